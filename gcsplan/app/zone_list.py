@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from gcsplan.errors import InputError
+from gcsplan.mission_file.airspace.left_out import listed
 from gcsplan.mission_file.load import read_no_fly
 from gcsplan.mission_file.zone_draft import ZoneDraft, zone_notes
 from gcsplan.mission_file.zone_reader import read_zones
@@ -51,7 +52,7 @@ class ListedZone:
 
 
 def list_zones(files: Sequence[Path]) -> tuple[list[ListedZone], list[str]]:
-    """The zones of mission files (.yaml) and of zone files, and the notes on them. Raises InputError.
+    """The no-fly zones of mission files (.yaml) and of zone files, and the notes on them and others. Raises InputError.
 
     Zones that are too far from a mission to matter are listed, too: a mission's places are not read.
     """
@@ -67,7 +68,8 @@ def list_zones(files: Sequence[Path]) -> tuple[list[ListedZone], list[str]]:
             own, said = found.zones, [*found.notes]
         drafts += own
         notes += said
-    return [_listed(draft) for draft in drafts], [*notes, *zone_notes([(draft, None) for draft in drafts])]
+    drafts, more = listed(drafts)
+    return [_listed(draft) for draft in drafts], [*notes, *more, *zone_notes([(draft, None) for draft in drafts])]
 
 
 def _listed(draft: ZoneDraft) -> ListedZone:

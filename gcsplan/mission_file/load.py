@@ -117,7 +117,7 @@ def load_mission(
 
 
 def read_no_fly(source: str | os.PathLike[str]) -> tuple[list[ZoneDraft], list[str]]:
-    """The zones of a mission file, and the notes on them; nothing else in it needs to be right. Raises InputError."""
+    """All zones of a mission file, used or not, and the notes on them, whatever else is wrong. Raises InputError."""
     file, where, raw, written = read_content(source, None)
     return _Reading(file, where, raw, written, None, (), None).zones_alone()
 
@@ -207,16 +207,14 @@ class _Reading:
         return replace(source, wider=partial(site.wider, source), reaching=self._reaching)
 
     def zones_alone(self) -> tuple[list[ZoneDraft], list[str]]:
-        """The zones that are used, far ones too, and the notes on them and the others. Raises InputError."""
+        """All zones, far ones and those that are not used too, and the notes on them. Raises InputError."""
         hours = hours_of(self.raw.get("at"), self.departure, f"{self.where}at", self.problems)
         self.problems = [p for p in self.problems if p.where.startswith(f"{self.where}no_fly")]
         self.notes = []
         published = self._zones(hours)
         if self.problems:
             raise self._refusal(self.problems)
-        self.notes += [f"not used, because {d.unused}: {one_line(d.name)}" for d in published if d.unused]
-        self.notes += [f"{fault.where}: {fault.message}" for draft in published for fault in draft.faults]
-        return used(published), list(dict.fromkeys(self.notes))
+        return published, list(dict.fromkeys(self.notes))
 
     def _reaching(self, places: Sequence[tuple[float, float]]) -> MissionFile:
         known = self.file, self.where.removesuffix(": "), self.given, self.text, self.planner_names

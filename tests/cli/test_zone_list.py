@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from pyproj import Geod
 
 from gcsplan.cli import console
 from gcsplan.cli.main import main
+from tests.support.paths import DATA
 
 GEOD = Geod(ellps="WGS84")
 RING = [[-84.3, 36.64], [-84.27, 36.64], [-84.27, 36.66], [-84.3, 36.66], [-84.3, 36.64]]
@@ -90,6 +92,17 @@ def test_check_lists_files_of_zones_and_leaves_missions_of_others_out(capsys: py
     assert "1500 ft AMSL" in capsys.readouterr().out
     assert run("check", "no.plan", "--list-zones") == 2
     assert "of which zones? Give a mission file (.yaml) or a file of zones" in capsys.readouterr().err
+
+
+def test_zones_of_an_authority_that_restrict_nothing_are_no_zones(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copy(DATA / "airspace" / "openair_openaip.txt", folder / "a.txt")
+    (folder / "m.yaml").write_text("version: 1\nno_fly: [{file: a.txt}]\n")
+    for arguments in (("check", "a.txt"), ("plan", "m.yaml")):
+        told = document(capsys, *arguments)
+        assert "TH-3-1" not in [zone["name"] for zone in told["zones"]]
+        assert "a.txt: not used, because they restrict nothing: TH-3-1" in told["notes"]
 
 
 def test_mistakes_in_zones_are_told_and_others_are_not(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -46,16 +46,26 @@ def unused_notes(drafts: Sequence[ZoneDraft], frame: Frame, box: Box) -> list[st
     edges = frame.to_degrees(*zip(*_border(wider), strict=True))
     turned = (edges[:, 1] - frame.lon_deg + 180.0) % 360.0 - 180.0
     window = (turned.min(), edges[:, 0].min(), turned.max(), edges[:, 0].max())
-    near = {id(draft) for draft in unused if _is_near(draft, frame, window)}
-    about: dict[tuple[str, str], list[str]] = {}
-    for draft in unused:
-        if id(draft) in near:
-            file = PurePath(draft.where.split(": ", 1)[0]).name
-            about.setdefault((file, draft.unused), []).append(one_line(draft.name))
-    notes = [f"{file}: not used, because {why}: {', '.join(names)}" for (file, why), names in about.items()]
+    near = [draft for draft in unused if _is_near(draft, frame, window)]
+    notes = _reasons(near)
     if len(near) < len(unused):
         notes.append(f"not used: {counted(len(unused) - len(near), 'further zone')} far from the mission")
     return notes
+
+
+def listed(drafts: Sequence[ZoneDraft]) -> tuple[list[ZoneDraft], list[str]]:
+    """The zones that are no-fly, and notes on all others and on what is not understood, wherever they lie."""
+    faults = [f"{fault.where}: {fault.message}" for draft in drafts for fault in draft.faults]
+    return used(drafts), [*_reasons([d for d in drafts if d.unused]), *dict.fromkeys(faults)]
+
+
+def _reasons(unused: Sequence[ZoneDraft]) -> list[str]:
+    """A note for each file and reason, with the names of all zones that are not used for it."""
+    about: dict[tuple[str, str], list[str]] = {}
+    for draft in unused:
+        file = PurePath(draft.where.split(": ", 1)[0]).name
+        about.setdefault((file, draft.unused), []).append(one_line(draft.name))
+    return [f"{file}: not used, because {why}: {', '.join(names)}" for (file, why), names in about.items()]
 
 
 def _border(box: Box) -> list[tuple[float, float]]:
