@@ -239,12 +239,9 @@ class _Run:
         """How much a leg is widened, m: for a turn before it until it ``settled``, and for a circle at its start."""
         return (REMAINS if settled else 1.0) * self.corners[k].off_m + (self.behind_m if k == 0 else 0.0)
 
-    def _settled_m(self, k: int) -> float:
-        """After how many metres of its straight part the aircraft is back on leg ``k``; 0 if it never leaves it."""
-        return self._settles_m(k, self.corners[k].off_m) if self.corners[k].off_m > 0.0 else 0.0
-
     def _settles_m(self, k: int, off_m: float) -> float:
-        return SETTLES_S * self.tuning.l1_slower * self.run[k].speed_m_s + off_m
+        """After how many metres of its straight part an aircraft that begins leg ``k`` ``off_m`` off is back on it."""
+        return SETTLES_S * self.tuning.l1_slower * self.run[k].speed_m_s + off_m if off_m > 0.0 else 0.0
 
     def _track(self, k: int) -> list[tuple[Floats, float, float]]:
         """Leg ``k`` as flown: (east and north, metres flown, how far the piece up to there may lie elsewhere)."""
@@ -258,7 +255,7 @@ class _Run:
         off = a.off_m + sag
         track = [(p, self.half_m[k] * (n - i) / max(n, 1), off) for i, p in reversed(list(enumerate(behind)))]
         done = float(self.half_m[k]) + max(float(self.straight_m[k]), 0.0)
-        if settled := (settled_m := self._settled_m(k)) < self.straight_m[k]:
+        if settled := (settled_m := self._settles_m(k, a.off_m)) < self.straight_m[k]:
             track.append((leaves + settled_m * along, float(self.half_m[k]) + settled_m, self._widen_m(k)))
         track.append((reaches, done, self._widen_m(k, settled=settled)))
         ahead, sag = self._half_arc(reaches, heading, b.turn)
@@ -356,7 +353,7 @@ class _Run:
                     )  # fmt: skip
         if self.straight_m[k] > SAME_M:
             along = np.array([math.cos(self.heading[k]), math.sin(self.heading[k])])
-            settled_m = min(self._settled_m(k), float(self.straight_m[k]))
+            settled_m = min(self._settles_m(k, a.off_m), float(self.straight_m[k]))
             cuts = a.tangent + np.array([0.0, settled_m, float(self.straight_m[k])])
             for i, (p, q) in enumerate(pairwise(cuts.tolist())):
                 if q - p > SAME_M:
