@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from gcsplan.dem.cells import Cell
@@ -83,21 +83,14 @@ GLO30 = Source(
     "provided under COPERNICUS by the European Union and ESA; all rights reserved",
 )
 
-GLO90 = Source(
+GLO90 = replace(
+    GLO30,
     name="copernicus-glo90",
     title="Copernicus DEM GLO-90",
-    kind="surface",
-    vertical_datum="EGM2008",
     bucket="copernicus-dem-90m",
     address="https://copernicus-dem-90m.s3.amazonaws.com",
-    listing="tileList.txt",
     listed=re.compile(r"^Copernicus_DSM_COG_30_([NS]\d{2})_00_([EW]\d{3})_00_DEM\s*$", re.MULTILINE),
-    last="_DEM",
-    least_tiles=20_000,
     object_of=_copernicus(30),
-    columns_of=_copernicus_columns,
-    shares_edges=False,
-    most_tile_bytes=128 * 2**20,
     notice=GLO30.notice.replace("-30", "-90"),
 )
 """It holds every tile of land, so its list tells the sea from tiles that another source merely lacks."""

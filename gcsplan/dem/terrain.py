@@ -75,7 +75,6 @@ def _told(
 ) -> tuple[dict[str, object], tuple[str, ...]]:
     """What reports say of the terrain, and notes."""
     info: dict[str, object] = {
-        "bare_dem": source.kind == "bare",
         "dem_source": source.name,
         "dem_kind": source.kind,
         "dem_tiles": names_of(records),
@@ -84,6 +83,7 @@ def _told(
     }
     notes = []
     if source.kind == "surface":
+        info["bare_dem"] = False
         notes.append(
             f"{source.name} is a surface model: where trees or buildings stand at the start, its ground is too high, "
             "and altitudes relative to home are flown lower by that; start in the open, or let altitude_error_m hold it"
