@@ -23,7 +23,6 @@ import pytest
 import yaml
 
 from gcsplan.app import outputs, pipeline, uploads
-from gcsplan.cli import main as cli
 from gcsplan.cli.options import MISBEHAVIOURS
 from gcsplan.mavlink.files.formats import read_mission_file, write_plan
 from gcsplan.mavlink.link import session
@@ -59,23 +58,12 @@ Run = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
-    """Call ``gcsplan ARGUMENTS`` in a directory with m.yaml and uav1.waypoints: exit code, standard output, error."""
-    monkeypatch.chdir(tmp_path)
+def run(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
+    """`run` of the folder, in a directory with m.yaml and uav1.waypoints, where silence is soon taken for an answer."""
     monkeypatch.setattr(uploads, "LISTEN_S", 0.05)
     (tmp_path / "m.yaml").write_text(MISSION)
     (tmp_path / "uav1.waypoints").write_text("\n".join(ROWS) + "\n")
-
-    def call(*arguments: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["gcsplan", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        out, err = capfd.readouterr()
-        code = ended.value.code
-        assert isinstance(code, int)
-        return code, out, err
-
-    return call
+    return run
 
 
 def require_civil(ended: tuple[int, str, str], what: object) -> None:
