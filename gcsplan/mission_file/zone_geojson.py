@@ -69,21 +69,10 @@ def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
         if centre is not None:
             found.add_circle(said, said.name, where, centre, _unread([coordinates]).remarks)
     elif kind in ("Polygon", "MultiPolygon"):
-        polygons = [coordinates] if kind == "Polygon" else coordinates
-        if not isinstance(polygons, list) or not polygons:
-            found.problems.append(Problem(at, f"a {kind} needs a list of coordinates, given {shown(polygons)}"))
-            return
-        for i, rings in enumerate(polygons):
-            part = said.name if kind == "Polygon" else f"{said.name}/{i + 1}"
-            _rings(found, rings, said, part, where, at if kind == "Polygon" else f"{at}[{i}]")
+        for rings, part, place in _parts(found, coordinates, said, at, kind):
+            _rings(found, rings, said, part, where, place)
     elif kind in ("LineString", "MultiLineString", "MultiPoint"):
-        parts = [coordinates] if kind == "LineString" else coordinates
-        if not isinstance(parts, list) or not parts:
-            found.problems.append(Problem(at, f"a {kind} needs a list of coordinates, given {shown(parts)}"))
-            return
-        for i, one in enumerate(parts):
-            part = said.name if kind == "LineString" else f"{said.name}/{i + 1}"
-            place = at if kind == "LineString" else f"{at}[{i}]"
+        for one, part, place in _parts(found, coordinates, said, at, kind):
             if kind == "MultiPoint":
                 centre = _position(found, one, place)
                 if centre is not None:
@@ -96,6 +85,17 @@ def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
                 where, f"must be a Polygon, a Point with radius_m or a LineString with buffer_m, given {shown(kind)}"
             )
         )
+
+
+def _parts(found: ZoneFile, coordinates: Any, said: Said, at: str, kind: str) -> list[tuple[Any, str, str]]:
+    """The parts of a geometry, each with its name and place; one part unless the kind begins with Multi."""
+    several = kind.startswith("Multi")
+    parts = coordinates if several else [coordinates]
+    if not isinstance(parts, list) or not parts:
+        found.problems.append(Problem(at, f"a {kind} needs a list of coordinates, given {shown(parts)}"))
+        return []
+    return [(part, f"{said.name}/{i + 1}" if several else said.name, f"{at}[{i}]" if several else at)
+            for i, part in enumerate(parts)]  # fmt: skip
 
 
 def _attributes(properties: dict[str, Any], geometry: dict[str, Any], where: str) -> list[Attribute]:

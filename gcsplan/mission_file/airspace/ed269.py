@@ -11,6 +11,7 @@ from gcsplan.mission_file.airspace.members import (
     number_or_none,
     outer_ring,
     position,
+    read_features,
     text_of,
     word,
 )
@@ -39,15 +40,8 @@ def _volumes_of(feature: Any) -> bool:
 
 def read_ed269(path: Path, whole: Any, policy: Policy) -> ZoneFile:
     """The zones of an ED-269 document; what is wrong is in their problems and faults."""
-    file = AirspaceFile(path, policy, KINDS)
     features = whole["features"] if isinstance(whole, dict) else whole
-    for i, feature in enumerate(features):
-        where = f"{path}: features[{i}]"
-        try:
-            _feature(file, feature, where, f"{path.stem}[{i}]")
-        except MemberError as why:
-            file.fault(where, str(why))
-    return file.finished()
+    return read_features(AirspaceFile(path, policy, KINDS), features, "features", _feature)
 
 
 def _feature(file: AirspaceFile, feature: Any, where: str, fallback: str) -> None:

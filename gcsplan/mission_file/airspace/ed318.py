@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.mission_file.airspace.ed269 import published
-from gcsplan.mission_file.airspace.members import MemberError, number_or_none, outer_ring, position
+from gcsplan.mission_file.airspace.members import MemberError, add_polygons, number_or_none, position, read_features
 from gcsplan.mission_file.airspace.policy import Policy, Published
 from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
 from gcsplan.mission_file.zone_attributes import is_number, shown
@@ -28,14 +28,7 @@ def is_ed318(whole: Any) -> bool:
 
 def read_ed318(path: Path, whole: Any, policy: Policy) -> ZoneFile:
     """The zones of an ED-318 collection; what is wrong is in their problems and faults."""
-    file = AirspaceFile(path, policy, KINDS)
-    for i, feature in enumerate(whole["features"]):
-        where = f"{path}: features[{i}]"
-        try:
-            _feature(file, feature, where, f"{path.stem}[{i}]")
-        except MemberError as why:
-            file.fault(where, str(why))
-    return file.finished()
+    return read_features(AirspaceFile(path, policy, KINDS), whole["features"], "features", _feature)
 
 
 def _feature(file: AirspaceFile, feature: Any, where: str, fallback: str) -> None:
@@ -65,7 +58,7 @@ def _geometry(file: AirspaceFile, zone: Published, part: str, geometry: Any, sha
     if not isinstance(geometry, dict):
         raise MemberError(f"the zone has no geometry, given {shown(geometry)}")
     limits = _limits(geometry.get("layer", shared), where, file.policy)
-    kind, coordinates = geometry.get("type"), geometry.get("coordinates")
+    kind = geometry.get("type")
     if kind == "Point":
         extent = geometry.get("extent")
         radius: Any = None
@@ -73,15 +66,9 @@ def _geometry(file: AirspaceFile, zone: Published, part: str, geometry: Any, sha
             radius = extent.get("radius")
         if not is_number(radius):
             raise MemberError(f"a Point has an extent with subType Circle and radius, given {shown(extent)}")
-        file.add_circle(zone, part, where, position(coordinates), float(radius), limits)
+        file.add_circle(zone, part, where, position(geometry.get("coordinates")), float(radius), limits)
     elif kind in ("Polygon", "MultiPolygon"):
-        polygons = [coordinates] if kind == "Polygon" else coordinates
-        if not isinstance(polygons, list) or not polygons:
-            raise MemberError(f"a {kind} has a list of coordinates, given {shown(polygons)}")
-        for i, rings in enumerate(polygons):
-            ring, holes = outer_ring(rings)
-            file.found.holes += holes
-            file.add_ring(zone, part if len(polygons) == 1 else f"{part}/{i + 1}", where, ring, limits)
+        add_polygons(file, zone, part, where, geometry, limits)
     else:
         raise MemberError(f"the geometry must be a Polygon, a MultiPolygon or a Point with extent, given {shown(kind)}")
 

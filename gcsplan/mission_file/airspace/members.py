@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import chain
 from typing import Any
 
-from gcsplan.mission_file.airspace.volumes import Corner
+from gcsplan.mission_file.airspace.policy import Published
+from gcsplan.mission_file.airspace.volumes import AirspaceFile, Corner, Limits
 from gcsplan.mission_file.zone_attributes import is_number, shown
+from gcsplan.mission_file.zone_file import ZoneFile
 
 
 class MemberError(ValueError):
@@ -80,3 +82,33 @@ def word(given: Any, name: str, *, known: Sequence[str] = ()) -> str:
     if known and plain.upper() not in known:
         raise MemberError(f"{name} must be one of {', '.join(known)}, given {plain[:60]!r}")
     return plain
+
+
+def read_features(
+    file: AirspaceFile, features: Sequence[Any], key: str, add: Callable[[AirspaceFile, Any, str, str], None]
+) -> ZoneFile:
+    """The zones that ``add(file, feature, where, name)`` finds in each feature of a list called ``key``.
+
+    ``name`` is for a feature without one; a MemberError refuses the file at that feature.
+    """
+    for i, feature in enumerate(features):
+        where = f"{file.path}: {key}[{i}]"
+        try:
+            add(file, feature, where, f"{file.path.stem}[{i}]")
+        except MemberError as why:
+            file.fault(where, str(why))
+    return file.finished()
+
+
+def add_polygons(
+    file: AirspaceFile, zone: Published, part: str, where: str, geometry: dict[str, Any], limits: Limits
+) -> None:
+    """Add a Polygon or MultiPolygon of GeoJSON, whose holes count as no-fly. Raises MemberError."""
+    kind, coordinates = geometry["type"], geometry.get("coordinates")
+    polygons = [coordinates] if kind == "Polygon" else coordinates
+    if not isinstance(polygons, list) or not polygons:
+        raise MemberError(f"a {kind} has a list of coordinates, given {shown(polygons)}")
+    for i, rings in enumerate(polygons):
+        ring, holes = outer_ring(rings)
+        file.found.holes += holes
+        file.add_ring(zone, part if len(polygons) == 1 else f"{part}/{i + 1}", where, ring, limits)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from gcsplan.mission_file.airspace.members import MemberError, number_or_none, outer_ring, text_of
+from gcsplan.mission_file.airspace.members import MemberError, add_polygons, number_or_none, read_features, text_of
 from gcsplan.mission_file.airspace.policy import Policy, Published
 from gcsplan.mission_file.airspace.times import ALWAYS, Period, TimeError, read_instant
 from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
@@ -66,13 +66,7 @@ def read_openaip(path: Path, whole: Any, policy: Policy) -> ZoneFile:
         page, pages = whole.get("page"), whole["totalPages"]
         words = f"the file is page {page} of {pages}, and the zones of the others are missing; save all pages and name"
         file.fault(f"{path}: totalPages", f"{words} each (or ask for a larger `limit`) and write totalPages as 1")
-    for i, one in enumerate(_airspaces(whole)):
-        where = f"{path}: {key}[{i}]"
-        try:
-            _airspace(file, one, where, f"{path.stem}[{i}]")
-        except MemberError as why:
-            file.fault(where, str(why))
-    return file.finished()
+    return read_features(file, _airspaces(whole), key, _airspace)
 
 
 def _airspace(file: AirspaceFile, one: Any, where: str, fallback: str) -> None:
@@ -89,14 +83,10 @@ def _airspace(file: AirspaceFile, one: Any, where: str, fallback: str) -> None:
     kind = geometry.get("type") if isinstance(geometry, dict) else None
     if not isinstance(geometry, dict) or kind not in ("Polygon", "MultiPolygon"):
         raise MemberError(f"zone {name[:60]!r}: the geometry must be a Polygon, given {shown(kind)}")
-    coordinates = geometry.get("coordinates")
-    polygons = [coordinates] if kind == "Polygon" else coordinates
-    if not isinstance(polygons, list) or not polygons:
-        raise MemberError(f"zone {name[:60]!r}: a {kind} has a list of coordinates, given {shown(polygons)}")
-    for i, rings in enumerate(polygons):
-        ring, holes = outer_ring(rings)
-        file.found.holes += holes
-        file.add_ring(zone, name if len(polygons) == 1 else f"{name}/{i + 1}", where, ring, limits)
+    try:
+        add_polygons(file, zone, name, where, geometry, limits)
+    except MemberError as why:
+        raise MemberError(f"zone {name[:60]!r}: {why}") from None
 
 
 def _named(members: dict[str, Any], key: str, names: dict[int, str], zone: str) -> str:
