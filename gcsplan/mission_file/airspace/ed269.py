@@ -29,8 +29,16 @@ CONDITIONS = "these zones may be entered under conditions, which are not judged:
 
 def is_ed269(whole: Any) -> bool:
     """Whether the value is an ED-269 document: its features' geometry is a list of volumes."""
-    features = whole.get("features") if isinstance(whole, dict) else whole
+    features = _list_of(whole)[1]
     return isinstance(features, list) and any(_volumes_of(f) for f in features)
+
+
+def _list_of(whole: Any) -> tuple[str, Any]:
+    """The list of zones and its name: ``features``, or ``UASZoneList`` in the standard's first version."""
+    if not isinstance(whole, dict):
+        return "features", whole
+    key = "features" if "features" in whole else "UASZoneList"
+    return key, whole.get(key)
 
 
 def _volumes_of(feature: Any) -> bool:
@@ -40,8 +48,8 @@ def _volumes_of(feature: Any) -> bool:
 
 def read_ed269(path: Path, whole: Any, policy: Policy) -> ZoneFile:
     """The zones of an ED-269 document; what is wrong is in their problems and faults."""
-    features = whole["features"] if isinstance(whole, dict) else whole
-    return read_features(AirspaceFile(path, policy, KINDS), features, "features", _feature)
+    key, features = _list_of(whole)
+    return read_features(AirspaceFile(path, policy, KINDS), features, key, _feature)
 
 
 def _feature(file: AirspaceFile, feature: Any, where: str, fallback: str) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.mission_file.airspace.ed269 import published
+from gcsplan.mission_file.airspace.layouts import ZONE, standard_properties
 from gcsplan.mission_file.airspace.members import MemberError, add_polygons, number_or_none, position, read_features
 from gcsplan.mission_file.airspace.policy import Policy, Published
 from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
@@ -18,23 +19,35 @@ MOST_GEOMETRIES = 1000
 
 
 def is_ed318(whole: Any) -> bool:
-    """Whether the value is an ED-318 collection: features with the members that the standard requires."""
-    features = whole.get("features") if isinstance(whole, dict) and whole.get("type") == "FeatureCollection" else None
-    return isinstance(features, list) and any(
-        isinstance(f, dict) and isinstance(f.get("properties"), dict) and f["properties"].keys() >= REQUIRED
-        for f in features
-    )
+    """Whether the value is an ED-318 collection, or one feature: with the members that the standard requires."""
+    return any(_required(f) for f in _features(whole))
+
+
+def _features(whole: Any) -> list[Any]:
+    if not isinstance(whole, dict):
+        return []
+    features = [whole] if whole.get("type") == "Feature" else whole.get("features")
+    return features if isinstance(features, list) and whole.get("type") in ("Feature", "FeatureCollection") else []
+
+
+def _required(feature: Any) -> bool:
+    properties = feature.get("properties") if isinstance(feature, dict) else None
+    if not isinstance(properties, dict):
+        return False
+    zone = properties.get(ZONE)
+    return (zone if isinstance(zone, dict) else properties).keys() >= REQUIRED
 
 
 def read_ed318(path: Path, whole: Any, policy: Policy) -> ZoneFile:
     """The zones of an ED-318 collection; what is wrong is in their problems and faults."""
-    return read_features(AirspaceFile(path, policy, KINDS), whole["features"], "features", _feature)
+    return read_features(AirspaceFile(path, policy, KINDS), _features(whole), "features", _feature)
 
 
 def _feature(file: AirspaceFile, feature: Any, where: str, fallback: str) -> None:
     properties = feature.get("properties") if isinstance(feature, dict) else None
     if not isinstance(properties, dict):
         raise MemberError(f"must be a Feature with properties, given {shown(feature)}")
+    properties, own = standard_properties(properties)
     times = properties.get("limitedApplicability")
     zone = published(properties, properties.get("type"), "type", times, fallback)
     geometry = feature.get("geometry")
@@ -46,8 +59,8 @@ def _feature(file: AirspaceFile, feature: Any, where: str, fallback: str) -> Non
     for i, one in enumerate(whole):
         part = zone.name if len(whole) == 1 else f"{zone.name}/{i + 1}"
         at = f"{where}.geometry" if one is geometry else f"{where}.geometry.geometries[{i}]"
-        # The layer of a collection holds for those of its geometries that have none.
-        layer = geometry.get("layer") if isinstance(geometry, dict) else None
+        # The layer of a collection, or else of the feature, holds for those of its geometries that have none.
+        layer = geometry.get("layer", own) if isinstance(geometry, dict) else None
         try:
             _geometry(file, zone, part, one, layer, at)
         except MemberError as why:

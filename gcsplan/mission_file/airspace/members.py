@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from itertools import chain
 from typing import Any
@@ -10,6 +11,8 @@ from gcsplan.mission_file.airspace.policy import Published
 from gcsplan.mission_file.airspace.volumes import AirspaceFile, Corner, Limits
 from gcsplan.mission_file.zone_attributes import is_number, shown
 from gcsplan.mission_file.zone_file import ZoneFile
+
+_NUMBER = re.compile(r"[-+]?\d{1,9}(\.\d{1,9})?", re.ASCII)
 
 
 class MemberError(ValueError):
@@ -68,9 +71,11 @@ def _many(given: list[Any]) -> list[Corner]:
 
 
 def number_or_none(given: Any, name: str) -> float | int | None:
-    """A finite number, or None. Raises MemberError."""
+    """A finite number, also as text, or None. Raises MemberError."""
     if given is None or is_number(given):
         return given  # type: ignore[no-any-return]
+    if isinstance(given, str) and _NUMBER.fullmatch(given.strip()):
+        return float(given)
     raise MemberError(f"{name} must be a number, given {shown(given)}")
 
 

@@ -157,14 +157,14 @@ def read_periods(given: Any) -> tuple[tuple[Period, ...], str]:
 def _period(given: Any) -> Period:
     if not isinstance(given, dict):
         raise TimeError("a period is no object")
-    unknown = sorted(str(k)[:40] for k in given if k not in ("permanent", "startDateTime", "endDateTime", "schedule"))
-    if unknown:
-        raise TimeError(f"{unknown[0]!r} of a period is not known")
     permanent = given.get("permanent")
     if permanent not in (None, "YES", "NO"):
         raise TimeError(f"permanent {str(permanent)[:20]!r} is neither YES nor NO")
     if permanent == "YES":
         return ALWAYS
+    unknown = sorted(str(k)[:40] for k in given if k not in ("permanent", "startDateTime", "endDateTime", "schedule"))
+    if unknown:
+        raise TimeError(f"{unknown[0]!r} of a period is not known")
     start, end = (_moment(given.get(key)) for key in ("startDateTime", "endDateTime"))
     schedule = given.get("schedule")
     if schedule is None or schedule == []:
@@ -185,12 +185,14 @@ def _moment(given: Any) -> datetime | None:
 
 def _daily(given: Any) -> Daily | None:
     """One line of a schedule; None if it depends on the sun, whose times are not computed."""
-    if not isinstance(given, dict) or not isinstance(given.get("day"), list) or not given["day"]:
+    said = given.get("day") if isinstance(given, dict) else None
+    listed = [said] if isinstance(said, str) else said
+    if not isinstance(listed, list) or not listed:
         raise TimeError("a line of a schedule has no days")
-    if given.get("startEvent") is not None or given.get("endEvent") is not None:
+    if any(given.get(key) not in (None, "") for key in ("startEvent", "endEvent")):
         return None
     days: set[int] = set()
-    for day in given["day"]:
+    for day in listed:
         if day not in (*WEEK, "ANY"):
             raise TimeError(f"{str(day)[:20]!r} is no day of the week")
         days |= set(range(7)) if day == "ANY" else {WEEK.index(day)}
@@ -199,7 +201,7 @@ def _daily(given: Any) -> Daily | None:
 
 def _of_day(given: Any, otherwise: str) -> timedelta:
     """The time from midnight UTC of a text such as ``06:00Z``, ``00:00:00.00Z`` or ``08:00+02:00``."""
-    text = otherwise if given is None else given
+    text = otherwise if given is None or given == "" else given
     if not isinstance(text, str) or len(text) > _MOST_CHARACTERS:
         raise TimeError(f"{str(text)[:40]!r} is no time of day")
     last = re.fullmatch(r"24:00(?::00(?:\.0+)?)?(Z|[+-]\d{2}:?\d{2})", text.strip(), re.ASCII)

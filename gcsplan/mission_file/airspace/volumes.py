@@ -31,6 +31,9 @@ LEAST_GEOID_M, GREATEST_GEOID_M = -110.0, 90.0
 
 _read = lru_cache(maxsize=4096)(read_level)  # zones repeat their limits
 
+NO_CEILING_M = 30_000.0
+"""Ceilings from here up, m, are no limit: states write 99 999 m or ft for none."""
+
 AROUND_DEG = 0.01
 """Degrees by which a zone without an outline is taken to reach beyond its points."""
 
@@ -108,6 +111,8 @@ class Limits:
                 raise LevelError("a floor needs a height")
             return None
         assert isinstance(level, Level)
+        if bound == "ceiling" and level.value_m >= NO_CEILING_M:
+            return None
         if words != given.words:
             error_m = GREATEST_GEOID_M if bound == "floor" else -LEAST_GEOID_M
             return self._off(bound, given, level.value_m, error_m, WIDENED)

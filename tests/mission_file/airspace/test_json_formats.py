@@ -10,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from gcsplan.mission_file.airspace.times import Hours
 from tests.mission_file.airspace.made import (
     HOLE,
     RING,
@@ -93,7 +94,87 @@ def test_what_ed269_cannot_say_is_named_with_its_feature(tmp_path: Path, zone: A
     assert (words in found and "features[1]" in found) if words else not found
 
 
+def test_ed269_of_interuss_is_read_with_its_times(tmp_path: Path) -> None:
+    found = read(tmp_path, (DATA / "ed269_interuss.json").read_bytes(), hours=Hours.read("2026-11-28"))
+    assert not found.problems
+    assert not any(z.faults for z in found.zones)
+    assert [(z.name, *limits(z)) for z in found.zones if not z.unused] == [
+        ("Lausanne Airport/1", "ground", "120 m AGL"),
+        ("Lausanne Airport/2", "30 m AGL", "120 m AGL"),
+        ("Lausanne Airport/3", "60 m AGL", "120 m AGL"),
+        ("Lake Geneva Wildlife Preserve", "ground", "120 m AGL"),
+        ("Gantrisch Nature Park", "ground", "76.2 m AGL"),
+    ]  # the circles ended in 2023, and one Gantrisch restricts nothing
+    always = read(tmp_path, (DATA / "ed269_interuss.json").read_bytes()).zones
+    assert [z.radius_m for z in always if not z.unused][:4] == [3000.0, 1000.0, 2500.0, 3500.0]
+
+
+def test_ed269_in_the_form_of_its_first_version(tmp_path: Path) -> None:
+    found = read(tmp_path, (DATA / "ed269_zone_list.json").read_bytes())
+    assert [(z.name, *limits(z)) for z in found.zones] == [("LSXX City Sample", "ground", "unlimited")]
+    assert "UASZoneList[0]" in said(tmp_path, {"UASZoneList": [ed269(volume(lowerLimit="1e3"))]})
+    assert limits(read(tmp_path, of(ed269(volume(lowerLimit="30.5")))).zones[0]) == ("30.5 m AGL", "120 m AGL")
+
+
+@pytest.mark.parametrize(("value", "unit"), [(99999, "M"), (99999, "FT"), (30_000, "M")])
+def test_a_ceiling_that_nothing_reaches_is_none(tmp_path: Path, value: float, unit: str) -> None:
+    zone = ed269(volume(upperLimit=value, uomDimensions=unit))
+    assert limits(read(tmp_path, of(zone)).zones[0]) == ("ground", "unlimited")
+
+
 # -- ED-318
+
+
+def test_the_swiss_sample_is_read(tmp_path: Path) -> None:
+    found = read(tmp_path, (DATA / "ed318_switzerland.json").read_bytes())
+    assert not found.problems
+    assert not any(z.faults for z in found.zones)
+    assert [(z.name, *limits(z)) for z in found.zones] == [
+        ("LSZB Bern-Belp 2", "60 m AGL", "unlimited"),
+        ("Protected natural object Langmatt", "ground", "unlimited"),
+        ("LSTB Bellechasse (Airport perimeter)", "ground", "unlimited"),
+    ]
+    assert "Skyguide Special Flight Office" in remarks(found)
+
+
+EVERY_DAY = {"day": "ANY", "startTime": "", "startEvent": "", "endTime": "", "endEvent": ""}
+GROUPED = {
+    "UASZone": {
+        "identifier": "MADE1", "country": "ESP", "name": "", "type": "REQ_AUTHORIZATION", "variant": "COMMON",
+        "restrictionConditions": "", "reasons": "AIR_TRAFFIC",
+    },
+    "limitedApplicability": [{"startDateTime": "", "endDateTime": "", "schedule": [EVERY_DAY]}],
+    "zoneAuthority": [{"purpose": "AUTHORIZATION", "intervalBefore": 0, "name": "", "email": "made@a.example"}],
+    "verticalLayer": {"upper": 900, "upperReference": "AGL", "lower": 45, "lowerReference": "AGL", "UOM": ""},
+}  # fmt: skip
+IN_ONE_TABLE = EVERY_DAY | {
+    "identifier": "MADE1", "country": "ESP", "name": "", "type": "REQ_AUTHORIZATION", "variant": "COMMON",
+    "purpose": "AUTHORIZATION", "name_authority": "", "email": "made@a.example", "phone": "",
+    "upper": 900, "upperReference": "AGL", "lower": 45, "lowerReference": "AGL", "uom": "M",
+    "startDateTime": "2026-01-01T00:00:00Z", "endDateTime": "",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("properties", [GROUPED, IN_ONE_TABLE])
+@pytest.mark.parametrize("alone", [False, True])
+def test_ed318_as_spain_lays_it_out(tmp_path: Path, properties: dict[str, Any], *, alone: bool) -> None:
+    feature = {"type": "Feature", "properties": properties, "geometry": {"type": "Polygon", "coordinates": [RING]}}
+    found = read(tmp_path, feature if alone else {"type": "FeatureCollection", "features": [feature]})
+    assert not found.problems
+    assert [(z.name, *limits(z)) for z in found.zones] == [("MADE1", "45 m AGL", "900 m AGL")]
+    assert "made@a.example" in remarks(found)
+    assert "not understood" not in remarks(found)
+
+
+def test_the_times_of_one_table_are_read(tmp_path: Path) -> None:
+    def zones(on: str, **changes: Any) -> int:
+        properties = IN_ONE_TABLE | changes
+        feature = {"type": "Feature", "properties": properties, "geometry": {"type": "Polygon", "coordinates": [RING]}}
+        return sum(not z.unused for z in read(tmp_path, feature, hours=Hours.read(on)).zones)
+
+    assert (zones("2025-12-31"), zones("2025-12-30"), zones("2026-06-01")) == (1, 0, 1)
+    assert (zones("2026-06-02", day="SUN"), zones("2026-06-02", day="TUE")) == (0, 1)  # a Tuesday
+    assert zones("2026-06-02", day="SUN", startEvent="BMCT") == 1  # the sun is not computed
 
 
 def test_the_standard_s_own_sample_is_read(tmp_path: Path) -> None:
