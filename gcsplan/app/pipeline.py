@@ -7,11 +7,14 @@ plan`.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime, timedelta
 from os import PathLike
 from typing import Any
 
+from gcsplan.app.executor import Inline, executor
+from gcsplan.app.fleet_jobs import PIECE_S, planned_by, world_of
 from gcsplan.app.fleet_planning import fleet_of
 from gcsplan.app.gate import GateTime
 from gcsplan.app.model import Brief, FleetPlan, Plan, VehiclePlan
@@ -23,15 +26,8 @@ from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.planners.problem import Progress
 from gcsplan.planners.registry import VOLUME_KEYS
 from gcsplan.planners.registry import get as get_planner
-from gcsplan.world.airspace import Airspace
-from gcsplan.world.world import World
 
 __all__ = ["load_mission", "plan", "world_of"]
-
-
-def world_of(source: MissionFile) -> World:
-    """The frame and airspace of a mission file."""
-    return World(source.frame, Airspace(source.surface, source.zones, scale=source.airspace_scale))
 
 
 def plan(
@@ -43,6 +39,8 @@ def plan(
     options: Mapping[str, object] | None = None,
     gate_utc: datetime | None = None,
     progress: Callable[[str, Progress], None] | None = None,
+    jobs: int | None = 1,
+    cluster: Any = None,
 ) -> Plan:
     """Plan every vehicle of a mission; nothing is written or sent.
 
@@ -50,6 +48,11 @@ def plan(
     (``length`` in metres or ``energy`` in joules), ``seed`` and ``options`` (keys of single planners, such as a swarm's
     ``encoding``) override the file's. ``gate_utc`` is the common start as a time of day; every ArduCopter then waits in
     the air until its own second. ``progress(vehicle, progress)`` is called from time to time.
+
+    ``jobs`` processes of this machine plan the vehicles (None: one for each core), or the workers of ``cluster``, the
+    address of a dask scheduler or a ``distributed.Client``; the plan is the same to the byte. A few vehicles are
+    planned in this process, for processes take seconds to start. A script that asks for processes needs
+    ``if __name__ == "__main__":``.
 
     Returns a `Plan`, whose ``vehicles`` are in the mission's order. In each of them, ``solution.path.points`` is the
     path, (N, 3) float64: east_m and north_m in the mission's plane, and amsl_m. ``mission`` holds the items as they are
@@ -81,7 +84,7 @@ def plan(
     merged = _options(source, name) | dict(options or {})
     by_priority = bool(entry.optimiser) and (merged.get("cost") or entry.defaults.get("cost")) == "msfoa"
     brief = Brief(source, world_of(source), entry.plan, goal, number, merged, by_priority and len(source.vehicles) > 1)
-    brief, vehicles = over_one_terrain(brief, _one_by_one(brief, progress), progress)
+    brief, vehicles = over_one_terrain(brief, _planned(brief, name, progress, jobs, cluster), progress)
     source = brief.source
     flown, fleet = fleet_of(vehicles, brief, None if gate_utc is None else GateTime(gate_utc))
     require_within_hours(source, flown, fleet)
@@ -107,6 +110,25 @@ def require_within_hours(source: MissionFile, flown: Sequence[VehiclePlan], flee
             f"{end:%Y-%m-%d %H:%M}Z; write at: [from, to] with all of the flight in it",
             where=f"{source.path}: at",
         )
+
+
+def _planned(
+    brief: Brief, planner: str, progress: Callable[[str, Progress], None] | None, jobs: int | None, cluster: Any
+) -> list[VehiclePlan]:
+    """Every vehicle's own plan, in this process or by workers. By priority each needs those before it."""
+    count = len(brief.source.vehicles)
+    if brief.by_priority or (jobs == 1 and cluster is None) or (count == 1 and cluster is None):
+        return _one_by_one(brief, progress)
+    begun_s = time.perf_counter()
+
+    def told(_: str, done: int) -> None:
+        if progress is not None:  # of no single vehicle, for several are planned at once
+            progress("", Progress(time.perf_counter() - begun_s, None, None, f"{done} of {count} planned"))
+
+    with executor(jobs, cluster, pieces=count, piece_s=PIECE_S) as workers:
+        if isinstance(workers, Inline):
+            return _one_by_one(brief, progress)
+        return planned_by(workers, brief, planner, told)
 
 
 def _one_by_one(brief: Brief, progress: Callable[[str, Progress], None] | None) -> list[VehiclePlan]:

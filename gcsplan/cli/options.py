@@ -51,6 +51,16 @@ ListZonesOption = Annotated[
         "--list-zones", help="Show what was understood of each zone: shape, size, floor, ceiling. Nothing else is done."
     ),
 ]
+JobsOption = Annotated[
+    int | None,
+    typer.Option(
+        "--jobs", metavar="N", help="Processes that share the work [default: one for each core, where that pays]."
+    ),
+]
+ClusterOption = Annotated[
+    str | None,
+    typer.Option("--cluster", metavar="ADDRESS", help="A dask scheduler whose workers do the work, tcp://HOST:PORT."),
+]
 UnjudgedOption = Annotated[
     bool, typer.Option("--allow-unjudged", help="Accept a mission of which something could not be judged.")
 ]

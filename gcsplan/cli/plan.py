@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,6 +16,8 @@ from gcsplan.cli.options import (
     LINKS,
     ArmedOption,
     AtomicOption,
+    ClusterOption,
+    JobsOption,
     JsonOption,
     ListZonesOption,
     MissionArgument,
@@ -114,6 +116,8 @@ def plan(
     atomic: AtomicOption = False,
     timeout: TimeoutOption = 60.0,
     list_zones: ListZonesOption = False,
+    jobs: JobsOption = None,
+    cluster: ClusterOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Plan a mission file, write its outputs, and upload and verify them on request.
@@ -127,7 +131,7 @@ def plan(
     from gcsplan.cli.console import plan_table, release_table, remark, say_notes_of, upload_table
     from gcsplan.cli.home_words import say_homes
     from gcsplan.cli.planning_display import planning_display
-    from gcsplan.export.outdir import add_output, settle_outputs
+    from gcsplan.export.outdir import settle_outputs
     from gcsplan.mission_file.samples import file_of
     from gcsplan.units import units_of
 
@@ -157,17 +161,19 @@ def plan(
                 options={k: v for k, v in (("encoding", encoding), ("cost", cost)) if v is not None},
                 progress=progress,
                 gate_utc=None if gate is None else gate.start,
+                jobs=jobs,
+                cluster=cluster,
             )
         pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
         homes = judged(planned, asked=report or way_home or rally, option=require_way_home)
-        jobs: list[UploadJob] = []
+        orders: list[UploadJob] = []
         if upload or fence or fence_infinite:
             where = targets or dict.fromkeys((v.name for v in planned.vehicles), "")
-            jobs = uploads.jobs_of(planned, where, homes, is_required(source, require_way_home))
+            orders = uploads.jobs_of(planned, where, homes, is_required(source, require_way_home))
         fence_notes: list[tuple[str, str]] = []
         if fence or fence_infinite:  # a fence that the mission would breach is refused before anything is written
-            jobs, fence_notes = fencing.with_fences(jobs, infinite=fence_infinite)
-        fences = {job.name: job.fence.items for job in jobs if job.fence is not None}
+            orders, fence_notes = fencing.with_fences(orders, infinite=fence_infinite)
+        fences = {job.name: job.fence.items for job in orders if job.fence is not None}
         files = outputs.outputs_of(planned, homes, fences, rally=rally)
         if report:
             files["report.html"] = outputs.report_of(planned, (), homes, system)
@@ -187,13 +193,11 @@ def plan(
         options = UploadOptions(
             allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout
         )
-        results = _upload(jobs, options, gate)
-        try:
-            add_output(directory, "upload.json", outputs.upload_text(planned, results, homes))
-            if report:
-                add_output(directory, "report.html", outputs.report_of(planned, results, homes, system))
-        except InputError as error:  # the outcome of the upload matters more
-            remark(f"note: what became of the upload is not written: {error}")
+        results = _upload(orders, options, gate)
+        told = {"upload.json": lambda: outputs.upload_text(planned, results, homes)}
+        if report:
+            told["report.html"] = lambda: outputs.report_of(planned, results, homes, system)
+        _add(directory, told)
         if not as_json:
             upload_table(results)
             release_table(planned, results, gate)
@@ -251,6 +255,18 @@ def _write(directory: Path, files: Mapping[str, str], pictures: dict[Path, bytes
         write_whole(file, content)
     if in_the_way:
         remark(f"{', '.join(in_the_way)} in {directory} were not gcsplan's, and were moved to {directory / 'previous'}")
+
+
+def _add(directory: Path, files: Mapping[str, Callable[[], str]]) -> None:
+    """Write what became of the upload beside the other outputs; the outcome itself matters more than a failure here."""
+    from gcsplan.cli.console import remark
+    from gcsplan.export.outdir import add_output
+
+    try:
+        for name, content in files.items():
+            add_output(directory, name, content())
+    except InputError as error:
+        remark(f"note: what became of the upload is not written: {error}")
 
 
 def _say_files(directory: Path, files: list[str]) -> None:

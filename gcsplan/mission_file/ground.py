@@ -80,20 +80,28 @@ class Site:
     def _widest(self, source: MissionFile, wanted: int, most_cells: int) -> MissionFile | None:
         """The widest window beyond the source's, up to level ``wanted``, that has at most ``most_cells``."""
         for level in range(wanted, source.level, -1):
-            known = self._loaded.get(level)
-            if known is not None and known.surface.ground_m.size <= most_cells:
-                return known
-            if self._box(level) == self._box(level - 1):
-                continue
-            problems: list[Problem] = []
-            found = self._ground(self._box(level), most_cells, problems, spare_m=RASTER_SPARE_M)
-            if found is None or problems or not _is_larger(found.surface, source.surface):
-                continue
-            wide = _moved(source, found, level)
-            wide = replace(wide, wider=partial(self.wider, wide))
-            self._loaded[level] = wide
-            return wide
+            if self._box(level) != self._box(level - 1):
+                wide = self._loaded_at(source, level, most_cells)
+                if wide is not None and _is_larger(wide.surface, source.surface):
+                    return wide
         return None
+
+    def at_level(self, source: MissionFile, level: int) -> MissionFile | None:
+        """See `MissionFile.at_level`."""
+        return source if level == source.level else self._loaded_at(source, level, None)
+
+    def _loaded_at(self, source: MissionFile, level: int, most_cells: int | None) -> MissionFile | None:
+        known = self._loaded.get(level)
+        if known is not None and (most_cells is None or known.surface.ground_m.size <= most_cells):
+            return known
+        problems: list[Problem] = []
+        found = self._ground(self._box(level), most_cells, problems, spare_m=RASTER_SPARE_M)
+        if found is None or problems:
+            return None
+        wide = _moved(source, found, level)
+        wide = replace(wide, wider=partial(self.wider, wide))
+        self._loaded[level] = wide
+        return wide
 
     def _ground(self, box: Box, most_cells: int | None, problems: list[Problem], spare_m: float) -> Ground | None:
         corner_m = max(math.hypot(e, n) for e in (box[0], box[2]) for n in (box[1], box[3]))

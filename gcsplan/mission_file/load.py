@@ -13,7 +13,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
-from pathlib import Path
 from typing import Any, get_args
 
 from gcsplan.dem.terrain import open_dem
@@ -28,6 +27,7 @@ from gcsplan.mission_file.ground import Ground, Site
 from gcsplan.mission_file.request import (
     AltitudeFrame,
     ArrivalRequest,
+    Content,
     MissionFile,
     PlannerRequest,
     ReturnRule,
@@ -113,36 +113,32 @@ def load_mission(
     if "version" in raw and (raw["version"] != 1 or isinstance(raw["version"], bool | float)):
         words = f"this gcsplan reads version 1, given {shown(raw['version'])}; write `version: 1`, or update gcsplan"
         raise InputError(words, where=f"{where}: version")
-    return _Reading(file, where, raw, written, planner_names, around, departure).mission()
+    names = None if planner_names is None else tuple(planner_names)
+    return load_content(Content(file, where, raw, written, names, tuple(around), departure))
+
+
+def load_content(content: Content) -> MissionFile:
+    """Read a mission again from what it was read from before. Raises InputError."""
+    return _Reading(content).mission()
 
 
 def read_no_fly(source: str | os.PathLike[str]) -> tuple[list[ZoneDraft], list[str]]:
     """All zones of a mission file, used or not, and the notes on them, whatever else is wrong. Raises InputError."""
     file, where, raw, written = read_content(source, None)
-    return _Reading(file, where, raw, written, None, (), None).zones_alone()
+    return _Reading(Content(file, where, raw, written)).zones_alone()
 
 
 class _Reading:
     """One pass over one file: the steps in order, and the problems found so far."""
 
-    def __init__(
-        self,
-        file: Path,
-        where: str,
-        raw: dict[str, Any],
-        text: str | None,
-        planner_names: Collection[str] | None,
-        around: Sequence[tuple[float, float]],
-        departure: datetime | None,
-    ) -> None:
-        self.departure = departure
-        self.file, self.given, self.text, self.planner_names, self.around = file, raw, text, planner_names, around
-        self.where = f"{where}: "
-        self.units = in_own_units(raw, self.where)
+    def __init__(self, content: Content) -> None:
+        self.content, self.file, self.text = content, content.file, content.text
+        self.where = f"{content.where}: "
+        self.units = in_own_units(content.given, self.where)
         self.raw = self.units.raw
         self.problems: list[Problem] = [*self.units.problems]
         self.notes: list[str] = [*self.units.notes]
-        self.local = raw.get("frame") is not None
+        self.local = content.given.get("frame") is not None
 
     def mission(self) -> MissionFile:
         raw, problems = self.raw, self.problems
@@ -163,7 +159,7 @@ class _Reading:
         names = check_unique(self._list("vehicles"), f"{self.where}vehicles", problems)
         arrival_keys = self._section(ArrivalKeys, "arrival")
         arrival = make_arrival(arrival_keys, names, f"{self.where}arrival", problems)
-        hours = hours_of(self.raw.get("at"), self.departure, f"{self.where}at", self.problems)
+        hours = hours_of(self.raw.get("at"), self.content.departure, f"{self.where}at", self.problems)
         published = self._zones(hours)
         drafts = used(published)
 
@@ -181,7 +177,8 @@ class _Reading:
             placed, far = place_zones(drafts, frame)
             self._far(far, frame)
             self.notes += zone_notes(placed)
-            others = [(float(e), float(n)) for e, n in (frame.to_plane(*p) for p in self.around if terrain.covers(*p))]
+            known = [p for p in self.content.around if terrain.covers(*p)]
+            others = [(float(e), float(n)) for e, n in (frame.to_plane(*p) for p in known)]
             others = [p for p in others if math.hypot(*p) <= FARTHEST_M]
             box = make_box([*(p.in_plane(frame) for p in places), *others], [z for _, z in placed], local=self.local)
             here = self._around(terrain, frame, box)
@@ -203,12 +200,13 @@ class _Reading:
             altitude_frame=altitude_frame, terrain_error_m=terrain_error_m, local=self.local, inputs=inputs,
             notes=tuple(dict.fromkeys(self.notes)), way_home=way_home, geoid=site.terrain.geoid,
             hours=hours if any(d.unused.startswith(OUT_OF_HOURS) for d in published) else None,
+            reaching=self._reaching, content=self.content,
         )  # fmt: skip
-        return replace(source, wider=partial(site.wider, source), reaching=self._reaching)
+        return replace(source, wider=partial(site.wider, source), at_level=partial(site.at_level, source))
 
     def zones_alone(self) -> tuple[list[ZoneDraft], list[str]]:
         """All zones, far ones and those that are not used too, and the notes on them. Raises InputError."""
-        hours = hours_of(self.raw.get("at"), self.departure, f"{self.where}at", self.problems)
+        hours = hours_of(self.raw.get("at"), self.content.departure, f"{self.where}at", self.problems)
         self.problems = [p for p in self.problems if p.where.startswith(f"{self.where}no_fly")]
         self.notes = []
         published = self._zones(hours)
@@ -217,8 +215,7 @@ class _Reading:
         return published, list(dict.fromkeys(self.notes))
 
     def _reaching(self, places: Sequence[tuple[float, float]]) -> MissionFile:
-        known = self.file, self.where.removesuffix(": "), self.given, self.text, self.planner_names
-        return _Reading(*known, places, self.departure).mission()
+        return load_content(replace(self.content, around=tuple(places)))
 
     def _refusal(self, problems: list[Problem]) -> InputError:
         """All problems as the user wrote the keys, with their lines if the mission was a text."""
@@ -272,7 +269,7 @@ class _Reading:
 
     def _planner(self) -> PlannerRequest:
         keys: PlannerKeys = self._section(PlannerKeys, "planner") or PlannerKeys()
-        known = self.planner_names
+        known = self.content.planner_names
         if known is None:
             from gcsplan.planners.registry import names
 

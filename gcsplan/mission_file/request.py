@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
@@ -80,6 +81,23 @@ class PlannerRequest:
     extras: dict[str, Any] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True)
+class Content:
+    """What a mission was read from: enough to read it again, in another process too.
+
+    ``where`` is its name in messages, ``given`` the mapping of keys, ``text`` its text if it has one. The others are as
+    in `load_mission`.
+    """
+
+    file: Path
+    where: str
+    given: dict[str, Any]
+    text: str | None
+    planner_names: tuple[str, ...] | None = None
+    around: tuple[tuple[float, float], ...] = ()
+    departure: datetime | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class MissionFile:
     """A mission file, read and checked; metres inside.
@@ -89,9 +107,10 @@ class MissionFile:
     loaded: that far around all terminals, at least twice as far as here, or as far as there is terrain; None if that
     takes more cells, or if there is no more. ``level`` counts the widenings; the terrain of each contains that of the
     one before. ``reaching(places)`` reads the same content again, with terrain for these places (latitude, longitude)
-    too. ``way_home``: whether a safe return is required, or only reported where it is judged. ``geoid`` is the grid
-    that the terrain was converted with, if it is ellipsoidal. ``hours`` are those of the flight, if a zone was left out
-    because it does not apply in them.
+    too. ``at_level(level)`` is the file over the terrain of that level; None if there is none. ``content`` is what
+    it was read from. ``way_home``: whether a safe return is required, or only reported where it is judged. ``geoid`` is
+    the grid that the terrain was converted with, if it is ellipsoidal. ``hours`` are those of the flight, if a zone was
+    left out because it does not apply in them.
     """
 
     name: str
@@ -115,3 +134,5 @@ class MissionFile:
     reaching: Callable[[Sequence[tuple[float, float]]], MissionFile] | None = None
     geoid: GeoidGrid | None = None
     hours: Hours | None = None
+    at_level: Callable[[int], MissionFile | None] | None = None
+    content: Content | None = None

@@ -1,0 +1,213 @@
+"""Where independent work is done: in this process, in processes of this machine, or on a dask cluster.
+
+The results are the same wherever it is done. Work is a function that can be imported, one value that all of it shares
+(sent once to each worker), and an item for each piece.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, Protocol, TypeVar
+
+from gcsplan.errors import GcsplanError, InputError, UsageError
+
+__all__ = ["Executor", "Inline", "executor"]
+
+Shared = TypeVar("Shared")
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+ANSWER_S = 15.0
+"""Seconds within which a scheduler must answer."""
+
+AHEAD = 4
+"""Pieces that are handed out for each worker at a time, so that none waits, and little is lost if the work ends."""
+
+MOST_JOBS = 512
+SILENT = 60
+"""Level of the logs of dask's own processes: above all, since what matters is raised here."""
+
+MISSING = "needs dask.distributed, which is not installed: pip install 'gcsplan[cluster]'"
+
+
+class Executor(Protocol):
+    """Does pieces of work."""
+
+    @property
+    def count(self) -> int:
+        """How many pieces are done at the same time."""
+        ...
+
+    def each(
+        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item]
+    ) -> Iterator[tuple[int, Result]]:
+        """Yield (number of the item, result) as results come; the order is free.
+
+        An error of ``function`` is raised, and what still waits is given up. Raises GcsplanError if a worker dies over
+        the same piece again and again.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Inline:
+    """Does the work in this process, in order."""
+
+    count: int = 1
+
+    def each(
+        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item]
+    ) -> Iterator[tuple[int, Result]]:
+        """See `Executor.each`."""
+        for number, item in enumerate(items):
+            yield number, function(shared, item)
+
+
+@dataclass(frozen=True, slots=True)
+class Dask:
+    """Does the work with the workers of a dask client; a piece whose worker dies is done again by another."""
+
+    client: Any
+
+    @property
+    def count(self) -> int:
+        """See `Executor.count`."""
+        return max(1, int(sum(self.client.nthreads().values())))
+
+    def each(
+        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item]
+    ) -> Iterator[tuple[int, Result]]:
+        """See `Executor.each`."""
+        distributed = import_module("distributed")
+        client = self.client
+        # A task, not scattered data: if the worker that holds the value dies, the scheduler makes it again.
+        kept = client.submit(_itself, shared, pure=False)
+        numbers: dict[Any, int] = {}
+        left = iter(enumerate(items))
+        done = distributed.as_completed(loop=client.loop)
+
+        def hand_out(most: int) -> None:
+            for number, item in left:
+                future = client.submit(function, kept, item, pure=False, priority=-number)
+                numbers[future] = number
+                done.add(future)
+                if (most := most - 1) <= 0:
+                    return
+
+        try:
+            hand_out(AHEAD * self.count)
+            for future in done:
+                number = numbers.pop(future)
+                try:
+                    result = future.result()
+                except distributed.KilledWorker as error:
+                    raise GcsplanError(
+                        f"workers died over piece {number + 1} of {len(items)} again and again (out of memory?)"
+                    ) from error
+                hand_out(1)
+                yield number, result
+        finally:
+            client.cancel([kept, *numbers])
+
+
+def _itself(value: Shared) -> Shared:
+    """A value as the result of a task."""
+    return value
+
+
+def sane_jobs() -> int:
+    """Processes for ``--jobs`` if it is not given: as many as there are cores for this process."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+
+
+@contextmanager
+def executor(
+    jobs: int | None = None, cluster: Any = None, *, pieces: int, piece_s: float, start_s: float = 4.0
+) -> Iterator[Executor]:
+    """The executor for ``pieces`` of work of about ``piece_s`` seconds each.
+
+    ``cluster`` is the address of a dask scheduler or a ``distributed.Client``, whose workers do the work. Otherwise
+    ``jobs`` processes of this machine do it (None: one for each core), if what they gain is more than the ``start_s``
+    seconds that it takes to start them; else this process alone does, and dask is not imported.
+
+    Raises InputError if dask is not installed and needed, or if no scheduler answers, UsageError for wrong ``jobs``.
+    """
+    if jobs is not None and not 1 <= jobs <= MOST_JOBS:
+        raise UsageError(f"--jobs {jobs}: 1 to {MOST_JOBS} processes are wanted")
+    if cluster is not None:
+        with _connected(cluster) as client:
+            yield Dask(client)
+        return
+    count = min(sane_jobs() if jobs is None else jobs, max(1, pieces))
+    gain_s = pieces * piece_s - math.ceil(pieces / count) * piece_s
+    if count == 1 or gain_s <= start_s or (jobs is None and not _installed()):
+        yield Inline()
+        return
+    with _processes(count) as client:
+        yield Dask(client)
+
+
+def _installed() -> bool:
+    from importlib.util import find_spec
+
+    return find_spec("distributed") is not None
+
+
+def _distributed(option: str) -> Any:
+    try:
+        return import_module("distributed")
+    except ImportError:
+        raise InputError(f"{option} {MISSING}") from None
+
+
+@contextmanager
+def _connected(cluster: Any) -> Iterator[Any]:
+    distributed = _distributed("--cluster")
+    if isinstance(cluster, distributed.Client):
+        yield cluster
+        return
+    try:
+        client = distributed.Client(cluster, timeout=ANSWER_S, set_as_default=False)
+    except (OSError, ValueError) as error:  # TimeoutError is an OSError
+        raise InputError(f"no dask scheduler answers: {error}", where=f"--cluster {cluster}") from error
+    try:
+        yield client
+    finally:
+        client.close()
+
+
+@contextmanager
+def _processes(count: int) -> Iterator[Any]:
+    """Workers of this machine, one thread each; their scheduler listens on the loopback address alone."""
+    distributed = _distributed("--jobs")
+    try:
+        with _deaf():
+            local = distributed.LocalCluster(
+                n_workers=count, threads_per_worker=1, processes=True, host="127.0.0.1",
+                dashboard_address="127.0.0.1:0", memory_limit=0, silence_logs=SILENT,
+            )  # fmt: skip
+    except RuntimeError as error:
+        words = "the processes of --jobs do not start; a script that asks for them needs `if __name__ == '__main__':`"
+        raise GcsplanError(f"{words} ({error})") from error
+    with local, distributed.Client(local, set_as_default=False) as client:
+        yield client
+
+
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Processes that are started here do not hear Ctrl-C: this process ends them, without a traceback from each."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

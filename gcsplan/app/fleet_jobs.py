@@ -1,0 +1,138 @@
+"""Plan the vehicles of a mission file with an executor: what a worker is sent, and what it sends back.
+
+A worker reads the mission again from its content, once for all vehicles, and must find the same terrain and zones. Its
+results hold no terrain: the caller puts them into its own.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from gcsplan.app.executor import Executor
+from gcsplan.app.model import Brief, VehiclePlan
+from gcsplan.app.refusals import plan_or_explain
+from gcsplan.check.verdict import Verdict
+from gcsplan.errors import GcsplanError, InputError
+from gcsplan.mavlink.build.order import Order
+from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mission_file.load import load_content
+from gcsplan.mission_file.request import Content, MissionFile
+from gcsplan.planners.problem import Problem, Solution
+from gcsplan.planners.registry import get as get_planner
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.world import World
+
+__all__ = ["planned_by", "world_of"]
+
+PIECE_S = 0.6
+"""Seconds that planning a vehicle takes, about: the median of 60 over mountains with margins."""
+
+_briefs: dict[str, Brief] = {}
+"""What this process has read for others; the last one only, for terrain is large."""
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What all vehicles of a mission share: the content, what its terrain and zones must be, and the planner."""
+
+    content: Content
+    inputs: Mapping[str, object]
+    planner: str
+    objective: str
+    seed: int
+    options: Mapping[str, object]
+    key: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A vehicle's plan without the terrain, which is that of ``level``."""
+
+    problem: Problem
+    solution: Solution
+    mission: Mission
+    verdict: Verdict
+    speed_m_s: float
+    notes: tuple[str, ...]
+    order: Order
+    level: int
+
+
+def world_of(source: MissionFile) -> World:
+    """The frame and airspace of a mission file."""
+    return World(source.frame, Airspace(source.surface, source.zones, scale=source.airspace_scale))
+
+
+def planned_by(
+    workers: Executor, brief: Brief, planner: str, told: Callable[[str, int], None] | None = None
+) -> list[VehiclePlan]:
+    """Every vehicle's own plan, in the file's order; ``told(vehicle, count)`` is called as each is done.
+
+    Raises what planning one after the other would raise: InputError, NoMission of the first vehicle that has none.
+    """
+    source = brief.source
+    assert source.content is not None
+    asked = Asked(source.content, source.inputs, planner, brief.objective, brief.seed, dict(brief.options))
+    asked = replace(asked, key=hashlib.sha256(pickle.dumps(asked)).hexdigest())
+    names = [r.vehicle.name for r in source.vehicles]
+    answers: dict[int, Answer] = {}
+    refused: dict[int, GcsplanError] = {}
+    for number, answer in workers.each(answer_of, asked, names):
+        if isinstance(answer, Answer):
+            answers[number] = answer
+        else:
+            refused[number] = answer
+        if told is not None:
+            told(names[number], len(answers) + len(refused))
+        if refused and all(k in answers for k in range(min(refused))):
+            raise refused[min(refused)]
+    return [_restored(brief, k, answers[k]) for k in range(len(names))]
+
+
+def answer_of(asked: Asked, name: str) -> Answer | GcsplanError:
+    """Plan one vehicle, in whatever process; why there is no plan is returned, so that the caller can order it."""
+    try:
+        brief = _brief_of(asked)
+        [request] = [r for r in brief.source.vehicles if r.vehicle.name == name]
+        plan = plan_or_explain(brief, request)
+    except GcsplanError as why:
+        return why
+    assert plan.brief is not None
+    return Answer(
+        replace(plan.problem, airspace=None, widen=None, progress=None),  # type: ignore[arg-type]
+        replace(plan.solution, problem=None),
+        plan.mission, plan.verdict, plan.speed_m_s, plan.notes, plan.order, plan.brief.source.level,
+    )  # fmt: skip
+
+
+def _brief_of(asked: Asked) -> Brief:
+    known = _briefs.get(asked.key)
+    if known is not None:
+        return known
+    source = load_content(asked.content)
+    other = sorted(k for k in {*source.inputs, *asked.inputs} if source.inputs.get(k) != asked.inputs.get(k))
+    if other:
+        raise InputError(
+            f"a worker reads other terrain or zones than the process that asks it ({', '.join(other)} differ): every "
+            f"machine of the cluster must see the same files under the same paths",
+            where=str(source.path),
+        )
+    _briefs.clear()
+    run = get_planner(asked.planner).plan
+    brief = Brief(source, world_of(source), run, asked.objective, asked.seed, asked.options)
+    return _briefs.setdefault(asked.key, brief)
+
+
+def _restored(brief: Brief, number: int, answer: Answer) -> VehiclePlan:
+    source = brief.source if brief.source.at_level is None else brief.source.at_level(answer.level)
+    if source is None:
+        raise InputError("the terrain that a worker planned over cannot be read here", where=str(brief.source.path))
+    over = brief if source is brief.source else replace(brief, source=source, world=world_of(source))
+    problem = replace(answer.problem, airspace=over.world.airspace)
+    return VehiclePlan(
+        brief.source.vehicles[number], problem, answer.solution, answer.mission, answer.verdict, answer.speed_m_s,
+        answer.notes, answer.order, over,
+    )  # fmt: skip
