@@ -216,7 +216,8 @@ def pulled(problem: Problem, points: Floats, level: Level, deadline_s: float) ->
 def _sides(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> dict[int, bool]:
     """For each zone within reach of a path, by index: whether the path passes over it."""
     track = make_track(problem, points[:, :2], pinned, pin_m)
-    s = distances(track.points)
+    s = distances(points[:, :2])  # of all points: a track keeps one of two that are less than a millimetre apart
+    s *= track.tube.s_m[-1] / s[-1]
     over: dict[int, bool] = {}
     for band in track.tube.bands:
         at = 0.5 * (band.s_m[:-1] + band.s_m[1:])

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from gcsplan.errors import NoMission
 from gcsplan.planners.lattice import pull_kernels
-from gcsplan.planners.lattice.planner import plan, straight_bound
+from gcsplan.planners.lattice.planner import _sides, plan, straight_bound
 from gcsplan.planners.problem import Problem, Progress, Via
-from gcsplan.planners.profile.climb_laps import climb_needed_deg, climb_tracks, extend, laps
+from gcsplan.planners.profile.climb_laps import climb_needed_deg, climb_tracks, extend, laps, pins_of
 from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
 from gcsplan.planners.profile.taut_string import Profile, taut_string
 from gcsplan.world.airspace import Airspace, Legs
@@ -93,6 +93,17 @@ def test_zones_in_the_band_are_passed_over_under_and_around() -> None:
     assert is_clear(p, solution.path.points)
     circles = replace(p, airspace=Airspace(jacksboro(), zones[:3]))
     assert faults(circles, solution.path) == []
+
+
+def test_a_path_with_two_points_at_one_place_has_sides() -> None:
+    """A track keeps one of the two, while the path's heights are those of all its points."""
+    bare = band_mission(1, 10.0)
+    start, goal = np.array(bare.start), np.array(bare.goal)
+    middle = 0.5 * (start + goal)
+    low, high = Zone("low", disc(middle, 300.0), None, Level(1.0, "agl")), Zone("high", disc(middle, 300.0), None, None)
+    problem = replace(bare, airspace=Airspace(bare.airspace.surface, (low, high)))
+    points = np.array([start, middle, (middle[0] + 1e-4, *middle[1:]), goal])
+    assert _sides(problem, points, *pins_of(problem, points)) == {0: True, 1: False}
 
 
 def test_vias_are_passed_at_their_altitudes() -> None:
