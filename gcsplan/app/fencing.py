@@ -237,7 +237,7 @@ def _notes(name: str, fence: Fence) -> list[tuple[str, str]]:
 def upload_fences(
     jobs: Sequence[UploadJob], links: Mapping[str, Link], options: session.SessionOptions
 ) -> dict[str, UploadResult | GcsplanError]:
-    """Send each job's fence over the link of its URL, all at once, read back and compare; results by job name.
+    """Send each job's fence over its link (``links`` by job name), all at once, and read back; results by job name.
 
     Call this before the missions are sent: an autopilot may refuse a mission because of an old fence. Vehicles without
     a fence, or with an empty one, are left as they are and are not in the result. A failure of one vehicle does not
@@ -249,9 +249,9 @@ def upload_fences(
         simulated = job.url == "sim"
         own = replace(options, simulated=simulated, listen_s=0.0 if simulated else options.listen_s)
         mission = job.mission
-        return session.ListOrder(links[job.url], mission.sysid, fence.items, mission.autopilot, job.name, own)
+        return session.ListOrder(links[job.name], mission.sysid, fence.items, mission.autopilot, job.name, own)
 
-    orders = [order_of(j, j.fence) for j in jobs if j.fence is not None and j.fence.items and j.url in links]
+    orders = [order_of(j, j.fence) for j in jobs if j.fence is not None and j.fence.items and j.name in links]
     return dict(zip([o.name for o in orders], session.upload_lists(orders, FENCE), strict=True))
 
 

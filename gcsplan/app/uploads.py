@@ -66,7 +66,21 @@ def targets(where: Sequence[str], vehicles: Sequence[Vehicle]) -> dict[str, str]
         else:
             url = SIM if word == SIM else _url(word, word)
             chosen |= dict.fromkeys(by_name, url)
-    return chosen | single
+    to = chosen | single
+    _require_apart(to, by_name)
+    return to
+
+
+def _require_apart(to: Mapping[str, str], by_name: Mapping[str, Vehicle]) -> None:
+    """Raise UsageError for two vehicles of one system id on one link, where nobody could tell them apart."""
+    seats: dict[tuple[str, int], str] = {}
+    for name, url in to.items():
+        other = seats.setdefault((url, by_name[name].sysid), name)
+        if other != name and url != SIM:  # simulated vehicles of one system id get links of their own
+            raise UsageError(
+                f"{other} and {name} both have system id {by_name[name].sysid}, and both would be reached over {url}: "
+                f"give each a link of its own (--upload link takes those of the mission file)"
+            )
 
 
 def _url(text: str, word: str) -> str:
@@ -165,17 +179,17 @@ def run_jobs(
     from gcsplan.mavlink.link.link import Link
 
     with ExitStack() as stack:
-        links: dict[str, Link] = {}
-        simulated = [job for job in jobs if job.url == SIM]
-        if simulated:
+        links: dict[str, Link] = {}  # by job
+        for group in _apart([job for job in jobs if job.url == SIM]):
             if simulator is None:
                 raise UsageError("nothing here can simulate a vehicle")
-            url = stack.enter_context(simulator([job.mission for job in simulated]))
-            links[SIM] = stack.enter_context(Link(url))  # unsigned: it stays on this machine
+            url = stack.enter_context(simulator([job.mission for job in group]))
+            links |= dict.fromkeys((j.name for j in group), stack.enter_context(Link(url)))  # unsigned: it stays here
         failed: dict[str, LinkError] = {}
         for url in dict.fromkeys(job.url for job in jobs if job.url != SIM):
             try:
-                links[url] = stack.enter_context(open_link(url))
+                link = stack.enter_context(open_link(url))
+                links |= dict.fromkeys((j.name for j in jobs if j.url == url), link)
             except LinkError as error:  # the other vehicles' links may work
                 failed[url] = error
         if failed and options.atomic:  # nothing has been sent yet, so every vehicle can keep its old mission
@@ -190,14 +204,14 @@ def run_jobs(
         orders = {
             job.name: order_of(
                 job,
-                links[job.url],
+                links[job.name],
                 options,
                 progress,
                 simulated=job.url == SIM,
                 listen_s=0.0 if job.url == SIM else LISTEN_S,
             )
             for job in jobs
-            if job.url in links and job.name not in barred
+            if job.name in links and job.name not in barred
         }
         results = session.upload_fleet(list(orders.values()), ended=report_end(progress))
         ended = dict(zip(orders, results, strict=True))
@@ -213,6 +227,19 @@ def run_jobs(
             for job in jobs
         ]  # fmt: skip
         return rolled_back(done, orders, ended) if options.atomic else done
+
+
+def _apart(jobs: Sequence[UploadJob]) -> list[list[UploadJob]]:
+    """The jobs in groups, in none of which two have one system id."""
+    groups: list[list[UploadJob]] = []
+    seen: dict[int, int] = {}
+    for job in jobs:
+        group = seen.get(job.mission.sysid, 0)
+        seen[job.mission.sysid] = group + 1
+        if group == len(groups):
+            groups.append([])
+        groups[group].append(job)
+    return groups
 
 
 def _fenced(

@@ -70,6 +70,9 @@ WANTED = {
 }
 """The keys that every mission has, and what to write where one is absent."""
 
+MOST_VEHICLES = 2000
+"""Most vehicles of one file: more than are flown together anywhere, and few enough for a table of all pairs."""
+
 TERRAIN_ERROR_M = 30.0
 """Metres by which a vehicle's own terrain may be shifted to its altitude at arming (ArduPilot's TERRAIN_OFS_MAX)."""
 
@@ -286,9 +289,10 @@ class _Reading:
     def _vehicles(self, terrain: TerrainKeys | None, altitude_frame: AltitudeFrame) -> list[Terminals]:
         where = f"{self.where}vehicles"
         value = self.raw.get("vehicles")
-        if value is not None and (not isinstance(value, list) or not value or len(value) > 255):
+        if value is not None and (not isinstance(value, list) or not 1 <= len(value) <= MOST_VEHICLES):
             dash = "; begin each vehicle with a dash: `- name: …`" if isinstance(value, dict) else ""
-            self.problems.append(Problem(where, f"must be a list of 1 to 255 vehicles, given {shown(value)}{dash}"))
+            words = f"must be a list of 1 to {MOST_VEHICLES} vehicles, given {shown(value)}{dash}"
+            self.problems.append(Problem(where, words))
             return []
         shared = self._section(LimitKeys, "limits") or LimitKeys()
         # If the shared limits are broken, a vehicle's complaint about a missing limit would only repeat that.

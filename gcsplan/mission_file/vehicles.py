@@ -50,10 +50,11 @@ is no bound: speed changes at once, and counts in space."""
 def check_unique(vehicles: Sequence[Any], where: str, problems: list[Problem]) -> tuple[str, ...]:
     """Report duplicate names and system ids among the vehicles as written; returns the names.
 
-    Names must differ by more than upper and lower case, because they become file names.
+    Names must differ by more than upper and lower case, because they become file names. A system id is that of one
+    vehicle on each link: vehicles that share one, as more than 255 must, have different links.
     """
     names: dict[str, int] = {}
-    sysids: dict[int, int] = {}
+    sysids: dict[int, dict[str | None, int]] = {}
     for i, keys in enumerate(vehicles):
         name, sysid = (keys.get("name"), keys.get("sysid")) if isinstance(keys, dict) else (None, None)
         if isinstance(name, str):
@@ -62,12 +63,16 @@ def check_unique(vehicles: Sequence[Any], where: str, problems: list[Problem]) -
                 problems.append(
                     Problem(f"{where}[{i}].name", f"{name[:64]!r} is the name of vehicles[{first}] already; change one")
                 )
-        if isinstance(sysid, int) and not isinstance(sysid, bool) and sysids.setdefault(sysid, i) != i:
-            problems.append(
-                Problem(
-                    f"{where}[{i}].sysid", f"{sysid} is the system id of vehicles[{sysids[sysid]}] already; change one"
+        if isinstance(sysid, int) and not isinstance(sysid, bool):
+            link = keys.get("link")
+            others = sysids.setdefault(sysid, {})
+            if others and (not isinstance(link, str) or link in others or None in others):
+                first = others.get(link, next(iter(others.values())))
+                cure = "change one, or give each of them a `link` of its own"
+                problems.append(
+                    Problem(f"{where}[{i}].sysid", f"{sysid} is the system id of vehicles[{first}] already; {cure}")
                 )
-            )
+            others.setdefault(link if isinstance(link, str) else None, i)
     return tuple(k["name"] for k in vehicles if isinstance(k, dict) and isinstance(k.get("name"), str))
 
 

@@ -544,6 +544,23 @@ def test_doubled_names_and_system_ids_are_told() -> None:
     assert {p.where.split(": ")[1] for p in found} == {"vehicles[1].name", "vehicles[1].sysid", "vehicles[2].sysid"}
 
 
+def test_vehicles_of_one_system_id_need_links_of_their_own() -> None:
+    def wrong(*links: str | None) -> list[str]:
+        some = [vehicle(name=f"v{k}", **({} if link is None else {"link": link})) for k, link in enumerate(links)]
+        return [p.where.split(": ")[1] for p in problems(fleet(*some))]
+
+    a, b = "udpout:127.0.0.1:14560", "udpout:127.0.0.1:14570"
+    assert load(fleet(vehicle(link=a), vehicle(name="b", link=b))).vehicles[1].vehicle.sysid == 1
+    assert wrong(a, b, a) == ["vehicles[2].sysid"]
+    assert wrong(a, None) == wrong(None, a) == ["vehicles[1].sysid"]
+
+
+def test_three_hundred_vehicles_are_read() -> None:
+    links = [f"udpout:127.0.0.1:{14560 + 10 * k}" for k in range(2)]
+    many = [vehicle(name=f"v{k}", sysid=k // 2 + 1, link=links[k % 2]) for k in range(300)]
+    assert len(load(fleet(*many)).vehicles) == 300
+
+
 @pytest.mark.parametrize(
     ("arrival", "key", "words"),
     [
@@ -610,8 +627,8 @@ def test_the_planners_own_table_is_asked_where_none_is_handed_in() -> None:
         ({"version": ...}, "version", "write `version: 1`"),
         ({"terrain": ...}, "terrain", "is missing"),
         ({"vehicles": ...}, "vehicles", "is missing"),
-        ({"vehicles": []}, "vehicles", "1 to 255 vehicles"),
-        ({"vehicles": {}}, "vehicles", "1 to 255 vehicles"),
+        ({"vehicles": []}, "vehicles", "1 to 2000 vehicles"),
+        ({"vehicles": {}}, "vehicles", "1 to 2000 vehicles"),
         ({"no_fly": {}}, "no_fly", "must be a list"),
         ({"no_flie": []}, "no_flie", "did you mean no_fly?"),
         ({"altitude_frame": "amls"}, "altitude_frame", "did you mean amsl?"),
