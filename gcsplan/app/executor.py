@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any, Protocol, TypeVar
 
 from gcsplan.errors import GcsplanError, InputError, UsageError
@@ -75,6 +76,11 @@ class Dask:
     """Does the work with the workers of a dask client; a piece whose worker dies is done again by another."""
 
     client: Any
+
+    @property
+    def dashboard(self) -> str:
+        """Address of the page that shows what the workers do; empty if its library is not installed."""
+        return str(self.client.dashboard_link or "") if find_spec("bokeh") else ""
 
     @property
     def count(self) -> int:
@@ -155,8 +161,6 @@ def executor(
 
 
 def _installed() -> bool:
-    from importlib.util import find_spec
-
     return find_spec("distributed") is not None
 
 

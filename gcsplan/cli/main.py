@@ -10,7 +10,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from gcsplan.cli import check, energy, fly, links, new, plan, rehearse, schema
+from gcsplan.cli import batch, check, energy, fly, links, new, plan, rehearse, schema
 from gcsplan.cli.bench import bench_app
 from gcsplan.cli.dem import dem_app
 from gcsplan.cli.ending import Interrupted, end_in_good_order, explained, fail, interrupted, put, speak_plainly
@@ -31,6 +31,7 @@ app.add_typer(dem_app, name="dem")
 app.add_typer(bench_app, name="bench")
 app.command(short_help="Write a commented mission file.")(new.new)
 app.command(short_help="Plan a mission file; upload and verify on request.")(plan.plan)
+app.command(short_help="Plan many mission files: a table, a map.")(batch.batch)
 app.command(short_help="Plan, fly it all in a simulator, judge.")(rehearse.rehearse)
 app.command(short_help="Does a file fly safely in a mission's world?")(check.check)
 app.command(short_help="Check files, upload them, read them back, compare.")(links.upload)

@@ -7,11 +7,8 @@ it the page still has every number, the map and the profiles.
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import math
 from collections.abc import Mapping, Sequence
-from importlib import resources
 
 import numpy as np
 
@@ -20,6 +17,7 @@ from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.figures import steepened
 from gcsplan.report import tables
 from gcsplan.report.briefing import briefing_html
+from gcsplan.report.document import document
 from gcsplan.report.fleet_view import fleet_html, motions_of
 from gcsplan.report.home_view import home_html, home_lines
 from gcsplan.report.markup import data_block, energy, esc, least, num, place, stated, steepest, tools
@@ -99,34 +97,12 @@ def render_page(page: Page) -> str:
             *_profiles(page, lines, found), home, fleet, *_details(page, lines, found), _end(page),
         )
     )  # fmt: skip
-    return _document(page.title, body, data_block("data", data))
+    return document(page.title, body, data_block("data", data), scripts=SCRIPTS)
 
 
 def _reach_m(subject: Subject) -> float:
     limits = subject.vehicle.limits
     return limits.horizontal_clearance_m + limits.track_error_m
-
-
-def _asset(name: str) -> str:
-    return resources.files("gcsplan.report").joinpath("assets", name).read_text(encoding="utf-8")
-
-
-def _document(title: str, body: str, data: str) -> str:
-    script = "(function(){\n'use strict';\n" + "\n".join(_asset(name) for name in SCRIPTS) + "\n})();"
-    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
-    # Nothing is loaded from elsewhere, and no other script can run, whatever the names in a file contain.
-    policy = (
-        f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'; base-uri 'none'"
-    )
-    return (
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        '<meta name="color-scheme" content="light dark">'
-        f'<meta name="generator" content="gcsplan {esc(__version__)}">'
-        f"<title>{esc(title)} – mission report</title><style>\n{_asset('report.css')}</style></head>"
-        f'<body>{body}<div id="tip" role="status" hidden></div>{data}<script>{script}</script></body></html>\n'
-    )
 
 
 VERDICTS = {

@@ -74,6 +74,7 @@ def told(planned: Plan) -> list[Any]:
 
 @pytest.fixture(scope="module")
 def workers() -> Iterator[Executor]:
+    pytest.importorskip("distributed")
     with executor(2, pieces=1000, piece_s=1.0) as two:
         assert isinstance(two, Dask)
         assert two.count == 2
@@ -170,6 +171,7 @@ def test_a_killed_worker_costs_its_own_pieces_only(workers: Executor, tmp_path: 
 
 @pytest.mark.slow
 def test_a_piece_that_kills_every_worker_is_named() -> None:
+    pytest.importorskip("distributed")
     with (
         executor(2, pieces=1000, piece_s=1.0) as two,
         pytest.raises(GcsplanError, match="piece 1 of 1 again and again"),
@@ -203,6 +205,7 @@ def test_terrain_that_planning_widened_is_the_same_here(monkeypatch: pytest.Monk
 
 @pytest.mark.slow
 def test_no_scheduler_answers() -> None:
+    pytest.importorskip("distributed")
     with (
         pytest.raises(InputError, match="no dask scheduler answers"),
         executor(cluster="tcp://127.0.0.1:9", pieces=1, piece_s=1.0),

@@ -1,0 +1,127 @@
+"""`gcsplan batch`."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gcsplan.cli import completion
+from gcsplan.cli.ending import emit
+from gcsplan.cli.options import (
+    ClusterOption,
+    JobsOption,
+    JsonOption,
+    UnitsName,
+    UnitsOption,
+    UnjudgedOption,
+)  # fmt: skip
+from gcsplan.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from gcsplan.app.batch import Record
+
+SHOWN = 20
+"""Missions without a plan that are printed at most; the table has all of them."""
+LINE_S = 5.0
+
+
+def batch(
+    missions: Annotated[
+        list[str],
+        typer.Argument(metavar="MISSION…", help="Mission files, folders of them, or patterns ('north/*.yaml')."),
+    ],
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Directory of all results.")],
+    jobs: JobsOption = None,
+    cluster: ClusterOption = None,
+    planner: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", autocompletion=completion.planners, help="A name from `gcsplan planners`."),
+    ] = None,
+    objective: Annotated[
+        str | None,
+        typer.Option(metavar="WHAT", autocompletion=completion.words("length", "energy"), help="length or energy."),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(metavar="N", help="Seed of everything random.")] = None,
+    report: Annotated[bool, typer.Option("--report", help="Also write a report.html for each mission.")] = False,
+    allow_unjudged: UnjudgedOption = False,
+    units: UnitsOption = UnitsName.METRIC,
+    as_json: JsonOption = False,
+) -> None:
+    """Plan many mission files: a table of all results, a page with a map, the outputs of each.
+
+    Nothing is sent. A mission that fails never stops the others, and the exit code is the worst. What is done and
+    unchanged is not planned again, so that the same command goes on after an interruption.
+    """
+    from gcsplan.app.batch import PIECE_S, Batch, BatchOptions, exit_code, missions_of
+    from gcsplan.app.executor import executor
+    from gcsplan.cli.console import remark, say
+
+    options = BatchOptions(planner, objective, seed, report, allow_unjudged)
+    work = Batch(missions_of(missions), out, options)
+    done, todo = work.known()
+    if done:
+        remark(f"{len(done)} of {len(work.missions)} missions are done and unchanged")
+    begun_s = said_s = time.perf_counter()
+
+    def told(record: Record) -> None:
+        nonlocal said_s
+        done.append(record)
+        now_s = time.perf_counter()
+        if now_s - said_s >= LINE_S:
+            said_s = now_s
+            bad = sum(r.code != 0 for r in done)
+            remark(f"{len(done)} of {len(work.missions)} missions, {bad} without a plan, {now_s - begun_s:.0f} s")
+
+    try:
+        if todo:
+            with executor(jobs, cluster, pieces=len(todo), piece_s=PIECE_S) as workers:
+                if (link := getattr(workers, "dashboard", "")) and len(todo) > 1:
+                    remark(f"the workers can be watched at {link}")
+                work.run(workers, todo, told)
+    finally:
+        order = {name: k for k, (name, _) in enumerate(work.missions)}
+        done.sort(key=lambda r: order[r.mission])
+        written = _tables(out, done, units, "report.html" if report else "summary.json") if done else []
+    if as_json:
+        emit({"missions": len(work.missions), "rows": [dict(row) for r in done for row in r.rows]})
+    else:
+        bad = [r for r in done if r.code != 0]
+        for record in bad[:SHOWN]:
+            say(f"{record.mission}: {record.rows[0]['verdict']}: {str(record.rows[0]['message']).splitlines()[0]}")
+        if len(bad) > SHOWN:
+            say(f"… and {len(bad) - SHOWN} more; the table has all of them")
+        count = sum(len(r.rows) for r in done if r.code == 0)
+        took_s = time.perf_counter() - begun_s
+        say(f"{len(done) - len(bad)} of {len(done)} missions planned, {count} vehicles, in {took_s:.1f} s")
+        say(f"written to {out}/: {', '.join(written)}")
+    raise typer.Exit(exit_code(done))
+
+
+def _tables(out: Path, done: Sequence[Record], units: UnitsName, page: str) -> list[str]:
+    """Write the table and the page of all results; returns their names."""
+    from gcsplan.app.batch import COLUMNS
+    from gcsplan.cli.console import remark
+    from gcsplan.export.outdir import write_whole
+    from gcsplan.export.table import csv_text, parquet_bytes
+    from gcsplan.report.index_page import render_index
+    from gcsplan.units import units_of
+
+    rows = [row for record in done for row in record.rows]
+    tracks = [track for record in done for track in (record.tracks or [[]] * len(record.rows))]
+    drawn = {k: track for k, track in enumerate(tracks) if len(track) > 1}
+    files: dict[str, str | bytes] = {
+        "results.csv": csv_text(COLUMNS, rows),
+        "index.html": render_index(out.resolve().name, rows, drawn, units_of(units), page),
+    }
+    try:
+        files["results.parquet"] = parquet_bytes(COLUMNS, rows)
+    except InputError as why:
+        remark(f"note: results.parquet is not written: {why}")
+    for name, content in files.items():
+        write_whole(out / name, content)
+    return sorted(files)

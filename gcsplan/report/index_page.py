@@ -1,0 +1,122 @@
+"""The page of a batch: how many missions there are and how they ended, a map of all tracks, a table that filters."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import PurePosixPath
+from typing import Any
+
+from gcsplan.report.document import document
+from gcsplan.report.markup import THIN, energy, esc, least, num
+from gcsplan.units import Units, duration
+
+Row = Mapping[str, Any]
+METRES_PER_DEGREE = 111_195.0
+"""Of a great circle, m."""
+WIDE = 1000.0
+"""Width of the map's own coordinates."""
+
+
+def render_index(
+    title: str, rows: Sequence[Row], tracks: Mapping[int, Sequence[Sequence[float]]], units: Units, page: str
+) -> str:
+    """The page; ``tracks`` are the row's number to its [latitude, longitude], ``page`` is a mission's file to open.
+
+    A row has the columns of the table of results; one without a vehicle is a mission that has no plan.
+    """
+    missions = {row["mission"]: row["code"] for row in rows}
+    bad = Counter(str(row["verdict"]) for row in rows if row["code"] != 0)
+    words = f"{num(len(missions))} missions, {num(sum(bool(r['vehicle']) for r in rows))} vehicles planned"
+    if bad:
+        words += "; " + ", ".join(f"{num(n)} {esc(kind)}" for kind, n in sorted(bad.items()))
+    body = (
+        f'<header><p class="brand">gcsplan · batch</p><h1>{esc(title)}</h1><p>{words}.</p></header>'
+        f"<main>{_failures(rows)}{_map(rows, tracks, units)}"
+        '<label class="filter" hidden>Filter '
+        '<input id="filter" type="search" placeholder="a name, a verdict, a reason">'
+        '<span id="count" class="note"></span></label>'
+        f"{_table(rows, units, page)}</main>"
+    )
+    return document(title, body, "", scripts=("index.js",), styles=("report.css", "index.css"), what="batch")
+
+
+def _failures(rows: Sequence[Row]) -> str:
+    bad = [row for row in rows if row["code"] != 0]
+    if not bad:
+        return ""
+    items = [f"<li><b>{esc(r['mission'])}</b>: {esc(r['verdict'])}: {esc(r['message'])}</li>" for r in bad]
+    return f'<h2>Missions without a plan</h2><ul class="findings">{"".join(items)}</ul>'
+
+
+def _map(rows: Sequence[Row], tracks: Mapping[int, Sequence[Sequence[float]]], units: Units) -> str:
+    """All tracks, north up, each degree of longitude as short as it is in the middle; nothing without a track."""
+    if not tracks:
+        return ""
+    lats = [p[0] for track in tracks.values() for p in track]
+    west = next(iter(tracks.values()))[0][1]
+    # Longitudes count from the first track, so that a batch across 180 degrees is drawn in one piece.
+    lons = [_turned(p[1], west) for track in tracks.values() for p in track]
+    shrink = max(0.05, math.cos(math.radians(0.5 * (min(lats) + max(lats)))))
+    span = max((max(lons) - min(lons)) * shrink, max(lats) - min(lats), 1e-4)
+    scale, edge = WIDE / span, 0.03 * WIDE
+    high = (max(lats) - min(lats)) * scale
+    parts = []
+    for number, track in tracks.items():
+        places = [
+            f"{(_turned(lon, west) - min(lons)) * shrink * scale:.1f} {(max(lats) - lat) * scale:.1f}"
+            for lat, lon in track
+        ]
+        name = f"{rows[number]['mission']} {rows[number]['vehicle']}"
+        parts.append(f'<path data-row="{number}" d="M{"L".join(places)}"><title>{esc(name)}</title></path>')
+    wide = (max(lons) - min(lons)) * shrink * scale
+    box = f"{-edge:.0f} {-edge:.0f} {wide + 2 * edge:.0f} {high + 2 * edge:.0f}"
+    return (
+        f'<svg id="tracks" viewBox="{box}" role="img" aria-label="all tracks, north up">{"".join(parts)}</svg>'
+        f'<p class="note">North is up; the map is {num(wide / scale * METRES_PER_DEGREE, 1, units.far)} wide.</p>'
+    )
+
+
+def _turned(lon_deg: float, from_deg: float) -> float:
+    return (lon_deg - from_deg + 180.0) % 360.0 - 180.0
+
+
+def _table(rows: Sequence[Row], units: Units, page: str) -> str:
+    head = (
+        ("mission", ""), ("vehicle", ""), ("verdict", ""), ("length", "n"), ("gap", "n"), ("energy", "n"),
+        ("least AGL", "n"), ("arrives, T+", "n"),
+    )  # fmt: skip
+    out = ['<div class="scroll"><table id="results"><caption>Every vehicle of every mission</caption><thead><tr>']
+    out += [f'<th scope="col" class="{kind}">{name}</th>' for name, kind in head]
+    out.append("</tr></thead><tbody>")
+    for number, row in enumerate(rows):
+        if row["code"] != 0:
+            continue
+        link = f'<a href="{_address(str(row["mission"]))}/{page}">{esc(row["mission"])}</a>'
+        cells = [
+            f'<th scope="row">{link}</th>',
+            f"<td>{esc(row['vehicle'])}</td>",
+            f'<td class="{"good" if row["verdict"] == "safe" else "bad"}">{esc(row["verdict"])}</td>',
+            f'<td class="n">{num(row.get("length_m"), 2, units.path)}</td>',
+            f'<td class="n">{_percent(row.get("gap_percent"))}</td>',
+            f'<td class="n">{energy(row.get("energy_j"))}</td>',
+            f'<td class="n">{least(row.get("min_agl_m"), 1, units.height)}</td>',
+            f'<td class="n">{_arrival(row.get("arrive_s"))}</td>',
+        ]
+        out.append(f'<tr data-row="{number}">{"".join(cells)}</tr>')
+    out.append("</tbody></table></div>")
+    return "".join(out)
+
+
+def _percent(value: float | None) -> str:
+    return "–" if value is None else f"{value:.2f}{THIN}%"
+
+
+def _arrival(seconds: float | None) -> str:
+    return "–" if seconds is None or not math.isfinite(seconds) else duration(seconds)
+
+
+def _address(name: str) -> str:
+    """The relative address of a folder, with the characters escaped that an address cannot have."""
+    return PurePosixPath("/", name).as_uri().removeprefix("file:///")

@@ -1,0 +1,214 @@
+"""Batches: every mission is planned once, bad ones stop nobody, and unchanged ones are kept."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from typer import testing as runner
+
+from gcsplan.app import batch as module
+from gcsplan.app.batch import Batch, BatchOptions, Record, exit_code, key_of, missions_of
+from gcsplan.app.executor import Dask, Inline, executor
+from gcsplan.cli.main import app
+from gcsplan.errors import UsageError
+from gcsplan.export.table import csv_text, parquet_bytes
+from gcsplan.mission_file.read_files import files_of
+from gcsplan.report.index_page import render_index
+from gcsplan.units import METRIC
+
+
+def mission(**changes: Any) -> str:
+    vehicle = {
+        "name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 12],
+        "start": [47.0, 8.0], "goal": [47.0, 8.02],
+    }  # fmt: skip
+    whole = {"version": 1, "terrain": {"flat_m": 100}, "limits": {"min_agl_m": 30}, "vehicles": [vehicle]}
+    return yaml.safe_dump(whole | changes)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Four missions: one good, one in a folder, one that is no YAML, one whose start lies in a zone."""
+    given = tmp_path / "missions"
+    (given / "north").mkdir(parents=True)
+    (given / "good.yaml").write_text(mission())
+    (given / "north" / "good.yaml").write_text(mission(name="another"))
+    (given / "north" / "broken.yaml").write_text("version: 1\nvehicles: [\n")
+    disc = {"name": "disc", "center": [47.0, 8.0], "radius_m": 200}
+    (given / "shut.yaml").write_text(mission(no_fly=[disc]))
+    return given
+
+
+def ran(folder: Path, out: Path, **options: Any) -> tuple[dict[str, Record], int]:
+    """The records by mission, and how many of them were planned now."""
+    work = Batch(missions_of([str(folder)]), out, BatchOptions(**options))
+    done, todo = work.known()
+    work.run(Inline(), todo, done.append)
+    return {r.mission: r for r in done}, len(todo)
+
+
+def test_every_mission_has_its_record_and_its_outputs(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    records, planned = ran(folder, out)
+    assert planned == 4
+    assert {name: r.code for name, r in records.items()} == {
+        "good": 0, "north/good": 0, "north/broken": 2, "shut": 2,
+    }  # fmt: skip
+    assert exit_code(list(records.values())) == 2
+    assert {p.name for p in (out / "north" / "good").iterdir()} >= {"uav1.waypoints", "uav1.plan", "summary.json"}
+    assert not (out / "shut").exists()
+    told = json.loads((out / "good" / "summary.json").read_text())["vehicles"][0]
+    (row,) = records["good"].rows
+    assert (row["length_m"], row["gap_percent"], row["verdict"]) == (told["length_m"], told["gap_percent"], "safe")
+    assert "no-fly zone 'disc'" in records["shut"].rows[0]["message"]
+
+
+def test_what_is_unchanged_is_kept(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    before, _ = ran(folder, out)
+    again, planned = ran(folder, out)
+    assert planned == 0
+    assert {n: (r.code, r.rows, r.tracks) for n, r in again.items()} == {
+        n: (r.code, r.rows, r.tracks) for n, r in before.items()
+    }
+    (folder / "shut.yaml").write_text(mission())
+    assert ran(folder, out)[1] == 1
+    (out / "good" / "summary.json").unlink()
+    assert ran(folder, out)[1] == 1
+    assert ran(folder, out, objective="energy")[1] == 4  # other options are another batch
+    (out / "records" / "good.json").write_text("{")
+    assert ran(folder, out, objective="energy")[1] == 1
+
+
+def test_a_mission_that_fails_now_loses_its_old_outputs(folder: Path, tmp_path: Path) -> None:
+    """No old mission may be flown by mistake."""
+    out = tmp_path / "out"
+    ran(folder, out)
+    (folder / "good.yaml").write_text((folder / "shut.yaml").read_text())
+    records, _ = ran(folder, out)
+    assert records["good"].code == 2
+    assert not (out / "good" / "uav1.plan").exists()
+    assert (out / "good" / "previous" / "uav1.plan").exists()
+
+
+def test_a_bug_in_one_mission_costs_only_that_mission(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(file: str, **options: Any) -> Any:
+        if "north" in file:
+            raise ZeroDivisionError("made")
+        return plan(file, **options)
+
+    plan = module.plan
+    monkeypatch.setattr(module, "plan", fails)
+    records, _ = ran(folder, tmp_path / "out")
+    assert {n: r.code for n, r in records.items()} == {"good": 0, "north/good": 70, "north/broken": 70, "shut": 2}
+    assert exit_code(list(records.values())) == 70
+    assert "a bug in gcsplan: ZeroDivisionError: made" in records["north/good"].rows[0]["message"]
+
+
+def test_the_key_is_of_all_files_that_a_mission_names(tmp_path: Path) -> None:
+    zones, tiles = tmp_path / "zones.geojson", tmp_path / "tiles"
+    zones.write_text("{}")
+    (tiles / "deep").mkdir(parents=True)
+    (tiles / "deep" / "a.tif").write_text("a")
+    file = tmp_path / "m.yaml"
+    file.write_text(mission(terrain={"dem": "tiles"}, no_fly=[{"file": "zones.geojson"}]))
+    assert files_of(file) == (tiles / "deep" / "a.tif", zones)
+    seen = {key_of(file, BatchOptions())}
+    for change in (
+        lambda: zones.write_text('{"a": 1}'),
+        lambda: (tiles / "b.tif").write_text("b"),
+        lambda: (tiles / "b.tif").write_text("longer"),
+        lambda: file.write_text(file.read_text() + "\n"),
+    ):
+        change()
+        key = key_of(file, BatchOptions())
+        assert key not in seen
+        seen.add(key)
+    assert key_of(file, BatchOptions(seed=2)) not in seen
+
+
+def test_names_are_paths_from_the_common_folder(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ["good", "north/broken", "north/good", "shut"]
+    assert sorted(n for n, _ in missions_of([str(folder)])) == names
+    assert [n for n, _ in missions_of([str(folder / "shut.yaml"), str(folder / "shut.yaml")])] == ["shut"]
+    monkeypatch.chdir(folder)
+    assert [n for n, _ in missions_of(["north/*.yaml"])] == ["broken", "good"]
+    assert [n for n, _ in missions_of(["sample:jacksboro"])] == ["jacksboro"]
+    assert [n for n, _ in missions_of(["nothing.yaml"])] == ["nothing"]  # its record says that there is no such file
+    with pytest.raises(UsageError, match="no mission file"):
+        missions_of(["east/*.yaml"])
+    (folder / "good.yml").write_text(mission())
+    with pytest.raises(UsageError, match="differ by their suffix"):
+        missions_of(["good.yaml", "good.yml"])
+
+
+@pytest.mark.parametrize(("codes", "worst"), [([0, 3, 2], 3), ([0], 0), ([4, 70], 70), ([2, 4], 4), ([], 0)])
+def test_the_exit_code_is_the_worst(codes: list[int], worst: int) -> None:
+    assert exit_code([Record("m", "", code, ()) for code in codes]) == worst
+
+
+def test_the_command_ends_with_a_table_and_a_page(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    done = runner.CliRunner().invoke(app, ["batch", str(folder), "-o", str(out), "--jobs", "1"])
+    assert done.exit_code == 2, done.output
+    assert "2 of 4 missions planned, 2 vehicles" in done.output
+    assert "shut: error:" in done.output
+    rows = list(csv.DictReader(io.StringIO((out / "results.csv").read_text())))
+    assert [(r["mission"], r["vehicle"], r["code"]) for r in rows] == [
+        ("good", "uav1", "0"), ("north/broken", "", "2"), ("north/good", "uav1", "0"), ("shut", "", "2"),
+    ]  # fmt: skip
+    page = (out / "index.html").read_text()
+    assert page.count("<path data-row=") == 2
+    assert 'href="north/good/summary.json"' in page
+    again = runner.CliRunner().invoke(app, ["batch", str(folder), "-o", str(out), "--json"])
+    assert "4 of 4 missions are done and unchanged" in again.output
+    told = json.loads(again.stdout)
+    assert (told["missions"], len(told["rows"])) == (4, 4)
+
+
+def test_the_page_escapes_what_files_say() -> None:
+    row = {"mission": "a<b", "vehicle": "<script>", "code": 0, "verdict": "safe", "message": ""}
+    bad = row | {"code": 3, "verdict": "no mission", "message": "<img src=x>", "vehicle": ""}
+    page = render_index("t<", [row, bad], {0: [[47.0, 179.99], [47.01, -179.99]]}, METRIC, "summary.json")
+    assert "<img" not in page
+    assert "<script>alert" not in page
+    assert "a&lt;b" in page
+    assert 'href="a%3Cb/summary.json"' in page
+    assert "2 missions" not in page  # one name, once
+    assert 'd="M0.0' in page  # a track across 180 degrees is one short line
+    assert "1.5" in page.split("the map is")[1][:12]
+
+
+def test_an_empty_map_is_none() -> None:
+    assert "<svg" not in render_index("t", [], {}, METRIC, "summary.json")
+
+
+def test_rows_as_csv_and_parquet() -> None:
+    rows = [{"a": 1.5, "b": "x,y"}, {"b": None}]
+    assert csv_text(("a", "b"), rows) == 'a,b\n1.5,"x,y"\n,\n'
+    arrow = pytest.importorskip("pyarrow.parquet")
+    table = arrow.read_table(io.BytesIO(parquet_bytes(("a", "b"), rows)))
+    assert table.to_pydict() == {"a": [1.5, None], "b": ["x,y", None]}
+
+
+@pytest.mark.slow
+def test_processes_make_the_same_files(folder: Path, tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
+    alone, shared = tmp_path / "alone", tmp_path / "shared"
+    ran(folder, alone)
+    work = Batch(missions_of([str(folder)]), shared, BatchOptions())
+    with executor(2, pieces=100, piece_s=1.0) as workers:
+        assert isinstance(workers, Dask)
+        work.run(workers, work.known()[1], lambda record: None)
+    for file in sorted(p.relative_to(alone) for p in alone.rglob("*") if p.is_file()):
+        if file.suffix in (".waypoints", ".plan", ".kml", ".geojson", ".csv"):
+            assert (shared / file).read_bytes() == (alone / file).read_bytes(), file
+    assert not Batch(missions_of([str(folder)]), shared, BatchOptions()).known()[1]
