@@ -15,9 +15,10 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.dem.cache import Cache, Record
-from gcsplan.dem.cells import Cell, cells_in, names_of
+from gcsplan.dem.cells import cells_in, names_of
 from gcsplan.dem.sources import SOURCES, Source
 from gcsplan.errors import InputError
+from gcsplan.world.cell import Cell
 from gcsplan.world.datum import VerticalDatum, take_apart
 from gcsplan.world.frame import Frame
 from gcsplan.world.raster import Raster, open_raster, sha256_of
