@@ -122,6 +122,36 @@ class TerrainGrid:
             found.update(Block(cell, int(n), int(e)) for n, e in pairs)
         return sorted(found)
 
+    def blocks_within(self, south_e7: float, west_e7: float, north_e7: float, east_e7: float) -> list[Block]:
+        """The blocks that the autopilot may look up anywhere in a box of degrees, which may cross the antimeridian.
+
+        A block on the border of the box or of its tile may be one too many, never one too few.
+        """
+        width = (east_e7 - west_e7) % (360.0 * DEGREE_E7) if east_e7 != west_e7 else 0.0
+        first = math.floor(west_e7 / DEGREE_E7)
+        found = []
+        for lat in range(math.floor(south_e7 / DEGREE_E7), math.floor(north_e7 / DEGREE_E7) + 1):
+            for lon in range(first, math.floor((west_e7 + width) / DEGREE_E7) + 1):
+                cell = Cell(lat, (lon + 180) % 360 - 180)
+                low, high = max(0.0, south_e7 - lat * DEGREE_E7), min(1.0 * DEGREE_E7, north_e7 - lat * DEGREE_E7)
+                left, right = (
+                    max(0.0, west_e7 - lon * DEGREE_E7),
+                    min(1.0 * DEGREE_E7, west_e7 + width - lon * DEGREE_E7),
+                )
+                found += self._blocks_of(cell, (low, high), (left, right))
+        return sorted(found)
+
+    def _blocks_of(self, cell: Cell, lat: tuple[float, float], lon: tuple[float, float]) -> list[Block]:
+        """Blocks of one tile that meet a box, given in 1e-7° from the tile's corner."""
+        a_row_m, a_column_m = self.spacing_m * STRIDE[0], self.spacing_m * STRIDE[1]
+        found = []
+        for row in range(int(lat[0] * METRES_OF_E7 / a_row_m), int(lat[1] * METRES_OF_E7 / a_row_m) + 1):
+            ends = np.clip([row * a_row_m / METRES_OF_E7, (row + 1) * a_row_m / METRES_OF_E7], *lat)
+            scale = longitude_scale(cell.lat_deg * DEGREE_E7 + 0.5 * ends) * METRES_OF_E7
+            first, last = int(lon[0] * scale.min() / a_column_m), int(lon[1] * scale.max() / a_column_m)
+            found += [Block(cell, row, column) for column in range(first, last + 1)]
+        return found
+
 
 def cell_at(lat_e7: float, lon_e7: float) -> Cell:
     """The tile of a place."""

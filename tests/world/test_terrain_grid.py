@@ -93,6 +93,19 @@ def test_no_post_lies_below_the_ground_and_none_a_metre_above_it() -> None:
     assert (PostHeights(grid, lambda a, o: 0 * a + 300.0 + 1e-9).block(block) == 300.0).all()
 
 
+def test_blocks_of_a_box_are_those_of_all_its_points() -> None:
+    grid = TerrainGrid()
+    for lat, lon, reach in ((36.55, -84.4, 0.1), (-33.02, 151.98, 0.1), (0.001, -0.001, 0.05), (61.0, 179.95, 0.2)):
+        south, west, north, east = ((lat - reach) * 1e7, (lon - reach) * 1e7, (lat + reach) * 1e7, (lon + reach) * 1e7)
+        ours = set(grid.blocks_within(south, west, north, east))
+        f = np.linspace(0.0, 1.0, 120)
+        points = (a.ravel() for a in np.meshgrid(south + f * (north - south), west + f * (east - west)))
+        theirs = set(grid.blocks_over(*points))
+        assert theirs <= ours
+        assert len(ours) <= len(theirs) + 12
+    assert len(grid.blocks_within(365_000_000, -844_000_000, 365_000_000, -844_000_000)) == 1
+
+
 def test_neighbouring_blocks_share_posts_and_a_window_is_their_mosaic() -> None:
     posts, cell = PostHeights(TerrainGrid(), hills), Cell(36, -85)
     whole = posts.window(cell, (410, 470), (555, 640))
