@@ -15,6 +15,7 @@ from gcsplan.cli.bench import bench_app
 from gcsplan.cli.dem import dem_app
 from gcsplan.cli.ending import Interrupted, end_in_good_order, explained, fail, interrupted, put, speak_plainly
 from gcsplan.cli.memory import settle_memory
+from gcsplan.cli.terrain import terrain_app
 from gcsplan.errors import GcsplanError, InputError
 
 app = typer.Typer(
@@ -28,6 +29,7 @@ app = typer.Typer(
     "7 read-back differs, 70 a bug of ours, 129, 130, 143 interrupted (SIGHUP, Ctrl-C, SIGTERM).",
 )
 app.add_typer(dem_app, name="dem")
+app.add_typer(terrain_app, name="terrain")
 app.add_typer(bench_app, name="bench")
 app.command(short_help="Write a commented mission file.")(new.new)
 app.command(short_help="Plan a mission file; upload and verify on request.")(plan.plan)

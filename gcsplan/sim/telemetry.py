@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from gcsplan.sim.parameters import Parameters
+from gcsplan.sim.terrain import TerrainMemory
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
 
@@ -45,6 +46,8 @@ class Telemetry:
             self.parameters.set_from_wire(name, value)
         vehicle.mode = _FIRST_MODE[vehicle.autopilot]
         self._began: float | None = None
+        self._terrain: TerrainMemory | None = None
+        self._tells_terrain = False
         self._by_id: dict[int, Callable[[float], Message]] = {
             mav.MAVLINK_MSG_ID_HEARTBEAT: self.heartbeat,
             mav.MAVLINK_MSG_ID_SYS_STATUS: self._sys_status,
@@ -56,6 +59,8 @@ class Telemetry:
             mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self._extended_sys_state,
             mav.MAVLINK_MSG_ID_AUTOPILOT_VERSION: self._autopilot_version,
         }
+        if vehicle.autopilot.is_ardupilot:
+            self._by_id[mav.MAVLINK_MSG_ID_TERRAIN_REPORT] = self._terrain_report
 
     def _boot_ms(self, now: float) -> int:
         if self._began is None:
@@ -79,6 +84,7 @@ class Telemetry:
             self._mission_current(now),
             self._home_position(now),
             self._extended_sys_state(now),
+            *self._terrain_messages(now),
         ]
 
     def heartbeat(self, now: float) -> Message:
@@ -161,6 +167,40 @@ class Telemetry:
             capabilities, version, 0, 0, 0, nothing, nothing, nothing, 0, 0, self._vehicle.sysid
         )
 
+    @property
+    def terrain(self) -> TerrainMemory | None:
+        """The terrain on board; None with TERRAIN_ENABLE 0, and for PX4."""
+        if not self._vehicle.autopilot.is_ardupilot or not self.parameters.value("TERRAIN_ENABLE"):
+            return None
+        spacing_m = int(self.parameters.value("TERRAIN_SPACING"))
+        if self._terrain is None or self._terrain.grid.spacing_m != spacing_m:
+            self._terrain = TerrainMemory(spacing_m)
+        return self._terrain
+
+    def _terrain_report(self, now: float) -> Message:
+        home, terrain = self._vehicle.home, self.terrain
+        if terrain is None:
+            return mav.MAVLink_terrain_report_message(home.lat_e7, home.lon_e7, 0, 0.0, 0.0, 0, 0)
+        return terrain.report(home.lat_e7, home.lon_e7, home.amsl_m)
+
+    def _terrain_messages(self, now: float) -> list[Message]:
+        """What a link has that carries the stream of terrain: it must have been asked for."""
+        terrain = self.terrain if self._tells_terrain else None
+        if terrain is None:
+            return []
+        terrain.look_around(self._vehicle.home, self._vehicle.items())
+        request = terrain.request(now)
+        return [self._terrain_report(now), *([] if request is None else [request])]
+
+    def _terrain_data(self, message: Message, now: float) -> list[Message]:
+        if self.terrain is not None:
+            self.terrain.take(message)
+        return []
+
+    def _terrain_check(self, message: Message, now: float) -> list[Message]:
+        terrain = self.terrain
+        return [] if terrain is None else [terrain.report(message.lat, message.lon, self._vehicle.home.amsl_m)]
+
     # sent on request
 
     def answer(self, message: Message, now: float) -> list[Message]:
@@ -176,6 +216,8 @@ class Telemetry:
             "SET_MODE": self._set_mode,
             "TIMESYNC": self._timesync,
             "PING": self._ping,
+            "TERRAIN_DATA": self._terrain_data,
+            "TERRAIN_CHECK": self._terrain_check,
             "AUTOPILOT_VERSION_REQUEST": lambda _, at: [self._autopilot_version(at)],
         }
         handler = handlers.get(message.get_type())
@@ -220,7 +262,11 @@ class Telemetry:
         if command == mav.MAV_CMD_GET_HOME_POSITION:
             return _ACCEPTED, [self._home_position(now)]
         if command == mav.MAV_CMD_SET_MESSAGE_INTERVAL:  # accepted, but everything is still sent once a second
-            return (_ACCEPTED if _whole(message.param1) in self._by_id else _DENIED), []
+            wanted = _whole(message.param1)
+            if wanted == mav.MAVLINK_MSG_ID_TERRAIN_REQUEST and vehicle.autopilot.is_ardupilot:
+                self._tells_terrain = message.param2 > 0.0
+                return _ACCEPTED, []
+            return (_ACCEPTED if wanted in self._by_id else _DENIED), []
         return _UNSUPPORTED, []
 
     def _update_flying(self) -> None:

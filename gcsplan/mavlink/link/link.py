@@ -122,6 +122,7 @@ class Link:
         self._next_heartbeat = clock()
         self._bad = self._unsigned = 0
         self.heard_systems: dict[int, float] = {}
+        self.background: list[PumpJob[None]] = []
         self.transport: Transport = transport or open_transport(self.endpoint)
         self.wait = wait
         self.prompt = PromptAnswers(self._writer, possible=isinstance(self.transport, Udp))
@@ -134,6 +135,9 @@ class Link:
 
     def close(self) -> None:
         """Close the socket or port."""
+        for job in self.background:
+            job.close()
+        self.background.clear()
         self.transport.close()
 
     @property
@@ -167,6 +171,11 @@ class Link:
         mine = self._channels.get(channel.sysid, [])
         if channel in mine:
             mine.remove(channel)
+
+    def serve(self, sysid: int, steps: Callable[[Channel], Steps[None]]) -> None:
+        """Run a task for a system beside all others of this link, whenever `pump` runs, until the link is closed."""
+        channel = self.channel(sysid)
+        self.background.append(PumpJob(channel, steps(channel)))
 
     def send(self, message: Any, to: Address, peer: Peer | None = None) -> bool:
         """Send a pymavlink message to ``peer``, by default where ``to`` was heard; False if no address is known.
@@ -288,7 +297,7 @@ class PumpJob(Generic[T]):
 
 
 def pump(jobs: Sequence[PumpJob[T]]) -> None:
-    """Run all ``jobs`` concurrently to their ends. Each job stores its own error."""
+    """Run all ``jobs`` concurrently to their ends, and what their links serve. Each job stores its own error."""
     if not jobs:
         return
     links = list({id(job.channel.link): job.channel.link for job in jobs}.values())
@@ -296,13 +305,17 @@ def pump(jobs: Sequence[PumpJob[T]]) -> None:
     try:
         while True:
             now = clock()
-            for job in jobs:
+            every: list[PumpJob[Any]] = [*jobs, *(job for link in links for job in link.background)]
+            for job in every:
                 if not job.ended and (job.channel.waits or now >= job.wake_at):
                     job.advance()
-            waiting = [job.wake_at for job in jobs if not job.ended]
-            if not waiting:
+            if all(job.ended for job in jobs):
                 return
-            due = min(*waiting, *(link.next_heartbeat for link in links), clock() + _IDLE_S)
+            due = min(
+                *(job.wake_at for job in every if not job.ended),
+                *(link.next_heartbeat for link in links),
+                clock() + _IDLE_S,
+            )
             if len(links) == 1 and links[0].answer(due):
                 continue
             links[0].wait([link.transport for link in links], due - clock())

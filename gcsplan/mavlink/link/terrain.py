@@ -1,0 +1,273 @@
+"""Terrain over a link: answer TERRAIN_REQUEST with TERRAIN_DATA, and compare what the vehicle reads with what it got.
+
+The vehicle asks for a block by its corner and for those of its 56 parts that it lacks, again every 2 s until it has
+them (AP_Terrain, `send_request`). A part of which one post is unknown is never sent: unknown is not ground. What is
+waiting to be sent is bounded, and sent at a pace that leaves room for the rest of the link.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import Any
+
+import numpy as np
+import pymavlink.dialects.v20.ardupilotmega as dialect
+
+from gcsplan.arrays import Floats
+from gcsplan.errors import GcsplanError
+from gcsplan.mavlink.link.link import Channel, Heard, Steps
+from gcsplan.mavlink.protocol.messages import Address
+from gcsplan.world.terrain_grid import ALL_PARTS, Block, Ground, PostHeights, TerrainGrid, known_parts, part_of
+
+LEAST_SPACING_M, MOST_SPACING_M = 5, 1000
+MOST_SPACINGS = 4
+MOST_WAITING = 64
+"""Blocks that wait to be sent; the vehicle asks again for those that are dropped. Its cache holds 12."""
+
+_PAUSE_S = 0.01
+_AT_ONCE = 4
+_SERIAL_SHARE = 0.25
+_BYTES_OF_PART = 43 + 12 + 13  # payload, frame, signature
+_ASK_AFTER_S, _ASK_EVERY_S, _ASKED_TIMES = 3.0, 5.0, 3
+_REQUESTS_EVERY_US = 500_000.0
+
+NEAR_ENOUGH_M = 0.5
+"""A vehicle that holds the grid that was sent reads it within this; more is other terrain."""
+
+
+@dataclass
+class Served:
+    """What was asked and answered so far. ``unknown``: blocks with parts that cannot be sent; ``strange``: requests
+    for blocks that are none of ArduPilot's."""
+
+    requests: int = 0
+    parts: int = 0
+    blocks: set[Block] = field(default_factory=set)
+    unknown: dict[Block, int] = field(default_factory=dict)
+    strange: int = 0
+    problems: list[str] = field(default_factory=list)
+
+    @property
+    def notes(self) -> list[str]:
+        """What a user should know."""
+        out = list(self.problems)
+        if self.unknown:
+            parts = sum(self.unknown.values())
+            first = min(self.unknown)
+            out.append(
+                f"{parts} parts of {len(self.unknown)} blocks that the vehicle asked for are not sent, because the "
+                f"terrain model does not know their ground (the first in {first.cell.name}): it asks for them again "
+                "and again, and does not arm a mission in the terrain frame before it has them; give a larger DEM"
+            )
+        if self.strange:
+            out.append(f"{self.strange} requests for terrain were for no block of ArduPilot's grid")
+        return out
+
+
+class TerrainService:
+    """The terrain that vehicles are given: heights by the spacing that they ask for, and what was given."""
+
+    def __init__(self, ground: Ground) -> None:
+        self._ground = ground
+        self._posts: dict[int, PostHeights] = {}
+        self.served: dict[int, Served] = {}
+
+    def posts(self, spacing_m: int) -> PostHeights:
+        """The heights of the grid with that spacing."""
+        if spacing_m not in self._posts:
+            while len(self._posts) >= MOST_SPACINGS:
+                del self._posts[next(iter(self._posts))]
+            self._posts[spacing_m] = PostHeights(TerrainGrid(spacing_m), self._ground)
+        return self._posts[spacing_m]
+
+    def steps(self, channel: Channel) -> Steps[None]:
+        """The endless task that answers one vehicle. See `Link.serve`."""
+        return _Answers(channel, self, self.served.setdefault(channel.sysid, Served())).steps()
+
+
+@dataclass
+class _Waiting:
+    """Parts of a block that are to be sent."""
+
+    to: Heard
+    block: Block
+    heights: Floats
+    bits: list[int]
+
+
+class _Answers:
+    def __init__(self, channel: Channel, service: TerrainService, served: Served) -> None:
+        self._channel, self._service, self._served = channel, service, served
+        self._queue: OrderedDict[tuple[int, int, int], _Waiting] = OrderedDict()
+        endpoint = channel.link.endpoint
+        baud = endpoint.baud if endpoint.kind == "serial" else 0
+        self._at_once = 1 if baud else _AT_ONCE
+        self._pause_s = 10.0 * _BYTES_OF_PART / (_SERIAL_SHARE * baud) if baud else _PAUSE_S
+
+    def steps(self) -> Steps[None]:
+        clock = self._channel.link.clock
+        ask_at, asked, send_at = clock() + _ASK_AFTER_S, 0, -math.inf
+        vehicle: Heard | None = None
+        while True:
+            for heard in self._channel.take():
+                kind = "" if heard.late else heard.message.get_type()
+                if kind == "HEARTBEAT" and heard.message.autopilot == dialect.MAV_AUTOPILOT_ARDUPILOTMEGA:
+                    vehicle = heard
+                elif kind == "TERRAIN_REQUEST":
+                    asked = _ASKED_TIMES  # it sends them by itself
+                    self._note(heard)
+            now = clock()
+            if now >= ask_at and asked < _ASKED_TIMES and vehicle is not None:
+                _ask_for_requests(self._channel, vehicle)
+                asked, ask_at = asked + 1, now + _ASK_EVERY_S
+            if self._queue and now >= send_at:
+                self._send()
+                send_at = now + self._pause_s
+            yield send_at if self._queue else max(ask_at, now + 0.1) if asked < _ASKED_TIMES else math.inf
+
+    def _note(self, heard: Heard) -> None:
+        m, served = heard.message, self._served
+        served.requests += 1
+        spacing = int(m.grid_spacing)
+        block = None
+        if LEAST_SPACING_M <= spacing <= MOST_SPACING_M:
+            posts = self._service.posts(spacing)
+            block = posts.grid.block_at(m.lat, m.lon)
+        if block is None:
+            served.strange += 1
+            return
+        try:
+            heights = posts.block(block)
+        except GcsplanError as why:  # terrain that cannot be loaded is unknown
+            if why.message not in served.problems:
+                served.problems.append(why.message)
+            return
+        known = known_parts(heights)
+        wanted = int(m.mask) & ALL_PARTS
+        missing = wanted & ~known
+        if missing:
+            served.unknown[block] = missing.bit_count()
+        bits = [bit for bit in range(ALL_PARTS.bit_length()) if wanted & known & (1 << bit)]
+        if bits:
+            self._queue[m.lat, m.lon, spacing] = _Waiting(heard, block, heights, bits)
+        while len(self._queue) > MOST_WAITING:
+            self._queue.popitem(last=False)
+
+    def _send(self) -> None:
+        for _ in range(self._at_once):
+            if not self._queue:
+                return
+            (lat, lon, spacing), first = next(iter(self._queue.items()))
+            bit = first.bits.pop(0)
+            data = [int(h) for h in part_of(first.heights, bit)]
+            message = dialect.MAVLink_terrain_data_message(lat, lon, spacing, bit, data)
+            self._channel.link.send(message, first.to.source, first.to.peer)
+            self._served.parts += 1
+            self._served.blocks.add(first.block)
+            if not first.bits:
+                del self._queue[lat, lon, spacing]
+
+
+def _ask_for_requests(channel: Channel, vehicle: Heard) -> None:
+    """Ask for TERRAIN_REQUEST and TERRAIN_REPORT, which a link without streams does not carry."""
+    interval = dialect.MAV_CMD_SET_MESSAGE_INTERVAL
+    for kind in (dialect.MAVLINK_MSG_ID_TERRAIN_REQUEST, dialect.MAVLINK_MSG_ID_TERRAIN_REPORT):
+        message = dialect.MAVLink_command_long_message(
+            *vehicle.source, interval, 0, kind, _REQUESTS_EVERY_US, 0, 0, 0, 0, 0
+        )
+        channel.link.send(message, vehicle.source, vehicle.peer)
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """What the vehicle reads at places, beside what it was sent.
+
+    ``off_m`` (N,): its height less ours, NaN where it has none. ``pending``, ``loaded``: parts, as it last said.
+    """
+
+    places_e7: tuple[tuple[int, int], ...]
+    off_m: Floats
+    pending: int
+    loaded: int
+
+    @property
+    def read(self) -> int:
+        """At how many places it has a height."""
+        return int(np.count_nonzero(~np.isnan(self.off_m)))
+
+    @property
+    def worst_m(self) -> float:
+        """The largest difference, m; NaN if it has no height anywhere."""
+        return float(np.nanmax(np.abs(self.off_m))) if self.read else math.nan
+
+    @property
+    def worst_at(self) -> tuple[float, float] | None:
+        """Where that is, degrees."""
+        if not self.read:
+            return None
+        lat, lon = self.places_e7[int(np.nanargmax(np.abs(self.off_m)))]
+        return lat / 1e7, lon / 1e7
+
+
+_OUTSTANDING = 12
+_BLOCKS_AT_ONCE = 2
+"""The vehicle keeps 12 blocks and nine of them are those around it: asked for more, it would drop one for the other."""
+_ANSWER_S, _UNREAD_S = 0.4, 0.5
+
+
+def compare_steps(
+    channel: Channel,
+    to: Address,
+    places_e7: Sequence[tuple[int, int]],
+    posts: PostHeights,
+    *,
+    patience_s: float,
+    progress: Callable[[int, int], None] | None = None,
+) -> Steps[Compared]:
+    """Ask with TERRAIN_CHECK what the vehicle reads at each place, until it has all, or nothing new for so long.
+
+    The places are asked block by block, for its cache holds few blocks; a service on the same link sends what it lacks.
+    """
+    clock = channel.link.clock
+    at = np.array(places_e7, float).reshape(-1, 2)
+    ours = posts.amsl(at[:, 0], at[:, 1])
+    block_of = {place: posts.grid.blocks_over(*place)[0] for place in places_e7}
+    left: OrderedDict[tuple[int, int], list[int]] = OrderedDict()  # one answer serves a place that is given twice
+    for k in sorted(range(len(places_e7)), key=lambda k: block_of[places_e7[k]]):
+        left.setdefault(places_e7[k], []).append(k)
+    theirs = np.full(len(places_e7), np.nan)
+    ask_at: dict[tuple[int, int], float] = {}
+    pending = loaded = 0
+    moved_at = clock()
+    while left and clock() < moved_at + patience_s:
+        now = clock()
+        soon = list(islice(left, _OUTSTANDING))
+        blocks = list(dict.fromkeys(block_of[place] for place in soon))[:_BLOCKS_AT_ONCE]
+        for place in soon:
+            if block_of[place] in blocks and now >= ask_at.get(place, -math.inf):
+                channel.send(dialect.MAVLink_terrain_check_message(*place), to)
+                ask_at[place] = now + _ANSWER_S
+        yield now + _ANSWER_S / 4
+        for heard in channel.take():
+            m: Any = heard.message
+            if heard.late or heard.source != to or m.get_type() != "TERRAIN_REPORT":
+                continue
+            moved_at = clock() if (m.loaded, m.pending) != (loaded, pending) else moved_at
+            pending, loaded = int(m.pending), int(m.loaded)
+            place = (int(m.lat), int(m.lon))
+            if place not in left:
+                continue
+            if m.spacing == 0:
+                ask_at[place] = clock() + _UNREAD_S
+                continue
+            if m.spacing == posts.grid.spacing_m and math.isfinite(m.terrain_height):
+                theirs[left[place]] = m.terrain_height
+            del left[place]
+            moved_at = clock()
+            if progress:
+                progress(len(places_e7) - len(left), len(places_e7))
+    return Compared(tuple(places_e7), theirs - ours, pending, loaded)
