@@ -1,6 +1,6 @@
 """ArduPilot's side of the mission protocol: three independent lists, requested with the legacy MISSION_REQUEST.
 
-Source: ArduPilot 4.6 and 4.7 ``MissionItemProtocol.cpp`` with its three subclasses, ``AP_Mission.cpp`` and
+Source: ArduPilot 4.6.2 and 4.7 ``MissionItemProtocol.cpp`` with its three subclasses, ``AP_Mission.cpp`` and
 ``GCS_Common.cpp``; `firmware` states what differs between the two. `board` states the rules of the tables.
 """
 
@@ -238,9 +238,6 @@ class _ArduPilotList:
             return self._past_the_end(message, sender, len(stored))
         if not message.legacy:
             return [(sender, Item(message.seq, item, self._type))]
-        if self._type != MISSION:
-            # ArduPilot sends degrees times 1e7 in these fields, which is no place on Earth; 0, 0 stands for that here.
-            item = MissionItem(item.command, item.frame, item.params, z=item.z, autocontinue=item.autocontinue)
         return [(sender, LegacyItem(message.seq, through_float(item), self._type))]
 
     def _past_the_end(self, message: Request, sender: Address, count: int) -> Out:
