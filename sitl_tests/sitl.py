@@ -29,6 +29,11 @@ from sitl_tests.peers import free_port
 VARIABLE = "GCSPLAN_SITL"
 SPEEDUP = 4.0
 _MODELS = {Autopilot.ARDUCOPTER: "+", Autopilot.ARDUPLANE: "plane"}
+_DEFAULTS = {
+    Autopilot.ARDUCOPTER: {},
+    # It stands still, and does not renew its home all the time.
+    Autopilot.ARDUPLANE: {"SERVO3_MIN": 1000, "RC3_MIN": 1000, "RC3_TRIM": 1000, "HOME_RESET_ALT": -1},
+}
 _HOME = "36.6000123,-84.3799877,371.25,90"
 _PORTS = ("--base-port", "--rc-in-port", "--irlock-port", "--sim-port-in", "--sim-port-out")
 _START_S, _READY_S, _STOP_S, _ANSWER_S = 20.0, 120.0, 10.0, 10.0
@@ -72,8 +77,11 @@ def running(autopilot: Autopilot, directory: Path) -> Iterator[Link]:
         return
     ports = [free_port(socket.SOCK_STREAM) for _ in _PORTS]
     options = [word for name, port in zip(_PORTS, ports, strict=True) for word in (name, str(port))]
+    defaults = directory / "defaults.parm"
+    defaults.write_text("".join(f"{name} {value}\n" for name, value in _DEFAULTS[autopilot].items()), encoding="ascii")
+    options += ["--model", _MODELS[autopilot], "--speedup", str(SPEEDUP), "--home", _HOME, "--defaults", str(defaults)]
     process = subprocess.Popen(
-        [str(program.resolve()), "--model", _MODELS[autopilot], "--speedup", str(SPEEDUP), "--home", _HOME, *options],
+        [str(program.resolve()), *options],
         cwd=directory, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     try:

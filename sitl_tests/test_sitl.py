@@ -206,7 +206,7 @@ def test_another_mission_on_board_is_told_apart(real: Real) -> None:
 def test_a_mission_is_cleared_and_the_home_stays(real: Real) -> None:
     assert upload_mission(real.link, every_command(real.home, real.autopilot), options=UNCHECKED).verified
     assert clear_mission(real.link, SYSID, options=UNCHECKED).verified
-    # Home alone is left; since 4.7 a plane, which renews its home until it is armed, counts it as an item.
+    # Since 4.7 a plane, which renews its home until it is armed, may count it as an item again.
     assert len(download_items(real.link, SYSID, options=UNCHECKED)) <= (real.autopilot is PLANE)
 
 

@@ -71,6 +71,8 @@ class ArduPilotServer:
 class _ArduPilotList:
     ASK_AGAIN_S = 1.0
     GIVE_UP_S = 8.0
+    HOME_RENEWED_S = 5.0
+    """At most so long after clearing its mission, a plane that is not armed stores its home in it again."""
 
     def __init__(self, mission_type: int, board: Board, faults: Faults, firmware: Firmware, plane: bool) -> None:
         self._type, self._board, self._faults, self._plane = mission_type, board, faults, plane
@@ -97,6 +99,7 @@ class _ArduPilotList:
         self._partner = Address(0, 0)
         self._count = self._next = 0
         self._asked_at = self._heard_at = 0.0
+        self._emptied_at: float | None = None
         self._new_fence: list[MissionItem] = []
 
     def receive(self, message: MissionMessage, sender: Address, now: float) -> Out:
@@ -106,11 +109,20 @@ class _ArduPilotList:
     @property
     def deadline(self) -> float | None:
         if self._phase is not Phase.RECEIVING:
-            return None
+            return self._home_due
         return min(self._asked_at + self.ASK_AGAIN_S, self._heard_at + self.GIVE_UP_S)
+
+    @property
+    def _home_due(self) -> float | None:
+        renews = self._plane and self._type == MISSION and self._firmware.has(KEEPS_HOME) and not self._board.armed
+        if not renews or self._emptied_at is None or self._board.lists[MISSION]:
+            return None
+        return self._emptied_at + self.HOME_RENEWED_S
 
     def on_timer(self, now: float) -> Out:
         if self._phase is not Phase.RECEIVING:
+            if self._home_due is not None and now >= self._home_due:
+                self._board.lists[MISSION] = [storage.home_item(self._board.home)]
             return []
         if now >= self._heard_at + self.GIVE_UP_S:
             self._phase = Phase.IDLE  # items that were replaced stay replaced
@@ -138,6 +150,7 @@ class _ArduPilotList:
             del stored[message.count :]
         self._partner, self._count, self._next, self._heard_at = sender, message.count, 0, now
         if message.count == 0:
+            self._emptied_at = now
             return self._finish(sender)
         self._phase = Phase.RECEIVING
         return self._ask(now)
@@ -211,10 +224,7 @@ class _ArduPilotList:
         if self._type == MISSION and self._board.armed and self._board.flying_mission:
             return [(sender, self._ack(ERROR))]
         self._board.lists[self._type] = []
-        if self._plane and self._type == MISSION and self._firmware.has(KEEPS_HOME):
-            self._board.lists[MISSION] = [
-                storage.home_item(self._board.home)
-            ]  # a disarmed plane renews it all the time
+        self._emptied_at = now
         return [(sender, self._ack(ACCEPTED))]
 
     def _clear_while_receiving(self, message: ClearAll, sender: Address, now: float) -> Out:

@@ -37,7 +37,8 @@ COUNTS_EVERY_LIST = Change(
 KEEPS_HOME = Change(
     ARDUPILOT, (4, 7), "home in an empty mission",
     "an empty mission has no items",
-    "home is item 0 as soon as it is known; a single item sent to an empty mission is stored behind it, as item 1",
+    "home is item 0 as soon as it is known, on a plane again 5 s after the mission was cleared; a single item sent to "
+    "an empty mission is stored behind it, as item 1",
 )  # fmt: skip
 KEEPS_RADII = Change(
     ARDUPILOT, (4, 7), "radius of a fence circle",

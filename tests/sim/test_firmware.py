@@ -6,7 +6,7 @@ import pytest
 
 from gcsplan.errors import UsageError
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, MissionItem
-from gcsplan.mavlink.protocol.messages import Ack, ClearAll, Count, Item, Request, RequestList
+from gcsplan.mavlink.protocol.messages import Ack, ClearAll, Count, Item, MissionMessage, Request, RequestList
 from gcsplan.sim.firmware import CHANGES, KNOWN, NAMES_UNITS, Change, Firmware, firmware_of, firmwares
 from gcsplan.sim.telemetry import Telemetry
 from gcsplan.sim.vehicle import LoopbackVehicle
@@ -54,16 +54,21 @@ def test_farther_past_the_end_of_a_fence_is_a_bad_sequence_in_both() -> None:
 
 
 @pytest.mark.parametrize(
-    ("autopilot", "version", "new", "cleared"),
+    ("autopilot", "version", "new", "later"),
     [(COPTER, "4.6", 0, 0), (PLANE, "4.6", 0, 0), (COPTER, "4.7", 1, 0), (PLANE, "4.7", 1, 1)],
 )
-def test_home_in_an_empty_mission(autopilot: Autopilot, version: str, new: int, cleared: int) -> None:
+@pytest.mark.parametrize("emptying", [ClearAll(), Count(0)])
+def test_home_in_an_empty_mission(
+    autopilot: Autopilot, version: str, new: int, later: int, emptying: MissionMessage
+) -> None:
     vehicle = a_vehicle(autopilot, version)
     assert say(vehicle, RequestList()) == [Count(new)]
     assert upload(vehicle, [waypoint(n) for n in range(3)]) == Ack(0)
     assert [i.z for i in download(vehicle)[1:]] == pytest.approx([61.0, 62.0], abs=0.01)
-    assert say(vehicle, ClearAll()) == [Ack(0)]
-    assert say(vehicle, RequestList()) == [Count(cleared)]
+    assert say(vehicle, emptying, 10.0) == [Ack(0)]
+    assert say(vehicle, RequestList(), 14.9) == [Count(0)]
+    assert vehicle.deadline == (15.0 if later else None)
+    assert say(vehicle, RequestList(), 15.0) == [Count(later)]
 
 
 def test_a_single_item_sent_to_an_empty_mission_is_stored_behind_home_since_4_7() -> None:
