@@ -14,9 +14,9 @@ from gcsplan.cli.options import JsonOption
 from gcsplan.errors import InputError, UsageError
 
 if TYPE_CHECKING:
-    from gcsplan.dem.cells import Cell
     from gcsplan.dem.fetch import Fetched, Progress
     from gcsplan.dem.sources import Source
+    from gcsplan.world.cell import Cell
 
 dem_app = typer.Typer(help="Terrain from published sources.", no_args_is_help=True)
 
@@ -109,9 +109,9 @@ def _source(name: str | None) -> Source:
 def _of_mission(path: Path, wanted: str | None) -> tuple[Source, Sequence[Cell]]:
     """The source that a mission names, and the tiles that it needs: all of them, or those that are missing."""
     from gcsplan.dem.cache import MissingTiles
-    from gcsplan.dem.cells import cell_of
     from gcsplan.dem.sources import SOURCES
     from gcsplan.mission_file import load_mission
+    from gcsplan.world.cell import cell_of
 
     try:
         inputs = load_mission(path).inputs
@@ -153,7 +153,8 @@ def _around(text: str, radius_km: float) -> Sequence[Cell]:
 
 
 def _named(text: str) -> Sequence[Cell]:
-    from gcsplan.dem.cells import MOST_CELLS, cell_of
+    from gcsplan.dem.cells import MOST_CELLS
+    from gcsplan.world.cell import cell_of
 
     names = [name.strip().upper() for name in text.split(",") if name.strip()]
     cells = [cell_of(name) for name in names]

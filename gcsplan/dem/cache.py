@@ -14,9 +14,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
-from gcsplan.dem.cells import Cell, names_of
+from gcsplan.dem.cells import names_of
 from gcsplan.dem.sources import Source
 from gcsplan.errors import InputError, Problem
+from gcsplan.world.cell import Cell
 
 CACHE_VARIABLE = "GCSPLAN_DEM_CACHE"
 State = Literal["tile", "sea", "absent"]

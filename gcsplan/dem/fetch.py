@@ -17,10 +17,10 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from gcsplan.dem.cache import Cache, Record, State, text_of
-from gcsplan.dem.cells import Cell
 from gcsplan.dem.download import Patience, Unreachable, download, is_address
 from gcsplan.dem.sources import MOST_LIST_BYTES, WITNESS, Source
 from gcsplan.errors import GcsplanError, InputError, LinkError
+from gcsplan.world.cell import Cell
 from gcsplan.world.raster import Raster, open_raster, sha256_of
 
 try:

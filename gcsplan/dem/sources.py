@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from gcsplan.dem.cells import Cell
+from gcsplan.world.cell import Cell
 
 Kind = Literal["surface", "bare"]
 

@@ -1,4 +1,4 @@
-"""Opens the terrain that a mission states: files, flat ground, or a published source by its name.
+"""Opens the terrain that a mission states: rasters, ArduPilot's .DAT files, flat ground, or a published source.
 
 A source's tiles come from the cache alone, and a mission uses those that its first window needs: the same ones
 whatever else the cache holds, so that a plan does not change when another mission's tiles are fetched.
@@ -15,11 +15,14 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.dem.cache import Cache, Record
-from gcsplan.dem.cells import Cell, cells_in, names_of
+from gcsplan.dem.cells import cells_in, names_of
+from gcsplan.dem.dat_terrain import DatTerrain, dat_files
 from gcsplan.dem.sources import SOURCES, Source
 from gcsplan.errors import InputError
+from gcsplan.world.cell import Cell
 from gcsplan.world.datum import VerticalDatum, take_apart
 from gcsplan.world.frame import Frame
+from gcsplan.world.mosaic import Mosaic
 from gcsplan.world.raster import Raster, open_raster, sha256_of
 from gcsplan.world.terrain import Box, OpenTerrain, Terrain, TerrainSpec, open_terrain, place, terrain_of
 
@@ -36,7 +39,8 @@ def open_dem(spec: TerrainSpec, *, where: str) -> OpenTerrain:
                 f"sea counts with a published source, which lists its tiles: dem: {' or '.join(SOURCES)}",
                 where=place(where, "sea"),
             )
-        return open_terrain(spec, where=where)
+        paths = dat_files(spec.dem, where=place(where, "dem"))
+        return DatTerrain(paths, spec, where=where) if paths else open_terrain(spec, where=where)
     if len(spec.dem) > 1:
         raise InputError(f"{named[0]} stands alone: no other tile beside it", where=place(where, "dem"))
     for key in ("crs", "height_unit"):
@@ -67,7 +71,7 @@ class _SourceTerrain:
         found = [tiles[c] if c in tiles else _sea(self._source, c, sample) for c in records if c in tiles or c in sea]
         spec = replace(self._spec, dem=(self._source.name,))
         info, notes = _told(self._source, records, sea, absent)
-        return terrain_of(found, spec, where=self._where, info=info, notes=notes)
+        return terrain_of(Mosaic(found, where=at), spec, where=self._where, info=info, notes=notes)
 
 
 def _told(

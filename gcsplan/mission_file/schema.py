@@ -100,7 +100,7 @@ class TerrainKeys(Keys):
         ]
         | None
     ) = None
-    """A raster (.tif, .hgt, .hgt.zip, .asc), a list of tiles, `sample:jacksboro`, `copernicus-glo30` or `srtm`."""
+    """A raster (.tif, .hgt, .hgt.zip, .asc), ArduPilot's .DAT (a file or folder), a list, a sample or a source."""
     vertical_datum: Text | None = None
     """The zero of heights: `EGM96`, `NAVD88`, `WGS84` (ellipsoidal), …; required if the raster does not state it."""
     geoid_grid: Text | None = None

@@ -103,7 +103,7 @@ def require_file(path: Path, *, where: str) -> None:
     """Raise InputError unless ``path`` is a file that can be read and is not empty."""
     try:
         if path.is_dir():
-            raise InputError(f"{path} is a folder; give a file", where=where)
+            raise InputError(f"{path} is a folder without .DAT files; give a file", where=where)
         if not path.is_file():
             raise InputError(absent(path), where=where)
         with path.open("rb") as file:

@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Literal, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from gcsplan.arrays import Indices
+from gcsplan.arrays import Floats, Indices
 from gcsplan.errors import InputError
 from gcsplan.world.datum import VerticalDatum, vertical_datum
 from gcsplan.world.frame import FARTHEST_M, Frame
@@ -92,6 +93,45 @@ class Terrain(OpenTerrain, Protocol):
         """
 
 
+class Tile(Protocol):
+    """What reports say of one file, and the datum that it states."""
+
+    @property
+    def name(self) -> str:
+        """The file's name."""
+
+    @property
+    def vertical(self) -> VerticalDatum | None:
+        """What its heights are above; None if it does not say."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know of it."""
+
+    def sha256(self) -> str:
+        """Its hash."""
+
+
+class Tiles(Protocol):
+    """Files as one grid of heights: a `Mosaic` of rasters, or posts of another kind."""
+
+    @property
+    def rasters(self) -> Sequence[Tile]:
+        """The files."""
+
+    def covers(self, lat_deg: float, lon_deg: float) -> bool:
+        """See `OpenTerrain.covers`."""
+
+    def extent(self, frame: Frame, box: Box) -> Box:
+        """See `Terrain.extent`."""
+
+    def window(self, frame: Frame, box: Box, *, spare_m: float = 0.0, most_cells: int | None = None) -> Window:
+        """See `Mosaic.window`."""
+
+    def node_degrees(self, window: Window, cols: ArrayLike, rows: ArrayLike) -> tuple[Floats, Floats]:
+        """See `Mosaic.node_degrees`."""
+
+
 def load_terrain(spec: TerrainSpec, frame: Frame, box: Box, *, where: str) -> Surface:
     """The surface over ``box`` (west, south, east, north, plane metres); ``where`` names the spec in messages.
 
@@ -107,22 +147,23 @@ def open_terrain(spec: TerrainSpec, *, where: str) -> Terrain:
         raise InputError("give either `dem` or `flat_m` and `peaks`", where=where)
     if not spec.dem:
         return _LocalTerrain(spec, where)
-    return terrain_of(_rasters(spec, place(where, "dem")), spec, where=where)
+    at = place(where, "dem")
+    return terrain_of(Mosaic(_rasters(spec, at), where=at), spec, where=where)
 
 
 def terrain_of(
-    rasters: Sequence[Raster],
+    tiles: Tiles,
     spec: TerrainSpec,
     *,
     where: str,
     info: Mapping[str, object] | None = None,
     notes: Sequence[str] = (),
 ) -> Terrain:
-    """Terrain of tiles that are open; ``spec`` says the rest, ``info`` and ``notes`` go with its surfaces too.
+    """Terrain of tiles on one grid; ``spec`` says the rest, ``info`` and ``notes`` go with its surfaces too.
 
     Raises InputError.
     """
-    return _RasterTerrain(rasters, spec, where, info or {}, notes)
+    return _RasterTerrain(tiles, spec, where, info or {}, notes)
 
 
 def place(where: str, key: str) -> str:
@@ -133,7 +174,7 @@ def place(where: str, key: str) -> str:
 class _RasterTerrain:
     def __init__(
         self,
-        rasters: Sequence[Raster],
+        tiles: Tiles,
         spec: TerrainSpec,
         where: str,
         info: Mapping[str, object],
@@ -141,8 +182,10 @@ class _RasterTerrain:
     ) -> None:
         self._spec, self._where = spec, where
         self._info, self._notes = info, notes
-        self._mosaic = Mosaic(rasters, where=place(where, "dem"))
-        self._datum = vertical_datum(spec.vertical_datum, rasters[0].vertical, where=place(where, "vertical_datum"))
+        self._mosaic = tiles
+        self._datum = vertical_datum(
+            spec.vertical_datum, tiles.rasters[0].vertical, where=place(where, "vertical_datum")
+        )
         self._geoid = _geoid(spec, self._datum, where)
         self._canopy: Mosaic | None = None
         if spec.canopy is not None:
@@ -300,7 +343,7 @@ def _geoid(spec: TerrainSpec, datum: VerticalDatum, where: str) -> GeoidGrid | N
     return None
 
 
-def _take_off_geoid(window: Window, geoid: GeoidGrid, mosaic: Mosaic) -> None:
+def _take_off_geoid(window: Window, geoid: GeoidGrid, mosaic: Tiles) -> None:
     """Lower every node, in place, by the geoid's height above the ellipsoid there."""
     rows, cols = window.heights_m.shape
     size = window.grid.metres_per_cell(*window.grid.centre)

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from gcsplan.dem.cells import Cell
+from gcsplan.world.cell import Cell
 from gcsplan.world.model_words import SURFACE_DEM
 from tests.support.tiles import Served, serving
 

@@ -18,11 +18,12 @@ import numpy as np
 import pytest
 
 from gcsplan.dem.cache import Cache, cache_folder
-from gcsplan.dem.cells import Cell, cell_of, cells_in
+from gcsplan.dem.cells import cells_in
 from gcsplan.dem.download import Patience
 from gcsplan.dem.fetch import Fetch, Fetched
 from gcsplan.dem.sources import GLO30, GLO90, SRTM, Source
 from gcsplan.errors import InputError, LinkError
+from gcsplan.world.cell import Cell, cell_of
 from gcsplan.world.frame import Frame
 from tests.support.tiles import Served, heights_of, send, serving, tile
 

@@ -11,12 +11,13 @@ import pytest
 
 from gcsplan.arrays import Floats
 from gcsplan.dem.cache import Cache, MissingTiles, Record, text_of
-from gcsplan.dem.cells import Cell, cells_in
+from gcsplan.dem.cells import cells_in
 from gcsplan.dem.sources import GLO30, SRTM, Source
 from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError
 from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.from_options import OpenWorld, WorldOptions
+from gcsplan.world.cell import Cell
 from gcsplan.world.frame import Frame
 from gcsplan.world.raster import sha256_of
 from gcsplan.world.surface import Surface

@@ -16,8 +16,8 @@ import rasterio
 from rasterio.transform import Affine
 
 from gcsplan.arrays import Floats
-from gcsplan.dem.cells import Cell
 from gcsplan.dem.sources import GLO30, GLO90, SRTM, Source
+from gcsplan.world.cell import Cell
 
 ROWS = 36
 """Rows of a tile here: a hundredth of a real one's."""

@@ -1,0 +1,167 @@
+"""ArduPilot's terrain files: N36W085.DAT holds the blocks of one degree tile, each in a record of 2048 bytes.
+
+The layout is that of AP_Terrain (`grid_block`, `seek_offset`): little-endian, a CRC-16 over the block, and the record's
+place in the file given by the block's place in the tile. A record of zeros is a block that nobody has filled.
+"""
+
+from __future__ import annotations
+
+import binascii
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gcsplan.arrays import Floats
+from gcsplan.errors import InputError
+from gcsplan.figures import counted
+from gcsplan.world.cell import Cell, cell_of
+from gcsplan.world.raster import require_file
+from gcsplan.world.terrain_grid import (
+    ALL_PARTS,
+    PART,
+    PARTS,
+    POSTS,
+    SAME_CORNER_E7,
+    Block,
+    TerrainGrid,
+    known_parts,
+)
+
+RECORD_BYTES = 2048
+SUFFIX = ".DAT"
+VERSION = 1
+MOST_BYTES = 256 * 2**20
+"""A tile with posts every 15 m has less."""
+
+RECORD = np.dtype([
+    ("bitmap", "<u8"), ("lat", "<i4"), ("lon", "<i4"), ("crc", "<u2"), ("version", "<u2"), ("spacing", "<u2"),
+    ("height", "<i2", POSTS), ("north", "<u2"), ("east", "<u2"), ("lon_degrees", "<i2"), ("lat_degrees", "i1"),
+    ("spare", "V227"),
+])  # fmt: skip
+CRC_BYTES = RECORD_BYTES - 227
+_CRC_AT = slice(16, 18)
+
+
+@dataclass(frozen=True, eq=False)
+class DatFile:
+    """One file: its tile, its spacing, and the heights of its good blocks (NaN for parts that are not known).
+
+    ``left_out``: how many blocks are not used, by the reason.
+    """
+
+    name: str
+    cell: Cell
+    grid: TerrainGrid
+    blocks: Mapping[Block, Floats]
+    left_out: Mapping[str, int]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know of it."""
+        return tuple(
+            f"{self.name}: {counted(n, 'block')} not used: {why}; the ground there is unknown"
+            for why, n in self.left_out.items()
+        )
+
+
+def file_name(cell: Cell) -> str:
+    """Such as ``N36W085.DAT``."""
+    return cell.name + SUFFIX
+
+
+def is_dat(path: Path) -> bool:
+    """Whether a name is that of a terrain file of ArduPilot."""
+    return path.suffix.upper() == SUFFIX
+
+
+def packed(grid: TerrainGrid, cell: Cell, blocks: Mapping[Block, Floats]) -> bytes:
+    """The bytes of a file with ``blocks``, of one tile; blocks of which nothing is known are left out."""
+    known = {block: heights for block, heights in blocks.items() if known_parts(heights)}
+    if not known:
+        return b""
+    row = grid.blocks_a_row(cell)
+    last = max(block.north * row + block.east for block in known)
+    out = np.zeros(last + 1, RECORD)
+    for block, heights in known.items():
+        record = out[block.north * row + block.east]
+        record["bitmap"], record["version"], record["spacing"] = known_parts(heights), VERSION, grid.spacing_m
+        record["lat"], record["lon"] = grid.corner_e7(block)
+        record["height"] = np.where(np.isnan(heights), 0.0, heights)
+        record["north"], record["east"] = block.north, block.east
+        record["lat_degrees"], record["lon_degrees"] = cell.lat_deg, cell.lon_deg
+        record["crc"] = crc_of(record.tobytes())
+    return out.tobytes()
+
+
+def crc_of(record: bytes) -> int:
+    """The CRC-16 (XMODEM) of a record, its own field counted as zero."""
+    data = bytearray(record[:CRC_BYTES])
+    data[_CRC_AT] = b"\0\0"
+    return binascii.crc_hqx(bytes(data), 0)
+
+
+def read_dat(path: Path, *, where: str) -> DatFile:
+    """Read a file. Blocks that the autopilot would not take are left out. Raises InputError if none is left."""
+    require_file(path, where=where)
+    size = path.stat().st_size
+    cell = cell_of(path.stem.upper())
+    if cell is None:
+        raise InputError(
+            f"{path} must be named after its south-west corner, as N36W085.DAT, given {path.name}", where=where
+        )
+    if size > MOST_BYTES or size % RECORD_BYTES:
+        raise InputError(
+            f"{path} is no terrain file of ArduPilot: {size} bytes, wanted records of {RECORD_BYTES}, "
+            f"{MOST_BYTES >> 20} MB at most",
+            where=where,
+        )
+    try:
+        data = path.read_bytes()
+    except OSError as why:
+        raise InputError(f"{path} cannot be read: {why.strerror or why}", where=where) from None
+    records = np.frombuffer(data, RECORD)
+    used = [int(k) for k in np.flatnonzero(records["bitmap"] & np.uint64(ALL_PARTS))]
+    spacings = Counter(int(records["spacing"][k]) for k in used)
+    left_out: Counter[str] = Counter()
+    if not used:
+        raise InputError(f"{path} holds no block of terrain: copy it after the autopilot has filled it", where=where)
+    grid = TerrainGrid(max(spacings, key=lambda s: (spacings[s], -s)))
+    blocks: dict[Block, Floats] = {}
+    for k in used:
+        fault = _fault(records, k, data, grid, cell) if grid.spacing_m > 0 else "its spacing is 0"
+        if fault:
+            left_out[fault] += 1
+            continue
+        block = Block(cell, int(records["north"][k]), int(records["east"][k]))
+        blocks[block] = _heights(records[k])
+    if not blocks:
+        raise InputError(f"{path} holds no good block of terrain: {next(iter(left_out))}", where=where)
+    return DatFile(path.name, cell, grid, blocks, dict(left_out))
+
+
+def _fault(records: NDArray[np.void], k: int, data: bytes, grid: TerrainGrid, cell: Cell) -> str:
+    """Why the autopilot does not take a record; empty if it does."""
+    record = records[k]
+    if int(record["crc"]) != crc_of(data[k * RECORD_BYTES : (k + 1) * RECORD_BYTES]):
+        return "its checksum is wrong"
+    if int(record["version"]) != VERSION:
+        return f"its format is version {int(record['version'])}, wanted {VERSION}"
+    if int(record["spacing"]) != grid.spacing_m:
+        return f"its spacing is {int(record['spacing'])} m, that of most is {grid.spacing_m} m"
+    block = Block(cell, int(record["north"]), int(record["east"]))
+    lat, lon = grid.corner_e7(block)
+    stated = (int(record["lat_degrees"]), int(record["lon_degrees"]))
+    misplaced = max(abs(lat - int(record["lat"])), abs(lon - int(record["lon"]))) > SAME_CORNER_E7
+    if stated != cell or misplaced or k != block.north * grid.blocks_a_row(cell) + block.east:
+        return "it lies elsewhere than its corner says (older tools placed blocks otherwise)"
+    return ""
+
+
+def _heights(record: np.void) -> Floats:
+    bits = (int(record["bitmap"]) >> np.arange(PARTS[0] * PARTS[1], dtype=np.uint64).astype(object)) & 1
+    known = np.kron(np.array(bits, bool).reshape(PARTS), np.ones((PART, PART), bool))
+    return np.where(known, record["height"].astype(float), np.nan)

@@ -1,0 +1,324 @@
+"""Terrain out of ArduPilot's .DAT files: the posts of the tile under the mission, as they are.
+
+The surface lies on the post grid of the tile that holds the middle of the mission, so that inside this tile its heights
+are those that the autopilot interpolates. A neighbouring tile has posts of its own that fit no common grid: there, and
+in the cells on the border, a node is as high as the highest post near it. The surface is then above the terrain of the
+files by up to what the ground rises within two spacings, and never below it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gcsplan.arrays import Floats
+from gcsplan.dem.cells import cells_in
+from gcsplan.dem.dat_file import DatFile, is_dat, read_dat
+from gcsplan.errors import InputError
+from gcsplan.world.cell import Cell, cell_of
+from gcsplan.world.datum import VerticalDatum
+from gcsplan.world.frame import Frame
+from gcsplan.world.mosaic import FIT_ERROR_M, Window
+from gcsplan.world.raster import MAX_CELLS, require_file, sha256_of
+from gcsplan.world.surface import GridMap
+from gcsplan.world.terrain import Box, Terrain, TerrainSpec, place, terrain_of
+from gcsplan.world.terrain_grid import DEGREE_E7, METRES_OF_E7, STRIDE, TerrainGrid, cell_at, longitude_scale
+
+REACH = 2.1
+"""Spacings around a node within which a post of another tile decides its height: a cell beside it, and its far end."""
+
+NOTE = (
+    "terrain of ArduPilot's .DAT files is in whole metres and may have been cut down to them: up to 1 m lower than its "
+    "source; altitude_error_m should hold it"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class DatTile:
+    """What reports say of one file."""
+
+    name: str
+    path: Path
+    notes: tuple[str, ...]
+    vertical: VerticalDatum | None = None
+
+    def sha256(self) -> str:
+        """The file's hash."""
+        return sha256_of(self.path)
+
+
+def dat_files(paths: Sequence[str], *, where: str) -> list[Path]:
+    """The .DAT files that ``paths`` name, as files or in folders; empty if they name none. Raises InputError."""
+    found: list[Path] = []
+    others = []
+    for text in paths:
+        path = Path(text)
+        inside = sorted(p for p in path.iterdir() if is_dat(p)) if path.is_dir() else []
+        if is_dat(path) or inside:
+            found += inside or [path]
+        else:
+            others.append(path.name)
+    if found and others:
+        raise InputError(f".DAT files stand alone, and {others[0]} is none; give the one or the other", where=where)
+    return found
+
+
+class DatTerrain:
+    """Files, each read when a place or a mission first needs it. Raises InputError for what is no such file."""
+
+    def __init__(self, paths: Sequence[Path], spec: TerrainSpec, *, where: str) -> None:
+        self._spec, self._where, self._at = spec, where, place(where, "dem")
+        self._paths: dict[Cell, Path] = {}
+        self._files: dict[Cell, DatFile] = {}
+        for path in paths:
+            require_file(path, where=self._at)
+            cell = cell_of(path.stem.upper())
+            if cell is None:
+                raise InputError(
+                    f"{path} must be named after its south-west corner, as N36W085.DAT, given {path.name}",
+                    where=self._at,
+                )
+            if self._paths.setdefault(cell, path) is not path:
+                raise InputError(f"{self._paths[cell]} and {path} are of one tile; give one of them", where=self._at)
+        for key in ("crs", "height_unit"):
+            if getattr(spec, key) is not None:
+                raise InputError("a .DAT file states it itself; remove the key", where=place(where, key))
+
+    def covers(self, lat_deg: float, lon_deg: float) -> bool:
+        """True if a place lies in a block that its file holds (which may still be unknown there)."""
+        cell = cell_at(lat_deg * 1e7, lon_deg * 1e7)
+        if cell not in self._paths:
+            return False
+        return _holds(self._file(cell), lat_deg, lon_deg)
+
+    def around(self, frame: Frame, box: Box) -> Terrain:
+        """The terrain that a mission in ``box`` (west, south, east, north, plane metres) uses. Raises InputError."""
+        cells = [cell for cell in cells_in(frame, box, where=self._at) if cell in self._paths]
+        if not cells:
+            raise InputError(
+                f"no .DAT file of this place, {cell_at(frame.lat_deg * 1e7, frame.lon_deg * 1e7).name}, is given",
+                where=self._at,
+            )
+        anchor = cell_at(frame.lat_deg * 1e7, frame.lon_deg * 1e7)
+        mosaic = DatMosaic([(self._file(c), self._paths[c]) for c in cells], anchor, where=self._at)
+        return terrain_of(mosaic, self._spec, where=self._where, notes=(NOTE,))
+
+    def _file(self, cell: Cell) -> DatFile:
+        if cell not in self._files:
+            self._files[cell] = read_dat(self._paths[cell], where=self._at)
+        return self._files[cell]
+
+
+class DatMosaic:
+    """Files of one spacing, on the posts of the tile ``anchor``. Raises InputError if the spacings differ."""
+
+    def __init__(self, files: Sequence[tuple[DatFile, Path]], anchor: Cell, *, where: str) -> None:
+        self.where, self._anchor = where, anchor
+        first = files[0][0]
+        self.grid = first.grid
+        for other, _ in files[1:]:
+            if other.grid != self.grid:
+                raise InputError(
+                    f"{first.name} has posts every {self.grid.spacing_m} m, {other.name} every "
+                    f"{other.grid.spacing_m} m: give files of one TERRAIN_SPACING",
+                    where=where,
+                )
+        self._files: Mapping[Cell, DatFile] = {file.cell: file for file, _ in files}
+        self.rasters = tuple(DatTile(file.name, path, file.notes) for file, path in files)
+
+    def covers(self, lat_deg: float, lon_deg: float) -> bool:
+        """True if a place lies in a block that some file holds (which may still be unknown there)."""
+        file = self._files.get(cell_at(lat_deg * 1e7, lon_deg * 1e7))
+        return file is not None and _holds(file, lat_deg, lon_deg)
+
+    def extent(self, frame: Frame, box: Box) -> Box:
+        """West, south, east, north of all blocks in the plane."""
+        lat, lon = self._border
+        plane = frame.to_plane(lat * 1e-7, lon * 1e-7)
+        low, high = plane.min(axis=0), plane.max(axis=0)
+        return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+    @cached_property
+    def _border(self) -> tuple[Floats, Floats]:
+        """Latitudes and longitudes, 1e-7°, of the corners of all blocks."""
+        lat, lon = [], []
+        for file in self._files.values():
+            at = np.array([(b.north, b.east) for b in file.blocks])
+            for north, east in ((0, 0), (0, 1), (1, 0), (1, 1)):
+                found = self.grid.post_e7(file.cell, (at[:, 0] + north) * STRIDE[0], (at[:, 1] + east) * STRIDE[1])
+                lat.append(found[0])
+                lon.append(found[1])
+        return np.concatenate(lat), np.concatenate(lon)
+
+    def node_degrees(self, window: Window, cols: ArrayLike, rows: ArrayLike) -> tuple[Floats, Floats]:
+        """Latitude and longitude of the nodes ``rows`` × ``cols`` of a window, (len(rows), len(cols)) each."""
+        east, north = np.meshgrid(window.x[np.asarray(cols)], window.y[np.asarray(rows)])
+        lat, lon = self.grid.post_e7(self._anchor, north, east)
+        return lat * 1e-7, lon * 1e-7
+
+    def window(self, frame: Frame, box: Box, *, spare_m: float = 0.0, most_cells: int | None = None) -> Window:
+        """The nodes that cover ``box`` (west, south, east, north, plane metres) and ``spare_m`` around it.
+
+        Raises InputError if no block meets the box, beyond ``most_cells``, and if the plane cannot be fitted.
+        """
+        anchor = self._anchor
+
+        def numbers(lat_e7: Floats, lon_e7: Floats) -> tuple[Floats, Floats]:
+            north_m, east_m = self.grid.offset_m(anchor, lat_e7, lon_e7)
+            return east_m / self.grid.spacing_m, north_m / self.grid.spacing_m
+
+        def exact(east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
+            degrees = frame.to_degrees(east_m, north_m) * 1e7
+            return numbers(degrees[..., 0], degrees[..., 1])
+
+        wide = (box[0] - spare_m, box[1] - spare_m, box[2] + spare_m, box[3] + spare_m)
+        east, north = exact(*_lattice(wide))
+        held = numbers(*self._border)
+        first = (max(math.floor(east.min()), math.floor(held[0].min())),
+                 max(math.floor(north.min()), math.floor(held[1].min())))  # fmt: skip
+        last = (min(math.ceil(east.max()), math.ceil(held[0].max())),
+                min(math.ceil(north.max()), math.ceil(held[1].max())))  # fmt: skip
+        cols, rows = last[0] - first[0] + 1, last[1] - first[1] + 1
+        if cols < 2 or rows < 2:
+            raise InputError(
+                f"the .DAT files ({', '.join(f.name for f in self.rasters[:4])}) do not cover the mission, which lies "
+                f"around {frame.lat_deg:.4f}, {frame.lon_deg:.4f}; give the files of this place",
+                where=self.where,
+            )
+        most = min(MAX_CELLS, MAX_CELLS if most_cells is None else most_cells)
+        if cols * rows > most:
+            raise InputError(
+                f"the mission needs {cols} × {rows} posts, more than {most / 1e6:.3g} million; plan a smaller mission",
+                where=self.where,
+            )
+
+        def in_window(east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
+            east, north = exact(east_m, north_m)
+            return east - first[0], last[1] - north
+
+        x, y = np.arange(first[0], last[0] + 1.0), np.arange(last[1], first[1] - 1.0, -1.0)
+        grid = GridMap.fit(in_window, _around(frame, self.grid, anchor, wide, x, y))
+        if not grid.error_m <= FIT_ERROR_M:
+            raise InputError("the mission is too wide for the posts of one tile; plan a smaller one", where=self.where)
+        heights = self._heights(anchor, x, y)
+        unknown = int(np.count_nonzero(np.isnan(heights)))
+        notes = [f"{unknown} of {heights.size} DEM nodes around the mission are unknown (no block)"] if unknown else []
+        (left, low), (right, high) = ([float(getattr(h, side)()) for h in held] for side in ("min", "max"))
+        goes_on = (first[0] > left, last[1] < high, last[0] < right, first[1] > low)
+        return Window(heights, grid, x, y, tuple(notes), goes_on)
+
+    def _heights(self, anchor: Cell, x: Floats, y: Floats) -> Floats:
+        """(rows, cols) heights of the nodes with these numbers of columns and rows, rows going south."""
+        north, east = y[::-1], x
+        inside, outside = self._sides(anchor, north, east)
+        heights = np.where(inside, self._posts(anchor, north, east), -np.inf)
+        if outside.any():
+            heights = np.maximum(heights, np.where(outside, self._raised(anchor, north, east), -np.inf))
+        return np.ascontiguousarray(heights[::-1])
+
+    def _sides(self, anchor: Cell, north: Floats, east: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Of each node: whether a cell beside it meets its own tile, and whether one meets another tile."""
+        high = DEGREE_E7 * METRES_OF_E7 / self.grid.spacing_m
+        corner = anchor.lat_deg * DEGREE_E7
+        span = np.stack([north - 1.0, north + 1.0]) * (self.grid.spacing_m / METRES_OF_E7)
+        wide = high * longitude_scale(corner + 0.5 * span)[..., None]
+        rows_in = ((north > -1.0) & (north < high + 1.0))[:, None]
+        rows_out = ((north < 1.0) | (north > high - 1.0))[:, None]
+        inside = rows_in & (east > -1.0) & (east < wide.max(axis=0) + 1.0)
+        return inside, rows_out | (east < 1.0) | (east > wide.min(axis=0) - 1.0)
+
+    def _posts(self, cell: Cell, north: Floats, east: Floats) -> Floats:
+        """Heights of a tile's posts; NaN where it has none. The higher one counts where two blocks hold a post.
+
+        The autopilot reads a point from the one block in whose stride it lies, up to and with the first post of the
+        next one.
+        """
+        out = np.full((len(north), len(east)), -np.inf)
+        file = self._files.get(cell)
+        for block, heights in ({} if file is None else file.blocks).items():
+            r0, c0 = block.north * STRIDE[0] - int(north[0]), block.east * STRIDE[1] - int(east[0])
+            rows = slice(max(r0, 0), max(0, min(r0 + STRIDE[0] + 1, len(north))))
+            cols = slice(max(c0, 0), max(0, min(c0 + STRIDE[1] + 1, len(east))))
+            if rows.start < rows.stop and cols.start < cols.stop:
+                part = heights[rows.start - r0 : rows.stop - r0, cols.start - c0 : cols.stop - c0]
+                out[rows, cols] = np.maximum(out[rows, cols], part)
+        return np.where(np.isinf(out), np.nan, out)
+
+    def _raised(self, anchor: Cell, north: Floats, east: Floats) -> Floats:
+        """The highest post of the other tiles around each node; NaN if one of them is unknown."""
+        f = np.linspace(0.0, 1.0, 33)
+        ends = [(a[0] - 3.0) + f * (a[-1] - a[0] + 6.0) for a in (north, east)]
+        lat, lon = self.grid.post_e7(anchor, *np.meshgrid(*ends, indexing="ij"))
+        out = np.full((len(north), len(east)), -np.inf)
+        for cell in _cells_between(lat, lon):
+            if cell == anchor:
+                continue
+            far = DEGREE_E7 * METRES_OF_E7 / self.grid.spacing_m
+            around = [m / self.grid.spacing_m for m in self.grid.offset_m(cell, lat, lon)]
+            n = np.arange(max(0.0, math.floor(around[0].min())), min(math.ceil(far), math.ceil(around[0].max())) + 1.0)
+            wide = far * longitude_scale(cell.lat_deg * DEGREE_E7 + 0.5 * DEGREE_E7 / far * n)[:, None]
+            e = np.arange(
+                max(0.0, math.floor(around[1].min())), math.ceil(min(wide.max(initial=0.0), around[1].max())) + 1.0
+            )
+            if not (n.size and e.size):
+                continue
+            # Of posts beyond the tile's eastern border the autopilot reads the first alone, of its row or the next.
+            last = np.pad(np.ceil(wide), ((1, 1), (0, 0)), mode="edge")
+            most = np.maximum(np.maximum(last[:-2], last[1:-1]), last[2:])
+            posts = np.where(e <= most, self._posts(cell, n, e), -np.inf)
+            posts_at = self.grid.post_e7(cell, *np.meshgrid(n, e, indexing="ij"))
+            north_m, east_m = self.grid.offset_m(anchor, *posts_at)
+            row, col = north_m / self.grid.spacing_m - north[0], east_m / self.grid.spacing_m - east[0]
+            _scatter(out, row.ravel(), col.ravel(), posts.ravel())
+        return np.where(np.isinf(out), np.nan, out)
+
+
+def _holds(file: DatFile, lat_deg: float, lon_deg: float) -> bool:
+    return any(block in file.blocks for block in file.grid.blocks_over(lat_deg * 1e7, lon_deg * 1e7))
+
+
+def _scatter(out: Floats, row: Floats, col: Floats, heights: Floats) -> None:
+    """Raise every node of ``out`` to the heights within `REACH` of it; an unknown one makes it unknown."""
+    rows, cols = out.shape
+    near = (row > -3.0) & (row < rows + 2.0) & (col > -3.0) & (col < cols + 2.0)
+    row, col, heights = row[near], col[near], heights[near]
+    down, left = np.floor(row).astype(int), np.floor(col).astype(int)
+    for i in range(-2, 4):
+        for j in range(-2, 4):
+            r, c = down + i, left + j
+            within = (np.abs(r - row) <= REACH) & (np.abs(c - col) <= REACH)
+            within &= (r >= 0) & (r < rows) & (c >= 0) & (c < cols)
+            np.maximum.at(out, (r[within], c[within]), heights[within])
+
+
+def _cells_between(lat_e7: Floats, lon_e7: Floats) -> list[Cell]:
+    """All tiles of a box in degrees, less than half a turn wide."""
+    lats = range(math.floor(lat_e7.min() / DEGREE_E7), math.floor(lat_e7.max() / DEGREE_E7) + 1)
+    west = lon_e7.flat[0]
+    turned = west + (lon_e7 - west + 180.0 * DEGREE_E7) % (360.0 * DEGREE_E7) - 180.0 * DEGREE_E7
+    lons = range(math.floor(turned.min() / DEGREE_E7), math.floor(turned.max() / DEGREE_E7) + 1)
+    return [Cell(a, (o + 180) % 360 - 180) for a in lats for o in lons if -90 <= a < 90]
+
+
+def _lattice(box: Box) -> tuple[Floats, Floats]:
+    f = np.linspace(0.0, 1.0, 33)
+    e, n = np.meshgrid(box[0] + f * (box[2] - box[0]), box[1] + f * (box[3] - box[1]))
+    return e.ravel(), n.ravel()
+
+
+def _around(frame: Frame, grid: TerrainGrid, anchor: Cell, wide: Box, x: Floats, y: Floats) -> Box:
+    """The plane's box that holds ``wide`` and the nodes."""
+    north, east = np.meshgrid(np.linspace(y[-1], y[0], 33), np.linspace(x[0], x[-1], 33))
+    lat, lon = grid.post_e7(anchor, north, east)
+    plane = frame.to_plane(lat * 1e-7, lon * 1e-7).reshape(-1, 2)
+    low, high = plane.min(axis=0), plane.max(axis=0)
+    return (
+        min(wide[0], float(low[0])), min(wide[1], float(low[1])),
+        max(wide[2], float(high[0])), max(wide[3], float(high[1])),
+    )  # fmt: skip
