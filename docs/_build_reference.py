@@ -20,6 +20,7 @@ from gcsplan import errors
 from gcsplan.cli import ending
 from gcsplan.mission_file import json_schema, schema, units
 from gcsplan.planners import registry
+from gcsplan.sim.firmware import CHANGES
 
 TOP = Path(__file__).resolve().parents[1]
 PACKAGE = Path(gcsplan.__file__).parent
@@ -350,6 +351,14 @@ def planners() -> str:
     return "\n".join(lines)
 
 
+def firmware_changes() -> str:
+    """The table of what differs between the versions of the simulated vehicles."""
+    lines = ["| since | what | before | since then |", "| --- | --- | --- | --- |"]
+    for c in CHANGES:
+        lines.append(f"| {c.family} {c.since[0]}.{c.since[1]} | {c.what} | {c.before} | {c.after} |")
+    return "\n".join(lines)
+
+
 def from_top(name: str) -> str:
     """A file of the repository as a page; its links count from here."""
     return (TOP / name).read_text(encoding="utf-8").replace("](docs/", "](")
@@ -362,6 +371,7 @@ PARTS: Mapping[str, Callable[[], str]] = {
     "exit-codes": exit_codes,
     "messages": all_messages,
     "planners": planners,
+    "firmware-changes": firmware_changes,
     "changelog": lambda: from_top("CHANGELOG.md"),
     "contributing": lambda: from_top("CONTRIBUTING.md"),
 }

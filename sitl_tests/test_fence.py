@@ -1,4 +1,4 @@
-"""Fences made from zones, with MAVSDK as a vehicle and as a reader of plans, and with a real ArduCopter."""
+"""Fences made from zones, with MAVSDK as a vehicle and as a reader of plans, and with real ArduPilots."""
 
 from __future__ import annotations
 
@@ -68,16 +68,16 @@ def test_mavsdk_imports_the_fence_of_a_plan(tmp_path: Path) -> None:
     assert len(areas_of(items, FRAME)) == 3
 
 
-@pytest.mark.skipif(not sitl.wanted(), reason=sitl.WHY_SKIPPED)
-def test_a_real_arducopter_keeps_a_fence(tmp_path: Path) -> None:
-    fence = a_fence(COPTER)
-    with sitl.running(sitl.wanted(), tmp_path) as link:
-        sitl.ready(link, 1)
-        result = upload_items(link, 1, fence.items, COPTER, FENCE, options=QUICK)
+@sitl.either()
+def test_a_real_ardupilot_keeps_a_fence(autopilot: Autopilot, tmp_path: Path) -> None:
+    fence = a_fence(autopilot)
+    with sitl.running(autopilot, tmp_path) as link:
+        sitl.ready(link, 1, autopilot)
+        result = upload_items(link, 1, fence.items, autopilot, FENCE, options=QUICK)
         assert result.verified, (result.reason, result.differences)
         read = download_items(link, 1, FENCE, options=QUICK)
-        assert faults(compare(fence.items, read, COPTER, FENCE)) == ()
-        most = [Zone(f"c{i}", Circle(200.0 * i, 3000.0, 40.0)) for i in range(42)]
-        full = upload_items(link, 1, fence_of(most, FRAME, COPTER).items, COPTER, FENCE, options=QUICK)
+        assert faults(compare(fence.items, read, autopilot, FENCE)) == ()
+        circles = [Zone(f"c{i}", Circle(200.0 * i, 3000.0, 40.0)) for i in range(42)]
+        full = upload_items(link, 1, fence_of(circles, FRAME, autopilot).items, autopilot, FENCE, options=QUICK)
         assert full.verified, (full.reason, full.differences)
         assert clear_mission(link, 1, FENCE, options=QUICK).verified

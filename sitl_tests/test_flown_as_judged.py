@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from itertools import groupby
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,9 +24,7 @@ from tests.support.worlds import world
 TRACK_ERROR_M = 3.0
 
 
-@pytest.mark.skipif(
-    not os.path.isfile(sitl.wanted()), reason=f"no autopilot: set {sitl.VARIABLE} to the path of an arducopter binary"
-)
+@sitl.needs(Autopilot.ARDUCOPTER, program=True)
 def test_a_real_arducopter_flies_splines_and_jumps_as_they_are_judged(monkeypatch: pytest.MonkeyPatch) -> None:
     where = world(half_m=1500.0)
     craft = Vehicle(
@@ -59,7 +55,9 @@ def test_a_real_arducopter_flies_splines_and_jumps_as_they_are_judged(monkeypatc
 
     monkeypatch.setattr(flown, "_trace", keeping)
     part = Part(craft, mission, verdict)
-    with sitl_instances(Path(sitl.wanted()), [part], speedup=10.0) as seats:
+    binary = sitl.binary(Autopilot.ARDUCOPTER)
+    assert binary is not None
+    with sitl_instances(binary, [part], speedup=10.0) as seats:
         flown.rehearse_sitl([part], where, Terms(), seats)
     (trace,) = traces
     judged = [seq for seq, _ in groupby(leg.seq for leg in verdict.legs)]

@@ -5,7 +5,6 @@ Needs the path of an arducopter binary, because each instance must start where i
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
@@ -15,12 +14,8 @@ from gcsplan.app.pipeline import plan
 from gcsplan.app.rehearsing import rehearse, rehearse_in_sitl
 from gcsplan.errors import LinkError, UsageError
 from gcsplan.mission_file import load_mission
+from gcsplan.vehicle import Autopilot
 from sitl_tests import sitl
-
-binary = pytest.mark.skipif(
-    not os.path.isfile(sitl.wanted()),
-    reason=f"no autopilot: set {sitl.VARIABLE} to the path of an arducopter binary (an instance for each vehicle)",
-)
 
 FLEET = """
 version: 1
@@ -59,11 +54,14 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> Plan:
     return plan(load_mission(file))
 
 
-@binary
+@sitl.needs(Autopilot.ARDUCOPTER, program=True)
 def test_two_real_arducopters_arrive_as_planned_and_as_the_built_in_simulator_says(planned: Plan) -> None:
     said: list[tuple[str, str]] = []
     result = rehearse_in_sitl(
-        planned, binary=Path(sitl.wanted()), speedup=10.0, report=lambda name, what: said.append((name, what))
+        planned,
+        binary=sitl.binary(Autopilot.ARDUCOPTER),
+        speedup=10.0,
+        report=lambda name, what: said.append((name, what)),
     )
     assert result.simulator == "sitl"
     assert result.breaches == ()

@@ -20,6 +20,7 @@ from gcsplan import errors
 from gcsplan.export.summary import ORDER
 from gcsplan.mission_file import schema
 from gcsplan.planners import registry
+from gcsplan.sim.firmware import CHANGES, KNOWN
 from gcsplan.world.airspace import Kind
 from tests.support.paths import REPOSITORY
 
@@ -127,6 +128,13 @@ def test_messages_are_read_out_of_the_code_with_what_is_only_known_later(made: M
 
 def test_every_planner_stands_in_the_table(made: ModuleType) -> None:
     assert [cells[0] for cells in rows(made.planners())][1:] == [f"`{name}`" for name in registry.names()]
+
+
+def test_every_change_of_a_firmware_stands_in_the_table(made: ModuleType) -> None:
+    assert [cells[1] for cells in rows(made.firmware_changes())][1:] == [change.what for change in CHANGES]
+    page = (DOCS / "reference" / "simulated-vehicles.md").read_text(encoding="utf-8")
+    for versions in KNOWN.values():
+        assert f"| {', '.join(sorted(f.name for f in versions))} | {versions[0].name} |" in page
 
 
 def test_the_python_reference_names_all_that_the_package_offers() -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from gcsplan.cli import completion
-from gcsplan.cli.options import AutopilotOption, ListenOption, MisbehaveOption, SimSysidOption
+from gcsplan.cli.options import AutopilotOption, FirmwareOption, ListenOption, MisbehaveOption, SimSysidOption
 from gcsplan.errors import UsageError
 
 
@@ -21,6 +21,7 @@ def sim(
     ] = None,
     listen: ListenOption = "udpin:127.0.0.1:14560",
     autopilot: AutopilotOption = None,
+    firmware: FirmwareOption = None,
     sysid: SimSysidOption = None,
     misbehave: MisbehaveOption = "",
 ) -> None:
@@ -29,6 +30,7 @@ def sim(
     Ctrl-C ends it.
     """
     from gcsplan.cli.console import remark
+    from gcsplan.sim.firmware import firmwares
     from gcsplan.sim.misbehaviour import Misbehaviour
     from gcsplan.sim.server import SimServer, serve
     from gcsplan.sim.vehicle import LoopbackVehicle
@@ -49,6 +51,7 @@ def sim(
         stands = [(sysid or 1, kind, (36.6, -84.38), 471.0, None)]  # a valley of the sample terrain
     else:
         raise UsageError(f"--autopilot {autopilot}: one of {', '.join(Autopilot)} is wanted")
+    versions = firmwares([stand[1] for stand in stands], firmware)
     vehicles = [
         LoopbackVehicle(
             number,
@@ -58,12 +61,13 @@ def sim(
             amsl_m=amsl_m,
             misbehave=trouble,
             parameters={} if lean_deg is None else {"ANGLE_MAX": 100.0 * lean_deg},
+            firmware=version,
         )
-        for number, kind, place, amsl_m, lean_deg in stands
+        for (number, kind, place, amsl_m, lean_deg), version in zip(stands, versions, strict=True)
     ]
 
     def ready(server: SimServer) -> None:
-        names = ", ".join(f"system {v.sysid} ({v.autopilot})" for v in vehicles)
+        names = ", ".join(f"system {v.sysid} ({v.autopilot} {v.firmware.name})" for v in vehicles)
         remark(f"simulating {names}; connect to {server.url_for_gcs}; Ctrl-C ends it")
 
     serve(vehicles, listen, on_ready=ready)

@@ -129,6 +129,14 @@ AutopilotOption = Annotated[
         help="Without a mission file: arducopter, arduplane or px4 [default: arducopter]",
     ),
 ]
+FirmwareOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="VERSION",
+        autocompletion=completion.words("4.6", "4.7", "1.16", "1.17", "1.18"),
+        help="Behave like this version: 4.6 or 4.7 of ArduPilot, 1.16, 1.17 or 1.18 of PX4 [default: 4.6, 1.17]",
+    ),
+]
 SimSysidOption = Annotated[
     int | None,
     typer.Option("--sysid", metavar="N", min=1, max=255, help="Without a mission file: system id [default: 1]"),

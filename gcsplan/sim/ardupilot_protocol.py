@@ -1,7 +1,7 @@
 """ArduPilot's side of the mission protocol: three independent lists, requested with the legacy MISSION_REQUEST.
 
-Source: ArduPilot 4.6 ``MissionItemProtocol.cpp`` with its three subclasses, and ``GCS_Common.cpp``. `board` states the
-rules of the tables.
+Source: ArduPilot 4.6.2 and 4.7 ``MissionItemProtocol.cpp`` with its three subclasses, ``AP_Mission.cpp`` and
+``GCS_Common.cpp``; `firmware` states what differs between the two. `board` states the rules of the tables.
 """
 
 from __future__ import annotations
@@ -36,14 +36,17 @@ from gcsplan.sim.board import (
     Refused,
     through_float,
 )
+from gcsplan.sim.firmware import COUNTS_EVERY_LIST, KEEPS_HOME, KEEPS_RADII, Firmware
 from gcsplan.sim.misbehaviour import Faults
 
 
 class ArduPilotServer:
     """Three independent lists; not atomic: COUNT truncates the old mission, and every item replaces one in place."""
 
-    def __init__(self, board: Board, faults: Faults, *, plane: bool) -> None:
-        self._lists = {t: _ArduPilotList(t, board, faults, plane) for t in (MISSION, FENCE, RALLY)}
+    def __init__(self, board: Board, faults: Faults, firmware: Firmware, *, plane: bool) -> None:
+        self._lists = {t: _ArduPilotList(t, board, faults, firmware, plane) for t in (MISSION, FENCE, RALLY)}
+        if firmware.has(KEEPS_HOME):
+            board.lists[MISSION] = [storage.home_item(board.home)]
 
     def receive(self, message: MissionMessage, sender: Address, now: float) -> Out:
         one = self._lists.get(message.mission_type)
@@ -68,9 +71,12 @@ class ArduPilotServer:
 class _ArduPilotList:
     ASK_AGAIN_S = 1.0
     GIVE_UP_S = 8.0
+    HOME_RENEWED_S = 5.0
+    """At most so long after clearing its mission, a plane that is not armed stores its home in it again."""
 
-    def __init__(self, mission_type: int, board: Board, faults: Faults, plane: bool) -> None:
+    def __init__(self, mission_type: int, board: Board, faults: Faults, firmware: Firmware, plane: bool) -> None:
         self._type, self._board, self._faults, self._plane = mission_type, board, faults, plane
+        self._firmware = firmware
         self.reset()
         self._table: Mapping[tuple[Phase, type[MissionMessage]], Callable[..., Out]] = {
             (Phase.IDLE, Count): self._begin,
@@ -93,6 +99,7 @@ class _ArduPilotList:
         self._partner = Address(0, 0)
         self._count = self._next = 0
         self._asked_at = self._heard_at = 0.0
+        self._emptied_at: float | None = None
         self._new_fence: list[MissionItem] = []
 
     def receive(self, message: MissionMessage, sender: Address, now: float) -> Out:
@@ -102,11 +109,20 @@ class _ArduPilotList:
     @property
     def deadline(self) -> float | None:
         if self._phase is not Phase.RECEIVING:
-            return None
+            return self._home_due
         return min(self._asked_at + self.ASK_AGAIN_S, self._heard_at + self.GIVE_UP_S)
+
+    @property
+    def _home_due(self) -> float | None:
+        renews = self._plane and self._type == MISSION and self._firmware.has(KEEPS_HOME) and not self._board.armed
+        if not renews or self._emptied_at is None or self._board.lists[MISSION]:
+            return None
+        return self._emptied_at + self.HOME_RENEWED_S
 
     def on_timer(self, now: float) -> Out:
         if self._phase is not Phase.RECEIVING:
+            if self._home_due is not None and now >= self._home_due:
+                self._board.lists[MISSION] = [storage.home_item(self._board.home)]
             return []
         if now >= self._heard_at + self.GIVE_UP_S:
             self._phase = Phase.IDLE  # items that were replaced stay replaced
@@ -134,6 +150,7 @@ class _ArduPilotList:
             del stored[message.count :]
         self._partner, self._count, self._next, self._heard_at = sender, message.count, 0, now
         if message.count == 0:
+            self._emptied_at = now
             return self._finish(sender)
         self._phase = Phase.RECEIVING
         return self._ask(now)
@@ -164,7 +181,10 @@ class _ArduPilotList:
         self._faults.refuse(self._type, message.seq)
         kept = self._faults.spoil(self._type, message.seq, self._kept(message))
         stored = self._new_fence if self._type == FENCE else self._board.lists[self._type]
-        if message.seq < len(stored):
+        if not stored and self._type == MISSION and self._firmware.has(KEEPS_HOME):
+            stored.append(storage.home_item(self._board.home))
+            stored.append(kept)
+        elif message.seq < len(stored):
             stored[message.seq] = kept
         elif message.seq == len(stored):
             stored.append(kept)
@@ -173,7 +193,7 @@ class _ArduPilotList:
 
     def _kept(self, message: Item) -> MissionItem:
         if self._type == FENCE:
-            return storage.keep_fence_item(message.item)
+            return storage.keep_fence_item(message.item, whole_radii=not self._firmware.has(KEEPS_RADII))
         if self._type == RALLY:
             return storage.keep_rally_item(message.item)
         kept = storage.keep_mission_item(message.item, plane=self._plane)
@@ -204,6 +224,7 @@ class _ArduPilotList:
         if self._type == MISSION and self._board.armed and self._board.flying_mission:
             return [(sender, self._ack(ERROR))]
         self._board.lists[self._type] = []
+        self._emptied_at = now
         return [(sender, self._ack(ACCEPTED))]
 
     def _clear_while_receiving(self, message: ClearAll, sender: Address, now: float) -> Out:
@@ -223,19 +244,22 @@ class _ArduPilotList:
             item = storage.home_item(Home(0, 0, 0.0) if self._board.booting else self._board.home)
         elif message.seq < len(stored) and not (self._type == MISSION and self._board.booting):
             item = stored[message.seq]
-        elif self._type == MISSION:
-            # "Try to educate the GCS on the actual size of the mission."
-            return [(sender, Count(len(stored), self._type)), (sender, self._ack(ERROR))]
-        elif self._type == FENCE and message.seq == len(stored):
-            return [(sender, self._ack(ERROR))]
         else:
-            return [(sender, self._ack(INVALID_SEQUENCE))]
+            return self._past_the_end(message, sender, len(stored))
         if not message.legacy:
             return [(sender, Item(message.seq, item, self._type))]
-        if self._type != MISSION:
-            # ArduPilot sends degrees times 1e7 in these fields, which is no place on Earth; 0, 0 stands for that here.
-            item = MissionItem(item.command, item.frame, item.params, z=item.z, autocontinue=item.autocontinue)
         return [(sender, LegacyItem(message.seq, through_float(item), self._type))]
+
+    def _past_the_end(self, message: Request, sender: Address, count: int) -> Out:
+        """Answer a request for an item that the list has not."""
+        # "Try to educate the GCS on the actual size of the mission."
+        lesson: Out = [(sender, Count(count, self._type))]
+        if self._firmware.has(COUNTS_EVERY_LIST):
+            return [*([] if message.legacy else lesson), (sender, self._ack(INVALID_SEQUENCE))]
+        if self._type == MISSION:
+            return [*lesson, (sender, self._ack(ERROR))]
+        right_after = self._type == FENCE and message.seq == count
+        return [(sender, self._ack(ERROR if right_after else INVALID_SEQUENCE))]
 
     def _tell_item_or_deny(self, message: Request, sender: Address, now: float) -> Out:
         # During an upload, ArduPilot denies only MISSION_REQUEST_INT.

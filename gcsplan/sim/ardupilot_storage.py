@@ -229,10 +229,11 @@ _VERTEX = {cmd.POLYGON_IN, cmd.POLYGON_OUT}
 _CIRCLE = {cmd.CIRCLE_IN, cmd.CIRCLE_OUT}
 
 
-def keep_fence_item(item: MissionItem) -> MissionItem:
+def keep_fence_item(item: MissionItem, *, whole_radii: bool) -> MissionItem:
     """Return one fence item as it reads back. Raises `Refused` for mistakes that the item alone shows.
 
-    Frame 2 is refused, the altitude is dropped, and frame and autocontinue read back as 0.
+    Frame 2 is refused, the altitude is dropped, and frame and autocontinue read back as 0. ``whole_radii``: a radius
+    less than 1 mm above whole metres is stored as an integer.
     """
     if item.frame not in _FRAMES or item.frame == 2:
         raise Refused(UNSUPPORTED_FRAME)
@@ -242,8 +243,8 @@ def keep_fence_item(item: MissionItem) -> MissionItem:
             raise Refused(INVALID_PARAM1)
         kept = _u8(first)
     elif item.command in _CIRCLE:
-        # A radius less than 1 mm above whole metres is stored as an integer.
-        kept = float(int(first)) if 0 < first < 2**31 and first - int(first) < 0.001 else first
+        whole = whole_radii and 0 < first < 2**31 and first - int(first) < 0.001
+        kept = float(int(first)) if whole else first
     elif item.command == cmd.FENCE_RETURN_POINT:
         kept = 0.0
     else:

@@ -1,13 +1,16 @@
 """A small table of parameters that simulated vehicles report, with each autopilot's names, types and defaults.
 
-Sources: parameter lists of ArduCopter 4.6, ArduPlane 4.6 and PX4 1.15 (defaults of a quadrotor).
+Sources: parameter lists of ArduCopter 4.6, ArduPlane 4.6 and PX4 1.15 (defaults of a quadrotor), and ArduPilot's list
+of the names that 4.7 changed.
 """
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+from gcsplan.sim.firmware import NAMES_UNITS, Firmware
 from gcsplan.vehicle import Autopilot
 
 INT32, REAL32 = 6, 9  # MAV_PARAM_TYPE
@@ -117,16 +120,47 @@ _TABLES: dict[Autopilot, dict[str, Parameter]] = {
 }
 
 
-class Parameters:
-    """The parameters of one vehicle, in alphabetical order, as autopilots list them."""
+_RENAMED = {
+    "ANGLE_MAX": ("ATC_ANGLE_MAX", 0.01), "LAND_SPEED": ("LAND_SPD_MS", 0.01), "RTL_ALT": ("RTL_ALT_M", 0.01),
+    "RTL_ALT_FINAL": ("RTL_ALT_FINAL_M", 0.01), "RTL_SPEED": ("RTL_SPEED_MS", 0.01),
+    "WPNAV_RADIUS": ("WP_RADIUS_M", 0.01), "WPNAV_SPEED": ("WP_SPD", 0.01), "WPNAV_SPEED_DN": ("WP_SPD_DN", 0.01),
+    "WPNAV_SPEED_UP": ("WP_SPD_UP", 0.01), "SYSID_THISMAV": ("MAV_SYSID", 1.0), "SYSID_MYGCS": ("MAV_GCS_SYSID", 1.0),
+}  # fmt: skip
+"""Names of 4.6 with the name in 4.7 and the factor of the value; those in another unit are floats in 4.7."""
 
-    def __init__(self, autopilot: Autopilot, sysid: int) -> None:
+
+def _in_4_7(table: dict[str, Parameter]) -> dict[str, Parameter]:
+    """Return a table of 4.6 with the names and units of 4.7."""
+    renamed = {}
+    for old, parameter in table.items():
+        name, factor = _RENAMED.get(old, (old, 1.0))
+        # Hundredths are decimals: 1500 * 0.01 is not 15.
+        renamed[name] = parameter if factor == 1.0 else _r(parameter.value / round(1.0 / factor))
+    if "ARMING_CHECK" in renamed:  # a mask of the checks to skip, no longer of those to make
+        del renamed["ARMING_CHECK"]
+        renamed["ARMING_SKIPCHK"] = _i(0)
+    return renamed
+
+
+class Parameters:
+    """The parameters of one vehicle, in alphabetical order, as autopilots list them.
+
+    ``given``: values that differ from the defaults, by the oldest name and in its unit.
+    """
+
+    def __init__(
+        self, autopilot: Autopilot, sysid: int, firmware: Firmware, given: Mapping[str, float] | None = None
+    ) -> None:
         own_id = {} if autopilot is Autopilot.PX4 else {"SYSID_THISMAV": _i(sysid, INT16)}
         self._table = dict(sorted({**_TABLES[autopilot], **own_id}.items()))
         if autopilot is Autopilot.PX4:
             self._table["MAV_SYS_ID"] = _i(sysid)
         # PX4 stores an integer's bytes in the float field, ArduPilot its value.
         self._bytewise = autopilot is Autopilot.PX4
+        for name, value in (given or {}).items():
+            self.set_from_wire(name, value)
+        if firmware.has(NAMES_UNITS):
+            self._table = dict(sorted(_in_4_7(self._table).items()))
 
     def __len__(self) -> int:
         return len(self._table)

@@ -1,6 +1,6 @@
 """PX4's side of the mission protocol: one transfer at a time, in order, and the new list replaces the old at the end.
 
-Source: PX4 ``mavlink_mission.cpp`` and ``mavlink_mission.h``. `board` states the rules of the table.
+Source: PX4 1.16 to main ``mavlink_mission.cpp`` and ``mavlink_mission.h``. `board` states the rules of the table.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Mapping
 
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import ALL, FENCE, MISSION, RALLY, MissionItem
 from gcsplan.mavlink.protocol.messages import (
     Ack,
@@ -33,7 +34,11 @@ from gcsplan.sim.board import (
     Refused,
     through_float,
 )
+from gcsplan.sim.firmware import TAKES_ARM_ITEMS, TAKES_AUTOTUNE_ITEMS, Firmware
 from gcsplan.sim.misbehaviour import Faults
+
+_COMMANDS = {cmd.COMPONENT_ARM_DISARM: TAKES_ARM_ITEMS, cmd.DO_AUTOTUNE_ENABLE: TAKES_AUTOTUNE_ITEMS}
+"""Commands that not every version takes."""
 
 
 class Px4Server:
@@ -42,8 +47,9 @@ class Px4Server:
     ASK_AGAIN_S = 0.25
     GIVE_UP_S = 5.0
 
-    def __init__(self, board: Board, faults: Faults) -> None:
+    def __init__(self, board: Board, faults: Faults, firmware: Firmware) -> None:
         self._board, self._faults = board, faults
+        self._unknown = {command for command, change in _COMMANDS.items() if not firmware.has(change)}
         self.reset()
         self._table: Mapping[tuple[Phase, type[MissionMessage]], Callable[..., Out]] = {
             (Phase.IDLE, Count): self._begin,
@@ -139,7 +145,7 @@ class Px4Server:
             return []
         try:
             self._faults.refuse(self._type, message.seq)
-            kept = storage.keep_item(message.item, self._type)
+            kept = storage.keep_item(message.item, self._type, unknown=self._unknown)
         except Refused as refused:
             self._phase = Phase.IDLE
             return self._answer(refused.code, sender)

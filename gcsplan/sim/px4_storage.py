@@ -6,7 +6,7 @@ Source: PX4 ``mavlink_mission.cpp`` (`parse_mavlink_mission_item`, `format_mavli
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Container
 
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, NO_POSITION, RALLY, MissionItem, float32
@@ -94,9 +94,14 @@ _FENCE_AND_RALLY = frozenset({cmd.POLYGON_IN, cmd.POLYGON_OUT, cmd.CIRCLE_IN, cm
 _IN_INT_MODE = {0: 5, 5: 5, 3: 6, 6: 6}
 
 
-def keep_item(item: MissionItem, mission_type: int) -> MissionItem:
-    """Return ``item`` as it reads back in MISSION_ITEM_INT: frames 0 and 3 become 5 and 6. Raises `Refused`."""
+def keep_item(item: MissionItem, mission_type: int, *, unknown: Container[int] = ()) -> MissionItem:
+    """Return ``item`` as it reads back in MISSION_ITEM_INT: frames 0 and 3 become 5 and 6. Raises `Refused`.
+
+    ``unknown``: commands that this version does not know yet.
+    """
     kept = _kept(item)
+    if item.command in unknown:
+        raise Refused(UNSUPPORTED)
     if mission_type == MISSION and item.command in _FENCE_AND_RALLY:
         raise Refused(ERROR)
     if mission_type == FENCE:

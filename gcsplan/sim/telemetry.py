@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
+from gcsplan.sim.firmware import TELLS_MISSION_STATE
 from gcsplan.sim.parameters import Parameters
 from gcsplan.sim.terrain import TerrainMemory
 from gcsplan.sim.vehicle import LoopbackVehicle
@@ -41,9 +42,7 @@ class Telemetry:
 
     def __init__(self, vehicle: LoopbackVehicle) -> None:
         self._vehicle = vehicle
-        self.parameters = Parameters(vehicle.autopilot, vehicle.sysid)
-        for name, value in vehicle.parameters.items():
-            self.parameters.set_from_wire(name, value)
+        self.parameters = Parameters(vehicle.autopilot, vehicle.sysid, vehicle.firmware, vehicle.parameters)
         vehicle.mode = _FIRST_MODE[vehicle.autopilot]
         self._began: float | None = None
         self._terrain: TerrainMemory | None = None
@@ -140,9 +139,14 @@ class Telemetry:
         return max(-(2**31), min(2**31 - 1, round(self._vehicle.home.amsl_m * 1000)))
 
     def _mission_current(self, now: float) -> Message:
-        items = len(self._vehicle.items())
-        state = 1 if items == 0 else 3 if self._vehicle.flying_mission else 2  # none, active, not started
-        return mav.MAVLink_mission_current_message(0, items or 65535, state, int(self._vehicle.flying_mission))
+        vehicle = self._vehicle
+        items, flying = len(vehicle.items()), vehicle.flying_mission
+        if vehicle.autopilot.is_ardupilot:  # home is not counted
+            items = max(0, items - 1)
+            return mav.MAVLink_mission_current_message(0, items, _mission_state(items, flying), int(flying))
+        if not vehicle.firmware.has(TELLS_MISSION_STATE):
+            return mav.MAVLink_mission_current_message(0, items or 65535, 0, 0)
+        return mav.MAVLink_mission_current_message(0, items or 65535, _mission_state(items, flying), 1 if flying else 2)
 
     def _home_position(self, now: float) -> Message:
         home = self._vehicle.home
@@ -158,11 +162,9 @@ class Telemetry:
         terrain = mav.MAV_PROTOCOL_CAPABILITY_TERRAIN
         if self._vehicle.autopilot.is_ardupilot:
             capabilities = _COMMON_CAPABILITIES | terrain | mav.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
-            version = (4 << 24) | (6 << 16) | 255
         else:
             capabilities = _COMMON_CAPABILITIES | mav.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
-            version = (1 << 24) | (15 << 16) | 255
-        nothing = [0] * 8
+        nothing, version = [0] * 8, self._vehicle.firmware.flight_sw_version
         return mav.MAVLink_autopilot_version_message(
             capabilities, version, 0, 0, 0, nothing, nothing, nothing, 0, 0, self._vehicle.sysid
         )
@@ -316,6 +318,11 @@ class Telemetry:
                 message.time_usec, message.seq, message.get_srcSystem(), message.get_srcComponent()
             )
         ]
+
+
+def _mission_state(items: int, flying: bool) -> int:
+    """Return a MISSION_STATE: none, active, not started."""
+    return 1 if items == 0 else 3 if flying else 2
 
 
 def _whole(value: float) -> int:

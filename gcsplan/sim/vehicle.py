@@ -21,6 +21,7 @@ from gcsplan.mavlink.protocol.messages import Ack, Address, Count, Item, Mission
 from gcsplan.sim.ardupilot_protocol import ArduPilotServer
 from gcsplan.sim.ardupilot_storage import home_item
 from gcsplan.sim.board import Board, MissionServer
+from gcsplan.sim.firmware import Firmware, firmware_of
 from gcsplan.sim.misbehaviour import Channel, Faults, Misbehaviour, spoilt
 from gcsplan.sim.px4_protocol import Px4Server
 from gcsplan.vehicle import Autopilot
@@ -32,7 +33,8 @@ class LoopbackVehicle:
     """One vehicle that stands on the ground and stores a mission, a fence and rally points.
 
     ``lat_deg``, ``lon_deg``, ``amsl_m``: its position, which is also its home. ``boot_s``: seconds after being switched
-    on for which it answers NO_SPACE (ArduPilot) or nothing (PX4). ``parameters``: those that differ from the defaults.
+    on for which it answers NO_SPACE (ArduPilot) or nothing (PX4). ``parameters``: those that differ from the defaults,
+    by their oldest names. ``firmware``: its version, None: the default of `firmware_of`.
     """
 
     def __init__(
@@ -48,9 +50,11 @@ class LoopbackVehicle:
         boot_s: float = 0.0,
         name: str = "",
         parameters: Mapping[str, float] | None = None,
+        firmware: Firmware | None = None,
     ) -> None:
         self.address = Address(sysid, compid)
         self.autopilot, self.parameters = autopilot, dict(parameters or {})
+        self.firmware = firmware or firmware_of(autopilot)
         self.name = name or f"vehicle {sysid}"
         self.misbehave = misbehave or Misbehaviour()
         self.mode = 0  # custom mode, as last set by a ground station
@@ -58,9 +62,9 @@ class LoopbackVehicle:
         self._board = Board(Home.at(lat_deg, lon_deg, amsl_m), armed=self.misbehave.armed)
         faults = Faults(self.misbehave)
         self._server: MissionServer = (
-            ArduPilotServer(self._board, faults, plane=autopilot is Autopilot.ARDUPLANE)
+            ArduPilotServer(self._board, faults, self.firmware, plane=autopilot is Autopilot.ARDUPLANE)
             if autopilot.is_ardupilot
-            else Px4Server(self._board, faults)
+            else Px4Server(self._board, faults, self.firmware)
         )
         rng = random.Random(self.misbehave.seed)
         self._inbound, self._outbound = Channel(self.misbehave, rng), Channel(self.misbehave, rng)

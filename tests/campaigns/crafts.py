@@ -15,6 +15,7 @@ from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.mavlink.mission.mission import MISSION, Home, MissionItem
 from gcsplan.mavlink.protocol import wire
 from gcsplan.mavlink.protocol.messages import Ack, Address, Count, Item, Request
+from gcsplan.sim.firmware import firmware_of
 from gcsplan.sim.hub import Hub
 from gcsplan.sim.misbehaviour import spoilt
 from gcsplan.sim.parameters import REAL32, Parameters
@@ -30,7 +31,7 @@ class OddParameters(Parameters):
     """Parameters with values that no autopilot should send, some of types that do not exist."""
 
     def __init__(self, autopilot: Autopilot, sysid: int, rng: random.Random) -> None:
-        super().__init__(autopilot, sysid)
+        super().__init__(autopilot, sysid, firmware_of(autopilot))
         self._rng = rng
 
     def on_wire(self, name: str) -> tuple[float, int]:

@@ -314,12 +314,16 @@ def test_ardupilot_denies_reading_during_an_upload_only_to_those_who_ask_in_the_
     assert type(say(vehicle, Request(1, legacy=True))[0]) is LegacyItem
 
 
-def test_ardupilots_fence_has_no_place_in_the_old_form() -> None:
+def test_ardupilots_fence_and_rally_points_have_float_degrees_in_the_old_form() -> None:
     vehicle = a_vehicle()
     upload(vehicle, [circle(30.0)], FENCE)
-    (answer,) = say(vehicle, Request(0, FENCE, legacy=True))
-    assert isinstance(answer, LegacyItem)
-    assert (answer.item.x, answer.item.y, answer.item.params[0]) == (0, 0, 30.0)
+    upload(vehicle, [MissionItem(5100, 3, x=366_000_001, y=-843_800_001, z=60.0)], RALLY)
+    for kind in (FENCE, RALLY):
+        (answer,) = say(vehicle, Request(0, kind, legacy=True))
+        assert isinstance(answer, LegacyItem)
+        (exact,) = download(vehicle, kind)
+        assert (answer.item.x, answer.item.y) == pytest.approx((exact.x, exact.y), abs=50)  # 0.4 m
+        assert answer.item.params == exact.params
 
 
 @BOTH

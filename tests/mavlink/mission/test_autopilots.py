@@ -170,7 +170,7 @@ def test_ardupilots_rules_agree_with_an_independent_reading_of_its_source(
 ) -> None:
     try:
         if one.command in range(5000, 5005):
-            theirs = keep_fence_item(one)
+            theirs = keep_fence_item(one, whole_radii=True)
         elif one.command == 5100:
             theirs = keep_rally_item(one)
         else:
