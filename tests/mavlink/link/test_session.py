@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import socket
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -248,6 +249,20 @@ def test_a_dead_link_says_which_direction_was_tried_and_names_the_other() -> Non
     assert "udpin: listens on 127.0.0.1" in str(dead.value)
     assert "udpout:127.0.0.1" in str(dead.value)
     assert dead.value.exit_code == 6
+
+
+def test_a_silent_vehicle_may_have_another_partner() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
+        silent.bind(("127.0.0.1", 0))
+        place = f"127.0.0.1:{silent.getsockname()[1]}"
+        with Link(f"udpout:{place}") as link, pytest.raises(LinkError) as dead:
+            discover(link, 1, 0.2)
+        assert f"sends to {place} from port {link.endpoint.sends_from}" in str(dead.value)
+        assert "answers only the address and port that it heard first" in str(dead.value)
+        assert f"udpin:{place} (listens)" in str(dead.value)
+        with Link(f"udpout:{place}"), Link(f"udpout:{place}") as second, pytest.raises(LinkError) as dead:
+            discover(second, 1, 0.2)
+        assert "a program uses" in str(dead.value)
 
 
 def test_the_wrong_number_is_told_with_the_numbers_that_are_there() -> None:
