@@ -140,7 +140,7 @@ def test_a_mission_that_the_vehicles_own_parameters_make_unsafe_is_not_sent() ->
 
     def judge(_: Mission, values: Mapping[str, float]) -> str | None:
         heard.append(dict(values))
-        return "a corner in a zone" if values.get("NAV_ACC_RAD") == 10.0 else None
+        return "a corner in a zone" if values.get("NAV_ACC_RAD") == 2.0 else None
 
     with air(board) as link, pytest.raises(VehicleRefused, match="a corner in a zone") as caught:
         upload_mission(link, mission(Autopilot.PX4), options=replace(OPTIONS, read_parameters=True), judge=judge)
@@ -439,6 +439,8 @@ def test_parameters_that_fit_say_nothing() -> None:
             "ends at 5 m (FENCE_RADIUS)",
         ),
         ({"RTL_RETURN_ALT": 60.0, "GF_ACTION": 1.0, "GF_MAX_VER_DIST": 50.0}, "ends at 50 m (GF_MAX_VER_DIST)"),
+        ({"RTL_RETURN_ALT": 60.0, "RTL_TYPE": 2.0}, "RTL_TYPE is 2 on board: the return is not straight home"),
+        ({"RTL_RETURN_ALT": 60.0, "RTL_CONE_ANG": 80.0}, "RTL_CONE_ANG is 80 on board"),
         ({"RTL_RETURN_ALT": 60.0, "NAV_DLL_ACT": 0.0}, "no failsafe action on board for loss of the ground station"),
     ],
 )
@@ -525,7 +527,7 @@ def test_what_is_on_board_is_judged_with_the_vehicles_own_parameters() -> None:
 
     def judge(read: Mission, values: Mapping[str, float]) -> str | None:
         heard.append((read, dict(values)))
-        return "a corner in a zone" if values.get("NAV_ACC_RAD") == 10.0 else None
+        return "a corner in a zone" if values.get("NAV_ACC_RAD") == 2.0 else None
 
     with air(board) as link:
         upload_mission(link, sent, options=OPTIONS).raise_for_outcome()
