@@ -184,7 +184,7 @@ def _terms(task: Task) -> dict[str, Any]:
     return {
         "mission_type": task.mission_type, "start": task.mission.home if task.mission else None,
         "ground_amsl_m": options.ground_amsl_m, "allow_armed": options.allow_armed,
-        "ignore_position": options.ignore_position,
+        "ignore_position": options.ignore_position, "judged": task.judge is not None,
     }  # fmt: skip
 
 

@@ -34,6 +34,7 @@ from gcsplan.mavlink.link.session import (
 from gcsplan.mavlink.link.watch import BOOT, CRITICAL, POWEROFF, STANDBY, UNINIT, VehicleState, Watch
 from gcsplan.mavlink.mission.autopilots import altitude_of_cm
 from gcsplan.mavlink.mission.compare import compare, faults
+from gcsplan.mavlink.mission.firmware import flies_straight
 from gcsplan.mavlink.mission.mission import ALL, FENCE, RALLY, Home, Mission, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.mavlink.protocol.transfer import Progress, Timers
@@ -375,6 +376,35 @@ def test_all_reasons_are_told_at_once() -> None:
     state = replace(READY, armed=True, lat_deg=40.0, sources=3, system_status=BOOT)
     with pytest.raises(VehicleRefused, match=r"3 autopilots.*booting.*armed.*m from the mission's start"):
         warnings_of(state)
+
+
+PX4_17, PX4_18 = int.from_bytes([1, 17, 0, 255], "big"), int.from_bytes([1, 18, 0, 128], "big")
+
+
+@pytest.mark.parametrize("version", [PX4_18, None, 0])
+def test_a_judged_mission_goes_to_no_px4_that_may_not_fly_straight_legs(version: int | None) -> None:
+    state = replace(READY, mav_autopilot=12, flight_sw_version=version)
+    items = mission(PX4).wire_items()
+    with pytest.raises(VehicleRefused, match="may change its altitude at the beginning of a leg") as refused:
+        preflight(state, items, PX4, judged=True)
+    assert (refused.value.reason, refused.value.exit_code) == ("firmware", 5)
+    assert "fly on (upstream issue 28507)" in " / ".join(preflight(state, items, PX4))  # unchecked: a warning
+    assert preflight(replace(state, flight_sw_version=PX4_17), items, PX4, judged=True) == []
+    level = [replace(item, z=65.0) for item in items]
+    assert preflight(state, level, PX4, judged=True) == []
+    assert preflight(state, [MissionItem(5004, 0)], PX4, mission_type=FENCE, judged=True) == []
+
+
+def test_what_a_px4_says_of_its_version_decides_an_upload(monkeypatch: pytest.MonkeyPatch) -> None:
+    board, sent = vehicle(PX4), mission(PX4)
+    with air(board) as link:
+        found = discover(link, 1, listen_s=0.0)
+        assert flies_straight(found.flight_sw_version)
+        monkeypatch.setattr("gcsplan.mavlink.mission.firmware.STRAIGHT_UNTIL", (1, 9))
+        with pytest.raises(VehicleRefused, match="the vehicle is PX4 1"):
+            upload_mission(link, sent, options=OPTIONS, judge=lambda read, values: None)
+        assert board.items() == ()
+        upload_mission(link, sent, options=OPTIONS).raise_for_outcome()
 
 
 def test_too_many_items_are_refused_before_they_are_sent() -> None:
