@@ -15,6 +15,9 @@ LEAN_DEG_PER_M_S = 3.0
 """Lean that an ArduCopter needs for 1 m/s of cruise speed, against its drag: its speed was measured to end near 10 m/s
 with 30° and near 15 m/s with 45°, whatever was commanded. An airframe with less drag is faster."""
 
+PX4_RETURN_M_S = 5.0
+"""PX4's MPC_XY_CRUISE, default: the speed of its return, whatever speed the mission has commanded."""
+
 
 def lean_for_deg(speed_m_s: float) -> float:
     """The lean angle that an ArduCopter needs for a cruise speed, about."""
@@ -98,6 +101,11 @@ class Vehicle:
     def lays_curves(self) -> bool:
         """Whether it flies legs as ArduPilot does: each leg is its own S-curve, measured in ArduPilot's own metres."""
         return self.autopilot.is_ardupilot and math.isfinite(self.leg_jerk_m_s3) and math.isfinite(self.accel_m_s2)
+
+    @property
+    def return_speed_m_s(self) -> float | None:
+        """The speed of the autopilot's own return; None: that of the mission."""
+        return PX4_RETURN_M_S if self.autopilot is Autopilot.PX4 and math.isfinite(self.accel_m_s2) else None
 
     @property
     def can_hold(self) -> bool:

@@ -13,7 +13,7 @@ from gcsplan.app.model import Plan
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed
-from gcsplan.mavlink.mission.return_altitude import on_board, return_on_board_m
+from gcsplan.mavlink.mission.return_altitude import on_board, return_on_board_m, returns_otherwise
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.units import UnitText
 from gcsplan.world.world import World
@@ -91,6 +91,8 @@ def against_on_board(home: WayHome, values: Mapping[str, float]) -> str | None:
     parameter = on_board(values)
     if height_m is None or parameter is None:
         return "a safe return is required, and the return altitude on board could not be read"
+    if otherwise := returns_otherwise(values):
+        return f"a safe return is required, and {otherwise}"
     if abs(height_m - home.rtl_rel_home_m) <= SAME_M:
         return None
     return (

@@ -13,6 +13,9 @@ from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 
+PX4_SLOW_BELOW_M = 5.0
+"""MPC_LAND_ALT2, default: below this height over home a landing PX4 is as slow as MPC_LAND_SPEED."""
+
 
 class Aboard:
     """Position, speed and stretches flown so far; and what an item's numbers mean at that point."""
@@ -108,6 +111,15 @@ class Aboard:
             ground = self.ground(here[0], here[1])
             return None if math.isnan(ground) else ground + item.z
         return None
+
+    def lands_fast(self, seq: int, ground_amsl_m: float) -> None:
+        """Note a landing so far above home that PX4 does not slow down for it."""
+        above_m = ground_amsl_m - self.home[2]
+        if self.autopilot is Autopilot.PX4 and above_m > PX4_SLOW_BELOW_M:
+            self.note(
+                f"item {seq}: it lands {above_m:.0f} m above home, and PX4 without a range finder slows down by its "
+                f"height over home: it may touch down at up to MPC_Z_VEL_MAX_DN (1.5 m/s, the default)"
+            )
 
     def hold(self, item: MissionItem) -> float:
         """Seconds for which the vehicle holds at a way point."""

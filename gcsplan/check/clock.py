@@ -45,18 +45,20 @@ def seconds_of(stretches: Sequence[Stretch], vehicle: Vehicle, world: World, hom
     ends[..., :2] = world.frame.to_plane(places[..., 0], places[..., 1])
     ends[..., 2] = places[..., 2]
     seconds = np.zeros(len(stretches))
+    home_m = world.ground_amsl(*home_deg)
+    home_amsl_m = None if math.isnan(home_m) else home_m
     for first, last in _runs(stretches, ends):
         if _upright(stretches[first], ends[first]):
-            seconds[first] = _column_s(stretches[first], ends[first], vehicle)
+            seconds[first] = _column_s(stretches[first], ends[first], vehicle, home_amsl_m)
         else:
             seconds[first:last] = _legs_s(stretches[first:last], ends[first:last], vehicle, world, home_deg)
     return seconds
 
 
-def _column_s(s: Stretch, ends: Floats, vehicle: Vehicle) -> float:
+def _column_s(s: Stretch, ends: Floats, vehicle: Vehicle, home_amsl_m: float | None) -> float:
     if s.rates_m_s is not None:
         vehicle = replace(vehicle, climb_m_s=s.rates_m_s[0], descent_m_s=s.rates_m_s[1])
-    parts = upright(ends[0, :2], float(ends[0, 2]), float(ends[1, 2]), vehicle, 0)
+    parts = upright(ends[0, :2], float(ends[0, 2]), float(ends[1, 2]), vehicle, 0, home_amsl_m)
     return math.fsum(part.time_s(s.speed_m_s) for part in parts)
 
 

@@ -25,6 +25,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -331,6 +332,7 @@ class _Pilot(Aboard):
             self.flight.not_judged.append(f"item {seq}: the ground at the landing place is unknown")
         else:
             down = (self.at[0], self.at[1], ground)
+            self.lands_fast(seq, ground)
             self.add(seq, "land", self.at, down, column=True)
             self.at = down
         self.landed = True
@@ -356,6 +358,7 @@ class _Pilot(Aboard):
             self.flight.not_judged.append(f"item {seq}: the return home is not judged: {why}")
             self.landed = True
             return
+        self.pace = replace(self.pace, speed_m_s=self.vehicle.return_speed_m_s or self.pace.speed_m_s)
         pieces = return_pieces(
             RULES[self.autopilot], self.at, self.home, self.home[2] + self.rtl_rel_home_m,
             about_m=about_turn_m(self.vehicle),

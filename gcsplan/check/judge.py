@@ -24,6 +24,7 @@ from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.check.tuning import DEFAULTS, Tuning
 from gcsplan.check.verdict import Finding, LegFigures, Verdict
 from gcsplan.mavlink.mission.autopilots import profile_of
+from gcsplan.mavlink.mission.firmware import STRAIGHT_NOTE, needs_straight
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.units import Joules, Quantity, UnitText, measured
 from gcsplan.vehicle import Vehicle
@@ -87,6 +88,8 @@ def judge(
         plane = legs_in_plane(flight.instead, vehicle.limits, world, terrain_error_m)
         report = steep_report(plane, world.airspace.examine(plane.legs, vehicle.limits), vehicle.limits)
         findings = _worst(findings, _findings(flight.instead, plane, report, vehicle.limits, world))
+    if needs_straight(mission.items, mission.autopilot):
+        flight.notes.append(STRAIGHT_NOTE)
     if any(s.terrain for s in flight.stretches):
         flight.notes.append(
             f"terrain-frame legs depend on the terrain data in the vehicle; judged with {terrain_error_m:g} m of error"

@@ -12,7 +12,7 @@ from gcsplan.cli import completion
 from gcsplan.errors import UsageError
 from gcsplan.units import AVIATION, IMPERIAL, METRIC
 
-LINKS = "udpout:HOST:PORT sends, udpin:HOST:PORT listens, tcp:HOST:PORT, /dev/ttyUSB0,57600."
+LINKS = "udpout:HOST:PORT sends (,LOCAL: from that port), udpin:HOST:PORT listens, tcp:HOST:PORT, /dev/ttyUSB0,57600."
 MISBEHAVIOURS = (
     "drop, duplicate, reorder, delay (probabilities), delay_s, corrupt (an item), corrupt_field, silent_after "
     "(messages), reboot_at (an item), reboot_s, reboot_loses, edit (an item), stray_sysid, stale_type, answer_sysid, "

@@ -19,7 +19,7 @@ import numpy as np
 from gcsplan.arrays import Floats, Indices
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.speeds import POSITION_ERROR_M, Stretch, column, legs
-from gcsplan.vehicle import Vehicle
+from gcsplan.vehicle import Autopilot, Vehicle
 
 __all__ = [
     "POSITION_ERROR_M", "Course", "End", "Route", "leg_lengths_m", "motion_error_m", "speed_for", "upright",
@@ -29,6 +29,10 @@ End = Literal["land", "loiter", "rtl", "none"]
 
 LAND_SLOWLY_M = 10.0
 """Height above ground, m, below which a landing is slow (ArduCopter's LAND_ALT_LOW)."""
+
+PX4_LAND_SLOWLY_M = 7.0
+"""Height above home, m, below which a landing PX4 without a range finder is slow. It slows down from MPC_LAND_ALT1
+(10 m) to MPC_LAND_ALT2 (5 m), which takes as long."""
 
 _LEAST_S = 1e-9
 
@@ -276,7 +280,8 @@ def _after(route: Route, vehicle: Vehicle) -> list[Stretch]:
         down = None if slanted is None else legs(slanted, vehicle, np.full(len(slanted) - 1, number, dtype=np.intp))
         return [] if down is None else [down]
     if route.end == "land" and route.goal_ground_amsl_m is not None:
-        return upright(goal[:2], float(goal[2]), route.goal_ground_amsl_m, vehicle, number)
+        home_m = route.start_ground_amsl_m
+        return upright(goal[:2], float(goal[2]), route.goal_ground_amsl_m, vehicle, number, home_m)
     if route.end != "rtl":
         return []
     home_amsl, rtl_amsl = _home(route)
@@ -285,6 +290,8 @@ def _after(route: Route, vehicle: Vehicle) -> list[Stretch]:
     above = np.array([[goal[0], goal[1], level], [home[0], home[1], level]])
     pace = None if route.pace is None else route.pace[-1:]
     way = legs(above, vehicle, np.array([number], dtype=np.intp), pace=pace)
+    if way is not None and vehicle.return_speed_m_s is not None:
+        way = way.at_its_own(vehicle.return_speed_m_s)
     stretches += [way] if way is not None else []
     return stretches + upright(home[:2], level, home_amsl, vehicle, number)
 
@@ -296,20 +303,28 @@ def _home(route: Route) -> tuple[float, float]:
     return route.start_ground_amsl_m, route.rtl_amsl_m
 
 
-def upright(place: Floats, from_amsl_m: float, to_amsl_m: float, vehicle: Vehicle, owner: int) -> list[Stretch]:
+def upright(
+    place: Floats, from_amsl_m: float, to_amsl_m: float, vehicle: Vehicle, owner: int, home_amsl_m: float | None = None
+) -> list[Stretch]:
     """A column over ``place`` (2,): a climb to a standstill, or a landing that is slow near the ground.
 
+    ``home_amsl_m``: the ground at home, above which PX4 slows down, wherever it lands; None: as at the landing place.
     Empty if both altitudes are the same.
     """
     if from_amsl_m == to_amsl_m:
         return []
+    slow_m_s = min(vehicle.land_m_s, vehicle.descent_m_s)
+    slow_from = to_amsl_m + LAND_SLOWLY_M
+    if vehicle.autopilot is Autopilot.PX4:
+        slow_from = (to_amsl_m if home_amsl_m is None else home_amsl_m) + PX4_LAND_SLOWLY_M
     if from_amsl_m < to_amsl_m:
         heights, most = [from_amsl_m, to_amsl_m], [vehicle.climb_m_s]
-    elif from_amsl_m <= (slow_from := to_amsl_m + LAND_SLOWLY_M):
-        heights, most = [from_amsl_m, to_amsl_m], [min(vehicle.land_m_s, vehicle.descent_m_s)]
+    elif from_amsl_m <= slow_from:
+        heights, most = [from_amsl_m, to_amsl_m], [slow_m_s]
+    elif slow_from <= to_amsl_m:
+        heights, most = [from_amsl_m, to_amsl_m], [vehicle.descent_m_s]
     else:
-        heights = [from_amsl_m, slow_from, to_amsl_m]
-        most = [vehicle.descent_m_s, min(vehicle.land_m_s, vehicle.descent_m_s)]
+        heights, most = [from_amsl_m, slow_from, to_amsl_m], [vehicle.descent_m_s, slow_m_s]
     climbs = from_amsl_m < to_amsl_m
     return [column(np.array(heights), np.array(most), place, vehicle, owner, stops=climbs)]
 

@@ -226,15 +226,15 @@ class VehicleKeys(LimitKeys):
     lean_angle_deg: Annotated[float, Field(ge=10.0, le=80.0)] | None = None
     """ArduCopter's largest lean (`ATC_ANGLE_MAX`): 3° for each m/s of cruise; if absent 30, so 10 m/s at most."""
     climb_m_s: Speed = 2.5
-    """Fastest climb rate; slows steep legs."""
+    """Fastest climb rate; slows steep legs. On PX4, if absent, 3 (`MPC_Z_V_AUTO_UP`)."""
     descent_m_s: Speed = 1.5
     """Fastest descent rate; slows steep legs."""
     land_m_s: Speed = 0.5
-    """Descent rate just above the ground."""
+    """Descent rate just above the ground. On PX4, if absent, 0.7 (`MPC_LAND_SPEED`)."""
     accel_m_s2: Accel = 1.5
     """Acceleration and braking along the path."""
     corner_accel_m_s2: Accel = 2.5
-    """Acceleration that bounds the speed in a corner."""
+    """Acceleration that bounds the speed in a corner. On PX4, if absent, 1.5 (`MPC_XY_TRAJ_P` · `MPC_ACC_HOR`)."""
     vertical_accel_m_s2: Accel = 1.0
     """Acceleration and braking in take-off and landing."""
     leg_jerk_m_s3: Accel = 1.0

@@ -46,6 +46,9 @@ MOTION = (
 """The keys that bound a vehicle's motion besides its cruise speed. In local metres (the papers' worlds) an absent key
 is no bound: speed changes at once, and counts in space."""
 
+PX4_MOTION = {"climb_m_s": 3.0, "land_m_s": 0.7, "corner_accel_m_s2": 1.5}
+"""Of `MOTION`, what differs on PX4: MPC_Z_V_AUTO_UP, MPC_LAND_SPEED, and MPC_XY_TRAJ_P · MPC_ACC_HOR; defaults."""
+
 
 def check_unique(vehicles: Sequence[Any], where: str, problems: list[Problem]) -> tuple[str, ...]:
     """Report duplicate names and system ids among the vehicles as written; returns the names.
@@ -189,7 +192,8 @@ def _motion(keys: VehicleKeys, notes: list[str], *, local: bool) -> dict[str, fl
             f"in local metres {', '.join(free)} bound nothing unless they are given: flight times are the ideal ones "
             "of the papers"
         )
-    return {key: math.inf if key in free else getattr(keys, key) for key in MOTION}
+    own = {k: v for k, v in PX4_MOTION.items() if keys.autopilot == "px4" and k not in keys.model_fields_set}
+    return {key: math.inf if key in free else own.get(key, getattr(keys, key)) for key in MOTION}
 
 
 def _limits(

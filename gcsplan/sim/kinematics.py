@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from gcsplan.vehicle import Vehicle
+from gcsplan.vehicle import Autopilot, Vehicle
 
 AT_ONCE_M_S2 = 1e4
 """Acceleration that stands for "unlimited", m/s²: 30 m/s in 3 ms."""
@@ -19,6 +19,9 @@ SHORT_LEG = 0.96
 
 AIRSPEED_SPARE = 1.2
 """Assumed highest airspeed of a vehicle, as a multiple of its fastest cruise: its reserve against wind."""
+
+PX4_LAND_BELOW_M = 7.0
+"""Height above home, m, below which a landing PX4 is slow: the middle of MPC_LAND_ALT1 and MPC_LAND_ALT2 in time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +34,9 @@ class Kinematics:
     ``corner_accel_m_s2``: lateral, on the arc that rounds a corner and passes its way point at ``cut_m``. With an
     infinite acceleration speeds change instantly; with an infinite corner acceleration corners are not rounded. With an
     infinite climb or descent rate the commanded speed is the speed in space on any slope. ``land_m_s``: descent rate in
-    the last ``land_below_m`` above the landing place. ``airspeed_m_s``: highest airspeed; a headwind is subtracted from
-    it. ``leg_jerk_m_s3``, ``leg_accel_m_s2``: of ArduPilot's S-curves, see `leg_m_s`; an infinite jerk disables them.
+    the last ``land_below_m`` above the landing place (above home for a PX4). ``airspeed_m_s``: highest airspeed; a
+    headwind is subtracted from it. ``leg_jerk_m_s3``, ``leg_accel_m_s2``: of ArduPilot's S-curves, see `leg_m_s`; an
+    infinite jerk disables them.
     """
 
     climb_m_s: float
@@ -57,6 +61,7 @@ class Kinematics:
             vertical_accel_m_s2=vehicle.vertical_accel_m_s2, accel_m_s2=vehicle.accel_m_s2,
             corner_accel_m_s2=vehicle.corner_accel_m_s2, land_m_s=vehicle.land_m_s,
             leg_jerk_m_s3=vehicle.leg_jerk_m_s3 if vehicle.lays_curves else math.inf,
+            land_below_m=PX4_LAND_BELOW_M if vehicle.autopilot is Autopilot.PX4 else 10.0,
         )  # fmt: skip
 
     def __post_init__(self) -> None:

@@ -172,11 +172,12 @@ def make_track(
         flight.stretches, ends = flight.stretches[first:], ends[first:]
     # A leg begins where the last one ended: a gap between them was not understood and is listed in `not_flown`.
     line, goal, i = _Line(ends[0, 0]), 0, 0
+    home_amsl_m = _home_amsl_m(mission, world) if vehicle.autopilot is Autopilot.PX4 else None
     stretches = flight.stretches
     while i < len(stretches):
         s = stretches[i]
         if s.column and not (wing and _slants(ends[i])):
-            _column(line, ends[i], s, kinematics)
+            _column(line, ends[i], s, kinematics, home_amsl_m)
             line.stop(s.hold_s)
         elif _stands(ends[i]):
             line.stop(s.hold_s)
@@ -193,6 +194,12 @@ def make_track(
     if not line.pieces:
         raise ValueError(f"{vehicle.name}: the mission flies nowhere")
     return _track(vehicle, line, goal, flight, kinematics, stretches[min(i, len(stretches) - 1)])
+
+
+def _home_amsl_m(mission: Mission, world: World) -> float:
+    """The ground at home, or home's own altitude where that is unknown."""
+    ground = world.ground_amsl(mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7)
+    return mission.home.amsl_m if math.isnan(ground) else ground
 
 
 def _as_measured(s: Stretch, mission: Mission, world: World) -> Stretch:
@@ -274,16 +281,19 @@ def _slants(ends: Floats) -> bool:
     return bool(np.hypot(*(ends[1] - ends[0])[:2]) > SAME_M)
 
 
-def _column(line: _Line, ends: Floats, s: Stretch, kinematics: Kinematics) -> None:
-    """Add a vertical piece: straight up, or straight down, with slow descent at the end."""
+def _column(line: _Line, ends: Floats, s: Stretch, kinematics: Kinematics, home_amsl_m: float | None) -> None:
+    """Add a vertical piece: straight up, or straight down, with slow descent at the end.
+
+    ``home_amsl_m``: the vehicle slows down by its height over home, wherever it lands (PX4); None: over its landing.
+    """
     start, end = line.points[-1], ends[1]
     climb, descent = s.rates_m_s or (kinematics.climb_m_s, kinematics.descent_m_s)
     if end[2] >= start[2]:
         line.add(end, s, kinematics, cap_m_s=climb)
         return
-    low = end[2] + kinematics.land_below_m
-    if start[2] > low > end[2]:
-        line.add(np.array([*end[:2], low]), s, kinematics, cap_m_s=descent)
+    low = (end[2] if home_amsl_m is None else home_amsl_m) + kinematics.land_below_m
+    if start[2] > low:
+        line.add(np.array([*end[:2], max(low, end[2])]), s, kinematics, cap_m_s=descent)
     line.add(end, s, kinematics, cap_m_s=min(kinematics.land_m_s, descent))
 
 

@@ -101,6 +101,23 @@ def test_rtl_climbs_returns_straight_and_lands_at_home() -> None:
     assert down.end == (36.6, -84.3, GROUND_M)
 
 
+def test_px4_returns_at_its_own_cruise_speed_and_others_at_the_missions() -> None:
+    items = TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), MissionItem(cmd.RTL, 2)
+    assert fly(*items, rtl_rel_home_m=120, autopilot=Autopilot.PX4).stretches[-2].speed_m_s == 5.0
+    assert fly(*items, rtl_rel_home_m=120).stretches[-2].speed_m_s == 15.0
+
+
+@pytest.mark.parametrize(("above_m", "told"), [(4.0, False), (30.0, True), (-30.0, False)])
+def test_a_px4_that_lands_far_above_home_does_not_slow_down_and_that_is_told(above_m: float, told: bool) -> None:
+    items = TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), at(cmd.LAND, 0.01, 0, 0)
+    for autopilot in (Autopilot.PX4, Autopilot.ARDUCOPTER):
+        mission = Mission(autopilot, HOME, items)
+        flight = follow(mission, vehicle(autopilot), lambda lat, lon: GROUND_M + (above_m if lat > 36.605 else 0.0))
+        assert flight.stretches[-1].end[2] == GROUND_M + above_m
+        said = any("touch down at up to MPC_Z_VEL_MAX_DN" in note for note in flight.notes)
+        assert said is (told and autopilot is Autopilot.PX4)
+
+
 def test_rtl_does_not_descend_before_it_is_home() -> None:
     flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 200), MissionItem(cmd.RTL, 2), rtl_rel_home_m=120)
     assert flight.stretches[-2].end[2] == GROUND_M + 200

@@ -209,6 +209,27 @@ def test_a_return_climbs_first_flies_home_level_and_lands() -> None:
     assert high.at(high.arrive_s + home)[0] == pytest.approx([0, 0, 200])
 
 
+@pytest.mark.parametrize(
+    ("goal_m", "slow_from_m"), [(300.0, 307.0), (280.0, 307.0), (304.0, 307.0), (320.0, 320.0), (200.0, 307.0)]
+)
+def test_a_landing_px4_slows_down_by_its_height_over_home(goal_m: float, slow_from_m: float) -> None:
+    px4 = vehicle(autopilot=Autopilot.PX4, descent_m_s=1.5, land_m_s=0.7, vertical_accel_m_s2=FREE)
+    there = (500.0, 0.0, 400.0)
+    way = route((0, 0, 365), there, start_ground_amsl_m=300.0, goal_ground_amsl_m=goal_m)
+    motion = fly(way, px4, 10.0)
+    takes_s = (there[2] - slow_from_m) / 1.5 + (slow_from_m - goal_m) / 0.7
+    assert motion.end_s - motion.arrive_s == pytest.approx(takes_s)
+
+
+def test_px4_returns_at_a_speed_of_its_own() -> None:
+    free = {"vertical_accel_m_s2": FREE, "climb_m_s": FREE, "descent_m_s": FREE, "land_m_s": FREE}
+    way = route((0, 0, 365), (1000, 0, 365), start_ground_amsl_m=300.0, end="rtl", rtl_amsl_m=365.0)
+    for speed in (4.0, 10.0):
+        motion = fly(way, vehicle(autopilot=Autopilot.PX4, **free), speed)
+        home_s = float(motion.times_s[(motion.points[:, 0] <= 1e-6) & (motion.times_s > motion.arrive_s)][0])
+        assert home_s - motion.arrive_s == pytest.approx(1000 / 5.0 + 5.0 / 1.5)
+
+
 def test_what_stays_in_the_air_says_so_and_what_ends_there_does_not() -> None:
     points = ((0.0, 0.0, 100.0), (600.0, 0.0, 100.0))
     assert fly(route(*points, end="loiter"), vehicle(), 10.0).ends_in_air

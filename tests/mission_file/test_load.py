@@ -83,6 +83,13 @@ def the_problem(whole: Any, folder: Path = Path()) -> tuple[str, str]:
     return found[0].where.split(": ", 1)[-1], found[0].message
 
 
+def test_motion_that_px4_flies_otherwise_has_defaults_of_its_own() -> None:
+    own = [load(base(vehicles=[vehicle(autopilot=a)])).vehicles[0].vehicle for a in ("arducopter", "px4")]
+    assert [(v.climb_m_s, v.land_m_s, v.corner_accel_m_s2) for v in own] == [(2.5, 0.5, 2.5), (3.0, 0.7, 1.5)]
+    given = load(base(vehicles=[vehicle(autopilot="px4", climb_m_s=1.0, land_m_s=0.3)])).vehicles[0].vehicle
+    assert (given.climb_m_s, given.land_m_s) == (1.0, 0.3)
+
+
 # -- the example --------------------------------------------------------------------------------------------------
 
 

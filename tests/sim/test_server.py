@@ -193,7 +193,7 @@ def test_parameters_are_listed_read_and_set() -> None:
 def test_px4_packs_whole_parameters_as_bytes() -> None:
     hub = Hub([a_vehicle(3, PX4)])
     values = {m.param_id: m for m in ask(hub, mav.MAVLink_param_request_list_message(3, 1))}
-    assert values["RTL_RETURN_ALT"].param_value == 60.0
+    assert values["RTL_RETURN_ALT"].param_value == 30.0
     assert struct.unpack("<i", struct.pack("<f", values["MAV_SYS_ID"].param_value)) == (3,)
 
 

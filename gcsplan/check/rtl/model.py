@@ -3,8 +3,10 @@
 - ArduCopter (mode_rtl.cpp, ``compute_return_target``): climbs on the spot to the higher of its altitude and RTL_ALT
   (RTL_ALT_M since 4.7; relative to home), flies straight home at that altitude, descends. Within a cone around home it
   climbs less: to RTL_CONE_SLOPE times the distance, at least 2.5 m. RTL_CLIMB_MIN (0) is added to its own altitude.
-- PX4 (rtl.cpp): the same with RTL_RETURN_ALT and RTL_CONE_ANG (45 degrees). Later versions have the cone only within
-  RTL_MIN_DIST (10 m) of home and climb fully beyond it; older ones go to RTL_DESCEND_ALT within that distance.
+- PX4 (rtl.cpp): the same with RTL_RETURN_ALT (30 m for multicopters, rc.mc_defaults) and RTL_CONE_ANG (45 degrees).
+  Later versions have the cone only within RTL_MIN_DIST (10 m) of home and climb fully beyond it; older ones go to
+  RTL_DESCEND_ALT within that distance. It flies home at MPC_XY_CRUISE (`Vehicle.return_speed_m_s`). It
+  returns so with RTL_TYPE 0 alone (`return_altitude.returns_otherwise`).
 - ArduPlane, a QuadPlane too: turns and flies home at once, and on the way climbs or glides to RTL_ALTITUDE
   (ALT_HOLD_RTL before 4.5; -1 keeps its altitude). Over home it circles with WP_LOITER_RAD, grown with altitude.
 
@@ -86,7 +88,7 @@ RULES = {
         loiter_radius_m=PLANE_LOITER_RADIUS_M, rally=RallyAltitude.OWN,
     ),
     Autopilot.PX4: ReturnRule(
-        "RTL_RETURN_ALT", 60.0, climbs_first=True,
+        "RTL_RETURN_ALT", 30.0, climbs_first=True,
         cone_slope=1.0,  # RTL_CONE_ANG 45°
         cone_differs=True, loiter_radius_m=0.0, rally=RallyAltitude.GROUND,
     ),

@@ -151,6 +151,11 @@ class Link:
         return self.transport.place
 
     @property
+    def note(self) -> str:
+        """What a user should know of how the link was opened; mostly empty."""
+        return self.transport.note if isinstance(self.transport, Udp) else ""
+
+    @property
     def garbage(self) -> int:
         """Number of frames with a wrong checksum, or with a missing, wrong or late signature."""
         return self._bad + sum(parser.bad for parser in self._parsers.values())

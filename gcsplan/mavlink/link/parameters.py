@@ -15,7 +15,7 @@ from gcsplan.mavlink.link.numbers import finite, whole
 from gcsplan.mavlink.link.preflight import distance_m
 from gcsplan.mavlink.mission.autopilots import PX4, profile_of
 from gcsplan.mavlink.mission.mission import GLOBAL, RELATIVE, Mission
-from gcsplan.mavlink.mission.return_altitude import RETURN_PARAMETERS, on_board
+from gcsplan.mavlink.mission.return_altitude import RETURN_PARAMETERS, on_board, returns_otherwise
 from gcsplan.vehicle import DEFAULT_LEAN_DEG, Autopilot, fastest_at_m_s, lean_for_deg
 
 Values = Mapping[str, float]
@@ -37,6 +37,7 @@ _PLANE = (
 _PX4 = (
     _RETURN[Autopilot.PX4], ("GF_ACTION",), ("GF_MAX_VER_DIST",), ("GF_MAX_HOR_DIST",),
     ("NAV_RCL_ACT",), ("NAV_DLL_ACT",), ("COM_LOW_BAT_ACT",), ("NAV_ACC_RAD",), ("NAV_MC_ALT_RAD",),
+    ("RTL_TYPE",), ("RTL_CONE_ANG",),
 )  # fmt: skip
 GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
     Autopilot.ARDUCOPTER: _COPTER, Autopilot.ARDUPLANE: _PLANE, Autopilot.PX4: _PX4,
@@ -137,6 +138,7 @@ def judge_parameters(
     found += [f"{name} could not be read, {want:g} is expected" for name, want in (expected or {}).items()
               if name not in values]  # fmt: skip
     found += _return_altitude(values, rtl_rel_home_m, advised_rel_home_m)
+    found += [words] if (words := returns_otherwise(values)) else []
     found += _fences(values, _extent(mission))
     found += _lean(values, mission)
     off = [f"{_FAILSAFES[name]} ({name})" for name in _FAILSAFES if values.get(name) == 0]

@@ -20,6 +20,7 @@ from gcsplan.mavlink.link.watch import (
     VehicleState,
 )
 from gcsplan.mavlink.mission.autopilots import is_generic, max_items, profile_of, type_name
+from gcsplan.mavlink.mission.firmware import STRAIGHT_UNTIL, flies_straight, needs_straight, version_words
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, TERRAIN, Home, MissionItem
 from gcsplan.vehicle import Autopilot
 
@@ -40,15 +41,17 @@ def preflight(
     ground_amsl_m: float | None = None,
     allow_armed: bool = False,
     ignore_position: bool = False,
+    judged: bool = False,
 ) -> list[str]:
     """Return the warnings about sending ``items`` (wire order) to a vehicle in ``state``.
 
     ``start``: where the mission begins. ``ground_amsl_m``: the ground altitude there, by default that of ``start``.
+    ``judged``: the list is a mission that was judged, with straight legs.
     Raises VehicleRefused with every reason against it; its ``reason`` is the first one's word.
     """
     against, warnings = objections(
         state, items, autopilot, mission_type=mission_type, start=start, ground_amsl_m=ground_amsl_m,
-        allow_armed=allow_armed, ignore_position=ignore_position,
+        allow_armed=allow_armed, ignore_position=ignore_position, judged=judged,
     )  # fmt: skip
     if against:
         words = "; ".join(text for _, text in against)
@@ -66,6 +69,7 @@ def objections(
     ground_amsl_m: float | None = None,
     allow_armed: bool = False,
     ignore_position: bool = False,
+    judged: bool = False,
 ) -> tuple[Reasons, list[str]]:
     """Return the reasons against sending, each a word and a text, and the warnings; arguments as in `preflight`."""
     against: list[tuple[str, str]] = []
@@ -73,6 +77,8 @@ def objections(
     identity(state, autopilot, against, warnings)
     _readiness(state, allow_armed, against, warnings)
     _abilities(state, items, autopilot, mission_type, against, warnings)
+    if mission_type == MISSION and needs_straight(items, autopilot) and not is_generic(state.mav_autopilot):
+        _straightness(state, against, warnings, judged=judged)
     if start is not None and not ignore_position:
         ground = start.amsl_m if ground_amsl_m is None else ground_amsl_m
         _position(state, start, ground, against, warnings)
@@ -154,6 +160,21 @@ def _abilities(
         warnings.append("the vehicle does not say that it takes MISSION_ITEM_INT")
     if any(item.frame in (TERRAIN, 11) for item in items) and state.can(CAN_TERRAIN) is False:
         warnings.append("the mission has altitudes above terrain, and the vehicle does not say that it knows terrain")
+
+
+def _straightness(state: VehicleState, against: Reasons, warnings: list[str], *, judged: bool) -> None:
+    if flies_straight(state.flight_sw_version):
+        return
+    last = ".".join(map(str, STRAIGHT_UNTIL))
+    words = (
+        f"the vehicle is PX4 {version_words(state.flight_sw_version)}, which may change its altitude at the beginning "
+        f"of a leg, miss the way point and fly on (upstream issue 28507)"
+    )
+    if judged:
+        words += f": the straight legs that were judged hold until PX4 {last} alone; fly that, or at one altitude"
+        against.append(("firmware", words))
+    else:
+        warnings.append(words)
 
 
 def _position(state: VehicleState, start: Home, ground_m: float, against: Reasons, warnings: list[str]) -> None:

@@ -109,8 +109,17 @@ def dead_link(link: Link, sysid: int, timeout_s: float) -> LinkError:
         hints.append(f"{link.garbage} frames did not check: is it MAVLink, is the baud rate right?")
     if not others:
         hints.append(f"is the vehicle on, and is {link.endpoint.other_direction()} meant?")
+    sends = link.endpoint.kind == "udp" and not link.endpoint.listens
+    if sends and not others:
+        hints.append(
+            "PX4 answers only the address and port that it heard first after it booted: if that was another program, "
+            "restart the vehicle, or send from that program's port (udpout:HOST:PORT,LOCAL)"
+        )
+    if link.note:
+        hints.append(link.note)
+    how = link.endpoint.understood() + (f" from port {link.place.rsplit(':', 1)[-1]}" if sends else "")
     return LinkError(
-        f"no heartbeat of system {sysid} within {timeout_s:g} s ({link.endpoint.understood()}); {'; '.join(hints)}",
+        f"no heartbeat of system {sysid} within {timeout_s:g} s ({how}); {'; '.join(hints)}",
         where=link.url,
         reason="no_heartbeat",
     )

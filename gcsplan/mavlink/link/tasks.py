@@ -124,7 +124,7 @@ def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
     clock, options = channel.link.clock, task.options
     watch = Watch(task.sysid)
     state = yield from finding(channel, watch, options)
-    warnings = preflight(state, task.items, task.autopilot, **_terms(task))
+    warnings = _of_link(channel) + preflight(state, task.items, task.autopilot, **_terms(task))
     recheck = _holding(channel, watch, state, options, lambda now: objections(
         now, task.items, task.autopilot, **_terms(task)
     ))  # fmt: skip
@@ -174,13 +174,17 @@ def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
     return replace(result, changed=changed.reason, change=changed.why) if changed else result
 
 
+def _of_link(channel: Channel) -> list[str]:
+    return [channel.link.note] if channel.link.note else []
+
+
 def _terms(task: Task) -> dict[str, Any]:
     """Return the arguments of preflight, for the first run and every repetition."""
     options = task.options
     return {
         "mission_type": task.mission_type, "start": task.mission.home if task.mission else None,
         "ground_amsl_m": options.ground_amsl_m, "allow_armed": options.allow_armed,
-        "ignore_position": options.ignore_position,
+        "ignore_position": options.ignore_position, "judged": task.judge is not None,
     }  # fmt: skip
 
 
@@ -246,7 +250,7 @@ def verifying(channel: Channel, task: Task) -> Steps[UploadResult]:
     With a judge the parameters are read too, since they decide where the vehicle turns.
     """
     state, recheck = yield from looking_at(channel, task.options)
-    warnings: list[str] = []
+    warnings = _of_link(channel)
     values: dict[str, float] = {}
     if task.judge is not None:
         against: Reasons = []
@@ -305,6 +309,7 @@ def clearing(
         mission_type=kinds[0],
         reason=f"unknown: {left} items are still there" if left else "accepted",
         on_board=f"the vehicle still holds {left} items" if left else "",
+        warnings=tuple(_of_link(channel)),
         texts=tuple(watch.texts),
     )
 

@@ -7,6 +7,7 @@ readable; one without handles (serial ports on Windows) is polled.
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import select
 import socket
@@ -109,9 +110,13 @@ def _patience_s(sock: socket.socket) -> float | None:
 
 
 class Udp:
-    """One UDP socket. ICMP errors about unreachable peers are ignored, because the timers detect silence anyway."""
+    """One UDP socket. ICMP errors about unreachable peers are ignored, because the timers detect silence anyway.
+
+    ``note``: says that another port than the endpoint's is sent from, and why; mostly empty.
+    """
 
     datagrams = True
+    note = ""
 
     def __init__(self, endpoint: Endpoint) -> None:
         family, address = _resolve(endpoint, socket.SOCK_DGRAM)
@@ -127,9 +132,25 @@ class Udp:
             else:
                 self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
                 self.default = address
+                self._leave_from(endpoint, "::" if family == socket.AF_INET6 else "")
         except OSError:
             self._socket.close()
             raise
+
+    def _leave_from(self, endpoint: Endpoint, everywhere: str) -> None:
+        """Send from the endpoint's port, or from any free one if a program uses it already."""
+        try:
+            self._socket.bind((everywhere, endpoint.sends_from))
+        except OSError as error:
+            if error.errno != errno.EADDRINUSE:
+                raise
+            self._socket.bind((everywhere, 0))
+            own = self._socket.getsockname()[1]
+            self.note = (
+                f"the link sends from port {own}, because a program uses {endpoint.sends_from} already: a PX4 that has "
+                f"heard that program answers it alone; end it, or give a port to send from ({endpoint.place} as "
+                f"udpout:HOST:PORT,LOCAL)"
+            )
 
     @property
     def handles(self) -> Sequence[int]:

@@ -2,7 +2,8 @@
 
 ========================================  =====================================================
 ``udpin:HOST:PORT``, ``udp:…``            listens (``udp:`` listens, as in pymavlink)
-``udpout:HOST:PORT``                      sends
+``udpout:HOST:PORT``                      sends, from a port that stays the same for this place
+``udpout:HOST:PORT,LOCAL``                sends from the port LOCAL (0: any free one)
 ``tcp:HOST:PORT``, ``tcpout:…``           connects
 ``tcpin:HOST:PORT``                       waits for connections
 ``/dev/ttyUSB0,57600``, ``COM3,57600``    serial port
@@ -15,6 +16,7 @@ All forms but the bare device names may be written with ``://``. IPv6 addresses 
 from __future__ import annotations
 
 import re
+import zlib
 from dataclasses import dataclass
 from typing import Literal
 
@@ -22,8 +24,9 @@ from gcsplan.errors import InputError
 
 DEFAULT_BAUD = 57600
 FORMS = (
-    "udpin:HOST:PORT (listens; udp: is the same), udpout:HOST:PORT (sends), tcp:HOST:PORT (connects), "
-    "tcpin:HOST:PORT (waits), /dev/ttyUSB0,57600 or COM3,57600 or serial:DEVICE:BAUD; also with ://"
+    "udpin:HOST:PORT (listens; udp: is the same), udpout:HOST:PORT (sends; ,LOCAL after it is the port to send from), "
+    "tcp:HOST:PORT (connects), tcpin:HOST:PORT (waits), /dev/ttyUSB0,57600 or COM3,57600 or serial:DEVICE:BAUD; also "
+    "with ://"
 )
 
 _SCHEMES: dict[str, tuple[Literal["udp", "tcp"], bool]] = {
@@ -36,12 +39,19 @@ _SCHEMES: dict[str, tuple[Literal["udp", "tcp"], bool]] = {
 }
 _BARE_DEVICE = re.compile(r"(?P<device>/dev/[^,\s]+|(\\\\\.\\)?COM\d+)(,(?P<baud>[^,]*))?", re.I | re.A)
 _HERE = ("", "0.0.0.0", "127.0.0.1", "localhost", "::", "::1")
+_EVERYWHERE = ("", "0.0.0.0", "::")
 _MOST_BAUD = 12_000_000
+_LEAST_LOCAL, _LOCAL_PORTS = 20_000, 12_768  # below the ports that systems give to programs that ask for any
+_DEFAULT_PORT = 14550
+_PX4_OWN_PORTS = range(18570, 18570 + 256)  # where simulated PX4s listen; they send to 14550
 
 
 @dataclass(frozen=True, slots=True)
 class Endpoint:
-    """Our end of a link. ``listens``: peers come to us; else we go to them. ``host``: empty for serial ports."""
+    """Our end of a link. ``listens``: peers come to us; else we go to them. ``host``: empty for serial ports.
+
+    ``local_port``: the port that UDP datagrams are sent from, 0 for any free one; None: `sends_from` chooses it.
+    """
 
     kind: Literal["udp", "tcp", "serial"]
     listens: bool
@@ -49,6 +59,18 @@ class Endpoint:
     port: int
     device: str = ""
     baud: int = 0
+    local_port: int | None = None
+
+    @property
+    def sends_from(self) -> int:
+        """The port that an outgoing UDP link sends from: ``local_port``, or one that depends on the place alone.
+
+        PX4 speaks only to the address and port that it heard first after it booted, so a later command must come from
+        the same port.
+        """
+        if self.local_port is not None:
+            return self.local_port
+        return _LEAST_LOCAL + (zlib.crc32(self.host.lower().encode()) + self.port) % _LOCAL_PORTS
 
     @property
     def place(self) -> str:
@@ -63,7 +85,8 @@ class Endpoint:
         if self.kind == "serial":
             bare = _BARE_DEVICE.fullmatch(self.device)
             return f"{self.device},{self.baud}" if bare else f"serial://{self.device}:{self.baud}"
-        return f"{self._scheme(self.listens)}:{self.place}"
+        own = "" if self.local_port is None else f",{self.local_port}"
+        return f"{self._scheme(self.listens)}:{self.place}{own}"
 
     def understood(self) -> str:
         """Return one clause about what the link does: ``udpout: sends to 127.0.0.1:14560``."""
@@ -74,11 +97,18 @@ class Endpoint:
         return f"tcpin: waits for connections on {self.place}" if self.listens else f"tcp: connects to {self.place}"
 
     def other_direction(self) -> str:
-        """Return what to try if nobody answers: the same place in the other direction."""
+        """Return what to try if nobody answers: the other direction, at an address that makes sense there."""
         if self.kind == "serial":
             return "another device or baud rate"
-        turned = self._scheme(not self.listens) + ":" + self.place
-        return f"{turned} ({'sends' if self.listens else 'listens'})" if self.kind == "udp" else turned
+        turned = self._scheme(not self.listens)
+        if self.kind == "tcp":
+            return f"{turned}:{self.place}"
+        if self.listens:
+            host = "VEHICLE" if self.host in _EVERYWHERE else self.place.rsplit(":", 1)[0]
+            return f"{turned}:{host}:{self.port} (sends to the vehicle)"
+        host = self.place.rsplit(":", 1)[0] if self.host in _HERE else "0.0.0.0"
+        port = _DEFAULT_PORT if self.port in _PX4_OWN_PORTS else self.port
+        return f"{turned}:{host}:{port} (listens)"
 
     def _scheme(self, listens: bool) -> str:
         return {("udp", True): "udpin", ("udp", False): "udpout", ("tcp", True): "tcpin"}.get(
@@ -101,10 +131,23 @@ def parse_url(text: str) -> Endpoint:
     if scheme not in _SCHEMES or not colon:
         raise _wrong(given, "is not a link that we know")
     kind, listens = _SCHEMES[scheme]
-    host, port = _host_and_port(given, rest[2:] if slashes else rest, listens)
+    rest, local = _local_port(given, rest[2:] if slashes else rest, wanted=kind == "udp" and not listens)
+    host, port = _host_and_port(given, rest, listens)
     if scheme == "udp" and slashes and host not in _HERE:
         raise _wrong(given, f"may mean either direction: write udpin://{host}:{port} or udpout://{host}:{port}")
-    return Endpoint(kind, listens, host, port)
+    return Endpoint(kind, listens, host, port, local_port=local)
+
+
+def _local_port(given: str, rest: str, *, wanted: bool) -> tuple[str, int | None]:
+    """Split off the port to send from, which only ``udpout:`` has."""
+    rest, comma, local = rest.partition(",")
+    if not comma:
+        return rest, None
+    if not wanted:
+        raise _wrong(given, "has a comma: only udpout:HOST:PORT,LOCAL sends from a port of its own")
+    if not re.fullmatch(r"[0-9]{1,5}", local) or int(local) > 65535:
+        raise _wrong(given, f"sends from port {local!r}; a port within 1 … 65535 is wanted, or 0 for any free one")
+    return rest, int(local)
 
 
 def _host_and_port(given: str, rest: str, listens: bool) -> tuple[str, int]:

@@ -48,7 +48,8 @@ class VehicleState:
     """The state that one vehicle reports; a field is None if the vehicle did not report it.
 
     ``address``: its autopilot's ids; ``peer``: its address on the link. ``system_status``: a MAV_STATE. ``amsl_m``:
-    metres above mean sea level. ``capabilities``: MAV_PROTOCOL_CAPABILITY bits. ``sources``: number of autopilots heard
+    metres above mean sea level. ``capabilities``: MAV_PROTOCOL_CAPABILITY bits. ``flight_sw_version``: of its firmware,
+    as in AUTOPILOT_VERSION. ``sources``: number of autopilots heard
     under this system id; more than one means several vehicles with the same id. ``texts``: its last status texts.
     ``beat_at`` and ``placed_at``: times of the last heartbeat and position (clock of the link; -inf: never).
     ``just_at``: another position reported within `FRESH_S`, too far away for the vehicle to have moved there.
@@ -70,6 +71,7 @@ class VehicleState:
     beat_at: float = -math.inf
     placed_at: float = -math.inf
     just_at: Place | None = None
+    flight_sw_version: int | None = None
 
     @property
     def what(self) -> str:
@@ -141,6 +143,7 @@ class _Told:
     leapt_from: Place | None = None
     leapt_at: float = -math.inf
     capabilities: int | None = None
+    version: int | None = None
     home: Home | None = None
     first: float = 0.0
     at: float = 0.0
@@ -241,7 +244,7 @@ class Watch:
             Address(self.sysid, best[0]), source.autopilot, source.kind, armed, source.status,
             lat, lon, amsl, told.capabilities, self._rivals(best[:2]), told.home, tuple(self.texts),
             best[1], source.at, told.placed_at,
-            told.leapt_from if now - told.leapt_at <= FRESH_S else None,
+            told.leapt_from if now - told.leapt_at <= FRESH_S else None, told.version,
         )  # fmt: skip
 
     def alike(self) -> bool:
@@ -340,7 +343,7 @@ def _fix(told: _Told, m: Any, now: float) -> None:
 
 
 def _version(told: _Told, m: Any, now: float) -> None:
-    told.capabilities = int(m.capabilities)
+    told.capabilities, told.version = int(m.capabilities), int(m.flight_sw_version)
 
 
 def _home_position(told: _Told, m: Any, now: float) -> None:

@@ -119,7 +119,7 @@ def test_at_the_lowest_altitude_it_is_safe_and_a_little_below_it_is_not(autopilo
 
 def test_without_an_altitude_the_autopilots_default_is_judged_and_said_so() -> None:
     for autopilot, parameter, default in (
-        (COPTER, "RTL_ALT", 15.0), (PLANE, "RTL_ALTITUDE", 100.0), (PX4, "RTL_RETURN_ALT", 60.0),
+        (COPTER, "RTL_ALT", 15.0), (PLANE, "RTL_ALTITUDE", 100.0), (PX4, "RTL_RETURN_ALT", 30.0),
     ):  # fmt: skip
         home = judged(world(), mission(world(), [(0, 0, 120), (2000, 0, 120)], autopilot))
         assert (home.parameter, home.rtl_rel_home_m, home.assumed) == (parameter, default, True)

@@ -440,6 +440,31 @@ def test_a_port_that_is_taken_is_told_with_the_other_direction() -> None:
             Link(f"udpin:127.0.0.1:{port}")
 
 
+def test_a_vehicle_that_keeps_its_first_partner_hears_every_link_from_the_same_port(peers: list[Peer]) -> None:
+    ports = set()
+    for _ in range(3):  # three commands, one after the other
+        with Link(f"udpout:127.0.0.1:{peers[0].port}", heartbeat_s=0.01) as link:
+            time.sleep(0.02)
+            link.poll()
+            ports.add(peers[0].hear("HEARTBEAT")[1])
+            assert link.place.endswith(f":{link.endpoint.sends_from}")
+            assert link.note == ""
+    assert len(ports) == 1
+
+
+def test_a_link_sends_from_the_port_that_was_given_and_from_a_free_one_if_that_is_taken(peers: list[Peer]) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("", 0))
+        own = free.getsockname()[1]
+        url = f"udpout:127.0.0.1:{peers[0].port},{own}"
+        with Link(url) as link:
+            assert not link.place.endswith(f":{own}")
+            assert f"because a program uses {own} already" in link.note
+    with Link(url) as link:
+        assert link.place.endswith(f":{own}")
+        assert link.note == ""
+
+
 def test_a_connection_that_is_refused_is_told_with_the_other_direction() -> None:
     with socket.socket() as unused:
         unused.bind(("127.0.0.1", 0))

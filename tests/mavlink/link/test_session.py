@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import socket
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -33,6 +34,7 @@ from gcsplan.mavlink.link.session import (
 from gcsplan.mavlink.link.watch import BOOT, CRITICAL, POWEROFF, STANDBY, UNINIT, VehicleState, Watch
 from gcsplan.mavlink.mission.autopilots import altitude_of_cm
 from gcsplan.mavlink.mission.compare import compare, faults
+from gcsplan.mavlink.mission.firmware import flies_straight
 from gcsplan.mavlink.mission.mission import ALL, FENCE, RALLY, Home, Mission, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.mavlink.protocol.transfer import Progress, Timers
@@ -139,7 +141,7 @@ def test_a_mission_that_the_vehicles_own_parameters_make_unsafe_is_not_sent() ->
 
     def judge(_: Mission, values: Mapping[str, float]) -> str | None:
         heard.append(dict(values))
-        return "a corner in a zone" if values.get("NAV_ACC_RAD") == 10.0 else None
+        return "a corner in a zone" if values.get("NAV_ACC_RAD") == 2.0 else None
 
     with air(board) as link, pytest.raises(VehicleRefused, match="a corner in a zone") as caught:
         upload_mission(link, mission(Autopilot.PX4), options=replace(OPTIONS, read_parameters=True), judge=judge)
@@ -248,6 +250,20 @@ def test_a_dead_link_says_which_direction_was_tried_and_names_the_other() -> Non
     assert "udpin: listens on 127.0.0.1" in str(dead.value)
     assert "udpout:127.0.0.1" in str(dead.value)
     assert dead.value.exit_code == 6
+
+
+def test_a_silent_vehicle_may_have_another_partner() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
+        silent.bind(("127.0.0.1", 0))
+        place = f"127.0.0.1:{silent.getsockname()[1]}"
+        with Link(f"udpout:{place}") as link, pytest.raises(LinkError) as dead:
+            discover(link, 1, 0.2)
+        assert f"sends to {place} from port {link.endpoint.sends_from}" in str(dead.value)
+        assert "answers only the address and port that it heard first" in str(dead.value)
+        assert f"udpin:{place} (listens)" in str(dead.value)
+        with Link(f"udpout:{place}"), Link(f"udpout:{place}") as second, pytest.raises(LinkError) as dead:
+            discover(second, 1, 0.2)
+        assert "a program uses" in str(dead.value)
 
 
 def test_the_wrong_number_is_told_with_the_numbers_that_are_there() -> None:
@@ -362,6 +378,35 @@ def test_all_reasons_are_told_at_once() -> None:
         warnings_of(state)
 
 
+PX4_17, PX4_18 = int.from_bytes([1, 17, 0, 255], "big"), int.from_bytes([1, 18, 0, 128], "big")
+
+
+@pytest.mark.parametrize("version", [PX4_18, None, 0])
+def test_a_judged_mission_goes_to_no_px4_that_may_not_fly_straight_legs(version: int | None) -> None:
+    state = replace(READY, mav_autopilot=12, flight_sw_version=version)
+    items = mission(PX4).wire_items()
+    with pytest.raises(VehicleRefused, match="may change its altitude at the beginning of a leg") as refused:
+        preflight(state, items, PX4, judged=True)
+    assert (refused.value.reason, refused.value.exit_code) == ("firmware", 5)
+    assert "fly on (upstream issue 28507)" in " / ".join(preflight(state, items, PX4))  # unchecked: a warning
+    assert preflight(replace(state, flight_sw_version=PX4_17), items, PX4, judged=True) == []
+    level = [replace(item, z=65.0) for item in items]
+    assert preflight(state, level, PX4, judged=True) == []
+    assert preflight(state, [MissionItem(5004, 0)], PX4, mission_type=FENCE, judged=True) == []
+
+
+def test_what_a_px4_says_of_its_version_decides_an_upload(monkeypatch: pytest.MonkeyPatch) -> None:
+    board, sent = vehicle(PX4), mission(PX4)
+    with air(board) as link:
+        found = discover(link, 1, listen_s=0.0)
+        assert flies_straight(found.flight_sw_version)
+        monkeypatch.setattr("gcsplan.mavlink.mission.firmware.STRAIGHT_UNTIL", (1, 9))
+        with pytest.raises(VehicleRefused, match="the vehicle is PX4 1"):
+            upload_mission(link, sent, options=OPTIONS, judge=lambda read, values: None)
+        assert board.items() == ()
+        upload_mission(link, sent, options=OPTIONS).raise_for_outcome()
+
+
 def test_too_many_items_are_refused_before_they_are_sent() -> None:
     with pytest.raises(VehicleRefused, match="at most 650 items and the list has 651"):
         preflight(READY, mission(count=650).wire_items(), COPTER)
@@ -424,6 +469,8 @@ def test_parameters_that_fit_say_nothing() -> None:
             "ends at 5 m (FENCE_RADIUS)",
         ),
         ({"RTL_RETURN_ALT": 60.0, "GF_ACTION": 1.0, "GF_MAX_VER_DIST": 50.0}, "ends at 50 m (GF_MAX_VER_DIST)"),
+        ({"RTL_RETURN_ALT": 60.0, "RTL_TYPE": 2.0}, "RTL_TYPE is 2 on board: the return is not straight home"),
+        ({"RTL_RETURN_ALT": 60.0, "RTL_CONE_ANG": 80.0}, "RTL_CONE_ANG is 80 on board"),
         ({"RTL_RETURN_ALT": 60.0, "NAV_DLL_ACT": 0.0}, "no failsafe action on board for loss of the ground station"),
     ],
 )
@@ -510,7 +557,7 @@ def test_what_is_on_board_is_judged_with_the_vehicles_own_parameters() -> None:
 
     def judge(read: Mission, values: Mapping[str, float]) -> str | None:
         heard.append((read, dict(values)))
-        return "a corner in a zone" if values.get("NAV_ACC_RAD") == 10.0 else None
+        return "a corner in a zone" if values.get("NAV_ACC_RAD") == 2.0 else None
 
     with air(board) as link:
         upload_mission(link, sent, options=OPTIONS).raise_for_outcome()

@@ -40,6 +40,8 @@ from tests.support.effort import draws
         ("serial:/dev/ttyUSB0,9600", Endpoint("serial", False, "", 0, "/dev/ttyUSB0", 9600)),
         ("serial:///dev/ttyUSB0:921600", Endpoint("serial", False, "", 0, "/dev/ttyUSB0", 921600)),
         ("serial://COM4:57600", Endpoint("serial", False, "", 0, "COM4", 57600)),
+        ("udpout:127.0.0.1:14560,14551", Endpoint("udp", False, "127.0.0.1", 14560, local_port=14551)),
+        ("udpout://[::1]:14560,0", Endpoint("udp", False, "::1", 14560, local_port=0)),
         ("  udpout:127.0.0.1:14560\n", Endpoint("udp", False, "127.0.0.1", 14560)),
     ],
 )
@@ -52,7 +54,9 @@ def test_a_link_is_understood(text: str, endpoint: Endpoint) -> None:
     ("text", "sentence", "other"),
     [
         ("udpout:127.0.0.1:14560", "udpout: sends to 127.0.0.1:14560", "udpin:127.0.0.1:14560"),
-        ("udp:0.0.0.0:14550", "udpin: listens on 0.0.0.0:14550", "udpout:0.0.0.0:14550"),
+        ("udpout:192.168.1.10:14550", "udpout: sends to 192.168.1.10:14550", "udpin:0.0.0.0:14550"),
+        ("udpout:127.0.0.1:18571", "udpout: sends to 127.0.0.1:18571", "udpin:127.0.0.1:14550"),
+        ("udp:0.0.0.0:14550", "udpin: listens on 0.0.0.0:14550", "udpout:VEHICLE:14550"),
         ("tcp:127.0.0.1:5760", "tcp: connects to 127.0.0.1:5760", "tcpin:127.0.0.1:5760"),
         ("tcpin:[::1]:5760", "tcpin: waits for connections on [::1]:5760", "tcp:[::1]:5760"),
         ("/dev/ttyUSB0", "serial: opens /dev/ttyUSB0 at 57600 baud", "baud rate"),
@@ -68,6 +72,8 @@ def test_the_direction_is_said_and_the_other_one_named(text: str, sentence: str,
     [
         "", "udp", "udp:", "udpout:", "udpout::14560", "udpout:127.0.0.1", "udpout:127.0.0.1:", "udpout:127.0.0.1:x",
         "udpout:127.0.0.1:70000", "udpout:127.0.0.1:0", "udpout:127.0.0.1:-1", "udpout:127.0.0.1:14560:1",
+        "udpout:127.0.0.1:14560,", "udpout:127.0.0.1:14560,x", "udpout:127.0.0.1:14560,70000", "udpin:0.0.0.0:14550,1",
+        "tcp:127.0.0.1:5760,1",
         "127.0.0.1:14550", "http://example.com", "udpbcast:10.0.0.255:14550", "tcp:::1:5760", "udpin:[::1:14550",
         "udpin://host/path:1", "/dev/ttyUSB0,fast", "/dev/ttyUSB0,0", "/dev/ttyUSB0,-5", "COM", "serial:", "serial://",
         "serial:/dev/ttyUSB0:99999999999", "udpin:127.0.0.1:١٤", "tcp:a b:5760",
@@ -79,6 +85,14 @@ def test_what_is_no_link_is_refused_with_the_forms_there_are(text: str) -> None:
     assert "udpin:HOST:PORT" in str(refused.value)
     assert "udpout:HOST:PORT" in str(refused.value)
     assert "/dev/ttyUSB0,57600" in str(refused.value)
+
+
+def test_the_port_to_send_from_depends_on_the_place_alone() -> None:
+    fleet = [parse_url(f"udpout:127.0.0.1:{18570 + n}").sends_from for n in range(100)]
+    assert len(set(fleet)) == 100
+    assert fleet == [parse_url(f"udpout://127.0.0.1:{18570 + n}").sends_from for n in range(100)]
+    assert all(20_000 <= port < 32_768 for port in fleet)
+    assert parse_url("udpout:127.0.0.1:18570,14551").sends_from == 14551
 
 
 def test_mavsdks_udp_to_a_far_host_may_mean_either_direction() -> None:
