@@ -53,7 +53,8 @@ CLOSE = 0.01
 """A run has converged when its cost is within this part of its final cost."""
 
 CODE = (
-    "*.py", "app/pipeline.py", "app/problems.py", "bench/papers_runs.py", "bench/papers_scenarios.py",
+    "*.py", "app/pipeline.py", "app/problems.py", "bench/papers_readings.py", "bench/papers_runs.py",
+    "bench/papers_scenarios.py",
     "mavlink/build/*.py", "mavlink/mission/mission.py", "mission_file/*.py", "native/*.py", "optimisers/*.py",
     "planners/**/*.py", "world/*.py",
 )  # fmt: skip
@@ -99,8 +100,7 @@ class PaperRun:
     @property
     def contender(self) -> Contender:
         """The algorithm's entry in the paper's table."""
-        paper = SCENARIOS[self.scenario].paper
-        return next(c for c in paper.contenders if c.name == self.algorithm)
+        return next(c for c in SCENARIOS[self.scenario].contenders if c.name == self.algorithm)
 
 
 class Store:
