@@ -12,10 +12,12 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from gcsplan.bench.papers_claims import MEASURES
+from gcsplan.bench.papers_judge import judge
 from gcsplan.bench.papers_printed import PRINTED, Least, faults, least_of
 from gcsplan.bench.papers_runs import OPTIMA, Key, PaperRun, Record, Store, carry_out, code_digest
 from gcsplan.bench.papers_scenarios import Scenario, Set, choose, mission_text, prepare
-from gcsplan.bench.papers_statistics import equal_evaluations, judge, row
+from gcsplan.bench.papers_statistics import equal_evaluations, row, time_row
 from gcsplan.errors import InputError
 
 MOST_RUNS = 10_000
@@ -48,7 +50,8 @@ def run(
         missions: directory of the scenarios' mission files; None: the usual folders.
 
     Returns:
-        ``settings``; ``scenarios``, each with straight line, optimum, rows and printed numbers; ``claims``.
+        ``settings``; ``scenarios``, each with straight line, optimum, rows and printed numbers; ``claims`` and
+        ``readings`` (`papers_judge`); ``times``, with ``rows`` and ``claims``, all that a clock has measured.
 
     Raises:
         InputError: for what cannot be run or written, and for a cluster that does not answer.
@@ -71,7 +74,8 @@ def run(
     ready(out)
     store = Store(out / KEPT)
     there = store.load()
-    every = [job for some in asked.values() for job in some]
+    # The references come first, so that a table that is read half way has its optimum.
+    every = sorted((job for some in asked.values() for job in some), key=lambda job: job.algorithm not in OPTIMA)
     todo = [job for job in every if job.key not in there]
     at = [len(every) - len(todo)]
     if done is not None:
@@ -86,13 +90,17 @@ def run(
 
     carry_out(todo, jobs, cluster, keep)
     found = {place: [there[job.key] for job in some] for place, some in asked.items()}
+    judged = judge([scenario for scenario, _ in chosen], found)
+    timed = [time_row(s.name, c.name, found[s.name, c.name]) for s, contenders in chosen for c in contenders]
     return {
-        "settings": {"runs": runs, "seed": seed},
+        "settings": {"runs": runs, "seed": seed, "code": code},
         "scenarios": [
             _summary(scenario, prepare(scenario.name, texts[scenario.name]), [c.name for c in contenders], found)
             for scenario, contenders in chosen
         ],
-        "claims": judge([scenario for scenario, _ in chosen], found),
+        "claims": judged["claims"],
+        "readings": judged["readings"],
+        "times": {"rows": timed, "claims": judged["times"]},
     }
 
 
@@ -116,7 +124,7 @@ def plain(result: dict[str, Any]) -> dict[str, Any]:
 
 
 def _optima(scenario: Scenario) -> list[str]:
-    energy = "energy" in scenario.paper.claimed.values()
+    energy = "energy" in MEASURES[scenario.paper.name].values()
     return [name for name, objective in OPTIMA.items() if objective == "length" or energy]
 
 
@@ -128,7 +136,9 @@ def _summary(
     scenario: Scenario, prepared: Set, names: Sequence[str], found: dict[tuple[str, str], list[Record]]
 ) -> dict[str, Any]:
     """All that the report says of a scenario; ``set`` and ``records`` are for its pictures."""
-    records = {name: found[scenario.name, name] for name in names}
+    own = {c.name for c in scenario.paper.contenders}
+    records = {name: found[scenario.name, name] for name in names if name in own}
+    others = {name: found[scenario.name, name] for name in names if name not in own}
     level = equal_evaluations(r for some in records.values() for r in some)
     least = Least.sum_of(prepared.least)
     energy = prepared.source.vehicles[0].vehicle.energy
@@ -146,9 +156,11 @@ def _summary(
         "optimum_j": optima.get("energy", {}).get("cost"),
         "bound_j": optima.get("energy", {}).get("bound"),
         "optimum_refused": optima["length"]["refused"],
-        "rows": [row(scenario.name, name, records[name], level) for name in names],
+        "rows": [row(scenario.name, name, some, level) for name, some in records.items()],
+        "reading_rows": [row(scenario.name, name, some, level) for name, some in others.items()],
         "printed": printed,
         "faults": {name: faults(printed[name], least_of(scenario.name), *rates) for name in printed},
+        "equal_evaluations": level,
         "set": prepared,
         "records": records,
         "best_path": found[scenario.name, "optimal"][0].get("paths"),

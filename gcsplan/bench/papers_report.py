@@ -1,4 +1,7 @@
-"""The papers' report: plain text for the terminal; CSV, Markdown, PNG and one self-contained HTML page as files."""
+"""The papers' report: plain text for the terminal; CSV, Markdown, PNG and one self-contained HTML page as files.
+
+All but the files of times are the same to the byte whenever the same runs are made.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +9,15 @@ import base64
 import csv
 import html
 import io
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gcsplan.bench.papers_claims_report import claims_table, counts, readings_table, stands, times_tables
 from gcsplan.bench.papers_printed import Number, Row
 from gcsplan.bench.papers_remarks import legend, remarks, schedules
-from gcsplan.bench.papers_statistics import FEW, LEAST_RUNS_TO_JUDGE, SIGNIFICANCE
+from gcsplan.bench.papers_tables import Table, significant
 from gcsplan.export.outdir import write_whole
 
 IMPOSSIBLE, UNREACHED = "†", "‡"
@@ -39,36 +42,18 @@ class _Column:
     brief: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Table:
-    """Plain cells under a heading, with notes."""
-
-    heading: str
-    header: tuple[str, ...]
-    rows: list[tuple[str, ...]]
-    notes: list[str] = field(default_factory=list)
-
-
 def _number(key: str, digits: int) -> Callable[[dict[str, Any]], str]:
     return lambda row: "–" if row[key] is None else f"{row[key]:,.{digits}f}"
 
 
-def _significant(value: float | None) -> str:
-    """A number with five digits or more, so that a cost of any size can be read."""
-    if value is None:
-        return "–"
-    whole = len(str(int(abs(value)))) if abs(value) >= 1.0 else 0
-    return f"{value:,.{max(0, 5 - whole)}f}"
-
-
 def _cost(key: str) -> Callable[[dict[str, Any]], str]:
-    return lambda row: _significant(row[key])
+    return lambda row: significant(row[key])
 
 
 def _mean(name: str, digits: int | None) -> Callable[[dict[str, Any]], str]:
     def words(row: dict[str, Any]) -> str:
         mean, std = row[f"mean_{name}"], row[f"std_{name}"]
-        worded = [_significant(x) if digits is None or x is None else f"{x:,.{digits}f}" for x in (mean, std)]
+        worded = [significant(x) if digits is None or x is None else f"{x:,.{digits}f}" for x in (mean, std)]
         return worded[0] if std is None else " ± ".join(worded)
 
     return words
@@ -83,7 +68,6 @@ _COLUMNS = (
     _Column(
         "collided runs (legs)", lambda row: f"{row['collided']} ({row['collisions']})", ("collisions",), brief=True
     ),
-    _Column("time, CPU s", _mean("time_s", 2), ("time_s",), brief=True),
     _Column("evaluations", _number("mean_evaluations", 0), brief=True),
     _Column("pitch, °", _mean("pitch_deg", 1), ("pitch_deg",)),
     _Column("yaw, °", _mean("yaw_deg", 1), ("yaw_deg",)),
@@ -98,24 +82,47 @@ _COLUMNS = (
 
 
 def scenario_table(summary: Summary, *, brief: bool = False) -> Table:
-    """A scenario's algorithms; each measured number is followed by the printed one if there is one."""
-    cells: list[list[str]] = [[] for _ in summary["rows"]]
+    """A scenario's algorithms, then the planner optimal's path and its certified bound; each measured number is
+    followed by the printed one if there is one."""
+    header, rows = _cells(summary, summary["rows"], brief)
+    rows += [_reference(header, summary, name, key) for name, key in (("optimal", "optimum"), ("its bound", "bound"))]
+    return Table(summary["name"], header, rows, _notes(summary))
+
+
+def readings_of_scenario(summary: Summary) -> Table:
+    """The same numbers of other readings of the paper."""
+    header, rows = _cells(summary, summary["reading_rows"], brief=False)
+    return Table(f"{summary['name']}: other readings", header, rows)
+
+
+def _reference(header: Sequence[str], summary: Summary, name: str, key: str) -> tuple[str, ...]:
+    """A row with the length, and the energy if it is known, of what no swarm has to do with."""
+    cells = ["–"] * len(header)
+    cells[0] = name
+    for title, value, digits in (("best legal, m", summary[f"{key}_m"], 2), ("energy, J", summary[f"{key}_j"], 0)):
+        if value is not None and title in header:
+            cells[header.index(title)] = f"{value:,.{digits}f}"
+    return tuple(cells)
+
+
+def _cells(summary: Summary, lines: Sequence[Any], brief: bool) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    cells: list[list[str]] = [[] for _ in lines]
     header: list[str] = []
     for column in _COLUMNS:
         if brief and not column.brief:
             continue
-        words = [column.ours(row) for row in summary["rows"]]
-        if all(word == "–" for word in words) and not brief:
+        words = [column.ours(row) for row in lines]
+        if all(word == "–" for word in words) and not brief and column.title != "best legal, m":
             continue
         header.append(column.title)
         for line, word in zip(cells, words, strict=True):
             line.append(word)
-        printed = [_printed(summary, row["algorithm"], column.printed) for row in summary["rows"]]
+        printed = [_printed(summary, row["algorithm"], column.printed) for row in lines]
         if any(printed):
             header.append("printed")
             for line, word in zip(cells, printed, strict=True):
                 line.append(word or "–")
-    return Table(summary["name"], tuple(header), [tuple(line) for line in cells], _notes(summary))
+    return tuple(header), [tuple(line) for line in cells]
 
 
 def _printed(summary: Summary, algorithm: str, names: Sequence[str]) -> str:
@@ -155,7 +162,7 @@ def _notes(summary: Summary) -> list[str]:
         part = 100.0 * (min(legal) / summary["optimum_m"] - 1.0)
         words = "above the planner optimal's" if part >= 0.0 else "below the path that the planner optimal found"
         out.append(f"The shortest legal run is {min(legal):,.2f} m, {abs(part):.2f} % {words}.")
-    level = summary["rows"][0]["equal_evaluations"]
+    level = summary["equal_evaluations"]
     out.append(f"“Equal evaluations” are the first {level:,} of each run, its schedule being that of the whole run.")
     reasons = {
         f"{name} {summary['printed'][name][measure].text} {UNITS[measure.rpartition('_')[2]]}: {why}"
@@ -166,48 +173,19 @@ def _notes(summary: Summary) -> list[str]:
     return out + remarks(summary["name"])
 
 
-def claims_table(claims: Sequence[dict[str, Any]]) -> Table:
-    """Every ranking that the papers claim, with its verdict."""
-    rows: list[tuple[str, ...]] = [
-        (
-            c["scenario"], c["source"], c["measure"], c["claim"], _median(c["median_low"]), _median(c["median_high"]),
-            "–" if c["p"] is None else f"{c['p']:.2g}", c["verdict"],
-        )
-        for c in claims
-    ]  # fmt: skip
-    header = ("scenario", "printed in", "measure", "claim", "median", "against", "p (Holm)", "verdict")
-    return Table("Rankings", header, rows, verdicts(claims))
-
-
-def _median(value: float | None) -> str:
-    return "illegal" if value is None else _significant(value)
-
-
-def verdicts(claims: Sequence[dict[str, Any]]) -> list[str]:
-    """How many claims of each paper were reproduced, in words."""
-    if not claims:
-        return []
-    out = [
-        f"Mann and Whitney's U, one-sided, Holm-corrected over all claims of a paper, p < {SIGNIFICANCE:g}; "
-        "runs that break a limit rank last in length and energy (“illegal”: half of the runs or more)."
-    ]
-    for paper in dict.fromkeys(c["paper"] for c in claims):
-        count = Counter(c["verdict"] for c in claims if c["paper"] == paper)
-        out.append(f"{paper}: " + ", ".join(f"{number} {verdict}" for verdict, number in count.items()) + ".")
-    if any(c["verdict"] == FEW for c in claims):
-        out.append(f"Rankings are judged from {LEAST_RUNS_TO_JUDGE} runs on.")
-    return out
-
-
 def tables(result: dict[str, Any]) -> Iterator[tuple[Summary | None, Table]]:
     """All tables; those of scenarios come with their summary."""
+    if result["claims"]:
+        yield None, claims_table(result["claims"])
+    if result["readings"]:
+        yield None, readings_table(result["readings"])
     for summary in result["scenarios"]:
         yield summary, scenario_table(summary)
+        if summary["reading_rows"]:
+            yield None, readings_of_scenario(summary)
         header, rows = schedules(summary)
         if rows:
             yield None, Table(f"{summary['name']}: schedule", header, rows, legend(rows))
-    if result["claims"]:
-        yield None, claims_table(result["claims"])
 
 
 def report(result: dict[str, Any]) -> str:
@@ -227,11 +205,13 @@ def report(result: dict[str, Any]) -> str:
         console.print(grid)
         page.write(shown.notes[0] + "\n\n")
     lines = [line.rstrip() for line in page.getvalue().splitlines()]
-    return "\n".join([*lines, *LEGEND, *verdicts(result["claims"])]) + "\n"
+    judged = [*result["claims"], *result["times"]["claims"]]
+    return "\n".join([*lines, *LEGEND, *counts(judged)]) + "\n"
 
 
 def write(result: dict[str, Any], out: Path) -> list[Path]:
-    """Write ``papers.csv``, ``papers-claims.csv``, ``papers.md``, ``papers.html``, and two pictures per scenario.
+    """Write ``papers.csv``, ``papers-claims.csv``, ``papers-readings.csv``, ``papers.md``, ``papers.html``, and two
+    pictures per scenario; apart from them ``papers-times.csv`` and ``papers-times.md`` with all that a clock measured.
 
     Each file is written whole or not at all. Raises InputError if one cannot be written.
     """
@@ -239,11 +219,16 @@ def write(result: dict[str, Any], out: Path) -> list[Path]:
 
     pictures = {}
     for summary in result["scenarios"]:
+        if not summary["records"]:
+            continue  # readings alone were run
         pictures[f"{summary['name']}-map.png"] = draw_map(summary)
         pictures[f"{summary['name']}-convergence.png"] = draw_convergence(summary)
     files: dict[str, str | bytes] = {
-        "papers.csv": _csv([_flat(row) for summary in result["scenarios"] for row in summary["rows"]]),
+        "papers.csv": _csv([_flat(s, row) for s in result["scenarios"] for row in (*s["rows"], *s["reading_rows"])]),
         "papers-claims.csv": _csv(result["claims"]),
+        "papers-readings.csv": _csv(result["readings"]),
+        "papers-times.csv": _csv(result["times"]["rows"]),
+        "papers-times.md": "\n".join(_times(result)) + "\n",
         "papers.md": "\n".join(_markdown(result)) + "\n",
         "papers.html": "\n".join(_page(result, pictures)) + "\n",
         **pictures,
@@ -253,9 +238,13 @@ def write(result: dict[str, Any], out: Path) -> list[Path]:
     return [out / name for name in files]
 
 
-def _flat(row: dict[str, Any]) -> dict[str, Any]:
+def _flat(summary: Summary, row: dict[str, Any]) -> dict[str, Any]:
     lengths = row["vehicle_lengths_m"]
-    return row | {"vehicle_lengths_m": "" if lengths is None else " ".join(f"{x:.3f}" for x in lengths)}
+    return row | {
+        "vehicle_lengths_m": "" if lengths is None else " ".join(f"{x:.3f}" for x in lengths),
+        "optimum_m": summary["optimum_m"],
+        "bound_m": summary["bound_m"],
+    }
 
 
 def _csv(rows: Sequence[dict[str, Any]]) -> str:
@@ -272,27 +261,31 @@ def _about(result: dict[str, Any]) -> str:
     return (
         f"{'The papers’ numbers of' if runs is None else runs} runs of each algorithm, seed "
         f"{result['settings']['seed']}, the same for all. Lengths, pitch, yaw and energy are of all runs; a run is "
-        "legal if the exact check finds no limit broken on its curve. Nothing was repaired. Time is of one core."
+        "legal if the exact check finds no limit broken on its curve. Nothing was repaired. Made by the code "
+        f"{result['settings']['code']} (`gcsplan bench papers`)."
     )
+
+
+def _times(result: dict[str, Any]) -> Iterator[str]:
+    yield from (f"# {TITLE}: times", "", "Seconds of one core.", "")
+    for table in times_tables(result["times"]):
+        yield from (f"## {table.heading}", "")
+        yield from table.markdown()
 
 
 def _markdown(result: dict[str, Any]) -> Iterator[str]:
     yield from (f"# {TITLE}", "", _about(result), "")
     for line in LEGEND:
         yield from (line, "")
+    yield from ("## What stands", "")
+    for title, sentences in stands(result):
+        yield from (f"### {title}", "", *(f"- {sentence}" for sentence in sentences), "")
     for summary, table in tables(result):
         yield from (f"## {table.heading}", "")
         if summary is not None:
             yield from (summary["source"], "")
-        yield f"| {' | '.join(table.header)} |"
-        yield f"| {' | '.join('---' if k == 0 else '---:' for k in range(len(table.header)))} |"
-        for row in table.rows:
-            yield f"| {' | '.join(row)} |"
-        yield ""
-        for note in table.notes:
-            yield f"- {note}"
-        yield ""
-        if summary is not None:
+        yield from table.markdown()
+        if summary is not None and summary["records"]:
             for what in ("map", "convergence"):
                 yield from (f"![{summary['name']}, {what}]({summary['name']}-{what}.png)", "")
 
@@ -310,19 +303,16 @@ def _page(result: dict[str, Any], pictures: dict[str, bytes]) -> Iterator[str]:
     yield f"<style>{_STYLE}</style></head><body><h1>{TITLE}</h1><p>{html.escape(_about(result))}</p>"
     for line in LEGEND:
         yield f"<p>{html.escape(line)}</p>"
+    yield "<h2>What stands</h2>"
+    for title, sentences in stands(result):
+        items = "".join(f"<li>{html.escape(sentence)}</li>" for sentence in sentences)
+        yield f"<h3>{html.escape(title)}</h3><ul>{items}</ul>"
     for summary, table in tables(result):
         yield f"<h2>{html.escape(table.heading)}</h2>"
         if summary is not None:
             yield f"<p>{html.escape(summary['source'])}</p>"
-        head = "".join(f"<th>{html.escape(cell)}</th>" for cell in table.header)
-        yield f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>'
-        for row in table.rows:
-            yield f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>"
-        yield "</tbody></table></div><ul>"
-        for note in table.notes:
-            yield f"<li>{html.escape(note)}</li>"
-        yield "</ul>"
-        if summary is not None:
+        yield from table.html()
+        if summary is not None and summary["records"]:
             for what in ("map", "convergence"):
                 name = f"{summary['name']}-{what}.png"
                 data = base64.b64encode(pictures[name]).decode()

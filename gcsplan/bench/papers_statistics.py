@@ -1,27 +1,19 @@
-"""Statistics of runs: rows of the tables, the papers' rankings under a rank test, and IB-ABC's schedules.
+"""Statistics of runs: rows of the tables, the rank test with its effect size, and IB-ABC's schedules.
 
-Rankings are tested by Mann and Whitney's U on runs, one-sided, and corrected by Holm over all claims of a paper. A run
-that breaks a limit under the exact check ranks behind every legal run, however short it is.
+In length and energy a run that breaks a limit under the exact check ranks behind every legal run, however short it is.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.bench.papers_runs import OPTIMA, Record
-from gcsplan.bench.papers_scenarios import Claim, Scenario, claims_of
-
-LEAST_RUNS_TO_JUDGE = 30
-SIGNIFICANCE = 0.05
-REPRODUCED, NOT, FEW, NO_LEGAL = (
-    "reproduced", "not reproduced", "too few runs to tell", "no run breaks no limit: nothing to rank"
-)  # fmt: skip
+from gcsplan.bench.papers_runs import Record
 
 UNITS = {
     "length": "length, m", "energy": "energy, J", "cost": "cost", "cost, equal evaluations": "cost, equal evaluations",
@@ -64,14 +56,16 @@ def _value(record: Record, measure: str, evaluations: int) -> float:
     return math.inf if found is None else float(found)
 
 
-def less(low: Floats, high: Floats) -> float:
-    """p of "``low`` is not less than ``high``" by Mann and Whitney's U (normal approximation, corrected for ties)."""
+def compare(low: Floats, high: Floats) -> tuple[float, float]:
+    """Two-sided p by Mann and Whitney's U (normal approximation, corrected for ties), and the effect size: the
+    probability that a run of ``low`` is less than one of ``high``, ties counted half (Vargha and Delaney's A)."""
     from scipy.stats import mannwhitneyu, rankdata
 
     ranks = rankdata(np.concatenate([low, high]))  # infinities tie with each other
     if np.ptp(ranks) == 0.0:
-        return 1.0
-    return float(mannwhitneyu(ranks[: len(low)], ranks[len(low) :], alternative="less", method="asymptotic").pvalue)
+        return 1.0, 0.5
+    found = mannwhitneyu(ranks[: len(low)], ranks[len(low) :], alternative="two-sided", method="asymptotic")
+    return float(found.pvalue), 1.0 - float(found.statistic) / (len(low) * len(high))
 
 
 def holm(p: Sequence[float]) -> list[float]:
@@ -89,53 +83,6 @@ def equal_evaluations(records: Iterable[Record]) -> int:
     return min((int(r["evaluations"]) for r in records if r["status"] == "found"), default=0)
 
 
-def judge(scenarios: Sequence[Scenario], runs: Mapping[tuple[str, str], Sequence[Record]]) -> list[dict[str, Any]]:
-    """Every claim of the papers on what was run, reproduced or not; ``runs`` by scenario and algorithm."""
-    out: list[dict[str, Any]] = []
-    for scenario in scenarios:
-        here = {name: found for (place, name), found in runs.items() if place == scenario.name and name not in OPTIMA}
-        level = equal_evaluations(r for found in here.values() for r in found)
-        for claim in claims_of(scenario):
-            if claim.low in here and claim.high in here:
-                out.append(_case(scenario, claim, here, level))
-                most = max(int(r.get("evaluations", 0)) for name in (claim.low, claim.high) for r in here[name])
-                if claim.measure in ("length", "cost") and most > level:
-                    again = Claim("cost, equal evaluations", claim.low, claim.high, claim.source)
-                    out.append(_case(scenario, again, here, level))
-    for paper in dict.fromkeys(case["paper"] for case in out):
-        tested = [case for case in out if case["paper"] == paper and case["p"] is not None]
-        for case, p in zip(tested, holm([case["p"] for case in tested]), strict=True):
-            case["p"] = p
-            case["verdict"] = REPRODUCED if p < SIGNIFICANCE else NOT
-    return out
-
-
-def _case(
-    scenario: Scenario, claim: Claim, here: Mapping[str, Sequence[Record]], evaluations: int
-) -> dict[str, Any]:  # p is corrected, and the verdict set, when all claims of the paper are there
-    low, high = (values(here[name], claim.measure, evaluations) for name in (claim.low, claim.high))
-    p, verdict = None, ""
-    if min(len(low), len(high)) < LEAST_RUNS_TO_JUDGE:
-        verdict = FEW
-    elif not (np.isfinite(low).any() or np.isfinite(high).any()):
-        verdict = NO_LEGAL
-    else:
-        p = less(low, high)
-    middle = [float(np.median(x)) for x in (low, high)]
-    return {
-        "paper": scenario.paper.name,
-        "scenario": scenario.name,
-        "measure": UNITS[claim.measure],
-        "claim": f"{claim.low} < {claim.high}",
-        "source": claim.source,
-        "runs": min(len(low), len(high)),
-        "median_low": middle[0] if math.isfinite(middle[0]) else None,
-        "median_high": middle[1] if math.isfinite(middle[1]) else None,
-        "p": p,
-        "verdict": verdict,
-    }
-
-
 def row(scenario: str, algorithm: str, records: Sequence[Record], evaluations: int) -> dict[str, Any]:
     """A row of the table. Lengths, pitch, yaw and energy cover all runs, legal or not, as in the papers."""
     found = [r for r in records if r["status"] == "found"]
@@ -149,9 +96,8 @@ def row(scenario: str, algorithm: str, records: Sequence[Record], evaluations: i
         "collisions": sum(r["collisions"] for r in found),
     }
     for name, key in (
-        ("length_m", "length_m"), ("cost", "cost"), ("energy_j", "energy_j"), ("time_s", "time_s"),
-        ("evaluations", "evaluations"), ("pitch_deg", "pitch_deg"), ("yaw_deg", "yaw_deg"), ("nearest_m", "nearest_m"),
-        ("converged", "converged"),
+        ("length_m", "length_m"), ("cost", "cost"), ("energy_j", "energy_j"), ("evaluations", "evaluations"),
+        ("pitch_deg", "pitch_deg"), ("yaw_deg", "yaw_deg"), ("nearest_m", "nearest_m"), ("converged", "converged"),
     ):  # fmt: skip
         numbers = np.array([r[key] for r in found if r[key] is not None], dtype=np.float64)
         out |= {f"{what}_{name}": value for what, value in _spread(numbers).items()}
@@ -164,6 +110,13 @@ def row(scenario: str, algorithm: str, records: Sequence[Record], evaluations: i
     parts = [r["lengths_m"] for r in found]
     out["vehicle_lengths_m"] = np.mean(parts, axis=0).tolist() if parts and len(parts[0]) > 1 else None
     return out
+
+
+def time_row(scenario: str, algorithm: str, records: Sequence[Record]) -> dict[str, Any]:
+    """The processor's seconds of an algorithm's runs: the only numbers that differ from one benchmark to the next."""
+    numbers = np.array([r["time_s"] for r in records if r["status"] == "found"], dtype=np.float64)
+    spread = {f"{what}_time_s": value for what, value in _spread(numbers).items()}
+    return {"scenario": scenario, "algorithm": algorithm, "runs": len(records), **spread}
 
 
 def _spread(numbers: Floats) -> dict[str, float | None]:

@@ -1,8 +1,8 @@
 """Artificial bees: ABC (Karaboga 2005), and IB-ABC with B-ABC (Tan et al. 2023).
 
-All bees of one kind fly at once, from the sources that the kind before left; in the papers they fly one by one.
-``group`` is the number of adjacent variables that form one element (the coordinates of a way point; 1 on functions). An
-element is changed as a whole.
+All bees of one kind fly at once, from the sources that the kind before left; in the papers they fly one by one, which
+ABC's parameter ``bees`` can have. ``group`` is the number of adjacent variables that form one element (the coordinates
+of a way point; 1 on functions). An element is changed as a whole.
 """
 
 from __future__ import annotations
@@ -11,15 +11,17 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.errors import InputError
-from gcsplan.optimisers.box import Run, Steps, clipped, keep_better, partners
+from gcsplan.optimisers.box import Run, Steps, clipped, keep_better, partners, require
 
 
-def abc(run: Run, *, limit: int, group: int) -> Steps:
+def abc(run: Run, *, limit: int, group: int, bees: str) -> Steps:
     """ABC: employed bees, onlookers by roulette on fitness, at most one scout a cycle; it may replace the best source.
 
     Each bee tries to change one element of its source: vⱼ = xⱼ + φ·(xⱼ − x_kj), k another source. Each bee that does
     not improve its source adds one to the source's failures; a scout replaces a source of more than ``limit`` failures.
+    ``bees`` is "together", or "one": each bee starts from what the bee before it left.
     """
+    require("abc", "bees", bees, ("together", "one"))
     x = run.first()
     f = yield x
     n = len(x)
@@ -28,9 +30,10 @@ def abc(run: Run, *, limit: int, group: int) -> Steps:
     for _ in run.cycles():
         for onlooking in (False, True):
             chosen = roulette(run.rng, f, n) if onlooking else everyone
-            tried = _one_element(run, x, chosen, group)
-            f_tried = yield tried
-            _take_best_of_each(x, f, failures, chosen, tried, f_tried)
+            for flying in (chosen,) if bees == "together" else chosen[:, None]:
+                tried = _one_element(run, x, flying, group)
+                f_tried = yield tried
+                _take_best_of_each(x, f, failures, flying, tried, f_tried)
         spent = int(failures.argmax())
         if failures[spent] > limit:
             # E Xu et al. eq. 4 adds rand·map(j) to the old place; here the place is drawn anew, uniformly.

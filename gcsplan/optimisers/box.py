@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
+from gcsplan.errors import InputError
 
 Steps = Generator[Floats, Floats, None]
 """A running optimiser: yields populations (n, dim) in [0, 1]; is sent their finite costs (n,), which it may change."""
@@ -66,6 +67,12 @@ class Run:
         left = 0 if self.evaluations_limit is None else self.evaluations_limit - self._first_cost
         by_evaluations = (self.evaluations - self._first_cost) / left if left > 0 else 0.0
         return min(1.0, max(by_iterations, by_evaluations))
+
+
+def require(optimiser: str, what: str, given: str, known: Sequence[str]) -> None:
+    """Raise InputError unless ``given`` is one of the ``known`` words of the parameter ``what``."""
+    if given not in known:
+        raise InputError(f"{optimiser}: {what} must be one of {', '.join(known)}, given {given!r}")
 
 
 def clipped(x: Floats) -> Floats:

@@ -12,24 +12,30 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
-from gcsplan.optimisers.box import Run, Steps, clipped
+from gcsplan.optimisers.box import Run, Steps, clipped, require
 
 LEVY_POWER = 1.5  # γ of eq. 10
 BEHAVIOURS = 4
 
 
-def abo(run: Run, *, alpha: float, beta: float, origin: float, stay_step: float, talk: str) -> Steps:
+def abo(
+    run: Run, *, alpha: float, beta: float, origin: float, stay_step: float, talk: str, rule: str, span: float
+) -> Steps:
     """ABO: one of four equally probable behaviours for each individual; the result replaces it even if it is worse.
 
     ``alpha`` and ``beta`` are the dependency coefficients, 1 or more; with both 1 this is the Parrot Optimizer.
     ``stay_step``: most by which staying moves along the diagonal (eq. 11). ``talk``: "added" or "printed" (eq. 12).
-    Raises InputError for other values.
+    ``rule``: "equations", or "authors", the published code of PO's authors (`parrots`), which ignores all parameters
+    but ``span``, the side of the box in the cost's own unit. Raises InputError for other values.
     """
+    require("abo", "rule", rule, ("equations", "authors"))
+    if rule == "authors":
+        yield from parrots(run, span)
+        return
     for what, given in (("alpha", alpha), ("beta", beta)):
         if given < 1.0:  # otherwise (α − t/T) becomes negative, and its fractional power is not real
             raise InputError(f"abo: {what} must be 1 or more, given {given}")
-    if talk not in ("added", "printed"):
-        raise InputError(f"abo: talk must be added or printed, given {talk!r}")
+    require("abo", "talk", talk, ("added", "printed"))
     x = run.first()
     f = yield x
     n, dim = x.shape
@@ -64,6 +70,47 @@ def abo(run: Run, *, alpha: float, beta: float, origin: float, stay_step: float,
         f = yield x
         if f.min() < f_best:
             best, f_best = x[f.argmin()].copy(), f.min()
+
+
+def parrots(run: Run, span: float) -> Steps:
+    """The Parrot Optimizer as in its authors' published code, version 2: positions are numbers from 0 to ``span``.
+
+    They fly from the ordered places of the last iteration, one by one, and each knows the best place so far. It differs
+    from the equations in four things: staying moves by a normal number, communicating alone by a small term that is the
+    same in all dimensions, and two random numbers, of communicating and of escaping, are drawn once for all.
+    """
+    x = run.first()
+    f = yield x
+    n, dim = x.shape
+    order = np.argsort(f, kind="stable")
+    x = span * x[order]
+    best, f_best = x[0].copy(), float(f[order[0]])
+    for _ in run.cycles():
+        share = min(1.0, run.elapsed + 1.0 / run.horizon)  # t/T, t from 1
+        talk, angle = run.rng.random() / 5.0, run.rng.random() * math.pi
+        mean = x.mean(axis=0)
+        flown, f_flown = np.empty_like(x), np.empty(n)
+        for j in range(n):
+            behaviour = run.rng.integers(0, BEHAVIOURS)
+            if behaviour == 0:
+                pull = run.rng.random() * (1.0 - share) ** (2.0 * share)
+                place = (x[j] - best) * levy(run.rng, (1, dim))[0] + pull * mean
+            elif behaviour == 1:
+                place = x[j] + best * levy(run.rng, (1, dim))[0] + run.rng.normal() * (1.0 - share)
+            elif behaviour == 2:
+                if run.rng.random() < 0.5:
+                    place = x[j] + talk * (1.0 - share) * (x[j] - mean)
+                else:
+                    part = max(run.rng.random(), np.finfo(float).tiny)
+                    place = x[j] + talk * (1.0 - share) * math.exp(-(j + 1) / (part * run.horizon))
+            else:
+                home = run.rng.random() * math.cos(0.5 * math.pi * share) * (best - x[j])
+                place = x[j] + home - math.cos(angle) * share ** (2.0 / run.horizon) * (x[j] - best)
+            flown[j] = np.clip(place, 0.0, span)
+            f_flown[j] = (yield clipped(flown[j : j + 1] / span))[0]
+            if f_flown[j] < f_best:
+                best, f_best = flown[j].copy(), float(f_flown[j])
+        x = flown[np.argsort(f_flown, kind="stable")]
 
 
 def levy(rng: np.random.Generator, shape: tuple[int, int]) -> Floats:

@@ -6,52 +6,88 @@ Distances are ‖·‖/√dim, so that range and step have the same meaning for 
 from __future__ import annotations
 
 from collections.abc import Generator
+from dataclasses import dataclass
 
 import numpy as np
 
-from gcsplan.arrays import Floats, Indices
-from gcsplan.optimisers.box import Run, Steps, clipped, rms_distances
+from gcsplan.arrays import Bools, Floats, Indices
+from gcsplan.optimisers.box import Run, Steps, clipped, require, rms_distances
 
 
-def krill(run: Run, *, sight: float, step: float, crowding: float, attempts: int) -> Steps:
+def krill(run: Run, *, sight: float, step: float, crowding: float, attempts: int, moves: str, crowd: str) -> Steps:
     """Each krill avoids enemies and cruises, and keeps the better result; where one of the two fails, it forages.
 
     ``sight`` is U, ``crowding`` δ, ``attempts`` T of foraging. The better result replaces the krill even if it is worse
-    than the krill was.
+    than the krill was. ``moves`` is "together", or "one": each krill sees where those before it have gone (fig. 9).
+    ``crowd`` is "ranks", or "printed": it goes where food over n_f is less than δ times its own.
     """
+    require("krill", "moves", moves, ("together", "one"))
+    require("krill", "crowd", crowd, ("ranks", "printed"))
     x = run.first()
     f = yield x
-    n = len(x)
-    everyone = np.arange(n)
+    everyone = np.arange(len(x))
+    rule = _Rule(run.rng, sight, step, crowding, attempts, crowd == "printed")
     for _ in run.cycles():
-        seen = rms_distances(x) < sight
-        seen[everyone, everyone] = False
+        for who in (everyone,) if moves == "together" else everyone[:, None]:
+            moved, f_moved = yield from rule.moved(x, f, who)
+            x, f = x.copy(), f.copy()
+            x[who], f[who] = moved, f_moved
+
+
+@dataclass(frozen=True, slots=True)
+class _Rule:
+    """One move of some krill; the parameters are those of `krill`."""
+
+    rng: np.random.Generator
+    sight: float
+    step: float
+    crowding: float
+    attempts: int
+    printed: bool
+
+    def moved(self, x: Floats, f: Floats, who: Indices) -> Generator[Floats, Floats, tuple[Floats, Floats]]:
+        """New places and costs of the krill ``who`` (m,) among all at ``x`` (n, dim) of costs ``f``."""
+        n, m = len(x), len(who)
+        seen = rms_distances(x) < self.sight
+        seen[np.arange(n), np.arange(n)] = False
         around = seen.sum(axis=1)
-        # E crowding Y_c/n_f < δ·Y_i compares food as a cost, and any ratio depends on the cost's offset. Here a krill
-        # goes if the target is better and fewer than δ·N krill are there.
-        roomy = (around > 0) & (around < crowding * n)
+        met = (around > 0)[who]
 
         # Enemy avoidance. E eq. 8 prints the centre of two krill; here the mean of all neighbours in sight.
-        centre = seen @ x / np.maximum(around, 1)[:, None]
-        f_centre = np.full(n, np.inf)
-        if roomy.any():
-            f_centre[roomy] = yield clipped(centre[roomy])
+        centre = seen[who] @ x / np.maximum(around[who], 1)[:, None]
+        asked = met & (self.printed | self._roomy(around[who], n))
+        f_centre = np.full(m, np.inf)
+        if asked.any():
+            f_centre[asked] = yield clipped(centre[asked])
+        avoids = self._goes(f_centre, around[who], f[who], n) & asked
 
         # Cruising. E prints Y_c where Y_j is meant; the crowd is counted around X_j.
-        lead = np.where(seen, f, np.inf).argmin(axis=1)
-        cruises = (around > 0) & (f[lead] < f) & (around[lead] < crowding * n)
+        lead = np.where(seen[who], f, np.inf).argmin(axis=1)
+        cruises = met & self._goes(f[lead], around[lead], f[who], n)
 
         target = np.concatenate([centre, x[lead]])
-        goes = np.concatenate([f_centre < f, cruises])
-        moved = np.concatenate([x, x])
-        moved[goes] = towards(run.rng, moved[goes], target[goes], step)
+        goes = np.concatenate([avoids, cruises])
+        moved = np.concatenate([x[who], x[who]])
+        moved[goes] = towards(self.rng, moved[goes], target[goes], self.step)
         stays = np.flatnonzero(~goes)
         if stays.size:
-            moved[stays] = yield from forage(run.rng, moved[stays], f[stays % n], sight, step, attempts)
+            moved[stays] = yield from forage(
+                self.rng, moved[stays], f[who[stays % m]], self.sight, self.step, self.attempts
+            )
         f_moved = yield clipped(moved)
-        cruised = f_moved[n:] < f_moved[:n]
-        x = np.where(cruised[:, None], moved[n:], moved[:n])
-        f = np.where(cruised, f_moved[n:], f_moved[:n])
+        cruised = f_moved[m:] < f_moved[:m]
+        return np.where(cruised[:, None], moved[m:], moved[:m]), np.where(cruised, f_moved[m:], f_moved[:m])
+
+    def _roomy(self, crowd: Indices, n: int) -> Bools:
+        return np.asarray(crowd < self.crowding * n)
+
+    def _goes(self, food: Floats, crowd: Indices, own: Floats, n: int) -> Bools:
+        """(m,) whether krill of food ``own`` go where there is ``food`` and a ``crowd``."""
+        # E crowding Y_c/n_f < δ·Y_i compares food as a cost, and any ratio depends on the cost's offset. Here a krill
+        # goes if the target is better and fewer than δ·N krill are there.
+        if self.printed:
+            return np.asarray(food / np.maximum(crowd, 1) < self.crowding * own)
+        return np.asarray((food < own) & self._roomy(crowd, n))
 
 
 def towards(rng: np.random.Generator, x: Floats, target: Floats, step: float) -> Floats:

@@ -101,7 +101,7 @@ _ENTRIES = (
         population=50,
         iterations=100,
         evaluations_per_iteration="2P to 23P, about 20P",
-        defaults=_set(sight=0.3, step=0.1, crowding=0.618, attempts=10),
+        defaults=_set(sight=0.3, step=0.1, crowding=0.618, attempts=10, moves="together", crowd="ranks"),
     ),
     Entry(
         name="abc",
@@ -112,7 +112,7 @@ _ENTRIES = (
         population=50,
         iterations=500,
         evaluations_per_iteration="2P, and 1 for a scout",
-        defaults=_set(limit=20, group=1),
+        defaults=_set(limit=20, group=1, bees="together"),
         least_population=2,
     ),
     Entry(
@@ -181,7 +181,7 @@ _ENTRIES = (
         equations="Dhargupta's Spearman rule",
         population=30,
         iterations=500,
-        defaults=_set(origin=0.0),
+        defaults=_set(origin=0.0, alike="ranks", span=1.0),
         least_population=3,
     ),
     Entry(
@@ -192,7 +192,7 @@ _ENTRIES = (
         equations="9-11, 13-25",
         population=30,
         iterations=500,
-        defaults=_set(origin=0.0, factor="cosine", leaders="apart"),
+        defaults=_set(origin=0.0, factor="cosine", leaders="apart", trial="every"),
         least_population=5,
     ),
     Entry(
@@ -203,7 +203,7 @@ _ENTRIES = (
         equations="13-25",
         population=30,
         iterations=500,
-        defaults=_set(origin=0.0, factor="printed", leaders="printed"),
+        defaults=_set(origin=0.0, factor="printed", leaders="printed", trial="every"),
         least_population=5,
     ),
     Entry(
@@ -246,7 +246,9 @@ _ENTRIES = (
         population=100,
         iterations=200,
         evaluations_per_iteration="2P",
-        defaults=_set(swarms=5, own_share=0.2, global_step=0.3, local_step=0.05, threshold=None),
+        defaults=_set(
+            swarms=5, own_share=0.2, global_step=0.3, local_step=0.05, threshold=None, beyond="clipped", origin=0.0
+        ),
     ),
     Entry(
         name="pso",
@@ -277,7 +279,7 @@ _ENTRIES = (
         equations="8-13, α = β = 1",
         population=200,
         iterations=100,
-        defaults=_set(alpha=1.0, beta=1.0, origin=0.0, stay_step=0.01, talk="added"),
+        defaults=_set(alpha=1.0, beta=1.0, origin=0.0, stay_step=0.01, talk="added", rule="equations", span=100.0),
     ),
     Entry(
         name="abo",
@@ -287,7 +289,7 @@ _ENTRIES = (
         equations="8-13",
         population=200,
         iterations=100,
-        defaults=_set(alpha=1.0, beta=1.0, origin=0.0, stay_step=0.01, talk="added"),
+        defaults=_set(alpha=1.0, beta=1.0, origin=0.0, stay_step=0.01, talk="added", rule="equations", span=100.0),
     ),
 )
 

@@ -13,8 +13,7 @@ import math
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices
-from gcsplan.errors import InputError
-from gcsplan.optimisers.box import WORST, Run, Steps, clipped, keep_better
+from gcsplan.optimisers.box import WORST, Run, Steps, clipped, keep_better, require
 
 PACK = 3  # α, β, δ
 ANNEALING_SHARE = 0.95  # η of eq. 25
@@ -69,28 +68,35 @@ def igwo(run: Run, *, origin: float) -> Steps:
         pack = Pack(x, f)
 
 
-def sogwo(run: Run, *, origin: float) -> Steps:
-    """Selective opposition GWO (Dhargupta et al. 2020): wolves unlike α are mirrored in the box before GWO's move."""
+def sogwo(run: Run, *, origin: float, alike: str, span: float) -> Steps:
+    """Selective opposition GWO (Dhargupta et al. 2020): wolves unlike α are mirrored in the box before GWO's move.
+
+    ``alike`` is "ranks" (`opposed`), or "distances", the rule in its authors' published code (`opposed_by_distance`);
+    ``span``: side of the box in the cost's own unit, which that rule depends on.
+    """
+    require("sogwo", "alike", alike, ("ranks", "distances"))
     x = run.first()
     f = yield x
     pack = Pack(x, f)
     for _ in run.cycles():
         a = 2.0 - 2.0 * run.elapsed
-        x = opposed(x, f, pack.x[0], a)
+        x = opposed(x, f, pack.x[0], a) if alike == "ranks" else opposed_by_distance(x, a, span)
         x = clipped(tell(run.rng, x, pack.x, a, origin).sum(axis=0) / PACK)
         f = yield x
         pack.meet(x, f)
 
 
-def ssgwo(run: Run, *, origin: float, factor: str, leaders: str) -> Steps:
+def ssgwo(run: Run, *, origin: float, factor: str, leaders: str, trial: str) -> Steps:
     """Hybrid of GWO and simulated annealing (Feng et al. 2024), eq. 13-25.
 
     ``factor`` is "cosine" or "printed" (eq. 13). ``leaders`` is "apart": non-leaders move by eq. 23 over eq. 9-11,
-    leaders by eq. 17-19 and only to improve; or "printed": every wolf moves by eq. 23 over eq. 17-19.
+    leaders by eq. 17-19 and only to improve; "all": every wolf moves by eq. 23 over eq. 9-11, whose A and C are what
+    Algorithm 1 updates; or "printed": every wolf moves by eq. 23 over eq. 17-19. ``trial`` is "every": eq. 24 decides
+    for each wolf; or "alpha": for α alone, as its letters say, while all others move anyway.
     """
-    for what, given, known in (("factor", factor, FACTORS), ("leaders", leaders, ("apart", "printed"))):
-        if given not in known:
-            raise InputError(f"ssgwo: {what} must be one of {', '.join(known)}, given {given!r}")
+    require("ssgwo", "factor", factor, tuple(FACTORS))
+    require("ssgwo", "leaders", leaders, ("apart", "all", "printed"))
+    require("ssgwo", "trial", trial, ("every", "alpha"))
     x = run.first()
     f = yield x
     finite = f[f < WORST]
@@ -107,12 +113,17 @@ def ssgwo(run: Run, *, origin: float, factor: str, leaders: str) -> Steps:
             tried[others] = _weighed(told, nearness(x, x[first])[:, others])  # eq. 23
             tried[first] = scattered(run.rng, x, first, others, a, 1)[:, 0]
         else:
-            told = scattered(run.rng, x, first, others, a, len(x))
+            if leaders == "all":
+                told = tell(run.rng, x, x[first], a, origin)
+            else:
+                told = scattered(run.rng, x, first, others, a, len(x))
             tried[:] = _weighed(told, nearness(x, x[first]))
         f_tried = yield clipped(tried)
         # E eq. 24: the inner "while (P > rand)" may never end; here one trial for each wolf and iteration.
         worse = np.maximum(f_tried - f, 0.0) / max(temperature, 1e-200)
         taken = (f_tried < f) | (run.rng.random(len(f)) < np.exp(-np.minimum(worse, 700.0)))
+        if trial == "alpha":
+            taken[order[1:]] = True
         if leaders == "apart":
             taken[first] = f_tried[first] < f[first]
         x[taken], f[taken] = tried[taken], f_tried[taken]
@@ -174,6 +185,24 @@ def opposed(x: Floats, f: Floats, alpha: Floats, a: float) -> Floats:
     turned = close & (unlike & (2 * close.sum(axis=1) >= dim))[:, None]
     out = x.copy()
     out[omega] = np.where(turned, 1.0 - x[omega], x[omega])
+    return out
+
+
+def opposed_by_distance(x: Floats, a: float, span: float) -> Floats:
+    """Selective opposition as in the published code of SOGWO's authors: positions (n, dim).
+
+    All wolves but the first three in memory, whatever their costs, are compared with the first: d = |Δ|, in the cost's
+    unit. Where 1 − 6·Σd²/(n·(n² − 1)), with n the number of wolves, is 0 or less, the first dimension with d < a is
+    mirrored. Their loop over all such dimensions ends after one, because it runs to the number of rows of a list.
+    """
+    n = len(x)
+    d = span * np.abs(x[PACK:] - x[0])
+    unlike = 6.0 * (d * d).sum(axis=1) >= n * (n * n - 1.0)
+    close = d < a
+    rows = np.flatnonzero(unlike & close.any(axis=1))
+    dims = close[rows].argmax(axis=1)
+    out = x.copy()
+    out[PACK + rows, dims] = 1.0 - out[PACK + rows, dims]
     return out
 
 

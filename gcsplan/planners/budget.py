@@ -43,10 +43,14 @@ SPARE_S = 0.5
 
 @dataclass(eq=False)
 class Budget:
-    """Seconds and megabytes that one plan may take, and the counted work spent so far."""
+    """Seconds and megabytes that one plan may take, and the counted work spent so far.
+
+    ``clocked``: whether the clock stops it too; if not, counted work alone does.
+    """
 
     seconds: float
     megabytes: float
+    clocked: bool = True
     begun_s: float = field(default_factory=time.perf_counter)
     spent: float = 0.0
     """Counted seconds so far."""
@@ -80,6 +84,8 @@ class Budget:
     @property
     def deadline_s(self) -> float:
         """The clock's last stop, on the scale of `time.perf_counter`."""
+        if not self.clocked:
+            return math.inf
         if self._first_s is None:
             return self.begun_s + FIRST * self.seconds + FIRST_S
         return self._first_s + max(self.seconds - SPARE_S, 0.5 * self.seconds)
@@ -106,6 +112,6 @@ class Budget:
         return self.megabytes
 
     @classmethod
-    def endless(cls) -> Budget:
-        """A budget without limits."""
-        return cls(math.inf, math.inf)
+    def endless(cls, *, clocked: bool = True) -> Budget:
+        """A budget without limits. A problem that carries one without ``clocked`` is planned without a clock."""
+        return cls(math.inf, math.inf, clocked)

@@ -17,7 +17,7 @@ from gcsplan.planners.optimal import planner
 from gcsplan.planners.optimal.governor import Search, govern
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.searches import NAMES, Searches
-from gcsplan.planners.problem import Problem, Solution
+from gcsplan.planners.problem import Problem, Refusal, Solution
 
 
 def mission(kind: str, seed: int = 1) -> Problem:
@@ -65,6 +65,18 @@ def test_a_clock_that_runs_faster_changes_nothing(kind: str, monkeypatch: pytest
         assert first.lower_bound == second.lower_bound
         assert first.stopped_by == second.stopped_by
     assert first.stopped_by != "time"
+
+
+@pytest.mark.usefixtures("clock")
+def test_without_a_clock_counted_work_alone_ends_a_plan(monkeypatch: pytest.MonkeyPatch) -> None:
+    p = replace(mission("wall"), budget_s=1.0)
+    counted = replace(p, budget=Budget.endless(clocked=False))
+    slow, fast = (plan_on_a_clock(counted, rate, monkeypatch) for rate in (1.0, 1e6))
+    with pytest.raises(Refusal):
+        plan_on_a_clock(p, 1e6, monkeypatch)  # the clock stops it before there is a first path
+    assert fast.stopped_by == slow.stopped_by != "time"
+    assert fast.path.points.tobytes() == slow.path.points.tobytes()
+    assert fast.lower_bound == slow.lower_bound
 
 
 def plan_on_a_clock(p: Problem, rate: float, monkeypatch: pytest.MonkeyPatch) -> Solution:

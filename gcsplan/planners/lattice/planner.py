@@ -56,8 +56,9 @@ def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True
 
     Start, goal and vias must be legal by themselves. ``tell(phase, cost)`` reports progress; ``begun`` is the
     `time.perf_counter` of the call. Deterministic: stops on counted work; ``budget_s`` is a last stop for all that
-    comes after the first path, and `WITHOUT` times that where there is none. ``climbs``: laps over start and goal are
-    allowed; ``known``: a path is known already, so only one search is made. Raises Refusal if no path is found.
+    comes after the first path, and `WITHOUT` times that where there is none, if the problem's budget is ``clocked``.
+    ``climbs``: laps over start and goal are allowed; ``known``: a path is known already, so only one search is made.
+    Raises Refusal if no path is found.
     """
     bound = straight_bound(problem)
     terminals = terminals_of(problem)
@@ -70,7 +71,8 @@ def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True
     first_s = math.inf if best is None else time.perf_counter() - begun
     router: Router | None = None
     timed_out = False
-    deadline_s, given_up_s = begun + problem.budget_s, begun + WITHOUT * problem.budget_s
+    last_s = problem.budget_s if problem.budget.clocked else math.inf
+    deadline_s, given_up_s = begun + last_s, begun + WITHOUT * last_s
     for level in LEVELS[:1] if known else LEVELS if climbs else LEVELS[:2]:
         if best is None and time.perf_counter() > given_up_s:
             break

@@ -48,12 +48,13 @@ def plan(problem: Problem) -> Solution:
     """A path from start to goal that passes `Airspace.examine`, and a cost that no such path can beat.
 
     Finds a first path, then improves path and bound until they are ``gap_percent`` apart, the budget is spent, or no
-    search is left to try. Deterministic: stops on counted work; the clock is a last stop. With ``turn_radius_m`` the
+    search is left to try. Deterministic: stops on counted work; the clock is a last stop, unless the problem's
+    ``budget`` is not ``clocked``. With ``turn_radius_m`` the
     path's points are fly-by way points, passed on arcs of that radius, and the flown path is the legal one.
     ``options``: ``without``, names of searches to leave out. If no path is found, raises Refusal (a NoMission), which
     names the binding constraint and says whether it is proved that there is no path.
     """
-    problem = replace(problem, budget=Budget(problem.budget_s, problem.budget_mb))
+    problem = replace(problem, budget=Budget(problem.budget_s, problem.budget_mb, problem.budget.clocked))
     return plan_over(problem, _within)
 
 

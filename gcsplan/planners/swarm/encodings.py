@@ -1,4 +1,4 @@
-"""Encodings: five mappings, by name, from a vector in the unit box to the control points of a path.
+"""Encodings: six mappings, by name, from a vector in the unit box to the control points of a path.
 
 Each encodes one stage, from a terminal to the next; a path with via points is its stages one after the other. The
 variables of one way point are adjacent, so that an optimiser can change them together (its parameter ``group``).
@@ -46,6 +46,11 @@ def _polar(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
     # E: MSFOA's eq. 31 has d = 1 … 3D, its eq. 32 k = 2 … D + 1. S > 1 is set to 1.
     pairs = u.reshape(*u.shape[:2], 3, 2)
     _box(scene, a, b, np.minimum(np.hypot(pairs[..., 0], pairs[..., 1]), 1.0), out)
+
+
+def _polar_signed(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
+    # Eq. 31 has the square root of a sum of squares, and no line of the paper keeps X and Y positive.
+    _polar(scene, a, b, np.abs(2.0 * u - 1.0), out)
 
 
 def _frame(a: Floats, b: Floats) -> tuple[Floats, Floats]:
@@ -98,6 +103,7 @@ ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
             Encoding("box", "each point anywhere in the flight volume", 3, 5, _box),
             Encoding("sections", "a point on each of K planes across the track, floor to ceiling", 2, 10, _sections),
             Encoding("polar", "a box whose coordinates are the radii of two hidden variables", 6, 5, _polar),
+            Encoding("polar-signed", "polar, where the hidden variables may be negative", 6, 5, _polar_signed),
             Encoding("bspline", "few points, each about its own station of the track", 3, 8, _bspline),
             Encoding("offsets", "at each of K stations the offset to the side and the altitude", 2, 8, _offsets),
         )

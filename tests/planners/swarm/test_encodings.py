@@ -86,6 +86,12 @@ def test_polar_coordinates_are_radii_and_those_beyond_one_lie_on_the_circle(scen
     np.testing.assert_allclose((at - scene.low) / (scene.high - scene.low), [0.5, 1.0, 0.0], atol=1e-12)
 
 
+def test_signed_polar_coordinates_are_radii_from_the_middle_of_the_variables(scene: Scene) -> None:
+    code = Code.of("polar-signed", scene, 1)
+    at = code.controls(np.array([[0.35, 0.7, 0.05, 0.95, 0.5, 0.5]]))[0][1]
+    np.testing.assert_allclose((at - scene.low) / (scene.high - scene.low), [0.5, 1.0, 0.0], atol=1e-12)
+
+
 def test_sections_stand_across_the_track_between_floor_and_ceiling(scene: Scene) -> None:
     code = Code.of("sections", scene, 3)
     a, b = scene.terminals[0], scene.terminals[-1]
