@@ -1,4 +1,4 @@
-"""How long each stretch of a flight takes: the fleet's model of motion (`fleet.speeds`), with the mission's own speeds.
+"""How long each stretch of a flight takes: the fleet's model of motion (`fleet.legs`), with the mission's own speeds.
 
 The same model makes a fleet's time table (`fleet.timing.Course`), so all times of a mission are of one kind: a vehicle
 accelerates, brakes, rounds its corners, and stops where it holds and where a take-off or a landing begins or ends. A
@@ -15,8 +15,8 @@ import numpy as np
 
 from gcsplan.arrays import Floats, Indices
 from gcsplan.check.stretch import Stretch
-from gcsplan.fleet.speeds import legs
-from gcsplan.fleet.timing import leg_lengths_m, upright
+from gcsplan.fleet.legs import legs
+from gcsplan.fleet.timing import upright
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.frame import Frame
 from gcsplan.world.surface import Surface
@@ -75,8 +75,7 @@ def _legs_s(
         speed = speed * pace_over_ground(points, home_deg, world.frame)[:-1]
     own = (vehicle.climb_m_s, vehicle.descent_m_s)
     stretch = legs(
-        points, vehicle, owner,
-        leg_m=leg_lengths_m(points, np.array([s.seq for s in run], dtype=np.intp)[owner]),
+        points, vehicle, owner, np.array([s.seq for s in run], dtype=np.intp)[owner],
         pace=speed, rates_m_s=np.array([s.rates_m_s or own for s in run])[owner],
     )  # fmt: skip
     return np.zeros(len(run)) if stretch is None else stretch.shares_s(1.0, len(run))

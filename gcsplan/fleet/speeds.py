@@ -1,11 +1,10 @@
 """The speed of a vehicle at each point of one stretch of its path, from a standstill to the next.
 
-The speed along the path is the largest that keeps five limits: the cruise speed horizontally, the climb and descent
-rates, the corner's acceleration in turns, the peak of a leg's own S-curve (ArduPilot flies short legs slowly), and one
-acceleration to reach it and to brake from it: with ``u = v²`` and ``s`` metres along the path, ``|du/ds| <= 2a``. The
-largest such profile at the nodes is ``u_i = min_j(cap_j² + 2a·|s_i - s_j|)``: two running minima, no loop (for the two
-passes over the speed limits see Bobrow, Dubowsky and Gibson 1985, "Time-optimal control of robotic manipulators along
-specified paths").
+The speed along the path is the largest that keeps four limits: the cruise speed horizontally, the climb and descent
+rates, the corner's acceleration in turns, and one acceleration to reach it and to brake from it: with ``u = v²`` and
+``s`` metres along the path, ``|du/ds| <= 2a``. The largest such profile at the nodes is ``u_i = min_j(cap_j² +
+2a·|s_i - s_j|)``: two running minima, no loop (for the two passes over the speed limits see Bobrow, Dubowsky and Gibson
+1985, "Time-optimal control of robotic manipulators along specified paths").
 """
 
 from __future__ import annotations
@@ -23,12 +22,6 @@ CUT_M = 2.0
 
 POSITION_ERROR_M = 0.25
 """Largest distance, m, of the straight pieces at constant speed from the curved, accelerated motion they replace."""
-
-LEG_ACCEL_M_S2 = 2.5
-"""ArduCopter's default of WPNAV_ACCEL."""
-
-LEG_SHARE = 0.96
-"""Part of the peak speed of a short leg's S-curve that a real ArduCopter flew."""
 
 _LEAST_RADIUS_M = 1e-9
 _LEAST_LENGTH_M = 1e-9
@@ -163,21 +156,19 @@ class Stretch:
         return places
 
 
-def legs(
-    points: Floats, vehicle: Vehicle, owner: Indices, leg_m: Floats | None = None, pace: Floats | None = None,
-    rates_m_s: Floats | None = None,
-) -> Stretch | None:  # fmt: skip
+def rounded(
+    points: Floats, vehicle: Vehicle, owner: Indices, pace: Floats | None = None, rates_m_s: Floats | None = None
+) -> Stretch | None:
     """The stretch through ``points`` (N, 3) without a stop, its corners rounded; None if nothing moves.
 
     ``owner`` (N - 1,) numbers the legs. With a corner acceleration of inf, corners are sharp. In the middle of a corner
     the vehicle has the way point's altitude, because the tangents of nearly straight tracks are half a leg long.
-    ``leg_m`` (N - 1,) are lengths from way point to way point, for legs that are parts of longer ones. ``pace`` (N -
-    1,) is the speed that results from a cruise speed of 1, if that is not 1. ``rates_m_s`` (N - 1, 2) are the rates of
-    climb and descent on each leg, if they are not the vehicle's own.
+    ``pace`` (N - 1,) is the speed that results from a cruise speed of 1, if that is not 1. ``rates_m_s`` (N - 1, 2) are
+    the rates of climb and descent on each leg, if they are not the vehicle's own.
     """
     whole = np.linalg.norm(np.diff(points, axis=0), axis=1)
     keep = np.append(True, whole > _LEAST_LENGTH_M)
-    p, owner, whole = points[keep], owner[keep[1:]], (whole if leg_m is None else leg_m)[keep[1:]]
+    p, owner = points[keep], owner[keep[1:]]
     if len(p) < 2:
         return None
     d = np.diff(p, axis=0)
@@ -213,13 +204,12 @@ def legs(
     there = arc_m > 0.0
     there[0::3] = length[0::3] > _LEAST_LENGTH_M
     rates = np.array([[vehicle.climb_m_s, vehicle.descent_m_s]]) if rates_m_s is None else rates_m_s[keep[1:]][leg]
-    most, per_cruise = _bounds(length, run_m, rise_m, rates)
+    most, per_cruise = bounds(length, run_m, rise_m, rates)
     if pace is not None:
         per_cruise *= pace[keep[1:]][leg]
     arc = arc_m > 0.0
     bend_most = np.sqrt(vehicle.corner_accel_m_s2 * arc_m[arc]) * (length[arc] / run_m[arc])
     most[arc] = np.minimum(most[arc], bend_most)
-    most = np.minimum(most, _most_of_legs(whole, vehicle)[leg])
     return Stretch(
         start[there], end[there], length[there], most[there], per_cruise[there], arc_m[there], arc_turn[there],
         towards[there], owners[there], vehicle.accel_m_s2,
@@ -246,24 +236,6 @@ def _corners(heading: Floats, run: Floats, corner_accel_m_s2: float) -> tuple[Fl
     return back, turn, radius
 
 
-def _most_of_legs(length: Floats, vehicle: Vehicle) -> Floats:
-    """(N,) the highest speed that the length of each leg (m, between two way points) allows, stopped at or not.
-
-    ArduPilot plans a leg as an S-curve that stops at its end, and begins the next one while this one brakes, so the
-    peak of the leg's own curve counts. Measured on ArduCopter: 12 m at 3.1 m/s, 23 at 4.8, 50 at 8.1, 70 at 10.
-    """
-    jerk = vehicle.leg_jerk_m_s3
-    if not vehicle.lays_curves:
-        return np.full(len(length), math.inf)
-    lag = LEG_ACCEL_M_S2**2 / jerk
-    peak = np.where(
-        length <= 2.0 * LEG_ACCEL_M_S2 * lag / jerk,
-        jerk * (0.5 * length / jerk) ** (2.0 / 3.0),
-        0.5 * (np.sqrt(lag**2 + 4.0 * LEG_ACCEL_M_S2 * length) - lag),
-    )
-    return LEG_SHARE * peak
-
-
 def column(heights_m: Floats, most_m_s: Floats, place: Floats, vehicle: Vehicle, owner: int, *, stops: bool) -> Stretch:
     """A vertical stretch over ``place`` (2,) through ``heights_m`` (S + 1,) amsl, at most ``most_m_s`` (S,).
 
@@ -281,7 +253,7 @@ def column(heights_m: Floats, most_m_s: Floats, place: Floats, vehicle: Vehicle,
     )  # fmt: skip
 
 
-def _bounds(length: Floats, run: Floats, rise: Floats, rates_m_s: Floats) -> tuple[Floats, Floats]:
+def bounds(length: Floats, run: Floats, rise: Floats, rates_m_s: Floats) -> tuple[Floats, Floats]:
     """Largest speed along each segment by climb and descent rates, and its ratio to the cruise speed."""
     rate = np.where(rise >= 0.0, rates_m_s[:, 0], rates_m_s[:, 1])
     in_space = np.isinf(rate)

@@ -17,12 +17,14 @@ from typing import Literal
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices
+from gcsplan.fleet.curved import Curved
+from gcsplan.fleet.legs import legs
 from gcsplan.fleet.motion import TimedPath
-from gcsplan.fleet.speeds import POSITION_ERROR_M, Stretch, column, legs
+from gcsplan.fleet.speeds import POSITION_ERROR_M, Stretch, column
 from gcsplan.vehicle import Autopilot, Vehicle
 
 __all__ = [
-    "POSITION_ERROR_M", "Course", "End", "Route", "leg_lengths_m", "motion_error_m", "speed_for", "upright",
+    "POSITION_ERROR_M", "Course", "End", "Route", "motion_error_m", "speed_for", "upright",
 ]  # fmt: skip
 
 End = Literal["land", "loiter", "rtl", "none"]
@@ -117,14 +119,14 @@ class Course:
         holds = np.zeros(len(route.points)) if route.holds_s is None else route.holds_s
         self.gate_s = float(holds[0])
         self.takeoff = _takeoff(route, vehicle)
-        self.to_goal: list[tuple[Stretch, float]] = []
+        self.to_goal: list[tuple[Stretch | Curved, float]] = []
         stops = [0, *(np.flatnonzero(holds[1:-1] > 0.0) + 1).tolist(), len(holds) - 1]
-        leg_m = leg_lengths_m(route.points, None if route.items is None else route.items[1:-1])
+        leg = None if route.items is None else route.items[1:-1]
         waited = 0.0
         for i, j in pairwise(stops):
             owner = np.arange(i + 1, j + 1, dtype=np.intp)
             pace = None if route.pace is None else route.pace[i:j]
-            stretch = legs(route.points[i : j + 1], vehicle, owner, leg_m=leg_m[i:j], pace=pace)
+            stretch = legs(route.points[i : j + 1], vehicle, owner, None if leg is None else leg[i:j], pace)
             held = float(holds[j]) if j < stops[-1] else 0.0
             if stretch is not None:
                 self.to_goal.append((stretch, held))
@@ -218,7 +220,7 @@ class _Motion:
         self.points = [start[None, :]]
         self.legs: list[Indices] = []
 
-    def go(self, stretch: Stretch, speed_m_s: float, error_m: float) -> None:
+    def go(self, stretch: Stretch | Curved, speed_m_s: float, error_m: float) -> None:
         times, points, owner = stretch.motion(speed_m_s, error_m)
         self.times.append(self.now_s + times)
         self.points.append(points)
@@ -246,21 +248,7 @@ class _Motion:
         return TimedPath(route.name, times[keep], points[keep], arrive_s, stays, items[keep[1:]])
 
 
-def leg_lengths_m(points: Floats, items: Indices | None) -> Floats:
-    """(N - 1,) metres from way point to way point, of the mission's leg that each piece of (N, 3) points is part of.
-
-    Pieces with the same of ``items`` (N - 1,) are one leg, cut to follow the ground.
-    """
-    own = np.asarray(np.linalg.norm(np.diff(points, axis=0), axis=1))
-    if items is None:
-        return own
-    first = np.flatnonzero(np.append(True, items[1:] != items[:-1]))
-    last = np.append(first[1:], len(items))
-    whole = np.linalg.norm(points[last] - points[first], axis=1)
-    return np.asarray(np.maximum(own, np.repeat(whole, last - first)))
-
-
-def _takeoff(route: Route, vehicle: Vehicle) -> Stretch | None:
+def _takeoff(route: Route, vehicle: Vehicle) -> Stretch | Curved | None:
     ground, top = route.start_ground_amsl_m, route.points[0]
     if route.climb_out is not None:
         way = legs(route.climb_out, vehicle, np.zeros(len(route.climb_out) - 1, dtype=np.intp))
@@ -269,7 +257,7 @@ def _takeoff(route: Route, vehicle: Vehicle) -> Stretch | None:
     return None if ground is None else next(iter(upright(top[:2], ground, float(top[2]), vehicle, 0)), None)
 
 
-def _after(route: Route, vehicle: Vehicle) -> list[Stretch]:
+def _after(route: Route, vehicle: Vehicle) -> list[Stretch | Curved]:
     """The stretches after the arrival."""
     goal, home = route.points[-1], route.points[0]
     number = len(route.points)
@@ -305,7 +293,7 @@ def _home(route: Route) -> tuple[float, float]:
 
 def upright(
     place: Floats, from_amsl_m: float, to_amsl_m: float, vehicle: Vehicle, owner: int, home_amsl_m: float | None = None
-) -> list[Stretch]:
+) -> list[Stretch | Curved]:
     """A column over ``place`` (2,): a climb to a standstill, or a landing that is slow near the ground.
 
     ``home_amsl_m``: the ground at home, above which PX4 slows down, wherever it lands; None: as at the landing place.

@@ -14,8 +14,8 @@ from gcsplan.vehicle import Autopilot, Vehicle
 AT_ONCE_M_S2 = 1e4
 """Acceleration that stands for "unlimited", m/s²: 30 m/s in 3 ms."""
 
-SHORT_LEG = 0.96
-"""Measured speed on a short leg, as a fraction of the peak speed of its S-curve."""
+FULL_ACCEL = 2.5 / 1.5
+"""Peak acceleration of an S-curve per acceleration of the trapezoid that it is equivalent to."""
 
 AIRSPEED_SPARE = 1.2
 """Assumed highest airspeed of a vehicle, as a multiple of its fastest cruise: its reserve against wind."""
@@ -35,8 +35,9 @@ class Kinematics:
     infinite acceleration speeds change instantly; with an infinite corner acceleration corners are not rounded. With an
     infinite climb or descent rate the commanded speed is the speed in space on any slope. ``land_m_s``: descent rate in
     the last ``land_below_m`` above the landing place (above home for a PX4). ``airspeed_m_s``: highest airspeed; a
-    headwind is subtracted from it. ``leg_jerk_m_s3``, ``leg_accel_m_s2``: of ArduPilot's S-curves, see `leg_m_s`; an
-    infinite jerk disables them.
+    headwind is subtracted from it. ``leg_jerk_m_s3``, ``leg_accel_m_s2``: of ArduPilot's S-curves (`scurves`); an
+    infinite jerk disables them. ``lean_deg``: the largest lean of ArduPilot's simulated quadrotor, which bounds its
+    speed.
     """
 
     climb_m_s: float
@@ -51,6 +52,7 @@ class Kinematics:
     land_below_m: float = 10.0
     leg_jerk_m_s3: float = math.inf
     leg_accel_m_s2: float = 2.5
+    lean_deg: float = math.inf
 
     @classmethod
     def of(cls, vehicle: Vehicle, airspeed_m_s: float | None = None) -> Kinematics:
@@ -62,6 +64,8 @@ class Kinematics:
             corner_accel_m_s2=vehicle.corner_accel_m_s2, land_m_s=vehicle.land_m_s,
             leg_jerk_m_s3=vehicle.leg_jerk_m_s3 if vehicle.lays_curves else math.inf,
             land_below_m=PX4_LAND_BELOW_M if vehicle.autopilot is Autopilot.PX4 else 10.0,
+            leg_accel_m_s2=FULL_ACCEL * vehicle.accel_m_s2,
+            lean_deg=vehicle.lean_angle_deg or math.inf,
         )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -82,21 +86,53 @@ class Kinematics:
             return 0.0
         return min(self.cut_m / math.tan(0.5 * half), 0.5 * shorter_leg_m) / math.tan(half)
 
-    def leg_m_s(self, length_m: float) -> float:
-        """Return the highest speed along a leg of ``length_m`` between two way points, passed with or without a stop.
+    @property
+    def lays_curves(self) -> bool:
+        """Whether its legs are S-curves."""
+        return math.isfinite(self.leg_jerk_m_s3) and math.isfinite(self.corner_accel_m_s2)
 
-        ArduPilot plans every leg as an S-curve that stops at its end, and begins the next one while this one brakes.
-        So a leg is flown no faster than the peak of its own curve (`AC_WPNav`, `SCurve`). Measured on ArduCopter: 12 m
-        at 3.1 m/s, 23 at 4.8, 39 at 6.9, 50 at 8.1, 61 at 9.1, 70 at 10, which is `SHORT_LEG` of the peak.
+    def leaning_m_s(self, rise: float, amsl_m: float, wanted_m_s: float) -> float:
+        """Return the speed along a slope at which the largest lean just balances the drag, at most ``wanted_m_s``.
+
+        ``rise``: sine of the slope. The quadrotor is the one of SIM_Frame.h.
         """
-        jerk, accel = self.leg_jerk_m_s3, self.leg_accel_m_s2
-        if math.isinf(jerk):
-            return math.inf
-        if length_m <= 2.0 * accel**3 / jerk**2:  # too short to reach the full acceleration
-            return SHORT_LEG * jerk * math.pow(0.5 * length_m / jerk, 2.0 / 3.0)
-        lag = accel**2 / jerk
-        return SHORT_LEG * 0.5 * (math.sqrt(lag**2 + 4.0 * accel * length_m) - lag)
+        if math.isinf(self.lean_deg) or _pushes_on(self.lean_deg, wanted_m_s, rise, amsl_m):
+            return wanted_m_s
+        slow, fast = 0.0, wanted_m_s
+        for _ in range(30):
+            middle = 0.5 * (slow + fast)
+            slow, fast = (middle, fast) if _pushes_on(self.lean_deg, middle, rise, amsl_m) else (slow, middle)
+        return slow
 
     def corner_m_s(self, radius_m: float) -> float:
         """Return the highest speed over ground on an arc."""
         return math.sqrt(self.corner_accel_m_s2 * radius_m)
+
+
+MASS_KG, DISC_M2, ROTOR_DRAG = 3.0, 0.385, 0.2
+HELD_M_S, HELD_DEG, HELD_AMSL_M = 15.08, 45.0, 593.0
+"""ArduPilot's simulated quadrotor (SIM_Frame.h): it holds this speed with this lean at this altitude."""
+GRAVITY_M_S2 = 9.80665
+
+
+def _pushes_on(lean_deg: float, speed_m_s: float, rise: float, amsl_m: float) -> bool:
+    """Whether at this speed along the slope the thrust at this lean still speeds the quadrotor up."""
+    weight_n = MASS_KG * GRAVITY_M_S2
+
+    def density(amsl: float) -> float:
+        return 1.225 * math.pow(1.0 - 0.0065 * amsl / 288.15, 4.2559)
+
+    def of_rotors(thrust_n: float, amsl: float) -> float:
+        return ROTOR_DRAG * math.sqrt(thrust_n * density(amsl) * DISC_M2)
+
+    held = math.radians(HELD_DEG)
+    rotors_n = math.cos(held) ** 2 * HELD_M_S * of_rotors(weight_n / math.cos(held), HELD_AMSL_M)
+    body_m2 = (weight_n * math.tan(held) - rotors_n) / (0.5 * density(HELD_AMSL_M) * HELD_M_S**2)
+    lean, level = math.radians(lean_deg), math.sqrt(1.0 - rise**2)
+    ahead = speed_m_s * (level * math.cos(lean) - rise * math.sin(lean))
+    above = speed_m_s * (level * math.sin(lean) + rise * math.cos(lean))
+    push, thrust_n = 0.5 * density(amsl_m) * body_m2, weight_n
+    for _ in range(12):  # the thrust that keeps it on the slope; drag from above adds to it
+        across = weight_n * math.cos(lean) + push * above * abs(above) + of_rotors(thrust_n, amsl_m) * above
+        thrust_n = max(across, 0.01 * weight_n)
+    return push * ahead * abs(ahead) + of_rotors(thrust_n, amsl_m) * ahead < weight_n * math.sin(lean)

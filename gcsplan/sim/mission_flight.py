@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gcsplan.arrays import Floats, Indices
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.sim.kinematics import AT_ONCE_M_S2
 from gcsplan.sim.trace import Trace
 from gcsplan.sim.track import PASSED, Track
@@ -109,10 +109,18 @@ class _Ways:
         self.command = np.concatenate([t.command_m_s for t in tracks])
         self.level = np.concatenate([t.level for t in tracks])
         self.accel = np.concatenate([t.accel_m_s2 for t in tracks])
+        # Pieces whose speed changes at once are flown by the clock: what each takes at its speed, and when it begins.
+        with np.errstate(divide="ignore"):
+            self.pace = np.minimum(self.cap, self.command / self.level)
+        self.timed = (self.accel >= AT_ONCE_M_S2) & np.isfinite(self.pace)
+        took = np.where(self.timed, (self.end - self.begin) / self.pace, 1.0)
+        self.clock = np.cumsum(took) - took
         delta = np.concatenate([np.diff(t.points, axis=0)[:, :2] for t in tracks])
         run = np.hypot(delta[:, 0], delta[:, 1])
         self.course = delta / np.where(run > 0.0, run, 1.0)[:, None]
         self.stop_node = np.concatenate([_next_stop(t) for t in tracks])
+        last = np.concatenate([first + _next_stop(t) - 1 for first, t in zip(self.first, tracks, strict=True)])
+        self.stop_clock = self.clock[last] + took[last]
         self.stop_at = np.concatenate([a[_next_stop(t)] for t, a in zip(tracks, along, strict=True)])
         self.hold = np.concatenate([t.hold_s[_next_stop(t)] for t in tracks])
         # Just before the stop, so that a look-up there finds a piece before the stop.
@@ -219,12 +227,34 @@ class _Lanes:
         gone = np.where(faster > v, faster * b - (faster - v) ** 2 / (2.0 * accel), 0.5 * (v + faster) * b)
         gone[b <= 0.0] = 0.0
         stops = ((gone >= left) | (2.0 * left <= v * b)) & (b > 0.0)
+        timed, then, pace = self._by_clock(b, command, over_ground)
+        at = np.searchsorted(ways.clock, then, side="right") - 1
+        stops = np.where(timed, then >= ways.stop_clock[k], stops)
+        gone = np.where(timed, ways.begin[at] + (then - ways.clock[at]) * ways.pace[at] - s, gone)
+        faster = np.where(timed, ways.pace[at] * pace, faster)
         self.s = np.where(stops, ways.stop_at[k], s + gone)
         self.v = np.where(stops, 0.0, np.where(b > 0.0, faster, v))
         self.clock[:] = to_s
+        over_s = np.where(timed, (then - ways.stop_clock[k]) / np.maximum(pace, 1e-9), -1.0)
         for lane in np.flatnonzero(stops):
-            self._stop(int(lane), to_s - float(b[lane]), float(v[lane]), float(faster[lane]), float(left[lane]))
+            left_s = float(b[lane] - over_s[lane]) if over_s[lane] >= 0.0 else None
+            self._stop(int(lane), to_s - float(b[lane]), float(v[lane]), float(faster[lane]), float(left[lane]), left_s)
         self.piece = np.where(stops | self.done, self.piece, self._piece_at(k, self.s))
+
+    def _by_clock(self, b: Floats, command: Floats, over_ground: Floats) -> tuple[Bools, Floats, Floats]:
+        """Which lanes are in pieces that are flown by the clock; their time on it after ``b`` seconds; and its pace.
+
+        The clock is slow where the wind allows less than the piece's speed, and fast until a lower commanded speed
+        takes hold.
+        """
+        ways, k = self._ways, self.piece
+        timed = ways.timed[k] & (b > 0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            held = over_ground / (ways.level[k] * ways.pace[k])
+            kept = self.command / command * ways.cap[k] / ways.pace[k]
+        pace = np.where(timed, np.minimum(kept, held), 0.0)
+        then = ways.clock[k] + (self.s - ways.begin[k]) / np.where(timed, ways.pace[k], 1.0) + b * pace
+        return timed, np.where(timed, then, 0.0), pace
 
     def _piece_at(self, k: Indices, s: Floats) -> Indices:
         """Return the pieces at ``s`` (L,): piece ``k`` or a later one before the next stop."""
@@ -236,11 +266,14 @@ class _Lanes:
             behind = behind[s[behind] >= ends[k[behind]]]
         return k
 
-    def _stop(self, lane: int, since_s: float, v: float, faster: float, left_m: float) -> None:
-        """Stop a lane ``left_m`` ahead, in a step that began at ``since_s`` with the speed ``v``."""
+    def _stop(self, lane: int, since_s: float, v: float, faster: float, left_m: float, left_s: float | None) -> None:
+        """Stop a lane ``left_m`` ahead, in a step that began at ``since_s`` with the speed ``v``; after ``left_s`` if
+        that is known."""
         ways, k = self._ways, int(self.piece[lane])
         accel, within_s = float(ways.accel[k]), float(self.clock[lane]) - since_s
-        if accel >= AT_ONCE_M_S2:
+        if left_s is not None:
+            took = left_s
+        elif accel >= AT_ONCE_M_S2:
             took = left_m / max(faster, CRAWL_M_S)
         else:
             took = 2.0 * left_m / v if v > 0.0 else math.sqrt(2.0 * left_m / accel)

@@ -55,13 +55,15 @@ _SPARE_S = 300.0
 
 @dataclass(slots=True)
 class _Log:
-    """What one vehicle reported in flight; ``released_ms``: its boot time at the acceptance of MISSION_START."""
+    """What one vehicle reported in flight; ``released_ms``: its boot time at the acceptance of MISSION_START;
+    ``reached_ms``: at which it reported an item as reached for the first time."""
 
     released_ms: int = 0
     boot_ms: list[int] = field(default_factory=list)
     places: list[tuple[float, float, float]] = field(default_factory=list)
     speeds: list[float] = field(default_factory=list)
     items: list[int] = field(default_factory=list)
+    reached_ms: dict[int, int] = field(default_factory=dict)
     down: bool = False
 
 
@@ -253,6 +255,8 @@ class _Pilot:
                 log.items.append(self.item)
         elif kind == "MISSION_CURRENT":
             self.item = message.seq
+        elif kind == "MISSION_ITEM_REACHED":
+            log.reached_ms.setdefault(message.seq, self.boot_ms)
         elif kind == "HEARTBEAT":
             armed = bool(message.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED)
             log.down = log.down or (bool(log.released_ms) and self._was_armed and not armed)
@@ -330,6 +334,9 @@ def _trace(log: _Log, part: Part, world: World) -> Trace:
         arrive_s = float(times[int(apart.argmin())])
     up = int((points[:, 2] > points[0, 2] + 0.3).argmax())
     begin = max(0, up - 1)
+    legs = part.verdict.path_legs or part.verdict.legs
+    if legs[-1].seq in log.reached_ms:  # it says so itself; it is slow and near about a second before
+        arrive_s = (log.reached_ms[legs[-1].seq] - log.released_ms) / 1000.0 + released_s
     command = {part.mission.first_seq + i: item.command for i, item in enumerate(part.mission.items)}
     moved = np.hypot(*np.diff(points[:, :2], axis=0).T) < np.abs(np.diff(points[:, 2])) + 0.05
     vertical = np.array([command.get(int(i)) in (cmd.TAKEOFF, cmd.LAND, cmd.RTL) for i in items[:-1]])

@@ -18,7 +18,8 @@ from gcsplan.check.flight import follow
 from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.sim.kinematics import Kinematics
+from gcsplan.sim.kinematics import AT_ONCE_M_S2, Kinematics
+from gcsplan.sim.scurves import leg_limits, step_legs
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World
 
@@ -105,10 +106,9 @@ class Track:
 
 
 class _Line:
-    """Collects nodes and pieces in order. ``leg_m_s``: the highest speed that the current leg's length allows."""
+    """Collects nodes and pieces in order."""
 
     def __init__(self, start: Floats) -> None:
-        self.leg_m_s = math.inf
         self.points = [start]
         self.hold_s = [0.0]
         self.pieces: list[tuple[float, float, float, float, bool, int]] = []
@@ -126,11 +126,20 @@ class _Line:
         vertical = climb if rise > 0 else descent
         if not cap_m_s:
             rate = vertical / abs(rise) if abs(rise) > 1e-9 else math.inf
-            cap_m_s = min(rate, self.leg_m_s, corner_m_s / level if level else math.inf)
+            cap_m_s = min(rate, corner_m_s / level if level else math.inf)
         if rise != 0.0 and math.isinf(vertical):  # the ideal vehicle holds the commanded speed in space
             level = 1.0
         accel = kinematics.vertical_accel_m_s2 if stretch.column else kinematics.accel_m_s2
         self.pieces.append((cap_m_s, stretch.speed_m_s, level, accel, stretch.column, stretch.seq))
+        self.points.append(to)
+        self.hold_s.append(PASSED)
+
+    def add_timed(self, to: Floats, stretch: Stretch, seconds: float) -> None:
+        """Add a piece to ``to`` that takes this time; its speed changes at once at its ends."""
+        delta = to - self.points[-1]
+        length = float(np.linalg.norm(delta))
+        level = 1.0 if length == 0.0 else float(math.hypot(delta[0], delta[1])) / length
+        self.pieces.append((length / seconds, stretch.speed_m_s, level, AT_ONCE_M_S2, stretch.column, stretch.seq))
         self.points.append(to)
         self.hold_s.append(PASSED)
 
@@ -306,6 +315,9 @@ def _run(line: _Line, stretches: Sequence[Stretch], ends: Floats, kinematics: Ki
     corners = np.array([line.points[-1], *(ends[i, 1] for i in legs)])
     if terrain:  # the height above ground changes linearly along the leg
         corners[:, 2] -= world.airspace.surface.ground_at(corners[:, 0], corners[:, 1])
+    if kinematics.lays_curves:
+        _curves(line, corners, [stretches[i] for i in legs], kinematics, world)
+        return
     arcs = [_arc(corners[k : k + 3], kinematics) for k in range(len(legs) - 1)]
     sharp_end = corners[-1][None, :], math.inf
     for k, i in enumerate(legs):  # second half of the previous corner, straight piece, first half of the next corner
@@ -316,12 +328,33 @@ def _run(line: _Line, stretches: Sequence[Stretch], ends: Floats, kinematics: Ki
         nodes, corner_m_s = arcs[k] if k < len(arcs) else sharp_end
         way.append((nodes[0], math.inf))
         way += [(node, corner_m_s) for node in nodes[1 : len(nodes) // 2 + 1]]
-        line.leg_m_s = kinematics.leg_m_s(float(np.linalg.norm(ends[i, 1] - ends[i, 0])))
         for to, corner_m_s in way:
             if terrain:
                 _over_ground(line, to, stretches[i], kinematics, corner_m_s, world)
             else:
                 line.add(to, stretches[i], kinematics, corner_m_s=corner_m_s)
+
+
+def _curves(line: _Line, corners: Floats, stretches: Sequence[Stretch], kinematics: Kinematics, world: World) -> None:
+    """Add legs that are flown as ArduPilot's S-curves; in the terrain frame ``corners`` hold heights above ground."""
+    terrain, ground_at = stretches[0].terrain, world.airspace.surface.ground_at
+
+    def cut(a: Floats, b: Floats) -> Floats:
+        """The way from ``a`` to ``b`` in short parts, if it follows the ground."""
+        parts = max(1, math.ceil(float(np.hypot(*(b - a)[:2])) / TERRAIN_PART_M)) if terrain else 1
+        places = np.linspace(a, b, parts + 1)
+        places[:, 2] += ground_at(places[:, 0], places[:, 1]) if terrain else 0.0
+        return places
+
+    most = [
+        leg_limits(cut(a, b), b - a, s, kinematics)
+        for a, b, s in zip(corners[:-1], corners[1:], stretches, strict=True)
+    ]
+    times, places, leg = step_legs(corners, np.array([v for v, _ in most]), np.array([a for _, a in most]), kinematics)
+    for k in range(1, len(times)):
+        parts = cut(places[k - 1], places[k])[1:]
+        for to in parts:
+            line.add_timed(to, stretches[leg[k]], (times[k] - times[k - 1]) / len(parts))
 
 
 def _over_ground(line: _Line, to: Floats, s: Stretch, kinematics: Kinematics, corner_m_s: float, world: World) -> None:

@@ -163,9 +163,12 @@ def test_a_speed_counts_in_the_metres_of_the_autopilot(lat_deg: float, autopilot
         assert flown.command_m_s[-1] == pytest.approx(8.0 * ratio, rel=2e-5)
 
 
-def test_short_legs_cost_nothing_where_no_curve_is_laid_out_for_each() -> None:
-    assert math.isinf(Kinematics.of(replace(COPTER, autopilot=Autopilot.PX4)).leg_m_s(5.0))
-    assert math.isinf(Kinematics.of(replace(COPTER, accel_m_s2=math.inf)).leg_m_s(5.0))
+def test_legs_are_curves_where_they_are_bounded_and_the_autopilot_is_ardupilot() -> None:
+    jerky = replace(COPTER, leg_jerk_m_s3=1.0)
+    assert Kinematics.of(jerky).lays_curves
+    assert not Kinematics.of(replace(jerky, autopilot=Autopilot.PX4)).lays_curves
+    assert not Kinematics.of(replace(jerky, accel_m_s2=math.inf)).lays_curves
+    assert not Kinematics.of(replace(jerky, corner_accel_m_s2=math.inf)).lays_curves
 
 
 def test_a_change_of_pitch_alone_costs_nothing_and_a_way_point_on_a_straight_line_neither() -> None:
