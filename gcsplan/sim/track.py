@@ -19,18 +19,13 @@ from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.sim.kinematics import AT_ONCE_M_S2, Kinematics
+from gcsplan.sim.rounding import SAME_M, rounded
 from gcsplan.sim.scurves import leg_limits, step_legs
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World
 
-SAG_M = 0.02
-"""Metres by which the chords of a rounded corner may lie off its arc."""
 TERRAIN_PART_M = 10.0
 """Longest piece of a leg that follows the terrain, in metres."""
-FAST_M_S = 60.0
-"""m/s: a corner that allows more than this, and is cut by at most half of `SAG_M`, is not rounded."""
-SAME_M = 0.01
-"""Metres: positions nearer than this are the same."""
 METRES_PER_DEGREE = 0.011131884502145034 * 1e7
 """Metres per degree of latitude in ArduPilot (`LOCATION_SCALING_FACTOR`)."""
 PASSED = -1.0
@@ -318,7 +313,7 @@ def _run(line: _Line, stretches: Sequence[Stretch], ends: Floats, kinematics: Ki
     if kinematics.lays_curves:
         _curves(line, corners, [stretches[i] for i in legs], kinematics, world)
         return
-    arcs = [_arc(corners[k : k + 3], kinematics) for k in range(len(legs) - 1)]
+    arcs = [rounded(corners[k : k + 3], kinematics) for k in range(len(legs) - 1)]
     sharp_end = corners[-1][None, :], math.inf
     for k, i in enumerate(legs):  # second half of the previous corner, straight piece, first half of the next corner
         way: list[tuple[Floats, float]] = []
@@ -367,37 +362,3 @@ def _over_ground(line: _Line, to: Floats, s: Stretch, kinematics: Kinematics, co
         east, north = here[:2] + f * (to[:2] - here[:2])
         z = float(surface.ground_at(east, north)) + agl + f * (to[2] - agl)
         line.add(np.array([east, north, z]), s, kinematics, corner_m_s=corner_m_s)
-
-
-def _arc(corner: Floats, kinematics: Kinematics) -> tuple[Floats, float]:
-    """Return the nodes of a rounded corner, an odd number, and the speed that it allows.
-
-    ``corner`` (3, 3): the way point between its neighbours. If there is no turn, the way point is the only node.
-    """
-    before, here, after = corner
-    into, out = here - before, after - here
-    run_in, run_out = math.hypot(into[0], into[1]), math.hypot(out[0], out[1])
-    sharp = here[None, :]
-    if min(run_in, run_out) <= SAME_M:
-        return sharp, math.inf
-    cross, dot = into[0] * out[1] - into[1] * out[0], into[0] * out[0] + into[1] * out[1]
-    turn = min(abs(math.atan2(cross, dot)), math.pi - 1e-3)
-    radius = kinematics.corner_radius_m(turn, min(run_in, run_out))
-    corner_m_s = kinematics.corner_m_s(radius)
-    straight = radius * (1.0 / math.cos(0.5 * turn) - 1.0) <= 0.5 * SAG_M and corner_m_s > FAST_M_S
-    if straight or radius <= 0.0:
-        return sharp, math.inf
-    tangent = radius * math.tan(0.5 * turn)
-    begin, end = here - into * (tangent / run_in), here + out * (tangent / run_out)
-    side = math.copysign(1.0, cross)
-    normal = side * np.array([-into[1], into[0]]) / run_in
-    centre = begin[:2] + radius * normal
-    parts = 2 * max(1, math.ceil(0.5 * turn / math.sqrt(8.0 * SAG_M / radius)))
-    u = np.arange(parts + 1) / parts
-    angle = side * turn * u
-    spoke = begin[:2] - centre
-    turned = np.column_stack(
-        [spoke[0] * np.cos(angle) - spoke[1] * np.sin(angle), spoke[0] * np.sin(angle) + spoke[1] * np.cos(angle)]
-    )
-    height = np.interp(u, [0.0, 0.5, 1.0], [begin[2], here[2], end[2]])  # a change of slope is not rounded
-    return np.column_stack([centre + turned, height]), corner_m_s

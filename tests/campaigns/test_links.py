@@ -5,8 +5,10 @@ from __future__ import annotations
 import pytest
 
 from gcsplan.mavlink.link.link import Heard, Steps
+from gcsplan.mavlink.link.parameters import GROUPS
 from gcsplan.mavlink.link.recheck import Recheck
 from gcsplan.mavlink.protocol.outcome import Changed
+from gcsplan.vehicle import Autopilot
 from tests.campaigns.links import Run, campaign, main
 
 
@@ -28,6 +30,13 @@ def test_the_campaign_finds_an_upload_that_does_not_look_again(monkeypatch: pyte
     assert any("an announcement to one that was heard to be armed" in words for words in found)
 
 
+@pytest.fixture
+def asked_for_less(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The seeds below were found when a PX4 was asked for two parameters less; with them the events miss each other."""
+    monkeypatch.setitem(GROUPS, Autopilot.PX4, GROUPS[Autopilot.PX4][:-2])
+
+
+@pytest.mark.usefixtures("asked_for_less")
 def test_seeds_that_found_something_once_find_nothing() -> None:
     """Twins with another component id at one address (first six seeds), a twin that came between an upload and the
     rollback of ``--atomic`` (301591), and false alarms of the campaign itself (the rest)."""
@@ -35,6 +44,7 @@ def test_seeds_that_found_something_once_find_nothing() -> None:
         assert campaign(range(seed, seed + 1))[1] == []
 
 
+@pytest.mark.usefixtures("asked_for_less")
 def test_the_campaign_finds_an_upload_that_answers_before_it_judges(monkeypatch: pytest.MonkeyPatch) -> None:
     def admits(self: Recheck, heard: Heard, message: object, now: float) -> bool:
         return heard.peer == self._channel.peer and not self.shut

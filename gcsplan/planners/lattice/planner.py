@@ -219,10 +219,9 @@ def _sides(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> di
     """For each zone within reach of a path, by index: whether the path passes over it."""
     track = make_track(problem, points[:, :2], pinned, pin_m)
     s = distances(points[:, :2])  # of all points: a track keeps one of two that are less than a millimetre apart
-    s *= track.tube.s_m[-1] / s[-1]
     over: dict[int, bool] = {}
     for band in track.tube.bands:
-        at = 0.5 * (band.s_m[:-1] + band.s_m[1:])
+        at = 0.5 * (band.s_m[:-1] + band.s_m[1:]) * (s[-1] / track.tube.s_m[-1])
         height = np.interp(at, s, points[:, 2])
         over[band.zone] = bool((height >= band.top_m.mean(axis=1)).mean() > 0.5)
     return over
