@@ -137,7 +137,7 @@ def _outside(
 ) -> list[Finding]:
     """One finding for each inclusion area that the flight, as `judge` follows it, leaves: the first leg that does."""
     stored = replace(mission, items=tuple(profile_of(mission.autopilot).stored(i) for i in mission.items))
-    flight = follow(stored, vehicle, world.ground_amsl, rtl_rel_home_m=rtl_rel_home_m)
+    flight = follow(stored, vehicle, world.ground_amsl, world.read_amsl, rtl_rel_home_m=rtl_rel_home_m)
     round_corners(flight, stored, vehicle, world.frame, tuning)
     flown = [*flight.stretches, *flight.instead]
     if not flown:

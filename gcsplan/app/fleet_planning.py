@@ -110,7 +110,7 @@ def route_of(v: VehiclePlan, world: World) -> Route:
     last = ends_with[-1] if ends_with else flown[-1]
     numbers = np.array([leg.seq for leg in flown], dtype=np.intp)
     if v.order.altitude_frame == "terrain":
-        points, holds, numbers = over_ground(points, holds, numbers, world.airspace.surface)
+        points, holds, numbers = over_ground(points, holds, numbers, world.vehicle_terrain)
     items = np.array([legs[0].seq, *numbers, last.seq], dtype=np.intp)
     pace = pace_over_ground(points, legs[0].start[:2], world.frame) if request.vehicle.lays_curves else None
     climb_out, glide = climb_out_and_glide(v, world)

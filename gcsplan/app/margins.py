@@ -14,6 +14,9 @@ __all__ = ["larger", "on_path"]
 
 HEIGHTS = ("min_agl", "max_agl", "max_amsl", "terrain_clearance")
 
+MOST_SLOPE = 0.9
+"""The most that is taken from the climb limit, as a part of it; a leg over the ground may be steeper than any path."""
+
 
 def on_path(mission: Mission, verdict: Verdict) -> list[Finding]:
     """The findings that another path may cure: not those of the battery, the take-off, the landing or the return."""
@@ -38,5 +41,5 @@ def larger(margins: Margins, findings: Sequence[Finding], corner_m: float = math
         margins.altitude_m + 0.02 + 1.05 * low_m,
         margins.track_m + 0.03 + 1.05 * near_m,
         3.0 * margins.bow_m,
-        margins.slope + (0.001 + 1.5 * steep if steep else 0.0),
+        min(margins.slope + (0.001 + 1.5 * steep if steep else 0.0), MOST_SLOPE),
     )

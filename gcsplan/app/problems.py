@@ -22,6 +22,7 @@ from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
+from gcsplan.world.terrain_grid import NEAR_ENOUGH_M
 from gcsplan.world.world import World
 from gcsplan.world.zones import Zone
 
@@ -222,7 +223,10 @@ def _largest_bow_m(world: World) -> float:
 
 
 def _with_margins(limits: Limits, margins: Margins, *, terrain: bool, source: MissionFile) -> Limits:
-    """The limits for the planner: the vehicle's, reduced by what the wire's rounding and the bow may take."""
+    """The limits for the planner: the vehicle's, reduced by what the wire's rounding and the bow may take.
+
+    In the terrain frame, too, by what a vehicle may read amiss and still be taken: an upload judges with it.
+    """
 
     def less(angle_deg: float) -> float:
         return math.degrees(math.atan(math.tan(math.radians(angle_deg)) * (1.0 - margins.slope)))
@@ -230,7 +234,9 @@ def _with_margins(limits: Limits, margins: Margins, *, terrain: bool, source: Mi
     return replace(
         limits,
         track_error_m=limits.track_error_m + margins.track_m + margins.bow_m,
-        altitude_error_m=limits.altitude_error_m + margins.altitude_m + (source.terrain_error_m if terrain else 0.0),
+        altitude_error_m=limits.altitude_error_m
+        + margins.altitude_m
+        + (source.terrain_error_m + NEAR_ENOUGH_M if terrain else 0.0),
         max_climb_deg=limits.max_climb_deg if limits.max_climb_deg >= 90 else less(limits.max_climb_deg),
         max_descent_deg=limits.max_descent_deg if limits.max_descent_deg >= 90 else less(limits.max_descent_deg),
     )

@@ -26,11 +26,13 @@ class Aboard:
         vehicle: Vehicle,
         ground_amsl: Callable[[float, float], float],
         rtl_rel_home_m: float | None,
+        read_amsl: Callable[[float, float], float] | None = None,
     ) -> None:
         self.flight = Flight()
         self.autopilot = mission.autopilot
         self.vehicle = vehicle
         self.ground = ground_amsl
+        self.read = ground_amsl if read_amsl is None else read_amsl
         self.rtl_rel_home_m = rtl_rel_home_m
         self.pace = Pace.of(vehicle)
         self.circle_m = 0.0
@@ -101,14 +103,14 @@ class Aboard:
                 return None
             if frame != m.TERRAIN or self.autopilot is Autopilot.ARDUPLANE:
                 return self.at[2]
-            kept = self.ground(*here[:2]) + self.at[2] - self.ground(*self.at[:2])
+            kept = self.read(*here[:2]) + self.at[2] - self.read(*self.at[:2])
             return None if math.isnan(kept) else kept
         if frame == m.GLOBAL:
             return item.z
         if frame == m.RELATIVE:
             return self.home[2] + item.z
         if frame == m.TERRAIN:
-            ground = self.ground(here[0], here[1])
+            ground = self.read(here[0], here[1])
             return None if math.isnan(ground) else ground + item.z
         return None
 

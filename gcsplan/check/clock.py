@@ -19,7 +19,7 @@ from gcsplan.fleet.legs import legs
 from gcsplan.fleet.timing import upright
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.frame import Frame
-from gcsplan.world.surface import Surface
+from gcsplan.world.vehicle_terrain import VehicleTerrain
 from gcsplan.world.world import World
 
 __all__ = ["over_ground", "pace_over_ground", "seconds_of"]
@@ -69,7 +69,7 @@ def _legs_s(
     points, owner = np.concatenate([ends[:1, 0], ends[:, 1]]), np.arange(len(run), dtype=np.intp)
     follows = np.array([s.terrain for s in run])
     if follows.any():
-        points, _, owner = over_ground(points, np.zeros(len(points)), owner, world.airspace.surface, follows)
+        points, _, owner = over_ground(points, np.zeros(len(points)), owner, world.vehicle_terrain, follows)
     speed = np.array([s.speed_m_s for s in run])[owner]
     if vehicle.lays_curves:
         speed = speed * pace_over_ground(points, home_deg, world.frame)[:-1]
@@ -118,13 +118,15 @@ def pace_over_ground(points: Floats, home_deg: tuple[float, float], frame: Frame
 
 
 def over_ground(
-    points: Floats, holds: Floats, numbers: Indices, surface: Surface, follows: np.ndarray | None = None
+    points: Floats, holds: Floats, numbers: Indices, terrain: VehicleTerrain, follows: np.ndarray | None = None
 ) -> tuple[Floats, Floats, Indices]:
     """Points (N, 3), holds (N,) and legs' numbers (N - 1,) with legs cut so that each keeps its height above ground.
 
-    That is interpolated between a leg's ends. ``follows`` (N - 1,): the legs that do so; None: all.
+    That is interpolated between a leg's ends, over the ground that the vehicle reads.
+
+    ``follows`` (N - 1,): the legs that do so; None: all.
     """
-    ground_at = surface.ground_at
+    ground_at = terrain.ground_at
     agl = points[:, 2] - ground_at(points[:, 0], points[:, 1])
     out, waits, owners = [points[:1]], [holds[:1]], []
     for i in range(1, len(points)):

@@ -55,15 +55,17 @@ def follow(
     mission: Mission,
     vehicle: Vehicle,
     ground_amsl: Callable[[float, float], float],
+    read_amsl: Callable[[float, float], float] | None = None,
     *,
     rtl_rel_home_m: float | None = None,
 ) -> Flight:
     """Return the flight that ``mission`` (as stored on board) leads to.
 
-    ``ground_amsl(lat_deg, lon_deg)`` is the terrain, NaN where unknown. ``rtl_rel_home_m`` is the altitude of a return
-    above home; without it an RTL is not judged.
+    ``ground_amsl(lat_deg, lon_deg)`` is the terrain, NaN where unknown; ``read_amsl`` likewise what the vehicle takes
+    for it in the terrain frame, by default the same. ``rtl_rel_home_m`` is the altitude of a return above home; without
+    it an RTL is not judged.
     """
-    pilot = _Pilot(mission, vehicle, ground_amsl, rtl_rel_home_m)
+    pilot = _Pilot(mission, vehicle, ground_amsl, rtl_rel_home_m, read_amsl)
     if fly_in_order(mission, pilot):
         pilot.finish()
     return pilot.flight
@@ -253,7 +255,7 @@ class _Pilot(Aboard):
             low, on = (*here[:2], here[2] - self.low_m), (half[0], half[1], half[2] - self.low_m)
             self.instead(seq, kind, low, on, reach_m=self.around_m)
         self.low_m = 0.0
-        start = self.ground(*target[:2]) + here[2] - self.ground(*here[:2]) if terrain else here[2]
+        start = self.read(*target[:2]) + here[2] - self.read(*here[:2]) if terrain else here[2]
         rise = target[2] - start
         if abs(rise) < PLANE_GLIDE_SLOPE_MIN_M or (rise > 0 and here[2] - self.home[2] <= PLANE_LOW_M):
             middle = 0.5 * rise
@@ -340,9 +342,9 @@ class _Pilot(Aboard):
     def _fly_to_landing(self, seq: int, item: MissionItem) -> None:
         here, terrain = self.at, item.frame in (m.TERRAIN, 11) and self.autopilot is Autopilot.ARDUCOPTER
         level = (item.lat_deg, item.lon_deg, here[2])
-        agl = here[2] - self.ground(*here[:2])
-        follows = (*level[:2], self.ground(*level[:2]) + agl)
-        self.at = follows if terrain and not math.isnan(agl) else level
+        agl = here[2] - self.read(*here[:2])
+        follows = (*level[:2], self.read(*level[:2]) + agl)
+        self.at = follows if terrain and not math.isnan(follows[2]) else level
         if flat_m(here, level) <= 0.02:
             self.at = level
             return

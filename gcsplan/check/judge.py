@@ -57,7 +57,7 @@ def judge(
     """
     table = profile_of(mission.autopilot)
     stored = replace(mission, items=tuple(table.stored(item) for item in mission.items))
-    flight = follow(stored, vehicle, world.ground_amsl, rtl_rel_home_m=rtl_rel_home_m)
+    flight = follow(stored, vehicle, world.ground_amsl, world.read_amsl, rtl_rel_home_m=rtl_rel_home_m)
     findings: list[Finding] = []
     count = len(mission.wire_items())
     if table.max_items is not None and count > table.max_items:
@@ -78,6 +78,7 @@ def judge(
     if vehicle.turn_radius_m > 0.0:
         findings += slant_findings([*flight.stretches, *flight.instead], vehicle, world)
     plane = legs_in_plane(flight.stretches, vehicle.limits, world, terrain_error_m)
+    findings += _unread(flight.stretches, plane)
     report = steep_report(plane, world.airspace.examine(plane.legs, vehicle.limits), vehicle.limits)
     home = mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7
     seconds = seconds_of(flight.stretches, vehicle, world, home)
@@ -86,13 +87,15 @@ def judge(
     near = nearest_misses(flight.stretches, plane.legs, plane.owner, report, vehicle, world) if misses else ()
     if flight.instead:  # alternatives must be legal too; the figures stay those of the mission
         plane = legs_in_plane(flight.instead, vehicle.limits, world, terrain_error_m)
+        findings += _unread(flight.instead, plane)
         report = steep_report(plane, world.airspace.examine(plane.legs, vehicle.limits), vehicle.limits)
         findings = _worst(findings, _findings(flight.instead, plane, report, vehicle.limits, world))
     if needs_straight(mission.items, mission.autopilot):
         flight.notes.append(STRAIGHT_NOTE)
     if any(s.terrain for s in flight.stretches):
         flight.notes.append(
-            f"terrain-frame legs depend on the terrain data in the vehicle; judged with {terrain_error_m:g} m of error"
+            f"terrain-frame legs depend on the terrain data in the vehicle; judged as it reads this terrain, at posts "
+            f"every {world.post_spacing_m} m, with {terrain_error_m:g} m of error"
         )
     verdict = Verdict(mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near)
     return _with_battery(verdict, vehicle, flight)
@@ -114,6 +117,19 @@ def _unreached(flight: Flight) -> list[Finding]:
         _finding(u.first, "unreachable", u.describe(), float(u.last - u.first + 1), 0.0, math.nan, "items")
         for u in flight.unreached
     ]
+
+
+def _unread(stretches: Sequence[Stretch], plane: PlaneLegs) -> list[Finding]:
+    """Findings for terrain-frame legs over ground that the vehicle's grid does not know."""
+    found = []
+    for s in (stretches[i] for i in plane.unread):
+        lat, lon, amsl = s.end
+        message = UnitText(
+            "item {} ({}): over ground that the vehicle's terrain grid does not know, on the way to {:.6f}, {:.6f}, {}",
+            s.seq, s.kind, lat, lon, Quantity(amsl, "amsl", 1),
+        )  # fmt: skip
+        found.append(Finding(s.seq, "coverage", message, lat, lon, amsl, math.nan, math.nan, math.nan, "m"))
+    return found
 
 
 def _is_too_far(stretch: Stretch, world: World) -> bool:

@@ -17,6 +17,7 @@ from gcsplan.check.stretch import Stretch
 from gcsplan.world.airspace import Kind, LegReport, Legs, Violation
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
+from gcsplan.world.vehicle_terrain import VehicleTerrain
 from gcsplan.world.world import World
 
 __all__ = ["PlaneLegs", "legs_in_plane", "steep_report"]
@@ -39,11 +40,13 @@ class PlaneLegs:
     """The legs of all stretches in the plane; ``owner`` (N,) is the index of each leg's stretch.
 
     ``steep`` (N, 2): steepest rise over run, up and down (negative), if that is not the leg's own slope; else NaN.
+    ``unread``: the terrain-frame stretches over ground that the vehicle's grid does not know; they stay straight.
     """
 
     legs: Legs
     owner: Indices
     steep: Floats
+    unread: tuple[int, ...] = ()
 
 
 def legs_in_plane(stretches: Sequence[Stretch], limits: Limits, world: World, terrain_error_m: float) -> PlaneLegs:
@@ -54,14 +57,20 @@ def legs_in_plane(stretches: Sequence[Stretch], limits: Limits, world: World, te
     plane[..., 2] = places[..., 2]
     bow_m = world.frame.bow_m(places[:, 0, :2], places[:, 1, :2])
     starts, ends, counts, deviation, steep = [], [], [], [], []
+    unread: list[int] = []
     for i, s in enumerate(stretches):
-        if s.terrain:
-            points, off_m, slopes = follow_ground(plane[i], world.airspace.surface)
-        else:
-            points, off_m, slopes = plane[i], np.zeros(1), np.array([s.steep or (np.nan, np.nan)])
-        starts.append(points[:-1])
-        ends.append(points[1:])
-        counts.append(len(points) - 1)
+        followed = follow_ground(plane[i], world.vehicle_terrain) if s.terrain else None
+        if s.terrain and followed is None:
+            unread.append(i)
+        begins, finishes, off_m, slopes = followed or (
+            plane[i, :1],
+            plane[i, 1:],
+            np.zeros(1),
+            np.array([s.steep or (np.nan, np.nan)]),
+        )
+        starts.append(begins)
+        ends.append(finishes)
+        counts.append(len(begins))
         deviation.append(off_m)
         steep.append(slopes)
     owner = np.repeat(np.arange(len(stretches)), counts)
@@ -72,29 +81,57 @@ def legs_in_plane(stretches: Sequence[Stretch], limits: Limits, world: World, te
         np.concatenate(starts), np.concatenate(ends), column[owner], track[owner],
         height[owner] + np.concatenate(deviation),
     )  # fmt: skip
-    return PlaneLegs(legs, owner, np.concatenate(steep))
+    return PlaneLegs(legs, owner, np.concatenate(steep), tuple(unread))
 
 
-def follow_ground(ends: Floats, surface: Surface) -> tuple[Floats, Floats, Floats]:
-    """A terrain-frame leg (2, 3) as straight pieces: points (N + 1, 3), their deviations, m (N,), and `steep` (N, 2).
+Followed = tuple[Floats, Floats, Floats, Floats]
+"""Starts and ends of pieces (N, 3), their deviations, m (N,), and `steep` (N, 2)."""
 
-    Height above ground is interpolated between the ends. Over unknown ground the leg stays one straight piece; its
-    examination reports the void.
+
+def follow_ground(ends: Floats, terrain: VehicleTerrain) -> Followed | None:
+    """A terrain-frame leg (2, 3) as straight pieces over the ground that the vehicle reads; None where it reads none.
+
+    Height above that ground is interpolated between the ends.
     """
-    straight = ends, np.zeros(1), np.full((1, 2), np.nan)
     run_m = float(np.hypot(*(ends[1, :2] - ends[0, :2])))
     if run_m <= SHORTEST_M:
-        return straight
+        return ends[:1], ends[1:], np.zeros(1), np.full((1, 2), np.nan)
+    parts = terrain.pieces(ends[:, :2])
+    if parts is None:
+        return None
+    (first, last), xy = (parts[0][2], parts[-1][2]), ends[:, :2]
+    agl = np.array([ends[0, 2] - float(first.ground_at(*xy[0])), ends[1, 2] - float(last.ground_at(*xy[1]))])
+    found = []
+    for a, b, surface in parts:
+        if (b - a) * run_m <= SHORTEST_M:
+            continue
+        piece = _follow(
+            xy[0] + a * (xy[1] - xy[0]),
+            xy[0] + b * (xy[1] - xy[0]),
+            surface,
+            agl[0] + np.array([a, b]) * (agl[1] - agl[0]),
+        )
+        if piece is None:
+            return None
+        found.append(piece)
+    starts, finishes, off, steep = (np.concatenate(x) for x in zip(*found, strict=True))
+    starts[0], finishes[-1] = ends
+    return starts, finishes, off, steep
+
+
+def _follow(begin: Floats, end: Floats, surface: Surface, agl: Floats) -> Followed | None:
+    """The piece of a leg over one surface; ``agl`` (2,) above it at its ends."""
+    ends = np.stack([begin, end])
+    run_m = float(np.hypot(*(end - begin)))
     t = _cell_cuts(ends, surface, run_m)
-    agl = ends[:, 2] - surface.ground_at(ends[:, 0], ends[:, 1])
 
     def altitude(f: Floats) -> Floats:
-        en = ends[0, :2] + f[:, None] * (ends[1, :2] - ends[0, :2])
+        en = begin + f[:, None] * (end - begin)
         return np.asarray(surface.ground_at(en[:, 0], en[:, 1]) + agl[0] + f * (agl[1] - agl[0]))
 
     z, middle = altitude(t), altitude(0.5 * (t[1:] + t[:-1]))
     if np.isnan(z).any() or np.isnan(middle).any():
-        return straight
+        return None
     sag = middle - 0.5 * (z[1:] + z[:-1])
     long_m = np.diff(t) * run_m
     slope, bend = np.diff(z) / long_m, 4.0 * np.abs(sag) / long_m
@@ -105,11 +142,9 @@ def follow_ground(ends: Floats, surface: Surface) -> tuple[Floats, Floats, Float
     f = np.append(t[:-1][piece] + np.diff(t)[piece] * share, 1.0)
     # Points on the quadratic itself (chord plus four times its sag at the middle), so that neighbouring pieces meet.
     z = np.append(z[:-1][piece] + (np.diff(z)[piece] + 4.0 * sag[piece] * (1.0 - share)) * share, z[-1])
-    en = ends[0, :2] + f[:, None] * (ends[1, :2] - ends[0, :2])
-    points = np.column_stack([en, z])
-    points[0], points[-1] = ends
+    points = np.column_stack([begin + f[:, None] * (end - begin), z])
     off = np.abs(sag) / parts**2
-    return points, off[piece], np.column_stack([slope + bend, slope - bend])[piece]
+    return points[:-1], points[1:], off[piece], np.column_stack([slope + bend, slope - bend])[piece]
 
 
 def _cell_cuts(ends: Floats, surface: Surface, run_m: float) -> Floats:

@@ -180,7 +180,7 @@ def _row(name: str, outcome: Compared | GcsplanError) -> dict[str, object]:
 
 
 def _against(name: str, compared: Compared) -> GcsplanError | None:
-    from gcsplan.mavlink.link.terrain import NEAR_ENOUGH_M
+    from gcsplan.world.terrain_grid import NEAR_ENOUGH_M
 
     if compared.worst_m > NEAR_ENOUGH_M and compared.worst_at is not None:
         lat, lon = compared.worst_at

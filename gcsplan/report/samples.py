@@ -75,7 +75,7 @@ def line_of(
         z = leg.start[2] + t * (leg.end[2] - leg.start[2])
         frame = items[leg.seq].frame if leg.seq < len(items) else 0
         if frame in TERRAIN_FRAMES and leg.kind == "cruise":
-            ground = surface.ground_at(en[:, 0], en[:, 1])
+            ground = world.vehicle_terrain.ground_at(en[:, 0], en[:, 1])
             agl = leg.start[2] - ground[0] + t * (leg.end[2] - ground[-1] - leg.start[2] + ground[0])
             z = np.where(np.isnan(ground + agl), z, ground + agl)
         columns.append(

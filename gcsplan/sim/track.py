@@ -159,7 +159,7 @@ def make_track(
     ``not_flown`` lists the parts that are not understood or cannot be simulated. Raises ValueError if the mission does
     not fly at all.
     """
-    flight = follow(mission, vehicle, world.ground_amsl, rtl_rel_home_m=rtl_rel_home_m)
+    flight = follow(mission, vehicle, world.ground_amsl, world.read_amsl, rtl_rel_home_m=rtl_rel_home_m)
     if not flight.stretches:
         raise ValueError(f"{vehicle.name}: the mission flies nowhere")
     if vehicle.lays_curves:
@@ -309,7 +309,7 @@ def _run(line: _Line, stretches: Sequence[Stretch], ends: Floats, kinematics: Ki
         return
     corners = np.array([line.points[-1], *(ends[i, 1] for i in legs)])
     if terrain:  # the height above ground changes linearly along the leg
-        corners[:, 2] -= world.airspace.surface.ground_at(corners[:, 0], corners[:, 1])
+        corners[:, 2] -= world.vehicle_terrain.ground_at(corners[:, 0], corners[:, 1])
     if kinematics.lays_curves:
         _curves(line, corners, [stretches[i] for i in legs], kinematics, world)
         return
@@ -332,7 +332,7 @@ def _run(line: _Line, stretches: Sequence[Stretch], ends: Floats, kinematics: Ki
 
 def _curves(line: _Line, corners: Floats, stretches: Sequence[Stretch], kinematics: Kinematics, world: World) -> None:
     """Add legs that are flown as ArduPilot's S-curves; in the terrain frame ``corners`` hold heights above ground."""
-    terrain, ground_at = stretches[0].terrain, world.airspace.surface.ground_at
+    terrain, ground_at = stretches[0].terrain, world.vehicle_terrain.ground_at
 
     def cut(a: Floats, b: Floats) -> Floats:
         """The way from ``a`` to ``b`` in short parts, if it follows the ground."""
@@ -354,11 +354,11 @@ def _curves(line: _Line, corners: Floats, stretches: Sequence[Stretch], kinemati
 
 def _over_ground(line: _Line, to: Floats, s: Stretch, kinematics: Kinematics, corner_m_s: float, world: World) -> None:
     """Add a piece whose height is above ground, in parts that follow the terrain."""
-    surface = world.airspace.surface
     here = line.points[-1]
-    agl = here[2] - float(surface.ground_at(here[0], here[1]))
     parts = max(1, math.ceil(float(math.hypot(*(to[:2] - here[:2]))) / TERRAIN_PART_M))
-    for f in np.arange(1, parts + 1) / parts:
-        east, north = here[:2] + f * (to[:2] - here[:2])
-        z = float(surface.ground_at(east, north)) + agl + f * (to[2] - agl)
-        line.add(np.array([east, north, z]), s, kinematics, corner_m_s=corner_m_s)
+    f = np.arange(parts + 1) / parts
+    en = here[:2] + f[:, None] * (to[:2] - here[:2])
+    ground = world.vehicle_terrain.ground_at(en[:, 0], en[:, 1])
+    agl = here[2] - ground[0]
+    for point in np.column_stack([en, ground + agl + f * (to[2] - agl)])[1:]:
+        line.add(point, s, kinematics, corner_m_s=corner_m_s)

@@ -43,6 +43,9 @@ SAME_CORNER_E7 = 10
 RAISED_LESS_M = 1e-6
 """A height this little above a whole metre counts as that metre: it is rounding, not ground."""
 
+NEAR_ENOUGH_M = 0.5
+"""A vehicle that holds the grid that was sent reads it within this; more is other terrain."""
+
 MOST_BLOCKS = 4096
 """Blocks that are kept; 30 MB."""
 

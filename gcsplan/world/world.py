@@ -1,21 +1,41 @@
-"""The world of one mission: its plane, and the airspace over it."""
+"""The world of one mission: its plane, the airspace over it, and the terrain that its vehicles know."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.frame import Frame
+from gcsplan.world.terrain_grid import SPACING_M
+from gcsplan.world.vehicle_terrain import VehicleTerrain
 
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """``frame`` is the only conversion from degrees; ``airspace`` knows only metres."""
+    """``frame`` is the only conversion from degrees; ``airspace`` knows only metres.
+
+    ``post_spacing_m``: of the terrain in the vehicles (ArduPilot's TERRAIN_SPACING).
+    """
 
     frame: Frame
     airspace: Airspace
+    post_spacing_m: int = SPACING_M
 
     def ground_amsl(self, lat_deg: float, lon_deg: float) -> float:
         """Ground at a place, metres AMSL; NaN where unknown."""
         east, north = self.frame.to_plane(lat_deg, lon_deg)
         return float(self.airspace.surface.ground_at(east, north))
+
+    def read_amsl(self, lat_deg: float, lon_deg: float) -> float:
+        """Ground at a place as the vehicle's own grid has it, metres AMSL; NaN where it has none."""
+        return self.vehicle_terrain.amsl(lat_deg, lon_deg)
+
+    @cached_property
+    def vehicle_terrain(self) -> VehicleTerrain:
+        """The ground as a vehicle that has this terrain on board reads it, in the terrain frame."""
+        return VehicleTerrain(self.frame, self.airspace.surface, self.post_spacing_m)
+
+    def with_posts(self, spacing_m: int) -> World:
+        """The same world for vehicles with other posts."""
+        return self if spacing_m == self.post_spacing_m else replace(self, post_spacing_m=spacing_m)

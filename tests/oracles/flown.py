@@ -40,6 +40,21 @@ class Ground:
     def __init__(self, heights: Floats, west: float, north: float, dx: float, dy: float) -> None:
         self.z, self.west, self.north, self.dx, self.dy = heights, west, north, dx, dy
 
+    def read(self, lat: Floats, lon: Floats) -> Floats:
+        """What ArduPilot takes for the ground: posts every 100 m of its own flat degree tiles, in metres upwards."""
+        m = float(np.float32(0.011131884502145034)) * 1e7
+        a, o = np.floor(lat), np.floor(lon)
+        north, east = (lat - a) * m / 100.0, (lon - o) * m * np.cos(np.radians(0.5 * (lat + a))) / 100.0
+        i, j = np.floor(north), np.floor(east)
+
+        def post(k: Floats, n: Floats) -> Floats:
+            at = a + k * 100.0 / m
+            return np.ceil(self.at(at, o + n * 100.0 / m / np.cos(np.radians(0.5 * (at + a)))) - 1e-6)
+
+        u, v = north - i, east - j
+        west, right = (post(i, n) + u * (post(i + 1, n) - post(i, n)) for n in (j, j + 1))
+        return np.asarray(west + v * (right - west))
+
     @classmethod
     def sample(cls) -> Ground:
         with np.load(get_sample_data("jacksboro_fault_dem.npz", asfileobj=False)) as file:
@@ -248,6 +263,9 @@ def fly(home: tuple[float, float], rows: list[Row], rules: Rules, ground: Ground
     def height(lat: float, lon: float) -> float:
         return float(ground.at(np.array([lat]), np.array([lon]))[0])
 
+    def read(lat: float, lon: float) -> float:
+        return float(ground.read(np.array([lat]), np.array([lon]))[0])
+
     datum = height(*home)
     at = (*home, datum)
     legs: list[Flown] = []
@@ -255,12 +273,12 @@ def fly(home: tuple[float, float], rows: list[Row], rules: Rules, ground: Ground
     for number, row in enumerate(rows, start=1):
         amsl = row.z + {0: 0.0, 3: datum, 10: 0.0, 2: 0.0}[row.frame]
         if row.frame == 10:
-            amsl += height(row.lat, row.lon)
+            amsl += read(row.lat, row.lon)
         if row.command in (22, 84):
             legs.append(Flown(number, at, (*home, amsl), column=True))
         elif row.command in (16, 17):
             to, terrain = (row.lat, row.lon, amsl), row.frame == 10
-            rise = amsl - at[2] - (height(*to[:2]) - height(*at[:2]) if terrain else 0.0)
+            rise = amsl - at[2] - (read(*to[:2]) - read(*at[:2]) if terrain else 0.0)
             if plane and (abs(rise) < GLIDE_SLOPE_MIN_M or (rise > 0 and at[2] - datum <= 20.0)):
                 half = 0.5 * rise
                 ends = (*at[:2], at[2] + half), (*to[:2], amsl - half)
@@ -313,7 +331,7 @@ def samples(
         lat, lon = lat0 + t * (lat1 - lat0), lon0 + t * (lon1 - lon0)
     if not leg.terrain:
         return lat, lon, z0 + t * (z1 - z0)
-    here = ground.at(lat, lon)
+    here = ground.read(lat, lon)
     return lat, lon, here + (z0 - here[0]) + t * ((z1 - here[-1]) - (z0 - here[0]))
 
 

@@ -218,7 +218,7 @@ def test_a_terrain_leg_follows_the_ground() -> None:
     flown = fly([way], [0.0])
     points = flown.points(0)
     far = points[points[:, 1] > 100]
-    agl = far[:, 2] - ground.airspace.surface.ground_at(far[:, 0], far[:, 1])
+    agl = far[:, 2] - ground.vehicle_terrain.ground_at(far[:, 0], far[:, 1])
     assert np.abs(agl - 50).max() < 0.5
     assert points[:, 2].max() > GROUND_M + 85
 

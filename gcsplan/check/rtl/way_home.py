@@ -64,7 +64,7 @@ def way_home(
     lat, lon = mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7
     ground = world.ground_amsl(lat, lon)
     judged_m = rule.default_rel_home_m if rtl_rel_home_m is None else rtl_rel_home_m
-    flight = follow(stored, vehicle, world.ground_amsl, rtl_rel_home_m=judged_m)
+    flight = follow(stored, vehicle, world.ground_amsl, world.read_amsl, rtl_rel_home_m=judged_m)
     if verdict.legs:
         round_corners(flight, stored, vehicle, world.frame)
     trace = trace_of(flight, vehicle, world, terrain_error_m) if verdict.legs else None

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.arrays import Floats
+from gcsplan.errors import InputError
 from gcsplan.mavlink.build.fixed_wing import build_wing
 from gcsplan.mavlink.build.order import Order, split_legs
 from gcsplan.mavlink.mission import commands as cmd
@@ -53,7 +54,13 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
     points = _spaced(path.points, 2.0 * acceptance_radius_m(vehicle) if order.spaced else 0.0)
     terrain = order.altitude_frame == "terrain"
     if terrain:  # split legs in height above ground, because the autopilot interpolates that height along a leg
-        ground = world.airspace.surface.ground_at(points[:, 0], points[:, 1])
+        ground = world.vehicle_terrain.ground_at(points[:, 0], points[:, 1])
+        if np.isnan(ground).any():
+            raise InputError(
+                f"{vehicle.name}: its path leads over ground that the vehicle's terrain grid does not know, though the "
+                "terrain model does: near the edge of the model, or of a void, not all posts of a part are known; give "
+                "a larger DEM, or another altitude_frame"
+            )
         points = np.column_stack([points[:, :2], points[:, 2] - ground])
     points = split_legs(points, world)
     places = world.frame.to_degrees(points[:, 0], points[:, 1])

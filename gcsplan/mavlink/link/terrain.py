@@ -35,9 +35,6 @@ _BYTES_OF_PART = 43 + 12 + 13  # payload, frame, signature
 _ASK_AFTER_S, _ASK_EVERY_S, _ASKED_TIMES = 3.0, 5.0, 3
 _REQUESTS_EVERY_US = 500_000.0
 
-NEAR_ENOUGH_M = 0.5
-"""A vehicle that holds the grid that was sent reads it within this; more is other terrain."""
-
 
 @dataclass
 class Served:
