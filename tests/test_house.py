@@ -54,7 +54,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "check": MISSION | {"fleet"},
     "export": ABOVE,
     "report": ABOVE | {"export"},
-    "sim": VEHICLE | MAVLINK | {"check"},
+    # The dem package writes the terrain files that SITL reads.
+    "sim": VEHICLE | MAVLINK | {"check", "dem"},
     "mission_file": OUTWARD | TERRAIN,
     "app": OUTWARD | {"mission_file"},
     "bench": APP,

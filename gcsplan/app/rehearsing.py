@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -81,10 +82,13 @@ def rehearse_in_sitl(
     speedup: float | None = None,
     i_know: bool = False,
     report: Callable[[str, str], None] | None = None,
+    weather: Weather | None = None,
+    seed: int = 1,
 ) -> Rehearsal:
-    """Rehearse with real ArduCopter SITL; starts one of ``binary`` for each vehicle without one of ``addresses``.
+    """Rehearse with real ArduPilot SITL; starts one of ``binary`` for each vehicle without one of ``addresses``.
 
-    Raises UsageError if a vehicle has neither. See `sim.sitl` for the other arguments.
+    ``binary``: a program, or a folder with arducopter and arduplane; its instances have the mission's terrain. Raises
+    UsageError if a vehicle has neither. See `sim.sitl` for the other arguments.
     """
     from gcsplan.sim.sitl import rehearse_sitl, require_here
     from gcsplan.sim.sitl_instances import SPEEDUP, sitl_instances
@@ -92,11 +96,14 @@ def rehearse_in_sitl(
     parts, seats = parts_of(planned), dict(addresses or {})
     if not i_know:
         require_here(list(seats.values()))
-    if binary is None:
-        return rehearse_sitl(parts, planned.world, terms_of(planned), seats, i_know=i_know, report=report)
-    without = [p for p in parts if p.vehicle.name not in seats]
-    with sitl_instances(binary, without, speedup=SPEEDUP if speedup is None else speedup) as started:
-        return rehearse_sitl(parts, planned.world, terms_of(planned), seats | started, i_know=i_know, report=report)
+    without = [p for p in parts if p.vehicle.name not in seats] if binary is not None else []
+    with ExitStack() as stack:
+        if binary is not None:
+            faster = SPEEDUP if speedup is None else speedup
+            seats |= stack.enter_context(sitl_instances(binary, without, speedup=faster, world=planned.world))
+        return rehearse_sitl(
+            parts, planned.world, terms_of(planned), seats, i_know=i_know, report=report, weather=weather, seed=seed
+        )
 
 
 def seats_of(words: Sequence[str], names: Sequence[str]) -> dict[str, str]:

@@ -51,13 +51,17 @@ def rehearse(
         list[str] | None,
         typer.Option(
             metavar="NAME=URL",
-            help="Fly it with a running ArduCopter SITL, one for each vehicle: uav1=tcp:127.0.0.1:5760. It is armed "
+            help="Fly it with a running ArduPilot SITL, one for each vehicle: uav1=tcp:127.0.0.1:5760. It is armed "
             "and started.",
         ),
     ] = None,
     sitl_binary: Annotated[
         Path | None,
-        typer.Option(metavar="PATH", help="Start an ArduCopter SITL of this program for each other vehicle."),
+        typer.Option(
+            metavar="PATH",
+            help="Start an SITL over the mission's terrain for each other vehicle: a program, or a folder with "
+            "arducopter and arduplane.",
+        ),
     ] = None,
     speedup: Annotated[
         float | None, typer.Option(metavar="X", help="With --sitl-binary: how fast its clock runs [default: 5]")
@@ -96,8 +100,8 @@ def rehearse(
         raise UsageError(f"--airspeed {airspeed:g}: a speed above 0 is wanted")
     require_html(report)
     in_sitl = bool(sitl) or sitl_binary is not None
-    if in_sitl and (not weather.calm or runs > 1 or airspeed is not None):
-        raise UsageError("--wind, --gusts, --noise-m, --airspeed and --runs are the built-in simulator's, not --sitl's")
+    if in_sitl and (noise_m or runs > 1 or airspeed is not None):
+        raise UsageError("--noise-m, --airspeed and --runs are the built-in simulator's, not --sitl's")
     if speedup is not None and sitl_binary is None:
         raise UsageError("--speedup goes with --sitl-binary")
     source = pipeline.load_mission(mission)
@@ -111,7 +115,7 @@ def rehearse(
         with talking(names):
             result = rehearsing.rehearse_in_sitl(
                 planned, binary=sitl_binary, addresses=addresses, speedup=speedup, i_know=i_know,
-                report=None if as_json else lambda name, what: remark(f"{name} {what}"),
+                report=None if as_json else lambda name, what: remark(f"{name} {what}"), weather=weather, seed=seed,
             )  # fmt: skip
     else:
         result = rehearsing.rehearse(planned, weather=weather, runs=runs, seed=seed, airspeed_m_s=airspeed)
@@ -139,7 +143,7 @@ def _show(planned: Plan, result: Rehearsal, units: Units) -> None:
 
     from gcsplan.cli.console import rows_table
 
-    by = "built-in simulator" if result.simulator == "gcsplan" else "ArduCopter SITL"
+    by = "built-in simulator" if result.simulator == "gcsplan" else "ArduPilot SITL"
     runs = f", {result.runs} runs" if result.runs > 1 else ""
     rows_table(f"rehearsal of {escape(planned.source.name)}  {by}{runs}", result.rows(units))
 

@@ -262,7 +262,8 @@ class Tally:
             self._arrive[i].append(trace.arrive_s)
             self._end[i].append(trace.end_s if arrived else math.nan)
             if not arrived:
-                self.breach("arrival", (trace.name,), f"{trace.name} never arrived at its goal", math.inf)
+                why = f": {trace.why}" if trace.why else ""
+                self.breach("arrival", (trace.name,), f"{trace.name} never arrived at its goal{why}", math.inf)
             judged = examine(trace, part.vehicle, self.world)
             before = self._lowest[i]
             if before is None or math.isnan(before.min_agl_m) or judged.min_agl_m < before.min_agl_m:

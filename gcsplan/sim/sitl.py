@@ -31,13 +31,18 @@ from gcsplan.mavlink.link.watch import VehicleState, Watch
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.sim.outcome import Part, Rehearsal, Tally, Terms, energy_of
+from gcsplan.sim.sitl_watch import FlightWatch
+from gcsplan.sim.sitl_wind import change_steps, wind_parameters
+from gcsplan.sim.sitl_wing import arrival_s, is_column, is_over
 from gcsplan.sim.trace import Trace
+from gcsplan.sim.wind import Weather
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.world import World
 
 __all__ = ["rehearse_sitl", "require_here"]
 
-_GUIDED = 4  # ArduCopter's custom mode in which it can be armed and MISSION_START switches to AUTO
+_ARMS_IN = {Autopilot.ARDUCOPTER: 4, Autopilot.ARDUPLANE: 0}
+"""Custom modes in which a vehicle can be armed, and from which MISSION_START leads to AUTO: GUIDED, MANUAL."""
 _READY_S, _SILENT_S, _ARM_S, _ANSWER_S = 180.0, 30.0, 120.0, 3.0
 _RATE_US = 100_000.0
 _ARMED_MS = 3000
@@ -58,6 +63,7 @@ class _Log:
     """What one vehicle reported in flight; ``released_ms``: its boot time at the acceptance of MISSION_START;
     ``reached_ms``: at which it reported an item as reached for the first time."""
 
+    watch: FlightWatch
     released_ms: int = 0
     boot_ms: list[int] = field(default_factory=list)
     places: list[tuple[float, float, float]] = field(default_factory=list)
@@ -86,12 +92,15 @@ def rehearse_sitl(
     *,
     i_know: bool = False,
     report: Callable[[str, str], None] | None = None,
+    weather: Weather | None = None,
+    seed: int = 1,
 ) -> Rehearsal:
     """Upload, arm, start, observe and judge one run.
 
-    ``seats``: the URL of each vehicle's autopilot, by its name; ``report(vehicle, what)``: progress.
+    ``seats``: the URL of each vehicle's autopilot, by its name; ``report(vehicle, what)``: progress. ``weather``: its
+    wind and gusts are set in the simulators for the flight; ``seed``: of a direction that it does not say.
 
-    Raises UsageError for a vehicle without a URL, an autopilot that is not ArduCopter, and (unless ``i_know``) a link
+    Raises UsageError for a vehicle without a URL, an autopilot that is not ArduPilot, and (unless ``i_know``) a link
     to another machine; VehicleRefused if a peer is no simulator, does not arm, or refuses its mission; LinkError if
     nobody answers.
     """
@@ -99,8 +108,8 @@ def rehearse_sitl(
         if part.vehicle.name not in seats:
             name = part.vehicle.name
             raise UsageError(f"--sitl: {name} has no address; give {name}=tcp:127.0.0.1:5760")
-        if part.vehicle.autopilot is not Autopilot.ARDUCOPTER:
-            raise UsageError(f"--sitl flies ArduCopter; {part.vehicle.name} is {part.vehicle.autopilot}")
+        if part.vehicle.autopilot not in _ARMS_IN:
+            raise UsageError(f"--sitl flies ArduCopter and ArduPlane; {part.vehicle.name} is {part.vehicle.autopilot}")
     if not i_know:
         require_here([seats[p.vehicle.name] for p in parts])
     said = report or (lambda name, what: None)
@@ -123,8 +132,12 @@ def rehearse_sitl(
             if isinstance(result, GcsplanError):
                 raise result
             result.raise_for_outcome()
+        weather = weather or Weather()
+        wind = wind_parameters(weather, seed)
+        calm = _all([PumpJob(c, change_steps(c, s, wind)) for c, s in zip(channels, states, strict=True)])
         flights = [PumpJob(c, _fly(c, p, s, world, said)) for c, p, s in zip(channels, parts, states, strict=True)]
         logs = _all(flights)
+        _all([PumpJob(c, change_steps(c, s, was)) for c, s, was in zip(channels, states, calm, strict=True)])
     tally = Tally(parts, world, terms)
     traces = [_trace(log, part, world) for log, part in zip(logs, parts, strict=True)]
     tally.add(traces)
@@ -135,7 +148,7 @@ def rehearse_sitl(
         if abs(t.begin_s - p.depart_s) > _ODD_LIFT_S
     ]
     energy = [energy_of(t.points, 0.0, p.vehicle) for t, p in zip(traces, parts, strict=True)]
-    return tally.result("sitl", 0, {}, energy, [()] * len(parts))
+    return tally.result("sitl", seed if wind else 0, weather.as_dict() if wind else {}, energy, [()] * len(parts))
 
 
 def _all(jobs: list[PumpJob[Any]]) -> list[Any]:
@@ -177,14 +190,15 @@ def _fly(
     channel: Channel, part: Part, state: VehicleState, world: World, report: Callable[[str, str], None]
 ) -> Steps[_Log]:
     """Arm, start, and record until the vehicle is down, or at its goal if it stays in the air."""
-    to, name, log = state.address, part.vehicle.name, _Log()
+    to, name, log = state.address, part.vehicle.name, _Log(FlightWatch(part.mission))
     pilot = _Pilot(channel, to, log)
     for message, every_us in (
         (dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, _RATE_US), (dialect.MAVLINK_MSG_ID_MISSION_CURRENT, _RATE_US)
     ):  # fmt: skip
         yield from pilot.command(dialect.MAV_CMD_SET_MESSAGE_INTERVAL, message, every_us)
     report(name, "arms")
-    yield from pilot.insist(dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, _GUIDED)
+    mode = _ARMS_IN[part.vehicle.autopilot]
+    yield from pilot.insist(dialect.MAV_CMD_DO_SET_MODE, dialect.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, mode)
     yield from pilot.insist(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
     armed_ms = pilot.boot_ms
     while pilot.boot_ms < armed_ms + _ARMED_MS:
@@ -194,7 +208,6 @@ def _fly(
     planned_s = part.verdict.time_s if part.arrive_s is None else part.arrive_s - part.depart_s + part.verdict.time_s
     latest_ms = log.released_ms + 1000.0 * (_LATE * planned_s + _SPARE_S)
     goal = _goal(part)
-    ground = world.ground_amsl(goal[0], goal[1])
     landing = part.mission.first_seq + len(part.mission.items) - 1
     last = part.mission.items[-1].command
     item = 0
@@ -203,14 +216,20 @@ def _fly(
         if item != pilot.item:
             item = pilot.item
             report(name, f"flies item {item}")
-        if log.down or pilot.boot_ms > latest_ms:
+        if log.down or pilot.boot_ms > latest_ms or log.watch.crashed:
+            log.watch.timed_out = pilot.boot_ms > latest_ms
             return log
         if not log.places:
             continue
-        if last == cmd.LAND and item == landing and log.places[-1][2] <= ground + 0.3:
-            log.down = True  # SITL's ground is flat at the altitude of home: it would sink through higher terrain
-            return log
-        if (
+        if last == cmd.LAND and item == landing:
+            lat_deg, lon_deg, amsl_m = log.places[-1]
+            if amsl_m <= world.ground_amsl(lat_deg, lon_deg) + 0.3:
+                log.down = True  # an SITL without terrain, flat at the altitude of home, would sink into higher ground
+                return log
+        if part.vehicle.autopilot is Autopilot.ARDUPLANE:
+            if is_over(part, log.places, log.boot_ms, goal):
+                return log
+        elif (
             last not in (cmd.LAND, cmd.RTL)
             and _apart_m(log.places[-1], goal) <= _NEAR_M
             and log.speeds[-1] <= _STILL_M_S
@@ -268,6 +287,8 @@ class _Pilot:
                 log.released_ms = self.boot_ms  # at the message's place in the stream, not when the task reads it
         elif kind == "STATUSTEXT":
             self._texts.append(str(message.text))
+        if log.released_ms:
+            log.watch.note(message, self.item)
 
     def command(self, command: int, *params: float) -> Steps[int | None]:
         """Send a command once; return its MAV_RESULT, None without an answer."""
@@ -332,6 +353,10 @@ def _trace(log: _Log, part: Part, world: World) -> Trace:
     arrive_s = float(times[int(there.argmax())]) if there.any() else math.nan
     if not there.any() and float(apart.min()) <= _NEAR_M:  # it passed the goal without stopping
         arrive_s = float(times[int(apart.argmin())])
+    wing = part.vehicle.autopilot is Autopilot.ARDUPLANE
+    if wing:
+        level = np.linalg.norm((points - aim)[:, :2], axis=1)
+        arrive_s = arrival_s(part, times, level, np.array(log.speeds)[first])
     up = int((points[:, 2] > points[0, 2] + 0.3).argmax())
     begin = max(0, up - 1)
     legs = part.verdict.path_legs or part.verdict.legs
@@ -341,9 +366,11 @@ def _trace(log: _Log, part: Part, world: World) -> Trace:
     moved = np.hypot(*np.diff(points[:, :2], axis=0).T) < np.abs(np.diff(points[:, 2])) + 0.05
     vertical = np.array([command.get(int(i)) in (cmd.TAKEOFF, cmd.LAND, cmd.RTL) for i in items[:-1]])
     before = items[:-1] < part.mission.first_seq  # no current item reported yet: it is taking off
+    column = is_column(part, points, items) if wing else (vertical & moved) | before
     last = part.mission.items[-1].command
+    height_m = float(points[-1, 2]) - world.ground_amsl(*places[-1, :2])
     return Trace(
-        name, times[begin:], points[begin:], ((vertical & moved) | before)[begin:], items[:-1][begin:].astype(np.intp),
+        name, times[begin:], points[begin:], column[begin:], items[:-1][begin:].astype(np.intp),
         arrive_s, _SLACK_M, np.full(len(times) - begin - 1, _SLACK_M),
-        not log.down and last not in (cmd.LAND, cmd.RTL) and not part.leaves, part.leaves,
+        not log.down and last not in (cmd.LAND, cmd.RTL) and not part.leaves, part.leaves, log.watch.why(height_m),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""One ArduCopter SITL for each vehicle of a mission: started at its start, with its speeds, and stopped afterwards."""
+"""One SITL for each vehicle of a mission: started at its start, over its terrain, and stopped afterwards."""
 
 from __future__ import annotations
 
@@ -8,12 +8,16 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from gcsplan.errors import LinkError, UsageError
-from gcsplan.mavlink.link.link import Link
 from gcsplan.sim.outcome import Part
-from gcsplan.vehicle import DEFAULT_LEAN_DEG
+from gcsplan.sim.sitl_frames import MODELS, heading_of, parameters_of
+from gcsplan.sim.sitl_ground import write_ground
+from gcsplan.sim.sockets import TcpTransport
+from gcsplan.vehicle import Autopilot
+from gcsplan.world.world import World
 
 _BASE_PORT = 5760
 _FIRST_INSTANCE, _LAST_INSTANCE = 20, 900
@@ -21,89 +25,86 @@ _START_S, _STOP_S = 30.0, 10.0
 SPEEDUP = 5.0
 """Factor by which the instances' clocks run faster than real time, if the machine is fast enough."""
 
-FRAME = {
-    "FRAME_CLASS": 1, "FRAME_TYPE": 0, "ARMING_CHECK": 0, "FS_THR_ENABLE": 0, "DISARM_DELAY": 0, "TERRAIN_ENABLE": 0,
-    "SIM_BARO_RND": 0, "COMPASS_OFS_X": 5, "COMPASS_OFS_Y": 13, "COMPASS_OFS_Z": -18, "INS_ACCOFFS_X": 0.001,
-    "INS_ACCOFFS_Y": 0.001, "INS_ACCOFFS_Z": 0.001, "INS_ACCSCAL_X": 1.001, "INS_ACCSCAL_Y": 1.001,
-    "INS_ACCSCAL_Z": 1.001, "MOT_THST_EXPO": 0.65, "MOT_THST_HOVER": 0.39, "MOT_BAT_VOLT_MIN": 9.6,
-    "MOT_BAT_VOLT_MAX": 12.8, "ATC_RAT_YAW_P": 0.3, "FENCE_ENABLE": 0,
-}  # fmt: skip
-"""Parameters of a quadrotor that arms without pilot, calibration or terrain data (from ArduPilot's SITL defaults)."""
-
-FAST_M_S, FAST_ANGLE_CD = 9.0, 4500
-"""Cruise speed (m/s) above which ANGLE_MAX is raised to this (0.01°): ANGLE_MAX 3000 was measured to limit the speed
-to about 10 m/s."""
-
-
-def parameters_of(part: Part) -> dict[str, float]:
-    """Return an instance's parameters: `FRAME` and the vehicle's own speeds and rates, so that it can fly the plan."""
-    v = part.vehicle
-    given = FRAME | {
-        "WPNAV_SPEED": 100.0 * v.speed_max_m_s, "WPNAV_SPEED_UP": 100.0 * v.climb_m_s,
-        "WPNAV_SPEED_DN": 100.0 * v.descent_m_s, "LAND_SPEED": 100.0 * v.land_m_s,
-    }  # fmt: skip
-    if v.lean_angle_deg is not None and v.lean_angle_deg > DEFAULT_LEAN_DEG:
-        given["ANGLE_MAX"] = 100.0 * v.lean_angle_deg
-    elif v.speed_max_m_s > FAST_M_S:
-        given["ANGLE_MAX"] = FAST_ANGLE_CD
-    if part.rtl_rel_home_m is not None:
-        given["RTL_ALT"] = 100.0 * part.rtl_rel_home_m
-    return given
-
 
 @contextmanager
-def sitl_instances(binary: Path, parts: Sequence[Part], *, speedup: float = SPEEDUP) -> Iterator[dict[str, str]]:
+def sitl_instances(
+    binary: Path, parts: Sequence[Part], *, speedup: float = SPEEDUP, world: World | None = None
+) -> Iterator[dict[str, str]]:
     """Start one instance for each part, each in its own directory; yield the URLs by vehicle; stop all at the end.
 
-    Raises UsageError for a file that cannot be executed, LinkError if an instance does not start.
+    ``binary``: an arducopter or arduplane, or a folder that holds them. ``world``: its terrain is the ground; None: the
+    ground is flat at the altitude of home. Raises UsageError for a file that cannot be executed, LinkError if an
+    instance does not start.
     """
-    if not binary.is_file() or not os.access(binary, os.X_OK):
-        raise UsageError(f"--sitl-binary {binary}: a program that can be run is wanted, an arducopter built for SITL")
     if not 0.1 <= speedup <= 100.0:
         raise UsageError(f"--speedup {speedup:g}: 0.1 to 100 times as fast as ours is wanted")
+    programs = {kind: _program(binary, kind) for kind in dict.fromkeys(p.vehicle.autopilot for p in parts)}
     with ExitStack() as stack:
         directory = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="gcsplan-sitl-")))
         seats: dict[str, str] = {}
         number = _FIRST_INSTANCE
         for part in parts:
             number = _free(number)
-            seats[part.vehicle.name] = stack.enter_context(_instance(binary, part, number, speedup, directory))
+            start = _Start(programs[part.vehicle.autopilot], number, speedup, directory / part.vehicle.name)
+            seats[part.vehicle.name] = stack.enter_context(_instance(start, part, world))
             number += 1
         yield seats
 
 
+def _program(binary: Path, autopilot: Autopilot) -> Path:
+    """The program for one kind of vehicle."""
+    found = binary / autopilot.value if binary.is_dir() else binary
+    if not found.is_file() or not os.access(found, os.X_OK):
+        raise UsageError(f"--sitl-binary {found}: a program that can be run is wanted, an {autopilot} built for SITL")
+    return found
+
+
 def _free(number: int) -> int:
-    """Return the next instance number on whose port nobody answers."""
+    """Return the next instance number whose port is free; nobody is called, for an SITL ends when its caller leaves."""
     while number <= _LAST_INSTANCE:
         try:
-            Link(_url(number)).close()
-        except LinkError:
+            TcpTransport(("127.0.0.1", _port(number))).close()
             return number
-        number += 1
+        except OSError:
+            number += 1
     raise LinkError("all ports for SITL instances are taken: end those that still run")
 
 
-def _url(number: int) -> str:
-    return f"tcp:127.0.0.1:{_BASE_PORT + 10 * number}"
+def _port(number: int) -> int:
+    return _BASE_PORT + 10 * number
+
+
+@dataclass(frozen=True, slots=True)
+class _Start:
+    """How one instance is started."""
+
+    program: Path
+    number: int
+    speedup: float
+    directory: Path
+
+    @property
+    def url(self) -> str:
+        return f"tcp:127.0.0.1:{_port(self.number)}"
 
 
 @contextmanager
-def _instance(binary: Path, part: Part, number: int, speedup: float, directory: Path) -> Iterator[str]:
-    name, home = part.vehicle.name, part.mission.home
-    own = directory / name
+def _instance(start: _Start, part: Part, world: World | None) -> Iterator[str]:
+    name, home, own = part.vehicle.name, part.mission.home, start.directory
     own.mkdir()
+    given = parameters_of(part) | ({} if world is None else write_ground(part, world, own))
     parameters = own / "defaults.parm"
-    parameters.write_text("".join(f"{key} {value:g}\n" for key, value in parameters_of(part).items()), encoding="ascii")
-    place = f"{home.lat_e7 / 1e7:.7f},{home.lon_e7 / 1e7:.7f},{home.amsl_m:.2f},0"
+    parameters.write_text("".join(f"{key} {value:g}\n" for key, value in given.items()), encoding="ascii")
+    place = f"{home.lat_e7 / 1e7:.7f},{home.lon_e7 / 1e7:.7f},{home.amsl_m:.2f},{heading_of(part):.1f}"
     command = [
-        str(binary.resolve()), "--model", "+", "--speedup", f"{speedup:g}", "--home", place, "-I", str(number),
-        "--sysid", str(part.vehicle.sysid), "--defaults", str(parameters),
+        str(start.program.resolve()), "--model", MODELS[part.vehicle.autopilot], "--speedup", f"{start.speedup:g}",
+        "--home", place, "-I", str(start.number), "--sysid", str(part.vehicle.sysid), "--defaults", str(parameters),
     ]  # fmt: skip
     with open(own / "output.txt", "wb") as said:
         process = subprocess.Popen(command, cwd=own, stdin=subprocess.DEVNULL, stdout=said, stderr=subprocess.STDOUT)
         try:
             _await(process, own / "output.txt", name)
-            yield _url(number)
+            yield start.url
         finally:
             process.terminate()
             with suppress(subprocess.TimeoutExpired):

@@ -47,7 +47,8 @@ class Trace:
     true path is within ``off_m`` of the straight pieces between the points; at every time the aircraft is within
     ``slack_m`` (M - 1,) of its place in uniform motion between them. ``column`` and ``seq`` (M - 1,): whether a piece
     belongs to a take-off or landing, and its wire item. ``arrive_s``: time of reaching the goal, NaN if never.
-    ``stays``: it stays in the air at the end; ``leaves``: it is gone after the end.
+    ``stays``: it stays in the air at the end; ``leaves``: it is gone after the end. ``why``: what kept it from
+    arriving, where that is known.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Trace:
     slack_m: Floats
     stays: bool = False
     leaves: bool = False
+    why: str = ""
 
     @property
     def begin_s(self) -> float:

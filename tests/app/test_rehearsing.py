@@ -110,6 +110,7 @@ def test_a_violation_ends_the_command_with_four_and_is_said_in_both_ways(
     "more",
     [
         {"sitl": ["uav1=tcp:127.0.0.1:5760"], "runs": 3},
+        {"sitl": ["uav1=tcp:127.0.0.1:5760"], "wind": 3.0, "noise_m": 1.0},
         {"speedup": 3.0},
         {"airspeed": 0.0},
         {"sitl": ["tcp:127.0.0.1:5760"]},
