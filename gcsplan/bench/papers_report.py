@@ -210,8 +210,8 @@ def report(result: dict[str, Any]) -> str:
 
 
 def write(result: dict[str, Any], out: Path) -> list[Path]:
-    """Write ``papers.csv``, ``papers-claims.csv``, ``papers-readings.csv``, ``papers.md``, ``papers.html``, and two
-    pictures per scenario; apart from them ``papers-times.csv`` and ``papers-times.md`` with all that a clock measured.
+    """Write ``papers.csv``, ``papers.md``, ``papers.html``, ``papers-claims.csv`` and ``.md``, ``papers-readings.csv``,
+    two pictures per scenario, and apart from them ``papers-times.csv`` and ``.md`` with all that a clock has measured.
 
     Each file is written whole or not at all. Raises InputError if one cannot be written.
     """
@@ -226,6 +226,7 @@ def write(result: dict[str, Any], out: Path) -> list[Path]:
     files: dict[str, str | bytes] = {
         "papers.csv": _csv([_flat(s, row) for s in result["scenarios"] for row in (*s["rows"], *s["reading_rows"])]),
         "papers-claims.csv": _csv(result["claims"]),
+        "papers-claims.md": "\n".join(_claims(result)) + "\n",
         "papers-readings.csv": _csv(result["readings"]),
         "papers-times.csv": _csv(result["times"]["rows"]),
         "papers-times.md": "\n".join(_times(result)) + "\n",
@@ -273,13 +274,27 @@ def _times(result: dict[str, Any]) -> Iterator[str]:
         yield from table.markdown()
 
 
+def _stands(result: dict[str, Any]) -> Iterator[str]:
+    yield from ("## What stands", "")
+    for title, sentences in stands(result):
+        yield from (f"### {title}", "", *(f"- {sentence}" for sentence in sentences), "")
+
+
+def _claims(result: dict[str, Any]) -> Iterator[str]:
+    """The page that one cites: what stands, every claim, every reading; it needs no other file."""
+    yield from (f"# {TITLE}: what stands", "", _about(result), "")
+    yield from _stands(result)
+    for table in (claims_table(result["claims"]), readings_table(result["readings"])):
+        if table.rows:
+            yield from (f"## {table.heading}", "")
+            yield from table.markdown()
+
+
 def _markdown(result: dict[str, Any]) -> Iterator[str]:
     yield from (f"# {TITLE}", "", _about(result), "")
     for line in LEGEND:
         yield from (line, "")
-    yield from ("## What stands", "")
-    for title, sentences in stands(result):
-        yield from (f"### {title}", "", *(f"- {sentence}" for sentence in sentences), "")
+    yield from _stands(result)
     for summary, table in tables(result):
         yield from (f"## {table.heading}", "")
         if summary is not None:

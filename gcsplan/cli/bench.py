@@ -157,7 +157,10 @@ def bench_papers(
         list[str] | None, typer.Option("--scenario", metavar="NAME", help="Of missions/papers; repeatable [all].")
     ] = None,
     algorithm: Annotated[
-        list[str] | None, typer.Option("--algorithm", metavar="NAME", help="Of the papers' own; repeatable [all].")
+        list[str] | None,
+        typer.Option(
+            "--algorithm", metavar="NAME", help="Of the papers or a reading, `ssgwo:leaders-all`; repeatable [all]."
+        ),
     ] = None,
     runs: Annotated[int | None, typer.Option(metavar="N", help="Of each [the paper's number, 30 where none].")] = None,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of all runs.")] = 1,

@@ -452,8 +452,8 @@ def test_the_files_hold_the_numbers_and_the_page_needs_no_other_file(finished: t
     result, out = finished
     files = {path.name: path for path in write(result, out)}
     assert set(files) == {
-        "papers.csv", "papers-claims.csv", "papers-readings.csv", "papers-times.csv", "papers-times.md", "papers.md",
-        "papers.html", f"{SCENARIO}-map.png", f"{SCENARIO}-convergence.png",
+        "papers.csv", "papers-claims.csv", "papers-claims.md", "papers-readings.csv", "papers-times.csv",
+        "papers-times.md", "papers.md", "papers.html", f"{SCENARIO}-map.png", f"{SCENARIO}-convergence.png",
     }  # fmt: skip
     with files["papers.csv"].open(encoding="utf-8", newline="") as file:
         lines = list(csv.DictReader(file))
