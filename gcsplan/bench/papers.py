@@ -35,6 +35,7 @@ def run(
     done: Callable[[int, int], None] | None = None,
     *,
     missions: Path | None = None,
+    readings: bool = True,
 ) -> dict[str, Any]:
     """Do every run that ``out`` does not hold yet, and sum up.
 
@@ -48,6 +49,7 @@ def run(
         cluster: address of a dask.distributed scheduler that does the runs instead (extra ``cluster``).
         done: called with the number of finished runs and of all runs.
         missions: directory of the scenarios' mission files; None: the usual folders.
+        readings: whether ``algorithms`` None means other readings of the papers, too.
 
     Returns:
         ``settings``; ``scenarios``, each with straight line, optimum, rows and printed numbers; ``claims`` and
@@ -61,7 +63,7 @@ def run(
         raise InputError(
             f"1 to {MOST_RUNS} runs, 1 job or more and a seed of 0 or more are wanted, given {runs}, {jobs}, {seed}"
         )
-    chosen = choose(scenarios, algorithms)
+    chosen = choose(scenarios, algorithms, readings=readings)
     asked: dict[tuple[str, str], list[PaperRun]] = {}
     code = code_digest()
     texts = {scenario.name: mission_text(scenario.name, missions) for scenario, _ in chosen}

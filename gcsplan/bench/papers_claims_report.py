@@ -108,7 +108,8 @@ def counts(claims: Rows) -> list[str]:
     for paper in dict.fromkeys(c["paper"] for c in claims):
         count = Counter(c["verdict"] for c in claims if c["paper"] == paper)
         told = ", ".join(f"{count[verdict]} {verdict}" for verdict in order if count[verdict])
-        out.append(f"{paper}: {sum(count.values())} claims, {told}.")
+        total = sum(count.values())
+        out.append(f"{paper}: {total} claim{'' if total == 1 else 's'}, {told}.")
     if any(c.get(f"{prefix}ranking") == FEW for c in claims for prefix in ("", "equal_", "twin_")):
         out.append(f"Rankings are judged from {LEAST_RUNS_TO_JUDGE} runs on.")
     return out

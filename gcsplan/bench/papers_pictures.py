@@ -76,7 +76,7 @@ def draw_map(summary: dict[str, Any]) -> bytes:
     figure.legend(*plan.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8, frameon=False)
     first = next(iter(shown))
     _profile(profile, ready, shown[first], first)
-    return _png(figure)
+    return png(figure)
 
 
 def _ground(ax: Axes, ready: Set, places: Floats) -> None:
@@ -133,7 +133,7 @@ def _profile(ax: Axes, ready: Set, run: Record | None, name: str) -> None:
 
 
 def draw_convergence(summary: dict[str, Any]) -> bytes:
-    """Median of the best cost so far with 10th and 90th percentile, over iterations and over evaluations."""
+    """Median of the best cost so far with its quartiles, over iterations and over evaluations."""
     figure = Figure(figsize=(10.5, 4.4), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(1, 2, sharey=True)
@@ -145,7 +145,7 @@ def draw_convergence(summary: dict[str, Any]) -> bytes:
                 continue
             grid = np.linspace(0.0, max(h[along][-1] for h in found), STEPS)
             costs = np.array([stepwise(h[along], h["cost"], grid) for h in found])
-            low, middle, high = (np.percentile(costs, q, axis=0, method="nearest") for q in (10, 50, 90))
+            low, middle, high = (np.percentile(costs, q, axis=0, method="nearest") for q in (25, 50, 75))
             shown = np.isfinite(high)
             if not shown.any():
                 continue
@@ -169,10 +169,8 @@ def draw_convergence(summary: dict[str, Any]) -> bytes:
     axes[0].set_ylabel(f"best cost so far,{chr(10) if len(unit) > 12 else ' '}{unit}")
     axes[1].legend(fontsize=8)
     runs = max(len(records) for records in summary["records"].values())
-    figure.suptitle(
-        f"{summary['name']}: median of {runs} runs, 10th to 90th percentile", x=0.01, ha="left", fontsize=10
-    )
-    return _png(figure)
+    figure.suptitle(f"{summary['name']}: median of {runs} runs, and quartiles", x=0.01, ha="left", fontsize=10)
+    return png(figure)
 
 
 def stepwise(x: Sequence[float], y: Sequence[float | None], grid: Floats) -> Floats:
@@ -182,7 +180,8 @@ def stepwise(x: Sequence[float], y: Sequence[float | None], grid: Floats) -> Flo
     return np.where(place < 0, np.inf, values[np.maximum(place, 0)])
 
 
-def _png(figure: Figure) -> bytes:
+def png(figure: Figure) -> bytes:
+    """The figure as PNG, the same bytes each time."""
     out = io.BytesIO()
     figure.savefig(out, format="png", dpi=100, metadata={"Software": None})
     return out.getvalue()

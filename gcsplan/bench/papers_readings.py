@@ -76,7 +76,7 @@ READINGS: Mapping[str, tuple[Reading, ...]] = MappingProxyType({
         _of("all-in-a-box", "MSFOA and FOA search the box, as their rivals do", msfoa=_BOX, foa=_BOX),
         _of("all-polar", "the rivals search hidden variables, as MSFOA and FOA do", pso=_POLAR, de=_POLAR, abc=_POLAR,
             iffo=_POLAR, mfoa=_POLAR),
-        _of(*_ONE_BEE, abc=_with(bees="one")),
+        # ABC one bee at a time is not among these: 60,000 costs one by one take as long as ten other runs.
     ),
     "abo": (
         _of("inertia-1", "PSO with inertia 1 throughout", pso=_with(inertia_first=1.0, inertia_last=1.0)),

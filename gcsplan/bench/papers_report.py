@@ -9,7 +9,7 @@ import base64
 import csv
 import html
 import io
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -210,26 +210,20 @@ def report(result: dict[str, Any]) -> str:
 
 
 def write(result: dict[str, Any], out: Path) -> list[Path]:
-    """Write ``papers.csv``, ``papers-claims.csv``, ``papers-readings.csv``, ``papers.md``, ``papers.html``, and two
-    pictures per scenario; apart from them ``papers-times.csv`` and ``papers-times.md`` with all that a clock measured.
+    """Write ``papers.csv``, ``papers.md``, ``papers.html``, ``papers-claims.csv`` and ``.md``, ``papers-readings.csv``,
+    pictures of each scenario, and apart from them ``papers-times.csv`` and ``.md`` with all that a clock has measured.
 
     Each file is written whole or not at all. Raises InputError if one cannot be written.
     """
-    from gcsplan.bench.papers_pictures import draw_convergence, draw_map
-
-    pictures = {}
-    for summary in result["scenarios"]:
-        if not summary["records"]:
-            continue  # readings alone were run
-        pictures[f"{summary['name']}-map.png"] = draw_map(summary)
-        pictures[f"{summary['name']}-convergence.png"] = draw_convergence(summary)
+    pictures = {name: data for summary in result["scenarios"] for name, data in _pictures(summary).items()}
     files: dict[str, str | bytes] = {
         "papers.csv": _csv([_flat(s, row) for s in result["scenarios"] for row in (*s["rows"], *s["reading_rows"])]),
         "papers-claims.csv": _csv(result["claims"]),
+        "papers-claims.md": "\n".join(_claims(result)) + "\n",
         "papers-readings.csv": _csv(result["readings"]),
         "papers-times.csv": _csv(result["times"]["rows"]),
         "papers-times.md": "\n".join(_times(result)) + "\n",
-        "papers.md": "\n".join(_markdown(result)) + "\n",
+        "papers.md": "\n".join(_markdown(result, pictures)) + "\n",
         "papers.html": "\n".join(_page(result, pictures)) + "\n",
         **pictures,
     }
@@ -273,21 +267,54 @@ def _times(result: dict[str, Any]) -> Iterator[str]:
         yield from table.markdown()
 
 
-def _markdown(result: dict[str, Any]) -> Iterator[str]:
-    yield from (f"# {TITLE}", "", _about(result), "")
-    for line in LEGEND:
-        yield from (line, "")
+def _stands(result: dict[str, Any]) -> Iterator[str]:
     yield from ("## What stands", "")
     for title, sentences in stands(result):
         yield from (f"### {title}", "", *(f"- {sentence}" for sentence in sentences), "")
+
+
+def _claims(result: dict[str, Any]) -> Iterator[str]:
+    """The page that one cites: what stands, every claim, every reading; it needs no other file."""
+    yield from (f"# {TITLE}: what stands", "", _about(result), "")
+    yield from _stands(result)
+    for table in (claims_table(result["claims"]), readings_table(result["readings"])):
+        if table.rows:
+            yield from (f"## {table.heading}", "")
+            yield from table.markdown()
+
+
+def _pictures(summary: Summary) -> dict[str, bytes]:
+    """PNG of a scenario by file name; none if readings alone were run."""
+    from gcsplan.bench.papers_pictures import draw_convergence, draw_map
+    from gcsplan.bench.papers_views import draw_boxes, draw_fleet, draw_space
+
+    if not summary["records"]:
+        return {}
+    drawn = {"map": draw_map, "space": draw_space, "convergence": draw_convergence, "boxes": draw_boxes}
+    out = {f"{summary['name']}-{what}.png": draw(summary) for what, draw in drawn.items()}
+    fleet = draw_fleet(summary)
+    return out if fleet is None else out | {f"{summary['name']}-fleet.png": fleet}
+
+
+def _of(summary: Summary | None, pictures: Iterable[str]) -> list[str]:
+    """The pictures of a scenario."""
+    if summary is None:
+        return []
+    return [name for name in pictures if name.rpartition("-")[0] == summary["name"]]
+
+
+def _markdown(result: dict[str, Any], pictures: Iterable[str]) -> Iterator[str]:
+    yield from (f"# {TITLE}", "", _about(result), "")
+    for line in LEGEND:
+        yield from (line, "")
+    yield from _stands(result)
     for summary, table in tables(result):
         yield from (f"## {table.heading}", "")
         if summary is not None:
             yield from (summary["source"], "")
         yield from table.markdown()
-        if summary is not None and summary["records"]:
-            for what in ("map", "convergence"):
-                yield from (f"![{summary['name']}, {what}]({summary['name']}-{what}.png)", "")
+        for name in _of(summary, pictures):
+            yield from (f"![{name.removesuffix('.png')}]({name})", "")
 
 
 _STYLE = (
@@ -312,9 +339,7 @@ def _page(result: dict[str, Any], pictures: dict[str, bytes]) -> Iterator[str]:
         if summary is not None:
             yield f"<p>{html.escape(summary['source'])}</p>"
         yield from table.html()
-        if summary is not None and summary["records"]:
-            for what in ("map", "convergence"):
-                name = f"{summary['name']}-{what}.png"
-                data = base64.b64encode(pictures[name]).decode()
-                yield f'<figure><img src="data:image/png;base64,{data}" alt="{name}"></figure>'
+        for name in _of(summary, pictures):
+            data = base64.b64encode(pictures[name]).decode()
+            yield f'<figure><img src="data:image/png;base64,{data}" alt="{name}"></figure>'
     yield "</body></html>"

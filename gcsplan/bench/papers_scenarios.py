@@ -130,14 +130,19 @@ SCENARIOS: Mapping[str, Scenario] = MappingProxyType(
 )  # fmt: skip
 
 
-def choose(names: Sequence[str] | None, algorithms: Sequence[str] | None) -> list[tuple[Scenario, list[Contender]]]:
-    """The scenarios called ``names`` (None: all), each with those of its contenders that ``algorithms`` names.
+def choose(
+    names: Sequence[str] | None, algorithms: Sequence[str] | None, *, readings: bool = True
+) -> list[tuple[Scenario, list[Contender]]]:
+    """The scenarios called ``names`` (None: all), each with those of its contenders that ``algorithms`` names; None:
+    all, or without ``readings`` the paper's own.
 
     Raises InputError for an unknown name, and if nothing is left.
     """
     asked = _known("scenario", names, SCENARIOS)
     here = {c.name: None for name in asked for c in SCENARIOS[name].contenders}
     wanted = _known("algorithm", algorithms, here)
+    if algorithms is None and not readings:
+        wanted = [name for name in wanted if ":" not in name]
     picked = [(SCENARIOS[n], [c for c in SCENARIOS[n].contenders if c.name in wanted]) for n in asked]
     return [(scenario, contenders) for scenario, contenders in picked if contenders]
 

@@ -157,7 +157,10 @@ def bench_papers(
         list[str] | None, typer.Option("--scenario", metavar="NAME", help="Of missions/papers; repeatable [all].")
     ] = None,
     algorithm: Annotated[
-        list[str] | None, typer.Option("--algorithm", metavar="NAME", help="Of the papers' own; repeatable [all].")
+        list[str] | None,
+        typer.Option(
+            "--algorithm", metavar="NAME", help="Of the papers or a reading, `ssgwo:leaders-all`; repeatable [all]."
+        ),
     ] = None,
     runs: Annotated[int | None, typer.Option(metavar="N", help="Of each [the paper's number, 30 where none].")] = None,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of all runs.")] = 1,
@@ -166,6 +169,9 @@ def bench_papers(
         str | None, typer.Option(metavar="ADDRESS", help="A dask.distributed scheduler instead (extra `cluster`).")
     ] = None,
     missions: Annotated[Path | None, typer.Option(metavar="DIR", help="Where the mission files are.")] = None,
+    readings: Annotated[
+        bool, typer.Option("--readings/--no-readings", help="Run other readings of the papers too.")
+    ] = True,
     speed: Annotated[
         bool, typer.Option("--speed", help="Measure speed instead, beside mealpy's (extra `bench`).")
     ] = False,
@@ -183,7 +189,9 @@ def bench_papers(
         return
     from gcsplan.bench import papers, papers_report
 
-    result = papers.run(scenario or None, algorithm or None, runs, seed, jobs, out, cluster, None, missions=missions)
+    result = papers.run(
+        scenario or None, algorithm or None, runs, seed, jobs, out, cluster, None, missions=missions, readings=readings
+    )
     files = papers_report.write(result, out)
     if as_json:
         emit(papers.plain(result) | {"files": [str(file) for file in files]})

@@ -29,6 +29,7 @@ from gcsplan.bench.papers_report import report, scenario_table, write
 from gcsplan.bench.papers_runs import PaperRun, Store, code_digest, seed_of, work
 from gcsplan.bench.papers_scenarios import SCENARIOS, choose, mission_text, prepare, settings_of
 from gcsplan.bench.papers_statistics import compare, holm, row, schedule, values
+from gcsplan.bench.papers_views import distances, draw_fleet, spread
 from gcsplan.errors import InputError
 from tests.support.effort import draws
 
@@ -452,20 +453,21 @@ def test_the_files_hold_the_numbers_and_the_page_needs_no_other_file(finished: t
     result, out = finished
     files = {path.name: path for path in write(result, out)}
     assert set(files) == {
-        "papers.csv", "papers-claims.csv", "papers-readings.csv", "papers-times.csv", "papers-times.md", "papers.md",
-        "papers.html", f"{SCENARIO}-map.png", f"{SCENARIO}-convergence.png",
+        "papers.csv", "papers-claims.csv", "papers-claims.md", "papers-readings.csv", "papers-times.csv",
+        "papers-times.md", "papers.md", "papers.html", f"{SCENARIO}-map.png", f"{SCENARIO}-convergence.png",
+        f"{SCENARIO}-space.png", f"{SCENARIO}-boxes.png",
     }  # fmt: skip
     with files["papers.csv"].open(encoding="utf-8", newline="") as file:
         lines = list(csv.DictReader(file))
     rows = result["scenarios"][0]["rows"]
     assert [float(line["mean_length_m"]) for line in lines] == [r["mean_length_m"] for r in rows]
-    for name in (f"{SCENARIO}-map.png", f"{SCENARIO}-convergence.png"):
+    for name in (n for n in files if n.endswith(".png")):
         assert files[name].read_bytes().startswith(b"\x89PNG\r\n")
     said = json.loads(json.dumps(plain(result), allow_nan=False))["scenarios"][0]
     assert said["rows"] == rows
     assert said["printed"]["ssgwo"]["best_length_m"] == "1129"
     page = files["papers.html"].read_text(encoding="utf-8")
-    assert re.findall(r'src="(.{0,22})', page) == ["data:image/png;base64,"] * 2
+    assert re.findall(r'src="(.{0,22})', page) == ["data:image/png;base64,"] * 4
     assert "http" not in page
     assert "<script" not in page
     text = files["papers.md"].read_text(encoding="utf-8")
@@ -476,8 +478,7 @@ def test_the_files_hold_the_numbers_and_the_page_needs_no_other_file(finished: t
 def test_another_clock_changes_the_files_of_times_alone(
     finished: tuple[dict[str, Any], Path], missions: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for draw in ("draw_map", "draw_convergence"):
-        monkeypatch.setattr(f"gcsplan.bench.papers_pictures.{draw}", lambda _: b"")
+    monkeypatch.setattr("gcsplan.bench.papers_report._pictures", lambda _: {})
     (tmp_path / "slow").mkdir()
     (tmp_path / "fast").mkdir()
     runs = [json.loads(line) for line in (finished[1] / KEPT).read_text(encoding="utf-8").splitlines()]
@@ -491,6 +492,37 @@ def test_another_clock_changes_the_files_of_times_alone(
         seen.append({file.name: file.read_bytes() for file in write(result, place)})
     assert said[0] == said[1]
     assert {name for name in seen[0] if seen[0][name] != seen[1][name]} == {"papers-times.csv", "papers-times.md"}
+
+
+def test_distances_of_a_fleet_are_those_of_points_that_fly_evenly() -> None:
+    one = np.array([[0.0, 0.0, 0.0], [30.0, 0.0, 0.0], [30.0, 70.0, 0.0]])
+    other = np.array([[0.0, 10.0, 0.0], [0.0, 10.0, 50.0]])
+    t, gap = distances(one, 10.0, other, 20.0)  # 10 m/s and 2.5 m/s
+    assert (t[0], t[-1]) == (0.0, 10.0)
+    for moment, found in zip(t, gap, strict=True):
+        first = (10.0 * moment, 0.0, 0.0) if moment <= 3.0 else (30.0, 10.0 * moment - 30.0, 0.0)
+        assert found == pytest.approx(math.dist(first, (0.0, 10.0, 2.5 * moment)))
+
+
+def test_box_plots_show_costs_of_all_runs_and_lengths_of_legal_ones() -> None:
+    records = [_record("gwo", k, x, k % 2) for k, x in enumerate((1140.0, 1132.0, 1160.0))]
+    records.append({"status": "refused"})
+    assert spread(records, "cost").tolist() == [1140.0, 1232.0, 1160.0]
+    assert spread(records, "length_m").tolist() == [1140.0, 1160.0]
+
+
+@pytest.mark.slow
+def test_a_fleet_has_its_distances_drawn_and_one_vehicle_none(finished: tuple[dict[str, Any], Path]) -> None:
+    assert draw_fleet(finished[0]["scenarios"][0]) is None
+    for name, paths in (("msfoa-1", 3), ("ib-abc-sequence", 4)):
+        ready = prepare(name, mission_text(name))
+        ends = [[list(p.start), list(p.goal)] for p in ready.problems]
+        assert len(ends) == paths
+        summary = {"name": name, "set": ready, "records": {"own": [_record("own", 0, 1.0, paths=ends)]}}
+        picture = draw_fleet(summary)
+        assert picture is not None
+        assert picture.startswith(b"\x89PNG")
+        assert draw_fleet(summary) == picture
 
 
 # -- speed -------------------------------------------------------------------------------------------------------------

@@ -153,4 +153,5 @@ def test_readings_run_in_the_papers_own_scenarios_and_not_in_their_twins() -> No
     assert papers_readings.readings_of("none") == ()
     for scenario, contenders in choose(None, None):
         assert any(":" in c.name for c in contenders) <= (not scenario.twin_of)
+    assert not any(":" in c.name for _, contenders in choose(None, None, readings=False) for c in contenders)
     assert [c.name for c in choose(["abo"], ["pso:inertia-1"])[0][1]] == ["pso:inertia-1"]
