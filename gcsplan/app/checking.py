@@ -10,6 +10,8 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gcsplan.app.fencing import own_fence
 from gcsplan.app.option_words import all_in_options, home_in_options, verdict_in_options
 from gcsplan.app.pipeline import world_of
@@ -198,8 +200,10 @@ def _extent_m(places: Sequence[tuple[float, float]]) -> float:
 def _reaching(source: MissionFile, places: Sequence[tuple[float, float]]) -> MissionFile:
     """``source`` with terrain loaded as far as ``places``; ``source`` itself if it covers them or cannot load more."""
     world = world_of(source)
-    on_earth = [p for p in places if abs(p[0]) <= 90.0 and abs(p[1]) <= 180.0]
-    unknown = [p for p in on_earth if math.isnan(world.ground_amsl(*p))]
+    at = np.array(places, dtype=float).reshape(-1, 2)
+    at = at[(np.abs(at[:, 0]) <= 90.0) & (np.abs(at[:, 1]) <= 180.0)]
+    ground = world.airspace.surface.ground_at(*world.frame.to_plane(at[:, 0], at[:, 1]).T)
+    unknown = [(lat, lon) for lat, lon in at[np.isnan(ground)].tolist()]
     return source.reaching(unknown) if unknown and source.reaching is not None else source
 
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.check.climb_out import slant_findings
 from gcsplan.check.clock import seconds_of
 from gcsplan.check.corners import round_corners
@@ -158,23 +158,24 @@ def _figures(
 ) -> tuple[LegFigures, ...]:
     energy = vehicle.energy
     ground_end = world.airspace.surface.ground_at(plane.legs.end[:, 0], plane.legs.end[:, 1])
+    of = [np.flatnonzero(plane.owner == i) for i in range(len(flight.stretches))]
+    lows = np.array([_lowest(report, mine) for mine in of], dtype=np.intp)
+    at = np.where(np.isnan(report.min_agl_m[lows]), 0.0, report.min_agl_at[lows])
+    low_en = plane.legs.start[lows, :2] + at[:, None] * (plane.legs.end[lows, :2] - plane.legs.start[lows, :2])
+    low_deg = world.frame.to_degrees(low_en[:, 0], low_en[:, 1]).tolist()
     figures = []
     for i, s in enumerate(flight.stretches):
-        mine = np.flatnonzero(plane.owner == i)
+        mine = of[i]
         delta = plane.legs.end[mine] - plane.legs.start[mine]
         run, rise = np.hypot(delta[:, 0], delta[:, 1]), delta[:, 2]
         horizontal_m = float(run.sum())
         agl = report.min_agl_m[mine]
         known = ~np.isnan(agl)
-        low = int(mine[known][agl[known].argmin()]) if known.any() else int(mine[0])
-        f = float(report.min_agl_at[low]) if known.any() else 0.0
-        low_en = plane.legs.start[low, :2] + f * (plane.legs.end[low, :2] - plane.legs.start[low, :2])
         near = int(mine[report.zone_clearance_m[mine].argmin()])
         zone = int(report.nearest_zone[near])
         steepest = mine[int(np.abs(report.climb_deg[mine]).argmax())]
         hold_s = 0.0 if math.isinf(s.hold_s) else s.hold_s
         hold_j = _hold_w(vehicle, s) * hold_s
-        lat, lon = world.frame.to_degrees(*low_en)
         highest = report.max_agl_m[mine]
         figures.append(
             LegFigures(
@@ -184,7 +185,7 @@ def _figures(
                 climb_deg=float(report.climb_deg[steepest]),
                 agl_end_m=s.end[2] - float(ground_end[mine[-1]]),
                 min_agl_m=float(agl[known].min()) if known.any() else math.nan,
-                min_agl_at=(float(lat), float(lon)),
+                min_agl_at=(low_deg[i][0], low_deg[i][1]),
                 max_agl_m=float(highest[known].max()) if known.any() else math.nan,
                 zone_clearance_m=float(report.zone_clearance_m[near]),
                 nearest_zone=world.airspace.zones[zone].name if zone >= 0 else "",
@@ -198,6 +199,13 @@ def _figures(
             )
         )  # fmt: skip
     return tuple(figures)
+
+
+def _lowest(report: LegReport, mine: Indices) -> int:
+    """The leg of ``mine`` that is lowest above known ground; the first if none is over known ground."""
+    agl = report.min_agl_m[mine]
+    known = ~np.isnan(agl)
+    return int(mine[known][agl[known].argmin()]) if known.any() else int(mine[0])
 
 
 WORDS = {
