@@ -53,13 +53,13 @@ class VehicleTerrain:
         Where it crosses into another degree tile, with posts of its own, the height may step.
         """
         f = np.linspace(0.0, 1.0, PARTS + 1)
-        cells = [self._cell(ends, x) for x in f]
+        east, north = (ends[0] + f[:, None] * (ends[1] - ends[0])).T
+        tiles = np.floor(self._frame.to_degrees(east, north) * 1e7 / DEGREE_E7)
         cuts = [0.0]
-        on = [cells[0]]
-        for k in range(PARTS):
-            if cells[k + 1] != cells[k]:
-                cuts.append(self._crossing(ends, f[k], f[k + 1]))
-                on.append(cells[k + 1])
+        on = [self._cell(ends, 0.0)]
+        for k in np.flatnonzero((tiles[1:] != tiles[:-1]).any(axis=1)).tolist():
+            cuts.append(self._crossing(ends, f[k], f[k + 1]))
+            on.append(self._cell(ends, f[k + 1]))
         cuts.append(1.0)
         out = []
         for a, b, cell in zip(cuts, cuts[1:], on, strict=False):
