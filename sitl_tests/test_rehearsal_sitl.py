@@ -11,9 +11,12 @@ import pytest
 
 from gcsplan.app.model import Plan
 from gcsplan.app.pipeline import plan
-from gcsplan.app.rehearsing import rehearse, rehearse_in_sitl
+from gcsplan.app.rehearsing import parts_of, rehearse, rehearse_in_sitl
 from gcsplan.errors import LinkError, UsageError
+from gcsplan.mavlink.mission.commands import WAYPOINT
 from gcsplan.mission_file import load_mission
+from gcsplan.sim.sitl_instances import sitl_instances
+from gcsplan.sim.wind import Weather
 from gcsplan.vehicle import Autopilot
 from sitl_tests import sitl
 
@@ -77,6 +80,60 @@ def test_two_real_arducopters_arrive_as_planned_and_as_the_built_in_simulator_sa
     assert ours.closest is not None
     assert result.closest.distance_m == pytest.approx(ours.closest.distance_m, abs=25.0)
     assert {name for name, what in said if what == "flies"} == {"uav1", "uav2"}
+
+
+BELOW = """
+version: 1
+name: Down from the ridge
+terrain: {dem: "sample:jacksboro", vertical_datum: EGM96}
+limits: {min_agl_m: 60, horizontal_clearance_m: 30, track_error_m: 3, altitude_error_m: 5, max_climb_deg: 15}
+vehicles:
+  - name: uav1
+    sysid: 1
+    autopilot: arducopter
+    speed_m_s: [3, 9]
+    start: [36.6130, -84.2650]
+    goal: [36.6180, -84.2560]
+planner: {name: optimal, objective: length, seed: 1}
+altitude_frame: relative
+"""
+
+
+@pytest.fixture(scope="module")
+def below(tmp_path_factory: pytest.TempPathFactory) -> Plan:
+    file = tmp_path_factory.mktemp("below") / "below.yaml"
+    file.write_text(BELOW, encoding="utf-8")
+    planned = plan(load_mission(file))
+    home_m = planned.vehicles[0].mission.home.amsl_m
+    assert min(i.z for i in planned.vehicles[0].mission.items if i.command == WAYPOINT) < -40.0
+    assert planned.world.ground_amsl(36.6180, -84.2560) < home_m - 100.0
+    return planned
+
+
+@sitl.needs(Autopilot.ARDUCOPTER, program=True)
+@pytest.mark.parametrize("weather", [None, Weather(6.0, 270.0, 1.0)], ids=["calm", "wind"])
+def test_it_flies_and_lands_below_home_over_the_missions_terrain(below: Plan, weather: Weather | None) -> None:
+    result = rehearse_in_sitl(
+        below, binary=sitl.binary(Autopilot.ARDUCOPTER), speedup=10.0, weather=weather, seed=3
+    )  # fmt: skip
+    assert result.breaches == ()
+    (flown,) = result.vehicles
+    assert flown.errors_s[0] == pytest.approx(0.0, abs=WITHIN_S)
+    assert flown.min_agl_m >= 60.0
+    goal_m = below.world.ground_amsl(36.6180, -84.2560)
+    assert result.flown[0].points[-1, 2] == pytest.approx(goal_m, abs=2.0)
+    assert result.weather == ({} if weather is None else weather.as_dict())
+
+
+@sitl.needs(Autopilot.ARDUCOPTER, program=True)
+def test_over_flat_ground_it_hits_that_and_says_so(below: Plan) -> None:
+    binary = sitl.binary(Autopilot.ARDUCOPTER)
+    assert binary is not None
+    with sitl_instances(binary, parts_of(below), speedup=10.0) as addresses:
+        result = rehearse_in_sitl(below, addresses=addresses)
+    (breach,) = [b for b in result.breaches if b.kind == "arrival"]
+    assert "it hit the ground at 1." in breach.message
+    assert "m above the mission's ground: without terrain an SITL's ground is flat" in breach.message
 
 
 def test_addresses_off_this_machine_are_refused_before_anything_is_opened(planned: Plan) -> None:
