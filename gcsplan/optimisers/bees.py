@@ -42,12 +42,14 @@ def abc(run: Run, *, limit: int, group: int, bees: str) -> Steps:
             failures[spent] = 0
 
 
-def ib_abc(run: Run, *, feedback: bool, scale: float, spent_share: float, group: int) -> Steps:
+def ib_abc(run: Run, *, feedback: bool, scale: float, spent_share: float, group: int, counts_from: str) -> Steps:
     """IB-ABC, eq. 7-10: feedback μ from counts of failures, followers that combine two other sources, and scouts only
     when the mean count is high.
 
-    ``scale`` bounds φ; ``spent_share`` is γ. Without ``feedback`` μ is 1: B-ABC, in our reading.
+    ``scale`` bounds φ; ``spent_share`` is γ. Without ``feedback`` μ is 1: B-ABC, in our reading. ``counts_from`` is the
+    first count of each source, "one" or "zero"; with zero, as the text says, μ = 0/0 of the first cycle is taken as 0.
     """
+    require("ib-abc", "counts_from", counts_from, ("one", "zero"))
     if not 0.0 < spent_share < 1.0:
         raise InputError(f"ib-abc: spent_share must lie between 0 and 1, given {spent_share}")
     x = run.first()
@@ -55,7 +57,7 @@ def ib_abc(run: Run, *, feedback: bool, scale: float, spent_share: float, group:
     n, dim = x.shape
     elements = -(-dim // group)  # D
     # E eq. 7: μ is 0/0 at the start; here the counts Tr are kept within [1, D] (Th = L = D).
-    count = np.ones(n)
+    count = np.full(n, 1.0 if counts_from == "one" else 0.0)
     for _ in run.cycles():
         # At least 1, because with D = 1 even sources that just improved have a count above γD.
         if count.mean() > max(spent_share * elements, 1.0):  # eq. 10
@@ -68,7 +70,7 @@ def ib_abc(run: Run, *, feedback: bool, scale: float, spent_share: float, group:
         for following in (False, True):
             k, m = partners(run.rng, n, n, 2)
             phi = scale * run.rng.uniform(-1.0, 1.0, size=(n, 1))
-            mu = (count / (count + count[k]))[:, None] if feedback else 1.0
+            mu = (count / np.maximum(count + count[k], 1.0))[:, None] if feedback else 1.0
             # Eq. 7 starts from the source itself, eq. 9 from another. The paper assigns followers to sources by
             # descending fitness, one each; when all fly at once this means one follower for every source.
             base = x[m] if following else x

@@ -21,6 +21,7 @@ READINGS: dict[str, tuple[str, dict[str, object], Oracle]] = {
     "ssgwo, α": ("ssgwo", {"leaders": "all", "trial": "alpha"}, lambda *a: swarms.ssgwo_all(*a, trial="alpha")),
     "sogwo": ("sogwo", {"alike": "distances", "span": 8.0}, lambda *a: swarms.sogwo_published(*a, span=8.0)),
     "abc": ("abc", {"bees": "one", "limit": 3}, lambda *a: swarms.one_bee(*a, limit=3)),
+    "ib-abc": ("ib-abc", {"counts_from": "zero"}, lambda *a: swarms.ib_abc_from_zero(*a)),
     "krill, one": (
         "krill", {"moves": "one", "attempts": 3, "sight": 0.4},
         lambda *a: swarms.krill(*a, one=True, printed=False, sight=0.4),

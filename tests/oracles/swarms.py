@@ -143,6 +143,39 @@ def one_bee(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator,
     return search.points
 
 
+def ib_abc_from_zero(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator) -> list[Point]:
+    """IB-ABC with Tr from 0: φ up to 0.5, γ 0.5; all bees of a kind at once."""
+    search = Search(cost)
+    x, f = first(search, rng, n, dim)
+    count = [0.0] * n
+    for _ in range(rounds):
+        if sum(count) / n > max(0.5 * dim, 1.0):  # eq. 10
+            best = f.index(min(f))
+            chosen = rng.permutation([i for i in range(n) if i != best])[: round(0.5 * n)]
+            places, costs = search.all(rng.random((len(chosen), dim)))
+            for i, place, found in zip(chosen, places, costs, strict=True):
+                x[i], f[i], count[i] = place, found, 1.0
+        better = [False] * n
+        for following in (False, True):
+            one, two = rng.integers(0, n - 1, size=n), rng.integers(0, n - 2, size=n)
+            phi = 0.5 * rng.uniform(-1.0, 1.0, size=(n, 1))[:, 0]
+            element = rng.integers(0, dim, size=(n, 1))[:, 0]
+            tried = []
+            for i in range(n):
+                k = [j for j in range(n) if j != i][one[i]]
+                m = [j for j in range(n) if j not in (i, k)][two[i]]
+                mu = count[i] / (count[i] + count[k]) if count[i] > 0.0 else 0.0
+                place, j = list(x[i]), element[i]
+                place[j] = (x[m] if following else x[i])[j] + phi[i] * (x[k][j] - x[i][j]) * mu  # eq. 7, 9
+                tried.append(place)
+            places, costs = search.all(tried)
+            for i in range(n):
+                if costs[i] < f[i]:
+                    x[i], f[i], better[i] = places[i], costs[i], True
+        count = [1.0 if better[i] else min(count[i] + 1.0, dim) for i in range(n)]
+    return search.points
+
+
 def krill(
     cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator, *, one: bool, printed: bool, sight: float
 ) -> list[Point]:
