@@ -30,10 +30,12 @@ def abc(run: Run, *, limit: int, group: int, bees: str) -> Steps:
     for _ in run.cycles():
         for onlooking in (False, True):
             chosen = roulette(run.rng, f, n) if onlooking else everyone
-            for flying in (chosen,) if bees == "together" else chosen[:, None]:
-                tried = _one_element(run, x, flying, group)
-                f_tried = yield tried
-                _take_best_of_each(x, f, failures, flying, tried, f_tried)
+            if bees == "one":
+                yield from _one_by_one(run, x, f, failures, chosen, group)
+                continue
+            tried = _one_element(run, x, chosen, group)
+            f_tried = yield tried
+            _take_best_of_each(x, f, failures, chosen, tried, f_tried)
         spent = int(failures.argmax())
         if failures[spent] > limit:
             # E Xu et al. eq. 4 adds rand·map(j) to the old place; here the place is drawn anew, uniformly.
@@ -89,15 +91,34 @@ def roulette(rng: np.random.Generator, f: Floats, count: int) -> Indices:
     return drawn
 
 
-def _one_element(run: Run, x: Floats, chosen: Indices, group: int) -> Floats:
-    """Positions (n, dim) of bees, one for each of ``chosen``: one element moved along the line from another source."""
-    n = len(x)
-    other = run.rng.integers(0, n - 1, size=len(chosen))
+def _others(run: Run, chosen: Indices, n: int) -> tuple[Indices, Floats]:
+    """For each bee another source than its own, and φ (bees, 1)."""
+    other: Indices = run.rng.integers(0, n - 1, size=len(chosen))
     other += other >= chosen
     # E Xu et al. eq. 3 prints rand for φ; here uniform in [−1, 1].
-    phi = run.rng.uniform(-1.0, 1.0, size=(len(chosen), 1))
+    return other, run.rng.uniform(-1.0, 1.0, size=(len(chosen), 1))
+
+
+def _one_element(run: Run, x: Floats, chosen: Indices, group: int) -> Floats:
+    """Positions (n, dim) of bees, one for each of ``chosen``: one element moved along the line from another source."""
+    other, phi = _others(run, chosen, len(x))
     mine = x[chosen]
     return clipped(np.where(_elements(run, len(chosen), run.dim, group), mine + phi * (mine - x[other]), mine))
+
+
+def _one_by_one(run: Run, x: Floats, f: Floats, failures: Indices, chosen: Indices, group: int) -> Steps:
+    """The flights of bees, one after the other, to the sources ``chosen``; updates all in place."""
+    other, phi = _others(run, chosen, len(x))
+    elements = run.rng.integers(0, -(-run.dim // group), size=len(chosen))
+    for i, k, step, element in zip(chosen, other, phi[:, 0], elements, strict=True):
+        part = slice(element * group, (element + 1) * group)
+        tried = x[i : i + 1].copy()
+        tried[0, part] += step * (x[i, part] - x[k, part])
+        f_tried = (yield clipped(tried))[0]
+        if f_tried < f[i]:
+            x[i], f[i], failures[i] = tried[0], f_tried, 0
+        else:
+            failures[i] += 1
 
 
 def _elements(run: Run, count: int, dim: int, group: int) -> Bools:
