@@ -8,6 +8,7 @@ judged apart, because it differs from run to run.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -136,36 +137,47 @@ def _correct(cells: Sequence[Cell]) -> None:
 
 
 def standing(judged: Mapping[str, Sequence[Mapping[str, Any]]], paper: str) -> Iterator[str]:
-    """What of a paper stands, in sentences: each measure with the claims that hold, tie and are reversed."""
-    claims = [c for c in judged["claims"] if c["paper"] == paper]
-    told = [c for c in claims if c["ranking"] in (HOLDS, TIE, REVERSED)]
+    """What of a paper stands, in sentences: each measure with the claims that hold, tie and are reversed; then what
+    each reading changes."""
+    claims = {c["claim"]: c for c in judged["claims"] if c["paper"] == paper}
+    told = [c for c in claims.values() if c["ranking"] in _WORDS]
     if not told:
         yield f"Rankings are judged from {LEAST_RUNS_TO_JUDGE} runs on: too few were made."
         return
-    impossible = sum(c["verdict"] == IMPOSSIBLE for c in claims)
-    counts = ", ".join(f"{sum(c['verdict'] == what for c in told)} {word}" for what, word in _VERBS)
-    yield f"Of {len(claims)} claims {counts}, {impossible} cannot be true as printed."
+    count = Counter(c["verdict"] for c in claims.values())
+    yield (
+        f"Of {len(claims)} claims {count[HOLDS]} hold, {count[REVERSED]} are reversed, {count[TIE]} show no "
+        f"difference, and {count[IMPOSSIBLE]} cannot be true as printed."
+    )
     for measure in dict.fromkeys(c["measure"] for c in told):
         parts = []
-        for what, word in _VERBS:
+        for ranking, word in _WORDS.items():
             places: dict[str, list[str]] = {}
             for c in told:
-                if c["measure"] == measure and c["ranking"] == what:
+                if c["measure"] == measure and c["ranking"] == ranking:
                     places.setdefault(c["words"], []).append(c["scenario"].removeprefix(f"{paper}-"))
             if places:
                 parts.append(f"{word}: " + "; ".join(f"{w} ({', '.join(at)})" for w, at in places.items()))
-        yield f"{measure.capitalize()}, as run here: " + ". ".join(p[0].upper() + p[1:] for p in parts) + "."
-    for case in judged["readings"]:
-        base = next((c for c in claims if c["claim"] == case["claim"]), None)
-        if base is not None and case["ranking"] in (HOLDS, REVERSED, TIE) and case["ranking"] != base["ranking"]:
-            yield (
-                f"{case['claim']} ({case['words']}, {case['measure']}) is {_as(base['ranking'])} as decided and "
-                f"{_as(case['ranking'])} under the reading {case['reading']} ({case['what']})."
-            )
+        yield f"{measure.capitalize()}, as run here. " + ". ".join(parts) + "."
+    for name in dict.fromkeys(r["reading"] for r in judged["readings"] if r["claim"] in claims):
+        yield _changed(name, [r for r in judged["readings"] if r["reading"] == name and r["claim"] in claims], claims)
 
 
-_VERBS = ((HOLDS, "hold"), (TIE, "show no difference"), (REVERSED, "are reversed"))
+_WORDS = {HOLDS: "Holds", REVERSED: "Reversed", TIE: "No difference"}
 
 
-def _as(ranking: str) -> str:
-    return {HOLDS: "true", TIE: "a tie", REVERSED: "reversed"}.get(ranking, ranking)
+def _changed(name: str, cases: Sequence[Mapping[str, Any]], claims: Mapping[str, Mapping[str, Any]]) -> str:
+    """Which claims of a paper come out differently under a reading."""
+    changes: dict[tuple[str, str], list[str]] = {}
+    for case in cases:
+        before, now = claims[case["claim"]]["ranking"], case["ranking"]
+        if before != now and {before, now} <= _WORDS.keys():
+            changes.setdefault((before, now), []).append(case["claim"])
+    words = "; ".join(
+        f"from “{_WORDS[before].lower()}” to “{_WORDS[now].lower()}”: {', '.join(which)}"
+        for (before, now), which in changes.items()
+    )
+    changed = sum(map(len, changes.values()))
+    return f"The reading {name} ({cases[0]['what']}) changes {changed} of {len(cases)} claims" + (
+        f", {words}." if words else "."
+    )

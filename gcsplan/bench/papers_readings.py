@@ -37,6 +37,7 @@ def _with(**parameters: object) -> Options:
 _ONE_BEE = ("one-bee-at-a-time", "each bee of ABC starts from what the bee before it left")
 _OFFSETS = MappingProxyType({"encoding": "offsets"})
 _SECTIONS = MappingProxyType({"encoding": "sections"})
+_WHOLE = MappingProxyType({"encoding": "sections-whole"})
 _POLAR, _BOX = MappingProxyType({"encoding": "polar"}), MappingProxyType({"encoding": "box"})
 _ALL = {"leaders": "all"}
 FIELD_M = 800.0
@@ -87,6 +88,10 @@ READINGS: Mapping[str, tuple[Reading, ...]] = MappingProxyType({
         _of("20-iterations", "“iteration cycle 20” is the number of iterations",
             **{name.replace("-", "_"): MappingProxyType({"iterations": 20})
                for name in ("ib-abc", "b-abc", "abc", "gwo")}),
+        _of("phi-to-1", "φ of eq. 7 and 9 from −1 to 1, as printed", ib_abc=_with(scale=1.0), b_abc=_with(scale=1.0)),
+        _of("counts-from-0", "the first Tr is 0, so no bee moves in the first cycle", ib_abc=_with(counts_from="zero")),
+        _of("whole-metres", "way points are whole metres (section 2.2)", ib_abc=_WHOLE, b_abc=_WHOLE, abc=_WHOLE,
+            gwo=_WHOLE),
         _of(*_ONE_BEE, abc=_with(bees="one")),
     ),
 })  # fmt: skip

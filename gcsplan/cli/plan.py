@@ -60,7 +60,7 @@ def plan(
         typer.Option(
             metavar="NAME",
             autocompletion=completion.encodings,
-            help="A swarm's encoding: box, sections, polar, polar-signed, bspline, offsets.",
+            help="A swarm's encoding: box, sections, sections-whole, polar, polar-signed, bspline, offsets.",
         ),
     ] = None,
     cost: Annotated[

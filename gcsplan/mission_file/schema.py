@@ -44,7 +44,7 @@ Speed = Annotated[float, Field(gt=0.0, le=300.0), AfterValidator(_no_trifle)]
 Accel = Annotated[float, Field(gt=0.0, le=100.0), AfterValidator(_no_trifle)]
 Seconds = Annotated[float, Field(ge=0.0, le=86400.0)]
 Text = Annotated[str, Field(min_length=1, max_length=300)]
-Encoding = Literal["box", "sections", "polar", "polar-signed", "bspline", "offsets"]
+Encoding = Literal["box", "sections", "sections-whole", "polar", "polar-signed", "bspline", "offsets"]
 SwarmCost = Literal["krill", "ssgwo", "msfoa", "abo", "ib-abc"]
 
 

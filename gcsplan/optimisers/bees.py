@@ -30,10 +30,12 @@ def abc(run: Run, *, limit: int, group: int, bees: str) -> Steps:
     for _ in run.cycles():
         for onlooking in (False, True):
             chosen = roulette(run.rng, f, n) if onlooking else everyone
-            for flying in (chosen,) if bees == "together" else chosen[:, None]:
-                tried = _one_element(run, x, flying, group)
-                f_tried = yield tried
-                _take_best_of_each(x, f, failures, flying, tried, f_tried)
+            if bees == "one":
+                yield from _one_by_one(run, x, f, failures, chosen, group)
+                continue
+            tried = _one_element(run, x, chosen, group)
+            f_tried = yield tried
+            _take_best_of_each(x, f, failures, chosen, tried, f_tried)
         spent = int(failures.argmax())
         if failures[spent] > limit:
             # E Xu et al. eq. 4 adds rand·map(j) to the old place; here the place is drawn anew, uniformly.
@@ -42,12 +44,14 @@ def abc(run: Run, *, limit: int, group: int, bees: str) -> Steps:
             failures[spent] = 0
 
 
-def ib_abc(run: Run, *, feedback: bool, scale: float, spent_share: float, group: int) -> Steps:
+def ib_abc(run: Run, *, feedback: bool, scale: float, spent_share: float, group: int, counts_from: str) -> Steps:
     """IB-ABC, eq. 7-10: feedback μ from counts of failures, followers that combine two other sources, and scouts only
     when the mean count is high.
 
-    ``scale`` bounds φ; ``spent_share`` is γ. Without ``feedback`` μ is 1: B-ABC, in our reading.
+    ``scale`` bounds φ; ``spent_share`` is γ. Without ``feedback`` μ is 1: B-ABC, in our reading. ``counts_from`` is the
+    first count of each source, "one" or "zero"; with zero, as the text says, μ = 0/0 of the first cycle is taken as 0.
     """
+    require("ib-abc", "counts_from", counts_from, ("one", "zero"))
     if not 0.0 < spent_share < 1.0:
         raise InputError(f"ib-abc: spent_share must lie between 0 and 1, given {spent_share}")
     x = run.first()
@@ -55,7 +59,7 @@ def ib_abc(run: Run, *, feedback: bool, scale: float, spent_share: float, group:
     n, dim = x.shape
     elements = -(-dim // group)  # D
     # E eq. 7: μ is 0/0 at the start; here the counts Tr are kept within [1, D] (Th = L = D).
-    count = np.ones(n)
+    count = np.full(n, 1.0 if counts_from == "one" else 0.0)
     for _ in run.cycles():
         # At least 1, because with D = 1 even sources that just improved have a count above γD.
         if count.mean() > max(spent_share * elements, 1.0):  # eq. 10
@@ -68,7 +72,7 @@ def ib_abc(run: Run, *, feedback: bool, scale: float, spent_share: float, group:
         for following in (False, True):
             k, m = partners(run.rng, n, n, 2)
             phi = scale * run.rng.uniform(-1.0, 1.0, size=(n, 1))
-            mu = (count / (count + count[k]))[:, None] if feedback else 1.0
+            mu = (count / np.maximum(count + count[k], 1.0))[:, None] if feedback else 1.0
             # Eq. 7 starts from the source itself, eq. 9 from another. The paper assigns followers to sources by
             # descending fitness, one each; when all fly at once this means one follower for every source.
             base = x[m] if following else x
@@ -87,15 +91,34 @@ def roulette(rng: np.random.Generator, f: Floats, count: int) -> Indices:
     return drawn
 
 
-def _one_element(run: Run, x: Floats, chosen: Indices, group: int) -> Floats:
-    """Positions (n, dim) of bees, one for each of ``chosen``: one element moved along the line from another source."""
-    n = len(x)
-    other = run.rng.integers(0, n - 1, size=len(chosen))
+def _others(run: Run, chosen: Indices, n: int) -> tuple[Indices, Floats]:
+    """For each bee another source than its own, and φ (bees, 1)."""
+    other: Indices = run.rng.integers(0, n - 1, size=len(chosen))
     other += other >= chosen
     # E Xu et al. eq. 3 prints rand for φ; here uniform in [−1, 1].
-    phi = run.rng.uniform(-1.0, 1.0, size=(len(chosen), 1))
+    return other, run.rng.uniform(-1.0, 1.0, size=(len(chosen), 1))
+
+
+def _one_element(run: Run, x: Floats, chosen: Indices, group: int) -> Floats:
+    """Positions (n, dim) of bees, one for each of ``chosen``: one element moved along the line from another source."""
+    other, phi = _others(run, chosen, len(x))
     mine = x[chosen]
     return clipped(np.where(_elements(run, len(chosen), run.dim, group), mine + phi * (mine - x[other]), mine))
+
+
+def _one_by_one(run: Run, x: Floats, f: Floats, failures: Indices, chosen: Indices, group: int) -> Steps:
+    """The flights of bees, one after the other, to the sources ``chosen``; updates all in place."""
+    other, phi = _others(run, chosen, len(x))
+    elements = run.rng.integers(0, -(-run.dim // group), size=len(chosen))
+    for i, k, step, element in zip(chosen, other, phi[:, 0], elements, strict=True):
+        part = slice(element * group, (element + 1) * group)
+        tried = x[i : i + 1].copy()
+        tried[0, part] += step * (x[i, part] - x[k, part])
+        f_tried = (yield clipped(tried))[0]
+        if f_tried < f[i]:
+            x[i], f[i], failures[i] = tried[0], f_tried, 0
+        else:
+            failures[i] += 1
 
 
 def _elements(run: Run, count: int, dim: int, group: int) -> Bools:

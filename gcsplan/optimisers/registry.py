@@ -124,7 +124,7 @@ _ENTRIES = (
         population=20,
         iterations=200,
         evaluations_per_iteration="2P, and P/2 for scouts",
-        defaults=_set(feedback=False, scale=0.5, spent_share=0.5, group=1),
+        defaults=_set(feedback=False, scale=0.5, spent_share=0.5, group=1, counts_from="one"),
         least_population=3,
     ),
     Entry(
@@ -136,7 +136,7 @@ _ENTRIES = (
         population=20,
         iterations=200,
         evaluations_per_iteration="2P, and P/2 for scouts",
-        defaults=_set(feedback=True, scale=0.5, spent_share=0.5, group=1),
+        defaults=_set(feedback=True, scale=0.5, spent_share=0.5, group=1, counts_from="one"),
         least_population=3,
     ),
     Entry(

@@ -190,6 +190,7 @@ def test_an_error_of_the_cost_closes_the_rule_and_comes_through() -> None:
         ({"optimiser": "krill", "parameters": {"moves": "two"}}, "one of together, one"),
         ({"optimiser": "krill", "parameters": {"crowd": "big"}}, "one of ranks, printed"),
         ({"optimiser": "abc", "parameters": {"bees": "two"}}, "one of together, one"),
+        ({"optimiser": "ib-abc", "parameters": {"counts_from": "two"}}, "one of one, zero"),
         ({"optimiser": "msfoa", "parameters": {"beyond": "kept"}}, "one of clipped, redrawn"),
         ({"optimiser": "ssgwo", "parameters": {"factor": "linear"}}, "one of cosine, printed"),
         ({"optimiser": "msfoa", "population": 4}, "5 swarms need a population of 5"),

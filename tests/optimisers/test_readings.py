@@ -21,6 +21,8 @@ READINGS: dict[str, tuple[str, dict[str, object], Oracle]] = {
     "ssgwo, α": ("ssgwo", {"leaders": "all", "trial": "alpha"}, lambda *a: swarms.ssgwo_all(*a, trial="alpha")),
     "sogwo": ("sogwo", {"alike": "distances", "span": 8.0}, lambda *a: swarms.sogwo_published(*a, span=8.0)),
     "abc": ("abc", {"bees": "one", "limit": 3}, lambda *a: swarms.one_bee(*a, limit=3)),
+    "abc, pairs": ("abc", {"bees": "one", "limit": 3, "group": 2}, lambda *a: swarms.one_bee(*a, limit=3, group=2)),
+    "ib-abc": ("ib-abc", {"counts_from": "zero"}, lambda *a: swarms.ib_abc_from_zero(*a)),
     "krill, one": (
         "krill", {"moves": "one", "attempts": 3, "sight": 0.4},
         lambda *a: swarms.krill(*a, one=True, printed=False, sight=0.4),
@@ -66,7 +68,9 @@ def test_a_reading_evaluates_the_points_of_the_text(name: str, function: str) ->
 def test_each_reading_differs_from_what_is_decided() -> None:
     cost = FUNCTIONS["f7"].on_unit_box(DIM, shifted=True)
     for name, (optimiser, parameters, _) in READINGS.items():
-        asked = {k: v for k, v in parameters.items() if k in ("swarms", "sight", "attempts", "limit", "global_step")}
+        asked = {
+            k: v for k, v in parameters.items() if k in ("swarms", "sight", "attempts", "limit", "group", "global_step")
+        }
         plain, other = (
             minimise(optimiser, cost, DIM, population=N, iterations=ROUNDS, seed=12, parameters=p).history.cost
             for p in (asked, parameters)

@@ -106,40 +106,75 @@ def sogwo_published(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Ge
     return search.points
 
 
-def one_bee(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator, limit: int) -> list[Point]:
+def one_bee(
+    cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator, limit: int, group: int = 1
+) -> list[Point]:
     """ABC (Karaboga 2005): each bee flies from what the bee before it left; one failure counter for each source."""
     search = Search(cost)
     x, f = first(search, rng, n, dim)
     failures = [0] * n
 
-    def fly(i: int) -> None:
-        k = int(rng.integers(0, n - 1, size=1)[0])
-        k += k >= i
-        phi = float(rng.uniform(-1.0, 1.0, size=(1, 1))[0, 0])
-        j = int(rng.integers(0, dim, size=(1, 1))[0, 0])
-        tried = list(x[i])
-        tried[j] += phi * (x[i][j] - x[k][j])
-        place, found = search(tried)
-        if found < f[i]:
-            x[i], f[i], failures[i] = place, found, 0
-        else:
-            failures[i] += 1
+    def fly(sources: list[int]) -> None:
+        others, phi = rng.integers(0, n - 1, size=n), rng.uniform(-1.0, 1.0, size=(n, 1))[:, 0]
+        for i, r, p, j in zip(sources, others, phi, rng.integers(0, dim // group, size=n), strict=True):
+            k = [source for source in range(n) if source != i][r]
+            tried = list(x[i])
+            for d in range(j * group, (j + 1) * group):
+                tried[d] += p * (x[i][d] - x[k][d])
+            place, found = search(tried)
+            if found < f[i]:
+                x[i], f[i], failures[i] = place, found, 0
+            else:
+                failures[i] += 1
+
+    def told(r: float) -> int:
+        fitness = [1.0 / (1.0 + v) for v in f]
+        at, total = 0, fitness[0]
+        while total <= r * sum(fitness):
+            at += 1
+            total += fitness[at]
+        return at
 
     for _ in range(rounds):
-        for i in range(n):
-            fly(i)
-        fitness = [1.0 / (1.0 + v) for v in f]
-        draws = rng.random(n)  # all onlookers choose by what the employed bees have told
-        for r in draws:
-            at, total = 0, fitness[0]
-            while total <= r * sum(fitness):
-                at += 1
-                total += fitness[at]
-            fly(at)
+        fly(list(range(n)))
+        fly([told(r) for r in rng.random(n)])  # all onlookers choose by what the employed bees have told
         spent = failures.index(max(failures))
         if failures[spent] > limit:
             x[spent], f[spent] = search(rng.random(dim))
             failures[spent] = 0
+    return search.points
+
+
+def ib_abc_from_zero(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator) -> list[Point]:
+    """IB-ABC with Tr from 0: φ up to 0.5, γ 0.5; all bees of a kind at once."""
+    search = Search(cost)
+    x, f = first(search, rng, n, dim)
+    count = [0.0] * n
+    for _ in range(rounds):
+        if sum(count) / n > max(0.5 * dim, 1.0):  # eq. 10
+            best = f.index(min(f))
+            chosen = rng.permutation([i for i in range(n) if i != best])[: round(0.5 * n)]
+            places, costs = search.all(rng.random((len(chosen), dim)))
+            for i, place, found in zip(chosen, places, costs, strict=True):
+                x[i], f[i], count[i] = place, found, 1.0
+        better = [False] * n
+        for following in (False, True):
+            one, two = rng.integers(0, n - 1, size=n), rng.integers(0, n - 2, size=n)
+            phi = 0.5 * rng.uniform(-1.0, 1.0, size=(n, 1))[:, 0]
+            element = rng.integers(0, dim, size=(n, 1))[:, 0]
+            tried = []
+            for i in range(n):
+                k = [j for j in range(n) if j != i][one[i]]
+                m = [j for j in range(n) if j not in (i, k)][two[i]]
+                mu = count[i] / (count[i] + count[k]) if count[i] > 0.0 else 0.0
+                place, j = list(x[i]), element[i]
+                place[j] = (x[m] if following else x[i])[j] + phi[i] * (x[k][j] - x[i][j]) * mu  # eq. 7, 9
+                tried.append(place)
+            places, costs = search.all(tried)
+            for i in range(n):
+                if costs[i] < f[i]:
+                    x[i], f[i], better[i] = places[i], costs[i], True
+        count = [1.0 if better[i] else min(count[i] + 1.0, dim) for i in range(n)]
     return search.points
 
 

@@ -1,4 +1,4 @@
-"""Encodings: six mappings, by name, from a vector in the unit box to the control points of a path.
+"""Encodings: seven mappings, by name, from a vector in the unit box to the control points of a path.
 
 Each encodes one stage, from a terminal to the next; a path with via points is its stages one after the other. The
 variables of one way point are adjacent, so that an optimiser can change them together (its parameter ``group``).
@@ -84,6 +84,12 @@ def _sections(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> Non
     out[..., 2] = low + u[..., 1] * (high - low)
 
 
+def _sections_whole(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
+    # IB-ABC, section 2.2: "points composed of three integers".
+    _sections(scene, a, b, u, out)
+    np.rint(out, out=out)
+
+
 def _offsets(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
     _flat(scene, a, b, _stations(u.shape[1]), 2.0 * OFFSET * (u[..., 0] - 0.5), out)
     _altitude(scene, u[..., 1], out)
@@ -102,6 +108,7 @@ ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
         for e in (
             Encoding("box", "each point anywhere in the flight volume", 3, 5, _box),
             Encoding("sections", "a point on each of K planes across the track, floor to ceiling", 2, 10, _sections),
+            Encoding("sections-whole", "sections, with each coordinate a whole metre", 2, 10, _sections_whole),
             Encoding("polar", "a box whose coordinates are the radii of two hidden variables", 6, 5, _polar),
             Encoding("polar-signed", "polar, where the hidden variables may be negative", 6, 5, _polar_signed),
             Encoding("bspline", "few points, each about its own station of the track", 3, 8, _bspline),

@@ -110,6 +110,13 @@ def test_sections_stand_across_the_track_between_floor_and_ceiling(scene: Scene)
     assert abs(above[0] - 75.0) < 0.5
 
 
+def test_whole_sections_are_sections_rounded_to_metres(scene: Scene) -> None:
+    u = np.random.default_rng(4).random((3, 8))
+    plain, whole = (Code.of(name, scene, 4).controls(u) for name in ("sections", "sections-whole"))
+    assert (whole[:, 1:-1] == np.round(plain[:, 1:-1])).all()
+    assert (whole[:, [0, -1]] == plain[:, [0, -1]]).all()
+
+
 def test_offsets_reach_a_quarter_aside_at_altitudes_of_the_volume(scene: Scene) -> None:
     code = Code.of("offsets", scene, 1)
     point = code.controls(np.array([[1.0, 0.25]]))[0][1]

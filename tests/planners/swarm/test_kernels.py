@@ -210,7 +210,9 @@ def test_a_leap_through_a_cylinder_between_two_samples_is_charged() -> None:
     assert cost.of_controls(controls)[0] > 3000.0
 
 
-@pytest.mark.parametrize("encoding", ["box", "sections", "polar", "polar-signed", "bspline", "offsets"])
+@pytest.mark.parametrize(
+    "encoding", ["box", "sections", "sections-whole", "polar", "polar-signed", "bspline", "offsets"]
+)
 def test_no_two_places_of_a_path_that_are_looked_at_are_far_apart(encoding: str) -> None:
     cost = cost_of("krill", 12, encoding)
     for path in cost.curve.samples(controls_of(cost, 30)):

@@ -54,7 +54,9 @@ def test_every_swarm_solves_a_toy_map_and_says_what_it_did(name: str) -> None:
 
 
 @pytest.mark.first_quick
-@pytest.mark.parametrize("encoding", ["box", "sections", "polar", "polar-signed", "bspline", "offsets"])
+@pytest.mark.parametrize(
+    "encoding", ["box", "sections", "sections-whole", "polar", "polar-signed", "bspline", "offsets"]
+)
 def test_every_encoding_and_cost_go_together(encoding: str) -> None:
     for cost in ("krill", "ssgwo", "msfoa", "abo", "ib-abc"):
         problem = toy(encoding=encoding, cost=cost, iterations=8, population=30)
