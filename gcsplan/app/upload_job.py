@@ -12,6 +12,7 @@ from gcsplan.mavlink.build.fence import Fence
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.protocol.machine import Progress
 from gcsplan.vehicle import Vehicle
+from gcsplan.world.terrain_grid import Ground
 from gcsplan.world.world import World
 
 SIM, LINK = "sim", "link"
@@ -38,6 +39,7 @@ class UploadJob:
     """One mission for one vehicle at one URL (`SIM` for a loopback vehicle of its own).
 
     ``way_home`` is None unless it was judged. ``home_required``: a vehicle that returns at another altitude is refused.
+    ``ground`` is what a vehicle that flies the terrain frame is sent.
     """
 
     name: str
@@ -51,6 +53,7 @@ class UploadJob:
     fence: Fence | None = None
     way_home: WayHome | None = None
     home_required: bool = False
+    ground: Ground | None = None
 
 
 @dataclass(frozen=True, eq=False)

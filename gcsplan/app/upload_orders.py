@@ -67,6 +67,7 @@ def order_of(
         rtl_rel_home_m=job.rtl_rel_home_m if job.way_home is None else job.way_home.rtl_rel_home_m,
         advised_rel_home_m=None if job.way_home is None else job.way_home.set_rel_home_m,
         simulated=simulated,
+        terrain=None if simulated else job.ground,
         timeout_s=options.timeout_s,
         listen_s=listen_s,
     )
@@ -88,6 +89,7 @@ def judge_on_board(job: UploadJob, *, allow_unjudged: bool, simulated: bool = Fa
     if job.world is None or job.vehicle is None:
         return None
     from gcsplan.mavlink.link.parameters import lean_shortage
+    from gcsplan.mavlink.link.terrain import terrain_error_m
 
     world, vehicle = job.world, job.vehicle
     planned_m_s = job.mission.commanded_m_s
@@ -105,9 +107,10 @@ def judge_on_board(job: UploadJob, *, allow_unjudged: bool, simulated: bool = Fa
         flown, tuning = replace(read_back, home=job.mission.home), Tuning.of(values)
         returns_m = None if simulated else return_on_board_m(values)
         rtl_rel_home_m = job.rtl_rel_home_m if returns_m is None else returns_m
-        verdict = judge(
-            flown, vehicle, world, rtl_rel_home_m=rtl_rel_home_m, terrain_error_m=job.terrain_error_m, tuning=tuning
-        )
+        spacing = values.get("TERRAIN_SPACING", math.nan)
+        spaced = world.with_posts(int(spacing)) if spacing >= 1.0 else world
+        error_m = terrain_error_m(values, job.terrain_error_m)
+        verdict = judge(flown, vehicle, spaced, rtl_rel_home_m=rtl_rel_home_m, terrain_error_m=error_m, tuning=tuning)
         if verdict.safe is True or (verdict.safe is None and allow_unjudged):
             return against_fence(job, flown, rtl_rel_home_m, tuning)
         return verdict.describe()

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from gcsplan.app.checking import Checked, check_files, split_name
 from gcsplan.app.fencing import not_fenced, upload_fences
+from gcsplan.app.ground import MissionGround
 from gcsplan.app.model import Plan
 from gcsplan.app.rollback import rolled_back
 from gcsplan.app.upload_job import LINK, SIM, JobResult, ProgressCall, UploadJob, UploadOptions
@@ -104,10 +105,11 @@ def jobs_of(
     ``homes``: ways home that were judged; ``home_required``: they must be safe.
     """
     source = plan.source
+    ground = MissionGround(source)
     return [
         UploadJob(
             v.name, where[v.name], v.mission, v.verdict, v.request.vehicle, plan.world, v.request.rtl_rel_home_m,
-            source.terrain_error_m, way_home=homes.get(v.name), home_required=home_required,
+            source.terrain_error_m, way_home=homes.get(v.name), home_required=home_required, ground=ground,
         )
         for v in plan.vehicles if v.name in where
     ]  # fmt: skip
@@ -123,7 +125,8 @@ def jobs_of_files(source: MissionFile, checked: Sequence[Checked], word: str) ->
     missing = [c.vehicle.name for c in checked if c.vehicle.name not in to]
     if missing:
         raise UsageError(f"--to {word} says nothing of {', '.join(missing)}")
-    return [_job(c, to[c.vehicle.name]) for c in checked]
+    ground = MissionGround(source)
+    return [replace(_job(c, to[c.vehicle.name]), ground=ground) for c in checked]
 
 
 def _job(c: Checked, url: str) -> UploadJob:

@@ -347,7 +347,7 @@ class MissionKeys(Keys):
     frame: FrameKeys | None = None
     """Makes this a mission in local metres, like the papers' worlds."""
     terrain_error_m: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
-    """With `altitude_frame: terrain`: largest error of the vehicle's own terrain."""
+    """With `altitude_frame: terrain`: largest error of the vehicle's terrain; at an upload the vehicle decides."""
 
 
 TOP_KEYS = tuple(MissionKeys.model_fields)

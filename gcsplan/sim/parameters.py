@@ -51,6 +51,7 @@ _ARDUPILOT = {
     "RALLY_TOTAL": _i(0, INT8),
     "SYSID_MYGCS": _i(255, INT16),
     "TERRAIN_ENABLE": _i(1, INT8),
+    "TERRAIN_OFS_MAX": _r(30.0),
     "TERRAIN_SPACING": _i(100, INT16),
 }
 

@@ -27,6 +27,7 @@ from gcsplan.mavlink.link.recheck import Judge as JudgeState
 from gcsplan.mavlink.link.recheck import Recheck
 from gcsplan.mavlink.link.results import UploadResult, outcome_word
 from gcsplan.mavlink.link.steps import discover_steps, parameter_steps
+from gcsplan.mavlink.link.terrain import TERRAIN_GROUPS, flies_terrain, terrain_steps
 from gcsplan.mavlink.link.watch import VehicleState, Watch
 from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA, max_items
 from gcsplan.mavlink.mission.autopilots import PX4 as MAV_PX4
@@ -45,6 +46,7 @@ from gcsplan.mavlink.protocol.transfer import (
     VerifiedUpload,
 )
 from gcsplan.vehicle import Autopilot
+from gcsplan.world.terrain_grid import Ground
 
 ProgressCall = Callable[[str, Progress], None]
 Judge = Callable[[Mission, Mapping[str, float]], str | None]
@@ -64,6 +66,7 @@ class SessionOptions:
     mission's home. ``timeout_s``: longest time without progress of a transfer (see `Patience`); it also limits
     ``discover_s`` and ``standby_s``. The parameters on board are compared with ``rtl_rel_home_m`` (the return altitude
     that was checked), ``advised_rel_home_m`` (the one to set, if another is better) and ``expected_parameters``.
+    ``terrain``: the ground for a mission in the terrain frame, which is then served and compared (`link.terrain`).
     """
 
     unchecked: bool = False
@@ -73,6 +76,7 @@ class SessionOptions:
     rtl_rel_home_m: float | None = None
     advised_rel_home_m: float | None = None
     expected_parameters: Mapping[str, float] = field(default_factory=dict)
+    terrain: Ground | None = None
     read_parameters: bool = True
     discover_s: float = 10.0
     listen_s: float = 1.5
@@ -130,6 +134,8 @@ def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
     ))  # fmt: skip
     against, values = yield from _parameters(channel, task, state, watch, recheck)
     warnings += against
+    noted, off = yield from terrain_steps(channel, state.address, task.items, values, options.terrain, recheck.note)
+    warnings, values = warnings + noted, values | off
     failed = task.judge(task.mission, values) if task.mission and task.judge and options.read_parameters else None
     if failed is not None:
         raise VehicleRefused(
@@ -202,7 +208,8 @@ def _parameters(
     warnings: list[str] = []
     values: dict[str, float] = {}
     if mission and options.read_parameters:
-        values = yield from parameter_steps(channel, state, GROUPS[task.autopilot], watch, recheck)
+        groups = GROUPS[task.autopilot] + (TERRAIN_GROUPS if flies_terrain(task.items) else ())
+        values = yield from parameter_steps(channel, state, groups, watch, recheck)
         warnings += judge_parameters(
             values, mission, rtl_rel_home_m=options.rtl_rel_home_m, advised_rel_home_m=options.advised_rel_home_m,
             expected=options.expected_parameters,

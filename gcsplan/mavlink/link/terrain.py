@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import islice, pairwise
 from typing import Any
 
 import numpy as np
@@ -20,8 +20,19 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 from gcsplan.arrays import Floats
 from gcsplan.errors import GcsplanError
 from gcsplan.mavlink.link.link import Channel, Heard, Steps
+from gcsplan.mavlink.mission.mission import TERRAIN, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
-from gcsplan.world.terrain_grid import ALL_PARTS, Block, Ground, PostHeights, TerrainGrid, known_parts, part_of
+from gcsplan.world.terrain_grid import (
+    ALL_PARTS,
+    NEAR_ENOUGH_M,
+    SPACING_M,
+    Block,
+    Ground,
+    PostHeights,
+    TerrainGrid,
+    known_parts,
+    part_of,
+)
 
 LEAST_SPACING_M, MOST_SPACING_M = 5, 1000
 MOST_SPACINGS = 4
@@ -223,11 +234,14 @@ def compare_steps(
     posts: PostHeights,
     *,
     patience_s: float,
+    most_s: float = math.inf,
     progress: Callable[[int, int], None] | None = None,
+    note: Callable[[Heard, float], None] | None = None,
 ) -> Steps[Compared]:
     """Ask with TERRAIN_CHECK what the vehicle reads at each place, until it has all, or nothing new for so long.
 
     The places are asked block by block, for its cache holds few blocks; a service on the same link sends what it lacks.
+    ``most_s``: the longest time for all; ``note``: is told of every message.
     """
     clock = channel.link.clock
     at = np.array(places_e7, float).reshape(-1, 2)
@@ -239,8 +253,8 @@ def compare_steps(
     theirs = np.full(len(places_e7), np.nan)
     ask_at: dict[tuple[int, int], float] = {}
     pending = loaded = 0
-    moved_at = clock()
-    while left and clock() < moved_at + patience_s:
+    began = moved_at = clock()
+    while left and clock() < min(moved_at + patience_s, began + most_s):
         now = clock()
         soon = list(islice(left, _OUTSTANDING))
         blocks = list(dict.fromkeys(block_of[place] for place in soon))[:_BLOCKS_AT_ONCE]
@@ -251,6 +265,8 @@ def compare_steps(
         yield now + _ANSWER_S / 4
         for heard in channel.take():
             m: Any = heard.message
+            if note:
+                note(heard, clock())
             if heard.late or heard.source != to or m.get_type() != "TERRAIN_REPORT":
                 continue
             moved_at = clock() if (m.loaded, m.pending) != (loaded, pending) else moved_at
@@ -268,3 +284,92 @@ def compare_steps(
             if progress:
                 progress(len(places_e7) - len(left), len(places_e7))
     return Compared(tuple(places_e7), theirs - ours, pending, loaded)
+
+
+OFF = "terrain_off_m"
+"""Beside the parameters that were read: how far the vehicle's heights are off those that it was sent, m, measured."""
+
+TERRAIN_GROUPS = (("TERRAIN_ENABLE",), ("TERRAIN_SPACING",), ("TERRAIN_OFS_MAX",))
+"""Parameters that are read, too, before a mission in the terrain frame is sent."""
+
+PLACES = 40
+"""Places that are compared before a mission is sent."""
+_UPLOAD_PATIENCE_S, _UPLOAD_MOST_S = 10.0, 45.0
+
+
+_TERRAIN_FRAMES = (TERRAIN, 11)
+
+
+def flies_terrain(items: Sequence[MissionItem]) -> bool:
+    """Whether a mission has an item in the terrain frame."""
+    return any(item.frame in _TERRAIN_FRAMES for item in items)
+
+
+def terrain_error_m(values: Mapping[str, float], judged_m: float) -> float:
+    """The error of terrain-frame legs, m, by what was read from the vehicle; ``judged_m`` if nothing was.
+
+    ArduPilot shifts all its terrain by at most TERRAIN_OFS_MAX when it arms.
+    """
+    shift_m, off_m = values.get("TERRAIN_OFS_MAX", math.nan), values.get(OFF, math.nan)
+    if not math.isfinite(shift_m) or shift_m < 0.0:
+        return judged_m if math.isnan(off_m) else max(judged_m, off_m)
+    return max(judged_m, shift_m) if math.isnan(off_m) else shift_m + off_m
+
+
+def places_along(items: Sequence[MissionItem], count: int = PLACES) -> list[tuple[int, int]]:
+    """Places, 1e-7°, on the legs to the items in the terrain frame, evenly on each."""
+    placed = [item for item in items if item.x or item.y]
+    legs = [(a, b) for a, b in pairwise(placed) if b.frame in _TERRAIN_FRAMES]
+    if not legs:
+        return []
+    chosen = legs[:: math.ceil(len(legs) / count)]
+    parts = np.linspace(1.0, 0.0, max(1, count // len(chosen)), endpoint=False)
+    turn = 3_600_000_000
+    return [
+        (round(a.x + f * (b.x - a.x)), a.y + round(f * ((b.y - a.y + turn // 2) % turn - turn // 2)))
+        for a, b in chosen
+        for f in parts.tolist()
+    ]
+
+
+def terrain_steps(
+    channel: Channel,
+    to: Address,
+    items: Sequence[MissionItem],
+    values: Mapping[str, float],
+    ground: Ground | None,
+    note: Callable[[Heard, float], None],
+) -> Steps[tuple[list[str], dict[str, float]]]:
+    """Serve a vehicle the terrain of a mission and compare what it then reads under it.
+
+    Return warnings, and `OFF` if it read anything. Nothing is done without ``ground`` or items in the terrain frame.
+    """
+    places = places_along(items)
+    if ground is None or not places:
+        return [], {}
+    if values.get("TERRAIN_ENABLE") == 0.0:
+        return ["TERRAIN_ENABLE is 0 on board: it knows no terrain and does not fly the terrain frame"], {}
+    spacing = values.get("TERRAIN_SPACING", float(SPACING_M))
+    if not LEAST_SPACING_M <= spacing <= MOST_SPACING_M:
+        return [f"TERRAIN_SPACING is {spacing:g} on board: the terrain that it reads was not compared"], {}
+    service = TerrainService(ground)
+    channel.link.serve(channel.sysid, service.steps)
+    compared = yield from compare_steps(
+        channel, to, places, service.posts(int(spacing)), patience_s=_UPLOAD_PATIENCE_S, most_s=_UPLOAD_MOST_S,
+        note=note,
+    )  # fmt: skip
+    warnings = list(service.served[channel.sysid].notes)
+    if compared.read < len(places):
+        warnings.append(
+            f"the vehicle has no terrain yet at {len(places) - compared.read} of {len(places)} places under the "
+            "mission; it does not arm before it has: gcsplan terrain serve --until-loaded gives it all"
+        )
+    if not compared.read:
+        return warnings, {}
+    if compared.worst_m > NEAR_ENOUGH_M and compared.worst_at is not None:
+        lat, lon = compared.worst_at
+        warnings.append(
+            f"the vehicle reads terrain {compared.worst_m:.1f} m off that of the mission at {lat:.6f}, {lon:.6f}: it "
+            "holds terrain from elsewhere (remove it from its SD card), or shifted it when it was armed (restart it)"
+        )
+    return warnings, {OFF: compared.worst_m}

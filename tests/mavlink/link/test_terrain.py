@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 import numpy as np
 import pymavlink.dialects.v20.ardupilotmega as dialect
 import pytest
@@ -10,11 +13,23 @@ from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.mavlink.link.frames import FrameWriter, Signing
 from gcsplan.mavlink.link.link import Link, PumpJob, Steps, pump
-from gcsplan.mavlink.link.terrain import Compared, TerrainService, compare_steps
+from gcsplan.mavlink.link.results import UploadResult
+from gcsplan.mavlink.link.session import SessionOptions, upload_mission
+from gcsplan.mavlink.link.terrain import (
+    OFF,
+    Compared,
+    TerrainService,
+    compare_steps,
+    places_along,
+    terrain_error_m,
+)
+from gcsplan.mavlink.mission import commands as cmd
+from gcsplan.mavlink.mission.mission import RELATIVE, TERRAIN, Home, Mission, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.sim.hub import Hub
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
+from gcsplan.world.terrain_grid import Ground
 from tests.campaigns.air import Air, Radio
 
 AT = (36.59, -84.25)
@@ -176,3 +191,71 @@ def test_the_vehicle_is_asked_for_its_requests_only_if_it_does_not_send_them() -
         link.serve(1, TerrainService(hills).steps)
         serve_for(link, 30.0)
     assert asked == [133, 136]
+
+
+def mission() -> Mission:
+    """Two legs in the terrain frame beside the vehicle."""
+    at = [(round((AT[0] + d) * 1e7), round((AT[1] + d) * 1e7)) for d in (0.0, 0.004, 0.008)]
+    items = [MissionItem(cmd.TAKEOFF, RELATIVE, x=at[0][0], y=at[0][1], z=100.0)]
+    items += [MissionItem(cmd.WAYPOINT, TERRAIN, x=a, y=o, z=100.0) for a, o in at[1:]]
+    return Mission(Autopilot.ARDUCOPTER, Home.at(*AT, 400.0), tuple(items), "uav1", 1)
+
+
+def uploaded(air: Air, ground: Ground | None, **more: object) -> tuple[UploadResult, dict[str, float]]:
+    """The result of an upload, and the values that it was judged with."""
+    told: dict[str, float] = {}
+
+    def judge(_: Mission, values: Mapping[str, float]) -> None:
+        told.update(values)
+
+    options = SessionOptions(unchecked=True, terrain=ground, **more)  # type: ignore[arg-type]
+    with air.link() as link:
+        return upload_mission(link, mission(), options=options, judge=judge), told
+
+
+def test_an_upload_serves_the_terrain_and_measures_what_the_vehicle_reads() -> None:
+    result, values = uploaded(air_with_vehicle(), hills)
+    assert result.outcome == "accepted"
+    assert values["TERRAIN_OFS_MAX"] == 30.0
+    assert values[OFF] < 0.001
+    assert not any("terrain" in warning for warning in result.warnings)
+    assert terrain_error_m(values, 30.0) == pytest.approx(30.0, abs=0.001)
+
+
+def test_an_upload_goes_on_without_terrain_and_says_so() -> None:
+    result, values = uploaded(air_with_vehicle(), lambda a, o: np.full(np.shape(a), np.nan))
+    assert result.outcome == "accepted"
+    assert OFF not in values
+    assert any("no terrain yet at 40 of 40 places" in warning for warning in result.warnings)
+
+
+def test_a_vehicle_without_terrain_is_told() -> None:
+    air = Air(1, Radio(), limit_s=900.0)
+    one = LoopbackVehicle(
+        1, Autopilot.ARDUCOPTER, lat_deg=AT[0], lon_deg=AT[1], amsl_m=400.0, parameters={"TERRAIN_ENABLE": 0}
+    )
+    air.put("vehicle", Hub([one], always="ground station"))
+    result, values = uploaded(air, hills)
+    assert any("TERRAIN_ENABLE is 0" in warning for warning in result.warnings)
+    assert OFF not in values
+
+
+def test_the_error_is_what_the_vehicle_may_shift_and_what_it_reads_amiss() -> None:
+    assert terrain_error_m({}, 30.0) == 30.0
+    assert terrain_error_m({"TERRAIN_OFS_MAX": 5.0, OFF: 0.25}, 30.0) == 5.25
+    assert terrain_error_m({"TERRAIN_OFS_MAX": 50.0, OFF: 0.25}, 30.0) == 50.25
+    # What was not measured makes nothing better.
+    assert terrain_error_m({"TERRAIN_OFS_MAX": 5.0}, 30.0) == 30.0
+    assert terrain_error_m({"TERRAIN_OFS_MAX": 50.0}, 30.0) == 50.0
+    assert terrain_error_m({OFF: 44.0}, 30.0) == 44.0
+
+
+def test_places_lie_on_the_legs_in_the_terrain_frame_alone() -> None:
+    items = mission().items
+    assert len(places_along(items)) == 40
+    assert places_along(items)[0] == (items[1].x, items[1].y)
+    assert places_along([replace(i, frame=RELATIVE) for i in items]) == []
+    many = [replace(items[1], x=items[1].x + 1000 * k) for k in range(650)]
+    assert len(places_along([items[0], *many])) <= 40
+    across = [replace(items[1], y=y) for y in (1_799_000_000, -1_799_000_000)]
+    assert all(abs(lon) > 1_798_999_999 for _, lon in places_along(across))
