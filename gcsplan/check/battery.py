@@ -1,9 +1,10 @@
 """The battery along a mission: what each leg uses, and whether the rest is enough for the return from every point.
 
 The model is R1/R2 (`gcsplan.vehicle.Energy`): a return costs R1 for its climb and its descent and R2 for the straight
-line home. Along a straight leg the energy spent is linear, and the energy of the return is convex, because the distance
-to home and the climb to the return's altitude are. So their sum exceeds a limit at most on two parts of a leg, one at
-each end, and bisection finds where it crosses the limit, without sampling.
+line home and for what the vehicle goes on before it turns home (`rtl.run_on`). Along a straight leg the energy spent is
+linear, and the energy of the return is convex, because the distance to home and the climb to the return's altitude are.
+So their sum exceeds a limit at most on two parts of a leg, one at each end, and bisection finds where it crosses the
+limit, without sampling.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import Any
 
 from gcsplan.check.geodesy import flat_m
 from gcsplan.check.rtl.model import RULES
+from gcsplan.check.rtl.run_on import more_m
 from gcsplan.check.stretch import Place
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.figures import raised
@@ -102,10 +104,11 @@ def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m:
         return None
     usable = (1.0 - energy.reserve) * energy.battery_j
 
-    def back_j(at: Place) -> float:
+    def back_j(at: Place, stands: bool) -> float:
         level = rule.level_amsl_m(return_amsl_m, at[2])
         vertical = abs(level - at[2]) + max(level - home[2], 0.0)
-        return energy.vertical_j_per_m * vertical + energy.horizontal_j_per_m * flat_m(at, home)
+        way_m = flat_m(at, home) + (0.0 if stands else more_m(vehicle, vehicle.speed_max_m_s, at[2]))
+        return energy.vertical_j_per_m * vertical + energy.horizontal_j_per_m * way_m
 
     spent = along = most = 0.0
     most_at, most_m = verdict.legs[0].start, 0.0
@@ -119,9 +122,12 @@ def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m:
         along += skipped_m
         hold_j = leg.hold_j
         way_j = leg.energy_j - hold_j
+        stands = rule.climbs_first and leg.horizontal_m == 0.0
 
-        def used(part: float, leg: LegFigures = leg, way_j: float = way_j, spent: float = spent) -> float:
-            return spent + part * way_j + back_j(_between(leg, part))
+        def used(
+            part: float, leg: LegFigures = leg, way_j: float = way_j, spent: float = spent, stands: bool = stands
+        ) -> float:
+            return spent + part * way_j + back_j(_between(leg, part), stands)
 
         ends = [(0.0, used(0.0)), (1.0, used(1.0) + hold_j)]
         for part, j in ends:
@@ -137,7 +143,7 @@ def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m:
                 short.append((low, high))
         spent += leg.energy_j
         along += leg.horizontal_m
-        back = back_j(leg.end)
+        back = back_j(leg.end, stands)
         rows.append(
             LegBattery(
                 leg.seq, leg.kind, leg.energy_j, spent, back, 100.0 * spent / energy.battery_j,

@@ -36,7 +36,8 @@ from gcsplan.check.climb_out import REACHED_M, circle_up, climb_out, glide, is_w
 from gcsplan.check.commands import flown_otherwise, moves_nothing
 from gcsplan.check.geodesy import flat_m
 from gcsplan.check.route import fly_in_order
-from gcsplan.check.rtl.model import RULES, about_turn_m, return_pieces
+from gcsplan.check.rtl.model import RULES, return_pieces
+from gcsplan.check.rtl.run_on import about_turn_m
 from gcsplan.check.spline import chords, towards
 from gcsplan.check.stretch import Flight, Place, StretchKind
 from gcsplan.mavlink.mission import commands as cmd
@@ -363,7 +364,7 @@ class _Pilot(Aboard):
         self.pace = replace(self.pace, speed_m_s=self.vehicle.return_speed_m_s or self.pace.speed_m_s)
         pieces = return_pieces(
             RULES[self.autopilot], self.at, self.home, self.home[2] + self.rtl_rel_home_m,
-            about_m=about_turn_m(self.vehicle),
+            about_m=about_turn_m(self.vehicle, self.pace.speed_m_s, self.at[2], flat_m(self.at, self.home)),
         )  # fmt: skip
         for piece in pieces:
             fly = self.instead if piece.instead else self.add

@@ -19,10 +19,15 @@ MEETS = -1.0
 
 def to_point(regions: Floats, point: Floats) -> Floats:
     """(M,) distance of each region (M, K, 2) from a point (2,); 0 inside."""
+    return to_points(regions, np.broadcast_to(point, (len(regions), 2)))
+
+
+def to_points(regions: Floats, points: Floats) -> Floats:
+    """(M,) distance of each region (M, K, 2) from its own point (M, 2); 0 inside."""
     best = np.full(len(regions), np.inf)
     for a, b in _pairs(regions):
-        best = np.minimum(best, _to_segment(point - a, b - a))
-    best[_holds(regions, np.broadcast_to(point, (len(regions), 1, 2)))[:, 0]] = 0.0
+        best = np.minimum(best, _to_segment(points - a, b - a))
+    best[_holds(regions, points[:, None])[:, 0]] = 0.0
     return best
 
 

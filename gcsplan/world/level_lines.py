@@ -71,12 +71,13 @@ class Crossings:
 class Swept:
     """The regions that N bundles of lines cover; zones are compared with them exactly.
 
-    ``regions`` (N, K, 2): the convex hull of these points; the first two are the ends of the segment on which the
-    bundle begins. ``extra_m`` (N,): by how much, in metres of the plane, it is wider than the limits' errors make it.
+    ``regions`` (N, K, 2): the convex hull of these points; the bundle begins in the hull of the first ``begin``.
+    ``extra_m`` (N,): by how much, in metres of the plane, it is wider than the limits' errors make it.
     """
 
     regions: Floats
     extra_m: Floats
+    begin: int = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,7 +209,7 @@ def _crossings(
             demanded = swept.extra_m[met] + (within - wide_m if over_ground[k] else reach.zone_m)
             near_it = _apart(swept.regions[met], row, vertex) < demanded - TOUCH_M
             met, demanded = met[near_it], demanded[near_it]
-            begin = _apart(swept.regions[met, :2], row, vertex) < demanded - TOUCH_M
+            begin = _apart(swept.regions[met, : swept.begin], row, vertex) < demanded - TOUCH_M
         lines.append(met)
         begins.append(begin)
         zones.append(np.full(len(met), k))

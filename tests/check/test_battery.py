@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from gcsplan.check.battery import BatteryHome, battery_home, flown
 from gcsplan.check.judge import judge
+from gcsplan.check.rtl.run_on import more_m
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.mavlink.mission.commands import LAND, LOITER_TIME, RTL, TAKEOFF, WAYPOINT
 from gcsplan.mavlink.mission.mission import RELATIVE, Home, Mission, MissionItem
@@ -22,6 +23,10 @@ from tests.support.worlds import vehicle, world
 
 FLAT = world(300.0)
 R1, R2, HOVER = 120.0, 100.0, 400.0
+
+
+MORE_M = 2.0 * (15.0**2 / (2.0 * 2.5) + 1.25)
+"""Out and back while a copter brakes from its 15 m/s before it turns home."""
 
 
 def craft(battery_j: float | None, reserve: float = 0.2) -> Vehicle:
@@ -50,9 +55,9 @@ def home_of(v: Verdict, craft: Vehicle, level_rel_home_m: float = 15.0) -> Batte
 
 
 def test_the_point_of_no_return_on_a_straight_way_out() -> None:
-    # Out at 80 m: spent 80·R1 + x·R2, back x·R2 + 80·R1: x = (usable − 160·R1) / (2·R2).
+    # Out at 80 m: spent 80·R1 + x·R2, back (x + MORE_M)·R2 + 80·R1.
     usable = 0.8 * 600_000.0
-    x = (usable - 160.0 * R1) / (2.0 * R2)
+    x = (usable - 160.0 * R1 - MORE_M * R2) / (2.0 * R2)
     plane = craft(600_000.0)
     found = home_of(judge(out(FLAT, (5000.0, 0.0, 80.0)), plane, FLAT), plane)
     assert found.no_return_m == pytest.approx(x, rel=1e-5)
@@ -60,10 +65,11 @@ def test_the_point_of_no_return_on_a_straight_way_out() -> None:
     assert found.point_of_no_return is not None
     assert float(FLAT.frame.to_plane(*found.point_of_no_return[:2])[0]) == pytest.approx(x, rel=1e-4)
     assert found.short == ((pytest.approx(x, rel=1e-5), pytest.approx(5000.0, rel=1e-5)),)
-    # A return needs most after landing at the far end: it must climb again to its altitude.
-    ends = 80 * R1 + 5000 * R2 + 80 * R1
-    assert found.most_j == pytest.approx(ends + 5000 * R2 + 2 * 15 * R1, rel=1e-5)
-    assert "point of no return at km 2.30" in found.describe()
+    # A return needs most at the far end. After the landing there it must climb again to its altitude, by 15 m, but it
+    # does not brake.
+    assert found.most_j == pytest.approx(160 * R1 + (5000 + 5000 + MORE_M) * R2, rel=1e-5)
+    assert found.legs[-1].return_j == pytest.approx(5000 * R2 + 2 * 15 * R1, rel=1e-5)
+    assert "point of no return at km 2.26" in found.describe()
 
 
 def test_a_battery_that_reaches_has_no_point_of_no_return() -> None:
@@ -99,7 +105,7 @@ def test_a_way_that_leads_back_may_be_short_in_the_middle_alone() -> None:
     found = home_of(verdict, v)
     (part,) = found.short
     # On the leg back, energy spent plus energy of the return stays what it was at the turn.
-    assert part[0] == pytest.approx((0.9 * (160 * R1 + 2 * 3000 * R2) - 160 * R1) / (2 * R2), rel=1e-4)
+    assert part[0] == pytest.approx((0.9 * (160 * R1 + 2 * 3000 * R2) - 160 * R1 - MORE_M * R2) / (2 * R2), rel=1e-4)
     assert part[1] == pytest.approx(6000.0, rel=1e-5)
 
 
@@ -107,7 +113,7 @@ def test_a_return_of_the_mission_itself_is_not_counted_twice() -> None:
     v = craft(2_000_000.0)
     verdict = judge(out(FLAT, (2000.0, 0.0, 80.0), last=RTL), v, FLAT, rtl_rel_home_m=80.0)
     found = home_of(verdict, v, 80.0)
-    assert found.most_j == pytest.approx(verdict.energy_j, rel=1e-5)
+    assert found.most_j == pytest.approx(verdict.energy_j + MORE_M * R2, rel=1e-5)
     assert {row.kind for row in found.legs} == {"takeoff", "cruise"}
 
 
@@ -163,8 +169,11 @@ def test_what_is_short_is_what_sampling_finds(
         for f in np.linspace(0.0, 1.0, 23):
             at = a + f * (b - a)
             away = math.hypot(*FLAT.frame.to_plane(at[0], at[1]))
+            more = MORE_M * (leg.horizontal_m > 0.0)  # a copter that moves brakes first, a plane turns about
+            if not climbs_first:
+                more = more_m(replace(v, autopilot=autopilot), v.speed_max_m_s, at[2])
             top = max(300.0 + level, at[2]) if climbs_first else 300.0 + level
-            need = spent + f * leg.energy_j + R2 * away + R1 * (abs(top - at[2]) + top - 300.0)
+            need = spent + f * leg.energy_j + R2 * (away + more) + R1 * (abs(top - at[2]) + top - 300.0)
             most = max(most, need)
             s = along + f * leg.horizontal_m
             inside = any(x - 1.0 <= s <= y + 1.0 for x, y in found.short)

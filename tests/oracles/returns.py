@@ -120,19 +120,50 @@ def _stored(z: float, autopilot: Autopilot) -> float:
     return z if autopilot is Autopilot.PX4 else math.trunc(float(np.float32(z) * np.float32(100.0))) / 100.0
 
 
-def breach(case: Case, at: Floats, *, legal: bool, more_m: float = 0.0, lift_m: float = 0.0) -> str:
-    """What the return from ``at`` (east, north, AMSL) breaks; empty if nothing.
+def run_on(case: Case, at: Floats, to: Floats, after: Floats | None) -> Floats:
+    """How far a multicopter at ``at`` on its way to ``to`` runs on at its highest speed there, east and north, m.
+
+    ``after``: where it flies next, None if it stops at ``to``. It slows down for the stop, and for the corner, to the
+    speed of an arc that passes 2 m from the corner and pulls 5 m/s².
+    """
+    way = (to - at)[:2]
+    left = float(np.hypot(*way))
+    if case.vehicle.autopilot is Autopilot.ARDUPLANE or left < 1.0:
+        return np.zeros(2)
+    corner = 0.0
+    if after is not None and np.hypot(*(after - to)[:2]) > 0.1:
+        cosine = float(way @ (after - to)[:2]) / left / float(np.hypot(*(after - to)[:2]))
+        half = 0.5 * math.acos(max(-1.0, min(1.0, cosine)))
+        corner = math.sqrt(5.0 * 2.0 / max(1.0 / max(math.cos(half), 1e-6) - 1.0, 1e-9))
+    if case.vehicle.autopilot is Autopilot.ARDUCOPTER:
+        speed = min(case.vehicle.speed_max_m_s, math.sqrt(corner**2 + 5.0 * left))
+        return np.asarray(way / left * (speed**2 / 5.0 + 1.2))
+    speed = min(case.vehicle.speed_max_m_s, math.sqrt(corner**2 + 6.0 * left))
+    return np.asarray(way / left * speed**2 / 6.0)
+
+
+def breach(
+    case: Case, at: Floats, *, legal: bool, more_m: float = 0.0, lift_m: float = 0.0, on: Floats | None = None
+) -> str:
+    """What the return from ``at`` (east, north, AMSL) breaks; empty if nothing; ``on``: see `run_on`.
 
     ``legal``: judge AGL and AMSL limits too; ``more_m``, ``lift_m``: metres added to track and altitude error.
     """
     limits, oracle, home = case.vehicle.limits, case.oracle, case.corners[0]
-    if legal and (found := breach(case, at, legal=False, more_m=more_m, lift_m=lift_m)):
+    if legal and (found := breach(case, at, legal=False, more_m=more_m, lift_m=lift_m, on=on)):
         return found
     if not legal:
         limits = replace(limits, min_agl_m=0.0, max_agl_m=None, max_amsl_m=None)
     track, altitude = limits.track_error_m + more_m / oracle.scale, limits.altitude_error_m + lift_m
     level = home[2] + case.level_rel_home_m
-    for start, end, column in _ways(case, at, level, cone=not legal):
+    ways = _ways(case, at, level, cone=not legal)
+    if on is not None and on.any():
+        for part in (0.4, 1.0):
+            stop = at + part * np.array([*on, 0.0])
+            ways += _ways(case, stop, level, cone=not legal)
+        if not legal:
+            ways.append((at, stop, False))
+    for start, end, column in ways:
         for k in range(len(oracle.zones)):
             if oracle.zone_breach(k, start, end, track, altitude, limits, spokes=10, rings=2):
                 return f"zone {k}, column {column}"

@@ -10,6 +10,8 @@
 - ArduPlane, a QuadPlane too: turns and flies home at once, and on the way climbs or glides to RTL_ALTITUDE
   (ALT_HOLD_RTL before 4.5; -1 keeps its altitude). Over home it circles with WP_LOITER_RAD, grown with altitude.
 
+How far each goes on before it flies home is in `run_on`.
+
 Two modules read these rules. `return_pieces` is the return of an RTL item, from one place; `sweep` judges the return
 after a failsafe, from every point of a mission. Where an autopilot may fly one of several altitudes, both judge all of
 them: in the cone from the cone's altitude up to the return altitude, on a plane's flight home from its altitude to the
@@ -20,19 +22,23 @@ with DO_LAND_START. `cone_differs` is judged in `return_pieces` alone.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
+from itertools import pairwise
 from typing import TypeVar
 
 from gcsplan.arrays import Floats
 from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth
 from gcsplan.check.geodesy import flat_m
 from gcsplan.check.stretch import Place
-from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.vehicle import Autopilot
 from gcsplan.world.limits import Limits
 
 AT_HOME_M = 5.0
 """Within this distance of home, m, or within the track error if that is larger, a return is only a descent."""
+
+ASIDE = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Parts of a plane's flight home: it begins aside of the line, and nears the line all the way; each has one width."""
 
 Metres = TypeVar("Metres", float, Floats)
 
@@ -95,14 +101,6 @@ RULES = {
 }  # fmt: skip
 
 
-def about_turn_m(vehicle: Vehicle) -> float:
-    """How far a plane may be from the beginning of its return while it turns about, m.
-
-    Without a turn radius the track error includes a turn: to turn about takes twice as much.
-    """
-    return 2.0 * max(vehicle.limits.track_error_m, vehicle.turn_radius_m)
-
-
 def at_home_m(limits: Limits) -> float:
     """The distance from home within which a return is only a descent, m."""
     return max(AT_HOME_M, limits.track_error_m)
@@ -124,15 +122,17 @@ class Piece:
 def return_pieces(rule: ReturnRule, at: Place, home: Place, return_amsl_m: float, *, about_m: float) -> list[Piece]:
     """The return from ``at`` to ``home`` (a place on the ground); the last piece ends where the return ends.
 
-    ``about_m``: see `about_turn_m`.
+    ``about_m``: see `run_on.about_turn_m`. A plane flies home from anywhere that far from ``at``.
     """
     lat, lon, ground = home
     level = rule.level_amsl_m(return_amsl_m, at[2])
     over = (lat, lon, level)
     if not rule.climbs_first:
+        aside = _band(at, home, at[2], level, instead=True)
         return [
             Piece(at, at, reach_m=about_m, instead=True),
             _band(at, home, at[2], level),
+            *(_part(aside, a, b, (1.0 - a) * about_m) for a, b in pairwise(ASIDE)),
             Piece(over, over, reach_m=rule.circle_m(level), hold_s=math.inf),
         ]
     cone = rule.cone_amsl_m(ground, flat_m(at, home))
@@ -146,6 +146,13 @@ def return_pieces(rule: ReturnRule, at: Place, home: Place, return_amsl_m: float
         Piece(up, over),
         Piece(over, (lat, lon, ground), column=True),
     ]
+
+
+def _part(piece: Piece, a: float, b: float, reach_m: float) -> Piece:
+    """A part of a level piece, widened."""
+    (lat, lon, amsl), end = piece.start, piece.end
+    places = [(lat + f * (end[0] - lat), lon + f * (end[1] - lon), amsl) for f in (a, b)]
+    return replace(piece, start=places[0], end=places[1], reach_m=reach_m)
 
 
 def _band(at: Place, home: Place, a_amsl_m: float, b_amsl_m: float, *, instead: bool = False) -> Piece:

@@ -1,26 +1,29 @@
 """The obstacles in height that returns from parts of a mission to a place meet.
 
-How each autopilot returns is in `model`. Where several flights are possible, all are judged. A plane climbs from its
-altitude at least at the slope of ``climb_m_s`` at its highest speed, or at once; it descends late or at once; it turns
-about first. The line home lies between the line straight in the plane and the line straight in degrees. Inside the cone
-min AGL does not apply, because the aircraft is about to land.
+How each autopilot returns is in `model`, how far it goes on before that in `run_on`. Where several flights are
+possible, all are judged. A plane climbs from its altitude at least at the slope of ``climb_m_s`` at its highest speed,
+or at once; it descends late or at once; it turns about first, and flies home from aside. The line home lies between the
+line straight in the plane and the line straight in degrees. Inside the cone min AGL does not apply, because the
+aircraft is about to land.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.check.rtl.model import RULES, about_turn_m, at_home_m
+from gcsplan.check.rtl.model import ASIDE, RULES, at_home_m
 from gcsplan.check.rtl.obstacles import GROUND, MAX_AGL, MAX_AMSL, Obstacles
-from gcsplan.check.rtl.trace import MissionTrace, TraceParts
+from gcsplan.check.rtl.run_on import about_turn_m, circle_home_m, levels_off_m
+from gcsplan.check.rtl.trace import TINY_M, MissionTrace, TraceParts
 from gcsplan.vehicle import Vehicle
-from gcsplan.world import level_lines
-from gcsplan.world.airspace import Legs
+from gcsplan.world import hulls, level_lines
+from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Level
 
@@ -70,54 +73,137 @@ class GradedObstacles:
         return GradedObstacles(self.clear.take(parts), self.legal.take(parts), 0)
 
 
+@dataclass(frozen=True, eq=False)
+class ReturnPlaces:
+    """Where N returns are seen from above: the convex hulls of ``regions`` (N, 9, 2), widened by ``wide_m`` (N,).
+
+    A return begins in the hull of the first four points; the fifth is home; the others bound how far a line home may be
+    bent, by ``bow_m`` (N,) at most. ``corner`` (N,): whether it may begin aside of the line through the first two.
+    ``low``, ``high`` (N,): the altitudes AMSL at which it begins. ``aside_m`` (N,): how far a plane's turn about leads
+    aside at its beginning; on the way home this fades to 0.
+    """
+
+    regions: Floats
+    wide_m: Floats
+    bow_m: Floats
+    corner: Bools
+    low: Floats
+    high: Floats
+    aside_m: Floats
+
+    def lines_home(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """One line home for each region, widened so that it covers the region, still without `wide_m` and `aside_m`.
+
+        Its start (N, 2); how far from there returns begin; its half width; the least distance home at which returns
+        begin, all (N,).
+        """
+        begin, home = self.regions[:, :4], self.regions[:, 4]
+        out = 0.5 * (begin[:, 0] + begin[:, 1]) - home
+        far = np.hypot(*out.T)
+        axis = np.divide(out, far[:, None], out=np.tile([1.0, 0.0], (len(far), 1)), where=far[:, None] > TINY_M)
+        from_home = begin - home[:, None]
+        along = (from_home * axis[:, None]).sum(axis=-1)
+        beside = np.abs(from_home[..., 1] * axis[:, None, 0] - from_home[..., 0] * axis[:, None, 1])
+        start = home + np.maximum(along.max(axis=1), 0.0)[:, None] * axis
+        half = np.where(along < 0.0, np.hypot(*from_home.transpose(2, 0, 1)), beside).max(axis=1)
+        reach = np.hypot(*(begin - start[:, None]).transpose(2, 0, 1)).max(axis=1)
+        return np.ascontiguousarray(start), reach, half, hulls.to_points(begin, home)
+
+    def swept(self, some: Indices, scale: float) -> level_lines.Swept:
+        """The regions of some returns, which have all the same kind of beginning."""
+        corner = bool(self.corner[some].any())
+        wide = (self.wide_m + self.aside_m)[some] * scale
+        if corner:
+            return level_lines.Swept(self.regions[some], wide, begin=4)
+        return level_lines.Swept(self.regions[some][:, STRAIGHT], wide)
+
+
+STRAIGHT = (0, 1, 4, 5, 6)
+"""The points of `ReturnPlaces.regions` that are needed if all returns begin on one line."""
+
+
+def places_of_returns(trace: MissionTrace, sides: TraceParts, target: Target, vehicle: Vehicle) -> ReturnPlaces:
+    """Where the returns from parts of the trace to ``target`` are.
+
+    A return lies between the line that is straight in the plane and the one that is straight in degrees. One curves
+    away from the other as a parabola, which lies within the triangle of its ends and the crossing of its tangents.
+    """
+    frame = trace.world.frame
+    begin, levels = trace.beginnings(sides)
+    goal = frame.to_degrees(target.east_m, target.north_m)
+    tangents, bows = [], []
+    for k in range(begin.shape[1]):
+        at = begin[:, k]
+        degrees = frame.to_degrees(*at.T)
+        turn = (goal[1] - degrees[:, 1] + 180.0) % 360.0 - 180.0
+        curved = frame.to_plane(0.5 * (degrees[:, 0] + goal[0]), degrees[:, 1] + 0.5 * turn)
+        straight = 0.5 * (at + target.en)
+        tangents.append(straight + TANGENT * (curved - straight))
+        bows.append(TANGENT / 2.0 * np.hypot(*(curved - straight).T))
+    home = np.broadcast_to(target.en, (len(sides), 1, 2))
+    regions = np.concatenate([begin, home, np.stack(tangents, axis=1)], axis=1)
+    low, high = trace.heights(sides)
+    down_m, up_m = levels_off_m(vehicle)
+    aside = np.zeros(len(sides))
+    if not RULES[vehicle.autopilot].climbs_first:
+        away = np.hypot(*(begin[:, 0] - target.en).T)
+        speed = trace.speed_m_s[sides.stretch]
+        aside = np.array([about_turn_m(vehicle, *one) for one in zip(speed, high, away, strict=True)])
+    return ReturnPlaces(
+        regions, trace.track_m[sides.stretch], np.max(bows, axis=0), (begin[:, 3] != begin[:, 1]).any(axis=1),
+        low - down_m * levels[:, 0], high + up_m * levels[:, 1], aside,
+    )  # fmt: skip
+
+
 def obstacles_of_returns(
     trace: MissionTrace, parts: TraceParts, target: Target, vehicle: Vehicle, *, whole: bool
 ) -> GradedObstacles:
     """The obstacles of returns from ``parts`` to ``target``: from all of each if ``whole``, else from its middle."""
     rule, limits, air = RULES[vehicle.autopilot], vehicle.limits, trace.world.airspace
     n = len(parts)
-    middle = trace.points(parts.middle)
-    start, end = np.ascontiguousarray(middle[:, :2]), np.tile(target.en, (n, 1))
     sides = parts if whole else TraceParts(parts.middle, parts.middle, parts.stretch)
-    low, high = trace.heights(sides)
-    distance = np.hypot(*(end - start).T)
-    own = trace.track_m[parts.stretch] * air.scale
-    regions, bow = _swept(trace, sides, target)
-    reach = 0.5 * np.hypot(*(regions[:, 1] - regions[:, 0]).T)  # half the length of a part, straight or a column
-    extra = reach + own + bow * air.scale
+    places = places_of_returns(trace, sides, target, vehicle)
+    low = places.low
+    start, reach, half_m, nearest = places.lines_home()
+    end = np.tile(target.en, (n, 1))
+    extra = half_m + (places.wide_m + places.bow_m) * air.scale
+    aside = places.aside_m * air.scale
     there_m = at_home_m(limits)
-    away = np.flatnonzero(distance + reach > there_m)
-    cone = rule.cone_amsl_m(target.cone_amsl_m, np.maximum(distance - reach, there_m))
-    about_m = about_turn_m(vehicle)
+    away = np.hypot(*(end - start).T) > there_m
+    cone = rule.cone_amsl_m(target.cone_amsl_m, np.maximum(nearest, there_m))
     climb = vehicle.climb_m_s / vehicle.speed_max_m_s if math.isfinite(vehicle.climb_m_s) else 1.0
-    found = _Builder(high)
-    for some in _alike(extra, away):
-        swept = level_lines.Swept(regions[some], own[some])
-        met = level_lines.over(air, start[some], end[some], limits, float(extra[some].max()), swept)
+    found = _Builder(places.high)
+
+    def groups(which: Bools) -> list[Indices]:
+        kinds = (np.flatnonzero(which & corner) for corner in (~places.corner, places.corner))
+        return [some for kind in kinds for some in alike_in_width(extra + aside, kind)]
+
+    for some in groups(away):
+        wide, swept = float((extra + aside)[some].max()), places.swept(some, air.scale)
+        met = level_lines.over(air, start[some], end[some], limits, wide, swept)
         found.cost += len(met.piece_line)
         at = met.crossings
+        i = some[at.line]
         if rule.climbs_first:
             found.ground(some, met, low[some], cone[some], np.full(len(some), np.inf))
-            i = some[at.line]
             found.zones(i, at, low[i], cone[i])
             spots = some[np.unique(at.line[at.begins])]
             if len(spots):
-                _climbs_on_the_spot(found, trace, sides, limits, spots, regions, float(extra[spots].max()))
+                _climbs_on_the_spot(found, trace, sides, limits, spots, places)
         else:
-            found.ground(some, met, -np.inf, *_climbs(met, low[some], reach[some] + about_m, climb))
-            i = some[at.line]
-            found.zones(i, at, -np.inf, low[i] + climb * np.maximum(at.s0_m - reach[i] - about_m, 0.0))
+            _flies_home(found, air, limits, some, (start, end), (reach, extra, aside), low, climb)
+            found.zones(i, at, -np.inf, low[i] + climb * np.maximum(at.s0_m - reach[i] - aside[i], 0.0))
     if rule.climbs_first:  # near home the altitude is not known: no zone may be within reach
-        for some in _alike(extra, np.flatnonzero(distance + reach <= there_m)):
-            swept = level_lines.Swept(regions[some], own[some])
-            met = level_lines.over(air, start[some], end[some], limits, float(extra[some].max()), swept)
+        for some in groups(~away):
+            wide, swept = float(extra[some].max()), places.swept(some, air.scale)
+            met = level_lines.over(air, start[some], end[some], limits, wide, swept)
             i = some[met.crossings.line]
             found.zones(i, met.crossings, low[i], np.full(len(i), -np.inf))
+        _brakes(found, trace, limits, places)
     else:
-        for some in _alike(extra, np.arange(n)):
-            met = level_lines.over(
-                air, start[some], start[some], limits, float(extra[some].max()) + about_m * air.scale
-            )
+        for some in alike_in_width(extra + aside, np.arange(n)):
+            wide = float((reach + places.wide_m * air.scale + aside)[some].max())
+            met = level_lines.over(air, start[some], start[some], limits, wide)
             found.cost += len(met.piece_line)
             found.ground(some, met, -np.inf, low[some], low[some])
             i = some[met.crossings.line]
@@ -129,61 +215,89 @@ def obstacles_of_returns(
     return GradedObstacles(*found.by_grade(), found.cost)
 
 
+def _flies_home(
+    found: _Builder,
+    air: Airspace,
+    limits: Limits,
+    some: Indices,
+    lines: tuple[Floats, Floats],
+    widths: tuple[Floats, Floats, Floats],
+    low: Floats,
+    climb: float,
+) -> None:
+    """Add the ground under planes that fly home from aside of the line: near home they are near the line.
+
+    ``widths``: how far from a line's start its returns begin, its half width, and how far aside planes turn about.
+    """
+    reach, extra, aside = widths
+    start, step = lines[0][some], (lines[1] - lines[0])[some]
+    length = np.hypot(*step.T)
+    for a, b in pairwise(ASIDE):
+        wide = float((extra + (1.0 - a) * aside)[some].max())
+        met = level_lines.over(air, start + a * step, start + b * step, limits, wide)
+        found.cost += len(met.piece_line)
+        spare = (reach + aside)[some] - a * length
+        found.ground(some, met, -np.inf, *_climbs(met, low[some], spare, climb))
+
+
+def _brakes(found: _Builder, trace: MissionTrace, limits: Limits, places: ReturnPlaces) -> None:
+    """Add the ground ahead, over which a multicopter brakes at the altitude at which its return begins.
+
+    The mission keeps min AGL, but where it climbs with the ground the vehicle brakes lower than that: only what it may
+    meet counts here.
+    """
+    air = trace.world.airspace
+    begin = places.regions[:, :4]
+    first, tip = begin[:, 0], begin[:, 1]
+    along = np.hypot(*(tip - first).T)
+    aside = np.hypot(*(begin[:, 2:] - tip[:, None]).transpose(2, 0, 1)).max(axis=1)
+    wide = aside + places.wide_m * air.scale
+    for some in alike_in_width(wide, np.flatnonzero(along > TINY_M)):
+        met = level_lines.over(air, first[some], tip[some], limits, float(wide[some].max()))
+        found.cost += len(met.piece_line)
+        for grade in (0, 1):
+            found._put(grade, some, -np.inf, met.clear_m, places.low[some], places.low[some], GROUND)
+
+
 def _climbs_on_the_spot(
     found: _Builder,
     trace: MissionTrace,
     sides: TraceParts,
     limits: Limits,
     spots: Indices,
-    regions: Floats,
-    wide_m: float,
+    places: ReturnPlaces,
 ) -> None:
     """Add the zones that returns meet while they climb, which they may begin anywhere on each part of ``spots``.
 
-    A zone's ceiling above ground elsewhere on the line home does not count here. Where the part itself is clear of
-    ground and zones under the exact check, a zone that stands on the ground is below it, and not in the way.
+    A zone's ceiling above ground elsewhere on the line home does not count here. Where the part itself, and where it
+    brakes, is clear of ground and zones under the exact check, a zone that stands on the ground is below it, and not in
+    the way.
     """
     air, parts = trace.world.airspace, sides.take(spots)
-    ends = regions[spots, :2]
-    own = trace.track_m[parts.stretch]
-    middle = ends.mean(axis=1)
-    at = level_lines.over(air, middle, middle, limits, wide_m, level_lines.Swept(ends, own * air.scale)).crossings
-    low, _ = trace.heights(parts)
-    clear = air.clear(
-        Legs(
-            trace.points(parts.start)[:, :3],
-            trace.points(parts.end)[:, :3],
-            np.zeros(len(spots), np.bool_),
-            limits.track_error_m + own,
-            limits.altitude_error_m + trace.altitude_m[parts.stretch],
-        ),
-        replace(limits, min_agl_m=0.0, max_amsl_m=None, max_agl_m=None, max_climb_deg=90.0, max_descent_deg=90.0),
-    )
+    begin, own, low = places.regions[spots, :4], trace.track_m[parts.stretch], places.low[spots]
+    middle = 0.5 * (begin[:, 0] + begin[:, 1])
+    wide_m = float((np.hypot(*(begin - middle[:, None]).transpose(2, 0, 1)).max(axis=1) + own * air.scale).max())
+    at = level_lines.over(
+        air, middle, middle, limits, wide_m, level_lines.Swept(begin, own * air.scale, begin=4)
+    ).crossings
+    clear = trace.straight(parts)
+    legs = [(trace.points(parts.start)[:, :3], trace.points(parts.end)[:, :3])]
+    legs += [(np.column_stack([begin[:, 0], low]), np.column_stack([begin[:, k], low])) for k in (1, 2, 3)]
+    for first, last in legs:
+        moves = (first != last).any(axis=1)
+        clear[moves] &= air.clear(
+            Legs(
+                first[moves],
+                last[moves],
+                np.zeros(int(moves.sum()), np.bool_),
+                limits.track_error_m + own[moves],
+                limits.altitude_error_m + trace.altitude_m[parts.stretch][moves],
+            ),
+            replace(limits, min_agl_m=0.0, max_amsl_m=None, max_agl_m=None, max_climb_deg=90.0, max_descent_deg=90.0),
+        )
     stands = np.array([z.floor is None or z.floor == Level(0.0, "agl") for z in air.zones])
-    met = at.take(~(stands[at.zone] & (clear & trace.straight(parts))[at.line]))
+    met = at.take(~(stands[at.zone] & clear[at.line]))
     found.zones(spots[met.line], met, low[met.line], np.full(len(met.line), -np.inf))
-
-
-def _swept(trace: MissionTrace, sides: TraceParts, target: Target) -> tuple[Floats, Floats]:
-    """The regions that returns from parts of the trace cover, (N, 5, 2) points around each, and the bows, metres.
-
-    A return lies between the line that is straight in the plane and the one that is straight in degrees. One curves
-    away from the other as a parabola, which lies within the triangle of its ends and the crossing of its tangents.
-    """
-    frame = trace.world.frame
-    goal = frame.to_degrees(target.east_m, target.north_m)
-    points, bows = [], []
-    for u in (sides.start, sides.end):
-        at = trace.points(u)[:, :2]
-        degrees = frame.to_degrees(*at.T)
-        turn = (goal[1] - degrees[:, 1] + 180.0) % 360.0 - 180.0
-        curved = frame.to_plane(0.5 * (degrees[:, 0] + goal[0]), degrees[:, 1] + 0.5 * turn)
-        straight = 0.5 * (at + target.en)
-        points.append((at, straight + TANGENT * (curved - straight)))
-        bows.append(TANGENT / 2.0 * np.hypot(*(curved - straight).T))
-    home = np.broadcast_to(target.en, points[0][0].shape)
-    regions = np.stack([points[0][0], points[1][0], points[1][1], home, points[0][1]], axis=1)
-    return regions, np.maximum(*bows)
 
 
 def _over_home(found: _Builder, trace: MissionTrace, target: Target, vehicle: Vehicle, n: int) -> None:
@@ -195,7 +309,8 @@ def _over_home(found: _Builder, trace: MissionTrace, target: Target, vehicle: Ve
             if top > target.ground_amsl_m:
                 found.ceiling(np.arange(n), np.full(n, bottom), zone, (0, 1))
         return
-    circle = RULES[vehicle.autopilot].circle_m(target.ground_amsl_m + CIRCLE_ABOVE_M)
+    high = target.ground_amsl_m + CIRCLE_ABOVE_M
+    circle = circle_home_m(RULES[vehicle.autopilot].circle_m(high), vehicle, high)
     met = level_lines.over(air, target.en[None], target.en[None], limits, circle * air.scale)
     every = np.arange(n)
     for grade, floor in enumerate((met.clear_m[0], met.legal_m[0])):
@@ -219,7 +334,7 @@ def _climbs(met: level_lines.LevelLines, low: Floats, spare: Floats, climb: floa
     return out[0], out[1]
 
 
-def _alike(extra: Floats, which: Indices) -> list[Indices]:
+def alike_in_width(extra: Floats, which: Indices) -> list[Indices]:
     """Groups of similar width, each in order."""
     if not len(which):
         return []

@@ -113,6 +113,15 @@ class ProfilePoint:
 
 
 @dataclass(frozen=True, slots=True)
+class LowestAgl:
+    """The lowest height above ground of all returns; the return begins ``at_m`` along the mission, on item ``seq``."""
+
+    agl_m: float
+    at_m: float
+    seq: int
+
+
+@dataclass(frozen=True, slots=True)
 class WayHome:
     """The way home from every point of one mission.
 
@@ -125,7 +134,8 @@ class WayHome:
     ``lowest_legal_rel_home_m``: the lowest that is legal from every point. ``unsafe``: where the return is not clear;
     ``irregular``: where it is clear but not legal. ``advised_rel_home_m``: the lowest clear altitude, or, if none is
     clear from every point, one that leaves little unsafe; ``rally``: points proposed for that case, to be judged with
-    it; ``left``: what stays unsafe even with them. ``profile``: in the order flown.
+    it; ``left``: what stays unsafe even with them. ``profile``: in the order flown. ``lowest``: how near to the ground
+    the returns come at the judged altitude, None where that is unknown.
 
     ``path_safe`` is the verdict on the path itself. ``set_rel_home_m``: the altitude to set on the vehicle (with
     ``rally``, if there are any): the judged one if nothing is better, else one that is legal, or clear, from every
@@ -151,6 +161,7 @@ class WayHome:
     rally: tuple[RallyPoint, ...]
     left: tuple[UnsafeStretch, ...]
     profile: tuple[ProfilePoint, ...]
+    lowest: LowestAgl | None
     not_judged: tuple[str, ...]
     notes: tuple[str, ...]
 
@@ -233,6 +244,7 @@ class WayHome:
             "unsafe": [s.as_dict() for s in self.unsafe],
             "irregular": [s.as_dict() for s in self.irregular],
             "battery": None if self.battery is None else self.battery.as_dict(),
+            "lowest_agl_m": None if self.lowest is None else self.lowest.agl_m,
             "advised_rel_home_m": self.advised_rel_home_m,
             "rally": [r.as_dict() for r in self.rally],
             "left": [s.as_dict() for s in self.left],
@@ -263,6 +275,7 @@ class WayHome:
         out += [
             ("clear of ground and zones", _altitudes(self.lowest_rel_home_m, self.highest_rel_home_m)),
             ("within all limits too", _altitudes(self.lowest_legal_rel_home_m, None)),
+            *self._lowest(),
             *self._battery(),
         ]
         out += [
@@ -278,6 +291,13 @@ class WayHome:
         out += [(STILL_NO_RETURN, UnitText("from {}", s.place_and_why)) for s in self.left]
         out += [(NOT_JUDGED, words) for words in self.not_judged]
         return out
+
+    def _lowest(self) -> list[tuple[str, str]]:
+        if self.lowest is None:
+            return []
+        agl, at = Quantity(self.lowest.agl_m, "height", 0, "down"), Quantity(self.lowest.at_m, "far", 2, bare=True)
+        words = "{} above ground, on the return from {} {} (item {})"
+        return [("lowest on a return", UnitText(words, agl, Symbol("far"), at, self.lowest.seq))]
 
     def _battery(self) -> list[tuple[str, str]]:
         return [] if self.battery is None else [("battery for the return", self.battery.describe())]

@@ -20,6 +20,7 @@ from gcsplan.check.battery import battery_home
 from gcsplan.check.corners import round_corners
 from gcsplan.check.flight import follow
 from gcsplan.check.judge import TERRAIN_ERROR_M
+from gcsplan.check.rtl.lowest import lowest_agl
 from gcsplan.check.rtl.model import RULES
 from gcsplan.check.rtl.rally import Proposal, propose
 from gcsplan.check.rtl.refinement import CLEAR, LEGAL, Refinement, sizes_m
@@ -113,6 +114,7 @@ def way_home(
         rally=proposal.points if proposal else (),
         left=proposal.left if proposal else (),
         profile=_profile(trace, refinement),
+        lowest=lowest_agl(trace, trace.cut(refinement.first_m), target, vehicle, level),
         not_judged=tuple(w for w in flight.not_judged if not w.startswith(RETURNS_BY_ITSELF)),
         notes=tuple(notes + list(proposal.notes if proposal else ())),
     )
@@ -198,6 +200,6 @@ def _not_judged(verdict: Verdict, vehicle: Vehicle, judged_m: float, assumed: bo
         parameter=RULES[vehicle.autopilot].parameter, rtl_rel_home_m=judged_m, assumed=assumed,
         home=(home.lat_e7 / 1e7, home.lon_e7 / 1e7, home.amsl_m), lowest_rel_home_m=None, highest_rel_home_m=None,
         lowest_legal_rel_home_m=None, unsafe=(), irregular=(), battery=None, advised_rel_home_m=None,
-        set_rel_home_m=None, set_leaves_m=None, rally=(), left=(), profile=(), not_judged=(why,),
+        set_rel_home_m=None, set_leaves_m=None, rally=(), left=(), profile=(), lowest=None, not_judged=(why,),
         notes=tuple(_notes(vehicle, judged_m, assumed)),
     )  # fmt: skip

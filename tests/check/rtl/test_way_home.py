@@ -31,7 +31,7 @@ from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
-from tests.oracles.returns import breach, random_case
+from tests.oracles.returns import breach, random_case, run_on
 from tests.support.worlds import vehicle, world
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
@@ -138,8 +138,8 @@ def test_a_zone_over_the_way_bounds_the_return_from_above() -> None:
     assert home.highest_rel_home_m == pytest.approx(115.0, abs=0.01)
     high = judged(w, m, v, 130.0)
     assert [s.zone for s in high.unsafe] == ["shelf"]
-    # Below the zone even the climb is blocked; short of it, though within its reach, nothing is in the way.
-    assert high.unsafe[0].from_m == pytest.approx(800.0, abs=5.0)
+    # Below the zone even the climb is blocked; it runs on by 46 m at 15 m/s, and so reaches it from short of it.
+    assert high.unsafe[0].from_m == pytest.approx(800.0 - 46.25, abs=5.0)
 
 
 def test_over_a_zone_on_a_slope_the_climb_counts_the_ceiling_there_alone() -> None:
@@ -470,16 +470,19 @@ def test_never_kinder_than_brute_force_in_rough_random_worlds(autopilot: Autopil
                 u = trace.first[i] + f * (trace.last[i] - trace.first[i])
                 at, to = case.corners[i + first_leg : i + first_leg + 2]
                 at = at + f * (to - at)
+                after = case.corners[i + first_leg + 2 : i + first_leg + 3]
+                on = run_on(case, at, to, after[0] if len(after) else None)
                 assert trace.points(np.array([u]))[0, :3] == pytest.approx(at, abs=1e-3)
                 part = (refinement.parts.start <= u + 1e-12) & (refinement.parts.end >= u - 1e-12)
                 for grade in (CLEAR, LEGAL):
-                    found = breach(case, at, legal=grade == LEGAL)
+                    found = breach(case, at, legal=grade == LEGAL, on=on)
                     assert not found or bad[grade][part].any(), (seed, i, f, grade, found)
                     looked, unsafe = looked + 1, unsafe + bool(found)
                     strict += not found and bool(bad[grade][part].all())
                 for grade, least in enumerate(lowest):
                     if math.isfinite(least):
-                        found = breach(replace(case, level_rel_home_m=least - ground), at, legal=grade == LEGAL)
+                        higher = replace(case, level_rel_home_m=least - ground)
+                        found = breach(higher, at, legal=grade == LEGAL, on=on)
                         assert not found, (seed, "lowest", i, f, grade, found)
     assert worlds >= 2
     assert 0.1 < unsafe / looked < 0.9
