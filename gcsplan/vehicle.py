@@ -65,7 +65,8 @@ class Energy:
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
-    """An airframe with its limits. Speeds are in m/s: over ground (cruise) and vertical (climb, descent).
+    """An airframe with its limits. Speeds are in m/s: over ground (cruise; of a fixed wing, the airspeed that it
+    indicates) and vertical (climb, descent).
 
     ``accel_m_s2`` is the acceleration and braking along the path, ``corner_accel_m_s2`` bounds the speed in a rounded
     corner, ``vertical_accel_m_s2`` applies in the columns of take-off and landing, ``land_m_s`` is the descent rate
@@ -98,6 +99,11 @@ class Vehicle:
     def lays_curves(self) -> bool:
         """Whether it flies legs as ArduPilot does: each leg is its own S-curve, measured in ArduPilot's own metres."""
         return self.autopilot.is_ardupilot and math.isfinite(self.leg_jerk_m_s3) and math.isfinite(self.accel_m_s2)
+
+    @property
+    def keeps_airspeed(self) -> bool:
+        """Whether its speed is the airspeed that it indicates, along its path: a fixed wing's."""
+        return self.autopilot is Autopilot.ARDUPLANE and self.turn_radius_m > 0.0
 
     @property
     def can_hold(self) -> bool:
