@@ -13,7 +13,6 @@ from pathlib import Path
 from gcsplan.errors import LinkError, UsageError
 from gcsplan.mavlink.link.link import Link
 from gcsplan.sim.outcome import Part
-from gcsplan.vehicle import DEFAULT_LEAN_DEG
 
 _BASE_PORT = 5760
 _FIRST_INSTANCE, _LAST_INSTANCE = 20, 900
@@ -42,7 +41,7 @@ def parameters_of(part: Part) -> dict[str, float]:
         "WPNAV_SPEED": 100.0 * v.speed_max_m_s, "WPNAV_SPEED_UP": 100.0 * v.climb_m_s,
         "WPNAV_SPEED_DN": 100.0 * v.descent_m_s, "LAND_SPEED": 100.0 * v.land_m_s,
     }  # fmt: skip
-    if v.lean_angle_deg is not None and v.lean_angle_deg > DEFAULT_LEAN_DEG:
+    if v.lean_angle_deg is not None:  # the planned times count with it
         given["ANGLE_MAX"] = 100.0 * v.lean_angle_deg
     elif v.speed_max_m_s > FAST_M_S:
         given["ANGLE_MAX"] = FAST_ANGLE_CD
