@@ -68,7 +68,8 @@ class Energy:
 
 @dataclass(frozen=True, slots=True)
 class Vehicle:
-    """An airframe with its limits. Speeds are in m/s: over ground (cruise) and vertical (climb, descent).
+    """An airframe with its limits. Speeds are in m/s: over ground (cruise; of a fixed wing, the airspeed that it
+    indicates) and vertical (climb, descent).
 
     ``accel_m_s2`` is the acceleration and braking along the path, ``corner_accel_m_s2`` bounds the speed in a rounded
     corner, ``vertical_accel_m_s2`` applies in the columns of take-off and landing, ``land_m_s`` is the descent rate
@@ -106,6 +107,11 @@ class Vehicle:
     def return_speed_m_s(self) -> float | None:
         """The speed of the autopilot's own return; None: that of the mission."""
         return PX4_RETURN_M_S if self.autopilot is Autopilot.PX4 and math.isfinite(self.accel_m_s2) else None
+
+    @property
+    def keeps_airspeed(self) -> bool:
+        """Whether its speed is the airspeed that it indicates, along its path: a fixed wing's."""
+        return self.autopilot is Autopilot.ARDUPLANE and self.turn_radius_m > 0.0
 
     @property
     def can_hold(self) -> bool:

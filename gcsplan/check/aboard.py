@@ -12,6 +12,7 @@ from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.atmosphere import true_per_indicated
 
 PX4_SLOW_BELOW_M = 5.0
 """MPC_LAND_ALT2, default: below this height over home a landing PX4 is as slow as MPC_LAND_SPEED."""
@@ -58,7 +59,7 @@ class Aboard:
 
     def note(self, words: str) -> None:
         """Add ``words`` to the notes unless they are there: a round may be flown more than once."""
-        if words not in self.flight.notes:
+        if words and words not in self.flight.notes:
             self.flight.notes.append(words)
 
     def instead(self, seq: int, kind: StretchKind, start: Place, end: Place, **more: object) -> None:
@@ -136,6 +137,10 @@ class Aboard:
         return max(0.0, item.params[0]) if math.isfinite(item.params[0]) else math.inf
 
     def turns_s(self, item: MissionItem, reach_m: float) -> float:
-        """Seconds that the item's turns take on a circle of radius ``reach_m``."""
+        """Seconds that the item's turns take on a circle of radius ``reach_m``.
+
+        In thin air ArduPlane flies a circle that is wider by the square of what makes it faster.
+        """
         turns = item.params[0] if math.isfinite(item.params[0]) and item.params[0] > 0 else 1.0
-        return turns * 2.0 * math.pi * reach_m / self.pace.speed_m_s
+        wider = float(true_per_indicated(self.at[2])) if self.autopilot is Autopilot.ARDUPLANE else 1.0
+        return turns * 2.0 * math.pi * reach_m * wider / self.pace.speed_m_s

@@ -29,7 +29,7 @@ from gcsplan.arrays import Floats
 from gcsplan.check.circles import circle_growth
 from gcsplan.check.geodesy import flat_m
 from gcsplan.check.stretch import Flight, Place, Stretch
-from gcsplan.check.tracking import tracking_m
+from gcsplan.check.tracking import tracking_m, true_m_s
 from gcsplan.check.tuning import DEFAULTS, Tuning
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
@@ -190,7 +190,7 @@ class _Run:
             tangent = tangent_m(self.radius, turn)
             begins = self._begins_m(mission, s, abs(turn), flight)
             early_m, late_m = (abs(b - tangent) for b in begins)
-            wander_m = tracking_m(self.radius, turn, s.speed_m_s, self.tuning)
+            wander_m = tracking_m(self.radius, turn, true_m_s(s), self.tuning)
             self.wander_m = max(self.wander_m, wander_m)
             off_m = max(early_m, late_m) * math.sin(min(abs(turn), 0.5 * math.pi))
             off_m += max(0.0, wander_m - self.error_m)
@@ -232,8 +232,8 @@ class _Run:
         if words not in flight.notes:
             flight.notes.append(words)
         thin = circle_growth(max(s.start[2], s.end[2]))  # WP_RADIUS grows with altitude as circles do
-        least, most = (self.tuning.plane_turns_m(s.speed_m_s, turn, growth) for growth in (1.0, thin))
-        return least, most
+        least = self.tuning.plane_turns_m(s.speed_m_s, turn)
+        return least, self.tuning.plane_turns_m(s.speed_m_s * math.sqrt(thin), turn, thin)
 
     def _widen_m(self, k: int, *, settled: bool = False) -> float:
         """How much a leg is widened, m: for a turn before it until it ``settled``, and for a circle at its start."""
@@ -241,7 +241,7 @@ class _Run:
 
     def _settles_m(self, k: int, off_m: float) -> float:
         """After how many metres of its straight part an aircraft that begins leg ``k`` ``off_m`` off is back on it."""
-        return SETTLES_S * self.tuning.l1_slower * self.run[k].speed_m_s + off_m if off_m > 0.0 else 0.0
+        return SETTLES_S * self.tuning.l1_slower * true_m_s(self.run[k]) + off_m if off_m > 0.0 else 0.0
 
     def _track(self, k: int) -> list[tuple[Floats, float, float]]:
         """Leg ``k`` as flown: (east and north, metres flown, how far the piece up to there may lie elsewhere)."""

@@ -2,7 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
+from gcsplan.world.atmosphere import density_ratio
+
 PLANE_LOITER_RADIUS_M = 60.0  # ArduPlane WP_LOITER_RAD, default
+
+
+HOT_DAY = 1.1
+"""How much thinner than the standard atmosphere the air may be."""
+
+TOLD_M = 1.0
+"""A circle that grows by less is not told."""
 
 
 def circle_growth(amsl_m: float) -> float:
@@ -10,4 +21,15 @@ def circle_growth(amsl_m: float) -> float:
 
     Source: AP_L1_Control.cpp, `loiter_radius`.
     """
-    return float(1.1 / (1.0 - 2.25577e-5 * max(amsl_m, 0.0)) ** 4.2559)
+    return float(HOT_DAY / density_ratio(max(amsl_m, 0.0)))
+
+
+def circle_words(seq: int, radius_m: float, amsl_m: float) -> str:
+    """What ArduPlane makes of a circle's radius at an altitude; empty where that is nearly the same."""
+    flown_m, most_m = radius_m / float(density_ratio(amsl_m)), radius_m * circle_growth(amsl_m)
+    if flown_m - radius_m < TOLD_M:
+        return ""
+    return (
+        f"item {seq}: ArduPlane widens its circle of {radius_m:g} m in the thin air at {amsl_m:.0f} m AMSL to about "
+        f"{flown_m:.0f} m; it is judged with {math.ceil(most_m)} m, for a hot day"
+    )

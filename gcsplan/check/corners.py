@@ -171,7 +171,8 @@ class _Cutter:
             return float(item.params[1])
         radius = self.tuning.says("WP_RADIUS", self.tuning.plane_radius_m)
         self._say(f"item {s.seq} gives no acceptance radius: its turn is judged as begun by {radius}")
-        return self.tuning.plane_turns_m(s.speed_m_s, turn, circle_growth(max(s.start[2], s.end[2])))
+        thin = circle_growth(max(s.start[2], s.end[2]))
+        return self.tuning.plane_turns_m(s.speed_m_s * math.sqrt(thin), turn, thin)
 
     # -- what is flown -------------------------------------------------------------------------------------------
 

@@ -31,7 +31,7 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.check.aboard import Aboard
-from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth
+from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth, circle_words
 from gcsplan.check.climb_out import REACHED_M, circle_up, climb_out, glide, is_wing
 from gcsplan.check.commands import flown_otherwise, moves_nothing
 from gcsplan.check.geodesy import flat_m
@@ -277,9 +277,10 @@ class _Pilot(Aboard):
         self._go(seq, item, short_m=0.0 if plane else reach_m)
         if not self.known:
             return
-        if plane:
-            reach_m *= circle_growth(self.at[2])
         hold_s = self.turns_s(item, reach_m) if turns else self.loiter_s(item)
+        if plane:
+            self.note(circle_words(seq, reach_m, self.at[2]))
+            reach_m *= circle_growth(self.at[2])
         self.add(seq, "loiter", self.at, self.at, reach_m=reach_m, hold_s=hold_s)
         self.direction = None
 
@@ -310,6 +311,7 @@ class _Pilot(Aboard):
         place = self.at[:2]
         if plane:
             around = (*place, 0.5 * (low + high))
+            self.note(circle_words(seq, reach_m, high))
             reach_m *= circle_growth(high)
             self.add(seq, "loiter", around, around, band_m=0.5 * (high - low), reach_m=reach_m)
             self.low_m, self.around_m = min(REACHED_M, self.at[2] - low), reach_m

@@ -13,9 +13,11 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
+from gcsplan.check.stretch import Stretch
 from gcsplan.check.tuning import DEFAULTS, Tuning
+from gcsplan.world.atmosphere import true_per_indicated
 
-__all__ = ["late_m", "tracking_m"]
+__all__ = ["late_m", "tracking_m", "true_m_s"]
 
 LATE_S, LATE_PER_SINE = 0.72, 3.0
 """Seconds of flight by which a turn lies outside its arc, and how fast that grows with the sine of a small turn."""
@@ -31,6 +33,11 @@ SLOWEST_M_S = 1.0
 
 CAPTURE_SINE = math.sqrt(0.5)
 GRAVITY_M_S2 = 9.80665
+
+
+def true_m_s(s: Stretch) -> float:
+    """The true airspeed at the higher end of a stretch, m/s."""
+    return s.speed_m_s * float(true_per_indicated(max(s.start[2], s.end[2])))
 
 
 def late_m(turn_rad: float, speed_m_s: float, tuning: Tuning = DEFAULTS) -> float:

@@ -40,6 +40,7 @@ LAG_S, LAG_FROM, REST_M_S = 0.36, 0.6, 0.96
 counts as REST_M_S. Measured on ArduCopter 4.7 at 5 to 15 m/s, from rest and out of turns of 4 to 135 degrees."""
 
 _TRIED, _ROUNDS = 16, 3
+_STEPS, _WITHIN = 30, 1e-6
 _HALVINGS = 60
 _LEAST_LENGTH_M = 1e-3
 _SAME_S = 1e-9
@@ -135,7 +136,7 @@ class Curved:
         upward = np.full(len(length), self.vehicle.vertical_accel_m_s2)
         accel = along_slope(run, rise, np.full(len(length), FULL_ACCEL * self.vehicle.accel_m_s2), upward, upward)
         flown = curves(length, speed, accel, self.vehicle.leg_jerk_m_s3)
-        turns = _Turns(flown, self.way / length[:, None], np.minimum(speed[:-1], speed[1:]), self.vehicle)
+        turns = _Turns.between(flown, self.way / length[:, None], speed, self.vehicle)
         overlap = _overlaps(turns)
         slow = np.append(REST_M_S, np.maximum(turns.speed_m_s(overlap), REST_M_S))
         lag = LAG_S * np.maximum(np.log(np.maximum(flown.peak_m_s / slow, 1.0)) - LAG_FROM, 0.0)
@@ -232,17 +233,35 @@ def _steps(lag: Floats) -> Floats:
 
 def _overlaps(turns: _Turns) -> Floats:
     """(T,) for how many seconds the leg before each turn is still flown when the next begins."""
-    most = np.minimum(turns.flown.start_s[:-1], turns.flown.start_s[1:])
-    low, high = np.zeros_like(most), most
-    for _ in range(_ROUNDS):  # the distance from the way point and the speed only rise with the overlap
-        low, high = _latest(low, high, turns.near)
+    found = turns.most_s.copy()
+    excess = turns.excess(found)
+    left = np.flatnonzero(excess > 0.0)
+    if len(left):
+        found[left] = _zero(turns.of(left).excess, found[left], excess[left])
     # Accelerations rise and fall again. The vehicle waits until all is right: the latest is the earliest in time.
-    if turns.gentle(low[None]).all():
-        return low
-    high, low = low, np.zeros_like(low)
+    if turns.gentle(found[None]).all():
+        return found
+    low, high = np.zeros_like(found), found
     for _ in range(_ROUNDS):
         low, high = _latest(low, high, turns.gentle)
     return low
+
+
+def _zero(excess: Callable[[Floats], Floats], high: Floats, above: Floats) -> Floats:
+    """(T,) where an excess that rises from -1 at 0 to ``above`` at ``high`` is 0: regula falsi (Illinois)."""
+    low, below = np.zeros_like(high), np.full_like(high, -1.0)
+    before = np.zeros_like(high)
+    for _ in range(_STEPS):
+        tried = high - (high - low) * above / (above - below)
+        now = excess(tried)
+        if (np.abs(now) < _WITHIN).all():
+            break
+        over = now > 0.0
+        kept_low, kept_high = np.where(before > 0.0, 0.5, 1.0), np.where(before < 0.0, 0.5, 1.0)
+        low, below = np.where(over, low, tried), np.where(over, kept_low * below, np.minimum(now, -1e-12))
+        high, above = np.where(over, tried, high), np.where(over, now, kept_high * above)
+        before = np.where(over, 1.0, -1.0)
+    return np.asarray(tried)
 
 
 def _latest(low: Floats, high: Floats, allowed: Callable[[Floats], Bools]) -> tuple[Floats, Floats]:
@@ -255,22 +274,44 @@ def _latest(low: Floats, high: Floats, allowed: Callable[[Floats], Bools]) -> tu
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Turns:
-    """The turns, T of them, between legs along ``course`` (T + 1, 3), with the lower speed limit of both (T,)."""
+    """T turns between two legs each: the curves of the legs before and of those after (2T,), the legs' directions
+    (T, 3), and the lower speed limit of both (T,)."""
 
-    flown: Curves
-    course: Floats
+    pairs: Curves
+    into: Floats
+    out: Floats
     slower_m_s: Floats
     vehicle: Vehicle
 
+    @classmethod
+    def between(cls, flown: Curves, course: Floats, speed_m_s: Floats, vehicle: Vehicle) -> _Turns:
+        """The turns between legs ``flown`` along ``course`` (L, 3), which may be as fast as ``speed_m_s`` (L,)."""
+        leg = np.arange(len(course) - 1)
+        slower = np.minimum(speed_m_s[:-1], speed_m_s[1:])
+        return cls(flown.of(np.concatenate([leg, leg + 1])), course[:-1], course[1:], slower, vehicle)
+
+    def of(self, turns: Indices) -> _Turns:
+        """The turns with these indices."""
+        pairs = self.pairs.of(np.concatenate([turns, turns + len(self.slower_m_s)]))
+        return _Turns(pairs, self.into[turns], self.out[turns], self.slower_m_s[turns], self.vehicle)
+
+    @property
+    def most_s(self) -> Floats:
+        """(T,) the longest overlap: one leg brakes and the other speeds up all the time."""
+        n = len(self.slower_m_s)
+        return np.minimum(self.pairs.start_s[:n], self.pairs.start_s[n:])
+
     @property
     def _cosine(self) -> Floats:
-        return np.asarray((self.course[:-1] * self.course[1:]).sum(axis=1))
+        return np.asarray((self.into * self.out).sum(axis=1))
 
-    def near(self, overlap: Floats) -> Bools:
-        """(K, T) whether in the middle of each turn it is near enough to the way point, and slow enough."""
-        (_, _, s), (_, _, r) = self._middle(overlap)
-        close = s * s + r * r - 2.0 * s * r * self._cosine < CORNER_M**2
-        return np.asarray(close & (self.speed_m_s(overlap) < self.slower_m_s * (1.0 + 1e-6)))
+    def excess(self, overlap: Floats) -> Floats:
+        """(T,) above 0 where the middle of a turn is too far from the way point, or too fast; it rises with the
+        overlap, nearly evenly, because distances rise as its cube and speeds as its square."""
+        (_, v, s), (_, w, r) = self._middle(overlap)
+        far = np.sqrt(np.maximum(s * s + r * r - 2.0 * s * r * self._cosine, 0.0)) / CORNER_M
+        fast = np.sqrt(np.maximum(v * v + w * w + 2.0 * v * w * self._cosine, 0.0)) / (self.slower_m_s * (1.0 + 1e-6))
+        return np.asarray(np.maximum(np.cbrt(far), np.sqrt(fast)) - 1.0)
 
     def speed_m_s(self, overlap: Floats) -> Floats:
         """(..., T) the speed in the middle of each turn."""
@@ -280,7 +321,7 @@ class _Turns:
     def gentle(self, overlap: Floats) -> Bools:
         """(K, T) whether the accelerations in the middle of each turn are small enough."""
         (a, _, _), (b, _, _) = self._middle(overlap)
-        bend = b[..., None] * self.course[1:] - a[..., None] * self.course[:-1]
+        bend = b[..., None] * self.out - a[..., None] * self.into
         across = np.hypot(bend[..., 0], bend[..., 1]) < CORNER_ACCEL * self.vehicle.corner_accel_m_s2 * (1.0 + 1e-6)
         return np.asarray(across & (np.abs(bend[..., 2]) < self.vehicle.vertical_accel_m_s2 * (1.0 + 1e-6)))
 
@@ -288,5 +329,6 @@ class _Turns:
         """Acceleration, speed and metres of both legs, from the end of one and the start of the other, in the middle
         of overlaps (K, T)."""
         half = 0.5 * overlap
-        into, out = self.flown.of(slice(None, -1)), self.flown.of(slice(1, None))
-        return into.begun(half), out.begun(half)
+        a, v, s = self.pairs.begun(np.concatenate([half, half], axis=-1))
+        n = len(self.slower_m_s)
+        return (a[..., :n], v[..., :n], s[..., :n]), (a[..., n:], v[..., n:], s[..., n:])

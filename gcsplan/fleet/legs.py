@@ -10,6 +10,7 @@ from gcsplan.arrays import Floats, Indices
 from gcsplan.fleet.curved import Curved, curved
 from gcsplan.fleet.speeds import Stretch, rounded
 from gcsplan.vehicle import Vehicle
+from gcsplan.world.atmosphere import true_per_indicated
 
 __all__ = ["legs"]
 
@@ -26,9 +27,22 @@ def legs(
     each part, if they are not the vehicle's own.
 
     ArduPilot flies S-curves (`curved`) unless a motion key of the vehicle is not bounded; every other vehicle rounds
-    its corners (`speeds`).
+    its corners (`speeds`). A fixed wing keeps the airspeed that it indicates, so it is faster in thin air, and its
+    rates of climb and descent are of the slopes that it flies.
     """
+    if vehicle.keeps_airspeed:
+        pace, rates_m_s = _in_air(points, vehicle, pace, rates_m_s)
     if vehicle.lays_curves and math.isfinite(vehicle.corner_accel_m_s2):
         numbers = np.arange(len(owner), dtype=np.intp) if leg is None else leg
         return curved(points, vehicle, owner, numbers, pace, rates_m_s)
     return rounded(points, vehicle, owner, pace, rates_m_s)
+
+
+def _in_air(points: Floats, vehicle: Vehicle, pace: Floats | None, rates_m_s: Floats | None) -> tuple[Floats, Floats]:
+    """``pace`` and ``rates_m_s`` with the part of the true airspeed that is horizontal on each part, in still air."""
+    d = np.diff(points, axis=0)
+    length = np.linalg.norm(d, axis=1)
+    level = np.hypot(d[:, 0], d[:, 1]) / np.where(length > 0.0, length, 1.0)
+    faster = true_per_indicated(0.5 * (points[1:, 2] + points[:-1, 2]))
+    rates = np.array([[vehicle.climb_m_s, vehicle.descent_m_s]]) if rates_m_s is None else rates_m_s
+    return faster * level * (1.0 if pace is None else pace), faster[:, None] * rates

@@ -8,11 +8,10 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.sim.kinematics import Kinematics
+from gcsplan.sim.true_speeds import SAME_M
 
 SAG_M = 0.02
 """Metres by which the chords of a rounded corner may lie off its arc."""
-SAME_M = 0.01
-"""Metres: positions nearer than this are the same."""
 FAST_M_S = 60.0
 """m/s: a corner that allows more than this, and is cut by at most half of `SAG_M`, is not rounded."""
 

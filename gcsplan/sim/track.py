@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,15 +19,14 @@ from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.sim.kinematics import AT_ONCE_M_S2, Kinematics
-from gcsplan.sim.rounding import SAME_M, rounded
+from gcsplan.sim.rounding import rounded
 from gcsplan.sim.scurves import leg_limits, step_legs
+from gcsplan.sim.true_speeds import SAME_M, as_measured, in_thin_air
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World
 
 TERRAIN_PART_M = 10.0
 """Longest piece of a leg that follows the terrain, in metres."""
-METRES_PER_DEGREE = 0.011131884502145034 * 1e7
-"""Metres per degree of latitude in ArduPilot (`LOCATION_SCALING_FACTOR`)."""
 PASSED = -1.0
 """Value in `Track.hold_s` of a node that is passed without a stop."""
 
@@ -101,9 +100,10 @@ class Track:
 
 
 class _Line:
-    """Collects nodes and pieces in order."""
+    """Collects nodes and pieces in order. ``in_space``: the commanded speed is along the path, not over ground."""
 
-    def __init__(self, start: Floats) -> None:
+    def __init__(self, start: Floats, *, in_space: bool) -> None:
+        self.in_space = in_space
         self.points = [start]
         self.hold_s = [0.0]
         self.pieces: list[tuple[float, float, float, float, bool, int]] = []
@@ -122,7 +122,7 @@ class _Line:
         if not cap_m_s:
             rate = vertical / abs(rise) if abs(rise) > 1e-9 else math.inf
             cap_m_s = min(rate, corner_m_s / level if level else math.inf)
-        if rise != 0.0 and math.isinf(vertical):  # the ideal vehicle holds the commanded speed in space
+        if self.in_space or (rise != 0.0 and math.isinf(vertical)):  # the ideal vehicle holds it in space
             level = 1.0
         accel = kinematics.vertical_accel_m_s2 if stretch.column else kinematics.accel_m_s2
         self.pieces.append((cap_m_s, stretch.speed_m_s, level, accel, stretch.column, stretch.seq))
@@ -163,10 +163,12 @@ def make_track(
     if not flight.stretches:
         raise ValueError(f"{vehicle.name}: the mission flies nowhere")
     if vehicle.lays_curves:
-        flight.stretches = [_as_measured(s, mission, world) for s in flight.stretches]
+        flight.stretches = [as_measured(s, mission, world) for s in flight.stretches]
     wing = vehicle.turn_radius_m > 0.0
     if wing:
         bend(flight, mission, vehicle, world.frame)
+        if vehicle.autopilot is Autopilot.ARDUPLANE:
+            flight.stretches = [in_thin_air(s, kinematics) for s in flight.stretches]
     places = np.array([(s.start, s.end) for s in flight.stretches])
     ends = np.empty_like(places)
     ends[..., :2] = world.frame.to_plane(places[..., 0], places[..., 1])
@@ -175,7 +177,7 @@ def make_track(
         first = next((k for k, s in enumerate(flight.stretches) if not s.column), 0)
         flight.stretches, ends = flight.stretches[first:], ends[first:]
     # A leg begins where the last one ended: a gap between them was not understood and is listed in `not_flown`.
-    line, goal, i = _Line(ends[0, 0]), 0, 0
+    line, goal, i = _Line(ends[0, 0], in_space=wing), 0, 0
     home_amsl_m = _home_amsl_m(mission, world) if vehicle.autopilot is Autopilot.PX4 else None
     stretches = flight.stretches
     while i < len(stretches):
@@ -204,26 +206,6 @@ def _home_amsl_m(mission: Mission, world: World) -> float:
     """The ground at home, or home's own altitude where that is unknown."""
     ground = world.ground_amsl(mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7)
     return mission.home.amsl_m if math.isnan(ground) else ground
-
-
-def _as_measured(s: Stretch, mission: Mission, world: World) -> Stretch:
-    """Return a leg with its true speed over ground, because ArduPilot flies the commanded speed in its own metres.
-
-    Those are measured on a sphere, from home; longitudes are scaled by the cosine of the latitude midway between home
-    and the way point (`Location::get_vector_xy_from_origin_NE`).
-    """
-    if s.column:
-        return s
-    home_lat, home_lon = mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7
-
-    def from_home(lat: float, lon: float) -> tuple[float, float]:
-        east = math.remainder(lon - home_lon, 360.0) * math.cos(math.radians(lat + home_lat) / 2.0)
-        return east * METRES_PER_DEGREE, (lat - home_lat) * METRES_PER_DEGREE
-
-    counted_m = math.dist(from_home(*s.start[:2]), from_home(*s.end[:2]))
-    places = np.array([s.start[:2], s.end[:2]])
-    true_m = math.dist(*world.frame.to_plane(places[:, 0], places[:, 1]).tolist())
-    return s if counted_m <= SAME_M else replace(s, speed_m_s=s.speed_m_s * true_m / counted_m)
 
 
 def _track(vehicle: Vehicle, line: _Line, goal: int, flight: Flight, kinematics: Kinematics, last: Stretch) -> Track:

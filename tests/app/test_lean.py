@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
 from typing import Any
@@ -152,6 +153,8 @@ def test_simulated_vehicles_lean_as_far_as_their_missions_need() -> None:
     assert result.verified
     vehicle = planned(lean_angle_deg=60).vehicles[0].request.vehicle
     assert parameters_of(SimpleNamespace(vehicle=vehicle, rtl_rel_home_m=None))["ANGLE_MAX"] == 6000.0  # type: ignore[arg-type]
+    leans = replace(vehicle, lean_angle_deg=30.0)  # no more than it was planned with
+    assert parameters_of(SimpleNamespace(vehicle=leans, rtl_rel_home_m=None))["ANGLE_MAX"] == 3000.0  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
