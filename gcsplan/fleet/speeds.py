@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices
+from gcsplan.fleet.smoothed import Smoothed, smoothed
 from gcsplan.vehicle import Vehicle
 
 CUT_M = 2.0
@@ -165,16 +166,19 @@ class Stretch:
 
 def legs(
     points: Floats, vehicle: Vehicle, owner: Indices, leg_m: Floats | None = None, pace: Floats | None = None,
-    rates_m_s: Floats | None = None,
-) -> Stretch | None:  # fmt: skip
+    rates_m_s: Floats | None = None, radius_m: Floats | None = None,
+) -> Stretch | Smoothed | None:  # fmt: skip
     """The stretch through ``points`` (N, 3) without a stop, its corners rounded; None if nothing moves.
 
     ``owner`` (N - 1,) numbers the legs. With a corner acceleration of inf, corners are sharp. In the middle of a corner
     the vehicle has the way point's altitude, because the tangents of nearly straight tracks are half a leg long.
     ``leg_m`` (N - 1,) are lengths from way point to way point, for legs that are parts of longer ones. ``pace`` (N -
     1,) is the speed that results from a cruise speed of 1, if that is not 1. ``rates_m_s`` (N - 1, 2) are the rates of
-    climb and descent on each leg, if they are not the vehicle's own.
+    climb and descent on each leg, if they are not the vehicle's own. ``radius_m`` (N - 1,) are PX4's acceptance radii
+    at the legs' ends; see `smoothed`.
     """
+    if vehicle.smooths:
+        return smoothed(points, vehicle, owner, pace, rates_m_s, radius_m)
     whole = np.linalg.norm(np.diff(points, axis=0), axis=1)
     keep = np.append(True, whole > _LEAST_LENGTH_M)
     p, owner, whole = points[keep], owner[keep[1:]], (whole if leg_m is None else leg_m)[keep[1:]]

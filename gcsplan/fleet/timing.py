@@ -18,6 +18,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats, Indices
 from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.smoothed import Smoothed
 from gcsplan.fleet.speeds import POSITION_ERROR_M, Stretch, column, legs
 from gcsplan.vehicle import Autopilot, Vehicle
 
@@ -117,7 +118,7 @@ class Course:
         holds = np.zeros(len(route.points)) if route.holds_s is None else route.holds_s
         self.gate_s = float(holds[0])
         self.takeoff = _takeoff(route, vehicle)
-        self.to_goal: list[tuple[Stretch, float]] = []
+        self.to_goal: list[tuple[Stretch | Smoothed, float]] = []
         stops = [0, *(np.flatnonzero(holds[1:-1] > 0.0) + 1).tolist(), len(holds) - 1]
         leg_m = leg_lengths_m(route.points, None if route.items is None else route.items[1:-1])
         waited = 0.0
@@ -218,7 +219,7 @@ class _Motion:
         self.points = [start[None, :]]
         self.legs: list[Indices] = []
 
-    def go(self, stretch: Stretch, speed_m_s: float, error_m: float) -> None:
+    def go(self, stretch: Stretch | Smoothed, speed_m_s: float, error_m: float) -> None:
         times, points, owner = stretch.motion(speed_m_s, error_m)
         self.times.append(self.now_s + times)
         self.points.append(points)
@@ -260,7 +261,7 @@ def leg_lengths_m(points: Floats, items: Indices | None) -> Floats:
     return np.asarray(np.maximum(own, np.repeat(whole, last - first)))
 
 
-def _takeoff(route: Route, vehicle: Vehicle) -> Stretch | None:
+def _takeoff(route: Route, vehicle: Vehicle) -> Stretch | Smoothed | None:
     ground, top = route.start_ground_amsl_m, route.points[0]
     if route.climb_out is not None:
         way = legs(route.climb_out, vehicle, np.zeros(len(route.climb_out) - 1, dtype=np.intp))
@@ -269,7 +270,7 @@ def _takeoff(route: Route, vehicle: Vehicle) -> Stretch | None:
     return None if ground is None else next(iter(upright(top[:2], ground, float(top[2]), vehicle, 0)), None)
 
 
-def _after(route: Route, vehicle: Vehicle) -> list[Stretch]:
+def _after(route: Route, vehicle: Vehicle) -> list[Stretch | Smoothed]:
     """The stretches after the arrival."""
     goal, home = route.points[-1], route.points[0]
     number = len(route.points)
@@ -305,7 +306,7 @@ def _home(route: Route) -> tuple[float, float]:
 
 def upright(
     place: Floats, from_amsl_m: float, to_amsl_m: float, vehicle: Vehicle, owner: int, home_amsl_m: float | None = None
-) -> list[Stretch]:
+) -> list[Stretch | Smoothed]:
     """A column over ``place`` (2,): a climb to a standstill, or a landing that is slow near the ground.
 
     ``home_amsl_m``: the ground at home, above which PX4 slows down, wherever it lands; None: as at the landing place.
