@@ -15,6 +15,9 @@ LEAN_DEG_PER_M_S = 3.0
 """Lean that an ArduCopter needs for 1 m/s of cruise speed, against its drag: its speed was measured to end near 10 m/s
 with 30° and near 15 m/s with 45°, whatever was commanded. An airframe with less drag is faster."""
 
+PX4_VEL_MAX_M_S = 12.0
+"""PX4's MPC_XY_VEL_MAX, default: it flies no faster, whatever is commanded, and says nothing."""
+
 PX4_RETURN_M_S = 5.0
 """PX4's MPC_XY_CRUISE, default: the speed of its return, whatever speed the mission has commanded."""
 
@@ -76,8 +79,8 @@ class Vehicle:
     just above the ground. ``leg_jerk_m_s3`` is the jerk of the S-curves that ArduPilot flies its legs with; it bounds
     the speed on a short leg. An acceleration of ``inf`` is an instant change of speed, a corner acceleration of ``inf``
     a sharp corner at full speed. A climb or descent rate of ``inf`` means that the cruise speed is the speed in space,
-    whatever the slope: the ideal vehicle of the papers. ``lean_angle_deg`` is an ArduCopter's largest lean angle, which
-    has bounded ``speed_max_m_s`` already; None: it bounds nothing.
+    whatever the slope: the ideal vehicle of the papers. ``lean_angle_deg`` is an ArduCopter's largest lean angle, and
+    ``vel_max_m_s`` a PX4's MPC_XY_VEL_MAX: they have bounded ``speed_max_m_s`` already; None: they bound nothing.
     """
 
     name: str
@@ -97,11 +100,23 @@ class Vehicle:
     vertical_accel_m_s2: float = 1.0
     leg_jerk_m_s3: float = math.inf
     lean_angle_deg: float | None = None
+    vel_max_m_s: float | None = None
 
     @property
     def lays_curves(self) -> bool:
         """Whether it flies legs as ArduPilot does: each leg is its own S-curve, measured in ArduPilot's own metres."""
         return self.autopilot.is_ardupilot and math.isfinite(self.leg_jerk_m_s3) and math.isfinite(self.accel_m_s2)
+
+    @property
+    def smooths(self) -> bool:
+        """Whether it flies legs as PX4 does: braking by distance, at a speed in corners that its radius decides."""
+        bounds = self.accel_m_s2, self.corner_accel_m_s2, self.leg_jerk_m_s3
+        return self.autopilot is Autopilot.PX4 and all(map(math.isfinite, bounds))
+
+    @property
+    def acceptance_m(self) -> float:
+        """The acceptance radius that is sent with each way point (1 … 255): the track error; not for ArduCopter."""
+        return min(max(1.0, math.floor(self.limits.track_error_m)), 255.0)
 
     @property
     def return_speed_m_s(self) -> float | None:

@@ -70,6 +70,7 @@ def order_of(
         terrain=None if simulated else job.ground,
         timeout_s=options.timeout_s,
         listen_s=listen_s,
+        vehicle=job.vehicle,
     )
     return session.UploadOrder(link, job.mission, job.verdict, settings, _judge_again(job, simulated), progress)
 
@@ -89,6 +90,7 @@ def judge_on_board(job: UploadJob, *, allow_unjudged: bool, simulated: bool = Fa
     if job.world is None or job.vehicle is None:
         return None
     from gcsplan.mavlink.link.parameters import lean_shortage
+    from gcsplan.mavlink.link.px4_motion import speed_shortage
     from gcsplan.mavlink.link.terrain import terrain_error_m
 
     world, vehicle = job.world, job.vehicle
@@ -98,6 +100,8 @@ def judge_on_board(job: UploadJob, *, allow_unjudged: bool, simulated: bool = Fa
 
     def again(read_back: Mission, values: Mapping[str, float]) -> str | None:
         if vehicle.lean_angle_deg is not None and (short := lean_shortage(values, planned_m_s)):
+            return short
+        if short := speed_shortage(values, vehicle, planned_m_s):
             return short
         if job.home_required and job.way_home is not None and not simulated:
             against = against_on_board(job.way_home, values)

@@ -8,8 +8,9 @@ corner's halves count for their own legs.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -38,8 +39,14 @@ overlap end this near to each other."""
 SLANTS_M = 0.01
 
 
-def seconds_of(stretches: Sequence[Stretch], vehicle: Vehicle, world: World, home_deg: tuple[float, float]) -> Floats:
-    """(N,) seconds of each stretch, without the hold at its end; ``home_deg``: home's latitude and longitude."""
+def seconds_of(
+    stretches: Sequence[Stretch], vehicle: Vehicle, world: World, home_deg: tuple[float, float],
+    radius_m: Mapping[int, float] = MappingProxyType({}),
+) -> Floats:  # fmt: skip
+    """(N,) seconds of each stretch, without the hold at its end; ``home_deg``: home's latitude and longitude.
+
+    ``radius_m``: acceptance radii of items, by seq, that are not the vehicle's own.
+    """
     places = np.array([(s.start, s.end) for s in stretches])
     ends = np.empty_like(places)
     ends[..., :2] = world.frame.to_plane(places[..., 0], places[..., 1])
@@ -51,7 +58,7 @@ def seconds_of(stretches: Sequence[Stretch], vehicle: Vehicle, world: World, hom
         if _upright(stretches[first], ends[first]):
             seconds[first] = _column_s(stretches[first], ends[first], vehicle, home_amsl_m)
         else:
-            seconds[first:last] = _legs_s(stretches[first:last], ends[first:last], vehicle, world, home_deg)
+            seconds[first:last] = _legs_s(stretches[first:last], ends[first:last], vehicle, world, home_deg, radius_m)
     return seconds
 
 
@@ -63,8 +70,9 @@ def _column_s(s: Stretch, ends: Floats, vehicle: Vehicle, home_amsl_m: float | N
 
 
 def _legs_s(
-    run: Sequence[Stretch], ends: Floats, vehicle: Vehicle, world: World, home_deg: tuple[float, float]
-) -> Floats:
+    run: Sequence[Stretch], ends: Floats, vehicle: Vehicle, world: World, home_deg: tuple[float, float],
+    radius_m: Mapping[int, float],
+) -> Floats:  # fmt: skip
     """(N,) seconds of each of N stretches that are flown from one standstill to the next."""
     points, owner = np.concatenate([ends[:1, 0], ends[:, 1]]), np.arange(len(run), dtype=np.intp)
     follows = np.array([s.terrain for s in run])
@@ -77,6 +85,7 @@ def _legs_s(
     stretch = legs(
         points, vehicle, owner, np.array([s.seq for s in run], dtype=np.intp)[owner],
         pace=speed, rates_m_s=np.array([s.rates_m_s or own for s in run])[owner],
+        radius_m=np.array([radius_m.get(s.seq, vehicle.acceptance_m) for s in run])[owner],
     )  # fmt: skip
     return np.zeros(len(run)) if stretch is None else stretch.shares_s(1.0, len(run))
 

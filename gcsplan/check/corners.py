@@ -149,9 +149,9 @@ class _Cutter:
                 self._say(f"corners are cut within {self.tuning.says('WPNAV_RADIUS', self.tuning.copter_radius_m)}")
             return self.tuning.copter_radius_m if fast else 0.0
         if self.mission.autopilot is Autopilot.PX4:
-            own = item.params[1] if item.command == cmd.WAYPOINT else 0.0
-            if math.isfinite(own) and own > 1e-7:
-                return own
+            accepts_m, own = self.tuning.px4_accepts_m(item)
+            if own:
+                return accepts_m
             if self.tuning.px4_radius_m > self.limits.track_error_m:
                 radius = self.tuning.says("NAV_ACC_RAD", self.tuning.px4_radius_m)
                 self._say(f"item {s.seq} gives no acceptance radius: it counts as reached within {radius}")

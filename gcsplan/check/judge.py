@@ -27,7 +27,7 @@ from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.firmware import STRAIGHT_NOTE, needs_straight
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.units import Joules, Quantity, UnitText, measured
-from gcsplan.vehicle import Vehicle
+from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import LegReport, Violation
 from gcsplan.world.frame import EARTH_RADIUS_M, FARTHEST_M
 from gcsplan.world.limits import Limits
@@ -81,7 +81,10 @@ def judge(
     findings += _unread(flight.stretches, plane)
     report = steep_report(plane, world.airspace.examine(plane.legs, vehicle.limits), vehicle.limits)
     home = mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7
-    seconds = seconds_of(flight.stretches, vehicle, world, home)
+    radius_m = {}
+    if mission.autopilot is Autopilot.PX4:
+        radius_m = {seq: tuning.px4_accepts_m(i)[0] for seq, i in enumerate(stored.items, stored.first_seq)}
+    seconds = seconds_of(flight.stretches, vehicle, world, home, radius_m)
     figures = _figures(flight, plane, report, vehicle, world, seconds)
     findings += _findings(flight.stretches, plane, report, vehicle.limits, world)
     near = nearest_misses(flight.stretches, plane.legs, plane.owner, report, vehicle, world) if misses else ()

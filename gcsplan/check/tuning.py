@@ -6,7 +6,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from gcsplan.mavlink.mission import commands as cmd
+from gcsplan.mavlink.mission.mission import MissionItem
+
 __all__ = ["DEFAULTS", "Tuning"]
+
+LEAST_RADIUS_M = 1e-7
+""" A smaller acceptance radius counts as none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +46,11 @@ class Tuning:
     def says(self, parameter: str, value: float, unit: str = "m") -> str:
         """``parameter``, its value and the source of the value, in words."""
         return f"{parameter} {value:g} {unit}, {'read from the vehicle' if parameter in self.read else 'the default'}"
+
+    def px4_accepts_m(self, item: MissionItem) -> tuple[float, bool]:
+        """The radius within which PX4 counts an item as reached, m, and whether it is the item's own."""
+        own = item.params[1] if item.command == cmd.WAYPOINT else 0.0
+        return (own, True) if math.isfinite(own) and own > LEAST_RADIUS_M else (self.px4_radius_m, False)
 
     @property
     def l1_slower(self) -> float:

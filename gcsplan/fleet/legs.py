@@ -8,26 +8,30 @@ import numpy as np
 
 from gcsplan.arrays import Floats, Indices
 from gcsplan.fleet.curved import Curved, curved
+from gcsplan.fleet.smoothed import Smoothed, smoothed
 from gcsplan.fleet.speeds import Stretch, rounded
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.atmosphere import true_per_indicated
 
-__all__ = ["legs"]
+__all__ = ["Motion", "legs"]
+
+Motion = Stretch | Curved | Smoothed
+"""A flight from one standstill to the next, by the autopilot's own rules."""
 
 
 def legs(
     points: Floats, vehicle: Vehicle, owner: Indices, leg: Indices | None = None, pace: Floats | None = None,
-    rates_m_s: Floats | None = None,
-) -> Stretch | Curved | None:  # fmt: skip
+    rates_m_s: Floats | None = None, radius_m: Floats | None = None,
+) -> Motion | None:  # fmt: skip
     """The stretch through ``points`` (N, 3) without a stop; None if nothing moves.
 
     ``owner`` (N - 1,) are the caller's numbers of the parts between them. Parts with the same number of ``leg`` (N -
     1,) are one leg, cut to follow the ground or a curve; None: each part is a leg. ``pace`` (N - 1,) is the speed that
     results from a cruise speed of 1, if that is not 1. ``rates_m_s`` (N - 1, 2) are the rates of climb and descent on
-    each part, if they are not the vehicle's own.
+    each part, ``radius_m`` (N - 1,) PX4's acceptance radius at its end, if they are not the vehicle's own.
 
-    ArduPilot flies S-curves (`curved`) unless a motion key of the vehicle is not bounded; every other vehicle rounds
-    its corners (`speeds`). A fixed wing keeps the airspeed that it indicates, so it is faster in thin air, and its
+    ArduPilot flies S-curves (`curved`) and PX4 smooths (`smoothed`) unless a motion key of the vehicle is not bounded;
+    every other vehicle rounds its corners (`speeds`). A fixed wing keeps the airspeed that it indicates, so it is faster in thin air, and its
     rates of climb and descent are of the slopes that it flies.
     """
     if vehicle.keeps_airspeed:
@@ -35,6 +39,8 @@ def legs(
     if vehicle.lays_curves and math.isfinite(vehicle.corner_accel_m_s2):
         numbers = np.arange(len(owner), dtype=np.intp) if leg is None else leg
         return curved(points, vehicle, owner, numbers, pace, rates_m_s)
+    if vehicle.smooths:
+        return smoothed(points, vehicle, owner, pace, rates_m_s, radius_m)
     return rounded(points, vehicle, owner, pace, rates_m_s)
 
 

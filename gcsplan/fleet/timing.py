@@ -17,10 +17,9 @@ from typing import Literal
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices
-from gcsplan.fleet.curved import Curved
-from gcsplan.fleet.legs import legs
+from gcsplan.fleet.legs import Motion, legs
 from gcsplan.fleet.motion import TimedPath
-from gcsplan.fleet.speeds import POSITION_ERROR_M, Stretch, column
+from gcsplan.fleet.speeds import POSITION_ERROR_M, column
 from gcsplan.vehicle import Autopilot, Vehicle
 
 __all__ = [
@@ -119,7 +118,7 @@ class Course:
         holds = np.zeros(len(route.points)) if route.holds_s is None else route.holds_s
         self.gate_s = float(holds[0])
         self.takeoff = _takeoff(route, vehicle)
-        self.to_goal: list[tuple[Stretch | Curved, float]] = []
+        self.to_goal: list[tuple[Motion, float]] = []
         stops = [0, *(np.flatnonzero(holds[1:-1] > 0.0) + 1).tolist(), len(holds) - 1]
         leg = None if route.items is None else route.items[1:-1]
         waited = 0.0
@@ -220,7 +219,7 @@ class _Motion:
         self.points = [start[None, :]]
         self.legs: list[Indices] = []
 
-    def go(self, stretch: Stretch | Curved, speed_m_s: float, error_m: float) -> None:
+    def go(self, stretch: Motion, speed_m_s: float, error_m: float) -> None:
         times, points, owner = stretch.motion(speed_m_s, error_m)
         self.times.append(self.now_s + times)
         self.points.append(points)
@@ -248,7 +247,7 @@ class _Motion:
         return TimedPath(route.name, times[keep], points[keep], arrive_s, stays, items[keep[1:]])
 
 
-def _takeoff(route: Route, vehicle: Vehicle) -> Stretch | Curved | None:
+def _takeoff(route: Route, vehicle: Vehicle) -> Motion | None:
     ground, top = route.start_ground_amsl_m, route.points[0]
     if route.climb_out is not None:
         way = legs(route.climb_out, vehicle, np.zeros(len(route.climb_out) - 1, dtype=np.intp))
@@ -257,7 +256,7 @@ def _takeoff(route: Route, vehicle: Vehicle) -> Stretch | Curved | None:
     return None if ground is None else next(iter(upright(top[:2], ground, float(top[2]), vehicle, 0)), None)
 
 
-def _after(route: Route, vehicle: Vehicle) -> list[Stretch | Curved]:
+def _after(route: Route, vehicle: Vehicle) -> list[Motion]:
     """The stretches after the arrival."""
     goal, home = route.points[-1], route.points[0]
     number = len(route.points)
@@ -293,7 +292,7 @@ def _home(route: Route) -> tuple[float, float]:
 
 def upright(
     place: Floats, from_amsl_m: float, to_amsl_m: float, vehicle: Vehicle, owner: int, home_amsl_m: float | None = None
-) -> list[Stretch | Curved]:
+) -> list[Motion]:
     """A column over ``place`` (2,): a climb to a standstill, or a landing that is slow near the ground.
 
     ``home_amsl_m``: the ground at home, above which PX4 slows down, wherever it lands; None: as at the landing place.

@@ -47,7 +47,7 @@ from gcsplan.mission_file.schema import (
 )  # fmt: skip
 from gcsplan.mission_file.terminals import Terminals
 from gcsplan.mission_file.units import in_own_units
-from gcsplan.mission_file.vehicles import check_unique, make_arrival, make_vehicle, within_lean
+from gcsplan.mission_file.vehicles import check_unique, make_arrival, make_vehicle, within_lean, within_vel_max
 from gcsplan.mission_file.world import (
     covered,
     make_box,
@@ -308,7 +308,8 @@ class _Reading:
             obstacle_m = 0.0 if terrain is None else terrain.obstacle_height_m
             vehicle = make_vehicle(keys, shared, at, self.problems, self.notes, local=self.local, obstacle_m=obstacle_m)
             if vehicle is not None:
-                vehicle = within_lean(vehicle, keys, at, self.problems, self.notes, local=self.local)
+                for within in (within_lean, within_vel_max):
+                    vehicle = within(vehicle, keys, at, self.problems, self.notes, local=self.local)
             if altitude_frame == "terrain" and keys.autopilot == "px4":
                 self.problems.append(
                     Problem(f"{at}.autopilot", "px4 flies no terrain frame; use altitude_frame: relative or amsl")

@@ -21,7 +21,7 @@ from gcsplan.mission_file.schema import (
     VehicleKeys,
 )  # fmt: skip
 from gcsplan.mission_file.units import UNITS, unit_end
-from gcsplan.vehicle import Autopilot
+from gcsplan.vehicle import PX4_VEL_MAX_M_S, Autopilot
 
 WIDTH = 100
 MIN_AGL_M = 60.0
@@ -128,7 +128,10 @@ def _vehicle(draft: Draft) -> Iterator[Row]:
     if draft.autopilot is Autopilot.ARDUCOPTER:
         lean = draft.lean_deg
         yield VehicleKeys, "lean_angle_deg", "30" if lean is None else f"{lean:.10g}", lean is not None
-    yield VehicleKeys, "climb_m_s", "2.5", True
+    px4 = draft.autopilot is Autopilot.PX4
+    if px4:
+        yield VehicleKeys, "mpc_xy_vel_max_m_s", f"{PX4_VEL_MAX_M_S:g}", False
+    yield VehicleKeys, "climb_m_s", "3" if px4 else "2.5", True
     yield VehicleKeys, "descent_m_s", "1.5", True
     if wing:
         yield VehicleKeys, "turn_radius_m", f"{WING_RADIUS_M:g}", True

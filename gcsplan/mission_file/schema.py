@@ -225,6 +225,8 @@ class VehicleKeys(LimitKeys):
     """Slowest and fastest cruise speed; one number is both. A fixed wing's is the airspeed that it indicates."""
     lean_angle_deg: Annotated[float, Field(ge=10.0, le=80.0)] | None = None
     """ArduCopter's largest lean (`ATC_ANGLE_MAX`): 3° for each m/s of cruise; if absent 30, so 10 m/s at most."""
+    mpc_xy_vel_max_m_s: Speed | None = None
+    """PX4's `MPC_XY_VEL_MAX`, the fastest cruise that it flies; if absent 12."""
     climb_m_s: Speed = 2.5
     """Fastest climb rate; slows steep legs. On PX4, if absent, 3 (`MPC_Z_V_AUTO_UP`)."""
     descent_m_s: Speed = 1.5
@@ -232,14 +234,15 @@ class VehicleKeys(LimitKeys):
     land_m_s: Speed = 0.5
     """Descent rate just above the ground. On PX4, if absent, 0.7 (`MPC_LAND_SPEED`)."""
     accel_m_s2: Accel = 1.5
-    """Acceleration and braking along the path; ArduPilot's S-curves peak at 5/3 of it (1.5: its WPNAV_ACCEL 2.5)."""
+    """Acceleration and braking along the path; ArduPilot's S-curves peak at 5/3 of it (1.5: its WPNAV_ACCEL 2.5). On
+    PX4, if absent, 3 (`MPC_ACC_HOR`)."""
     corner_accel_m_s2: Accel = 2.5
     """Acceleration that bounds the speed in a corner; ArduPilot turns with up to twice as much (WPNAV_ACCEL_C). On PX4,
     if absent, 1.5 (`MPC_XY_TRAJ_P` · `MPC_ACC_HOR`)."""
     vertical_accel_m_s2: Accel = 1.0
     """Acceleration and braking in take-off and landing."""
     leg_jerk_m_s3: Accel = 1.0
-    """Jerk of ArduPilot's S-curves (WPNAV_JERK)."""
+    """Jerk of ArduPilot's S-curves (WPNAV_JERK). On PX4, if absent, 4 (`MPC_JERK_AUTO`)."""
     turn_radius_m: Length = 0.0
     """Above 0: a fixed wing, whose corners are planned and judged as arcs."""
     energy: EnergyKeys = EnergyKeys()

@@ -13,6 +13,7 @@ from gcsplan.mission_file.schema import ArrivalKeys, LimitKeys, VehicleKeys, nea
 from gcsplan.vehicle import (
     DEFAULT_LEAN_DEG,
     LARGEST_LEAN_DEG,
+    PX4_VEL_MAX_M_S,
     Autopilot,
     Energy,
     Vehicle,
@@ -46,8 +47,9 @@ MOTION = (
 """The keys that bound a vehicle's motion besides its cruise speed. In local metres (the papers' worlds) an absent key
 is no bound: speed changes at once, and counts in space."""
 
-PX4_MOTION = {"climb_m_s": 3.0, "land_m_s": 0.7, "corner_accel_m_s2": 1.5}
-"""Of `MOTION`, what differs on PX4: MPC_Z_V_AUTO_UP, MPC_LAND_SPEED, and MPC_XY_TRAJ_P · MPC_ACC_HOR; defaults."""
+PX4_MOTION = {"climb_m_s": 3.0, "land_m_s": 0.7, "accel_m_s2": 3.0, "corner_accel_m_s2": 1.5, "leg_jerk_m_s3": 4.0}
+"""Of `MOTION`, what differs on PX4: MPC_Z_V_AUTO_UP, MPC_LAND_SPEED, MPC_ACC_HOR, MPC_XY_TRAJ_P · MPC_ACC_HOR and
+MPC_JERK_AUTO; defaults."""
 
 
 def check_unique(vehicles: Sequence[Any], where: str, problems: list[Problem]) -> tuple[str, ...]:
@@ -142,6 +144,34 @@ def within_lean(
         vehicle, lean_angle_deg=leans_deg, speed_max_m_s=min(wanted, most),
         speed_min_m_s=min(vehicle.speed_min_m_s, most),
     )  # fmt: skip
+
+
+def within_vel_max(
+    vehicle: Vehicle, keys: VehicleKeys, where: str, problems: list[Problem], notes: list[str], *, local: bool
+) -> Vehicle:
+    """``vehicle`` with the speeds that PX4's MPC_XY_VEL_MAX allows, and a note if that is less than its keys want.
+
+    In local metres (the papers' worlds) an absent key is no bound.
+    """
+    most = keys.mpc_xy_vel_max_m_s
+    if vehicle.autopilot is not Autopilot.PX4:
+        if most is not None:
+            words = f"is PX4's alone: leave it out for {vehicle.autopilot}, given {most:g}"
+            problems.append(Problem(f"{where}.mpc_xy_vel_max_m_s", words))
+        return vehicle
+    if most is None and local:
+        return vehicle
+    own = PX4_VEL_MAX_M_S if most is None else most
+    wanted = vehicle.speed_max_m_s
+    if wanted > own:
+        why = f"MPC_XY_VEL_MAX {own:g} m/s" + (", PX4's default," if most is None else " (mpc_xy_vel_max_m_s)")
+        notes.append(
+            f"{vehicle.name}: planned with {own:g} m/s, not {wanted:g}: {why} allows no more; for {wanted:g} m/s write "
+            f"mpc_xy_vel_max_m_s: {wanted:g}, and set MPC_XY_VEL_MAX {wanted:g}"
+        )
+    return replace(
+        vehicle, vel_max_m_s=own, speed_max_m_s=min(wanted, own), speed_min_m_s=min(vehicle.speed_min_m_s, own)
+    )
 
 
 def _check_wing(keys: VehicleKeys, limits: Limits | None, where: str, problems: list[Problem]) -> None:

@@ -31,7 +31,7 @@ def acceptance_radius_m(vehicle: Vehicle) -> float:
     """Return the acceptance radius: ArduCopter's own parameter; else the track error, sent with each item (1 … 255)."""
     if vehicle.autopilot is Autopilot.ARDUCOPTER:
         return COPTER_ACCEPTANCE_M
-    return min(max(1.0, math.floor(vehicle.limits.track_error_m)), 255.0)
+    return vehicle.acceptance_m
 
 
 def corner_m(vehicle: Vehicle) -> float:

@@ -37,7 +37,8 @@ _PLANE = (
 _PX4 = (
     _RETURN[Autopilot.PX4], ("GF_ACTION",), ("GF_MAX_VER_DIST",), ("GF_MAX_HOR_DIST",),
     ("NAV_RCL_ACT",), ("NAV_DLL_ACT",), ("COM_LOW_BAT_ACT",), ("NAV_ACC_RAD",), ("NAV_MC_ALT_RAD",),
-    ("RTL_TYPE",), ("RTL_CONE_ANG",),
+    ("RTL_TYPE",), ("RTL_CONE_ANG",), ("MPC_XY_VEL_MAX",), ("MPC_XY_CRUISE",), ("MPC_ACC_HOR",), ("MPC_JERK_AUTO",),
+    ("MPC_XY_TRAJ_P",), ("MPC_Z_V_AUTO_UP",), ("MPC_Z_V_AUTO_DN",),
 )  # fmt: skip
 GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
     Autopilot.ARDUCOPTER: _COPTER, Autopilot.ARDUPLANE: _PLANE, Autopilot.PX4: _PX4,

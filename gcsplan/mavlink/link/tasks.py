@@ -23,6 +23,7 @@ from gcsplan.mavlink.link.preflight import (
     preflight,
     rivals_words,
 )
+from gcsplan.mavlink.link.px4_motion import slower_words
 from gcsplan.mavlink.link.recheck import Judge as JudgeState
 from gcsplan.mavlink.link.recheck import Recheck
 from gcsplan.mavlink.link.results import UploadResult, outcome_word
@@ -45,7 +46,7 @@ from gcsplan.mavlink.protocol.transfer import (
     Timers,
     VerifiedUpload,
 )
-from gcsplan.vehicle import Autopilot
+from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.terrain_grid import Ground
 
 ProgressCall = Callable[[str, Progress], None]
@@ -65,8 +66,9 @@ class SessionOptions:
     to wait for a vehicle that is booting. ``ground_amsl_m``: DEM altitude at the start, by default the altitude of the
     mission's home. ``timeout_s``: longest time without progress of a transfer (see `Patience`); it also limits
     ``discover_s`` and ``standby_s``. The parameters on board are compared with ``rtl_rel_home_m`` (the return altitude
-    that was checked), ``advised_rel_home_m`` (the one to set, if another is better) and ``expected_parameters``.
-    ``terrain``: the ground for a mission in the terrain frame, which is then served and compared (`link.terrain`).
+    that was checked), ``advised_rel_home_m`` (the one to set, if another is better) and ``expected_parameters``, and a
+    PX4's motion with ``vehicle``. ``terrain``: the ground for a mission in the terrain frame, which is then served and
+    compared (`link.terrain`).
     """
 
     unchecked: bool = False
@@ -85,6 +87,7 @@ class SessionOptions:
     attempts: int = 4
     timers: Timers = field(default_factory=Timers)
     simulated: bool = False
+    vehicle: Vehicle | None = None
 
     def __post_init__(self) -> None:
         checked_timeout_s(self.timeout_s)
@@ -214,6 +217,7 @@ def _parameters(
             values, mission, rtl_rel_home_m=options.rtl_rel_home_m, advised_rel_home_m=options.advised_rel_home_m,
             expected=options.expected_parameters,
         )  # fmt: skip
+        warnings += slower_words(values, options.vehicle) if options.vehicle else []
     if task.mission_type == FENCE and options.read_parameters:
         values = yield from parameter_steps(channel, state, FENCE_GROUPS[task.autopilot], watch, recheck)
         warnings += judge_fence_parameters(values)
