@@ -30,9 +30,9 @@ def legs(
     results from a cruise speed of 1, if that is not 1. ``rates_m_s`` (N - 1, 2) are the rates of climb and descent on
     each part, ``radius_m`` (N - 1,) PX4's acceptance radius at its end, if they are not the vehicle's own.
 
-    ArduPilot flies S-curves (`curved`) and PX4 smooths (`smoothed`) unless a motion key of the vehicle is not bounded;
-    every other vehicle rounds its corners (`speeds`). A fixed wing keeps the airspeed that it indicates, so it is faster in thin air, and its
-    rates of climb and descent are of the slopes that it flies.
+    ArduPilot flies S-curves (`curved`) and PX4 smooths (`smoothed`) unless a motion key of the vehicle is not
+    bounded; every other vehicle rounds its corners (`speeds`). A fixed wing keeps the airspeed that it indicates,
+    so it is faster in thin air, and its rates of climb and descent are of the slopes that it flies.
     """
     if vehicle.keeps_airspeed:
         pace, rates_m_s = _in_air(points, vehicle, pace, rates_m_s)

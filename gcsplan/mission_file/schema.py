@@ -234,11 +234,9 @@ class VehicleKeys(LimitKeys):
     land_m_s: Speed = 0.5
     """Descent rate just above the ground. On PX4, if absent, 0.7 (`MPC_LAND_SPEED`)."""
     accel_m_s2: Accel = 1.5
-    """Acceleration and braking along the path; ArduPilot's S-curves peak at 5/3 of it (1.5: its WPNAV_ACCEL 2.5). On
-    PX4, if absent, 3 (`MPC_ACC_HOR`)."""
+    """Acceleration and braking along the path; ArduPilot peaks at 5/3 of it. On PX4, if absent, 3 (`MPC_ACC_HOR`)."""
     corner_accel_m_s2: Accel = 2.5
-    """Acceleration that bounds the speed in a corner; ArduPilot turns with up to twice as much (WPNAV_ACCEL_C). On PX4,
-    if absent, 1.5 (`MPC_XY_TRAJ_P` · `MPC_ACC_HOR`)."""
+    """Acceleration that bounds the speed in a corner; ArduPilot has twice that. On PX4, if absent, 1.5 (half of 3)."""
     vertical_accel_m_s2: Accel = 1.0
     """Acceleration and braking in take-off and landing."""
     leg_jerk_m_s3: Accel = 1.0

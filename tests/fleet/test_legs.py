@@ -11,6 +11,7 @@ import pytest
 
 from gcsplan.fleet.curved import Curved
 from gcsplan.fleet.legs import legs
+from gcsplan.fleet.smoothed import Smoothed
 from gcsplan.fleet.speeds import Stretch
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
@@ -62,8 +63,9 @@ def test_only_bounded_motion_of_ardupilot_is_curved() -> None:
     points, owner = np.array([[0.0, 0.0, 50.0], [90.0, 0.0, 50.0]]), np.arange(1)
     assert isinstance(legs(points, COPTER, owner), Curved)
     for other in (
-        replace(COPTER, autopilot=Autopilot.PX4), replace(COPTER, leg_jerk_m_s3=math.inf),
+        replace(COPTER, leg_jerk_m_s3=math.inf),
         replace(COPTER, corner_accel_m_s2=math.inf), replace(COPTER, accel_m_s2=math.inf), WING,
     ):  # fmt: skip
         assert isinstance(legs(points, other, owner), Stretch)
+    assert isinstance(legs(points, replace(COPTER, autopilot=Autopilot.PX4), owner), Smoothed)
     assert legs(points[[0, 0]], COPTER, owner) is None
