@@ -53,7 +53,11 @@ class VehicleTerrain:
         Where it crosses into another degree tile, with posts of its own, the height may step.
         """
         f = np.linspace(0.0, 1.0, PARTS + 1)
-        cells = [self._cell(ends, x) for x in f]
+        degrees = self._frame.to_degrees(*(ends[0] + f[:, None] * (ends[1] - ends[0])).T)
+        if (np.floor(degrees) == np.floor(degrees[0])).all():
+            only = self._surface_of(self._cell(ends, 0.0))
+            return None if only is None else [(0.0, 1.0, only)]
+        cells = [cell_at(lat * 1e7, lon * 1e7) for lat, lon in degrees.tolist()]
         cuts = [0.0]
         on = [cells[0]]
         for k in range(PARTS):
