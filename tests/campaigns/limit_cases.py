@@ -29,6 +29,8 @@ LOITER_TO_ALT = 31
 
 FAMILIES = ("copter", "px4", "vtol", "terrain", "return", "spline", "circle", "jump", "wing", "battery", "fleet")
 """Kinds of mission: straight legs of each autopilot, terrain frame, a return, curves, circles, arcs, jumps, fleets."""
+POSTS_M = 20
+"""Spacing of the vehicle's terrain, m: the worlds are too small for one of 100 m."""
 
 WING_RADIUS_M, WING_SPEED_M_S = 40.0, 14.0
 
@@ -56,7 +58,7 @@ class Case:
         return replace(self, vehicle=replace(self.vehicle, limits=limits))
 
     def verdict(self, mission: Mission | None = None) -> Verdict:
-        world = World(self.frame, airspace_of(self.surface, self.zones))
+        world = World(self.frame, airspace_of(self.surface, self.zones), POSTS_M)
         return judge(
             mission or self.mission, self.vehicle, world, rtl_rel_home_m=self.rtl_m,
             terrain_error_m=self.terrain_error_m,

@@ -18,7 +18,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.vehicle import Autopilot
-from tests.campaigns.limit_cases import WING_RADIUS_M, Case
+from tests.campaigns.limit_cases import POSTS_M, WING_RADIUS_M, Case
 from tests.oracles.legs import Oracle
 
 STEP_M = 0.25
@@ -80,13 +80,31 @@ class Flight:
     def ground(self, en: Floats) -> float:
         return float(self.oracle.height(self.case.surface.ground_m, en[:1], en[1:2])[0])
 
+    def read(self, en: Floats) -> Floats:
+        """(N,) what ArduPilot takes for the ground at points (N, 2): whole metres at posts of its flat degree tiles."""
+        lat, lon = self.case.frame.to_degrees(*en.T).T
+        metre = float(np.float32(0.011131884502145034)) * 1e7 / POSTS_M
+        a, o = np.floor(lat), np.floor(lon)
+        north, east = (lat - a) * metre, (lon - o) * metre * np.cos(np.radians(0.5 * (lat + a)))
+        i, j = np.floor(north), np.floor(east)
+
+        def post(k: Floats, n: Floats) -> Floats:
+            at = a + k / metre
+            there = self.case.frame.to_plane(at, o + n / metre / np.cos(np.radians(0.5 * (at + a))))
+            return np.ceil(self.oracle.height(self.case.surface.ground_m, *there.T) - 1e-6)
+
+        u, v = north - i, east - j
+        west, right = (post(i, n) + u * (post(i + 1, n) - post(i, n)) for n in (j, j + 1))
+        return np.asarray(west + v * (right - west))
+
     def target(self, item: MissionItem, here: Floats) -> Floats:
         """The place an item leads to from ``here``; ArduCopter keeps its altitude if the item's altitude is 0."""
         en = self.place(item.x, item.y)
         if self.autopilot is Autopilot.ARDUCOPTER and stored_m(item, self.autopilot) == 0.0:
-            kept = here[2] - self.ground(here) + self.ground(en) if item.frame == 10 else here[2]
+            read = self.read(np.array([here[:2], en]))
+            kept = here[2] - read[0] + read[1] if item.frame == 10 else here[2]
             return np.array([*en, kept])
-        base = {0: 0.0, 3: self.datum}.get(item.frame, self.ground(en))
+        base = {0: 0.0, 3: self.datum}.get(item.frame, float(self.read(en[None])[0]))
         return np.array([*en, base + stored_m(item, self.autopilot)])
 
     def straight(self, a: Floats, b: Floats, terrain: bool = False) -> Floats:
@@ -98,7 +116,7 @@ class Flight:
             ends = self.case.frame.to_degrees(*np.array([a[:2], b[:2]]).T)
             points[:, :2] = self.case.frame.to_plane(*(ends[0] + t * (ends[1] - ends[0])).T)
         if terrain:
-            z = self.oracle.height(self.case.surface.ground_m, *points[:, :2].T)
+            z = self.read(points[:, :2])
             agl = a[2] - z[0] + t[:, 0] * ((b[2] - z[-1]) - (a[2] - z[0]))
             points[:, 2] = z + agl
         return points

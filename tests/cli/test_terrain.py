@@ -10,6 +10,7 @@ import pytest
 
 from gcsplan.dem.dat_file import read_dat
 from gcsplan.mavlink.link import terrain as link_terrain
+from gcsplan.mission_file import load_mission
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
@@ -63,9 +64,7 @@ def test_files_for_the_card_read_as_terrain(run: Run, mission: Path, tmp_path: P
 
     flown = tmp_path / "again.yaml"
     flown.write_text(MISSION.replace("sample:jacksboro", f"{out}, vertical_datum: EGM96"))
-    code, text, err = run("plan", flown, "--json")
-    assert code == 0, err
-    assert json.loads(text)["inputs"]["resolution_m"] == 100
+    assert load_mission(flown).inputs["resolution_m"] == 100
 
 
 def test_a_margin_that_is_too_wide_is_refused(run: Run, mission: Path, tmp_path: Path) -> None:

@@ -65,7 +65,7 @@ def serve_for(link: Link, seconds: float) -> None:
 def compared(link: Link, service: TerrainService, places: list[tuple[int, int]], spacing_m: int = 100) -> Compared:
     channel = link.channel(1)
     posts = service.posts(spacing_m)
-    job = PumpJob(channel, compare_steps(channel, VEHICLE, places, posts, patience_s=60.0))
+    job = PumpJob(channel, compare_steps(channel, VEHICLE, places, posts, patience_s=20.0))
     pump([job])
     assert job.error is None
     assert job.result is not None
@@ -99,13 +99,14 @@ def test_a_vehicle_gets_all_that_it_asks_for(loss: float, spacing_m: int) -> Non
         assert telemetry.terrain.loaded == 56 * len(served.blocks)
 
 
+@pytest.mark.slow
 def test_what_it_reads_is_what_was_sent() -> None:
     air = air_with_vehicle()
     service = TerrainService(hills)
     with air.link() as link:
         link.serve(1, service.steps)
-        result = compared(link, service, [*places(24), places(1)[0]])
-    assert result.read == 25
+        result = compared(link, service, [*places(9), places(1)[0]])
+    assert result.read == 10
     assert result.worst_m < 0.001
     assert result.worst_at is not None
 
@@ -150,6 +151,7 @@ def test_terrain_that_cannot_be_loaded_is_told_and_the_link_goes_on() -> None:
     assert service.served[1].notes == ["the tile is damaged"]
 
 
+@pytest.mark.slow
 def test_strange_requests_are_counted_and_what_waits_is_bounded() -> None:
     air = air_with_vehicle()
     service = TerrainService(hills)
@@ -158,7 +160,7 @@ def test_strange_requests_are_counted_and_what_waits_is_bounded() -> None:
     with air.link() as link:
         link.serve(1, service.steps)
         grid = service.posts(100).grid
-        for block in grid.blocks_within(365e6, -845e6, 368e6, -841e6)[:200]:
+        for block in grid.blocks_within(365e6, -845e6, 368e6, -841e6)[:90]:
             request = dialect.MAVLink_terrain_request_message(*grid.corner_e7(block), 100, mask)
             air.say("vehicle", writer.pack(request), "vehicle")
         for lat, lon, spacing in ((365_000_123, -844_000_000, 100), (365_000_000, -844_000_000, 0)):
@@ -172,8 +174,8 @@ def test_strange_requests_are_counted_and_what_waits_is_bounded() -> None:
         serve_for(link, 30.0)
     served = service.served[1]
     assert served.strange == 3
-    assert served.requests >= 150
-    assert served.parts <= 64 * 56 + 40 * 56
+    assert served.requests >= 75
+    assert served.parts <= 64 * 56 + 20 * 56
 
 
 def test_the_vehicle_is_asked_for_its_requests_only_if_it_does_not_send_them() -> None:
@@ -189,7 +191,7 @@ def test_the_vehicle_is_asked_for_its_requests_only_if_it_does_not_send_them() -
 
         link.send = watched  # type: ignore[method-assign]
         link.serve(1, TerrainService(hills).steps)
-        serve_for(link, 30.0)
+        serve_for(link, 12.0)
     assert asked == [133, 136]
 
 
