@@ -20,6 +20,9 @@ FULL_ACCEL = 2.5 / 1.5
 AIRSPEED_SPARE = 1.2
 """Assumed highest airspeed of a vehicle, as a multiple of its fastest cruise: its reserve against wind."""
 
+PX4_EVEN_ACCEL = 0.65
+"""PX4's even acceleration and braking that take about as long as its own, per MPC_ACC_HOR."""
+
 PX4_LAND_BELOW_M = 7.0
 """Height above home, m, below which a landing PX4 is slow: the middle of MPC_LAND_ALT1 and MPC_LAND_ALT2 in time."""
 
@@ -53,6 +56,7 @@ class Kinematics:
     leg_jerk_m_s3: float = math.inf
     leg_accel_m_s2: float = 2.5
     lean_deg: float = math.inf
+    accepts_m: float = 0.0
 
     @classmethod
     def of(cls, vehicle: Vehicle, airspeed_m_s: float | None = None) -> Kinematics:
@@ -60,9 +64,11 @@ class Kinematics:
         return cls(
             vehicle.climb_m_s, vehicle.descent_m_s,
             AIRSPEED_SPARE * vehicle.speed_max_m_s if airspeed_m_s is None else airspeed_m_s,
-            vertical_accel_m_s2=vehicle.vertical_accel_m_s2, accel_m_s2=vehicle.accel_m_s2,
+            vertical_accel_m_s2=vehicle.vertical_accel_m_s2,
+            accel_m_s2=(PX4_EVEN_ACCEL if vehicle.smooths else 1.0) * vehicle.accel_m_s2,
             corner_accel_m_s2=vehicle.corner_accel_m_s2, land_m_s=vehicle.land_m_s,
             leg_jerk_m_s3=vehicle.leg_jerk_m_s3 if vehicle.lays_curves else math.inf,
+            accepts_m=vehicle.acceptance_m if vehicle.smooths else 0.0,
             land_below_m=PX4_LAND_BELOW_M if vehicle.autopilot is Autopilot.PX4 else 10.0,
             leg_accel_m_s2=FULL_ACCEL * vehicle.accel_m_s2,
             lean_deg=vehicle.lean_angle_deg or math.inf,
@@ -71,7 +77,7 @@ class Kinematics:
     def __post_init__(self) -> None:
         for name in self.__slots__:
             value = getattr(self, name)
-            if not value > 0.0 and not (value == 0.0 and name in ("cut_m", "land_below_m")):
+            if not value > 0.0 and not (value == 0.0 and name in ("cut_m", "land_below_m", "accepts_m")):
                 raise ValueError(f"{name} of a moving vehicle must be above 0, given {value:g}")
             if name.endswith("_m_s2") and name != "corner_accel_m_s2":
                 object.__setattr__(self, name, min(value, AT_ONCE_M_S2))
@@ -79,12 +85,14 @@ class Kinematics:
     def corner_radius_m(self, turn_rad: float, shorter_leg_m: float) -> float:
         """Return the radius of the arc at a turn; 0 if the corner is not rounded.
 
-        The arc touches both legs, passes the way point at `cut_m`, and uses at most half of the shorter leg.
+        The arc touches both legs, passes the way point at `cut_m`, and uses at most half of the shorter leg. A PX4
+        begins it ``accepts_m`` before the way point instead.
         """
         half = 0.5 * min(turn_rad, math.pi - 1e-3)
         if half <= 1e-7 or self.cut_m <= 0.0 or math.isinf(self.corner_accel_m_s2):
             return 0.0
-        return min(self.cut_m / math.tan(0.5 * half), 0.5 * shorter_leg_m) / math.tan(half)
+        tangent = self.accepts_m or self.cut_m / math.tan(0.5 * half)
+        return min(tangent, 0.5 * shorter_leg_m) / math.tan(half)
 
     @property
     def lays_curves(self) -> bool:

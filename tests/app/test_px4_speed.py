@@ -9,6 +9,7 @@ import yaml
 
 from gcsplan import upload
 from gcsplan.app.pipeline import plan
+from gcsplan.app.rehearsing import rehearse
 from gcsplan.errors import InputError
 from gcsplan.mavlink.link.px4_motion import slower_words, speed_shortage
 from gcsplan.mission_file import MissionFile, load_mission
@@ -77,3 +78,13 @@ def test_a_px4_that_would_not_fly_the_speed_gets_no_mission(monkeypatch: pytest.
             assert board.items() == ()
         else:
             assert any("MPC_XY_CRUISE is 3 on board" in line for line in result.warnings)
+
+
+def test_the_simulated_px4_arrives_when_the_plan_says() -> None:
+    zigzag = [[46.5 + 0.0012 * n, 8.0 + 0.0006 * (n % 2)] for n in range(1, 8)]
+    for speed in (5, 10):
+        done = plan(loaded(speed_m_s=speed, via=zigzag, goal=[46.5096, 8.0]))
+        [flown] = rehearse(done).vehicles
+        assert flown.planned_s is not None
+        assert flown.planned_s > 1070.0 / speed
+        assert flown.errors_s[0] == pytest.approx(0.0, rel=0.0, abs=0.012 * flown.planned_s)
