@@ -594,3 +594,17 @@ def test_the_return_from_the_middle_is_never_judged_more_strictly_than_from_the_
         assert (middle[grade].lowest(300.0) <= whole[grade].lowest(300.0) + 1e-6).all()
         for level in (320.0, 380.0, 430.0):
             assert (middle[grade].passes(level) >= whole[grade].passes(level)).all()
+
+
+@pytest.mark.parametrize("command", [188, 189])
+def test_a_planes_return_that_leads_on_to_a_landing_sequence_is_not_called_safe(command: int) -> None:
+    w = world()
+    m = mission(w, [(0, 0, 120), (3000, 0, 120)], PLANE)
+    m = replace(m, items=(*m.items[:2], Item(command, 2), *m.items[2:]))
+    home = judged(w, m, vehicle(PLANE, **BARE), 100.0)
+    assert home.unsafe == ()
+    assert home.safe is None
+    assert any("start: the return leads on to it, by RTL_AUTOLAND" in words for words in home.not_judged)
+    copter = mission(w, [(0, 0, 120), (3000, 0, 120)])
+    copter = replace(copter, items=(*copter.items[:2], Item(command, 2), *copter.items[2:]))
+    assert judged(w, copter, vehicle(**BARE), 100.0).safe is True  # its RTL does not look for one
