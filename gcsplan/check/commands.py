@@ -44,6 +44,34 @@ LAND_STARTS = (cmd.DO_RETURN_PATH_START, cmd.DO_LAND_START)
 FW_DESCENT = 1.0  # NAV_VTOL_LAND_OPTIONS
 
 
+WHY_LOST = {
+    cmd.ARC_WAYPOINT: "an arc, which only ArduCopter 4.7 and later know",
+    cmd.SPLINE_WAYPOINT: "a spline is known only for ArduCopter, without terrain frame and with an item after it",
+    cmd.VTOL_TAKEOFF: "it changes to forward flight after its climb, in a direction that is not known",
+    cmd.TAKEOFF: "a take-off in the air",
+    cmd.ALTITUDE_WAIT: "it waits for an altitude that a balloon may bring",
+    cmd.GUIDED_ENABLE: "another computer flies from there on",
+    cmd.PAYLOAD_PLACE: "it descends until it feels the ground",
+    cmd.DO_SET_HOME: "it moves home, from which altitudes and the return count",
+    cmd.DO_PARACHUTE: "it releases the parachute",
+    cmd.DO_AUX_FUNCTION: "a switch may change the flight mode",
+    cmd.DO_ENGINE_CONTROL: "it starts or stops the engine",
+    cmd.DO_SET_PARAMETER: "it may change any parameter",
+    cmd.DO_GO_AROUND: "it breaks a landing off",
+}
+"""Why what is flown for a command is not known, where that does not depend on the item's numbers."""
+
+
+def why_lost(item: MissionItem, mission: Mission) -> str:
+    """Return why what the autopilot flies for an item is not known."""
+    if item.command == cmd.WAYPOINT:
+        return "waypoint: the ground there, or under the leg to it, is not known, or its altitude cannot be told"
+    if item.command == cmd.TAKEOFF and mission.autopilot is Autopilot.ARDUCOPTER:
+        return "take-off: its altitude cannot be told, or it comes in the air"
+    name = "" if item.command not in cmd.WORDS else f"{cmd.command_name(item.command)}: "
+    return name + WHY_LOST.get(item.command, "its motion is not known")
+
+
 def flown_otherwise(item: MissionItem, mission: Mission) -> str:
     """Return why the autopilot flies ``item`` (as stored) differently from what its command says; empty if it does not.
 

@@ -33,7 +33,7 @@ import numpy as np
 from gcsplan.check.aboard import Aboard
 from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth, circle_words
 from gcsplan.check.climb_out import REACHED_M, circle_up, climb_out, glide, is_wing
-from gcsplan.check.commands import flown_otherwise, moves_nothing
+from gcsplan.check.commands import flown_otherwise, moves_nothing, why_lost
 from gcsplan.check.geodesy import flat_m
 from gcsplan.check.route import fly_in_order
 from gcsplan.check.rtl.model import RULES, return_pieces
@@ -156,7 +156,7 @@ class _Pilot(Aboard):
             )
             self.airborne, self.known = True, False
             return
-        if item.command == cmd.VTOL_TAKEOFF and self.autopilot is not Autopilot.ARDUPLANE:
+        if item.command == cmd.VTOL_TAKEOFF and self.autopilot is Autopilot.PX4:
             self._lose(seq, item)
             return
         lat, lon, ground = self.home
@@ -387,7 +387,8 @@ class _Pilot(Aboard):
     def _lose(self, seq: int, item: MissionItem) -> None:
         self.direction = None
         self.flight.not_judged.append(
-            f"item {seq}: what {self.autopilot} flies for command {item.command} is not judged"
+            f"item {seq}: what {self.autopilot} flies for command {item.command} is not judged: "
+            f"{why_lost(item, self.mission)}"
         )
         target = self.target(item) if self.has_place(item) else None
         if target is not None and cmd.is_nav(item.command):

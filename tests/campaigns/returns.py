@@ -59,7 +59,7 @@ class Scene:
 
     def parts(self, seq: int, from_m: float, to_m: float) -> TraceParts:
         """The part of the trace on the way to item ``seq`` between two distances before its end."""
-        k = int(np.flatnonzero(self.trace.seq[: self.trace.mains] == seq)[-1])
+        k = longest(self.trace, seq)
         first, last = self.trace.first[k], self.trace.last[k]
         ends = self.trace.points(np.array([first, last]))[:, :2]
         share = (last - first) / max(float(np.hypot(*(ends[1] - ends[0]))), 1e-6)
@@ -69,6 +69,12 @@ class Scene:
     def place(self, seq: int, left_m: float) -> Floats:
         part = self.parts(seq, left_m, left_m)
         return self.trace.points(part.start)[0, :3]
+
+
+def longest(trace: MissionTrace, seq: int) -> int:
+    """The longest stretch on the way to an item: for a plane the straight one between two arcs."""
+    mine = np.flatnonzero(trace.seq[: trace.mains] == seq)
+    return int(mine[(trace.last - trace.first)[mine].argmax()])
 
 
 def scene(rng: np.random.Generator, autopilot: Autopilot) -> Scene:
@@ -121,8 +127,7 @@ def scene(rng: np.random.Generator, autopilot: Autopilot) -> Scene:
     assert trace is not None
     seq = int(rng.integers(4, 4 + 4))
     seq = min(seq, int(trace.seq[: trace.mains].max()))
-    # A plane's arc belongs to the item after it; the last stretch of an item is its straight one.
-    k = int(np.flatnonzero(trace.seq[: trace.mains] == seq)[-1])
+    k = longest(trace, seq)
     ends = trace.points(np.array([trace.first[k], trace.last[k]]))[:, :2]
     length = float(np.hypot(*(ends[1] - ends[0])))
     left = float(rng.uniform(0.3 if is_plane else 0.05, 0.9)) * length

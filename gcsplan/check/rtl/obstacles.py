@@ -17,8 +17,9 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 
 TOUCH_M = 1e-6
-GROUND, MAX_AMSL, MAX_AGL = -1, -2, -3
-"""Values of `Obstacles.what` for obstacles that are no zones."""
+GROUND, MAX_AMSL, MAX_AGL, AHEAD, UNKNOWN = -1, -2, -3, -4, -5
+"""Values of `Obstacles.what` for obstacles that are no zones; `AHEAD`: ground where the vehicle brakes before it
+returns; `UNKNOWN`: ground that is not known (`Obstacles.kind` alone)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +28,7 @@ class Obstacles:
 
     ``high`` (N,): the highest altitude at which each return begins. For each obstacle (R,): ``back``, the index of its
     return; its bottom and top; ``base`` and ``limit``: the lowest altitude of the return there
-    is ``max(base, min(h, limit))``; ``what``: `GROUND`, `MAX_AMSL`, `MAX_AGL` or a zone's index.
+    is ``max(base, min(h, limit))``; ``what``: `GROUND`, `AHEAD`, `MAX_AMSL`, `MAX_AGL` or a zone's index.
     """
 
     high: Floats
@@ -85,15 +86,25 @@ class Obstacles:
         under = np.maximum(self.base, h) < self.top - TOUCH_M
         return float(self.bottom[under].min(initial=np.inf))
 
-    def worst(self, which: int, level: float) -> int | None:
-        """The index of the worst obstacle that return ``which`` hits; None if it hits none.
+    def kind(self) -> Indices:
+        """(R,) `what` of each obstacle, with `UNKNOWN` for ground that is not known."""
+        unknown = np.isinf(self.top) & ((self.what == GROUND) | (self.what == AHEAD))
+        return np.where(unknown, UNKNOWN, self.what)
 
-        Obstacles that no level passes come first, then zones before ground, then the highest top.
-        """
-        rows = np.flatnonzero((self.back == which) & self.hit(level))
-        if not len(rows):
-            return None
-        return int(rows[np.lexsort((self.top[rows], self.what[rows] >= 0, np.isinf(self._over(rows))))[-1]])
+    def over(self) -> Floats:
+        """(R,) the level that passes over each obstacle; inf if none does."""
+        return self._over(np.arange(len(self.back)))
+
+    def last_hit(self, start: float) -> Bools:
+        """(R,) the obstacles that no level passes over, hit by returns that rise from ``start`` until nothing helps."""
+        level, over = np.full(len(self), start), self.over()
+        for _ in range(len(self.back) + 1):
+            hit = self.hit(level)
+            more = hit & np.isfinite(over) & (over > level[self.back])
+            if not more.any():
+                return hit & np.isinf(over)
+            np.maximum.at(level, self.back[more], over[more])
+        return np.zeros(len(self.back), np.bool_)
 
     def _over(self, rows: Indices) -> Floats:
         """The level that passes over each obstacle of ``rows``; inf if none does."""

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from gcsplan.arrays import Bools, Indices
-from gcsplan.check.rtl.obstacles import GROUND, MAX_AGL, MAX_AMSL, Obstacles
+from gcsplan.arrays import Bools, Floats, Indices
+from gcsplan.check.rtl.obstacles import AHEAD, GROUND, MAX_AGL, MAX_AMSL, Obstacles
 from gcsplan.check.rtl.refinement import CLEAR, Refinement
 from gcsplan.check.rtl.sweep import Target
 from gcsplan.check.rtl.trace import MissionTrace
 from gcsplan.check.rtl.verdict import UnsafeStretch
 from gcsplan.check.stretch import Place
-from gcsplan.units import Quantity, UnitText
+from gcsplan.units import Quantity, UnitText, joined
 
 ROUND_M = 0.1
 LOOKED_AT = 500
 """Samples on the line home; messages name the highest of them."""
+
+SHORT_M, MOST_PIECES = 100.0, 12
+"""A stretch is cut where its reasons change, into pieces no shorter than this, and no more than this many."""
 
 
 def rel_home(obstacles: Obstacles, level: float, home_amsl_m: float, returns: Bools | None = None) -> float | None:
@@ -47,11 +51,13 @@ def stretches_of(
     bad = refinement.bad(grade, level)
     if but is not None:
         bad &= ~refinement.bad(but, level)
-    found = [_stretch(trace, refinement, grade, level, group, target) for group in _groups(refinement, bad)]
+    kinds = _kinds(refinement.strict[grade], level)
+    runs = [run for group in _groups(bad) for run in _alike(group, kinds, refinement)]
+    found = [_stretch(trace, refinement, grade, level, run, target) for run in runs]
     return _without_doubles(found)
 
 
-def _groups(refinement: Refinement, bad: Bools) -> list[Indices]:
+def _groups(bad: Bools) -> list[Indices]:
     """Runs of bad parts that follow each other on the trace."""
     where = np.flatnonzero(bad)
     if not len(where):
@@ -59,26 +65,55 @@ def _groups(refinement: Refinement, bad: Bools) -> list[Indices]:
     return np.split(where, np.flatnonzero(np.diff(where) > 1) + 1)
 
 
+def _kinds(obstacles: Obstacles, level: float) -> list[frozenset[int]]:
+    """The kinds of obstacles that each return hits at the level."""
+    hit = obstacles.hit(level)
+    found: list[set[int]] = [set() for _ in range(len(obstacles))]
+    for back, kind in zip(obstacles.back[hit].tolist(), obstacles.kind()[hit].tolist(), strict=True):
+        found[back].add(kind)
+    return [frozenset(one) for one in found]
+
+
+def _alike(group: Indices, kinds: Sequence[frozenset[int]], refinement: Refinement) -> list[Indices]:
+    """A run of parts, cut where the reasons change; of two pieces that differ, one shorter than `SHORT_M` is joined."""
+    pieces = [[int(k)] for k in group]
+    size = refinement.parts.size
+
+    def reasons(piece: list[int]) -> frozenset[int]:
+        return frozenset().union(*(kinds[k] for k in piece))
+
+    joined: list[tuple[frozenset[int], list[int]]] = []
+    for piece in pieces:
+        mine = reasons(piece)
+        if joined and joined[-1][0] == mine:
+            joined[-1][1].extend(piece)
+        else:
+            joined.append((mine, piece))
+    while len(joined) > 1:
+        lengths = [float(size[piece].sum()) for _, piece in joined]
+        k = min(range(len(joined)), key=lengths.__getitem__)
+        if lengths[k] >= SHORT_M and len(joined) <= MOST_PIECES:
+            break
+        beside = [i for i in (k - 1, k + 1) if 0 <= i < len(joined)]
+        i = max(beside, key=lambda i: (len(joined[i][0] & joined[k][0]), -lengths[i]))
+        a, b = min(i, k), max(i, k)
+        joined[a : b + 1] = [(joined[a][0] | joined[b][0], joined[a][1] + joined[b][1])]
+    return [np.array(piece) for _, piece in joined]
+
+
 def _stretch(
     trace: MissionTrace, refinement: Refinement, grade: int, level: float, group: Indices, target: Target | None
 ) -> UnsafeStretch:
-    obstacles, parts = refinement.strict[grade], refinement.parts
-    mine = np.zeros(len(obstacles), np.bool_)
+    parts = refinement.parts
+    mine = np.zeros(len(parts), np.bool_)
     mine[group] = True
-    own = obstacles.take(mine)
+    own = refinement.strict[grade].take(mine)
     home = math.nan if target is None else target.ground_amsl_m
-    each = own.lowest(refinement.start)
-    k = int(each.argmax())
-    row = own.worst(k, level)
-    assert row is not None
     first, last = int(group[0]), int(group[-1])
     a, b = float(parts.start[first]), float(parts.end[last])
     from_m, to_m = (float(np.interp(u, trace.u, trace.along)) for u in (a, b))
-    zone = int(own.what[row])
-    name = trace.world.airspace.zones[zone].name if zone >= 0 else ""
-    obstacle = None
-    if target is not None and zone == GROUND and math.isfinite(own.top[row]):
-        obstacle = _obstacle(trace, float(parts.middle[group[k]]), target)
+    clauses, zone, obstacle = _reasons(trace, own, parts.middle[group], level, grade, target)
+    together = own.together(refinement.start)
     return UnsafeStretch(
         from_seq=int(trace.seq[parts.stretch[first]]),
         to_seq=int(trace.seq[parts.stretch[last]]),
@@ -86,11 +121,49 @@ def _stretch(
         end=trace.place(b),
         from_m=from_m,
         to_m=to_m,
-        why=_why(own, row, name, grade, obstacle),
-        zone=name,
+        why=UnitText("the return {}", joined(" and ", clauses)),
+        zone=zone,
         obstacle=obstacle,
-        lowest_rel_home_m=None if target is None else rel_home(own, own.together(refinement.start), home),
+        lowest_rel_home_m=None if target is None else rel_home(own, together, home),
+        because=_because(trace, own, refinement.start, level) if math.isinf(together) else "",
     )
+
+
+def _reasons(
+    trace: MissionTrace, own: Obstacles, middle: Floats, level: float, grade: int, target: Target | None
+) -> tuple[list[UnitText | str], str, Place | None]:
+    """What the returns of a stretch do at the level, worst first; the first zone's name; the place of the ground."""
+    hit, kind, over = own.hit(level), own.kind(), own.over()
+    names = [z.name for z in trace.world.airspace.zones]
+    clauses: list[tuple[tuple[bool, float], UnitText | str]] = []
+    obstacle = None
+    zone = ""
+    for one in np.unique(kind[hit]).tolist():
+        rows = np.flatnonzero(hit & (kind == one))
+        row = int(rows[np.lexsort((own.top[rows], np.isinf(over[rows])))[-1]])
+        place = None
+        if one in (GROUND, AHEAD) and target is not None:
+            place = _obstacle(trace, float(middle[own.back[row]]), target) if one == GROUND else None
+            obstacle = obstacle or place
+        if one >= 0:
+            zone = zone or names[one]
+        clauses.append(((math.isinf(over[row]), float(own.top[row])), _why(own, row, names, grade, place)))
+    clauses.sort(key=lambda c: c[0], reverse=True)
+    return [words for _, words in clauses], zone, obstacle
+
+
+def _because(trace: MissionTrace, own: Obstacles, start: float, level: float) -> UnitText | str:
+    """Why no return altitude helps, if that is not among the reasons at the level itself."""
+    last = own.last_hit(start)
+    if not last.any():
+        return "what one part of it needs is too high for another"
+    kind = own.kind()
+    known = set(kind[own.hit(level) & np.isinf(own.over())].tolist())
+    rows = [int(np.flatnonzero(last & (kind == k))[0]) for k in np.unique(kind[last]).tolist() if k not in known]
+    if not rows or known:
+        return ""
+    names = [z.name for z in trace.world.airspace.zones]
+    return UnitText("at another altitude it {}", joined(" and ", [_why(own, row, names, CLEAR, None) for row in rows]))
 
 
 def _obstacle(trace: MissionTrace, u: float, target: Target) -> Place | None:
@@ -105,28 +178,30 @@ def _obstacle(trace: MissionTrace, u: float, target: Target) -> Place | None:
     return lat, lon, float(top[k])
 
 
-def _why(obstacles: Obstacles, row: int, name: str, grade: int, obstacle: Place | None) -> str:
+def _why(obstacles: Obstacles, row: int, names: Sequence[str], grade: int, obstacle: Place | None) -> UnitText | str:
+    """What a return does that hits an obstacle: a verb and its objects."""
     what, top, bottom = int(obstacles.what[row]), float(obstacles.top[row]), float(obstacles.bottom[row])
     if what == MAX_AMSL:
-        return "the return rises above max_amsl_m"
+        return "rises above max_amsl_m"
     if what == MAX_AGL:
-        return "the return comes higher above ground than max_agl_m"
-    if what == GROUND:
+        return "comes higher above ground than max_agl_m"
+    if what in (GROUND, AHEAD):
         if math.isinf(top):
-            return "the ground on the way home is unknown to the terrain model"
+            return "leads over ground that is unknown to the terrain model"
+        if what == AHEAD:
+            return UnitText("brakes into ground ahead, below {}", Quantity(top, "amsl", 0, "up"))
         place: str = ""
         if obstacle is not None:
             place = UnitText(" at {:.6f}, {:.6f} ({})", *obstacle[:2], Quantity(obstacle[2], "amsl", 0))
-        meets = (
-            "meets ground{} and would clear"
-            if grade == CLEAR
-            else "comes nearer than min_agl_m to ground{} and would keep"
-        )
-        return UnitText(f"the return {meets} it at {{}}", place, Quantity(top, "amsl", 0, "up"))
+        meets = "meets ground" if grade == CLEAR else "comes nearer than min_agl_m to ground"
+        if math.isinf(obstacles.over()[row]):
+            return UnitText("{}{} before it has climbed over it, to {}", meets, place, Quantity(top, "amsl", 0, "up"))
+        would = "clear" if grade == CLEAR else "keep"
+        return UnitText("{}{} and would {} it at {}", meets, place, would, Quantity(top, "amsl", 0, "up"))
     height: str = ""
     if math.isinf(top):
         height = " (no top)" if math.isinf(bottom) else UnitText(" (from {} up)", Quantity(bottom, "amsl", 0))
-    return UnitText("the return meets no-fly zone “{}”{} or its clearance", name, height)
+    return UnitText("meets no-fly zone “{}”{} or its clearance", names[what], height)
 
 
 def _without_doubles(found: list[UnsafeStretch]) -> tuple[UnsafeStretch, ...]:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.rtl.model import ASIDE, RULES, at_home_m
-from gcsplan.check.rtl.obstacles import GROUND, MAX_AGL, MAX_AMSL, Obstacles
+from gcsplan.check.rtl.obstacles import AHEAD, GROUND, MAX_AGL, MAX_AMSL, Obstacles
 from gcsplan.check.rtl.run_on import about_turn_m, circle_home_m, levels_off_m
 from gcsplan.check.rtl.trace import TINY_M, MissionTrace, TraceParts
 from gcsplan.vehicle import Vehicle
@@ -255,8 +255,7 @@ def _brakes(found: _Builder, trace: MissionTrace, limits: Limits, places: Return
     for some in alike_in_width(wide, np.flatnonzero(along > TINY_M)):
         met = level_lines.over(air, first[some], tip[some], limits, float(wide[some].max()))
         found.cost += len(met.piece_line)
-        for grade in (0, 1):
-            found._put(grade, some, -np.inf, met.clear_m, places.low[some], places.low[some], GROUND)
+        found.ahead(some, met.clear_m, places.low[some])
 
 
 def _climbs_on_the_spot(
@@ -371,6 +370,11 @@ class _Builder:
         """Add the zones that returns meet."""
         for grade in (0, 1):
             self._put(grade, i, at.bottom_m, at.top_m, base, limit, at.zone)
+
+    def ahead(self, i: Indices, top: Floats, low: Floats) -> None:
+        """Add ground that is passed at ``low``, whatever the level."""
+        for grade in (0, 1):
+            self._put(grade, i, -np.inf, top, low, low, AHEAD)
 
     def one(self, grade: int, i: Indices, bottom: float, top: float, what: int) -> None:
         """Add the same obstacle for each of ``i``, where the return is at its level."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,7 +22,8 @@ class UnsafeStretch:
     ``from_seq``, ``to_seq``: wire items that the vehicle flies to at its ends; ``start``, ``end``: where the vehicle is
     there; ``from_m``, ``to_m``: horizontal metres along the mission (equal for a column). ``why``: the reason in words;
     ``obstacle``: the highest ground in the way, if ground is the reason. ``lowest_rel_home_m``: the lowest return
-    altitude that is safe from all of the stretch, None if there is none.
+    altitude that is safe from all of the stretch, None if there is none; ``because``: why there is none, if ``why``
+    does not say so.
     """
 
     from_seq: int
@@ -34,6 +36,7 @@ class UnsafeStretch:
     zone: str
     obstacle: Place | None
     lowest_rel_home_m: float | None
+    because: str = ""
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values; places as [latitude, longitude, AMSL]."""
@@ -65,9 +68,26 @@ class UnsafeStretch:
     def describe(self, good: str = "safe") -> UnitText:
         """Where, why, and which altitude would help; ``good``: what the return is at that altitude."""
         if self.lowest_rel_home_m is None:
-            return UnitText("{}; no return altitude is {} from there", self.place_and_why, good)
+            why: str = UnitText(": {}", self.because) if self.because else ""
+            return UnitText("{}; no return altitude is {} from there{}", self.place_and_why, good, why)
         lowest = _at_least(self.lowest_rel_home_m)
         return UnitText("{}; {} from there at {} above home", self.place_and_why, good, lowest)
+
+
+def worst_first(stretches: Sequence[UnsafeStretch]) -> list[UnsafeStretch]:
+    """Stretches by reason: the reason with the worst stretch first, and of one reason the worst first.
+
+    A stretch from which no altitude helps is worse than any other; then the longer one is.
+    """
+
+    def bad(s: UnsafeStretch) -> tuple[bool, float]:
+        return s.lowest_rel_home_m is None, s.to_m - s.from_m
+
+    by_reason: dict[tuple[str, bool], list[UnsafeStretch]] = {}
+    for s in stretches:
+        by_reason.setdefault((s.zone, s.obstacle is not None), []).append(s)
+    groups = [sorted(group, key=bad, reverse=True) for group in by_reason.values()]
+    return [s for group in sorted(groups, key=lambda group: bad(group[0]), reverse=True) for s in group]
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,7 +284,7 @@ class WayHome:
         out: list[tuple[str, str]] = [("judged at", judged_at)]
         if self.advice:
             out.append(("on the vehicle", self.advice))
-        out += [(NO_RETURN, UnitText("from {}", s.describe())) for s in self.unsafe]
+        out += [(NO_RETURN, UnitText("from {}", s.describe())) for s in worst_first(self.unsafe)]
         if self.irregular:
             first, length = self.irregular[0], together_m((s.from_m, s.to_m) for s in self.irregular)
             where = UnitText("from {} of the path", Reach(length)) if length >= 0.5 else "from a point of the path"
@@ -288,7 +308,7 @@ class WayHome:
             )
             for number, r in enumerate(self.rally, start=1)
         ]  # fmt: skip
-        out += [(STILL_NO_RETURN, UnitText("from {}", s.place_and_why)) for s in self.left]
+        out += [(STILL_NO_RETURN, UnitText("from {}", s.place_and_why)) for s in worst_first(self.left)]
         out += [(NOT_JUDGED, words) for words in self.not_judged]
         return out
 

@@ -17,6 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from gcsplan.check.battery import battery_home
+from gcsplan.check.commands import LAND_STARTS
 from gcsplan.check.corners import round_corners
 from gcsplan.check.flight import follow
 from gcsplan.check.judge import TERRAIN_ERROR_M
@@ -33,7 +34,9 @@ from gcsplan.check.stretch import Place
 from gcsplan.check.verdict import Verdict
 from gcsplan.figures import floored, raised
 from gcsplan.mavlink.mission.autopilots import profile_of
-from gcsplan.vehicle import Vehicle
+from gcsplan.mavlink.mission.commands import command_name
+from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World
 
 __all__ = ["RallyPoint", "UnsafeStretch", "WayHome", "way_home"]
@@ -115,7 +118,10 @@ def way_home(
         left=proposal.left if proposal else (),
         profile=_profile(trace, refinement),
         lowest=lowest_agl(trace, trace.cut(refinement.first_m), target, vehicle, level),
-        not_judged=tuple(w for w in flight.not_judged if not w.startswith(RETURNS_BY_ITSELF)),
+        not_judged=(
+            *(w for w in flight.not_judged if not w.startswith(RETURNS_BY_ITSELF)),
+            *_landing_sequence(mission),
+        ),
         notes=tuple(notes + list(proposal.notes if proposal else ())),
     )
 
@@ -191,6 +197,21 @@ def _notes(vehicle: Vehicle, judged_m: float, assumed: bool) -> list[str]:
     if not rule.climbs_first:
         notes.append("a plane's return is judged from its flight, not from its take-off and landing")
     return notes
+
+
+def _landing_sequence(mission: Mission) -> list[str]:
+    """That ArduPlane's return may lead to a landing sequence of the mission; empty if there is none.
+
+    With DO_LAND_START or DO_RETURN_PATH_START in its mission ArduPlane arms only with RTL_AUTOLAND set, and RTL then
+    leads there: at once (2), after home (1), or to the nearest leg of the return path (4) (mode_rtl.cpp, `navigate`).
+    """
+    starts = [k for k, item in enumerate(mission.items, start=mission.first_seq) if item.command in LAND_STARTS]
+    if mission.autopilot is not Autopilot.ARDUPLANE or not starts:
+        return []
+    name = command_name(mission.items[starts[0] - mission.first_seq].command)
+    return [
+        f"item {starts[0]}: {name}: the return leads on to it, by RTL_AUTOLAND; only the flight straight home is judged"
+    ]
 
 
 def _not_judged(verdict: Verdict, vehicle: Vehicle, judged_m: float, assumed: bool, why: str) -> WayHome:

@@ -54,6 +54,10 @@ HAS_PLACE = frozenset(
 """Mission commands that have a location in common.xml, so that an unset location has a meaning."""
 
 
+PLACE_IS_A_HINT = (cmd.DO_RETURN_PATH_START, cmd.DO_LAND_START)
+"""Files have degrees in these even in frame 2; ground stations send the whole part, and no autopilot flies there."""
+
+
 @dataclass(frozen=True, slots=True)
 class MissionFileRead:
     """A mission from a file, with remarks for the user (``notes``, whole sentences).
@@ -158,6 +162,8 @@ def _xy(command: int, frame: int, raw: RawItem, bad: Callable[[str], None]) -> t
         else:
             return degrees_e7_of(raw.x), degrees_e7_of(raw.y)
         return None, None
+    if command in PLACE_IS_A_HINT and abs(raw.x) <= 90.0 and abs(raw.y) <= 180.0:
+        return int(raw.x), int(raw.y)
     x, y = whole(raw.x, -(2**31), 2**31 - 1), whole(raw.y, -(2**31), 2**31 - 1)
     for number, read, value in ((5, x, raw.x), (6, y, raw.y)):
         if read is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -20,6 +21,7 @@ from gcsplan.check.rtl.refinement import CLEAR, LEGAL
 from gcsplan.check.rtl.stretches import rel_home
 from gcsplan.check.rtl.sweep import Target, obstacles_of_returns
 from gcsplan.check.rtl.trace import trace_of
+from gcsplan.check.rtl.verdict import worst_first
 from gcsplan.check.rtl.way_home import WayHome, refinement_of, way_home
 from gcsplan.figures import counted
 from gcsplan.mavlink.mission.autopilots import profile_of
@@ -317,6 +319,46 @@ def test_the_circle_over_home_is_judged_for_a_plane() -> None:
     assert judged(w, mission(w, [(0, 0, 150), (2000, 0, 150)], land=False), vehicle(**BARE), 60.0).safe is True
 
 
+def test_all_reasons_of_a_return_are_named_together_and_stretches_are_cut_where_they_change() -> None:
+    # Behind the ridge, on the northern half of the way, the line home meets the tower too.
+    tower = Zone("tower", Circle(1600.0, 400.0, 150.0))
+    w = world(ridge, [tower])
+    home = judged(
+        w, mission(w, [(0, 0, 150), (2200, -600, 150), (2200, -600, 40), (2200, 1500, 40)]), vehicle(**BARE), 50.0
+    )
+    both = [s for s in home.unsafe if s.zone == "tower"]
+    ground = [s for s in home.unsafe if not s.zone]
+    assert both
+    assert ground
+    for s in both:
+        assert "meets ground" in s.why
+        assert (
+            " and meets no-fly zone “tower” (no top)" in s.why or "“tower” (no top) or its clearance and meets" in s.why
+        )
+        assert s.describe().endswith("no return altitude is safe from there")
+    for s in ground:
+        assert "tower" not in s.why
+        assert "meets ground" in s.why
+        assert s.lowest_rel_home_m == pytest.approx(105.0, abs=3.0)
+        assert "no return altitude" not in s.describe()
+    told = [words for label, words in home.rows() if label == "no safe return"]
+    assert "tower" in told[0]  # the worst first: no altitude helps
+    assert [s.from_m for s in home.unsafe] == sorted(s.from_m for s in home.unsafe)
+
+
+def test_where_no_altitude_helps_though_each_obstacle_could_be_passed_it_says_what_is_above() -> None:
+    lid = Zone("lid", Circle(1000.0, 0.0, 400.0), floor=Level(402.0, "amsl"))
+    w = world(ridge, [lid])
+    home = judged(w, mission(w, [(0, 0, 40), (0, 1500, 40), (2000, 1500, 130), (2500, 0, 40)]), vehicle(**BARE), 50.0)
+    (worst, *_) = [s for s in worst_first(home.unsafe) if s.lowest_rel_home_m is None]
+    words = worst.describe()
+    assert re.search("meets ground at .* and would clear it at 40[0-9] m AMSL; no return", words)
+    assert (
+        "no return altitude is safe from there: at another altitude it meets no-fly zone “lid” (from 397 m AMSL up)"
+        in words
+    )
+
+
 def test_over_unknown_ground_no_return_is_safe() -> None:
     def hole(east: Floats, north: Floats) -> Floats:
         return np.where((np.abs(east - 1000.0) < 150.0) & (np.abs(north) < 150.0), np.nan, 300.0)
@@ -552,3 +594,17 @@ def test_the_return_from_the_middle_is_never_judged_more_strictly_than_from_the_
         assert (middle[grade].lowest(300.0) <= whole[grade].lowest(300.0) + 1e-6).all()
         for level in (320.0, 380.0, 430.0):
             assert (middle[grade].passes(level) >= whole[grade].passes(level)).all()
+
+
+@pytest.mark.parametrize("command", [188, 189])
+def test_a_planes_return_that_leads_on_to_a_landing_sequence_is_not_called_safe(command: int) -> None:
+    w = world()
+    m = mission(w, [(0, 0, 120), (3000, 0, 120)], PLANE)
+    m = replace(m, items=(*m.items[:2], Item(command, 2), *m.items[2:]))
+    home = judged(w, m, vehicle(PLANE, **BARE), 100.0)
+    assert home.unsafe == ()
+    assert home.safe is None
+    assert any("start: the return leads on to it, by RTL_AUTOLAND" in words for words in home.not_judged)
+    copter = mission(w, [(0, 0, 120), (3000, 0, 120)])
+    copter = replace(copter, items=(*copter.items[:2], Item(command, 2), *copter.items[2:]))
+    assert judged(w, copter, vehicle(**BARE), 100.0).safe is True  # its RTL does not look for one

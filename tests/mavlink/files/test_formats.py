@@ -360,6 +360,16 @@ def test_all_mistakes_are_told_at_once() -> None:
     assert [p.where for p in caught.value.problems] == ["f:3", "f:4"]
 
 
+@pytest.mark.parametrize("command", [188, 189])
+def test_where_a_landing_sequence_begins_may_stand_in_degrees_in_frame_2(command: int) -> None:
+    # PX4's own test missions have it so; ground stations send the whole part.
+    plan = plan_of()
+    row = {"type": "SimpleItem", "autoContinue": True, "command": command, "doJumpId": 99, "frame": 2}
+    plan["mission"]["items"].append(row | {"params": [0, 0, 0, 0, 47.397, 8.54505, 0]})
+    read = read_plan(json.dumps(plan), autopilot=COPTER, where="f").items[-1]
+    assert (read.command, read.x, read.y) == (command, 47, 8)
+
+
 def test_a_mission_of_more_than_ten_thousand_items_is_not_read() -> None:
     rows = "".join(f"{i}\t0\t3\t16\t0\t0\t0\t0\t1\t1\t1\t1\n" for i in range(1, 10_005))
     with pytest.raises(InputError, match="more than 10000 items"):
