@@ -11,7 +11,7 @@ from gcsplan.check.geodesy import offset_m
 from gcsplan.check.tuning import DEFAULTS
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.sim.outcome import Part
-from gcsplan.vehicle import DEFAULT_LEAN_DEG, Autopilot
+from gcsplan.vehicle import Autopilot
 
 MODELS = {Autopilot.ARDUCOPTER: "+", Autopilot.ARDUPLANE: "plane"}
 """The name of each vehicle's model in SITL."""
@@ -58,7 +58,7 @@ def _copter(part: Part) -> dict[str, float]:
     }  # fmt: skip
     if part.rtl_rel_home_m is not None:
         speeds["RTL_ALT", "RTL_ALT_M"] = part.rtl_rel_home_m
-    if v.lean_angle_deg is not None and v.lean_angle_deg > DEFAULT_LEAN_DEG:
+    if v.lean_angle_deg is not None:  # the planned times count with it
         speeds["ANGLE_MAX", "ATC_ANGLE_MAX"] = v.lean_angle_deg
     elif v.speed_max_m_s > FAST_M_S:
         speeds["ANGLE_MAX", "ATC_ANGLE_MAX"] = FAST_LEAN_DEG
