@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gcsplan.app.model import Plan
@@ -123,6 +124,21 @@ def test_it_flies_and_lands_below_home_over_the_missions_terrain(below: Plan, we
     goal_m = below.world.ground_amsl(36.6180, -84.2560)
     assert result.flown[0].points[-1, 2] == pytest.approx(goal_m, abs=2.0)
     assert result.weather == ({} if weather is None else weather.as_dict())
+    # From the 65 m of the approach down to 10 m at full rate, from there slowly.
+    assert flown.end_s[0] - flown.arrive_s[0] == pytest.approx(55.0 / 1.5 + 10.0 / 0.5, abs=8.0)
+
+
+@sitl.needs(Autopilot.ARDUCOPTER, program=True)
+def test_it_lands_slowly_above_home(tmp_path: Path) -> None:
+    text = BELOW.replace("start: [36.6130, -84.2650]", "start: [36.6180, -84.2560]")
+    file = tmp_path / "above.yaml"
+    file.write_text(text.replace("goal: [36.6180, -84.2560]", "goal: [36.6150, -84.2610]"), encoding="utf-8")
+    result = rehearse_in_sitl(plan(load_mission(file)), binary=sitl.binary(Autopilot.ARDUCOPTER), speedup=10.0)
+    assert result.breaches == ()
+    points, times = result.flown[0].points, result.flown[0].times_s
+    low = points[:, 2] < points[-1, 2] + 4.0
+    low &= times > result.vehicles[0].arrive_s[0]
+    assert np.ptp(points[low, 2]) / np.ptp(times[low]) < 0.7
 
 
 @sitl.needs(Autopilot.ARDUCOPTER, program=True)

@@ -1,8 +1,10 @@
 """The order in which the items of a mission are flown: jumps with their counts, as the autopilots count them.
 
-- A jump's count belongs to the jump and is never reset: once it is used up, the jump is skipped
-  (ArduPilot's `AP_Mission::get_next_cmd`, PX4's `getNonJumpItem`). A count of 0 never jumps; −1 repeats without end on
-  ArduPilot and 65,535 times on PX4, which keeps 16 bits.
+- A jump's count belongs to the jump: once it is used up, the jump is skipped (ArduPilot's `AP_Mission::get_next_cmd`,
+  PX4's `getNonJumpItem`). A count of 0 never jumps; −1 repeats without end on ArduPilot and 65,535 times on PX4, which
+  keeps 16 bits.
+- A skipped jump that is reached again, from a jump behind it, is skipped again before ArduPilot 4.7; since 4.7 its
+  count begins anew, unless MIS_OPTIONS bit 3 is set. So what follows depends on the version, and is not judged.
 - ArduPilot counts `MOST_JUMPS` jumps of one mission and treats the others as used up. Only ArduPilot has jump tags.
 - A round that begins in the same state as the round before it is flown identically: it is followed once, and counted.
 - Nothing is flown after a hold or a loop without end. On ArduPilot the DO_ items right after a hold are carried out
@@ -54,14 +56,14 @@ class Pilot(Protocol):
 class _Jump:
     """One jump: the index of its target (None: no such item), its rounds (None: without end), and its progress.
 
-    ``done``: rounds flown. ``was``: when it last jumped, the state then, and the numbers of ``stretches`` and
-    ``instead``.
+    ``done``: rounds flown; ``passed``: how often it was skipped. ``was``: when it last jumped, the state then, and the
+    numbers of ``stretches`` and ``instead``.
     """
 
-    __slots__ = ("done", "rounds", "target", "was")
+    __slots__ = ("done", "passed", "rounds", "target", "was")
 
     def __init__(self, target: int | None, rounds: int | None) -> None:
-        self.target, self.rounds, self.done = target, rounds, 0
+        self.target, self.rounds, self.done, self.passed = target, rounds, 0, 0
         self.was: tuple[Hashable, int, int] | None = None
 
 
@@ -91,6 +93,7 @@ def fly_in_order(mission: Mission, pilot: Pilot) -> bool:
             flight.not_judged.append(f"item {seq} jumps to an item that the mission has not")
             return False
         if jump.rounds is not None and jump.done >= jump.rounds:
+            _pass(mission, flight, seq, jump)
             index += 1
             continue
         others = tuple(j.done for j in jumps.values() if j is not jump)
@@ -102,6 +105,7 @@ def fly_in_order(mission: Mission, pilot: Pilot) -> bool:
                     _never(mission, flight, seq, index + 1, loop=True)
                 return False
             _again(flight, jump, jump.was)
+            _pass(mission, flight, seq, jump)
             index += 1
             continue
         jump.was = (begins, len(flight.stretches), len(flight.instead))
@@ -129,6 +133,16 @@ def _jumps(mission: Mission) -> dict[int, _Jump]:
         endless = mission.autopilot.is_ardupilot and count == -1.0
         jumps[index] = _Jump(target, None if endless else max(0, int(count)) if count == count else 0)
     return jumps
+
+
+def _pass(mission: Mission, flight: Flight, seq: int, jump: _Jump) -> None:
+    """Skip a jump that is used up; the second time, say that another version of ArduPilot does not."""
+    jump.passed += 1
+    if jump.passed == 2 and jump.rounds and mission.autopilot.is_ardupilot:
+        flight.not_judged.append(
+            f"item {seq} is reached again after its {jump.rounds} jumps: ArduPilot before 4.7 skips it then, and 4.7 "
+            f"begins its count anew (MIS_OPTIONS bit 3 stops that), so how long it flies depends on the version"
+        )
 
 
 def _again(flight: Flight, jump: _Jump, was: tuple[Hashable, int, int]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 
 import numpy as np
@@ -105,6 +106,45 @@ def test_a_jump_without_end_is_flown_once_and_named() -> None:
     assert all(s.seq != 5 for s in flight.stretches)
     assert any("without end" in n and "item 4" in n and "5" in n for n in flight.notes)
     assert flight.not_judged == []
+
+
+def flown_anew(items: tuple[MissionItem, ...], first: int) -> Counter[tuple[float, float]]:
+    """As ArduPilot 4.7 flies: the count of a jump begins anew when it has been skipped (get_next_do_cmd)."""
+    done: Counter[int] = Counter()
+    count: Counter[tuple[float, float]] = Counter()
+    here, index = 36.6, 0
+    for _ in range(20_000):
+        if index >= len(items):
+            return count
+        item = items[index]
+        if item.command == cmd.DO_JUMP and done[index] < item.params[1]:
+            done[index] += 1
+            index = int(item.params[0]) - first
+            continue
+        done[index] = 0
+        if item.command == cmd.WAYPOINT:
+            count[here, item.lat_deg] += 1
+            here = item.lat_deg
+        index += 1
+    return Counter({(math.nan, math.nan): 1})  # it never ends
+
+
+@settings(max_examples=draws(120))
+@given(jumpy())
+def test_what_is_judged_is_flown_so_by_every_version(items: tuple[MissionItem, ...]) -> None:
+    """A jump that is reached again after its rounds is judged by none: 4.7 begins its count anew."""
+    flight = fly(*items)
+    same = legs(flight) == flown_anew((TAKEOFF, *items), 1)
+    assert same or any("4.7 begins its count anew" in words for words in flight.not_judged)
+
+
+def test_a_loop_within_a_loop_is_not_judged_on_ardupilot() -> None:
+    items = (way_point(1), way_point(2), jump(2, 2), way_point(3), jump(2, 1))
+    (words,) = fly(*items).not_judged
+    assert words.startswith("item 4 is reached again after its 2 jumps")
+    assert flown_anew((TAKEOFF, *items), 1) - legs(fly(*items)) != Counter()
+    assert fly(*items, autopilot=Autopilot.PX4).not_judged == []
+    assert fly(*items[:4]).not_judged == []
 
 
 def test_px4_counts_from_zero_and_keeps_sixteen_bits() -> None:

@@ -79,7 +79,8 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
 
     def item(command: int, i: int, frame: int, cm: int, *, radius_m: float = 0.0) -> MissionItem:
         yaw = round(float(bearings[max(i - 1, 0)]), 1) if px4 else 0.0
-        z = 0.0 if command in (cmd.LAND, cmd.VTOL_LAND) else altitude_of_cm(cm, vehicle.autopilot)
+        lands = command in (cmd.LAND, cmd.VTOL_LAND)
+        z = 0.0 if lands and not cm else altitude_of_cm(cm, vehicle.autopilot)
         return MissionItem(command, frame, (0.0, radius_m, 0.0, yaw), int(lat_e7[i]), int(lon_e7[i]), z)
 
     radius = 0.0 if vehicle.autopilot is Autopilot.ARDUCOPTER else acceptance_radius_m(vehicle)
@@ -98,10 +99,23 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
     else:
         items.append(item(cmd.WAYPOINT, last, frame, int(cm[last]), radius_m=radius))
     if order.end == "land":
-        items.append(item(cmd.VTOL_LAND if plane else cmd.LAND, last, m.RELATIVE, 0))
+        pad_cm = _pad_cm(world, items[-1], datum, vehicle)
+        items.append(item(cmd.VTOL_LAND if plane else cmd.LAND, last, m.RELATIVE, pad_cm))
     elif order.end == "rtl":
         items.append(MissionItem(cmd.RTL, m.NO_POSITION))
     return Mission(vehicle.autopilot, home, tuple(items), vehicle.name, vehicle.sysid)
+
+
+def _pad_cm(world: World, above: MissionItem, datum: float, vehicle: Vehicle) -> int:
+    """Return the ground below an item relative to home, cm, for ArduCopter's LAND; 0 for others, and where unknown.
+
+    ArduCopter does not fly to this altitude, but since 4.7 it slows down for the landing at 10 m above it (before: 10 m
+    above the terrain that it has, or above home).
+    """
+    ground = world.ground_amsl(above.lat_deg, above.lon_deg)
+    if vehicle.autopilot is not Autopilot.ARDUCOPTER or math.isnan(ground):
+        return 0
+    return round((ground - datum) * 100.0)
 
 
 def _gate(order: Order, vehicle: Vehicle) -> MissionItem:

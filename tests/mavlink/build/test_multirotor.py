@@ -42,6 +42,18 @@ def test_arduplane_takes_off_and_lands_as_a_vtol_and_sends_an_acceptance_radius(
     assert mission.items[2].params[1] == 40.0
 
 
+@pytest.mark.parametrize("slope", [0.05, 0.0, -0.05])
+def test_a_copters_landing_says_where_the_ground_is(slope: float) -> None:
+    """ArduCopter 4.7 slows down at 10 m above this altitude: with 0 it hits ground above home at full descent rate."""
+    where = world(lambda e, n: 300.0 + slope * e)
+    points = np.array([[0.0, 0, 366.0], [1500, 200, 480.0], [4000, 0, 600.0]])
+    land = build_mission(Path(points), where, vehicle(), HOME_DEG, Order()).items[-1]
+    assert (land.command, land.frame) == (cmd.LAND, m.RELATIVE)
+    assert stored(land, Autopilot.ARDUCOPTER).z == pytest.approx(slope * 4000.0, abs=0.02)
+    px4 = build_mission(Path(points), where, vehicle(Autopilot.PX4), HOME_DEG, Order()).items[-1]
+    assert (px4.command, px4.z) == (cmd.LAND, 0.0)
+
+
 def test_px4_points_its_nose_along_the_leg_and_ardupilot_is_sent_none() -> None:
     px4 = build_mission(PATH, WORLD, vehicle(Autopilot.PX4), HOME_DEG, Order())
     assert px4.items[2].params[3] == pytest.approx(np.degrees(np.arctan2(1500, 200)), abs=0.06)
