@@ -82,6 +82,11 @@ READINGS: Mapping[str, tuple[Reading, ...]] = MappingProxyType({
     "abo": (
         _of("inertia-1", "PSO with inertia 1 throughout", pso=_with(inertia_first=1.0, inertia_last=1.0)),
         _of("inertia-0.8", "PSO with inertia 0.8 throughout", pso=_with(inertia_first=0.8, inertia_last=0.8)),
+        # No particle has a speed of ten boxes: the bounds stop it before.
+        _of("inertia-1-unlimited", "PSO with inertia 1 and no limit of speed",
+            pso=_with(inertia_first=1.0, inertia_last=1.0, top_speed=10.0)),
+        _of("inertia-0.8-unlimited", "PSO with inertia 0.8 and no limit of speed",
+            pso=_with(inertia_first=0.8, inertia_last=0.8, top_speed=10.0)),
         _of("published-po", "PO as in its authors' code, lengths in metres", po=_with(rule="authors", span=100.0)),
     ),
     "ib-abc": (

@@ -50,16 +50,29 @@ READINGS: dict[str, tuple[str, dict[str, object], Oracle]] = {
 @pytest.mark.parametrize("name", READINGS)
 @pytest.mark.parametrize("function", ["f1", "f7", "f9"])
 def test_a_reading_evaluates_the_points_of_the_text(name: str, function: str) -> None:
+    same_points(name, FUNCTIONS[function].on_unit_box(DIM, shifted=True), DIM)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in READINGS if name != "abc, pairs"])  # a path may have no pairs
+@pytest.mark.parametrize("scenario", ["krill-mound", "ssgwo-table3", "ib-abc-together"])
+def test_a_reading_evaluates_the_points_of_the_text_on_paths_too(name: str, scenario: str) -> None:
+    from gcsplan.bench.papers_speed import _cost_of  # the quick tests need no map
+
+    cost, _, _ = _cost_of(scenario, None)
+    same_points(name, cost, cost.dim)
+
+
+def same_points(name: str, cost: Callable[[Floats], Floats], dim: int) -> None:
     optimiser, parameters, oracle = READINGS[name]
-    cost = FUNCTIONS[function].on_unit_box(DIM, shifted=True)
     seen: list[Floats] = []
 
     def noted(x: Floats) -> Floats:
         seen.append(x.copy())
         return np.asarray(cost(x))
 
-    minimise(optimiser, noted, DIM, population=N, iterations=ROUNDS, seed=12, parameters=parameters)
-    wanted = oracle(lambda p: float(cost(np.array([p]))[0]), N, DIM, ROUNDS, np.random.default_rng(12))
+    minimise(optimiser, noted, dim, population=N, iterations=ROUNDS, seed=12, parameters=parameters)
+    wanted = oracle(lambda p: float(cost(np.array([p]))[0]), N, dim, ROUNDS, np.random.default_rng(12))
     got = np.concatenate(seen)
     assert got.shape == np.shape(wanted)
     np.testing.assert_allclose(got, wanted, atol=1e-9)
