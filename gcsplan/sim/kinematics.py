@@ -40,7 +40,7 @@ class Kinematics:
     the last ``land_below_m`` above the landing place (above home for a PX4). ``airspeed_m_s``: highest airspeed; a
     headwind is subtracted from it. ``leg_jerk_m_s3``, ``leg_accel_m_s2``: of ArduPilot's S-curves (`scurves`); an
     infinite jerk disables them. ``lean_deg``: the largest lean of ArduPilot's simulated quadrotor, which bounds its
-    speed.
+    speed. ``accepts_m``: PX4's acceptance radius, where its turns begin; 0 for others.
     """
 
     climb_m_s: float

@@ -21,7 +21,7 @@ from gcsplan.mavlink.link.watch import (
 )
 from gcsplan.mavlink.mission.autopilots import is_generic, max_items, profile_of, type_name
 from gcsplan.mavlink.mission.firmware import STRAIGHT_UNTIL, flies_straight, needs_straight, version_words
-from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, TERRAIN, Home, MissionItem
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, RELATIVE, TERRAIN, Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot
 
 NEAR_START_M = 30.0
@@ -219,3 +219,17 @@ def distance_m(lat_a: float, lon_a: float, lat_b: float, lon_b: float) -> float:
     a, b = math.radians(lat_a), math.radians(lat_b)
     h = math.sin((b - a) / 2) ** 2 + math.cos(a) * math.cos(b) * math.sin(math.radians(lon_b - lon_a) / 2) ** 2
     return 2 * _EARTH_RADIUS_M * math.asin(min(1.0, math.sqrt(h)))
+
+
+def other_home(mission: Mission, read: tuple[MissionItem, ...]) -> list[str]:
+    """Warn if ArduPilot's item 0 is away from the mission's start: relative altitudes count from it until arming."""
+    if not mission.autopilot.is_ardupilot or (read[0].x, read[0].y) == (0, 0):
+        return []
+    theirs, ours = Home(read[0].x, read[0].y, read[0].z), mission.home
+    away_m = distance_m(ours.lat_e7 / 1e7, ours.lon_e7 / 1e7, theirs.lat_e7 / 1e7, theirs.lon_e7 / 1e7)
+    higher_m = theirs.amsl_m - ours.amsl_m
+    if away_m <= NEAR_START_M and abs(higher_m) <= NEAR_GROUND_M:
+        return []
+    relative = any(item.frame in (RELATIVE, 6) for item in mission.items)
+    counts = "; its relative altitudes count from there if it is not armed at the start" if relative else ""
+    return [f"the vehicle's home is {away_m:.0f} m from the mission's start and {higher_m:+.1f} m in height{counts}"]

@@ -13,13 +13,12 @@ from gcsplan.mavlink.link.drive import drive
 from gcsplan.mavlink.link.link import Channel, Steps
 from gcsplan.mavlink.link.parameters import FENCE_GROUPS, GROUPS, judge_fence_parameters, judge_parameters
 from gcsplan.mavlink.link.preflight import (
-    NEAR_GROUND_M,
     NEAR_START_M,
     Reasons,
     apart_m,
-    distance_m,
     identity,
     objections,
+    other_home,
     preflight,
     rivals_words,
 )
@@ -33,7 +32,7 @@ from gcsplan.mavlink.link.watch import VehicleState, Watch
 from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA, max_items
 from gcsplan.mavlink.mission.autopilots import PX4 as MAV_PX4
 from gcsplan.mavlink.mission.compare import compare, faults
-from gcsplan.mavlink.mission.mission import FENCE, MISSION, RELATIVE, Home, Mission, MissionItem
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, Mission, MissionItem
 from gcsplan.mavlink.protocol.patience import TIMEOUT_S, Patience, checked_timeout_s
 from gcsplan.mavlink.protocol.transfer import (
     Accepted,
@@ -366,7 +365,7 @@ def result_of(
             task.autopilot, settled.read_back, home=task.mission.home, name=task.name, sysid=task.sysid
         )
         failed = task.judge(mission, values) if task.judge else None
-        warnings = warnings + _other_home(task.mission, settled.read_back)
+        warnings = warnings + other_home(task.mission, settled.read_back)
     return UploadResult(
         task.name,
         task.sysid,
@@ -388,17 +387,3 @@ def result_of(
         settled.read_back,
         mission,
     )
-
-
-def _other_home(mission: Mission, read: tuple[MissionItem, ...]) -> list[str]:
-    """Warn if ArduPilot's item 0 is away from the mission's start: relative altitudes count from it until arming."""
-    if not mission.autopilot.is_ardupilot or (read[0].x, read[0].y) == (0, 0):
-        return []
-    theirs, ours = Home(read[0].x, read[0].y, read[0].z), mission.home
-    away_m = distance_m(ours.lat_e7 / 1e7, ours.lon_e7 / 1e7, theirs.lat_e7 / 1e7, theirs.lon_e7 / 1e7)
-    higher_m = theirs.amsl_m - ours.amsl_m
-    if away_m <= NEAR_START_M and abs(higher_m) <= NEAR_GROUND_M:
-        return []
-    relative = any(item.frame in (RELATIVE, 6) for item in mission.items)
-    counts = "; its relative altitudes count from there if it is not armed at the start" if relative else ""
-    return [f"the vehicle's home is {away_m:.0f} m from the mission's start and {higher_m:+.1f} m in height{counts}"]
