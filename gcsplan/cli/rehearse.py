@@ -43,7 +43,10 @@ def rehearse(
     noise_m: Annotated[float, typer.Option(metavar="M", help="Position error, as a standard deviation.")] = 0.0,
     airspeed: Annotated[
         float | None,
-        typer.Option(metavar="M_S", help="The most through the air [default: 1.2 times the fastest cruise]"),
+        typer.Option(
+            metavar="M_S",
+            help="The most through the air [default: what the lean angle allows, else 1.2 times the fastest cruise]",
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of wind, gusts and noise.")] = 1,
     runs: Annotated[int, typer.Option(metavar="K", min=1, max=10_000, help="Fly it so often, with other weather.")] = 1,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 from gcsplan.vehicle import Autopilot, Vehicle
 
@@ -19,6 +20,9 @@ FULL_ACCEL = 2.5 / 1.5
 
 AIRSPEED_SPARE = 1.2
 """Assumed highest airspeed of a vehicle, as a multiple of its fastest cruise: its reserve against wind."""
+FASTEST_M_S = 60.0
+STEP, STEEPEST, STEP_M = 0.01, 50, 25.0
+"""Slopes (rise per metre) and altitudes are rounded to these where only the airspeed depends on them."""
 
 PX4_EVEN_ACCEL = 0.65
 """PX4's even acceleration and braking that take about as long as its own, per MPC_ACC_HOR."""
@@ -60,10 +64,16 @@ class Kinematics:
 
     @classmethod
     def of(cls, vehicle: Vehicle, airspeed_m_s: float | None = None) -> Kinematics:
-        """Return a vehicle's kinematics, with defaults for the rest; ``airspeed_m_s`` None: use `AIRSPEED_SPARE`."""
+        """Return a vehicle's kinematics, with defaults for the rest.
+
+        ``airspeed_m_s`` None: what its lean angle allows; without one, `AIRSPEED_SPARE`.
+        """
+        if airspeed_m_s is None:
+            spare = AIRSPEED_SPARE * vehicle.speed_max_m_s
+            airspeed_m_s = spare if vehicle.lean_angle_deg is None else math.inf
         return cls(
             vehicle.climb_m_s, vehicle.descent_m_s,
-            AIRSPEED_SPARE * vehicle.speed_max_m_s if airspeed_m_s is None else airspeed_m_s,
+            airspeed_m_s,
             vertical_accel_m_s2=vehicle.vertical_accel_m_s2,
             accel_m_s2=(PX4_EVEN_ACCEL if vehicle.smooths else 1.0) * vehicle.accel_m_s2,
             corner_accel_m_s2=vehicle.corner_accel_m_s2, land_m_s=vehicle.land_m_s,
@@ -112,9 +122,19 @@ class Kinematics:
             slow, fast = (middle, fast) if _pushes_on(self.lean_deg, middle, rise, amsl_m) else (slow, middle)
         return slow
 
+    def airspeed_on(self, rise: float, amsl_m: float) -> float:
+        """Return the highest airspeed on a slope, about."""
+        steps, height_m = max(-STEEPEST, min(STEEPEST, round(rise / STEP))), STEP_M * round(amsl_m / STEP_M)
+        return min(self.airspeed_m_s, _leaning_m_s(self, STEP * steps, height_m))
+
     def corner_m_s(self, radius_m: float) -> float:
         """Return the highest speed over ground on an arc."""
         return math.sqrt(self.corner_accel_m_s2 * radius_m)
+
+
+@lru_cache(maxsize=4096)
+def _leaning_m_s(kinematics: Kinematics, rise: float, amsl_m: float) -> float:
+    return kinematics.leaning_m_s(rise, amsl_m, FASTEST_M_S)
 
 
 MASS_KG, DISC_M2, ROTOR_DRAG = 3.0, 0.385, 0.2

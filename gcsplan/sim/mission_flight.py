@@ -109,6 +109,7 @@ class _Ways:
         self.command = np.concatenate([t.command_m_s for t in tracks])
         self.level = np.concatenate([t.level for t in tracks])
         self.accel = np.concatenate([t.accel_m_s2 for t in tracks])
+        self.airspeed = np.concatenate([t.airspeed_m_s for t in tracks])
         # Pieces whose speed changes at once are flown by the clock: what each takes at its speed, and when it begins.
         with np.errstate(divide="ignore"):
             self.pace = np.minimum(self.cap, self.command / self.level)
@@ -184,7 +185,7 @@ class _Lanes:
         self._ways, self._tracks = ways, tracks
         self._goal = np.tile([t.goal for t in tracks], runs)
         self._slowing = np.tile([t.slowing_m_s2 for t in tracks], runs)
-        self._airspeed = np.tile([t.airspeed_m_s for t in tracks], runs)
+        self._keeps = np.tile([t.keeps_airspeed for t in tracks], runs)
         self.piece = np.tile(ways.first, runs)
         self.s, self.v = np.zeros(n), np.zeros(n)
         self.command = ways.command[self.piece]
@@ -208,7 +209,7 @@ class _Lanes:
         slower = np.maximum(command, self.command - self._slowing * b)
         self.command = np.where((v > 0.0) & (command < self.command), slower, command)
         accel = ways.accel[k]
-        over_ground = self.command if wind is None else np.minimum(self.command, self._headway(k, wind))
+        over_ground = self.command if wind is None else self._over_ground(k, wind)
         # The limits at the end of the step count, because a step may lead into a corner or out of one.
         there = self._piece_at(k, np.minimum(s + v * b, ways.before_stop[k]))
         with np.errstate(divide="ignore"):
@@ -292,10 +293,21 @@ class _Lanes:
         first = int(ways.first[lane % len(self._tracks)])
         self.piece[lane] = first + node
 
-    def _headway(self, k: Indices, wind: Floats) -> Floats:
-        """Return the highest speed over ground along the course while the vehicle crabs into the wind."""
+    def _over_ground(self, k: Indices, wind: Floats) -> Floats:
+        """Return the speed over ground along the course while the vehicle crabs into the wind.
+
+        A vehicle that keeps its airspeed is faster with the wind behind it; every other flies its commanded speed if
+        its highest airspeed allows it.
+        """
         course = self._ways.course[k]
         tail = (course * wind).sum(axis=1)
         cross = course[:, 0] * wind[:, 1] - course[:, 1] * wind[:, 0]
-        through = np.sqrt(np.maximum(self._airspeed**2 - cross**2, 0.0))
-        return np.asarray(np.maximum(tail + through, HEADWAY_M_S))
+        level, slope = self._ways.airspeed[k].T
+        most = level
+        for _ in range(2):  # through the air its slope is less steep in a headwind, and steeper in a tailwind
+            in_air = np.where(self._keeps, np.minimum(self.command, most), most)
+            through = np.sqrt(np.maximum(in_air**2 - cross**2, 0.0))
+            headway = np.maximum(tail + through, HEADWAY_M_S)
+            with np.errstate(invalid="ignore"):  # an airspeed without a bound
+                most = np.where(np.isinf(level), level, level + (slope - level) * np.minimum(headway / most, 1.5))
+        return np.asarray(np.where(self._keeps, headway, np.minimum(self.command, headway)))

@@ -38,8 +38,9 @@ class Track:
     ``points`` (N, 3): east_m, north_m, amsl_m. ``hold_s`` (N,): seconds that the vehicle stands at a node, `PASSED` if
     it does not stop, infinite if it stays. Of the pieces (N - 1,): ``cap_m_s``, the highest speed along it that climb,
     descent and corners allow; ``command_m_s``, the commanded speed over ground; ``level``, the horizontal fraction of
-    its length; ``accel_m_s2``; ``column`` (take-off or landing); ``seq``, the wire item. ``goal``: the node at which
-    the planned path ends.
+    its length; ``accel_m_s2``; ``airspeed_m_s`` (N - 1, 2), the highest level and on its slope; ``column`` (take-off or
+    landing); ``seq``, the wire item. ``goal``: the node at which the planned path ends. ``keeps_airspeed``: the
+    commanded speed is through the air, and wind adds to it.
     """
 
     name: str
@@ -54,8 +55,9 @@ class Track:
     goal: int
     ends_in_air: bool
     slowing_m_s2: float
-    airspeed_m_s: float
+    airspeed_m_s: Floats
     not_flown: tuple[str, ...]
+    keeps_airspeed: bool = False
 
     @property
     def length_m(self) -> Floats:
@@ -219,9 +221,18 @@ def _track(vehicle: Vehicle, line: _Line, goal: int, flight: Flight, kinematics:
     return Track(
         name, points, np.array(line.hold_s), np.array(cap), np.array(command), np.array(level),
         np.array(accel), np.array(column, dtype=np.bool_), np.array(seq, dtype=np.intp), goal,
-        not (last.column and last.end[2] < last.start[2]), kinematics.slowing_m_s2, kinematics.airspeed_m_s,
-        (*flight.not_judged, *_left_out(flight), *turns),
+        not (last.column and last.end[2] < last.start[2]), kinematics.slowing_m_s2,
+        _airspeeds(points, kinematics),
+        (*flight.not_judged, *_left_out(flight), *turns), vehicle.keeps_airspeed,
     )  # fmt: skip
+
+
+def _airspeeds(points: Floats, kinematics: Kinematics) -> Floats:
+    """(N - 1, 2) the highest airspeeds along each piece: level at its altitude, and on its slope."""
+    way = np.diff(points, axis=0)
+    rise = way[:, 2] / np.maximum(np.linalg.norm(way, axis=1), SAME_M)
+    each = zip(rise.tolist(), points[1:, 2].tolist(), strict=True)
+    return np.array([(kinematics.airspeed_on(0.0, z), kinematics.airspeed_on(r, z)) for r, z in each])
 
 
 def _left_out(flight: Flight) -> list[str]:

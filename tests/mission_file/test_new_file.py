@@ -66,8 +66,8 @@ def test_every_key_has_a_comment_with_its_unit_above_it() -> None:
     text = " ".join("\n".join(lines).replace("# ", "").split())
     assert "Least distance to every zone, and to ground that reaches flight level. In m. Default: 30." in text
     assert "or nothing. One of land, loiter, rtl, none. Default: land." in text
-    assert "Slowest and fastest cruise speed; one number is both." in text
-    assert "In m/s. Default: [3, 15]." in text
+    assert "Slowest and fastest cruise speed; one number is both. A fixed wing's is the airspeed" in text
+    assert "that it indicates. In m/s. Default: [3, 15]." in text
 
 
 def test_flat_ground_and_odd_names() -> None:
