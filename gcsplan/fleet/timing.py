@@ -31,6 +31,9 @@ End = Literal["land", "loiter", "rtl", "none"]
 LAND_SLOWLY_M = 10.0
 """Height above ground, m, below which a landing is slow (ArduCopter's LAND_ALT_LOW)."""
 
+PX4_TAKE_OFF_M, PX4_TAKE_OFF_M_S = 10.0, 1.5
+"""Below this height, m, a PX4 takes off at this speed (MPC_LAND_ALT1, MPC_TKO_SPEED): flown, 22.0 s to 44 m."""
+
 PX4_LAND_SLOWLY_M = 7.0
 """Height above home, m, below which a landing PX4 without a range finder is slow. It slows down from MPC_LAND_ALT1
 (10 m) to MPC_LAND_ALT2 (5 m), which takes as long."""
@@ -253,7 +256,7 @@ def _takeoff(route: Route, vehicle: Vehicle) -> Motion | None:
         way = legs(route.climb_out, vehicle, np.zeros(len(route.climb_out) - 1, dtype=np.intp))
         # The mission sets its speed after the climb-out, which is flown at the vehicle's own.
         return None if way is None else way.at_its_own(vehicle.speed_max_m_s)
-    return None if ground is None else next(iter(upright(top[:2], ground, float(top[2]), vehicle, 0)), None)
+    return None if ground is None else next(iter(upright(top[:2], ground, float(top[2]), vehicle, 0, ground)), None)
 
 
 def _after(route: Route, vehicle: Vehicle) -> list[Motion]:
@@ -304,7 +307,13 @@ def upright(
     slow_from = to_amsl_m + LAND_SLOWLY_M
     if vehicle.autopilot is Autopilot.PX4:
         slow_from = (to_amsl_m if home_amsl_m is None else home_amsl_m) + PX4_LAND_SLOWLY_M
-    if from_amsl_m < to_amsl_m:
+    fast_from = from_amsl_m + PX4_TAKE_OFF_M
+    if vehicle.smooths and home_amsl_m is not None and home_amsl_m == from_amsl_m and fast_from < to_amsl_m:
+        heights, most = (
+            [from_amsl_m, fast_from, to_amsl_m],
+            [min(PX4_TAKE_OFF_M_S, vehicle.climb_m_s), vehicle.climb_m_s],
+        )
+    elif from_amsl_m < to_amsl_m:
         heights, most = [from_amsl_m, to_amsl_m], [vehicle.climb_m_s]
     elif from_amsl_m <= slow_from:
         heights, most = [from_amsl_m, to_amsl_m], [slow_m_s]

@@ -61,6 +61,7 @@ class Kinematics:
     leg_accel_m_s2: float = 2.5
     lean_deg: float = math.inf
     accepts_m: float = 0.0
+    takes_off_below_m: float = 0.0
 
     @classmethod
     def of(cls, vehicle: Vehicle, airspeed_m_s: float | None = None) -> Kinematics:
@@ -78,6 +79,7 @@ class Kinematics:
             accel_m_s2=(PX4_EVEN_ACCEL if vehicle.smooths else 1.0) * vehicle.accel_m_s2,
             corner_accel_m_s2=vehicle.corner_accel_m_s2, land_m_s=vehicle.land_m_s,
             leg_jerk_m_s3=vehicle.leg_jerk_m_s3 if vehicle.lays_curves else math.inf,
+            takes_off_below_m=10.0 if vehicle.smooths else 0.0,
             accepts_m=vehicle.acceptance_m if vehicle.smooths else 0.0,
             land_below_m=PX4_LAND_BELOW_M if vehicle.autopilot is Autopilot.PX4 else 10.0,
             leg_accel_m_s2=FULL_ACCEL * vehicle.accel_m_s2,
@@ -87,7 +89,9 @@ class Kinematics:
     def __post_init__(self) -> None:
         for name in self.__slots__:
             value = getattr(self, name)
-            if not value > 0.0 and not (value == 0.0 and name in ("cut_m", "land_below_m", "accepts_m")):
+            if not value > 0.0 and not (
+                value == 0.0 and name in ("cut_m", "land_below_m", "accepts_m", "takes_off_below_m")
+            ):
                 raise ValueError(f"{name} of a moving vehicle must be above 0, given {value:g}")
             if name.endswith("_m_s2") and name != "corner_accel_m_s2":
                 object.__setattr__(self, name, min(value, AT_ONCE_M_S2))

@@ -27,6 +27,8 @@ from gcsplan.world.world import World
 
 TERRAIN_PART_M = 10.0
 """Longest piece of a leg that follows the terrain, in metres."""
+PX4_TAKE_OFF_M_S = 1.5
+"""m/s: PX4's speed in the first metres of a take-off (MPC_TKO_SPEED)."""
 PASSED = -1.0
 """Value in `Track.hold_s` of a node that is passed without a stop."""
 
@@ -286,6 +288,9 @@ def _column(line: _Line, ends: Floats, s: Stretch, kinematics: Kinematics, home_
     start, end = line.points[-1], ends[1]
     climb, descent = s.rates_m_s or (kinematics.climb_m_s, kinematics.descent_m_s)
     if end[2] >= start[2]:
+        low = start[2] + kinematics.takes_off_below_m
+        if s.kind == "takeoff" and start[2] < low < end[2]:
+            line.add(np.array([*end[:2], low]), s, kinematics, cap_m_s=min(climb, PX4_TAKE_OFF_M_S))
         line.add(end, s, kinematics, cap_m_s=climb)
         return
     low = (end[2] if home_amsl_m is None else home_amsl_m) + kinematics.land_below_m
