@@ -48,7 +48,7 @@ WHY_LOST = {
     cmd.ARC_WAYPOINT: "an arc, which only ArduCopter 4.7 and later know",
     cmd.SPLINE_WAYPOINT: "a spline is known only for ArduCopter, without terrain frame and with an item after it",
     cmd.VTOL_TAKEOFF: "it changes to forward flight after its climb, in a direction that is not known",
-    cmd.TAKEOFF: "a take-off in the air",
+    cmd.TAKEOFF: "it comes in the air, or its altitude cannot be told",
     cmd.ALTITUDE_WAIT: "it waits for an altitude that a balloon may bring",
     cmd.GUIDED_ENABLE: "another computer flies from there on",
     cmd.PAYLOAD_PLACE: "it descends until it feels the ground",
@@ -66,8 +66,8 @@ def why_lost(item: MissionItem, mission: Mission) -> str:
     """Return why what the autopilot flies for an item is not known."""
     if item.command == cmd.WAYPOINT:
         return "waypoint: the ground there, or under the leg to it, is not known, or its altitude cannot be told"
-    if item.command == cmd.TAKEOFF and mission.autopilot is Autopilot.ARDUCOPTER:
-        return "take-off: its altitude cannot be told, or it comes in the air"
+    if item.command in (cmd.TAKEOFF, cmd.VTOL_TAKEOFF) and mission.autopilot.is_ardupilot:
+        return f"{cmd.command_name(item.command)}: it comes in the air, or its altitude cannot be told"
     name = "" if item.command not in cmd.WORDS else f"{cmd.command_name(item.command)}: "
     return name + WHY_LOST.get(item.command, "its motion is not known")
 

@@ -315,9 +315,12 @@ class WayHome:
     def _lowest(self) -> list[tuple[str, str]]:
         if self.lowest is None:
             return []
-        agl, at = Quantity(self.lowest.agl_m, "height", 0, "down"), Quantity(self.lowest.at_m, "far", 2, bare=True)
-        words = "{} above ground, on the return from {} {} (item {})"
-        return [("lowest on a return", UnitText(words, agl, Symbol("far"), at, self.lowest.seq))]
+        below = self.lowest.agl_m < 0.0
+        agl = Quantity(abs(self.lowest.agl_m), "height", 0, "up" if below else "down")
+        at = Quantity(self.lowest.at_m, "far", 2, bare=True)
+        words = "{} {} ground, on the return from {} {} (item {})"
+        side = "below" if below else "above"
+        return [("lowest on a return", UnitText(words, agl, side, Symbol("far"), at, self.lowest.seq))]
 
     def _battery(self) -> list[tuple[str, str]]:
         return [] if self.battery is None else [("battery for the return", self.battery.describe())]

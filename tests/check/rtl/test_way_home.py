@@ -319,6 +319,18 @@ def test_the_circle_over_home_is_judged_for_a_plane() -> None:
     assert judged(w, mission(w, [(0, 0, 150), (2000, 0, 150)], land=False), vehicle(**BARE), 60.0).safe is True
 
 
+def test_the_lowest_height_of_all_returns_is_told() -> None:
+    w = world(ridge)
+    low, high = (judged(w, mission(w, OVER), vehicle(**BARE), rtl) for rtl in (50.0, 130.0))
+    assert low.lowest is not None
+    assert high.lowest is not None
+    assert low.lowest.agl_m == pytest.approx(-50.0, abs=1.0)  # the ridge is 100 m above home
+    assert high.lowest.agl_m == pytest.approx(30.0, abs=1.0)
+    told = [dict(home.rows())["lowest on a return"] for home in (low, high)]
+    assert [" ".join(words.split()[1:4]) for words in told] == ["m below ground,", "m above ground,"]
+    assert high.as_dict()["lowest_agl_m"] == high.lowest.agl_m
+
+
 def test_all_reasons_of_a_return_are_named_together_and_stretches_are_cut_where_they_change() -> None:
     # Behind the ridge, on the northern half of the way, the line home meets the tower too.
     tower = Zone("tower", Circle(1600.0, 400.0, 150.0))
