@@ -267,7 +267,12 @@ def _after(route: Route, vehicle: Vehicle) -> list[Motion]:
     if route.climb_out is not None and route.end == "rtl":
         slanted = np.array([goal, [*route.climb_out[0, :2], _home(route)[1]]])
     if slanted is not None or route.climb_out is not None:
-        down = None if slanted is None else legs(slanted, vehicle, np.full(len(slanted) - 1, number, dtype=np.intp))
+        if slanted is None:
+            return []
+        # A wing's return is judged level, in the middle of the band in which it may change its altitude.
+        d = np.diff(slanted, axis=0)
+        level = np.linalg.norm(d, axis=1) / np.hypot(d[:, 0], d[:, 1]) if route.end == "rtl" else None
+        down = legs(slanted, vehicle, np.full(len(d), number, dtype=np.intp), pace=level)
         return [] if down is None else [down]
     if route.end == "land" and route.goal_ground_amsl_m is not None:
         home_m = route.start_ground_amsl_m

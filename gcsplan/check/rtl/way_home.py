@@ -85,6 +85,10 @@ def way_home(
     unsafe = stretches_of(trace, refinement, CLEAR, level, target)
     irregular = stretches_of(trace, refinement, LEGAL, level, target, but=CLEAR)
     proposal = propose(trace, refinement, target, vehicle, judged_m) if rally and lowest is None else None
+    unsafe_m = together_m((s.from_m, s.to_m) for s in unsafe)
+    if proposal is not None and not proposal.points and _left_m(proposal) >= unsafe_m:
+        # The proposal was looked at less closely than the altitude that was judged, which is as good.
+        proposal = replace(proposal, rel_home_m=judged_m, left=tuple(unsafe))
     best_m = judged_m if not unsafe and not irregular else _whole(lowest_legal, highest_legal)
     if best_m is None:
         best_m = judged_m if not unsafe else _whole(lowest, highest)
@@ -160,8 +164,8 @@ def _short_m(verdict: Verdict, vehicle: Vehicle, home: Place, rel_home_m: float)
     return 0.0 if battery is None else together_m(battery.short)
 
 
-def _left_m(proposal: Proposal | None) -> float | None:
-    return None if proposal is None else together_m((s.from_m, s.to_m) for s in proposal.left)
+def _left_m(proposal: Proposal | None) -> float:
+    return math.inf if proposal is None else together_m((s.from_m, s.to_m) for s in proposal.left)
 
 
 def _profile(trace: MissionTrace, refinement: Refinement) -> tuple[ProfilePoint, ...]:
