@@ -17,6 +17,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import Any, Protocol, TypeVar
 
+from gcsplan import __version__
 from gcsplan.errors import GcsplanError, InputError, UsageError
 
 __all__ = ["Executor", "Inline", "executor"]
@@ -101,7 +102,7 @@ class Dask:
 
         def hand_out(most: int) -> None:
             for number, item in left:
-                future = client.submit(function, kept, item, pure=False, priority=-number)
+                future = client.submit(_done, function, __version__, kept, item, pure=False, priority=-number)
                 numbers[future] = number
                 done.add(future)
                 if (most := most - 1) <= 0:
@@ -121,6 +122,16 @@ class Dask:
                 yield number, result
         finally:
             client.cancel([kept, *numbers])
+
+
+def _done(function: Callable[[Shared, Item], Result], version: str, shared: Shared, item: Item) -> Result:
+    """A piece of work, if the worker has the version of gcsplan that asks for it."""
+    if version != __version__:
+        raise InputError(
+            f"a worker of the cluster has gcsplan {__version__}, and this is {version}: install one version on all of "
+            f"its machines"
+        )
+    return function(shared, item)
 
 
 def _itself(value: Shared) -> Shared:
@@ -182,9 +193,19 @@ def _connected(cluster: Any) -> Iterator[Any]:
     except (OSError, ValueError) as error:  # TimeoutError is an OSError
         raise InputError(f"no dask scheduler answers: {error}", where=f"--cluster {cluster}") from error
     try:
+        if not client.nthreads():
+            _wait_for_workers(client, cluster)
         yield client
     finally:
         client.close()
+
+
+def _wait_for_workers(client: Any, cluster: Any) -> None:
+    try:
+        client.wait_for_workers(1, timeout=ANSWER_S)
+    except TimeoutError:
+        words = f"the dask scheduler has had no worker for {ANSWER_S:g} s: start some (dask worker ADDRESS)"
+        raise InputError(words, where=f"--cluster {cluster}") from None
 
 
 @contextmanager

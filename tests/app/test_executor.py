@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gcsplan import __version__
 from gcsplan.app import executor as module
 from gcsplan.app.executor import Dask, Executor, Inline, executor
 from gcsplan.app.fleet_jobs import planned_by
@@ -201,6 +202,24 @@ def test_terrain_that_planning_widened_is_the_same_here(monkeypatch: pytest.Monk
     other = plan(mission)
     assert other.source.level == alone.source.level
     assert told(other) == told(alone)
+
+
+def test_a_worker_of_another_version_is_refused() -> None:
+    assert module._done(square, __version__, 1, 2) == 5
+    with pytest.raises(InputError, match=r"a worker of the cluster has gcsplan .*, and this is 9.9"):
+        module._done(square, "9.9", 1, 2)
+
+
+@pytest.mark.slow
+def test_a_scheduler_without_workers_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(module, "ANSWER_S", 1.0)
+    with (
+        distributed.LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address="127.0.0.1:0") as empty,
+        pytest.raises(InputError, match="no worker"),
+        executor(cluster=empty.scheduler_address, pieces=1, piece_s=1.0),
+    ):
+        pass
 
 
 @pytest.mark.slow
