@@ -6,11 +6,13 @@ lie in it, so no hull is ever built: the distance is the least over all pairs, t
 
 from __future__ import annotations
 
+import math
+from functools import cache
 from itertools import combinations
 
 import numpy as np
 
-from gcsplan.arrays import Bools, Floats
+from gcsplan.arrays import Bools, Floats, Indices
 
 AT_ONCE = 1_000_000
 MEETS = -1.0
@@ -24,16 +26,16 @@ def to_point(regions: Floats, point: Floats) -> Floats:
 
 def to_points(regions: Floats, points: Floats) -> Floats:
     """(M,) distance of each region (M, K, 2) from its own point (M, 2); 0 inside."""
-    best = np.full(len(regions), np.inf)
-    for a, b in _pairs(regions):
-        best = np.minimum(best, _to_segment(points - a, b - a))
+    first, second = _choices(regions.shape[1], 2)
+    a, b = regions[:, first], regions[:, second]
+    best = np.asarray(_to_segment(points[:, None] - a, b - a).min(axis=1, initial=np.inf))
     best[_holds(regions, points[:, None])[:, 0]] = 0.0
     return best
 
 
 def to_polygon(regions: Floats, corners: Floats) -> Floats:
     """(M,) distance of each region (M, K, 2) from a polygon (V, 2) with its inside; `MEETS` where they overlap."""
-    at_once = max(AT_ONCE // (len(corners) * regions.shape[1]), 1)
+    at_once = max(AT_ONCE // (len(corners) * max(math.comb(regions.shape[1], 3), 1)), 1)
     parts = [_to_polygon(regions[i : i + at_once], corners) for i in range(0, len(regions), at_once)]
     return np.concatenate(parts) if parts else np.zeros(0)
 
@@ -71,15 +73,18 @@ def _to_segment(away: Floats, step: Floats) -> Floats:
 
 def _holds(regions: Floats, points: Floats) -> Bools:
     """(M, P) whether each region contains its own points (M, P, 2)."""
-    held = np.zeros(points.shape[:2], np.bool_)
-    for i, j, k in combinations(range(regions.shape[1]), 3):
-        a, b, c = (regions[:, n, None] for n in (i, j, k))
-        sides = _cross(b - a, points - a), _cross(c - b, points - b), _cross(a - c, points - c)
-        size = _cross(b - a, c - a)
-        left = (sides[0] > 0.0) & (sides[1] > 0.0) & (sides[2] > 0.0)
-        right = (sides[0] < 0.0) & (sides[1] < 0.0) & (sides[2] < 0.0)
-        held |= (left | right) & (size != 0.0)
-    return held
+    a, b, c = (regions[:, some, None] for some in _choices(regions.shape[1], 3))
+    at = points[:, None]
+    sides = _cross(b - a, at - a), _cross(c - b, at - b), _cross(a - c, at - c)
+    left = (sides[0] > 0.0) & (sides[1] > 0.0) & (sides[2] > 0.0)
+    right = (sides[0] < 0.0) & (sides[1] < 0.0) & (sides[2] < 0.0)
+    return np.asarray(((left | right) & (_cross(b - a, c - a) != 0.0)).any(axis=1))
+
+
+@cache
+def _choices(count: int, size: int) -> tuple[Indices, ...]:
+    """The numbers of all choices of ``size`` of ``count`` points: those of the first points, of the second, …"""
+    return tuple(np.array(list(combinations(range(count), size)), dtype=np.intp).reshape(-1, size).T)
 
 
 def _inside(points: Floats, corners: Floats) -> Bools:
