@@ -39,8 +39,12 @@ def test_a_mission_of_the_gallery_is_safe_and_its_files_are_what_was_judged(file
 @pytest.mark.parametrize("file", [pytest.param(f, id=f.stem) for f in MISSIONS.glob("*.yaml")])
 def test_every_mission_of_the_gallery_has_a_safe_return_from_all_of_its_paths(file: Path) -> None:
     homes = homes_of(plan(load_mission(file)))
-    assert {home.headline for home in homes.values()} == {"path safe; safe return from all of it"}
-    assert {home.set_leaves_m for home in homes.values()} == {0.0}
+    for name, home in homes.items():
+        if file.stem == "fleet-100" and home.unsafe:  # as the mission says
+            assert sum(s.to_m - s.from_m for s in home.unsafe) <= 50.0, name
+            assert all("quarry" in s.why for s in home.unsafe), name
+        else:
+            assert (home.headline, home.set_leaves_m) == ("path safe; safe return from all of it", 0.0), name
 
 
 @pytest.mark.slow

@@ -72,12 +72,29 @@ class Swept:
     """The regions that N bundles of lines cover; zones are compared with them exactly.
 
     ``regions`` (N, K, 2): the convex hull of these points; the bundle begins in the hull of the first ``begin``.
-    ``extra_m`` (N,): by how much, in metres of the plane, it is wider than the limits' errors make it.
+    ``extra_m`` (N,): by how much, in metres of the plane, it is wider than the limits' errors make it. If ``inner``
+    (N, J, 2) is given, the clearance of the limits is kept from the hull of these points alone, whose first two it
+    begins between, and from the rest no more than their errors.
     """
 
     regions: Floats
     extra_m: Floats
     begin: int = 2
+    inner: Floats | None = None
+
+    def near(self, met: Indices, row: Floats, vertex: Floats, demanded: Floats, spared_m: float) -> tuple[Bools, Bools]:
+        """For the bundles ``met``: whether each is nearer to a zone than ``demanded`` (M,), and whether its begin is.
+
+        ``spared_m``: the part of it that is clearance.
+        """
+        spared = 0.0 if self.inner is None else spared_m
+        found, begins = (
+            _apart(self.regions[met, :count], row, vertex) < demanded - spared - TOUCH_M for count in (None, self.begin)
+        )
+        if self.inner is not None:
+            found |= _apart(self.inner[met], row, vertex) < demanded - TOUCH_M
+            begins |= _apart(self.inner[met, :2], row, vertex) < demanded - TOUCH_M
+        return found, begins
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +147,8 @@ def over(
     np.maximum.at(legal_m, line, legal)
     if limits.max_agl_m is not None:
         np.minimum.at(ceiling_m, line, low + limits.max_agl_m)
-    found = _crossings(air, starts, ends, reach, wide_m, error, swept)
+    clearance_m = limits.horizontal_clearance_m * air.scale
+    found = _crossings(air, starts, ends, reach, wide_m, error, swept, clearance_m)
     return LevelLines(clear_m, legal_m, ceiling_m, found, line, s0, high, legal)
 
 
@@ -182,8 +200,9 @@ def _few(reach_m: float, air: Airspace) -> float:
 
 
 def _crossings(
-    air: Airspace, starts: Floats, ends: Floats, reach: Reaches, wide_m: float, error_m: float, swept: Swept | None
-) -> Crossings:
+    air: Airspace, starts: Floats, ends: Floats, reach: Reaches, wide_m: float, error_m: float, swept: Swept | None,
+    clearance_m: float,
+) -> Crossings:  # fmt: skip
     table, vertex = air._zones.table, air._zones.vertex
     step = ends - starts
     length = np.hypot(*step.T)
@@ -207,9 +226,8 @@ def _crossings(
             begin = s0[met] <= 0.0
         else:
             demanded = swept.extra_m[met] + (within - wide_m if over_ground[k] else reach.zone_m)
-            near_it = _apart(swept.regions[met], row, vertex) < demanded - TOUCH_M
-            met, demanded = met[near_it], demanded[near_it]
-            begin = _apart(swept.regions[met, : swept.begin], row, vertex) < demanded - TOUCH_M
+            near_it, begin = swept.near(met, row, vertex, demanded, clearance_m)
+            met, begin = met[near_it], begin[near_it]
         lines.append(met)
         begins.append(begin)
         zones.append(np.full(len(met), k))

@@ -7,6 +7,7 @@ valley or a ridge that is narrower than its posts it flies higher or lower above
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,18 +26,20 @@ Piece = tuple[float, float, Surface]
 """A part of a line, from and to (0 to 1), and the vehicle's ground under it."""
 
 
+def _ground_at(frame: Frame, surface: Surface, lat_deg: Floats, lon_deg: Floats) -> Floats:
+    plane = frame.to_plane(lat_deg, lon_deg)
+    return surface.ground_at(plane[..., 0], plane[..., 1])
+
+
 class VehicleTerrain:
     """The vehicle's grid over ``surface``; unknown where the vehicle would not get all posts of a 4 × 4 part."""
 
     def __init__(self, frame: Frame, surface: Surface, spacing_m: int = SPACING_M) -> None:
         self._frame, self._surface = frame, surface
-        self.posts = PostHeights(TerrainGrid(spacing_m), self._ground)
+        # No method of this object: a cycle would hold the terrain until Python looks for cycles.
+        self.posts = PostHeights(TerrainGrid(spacing_m), partial(_ground_at, frame, surface))
         self._surfaces: dict[Cell, Surface | None] = {}
         self._range: tuple[Floats, Floats] | None = None
-
-    def _ground(self, lat_deg: Floats, lon_deg: Floats) -> Floats:
-        plane = self._frame.to_plane(lat_deg, lon_deg)
-        return self._surface.ground_at(plane[..., 0], plane[..., 1])
 
     def amsl(self, lat_deg: float, lon_deg: float) -> float:
         """The height that the vehicle reads at a place, m AMSL; NaN where unknown."""

@@ -157,15 +157,18 @@ def breach(
     track, altitude = limits.track_error_m + more_m / oracle.scale, limits.altitude_error_m + lift_m
     level = home[2] + case.level_rel_home_m
     ways = _ways(case, at, level, cone=not legal)
+    own = len(ways)  # from the mission's own line; the others keep no clearance from zones
     if on is not None and on.any():
         for part in (0.4, 1.0):
             stop = at + part * np.array([*on, 0.0])
             ways += _ways(case, stop, level, cone=not legal)
         if not legal:
             ways.append((at, stop, False))
-    for start, end, column in ways:
+    bare = replace(limits, horizontal_clearance_m=0.0)
+    for number, (start, end, column) in enumerate(ways):
         for k in range(len(oracle.zones)):
-            if oracle.zone_breach(k, start, end, track, altitude, limits, spokes=10, rings=2):
+            kept = limits if number < own else bare
+            if oracle.zone_breach(k, start, end, track, altitude, kept, spokes=10, rings=2):
                 return f"zone {k}, column {column}"
         if column:
             continue

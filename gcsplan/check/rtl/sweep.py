@@ -4,7 +4,8 @@ How each autopilot returns is in `model`, how far it goes on before that in `run
 possible, all are judged. A plane climbs from its altitude at least at the slope of ``climb_m_s`` at its highest speed,
 or at once; it descends late or at once; it turns about first, and flies home from aside. The line home lies between the
 line straight in the plane and the line straight in degrees. Inside the cone min AGL does not apply, because the
-aircraft is about to land.
+aircraft is about to land. Where a multicopter brakes, and on its way home from there, it keeps off zones themselves by
+its errors; the clearance from zones is kept by returns from the mission's own line.
 """
 
 from __future__ import annotations
@@ -80,7 +81,8 @@ class ReturnPlaces:
     A return begins in the hull of the first four points; the fifth is home; the others bound how far a line home may be
     bent, by ``bow_m`` (N,) at most. ``corner`` (N,): whether it may begin aside of the line through the first two.
     ``low``, ``high`` (N,): the altitudes AMSL at which it begins. ``aside_m`` (N,): how far a plane's turn about leads
-    aside at its beginning; on the way home this fades to 0.
+    aside at its beginning; on the way home this fades to 0. ``inner`` (N, 5, 2): the same as ``regions`` for returns
+    that begin at once, on the mission's own line: its ends, home, and what bounds the bend.
     """
 
     regions: Floats
@@ -90,6 +92,7 @@ class ReturnPlaces:
     low: Floats
     high: Floats
     aside_m: Floats
+    inner: Floats
 
     def lines_home(self) -> tuple[Floats, Floats, Floats, Floats]:
         """One line home for each region, widened so that it covers the region, still without `wide_m` and `aside_m`.
@@ -113,9 +116,10 @@ class ReturnPlaces:
         """The regions of some returns, which have all the same kind of beginning."""
         corner = bool(self.corner[some].any())
         wide = (self.wide_m + self.aside_m)[some] * scale
+        inner = self.inner[some]
         if corner:
-            return level_lines.Swept(self.regions[some], wide, begin=4)
-        return level_lines.Swept(self.regions[some][:, STRAIGHT], wide)
+            return level_lines.Swept(self.regions[some], wide, begin=4, inner=inner)
+        return level_lines.Swept(self.regions[some][:, STRAIGHT], wide, inner=inner)
 
 
 STRAIGHT = (0, 1, 4, 5, 6)
@@ -130,10 +134,11 @@ def places_of_returns(trace: MissionTrace, sides: TraceParts, target: Target, ve
     """
     frame = trace.world.frame
     begin, levels = trace.beginnings(sides)
+    every = np.concatenate([begin, trace.points(sides.end)[:, None, :2]], axis=1)
     goal = frame.to_degrees(target.east_m, target.north_m)
     tangents, bows = [], []
-    for k in range(begin.shape[1]):
-        at = begin[:, k]
+    for k in range(every.shape[1]):
+        at = every[:, k]
         degrees = frame.to_degrees(*at.T)
         turn = (goal[1] - degrees[:, 1] + 180.0) % 360.0 - 180.0
         curved = frame.to_plane(0.5 * (degrees[:, 0] + goal[0]), degrees[:, 1] + 0.5 * turn)
@@ -141,7 +146,8 @@ def places_of_returns(trace: MissionTrace, sides: TraceParts, target: Target, ve
         tangents.append(straight + TANGENT * (curved - straight))
         bows.append(TANGENT / 2.0 * np.hypot(*(curved - straight).T))
     home = np.broadcast_to(target.en, (len(sides), 1, 2))
-    regions = np.concatenate([begin, home, np.stack(tangents, axis=1)], axis=1)
+    regions = np.concatenate([begin, home, np.stack(tangents[:-1], axis=1)], axis=1)
+    inner = np.concatenate([every[:, [0, -1]], home, np.stack([tangents[0], tangents[-1]], axis=1)], axis=1)
     low, high = trace.heights(sides)
     down_m, up_m = levels_off_m(vehicle)
     aside = np.zeros(len(sides))
@@ -151,7 +157,7 @@ def places_of_returns(trace: MissionTrace, sides: TraceParts, target: Target, ve
         aside = np.array([about_turn_m(vehicle, *one) for one in zip(speed, high, away, strict=True)])
     return ReturnPlaces(
         regions, trace.track_m[sides.stretch], np.max(bows, axis=0), (begin[:, 3] != begin[:, 1]).any(axis=1),
-        low - down_m * levels[:, 0], high + up_m * levels[:, 1], aside,
+        low - down_m * levels[:, 0], high + up_m * levels[:, 1], aside, inner,
     )  # fmt: skip
 
 
@@ -277,8 +283,9 @@ def _climbs_on_the_spot(
     middle = 0.5 * (begin[:, 0] + begin[:, 1])
     wide_m = float((np.hypot(*(begin - middle[:, None]).transpose(2, 0, 1)).max(axis=1) + own * air.scale).max())
     at = level_lines.over(
-        air, middle, middle, limits, wide_m, level_lines.Swept(begin, own * air.scale, begin=4)
-    ).crossings
+        air, middle, middle, limits, wide_m,
+        level_lines.Swept(begin, own * air.scale, begin=4, inner=places.inner[spots, :2]),
+    ).crossings  # fmt: skip
     clear = trace.straight(parts)
     legs = [(trace.points(parts.start)[:, :3], trace.points(parts.end)[:, :3])]
     legs += [(np.column_stack([begin[:, 0], low]), np.column_stack([begin[:, k], low])) for k in (1, 2, 3)]
