@@ -20,8 +20,9 @@ from gcsplan.check.corners import round_corners
 from gcsplan.check.flight import follow
 from gcsplan.check.rtl.lowest import heights_agl
 from gcsplan.check.rtl.model import RULES
+from gcsplan.check.rtl.places import ReturnPlaces, Target, places_of_returns
 from gcsplan.check.rtl.run_on import circle_home_m
-from gcsplan.check.rtl.sweep import CIRCLE_ABOVE_M, ReturnPlaces, Target, places_of_returns
+from gcsplan.check.rtl.sweep import CIRCLE_ABOVE_M
 from gcsplan.check.rtl.trace import MissionTrace, TraceParts, trace_of
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.commands import DO_CHANGE_SPEED, TAKEOFF, WAYPOINT

@@ -14,9 +14,10 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.check.rtl.model import ASIDE, RULES, at_home_m
+from gcsplan.check.rtl.places import Target, places_of_returns
 from gcsplan.check.rtl.refinement import SMALLEST_M
 from gcsplan.check.rtl.run_on import circle_home_m
-from gcsplan.check.rtl.sweep import CIRCLE_ABOVE_M, Target, alike_in_width, places_of_returns
+from gcsplan.check.rtl.sweep import CIRCLE_ABOVE_M, alike_in_width
 from gcsplan.check.rtl.trace import TINY_M, MissionTrace, TraceParts
 from gcsplan.check.rtl.verdict import LowestAgl
 from gcsplan.vehicle import Vehicle

@@ -18,9 +18,10 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.rtl.model import RULES, RallyAltitude
 from gcsplan.check.rtl.obstacles import Obstacles
+from gcsplan.check.rtl.places import Target
 from gcsplan.check.rtl.refinement import CLEAR, Refinement
 from gcsplan.check.rtl.stretches import stretches_of
-from gcsplan.check.rtl.sweep import GradedObstacles, Target, obstacles_of_returns
+from gcsplan.check.rtl.sweep import GradedObstacles, obstacles_of_returns
 from gcsplan.check.rtl.trace import MissionTrace, TraceParts
 from gcsplan.check.rtl.verdict import RallyPoint, UnsafeStretch
 from gcsplan.mavlink.mission.commands import RALLY_POINT

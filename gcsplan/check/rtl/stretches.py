@@ -9,8 +9,8 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.rtl.obstacles import AHEAD, GROUND, MAX_AGL, MAX_AMSL, Obstacles
+from gcsplan.check.rtl.places import Target
 from gcsplan.check.rtl.refinement import CLEAR, Refinement
-from gcsplan.check.rtl.sweep import Target
 from gcsplan.check.rtl.trace import MissionTrace
 from gcsplan.check.rtl.verdict import UnsafeStretch
 from gcsplan.check.stretch import Place

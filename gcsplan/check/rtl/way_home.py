@@ -23,10 +23,11 @@ from gcsplan.check.flight import follow
 from gcsplan.check.judge import TERRAIN_ERROR_M
 from gcsplan.check.rtl.lowest import lowest_agl
 from gcsplan.check.rtl.model import RULES
+from gcsplan.check.rtl.places import Target
 from gcsplan.check.rtl.rally import Proposal, propose
 from gcsplan.check.rtl.refinement import CLEAR, LEGAL, Refinement, sizes_m
 from gcsplan.check.rtl.stretches import rel_home, stretches_of
-from gcsplan.check.rtl.sweep import GradedObstacles, Target, obstacles_of_returns
+from gcsplan.check.rtl.sweep import GradedObstacles, obstacles_of_returns
 from gcsplan.check.rtl.trace import MissionTrace, TraceParts, trace_of
 from gcsplan.check.rtl.verdict import ProfilePoint, RallyPoint, UnsafeStretch, WayHome
 from gcsplan.check.rtl.words import together_m

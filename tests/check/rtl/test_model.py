@@ -12,8 +12,9 @@ import pytest
 from gcsplan.check.circles import circle_growth
 from gcsplan.check.geodesy import flat_m
 from gcsplan.check.rtl.model import RULES, Piece, at_home_m, return_pieces
+from gcsplan.check.rtl.places import Target
 from gcsplan.check.rtl.run_on import about_turn_m, run_on_m, run_past_m
-from gcsplan.check.rtl.sweep import Target, obstacles_of_returns
+from gcsplan.check.rtl.sweep import obstacles_of_returns
 from gcsplan.check.rtl.trace import MissionTrace
 from gcsplan.check.stretch import Place
 from gcsplan.vehicle import Autopilot

@@ -16,10 +16,11 @@ from gcsplan.arrays import Floats
 from gcsplan.check.flight import follow
 from gcsplan.check.judge import judge
 from gcsplan.check.rtl.obstacles import Obstacles
+from gcsplan.check.rtl.places import Target
 from gcsplan.check.rtl.rally import rally_items
 from gcsplan.check.rtl.refinement import CLEAR, LEGAL
 from gcsplan.check.rtl.stretches import rel_home
-from gcsplan.check.rtl.sweep import Target, obstacles_of_returns
+from gcsplan.check.rtl.sweep import obstacles_of_returns
 from gcsplan.check.rtl.trace import trace_of
 from gcsplan.check.rtl.verdict import worst_first
 from gcsplan.check.rtl.way_home import WayHome, refinement_of, way_home
