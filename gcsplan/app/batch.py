@@ -68,7 +68,6 @@ class Record:
     rows: tuple[Mapping[str, Any], ...]
     tracks: tuple[Sequence[Sequence[float]], ...] = ()
     files: Mapping[str, str] | None = None
-    again: bool = False
 
 
 def missions_of(given: Sequence[str]) -> list[tuple[str, Path]]:
@@ -135,7 +134,7 @@ class Batch:
         """The record of an earlier run; None if there is none, or if its outputs are gone."""
         try:
             given = json.loads(self._record_file(name).read_text(encoding="utf-8"))
-            record = Record(name, given["key"], given["code"], tuple(given["rows"]), tuple(given["tracks"]), again=True)
+            record = Record(name, given["key"], given["code"], tuple(given["rows"]), tuple(given["tracks"]))
         except (OSError, ValueError, KeyError, TypeError):
             return None
         if record.code == 0 and not (self.directory / name / "summary.json").is_file():
@@ -179,7 +178,7 @@ def key_of(path: Path, options: BatchOptions) -> str:
 def record_of(options: BatchOptions, item: tuple[str, str]) -> Record:
     """Plan one mission, in whatever process; every failure becomes a row."""
     name, file = item
-    key = key_of(Path(file), options)
+    key = key_of(Path(file), options)  # of what is planned now: since `known` read it, the file may have changed
     try:
         planned = plan(
             file, planner=options.planner, objective=options.objective, seed=options.seed,

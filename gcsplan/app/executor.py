@@ -42,11 +42,6 @@ MISSING = "needs dask.distributed, which is not installed: pip install 'gcsplan[
 class Executor(Protocol):
     """Does pieces of work."""
 
-    @property
-    def count(self) -> int:
-        """How many pieces are done at the same time."""
-        ...
-
     def each(
         self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item]
     ) -> Iterator[tuple[int, Result]]:
@@ -61,8 +56,6 @@ class Executor(Protocol):
 @dataclass(frozen=True, slots=True)
 class Inline:
     """Does the work in this process, in order."""
-
-    count: int = 1
 
     def each(
         self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item]
@@ -85,7 +78,7 @@ class Dask:
 
     @property
     def count(self) -> int:
-        """See `Executor.count`."""
+        """How many pieces are done at the same time."""
         return max(1, int(sum(self.client.nthreads().values())))
 
     def each(

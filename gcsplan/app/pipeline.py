@@ -116,9 +116,9 @@ def _planned(
     brief: Brief, planner: str, progress: Callable[[str, Progress], None] | None, jobs: int | None, cluster: Any
 ) -> list[VehiclePlan]:
     """Every vehicle's own plan, in this process or by workers. By priority each needs those before it."""
-    count = len(brief.source.vehicles)
-    if brief.by_priority or (jobs == 1 and cluster is None) or (count == 1 and cluster is None):
+    if brief.by_priority:
         return _one_by_one(brief, progress)
+    count = len(brief.source.vehicles)
     begun_s = time.perf_counter()
 
     def told(_: str, done: int) -> None:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -17,13 +17,15 @@ from gcsplan.mission_file import MissionFile
 from gcsplan.world.terrain_grid import PostHeights
 
 if TYPE_CHECKING:
-    from gcsplan.mavlink.link.link import Channel, Link, Steps
+    from gcsplan.mavlink.link.link import Channel, PumpJob, Steps
     from gcsplan.mavlink.link.terrain import Compared, TerrainService
 
 QUIET_S = 5.0
 """A vehicle that reports nothing pending for so long has all that it asks for."""
 
 COMPARE_PATIENCE_S = 60.0
+
+T = TypeVar("T")
 
 Report = Callable[[str, int, int], None]
 """Called with a vehicle's name and two counts: parts loaded and pending, or places compared and wanted."""
@@ -66,28 +68,25 @@ def serve(
     ``where`` as in ``--upload``. Ctrl-C ends it too, with what was served until then. Raises LinkError if a vehicle is
     not heard.
     """
-    from gcsplan.mavlink.link.link import PumpJob, pump
+    from gcsplan.mavlink.link.link import pump
     from gcsplan.mavlink.link.terrain import Served, TerrainService
 
     urls = _vehicles_of(source, where)
     service = TerrainService(MissionGround(source))
     seen: dict[str, _Seen] = {name: _Seen() for name in urls}
-    sysids = {r.vehicle.name: r.vehicle.sysid for r in source.vehicles}
-    with ExitStack() as stack:
-        links = {url: stack.enter_context(open_link(url)) for url in dict.fromkeys(urls.values())}
-        jobs = []
-        for name, url in urls.items():
-            serve_on(links[url], sysids[name], service)
-            channel = links[url].channel(sysids[name])
-            jobs.append(PumpJob(channel, _watched(channel, name, seen[name], seconds, until_loaded, report)))
+
+    def watched(channel: Channel, name: str) -> Steps[None]:
+        return _watched(channel, name, seen[name], seconds, until_loaded, report)
+
+    with _jobs(source, urls, service, watched) as jobs:
         with suppress(KeyboardInterrupt):
             pump(jobs)
         for job in jobs:
             if job.error is not None:
                 raise job.error
     done = []
-    for name, url in urls.items():
-        served, state = service.served.get(sysids[name], Served()), seen[name]
+    for (name, url), job in zip(urls.items(), jobs, strict=True):
+        served, state = service.served.get(job.channel.sysid, Served()), seen[name]
         done.append(
             ServedTo(
                 name, url, served.requests, served.parts, len(served.blocks), sum(served.unknown.values()),
@@ -97,9 +96,22 @@ def serve(
     return done
 
 
-def serve_on(link: Link, sysid: int, service: TerrainService) -> None:
-    """Answer a vehicle's terrain requests whenever something else is done on ``link``, until it is closed."""
-    link.serve(sysid, service.steps)
+@contextmanager
+def _jobs(
+    source: MissionFile, urls: Mapping[str, str], service: TerrainService, steps: Callable[[Channel, str], Steps[T]]
+) -> Iterator[list[PumpJob[T]]]:
+    """A task for each vehicle, over links that answer its terrain requests beside it."""
+    from gcsplan.mavlink.link.link import PumpJob
+
+    sysids = {r.vehicle.name: r.vehicle.sysid for r in source.vehicles}
+    with ExitStack() as stack:
+        links = {url: stack.enter_context(open_link(url)) for url in dict.fromkeys(urls.values())}
+        jobs = []
+        for name, url in urls.items():
+            links[url].serve(sysids[name], service.steps)
+            channel = links[url].channel(sysids[name])
+            jobs.append(PumpJob(channel, steps(channel, name)))
+        yield jobs
 
 
 @dataclass
@@ -142,7 +154,7 @@ def compare(
     report: Report | None = None,
 ) -> Mapping[str, Compared | GcsplanError]:
     """Ask every vehicle what terrain it reads at random places of the mission's ground, and serve what it lacks."""
-    from gcsplan.mavlink.link.link import PumpJob, pump
+    from gcsplan.mavlink.link.link import pump
     from gcsplan.mavlink.link.terrain import TerrainService
 
     urls = _vehicles_of(source, where)
@@ -150,14 +162,11 @@ def compare(
     service = TerrainService(ground)
     posts = service.posts(spacing_m)
     places = random_places(ground, posts, points, seed)
-    sysids = {r.vehicle.name: r.vehicle.sysid for r in source.vehicles}
-    with ExitStack() as stack:
-        links = {url: stack.enter_context(open_link(url)) for url in dict.fromkeys(urls.values())}
-        jobs = []
-        for name, url in urls.items():
-            serve_on(links[url], sysids[name], service)
-            channel = links[url].channel(sysids[name])
-            jobs.append(PumpJob(channel, _compared(channel, name, places, posts, report)))
+
+    def compared(channel: Channel, name: str) -> Steps[Compared]:
+        return _compared(channel, name, places, posts, report)
+
+    with _jobs(source, urls, service, compared) as jobs:
         pump(jobs)
     found: dict[str, Compared | GcsplanError] = {}
     for name, job in zip(urls, jobs, strict=True):

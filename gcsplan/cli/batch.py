@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gcsplan.cli import completion
 from gcsplan.cli.ending import emit
 from gcsplan.cli.options import (
     ClusterOption,
     JobsOption,
     JsonOption,
+    ObjectiveOption,
+    PlannerOption,
+    SeedOption,
     UnitsName,
     UnitsOption,
     UnjudgedOption,
@@ -38,15 +40,9 @@ def batch(
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Directory of all results.")],
     jobs: JobsOption = None,
     cluster: ClusterOption = None,
-    planner: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", autocompletion=completion.planners, help="A name from `gcsplan planners`."),
-    ] = None,
-    objective: Annotated[
-        str | None,
-        typer.Option(metavar="WHAT", autocompletion=completion.words("length", "energy"), help="length or energy."),
-    ] = None,
-    seed: Annotated[int | None, typer.Option(metavar="N", help="Seed of everything random.")] = None,
+    planner: PlannerOption = None,
+    objective: ObjectiveOption = None,
+    seed: SeedOption = None,
     report: Annotated[bool, typer.Option("--report", help="Also write a report.html for each mission.")] = False,
     allow_unjudged: UnjudgedOption = False,
     units: UnitsOption = UnitsName.METRIC,

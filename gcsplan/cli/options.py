@@ -51,6 +51,22 @@ ListZonesOption = Annotated[
         "--list-zones", help="Show what was understood of each zone: shape, size, floor, ceiling. Nothing else is done."
     ),
 ]
+PlannerOption = Annotated[
+    str | None,
+    typer.Option(
+        "--planner", metavar="NAME", autocompletion=completion.planners, help="A name from `gcsplan planners`."
+    ),
+]
+ObjectiveOption = Annotated[
+    str | None,
+    typer.Option(
+        "--objective",
+        metavar="WHAT",
+        autocompletion=completion.words("length", "energy"),
+        help="length or energy.",
+    ),
+]
+SeedOption = Annotated[int | None, typer.Option("--seed", metavar="N", help="Seed of everything random.")]
 JobsOption = Annotated[
     int | None,
     typer.Option(

@@ -21,8 +21,11 @@ from gcsplan.cli.options import (
     JsonOption,
     ListZonesOption,
     MissionArgument,
+    ObjectiveOption,
     PlaceOption,
+    PlannerOption,
     RequireWayHomeOption,
+    SeedOption,
     TimeoutOption,
     UnitsName,
     UnitsOption,
@@ -46,15 +49,9 @@ def plan(
     out: Annotated[
         Path | None, typer.Option("-o", "--out", metavar="DIR", help="Output directory [default: ./<mission stem>]")
     ] = None,
-    planner: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", autocompletion=completion.planners, help="A name from `gcsplan planners`."),
-    ] = None,
-    objective: Annotated[
-        str | None,
-        typer.Option(metavar="WHAT", autocompletion=completion.words("length", "energy"), help="length or energy."),
-    ] = None,
-    seed: Annotated[int | None, typer.Option(metavar="N", help="Seed of everything random.")] = None,
+    planner: PlannerOption = None,
+    objective: ObjectiveOption = None,
+    seed: SeedOption = None,
     encoding: Annotated[
         str | None,
         typer.Option(

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gcsplan.cli import completion
 from gcsplan.cli.ending import emit, talking
 from gcsplan.cli.options import (
     JsonOption,
     MissionArgument,
+    PlannerOption,
     RequireWayHomeOption,
     UnitsName,
     UnitsOption,
@@ -30,10 +30,7 @@ if TYPE_CHECKING:
 
 def rehearse(
     mission: MissionArgument,
-    planner: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", autocompletion=completion.planners, help="A name from `gcsplan planners`."),
-    ] = None,
+    planner: PlannerOption = None,
     wind: Annotated[float, typer.Option(metavar="M_S", help="A steady wind.")] = 0.0,
     wind_from: Annotated[
         float | None,
