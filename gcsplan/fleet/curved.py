@@ -11,9 +11,8 @@ speed: `LAG_S` is what that was measured to cost.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -87,13 +86,6 @@ class Curved:
         part_s, leg = self._part_s(cruise_m_s), self._leg
         share = part_s / np.bincount(leg, weights=part_s)[leg]
         return np.bincount(self.owner, weights=seconds[leg] * share, minlength=legs).astype(np.float64)
-
-    def at_its_own(self, speed_m_s: float) -> Curved:
-        """The same stretch flown at ``speed_m_s``, whatever the cruise speed."""
-        return replace(
-            self, most_m_s=np.minimum(self.most_m_s, speed_m_s * self.per_cruise),
-            per_cruise=np.full_like(self.per_cruise, math.inf),
-        )  # fmt: skip
 
     def motion(self, cruise_m_s: float, error_m: float = POSITION_ERROR_M) -> tuple[Floats, Floats, Indices]:
         """Times (M,) since the stretch began, places (M, 3) and legs (M,) at the end of each of M straight pieces.

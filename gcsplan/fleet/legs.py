@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from gcsplan.fleet.speeds import Stretch, rounded
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.atmosphere import true_per_indicated
 
-__all__ = ["Motion", "legs"]
+__all__ = ["Motion", "at_own_speed", "legs"]
 
 Motion = Stretch | Curved | Smoothed
 """A flight from one standstill to the next, by the autopilot's own rules."""
@@ -42,6 +43,12 @@ def legs(
     if vehicle.smooths:
         return smoothed(points, vehicle, owner, pace, rates_m_s, radius_m)
     return rounded(points, vehicle, owner, pace, rates_m_s)
+
+
+def at_own_speed(way: Motion, speed_m_s: float) -> Motion:
+    """The same flight at ``speed_m_s``, whatever the cruise speed."""
+    most_m_s = np.minimum(way.most_m_s, speed_m_s * way.per_cruise)
+    return replace(way, most_m_s=most_m_s, per_cruise=np.full_like(way.per_cruise, math.inf))
 
 
 def _in_air(points: Floats, vehicle: Vehicle, pace: Floats | None, rates_m_s: Floats | None) -> tuple[Floats, Floats]:

@@ -16,7 +16,7 @@ The limits are of horizontal speeds and distances; a slope bounds the speed by t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -80,13 +80,6 @@ class Smoothed:
         s, v, t = self._times(cruise_m_s)
         ends = np.append(_clock(self.begin_m, s, v, t), t[-1])
         return np.bincount(self.owner, weights=np.diff(ends), minlength=legs).astype(np.float64)
-
-    def at_its_own(self, speed_m_s: float) -> Smoothed:
-        """The same stretch flown at ``speed_m_s``, whatever the cruise speed."""
-        return replace(
-            self, most_m_s=np.minimum(self.most_m_s, speed_m_s * self.per_cruise),
-            per_cruise=np.full_like(self.per_cruise, math.inf),
-        )  # fmt: skip
 
     def motion(self, cruise_m_s: float, error_m: float) -> tuple[Floats, Floats, Indices]:
         """Times (M,) since the stretch began, places (M, 3) and legs (M,) at the end of each of M straight pieces.

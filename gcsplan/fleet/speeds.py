@@ -10,7 +10,7 @@ rates, the corner's acceleration in turns, and one acceleration to reach it and 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -93,13 +93,6 @@ class Stretch:
         seconds = self._phases(cruise_m_s)[3].sum(axis=0)
         shares: Floats = np.bincount(self.owner, weights=seconds, minlength=legs).astype(np.float64)
         return shares
-
-    def at_its_own(self, speed_m_s: float) -> Stretch:
-        """The same stretch flown at ``speed_m_s``, whatever the cruise speed."""
-        return replace(
-            self, most_m_s=np.minimum(self.most_m_s, speed_m_s * self.per_cruise),
-            per_cruise=np.full_like(self.per_cruise, math.inf),
-        )  # fmt: skip
 
     def motion(self, cruise_m_s: float, error_m: float = POSITION_ERROR_M) -> tuple[Floats, Floats, Indices]:
         """Times (M,) since the stretch began, places (M, 3) and legs (M,) at the end of each of M straight pieces.

@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices
-from gcsplan.fleet.legs import Motion, legs
+from gcsplan.fleet.legs import Motion, at_own_speed, legs
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.speeds import POSITION_ERROR_M, column
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -255,7 +255,7 @@ def _takeoff(route: Route, vehicle: Vehicle) -> Motion | None:
     if route.climb_out is not None:
         way = legs(route.climb_out, vehicle, np.zeros(len(route.climb_out) - 1, dtype=np.intp))
         # The mission sets its speed after the climb-out, which is flown at the vehicle's own.
-        return None if way is None else way.at_its_own(vehicle.speed_max_m_s)
+        return None if way is None else at_own_speed(way, vehicle.speed_max_m_s)
     return None if ground is None else next(iter(upright(top[:2], ground, float(top[2]), vehicle, 0, ground)), None)
 
 
@@ -286,7 +286,7 @@ def _after(route: Route, vehicle: Vehicle) -> list[Motion]:
     pace = None if route.pace is None else route.pace[-1:]
     way = legs(above, vehicle, np.array([number], dtype=np.intp), pace=pace)
     if way is not None and vehicle.return_speed_m_s is not None:
-        way = way.at_its_own(vehicle.return_speed_m_s)
+        way = at_own_speed(way, vehicle.return_speed_m_s)
     stretches += [way] if way is not None else []
     return stretches + upright(home[:2], level, home_amsl, vehicle, number)
 

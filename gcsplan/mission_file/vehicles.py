@@ -125,9 +125,7 @@ def within_lean(
     """
     lean_deg = keys.lean_angle_deg
     if vehicle.autopilot is not Autopilot.ARDUCOPTER:
-        if lean_deg is not None:
-            words = f"is ArduCopter's alone: leave it out for {vehicle.autopilot}, given {lean_deg:g}"
-            problems.append(Problem(f"{where}.lean_angle_deg", words))
+        problems += _of_another(vehicle, "ArduCopter", f"{where}.lean_angle_deg", lean_deg)
         return vehicle
     if lean_deg is None and local:
         return vehicle
@@ -140,10 +138,7 @@ def within_lean(
             f"; for {wanted:g} m/s write lean_angle_deg: {needs_deg}, and set {lean_words(needs_deg)}"
         )  # fmt: skip
         notes.append(f"{vehicle.name}: planned with {most:g} m/s, not {wanted:g}: {angle} allows about that{cure}")
-    return replace(
-        vehicle, lean_angle_deg=leans_deg, speed_max_m_s=min(wanted, most),
-        speed_min_m_s=min(vehicle.speed_min_m_s, most),
-    )  # fmt: skip
+    return _no_faster(replace(vehicle, lean_angle_deg=leans_deg), most)
 
 
 def within_vel_max(
@@ -155,9 +150,7 @@ def within_vel_max(
     """
     most = keys.mpc_xy_vel_max_m_s
     if vehicle.autopilot is not Autopilot.PX4:
-        if most is not None:
-            words = f"is PX4's alone: leave it out for {vehicle.autopilot}, given {most:g}"
-            problems.append(Problem(f"{where}.mpc_xy_vel_max_m_s", words))
+        problems += _of_another(vehicle, "PX4", f"{where}.mpc_xy_vel_max_m_s", most)
         return vehicle
     if most is None and local:
         return vehicle
@@ -169,8 +162,20 @@ def within_vel_max(
             f"{vehicle.name}: planned with {own:g} m/s, not {wanted:g}: {why} allows no more; for {wanted:g} m/s write "
             f"mpc_xy_vel_max_m_s: {wanted:g}, and set MPC_XY_VEL_MAX {wanted:g}"
         )
+    return _no_faster(replace(vehicle, vel_max_m_s=own), own)
+
+
+def _of_another(vehicle: Vehicle, owner: str, where: str, value: float | None) -> list[Problem]:
+    """The problem of a key that only the autopilot ``owner`` has, if it is given for this vehicle."""
+    if value is None:
+        return []
+    return [Problem(where, f"is {owner}'s alone: leave it out for {vehicle.autopilot}, given {value:g}")]
+
+
+def _no_faster(vehicle: Vehicle, most_m_s: float) -> Vehicle:
+    """``vehicle`` with speeds of at most ``most_m_s``."""
     return replace(
-        vehicle, vel_max_m_s=own, speed_max_m_s=min(wanted, own), speed_min_m_s=min(vehicle.speed_min_m_s, own)
+        vehicle, speed_max_m_s=min(vehicle.speed_max_m_s, most_m_s), speed_min_m_s=min(vehicle.speed_min_m_s, most_m_s)
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats
+from gcsplan.fleet.legs import at_own_speed
 from gcsplan.fleet.smoothed import Smoothed, smoothed
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
@@ -96,5 +97,5 @@ def test_whatever_is_flown_the_motion_is_whole_and_faster_is_never_later(seed: i
     assert (np.diff(owner) >= 0).all()
     run = np.hypot(*np.diff(np.vstack([points[:1], places]), axis=0)[:, :2].T)
     assert (run <= 8.001 * np.diff(np.append(0.0, at)) + 1e-6).all()
-    slower = way.at_its_own(3.0)
+    slower = at_own_speed(way, 3.0)
     assert slower.time_s(12.0) == slower.time_s(1.0) == way.time_s(3.0)
