@@ -35,6 +35,10 @@ class Problem:
     def __str__(self) -> str:
         return f"{self.where}: {self.message}" if self.where else self.message
 
+    def as_dict(self) -> dict[str, str]:
+        """What ``--json`` says of it."""
+        return {"where": self.where, "message": self.message}
+
 
 class GcsplanError(Exception):
     """Root of the error tree. ``reason`` is a word for scripts and ``where`` is the place; both may be empty."""
@@ -50,6 +54,10 @@ class GcsplanError(Exception):
 
     def __str__(self) -> str:
         return f"{self.where}: {self.message}" if self.where else self.message
+
+    def as_dict(self) -> dict[str, object]:
+        """What ``--json`` says of it."""
+        return {"code": self.exit_code, "reason": self.reason, "message": self.message, "where": self.where}
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Python's default calls the class with the message alone, and drops or misses the keyword arguments.
@@ -72,6 +80,10 @@ class InputError(GcsplanError, ValueError):
     def __init__(self, message: str, *, where: str = "", reason: str = "", problems: Iterable[Problem] = ()) -> None:
         super().__init__(message, where=where, reason=reason)
         self.problems: tuple[Problem, ...] = tuple(problems) or (Problem(where, message),)
+
+    def as_dict(self) -> dict[str, object]:
+        """What ``--json`` says of it, each problem included."""
+        return super().as_dict() | {"problems": [p.as_dict() for p in self.problems]}
 
     @classmethod
     def of(cls, problems: Iterable[Problem], *, headline: str = "") -> InputError:

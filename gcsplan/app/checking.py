@@ -373,7 +373,7 @@ def failure(
         "where": ", ".join([*(str(c.file) for c in bad), *(name for name, _ in unreadable)]),
     }
     if problems:
-        document["problems"] = [{"where": p.where, "message": p.message} for p in problems]
+        document["problems"] = [p.as_dict() for p in problems]
     return document
 
 

@@ -138,14 +138,10 @@ def complain(error: GcsplanError) -> None:
 
 def fail(error: GcsplanError, as_json: bool, debug: bool) -> NoReturn:
     """Print one message on standard error and, with ``as_json``, one JSON document; then exit with the error's code."""
-    code = error.exit_code
     if debug:
         traceback.print_exc()
     complain(error)
     if as_json:
-        document = {"code": code, "reason": error.reason, "message": error.message, "where": error.where}
-        if isinstance(error, InputError):
-            document["problems"] = [{"where": p.where, "message": p.message} for p in error.problems]
         with suppress(InputError, BrokenPipeError):
-            put(json.dumps({"error": document}) + "\n")
-    sys.exit(code)
+            put(json.dumps({"error": error.as_dict()}) + "\n")
+    sys.exit(error.exit_code)

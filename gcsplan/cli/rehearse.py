@@ -125,7 +125,7 @@ def rehearse(
     if as_json:
         failure = None
         if error is not None:
-            failure = {"code": error.exit_code, "reason": error.reason, "message": error.message, "where": str(mission)}
+            failure = error.as_dict() | {"where": str(mission)}
         judged = {"way_home": {name: home.as_dict() for name, home in homes.items()}} if homes else {}
         emit({"name": source.name} | result.as_dict() | judged, failure)
     else:

@@ -118,7 +118,7 @@ def serve(
         reason="terrain_pending",
     )
     if as_json:
-        emit({"vehicles": [d.as_dict() for d in done]}, _as_error(error) if late else None)
+        emit({"vehicles": [d.as_dict() for d in done]}, error.as_dict() if late else None)
         raise typer.Exit(error.exit_code if late else 0)
     for d in done:
         say(f"{d.vehicle}: {counted(d.parts, 'part')} of {counted(d.blocks, 'block')} sent"
@@ -159,7 +159,7 @@ def check(
             worst = error
         rows.append(_row(name, outcome))
     if as_json:
-        emit({"vehicles": rows}, None if worst is None else _as_error(worst))
+        emit({"vehicles": rows}, None if worst is None else worst.as_dict())
         raise typer.Exit(0 if worst is None else worst.exit_code)
     from gcsplan.cli.console import say
 
@@ -197,10 +197,6 @@ def _against(name: str, compared: Compared) -> GcsplanError | None:
             reason="terrain_pending",
         )
     return None
-
-
-def _as_error(error: GcsplanError) -> dict[str, object]:
-    return {"code": error.exit_code, "reason": error.reason, "message": error.message, "where": error.where}
 
 
 @contextmanager

@@ -73,6 +73,16 @@ def file_name(cell: Cell) -> str:
     return cell.name + SUFFIX
 
 
+def cell_of_file(path: Path, *, where: str) -> Cell:
+    """The tile that a file's name tells. Raises InputError if it tells none."""
+    cell = cell_of(path.stem.upper())
+    if cell is None:
+        raise InputError(
+            f"{path} must be named after its south-west corner, as N36W085.DAT, given {path.name}", where=where
+        )
+    return cell
+
+
 def is_dat(path: Path) -> bool:
     """Whether a name is that of a terrain file of ArduPilot."""
     return path.suffix.upper() == SUFFIX
@@ -108,11 +118,7 @@ def read_dat(path: Path, *, where: str) -> DatFile:
     """Read a file. Blocks that the autopilot would not take are left out. Raises InputError if none is left."""
     require_file(path, where=where)
     size = path.stat().st_size
-    cell = cell_of(path.stem.upper())
-    if cell is None:
-        raise InputError(
-            f"{path} must be named after its south-west corner, as N36W085.DAT, given {path.name}", where=where
-        )
+    cell = cell_of_file(path, where=where)
     if size > MOST_BYTES or size % RECORD_BYTES:
         raise InputError(
             f"{path} is no terrain file of ArduPilot: {size} bytes, wanted records of {RECORD_BYTES}, "

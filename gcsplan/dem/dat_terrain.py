@@ -19,9 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from gcsplan.arrays import Floats
 from gcsplan.dem.cells import cells_in
-from gcsplan.dem.dat_file import DatFile, is_dat, read_dat
+from gcsplan.dem.dat_file import DatFile, cell_of_file, is_dat, read_dat
 from gcsplan.errors import InputError
-from gcsplan.world.cell import Cell, cell_of
+from gcsplan.world.cell import Cell
 from gcsplan.world.datum import VerticalDatum
 from gcsplan.world.frame import Frame
 from gcsplan.world.mosaic import FIT_ERROR_M, Window
@@ -78,12 +78,7 @@ class DatTerrain:
         self._files: dict[Cell, DatFile] = {}
         for path in paths:
             require_file(path, where=self._at)
-            cell = cell_of(path.stem.upper())
-            if cell is None:
-                raise InputError(
-                    f"{path} must be named after its south-west corner, as N36W085.DAT, given {path.name}",
-                    where=self._at,
-                )
+            cell = cell_of_file(path, where=self._at)
             if self._paths.setdefault(cell, path) is not path:
                 raise InputError(f"{self._paths[cell]} and {path} are of one tile; give one of them", where=self._at)
         for key in ("crs", "height_unit"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 from gcsplan.dem.dat_file import file_name, packed, read_dat
@@ -48,14 +49,14 @@ def blocks_around(
     more = margin_km / KM_A_DEGREE
     wide = more / max(0.01, math.cos(math.radians(max(abs(south), abs(north)))))
     edges = (max(south - more, -90.0), west - wide, min(north + more, 90.0), east + wide)
-    blocks = grid.blocks_within(*(x * 1e7 for x in edges))
+    blocks = list(islice(grid.blocks_within(*(x * 1e7 for x in edges)), MOST_BLOCKS + 1))
     if len(blocks) > MOST_BLOCKS:
         raise InputError(
-            f"{len(blocks)} blocks of {grid.spacing_m} m are more than {MOST_BLOCKS}: give a smaller --margin-km or a "
-            "larger --spacing",
+            f"the mission and {margin_km:g} km around it are more than {MOST_BLOCKS} blocks of {grid.spacing_m} m: "
+            "give a smaller --margin-km or a larger --spacing",
             where=where,
         )
-    return blocks
+    return sorted(blocks)
 
 
 def contents_of(posts: PostHeights, blocks: Iterable[Block], folder: Path, *, add: bool, where: str) -> DatContents:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -125,14 +125,14 @@ class TerrainGrid:
             found.update(Block(cell, int(n), int(e)) for n, e in pairs)
         return sorted(found)
 
-    def blocks_within(self, south_e7: float, west_e7: float, north_e7: float, east_e7: float) -> list[Block]:
+    def blocks_within(self, south_e7: float, west_e7: float, north_e7: float, east_e7: float) -> Iterator[Block]:
         """The blocks that the autopilot may look up anywhere in a box of degrees, which may cross the antimeridian.
 
-        A block on the border of the box or of its tile may be one too many, never one too few.
+        They come tile by tile and row by row, and are found as they are asked for. A block on the border of the box
+        or of its tile may be one too many, never one too few.
         """
         width = (east_e7 - west_e7) % (360.0 * DEGREE_E7) if east_e7 != west_e7 else 0.0
         first = math.floor(west_e7 / DEGREE_E7)
-        found = []
         for lat in range(math.floor(south_e7 / DEGREE_E7), math.floor(north_e7 / DEGREE_E7) + 1):
             for lon in range(first, math.floor((west_e7 + width) / DEGREE_E7) + 1):
                 cell = Cell(lat, (lon + 180) % 360 - 180)
@@ -141,19 +141,16 @@ class TerrainGrid:
                     max(0.0, west_e7 - lon * DEGREE_E7),
                     min(1.0 * DEGREE_E7, west_e7 + width - lon * DEGREE_E7),
                 )
-                found += self._blocks_of(cell, (low, high), (left, right))
-        return sorted(found)
+                yield from self._blocks_of(cell, (low, high), (left, right))
 
-    def _blocks_of(self, cell: Cell, lat: tuple[float, float], lon: tuple[float, float]) -> list[Block]:
+    def _blocks_of(self, cell: Cell, lat: tuple[float, float], lon: tuple[float, float]) -> Iterator[Block]:
         """Blocks of one tile that meet a box, given in 1e-7° from the tile's corner."""
         a_row_m, a_column_m = self.spacing_m * STRIDE[0], self.spacing_m * STRIDE[1]
-        found = []
         for row in range(int(lat[0] * METRES_OF_E7 / a_row_m), int(lat[1] * METRES_OF_E7 / a_row_m) + 1):
             ends = np.clip([row * a_row_m / METRES_OF_E7, (row + 1) * a_row_m / METRES_OF_E7], *lat)
             scale = longitude_scale(cell.lat_deg * DEGREE_E7 + 0.5 * ends) * METRES_OF_E7
             first, last = int(lon[0] * scale.min() / a_column_m), int(lon[1] * scale.max() / a_column_m)
-            found += [Block(cell, row, column) for column in range(first, last + 1)]
-        return found
+            yield from (Block(cell, row, column) for column in range(first, last + 1))
 
 
 def cell_at(lat_e7: float, lon_e7: float) -> Cell:

@@ -70,6 +70,7 @@ def test_files_for_the_card_read_as_terrain(run: Run, mission: Path, tmp_path: P
 def test_a_margin_that_is_too_wide_is_refused(run: Run, mission: Path, tmp_path: Path) -> None:
     code, _, err = run("terrain", "dat", mission, "-o", tmp_path / "x", "--margin-km", 100, "--spacing", 20)
     assert code == 2
+    assert "more than 20000 blocks" in err
     assert "smaller --margin-km" in err
     assert not (tmp_path / "x").exists()
 

@@ -32,7 +32,7 @@ def write(folder: Path, lat: float, lon: float, *, reach_deg: float = 0.08, grid
     grid = grid or TerrainGrid()
     posts = PostHeights(grid, hills)
     south, west, north, east = (x * 1e7 for x in (lat - reach_deg, lon - reach_deg, lat + reach_deg, lon + reach_deg))
-    blocks = grid.blocks_within(south, west, north, east)
+    blocks = list(grid.blocks_within(south, west, north, east))
     folder.mkdir(exist_ok=True)
     for cell in sorted({block.cell for block in blocks}):
         mine = {b: posts.block(b) for b in blocks if b.cell == cell}
