@@ -9,19 +9,22 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.planning import plan_vehicle
 from gcsplan.errors import InputError, NoMission
-from gcsplan.fleet.separation import Conflict, Rules
 from gcsplan.fleet.timing import Route
 from gcsplan.mission_file import VehicleRequest
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Zone
+
+if TYPE_CHECKING:
+    from gcsplan.fleet.separation import Conflict, Rules
 
 RADII = (1.0, 3.0, 8.0)
 """Radii of the discs around places of conflict, in needed distances; each attempt is wider than the one before."""

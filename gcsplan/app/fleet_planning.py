@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -22,10 +22,12 @@ from gcsplan.check.clock import over_ground, pace_over_ground
 from gcsplan.errors import NoMission
 from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, schedule
 from gcsplan.fleet.motion import TimedPath
-from gcsplan.fleet.separation import Conflict, Place, Rules, separation
 from gcsplan.fleet.timing import Course, Route, motion_error_m
 from gcsplan.mission_file import ArrivalRequest
 from gcsplan.world.world import World
+
+if TYPE_CHECKING:
+    from gcsplan.fleet.separation import Conflict, Place, Rules
 
 LATER_S = 600.0
 """Seconds by which all arrivals may be delayed to keep a fleet apart, if the mission file sets no arrival time."""
@@ -68,7 +70,11 @@ def fleet_of(
         for v, slot, opens_s in zip(vehicles, slots, opens, strict=True)
     )  # fmt: skip
     motions = tuple(_motion(v, slot, world) for v, slot in zip(flown, slots, strict=True))
-    found = separation(motions, rules_of(arrival, flown)) if len(flown) > 1 else None
+    found = None
+    if len(flown) > 1:
+        from gcsplan.fleet.separation import separation  # imported here because most plans have one vehicle
+
+        found = separation(motions, rules_of(arrival, flown))
     if found is not None:
         notes += found.notes
         if not found.safe and arrival is not None:  # the missions as built are what is flown, so this check decides
@@ -130,6 +136,8 @@ def route_of(v: VehiclePlan, world: World) -> Route:
 
 def rules_of(arrival: ArrivalRequest | None, vehicles: Sequence[VehiclePlan]) -> Rules:
     """The requested separation, with the error of the modelled motions."""
+    from gcsplan.fleet.separation import Rules
+
     error_m = max(motion_error_m(v.request.vehicle) + circling_m(v) for v in vehicles)
     leaving = frozenset(v.name for v in vehicles if v.request.end == "none")
     if arrival is None:

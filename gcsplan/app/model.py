@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
+from typing import TYPE_CHECKING
 
 from gcsplan.check.verdict import Verdict
 from gcsplan.fleet.arrival import Slot
 from gcsplan.fleet.motion import TimedPath
-from gcsplan.fleet.separation import Encounter, Separation
 from gcsplan.mavlink.build.order import Order
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.planners.problem import Problem, Solution
 from gcsplan.world.world import World
+
+if TYPE_CHECKING:
+    from gcsplan.fleet.separation import Encounter, Separation
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,6 @@ from dataclasses import replace
 from gcsplan.app.margins import larger, on_path
 from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.problems import built, looked_over, make_problem, run_planner, unsafe
-from gcsplan.app.wings import plan_wing
 from gcsplan.errors import NoMission
 from gcsplan.mavlink.build.multirotor import acceptance_radius_m
 from gcsplan.mavlink.build.order import MARGINS, Order
@@ -42,6 +41,8 @@ def plan_vehicle(
     world = brief.world if searched is None else searched
     merged = {**brief.options, **(options or {})}
     if vehicle.turn_radius_m > 0.0:
+        from gcsplan.app.wings import plan_wing  # imported here because most vehicles are multicopters
+
         return plan_wing(brief, request, limited, world, merged, progress)
     margins, failed = MARGINS, None
     for _ in range(ATTEMPTS):

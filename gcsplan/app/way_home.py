@@ -8,15 +8,18 @@ judged. Otherwise the return is judged where that is asked for, and reported as 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from gcsplan.app.model import Plan
-from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed
 from gcsplan.mavlink.mission.return_altitude import on_board, return_on_board_m, returns_otherwise
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.units import UnitText
 from gcsplan.world.world import World
+
+if TYPE_CHECKING:
+    from gcsplan.check.rtl.verdict import WayHome
 
 MOST_SHOWN = 5
 """Vehicles that a warning or a refusal names one by one."""

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
 from gcsplan.app.way_home import warnings
-from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.check.rtl.words import NO_RETURN, STILL_NO_RETURN
 from gcsplan.cli.console import aside, console, rows_table, say
 from gcsplan.figures import raised
 from gcsplan.mavlink.mission.return_altitude import setting
 from gcsplan.units import Reach, Unit, Units, in_units
+
+if TYPE_CHECKING:
+    from gcsplan.check.rtl.verdict import WayHome
 
 MOST_ROWS = 8
 """Rows with one label that are printed; the report and JSON have all of them."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 import sys
 from collections.abc import Callable
@@ -46,23 +47,38 @@ app.command()(plan.planners)
 app.command(short_help="The JSON Schema of a mission file, for editors.")(schema.schema)
 
 
-@app.callback(invoke_without_command=True)
-def root(
-    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="Show a traceback with an error.")] = False,
-) -> None:
-    """Options of all commands."""
-    if version:
+def _print_version(asked: bool) -> None:
+    if asked:
         from gcsplan import __version__
 
         put(f"{__version__}\n")
         raise typer.Exit
 
 
+@app.callback(invoke_without_command=True)
+def root(
+    # eager: it is printed before typer imports what it reads other options with
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", is_eager=True, callback=_print_version)
+    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show a traceback with an error.")] = False,
+) -> None:
+    """Options of all commands."""
+
+
 @cache
-def _commands() -> Callable[..., object]:
-    """The commands with their options, made once: the app itself would make them again for every call."""
-    return typer.main.get_command(app)
+def _commands(called: str) -> Callable[..., object]:
+    """The command ``called`` with its options, made once; all commands if there is none of that name.
+
+    typer makes the options of every command that it knows, which takes longer than anything else before a command runs.
+    """
+    own = [c for c in app.registered_commands if called == (c.name or (c.callback and c.callback.__name__))]
+    groups = [g for g in app.registered_groups if g.name == called]
+    if not own and not groups:
+        return typer.main.get_command(app)
+    one = copy.copy(app)
+    one.registered_commands, one.registered_groups = own, groups
+    return typer.main.get_command(one)
 
 
 def main() -> NoReturn:
@@ -72,10 +88,12 @@ def main() -> NoReturn:
     as_json = "--json" in arguments
     speak_plainly()
     settle_memory()
+    # gcsplan uses no plug-ins of pydantic; a search for them reads the lists of all installed packages
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
         end_in_good_order()
         # With standalone_mode=False click returns the code of typer.Exit instead of exiting.
-        code = _commands()(args=arguments, prog_name="gcsplan", standalone_mode=False)
+        code = _commands(arguments[0] if arguments else "")(args=arguments, prog_name="gcsplan", standalone_mode=False)
         if code == Interrupted.exit_code:  # typer's code for Ctrl-C
             raise KeyboardInterrupt
         put("")

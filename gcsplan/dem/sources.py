@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal
 
 from gcsplan.world.cell import Cell
@@ -121,3 +122,11 @@ WITNESS = GLO90
 """The fuller source, whose list must agree before a missing tile counts as sea."""
 
 MOST_LIST_BYTES = 64 * 2**20
+
+
+def source_or_path(name: str, folder: Path) -> str:
+    """The name of a source, or the path of a file in ``folder``; a file that has a source's name is that file."""
+    path = folder / name
+    if name in SOURCES:
+        return str(path.absolute()) if path.exists() else name
+    return str(path)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -136,11 +135,3 @@ def _sea(source: Source, cell: Cell, sample: Raster | None) -> Raster:
         cell.lat_deg + 1.0 + 0.5 * dy, dx, dy, cols + more, rows + more, VerticalDatum(source.vertical_datum), read,
         (rows + more) * (cols + more), lambda: hashlib.sha256(f"sea {cell.name}".encode()).hexdigest(),
     )  # fmt: skip
-
-
-def source_or_path(name: str, folder: Path) -> str:
-    """The name of a source, or the path of a file in ``folder``; a file that has a source's name is that file."""
-    path = folder / name
-    if name in SOURCES:
-        return str(path.absolute()) if path.exists() else name
-    return str(path)

@@ -19,7 +19,7 @@ from gcsplan.mission_file.world import LOCAL_MARGIN_M, MARGIN_M, Box, Place, set
 from gcsplan.mission_file.zone_draft import ZoneDraft
 from gcsplan.world.frame import FARTHEST_M, Frame
 from gcsplan.world.surface import Surface
-from gcsplan.world.terrain import RASTER_SPARE_M, Terrain
+from gcsplan.world.terrain import RASTER_SPARE_M, OpenTerrain, Terrain, TerrainSpec, open_terrain
 from gcsplan.world.zones import Zone
 
 Placed = Sequence[tuple[ZoneDraft, Zone]]
@@ -33,6 +33,15 @@ EDGE_M = 100.0
 
 QUICK_CELLS = 1_000_000
 """Cells of a window that is small enough to search at once, without a smaller window first."""
+
+
+def opened(spec: TerrainSpec, *, where: str) -> OpenTerrain:
+    """Open the terrain that ``spec`` names; ``where`` is its place in the mission file. Raises InputError."""
+    if not spec.dem and not spec.sea:
+        return open_terrain(spec, where=where)
+    from gcsplan.dem.terrain import open_dem  # imported here because flat ground and peaks have no files
+
+    return open_dem(spec, where=where)
 
 
 @dataclass(frozen=True, eq=False)

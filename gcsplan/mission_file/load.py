@@ -15,15 +15,13 @@ from datetime import datetime
 from functools import partial
 from typing import Any, get_args
 
-from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError, Problem
 from gcsplan.figures import counted
 from gcsplan.mission_file.airspace.left_out import faults_near, unused_notes, used
-from gcsplan.mission_file.airspace.policy import OUT_OF_HOURS
-from gcsplan.mission_file.airspace.times import Hours, hours_of
+from gcsplan.mission_file.airspace.times import OUT_OF_HOURS, Hours, hours_of
 from gcsplan.mission_file.complaints import read_section, told_once, unknown_keys, with_lines
 from gcsplan.mission_file.content import read_content
-from gcsplan.mission_file.ground import Ground, Site
+from gcsplan.mission_file.ground import Ground, Site, opened
 from gcsplan.mission_file.request import (
     AltitudeFrame,
     ArrivalRequest,
@@ -379,7 +377,7 @@ class _Reading:
             )
             return None
         try:
-            return open_dem(spec, where=where)
+            return opened(spec, where=where)
         except InputError as why:
             self.problems += why.problems
             return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from gcsplan.dem.terrain import source_or_path
+from gcsplan.dem.sources import source_or_path
 from gcsplan.mission_file.content import read_content
 
 MOST_FILES = 100_000

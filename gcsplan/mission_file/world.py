@@ -9,15 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from gcsplan.dem.terrain import source_or_path
+from gcsplan.dem.sources import source_or_path
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file.airspace.policy import Policy
 from gcsplan.mission_file.airspace.times import Hours
 from gcsplan.mission_file.places import Degrees
 from gcsplan.mission_file.point_keys import LocalPoint
 from gcsplan.mission_file.schema import FrameKeys, TerrainKeys, ZoneKeys
-from gcsplan.mission_file.zone_attributes import SIZES
 from gcsplan.mission_file.zone_draft import (
+    SIZES,
     Bounds,
     ZoneDraft,
     check_degrees,
@@ -26,7 +25,6 @@ from gcsplan.mission_file.zone_draft import (
     corridor,
     polygon,
 )
-from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.world.frame import FARTHEST_M, Frame, centre_of
 from gcsplan.world.peaks import Peak
 from gcsplan.world.surface import Surface
@@ -230,6 +228,9 @@ def _zones_of_file(
     good = [check_size(size_m, at, problems) for size_m, at in sizes]
     if not all(good):
         return []
+    from gcsplan.mission_file.airspace.policy import Policy  # imported here because most missions name no files
+    from gcsplan.mission_file.zone_reader import read_zones
+
     wanted = None if keys.kinds is None else tuple(keys.kinds)
     try:
         policy = Policy(wanted, tuple(keys.authorised), hours, keys.flight_level_error_m, where)

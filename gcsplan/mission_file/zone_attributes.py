@@ -14,7 +14,7 @@ from functools import lru_cache
 from typing import Any
 
 from gcsplan.errors import Problem
-from gcsplan.mission_file.zone_draft import Bounds, Remark
+from gcsplan.mission_file.zone_draft import SIZES, Bounds, Remark
 from gcsplan.mission_file.zone_levels import (
     EXAMPLES,
     LARGEST_M,
@@ -27,9 +27,6 @@ from gcsplan.mission_file.zone_levels import (
 from gcsplan.world.zones import Level
 
 NAMES = ("name", "title", "label", "designator", "identifier", "ident")
-RADIUS = "radius_m"
-BUFFER = "buffer_m"
-SIZES = (RADIUS, BUFFER)
 OWN = ("flooraglm", "flooramslm", "ceilingaglm", "ceilingamslm")
 BOUNDS = {
     "lower": "floor", "floor": "floor", "bottom": "floor", "base": "floor",

@@ -10,7 +10,8 @@ from pathlib import Path
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.places import read_place
-from gcsplan.mission_file.zone_attributes import SIZES, Attribute, as_figure, read_attributes
+from gcsplan.mission_file.zone_attributes import Attribute, as_figure, read_attributes
+from gcsplan.mission_file.zone_draft import SIZES
 from gcsplan.mission_file.zone_file import ZoneFile
 
 LAT = ("lat", "latitude", "latdeg", "latitudedeg", "latdec", "latdd", "latwgs84")

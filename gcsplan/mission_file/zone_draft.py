@@ -23,6 +23,9 @@ from gcsplan.world.degree_shapes import (
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 
+SIZES = ("radius_m", "buffer_m")
+"""The keys of a zone's size, in a mission file as in the attributes of other files."""
+
 MAX_VERTICES = 100_000
 """Most vertices of one polygon."""
 

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file.zone_attributes import SIZES, Attribute, Said, is_number, read_attributes, shown
+from gcsplan.mission_file.zone_attributes import Attribute, Said, is_number, read_attributes, shown
+from gcsplan.mission_file.zone_draft import SIZES
 from gcsplan.mission_file.zone_file import Drawn, ZoneFile
 
 ALTITUDES = "the altitudes of corners are not read as limits"

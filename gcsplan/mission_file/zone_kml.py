@@ -16,7 +16,8 @@ import defusedxml.ElementTree
 from defusedxml.common import DefusedXmlException
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file.zone_attributes import SIZES, Attribute, Said, as_figure, read_attributes
+from gcsplan.mission_file.zone_attributes import Attribute, Said, as_figure, read_attributes
+from gcsplan.mission_file.zone_draft import SIZES
 from gcsplan.mission_file.zone_file import NOT_DRAWN, Drawn, ZoneFile
 from gcsplan.mission_file.zone_levels import LARGEST_M
 from gcsplan.world.zones import Level

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file.zone_attributes import SIZES, Attribute, Said, as_figure, read_attributes
-from gcsplan.mission_file.zone_draft import MAX_VERTICES
+from gcsplan.mission_file.zone_attributes import Attribute, Said, as_figure, read_attributes
+from gcsplan.mission_file.zone_draft import MAX_VERTICES, SIZES
 from gcsplan.mission_file.zone_file import MAX_ZONES, Drawn, ZoneFile
 from gcsplan.mission_file.zone_geojson import ALTITUDES
 from gcsplan.mission_file.zone_zip import unpack

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from gcsplan.cli import main
 from gcsplan.mission_file import samples
 from gcsplan.planners import registry
 from gcsplan.vehicle import Autopilot
@@ -72,3 +73,11 @@ print([name for name in heavy if name in sys.modules])
 """
     done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
+
+
+def test_a_command_is_made_without_the_options_of_the_others() -> None:
+    every = set(main._commands("").commands)
+    assert {"plan", "fit-energy", "dem"} <= every
+    assert every == set(main._commands("no such command").commands)
+    for name in every:
+        assert set(main._commands(name).commands) == {name}

@@ -9,14 +9,13 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 
 from gcsplan.errors import Problem
-from gcsplan.mission_file.airspace.times import Hours, Period, apply_in
+from gcsplan.mission_file.airspace.times import OUT_OF_HOURS, Hours, Period, apply_in
 from gcsplan.mission_file.schema import nearest
 from gcsplan.mission_file.zone_draft import Remark
 
 ASKED = "these zones may be entered with an authorisation, and are no-fly without one"
 UNREAD_TIMES = "the times of these zones are not understood: they count as always"
 
-OUT_OF_HOURS = "they do not apply in the hours of the mission"
 
 _SHOWN = 12
 

@@ -26,6 +26,9 @@ _DATE = re.compile(r"\d{4}-\d{2}-\d{2}", re.ASCII)
 _MOST_CHARACTERS = 40
 
 WEEK = ("MON", "TUE", "WED", "THU", "FRI", "SAT", "SUN")
+OUT_OF_HOURS = "they do not apply in the hours of the mission"
+"""Why such zones are not used."""
+
 WANTED = "2026-11-23T10:00Z, a day such as 2026-11-23 (UTC), or [from, to]"
 
 
