@@ -197,3 +197,40 @@ def bench_papers(
         emit(papers.plain(result) | {"files": [str(file) for file in files]})
     else:
         put(papers_report.report(result))
+
+
+@bench_app.command("metabox", short_help="Our optimisers beside MetaEvoBox's, on its UAV family.")
+def bench_metabox(
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Instances and tables go there.")] = Path(
+        "bench-metabox"
+    ),
+    python: Annotated[
+        Path | None, typer.Option("--python", metavar="FILE", help="Of MetaEvoBox's environment [default: this one].")
+    ] = None,
+    instances: Annotated[int, typer.Option(metavar="N", help="Generated instances, 15 and 30 threats in turn.")] = 2,
+    runs: Annotated[int, typer.Option(metavar="N", help="Of each optimiser on each instance.")] = 5,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of instances and runs.")] = 1,
+    evaluations: Annotated[int, typer.Option(metavar="N", help="Of each run; MetaEvoBox's own number.")] = 2500,
+    algorithm: Annotated[
+        list[str] | None, typer.Option("--algorithm", metavar="NAME", help="Of ours or theirs; repeatable [all].")
+    ] = None,
+    jobs: Annotated[int, typer.Option(metavar="N", help="Processes of MetaEvoBox.")] = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Run our optimisers beside MetaEvoBox's own on generated instances of its UAV family (extra `metabox`)."""
+    from gcsplan.bench import metabox, metabox_report
+    from gcsplan.cli.console import remark
+
+    def tell(done: int, of: int) -> None:
+        if done % 50 == 0 or done == of:
+            remark(f"{done} of {of} runs")
+
+    result = metabox.run(
+        out, python, instances=instances, runs=runs, seed=seed, evaluations=evaluations,
+        algorithms=algorithm or None, jobs=jobs, done=tell,
+    )  # fmt: skip
+    files = metabox_report.write(result, out)
+    if as_json:
+        emit(result | {"rows": metabox_report.rows(result), "files": [str(file) for file in files]})
+    else:
+        put(metabox_report.report(result))
