@@ -5,6 +5,7 @@ Everything is timed in one process, one after the other, best of a few; the rati
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from importlib import import_module
@@ -19,15 +20,24 @@ from gcsplan.bench.papers_scenarios import SCENARIOS, mission_text, prepare, set
 from gcsplan.errors import InputError
 from gcsplan.optimisers.driver import minimise
 from gcsplan.planners.problem import Problem
+from gcsplan.planners.swarm import cost_kernels as k
 from gcsplan.planners.swarm.encodings import Code
-from gcsplan.planners.swarm.objectives import Cost, get_objective
+from gcsplan.planners.swarm.objectives import Cost, get_objective, sampled
 from gcsplan.planners.swarm.scene import Scene
+from gcsplan.planners.swarm.scene_kernels import SPACING
 
 CASE = "ssgwo-table5"
 """The scenario that is timed: twelve cylinders, population 30, 500 iterations, 30 nodes."""
 KRILL = ("krill-mound", "krill-forest", "krill-hills")
 BATCH = 2048
 COSTS = (("krill", "bspline"), ("ssgwo", "bspline"), ("msfoa", "bspline"), ("ib-abc", "sections"))
+GROUPS = {
+    "turns and slopes between nodes": k.ANGLES, "turns in space": k.ANGLES | k.BENDS, "exponentials of angles": k.YAWS,
+    "nodes near zones": k.NODES_NEAR, "samples near zones": k.SAMPLES_NEAR, "heights above ground": k.HEIGHTS,
+    "concealment": k.HIDING, "counts of samples": k.COUNTS,
+}  # fmt: skip
+"""The optional groups of terms, in words; those of turns in space contain the other turns."""
+BARE, DIVIDED, ZONES = "curve, lengths, floor", "denser samples on long legs", "zones"
 AIMS = {"run_s": 0.25, "mealpy_ratio": 10.0, "single_ratio": 3.0, "costs_per_s": 300_000.0, "krill_s": 0.5}
 """The aims: most seconds, least ratios and rates."""
 
@@ -51,8 +61,10 @@ def run(repeats: int = 3, *, missions: Path | None = None, mealpy: bool = True) 
     krill = _best_s({name: _whole(name, missions) for name in KRILL}, repeats)
     batches = {f"{objective} cost, {encoding}": _batch(objective, encoding) for objective, encoding in COSTS}
     rates = {name: BATCH / seconds for name, seconds in _best_s(batches, repeats).items()}
+    parts = {name: 1e6 * seconds / BATCH for name, seconds in _best_s(_parts(), repeats).items()}
     return {
         "repeats": repeats, "population": size, "iterations": rounds, **took, "krill_s": krill, "costs_per_s": rates,
+        "parts_us": _differences(parts),
         "single_ratio": took["single_s"] / took["run_s"],
         "mealpy_ratio": took["mealpy_s"] / took["run_s"] if mealpy else None,
     }  # fmt: skip
@@ -78,6 +90,9 @@ def report(result: dict[str, Any]) -> str:
     for name, rate in r["costs_per_s"].items():
         least = AIMS["costs_per_s"]
         rows.append(line(f"{name}: paths a second", f"{rate:,.0f}", f"≥ {least:,.0f}", rate >= least))
+    if r["parts_us"]:
+        rows += ["", "Where a path's time goes, µs:"]
+        rows += [f"  {name:<44} {took:>14.2f}" for name, took in r["parts_us"].items()]
     return "\n".join(
         [
             f"Population {r['population']}, {r['iterations']} iterations, 30 nodes; paths of about 200 samples over "
@@ -130,12 +145,49 @@ def _mealpy(cost: Cost, size: int, rounds: int) -> Callable[[], object]:
     return lambda: mealpy.GWO.OriginalGWO(epoch=rounds, pop_size=size).solve(told, seed=1)
 
 
-def _batch(objective: str, encoding: str) -> Callable[[], object]:
-    """The cost of a batch of paths between opposite corners of the sample DEM, among 12 zones."""
+def _bench_problem() -> Problem:
+    """Between opposite corners of the sample DEM, among 12 zones."""
     airspace, _ = scene(2, 1)
     ends = [(e, e, float(airspace.surface.top_at(e, e)) + 2.0 * LIMITS.min_agl_m) for e in (-9000.0, 9000.0)]
-    problem = Problem(airspace, LIMITS, ends[0], ends[1])
+    return Problem(airspace, LIMITS, ends[0], ends[1])
+
+
+def _batch(objective: str, encoding: str) -> Callable[[], object]:
+    """The cost of a batch of paths."""
+    problem = _bench_problem()
     code = Code.of(encoding, Scene.of(problem), 8)
     cost = Cost(problem, code, get_objective(objective))
     u = np.random.default_rng(1).random((BATCH, cost.dim))
     return lambda: cost(u)
+
+
+def _parts() -> dict[str, Callable[[], object]]:
+    """The kernel of all costs with more and more of its work, then with each of `GROUPS` on top."""
+    scene_ = Scene.of(_bench_problem())
+    code = Code.of("bspline", scene_, 8)
+    drawn, stride = sampled(scene_, code.points)
+    controls = code.controls(np.random.default_rng(1).random((BATCH, code.dim)))
+    room, out = k.room(drawn.basis.shape[1]), np.empty((BATCH, k.TERMS))
+    whole = scene_.numbers.copy()
+    whole[SPACING] = math.inf
+
+    def work(wanted: int, zones: Floats, numbers: Floats) -> Callable[[], object]:
+        return lambda: k.measure(
+            controls, drawn.bands, drawn.spans, scene_.heights, scene_.quadratic, scene_.floors, scene_.floor_map,
+            numbers, zones, scene_.corners, stride, wanted, *room, out,
+        )  # fmt: skip
+
+    none = scene_.zones[:0]
+    return {
+        BARE: work(0, none, whole),
+        DIVIDED: work(0, none, scene_.numbers),
+        ZONES: work(0, scene_.zones, scene_.numbers),
+        **{name: work(bits, scene_.zones, scene_.numbers) for name, bits in GROUPS.items()},
+    }
+
+
+def _differences(took: Mapping[str, float]) -> dict[str, float]:
+    """What each part adds to the work before it."""
+    whole = took[ZONES]
+    first = {BARE: took[BARE], DIVIDED: took[DIVIDED] - took[BARE], ZONES: whole - took[DIVIDED]}
+    return first | {name: took[name] - whole for name in GROUPS}

@@ -544,8 +544,23 @@ def test_the_speed_report_says_what_was_missed() -> None:
     made = {
         "repeats": 3, "population": 30, "iterations": 500, "run_s": 0.2, "single_s": 1.0,
         "krill_s": {"krill-mound": 0.6}, "costs_per_s": {"krill cost, bspline": 3e5},
-        "single_ratio": 5.0, "mealpy_ratio": 9.0,
+        "single_ratio": 5.0, "mealpy_ratio": 9.0, "parts_us": {},
     }  # fmt: skip
     lines = [line.split() for line in papers_speed.report(made).splitlines()[1:]]
     assert [line[-1] for line in lines] == ["reached", "missed", "reached", "missed", "reached"]
     assert "mealpy" not in papers_speed.report(made | {"mealpy_ratio": None})
+    assert "\n  zones                                                  0.80\n" in papers_speed.report(
+        made | {"parts_us": {"zones": 0.8}}
+    )
+
+
+def test_the_parts_of_the_costs_time_add_up() -> None:
+    took = {name: float(i) for i, name in enumerate(papers_speed._parts(), start=1)}
+    parts = papers_speed._differences(took)
+    assert list(parts) == list(took)
+    bare = (papers_speed.BARE, papers_speed.DIVIDED, papers_speed.ZONES)
+    assert sum(parts[name] for name in bare) == took[papers_speed.ZONES]
+    for name in papers_speed.GROUPS:
+        assert parts[name] + took[papers_speed.ZONES] == took[name]
+    for measured in papers_speed._parts().values():
+        measured()
