@@ -139,7 +139,7 @@ def _outside(
     stored = replace(mission, items=tuple(profile_of(mission.autopilot).stored(i) for i in mission.items))
     flight = follow(stored, vehicle, world.ground_amsl, world.read_amsl, rtl_rel_home_m=rtl_rel_home_m)
     round_corners(flight, stored, vehicle, world.frame, tuning)
-    flown = [*flight.stretches, *flight.instead]
+    flown = [*flight.stretches, *flight.others]
     if not flown:
         return []
     plane = legs_in_plane(flown, vehicle.limits, world, 0.0)

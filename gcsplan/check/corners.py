@@ -50,7 +50,13 @@ UNJUDGED = "that is not judged"
 
 
 def round_corners(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tuning: Tuning = DEFAULTS) -> None:
-    """Add to ``flight`` the arcs or widened legs that are flown at the corners of ``mission`` (as stored)."""
+    """Add to ``flight`` the arcs or widened legs that are flown at the corners of ``mission`` (as stored).
+
+    What is unknown about its flights `apart` becomes unknown about the whole.
+    """
+    for part in flight.apart:
+        round_corners(part, mission, vehicle, frame, tuning)
+        flight.adopt(part)
     if vehicle.turn_radius_m > 0.0:
         bend(flight, mission, vehicle, frame, tuning)
         return

@@ -35,7 +35,7 @@ from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth, circle_w
 from gcsplan.check.climb_out import REACHED_M, circle_up, climb_out, glide, is_wing
 from gcsplan.check.commands import flown_otherwise, moves_nothing, why_lost
 from gcsplan.check.geodesy import flat_m
-from gcsplan.check.route import fly_in_order
+from gcsplan.check.route import fly_all
 from gcsplan.check.rtl.model import RULES, return_pieces
 from gcsplan.check.rtl.run_on import about_turn_m
 from gcsplan.check.spline import chords, towards
@@ -66,10 +66,7 @@ def follow(
     for it in the terrain frame, by default the same. ``rtl_rel_home_m`` is the altitude of a return above home; without
     it an RTL is not judged.
     """
-    pilot = _Pilot(mission, vehicle, ground_amsl, rtl_rel_home_m, read_amsl)
-    if fly_in_order(mission, pilot):
-        pilot.finish()
-    return pilot.flight
+    return fly_all(mission, lambda: _Pilot(mission, vehicle, ground_amsl, rtl_rel_home_m, read_amsl))
 
 
 class _Pilot(Aboard):

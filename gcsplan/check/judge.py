@@ -71,12 +71,12 @@ def judge(
     if not flight.stretches:
         flight.not_judged.append("the mission flies nowhere: it has no item that moves the vehicle")
         return Verdict(mission, (), tuple(findings), tuple(flight.not_judged), tuple(flight.notes))
-    far = [_too_far(s) for s in (*flight.stretches, *flight.instead) if _is_too_far(s, world)]
+    far = [_too_far(s) for s in (*flight.stretches, *flight.others) if _is_too_far(s, world)]
     if far:  # beyond the projected plane and any terrain model that could be loaded
         return Verdict(mission, (), tuple(findings + far), tuple(flight.not_judged), tuple(flight.notes))
     round_corners(flight, stored, vehicle, world.frame, tuning)
     if vehicle.turn_radius_m > 0.0:
-        findings += slant_findings([*flight.stretches, *flight.instead], vehicle, world)
+        findings += slant_findings([*flight.stretches, *flight.others], vehicle, world)
     plane = legs_in_plane(flight.stretches, vehicle.limits, world, terrain_error_m)
     findings += _unread(flight.stretches, plane)
     report = steep_report(plane, world.airspace.examine(plane.legs, vehicle.limits), vehicle.limits)
@@ -88,11 +88,11 @@ def judge(
     figures = _figures(flight, plane, report, vehicle, world, seconds)
     findings += _findings(flight.stretches, plane, report, vehicle.limits, world)
     near = nearest_misses(flight.stretches, plane.legs, plane.owner, report, vehicle, world) if misses else ()
-    if flight.instead:  # alternatives must be legal too; the figures stay those of the mission
-        plane = legs_in_plane(flight.instead, vehicle.limits, world, terrain_error_m)
-        findings += _unread(flight.instead, plane)
+    if others := flight.others:  # they must be legal too; the figures stay those of the mission
+        plane = legs_in_plane(others, vehicle.limits, world, terrain_error_m)
+        findings += _unread(others, plane)
         report = steep_report(plane, world.airspace.examine(plane.legs, vehicle.limits), vehicle.limits)
-        findings = _worst(findings, _findings(flight.instead, plane, report, vehicle.limits, world))
+        findings = _worst(findings, _findings(others, plane, report, vehicle.limits, world))
     if needs_straight(mission.items, mission.autopilot):
         flight.notes.append(STRAIGHT_NOTE)
     if any(s.terrain for s in flight.stretches):

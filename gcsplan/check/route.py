@@ -8,12 +8,14 @@
 - ArduPilot counts `MOST_JUMPS` jumps of one mission and treats the others as used up. Only ArduPilot has jump tags.
 - A round that begins in the same state as the round before it is flown identically: it is followed once, and counted.
 - Nothing is flown after a hold or a loop without end. On ArduPilot the DO_ items right after a hold are carried out
-  while it lasts, and only a return leads to the items after DO_LAND_START.
+  while it lasts. Only a return leads to the items after a DO_LAND_START or DO_RETURN_PATH_START that stands behind a
+  hold, a loop, a return or a landing: ArduPilot jumps there (AP_Mission.cpp, `jump_to_landing_sequence`,
+  `jump_to_closest_mission_leg`). `Flight.apart_from` tells where they begin.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import replace
 from typing import Protocol
 
@@ -32,9 +34,15 @@ class Pilot(Protocol):
 
     flight: Flight
     jumped_from: int | None
+    airborne: bool
+    known: bool
 
     def fly(self, seq: int, item: MissionItem) -> None:
         """Fly one item."""
+        ...
+
+    def finish(self) -> None:
+        """Add what follows the last item."""
         ...
 
     @property
@@ -67,20 +75,50 @@ class _Jump:
         self.was: tuple[Hashable, int, int] | None = None
 
 
-def fly_in_order(mission: Mission, pilot: Pilot) -> bool:
-    """Make ``pilot`` fly the items of ``mission`` (as stored) in order; return False if that never ends."""
+def fly_all(mission: Mission, make_pilot: Callable[[], Pilot]) -> Flight:
+    """The flight of ``mission`` (as stored), and in `Flight.apart` what only a return leads to."""
+    pilot = make_pilot()
+    if fly_in_order(mission, pilot):
+        pilot.finish()
+    flight = pilot.flight
+    start = flight.apart_from
+    last = -1
+    while start is not None and start > last:
+        pilot = make_pilot()
+        pilot.airborne, pilot.known = True, False  # where a return comes from is judged with the way home
+        if fly_in_order(mission, pilot, start):
+            pilot.finish()
+        flight.apart.append(pilot.flight)
+        flight.adopt(pilot.flight)
+        last, start = start, pilot.flight.apart_from
+    if start is not None:
+        flight.not_judged.append(
+            f"items {mission.first_seq + start} to {mission.first_seq + len(mission.items) - 1}: a jump leads back "
+            f"from what only a return leads to: what follows is not judged"
+        )
+    return flight
+
+
+def fly_in_order(mission: Mission, pilot: Pilot, start: int = 0) -> bool:
+    """Make ``pilot`` fly the items of ``mission`` (as stored) in order; return False if that never ends.
+
+    ``start``: the index of the first item.
+    """
     jumps = _jumps(mission)
     flight, first, items = pilot.flight, mission.first_seq, mission.items
     if mission.autopilot.is_ardupilot and len(jumps) > MOST_JUMPS:
         flight.not_judged.append(
             f"the mission has {len(jumps)} jumps, and ArduPilot counts {MOST_JUMPS} on small boards and passes the rest"
         )
-    index = steps = 0
+    index, steps = start, 0
     while index < len(items):
         steps += 1
         if steps > MOST_STEPS:
             flight.not_judged.append(f"the jumps lead through more than {MOST_STEPS} items: the rest is not judged")
             return False
+        if pilot.over and mission.autopilot.is_ardupilot and items[index].command in LAND_STARTS:
+            flight.apart_from = index
+            return True
         seq, jump = first + index, jumps.get(index)
         if jump is None or pilot.over:
             pilot.fly(seq, items[index])
@@ -168,10 +206,7 @@ def _never(mission: Mission, flight: Flight, seq: int, index: int, *, loop: bool
     if never:
         flight.unreached.append(Unreached(seq, first + never[0], first + never[-1], loop))
     if landing < len(items) - 1:
-        flight.not_judged.append(
-            f"item {first + landing} begins a landing that only a return leads to (DO_LAND_START): items "
-            f"{first + landing + 1} to {first + len(items) - 1} are not judged"
-        )
+        flight.apart_from = landing
 
 
 def _without_end(flight: Flight, seq: int, target: int, last: int, was: tuple[Hashable, int, int]) -> None:

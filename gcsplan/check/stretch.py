@@ -60,7 +60,9 @@ class Flight:
     """All stretches in order, what could not be followed, and what is assumed.
 
     ``instead``: stretches that another version flies in place of some of ``stretches``; they must be legal too.
-    ``loop_seq``: the jump that leads back without end, None if there is none.
+    ``loop_seq``: the jump that leads back without end, None if there is none. ``apart_from``: the index of the
+    DO_LAND_START or DO_RETURN_PATH_START that begins what only a return leads to, None if there is none; ``apart``:
+    those flights, each from the first place after its start.
     """
 
     stretches: list[Stretch] = field(default_factory=list)
@@ -69,3 +71,16 @@ class Flight:
     notes: list[str] = field(default_factory=list)
     unreached: list[Unreached] = field(default_factory=list)
     loop_seq: int | None = None
+    apart_from: int | None = None
+    apart: list[Flight] = field(default_factory=list)
+
+    @property
+    def others(self) -> list[Stretch]:
+        """Everything that must be legal too and is not flown in the order of the items: `instead` and `apart`."""
+        return [*self.instead, *(s for part in self.apart for s in (*part.stretches, *part.others))]
+
+    def adopt(self, part: Flight) -> None:
+        """Take over what is unknown and assumed about a flight ``part`` of this one."""
+        for mine, more in ((self.not_judged, part.not_judged), (self.notes, part.notes)):
+            mine += [words for words in more if words not in mine]
+        self.unreached += [one for one in part.unreached if one not in self.unreached]

@@ -80,10 +80,30 @@ def test_do_items_behind_a_hold_are_carried_out_by_ardupilot_and_not_by_px4() ->
     assert [f.kind for f in flown(PX4, A, WAIT, shot).findings] == ["unreachable"]
 
 
-def test_a_landing_that_a_return_leads_to_is_not_judged() -> None:
-    verdict = flown(COPTER, A, WAIT, do(LAND_START), B, DOWN)
-    assert verdict.safe is None
-    assert any("DO_LAND_START" in words and "5 to 6" in words for words in verdict.not_judged)
+@pytest.mark.parametrize("before", [[WAIT], [DOWN], [do(cmd.DO_JUMP, 2, -1)], [do(cmd.RTL)], []])
+@pytest.mark.parametrize("start", [cmd.DO_LAND_START, cmd.DO_RETURN_PATH_START])
+def test_what_only_a_return_leads_to_is_judged_and_counts_in_no_figure(start: int, before: list[MissionItem]) -> None:
+    """It is judged whether the items lead there too or not: behind a hold, a landing, a loop, a return."""
+    good = flown(COPTER, A, *before, do(start), B, DOWN, rtl_m=100.0)
+    assert good.safe is True, good.describe()
+    alone = flown(COPTER, A, *before, rtl_m=100.0)
+    if before:
+        assert good.energy_j == alone.energy_j
+        assert good.time_s == alone.time_s
+    low = flown(COPTER, A, *before, do(start), replace(B, z=20.0), DOWN, rtl_m=100.0)
+    behind = low.mission.first_seq + 3 + len(before)
+    assert ("min_agl", behind) in {(f.kind, f.seq) for f in low.findings}
+
+
+def test_two_landings_that_only_returns_lead_to_are_both_judged() -> None:
+    low = at(cmd.WAYPOINT, 500, 0, 20)
+    verdict = flown(COPTER, A, WAIT, do(LAND_START), B, DOWN, do(LAND_START), low, DOWN)
+    assert ("min_agl", 8) in {(f.kind, f.seq) for f in verdict.findings}
+    held = flown(COPTER, A, WAIT, do(LAND_START), B, WAIT, DOWN)
+    assert [(f.kind, f.seq) for f in held.findings] == [("unreachable", 7)]
+    back = flown(COPTER, A, WAIT, do(LAND_START), B, do(cmd.DO_JUMP, 2, 1), DOWN, do(LAND_START), B, DOWN)
+    assert back.safe is None
+    assert any("a jump leads back from what only a return leads to" in words for words in back.not_judged)
 
 
 def test_what_stands_behind_a_loop_without_end_is_a_finding_and_how_long_it_lasts_is_told() -> None:
