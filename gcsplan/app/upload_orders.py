@@ -65,6 +65,7 @@ def order_of(
         ignore_position=options.ignore_position,
         ground_amsl_m=ground_m,
         rtl_rel_home_m=job.rtl_rel_home_m if job.way_home is None else job.way_home.rtl_rel_home_m,
+        route=None if job.way_home is None else job.way_home.route,
         advised_rel_home_m=None if job.way_home is None else job.way_home.set_rel_home_m,
         simulated=simulated,
         terrain=None if simulated else job.ground,
@@ -104,7 +105,7 @@ def judge_on_board(job: UploadJob, *, allow_unjudged: bool, simulated: bool = Fa
         if short := speed_shortage(values, vehicle, planned_m_s):
             return short
         if job.home_required and job.way_home is not None and not simulated:
-            against = against_on_board(job.way_home, values)
+            against = against_on_board(job.way_home, values, job.mission)
             if against is not None:
                 return against
         # Home on board is where the vehicle is now, but the altitudes count from the planned start.

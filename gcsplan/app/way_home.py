@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING
 from gcsplan.app.model import Plan
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed
+from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.return_altitude import on_board, return_on_board_m, returns_otherwise
+from gcsplan.mavlink.mission.return_route import takes_another_route
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.units import UnitText
 from gcsplan.world.world import World
@@ -46,8 +48,9 @@ def home_of(verdict: Verdict, request: VehicleRequest, world: World, terrain_err
     from gcsplan.check.rtl.way_home import way_home
 
     return way_home(
-        verdict, request.vehicle, world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=terrain_error_m
-    )
+        verdict, request.vehicle, world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=terrain_error_m,
+        route=request.return_route,
+    )  # fmt: skip
 
 
 def homes_of(plan: Plan) -> dict[str, WayHome]:
@@ -88,8 +91,12 @@ def _lines(name: str, home: WayHome | None) -> list[str]:
     return [UnitText("{}: {}", name, line) for line in (home.headline, home.advice) if line]
 
 
-def against_on_board(home: WayHome, values: Mapping[str, float]) -> str | None:
+def against_on_board(home: WayHome, values: Mapping[str, float], mission: Mission) -> str | None:
     """Why a required return is not the one that a vehicle with these parameters would fly; None if it is."""
+    if otherwise := takes_another_route(values, mission, home.route):
+        return f"a safe return is required, and {otherwise}"
+    if home.route == "mission":
+        return None
     height_m = return_on_board_m(values)
     parameter = on_board(values)
     if height_m is None or parameter is None:

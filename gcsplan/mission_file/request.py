@@ -8,6 +8,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
+from gcsplan.mavlink.mission.return_route import Route
 from gcsplan.mission_file.airspace.times import Hours
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.frame import Frame
@@ -63,6 +64,7 @@ class VehicleRequest:
     via: tuple[tuple[float, float, float | None], ...] = ()
     end: End = "land"
     rtl_rel_home_m: float | None = None
+    return_route: Route | None = None
     takeoff_heading_deg: float | None = None
     start_amsl_m: float | None = None
     goal_amsl_m: float | None = None

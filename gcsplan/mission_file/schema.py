@@ -219,6 +219,8 @@ class VehicleKeys(LimitKeys):
     """What follows the path: a landing, a hold or circle, the autopilot's return, or nothing."""
     rtl_rel_home_m: Positive | None = None
     """Height above home of the autopilot's own return; needed with `end: rtl`."""
+    return_route: Literal["straight", "mission"] | None = None
+    """How it returns: straight home, or by the mission's return path or landing sequence; if absent, straight home."""
     takeoff_heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | None = None
     """Launch heading of a fixed wing; if absent, the planner chooses one."""
     speed_m_s: SpeedRange = [3.0, 15.0]

@@ -79,6 +79,7 @@ def make_request(
         via=tuple(v for v in via if v is not None),
         end=keys.end,
         rtl_rel_home_m=keys.rtl_rel_home_m,
+        return_route=keys.return_route,
         takeoff_heading_deg=keys.takeoff_heading_deg,
         start_amsl_m=start.amsl_m,
         goal_amsl_m=goal.amsl_m,

@@ -54,7 +54,7 @@ def stretches_of(
     kinds = _kinds(refinement.strict[grade], level)
     runs = [run for group in _groups(bad) for run in _alike(group, kinds, refinement)]
     found = [_stretch(trace, refinement, grade, level, run, target) for run in runs]
-    return _without_doubles(found)
+    return without_doubles(found)
 
 
 def _groups(bad: Bools) -> list[Indices]:
@@ -204,7 +204,7 @@ def _why(obstacles: Obstacles, row: int, names: Sequence[str], grade: int, obsta
     return UnitText("meets no-fly zone “{}”{} or its clearance", names[what], height)
 
 
-def _without_doubles(found: list[UnsafeStretch]) -> tuple[UnsafeStretch, ...]:
+def without_doubles(found: list[UnsafeStretch]) -> tuple[UnsafeStretch, ...]:
     """Drop stretches within another one: they come from other versions that fly differently between these items."""
     kept = [
         s

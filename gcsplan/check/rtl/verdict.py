@@ -11,6 +11,7 @@ from gcsplan.check.rtl.words import NO_RETURN, NOT_JUDGED, PATH, STILL_NO_RETURN
 from gcsplan.check.stretch import Place
 from gcsplan.figures import counted
 from gcsplan.mavlink.mission.return_altitude import setting, settings
+from gcsplan.mavlink.mission.return_route import Route, route_setting
 from gcsplan.units import Quantity, Reach, Symbol, UnitText, joined
 from gcsplan.vehicle import Autopilot
 
@@ -160,6 +161,9 @@ class WayHome:
     ``path_safe`` is the verdict on the path itself. ``set_rel_home_m``: the altitude to set on the vehicle (with
     ``rally``, if there are any): the judged one if nothing is better, else one that is legal, or clear, from every
     point; None if nothing could be judged. ``set_leaves_m``: metres of the path that it leaves without a safe return.
+
+    ``route``: whether the returns were judged straight home, or to where they join the mission, behind the wire items
+    ``starts``; ``along_path``: along a return path, else to a landing sequence. Altitudes say nothing then.
     """
 
     vehicle: str
@@ -184,6 +188,9 @@ class WayHome:
     lowest: LowestAgl | None
     not_judged: tuple[str, ...]
     notes: tuple[str, ...]
+    route: Route = "straight"
+    starts: tuple[int, ...] = ()
+    along_path: bool = False
 
     @property
     def safe(self) -> bool | None:
@@ -221,6 +228,8 @@ class WayHome:
     @property
     def advice(self) -> str:
         """The parameter and value to set, and what that leaves; empty if there is no value to name."""
+        if self.route == "mission":
+            return f"set {route_setting(self.autopilot, path=self.along_path)}" if self.starts else ""
         if self.set_rel_home_m is None:
             return ""
         with_points = f", with {counted(len(self.rally), 'rally point')} on board (--rally)" if self.rally else ""
@@ -250,6 +259,8 @@ class WayHome:
         """Plain values for ``summary.json``; the profile on request."""
         out: dict[str, Any] = {
             "parameter": self.parameter,
+            "route": self.route,
+            "joins": list(self.starts),
             "rtl_rel_home_m": self.rtl_rel_home_m,
             "assumed": self.assumed,
             "safe": self.safe,
@@ -279,6 +290,8 @@ class WayHome:
 
     def rows(self) -> list[tuple[str, str]]:
         """(label, words) for a table of two columns, below the headline."""
+        if self.route == "mission":
+            return self._rows_of_mission()
         source = "the autopilot's default" if self.assumed else "as given"
         judged_at = UnitText("{} above home, {}", Quantity(self.rtl_rel_home_m, "height", None), source)
         out: list[tuple[str, str]] = [("judged at", judged_at)]
@@ -311,6 +324,21 @@ class WayHome:
         out += [(STILL_NO_RETURN, UnitText("from {}", s.place_and_why)) for s in worst_first(self.left)]
         out += [(NOT_JUDGED, words) for words in self.not_judged]
         return out
+
+    def _rows_of_mission(self) -> list[tuple[str, str]]:
+        what = "return path" if self.along_path else "landing sequence"
+        out: list[tuple[str, str]] = []
+        if self.starts:
+            items = f"item {self.starts[0]}" + "".join(f", {k}" for k in self.starts[1:])
+            out.append(("judged as", f"joined to the mission's {what} ({items})"))
+        if self.advice:
+            out.append(("on the vehicle", self.advice))
+        out += [(NO_RETURN, UnitText("from {}", s.place_and_why)) for s in worst_first(self.unsafe)]
+        if self.irregular:
+            length = together_m((s.from_m, s.to_m) for s in self.irregular)
+            words = "from {} of the path the return hits nothing but breaks a limit; first from {}"
+            out.append(("outside a limit", UnitText(words, Reach(length), self.irregular[0].place_and_why)))
+        return out + self._battery() + [(NOT_JUDGED, words) for words in self.not_judged]
 
     def _lowest(self) -> list[tuple[str, str]]:
         if self.lowest is None:

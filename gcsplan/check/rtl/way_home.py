@@ -21,6 +21,8 @@ from gcsplan.check.commands import LAND_STARTS
 from gcsplan.check.corners import round_corners
 from gcsplan.check.flight import follow
 from gcsplan.check.judge import TERRAIN_ERROR_M
+from gcsplan.check.rtl.by_mission import return_by_mission
+from gcsplan.check.rtl.joins import LANDS, joins_of
 from gcsplan.check.rtl.lowest import lowest_agl
 from gcsplan.check.rtl.model import RULES
 from gcsplan.check.rtl.places import Target
@@ -31,12 +33,13 @@ from gcsplan.check.rtl.sweep import GradedObstacles, obstacles_of_returns
 from gcsplan.check.rtl.trace import MissionTrace, TraceParts, trace_of
 from gcsplan.check.rtl.verdict import ProfilePoint, RallyPoint, UnsafeStretch, WayHome
 from gcsplan.check.rtl.words import together_m
-from gcsplan.check.stretch import Place
+from gcsplan.check.stretch import Flight, Place
 from gcsplan.check.verdict import Verdict
 from gcsplan.figures import floored, raised
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.commands import command_name
 from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mavlink.mission.return_route import Route
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World
 
@@ -58,11 +61,13 @@ def way_home(
     rtl_rel_home_m: float | None = None,
     terrain_error_m: float = TERRAIN_ERROR_M,
     rally: bool = True,
+    route: Route | None = None,
 ) -> WayHome:
     """Judge the return home from every point of the mission of ``verdict``.
 
     ``rtl_rel_home_m`` is the vehicle's return altitude above home; None: the autopilot's default. ``rally``: propose
-    rally points if no altitude is clear from every point. Never raises for a mission that is merely unsafe.
+    rally points if no altitude is clear from every point. ``route``: straight home, or to where the return joins the
+    mission (`joins`); None: not said, which counts as straight home. Never raises for a mission that is merely unsafe.
     """
     mission, rule = verdict.mission, RULES[vehicle.autopilot]
     stored = replace(mission, items=tuple(profile_of(mission.autopilot).stored(item) for item in mission.items))
@@ -75,7 +80,9 @@ def way_home(
     trace = trace_of(flight, vehicle, world, terrain_error_m) if verdict.legs else None
     if trace is None or math.isnan(ground):
         why = "the mission could not be followed" if trace is None else "the ground at home is unknown"
-        return _not_judged(verdict, vehicle, judged_m, rtl_rel_home_m is None, why)
+        return _not_judged(verdict, vehicle, judged_m, rtl_rel_home_m is None, (why,))
+    if route == "mission":
+        return _along_mission(verdict, vehicle, stored, flight, trace, judged_m)
     home = (lat, lon, ground)
     east, north = (float(x) for x in world.frame.to_plane(lat, lon))
     target = Target(east, north, ground, ground)
@@ -125,10 +132,38 @@ def way_home(
         lowest=lowest_agl(trace, trace.cut(refinement.first_m), target, vehicle, level),
         not_judged=(
             *(w for w in flight.not_judged if not w.startswith(RETURNS_BY_ITSELF)),
-            *_landing_sequence(mission),
+            *(() if route == "straight" else _landing_sequence(mission)),
         ),
         notes=tuple(notes + list(proposal.notes if proposal else ())),
     )
+
+
+def _along_mission(
+    verdict: Verdict, vehicle: Vehicle, stored: Mission, flight: Flight, trace: MissionTrace, judged_m: float
+) -> WayHome:
+    """The way home if returns join the mission, at a return path or a landing sequence."""
+    home = _not_judged(verdict, vehicle, judged_m, False, ())
+    if vehicle.autopilot is Autopilot.PX4:
+        why = "PX4's returns along the mission (RTL_TYPE above 0) are not judged: only its return straight home is"
+        return replace(home, route="mission", not_judged=(why,))
+    joins = joins_of(stored, flight, vehicle, trace.world)
+    known = tuple(w for w in flight.not_judged if not w.startswith(RETURNS_BY_ITSELF))
+    if joins.why_not:
+        return replace(home, route="mission", starts=joins.starts, along_path=joins.path,
+                       not_judged=(*joins.why_not, *known))  # fmt: skip
+    landing = frozenset(k for k, item in enumerate(stored.items, stored.first_seq) if item.command in LANDS)
+    found = return_by_mission(trace, joins, landing, verdict, vehicle)
+    notes = list(home.notes)
+    if joins.path:
+        notes.append("DO_RETURN_PATH_START: ArduCopter 4.6.0 and ArduPlane 4.6.2 are the first to know it")
+    if vehicle.autopilot is Autopilot.ARDUCOPTER:
+        notes.append("a breach of the fence (FENCE_ACTION) and RTL itself still return straight home")
+    if found.stopped_early:
+        notes.append("the mission is too long to look at all of it closely: unsafe stretches may be drawn too long")
+    return replace(
+        home, route="mission", starts=joins.starts, along_path=joins.path, unsafe=found.unsafe,
+        irregular=found.irregular, battery=found.battery, not_judged=known, notes=tuple(notes),
+    )  # fmt: skip
 
 
 def refinement_of(trace: MissionTrace, target: Target, vehicle: Vehicle, level: float) -> Refinement:
@@ -208,24 +243,26 @@ def _landing_sequence(mission: Mission) -> list[str]:
     """That ArduPlane's return may lead to a landing sequence of the mission; empty if there is none.
 
     With DO_LAND_START or DO_RETURN_PATH_START in its mission ArduPlane arms only with RTL_AUTOLAND set, and RTL then
-    leads there: at once (2), after home (1), or to the nearest leg of the return path (4) (mode_rtl.cpp, `navigate`).
+    leads there: at once (2), after home (1), or to the nearest leg of the return path (4) (mode_rtl.cpp, `navigate`);
+    with 3 it does not.
     """
     starts = [k for k, item in enumerate(mission.items, start=mission.first_seq) if item.command in LAND_STARTS]
     if mission.autopilot is not Autopilot.ARDUPLANE or not starts:
         return []
     name = command_name(mission.items[starts[0] - mission.first_seq].command)
     return [
-        f"item {starts[0]}: {name}: the return leads on to it, by RTL_AUTOLAND; only the flight straight home is judged"
+        f"item {starts[0]}: {name}: the return leads on to it, by RTL_AUTOLAND; only the flight straight home is "
+        f"judged: say return_route: mission for RTL_AUTOLAND 2 or 4, or return_route: straight for 3"
     ]
 
 
-def _not_judged(verdict: Verdict, vehicle: Vehicle, judged_m: float, assumed: bool, why: str) -> WayHome:
+def _not_judged(verdict: Verdict, vehicle: Vehicle, judged_m: float, assumed: bool, why: tuple[str, ...]) -> WayHome:
     home = verdict.mission.home
     return WayHome(
         vehicle=vehicle.name, autopilot=vehicle.autopilot, path_safe=verdict.safe,
         parameter=RULES[vehicle.autopilot].parameter, rtl_rel_home_m=judged_m, assumed=assumed,
         home=(home.lat_e7 / 1e7, home.lon_e7 / 1e7, home.amsl_m), lowest_rel_home_m=None, highest_rel_home_m=None,
         lowest_legal_rel_home_m=None, unsafe=(), irregular=(), battery=None, advised_rel_home_m=None,
-        set_rel_home_m=None, set_leaves_m=None, rally=(), left=(), profile=(), lowest=None, not_judged=(why,),
+        set_rel_home_m=None, set_leaves_m=None, rally=(), left=(), profile=(), lowest=None, not_judged=why,
         notes=tuple(_notes(vehicle, judged_m, assumed)),
     )  # fmt: skip

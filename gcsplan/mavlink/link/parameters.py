@@ -16,6 +16,7 @@ from gcsplan.mavlink.link.preflight import distance_m
 from gcsplan.mavlink.mission.autopilots import PX4, profile_of
 from gcsplan.mavlink.mission.mission import GLOBAL, RELATIVE, Mission
 from gcsplan.mavlink.mission.return_altitude import RETURN_PARAMETERS, on_board, returns_otherwise
+from gcsplan.mavlink.mission.return_route import Route, takes_another_route
 from gcsplan.vehicle import DEFAULT_LEAN_DEG, Autopilot, fastest_at_m_s, lean_for_deg
 
 Values = Mapping[str, float]
@@ -24,14 +25,14 @@ _RETURN = {autopilot: tuple(p.name for p in known) for autopilot, known in RETUR
 _COPTER = (
     _RETURN[Autopilot.ARDUCOPTER],
     ("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ALT_MAX",), ("FENCE_RADIUS",),
-    ("FS_THR_ENABLE",), ("FS_GCS_ENABLE",), ("BATT_FS_LOW_ACT",),
+    ("FS_THR_ENABLE",), ("FS_GCS_ENABLE",), ("BATT_FS_LOW_ACT",), ("BATT_FS_CRT_ACT",),
     ("WPNAV_RADIUS", "WP_RADIUS_M"),  # cm; renamed and in metres since 4.7
     ("ANGLE_MAX", "ATC_ANGLE_MAX"),  # hundredths of a degree; renamed and in degrees since 4.7
 )  # fmt: skip
 _PLANE = (
     _RETURN[Autopilot.ARDUPLANE],
     ("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ALT_MAX",),
-    ("THR_FAILSAFE",), ("FS_LONG_ACTN",), ("FS_GCS_ENABL",), ("BATT_FS_LOW_ACT",),
+    ("RTL_AUTOLAND",), ("THR_FAILSAFE",), ("FS_LONG_ACTN",), ("FS_GCS_ENABL",), ("BATT_FS_LOW_ACT",),
     ("WP_RADIUS",), ("NAVL1_PERIOD",), ("NAVL1_DAMPING",),
 )  # fmt: skip
 _PX4 = (
@@ -121,11 +122,13 @@ def judge_parameters(
     rtl_rel_home_m: float | None = None,
     advised_rel_home_m: float | None = None,
     expected: Values | None = None,
+    route: Route | None = None,
 ) -> list[str]:
     """Return in words which ``values`` do not fit ``mission``; nothing is changed on board.
 
     ``rtl_rel_home_m``: the return altitude that the mission was checked with, m above home; ``advised_rel_home_m``: the
-    one to set, if that check found it better. ``expected``: the values that the user expects, by name.
+    one to set, if that check found it better. ``expected``: the values that the user expects, by name. ``route``: the
+    one that the return was judged by.
     """
     label = profile_of(mission.autopilot).label
     if not values:
@@ -138,7 +141,9 @@ def judge_parameters(
     ]
     found += [f"{name} could not be read, {want:g} is expected" for name, want in (expected or {}).items()
               if name not in values]  # fmt: skip
-    found += _return_altitude(values, rtl_rel_home_m, advised_rel_home_m)
+    if route != "mission":
+        found += _return_altitude(values, rtl_rel_home_m, advised_rel_home_m)
+    found += [words] if (words := takes_another_route(values, mission, route)) else []
     found += [words] if (words := returns_otherwise(values)) else []
     found += _fences(values, _extent(mission))
     found += _lean(values, mission)

@@ -33,6 +33,7 @@ from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA, max_items
 from gcsplan.mavlink.mission.autopilots import PX4 as MAV_PX4
 from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, Mission, MissionItem
+from gcsplan.mavlink.mission.return_route import Route
 from gcsplan.mavlink.protocol.patience import TIMEOUT_S, Patience, checked_timeout_s
 from gcsplan.mavlink.protocol.transfer import (
     Accepted,
@@ -65,9 +66,9 @@ class SessionOptions:
     to wait for a vehicle that is booting. ``ground_amsl_m``: DEM altitude at the start, by default the altitude of the
     mission's home. ``timeout_s``: longest time without progress of a transfer (see `Patience`); it also limits
     ``discover_s`` and ``standby_s``. The parameters on board are compared with ``rtl_rel_home_m`` (the return altitude
-    that was checked), ``advised_rel_home_m`` (the one to set, if another is better) and ``expected_parameters``, and a
-    PX4's motion with ``vehicle``. ``terrain``: the ground for a mission in the terrain frame, which is then served and
-    compared (`link.terrain`).
+    that was checked), ``route`` (of the return that was checked), ``advised_rel_home_m`` (the one to set, if another is
+    better) and ``expected_parameters``, and a PX4's motion with ``vehicle``. ``terrain``: the ground for a mission in
+    the terrain frame, which is then served and compared (`link.terrain`).
     """
 
     unchecked: bool = False
@@ -75,6 +76,7 @@ class SessionOptions:
     ignore_position: bool = False
     ground_amsl_m: float | None = None
     rtl_rel_home_m: float | None = None
+    route: Route | None = None
     advised_rel_home_m: float | None = None
     expected_parameters: Mapping[str, float] = field(default_factory=dict)
     terrain: Ground | None = None
@@ -214,7 +216,7 @@ def _parameters(
         values = yield from parameter_steps(channel, state, groups, watch, recheck)
         warnings += judge_parameters(
             values, mission, rtl_rel_home_m=options.rtl_rel_home_m, advised_rel_home_m=options.advised_rel_home_m,
-            expected=options.expected_parameters,
+            expected=options.expected_parameters, route=options.route,
         )  # fmt: skip
         warnings += slower_words(values, options.vehicle) if options.vehicle else []
     if task.mission_type == FENCE and options.read_parameters:

@@ -1,0 +1,97 @@
+"""Whether a vehicle returns straight home or along its mission: the parameters that decide it.
+
+- ArduCopter's failsafes each choose: 6 is Auto RTL, which joins a return path or a landing sequence of the mission (and
+  returns straight home if there is none); 1 or 2 is RTL, which does not. A breach of the fence never chooses Auto RTL.
+- ArduPlane has RTL_AUTOLAND for every RTL: 0 straight home (with such items in its mission it then does not arm), 1
+  straight home and then to the landing sequence, 2 to the landing sequence, 3 straight home, 4 to the return path.
+- PX4 has RTL_TYPE; only 0, straight home, is judged (`return_altitude.returns_otherwise`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+from gcsplan.mavlink.mission.commands import DO_LAND_START, DO_RETURN_PATH_START
+from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.vehicle import Autopilot
+
+Route = Literal["straight", "mission"]
+
+AUTO_RTL = 6.0
+COPTER_RETURNS: dict[str, tuple[float, ...]] = {
+    "FS_THR_ENABLE": (1.0, 2.0, 4.0, 5.0), "FS_GCS_ENABLE": (1.0, 2.0, 3.0, 4.0), "BATT_FS_LOW_ACT": (2.0, 3.0, 4.0),
+    "BATT_FS_CRT_ACT": (2.0, 3.0, 4.0),
+}  # fmt: skip
+"""ArduCopter's failsafes, and the values with which each returns by another way: RTL or SmartRTL."""
+
+AUTOLAND_PATH, AUTOLAND_LANDING = 4.0, 2.0
+STRAIGHT_AUTOLAND = (0.0, 3.0)
+
+
+def starts(mission: Mission) -> tuple[str, ...]:
+    """The names of the commands in ``mission`` that a return may join."""
+    names = {DO_RETURN_PATH_START: "DO_RETURN_PATH_START", DO_LAND_START: "DO_LAND_START"}
+    held = {item.command for item in mission.items}
+    return tuple(name for command, name in names.items() if command in held)
+
+
+def route_setting(autopilot: Autopilot, *, path: bool) -> str:
+    """What to set for returns along the mission; ``path``: along a return path, else to a landing sequence."""
+    if autopilot is Autopilot.ARDUPLANE:
+        return f"RTL_AUTOLAND {AUTOLAND_PATH if path else AUTOLAND_LANDING:g}"
+    return f"{', '.join(COPTER_RETURNS)} {AUTO_RTL:g} (Auto RTL)"
+
+
+def takes_another_route(values: Mapping[str, float], mission: Mission, route: Route | None) -> str:
+    """Why a vehicle with these parameters returns by another route than ``route``, in words; empty if it does not.
+
+    ``values`` are what was read; a parameter that decides and is not among them counts as wrong.
+    """
+    held = starts(mission)
+    if not held or mission.autopilot is Autopilot.PX4:
+        return ""
+    path = "DO_RETURN_PATH_START" in held
+    if mission.autopilot is Autopilot.ARDUPLANE:
+        return _plane(values.get("RTL_AUTOLAND"), held, path, route)
+    if route != "mission":
+        on = [name for name in COPTER_RETURNS if values.get(name) == AUTO_RTL]
+        if not on:
+            return ""
+        return (
+            f"{', '.join(on)} is {AUTO_RTL:g} on board: the return joins the mission at {held[0]}, and was judged "
+            f"straight home: set 1 or 2 (RTL), or judge it with return_route: mission"
+        )
+    other = [f"{name} {values[name]:g}" for name, wrong in COPTER_RETURNS.items() if values.get(name) in wrong]
+    unread = [name for name in COPTER_RETURNS if name not in values]
+    if unread and len(unread) == len(COPTER_RETURNS):
+        return f"none of {', '.join(unread)} could be read: whether the return joins the mission is not known"
+    if not other:
+        return ""
+    return (
+        f"{', '.join(other)} on board: such a return does not join the mission at {held[0]}, as it was judged: set "
+        f"{AUTO_RTL:g} (Auto RTL)"
+    )
+
+
+def _plane(value: float | None, held: tuple[str, ...], path: bool, route: Route | None) -> str:
+    if value is None:
+        return "RTL_AUTOLAND could not be read: whether the return joins the mission is not known"
+    if value == 0.0:
+        wanted = "3" if route != "mission" else f"{AUTOLAND_PATH if path else AUTOLAND_LANDING:g}"
+        return (
+            f"RTL_AUTOLAND is 0 on board: with {held[0]} in its mission ArduPlane does not arm: set RTL_AUTOLAND "
+            f"{wanted}"
+        )
+    wanted_value = AUTOLAND_PATH if path else AUTOLAND_LANDING
+    if route == "mission" and value != wanted_value:
+        return (
+            f"RTL_AUTOLAND is {value:g} on board, and the return was judged as with {wanted_value:g}: set "
+            f"RTL_AUTOLAND {wanted_value:g}"
+        )
+    if route != "mission" and value not in STRAIGHT_AUTOLAND:
+        return (
+            f"RTL_AUTOLAND is {value:g} on board: the return leads on to {held[0]}, and was judged straight home: set "
+            f"RTL_AUTOLAND 3, or judge it with return_route: mission"
+        )
+    return ""
