@@ -8,11 +8,12 @@ from dataclasses import replace
 from gcsplan.app.margins import larger, on_path
 from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.problems import built, looked_over, make_problem, run_planner, unsafe
-from gcsplan.errors import NoMission
+from gcsplan.errors import InputError, NoMission
 from gcsplan.mavlink.build.multirotor import acceptance_radius_m
 from gcsplan.mavlink.build.order import MARGINS, Order
 from gcsplan.mission_file import VehicleRequest
 from gcsplan.planners.problem import Progress
+from gcsplan.vehicle import Autopilot
 from gcsplan.world.limits import Limits
 from gcsplan.world.world import World
 
@@ -38,6 +39,8 @@ def plan_vehicle(
     """
     source, vehicle = brief.source, request.vehicle
     limited = request if limits is None else replace(request, vehicle=replace(vehicle, limits=limits))
+    if request.return_route == "mission":
+        limited = _both_ways(limited, source.altitude_frame)
     world = brief.world if searched is None else searched
     merged = {**brief.options, **(options or {})}
     if vehicle.turn_radius_m > 0.0:
@@ -57,7 +60,9 @@ def plan_vehicle(
             break  # there is no path with margins this large: report what the last mission broke
         over = looked_over(brief, solution)
         for spaced in (True, False):  # first without way points nearer than the acceptance radii, where that is legal
-            order = Order(request.end, source.altitude_frame, spaced=spaced)
+            order = Order(
+                request.end, source.altitude_frame, spaced=spaced, return_path=request.return_route == "mission"
+            )
             mission, verdict = built(over, request, solution, order)
             if not verdict.findings:
                 return VehiclePlan(
@@ -70,6 +75,28 @@ def plan_vehicle(
         margins = larger(margins, findings, acceptance_radius_m(vehicle))
     assert failed is not None
     raise unsafe(failed, vehicle)
+
+
+def _both_ways(request: VehicleRequest, altitude_frame: str) -> VehicleRequest:
+    """``request`` with limits under which its path may be flown back, too, where a climb is a descent.
+
+    Raises InputError if no path back is written for it.
+    """
+    vehicle, limits = request.vehicle, request.vehicle.limits
+    why = ""
+    if vehicle.autopilot is not Autopilot.ARDUCOPTER:
+        why = f"return paths are written for ArduCopter alone, and it is {vehicle.autopilot}"
+    elif altitude_frame == "terrain":
+        why = "a return path in the terrain frame is not judged: altitude_frame relative or amsl is wanted"
+    elif request.end == "none":
+        why = "with end: none the mission would go on along its return path: end: land, loiter or rtl is wanted"
+    if why:
+        raise InputError(f"{vehicle.name}: return_route: mission: {why}")
+    steepest = min(limits.max_climb_deg, limits.max_descent_deg)
+    return replace(
+        request,
+        vehicle=replace(vehicle, limits=replace(limits, max_climb_deg=steepest, max_descent_deg=steepest)),
+    )
 
 
 def over_one_terrain(

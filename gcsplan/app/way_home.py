@@ -8,16 +8,18 @@ judged. Otherwise the return is judged where that is asked for, and reported as 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from gcsplan.app.model import Plan
+from gcsplan.app.model import Plan, VehiclePlan
 from gcsplan.check.verdict import Verdict
-from gcsplan.errors import CheckFailed
+from gcsplan.errors import CheckFailed, NoMission
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.return_altitude import on_board, return_on_board_m, returns_otherwise
-from gcsplan.mavlink.mission.return_route import takes_another_route
+from gcsplan.mavlink.mission.return_route import route_setting, takes_another_route
 from gcsplan.mission_file import MissionFile, VehicleRequest
-from gcsplan.units import UnitText
+from gcsplan.units import Reach, UnitText
+from gcsplan.vehicle import Autopilot
 from gcsplan.world.world import World
 
 if TYPE_CHECKING:
@@ -55,7 +57,42 @@ def home_of(verdict: Verdict, request: VehicleRequest, world: World, terrain_err
 
 def homes_of(plan: Plan) -> dict[str, WayHome]:
     """The way home of every vehicle of a plan."""
-    return {v.name: home_of(v.verdict, v.request, plan.world, plan.source.terrain_error_m) for v in plan.vehicles}
+    error_m = plan.source.terrain_error_m
+    return {v.name: _with_path_back(v, home_of(v.verdict, v.request, plan.world, error_m)) for v in plan.vehicles}
+
+
+def _with_path_back(v: VehiclePlan, home: WayHome) -> WayHome:
+    """``home``, and what a return path back along the track would do if no return altitude makes all returns safe."""
+    enough = home.safe is not False or (home.set_rel_home_m is not None and not home.set_leaves_m)
+    request, brief = v.request, v.brief
+    if enough or brief is None or home.route == "mission" or not writes_path_back(request, brief.source.altitude_frame):
+        return home
+    from gcsplan.app.problems import built
+
+    try:
+        _, verdict = built(brief, request, v.solution, replace(v.order, return_path=True))
+    except NoMission:  # too many items
+        return home
+    if verdict.findings:
+        return home
+    error_m = brief.source.terrain_error_m
+    path = home_of(verdict, replace(request, return_route="mission"), brief.world, error_m)
+    if path.not_judged or path.no_return_m >= (
+        home.set_leaves_m if home.set_leaves_m is not None else home.no_return_m
+    ):
+        return home
+    left = "every return safe" if path.safe else UnitText("all but {} of it safe", Reach(path.no_return_m))
+    words = UnitText(
+        "return_route: mission writes a return path back along the track, which makes {}: needs ArduCopter 4.6 or "
+        "later, and {}", left, route_setting(request.vehicle.autopilot, path=True),
+    )  # fmt: skip
+    return replace(home, path_back=words)
+
+
+def writes_path_back(request: VehicleRequest, altitude_frame: str) -> bool:
+    """Whether a return path can be written: for ArduCopter, behind an end, in a frame in which it is judged."""
+    copter = request.vehicle.autopilot is Autopilot.ARDUCOPTER
+    return copter and request.end != "none" and altitude_frame != "terrain"
 
 
 def judged(plan: Plan, *, asked: bool, option: bool = False) -> dict[str, WayHome]:
@@ -85,10 +122,10 @@ def require(homes: Mapping[str, WayHome | None], *, required: bool) -> None:
 
 
 def _lines(name: str, home: WayHome | None) -> list[str]:
-    """The headline, and what to set."""
+    """The headline, what to set, and what a return path would do."""
     if home is None:
         return [f"{name}: the return was not judged"]
-    return [UnitText("{}: {}", name, line) for line in (home.headline, home.advice) if line]
+    return [UnitText("{}: {}", name, line) for line in (home.headline, home.advice, home.path_back) if line]
 
 
 def against_on_board(home: WayHome, values: Mapping[str, float], mission: Mission) -> str | None:

@@ -6,6 +6,7 @@ The whole table, by command, autopilot and param, is in docs/safety.md.
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
@@ -40,6 +41,18 @@ def moves_nothing(command: int, first: float) -> bool:
 
 
 LAND_STARTS = (cmd.DO_RETURN_PATH_START, cmd.DO_LAND_START)
+
+ENDS = (cmd.LAND, cmd.VTOL_LAND, cmd.RTL, cmd.LOITER_UNLIM)
+"""Commands behind which the items of a mission are not flown in order."""
+
+
+def flown_in_order(mission: Mission) -> tuple[MissionItem, ...]:
+    """The items without those that only a return leads to: behind an end and a start such as DO_LAND_START."""
+    for k, (item, after) in enumerate(pairwise(mission.items), start=1):
+        if item.command in ENDS and after.command in LAND_STARTS and mission.autopilot.is_ardupilot:
+            return mission.items[:k]
+    return mission.items
+
 
 FW_DESCENT = 1.0  # NAV_VTOL_LAND_OPTIONS
 

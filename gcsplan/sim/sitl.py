@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
+from gcsplan.check.commands import flown_in_order
 from gcsplan.check.geodesy import offset_m
 from gcsplan.errors import GcsplanError, LinkError, UsageError, VehicleRefused
 from gcsplan.mavlink.link.frames import signing_key
@@ -209,7 +210,7 @@ def _fly(
     latest_ms = log.released_ms + 1000.0 * (_LATE * planned_s + _SPARE_S)
     goal = _goal(part)
     landing = part.mission.first_seq + len(part.mission.items) - 1
-    last = part.mission.items[-1].command
+    last = flown_in_order(part.mission)[-1].command
     item = 0
     while True:
         yield from pilot.listen(_ANSWER_S)
@@ -367,7 +368,7 @@ def _trace(log: _Log, part: Part, world: World) -> Trace:
     vertical = np.array([command.get(int(i)) in (cmd.TAKEOFF, cmd.LAND, cmd.RTL) for i in items[:-1]])
     before = items[:-1] < part.mission.first_seq  # no current item reported yet: it is taking off
     column = is_column(part, points, items) if wing else (vertical & moved) | before
-    last = part.mission.items[-1].command
+    last = flown_in_order(part.mission)[-1].command
     height_m = float(points[-1, 2]) - world.ground_amsl(*places[-1, :2])
     return Trace(
         name, times[begin:], points[begin:], column[begin:], items[:-1][begin:].astype(np.intp),

@@ -9,6 +9,7 @@ from itertools import takewhile
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
+from gcsplan.check.commands import flown_in_order
 from gcsplan.check.geodesy import flat_m
 from gcsplan.check.stretch import Place
 from gcsplan.mavlink.mission import commands as cmd
@@ -38,7 +39,7 @@ def arrival_s(part: Part, times_s: Floats, apart_m: Floats, speed_m_s: Floats) -
     first = nearest = int(inside.argmax())
     while nearest + 1 < len(apart_m) and apart_m[nearest + 1] < apart_m[nearest]:
         nearest += 1
-    if part.mission.items[-1].command in _CIRCLES:
+    if flown_in_order(part.mission)[-1].command in _CIRCLES:
         return float(times_s[first] + apart_m[first] / max(float(speed_m_s[first]), 1.0))
     return float(times_s[nearest])
 
@@ -52,13 +53,13 @@ def is_column(part: Part, points: Floats, items: Indices) -> Bools:
     climb_out_m = math.fsum(leg.horizontal_m for leg in climb_out)
     flown_m = np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))
     landing = part.mission.first_seq + len(part.mission.items) - 1
-    glides = (items[:-1] == landing) & (part.mission.items[-1].command == cmd.LAND)
+    glides = (items[:-1] == landing) & (flown_in_order(part.mission)[-1].command == cmd.LAND)
     return np.asarray((flown_m <= climb_out_m) | glides)
 
 
 def is_over(part: Part, places: Sequence[Place], boot_ms: Sequence[int], goal: Place) -> bool:
     """Whether it has been at the end of its flight for `CIRCLES_S`; a landing ends otherwise."""
-    last = part.mission.items[-1].command
+    last = flown_in_order(part.mission)[-1].command
     home = part.mission.home
     end = (home.lat_e7 / 1e7, home.lon_e7 / 1e7, home.amsl_m) if last == cmd.RTL else goal
     if last == cmd.LAND or flat_m(places[-1], end) > reach_m(part):

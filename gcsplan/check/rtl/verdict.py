@@ -164,6 +164,7 @@ class WayHome:
 
     ``route``: whether the returns were judged straight home, or to where they join the mission, behind the wire items
     ``starts``; ``along_path``: along a return path, else to a landing sequence. Altitudes say nothing then.
+    ``path_back``: what a return path along the mission's own track would do, where no altitude is enough; mostly empty.
     """
 
     vehicle: str
@@ -191,6 +192,7 @@ class WayHome:
     route: Route = "straight"
     starts: tuple[int, ...] = ()
     along_path: bool = False
+    path_back: str = ""
 
     @property
     def safe(self) -> bool | None:
@@ -261,6 +263,7 @@ class WayHome:
             "parameter": self.parameter,
             "route": self.route,
             "joins": list(self.starts),
+            "path_back": self.path_back or None,
             "rtl_rel_home_m": self.rtl_rel_home_m,
             "assumed": self.assumed,
             "safe": self.safe,
@@ -297,6 +300,8 @@ class WayHome:
         out: list[tuple[str, str]] = [("judged at", judged_at)]
         if self.advice:
             out.append(("on the vehicle", self.advice))
+        if self.path_back:
+            out.append(("instead", self.path_back))
         out += [(NO_RETURN, UnitText("from {}", s.describe())) for s in worst_first(self.unsafe)]
         if self.irregular:
             first, length = self.irregular[0], together_m((s.from_m, s.to_m) for s in self.irregular)

@@ -103,6 +103,10 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
         items.append(item(cmd.VTOL_LAND if plane else cmd.LAND, last, m.RELATIVE, pad_cm))
     elif order.end == "rtl":
         items.append(MissionItem(cmd.RTL, m.NO_POSITION))
+    if order.return_path:
+        items.append(MissionItem(cmd.DO_RETURN_PATH_START, m.NO_POSITION))
+        items += [item(cmd.WAYPOINT, i, frame, int(cm[i]), radius_m=radius) for i in range(last, -1, -1)]
+        items.append(item(cmd.LAND, 0, m.RELATIVE, 0))
     return Mission(vehicle.autopilot, home, tuple(items), vehicle.name, vehicle.sysid)
 
 

@@ -60,7 +60,8 @@ class Order:
     ``spaced``: drop way points nearer to their neighbours than two acceptance radii. ``hold_s``: seconds to wait in the
     air above the start (the gate) before departure; only multicopters can (`Vehicle.can_hold`). ``gate_utc``: wait
     there until this hour, minute and second of the day, UTC, instead; only ArduCopter can. ``wing``: the ends of a
-    fixed wing's mission, None for aircraft that can hover.
+    fixed wing's mission, None for aircraft that can hover. ``return_path``: behind the end, add a return path back
+    along the track to a landing at home, to which ArduCopter returns by Auto RTL.
     """
 
     end: End = "land"
@@ -70,6 +71,7 @@ class Order:
     hold_s: int = 0
     gate_utc: tuple[int, int, int] | None = None
     wing: Wing | None = None
+    return_path: bool = False
 
 
 def split_legs(points: Floats, world: World) -> Floats:
