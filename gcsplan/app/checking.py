@@ -272,7 +272,10 @@ def _request(opened: OpenWorld, mission: Mission, name: str, world: World) -> Ve
     east, north = (float(x) for x in world.frame.to_plane(*at))
     place = (east, north, world.ground_amsl(*at))
     vehicle = opened.vehicle(re.sub(r"[^A-Za-z0-9_-]", "_", name) or "file", mission.autopilot.value)
-    return VehicleRequest(vehicle, place, place, at, at, rtl_rel_home_m=opened.options.rtl_rel_home_m)
+    options = opened.options
+    return VehicleRequest(
+        vehicle, place, place, at, at, rtl_rel_home_m=options.rtl_rel_home_m, return_route=options.return_route
+    )
 
 
 def _judged(

@@ -23,6 +23,7 @@ from gcsplan.errors import InputError, UsageError
 
 if TYPE_CHECKING:
     from gcsplan.app.checking import Batch, Checked, Returns
+    from gcsplan.mavlink.mission.return_route import Route
     from gcsplan.mission_file.from_options import WorldOptions
     from gcsplan.mission_file.places import Degrees
     from gcsplan.units import Units
@@ -89,6 +90,10 @@ def check(
     rtl_altitude: Annotated[
         Number, typer.Option(metavar="M", help="Above home, at which the vehicle returns (its own parameter).")
     ] = None,
+    return_route: Annotated[
+        str | None,
+        typer.Option(metavar="ROUTE", help="straight home, or by the mission's return path or landing: mission."),
+    ] = None,
     way_home: WayHomeOption = False,
     require_way_home: RequireWayHomeOption = False,
     units: UnitsOption = UnitsName.METRIC,
@@ -131,7 +136,7 @@ def check(
         "--max-amsl": max_amsl, "--clearance": clearance, "--track-error": track_error,
         "--altitude-error": altitude_error, "--max-climb": max_climb, "--max-descent": max_descent,
         "--autopilot": autopilot, "--home": home, "--speed": speed, "--climb-rate": climb_rate,
-        "--descent-rate": descent_rate, "--rtl-altitude": rtl_altitude,
+        "--descent-rate": descent_rate, "--rtl-altitude": rtl_altitude, "--return-route": return_route,
     }  # fmt: skip
     given = {k: v for k, v in given.items() if v not in (None, [])}
     require_html(report)
@@ -197,7 +202,7 @@ def _options(given: dict[str, object]) -> WorldOptions:
     vehicle = under("climb_m_s", "descent_m_s")
     if isinstance(speed := given.get("--speed"), float):
         vehicle["speed_m_s"] = [min(speed, 3.0), speed]
-    zones, rtl = given.get("--zones"), given.get("--rtl-altitude")
+    zones, rtl, route = given.get("--zones"), given.get("--rtl-altitude"), given.get("--return-route")
     home = _home(str(given["--home"])) if "--home" in given else None
     return WorldOptions(
         terrain=under("dem", "vertical_datum", "geoid_grid", "crs", "obstacle_height_m"),
@@ -206,8 +211,15 @@ def _options(given: dict[str, object]) -> WorldOptions:
         vehicle=vehicle,
         home=None if home is None else (home.lat_deg, home.lon_deg),
         rtl_rel_home_m=rtl if isinstance(rtl, float) else None,
+        return_route=_route(route),
         notes=() if home is None or not home.note else (f"--home: {home.note}",),
     )
+
+
+def _route(given: object) -> Route | None:
+    if given in (None, "straight", "mission"):
+        return given
+    raise UsageError(f"--return-route {given}: straight or mission is wanted")
 
 
 def _home(text: str) -> Degrees:

@@ -31,7 +31,7 @@ def say_homes(homes: Mapping[str, WayHome], units: Units) -> None:
     rows = [
         {
             "vehicle": escape(name),
-            f"return at, {unit.symbol}": unit.stated(home.rtl_rel_home_m) + (" (default)" if home.assumed else ""),
+            f"return at, {unit.symbol}": _return_at(home, unit),
             "way home": WORDS[home.safe],
             "unsafe from": Reach(home.no_return_m).text(units) if home.safe is False else "–",
             f"to set, {unit.symbol}": _to_set(home, unit),
@@ -47,6 +47,12 @@ def say_homes(homes: Mapping[str, WayHome], units: Units) -> None:
         if best_m is not None:
             say(f"{words} {unit.symbol} above home: {setting(autopilot, best_m)}")
     say_warnings(homes, units)
+
+
+def _return_at(home: WayHome, unit: Unit) -> str:
+    if home.route == "mission":
+        return "by the mission"
+    return str(unit.stated(home.rtl_rel_home_m)) + (" (default)" if home.assumed else "")
 
 
 def _to_set(home: WayHome, unit: Unit) -> str:

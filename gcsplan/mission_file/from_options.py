@@ -14,6 +14,7 @@ from pathlib import Path
 from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError, Problem
 from gcsplan.figures import counted
+from gcsplan.mavlink.mission.return_route import Route
 from gcsplan.mission_file.airspace.left_out import faults_near, unused_notes, used
 from gcsplan.mission_file.complaints import read_section
 from gcsplan.mission_file.load import TERRAIN_ERROR_M
@@ -38,7 +39,7 @@ OPTIONS = {
     "altitude_error_m": "--altitude-error", "max_climb_deg": "--max-climb", "max_descent_deg": "--max-descent",
     "descent_m_s": "--descent-rate", "dem": "--dem", "vertical_datum": "--vertical-datum", "autopilot": "--autopilot",
     "geoid_grid": "--geoid-grid", "obstacle_height_m": "--obstacle-height", "start": "--home",
-    "rtl_rel_home_m": "--rtl-altitude", "crs": "--crs",
+    "rtl_rel_home_m": "--rtl-altitude", "return_route": "--return-route", "crs": "--crs",
 }  # fmt: skip
 """The option for each key of a mission file."""
 
@@ -56,6 +57,7 @@ class WorldOptions:
     vehicle: Mapping[str, object] = field(default_factory=dict)
     home: tuple[float, float] | None = None
     rtl_rel_home_m: float | None = None
+    return_route: Route | None = None
     terrain_error_m: float = TERRAIN_ERROR_M
     notes: tuple[str, ...] = ()
 

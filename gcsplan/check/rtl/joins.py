@@ -11,7 +11,8 @@
 - The way there is the leg of an ordinary item: straight in space for ArduCopter. To a landing ArduCopter flies level
   since 4.6.
 
-Not judged: jumps, return paths that hold more than way points and a landing, places in the terrain frame.
+Not judged: jumps behind a start or over it, return paths that hold more than way points and a landing, places in the
+terrain frame.
 """
 
 from __future__ import annotations
@@ -89,9 +90,8 @@ def joins_of(mission: Mission, flight: Flight, vehicle: Vehicle, world: World) -
         names = " nor ".join(cmd.command_name(c) for c in LAND_STARTS)
         return Joins(False, (), why_not=(f"the mission holds neither {names}: there is nothing that a return joins",))
     finder = _Finder(mission, flight, vehicle, world)
-    jumps = [k for k, i in enumerate(mission.items, mission.first_seq) if i.command in (cmd.DO_JUMP, cmd.DO_JUMP_TAG)]
-    if jumps:
-        finder.why_not.append(f"item {jumps[0]} jumps: which item a return joins depends on the jumps that are left")
+    if (jump := _jump_at_starts(mission, min(*paths, *landings, len(mission.items)))) is not None:
+        finder.why_not.append(f"item {jump} jumps: what a return joins depends on the jumps that are left")
     for k in paths:
         finder.path(k)
     for k in () if paths else landings:
@@ -103,6 +103,18 @@ def joins_of(mission: Mission, flight: Flight, vehicle: Vehicle, world: World) -
         bool(paths), starts, joins, tuple(dict.fromkeys(finder.why_not)),
         None if past is None else mission.first_seq + past,
     )  # fmt: skip
+
+
+def _jump_at_starts(mission: Mission, first: int) -> int | None:
+    """The wire item of a jump behind the first start, at index ``first``, or from before it to behind it; or None."""
+    seq = mission.first_seq
+    for k, item in enumerate(mission.items):
+        tagged = item.command == cmd.DO_JUMP_TAG
+        if item.command == cmd.DO_JUMP or tagged:
+            target = item.params[0] - seq
+            if k > first or tagged or not target <= first:
+                return seq + k
+    return None
 
 
 @dataclass(eq=False)

@@ -40,6 +40,7 @@ from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.commands import command_name
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.return_route import Route
+from gcsplan.units import UnitText
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World
 
@@ -48,6 +49,9 @@ __all__ = ["RallyPoint", "UnsafeStretch", "WayHome", "way_home"]
 PROFILE_POINTS = 400
 NOISE_M = 1e-3
 """Subtracted from the highest altitude, so that it does not touch what is above it, m."""
+
+MOST_UNKNOWN = 5
+"""Stretches from which a return that joins the mission is not known, that are told."""
 
 RETURNS_BY_ITSELF = "after the last item ArduPlane returns"
 """The beginning of `flight`'s note on the return, which is judged here."""
@@ -101,14 +105,7 @@ def way_home(
     if best_m is None:
         best_m = judged_m if not unsafe else _whole(lowest, highest)
     notes = _notes(vehicle, judged_m, rtl_rel_home_m is None)
-    most_amsl = vehicle.limits.max_amsl_m
-    if most_amsl is not None and lowest is not None and ground + lowest > most_amsl - vehicle.limits.altitude_error_m:
-        most_m = most_amsl - vehicle.limits.altitude_error_m - ground
-        allowed = f"it allows {floored(most_m, 0):.0f} m above home" if most_m > 0.0 else "home is not below it"
-        need = f"the lowest that is clear from all of the path, {raised(lowest, 1):g} m above home"
-        notes.append(f"every clear return altitude rises above max_amsl_m: {need}; {allowed}")
-    if refinement.stopped_early:
-        notes.append("the terrain is too fine to look at all of it closely: unsafe stretches may be drawn too long")
+    notes += _warnings(refinement, vehicle, ground, lowest)
     return WayHome(
         vehicle=vehicle.name,
         autopilot=vehicle.autopilot,
@@ -162,7 +159,8 @@ def _along_mission(
         notes.append("the mission is too long to look at all of it closely: unsafe stretches may be drawn too long")
     return replace(
         home, route="mission", starts=joins.starts, along_path=joins.path, unsafe=found.unsafe,
-        irregular=found.irregular, battery=found.battery, not_judged=known, notes=tuple(notes),
+        irregular=found.irregular, battery=found.battery, notes=tuple(notes),
+        not_judged=(*(UnitText("from {}", s.place_and_why) for s in found.unknown[:MOST_UNKNOWN]), *known),
     )  # fmt: skip
 
 
@@ -254,6 +252,20 @@ def _landing_sequence(mission: Mission) -> list[str]:
         f"item {starts[0]}: {name}: the return leads on to it, by RTL_AUTOLAND; only the flight straight home is "
         f"judged: say return_route: mission for RTL_AUTOLAND 2 or 4, or return_route: straight for 3"
     ]
+
+
+def _warnings(refinement: Refinement, vehicle: Vehicle, ground: float, lowest: float | None) -> list[str]:
+    """What the user must know of the altitudes that were found."""
+    notes = []
+    most_amsl = vehicle.limits.max_amsl_m
+    if most_amsl is not None and lowest is not None and ground + lowest > most_amsl - vehicle.limits.altitude_error_m:
+        most_m = most_amsl - vehicle.limits.altitude_error_m - ground
+        allowed = f"it allows {floored(most_m, 0):.0f} m above home" if most_m > 0.0 else "home is not below it"
+        need = f"the lowest that is clear from all of the path, {raised(lowest, 1):g} m above home"
+        notes.append(f"every clear return altitude rises above max_amsl_m: {need}; {allowed}")
+    if refinement.stopped_early:
+        notes.append("the terrain is too fine to look at all of it closely: unsafe stretches may be drawn too long")
+    return notes
 
 
 def _not_judged(verdict: Verdict, vehicle: Vehicle, judged_m: float, assumed: bool, why: tuple[str, ...]) -> WayHome:

@@ -118,6 +118,20 @@ def test_the_battery_counts_the_way_along_the_path() -> None:
     assert len(short.battery.legs) == len(judge(m, poor, w).legs)
 
 
+def test_rounds_before_a_start_cost_their_energy_and_change_nothing_else() -> None:
+    w = world()
+    m = mission(w, [(0, 0, 80), (3000, 0, 80)], land=False)
+    rounds = Item(cmd.DO_JUMP, NO_POSITION, (2.0, 3.0, 0.0, 0.0))
+    v = replace(vehicle(), energy=Energy(0.0, 100.0, battery_j=1e7, reserve=0.0))
+    once, often = (joined(w, back(replace(m, items=(*m.items, *more))), v) for more in ((), (rounds,)))
+    assert once.safe is True
+    assert often.safe is True, often.describe()
+    assert once.battery is not None
+    assert often.battery is not None
+    # Three more rounds of 3 km out and 3 km back before the last point of the path, from where it flies home.
+    assert often.battery.most_j - once.battery.most_j == pytest.approx(3 * 6000.0 * 100.0, rel=0.02)
+
+
 @pytest.mark.parametrize(
     ("items", "words"),
     [
@@ -126,7 +140,8 @@ def test_the_battery_counts_the_way_along_the_path() -> None:
         ([START, Item(cmd.WAYPOINT, 10, x=366010000, y=-843000000, z=80.0)], "frame"),
         ([START, Item(cmd.WAYPOINT, RELATIVE, x=366010000, y=-843000000, z=80.0)], "does not end with a landing"),
         ([START], "no item that moves"),
-        ([Item(cmd.DO_JUMP, NO_POSITION, (2.0, 1.0, 0.0, 0.0)), START], "jumps"),
+        ([START, Item(cmd.DO_JUMP, NO_POSITION, (2.0, 1.0, 0.0, 0.0))], "jumps"),
+        ([Item(cmd.DO_JUMP, NO_POSITION, (7.0, 1.0, 0.0, 0.0)), START], "jumps"),
     ],
 )
 def test_what_is_not_known_is_not_judged(items: list[Item], words: str) -> None:
@@ -158,7 +173,8 @@ def test_a_plane_swings_wide_where_it_joins() -> None:
     down = replace(m.items[-1], x=ways[-1].x, y=ways[-1].y)
     held = replace(m, items=(*m.items, START, *ways, down))
     short = joined(w, replace(held, items=(*held.items[:-2], replace(down, x=ways[-2].x, y=ways[-2].y))), v)
-    assert "not back on its line before the landing" in short.describe()
+    assert short.safe is None
+    assert "not on its line again before the landing" in short.describe()
     home = joined(w, held, v)
     assert home.safe is True, home.describe()
     assert "RTL_AUTOLAND 4" in home.advice
@@ -167,7 +183,9 @@ def test_a_plane_swings_wide_where_it_joins() -> None:
     away = world(half_m=9000.0, zones=[Zone("tower", Circle(2000.0, 1500.0, 20.0))])
     assert joined(away, held, v).safe is True
     climbs = replace(held, items=(*held.items[:5], *(replace(i, z=600.0) for i in held.items[5:7]), *held.items[7:]))
-    assert joined(w, climbs, v).safe is False  # 450 m of climb on the way back: it is too short for that
+    high = joined(w, climbs, v)  # 450 m of climb on the way back
+    assert high.safe is None
+    assert any("too short for its climb" in words for words in high.not_judged)
 
 
 def _reported(home: WayHome, seq: int, along_m: float, *, legal: bool) -> bool:
