@@ -11,6 +11,7 @@ from gcsplan.world.limits import Limits
 DEFAULT_LEAN_DEG, LARGEST_LEAN_DEG = 30.0, 80.0
 """ArduCopter's largest lean angle: its default, and the most that it accepts."""
 
+COPTER_RETURN_WAITS_S = 5.0  # ArduCopter RTL_LOIT_TIME, default
 LEAN_DEG_PER_M_S = 3.0
 """Lean that an ArduCopter needs for 1 m/s of cruise speed, against its drag: its speed was measured to end near 10 m/s
 with 30° and near 15 m/s with 45°, whatever was commanded. An airframe with less drag is faster."""
@@ -122,6 +123,12 @@ class Vehicle:
     def return_speed_m_s(self) -> float | None:
         """The speed of the autopilot's own return; None: that of the mission."""
         return PX4_RETURN_M_S if self.autopilot is Autopilot.PX4 and math.isfinite(self.accel_m_s2) else None
+
+    @property
+    def return_waits_s(self) -> float:
+        """How long it hovers over home at the end of the autopilot's own return, before it descends."""
+        copter = self.autopilot is Autopilot.ARDUCOPTER and math.isfinite(self.accel_m_s2)
+        return COPTER_RETURN_WAITS_S if copter else 0.0
 
     @property
     def keeps_airspeed(self) -> bool:

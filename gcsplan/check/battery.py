@@ -1,10 +1,10 @@
 """The battery along a mission: what each leg uses, and whether the rest is enough for the return from every point.
 
 The model is R1/R2 (`gcsplan.vehicle.Energy`): a return costs R1 for its climb and its descent and R2 for the straight
-line home and for what the vehicle goes on before it turns home (`rtl.run_on`). Along a straight leg the energy spent is
-linear, and the energy of the return is convex, because the distance to home and the climb to the return's altitude are.
-So their sum exceeds a limit at most on two parts of a leg, one at each end, and bisection finds where it crosses the
-limit, without sampling.
+line home and for what the vehicle goes on before it turns home (`rtl.run_on`), and the power of hovering for the
+seconds over home. Along a straight leg the energy spent is linear, and the energy of the return is convex, because the
+distance to home and the climb to the return's altitude are. So their sum exceeds a limit at most on two parts of a leg,
+one at each end, and bisection finds where it crosses the limit, without sampling.
 """
 
 from __future__ import annotations
@@ -108,7 +108,8 @@ def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m:
         level = rule.level_amsl_m(return_amsl_m, at[2])
         vertical = abs(level - at[2]) + max(level - home[2], 0.0)
         way_m = flat_m(at, home) + (0.0 if stands else more_m(vehicle, vehicle.speed_max_m_s, at[2]))
-        return energy.vertical_j_per_m * vertical + energy.horizontal_j_per_m * way_m
+        waits_j = energy.hover_w * vehicle.return_waits_s
+        return energy.vertical_j_per_m * vertical + energy.horizontal_j_per_m * way_m + waits_j
 
     spent = along = most = 0.0
     most_at, most_m = verdict.legs[0].start, 0.0

@@ -369,6 +369,7 @@ class _Pilot(Aboard):
             fly = self.instead if piece.instead else self.add
             fly(seq, "rtl", piece.start, piece.end, column=piece.column, band_m=piece.band_m, reach_m=piece.reach_m,
                 hold_s=piece.hold_s)  # fmt: skip
+            waits_s=self.vehicle.return_waits_s,
         self.at = pieces[-1].end
         self.landed = True
 

@@ -101,6 +101,7 @@ class Route:
         corners = _flown(self)
         d = np.diff(corners, axis=0)
         held = hold_s + (0.0 if self.holds_s is None else float(self.holds_s.sum()))
+        held += vehicle.return_waits_s if self.end == "rtl" else 0.0
         energy = vehicle.energy
         return (
             energy.vertical_j_per_m * float(np.abs(d[:, 2]).sum())
@@ -170,6 +171,8 @@ class Course:
         if self.after:
             motion.wait(self.goal_s, len(route.points) - 1)
         for stretch in self.after:
+            if route.end == "rtl" and stretch is self.after[-1] and (stretch.start[0, :2] == route.points[0, :2]).all():
+                motion.wait(self.vehicle.return_waits_s, len(route.points))
             motion.go(stretch, speed_m_s, error_m)
         return motion.path(route, arrive_s)
 

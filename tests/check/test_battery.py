@@ -25,6 +25,7 @@ FLAT = world(300.0)
 R1, R2, HOVER = 120.0, 100.0, 400.0
 
 
+WAITS_J = HOVER * 5.0  # over home (RTL_LOIT_TIME)
 MORE_M = 2.0 * (15.0**2 / (2.0 * 2.5) + 1.25)
 """Out and back while a copter brakes from its 15 m/s before it turns home."""
 
@@ -55,9 +56,9 @@ def home_of(v: Verdict, craft: Vehicle, level_rel_home_m: float = 15.0) -> Batte
 
 
 def test_the_point_of_no_return_on_a_straight_way_out() -> None:
-    # Out at 80 m: spent 80·R1 + x·R2, back (x + MORE_M)·R2 + 80·R1.
+    # Out at 80 m: spent 80·R1 + x·R2, back (x + MORE_M)·R2 + 80·R1, and the seconds over home.
     usable = 0.8 * 600_000.0
-    x = (usable - 160.0 * R1 - MORE_M * R2) / (2.0 * R2)
+    x = (usable - 160.0 * R1 - MORE_M * R2 - WAITS_J) / (2.0 * R2)
     plane = craft(600_000.0)
     found = home_of(judge(out(FLAT, (5000.0, 0.0, 80.0)), plane, FLAT), plane)
     assert found.no_return_m == pytest.approx(x, rel=1e-5)
@@ -67,9 +68,9 @@ def test_the_point_of_no_return_on_a_straight_way_out() -> None:
     assert found.short == ((pytest.approx(x, rel=1e-5), pytest.approx(5000.0, rel=1e-5)),)
     # A return needs most at the far end. After the landing there it must climb again to its altitude, by 15 m, but it
     # does not brake.
-    assert found.most_j == pytest.approx(160 * R1 + (5000 + 5000 + MORE_M) * R2, rel=1e-5)
-    assert found.legs[-1].return_j == pytest.approx(5000 * R2 + 2 * 15 * R1, rel=1e-5)
-    assert "point of no return at km 2.26" in found.describe()
+    assert found.most_j == pytest.approx(160 * R1 + (5000 + 5000 + MORE_M) * R2 + WAITS_J, rel=1e-5)
+    assert found.legs[-1].return_j == pytest.approx(5000 * R2 + 2 * 15 * R1 + WAITS_J, rel=1e-5)
+    assert "point of no return at km 2.25" in found.describe()
 
 
 def test_a_battery_that_reaches_has_no_point_of_no_return() -> None:
@@ -105,7 +106,8 @@ def test_a_way_that_leads_back_may_be_short_in_the_middle_alone() -> None:
     found = home_of(verdict, v)
     (part,) = found.short
     # On the leg back, energy spent plus energy of the return stays what it was at the turn.
-    assert part[0] == pytest.approx((0.9 * (160 * R1 + 2 * 3000 * R2) - 160 * R1 - MORE_M * R2) / (2 * R2), rel=1e-4)
+    may = 0.9 * (160 * R1 + 2 * 3000 * R2) - 160 * R1 - MORE_M * R2 - WAITS_J
+    assert part[0] == pytest.approx(may / (2 * R2), rel=1e-4)
     assert part[1] == pytest.approx(6000.0, rel=1e-5)
 
 

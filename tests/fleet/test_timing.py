@@ -202,9 +202,11 @@ def test_a_return_climbs_first_flies_home_level_and_lands() -> None:
     motion = fly(route((0, 0, 100), (600, 0, 100), **more), vehicle(), 10.0)
     climb, home = 20 / 2.5 + 2.5, 600 / 10 + 10 / 1.5
     down = 1.5 + (70 - 1.5**2 / 2 - 1.0) / 1.5 + 1.0 + 20
-    assert motion.end_s - motion.arrive_s == pytest.approx(climb + home + down, rel=1e-9)
+    waits = 5.0  # RTL_LOIT_TIME
+    assert motion.end_s - motion.arrive_s == pytest.approx(climb + home + waits + down, rel=1e-9)
     assert np.array_equal(motion.points[-1], [0, 0, 40])
     assert motion.at(motion.arrive_s + climb + home)[0] == pytest.approx([0, 0, 120])
+    assert motion.at(motion.arrive_s + climb + home + waits)[0] == pytest.approx([0, 0, 120])
     high = fly(route((0, 0, 200), (600, 0, 200), **more), vehicle(), 10.0)  # higher than that: no climb, no descent
     assert high.at(high.arrive_s + home)[0] == pytest.approx([0, 0, 200])
 
@@ -307,7 +309,7 @@ def test_energy_counts_columns_the_way_home_and_hovering() -> None:
     assert way.energy_j(craft) == pytest.approx(10 * (60 + 50 + 60) + 500)
     assert way.energy_j(craft, hold_s=3) == pytest.approx(10 * 170 + 500 + 1200)
     home = replace(way, end="rtl", rtl_amsl_m=200.0, holds_s=np.array([1.0, 0.0]))
-    assert home.energy_j(craft) == pytest.approx(10 * (60 + 50 + 50 + 160) + 1000 + 400)
+    assert home.energy_j(craft) == pytest.approx(10 * (60 + 50 + 50 + 160) + 1000 + 400 + 400 * 5)
 
 
 # -- properties ---------------------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 - ArduCopter (mode_rtl.cpp, ``compute_return_target``): climbs on the spot to the higher of its altitude and RTL_ALT
   (RTL_ALT_M since 4.7; relative to home), flies straight home at that altitude, descends. Within a cone around home it
   climbs less: to RTL_CONE_SLOPE times the distance, at least 2.5 m. RTL_CLIMB_MIN (0) is added to its own altitude.
+  Over home it hovers for RTL_LOIT_TIME (5 s), turning its nose as it was when it armed, before it descends.
 - PX4 (rtl.cpp): the same with RTL_RETURN_ALT (30 m for multicopters, rc.mc_defaults) and RTL_CONE_ANG (45 degrees).
   Later versions have the cone only within RTL_MIN_DIST (10 m) of home and climb fully beyond it; older ones go to
   RTL_DESCEND_ALT within that distance. It flies home at MPC_XY_CRUISE (`Vehicle.return_speed_m_s`). It
@@ -119,10 +120,13 @@ class Piece:
     instead: bool = False
 
 
-def return_pieces(rule: ReturnRule, at: Place, home: Place, return_amsl_m: float, *, about_m: float) -> list[Piece]:
+def return_pieces(
+    rule: ReturnRule, at: Place, home: Place, return_amsl_m: float, *, about_m: float, waits_s: float = 0.0
+) -> list[Piece]:
     """The return from ``at`` to ``home`` (a place on the ground); the last piece ends where the return ends.
 
-    ``about_m``: see `run_on.about_turn_m`. A plane flies home from anywhere that far from ``at``.
+    ``waits_s``: the seconds over home before it descends. ``about_m``: see `run_on.about_turn_m`; a plane flies home
+    from anywhere that far from ``at``.
     """
     lat, lon, ground = home
     level = rule.level_amsl_m(return_amsl_m, at[2])
@@ -144,6 +148,7 @@ def return_pieces(rule: ReturnRule, at: Place, home: Place, return_amsl_m: float
         *([_band(at, home, lowest, level, instead=True)] if lowest < level else []),
         Piece(at, up, column=True),
         Piece(up, over),
+        *([Piece(over, over, hold_s=waits_s)] if waits_s > 0.0 else []),
         Piece(over, (lat, lon, ground), column=True),
     ]
 
