@@ -16,13 +16,19 @@ from gcsplan.app.fencing import own_fence
 from gcsplan.app.option_words import all_in_options, home_in_options, verdict_in_options
 from gcsplan.app.pipeline import world_of
 from gcsplan.app.way_home import home_of, is_required, lets_fly
+from gcsplan.check.arc_waypoint import curve_bulge
 from gcsplan.check.judge import TERRAIN_ERROR_M, judge
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed, InputError, Problem, UsageError
 from gcsplan.mavlink.files.file_items import HAS_PLACE, MissionFileRead
 from gcsplan.mavlink.files.formats import read_mission_file
-from gcsplan.mavlink.mission.commands import LOITER_TIME, LOITER_TO_ALT, LOITER_TURNS, LOITER_UNLIM, SPLINE_WAYPOINT
+from gcsplan.mavlink.mission.commands import (
+    LOITER_TIME,
+    LOITER_TO_ALT,
+    LOITER_TURNS,
+    LOITER_UNLIM,
+)
 from gcsplan.mavlink.mission.mission import NO_POSITION, Home, Mission, MissionItem
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.mission_file.from_options import OpenWorld, WorldOptions
@@ -39,7 +45,6 @@ CIRCLES = frozenset({LOITER_UNLIM, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALT})
 DEFAULT_CIRCLE_M = 150.0
 """Radius of a circle, m, whose own radius is not stated: more than a plane's own circle needs at any altitude."""
 
-SPLINE_BULGE = 0.6
 """A spline's two tangents together are at most four times its length, so it bulges by at most 16/27 of its length."""
 
 
@@ -178,13 +183,12 @@ def places_of(mission: Mission) -> list[tuple[float, float]]:
 
 
 def beyond_m(mission: Mission) -> float:
-    """How far from its places a mission may fly, m: the radius of its widest circle plus the bulge of its splines."""
+    """How far from its places a mission may fly, m: the radius of its widest circle plus the bulge of its curves."""
     circles = [p for i in mission.items if i.command in CIRCLES for p in i.params[1:3]]
     widest = max((min(abs(p), 3000.0) for p in circles if math.isfinite(p)), default=0.0)
-    if any(i.command == SPLINE_WAYPOINT for i in mission.items):
-        extent_m = _extent_m(places_of(mission))
-        # A mission wider than any plane is refused as too far apart later, so it needs no terrain here.
-        widest += SPLINE_BULGE * extent_m if extent_m <= 2.0 * FARTHEST_M else 0.0
+    bulge = max(map(curve_bulge, mission.items), default=0.0)
+    if bulge and (extent_m := _extent_m(places_of(mission))) <= 2.0 * FARTHEST_M:  # a wider mission is refused later
+        widest += bulge * extent_m
     return float(widest) + DEFAULT_CIRCLE_M
 
 
@@ -272,10 +276,8 @@ def _request(opened: OpenWorld, mission: Mission, name: str, world: World) -> Ve
     east, north = (float(x) for x in world.frame.to_plane(*at))
     place = (east, north, world.ground_amsl(*at))
     vehicle = opened.vehicle(re.sub(r"[^A-Za-z0-9_-]", "_", name) or "file", mission.autopilot.value)
-    options = opened.options
-    return VehicleRequest(
-        vehicle, place, place, at, at, rtl_rel_home_m=options.rtl_rel_home_m, return_route=options.return_route
-    )
+    o = opened.options
+    return VehicleRequest(vehicle, place, place, at, at, rtl_rel_home_m=o.rtl_rel_home_m, return_route=o.return_route)
 
 
 def _judged(

@@ -58,7 +58,8 @@ FW_DESCENT = 1.0  # NAV_VTOL_LAND_OPTIONS
 
 
 WHY_LOST = {
-    cmd.ARC_WAYPOINT: "an arc, which only ArduCopter 4.7 and later know",
+    cmd.ARC_WAYPOINT: "an arc is known only for ArduCopter, up to 359°, without terrain frame, with an item after it "
+    "that is no spline, and not from a circle",
     cmd.SPLINE_WAYPOINT: "a spline is known only for ArduCopter, without terrain frame and with an item after it",
     cmd.VTOL_TAKEOFF: "it changes to forward flight after its climb, in a direction that is not known",
     cmd.TAKEOFF: "it comes in the air, or its altitude cannot be told",

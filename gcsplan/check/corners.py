@@ -150,7 +150,7 @@ class _Cutter:
         if self.copter:
             nearby = self._item(after.seq)
             curves = nearby is not None and nearby.command == cmd.SPLINE_WAYPOINT
-            fast = item.command == cmd.WAYPOINT and after.kind == "cruise" and not (stops or curves)
+            fast = item.command in (cmd.WAYPOINT, cmd.ARC_WAYPOINT) and after.kind == "cruise" and not (stops or curves)
             if fast and self.tuning.copter_radius_m > self.limits.track_error_m:
                 self._say(f"corners are cut within {self.tuning.says('WPNAV_RADIUS', self.tuning.copter_radius_m)}")
             return self.tuning.copter_radius_m if fast else 0.0

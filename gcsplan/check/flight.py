@@ -18,7 +18,7 @@ nothing is lost silently. Facts about the autopilots come from ArduPilot's and P
   LOITER_TIME uses WP_LOITER_RAD whatever the item says, and so does a radius of 1 m or less (commands_logic.cpp).
 - LAND with a place flies there level (in terrain frame at its height above ground), then descends. ArduCopter before
   4.6 holds its height above ground wherever it has terrain data: that is judged too.
-- RTL: `rtl.model`. Jumps: `route`. Splines: `spline`.
+- RTL: `rtl.model`. Jumps: `route`. Splines: `spline`. Arcs: `arc_waypoint`.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.check.aboard import Aboard
+from gcsplan.check.arc_waypoint import fly_arc
 from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth, circle_words
 from gcsplan.check.climb_out import REACHED_M, circle_up, climb_out, glide, is_wing
 from gcsplan.check.commands import flown_otherwise, moves_nothing, why_lost
@@ -110,6 +111,9 @@ class _Pilot(Aboard):
             self._go(seq, item, hold_s=self.hold(item))
         elif command == cmd.SPLINE_WAYPOINT:
             self._curve(seq, item)
+        elif command == cmd.ARC_WAYPOINT:
+            if not fly_arc(self, seq, item, self._next(seq)):
+                self._lose(seq, item)
         elif command in (cmd.LOITER_UNLIM, cmd.LOITER_TIME, cmd.LOITER_TURNS):
             self._loiter(seq, item)
         elif command == cmd.LOITER_TO_ALT:
@@ -210,7 +214,8 @@ class _Pilot(Aboard):
         target, after = self.target(item), self._next(seq)
         terrain = any(i is not None and i.frame in (m.TERRAIN, 11) for i in (item, after))
         copter = self.autopilot is Autopilot.ARDUCOPTER
-        if not copter or target is None or terrain or after is None or not (self.airborne and self.known):
+        known = self.airborne and self.known
+        if not copter or target is None or terrain or not known or after is None or after.command == cmd.ARC_WAYPOINT:
             self._lose(seq, item)
             return
         here, arrives = self.at, np.zeros(3)
@@ -364,12 +369,12 @@ class _Pilot(Aboard):
         pieces = return_pieces(
             RULES[self.autopilot], self.at, self.home, self.home[2] + self.rtl_rel_home_m,
             about_m=about_turn_m(self.vehicle, self.pace.speed_m_s, self.at[2], flat_m(self.at, self.home)),
+            waits_s=self.vehicle.return_waits_s,
         )  # fmt: skip
         for piece in pieces:
             fly = self.instead if piece.instead else self.add
             fly(seq, "rtl", piece.start, piece.end, column=piece.column, band_m=piece.band_m, reach_m=piece.reach_m,
                 hold_s=piece.hold_s)  # fmt: skip
-            waits_s=self.vehicle.return_waits_s,
         self.at = pieces[-1].end
         self.landed = True
 

@@ -43,6 +43,7 @@ _STEPS, _WITHIN = 30, 1e-6
 _HALVINGS = 60
 _LEAST_LENGTH_M = 1e-3
 _SAME_S = 1e-9
+_LEVEL = np.array([1.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -51,13 +52,16 @@ class Curved:
 
     ``knots`` (P + 1, 3) are the ends of the parts in metres, ``at`` (P + 1,) where these are: number of the leg plus
     part of the leg. ``way`` (L, 3) are the legs as the autopilot counts them, in metres: a leg that follows the ground
-    is level. ``part_m`` (P,) are the parts' lengths so counted. The speed along a part is at most ``most_m_s`` (P,) and
+    is level. ``begins``, ``ends`` (L, 3) are the directions in which each leg begins and ends; of a curve they differ.
+    ``part_m`` (P,) are the parts' lengths so counted. The speed along a part is at most ``most_m_s`` (P,) and
     at most the cruise speed times ``per_cruise`` (P,). ``owner`` (P,) is the caller's number of each part.
     """
 
     knots: Floats
     at: Floats
     way: Floats
+    begins: Floats
+    ends: Floats
     part_m: Floats
     most_m_s: Floats
     per_cruise: Floats
@@ -128,7 +132,7 @@ class Curved:
         upward = np.full(len(length), self.vehicle.vertical_accel_m_s2)
         accel = along_slope(run, rise, np.full(len(length), FULL_ACCEL * self.vehicle.accel_m_s2), upward, upward)
         flown = curves(length, speed, accel, self.vehicle.leg_jerk_m_s3)
-        turns = _Turns.between(flown, self.way / length[:, None], speed, self.vehicle)
+        turns = _Turns.between(flown, (self.ends, self.begins), speed, self.vehicle)
         overlap = _overlaps(turns)
         slow = np.append(REST_M_S, np.maximum(turns.speed_m_s(overlap), REST_M_S))
         lag = LAG_S * np.maximum(np.log(np.maximum(flown.peak_m_s / slow, 1.0)) - LAG_FROM, 0.0)
@@ -197,16 +201,25 @@ def curved(
     way = p[last] - p[first]
     follows = (last - first > 1)[number] & (run > 0.0)  # parts of a leg that follows the ground
     level = np.where(follows, run / length, 1.0)
-    way[last - first > 1, 2] = 0.0
+    several = last - first > 1
+    way[several, 2] = 0.0
     part_m = length * level
     whole = np.bincount(number, weights=part_m)
     straight = np.linalg.norm(way, axis=1)
     way = np.where((straight > 0.0)[:, None], way, d[last - 1])
     way *= (whole / np.linalg.norm(way, axis=1))[:, None]
+    begins, ends = (_unit(np.where(several[:, None], d[k] * _LEVEL, d[k]), way) for k in (first, last - 1))
     done = np.cumsum(part_m) - np.concatenate([[0.0], np.cumsum(whole)])[number]
     at = np.append(0.0, number + np.minimum(done / whole[number], 1.0))
     at[last] = number[last - 1] + 1.0
-    return Curved(p, at, way, part_m, most * level, per_cruise * level, owner, vehicle)
+    return Curved(p, at, way, begins, ends, part_m, most * level, per_cruise * level, owner, vehicle)
+
+
+def _unit(way: Floats, instead: Floats) -> Floats:
+    """(L, 3) the directions of ``way``; those of ``instead`` where it has no length."""
+    known = np.linalg.norm(way, axis=1) > _LEAST_LENGTH_M
+    course = np.where(known[:, None], way, instead)
+    return np.asarray(course / np.linalg.norm(course, axis=1)[:, None])
 
 
 def _spread(begin: Floats, seconds: Floats, pieces: Indices) -> Floats:
@@ -276,11 +289,15 @@ class _Turns:
     vehicle: Vehicle
 
     @classmethod
-    def between(cls, flown: Curves, course: Floats, speed_m_s: Floats, vehicle: Vehicle) -> _Turns:
-        """The turns between legs ``flown`` along ``course`` (L, 3), which may be as fast as ``speed_m_s`` (L,)."""
-        leg = np.arange(len(course) - 1)
+    def between(cls, flown: Curves, courses: tuple[Floats, Floats], speed_m_s: Floats, vehicle: Vehicle) -> _Turns:
+        """The turns between legs ``flown``, which may be as fast as ``speed_m_s`` (L,).
+
+        ``courses``: the directions in which each leg ends and begins, (L, 3) each.
+        """
+        ends, begins = courses
+        leg = np.arange(len(ends) - 1)
         slower = np.minimum(speed_m_s[:-1], speed_m_s[1:])
-        return cls(flown.of(np.concatenate([leg, leg + 1])), course[:-1], course[1:], slower, vehicle)
+        return cls(flown.of(np.concatenate([leg, leg + 1])), ends[:-1], begins[1:], slower, vehicle)
 
     def of(self, turns: Indices) -> _Turns:
         """The turns with these indices."""

@@ -36,7 +36,7 @@ from gcsplan.sim.board import (
     Refused,
     through_float,
 )
-from gcsplan.sim.firmware import COUNTS_EVERY_LIST, KEEPS_HOME, KEEPS_RADII, Firmware
+from gcsplan.sim.firmware import COUNTS_EVERY_LIST, KEEPS_HOME, KEEPS_RADII, TAKES_ARCS, Firmware
 from gcsplan.sim.misbehaviour import Faults
 
 
@@ -196,7 +196,8 @@ class _ArduPilotList:
             return storage.keep_fence_item(message.item, whole_radii=not self._firmware.has(KEEPS_RADII))
         if self._type == RALLY:
             return storage.keep_rally_item(message.item)
-        kept = storage.keep_mission_item(message.item, plane=self._plane)
+        arcs = self._firmware.has(TAKES_ARCS) and not self._plane
+        kept = storage.keep_mission_item(message.item, plane=self._plane, arcs=arcs)
         if kept.command == cmd.DO_JUMP:
             target, known = kept.params[0], max(len(self._board.lists[MISSION]), self._count)
             if target == 0 or target >= known:

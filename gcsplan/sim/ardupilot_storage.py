@@ -94,6 +94,7 @@ _LOCATED: dict[int, tuple[Keep, Keep, Keep, Keep]] = {
     cmd.CONTINUE_AND_CHANGE_ALT: _FIRST_U16,
     cmd.LOITER_TO_ALT: (_zero, _signed_u16, _zero, _positive),
     cmd.SPLINE_WAYPOINT: _FIRST_U16,  # spline waypoint
+    cmd.ARC_WAYPOINT: (_same, _same, _same, _same),
     cmd.VTOL_TAKEOFF: _NOTHING,
     cmd.VTOL_LAND: _FIRST_U16,
     cmd.GUIDED_ENABLE: _FIRST_U16,
@@ -156,15 +157,15 @@ _FRAMES = {0: GLOBAL, 2: GLOBAL, 5: GLOBAL, 3: RELATIVE, 6: RELATIVE, 10: TERRAI
 _ALT_LIMIT_M = 83_000.0
 
 
-def keep_mission_item(item: MissionItem, *, plane: bool) -> MissionItem:
-    """Return ``item`` as it reads back from a mission. Raises `Refused`."""
+def keep_mission_item(item: MissionItem, *, plane: bool, arcs: bool = False) -> MissionItem:
+    """Return ``item`` as it reads back from a mission; ``arcs``: arc way points are known. Raises `Refused`."""
     allowed = _NAN_ALLOWED.get(item.command, set())
     for index, value in enumerate(item.params):
         if math.isinf(value) or (math.isnan(value) and index not in allowed):
             raise Refused(INVALID_PARAM1 + index)
     if item.command in (0, 1):
         raise Refused(INVALID)
-    if plane and item.command == cmd.SPLINE_WAYPOINT:
+    if (plane and item.command == cmd.SPLINE_WAYPOINT) or (item.command == cmd.ARC_WAYPOINT and not arcs):
         raise Refused(UNSUPPORTED)
     if item.command in _PLACELESS:
         keeps = _PLACELESS[item.command]

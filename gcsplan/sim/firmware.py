@@ -52,6 +52,9 @@ NAMES_UNITS = Change(
     "ATC_ANGLE_MAX, ARMING_SKIPCHK, LAND_SPD_MS, RTL_ALT_M, RTL_ALT_FINAL_M, RTL_SPEED_MS, MAV_GCS_SYSID, MAV_SYSID, "
     "WP_RADIUS_M, WP_SPD, WP_SPD_DN, WP_SPD_UP: metres and degrees",
 )  # fmt: skip
+TAKES_ARCS = Change(
+    ARDUPILOT, (4, 7), "NAV_ARC_WAYPOINT in a copter's mission", "refused: ACK 3", "stored as sent, and flown",
+)  # fmt: skip
 TAKES_ARM_ITEMS = Change(
     PX4, (1, 17), "COMPONENT_ARM_DISARM in a mission", "refused: ACK 3", "stored",
 )  # fmt: skip
@@ -63,7 +66,7 @@ TAKES_AUTOTUNE_ITEMS = Change(
 )  # fmt: skip
 
 CHANGES = (
-    COUNTS_EVERY_LIST, KEEPS_HOME, KEEPS_RADII, NAMES_UNITS,
+    COUNTS_EVERY_LIST, KEEPS_HOME, KEEPS_RADII, NAMES_UNITS, TAKES_ARCS,
     TAKES_ARM_ITEMS, TELLS_MISSION_STATE, TAKES_AUTOTUNE_ITEMS,
 )  # fmt: skip
 

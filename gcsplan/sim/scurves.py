@@ -8,7 +8,7 @@ begin the next leg: from then on both motions are added. This module steps throu
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -34,9 +34,13 @@ HALVINGS = 50
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Leg:
-    """One leg: its start step by step (seconds, acceleration, speed, metres), and how long it keeps its peak speed."""
+    """One leg: its start step by step (seconds, acceleration, speed, metres), and how long it keeps its peak speed.
 
-    way: Floats
+    ``points`` (P, 3): from its beginning, metres; two for a straight leg, more for a curve. ``along_m`` (P,).
+    """
+
+    points: Floats
+    along_m: Floats
     length_m: float
     t: Floats
     accel_m_s2: Floats
@@ -54,20 +58,38 @@ class _Leg:
 
     def at(self, t: Floats) -> Floats:
         """(N, 3) metres flown after ``t`` (N,) seconds."""
-        knots = np.append(self.t, self.time_s - self.t[::-1])
-        gone = np.interp(t, knots, np.append(self.gone_m, self.length_m - self.gone_m[::-1]))
-        return (gone / self.length_m)[:, None] * self.way
+        gone = np.interp(t, *self._knots)
+        return np.stack([np.interp(gone, self.along_m, axis) for axis in self.points.T], axis=1)
+
+    @property
+    def _knots(self) -> tuple[Floats, Floats]:
+        return (
+            np.append(self.t, self.time_s - self.t[::-1]),
+            np.append(self.gone_m, self.length_m - self.gone_m[::-1]),
+        )
+
+    @property
+    def bends_s(self) -> Floats:
+        """Seconds at which it passes its inner points."""
+        seconds, gone = self._knots
+        return np.asarray(np.interp(self.along_m[1:-1], gone, seconds))
+
+    @property
+    def ways(self) -> tuple[Floats, Floats]:
+        """Unit vectors (3,) at its beginning and at its end."""
+        first, last = self.points[1] - self.points[0], self.points[-1] - self.points[-2]
+        return first / np.linalg.norm(first), last / np.linalg.norm(last)
 
 
 def step_legs(
-    corners: Floats, speed_m_s: Floats, accel_m_s2: Floats, kinematics: Kinematics
+    ways: Sequence[Floats], speed_m_s: Floats, accel_m_s2: Floats, kinematics: Kinematics
 ) -> tuple[Floats, Floats, Indices]:
-    """Times (M,), places (M, 3) and legs (M,) of a flight through ``corners`` (L + 1, 3), from rest to rest.
+    """Times (M,), places (M, 3) and legs (M,) of a flight along ``ways``, from rest to rest.
 
+    ``ways``: (P, 3) points of each of L legs, more than two for a curve; each begins where the one before ends.
     ``speed_m_s``, ``accel_m_s2`` (L,) are the most along each leg. The leg of a sample is the one flown up to it; it
     changes in the middle of the turn.
     """
-    ways = np.diff(corners, axis=0)
     legs = [
         _lay_out(way, float(v), float(a), kinematics.leg_jerk_m_s3)
         for way, v, a in zip(ways, speed_m_s, accel_m_s2, strict=True)
@@ -80,7 +102,7 @@ def step_legs(
         turned.append(end - 0.5 * overlap_s)
         slow.append(max(turning_m_s, REST_M_S))
     times = _sample_times(legs, begin, turned)
-    places = np.tile(corners[0], (len(times), 1))
+    places = np.tile(ways[0][0], (len(times), 1))
     for leg, since in zip(legs, begin, strict=True):
         after = int(np.searchsorted(times, since))
         places[after:] += leg.at(times[after:] - since)
@@ -114,7 +136,7 @@ def _sample_times(legs: list[_Leg], begin: list[float], turned: list[float]) -> 
     found = [np.array(turned), np.array([begin[-1] + legs[-1].time_s])]
     for leg, since in zip(legs, begin, strict=True):
         ramp = np.append(np.arange(0.0, leg.start_s, SAMPLE_S), leg.start_s)
-        found += [since + ramp, since + leg.time_s - ramp]
+        found += [since + ramp, since + leg.time_s - ramp, since + leg.bends_s]
     times = np.unique(np.round(np.concatenate(found), 6))
     return np.asarray(times[np.append(True, np.diff(times) > 0.1 * STEP_S)])
 
@@ -125,7 +147,7 @@ def _begins_early(leg: _Leg, after: _Leg, slowest_m_s: float, kinematics: Kinema
     It begins at the first step of the braking at which all is right.
     """
     left = np.arange(min(leg.start_s, after.start_s), 0.0, -STEP_S)
-    into, out = leg.way / leg.length_m, after.way / after.length_m
+    into, out = leg.ways[1], after.ways[0]
 
     def added(of: str, sign: float) -> Floats:
         """(N, 3) what both legs add up to in the middle of each overlap."""
@@ -146,10 +168,11 @@ def _begins_early(leg: _Leg, after: _Leg, slowest_m_s: float, kinematics: Kinema
 
 
 def _lay_out(way: Floats, speed_m_s: float, accel_m_s2: float, jerk_m_s3: float) -> _Leg:
-    length_m = float(np.linalg.norm(way))
+    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1)))
+    length_m = float(along[-1])
     t, accel, speed, gone = _start(length_m, speed_m_s, accel_m_s2, jerk_m_s3)
     level_s = max(length_m - 2.0 * float(gone[-1]), 0.0) / float(speed[-1])
-    return _Leg(way, length_m, t, accel, speed, gone, level_s)
+    return _Leg(way - way[0], along, length_m, t, accel, speed, gone, level_s)
 
 
 @lru_cache(maxsize=256)

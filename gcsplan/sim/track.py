@@ -343,11 +343,15 @@ def _curves(line: _Line, corners: Floats, stretches: Sequence[Stretch], kinemati
         leg_limits(cut(a, b), b - a, s, kinematics)
         for a, b, s in zip(corners[:-1], corners[1:], stretches, strict=True)
     ]
-    times, places, leg = step_legs(corners, np.array([v for v, _ in most]), np.array([a for _, a in most]), kinematics)
+    first = [0, *(k for k in range(1, len(stretches)) if terrain or stretches[k].seq != stretches[k - 1].seq)]
+    ends = [*first[1:], len(stretches)]  # chords of one curve are one leg
+    ways = [corners[a : b + 1] for a, b in zip(first, ends, strict=True)]
+    speed, accel = (np.minimum.reduceat(np.array([one[n] for one in most]), first) for n in (0, 1))
+    times, places, leg = step_legs(ways, speed, accel, kinematics)
     for k in range(1, len(times)):
         parts = cut(places[k - 1], places[k])[1:]
         for to in parts:
-            line.add_timed(to, stretches[leg[k]], (times[k] - times[k - 1]) / len(parts))
+            line.add_timed(to, stretches[first[leg[k]]], (times[k] - times[k - 1]) / len(parts))
 
 
 def _over_ground(line: _Line, to: Floats, s: Stretch, kinematics: Kinematics, corner_m_s: float, world: World) -> None:

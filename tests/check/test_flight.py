@@ -96,8 +96,9 @@ def test_a_landing_elsewhere_flies_there_level_first() -> None:
 
 def test_rtl_climbs_returns_straight_and_lands_at_home() -> None:
     flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), MissionItem(cmd.RTL, 2), rtl_rel_home_m=120)
-    up, back, down = flight.stretches[-3:]
+    up, back, waits, down = flight.stretches[-4:]
     assert (up.column, back.column, down.column) == (True, False, True)
+    assert (waits.start, waits.hold_s) == (back.end, 5.0)  # RTL_LOIT_TIME
     assert up.end[2] == GROUND_M + 120 == back.end[2]
     assert down.end == (36.6, -84.3, GROUND_M)
 
@@ -403,7 +404,6 @@ def test_a_command_that_is_not_judged_is_named_with_the_reason() -> None:
     for command, words in (
         (cmd.PAYLOAD_PLACE, "payload place: it descends until it feels the ground"),
         (cmd.DO_AUX_FUNCTION, "auxiliary function: a switch may change the flight mode"),
-        (cmd.ARC_WAYPOINT, "arc waypoint: an arc, which only ArduCopter 4.7 and later know"),
     ):
         flight = fly(TAKEOFF, MissionItem(command, 3, (1.0, 0.0, 0.0, 0.0), TAKEOFF.x + 9000, TAKEOFF.y, 80.0))
         assert flight.not_judged == [f"item 2: what arducopter flies for command {command} is not judged: {words}"]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.lib.stride_tricks import sliding_window_view
 
 from gcsplan.arrays import Floats
 from gcsplan.fleet.curved import CORNER_M, Curved
@@ -56,7 +57,9 @@ def test_the_built_in_simulator_flies_as_a_real_arducopter_flew(flight: dict[str
     high = 0.5 * (points[1:, 2] + points[:-1, 2])
     speed = [kinematics.leaning_m_s(*each) for each in zip(rise / length, high, most, strict=True)]
     accel = np.minimum(2.5 * length / run, 1.0 * length / np.abs(rise + 1e-12))
-    times, _, leg = step_legs(points, np.array(speed), accel, kinematics)
+    times, _, leg = step_legs(
+        [*sliding_window_view(points, 2, axis=0).swapaxes(1, 2)], np.array(speed), accel, kinematics
+    )
     reached = np.append(times[1:][np.diff(leg) > 0], times[-1])
     assert len(reached) == len(flight["reached_s"])
     assert abs(times[-1] - flight["reached_s"][-1]) < max(0.35, 0.001 * times[-1])
@@ -70,7 +73,9 @@ def test_the_flight_takes_as_long_and_is_in_the_same_places_as_curves_stepped_in
     run, rise, length = np.hypot(way[:, 0], way[:, 1]), way[:, 2], np.linalg.norm(way, axis=1)
     speed = np.minimum(speed_m_s * length / run, np.where(rise > 0, 2.5, 1.5) * length / np.abs(rise))
     accel = np.minimum(2.5 * length / run, 1.0 * length / np.abs(rise))
-    times, places, _ = step_legs(points, speed, accel, Kinematics.of(COPTER))
+    times, places, _ = step_legs(
+        [*sliding_window_view(points, 2, axis=0).swapaxes(1, 2)], speed, accel, Kinematics.of(COPTER)
+    )
     stretch = through(points)
     assert stretch.time_s(speed_m_s) == pytest.approx(times[-1], abs=0.05)
     at, there, _ = stretch.motion(speed_m_s, 0.02)

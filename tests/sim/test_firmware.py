@@ -48,6 +48,17 @@ def test_a_request_right_past_the_end(version: str, legacy: bool, answers: dict[
         assert say(vehicle, Request(2, kind, legacy=legacy)) == answers[kind]
 
 
+@pytest.mark.parametrize(
+    ("autopilot", "version", "code"), [(COPTER, "4.6", 3), (COPTER, "4.7", 0), (PLANE, "4.6", 3), (PLANE, "4.7", 3)]
+)
+def test_only_a_copter_since_4_7_takes_arcs(autopilot: Autopilot, version: str, code: int) -> None:
+    vehicle = a_vehicle(autopilot, version)
+    arc = MissionItem(36, 3, (-120.0, 0, 0, 0), 366_000_000, -843_800_000, 60.0)
+    assert upload(vehicle, [waypoint(0), arc]) == Ack(code)
+    if code == 0:
+        assert download(vehicle)[1] == arc
+
+
 def test_farther_past_the_end_of_a_fence_is_a_bad_sequence_in_both() -> None:
     assert say(filled("4.6"), Request(3, FENCE)) == [Ack(13, FENCE)]
     assert say(filled("4.7"), Request(3, FENCE)) == [Count(2, FENCE), Ack(13, FENCE)]
