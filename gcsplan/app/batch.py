@@ -21,7 +21,7 @@ from gcsplan.app import outputs
 from gcsplan.app.executor import Executor
 from gcsplan.app.model import Plan
 from gcsplan.app.pipeline import plan, require_passing
-from gcsplan.errors import GcsplanError, InputError, UsageError
+from gcsplan.errors import GcsplanError, InputError, NoMission, UsageError
 from gcsplan.export.outdir import retire_outputs, settle_outputs, write_outputs, write_whole
 from gcsplan.mission_file.read_files import files_of
 from gcsplan.mission_file.samples import file_of, is_sample
@@ -59,7 +59,8 @@ class Record:
     """The result of one mission: a row for each vehicle (one without a vehicle if there is no mission), and tracks.
 
     ``code`` is the exit code that `plan` would end with; ``files`` are the outputs, name to text, empty if they are on
-    disk already. ``tracks`` are lists of [latitude, longitude], one for each vehicle.
+    disk already. ``tracks`` are lists of [latitude, longitude], one for each of the first rows; the vehicles of the
+    other rows are left out.
     """
 
     mission: str
@@ -137,7 +138,7 @@ class Batch:
             record = Record(name, given["key"], given["code"], tuple(given["rows"]), tuple(given["tracks"]))
         except (OSError, ValueError, KeyError, TypeError):
             return None
-        if record.code == 0 and not (self.directory / name / "summary.json").is_file():
+        if record.tracks and not (self.directory / name / "summary.json").is_file():
             return None
         return record
 
@@ -193,7 +194,9 @@ def record_of(options: BatchOptions, item: tuple[str, str]) -> Record:
     except Exception as why:  # a bug of ours in one mission must not cost the others
         words = f"internal error, a bug in gcsplan: {type(why).__name__}: {why}"
         return Record(name, key, 70, (_refusal(name, 70, "internal", words),))
-    return Record(name, key, 0, tuple(_rows(name, files["summary.json"])), tuple(_tracks(planned)), files)
+    out = [_refusal(name, NoMission.exit_code, v.reason, v.message, v.name) for v in planned.left_out]
+    code = NoMission.exit_code if out else 0
+    return Record(name, key, code, (*_rows(name, files["summary.json"]), *out), tuple(_tracks(planned)), files)
 
 
 COLUMNS = (
@@ -204,9 +207,9 @@ COLUMNS = (
 """The columns of the table of results."""
 
 
-def _refusal(name: str, code: int, reason: str, message: str) -> dict[str, Any]:
+def _refusal(name: str, code: int, reason: str, message: str, vehicle: str = "") -> dict[str, Any]:
     verdict = {3: "no mission", 4: "not safe"}.get(code, "error")
-    return {"mission": name, "vehicle": "", "code": code, "verdict": verdict, "reason": reason, "message": message}
+    return {"mission": name, "vehicle": vehicle, "code": code, "verdict": verdict, "reason": reason, "message": message}
 
 
 def _rows(name: str, summary: str) -> list[dict[str, Any]]:

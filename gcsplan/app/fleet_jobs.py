@@ -12,10 +12,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from gcsplan.app.executor import Executor
+from gcsplan.app.leaving_out import LeavingOut
 from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.refusals import plan_or_explain
 from gcsplan.check.verdict import Verdict
-from gcsplan.errors import GcsplanError, InputError
+from gcsplan.errors import GcsplanError, InputError, NoMission
 from gcsplan.mavlink.build.order import Order
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file.load import load_content
@@ -67,12 +68,18 @@ def world_of(source: MissionFile) -> World:
 
 
 def planned_by(
-    workers: Executor, brief: Brief, planner: str, told: Callable[[str, int], None] | None = None
+    workers: Executor,
+    brief: Brief,
+    planner: str,
+    told: Callable[[str, int], None] | None = None,
+    leaving: LeavingOut | None = None,
 ) -> list[VehiclePlan]:
     """Every vehicle's own plan, in the file's order; ``told(vehicle, count)`` is called as each is done.
 
-    Raises what planning one after the other would raise: InputError, NoMission of the first vehicle that has none.
+    Raises what planning one after the other would raise: InputError, NoMission of the first vehicle that has none,
+    unless ``leaving`` may leave it out.
     """
+    leaving = leaving or LeavingOut(allowed=False)
     source = brief.source
     assert source.content is not None
     asked = Asked(source.content, source.inputs, planner, brief.objective, brief.seed, dict(brief.options))
@@ -87,9 +94,13 @@ def planned_by(
             refused[number] = answer
         if told is not None:
             told(names[number], len(answers) + len(refused))
-        if refused and all(k in answers for k in range(min(refused))):
-            raise refused[min(refused)]
-    return [_restored(brief, k, answers[k]) for k in range(len(names))]
+        fatal = [k for k, why in refused.items() if not (leaving.allowed and isinstance(why, NoMission))]
+        if fatal and all(k in answers or k in refused for k in range(min(fatal))):
+            raise refused[min(fatal)]
+    for number, why in sorted(refused.items()):
+        if isinstance(why, NoMission):
+            leaving.leave(names[number], why)
+    return [_restored(brief, k, answers[k]) for k in sorted(answers)]
 
 
 def answer_of(asked: Asked, name: str) -> Answer | GcsplanError:

@@ -16,6 +16,7 @@ import numpy as np
 from gcsplan.app.climb_out import circling_m, climb_out_and_glide
 from gcsplan.app.detours import Detours
 from gcsplan.app.gate import SLACK_S, GateTime, gated
+from gcsplan.app.leaving_out import LeavingOut, least_to_leave
 from gcsplan.app.model import Brief, FleetPlan, VehiclePlan
 from gcsplan.app.planning import rebuilt
 from gcsplan.check.clock import over_ground, pace_over_ground
@@ -27,7 +28,7 @@ from gcsplan.mission_file import ArrivalRequest
 from gcsplan.world.world import World
 
 if TYPE_CHECKING:
-    from gcsplan.fleet.separation import Conflict, Place, Rules
+    from gcsplan.fleet.separation import Conflict, Place, Rules, Separation
 
 LATER_S = 600.0
 """Seconds by which all arrivals may be delayed to keep a fleet apart, if the mission file sets no arrival time."""
@@ -38,47 +39,44 @@ __all__ = ["crew_of", "fleet_of", "route_of"]
 
 
 def fleet_of(
-    vehicles: Sequence[VehiclePlan], brief: Brief, gate: GateTime | None = None
+    vehicles: Sequence[VehiclePlan], brief: Brief, gate: GateTime | None = None, leaving: LeavingOut | None = None
 ) -> tuple[tuple[VehiclePlan, ...], FleetPlan]:
     """The vehicles' missions with their speeds and gates, and the fleet's time table.
 
     With ``gate`` every vehicle waits in the air until its own second of the day. Raises NoMission: ``time`` if they
-    cannot arrive as requested, ``separation`` if they cannot keep apart.
+    cannot arrive as requested, ``separation`` if they cannot keep apart; with ``leaving`` such vehicles may be left
+    out, and the results are those of the others.
     """
     world, arrival = brief.world, brief.source.arrival
+    leaving = leaving or LeavingOut(allowed=False)
     crews = [crew_of(v, world) for v in vehicles]
     notes: list[str] = []
     if arrival is None:
         plan = schedule(crews, "none")
     else:
         detours = Detours(vehicles, brief, rules_of(arrival, vehicles), lambda v: route_of(v, world))
-        plan, notes = _scheduled(crews, arrival, detours)
-        if len(vehicles) > 1:
-            plan = _kept_apart(plan, vehicles, crews, brief, arrival, detours)
-        vehicles = [detours.plan_of(v.name, plan.of(v.name).route) for v in vehicles]
+        plan, notes = _scheduled(crews, arrival, detours, leaving)
+        if len(plan.slots) > 1:
+            plan = _kept_apart(plan, vehicles, crews, brief, arrival, detours, leaving)
+        placed = {slot.name: slot for slot in plan.slots}
+        vehicles = [detours.plan_of(v.name, placed[v.name].route) for v in vehicles if v.name in placed]
         crews = [crew_of(v, world) for v in vehicles]
-    slots = [plan.of(v.name) for v in vehicles]
-    opens: list[int | None] = [None] * len(slots)
-    if gate is not None:
-        with_gates = gated(crews, slots)
-        slots, opens = [slot for slot, _ in with_gates], [opens_s for _, opens_s in with_gates]
-    flown = tuple(
-        rebuilt(
-            v, brief, speed_m_s=slot.speed_m_s, hold_s=slot.hold_s,
-            gate_utc=None if gate is None or opens_s is None else gate.of_day(opens_s),
-        )
-        for v, slot, opens_s in zip(vehicles, slots, opens, strict=True)
-    )  # fmt: skip
-    motions = tuple(_motion(v, slot, world) for v, slot in zip(flown, slots, strict=True))
-    found = None
-    if len(flown) > 1:
-        from gcsplan.fleet.separation import separation  # imported here because most plans have one vehicle
-
-        found = separation(motions, rules_of(arrival, flown))
+    flown, slots = _timed(vehicles, crews, plan, brief, gate, leaving)
+    leaving.require_some(flown)
+    motions = [_motion(v, slot, world) for v, slot in zip(flown, slots, strict=True)]
+    found = _separation(motions, flown, arrival)
+    if found is not None and not found.safe and arrival is not None:
+        # The missions as built are what is flown, so this check decides.
+        if not leaving.allowed:
+            raise NoMission(_conflict_text(found.conflicts, world), reason="separation")
+        leave = least_to_leave(found.conflicts)
+        for name, conflict in leave.items():
+            leaving.leave(name, NoMission(_conflict_text([conflict], world), reason="separation"))
+        rows = [k for k, v in enumerate(flown) if v.name not in leave]
+        flown, slots, motions = [flown[k] for k in rows], [slots[k] for k in rows], [motions[k] for k in rows]
+        found = _separation(motions, flown, arrival)
     if found is not None:
         notes += found.notes
-        if not found.safe and arrival is not None:  # the missions as built are what is flown, so this check decides
-            raise NoMission(_conflict_text(found.conflicts, world), reason="separation")
         if not found.safe:
             notes.append(
                 f"the file asks for no `arrival`, so nothing keeps the vehicles apart; released together, "
@@ -89,8 +87,49 @@ def fleet_of(
             f"the gates open from T+0 = {gate.start:%Y-%m-%d %H:%M:%S} UTC on: a vehicle that comes to its gate after "
             f"its second waits there for nearly a day; release each by its time, {SLACK_S:g} s are to spare"
         )
-    start = None if gate is None else gate.start
-    return flown, FleetPlan(plan.mode, plan.order, plan.interval_s, tuple(slots), motions, found, tuple(notes), start)
+    names = {v.name for v in flown}
+    order = tuple(name for name in plan.order if name in names)
+    return tuple(flown), FleetPlan(
+        plan.mode, order, plan.interval_s, tuple(slots), tuple(motions), found, tuple(notes),
+        None if gate is None else gate.start,
+    )  # fmt: skip
+
+
+def _separation(
+    motions: Sequence[TimedPath], flown: Sequence[VehiclePlan], arrival: ArrivalRequest | None
+) -> Separation | None:
+    if len(flown) < 2:
+        return None
+    from gcsplan.fleet.separation import separation  # imported here because most plans have one vehicle
+
+    return separation(motions, rules_of(arrival, flown))
+
+
+def _timed(
+    vehicles: Sequence[VehiclePlan],
+    crews: Sequence[Crew],
+    plan: Schedule,
+    brief: Brief,
+    gate: GateTime | None,
+    leaving: LeavingOut,
+) -> tuple[list[VehiclePlan], list[Slot]]:
+    """Every vehicle's mission with its speed and gate, and its slot."""
+    placed = {slot.name: slot for slot in plan.slots}
+    slots = [placed[v.name] for v in vehicles]
+    opens: list[int | None] = [None] * len(slots)
+    if gate is not None:
+        with_gates = gated(crews, slots)
+        slots, opens = [slot for slot, _ in with_gates], [opens_s for _, opens_s in with_gates]
+    flown, kept = [], []
+    for v, slot, opens_s in zip(vehicles, slots, opens, strict=True):
+        at = None if gate is None or opens_s is None else gate.of_day(opens_s)
+        try:
+            flown.append(rebuilt(v, brief, speed_m_s=slot.speed_m_s, hold_s=slot.hold_s, gate_utc=at))
+        except NoMission as why:
+            leaving.leave(v.name, why)
+        else:
+            kept.append(slot)
+    return flown, kept
 
 
 def crew_of(v: VehiclePlan, world: World) -> Crew:
@@ -151,28 +190,35 @@ def rules_of(arrival: ArrivalRequest | None, vehicles: Sequence[VehiclePlan]) ->
     )
 
 
-def _scheduled(crews: Sequence[Crew], arrival: ArrivalRequest, detours: Detours) -> tuple[Schedule, list[str]]:
+def _scheduled(
+    crews: Sequence[Crew], arrival: ArrivalRequest, detours: Detours, leaving: LeavingOut
+) -> tuple[Schedule, list[str]]:
     """The requested schedule, and notes on it.
 
     If the file does not set `clock`, the first vehicle's clock is tried, then that of the whole fleet.
     """
+    names = {c.name for c in crews}
 
-    def by_clock(clock: Literal["first", "fleet"]) -> Schedule:
-        return schedule(
+    def by_clock(clock: Literal["first", "fleet"], *, leave_out: bool) -> Schedule:
+        plan = schedule(
             crews, arrival.mode,
-            order="best" if arrival.best_order else arrival.order,
+            order="best" if arrival.best_order else [name for name in arrival.order if name in names],
             interval_s=arrival.interval_s, hold=arrival.hold, clock=clock, arrive_s=arrival.arrive_s,
-            longer=detours.longer,
+            longer=detours.longer, leave_out=leave_out,
         )  # fmt: skip
+        for why in plan.left_out:
+            leaving.leave(why.vehicle, why)
+        return plan
 
+    open_clock = arrival.clock is None and arrival.arrive_s is None and arrival.mode == "sequence"
     try:
-        return by_clock(arrival.clock or "first"), []
+        return by_clock(arrival.clock or "first", leave_out=leaving.allowed and not open_clock), []
     except NoSchedule:
-        if arrival.clock is not None or arrival.arrive_s is not None or arrival.mode != "sequence":
+        if not open_clock:
             raise
-    plan = by_clock("fleet")
+    plan = by_clock("fleet", leave_out=leaving.allowed)
     first = plan.slots[0]
-    early_s = min(c.fast_s for c in map(Craft, crews) if c.name == first.name)
+    early_s = min(Craft(c).fast_s for c in crews if c.name == first.name)
     return plan, [
         f"{first.name}, the first, arrives at {first.arrive_s:.1f} s instead of {early_s:.1f} s, so that the others "
         f"can follow {plan.interval_s:g} s apart (clock: fleet)"
@@ -186,18 +232,22 @@ def _kept_apart(
     brief: Brief,
     arrival: ArrivalRequest,
     detours: Detours,
+    leaving: LeavingOut,
 ) -> Schedule:
     """The schedule with its conflicts resolved by departures, speeds, holds or other paths."""
     from gcsplan.fleet.resolve import resolve  # imported here because most plans have one vehicle
 
     settled = resolve(
         plan, crews, rules_of(arrival, vehicles),
-        priority=arrival.order if brief.by_priority else None,
+        priority=[name for name in arrival.order if name in plan.order] if brief.by_priority else None,
         hold=arrival.hold,
         later_s=0.0 if arrival.arrive_s is not None else LATER_S,
         replan=detours,
         where=lambda place: words_of(brief.world, place),
+        leave_out=leaving.allowed,
     )  # fmt: skip
+    for why in settled.left_out:
+        leaving.leave(why.vehicle, why)
     return settled.schedule
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from typing import TYPE_CHECKING
 
+from gcsplan.app.leaving_out import LeftOut
 from gcsplan.check.verdict import Verdict
 from gcsplan.fleet.arrival import Slot
 from gcsplan.fleet.motion import TimedPath
@@ -100,7 +101,7 @@ class FleetPlan:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A planned mission file. ``planner`` is the one that was used."""
+    """A planned mission file. ``planner`` is the one that was used, ``left_out`` are vehicles without a mission."""
 
     source: MissionFile
     world: World
@@ -110,3 +111,4 @@ class Plan:
     vehicles: tuple[VehiclePlan, ...]
     notes: tuple[str, ...] = ()
     fleet: FleetPlan | None = None
+    left_out: tuple[LeftOut, ...] = ()

@@ -120,6 +120,7 @@ def summary_of(plan: Plan, results: Sequence[JobResult] = (), homes: Homes = Map
             for v in plan.vehicles
         ],
         "fleet": _fleet(plan),
+        "left_out": [v.as_dict() for v in plan.left_out],
         "notes": list(dict.fromkeys(plan.notes)),
     }
 

@@ -17,11 +17,12 @@ from gcsplan.app.executor import Inline, executor
 from gcsplan.app.fleet_jobs import PIECE_S, planned_by, world_of
 from gcsplan.app.fleet_planning import fleet_of
 from gcsplan.app.gate import GateTime
+from gcsplan.app.leaving_out import LeavingOut
 from gcsplan.app.model import Brief, FleetPlan, Plan, VehiclePlan
 from gcsplan.app.planning import over_one_terrain
 from gcsplan.app.refusals import plan_or_explain
 from gcsplan.check.verdict import Verdict
-from gcsplan.errors import CheckFailed, InputError
+from gcsplan.errors import CheckFailed, InputError, NoMission
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.planners.problem import Progress
 from gcsplan.planners.registry import VOLUME_KEYS
@@ -41,6 +42,7 @@ def plan(
     progress: Callable[[str, Progress], None] | None = None,
     jobs: int | None = 1,
     cluster: Any = None,
+    leave_out: bool | None = None,
 ) -> Plan:
     """Plan every vehicle of a mission; nothing is written or sent.
 
@@ -53,6 +55,9 @@ def plan(
     address of a dask scheduler or a ``distributed.Client``; the plan is the same to the byte. A few vehicles are
     planned in this process, for processes take seconds to start. A script that asks for processes needs
     ``if __name__ == "__main__":``.
+
+    ``leave_out``: a vehicle without a mission is left out, and the others are planned; ``left_out`` of the plan names
+    those, and says why. Otherwise, the first such vehicle refuses the whole (None: as the mission's ``arrival`` says).
 
     Returns a `Plan`, whose ``vehicles`` are in the mission's order. In each of them, ``solution.path.points`` is the
     path, (N, 3) float64: east_m and north_m in the mission's plane, and amsl_m. ``mission`` holds the items as they are
@@ -84,15 +89,20 @@ def plan(
     merged = _options(source, name) | dict(options or {})
     by_priority = bool(entry.optimiser) and (merged.get("cost") or entry.defaults.get("cost")) == "msfoa"
     brief = Brief(source, world_of(source), entry.plan, goal, number, merged, by_priority and len(source.vehicles) > 1)
-    brief, vehicles = over_one_terrain(brief, _planned(brief, name, progress, jobs, cluster), progress)
+    if leave_out is None:
+        leave_out = source.arrival is not None and source.arrival.leave_out
+    leaving = LeavingOut(allowed=leave_out)
+    vehicles = _planned(brief, name, progress, jobs, cluster, leaving)
+    brief, vehicles = over_one_terrain(brief, vehicles, progress, leaving)
+    leaving.require_some(vehicles)
     source = brief.source
-    flown, fleet = fleet_of(vehicles, brief, None if gate_utc is None else GateTime(gate_utc))
+    flown, fleet = fleet_of(vehicles, brief, None if gate_utc is None else GateTime(gate_utc), leaving)
     require_within_hours(source, flown, fleet)
     notes = list(source.notes)
     if len(flown) > 1 and source.arrival is None:
         notes.append("the file asks for no `arrival`: the separation between vehicles is not judged")
     notes += fleet.notes
-    return Plan(source, brief.world, name, goal, number, flown, tuple(notes), fleet)
+    return Plan(source, brief.world, name, goal, number, flown, tuple(notes), fleet, tuple(leaving.found))
 
 
 def require_within_hours(source: MissionFile, flown: Sequence[VehiclePlan], fleet: FleetPlan) -> None:
@@ -113,11 +123,12 @@ def require_within_hours(source: MissionFile, flown: Sequence[VehiclePlan], flee
 
 
 def _planned(
-    brief: Brief, planner: str, progress: Callable[[str, Progress], None] | None, jobs: int | None, cluster: Any
-) -> list[VehiclePlan]:
+    brief: Brief, planner: str, progress: Callable[[str, Progress], None] | None, jobs: int | None, cluster: Any,
+    leaving: LeavingOut,
+) -> list[VehiclePlan]:  # fmt: skip
     """Every vehicle's own plan, in this process or by workers. By priority each needs those before it."""
     if brief.by_priority:
-        return _one_by_one(brief, progress)
+        return _one_by_one(brief, progress, leaving)
     count = len(brief.source.vehicles)
     begun_s = time.perf_counter()
 
@@ -127,11 +138,13 @@ def _planned(
 
     with executor(jobs, cluster, pieces=count, piece_s=PIECE_S) as workers:
         if isinstance(workers, Inline):
-            return _one_by_one(brief, progress)
-        return planned_by(workers, brief, planner, told)
+            return _one_by_one(brief, progress, leaving)
+        return planned_by(workers, brief, planner, told, leaving)
 
 
-def _one_by_one(brief: Brief, progress: Callable[[str, Progress], None] | None) -> list[VehiclePlan]:
+def _one_by_one(
+    brief: Brief, progress: Callable[[str, Progress], None] | None, leaving: LeavingOut
+) -> list[VehiclePlan]:
     """Every vehicle's own plan, in the file's order. By priority (MSFOA), each knows the paths before it."""
     requests = {r.vehicle.name: r for r in brief.source.vehicles}
     arrival = brief.source.arrival
@@ -143,8 +156,11 @@ def _one_by_one(brief: Brief, progress: Callable[[str, Progress], None] | None) 
         if brief.by_priority:
             earlier = tuple(plan.solution.path.points for plan in plans.values())
             more = {"earlier": earlier, "speed_m_s": request.vehicle.speed_max_m_s}
-        plans[name] = plan_or_explain(brief, request, report, options=more)
-    return [plans[name] for name in requests]
+        try:
+            plans[name] = plan_or_explain(brief, request, report, options=more)
+        except NoMission as why:
+            leaving.leave(name, why)
+    return [plans[name] for name in requests if name in plans]
 
 
 def _options(source: MissionFile, planner: str) -> dict[str, object]:

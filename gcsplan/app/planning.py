@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from gcsplan.app.leaving_out import LeavingOut
 from gcsplan.app.margins import larger, on_path
 from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.problems import built, looked_over, make_problem, run_planner, unsafe
@@ -100,9 +101,13 @@ def _both_ways(request: VehicleRequest, altitude_frame: str) -> VehicleRequest:
 
 
 def over_one_terrain(
-    brief: Brief, vehicles: Sequence[VehiclePlan], progress: Callable[[str, Progress], None] | None = None
+    brief: Brief,
+    vehicles: Sequence[VehiclePlan],
+    progress: Callable[[str, Progress], None] | None = None,
+    leaving: LeavingOut | None = None,
 ) -> tuple[Brief, list[VehiclePlan]]:
     """Judge all vehicles over the widest terrain that any of them needed; replan those that fail there."""
+    leaving = leaving or LeavingOut(allowed=False)
     wide = widest(brief, vehicles)
     out = []
     for v in vehicles:
@@ -114,7 +119,10 @@ def over_one_terrain(
             out.append(replace(v, mission=mission, verdict=verdict, brief=wide))
             continue
         report = None if progress is None else lambda what, who=v.name: progress(who, what)
-        out.append(plan_vehicle(wide, v.request, report))
+        try:
+            out.append(plan_vehicle(wide, v.request, report))
+        except NoMission as why:
+            leaving.leave(v.name, why)
     return wide, out
 
 

@@ -19,6 +19,9 @@ from gcsplan.sim.outcome import Rehearsal
 from gcsplan.sim.trace import Trace
 from gcsplan.units import METRIC, Units
 
+MOST_NAMES = 100
+"""Most names of the order of arrival in one line; the schedule has all."""
+
 
 def render(
     plan: Plan, results: Sequence[JobResult] = (), homes: Mapping[str, WayHome] | None = None, units: Units = METRIC
@@ -38,7 +41,8 @@ def page_of_plan(
     several = fleet is not None and len(plan.vehicles) > 1
     if fleet is not None and several and fleet.mode != "none":
         apart = f", {fleet.interval_s:g} s apart" if fleet.mode == "sequence" else ""
-        facts += [("arrival", f"{fleet.mode}: {', '.join(fleet.order)}{apart}")]
+        order = ", ".join(fleet.order[:MOST_NAMES]) + (" …" if len(fleet.order) > MOST_NAMES else "")
+        facts += [("arrival", f"{fleet.mode}: {order}{apart}")]
     subjects = []
     for v in plan.vehicles:
         certificate = Certificate(
@@ -57,6 +61,7 @@ def page_of_plan(
     return Page(
         source.name, plan.world, tuple(subjects), dict(source.inputs), tuple(facts), tuple(dict.fromkeys(plan.notes)),
         fleet.separation if fleet is not None else None, fleet.order if fleet is not None else (), units,
+        left_out=tuple((v.name, v.message) for v in plan.left_out),
     )  # fmt: skip
 
 

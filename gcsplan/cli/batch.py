@@ -88,10 +88,12 @@ def batch(
     else:
         bad = [r for r in done if r.code != 0]
         for record in bad[:SHOWN]:
-            say(f"{record.mission}: {record.rows[0]['verdict']}: {str(record.rows[0]['message']).splitlines()[0]}")
+            row = next(row for row in record.rows if row["code"] != 0)
+            name = f"{record.mission} {row['vehicle']}".rstrip()
+            say(f"{name}: {row['verdict']}: {str(row['message']).splitlines()[0]}")
         if len(bad) > SHOWN:
             say(f"… and {len(bad) - SHOWN} more; the table has all of them")
-        count = sum(len(r.rows) for r in done if r.code == 0)
+        count = sum(row["code"] == 0 for r in done for row in r.rows)
         took_s = time.perf_counter() - begun_s
         say(f"{len(done) - len(bad)} of {len(done)} missions planned, {count} vehicles, in {took_s:.1f} s")
         say(f"written to {out}/: {', '.join(written)}")
@@ -108,7 +110,7 @@ def _tables(out: Path, done: Sequence[Record], units: UnitsName, page: str) -> l
     from gcsplan.units import units_of
 
     rows = [row for record in done for row in record.rows]
-    tracks = [track for record in done for track in (record.tracks or [[]] * len(record.rows))]
+    tracks = [track for r in done for track in (*r.tracks, *[[]] * (len(r.rows) - len(r.tracks)))]
     drawn = {k: track for k, track in enumerate(tracks) if len(track) > 1}
     files: dict[str, str | bytes] = {
         "results.csv": csv_text(COLUMNS, rows),

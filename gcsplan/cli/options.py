@@ -77,6 +77,13 @@ ClusterOption = Annotated[
     str | None,
     typer.Option("--cluster", metavar="ADDRESS", help="A dask scheduler whose workers do the work, tcp://HOST:PORT."),
 ]
+LeaveOutOption = Annotated[
+    bool,
+    typer.Option(
+        "--leave-out",
+        help="Leave out, by name, each vehicle that has no mission, and plan the others; ends with 3 if there is one.",
+    ),
+]
 UnjudgedOption = Annotated[
     bool, typer.Option("--allow-unjudged", help="Accept a mission of which something could not be judged.")
 ]

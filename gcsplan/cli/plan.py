@@ -6,12 +6,12 @@ import os
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from gcsplan.cli import completion
-from gcsplan.cli.ending import emit, talking
+from gcsplan.cli.ending import complain, emit, talking
 from gcsplan.cli.options import (
     LINKS,
     ArmedOption,
@@ -19,6 +19,7 @@ from gcsplan.cli.options import (
     ClusterOption,
     JobsOption,
     JsonOption,
+    LeaveOutOption,
     ListZonesOption,
     MissionArgument,
     ObjectiveOption,
@@ -113,6 +114,7 @@ def plan(
     atomic: AtomicOption = False,
     timeout: TimeoutOption = 60.0,
     list_zones: ListZonesOption = False,
+    leave_out: LeaveOutOption = False,
     jobs: JobsOption = None,
     cluster: ClusterOption = None,
     as_json: JsonOption = False,
@@ -120,7 +122,8 @@ def plan(
     """Plan a mission file, write its outputs, and upload and verify them on request.
 
     Without --upload nothing is sent. The outputs are written whole or not at all. If no safe mission exists, earlier
-    outputs are moved to DIR/previous, so that no old mission is flown by mistake.
+    outputs are moved to DIR/previous, so that no old mission is flown by mistake. One vehicle without a mission refuses
+    a whole fleet, unless it may be left out.
     """
     from gcsplan.app import outputs, pipeline
     from gcsplan.app.gate import GateTime
@@ -151,16 +154,11 @@ def plan(
         names = [r.vehicle.name for r in source.vehicles]
         with planning_display(names, objective or source.planner.objective) as progress:
             planned = pipeline.plan(
-                source,
-                planner=planner,
-                objective=objective,
-                seed=seed,
+                source, planner=planner, objective=objective, seed=seed,
                 options={k: v for k, v in (("encoding", encoding), ("cost", cost)) if v is not None},
-                progress=progress,
-                gate_utc=None if gate is None else gate.start,
-                jobs=jobs,
-                cluster=cluster,
-            )
+                progress=progress, gate_utc=None if gate is None else gate.start,
+                jobs=jobs, cluster=cluster, leave_out=leave_out or None,
+            )  # fmt: skip
         pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
         homes = judged(planned, asked=report or way_home or rally, option=require_way_home)
         orders: list[UploadJob] = []
@@ -198,9 +196,22 @@ def plan(
         if not as_json:
             upload_table(results)
             release_table(planned, results, gate)
+    left_out = _left_out(planned, mission)
+    failure = (uploads.failure(results) if targets else None) or left_out
     if as_json:
-        emit(outputs.summary_of(planned, results, homes), uploads.failure(results) if targets else None)
-    raise typer.Exit(uploads.exit_code(results) if targets else 0)
+        emit(outputs.summary_of(planned, results, homes), failure)
+    raise typer.Exit(failure["code"] if failure is not None else 0)
+
+
+def _left_out(planned: Plan, mission: Path) -> dict[str, Any] | None:
+    """Name the vehicles that are left out on standard error; returns the ``error`` of ``--json``, None without one."""
+    from gcsplan.app.leaving_out import refusal_of
+
+    if not planned.left_out:
+        return None
+    refusal = refusal_of(planned.left_out)
+    complain(refusal)
+    return refusal.as_dict() | {"where": str(mission)}
 
 
 def _list_zones(mission: Path, units: Units, upload: list[str] | None, as_json: bool) -> None:

@@ -22,8 +22,9 @@ Again = Callable[[float], Schedule]
 """``again(interval_s)``: the schedule of the sequence with that interval."""
 
 ATTEMPTS = 4
-PROMOTIONS = 3
-"""Most vehicles that may be put before the one in their way if nothing else helps them and no priority is set."""
+PROMOTIONS, MOST_AGAIN = 3, 150
+"""Most vehicles that may be put before the one in their way if nothing else helps them and no priority is set; and most
+vehicles that are fixed again for one of them."""
 
 LATER_S = 600.0
 """Seconds by which the whole fleet may arrive later if its clock leaves a vehicle no possibility to evade."""
@@ -81,6 +82,7 @@ class Ask:
     later_s: float
     replan: Replan | None = None
     attempts: int = 0
+    leave_out: bool = False
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -119,55 +121,74 @@ Settled = dict[str, Choice]
 """Choices by name, in the order in which they were fixed."""
 
 
-def settle(plan: Schedule, ask: Ask) -> Settled | Stuck:
+@dataclass(frozen=True, eq=False, slots=True)
+class Settlement:
+    """The choices of all vehicles but those that are ``stuck``: at most one, unless vehicles may be left out."""
+
+    done: Settled
+    stuck: tuple[Stuck, ...] = ()
+
+
+def settle(plan: Schedule, ask: Ask) -> Settlement:
     """Choices for all vehicles. Other paths are used only if nothing else helps.
 
     A vehicle may leave up to ``ask.later_s`` before 0 s; see `moved`.
     """
-    settled = _settle(plan, replace(ask, replan=None))
-    if isinstance(settled, Stuck) and ask.replan is not None:
-        settled = _settle(plan, ask)
-    return settled
+    if ask.replan is None:
+        return _settle(plan, ask, {})[0]
+    found, before = _settle(plan, replace(ask, replan=None, leave_out=False), {})
+    return _settle(plan, ask, before)[0] if found.stuck else found
 
 
 def moved(settled: Settled) -> tuple[Settled, float]:
     """Delay all equally, so that no vehicle leaves before 0 s; returns the choices and the delay, s."""
-    later = max(0.0, -min(choice.option.slot.depart_s for choice in settled.values()))
+    later = max(0.0, -min((choice.option.slot.depart_s for choice in settled.values()), default=0.0))
     return (settled if later <= 0.0 else {name: choice.later(later) for name, choice in settled.items()}), later
 
 
-def _settle(plan: Schedule, ask: Ask) -> Settled | Stuck:
-    """Fix all in order. Without a set priority, a vehicle that is stuck is moved before those in its way."""
+def _settle(plan: Schedule, ask: Ask, done: Settled) -> tuple[Settlement, Settled]:
+    """Fix all in order; those in ``done``, the first of them, stay as they are. Also returns those before any trouble.
+
+    A vehicle that is stuck is moved before those in its way, if no priority is set and not too many are fixed again;
+    else it is left out, or ends this.
+    """
     order = list(plan.order if ask.priority is None else ask.priority)
-    promoted: set[str] = set()
-    done: Settled = {}
-    while True:
-        stuck = _in_order(plan, ask, order, done)
-        if stuck is None:
-            return done
-        if ask.priority is not None or stuck.at_goals or stuck.name in promoted or len(promoted) >= PROMOTIONS:
-            return stuck
-        promoted.add(stuck.name)
-        order.remove(stuck.name)
-        turn = min(order.index(other) for other in stuck.others)
-        order.insert(turn, stuck.name)
-        done = {name: done[name] for name in order[:turn]}
-
-
-def _in_order(plan: Schedule, ask: Ask, order: Sequence[str], done: Settled) -> Stuck | None:
-    """Fix vehicle after vehicle: keep those in ``done`` as they are, and add the others until one is stuck."""
-    vehicles = {c.name: c.vehicle for c in ask.crews}
-    taken = Taken(ask.rules)
+    slots, vehicles = {s.name: s for s in plan.slots}, {c.name: c.vehicle for c in ask.crews}
     freedom = Freedom(plan.mode, ask.hold, ask.later_s)
-    for name in order:
-        if name not in done:
-            was = plan.of(name)
-            found = _choice(Chooser(vehicles[name], was.route, was, freedom, taken), plan, ask)
-            if isinstance(found, Stuck):
-                return found
-            done[name] = found
-        taken.add(done[name].option.path)
-    return None
+    promoted: set[str] = set()
+    left: list[Stuck] = []
+    before: Settled | None = None
+    taken, turn = _taken(ask.rules, done), len(done)
+    while turn < len(order):
+        name = order[turn]
+        was = slots[name]
+        found = _choice(Chooser(vehicles[name], was.route, was, freedom, taken), plan, ask)
+        if isinstance(found, Choice):
+            done = done | {name: found}
+            taken.add(found.option.path)
+            turn += 1
+            continue
+        before = done if before is None else before
+        order.pop(turn)
+        first = min(order.index(other) for other in found.others)
+        may = ask.priority is None and not found.at_goals and name not in promoted
+        if may and len(promoted) < PROMOTIONS and turn - first <= MOST_AGAIN:
+            promoted.add(name)
+            order.insert(first, name)
+            done = {name: done[name] for name in order[:first]}
+            taken, turn = _taken(ask.rules, done), first
+            continue
+        left.append(found)
+        if not ask.leave_out:
+            break
+    return Settlement(done, tuple(left)), done if before is None else before
+
+
+def _taken(rules: Rules, done: Settled) -> Taken:
+    taken = Taken(rules)
+    for choice in done.values():
+        taken.add(choice.option.path)
+    return taken
 
 
 def _choice(chooser: Chooser, plan: Schedule, ask: Ask) -> Choice | Stuck:
@@ -183,7 +204,8 @@ def _choice(chooser: Chooser, plan: Schedule, ask: Ask) -> Choice | Stuck:
         best = _other_path(was.name, chooser, met, ask.replan, ask.attempts)
     if best is None:
         others = tuple({n for c in met for n in c.worst.vehicles} - {was.name})
-        return Stuck(was.name, met[0], others, any(_at_goals(c, plan, ask.rules) for c in met))
+        near_goals = [c for c in met if _at_goals(c, plan, ask.rules)]  # what no departure, speed or path can help
+        return Stuck(was.name, [*near_goals, *met][0], others, bool(near_goals))
     change = Change(was.name, best.how, was, best.slot, best.extra_j, met[0])
     note = change.describe(lambda place: f"{place[2]:.0f} m above sea level")
     best = replace(best, slot=replace(best.slot, notes=(*best.slot.notes, note)))

@@ -31,15 +31,22 @@ __all__ = [
 
 Mode = Literal["sequence", "together", "none"]
 
+EXPLAINED = 3
+"""Vehicles that are left out whose errors say what would work: finding it looks at the whole fleet."""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Schedule:
-    """Slots in the order of ``order``: by arrival for sequence and none, as requested for together."""
+    """Slots in the order of ``order``: by arrival for sequence and none, as requested for together.
+
+    ``left_out`` says of each vehicle without a slot why it cannot comply; its turn stays empty.
+    """
 
     mode: Mode
     order: tuple[str, ...]
     slots: tuple[Slot, ...]
     interval_s: float = 0.0
+    left_out: tuple[NoSchedule, ...] = ()
 
     def of(self, name: str) -> Slot:
         """The slot of a vehicle."""
@@ -77,6 +84,7 @@ def schedule(
     clock: Clock = "fleet",
     arrive_s: float | None = None,
     longer: Longer | None = None,
+    leave_out: bool = False,
 ) -> Schedule:
     """Departures and speeds with which the fleet arrives as requested.
 
@@ -90,7 +98,8 @@ def schedule(
     leave at once and it holds at the gate (``gate``: multicopters; costs ``hover_w``), or nobody waits (``none``). If
     it cannot wait, ``longer(name, length_m)`` is called for a path of that length.
 
-    Raises NoSchedule if a vehicle cannot comply, with the smallest interval or the earliest arrival that works.
+    Raises NoSchedule if a vehicle cannot comply, with the smallest interval or the earliest arrival that works. With
+    ``leave_out`` only if none can; otherwise the others keep their turns, and ``left_out`` has the errors.
     """
     craft = [Craft(c) for c in crews]
     if not craft or len({c.name for c in craft}) != len(craft):
@@ -108,14 +117,22 @@ def schedule(
     else:
         first_s = float(fast[0])
     slots = []
+    left_out: list[NoSchedule] = []
     for turn, one in enumerate(craft):
         slot = one.at(first_s + turn * step_s, hold, longer)
         if slot is None:
-            raise _refusal(craft, turn, mode, step_s, hold, clock, arrive_s, first_s)
-        slots.append(slot)
-    if mode == "sequence" and arrive_s is None and first_s > craft[0].fast_s + WITHIN_S:
+            cures = len(left_out) < EXPLAINED
+            left_out.append(_refusal(craft, turn, mode, step_s, hold, clock, arrive_s, first_s, cures=cures))
+            if not leave_out:
+                raise left_out[0]
+        else:
+            slots.append(slot)
+    if not slots:
+        raise left_out[0]
+    leads = slots[0].name == craft[0].name
+    if leads and mode == "sequence" and arrive_s is None and first_s > craft[0].fast_s + WITHIN_S:
         slots[0] = replace(slots[0], notes=(*slots[0].notes, _why_later(craft, first_s, step_s)))
-    return Schedule(mode, tuple(s.name for s in slots), tuple(slots), step_s)
+    return Schedule(mode, tuple(s.name for s in slots), tuple(slots), step_s, tuple(left_out))
 
 
 def _why_later(craft: Sequence[Craft], first_s: float, step_s: float) -> str:
@@ -169,13 +186,10 @@ def _best(
 
 def _refusal(
     craft: Sequence[Craft], turn: int, mode: Mode, step_s: float, hold: Hold, clock: Clock, arrive_s: float | None,
-    first_s: float,
+    first_s: float, *, cures: bool,
 ) -> NoSchedule:  # fmt: skip
-    """The NoSchedule that says why this turn cannot be kept, and what would work."""
+    """The NoSchedule that says why this turn cannot be kept and, with ``cures``, what would work."""
     one, at_s = craft[turn], first_s + turn * step_s
-    fast, latest = np.array([c.fast_s for c in craft]), np.array([c.latest_s(hold) for c in craft])
-    earliest = earliest_first(fast, latest, step_s)
-    interval = _least_interval(craft, hold, clock, arrive_s) if mode == "sequence" else None
     late = at_s < one.fast_s
     what = f"the common arrival is {at_s:.1f} s" if mode == "together" else f"its turn is {at_s:.1f} s"
     speed_m_s, needs_s = (one.fastest_m_s, one.fast_s) if late else (one.slowest_m_s, one.slow_s)
@@ -183,27 +197,32 @@ def _refusal(
     why += f"{'fastest' if late else 'slowest'} ({speed_m_s:g} m/s) it needs {needs_s:.1f} s"
     if not late:
         why += "; nobody may wait" if hold == "none" else f"; {_cannot_wait(one)}"
-    cures = []
+    if not cures:
+        return NoSchedule(why, vehicle=one.name)
+    fast, latest = np.array([c.fast_s for c in craft]), np.array([c.latest_s(hold) for c in craft])
+    earliest = earliest_first(fast, latest, step_s)
+    interval = _least_interval(craft, hold, clock, arrive_s) if mode == "sequence" else None
+    said = []
     if mode == "together":
-        cures.append(
+        said.append(
             "there is no common arrival of all" if earliest is None
             else f"the earliest common arrival is arrive_s: {_up(earliest)}"
         )  # fmt: skip
     else:
         low, high = interval_range(fast, latest, clock, arrive_s)
         if interval is None:
-            cures.append("no interval_s works in this order")
+            said.append("no interval_s works in this order")
         elif late:
-            cures.append(f"the earliest feasible interval_s is {_up(interval)}")
+            said.append(f"the earliest feasible interval_s is {_up(interval)}")
         else:
-            cures.append(f"an interval_s from {_up(low)} to {math.floor(high * 1e3 + 1e-6) / 1e3:.3f} works")
+            said.append(f"an interval_s from {_up(low)} to {math.floor(high * 1e3 + 1e-6) / 1e3:.3f} works")
         if earliest is not None:
-            cures.append(f"with this interval all can follow a first at {_up(earliest)} s (clock: fleet)")
+            said.append(f"with this interval all can follow a first at {_up(earliest)} s (clock: fleet)")
         if _best(craft, step_s, hold, clock, arrive_s, None) is not None:
-            cures.append("order: best finds an order that works")
+            said.append("order: best finds an order that works")
     if hold != "ground" and not late:
-        cures.append("hold: ground lets it leave later")
-    return NoSchedule(f"{why}; {'; '.join(cures)}", vehicle=one.name, interval_s=interval, arrive_s=earliest)
+        said.append("hold: ground lets it leave later")
+    return NoSchedule(f"{why}; {'; '.join(said)}", vehicle=one.name, interval_s=interval, arrive_s=earliest)
 
 
 def _cannot_wait(one: Craft) -> str:

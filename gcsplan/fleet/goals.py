@@ -10,7 +10,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import NoMission
-from gcsplan.fleet._settle import LATER_S, Again, Ask, Stuck, maker, motion_of, settle, with_leaving
+from gcsplan.fleet._settle import LATER_S, Again, Ask, maker, motion_of, settle, with_leaving
 from gcsplan.fleet._taken import Taken
 from gcsplan.fleet.arrival import Crew, Hold, Schedule
 from gcsplan.fleet.separation import Rules
@@ -57,7 +57,7 @@ def least_interval_s(
             anew = make(tenths * INTERVAL_STEP_S)
         except NoMission:
             return False
-        return not isinstance(settle(anew, ask), Stuck)
+        return not settle(anew, ask).stuck
 
     floor = math.floor(plan.interval_s / INTERVAL_STEP_S + 1e-9)
     bad, good, step = floor, floor + max(1, _guess(plan, current, rules, between)), 1
@@ -115,7 +115,7 @@ def least_goals_m(
         moved = [c if c.name == between[0] else Crew(c.vehicle, _ended(c.route, still, tenths)) for c in own]
         try:
             anew = maker(pair, moved, hold)(pair.interval_s)
-            if not isinstance(settle(anew, Ask(moved, rules, None, hold, later_s)), Stuck):
+            if not settle(anew, Ask(moved, rules, None, hold, later_s)).stuck:
                 return tenths
         except NoMission:
             pass

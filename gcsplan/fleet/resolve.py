@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gcsplan.errors import NoMission
+from gcsplan.fleet._groups import settle_groups
 from gcsplan.fleet._settle import (
     ATTEMPTS,
     LATER_S,
@@ -25,11 +26,9 @@ from gcsplan.fleet._settle import (
     Stuck,
     maker,
     motion_of,
-    moved,
-    settle,
     with_leaving,
 )
-from gcsplan.fleet.arrival import Crew, Hold, Schedule
+from gcsplan.fleet.arrival import EXPLAINED, Crew, Hold, Schedule
 from gcsplan.fleet.goals import MANY, least_goals_m, least_interval_s, rounded_up
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import TOLERANCE_M, Conflict, Place, Rules, Separation, Where, in_metres, separation
@@ -42,7 +41,8 @@ class Resolved:
     """A fleet that keeps its separation.
 
     ``schedule`` has every slot as it is flown, ``paths`` the motions in its order, ``changes`` what was changed,
-    ``separation`` the exact judgement. ``later_s`` is the delay of all arrivals.
+    ``separation`` the exact judgement. ``later_s`` is the delay of all arrivals. ``left_out`` has an error for each
+    vehicle that is left out.
     """
 
     schedule: Schedule
@@ -50,6 +50,7 @@ class Resolved:
     changes: tuple[Change, ...]
     separation: Separation
     later_s: float = 0.0
+    left_out: tuple[NotSeparated, ...] = ()
 
     def notes(self, where: Where = in_metres) -> tuple[str, ...]:
         """The changes in words for the user, one line each."""
@@ -64,16 +65,22 @@ class Resolved:
 class NotSeparated(NoMission):
     """No possibility was found to keep two vehicles apart.
 
-    ``conflict`` has the two vehicles, the places and the time. If goals nearer than the needed distance are the reason,
-    ``interval_s`` is the smallest interval that works, and ``goals_m`` the distance of goals that works; both are None
-    otherwise, or if none works.
+    ``conflict`` has the two vehicles, the places and the time; ``vehicle`` is the one that has to give way. If goals
+    nearer than the needed distance are the reason, ``interval_s`` is the smallest interval that works, and ``goals_m``
+    the distance of goals that works; both are None otherwise, or if none works.
     """
 
     def __init__(
-        self, message: str, *, conflict: Conflict, interval_s: float | None = None, goals_m: float | None = None
+        self,
+        message: str,
+        *,
+        conflict: Conflict,
+        vehicle: str = "",
+        interval_s: float | None = None,
+        goals_m: float | None = None,
     ) -> None:
         super().__init__(message, reason="separation")
-        self.conflict = conflict
+        self.conflict, self.vehicle = conflict, vehicle
         self.interval_s = interval_s
         self.goals_m = goals_m
 
@@ -105,6 +112,7 @@ def resolve(
     later_s: float = LATER_S,
     again: Again | None = None,
     where: Where = in_metres,
+    leave_out: bool = False,
 ) -> Resolved:
     """Change ``plan`` until every two vehicles keep ``rules``.
 
@@ -116,42 +124,51 @@ def resolve(
     route ends with ``none`` are gone on arrival. ``replan`` is called last. ``again(interval_s)`` makes a new schedule
     (None: from ``crews``).
 
-    Raises NotSeparated (NoMission, ``separation``).
+    Vehicles that never come near each other are resolved in groups of their own. With ``leave_out`` a vehicle that
+    nothing helps is left out, and its turn stays empty.
+
+    Raises NotSeparated (NoMission, ``separation``); with ``leave_out`` only if no vehicle is left.
     """
     rules = with_leaving(rules, plan)
     if priority is not None and sorted(priority) != sorted(s.name for s in plan.slots):
         raise ValueError(f"a priority names every vehicle once: {', '.join(plan.order)}; given {', '.join(priority)}")
-    _refuse_goals(plan, crews, rules, hold, where)
-    ask = Ask(crews, rules, priority, hold, later_s, replan, attempts)
-    settled = settle(plan, ask)
-    if isinstance(settled, Stuck):
-        raise _refusal(plan, ask, settled, again or maker(plan, crews, hold), where)
-    done, moved_s = moved(settled)
-    slots = tuple(done[s.name].option.slot for s in plan.slots)
+    ask = Ask(crews, rules, priority, hold, later_s, replan, attempts, leave_out)
+    if not leave_out:
+        _refuse_goals(plan, ask, where)
+    settled, judged, moved_s = settle_groups(plan, ask)
+    left_out = tuple(
+        _refusal(plan, ask, stuck, again or maker(plan, crews, hold), where, cures=k < EXPLAINED)
+        for k, stuck in enumerate(settled.stuck)
+    )
+    if judged is None:
+        raise left_out[0]
+    done = settled.done
+    slots = tuple(done[s.name].option.slot for s in plan.slots if s.name in done)
     if plan.mode == "none":
         slots = tuple(sorted(slots, key=lambda s: s.arrive_s))
     paths = tuple(done[s.name].option.path for s in slots)
     changes = tuple(choice.change for choice in done.values() if choice.change is not None)
-    judged = separation(paths, rules)
-    if not judged.safe:  # a cross-check: shifts and judgement are computed independently
+    if not judged.safe and not leave_out:  # a cross-check: shifts and judgement are computed independently
         worst = judged.conflicts[0]
         raise NotSeparated(f"{worst.describe(where)}: resolving it failed", conflict=worst)
-    return Resolved(replace(plan, order=tuple(s.name for s in slots), slots=slots), paths, changes, judged, moved_s)
+    timed = replace(plan, order=tuple(s.name for s in slots), slots=slots)
+    return Resolved(timed, paths, changes, judged, moved_s, left_out)
 
 
 # -- goals nearer than the separation, and refusals -------------------------------------------------------------------
 
 
-def _refuse_goals(plan: Schedule, crews: Sequence[Crew], rules: Rules, hold: Hold, where: Where) -> None:
+def _refuse_goals(plan: Schedule, ask: Ask, where: Where) -> None:
     """Refuse at once if two goals are so near that no departure, speed or path can help."""
+    crews, rules = ask.crews, ask.rules
     vehicles = {c.name: c.vehicle for c in crews}
     slots, needed = plan.slots, rules.needed_m - TOLERANCE_M
     goals = np.array([s.route.points[-1] for s in slots])
-    for i, j in zip(*np.triu_indices(len(slots), 1), strict=True):
+    first, second = np.triu_indices(len(slots), 1)
+    apart = np.hypot(*(goals[first] - goals[second])[:, :2].T)
+    for row in np.flatnonzero(apart < needed).tolist():
+        i, j, flat = first[row], second[row], float(apart[row])
         a, b = slots[i], slots[j]
-        flat = float(np.hypot(*(goals[i] - goals[j])[:2]))
-        if flat >= needed:
-            continue
         near = float(np.linalg.norm(goals[i] - goals[j])) < needed
         ends = {a.route.end, b.route.end}
         if plan.mode == "together" and near:
@@ -167,11 +184,12 @@ def _refuse_goals(plan: Schedule, crews: Sequence[Crew], rules: Rules, hold: Hol
         if not conflicts:
             continue
         conflict = max(conflicts, key=lambda c: c.from_s)
-        goals_m = least_goals_m(plan, crews, rules, (a.name, b.name), hold=hold) or rounded_up(rules.needed_m)
+        goals_m = least_goals_m(plan, crews, rules, (a.name, b.name), hold=ask.hold) or rounded_up(rules.needed_m)
         raise NotSeparated(
             f"the goals of {a.name} and {b.name} are {flat:.1f} m apart, and {why}; {_asked(rules)}: put the goals at "
             f"least {goals_m:g} m apart{_other_cure(plan, ends)}; {conflict.describe(where)}",
             conflict=conflict,
+            vehicle=b.name,
             goals_m=goals_m,
         )
 
@@ -193,18 +211,19 @@ def _asked(rules: Rules) -> str:
     return f"separation_m is {rules.separation_m:g}" + (f" ({', '.join(more)})" if more else "")
 
 
-def _refusal(plan: Schedule, ask: Ask, stuck: Stuck, again: Again, where: Where) -> NotSeparated:
+def _refusal(plan: Schedule, ask: Ask, stuck: Stuck, again: Again, where: Where, *, cures: bool) -> NotSeparated:
+    """Why a vehicle is stuck and, with ``cures``, what would work."""
     conflict, rules = stuck.conflict, ask.rules
     words = f"{conflict.describe(where)}; no departure, speed, hold or other path of {stuck.name} that was tried helps"
     interval, goals_m = None, None
-    if stuck.at_goals:
+    if stuck.at_goals and cures:
         goals_m = least_goals_m(plan, ask.crews, rules, conflict.worst.vehicles, hold=ask.hold, later_s=ask.later_s)
-        cures = [] if goals_m is None else [f"goals at least {goals_m:g} m apart, each on the side it is reached from"]
+        said = [] if goals_m is None else [f"goals at least {goals_m:g} m apart, each on the side it is reached from"]
         if plan.mode == "sequence":
             interval = least_interval_s(
                 plan, ask.crews, rules, hold=ask.hold, later_s=ask.later_s, again=again, between=conflict.worst.vehicles
             )
             if interval is not None:
-                cures.insert(0, f"interval_s {interval:g}{' or more' if len(plan.slots) > MANY else ''}")
-        words += f"; what works: {', or '.join(cures)}" if cures else ""
-    return NotSeparated(words, conflict=conflict, interval_s=interval, goals_m=goals_m)
+                said.insert(0, f"interval_s {interval:g}{' or more' if len(plan.slots) > MANY else ''}")
+        words += f"; what works: {', or '.join(said)}" if said else ""
+    return NotSeparated(words, conflict=conflict, vehicle=stuck.name, interval_s=interval, goals_m=goals_m)

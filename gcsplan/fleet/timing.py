@@ -23,7 +23,7 @@ from gcsplan.fleet.speeds import POSITION_ERROR_M, column
 from gcsplan.vehicle import Autopilot, Vehicle
 
 __all__ = [
-    "POSITION_ERROR_M", "Course", "End", "Route", "motion_error_m", "speed_for", "upright",
+    "POSITION_ERROR_M", "Course", "End", "Route", "flown_corners", "motion_error_m", "speed_for", "upright",
 ]  # fmt: skip
 
 End = Literal["land", "loiter", "rtl", "none"]
@@ -98,7 +98,7 @@ class Route:
         Holds take ``hover_w``. Corners are not cut. ``hold_s`` is added to the route's own holds. Waiting on the ground
         costs nothing.
         """
-        corners = _flown(self)
+        corners = flown_corners(self)
         d = np.diff(corners, axis=0)
         held = hold_s + (0.0 if self.holds_s is None else float(self.holds_s.sum()))
         held += vehicle.return_waits_s if self.end == "rtl" else 0.0
@@ -333,8 +333,8 @@ def upright(
     return [column(np.array(heights), np.array(most), place, vehicle, owner, stops=climbs)]
 
 
-def _flown(route: Route) -> Floats:
-    """The corners of the whole flight as a polyline, with columns and the return."""
+def flown_corners(route: Route) -> Floats:
+    """(N, 3) the corners of the whole flight as a polyline, with columns and the return."""
     first, last = route.points[0], route.points[-1]
     before, behind = [], []
     if route.climb_out is not None:

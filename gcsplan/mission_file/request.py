@@ -29,7 +29,8 @@ class ArrivalRequest:
     first of a sequence, or of all together; None: by ``clock``, when the first can (``first``) or when the whole fleet
     can (``fleet``). ``hold`` is where a vehicle waits that would arrive too early: on the ground, at the gate (the top
     of take-off), or nowhere. ``window_s``: each may arrive this much earlier or later. ``pad_clear_s`` is the time
-    after a landing at which the pad is free again; None: never.
+    after a landing at which the pad is free again; None: never. ``leave_out``: vehicles without a mission are left out,
+    and the others are planned.
     """
 
     mode: Literal["sequence", "together", "none"]
@@ -42,6 +43,7 @@ class ArrivalRequest:
     hold: Literal["ground", "gate", "none"] = "ground"
     window_s: float = 0.0
     pad_clear_s: float | None = None
+    leave_out: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -283,6 +283,8 @@ class ArrivalKeys(Keys):
     """Time after a landing at which the pad is free again; if absent, never."""
     separation_m: Length | None = None
     """Least distance between any two vehicles, from take-off to landing."""
+    leave_out: bool = False
+    """Whether a vehicle without a mission is left out, by name, and the others planned; otherwise it refuses all."""
 
 
 def _plain_values(parameters: dict[str, Any]) -> dict[str, Any]:

@@ -26,9 +26,9 @@ def render_index(
 
     A row has the columns of the table of results; one without a vehicle is a mission that has no plan.
     """
-    missions = {row["mission"]: row["code"] for row in rows}
+    missions = {row["mission"] for row in rows}
     bad = Counter(str(row["verdict"]) for row in rows if row["code"] != 0)
-    words = f"{num(len(missions))} missions, {num(sum(bool(r['vehicle']) for r in rows))} vehicles planned"
+    words = f"{num(len(missions))} missions, {num(sum(r['code'] == 0 for r in rows))} vehicles planned"
     if bad:
         words += "; " + ", ".join(f"{num(n)} {esc(kind)}" for kind, n in sorted(bad.items()))
     body = (
@@ -46,8 +46,12 @@ def _failures(rows: Sequence[Row]) -> str:
     bad = [row for row in rows if row["code"] != 0]
     if not bad:
         return ""
-    items = [f"<li><b>{esc(r['mission'])}</b>: {esc(r['verdict'])}: {esc(r['message'])}</li>" for r in bad]
-    return f'<h2>Missions without a plan</h2><ul class="findings">{"".join(items)}</ul>'
+    names = [f"{r['mission']} {r['vehicle']}".rstrip() for r in bad]
+    items = [
+        f"<li><b>{esc(name)}</b>: {esc(r['verdict'])}: {esc(r['message'])}</li>"
+        for name, r in zip(names, bad, strict=True)
+    ]
+    return f'<h2>Without a plan</h2><ul class="findings">{"".join(items)}</ul>'
 
 
 def _map(rows: Sequence[Row], tracks: Mapping[int, Sequence[Sequence[float]]], units: Units) -> str:

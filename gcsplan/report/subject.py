@@ -96,7 +96,8 @@ class Rehearsed:
 class Page:
     """Everything that one report shows. ``facts`` are names and values of what was requested, in the order shown.
 
-    ``units`` are those of all numbers on the page; notes are in metres, as they say what to write into a file.
+    ``left_out`` are names of vehicles without a mission, and why. ``units`` are those of all numbers on the page; notes
+    are in metres, as they say what to write into a file.
     """
 
     title: str
@@ -109,6 +110,7 @@ class Page:
     order: tuple[str, ...] = ()
     units: Units = METRIC
     rehearsed: Rehearsed | None = None
+    left_out: tuple[tuple[str, str], ...] = ()
 
     @property
     def time_decimals(self) -> int:
