@@ -64,6 +64,7 @@ def _shown(page: Page) -> list[tuple[int, Subject]]:
 def _problems(page: Page) -> str:
     """What is broken and what was not judged, the first of each."""
     found = [f"{s.name}: {in_units(f.message, page.units)}" for s in page.subjects for f in s.verdict.findings]
+    found += [f"{name}: no mission, left out: {why}" for name, why in page.left_out]
     found += [in_units(text, page.units) for text in page.rehearsed.violations] if page.rehearsed is not None else []
     unjudged = [f"{s.name}: not judged: {what}" for s in page.subjects for what in s.verdict.not_judged]
     out = [*found[:MOST_FINDINGS], *unjudged[:MOST_NOTES]]

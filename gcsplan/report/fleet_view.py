@@ -14,6 +14,7 @@ from gcsplan.report.chart import Axes, chart_html
 from gcsplan.report.marks import Mark
 from gcsplan.report.markup import esc, least, num, stated, table, tools
 from gcsplan.report.plan_view import COLOURS
+from gcsplan.report.shown import only_some
 from gcsplan.report.subject import Page
 from gcsplan.units import Units, duration
 
@@ -29,8 +30,11 @@ def motions_of(page: Page) -> list[tuple[int, TimedPath]]:
     return found if len(found) > 1 else []
 
 
-def fleet_html(page: Page, charts: dict[str, object]) -> str:
-    """The two charts and the table; the charts' numbers are added to ``charts`` for the page's script."""
+def fleet_html(page: Page, charts: dict[str, object], full: frozenset[int]) -> str:
+    """The two charts and the table; the charts' numbers are added to ``charts`` for the page's script.
+
+    The way flown is drawn of the vehicles in ``full``.
+    """
     motions = motions_of(page)
     if not motions:
         return ""
@@ -41,7 +45,8 @@ def fleet_html(page: Page, charts: dict[str, object]) -> str:
         + _schedule(page, motions)
         + "<h3>Way flown over time</h3>"
         + tools("distance")
-        + _distance_chart(motions, times, charts, page.units)
+        + _distance_chart([m for m in motions if m[0] in full], times, charts, page.units)
+        + only_some(page, full)
         + "<h3>Separation over time</h3>"
         + tools("separation")
         + _separation_chart(page, motions, times, charts)
@@ -73,6 +78,22 @@ def apart_m(a: TimedPath, b: TimedPath, times_s: Floats) -> Floats:
     return np.where(inside, np.linalg.norm(a.at(times_s) - b.at(times_s), axis=1), np.nan)
 
 
+def nearest_two_m(motions: Sequence[TimedPath], times_s: Floats) -> Floats:
+    """(M,) distance in space of the nearest two of those in the air at each time; NaN if there are no two."""
+    from scipy.spatial import cKDTree  # slow to import, and most pages show one vehicle
+
+    places = np.full((len(times_s), len(motions), 3), np.nan)
+    for k, m in enumerate(motions):
+        inside = (times_s >= m.begin_s) & (times_s <= (math.inf if m.ends_in_air else m.end_s))
+        places[inside, k] = m.at(times_s[inside])
+    out = np.full(len(times_s), np.nan)
+    for row, here in enumerate(places):
+        flying = here[~np.isnan(here[:, 0])]
+        if len(flying) > 1:
+            out[row] = np.asarray(cKDTree(flying).query(flying, k=[2])[0]).min()
+    return out
+
+
 def _schedule(page: Page, motions: Sequence[tuple[int, TimedPath]]) -> str:
     order = {name: i + 1 for i, name in enumerate(page.order)}
     rows = []
@@ -97,7 +118,8 @@ def _schedule(page: Page, motions: Sequence[tuple[int, TimedPath]]) -> str:
         "on the ground",
         "horizontal way",
     )
-    return table("Schedule: times since the fleet's common start, h:mm:ss", head, rows)
+    of = [i for i, _ in sorted(motions, key=lambda m: m[1].arrive_s)]
+    return table("Schedule: times since the fleet's common start, h:mm:ss", head, rows, numbers=of)
 
 
 def separation_words(page: Page) -> str:
@@ -135,13 +157,11 @@ def _distance_chart(
 def _separation_chart(
     page: Page, motions: Sequence[tuple[int, TimedPath]], times: Floats, charts: dict[str, object]
 ) -> str:
-    pairs = [(a, b, apart_m(a[1], b[1], times)) for a, b in combinations(motions, 2)]
-    every = np.stack([p[2] for p in pairs])
-    some = ~np.isnan(every).all(axis=0)
-    if not some.any():
+    nearest = nearest_two_m([m for _, m in motions], times)
+    if np.isnan(nearest).all():
         return '<p class="note">No two vehicles are ever in the air at the same time.</p>'
-    nearest = np.full(len(times), np.nan)
-    nearest[some] = np.nanmin(every[:, some], axis=0)
+    few = math.comb(len(motions), 2) <= MOST_PAIRS
+    pairs = [(a, b, apart_m(a[1], b[1], times)) for a, b in combinations(motions, 2)] if few else []
     needed_m = page.separation.rules.needed_m if page.separation is not None else None
     unit = page.units.distance
     high = max(float(np.nanmax(nearest)), 1.4 * (needed_m or 0.0), 1.0)
@@ -150,7 +170,7 @@ def _separation_chart(
     if needed_m:
         ends, zero = [times[0], times[-1]], [0.0, 0.0]
         shapes += [axes.area(ends, zero, [needed_m, needed_m], "below"), axes.line(ends, [needed_m, needed_m], "floor")]
-    if len(pairs) <= MOST_PAIRS:
+    if pairs:
         shapes += [axes.line(times, d, "pair") for _, _, d in pairs]
         numbers += [(f"{a[1].name} – {b[1].name}", "distance", 1, d) for a, b, d in pairs]
     shapes.append(axes.line(times, nearest, "nearest"))
@@ -161,7 +181,7 @@ def _separation_chart(
     words = f"Distance of the nearest two vehicles over time{nearest_words}; asked for: {num(needed_m, 1, unit)}"
     key = (
         '<ul class="legend"><li><i class="stroke nearest"></i>nearest two</li>'
-        + ('<li><i class="stroke pair"></i>each pair</li>' if len(pairs) <= MOST_PAIRS else "")
+        + ('<li><i class="stroke pair"></i>each pair</li>' if pairs else "")
         + ('<li><i class="swatch below"></i>nearer than needed</li>' if needed_m else "")
         + "</ul>"
     )

@@ -15,6 +15,7 @@ from gcsplan.report.markup import at_least, between, energy, esc, num, place, st
 from gcsplan.report.plan_view import COLOURS
 from gcsplan.report.profile_view import along_axes
 from gcsplan.report.samples import Line
+from gcsplan.report.shown import only_some
 from gcsplan.report.subject import Page, Subject
 from gcsplan.units import Units, in_units
 
@@ -47,13 +48,17 @@ def _home_line(subject: Subject, several: bool, units: Units) -> str:
     return f'<p class="bare{bad}"><b>{who}{esc(in_units(home.headline, units))}</b>{cure}; {see}</p>'
 
 
-def home_html(page: Page, lines: Sequence[Line | None], charts: dict[str, object]) -> str:
+def home_html(page: Page, lines: Sequence[Line | None], charts: dict[str, object], full: frozenset[int]) -> str:
     """The section; empty if no way home was judged. The charts' numbers are added to ``charts``."""
-    parts = []
-    for i, (subject, line) in enumerate(zip(page.subjects, lines, strict=True)):
+    parts: list[str] = []
+    for i in sorted(full):
+        subject = page.subjects[i]
         if subject.home is not None:
-            parts.append(_one(subject, subject.home, line, i, charts, page.units, open_=i < 1))
-    return f'<section id="home"><h2>The way home after a failsafe</h2>{"".join(parts)}</section>' if parts else ""
+            parts.append(_one(subject, subject.home, lines[i], i, charts, page.units, open_=not parts))
+    if not parts:
+        return ""
+    head = '<section id="home"><h2>The way home after a failsafe</h2>'
+    return f"{head}{only_some(page, full)}{''.join(parts)}</section>"
 
 
 def _one(

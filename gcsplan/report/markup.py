@@ -93,9 +93,13 @@ def place(lat_deg: float, lon_deg: float) -> str:
     return f"{lat_deg:.5f}, {lon_deg:.5f}" if math.isfinite(lat_deg) and math.isfinite(lon_deg) else "–"
 
 
-def table(caption: str, head: Sequence[str], rows: Iterable[Sequence[str]], *, marks: Sequence[str] = ()) -> str:
+def table(
+    caption: str, head: Sequence[str], rows: Iterable[Sequence[str]], *, marks: Sequence[str] = (),
+    numbers: Sequence[int] = (),
+) -> str:  # fmt: skip
     """A table of HTML cells; the first cell of a row is its header. ``marks`` are CSS classes of the rows.
 
+    ``numbers`` are the numbers of the vehicles of the rows, by which the page's filter finds them.
     Columns whose head ends in a bar hold words and are left-aligned; all others hold numbers.
     """
     words = [h.endswith("|") for h in head]
@@ -104,8 +108,8 @@ def table(caption: str, head: Sequence[str], rows: Iterable[Sequence[str]], *, m
     out += [f'<th scope="col"{k}>{h.rstrip("|")}</th>' for h, k in zip(head, kinds, strict=True)]
     out.append("</tr></thead><tbody>")
     for i, row in enumerate(rows):
-        mark = marks[i] if i < len(marks) and marks[i] else ""
-        out.append(f'<tr class="{mark}">' if mark else "<tr>")
+        mark = f' class="{marks[i]}"' if i < len(marks) and marks[i] else ""
+        out.append(f'<tr{mark} data-vehicle="{numbers[i]}">' if numbers else f"<tr{mark}>")
         for j, (cell, kind) in enumerate(zip(row, kinds, strict=True)):
             out.append(f'<th scope="row"{kind}>{cell}</th>' if j == 0 else f"<td{kind}>{cell}</td>")
         out.append("</tr>")

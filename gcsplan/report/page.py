@@ -26,8 +26,9 @@ from gcsplan.report.profile_view import profile_html, profile_legend
 from gcsplan.report.rehearsal_view import headline, rehearsal_html
 from gcsplan.report.relief import Relief, extent_of, relief_of
 from gcsplan.report.replay import replay_data, replay_html, replay_of
-from gcsplan.report.samples import MOST_SAMPLES, Line, Passage, line_of, passages
+from gcsplan.report.samples import Line, Passage, line_of, passages
 from gcsplan.report.scene_data import exaggeration, zone_meshes
+from gcsplan.report.shown import in_full, left_out_html, only_some, samples_of
 from gcsplan.report.subject import CheckedFile, Page, Subject, page_of_check
 from gcsplan.units import KILOJOULE, METRIC, Unit, Units, duration, in_units
 from gcsplan.world.model_words import what_is_not_in
@@ -37,10 +38,16 @@ __all__ = ["render_check", "render_page"]
 
 OPEN_VEHICLES = 3
 """Vehicles whose profiles are open at first; the others open on a tap, and on paper. So do a fleet's tables."""
+MOST_NOTES = 200
+"""Most notes that are open at first."""
 MOST_CARDS = 6
 """Most vehicles with cards; the key figures of more are in one table."""
+FILTER = (
+    '<label class="filter" hidden>Filter vehicles <input type="search" placeholder="a name, a verdict, a zone">'
+    '<span class="note"></span></label>'
+)
 SCRIPTS = ("base.js", "labels.js", "view.js", "flight.js", "replay.js", "charts.js", "mesh.js", "scene.js",
-           "start.js")  # fmt: skip
+           "filter.js", "start.js")  # fmt: skip
 
 
 def render_check(
@@ -63,17 +70,20 @@ def render_check(
 
 def render_page(page: Page) -> str:
     """A `Page` as HTML text."""
-    samples = max(150, min(1200, MOST_SAMPLES // max(len(page.subjects), 1)))
-    lines = [line_of(s.verdict, page.world, s.vehicle.limits, samples=samples, slot=s.slot) for s in page.subjects]
+    full = in_full(page)
+    lines = [
+        line_of(s.verdict, page.world, s.vehicle.limits, samples=samples, slot=s.slot)
+        for s, samples in zip(page.subjects, samples_of(page, full), strict=True)
+    ]
     drawn = [line for line in lines if line is not None]
     zones, surface = page.world.airspace.zones, page.world.airspace.surface
     relief = relief_of(page.world, extent_of(drawn, zones, surface), page.units.height)
     found = [
-        passages(line, zones, _reach_m(subject)) if line is not None else []
-        for subject, line in zip(page.subjects, lines, strict=True)
+        passages(line, zones, _reach_m(subject)) if line is not None and i in full else []
+        for i, (subject, line) in enumerate(zip(page.subjects, lines, strict=True))
     ]
     charts: dict[str, object] = {}
-    fleet, home = fleet_html(page, charts), home_html(page, lines, charts)
+    fleet, home = fleet_html(page, charts, full), home_html(page, lines, charts, full)
     replay = replay_of(page)
     flown = [t.places[:, 1:3] for t in replay.tracks if t.flown] if replay is not None else []
     data = {
@@ -87,14 +97,14 @@ def render_page(page: Page) -> str:
         "exaggeration": exaggeration(relief, drawn),
         "charts": charts, "units": page.units.as_dict(), "replay": replay_data(replay, page) if replay else None,
     }  # fmt: skip
-    marks = map_marks(page, lines, relief)
+    marks = map_marks(page, lines, relief, full)
     body = "".join(
         (
             briefing_html(page, _verdict(page), relief, marks), _header(page), _vehicles(page),
             f'<section><h2>Map</h2>{tools("map")}{map_html(page, lines, relief, marks, flown)}'
             f"{replay_html(replay, page) if replay else ''}</section>",
             rehearsal_html(page), _scene(page, relief),
-            *_profiles(page, lines, found), home, fleet, *_details(page, lines, found), _end(page),
+            *_profiles(page, lines, found, full), home, fleet, *_details(page, lines, found, full), _end(page),
         )
     )  # fmt: skip
     return document(page.title, body, data_block("data", data), scripts=SCRIPTS)
@@ -143,6 +153,7 @@ def _header(page: Page) -> str:
         f'<div class="verdict {kind}"><span class="sign" aria-hidden="true">{sign}</span>'
         f"<div><strong>{word}</strong><p>{words}</p></div></div>"
         + (f'<ul class="findings">{listed}</ul>' if listed else "")
+        + left_out_html(page)
         + bare
         + home_lines(page)
         + "</header>"
@@ -153,7 +164,7 @@ def _vehicles(page: Page) -> str:
     if len(page.subjects) > MOST_CARDS:
         found = [verdict_of(s.verdict.safe, homeless=s.homeless) for s in page.subjects]
         words = [f"{sign} {word.lower()}" for _, sign, word, _ in found]
-        return f"<section>{tables.vehicles_table(page, words)}</section>"
+        return f'<section id="vehicles">{FILTER}{tables.vehicles_table(page, words)}</section>'
     cards = "".join(_card(s, i, page) for i, s in enumerate(page.subjects))
     return f'<section class="cards" aria-label="Key figures">{cards}</section>'
 
@@ -236,13 +247,16 @@ def _scene(page: Page, relief: Relief) -> str:
     )
 
 
-def _profiles(page: Page, lines: Sequence[Line | None], found: Sequence[list[Passage]]) -> list[str]:
-    parts = ['<section id="profiles"><h2>Altitude along the way</h2>']
-    for i, (subject, line) in enumerate(zip(page.subjects, lines, strict=True)):
+def _profiles(
+    page: Page, lines: Sequence[Line | None], found: Sequence[list[Passage]], full: frozenset[int]
+) -> list[str]:
+    parts = ['<section id="profiles"><h2>Altitude along the way</h2>', only_some(page, full)]
+    for i in sorted(full):
+        subject, line = page.subjects[i], lines[i]
         if line is None or not np.isfinite(line.ground_m).any():
             parts.append(f'<p class="note">{esc(subject.name)}: there is no line over known ground to draw.</p>')
             continue
-        shown = " open" if i < OPEN_VEHICLES else ""
+        shown = " open" if len(parts) < 2 + OPEN_VEHICLES else ""
         unit = page.units.along(line.length_m)
         length = num(line.length_m, 2 if unit is page.units.far else 0, unit)
         parts.append(
@@ -254,9 +268,12 @@ def _profiles(page: Page, lines: Sequence[Line | None], found: Sequence[list[Pas
     return parts
 
 
-def _details(page: Page, lines: Sequence[Line | None], found: Sequence[list[Passage]]) -> list[str]:
-    parts = ['<section id="numbers"><h2>Numbers</h2>', tables.certificate_table(page)]
-    for i, (subject, line) in enumerate(zip(page.subjects, lines, strict=True)):
+def _details(
+    page: Page, lines: Sequence[Line | None], found: Sequence[list[Passage]], full: frozenset[int]
+) -> list[str]:
+    parts = ['<section id="numbers"><h2>Numbers</h2>', tables.certificate_table(page), only_some(page, full)]
+    for i in sorted(full):
+        subject, line = page.subjects[i], lines[i]
         shown = " open" if len(page.subjects) == 1 else ""
         parts.append(f"<details{shown}><summary>{esc(subject.name)}: limits, zones and legs</summary>")
         parts.append(tables.limits_table(subject, line, page.units))
@@ -280,12 +297,18 @@ def _end(page: Page) -> str:
         f'<section id="sent"><h2>Upload</h2>{tables.upload_table(page)}</section>'
         '<section id="notes"><h2>Notes, and what was not judged</h2>'
         + (f"<h3>Not judged</h3><ul>{missing}</ul>" if missing else "")
-        + (f"<h3>Notes</h3><ul>{listed}</ul>" if listed else "")
+        + (_notes(listed, len(dict.fromkeys(notes))) if listed else "")
         + "<p>Wind, emergency landing sites and moving obstacles are not in the model. The terrain model has errors of "
         "its own.</p></section>"
         f'<section id="inputs"><h2>What went in</h2>{inputs}</section>'
         f"<footer>gcsplan {esc(__version__)}; numbers of room and clearance are rounded down</footer>"
     )
+
+
+def _notes(listed: str, count: int) -> str:
+    if count <= MOST_NOTES:
+        return f"<h3>Notes</h3><ul>{listed}</ul>"
+    return f"<details><summary>{count} notes</summary><ul>{listed}</ul></details>"
 
 
 def _broken(subject: Subject, world: World) -> list[list[object]]:

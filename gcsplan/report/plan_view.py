@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
 import numpy as np
 
@@ -20,15 +20,17 @@ from gcsplan.world.zones import Circle, Level, Zone
 
 LARGE = 0.12
 """Part of the map's height above which a zone's name is inside it; the names of smaller ones are beside them."""
+MOST_NAMES = 100
+"""Most vehicles that the legend names."""
 COLOURS = 8
 """Number of the style sheet's classes t0 …; more vehicles reuse them from the first."""
 
 
-def map_marks(page: Page, lines: Sequence[Line | None], relief: Relief) -> list[Mark]:
-    """The marks of the map: zones' names, way points, starts and goals, tight places."""
+def map_marks(page: Page, lines: Sequence[Line | None], relief: Relief, full: Container[int]) -> list[Mark]:
+    """The marks of the map: zones' names, and of the vehicles in ``full`` way points, starts, goals, tight places."""
     marks = [m for zone in page.world.airspace.zones for m in _zone_mark(zone, relief.extent, page.units)]
     for i, (subject, line) in enumerate(zip(page.subjects, lines, strict=True)):
-        if line is not None:
+        if line is not None and i in full:
             marks += _track_marks(subject, line, i, relief.extent, page.world, page.units)
     return marks
 
@@ -75,8 +77,10 @@ def legend(page: Page, relief: Relief) -> str:
     """The legend of colours, for the map and the view in space."""
     units = page.units
     tracks = "".join(
-        f'<li><i class="swatch t{i % COLOURS}"></i>{esc(s.name)}</li>' for i, s in enumerate(page.subjects)
+        f'<li><i class="swatch t{i % COLOURS}"></i>{esc(s.name)}</li>' for i, s in enumerate(page.subjects[:MOST_NAMES])
     )
+    if len(page.subjects) > MOST_NAMES:
+        tracks += f"<li>and {len(page.subjects) - MOST_NAMES} more vehicles</li>"
     stops = ",".join(f"rgb({r},{g},{b}) {100 * at:g}%" for at, (r, g, b) in TINTS)
     ground = ""
     if math.isfinite(relief.low_m):
@@ -148,7 +152,7 @@ def _track_svg(line: Line, index: int, extent: Extent) -> str:
     keep[0] = True
     points = " ".join(f"{x:.1f},{y:.1f}" for x, y in xy[keep])
     return (
-        f'<polyline class="casing" points="{points}"/>'
+        f'<polyline class="casing" data-line="{index}" points="{points}"/>'
         f'<polyline class="track t{index % COLOURS}" data-line="{index}" points="{points}"/>'
     )
 

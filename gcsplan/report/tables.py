@@ -54,7 +54,7 @@ def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
         marks.append("bad" if verdict.safe is False else "close" if verdict.safe is None or s.homeless else "")
     head = ("vehicle|", "verdict|", "path", "gap", "lowest AGL", "nearest zone|", "steepest", "energy", "battery",
             "arrives", "way home|")  # fmt: skip
-    return table("Key figures", head, rows, marks=marks)
+    return table("Key figures", head, rows, marks=marks, numbers=range(len(rows)))
 
 
 def legs_table(subject: Subject, units: Units) -> str:

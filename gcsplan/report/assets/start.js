@@ -5,7 +5,7 @@ function startBriefing() {
   const figure = document.querySelector('.briefing .map'), marks = marksOf(figure);
   window.addEventListener('beforeprint', () => layMarks(figure, marks, { x: 0, y: 0, w: 1, h: 1 }));
 }
-const starts = [startMap, startBriefing, ...[...document.querySelectorAll('figure.chart')].map((f) => () => startChart(f)), startScene, startReplay];
+const starts = [startMap, startBriefing, ...[...document.querySelectorAll('figure.chart')].map((f) => () => startChart(f)), startScene, startReplay, startFilter];
 for (const start of starts) {
   try { start(); } catch (error) { console.error(error); }
 }
