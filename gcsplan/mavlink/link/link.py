@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
@@ -301,21 +301,29 @@ class PumpJob(Generic[T]):
         self._steps.close()
 
 
-def pump(jobs: Sequence[PumpJob[T]]) -> None:
-    """Run all ``jobs`` concurrently to their ends, and what their links serve. Each job stores its own error."""
+def pump(jobs: Sequence[PumpJob[T]], *, most: int | None = None, most_on_link: int | None = None) -> None:
+    """Run all ``jobs`` concurrently to their ends, and what their links serve. Each job stores its own error.
+
+    At most ``most`` run at a time, and ``most_on_link`` of each link (None: all). The others wait for their turn in
+    their order; what is heard meanwhile is not kept, so that a job sees its vehicle as it is when its turn comes.
+    """
     if not jobs:
         return
     links = list({id(job.channel.link): job.channel.link for job in jobs}.values())
     clock = links[0].clock
+    turns = _Turns(jobs, most or len(jobs), most_on_link or len(jobs))
     try:
         while True:
             now = clock()
-            every: list[PumpJob[Any]] = [*jobs, *(job for link in links for job in link.background)]
+            turns.begin()
+            every: list[PumpJob[Any]] = [*turns.active, *(job for link in links for job in link.background)]
             for job in every:
                 if not job.ended and (job.channel.waits or now >= job.wake_at):
                     job.advance()
-            if all(job.ended for job in jobs):
-                return
+            if turns.end():
+                if turns.over:
+                    return
+                continue
             due = min(
                 *(job.wake_at for job in every if not job.ended),
                 *(link.next_heartbeat for link in links),
@@ -329,6 +337,42 @@ def pump(jobs: Sequence[PumpJob[T]]) -> None:
     finally:
         for job in jobs:
             job.close()
+
+
+class _Turns:
+    """The jobs that run, and those that wait for their turn."""
+
+    def __init__(self, jobs: Sequence[PumpJob[Any]], most: int, most_on_link: int) -> None:
+        self._waiting, self._most, self._most_on_link = deque(jobs), most, most_on_link
+        self.active: list[PumpJob[Any]] = []
+        self._later = False  # whether the jobs that begin have waited for others
+
+    @property
+    def over(self) -> bool:
+        """Whether every job has ended."""
+        return not self.active and not self._waiting
+
+    def begin(self) -> None:
+        """Begin the jobs for which there is room."""
+        if not self._waiting or len(self.active) >= self._most:
+            return
+        on_link = Counter(id(job.channel.link) for job in self.active)
+        for _ in range(len(self._waiting)):
+            job = self._waiting.popleft()
+            if len(self.active) < self._most and on_link[id(job.channel.link)] < self._most_on_link:
+                on_link[id(job.channel.link)] += 1
+                if self._later:
+                    job.channel.inbox.clear()
+                self.active.append(job)
+            else:
+                self._waiting.append(job)  # all are looked at once, so that their order stays
+        self._later = True
+
+    def end(self) -> bool:
+        """Forget the jobs that have ended; returns whether there were any."""
+        before = len(self.active)
+        self.active = [job for job in self.active if not job.ended]
+        return len(self.active) < before
 
 
 def run(channel: Channel, steps: Steps[T]) -> T:

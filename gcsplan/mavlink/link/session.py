@@ -60,6 +60,9 @@ __all__ = [
 
 T = TypeVar("T")
 
+MOST_AT_ONCE, MOST_ON_LINK = 200, 50
+"""Most vehicles of a fleet that are talked to at a time, on all links and on one."""
+
 
 class Checked(Protocol):
     """The part of a verdict that an upload needs."""
@@ -144,6 +147,7 @@ def upload_mission(
 def upload_fleet(orders: Sequence[UploadOrder], *, ended: EndCall | None = None) -> list[UploadResult | GcsplanError]:
     """Run several uploads at once, on one link or several; return results or errors in the order of ``orders``.
 
+    At most `MOST_AT_ONCE` run at a time, and `MOST_ON_LINK` on one link; the others wait for their turn.
     ``ended(order, outcome)`` is called as each of them ends. Raises CheckFailed, before anything is sent, unless every
     mission has its passing verdict; InputError if two missions are for the same vehicle.
     """
@@ -207,7 +211,7 @@ def _together(
         for link, sysid, steps in starts:
             channel = link.channel(sysid)
             jobs.append(PumpJob(channel, steps(channel)))
-        pump(jobs)
+        pump(jobs, most=MOST_AT_ONCE, most_on_link=MOST_ON_LINK)
     finally:
         for job in jobs:
             job.channel.link.drop(job.channel)

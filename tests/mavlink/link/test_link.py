@@ -552,6 +552,43 @@ def test_tasks_run_together_and_errors_stay_with_their_own() -> None:
         pump([])
 
 
+@pytest.mark.parametrize(("most", "most_on_link"), [(7, 3), (2, 50), (200, 4), (1, 1)])
+def test_no_more_tasks_run_at_a_time_than_may(most: int, most_on_link: int) -> None:
+    running: set[tuple[int, int]] = set()
+    begun: list[tuple[int, int]] = []
+    peaks: list[tuple[int, int]] = []
+
+    def task(which: int, number: int, channel: Channel) -> Steps[int]:
+        begun.append((which, number))
+        running.add((which, number))
+        # What was heard while it waited says nothing of its vehicle now.
+        assert most_on_link >= 20 or not channel.inbox
+        for _ in range(1 + number % 3):
+            peaks.append((len(running), max(sum(w == k for w, _ in running) for k in range(3))))
+            yield time.monotonic() + 0.002
+        running.discard((which, number))
+        if number == 5:
+            raise LinkError("gone")
+        return number
+
+    with contextlib.ExitStack() as stack:
+        links = [stack.enter_context(Link("udpin:127.0.0.1:0", heartbeat_s=None)) for _ in range(3)]
+        jobs = []
+        for number in range(20):
+            for which, link in enumerate(links):
+                channel = link.channel(number + 1)
+                jobs.append(PumpJob(channel, task(which, number, channel)))
+                if number >= most_on_link:
+                    channel.inbox.append(Heard(VEHICLE, ("127.0.0.1", 1), None))
+        pump(jobs, most=most, most_on_link=most_on_link)
+    assert [job.result for job in jobs] == [None if k == 5 else k for k in range(20) for _ in range(3)]
+    assert sum(isinstance(job.error, LinkError) for job in jobs) == 3
+    assert max(peak for peak, _ in peaks) <= most
+    assert max(peak for _, peak in peaks) <= most_on_link
+    for which in range(3):  # in their order on each link
+        assert [n for w, n in begun if w == which] == list(range(20))
+
+
 def test_an_interrupt_cancels_what_runs() -> None:
     peer = Peer()
     with contextlib.closing(peer.socket), Link(f"udpout:127.0.0.1:{peer.port}", heartbeat_s=None) as link:
