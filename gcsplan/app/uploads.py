@@ -74,10 +74,12 @@ def targets(where: Sequence[str], vehicles: Sequence[Vehicle]) -> dict[str, str]
 
 def _require_apart(to: Mapping[str, str], by_name: Mapping[str, Vehicle]) -> None:
     """Raise UsageError for two vehicles of one system id on one link, where nobody could tell them apart."""
-    seats: dict[tuple[str, int], str] = {}
+    seats: dict[tuple[object, int], str] = {}
     for name, url in to.items():
-        other = seats.setdefault((url, by_name[name].sysid), name)
-        if other != name and url != SIM:  # simulated vehicles of one system id get links of their own
+        if url == SIM:
+            continue  # simulated vehicles of one system id get links of their own
+        other = seats.setdefault((parse_url(url).far_end, by_name[name].sysid), name)
+        if other != name:
             raise UsageError(
                 f"{other} and {name} both have system id {by_name[name].sysid}, and both would be reached over {url}: "
                 f"give each a link of its own (--upload link takes those of the mission file)"

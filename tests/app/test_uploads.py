@@ -36,7 +36,8 @@ def test_two_of_one_system_id_are_not_sent_over_one_link() -> None:
     assert uploads.targets(["link"], vehicles) == dict(zip(("uav1", "uav2"), PORTS, strict=True))
     assert uploads.targets(["sim"], vehicles) == {"uav1": "sim", "uav2": "sim"}
     assert uploads.targets([f"uav1={PORTS[1]}"], vehicles) == {"uav1": PORTS[1]}
-    for where in ([PORTS[0]], ["link", f"uav1={PORTS[1]}"]):
+    same = PORTS[1].replace("127.0.0.1", "localhost") + ",5000"  # the same place, written otherwise
+    for where in ([PORTS[0]], ["link", f"uav1={PORTS[1]}"], ["link", f"uav1={same}"]):
         with pytest.raises(UsageError, match="uav1 and uav2 both have system id 1") as caught:
             uploads.targets(where, vehicles)
         assert "a link of its own" in str(caught.value)

@@ -80,6 +80,12 @@ class Endpoint:
         return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
 
     @property
+    def far_end(self) -> tuple[str, bool, str, int]:
+        """What the link reaches, however its URL is written: all names of this machine are one place."""
+        here = self.listens or self.host.lower() in _HERE
+        return self.kind, self.listens, self.device or ("" if here else self.host.lower()), self.port
+
+    @property
     def url(self) -> str:
         """The URL in pymavlink's notation."""
         if self.kind == "serial":
