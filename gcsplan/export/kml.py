@@ -21,6 +21,8 @@ from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Level, Zone
 
 TRACK_COLOURS = ("ff0099ff", "ffff9900", "ff66cc00", "ffcc00cc", "ff00cccc", "ff3333ff")  # aabbggrr
+MOST_WHOLE = 100
+"""Most tracks that are drawn with a curtain to the ground and all way points; of more, way points are there to tick."""
 DRAWN_TOP_M = 300.0
 """Metres above the highest track up to which a zone without a ceiling is drawn."""
 
@@ -64,8 +66,9 @@ def write_kml(
         '<Style id="zone"><LineStyle><color>ff0000ff</color></LineStyle>'
         "<PolyStyle><color>600000ff</color></PolyStyle></Style>",
     ]
+    light = len(tracks) > MOST_WHOLE
     for number, track in enumerate(tracks):
-        lines += _track(track, number % len(TRACK_COLOURS), frame, start)
+        lines += _track(track, number % len(TRACK_COLOURS), frame, start, light=light)
     if zones:
         lines += ["<Folder>", "<name>no-fly zones</name>"]
         for zone, outline in zip(zones, outlines, strict=True):
@@ -129,28 +132,33 @@ def _place(lat_deg: float, lon_deg: float, height_m: float) -> str:
     return f"{lon_deg:.7f},{lat_deg:.7f},{height_m:.2f}"
 
 
-def _track(track: Track, style: int, frame: Frame, start: datetime | None) -> Iterable[str]:
+def _track(track: Track, style: int, frame: Frame, start: datetime | None, *, light: bool) -> Iterable[str]:
     name = _text(track.vehicle)
     yield "<Folder>"
     yield f"<name>{name}</name>"
     yield from _look_at(_places(track), frame, along=True)
     yield f"<Placemark><name>{name}</name><styleUrl>#track{style}</styleUrl>"
-    yield "<LineString><extrude>1</extrude><altitudeMode>absolute</altitudeMode>"
+    yield f"<LineString>{'' if light else '<extrude>1</extrude>'}<altitudeMode>absolute</altitudeMode>"
     yield f"<coordinates>{_coordinates(track.lat_deg, track.lon_deg, track.amsl_m)}</coordinates>"
     yield "</LineString></Placemark>"
     if start is not None and track.left_s is not None:
         yield from _moving(track, style, start)
+    if light:
+        yield "<Folder><name>way points</name><visibility>0</visibility>"
+    hidden = "<visibility>0</visibility>" if light else ""  # of each: a viewer shows what its own element says
     shown: set[int | None] = set()
     for point, lat, lon, amsl in zip(track.waypoints, track.lat_deg, track.lon_deg, track.amsl_m, strict=False):
         if point is None or (point.number in shown and point.number is not None):
             continue  # a jump leads back to an item that has its place already
         shown.add(point.number)
         yield (
-            f"<Placemark><name>{_text(point.name)}</name><styleUrl>#point{style}</styleUrl>"
+            f"<Placemark><name>{_text(point.name)}</name>{hidden}<styleUrl>#point{style}</styleUrl>"
             f"<ExtendedData>{_fields(track, point, float(amsl))}</ExtendedData>"
             f"<Point><altitudeMode>absolute</altitudeMode><coordinates>{_place(lat, lon, amsl)}</coordinates></Point>"
             "</Placemark>"
         )
+    if light:
+        yield "</Folder>"
     yield "</Folder>"
 
 

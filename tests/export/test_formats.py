@@ -193,9 +193,10 @@ def test_a_marker_moves_only_where_the_mission_has_a_time_of_day() -> None:
 CHILDREN = {
     "kml": ["Document"],
     "Document": ["name", "open", "LookAt", "Style", "StyleMap", "Folder"],
-    "Folder": ["name", "LookAt", "Placemark"],
+    "Folder": ["name", "visibility", "LookAt", "Placemark", "Folder"],
     "Placemark": [
-        "name", "description", "styleUrl", "ExtendedData", "Point", "LineString", "Polygon", "MultiGeometry", "Track",
+        "name", "visibility", "description", "styleUrl", "ExtendedData", "Point", "LineString", "Polygon",
+        "MultiGeometry", "Track",
     ],
     "LookAt": ["longitude", "latitude", "altitude", "heading", "tilt", "range", "altitudeMode"],
     "Style": ["IconStyle", "LabelStyle", "LineStyle", "PolyStyle", "BalloonStyle"],
@@ -209,9 +210,10 @@ CHILDREN = {
 """The children of our KML's elements, in the order of ogckml22.xsd and kml22gx.xsd; Style and StyleMap take turns."""
 
 
-def test_elements_stand_in_the_order_of_the_schema() -> None:
+@pytest.mark.parametrize("count", [1, 101])
+def test_elements_stand_in_the_order_of_the_schema(count: int) -> None:
     start = datetime(2026, 11, 21, 18, 30, tzinfo=UTC)
-    root = ET.fromstring(write_kml("m", [TRACK], ZONES, FRAME, start))
+    root = ET.fromstring(write_kml("m", [TRACK] * count, ZONES, FRAME, start))
     seen = set()
     for element in root.iter():
         tag = element.tag.split("}")[1]
@@ -226,6 +228,19 @@ def test_elements_stand_in_the_order_of_the_schema() -> None:
     ids = [e.get("id") for e in root.iter() if e.get("id")]
     assert len(ids) == len(set(ids))
     assert {u.text for u in root.iter(KML + "styleUrl")} <= {f"#{i}" for i in ids}
+
+
+def test_of_a_large_fleet_the_way_points_are_there_to_tick_and_tracks_have_no_curtain() -> None:
+    root = ET.fromstring(write_kml("m", [replace(TRACK, vehicle=f"uav{n}") for n in range(101)], ZONES, FRAME))
+    whole = ET.fromstring(write_kml("m", [TRACK], ZONES, FRAME))
+    tracks = [p for p in root.iter(f"{KML}Placemark") if p.find(f"{KML}LineString") is not None]
+    points = [p for p in root.iter(f"{KML}Placemark") if p.find(f"{KML}Point") is not None]
+    assert len(tracks) == 101
+    assert not [p for p in tracks if p.find(f".//{KML}extrude") is not None or p.find(f"{KML}visibility") is not None]
+    assert [p.findtext(f"{KML}visibility") for p in points] == ["0"] * 202
+    line = f".//{KML}LineString/{KML}coordinates"
+    assert root.findtext(line) == whole.findtext(line)
+    assert not list(whole.iter(f"{KML}visibility"))
 
 
 def test_a_hundred_vehicles_make_a_file_that_viewers_open() -> None:
