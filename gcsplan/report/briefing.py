@@ -39,8 +39,8 @@ def briefing_html(page: Page, verdict: tuple[str, str, str, str], relief: Relief
     shown = _shown(page)
     rest = len(page.subjects) - len(shown)
     more = f"{rest} more vehicles are not on this page: see the tables that follow." if rest else ""
-    words = what_is_not_in(page.inputs)
-    bare = f"{esc(words[0].upper() + words[1:])}. " if words else ""
+    absent = what_is_not_in(page.inputs)
+    bare = f"{esc(absent[0].upper() + absent[1:])}. " if absent else ""
     apart = separation_words(page)
     problems = _problems(page)
     high_mm = SMALL_MAP_MM if problems else MAP_MM

@@ -146,8 +146,8 @@ def _header(page: Page) -> str:
     wrong += [(s, f"not judged: {what}") for s in page.subjects for what in s.verdict.not_judged]
     several = len(page.subjects) > 1
     listed = "".join(f"<li>{f'<b>{esc(s.name)}</b>: ' if several else ''}{esc(text)}</li>" for s, text in wrong)
-    words = what_is_not_in(page.inputs)
-    bare = f'<p class="bare"><b>{esc(words)}</b></p>' if words else ""
+    absent = what_is_not_in(page.inputs)
+    bare = f'<p class="bare"><b>{esc(absent)}</b></p>' if absent else ""
     return (
         f'<header><p class="brand">gcsplan mission report</p><h1>{esc(page.title)}</h1>'
         f'<div class="verdict {kind}"><span class="sign" aria-hidden="true">{sign}</span>'
