@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from gcsplan.cli.ending import emit, put
-from gcsplan.cli.options import JsonOption
+from gcsplan.cli.options import JobsOption, JsonOption
 from gcsplan.errors import UsageError
 
 bench_app = typer.Typer(
@@ -66,6 +66,25 @@ def bench_upload(
 
     items = 600 if items is None else items
     result = bench.run(items=items, runs=runs)
+    _tell(result, bench.report, as_json)
+
+
+@bench_app.command("fleet", short_help="A large fleet, from mission file to upload.")
+def bench_fleet(
+    vehicles: Annotated[int, typer.Option(metavar="N", help="Vehicles, 2 to 2000.")] = 1000,
+    interval: Annotated[float, typer.Option(metavar="S", help="Time between one arrival and the next.")] = 4.0,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of depots, places and zones.")] = 1,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Mission file and outputs go there.")] = Path(
+        "bench-fleet"
+    ),
+    upload: Annotated[bool, typer.Option("--upload", help="Also upload to simulated vehicles.")] = False,
+    jobs: JobsOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Make the mission of a large fleet over the sample terrain, plan and export it, and sample all distances."""
+    from gcsplan.bench import fleet as bench
+
+    result = bench.run(vehicles, out, seed=seed, interval_s=interval, jobs=jobs, upload=upload)
     _tell(result, bench.report, as_json)
 
 
