@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gcsplan.cli.ending import emit, talking
+from gcsplan.cli.ending import complain, emit, talking
 from gcsplan.cli.options import (
     JsonOption,
     MissionArgument,
@@ -19,7 +19,7 @@ from gcsplan.cli.options import (
     WayHomeOption,
     require_html,
 )
-from gcsplan.errors import UsageError
+from gcsplan.errors import GcsplanError, UsageError
 from gcsplan.units import Quantity, duration, in_units, units_of
 
 if TYPE_CHECKING:
@@ -88,6 +88,7 @@ def rehearse(
     """
     from gcsplan.app import pipeline, rehearsing
     from gcsplan.app import way_home as returns
+    from gcsplan.app.leaving_out import refusal_of
     from gcsplan.app.report_page import render_rehearsal
     from gcsplan.cli.console import remark, say, say_notes
     from gcsplan.cli.home_words import say_homes
@@ -119,7 +120,10 @@ def rehearse(
             )  # fmt: skip
     else:
         result = rehearsing.rehearse(planned, weather=weather, runs=runs, seed=seed, airspeed_m_s=airspeed)
-    error = result.error(allow_unjudged=allow_unjudged)
+    error: GcsplanError | None = result.error(allow_unjudged=allow_unjudged)
+    if planned.left_out:
+        complain(refusal := refusal_of(planned.left_out))
+        error = error or refusal
     if report is not None:  # also of a rehearsal that found violations: it shows where
         write_whole(report, render_rehearsal(planned, result, homes, units_of(units)))
     if as_json:

@@ -35,3 +35,16 @@ def test_the_command_names_them_writes_the_others_and_ends_with_three(run: Any, 
     assert [v["name"] for v in document["left_out"]] == ["uav2", "uav5"]
     code, _, err = run("plan", file, "--leave-out", "-o", tmp_path / "good", "--planner", "nobody")
     assert code == 2
+
+
+def test_a_rehearsal_flies_the_others_and_ends_with_three(run: Any, tmp_path: Path) -> None:
+    file = tmp_path / "four.yaml"
+    file.write_text(yaml.safe_dump(mission(GOOD[0], SHUT, GOOD[1], leave_out=True)))
+    code, out, err = run("rehearse", file)
+    assert code == 3
+    assert "1 vehicle without a mission, left out: uav2" in err
+    assert "uav3" in out
+    code, out, _ = run("rehearse", file, "--json")
+    document = json.loads(out)
+    assert code == document["error"]["code"] == 3
+    assert [v["name"] for v in document["vehicles"]] == ["uav1", "uav3"]
