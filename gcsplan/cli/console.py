@@ -29,6 +29,12 @@ if TYPE_CHECKING:
 
 PLAIN_WIDTH = 130  # columns of a log file or a pipe, whose width is unknown
 WIDEST = 100_000
+MOST_WHOLE = 30
+"""Most vehicles whose table has all columns, and whose transfers have a bar each."""
+BRIEF = ("vehicle", "length", "battery", "lowest", "speed", "departs", "arrives", "verdict")
+"""How the names of the columns begin that the table of a larger fleet has."""
+MOST_NOTES, MOST_NAMES = 120, 110
+"""Most notes on vehicles that are printed, and most names in one line."""
 
 
 class _Results:
@@ -118,6 +124,8 @@ def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) 
     rows = [_plan_row(v, plan.fleet, homes.get(v.name), units) for v in plan.vehicles]
     if all(row["energy, mAh"] == "–" for row in rows):  # a mission without a battery's voltage has no charges
         rows = [{name: words for name, words in row.items() if name != "energy, mAh"} for row in rows]
+    if len(rows) > MOST_WHOLE:
+        rows = [{name: words for name, words in row.items() if name.startswith(BRIEF)} for row in rows]
     title = f"[bold]{escape(plan.source.name)}[/]  planner {plan.planner}, objective {plan.objective}"
     if len(rows) > 4:
         rows_table(title, rows, left=("vehicle", "verdict"))
@@ -140,7 +148,7 @@ def _say_fleet(plan: Plan, units: Units) -> None:
         return
     how = f"{fleet.interval_s:g} s apart" if fleet.mode == "sequence" else ""
     if fleet.mode != "none":
-        say(f"arrival: {fleet.mode}{f', {how}' if how else ''}; order {', '.join(fleet.order)}")
+        say(f"arrival: {fleet.mode}{f', {how}' if how else ''}; order {names_of(fleet.order)}")
     closest = fleet.closest
     if fleet.separation is None:
         return
@@ -293,12 +301,25 @@ def say_notes_of(notes: Sequence[tuple[str, str]]) -> None:
     names: dict[str, list[str]] = {}
     for name, note in dict.fromkeys(notes):
         names.setdefault(note, []).append(name)
-    say_notes([f"{', '.join(of)}: {note}" for note, of in names.items()])
+    lines = [f"{names_of(of)}: {note}" for note, of in names.items()]
+    if len(lines) > MOST_NOTES:
+        lines = [*lines[:MOST_NOTES], f"… and {len(lines) - MOST_NOTES} more on vehicles: --json has all"]
+    say_notes(lines)
+
+
+def names_of(names: Sequence[str]) -> str:
+    """Names in a line; of many the first and the last."""
+    if len(names) <= MOST_NAMES:
+        return ", ".join(names)
+    return f"{', '.join(names[: MOST_NAMES // 2])}, … {', '.join(names[-2:])} ({len(names)} in all)"
 
 
 @contextmanager
 def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, Transfer], None]]:
-    """Show a live table of transfers, on a terminal only; yields a function to call with (name, progress)."""
+    """Show a live table of transfers, on a terminal only; yields a function to call with (name, progress).
+
+    Of more than `MOST_WHOLE` vehicles it shows how many have ended.
+    """
     if not aside.is_terminal:
         yield lambda name, transfer: None
         return
@@ -310,6 +331,18 @@ def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, Transfer]
         TimeElapsedColumn(),
     )  # fmt: skip
     with Bars(*columns, console=aside, transient=True) as bars:
+        if len(names) > MOST_WHOLE:
+            whole, over = bars.add_task(f"{len(names)} vehicles", total=len(names), phase=""), dict[str, bool]()
+
+            def count(name: str, transfer: Transfer) -> None:
+                failed = transfer.phase.endswith("!")
+                if failed or transfer.phase == "verified":
+                    over[name] = failed
+                    bad = f"[bold red]{sum(over.values())} failed[/]" if any(over.values()) else ""
+                    bars.update(whole, completed=len(over), phase=bad)
+
+            yield count
+            return
         tasks = {name: bars.add_task(escape(name), total=None, phase="looking for it") for name in names}
 
         def update(name: str, transfer: Transfer) -> None:
