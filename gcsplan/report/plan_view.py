@@ -77,10 +77,10 @@ def legend(page: Page, relief: Relief) -> str:
     """The legend of colours, for the map and the view in space."""
     units = page.units
     tracks = "".join(
-        f'<li><i class="swatch t{i % COLOURS}"></i>{esc(s.name)}</li>' for i, s in enumerate(page.subjects[:MOST_NAMES])
+        f'<li><i class="swatch t{i % COLOURS}"></i>{esc(s.name)}</li>' for i, s in enumerate(page.subjects)
     )
     if len(page.subjects) > MOST_NAMES:
-        tracks += f"<li>and {len(page.subjects) - MOST_NAMES} more vehicles</li>"
+        tracks = f"<li>{len(page.subjects)} vehicles in {COLOURS} colours</li>"
     stops = ",".join(f"rgb({r},{g},{b}) {100 * at:g}%" for at, (r, g, b) in TINTS)
     ground = ""
     if math.isfinite(relief.low_m):

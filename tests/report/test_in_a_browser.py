@@ -16,7 +16,7 @@ from gcsplan.check.rtl.way_home import way_home
 from gcsplan.report.page import render_page
 from gcsplan.report.subject import Subject
 from gcsplan.units import AVIATION, IMPERIAL, METRIC, Units
-from tests.report.test_page import HOSTILE, fleet_page, small_page, verdict_over
+from tests.report.test_page import HOSTILE, fleet_page, many_page, small_page, verdict_over
 from tests.support import browser as chromium
 from tests.support.browser import Browser
 from tests.support.shown import same, taken_apart
@@ -314,3 +314,28 @@ def test_without_scripts_the_map_the_profile_and_every_number_are_there(page: Br
     assert page.evaluate("getComputedStyle(document.querySelector('#space')).display") == "none"
     assert page.evaluate("document.querySelectorAll('.tools:not([hidden])').length") == 0
     assert "lowest above ground" in page.evaluate("document.body.innerText")
+
+
+def test_the_filter_narrows_every_table_the_map_and_the_replay(page: Browser, tmp_path: Path) -> None:
+    file = tmp_path / "many.html"
+    file.write_text(render_page(many_page(130)), encoding="utf-8")
+    page.visit(file, width=1200, height=900)
+    assert page.complaints() == []
+    count = "document.querySelector('label.filter span').textContent"
+    assert page.evaluate(count) == "130 of 130"
+    profiles = "document.querySelectorAll('#profiles figure').length"
+    assert page.evaluate(profiles) == 24
+    enter = (
+        "(() => {{ const e = document.querySelector('{}'); e.value = '{}'; e.dispatchEvent(new Event('input')); }})()"
+    )
+    page.evaluate(enter.format("#replay input", 300))
+    page.evaluate(enter.format("label.filter input", "uav12"))
+    assert page.evaluate(count) == "11 of 130"  # uav12 and uav120 to uav129
+    shown = "[...document.querySelectorAll('{}')].filter((e) => !e.hidden && e.style.display !== 'none').length"
+    for what, expected in (
+        ("#vehicles tr[data-vehicle]", 11), ("#fleet tr[data-vehicle]", 11), ("#map .track", 11),
+        ("#map .casing", 11), (".crafts .craft", 11),
+    ):  # fmt: skip
+        assert page.evaluate(shown.format(what)) == expected, what
+    page.evaluate(enter.format("label.filter input", "UAV7 safe"))
+    assert page.evaluate(count) == "11 of 130"  # uav7, uav70 to uav79

@@ -43,6 +43,7 @@ from gcsplan.world.model_words import BARE_DEM, SURFACE_DEM
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from tests.fleet.test_separation import random_fleet
 from tests.support.effort import draws
 from tests.support.worlds import vehicle, world
 
@@ -534,6 +535,58 @@ def fleet_page() -> Page:
         separation=separation([a, b], Rules(50.0)),
         order=("uav1", "uav2"),
     )
+
+
+def many_page(count: int) -> Page:
+    """The first vehicle of the fleet, many times over and behind itself: uav1 to uav…; the last is not judged."""
+    page = fleet_page()
+    first = page.subjects[0]
+    assert first.motion is not None
+    motion = first.motion
+    paths = [
+        TimedPath(f"uav{k}", motion.times_s + k, motion.points + np.array([0.0, 0.0, 60.0 * k]), motion.arrive_s + k)
+        for k in range(1, count + 1)
+    ]
+    subjects = [replace(first, name=p.name, motion=p) for p in paths]
+    last = subjects[-1]
+    unjudged = replace(last.verdict, not_judged=("the wind",))
+    subjects[-1] = replace(last, verdict=unjudged)
+    return replace(
+        page, subjects=tuple(subjects), separation=separation(paths, Rules(50.0)), order=tuple(p.name for p in paths),
+        left_out=(("uav999", "it is <shut> in"),),
+    )  # fmt: skip
+
+
+def test_of_a_large_fleet_all_are_on_the_map_and_some_have_profiles() -> None:
+    page = many_page(130)
+    text = render_page(page)
+    read = Reader(text)
+    assert len(read.data["lines"]) == 130
+    assert text.count('<polyline class="track ') == 130
+    profiles = set(re.findall(r'<figure class="[^"]*" id="profile-(\d+)"', text))
+    assert len(profiles) == 24
+    assert "129" in profiles  # the one with a problem
+    least = page.separation.least if page.separation is not None else None
+    assert least is not None
+    assert {str(int(name[3:]) - 1) for name in least.vehicles} <= profiles
+    assert "Of 130 vehicles 24 are shown" in read.text
+    assert "1 without a mission, left out" in read.text
+    assert "it is <shut> in" in read.text
+    assert {int(n) for n in re.findall(r'<tr[^>]* data-vehicle="(\d+)"', text)} == set(range(130))
+    assert len(text) < 4_000_000
+    whole = render_page(many_page(100))
+    assert len(set(re.findall(r'id="profile-(\d+)"', whole))) == 100
+    assert "are shown: those with problems" not in whole
+
+
+def test_the_nearest_two_over_time_are_those_of_all_pairs() -> None:
+    for seed in range(6):
+        paths = random_fleet(seed)
+        times = np.linspace(min(p.begin_s for p in paths) - 5.0, max(p.end_s for p in paths) + 5.0, 300)
+        pairs = [fleet_view.apart_m(a, b, times) for a, b in combinations(paths, 2)]
+        brute = np.fmin.reduce(pairs)
+        found = fleet_view.nearest_two_m(paths, times)
+        assert np.allclose(found, brute, equal_nan=True)
 
 
 def test_a_fleets_report_tells_the_exact_separation_and_draws_it_over_time() -> None:

@@ -18,9 +18,12 @@ function startFilter() {
       const fits = words.every((word) => text.includes(word));
       for (const row of rows.get(number) || []) row.hidden = !fits;
       for (const track of tracks.get(number) || []) track.style.display = fits ? '' : 'none';
+      if (fits) unwanted.delete(+number); else unwanted.add(+number);
       shown += fits ? 1 : 0;
     }
     count.textContent = `${shown} of ${texts.size}`;
+    document.getElementById('map').classList.toggle('filtered', shown < texts.size);
+    for (const move of movers) move();
   }
   label.hidden = false;
   box.addEventListener('input', show);
@@ -32,5 +35,5 @@ function startFilter() {
       }
     }
   }
-  show();
+  count.textContent = `${texts.size} of ${texts.size}`;
 }

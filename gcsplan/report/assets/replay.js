@@ -68,18 +68,25 @@ function startReplay() {
   moveTo(0, false);
 }
 
+// The vehicles that the filter hides, by number.
+const unwanted = new Set();
+
+// Of more vehicles than this the dots are small and without names.
+const MOST_NAMED = 100;
+
 // Dots of the vehicles over the map, with their names where there is room: beside no mark and no label of the map.
 function startCrafts(figure, made) {
   const layer = document.createElement('div');
-  layer.className = 'crafts';
+  const many = replay.tracks.length > MOST_NAMED;
+  layer.className = many ? 'crafts many' : 'crafts';
   figure.append(layer);
   const crafts = replay.tracks.map((track) => {
     const el = document.createElement('i'), label = document.createElement('b');
     el.className = `craft t${track.k % 8}${hollow(track) ? ' planned' : ''}`;
-    label.textContent = hollow(track) ? '' : track.name;
+    label.textContent = many || hollow(track) ? '' : track.name;
     el.append(label);
     layer.append(el);
-    return { el, label, r: 8 };
+    return { el, label, r: many ? 4 : 8, k: track.k };
   });
   function move() {
     layer.hidden = !replay.shown;
@@ -89,7 +96,7 @@ function startCrafts(figure, made) {
       const place = replay.places[i];
       const u = place && ((place.e - ground.west) / ground.width - view.x) / view.w;
       const v = place && ((ground.north - place.n) / ground.height - view.y) / view.h;
-      c.el.hidden = !place || u < 0 || u > 1 || v < 0 || v > 1;
+      c.el.hidden = !place || unwanted.has(c.k) || u < 0 || u > 1 || v < 0 || v > 1;
       if (c.el.hidden) return;
       c.x = u * width;
       c.y = v * height;
