@@ -168,11 +168,15 @@ class Link:
     def channel(self, sysid: int) -> Channel:
         """Return a new channel for one system id; `drop` it when done."""
         channel = Channel(self, sysid)
-        self._channels.setdefault(sysid, []).append(channel)
+        self.hear(channel)
         return channel
 
+    def hear(self, channel: Channel) -> None:
+        """Put the messages of its system into ``channel`` again, after `drop`."""
+        self._channels.setdefault(channel.sysid, []).append(channel)
+
     def drop(self, channel: Channel) -> None:
-        """Remove ``channel``."""
+        """Put no more messages into ``channel``."""
         mine = self._channels.get(channel.sysid, [])
         if channel in mine:
             mine.remove(channel)
@@ -305,7 +309,8 @@ def pump(jobs: Sequence[PumpJob[T]], *, most: int | None = None, most_on_link: i
     """Run all ``jobs`` concurrently to their ends, and what their links serve. Each job stores its own error.
 
     At most ``most`` run at a time, and ``most_on_link`` of each link (None: all). The others wait for their turn in
-    their order; what is heard meanwhile is not kept, so that a job sees its vehicle as it is when its turn comes.
+    their order, and their channels hear nothing until then, so that a job sees its vehicle as it is when its turn
+    comes, and nothing piles up.
     """
     if not jobs:
         return
@@ -345,7 +350,7 @@ class _Turns:
     def __init__(self, jobs: Sequence[PumpJob[Any]], most: int, most_on_link: int) -> None:
         self._waiting, self._most, self._most_on_link = deque(jobs), most, most_on_link
         self.active: list[PumpJob[Any]] = []
-        self._later = False  # whether the jobs that begin have waited for others
+        self._deaf: set[int] = set()  # ids of the jobs whose channels hear nothing
 
     @property
     def over(self) -> bool:
@@ -354,25 +359,32 @@ class _Turns:
 
     def begin(self) -> None:
         """Begin the jobs for which there is room."""
-        if not self._waiting or len(self.active) >= self._most:
+        if not self._waiting or (self._deaf and len(self.active) >= self._most):
             return
         on_link = Counter(id(job.channel.link) for job in self.active)
         for _ in range(len(self._waiting)):
             job = self._waiting.popleft()
             if len(self.active) < self._most and on_link[id(job.channel.link)] < self._most_on_link:
                 on_link[id(job.channel.link)] += 1
-                if self._later:
-                    job.channel.inbox.clear()
+                if id(job) in self._deaf:
+                    job.channel.link.hear(job.channel)
                 self.active.append(job)
             else:
                 self._waiting.append(job)  # all are looked at once, so that their order stays
-        self._later = True
+                if id(job) not in self._deaf:
+                    self._deaf.add(id(job))
+                    job.channel.link.drop(job.channel)
+                    job.channel.inbox.clear()
 
     def end(self) -> bool:
         """Forget the jobs that have ended; returns whether there were any."""
-        before = len(self.active)
+        over = [job for job in self.active if job.ended]
         self.active = [job for job in self.active if not job.ended]
-        return len(self.active) < before
+        if self._waiting:  # what their vehicles say until the others are done is nobody's
+            for job in over:
+                job.channel.link.drop(job.channel)
+                job.channel.inbox.clear()
+        return bool(over)
 
 
 def run(channel: Channel, steps: Steps[T]) -> T:

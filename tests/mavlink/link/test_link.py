@@ -589,6 +589,27 @@ def test_no_more_tasks_run_at_a_time_than_may(most: int, most_on_link: int) -> N
         assert [n for w, n in begun if w == which] == list(range(20))
 
 
+def test_a_channel_whose_task_waits_for_its_turn_hears_nothing_and_then_hears_again(peers: list[Peer]) -> None:
+    heard: list[tuple[int, int]] = []
+    with Link("udpin:127.0.0.1:0", heartbeat_s=None) as link:
+        port = int(link.place.rsplit(":", 1)[1])
+
+        def task(number: int, channel: Channel) -> Steps[None]:
+            heard.append((number, len(channel.inbox)))
+            for peer in peers:
+                peer.send(heartbeat(), port)
+            end = time.monotonic() + 0.2
+            while time.monotonic() < end:
+                yield time.monotonic() + 0.02
+            heard.append((number, len(channel.inbox)))
+
+        channels = [link.channel(n) for n in (1, 2, 3)]
+        pump([PumpJob(c, task(n, c)) for n, c in enumerate(channels, start=1)], most=1)
+        left = [len(c.inbox) for c in channels]
+    assert heard == [(1, 0), (1, 1), (2, 0), (2, 1), (3, 0), (3, 1)]  # nothing of what was said to those who waited
+    assert left == [0, 0, 1]
+
+
 def test_an_interrupt_cancels_what_runs() -> None:
     peer = Peer()
     with contextlib.closing(peer.socket), Link(f"udpout:127.0.0.1:{peer.port}", heartbeat_s=None) as link:
