@@ -1,9 +1,9 @@
 """The missions of ``gcsplan bench fleet``: depots over the sample terrain whose copters fly to places around them.
 
 Each depot has rows of pads; each pad has one copter, and each copter a place of its own, drawn around its depot. Places
-are drawn apart from each other, from every pad and from zones, but without a look at heights or slopes: a place that
-cannot be reached is a vehicle that has no mission. Arrivals are in sequence, and the depots take turns. System ids
-repeat; each link has a system id once. This module uses no planner.
+are drawn apart from each other, from every pad and from zones, but without a look at heights or at the battery, which
+is the same for all: a copter whose place is too far or too high for it has no mission. Arrivals are in sequence, and
+the depots take turns. System ids repeat; each link has a system id once. This module uses no planner.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ METRES_PER_DEGREE = 111_200.0
 PADS = 10
 """Pads in a row of a depot, and rows."""
 PAD_M = 90.0
+BATTERY_J, RESERVE = 6.2e5, 0.2
+"""Battery of each copter, J, and the part of it that must be left: too little for about one flight in a hundred."""
 NEAREST_M, FARTHEST_M = 1500.0, 4000.0
 """Distance of a copter's goal from the middle of its depot, m."""
 APART_M = 100.0
@@ -72,6 +74,7 @@ def fleet_document(vehicles: int, seed: int = 1, interval_s: float = 4.0) -> Doc
             {
                 "name": f"uav{k + 1:04d}", "sysid": k % ON_A_LINK + 1, "autopilot": "arducopter",
                 "start": _degrees(starts[k]), "goal": _degrees(goals[k]), "speed_m_s": [3, 10],
+                "energy": {"battery_j": BATTERY_J, "reserve": RESERVE},
                 "link": f"udpout:127.0.0.1:{FIRST_PORT + k // ON_A_LINK}",
             }
             for k in range(vehicles)

@@ -60,7 +60,7 @@ __all__ = [
 
 T = TypeVar("T")
 
-MOST_AT_ONCE, MOST_ON_LINK = 200, 50
+MOST_AT_ONCE, MOST_ON_LINK = 50, 25
 """Most vehicles of a fleet that are talked to at a time, on all links and on one."""
 
 
