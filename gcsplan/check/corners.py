@@ -28,11 +28,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from gcsplan.arrays import Floats
 from gcsplan.check.arcs import bend
 from gcsplan.check.circles import circle_growth
-from gcsplan.check.geodesy import flat_m
-from gcsplan.check.spline import towards
+from gcsplan.check.geodesy import flat_m, offset_m
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.check.tuning import DEFAULTS, Tuning
 from gcsplan.mavlink.mission import commands as cmd
@@ -254,5 +252,5 @@ def _turn(s: Stretch, after: Stretch) -> float:
 
 
 def _course(s: Stretch) -> float | None:
-    way: Floats = towards(s.start, s.end)
-    return math.atan2(way[1], way[0]) if math.hypot(way[0], way[1]) > SAME_M else None
+    east, north = offset_m(s.start, s.end)
+    return math.atan2(north, east) if math.hypot(east, north) > SAME_M else None

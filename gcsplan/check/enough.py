@@ -57,7 +57,7 @@ def _lift(v: Violation, broken: Indices, legs: Legs, limits: Limits, air: Airspa
             legs.start[broken] + lift, legs.end[broken] + lift, legs.column[broken], legs.track_error_m[broken],
             legs.altitude_error_m[broken],
         )  # fmt: skip
-        return max((w.by for w in air.examine(moved, alone).violations if w.kind == v.kind), default=0.0)
+        return air.deepest(moved, alone, v.kind)
 
     by = rounded_up(v.by)
     for _ in range(TRIES):

@@ -202,7 +202,7 @@ class _Pilot(Aboard):
                 )
             self.airborne = self.known = True
             self.at = target
-        terrain, away_m = item.frame in (m.TERRAIN, 11), flat_m(self.at, target)
+        terrain, away_m = item.frame in (m.TERRAIN, 11), flat_m(self.at, target) if short_m > 0.0 else 0.0
         if short_m > 0.0 and away_m > short_m and not terrain:
             part = 1.0 - short_m / away_m
             edge = tuple(a + part * (b - a) for a, b in zip(self.at[:2], target[:2], strict=True))
@@ -347,12 +347,12 @@ class _Pilot(Aboard):
     def _fly_to_landing(self, seq: int, item: MissionItem) -> None:
         here, terrain = self.at, item.frame in (m.TERRAIN, 11) and self.autopilot is Autopilot.ARDUCOPTER
         level = (item.lat_deg, item.lon_deg, here[2])
-        agl = here[2] - self.read(*here[:2])
-        follows = (*level[:2], self.read(*level[:2]) + agl)
-        self.at = follows if terrain and not math.isnan(follows[2]) else level
         if flat_m(here, level) <= 0.02:
             self.at = level
             return
+        agl = here[2] - self.read(*here[:2])
+        follows = (*level[:2], self.read(*level[:2]) + agl)
+        self.at = follows if terrain and not math.isnan(follows[2]) else level
         self.add(seq, "land", here, self.at, terrain=terrain)
         if self.autopilot is Autopilot.ARDUCOPTER and not terrain and not math.isnan(follows[2]):
             down = (*level[:2], min(follows[2], self.ground(*level[:2])))

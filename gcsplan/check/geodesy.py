@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 from gcsplan.check.stretch import Place
 
@@ -17,6 +18,7 @@ def degree_m(lat_deg: float) -> tuple[float, float]:
     return math.radians(east), math.radians(north)
 
 
+@lru_cache(maxsize=1024)
 def offset_m(a: Place, b: Place) -> tuple[float, float]:
     """Metres east and north from ``a`` to ``b``, by the ellipsoid's radii at mid latitude: 1e-6 off over 100 km."""
     east, north = degree_m(0.5 * (a[0] + b[0]))

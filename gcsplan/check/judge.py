@@ -7,8 +7,9 @@ track and altitude errors and by the bow between the line straight in the plane 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -48,11 +49,13 @@ def judge(
     rtl_rel_home_m: float | None = None,
     terrain_error_m: float = TERRAIN_ERROR_M,
     misses: bool = False,
+    times: bool = True,
     tuning: Tuning = DEFAULTS,
 ) -> Verdict:
     """Judge ``mission`` for ``vehicle`` in ``world``; never raises for a mission that is merely unsafe.
 
-    ``misses``: also report how near it comes to each limit (half as much work again). ``tuning``: the parameters that
+    ``misses``: also report how near it comes to each limit (half as much work again). ``times``: without them the legs'
+    ``time_s`` are NaN, unless a limit hangs on them; a third of the work. ``tuning``: the parameters that
     decide where the autopilot turns, if they were read from the vehicle.
     """
     table = profile_of(mission.autopilot)
@@ -84,7 +87,9 @@ def judge(
     radius_m = {}
     if mission.autopilot is Autopilot.PX4:
         radius_m = {seq: tuning.px4_accepts_m(i)[0] for seq, i in enumerate(stored.items, stored.first_seq)}
-    seconds = seconds_of(flight.stretches, vehicle, world, home, radius_m)
+    seconds = np.full(len(flight.stretches), math.nan)
+    if times or flight.loop_seq is not None:  # how long the battery lasts in a round depends on them
+        seconds = seconds_of(flight.stretches, vehicle, world, home, radius_m)
     figures = _figures(flight, plane, report, vehicle, world, seconds)
     findings += _findings(flight.stretches, plane, report, vehicle.limits, world)
     near = nearest_misses(flight.stretches, plane.legs, plane.owner, report, vehicle, world) if misses else ()
@@ -160,41 +165,50 @@ def _figures(
     flight: Flight, plane: PlaneLegs, report: LegReport, vehicle: Vehicle, world: World, seconds: Floats
 ) -> tuple[LegFigures, ...]:
     energy = vehicle.energy
-    ground_end = world.airspace.surface.ground_at(plane.legs.end[:, 0], plane.legs.end[:, 1])
-    of = [np.flatnonzero(plane.owner == i) for i in range(len(flight.stretches))]
-    lows = np.array([_lowest(report, mine) for mine in of], dtype=np.intp)
+    delta = plane.legs.end - plane.legs.start
+    runs, rises = np.hypot(delta[:, 0], delta[:, 1]), delta[:, 2]
+    edges = np.searchsorted(plane.owner, np.arange(len(flight.stretches) + 1))
+    alone = len(plane.owner) == len(flight.stretches)
+
+    def each(of: Callable[[Floats], float], values: Floats) -> list[float]:
+        """A number for each stretch out of those of its legs; mostly a stretch has one leg alone."""
+        return values.tolist() if alone else [of(values[a:b]) for a, b in pairwise(edges.tolist())]
+
+    def first(of: Callable[[Floats], np.intp], values: Floats) -> Indices:
+        """The leg of each stretch that ``of`` finds among its own."""
+        return edges[:-1] if alone else np.array([a + of(values[a:b]) for a, b in pairwise(edges.tolist())], np.intp)
+
+    lows = first(_lowest, report.min_agl_m)
     at = np.where(np.isnan(report.min_agl_m[lows]), 0.0, report.min_agl_at[lows])
     low_en = plane.legs.start[lows, :2] + at[:, None] * (plane.legs.end[lows, :2] - plane.legs.start[lows, :2])
-    low_deg = world.frame.to_degrees(low_en[:, 0], low_en[:, 1]).tolist()
+    near, steepest = first(np.argmin, report.zone_clearance_m), first(np.argmax, np.abs(report.climb_deg))
+    ends = plane.legs.end[edges[1:] - 1]
+    known = ~np.isnan(report.min_agl_m)
+    rows = zip(
+        flight.stretches, each(np.sum, runs), each(np.sum, np.hypot(runs, rises)), each(np.sum, np.abs(rises)),
+        report.climb_deg[steepest].tolist(), world.airspace.surface.ground_at(ends[:, 0], ends[:, 1]).tolist(),
+        each(_least, report.min_agl_m), world.frame.to_degrees(low_en[:, 0], low_en[:, 1]).tolist(),
+        each(_most, np.where(known, report.max_agl_m, math.nan)), report.zone_clearance_m[near].tolist(),
+        report.nearest_zone[near].tolist(), seconds.tolist(), strict=True,
+    )  # fmt: skip
     figures = []
-    for i, s in enumerate(flight.stretches):
-        mine = of[i]
-        delta = plane.legs.end[mine] - plane.legs.start[mine]
-        run, rise = np.hypot(delta[:, 0], delta[:, 1]), delta[:, 2]
-        horizontal_m = float(run.sum())
-        agl = report.min_agl_m[mine]
-        known = ~np.isnan(agl)
-        near = int(mine[report.zone_clearance_m[mine].argmin()])
-        zone = int(report.nearest_zone[near])
-        steepest = mine[int(np.abs(report.climb_deg[mine]).argmax())]
+    for s, run_m, length_m, rise_m, climb_deg, ground_m, agl_m, low_deg, top_m, clear_m, zone, time_s in rows:
         hold_s = 0.0 if math.isinf(s.hold_s) else s.hold_s
         hold_j = _hold_w(vehicle, s) * hold_s
-        highest = report.max_agl_m[mine]
         figures.append(
             LegFigures(
                 seq=s.seq, kind=s.kind, start=s.start, end=s.end, column=s.column, on_path=s.on_path,
-                horizontal_m=horizontal_m,
-                length_m=float(np.hypot(run, rise).sum()),
-                climb_deg=float(report.climb_deg[steepest]),
-                agl_end_m=s.end[2] - float(ground_end[mine[-1]]),
-                min_agl_m=float(agl[known].min()) if known.any() else math.nan,
-                min_agl_at=(low_deg[i][0], low_deg[i][1]),
-                max_agl_m=float(highest[known].max()) if known.any() else math.nan,
-                zone_clearance_m=float(report.zone_clearance_m[near]),
+                horizontal_m=float(run_m),
+                length_m=float(length_m),
+                climb_deg=climb_deg,
+                agl_end_m=s.end[2] - ground_m,
+                min_agl_m=agl_m,
+                min_agl_at=(low_deg[0], low_deg[1]),
+                max_agl_m=top_m,
+                zone_clearance_m=clear_m,
                 nearest_zone=world.airspace.zones[zone].name if zone >= 0 else "",
-                energy_j=energy.vertical_j_per_m * float(np.abs(rise).sum())
-                + energy.horizontal_j_per_m * horizontal_m + hold_j,
-                time_s=float(seconds[i]) + hold_s,
+                energy_j=energy.vertical_j_per_m * float(rise_m) + energy.horizontal_j_per_m * float(run_m) + hold_j,
+                time_s=time_s + hold_s,
                 hold_s=s.hold_s,
                 hold_j=hold_j,
                 times=s.times,
@@ -204,11 +218,18 @@ def _figures(
     return tuple(figures)
 
 
-def _lowest(report: LegReport, mine: Indices) -> int:
-    """The leg of ``mine`` that is lowest above known ground; the first if none is over known ground."""
-    agl = report.min_agl_m[mine]
-    known = ~np.isnan(agl)
-    return int(mine[known][agl[known].argmin()]) if known.any() else int(mine[0])
+def _lowest(agl_m: Floats) -> np.intp:
+    """The leg that is lowest above known ground; the first if none is over known ground."""
+    known = np.flatnonzero(~np.isnan(agl_m))
+    return known[agl_m[known].argmin()] if len(known) else np.intp(0)
+
+
+def _least(agl_m: Floats) -> float:
+    return float(np.fmin.reduce(agl_m))
+
+
+def _most(agl_m: Floats) -> float:
+    return float(np.fmax.reduce(agl_m))
 
 
 WORDS = {

@@ -33,6 +33,7 @@ MOST_PARTS = 200
 """Most parts into which a piece of a terrain-frame leg is cut to keep `SAG_M`."""
 
 NOISE_DEG = 1e-6
+_STRAIGHT = (math.nan, math.nan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +57,12 @@ def legs_in_plane(stretches: Sequence[Stretch], limits: Limits, world: World, te
     plane[..., :2] = world.frame.to_plane(places[..., 0], places[..., 1])
     plane[..., 2] = places[..., 2]
     bow_m = world.frame.bow_m(places[:, 0, :2], places[:, 1, :2])
+    track = limits.track_error_m + bow_m + np.array([s.reach_m for s in stretches])
+    height = limits.altitude_error_m + np.array([s.band_m + (terrain_error_m if s.terrain else 0.0) for s in stretches])
+    column = np.array([s.column for s in stretches])
+    if not any(s.terrain for s in stretches):
+        slopes = np.array([s.steep or _STRAIGHT for s in stretches])
+        return PlaneLegs(Legs(plane[:, 0], plane[:, 1], column, track, height), np.arange(len(stretches)), slopes)
     starts, ends, counts, deviation, steep = [], [], [], [], []
     unread: list[int] = []
     for i, s in enumerate(stretches):
@@ -66,7 +73,7 @@ def legs_in_plane(stretches: Sequence[Stretch], limits: Limits, world: World, te
             plane[i, :1],
             plane[i, 1:],
             np.zeros(1),
-            np.array([s.steep or (np.nan, np.nan)]),
+            np.array([s.steep or _STRAIGHT]),
         )
         starts.append(begins)
         ends.append(finishes)
@@ -74,9 +81,6 @@ def legs_in_plane(stretches: Sequence[Stretch], limits: Limits, world: World, te
         deviation.append(off_m)
         steep.append(slopes)
     owner = np.repeat(np.arange(len(stretches)), counts)
-    track = limits.track_error_m + bow_m + np.array([s.reach_m for s in stretches])
-    height = limits.altitude_error_m + np.array([s.band_m + (terrain_error_m if s.terrain else 0.0) for s in stretches])
-    column = np.array([s.column for s in stretches])
     legs = Legs(
         np.concatenate(starts), np.concatenate(ends), column[owner], track[owner],
         height[owner] + np.concatenate(deviation),

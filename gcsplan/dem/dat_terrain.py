@@ -9,7 +9,7 @@ files by up to what the ground rises within two spacings, and never below it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats
 from gcsplan.dem.cells import cells_in
 from gcsplan.dem.dat_file import DatFile, cell_of_file, is_dat, read_dat
 from gcsplan.errors import InputError
@@ -85,12 +85,14 @@ class DatTerrain:
             if getattr(spec, key) is not None:
                 raise InputError("a .DAT file states it itself; remove the key", where=place(where, key))
 
-    def covers(self, lat_deg: float, lon_deg: float) -> bool:
-        """True if a place lies in a block that its file holds (which may still be unknown there)."""
-        cell = cell_at(lat_deg * 1e7, lon_deg * 1e7)
-        if cell not in self._paths:
-            return False
-        return _holds(self._file(cell), lat_deg, lon_deg)
+    def covers(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
+        """True where a place lies in a block that its file holds (which may still be unknown there)."""
+
+        def known(lat: float, lon: float) -> bool:
+            cell = cell_at(lat * 1e7, lon * 1e7)
+            return cell in self._paths and _holds(self._file(cell), lat, lon)
+
+        return _each(known, lat_deg, lon_deg)
 
     def around(self, frame: Frame, box: Box) -> Terrain:
         """The terrain that a mission in ``box`` (west, south, east, north, plane metres) uses. Raises InputError."""
@@ -127,10 +129,14 @@ class DatMosaic:
         self._files: Mapping[Cell, DatFile] = {file.cell: file for file, _ in files}
         self.rasters = tuple(DatTile(file.name, path, file.notes) for file, path in files)
 
-    def covers(self, lat_deg: float, lon_deg: float) -> bool:
-        """True if a place lies in a block that some file holds (which may still be unknown there)."""
-        file = self._files.get(cell_at(lat_deg * 1e7, lon_deg * 1e7))
-        return file is not None and _holds(file, lat_deg, lon_deg)
+    def covers(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
+        """True where a place lies in a block that some file holds (which may still be unknown there)."""
+
+        def known(lat: float, lon: float) -> bool:
+            file = self._files.get(cell_at(lat * 1e7, lon * 1e7))
+            return file is not None and _holds(file, lat, lon)
+
+        return _each(known, lat_deg, lon_deg)
 
     def extent(self, frame: Frame, box: Box) -> Box:
         """West, south, east, north of all blocks in the plane."""
@@ -272,6 +278,13 @@ class DatMosaic:
             row, col = north_m / self.grid.spacing_m - north[0], east_m / self.grid.spacing_m - east[0]
             _scatter(out, row.ravel(), col.ravel(), posts.ravel())
         return np.where(np.isinf(out), np.nan, out)
+
+
+def _each(known: Callable[[float, float], bool], lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
+    """``known`` of each place."""
+    lat, lon = np.broadcast_arrays(np.asarray(lat_deg, float), np.asarray(lon_deg, float))
+    found = [known(*at) for at in zip(lat.ravel().tolist(), lon.ravel().tolist(), strict=True)]
+    return np.array(found, np.bool_).reshape(lat.shape)
 
 
 def _holds(file: DatFile, lat_deg: float, lon_deg: float) -> bool:

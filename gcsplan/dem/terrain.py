@@ -11,8 +11,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats
 from gcsplan.dem.cache import Cache, Record
 from gcsplan.dem.cells import cells_in, names_of
 from gcsplan.dem.dat_terrain import DatTerrain, dat_files
@@ -54,8 +55,8 @@ class _SourceTerrain:
     def __init__(self, source: Source, spec: TerrainSpec, where: str) -> None:
         self._source, self._spec, self._where = source, spec, where
 
-    def covers(self, lat_deg: float, lon_deg: float) -> bool:
-        return True
+    def covers(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
+        return np.ones(np.shape(lat_deg), np.bool_)
 
     def around(self, frame: Frame, box: Box) -> Terrain:
         at = place(self._where, "dem")

@@ -11,6 +11,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gcsplan.arrays import Floats
 from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError, Problem
 from gcsplan.figures import counted
@@ -62,8 +66,16 @@ class WorldOptions:
     notes: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """A part of the world: the middle of its plane (latitude, longitude), and a box in it, in metres."""
+
+    centre_deg: tuple[float, float]
+    box: Box
+
+
 class OpenWorld:
-    """Terrain and zones of the options, opened and checked; `around` loads the part that some places need."""
+    """Terrain and zones of the options, opened and checked; `over` loads the part that some places need (`extent`)."""
 
     def __init__(self, options: WorldOptions) -> None:
         problems: list[Problem] = []
@@ -71,6 +83,7 @@ class OpenWorld:
         self.notes: list[str] = [*options.notes]
         self._drafts = _drafts(options.zones, problems, self.notes)
         self._terrain: OpenTerrain | None = None
+        self._made: dict[str, Vehicle] = {}
         keys = read_section(TerrainKeys, dict(options.terrain), "", problems)
         if keys is not None:
             self._obstacle_m = keys.obstacle_height_m
@@ -86,6 +99,12 @@ class OpenWorld:
 
     def vehicle(self, name: str, autopilot: str) -> Vehicle:
         """The vehicle that the options describe, for a file of that autopilot. Raises InputError."""
+        if autopilot not in self._made:
+            self._made[autopilot] = self._make(autopilot)
+        return replace(self._made[autopilot], name=name)
+
+    def _make(self, autopilot: str) -> Vehicle:
+        """See `vehicle`."""
         problems: list[Problem] = []
         notes: list[str] = []
         given = {"name": "file", "sysid": 1, "autopilot": autopilot, "start": [0.0, 0.0], "goal": [0.0, 0.0]}
@@ -96,10 +115,14 @@ class OpenWorld:
         if made is None:
             raise InputError.of([_renamed(p) for p in problems])
         self.notes += [n.removeprefix("file: ") for n in notes if n.removeprefix("file: ") not in self.notes]
-        return replace(made, name=name)
+        return made
 
-    def around(self, places: Sequence[tuple[float, float]], reach_m: float = 0.0) -> tuple[World, dict[str, object]]:
-        """The world that holds ``places`` (latitude, longitude), and the description of its sources.
+    def around(self, places: ArrayLike, reach_m: float = 0.0) -> tuple[World, dict[str, object]]:
+        """The world of the `extent` of ``places``, and the description of its sources. Raises InputError."""
+        return self.over(self.extent(places, reach_m))
+
+    def extent(self, places: ArrayLike, reach_m: float = 0.0) -> Extent:
+        """The part of the world that holds ``places`` (N, 2), latitude and longitude.
 
         ``reach_m`` is how far beyond them terrain is needed, in metres; `MARGIN_M` or a tenth of their extent, and the
         clearance, are added.
@@ -108,18 +131,26 @@ class OpenWorld:
         left, or if they are too far apart for one plane.
         """
         assert self._terrain is not None
-        known = [p for p in places if self._terrain.covers(*p)]
-        if not known:
-            swapped = any(abs(lon) <= 90.0 and self._terrain.covers(lon, lat) for lat, lon in places)
+        every = np.asarray(places, float).reshape(-1, 2)
+        known = every[self._terrain.covers(every[:, 0], every[:, 1])]
+        if not len(known):
+            turned = every[np.abs(every[:, 1]) <= 90.0]
+            swapped = bool(self._terrain.covers(turned[:, 1], turned[:, 0]).any())
             hint = "; latitude and longitude look swapped" if swapped else ""
             raise InputError(f"the DEM holds none of the mission's places{hint}; add the tile", where="--dem")
-        frame = Frame(*centre_of([p[0] for p in known], [p[1] for p in known]))
-        in_plane = [(float(e), float(n)) for e, n in (frame.to_plane(*p) for p in known)]
-        if not all(math.hypot(*p) <= FARTHEST_M for p in in_plane):
+        frame = Frame(*centre_of(known[:, 0], known[:, 1]))
+        in_plane = frame.to_plane(known[:, 0], known[:, 1])
+        if not (np.hypot(in_plane[:, 0], in_plane[:, 1]) <= FARTHEST_M).all():
             raise InputError(
                 f"the places lie more than {FARTHEST_M / 1000:.0f} km from their middle: too far for one plane",
                 where="--dem",
             )
+        return Extent((frame.lat_deg, frame.lon_deg), self._box(in_plane, reach_m))
+
+    def over(self, extent: Extent) -> tuple[World, dict[str, object]]:
+        """The world of an extent, and the description of its sources. Raises InputError."""
+        assert self._terrain is not None
+        frame, box = Frame(*extent.centre_deg), extent.box
         drafts = used(self._drafts)
         placed, far = place_zones(drafts, frame)
         # A swapped zone would belong to the mission; as it stands it would be left out, and flown through.
@@ -128,7 +159,6 @@ class OpenWorld:
             for draft in far
             if looks_swapped(draft, frame)
         ]
-        box = self._box(in_plane, reach_m)
         problems += faults_near(placed, box)
         scale = frame.scale_at(max(math.hypot(e, n) for e in (box[0], box[2]) for n in (box[1], box[3])))
         surface = self._terrain.around(frame, box).load(frame, box)
@@ -153,10 +183,9 @@ class OpenWorld:
         inputs["notes"] = tuple(dict.fromkeys(said))
         return World(frame, Airspace(surface, zones, scale=scale)), inputs
 
-    def _box(self, points: Sequence[tuple[float, float]], reach_m: float) -> Box:
+    def _box(self, points: Floats, reach_m: float) -> Box:
         """The box to load. A check needs no room for detours, so terrain of 1 m resolution fits a long mission."""
-        east, north = [p[0] for p in points], [p[1] for p in points]
-        low, high = (min(east), min(north)), (max(east), max(north))
+        low, high = points.min(axis=0).tolist(), points.max(axis=0).tolist()
         extent = max(high[0] - low[0], high[1] - low[1])
         near = [self._limits.horizontal_clearance_m, self._limits.track_error_m]
         margin = reach_m + max(MARGIN_M, min(0.1 * extent, MARGIN_MOST_M)) + sum(x for x in near if x is not None)

@@ -12,6 +12,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from weakref import WeakValueDictionary
 
+import numpy as np
+
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.request import MissionFile, VehicleRequest
 from gcsplan.mission_file.terminals import Terminals, make_request
@@ -209,3 +211,13 @@ def _moved(source: MissionFile, ground: Ground, level: int) -> MissionFile:
         notes=(*(n for n in source.notes if n not in old), *(str(n) for n in new)),
         level=level,
     )
+
+
+def known_in_plane(
+    places: Sequence[tuple[float, float]], terrain: OpenTerrain, frame: Frame
+) -> list[tuple[float, float]]:
+    """Where in the plane those places (latitude, longitude) lie that the terrain covers and the plane holds."""
+    at = np.array(places, float).reshape(-1, 2)
+    at = at[terrain.covers(at[:, 0], at[:, 1])]
+    plane = frame.to_plane(at[:, 0], at[:, 1])
+    return [(e, n) for e, n in plane.tolist() if math.hypot(e, n) <= FARTHEST_M]

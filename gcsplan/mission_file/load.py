@@ -6,7 +6,6 @@ Each mistake has its file, its key path, the given value and the required one. T
 
 from __future__ import annotations
 
-import math
 import os
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
@@ -21,7 +20,7 @@ from gcsplan.mission_file.airspace.left_out import faults_near, unused_notes, us
 from gcsplan.mission_file.airspace.times import OUT_OF_HOURS, Hours, hours_of
 from gcsplan.mission_file.complaints import read_section, told_once, unknown_keys, with_lines
 from gcsplan.mission_file.content import read_content
-from gcsplan.mission_file.ground import Ground, Site, opened
+from gcsplan.mission_file.ground import Ground, Site, known_in_plane, opened
 from gcsplan.mission_file.request import (
     AltitudeFrame,
     ArrivalRequest,
@@ -56,7 +55,7 @@ from gcsplan.mission_file.world import (
     place_notes,
 )  # fmt: skip
 from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, one_line, place_zones, zone_notes, zones_sha256
-from gcsplan.world.frame import FARTHEST_M, Frame
+from gcsplan.world.frame import Frame
 from gcsplan.world.terrain import OpenTerrain, Terrain, TerrainSpec
 
 __all__ = ["ArrivalRequest", "MissionFile", "PlannerRequest", "VehicleRequest", "load_mission"]
@@ -178,9 +177,7 @@ class _Reading:
             placed, far = place_zones(drafts, frame)
             self._far(far, frame)
             self.notes += zone_notes(placed)
-            known = [p for p in self.content.around if terrain.covers(*p)]
-            others = [(float(e), float(n)) for e, n in (frame.to_plane(*p) for p in known)]
-            others = [p for p in others if math.hypot(*p) <= FARTHEST_M]
+            others = known_in_plane(self.content.around, terrain, frame)
             box = make_box([*(p.in_plane(frame) for p in places), *others], [z for _, z in placed], local=self.local)
             here = self._around(terrain, frame, box)
             if here is not None:

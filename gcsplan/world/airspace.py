@@ -86,7 +86,7 @@ class Legs:
             a: NDArray[np.generic] = np.ascontiguousarray(getattr(self, name), dtype=dtype).view()
             if a.shape != shape:
                 raise ValueError(f"{name} of {n} legs must have the shape {shape}, given {a.shape}")
-            if not np.isfinite(a).all():
+            if dtype is np.float64 and not np.isfinite(a).all():
                 raise ValueError(f"{name} of a leg must be finite")
             if name.endswith("error_m") and n and a.min() < 0.0:
                 raise ValueError(f"{name} of a leg must be 0 or more, given {a.min():g}")
@@ -184,6 +184,20 @@ class Airspace:
 
     def examine(self, legs: Legs, limits: Limits) -> LegReport:
         """Every violation along the whole of every leg. ``limits``' own errors are not used: the legs carry them."""
+        found, worst, nearest, hit, hit_at = self._examined(legs, limits)
+        run, rise = np.hypot(*(legs.end - legs.start)[:, :2].T), legs.end[:, 2] - legs.start[:, 2]
+        climb_deg = np.degrees(np.arctan2(rise, run))
+        violations = self._violations(legs, limits, climb_deg, worst, hit, hit_at)
+        return LegReport(found[:, 0], found[:, 1], found[:, 2], climb_deg, found[:, 3], nearest, violations)
+
+    def deepest(self, legs: Legs, limits: Limits, kind: Kind) -> float:
+        """By how much the worst of ``legs`` breaks a limit of height, as in `examine`; 0 if none does."""
+        worst = self._examined(legs, limits)[1][:, _NUMBERS[kind], 0]
+        return float(worst[worst > 0.0].max(initial=0.0))
+
+    def _examined(self, legs: Legs, limits: Limits) -> tuple[Floats, Floats, Indices, Indices, Floats]:
+        """What the kernel finds: figures (N, 4), the worst of each kind (N, 7, 2), the nearest zone (N,), and the zones
+        that are hit: leg and zone (H, 2), distance and fraction (H, 2)."""
         n = len(legs)
         ok, found = np.zeros(n, np.bool_), np.full((n, 4), np.nan)
         worst, nearest = np.full((n, 7, 2), np.nan), np.full(n, -1, np.intp)
@@ -193,19 +207,8 @@ class Airspace:
             hit, hit_at = np.zeros((room, 2), np.intp), np.zeros((room, 2))
             hits = self._judge(legs, limits, True, ok, Held(FOUND, found, worst, nearest, hit, hit_at))
             if hits <= room:
-                break
+                return found, worst, nearest, hit[:hits], hit_at[:hits]
             room = hits
-        run, rise = np.hypot(*(legs.end - legs.start)[:, :2].T), legs.end[:, 2] - legs.start[:, 2]
-        climb_deg = np.degrees(np.arctan2(rise, run))
-        return LegReport(
-            found[:, 0],
-            found[:, 1],
-            found[:, 2],
-            climb_deg,
-            found[:, 3],
-            nearest,
-            self._violations(legs, limits, climb_deg, worst, hit[:hits], hit_at[:hits]),
-        )
 
     def clear(self, legs: Legs, limits: Limits) -> Bools:
         """(N,) True where `examine` would find no violation; faster."""
@@ -311,16 +314,18 @@ class Airspace:
     ) -> tuple[Violation, ...]:
         """Violations by leg, in the order of the kinds."""
         leg, kind = np.nonzero(worst[:, :, 0] > 0.0)
+        if not len(leg) and not len(hit):
+            return ()
         by, at = worst[leg, kind, 0], worst[leg, kind, 1]
         reach = (legs.track_error_m + limits.horizontal_clearance_m) * self.scale
         known_within = np.where(legs.column, legs.track_error_m * self.scale, reach)
-        steep = np.isin(kind, (CLIMB, DESCENT))
+        steep = (kind == CLIMB) | (kind == DESCENT)
         asked = np.zeros(len(_KINDS))
         asked[[MIN_AGL, CLIMB, DESCENT]] = limits.min_agl_m, limits.max_climb_deg, limits.max_descent_deg
         asked[[MAX_AGL, MAX_AMSL]] = limits.max_agl_m or 0.0, limits.max_amsl_m or 0.0
         limit = np.where(kind == COVERAGE, known_within[leg], asked[kind])
         by = np.where(steep, np.maximum(np.abs(climb_deg[leg]) - limit, ANGLE_DEG), by)
-        value = limit + np.where(np.isin(kind, (MIN_AGL, TERRAIN, COVERAGE)), -by, by)
+        value = limit + np.where((kind == MIN_AGL) | (kind == TERRAIN) | (kind == COVERAGE), -by, by)
         value = np.where(kind == COVERAGE, np.maximum(value, 0.0), value)
         hit_value, hit_t = self._depths(legs, hit, hit_at)
         hit_reach = reach[hit[:, 0]]
@@ -381,6 +386,7 @@ _KINDS: dict[int, Kind] = {
     ZONE: "zone", MIN_AGL: "min_agl", TERRAIN: "terrain_clearance", MAX_AGL: "max_agl", MAX_AMSL: "max_amsl",
     COVERAGE: "coverage", CLIMB: "climb", DESCENT: "descent",
 }  # fmt: skip
+_NUMBERS = {kind: number for number, kind in _KINDS.items()}
 
 _NOTHING = (
     np.zeros((0, 4)), np.zeros((0, 7, 2)), np.zeros(0, np.intp), np.zeros((0, 2), np.intp), np.zeros((0, 2)),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import InputError
 from gcsplan.world.datum import plane_to_raster, to_wgs84
 from gcsplan.world.frame import Frame
@@ -137,18 +137,26 @@ class Mosaic:
         self._degrees = to_wgs84(first.crs.horizontal, where=where)
         self._layout(0.0)  # finds tiles off the common grid before anything is read
 
-    def covers(self, lat_deg: float, lon_deg: float) -> bool:
-        """True if a place lies on some tile (which may still be void there); accurate to a few metres."""
-        x, y = (float(v) for v in self._degrees.transform(lon_deg, lat_deg, direction="INVERSE"))
-        if not (math.isfinite(x) and math.isfinite(y)):
-            return False
-        layout = self._layout(lon_deg)
-        col, row = layout.grid_of(self._near(np.asarray(x), lon_deg), np.asarray(y))
-        return any(
-            p.col - 0.5 * p.step <= col <= p.col + p.cols - 1 + 0.5 * p.step
-            and p.row - 0.5 <= row <= p.row + p.raster.rows - 0.5
-            for p in layout.tiles
-        )
+    def covers(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
+        """True where a place lies on some tile (which may still be void there); accurate to a few metres."""
+        lat, lon = np.broadcast_arrays(np.asarray(lat_deg, float), np.asarray(lon_deg, float))
+        if not lon.size:
+            return np.zeros(lon.shape, np.bool_)
+        west, east = float(lon.min()), float(lon.max())
+        if any(self._turn(r, west) != self._turn(r, east) for r in self.rasters):  # not one layout for all of them
+            each = [self.covers(*place) for place in zip(lat.ravel().tolist(), lon.ravel().tolist(), strict=True)]
+            return np.array(each, np.bool_).reshape(lon.shape)
+        x, y = (np.asarray(a, float) for a in self._degrees.transform(lon, lat, direction="INVERSE"))
+        known = np.isfinite(x) & np.isfinite(y)
+        layout = self._layout(west)
+        col, row = layout.grid_of(self._near(np.where(known, x, 0.0), lon), np.where(known, y, 0.0))
+        on = np.zeros(lon.shape, np.bool_)
+        for p in layout.tiles:
+            on |= (
+                (p.col - 0.5 * p.step <= col) & (col <= p.col + p.cols - 1 + 0.5 * p.step)
+                & (p.row - 0.5 <= row) & (row <= p.row + p.raster.rows - 0.5)
+            )  # fmt: skip
+        return np.asarray(known & on)
 
     def node_degrees(self, window: Window, cols: ArrayLike, rows: ArrayLike) -> tuple[Floats, Floats]:
         """Latitude and longitude of the nodes ``rows`` × ``cols`` of a window, (len(rows), len(cols)) each.
@@ -248,7 +256,7 @@ class Mosaic:
         y = layout.y0 - layout.dy * np.linspace(min(rows), max(rows), 33)
         return _plane_box(there, x, y)
 
-    def _near(self, x: Floats, lon_deg: float) -> Floats:
+    def _near(self, x: Floats, lon_deg: Floats | float) -> Floats:
         """Longitudes within half a turn of ``lon_deg``, so that the antimeridian is no edge; projected x unchanged."""
         return np.asarray(lon_deg + (x - lon_deg + 180.0) % 360.0 - 180.0) if self.crs.geographic else x
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.polynomial.polynomial import polyvander2d
@@ -70,18 +71,23 @@ class GridMap:
         u = (np.asarray(east_m, float) - self.centre[0]) / self.scale_m
         v = (np.asarray(north_m, float) - self.centre[1]) / self.scale_m
         v = v.reshape((1,) * (u.ndim - v.ndim) + v.shape)  # of_u has axes before those of v
-        square = np.zeros((DEGREE + 1, 2, DEGREE + 1))
-        square[_IN_U, :, _IN_V] = self.coefficients
         with np.errstate(over="ignore", invalid="ignore"):
             powers = np.ones((DEGREE + 1, v.size))
             for power in range(DEGREE):
                 np.multiply(powers[power], v.ravel(), out=powers[power + 1])
             # The coefficient of each power of u at each v.
-            of_u = (square.reshape(-1, DEGREE + 1) @ powers).reshape(DEGREE + 1, 2, *v.shape)
+            of_u = (self._square @ powers).reshape(DEGREE + 1, 2, *v.shape)
             value = of_u[DEGREE]
             for power in reversed(range(DEGREE)):
                 value = value * u + of_u[power]
         return np.stack([value[0], value[1]], axis=-1)
+
+    @cached_property
+    def _square(self) -> Floats:
+        """((DEGREE + 1) * 2, DEGREE + 1) the coefficients: a row for each power of u and column or row, 0 if none."""
+        square = np.zeros((DEGREE + 1, 2, DEGREE + 1))
+        square[_IN_U, :, _IN_V] = self.coefficients
+        return square.reshape(-1, DEGREE + 1)
 
     def jacobian(self, east_m: float, north_m: float) -> Floats:
         """(2, 2) d(col, row) / d(east_m, north_m) at a point."""

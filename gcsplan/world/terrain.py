@@ -16,7 +16,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gcsplan.arrays import Floats, Indices
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.errors import InputError
 from gcsplan.world.datum import VerticalDatum, vertical_datum
 from gcsplan.world.frame import FARTHEST_M, Frame
@@ -64,8 +64,8 @@ class TerrainSpec:
 class OpenTerrain(Protocol):
     """A terrain that has been found and accepted, as far as that is possible before a mission's area is known."""
 
-    def covers(self, lat_deg: float, lon_deg: float) -> bool:
-        """True if a place lies on the terrain (which may still be void there)."""
+    def covers(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
+        """True where a place lies on the terrain (which may still be void there)."""
 
     def around(self, frame: Frame, box: Box) -> Terrain:
         """The terrain that a mission in ``box`` (west, south, east, north, plane metres) uses. Raises InputError."""
@@ -119,7 +119,7 @@ class Tiles(Protocol):
     def rasters(self) -> Sequence[Tile]:
         """The files."""
 
-    def covers(self, lat_deg: float, lon_deg: float) -> bool:
+    def covers(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
         """See `OpenTerrain.covers`."""
 
     def extent(self, frame: Frame, box: Box) -> Box:
@@ -193,7 +193,7 @@ class _RasterTerrain:
             raster = open_raster(Path(spec.canopy), where=place(where, "canopy"))
             self._canopy = Mosaic([raster], where=place(where, "canopy"))
 
-    def covers(self, lat_deg: float, lon_deg: float) -> bool:
+    def covers(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
         return self._mosaic.covers(lat_deg, lon_deg)
 
     def around(self, frame: Frame, box: Box) -> Terrain:
@@ -269,8 +269,8 @@ class _LocalTerrain:
         if self._datum.ellipsoidal:
             raise InputError("flat ground and peaks are above mean sea level", where=place(where, "vertical_datum"))
 
-    def covers(self, lat_deg: float, lon_deg: float) -> bool:
-        return True
+    def covers(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
+        return np.ones(np.shape(lat_deg), np.bool_)
 
     def around(self, frame: Frame, box: Box) -> Terrain:
         return self

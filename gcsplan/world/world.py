@@ -10,6 +10,9 @@ from gcsplan.world.frame import Frame
 from gcsplan.world.terrain_grid import SPACING_M
 from gcsplan.world.vehicle_terrain import VehicleTerrain
 
+KEPT = 64
+"""Most places whose ground is kept."""
+
 
 @dataclass(frozen=True, eq=False)
 class World:
@@ -24,8 +27,18 @@ class World:
 
     def ground_amsl(self, lat_deg: float, lon_deg: float) -> float:
         """Ground at a place, metres AMSL; NaN where unknown."""
-        east, north = self.frame.to_plane(lat_deg, lon_deg)
-        return float(self.airspace.surface.ground_at(east, north))
+        place = lat_deg, lon_deg
+        if place not in self._grounds:
+            if len(self._grounds) >= KEPT:
+                self._grounds.clear()
+            east, north = self.frame.to_plane(lat_deg, lon_deg)
+            self._grounds[place] = float(self.airspace.surface.ground_at(east, north))
+        return self._grounds[place]
+
+    @cached_property
+    def _grounds(self) -> dict[tuple[float, float], float]:
+        """The ground at places that were asked for last: home is asked for again and again."""
+        return {}
 
     def read_amsl(self, lat_deg: float, lon_deg: float) -> float:
         """Ground at a place as the vehicle's own grid has it, metres AMSL; NaN where it has none."""

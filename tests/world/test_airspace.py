@@ -386,8 +386,11 @@ def test_clear_says_what_examine_says_of_ten_thousand_legs_over_mountains() -> N
     heights = [surface.top_at(*p.T) + rng.uniform(60.0, 200.0, len(p)) for p in (a, b)]
     errors = rng.uniform(0.0, 20.0, 10_000), rng.uniform(0.0, 10.0, 10_000)
     legs = Legs(np.column_stack([a, heights[0]]), np.column_stack([b, heights[1]]), rng.random(10_000) < 0.1, *errors)
-    report = judged(airspace, legs, Limits(60.0, 300.0, 900.0, 40.0, max_climb_deg=15.0, max_descent_deg=15.0))
+    limits = Limits(60.0, 300.0, 900.0, 40.0, max_climb_deg=15.0, max_descent_deg=15.0)
+    report = judged(airspace, legs, limits)
     assert {v.kind for v in report.violations} >= {"min_agl", "max_agl", "max_amsl", "climb", "descent"}
+    for kind in ("min_agl", "max_agl", "max_amsl", "terrain_clearance"):
+        assert airspace.deepest(legs, limits, kind) == max(v.by for v in report.violations if v.kind == kind)
     keys = [(v.leg, v.kind, v.zone) for v in report.violations]
     assert len(set(keys)) == len(keys)
     assert [v.leg for v in report.violations] == sorted(v.leg for v in report.violations)

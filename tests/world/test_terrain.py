@@ -388,6 +388,23 @@ def test_covers_asks_for_the_tile_and_not_for_its_heights(tmp_path: Path) -> Non
     assert not terrain.covers(89.0, -84.5)
 
 
+@pytest.mark.parametrize("west", [-84.6, 179.9])
+def test_covers_tells_of_many_places_what_it_tells_of_each(tmp_path: Path, west: float) -> None:
+    other = (west + 0.4 + 180.0) % 360.0 - 180.0
+    tiles = degrees_tif(tmp_path / "a.tif", west=west), degrees_tif(tmp_path / "b.tif", west=other)
+    terrain = open_terrain(TerrainSpec(dem=tiles, vertical_datum="EGM96"), where="m")
+    rng = np.random.default_rng(3)
+    lat, lon = rng.uniform(36.3, 36.7, 400), (west + rng.uniform(-0.1, 0.7, 400) + 180.0) % 360.0 - 180.0
+    lon[:3] = (0.0, 180.0, -180.0)
+    found = terrain.covers(lat, lon)
+    assert found.tolist() == [bool(terrain.covers(*at)) for at in zip(lat, lon, strict=True)]
+    east = (lon - west + 180.0) % 360.0 - 180.0  # of the first tile's edge
+    inside = (lat > 36.4) & (lat < 36.6) & (((east > 0.0) & (east < 0.2)) | ((east > 0.4) & (east < 0.6)))
+    assert 50 < np.count_nonzero(inside) < 350
+    assert found.tolist() == inside.tolist()
+    assert terrain.covers([], []).shape == (0,)
+
+
 # -- units and datums ---------------------------------------------------------------------------------------------
 
 

@@ -54,6 +54,13 @@ HAS_PLACE = frozenset(
 """Mission commands that have a location in common.xml, so that an unset location has a meaning."""
 
 
+PLAIN_FLOAT = 3e38
+"""Every float32 holds a number below this."""
+
+PLAIN_PART = 0.49
+"""A product that lies within this of a whole number is rounded to it in binary arithmetic too, which is off by 2e-3 at
+most."""
+
 PLACE_IS_A_HINT = (cmd.DO_RETURN_PATH_START, cmd.DO_LAND_START)
 """Files have degrees in these even in frame 2; ground stations send the whole part, and no autopilot flies there."""
 
@@ -103,6 +110,10 @@ def degrees_e7_of(degrees: float) -> int:
 
     Binary arithmetic could round a decimal half the wrong way. ``degrees`` is finite and below 1e6.
     """
+    binary = degrees * 1e7
+    near = round(binary)
+    if abs(binary - near) < PLAIN_PART:
+        return near
     return int(Decimal(repr(degrees)).scaleb(7).to_integral_value(ROUND_HALF_EVEN))
 
 
@@ -139,11 +150,11 @@ def read_item(raw: RawItem, problems: list[Problem], where: str) -> MissionItem 
     if frame not in FRAMES:
         bad(f"the frame must be 0 (AMSL), 2 (no place), 3 (relative to home) or 10 (terrain), given {raw.frame:g}")
     for number, value in enumerate(raw.params, start=1):
-        if math.isinf(float32(value)):
+        if _too_large(value):
             bad(f"param{number} must be a number that a float32 holds, given {value:g}")
     if command is None or frame is None:
         return None
-    if math.isinf(float32(raw.z)) or (math.isnan(raw.z) and in_degrees(command, frame)):
+    if _too_large(raw.z) or (math.isnan(raw.z) and in_degrees(command, frame)):
         bad(f"the altitude (param7) must be a number that a float32 holds, given {raw.z:g}")
     if len(problems) > before:
         return None
@@ -151,6 +162,11 @@ def read_item(raw: RawItem, problems: list[Problem], where: str) -> MissionItem 
     if x is None or y is None:
         return None
     return MissionItem(command, frame, raw.params, x, y, raw.z, raw.autocontinue)
+
+
+def _too_large(value: float) -> bool:
+    """Whether a float32 cannot hold it; asked of the wire's own rounding near the limit alone."""
+    return not abs(value) < PLAIN_FLOAT and math.isinf(float32(value))
 
 
 def _xy(command: int, frame: int, raw: RawItem, bad: Callable[[str], None]) -> tuple[int | None, int | None]:

@@ -36,12 +36,14 @@ from gcsplan.vehicle import Autopilot
 HEADER = "QGC WPL 110"
 COLUMNS = ("seq", "current", "frame", "command", "param1", "param2", "param3", "param4", "x", "y", "z", "autocontinue")
 MAX_LINE = 1000
+MAX_NUMBER = 64
 MAX_PROBLEMS = 20
 HOME_ROW = "0 1 0 16 0 0 0 0 <lat> <lon> <AMSL> 1"
 
 # No two parts of the pattern can match the same digits, so a long run of digits takes only one pass.
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _SPLIT = re.compile(r"[\t ,]+")
+_ROW = re.compile(rf"{_NUMBER.pattern}(?:[\t ,]+{_NUMBER.pattern}){{11}}")
 
 
 def write_waypoints(mission: Mission) -> str:
@@ -137,11 +139,11 @@ def _row(line: str, number: int, place: str, problems: list[Problem]) -> _Row | 
     if len(fields) != len(COLUMNS):
         problems.append(Problem(place, f"a row has {len(COLUMNS)} columns, this one has {len(fields)}"))
         return None
-    values: list[float] = []
-    for name, field in zip(COLUMNS, fields, strict=True):
+    values = _plain(line, fields)
+    for name, field in zip(COLUMNS, fields, strict=True) if not values else ():
         if name.startswith("param") and field.lower() in ("nan", "-nan"):
             values.append(math.nan)
-        elif len(field) <= 64 and _NUMBER.fullmatch(field) and math.isfinite(float(field)):
+        elif len(field) <= MAX_NUMBER and _NUMBER.fullmatch(field) and math.isfinite(float(field)):
             values.append(float(field))
         else:
             problems.append(Problem(place, f"{name} must be a number, given {field[:40]!r}"))
@@ -155,6 +157,14 @@ def _row(line: str, number: int, place: str, problems: list[Problem]) -> _Row | 
     p1, p2, p3, p4, x, y, z = values[4:11]
     raw = RawItem(values[3], values[2], (p1, p2, p3, p4), x, y, z, bool(autocontinue))
     return _Row(number, seq, raw, (_decimals(fields[8]), _decimals(fields[9])))
+
+
+def _plain(line: str, fields: list[str]) -> list[float]:
+    """The numbers of a row that holds nothing but finite ones, at once; else none."""
+    if _ROW.fullmatch(line) is None or max(map(len, fields)) > MAX_NUMBER:
+        return []
+    values = list(map(float, fields))
+    return values if all(map(math.isfinite, values)) else []
 
 
 def _decimals(field: str) -> int:

@@ -23,10 +23,13 @@ FRAME_SYNONYMS = {5: GLOBAL, 6: RELATIVE, 11: TERRAIN}
 MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255
 
 
+_ONE, _FIVE = struct.Struct("<f"), struct.Struct("<5f")
+
+
 def float32(value: float) -> float:
     """Return the float32 nearest to ``value``, as sent on the wire; ``±inf`` beyond its range."""
     try:
-        return float(struct.unpack("<f", struct.pack("<f", value))[0])
+        return float(_ONE.unpack(_ONE.pack(value))[0])
     except OverflowError:
         return math.copysign(math.inf, value)
 
@@ -55,14 +58,25 @@ class MissionItem:
     def __post_init__(self) -> None:
         if len(self.params) != 4:
             raise ValueError(f"an item has 4 params, given {len(self.params)}")
+        if not (
+            0 <= self.command <= 65535 and 0 <= self.frame <= 255
+            and -(2**31) <= self.x < 2**31 and -(2**31) <= self.y < 2**31
+        ):  # fmt: skip
+            self._refuse()
+        try:
+            *params, z = _FIVE.unpack(_FIVE.pack(*self.params, self.z))
+        except OverflowError:
+            *params, z = map(float32, (*self.params, self.z))
+        object.__setattr__(self, "params", tuple(params))
+        object.__setattr__(self, "z", z)
+
+    def _refuse(self) -> None:
         for name, value, low, high in (
             ("command", self.command, 0, 65535), ("frame", self.frame, 0, 255),
             ("x", self.x, -(2**31), 2**31 - 1), ("y", self.y, -(2**31), 2**31 - 1),
         ):  # fmt: skip
             if not low <= value <= high:
                 raise InputError(f"{name} of a mission item must lie within {low} … {high}, given {value}")
-        object.__setattr__(self, "params", tuple(float32(p) for p in self.params))
-        object.__setattr__(self, "z", float32(self.z))
 
     @property
     def wire(self) -> bytes:

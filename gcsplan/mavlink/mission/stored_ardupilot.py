@@ -236,22 +236,18 @@ def _stored(item: MissionItem, rule: Rule | None) -> MissionItem:
         return _stored_fence(item)
     if item.command == cmd.RALLY_POINT:
         return MissionItem(item.command, frame, (0.0, 0.0, 0.0, 0.0), item.x, item.y, _i16(item.z), False)
-    located = MissionItem(
-        item.command,
-        GLOBAL if frame == NO_POSITION else frame,
-        item.params,
-        item.x,
-        item.y,
-        read_back_altitudes(stored_cm(item.z))[0],
-    )
+    if frame == NO_POSITION:
+        frame = GLOBAL
     if rule is None:  # unknown command: expect the same numbers back, so that every difference is reported
-        return located
+        altitude_m = read_back_altitudes(stored_cm(item.z))[0]
+        return MissionItem(item.command, frame, item.params, item.x, item.y, altitude_m)
     p1, p2, p3, p4 = (keep(value) for keep, value in zip(rule.params, item.params, strict=True))
     if item.command == cmd.LOITER_TURNS:
         p1, p2, p3, p4 = _loiter_turns(item.params)
     if not rule.located:
         return MissionItem(item.command, GLOBAL, (p1, p2, p3, p4))
-    return MissionItem(item.command, located.frame, (p1, p2, p3, p4), item.x, item.y, located.z)
+    altitude_m = read_back_altitudes(stored_cm(item.z))[0]
+    return MissionItem(item.command, frame, (p1, p2, p3, p4), item.x, item.y, altitude_m)
 
 
 def _stored_fence(item: MissionItem) -> MissionItem:

@@ -8,7 +8,7 @@ import math
 import os
 import struct
 from dataclasses import replace
-from decimal import Decimal
+from decimal import ROUND_HALF_EVEN, Decimal
 from pathlib import Path
 from typing import Any
 
@@ -131,6 +131,34 @@ def test_degrees_are_rounded_and_never_truncated() -> None:
     assert degrees_e7_of(36.12345679) == 361_234_568
     assert degrees_e7_of(-84.38765439) == -843_876_544
     assert degrees_e7_of(0.00000006) == 1
+
+
+@settings(max_examples=draws(300))
+@given(int32, st.sampled_from(["0", "4", "48", "49", "4999", "5", "50001", "51", "99"]))
+def test_degrees_are_rounded_as_the_decimals_that_they_are_written_in(e7: int, beyond: str) -> None:
+    degrees = float(degrees_text(e7)[:-1] + beyond)
+    exact = Decimal(repr(degrees)).scaleb(7).to_integral_value(ROUND_HALF_EVEN)
+    assert degrees_e7_of(degrees) == int(exact)
+
+
+@pytest.mark.parametrize("field", ["1e400", "0." + "0" * 70, "+.5", "5.", "-1E2", "1_0", "١", "inf", "NaN", "0x1"])
+@pytest.mark.parametrize("column", [0, 2, 4, 8, 10])
+def test_a_row_is_read_at_once_as_it_is_number_by_number(
+    field: str, column: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    row = ["1", "0", "3", "16", "0", "0", "0", "0", "36.6", "-84.3", "100", "1"]
+    row[column] = field
+    text = "QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t36.6\t-84.3\t400\t1\n" + "\t".join(row) + "\n"
+
+    def read() -> str:
+        try:
+            return repr(parse_waypoints(text, autopilot=COPTER, where="x"))
+        except InputError as why:
+            return str(why)
+
+    at_once = read()
+    monkeypatch.setattr("gcsplan.mavlink.files.waypoints_file._plain", lambda line, fields: [])
+    assert read() == at_once
 
 
 # -- the text of .waypoints ---------------------------------------------------------------------------------------
