@@ -10,7 +10,7 @@ import math
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
@@ -20,7 +20,7 @@ from typing import Any, Protocol, TypeVar
 from gcsplan import __version__
 from gcsplan.errors import GcsplanError, InputError, UsageError
 
-__all__ = ["Executor", "Inline", "executor"]
+__all__ = ["Executor", "Inline", "executor", "in_order", "require_same_inputs"]
 
 Shared = TypeVar("Shared")
 Item = TypeVar("Item")
@@ -31,6 +31,10 @@ ANSWER_S = 15.0
 
 AHEAD = 4
 """Pieces that are handed out for each worker at a time, so that none waits, and little is lost if the work ends."""
+
+LEAD = 8
+"""How far results may run ahead of a piece that is slow, as a multiple of the pieces that are handed out: so many of
+them at most wait to be put in order."""
 
 MOST_JOBS = 512
 SILENT = 60
@@ -90,19 +94,19 @@ class Dask:
         # A task, not scattered data: if the worker that holds the value dies, the scheduler makes it again.
         kept = client.submit(_itself, shared, pure=False)
         numbers: dict[Any, int] = {}
-        left = iter(enumerate(items))
+        begun, most = 0, AHEAD * self.count
         done = distributed.as_completed(loop=client.loop)
 
-        def hand_out(most: int) -> None:
-            for number, item in left:
-                future = client.submit(_done, function, __version__, kept, item, pure=False, priority=-number)
-                numbers[future] = number
+        def hand_out() -> None:
+            nonlocal begun
+            while begun < min(len(items), min(numbers.values(), default=begun) + LEAD * most) and len(numbers) < most:
+                future = client.submit(_done, function, __version__, kept, items[begun], pure=False, priority=-begun)
+                numbers[future] = begun
+                begun += 1
                 done.add(future)
-                if (most := most - 1) <= 0:
-                    return
 
         try:
-            hand_out(AHEAD * self.count)
+            hand_out()
             for future in done:
                 number = numbers.pop(future)
                 try:
@@ -111,7 +115,7 @@ class Dask:
                     raise GcsplanError(
                         f"workers died over piece {number + 1} of {len(items)} again and again (out of memory?)"
                     ) from error
-                hand_out(1)
+                hand_out()
                 yield number, result
         finally:
             client.cancel([kept, *numbers])
@@ -125,6 +129,28 @@ def _done(function: Callable[[Shared, Item], Result], version: str, shared: Shar
             f"its machines"
         )
     return function(shared, item)
+
+
+def in_order(results: Iterable[tuple[int, Result]]) -> Iterator[tuple[int, Result]]:
+    """The results of `Executor.each` by number, from 0 on; those that come early wait."""
+    early: dict[int, Result] = {}
+    wanted = 0
+    for number, result in results:
+        early[number] = result
+        while wanted in early:
+            yield wanted, early.pop(wanted)
+            wanted += 1
+
+
+def require_same_inputs(found: Mapping[str, object], asked: Mapping[str, object], where: str) -> None:
+    """Raise InputError if a worker's terrain or zones are others than those of the process that asks it."""
+    other = sorted(k for k in {*found, *asked} if found.get(k) != asked.get(k))
+    if other:
+        raise InputError(
+            f"a worker reads other terrain or zones than the process that asks it ({', '.join(other)} differ): every "
+            f"machine of the cluster must see the same files under the same paths",
+            where=where,
+        )
 
 
 def _itself(value: Shared) -> Shared:
@@ -141,7 +167,7 @@ def sane_jobs() -> int:
 def executor(
     jobs: int | None = None, cluster: Any = None, *, pieces: int, piece_s: float, start_s: float = 4.0
 ) -> Iterator[Executor]:
-    """The executor for ``pieces`` of work of about ``piece_s`` seconds each.
+    """The executor for ``pieces`` of work of about ``piece_s`` seconds each; one piece is done in this process.
 
     ``cluster`` is the address of a dask scheduler or a ``distributed.Client``, whose workers do the work. Otherwise
     ``jobs`` processes of this machine do it (None: one for each core), if what they gain is more than the ``start_s``
@@ -151,6 +177,9 @@ def executor(
     """
     if jobs is not None and not 1 <= jobs <= MOST_JOBS:
         raise UsageError(f"--jobs {jobs}: 1 to {MOST_JOBS} processes are wanted")
+    if pieces <= 1:
+        yield Inline()
+        return
     if cluster is not None:
         with _connected(cluster) as client:
             yield Dask(client)

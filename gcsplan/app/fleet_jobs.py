@@ -11,7 +11,7 @@ import pickle
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from gcsplan.app.executor import Executor
+from gcsplan.app.executor import Executor, require_same_inputs
 from gcsplan.app.leaving_out import LeavingOut
 from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.refusals import plan_or_explain
@@ -124,13 +124,7 @@ def _brief_of(asked: Asked) -> Brief:
     if known is not None:
         return known
     source = load_content(asked.content)
-    other = sorted(k for k in {*source.inputs, *asked.inputs} if source.inputs.get(k) != asked.inputs.get(k))
-    if other:
-        raise InputError(
-            f"a worker reads other terrain or zones than the process that asks it ({', '.join(other)} differ): every "
-            f"machine of the cluster must see the same files under the same paths",
-            where=str(source.path),
-        )
+    require_same_inputs(source.inputs, asked.inputs, str(source.path))
     _briefs.clear()
     run = get_planner(asked.planner).plan
     brief = Brief(source, world_of(source), run, asked.objective, asked.seed, asked.options)

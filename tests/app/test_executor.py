@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pickle
 import signal
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ import pytest
 
 from gcsplan import __version__
 from gcsplan.app import executor as module
-from gcsplan.app.executor import Dask, Executor, Inline, executor
+from gcsplan.app.executor import Dask, Executor, Inline, executor, in_order
 from gcsplan.app.fleet_jobs import planned_by
 from gcsplan.app.model import Plan
 from gcsplan.app.pipeline import plan
@@ -23,6 +24,11 @@ from gcsplan.errors import GcsplanError, InputError, NoMission, UsageError
 
 def square(shared: int, item: int) -> int:
     return shared + item * item
+
+
+def slow_first(shared: int, item: int) -> int:
+    time.sleep(3.0 if item == 0 else 0.0)
+    return item
 
 
 def fails_at_three(shared: int, item: int) -> int:
@@ -104,6 +110,18 @@ def test_without_dask_the_message_says_what_to_install(monkeypatch: pytest.Monke
         assert isinstance(default, Inline)
 
 
+def test_one_piece_is_done_in_this_process_whatever_is_asked_for() -> None:
+    with executor(cluster="tcp://127.0.0.1:9", pieces=1, piece_s=100.0) as here:
+        assert isinstance(here, Inline)
+    with pytest.raises(UsageError), executor(0, cluster="tcp://127.0.0.1:9", pieces=1, piece_s=1.0):
+        pass
+
+
+def test_results_are_put_in_order_and_few_wait() -> None:
+    come = [(2, "c"), (0, "a"), (1, "b"), (4, "e"), (3, "d")]
+    assert list(in_order(iter(come))) == [(0, "a"), (1, "b"), (2, "c"), (3, "d"), (4, "e")]
+
+
 @pytest.mark.parametrize("jobs", [0, -1, 513])
 def test_a_wrong_number_of_processes_is_refused(jobs: int) -> None:
     with pytest.raises(UsageError, match="1 to 512"), executor(jobs, pieces=10, piece_s=1.0):
@@ -165,6 +183,20 @@ def test_processes_give_the_same_results(workers: Executor) -> None:
 
 
 @pytest.mark.slow
+def test_results_do_not_run_far_ahead_of_a_slow_piece(workers: Executor, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert isinstance(workers, Dask)
+    monkeypatch.setattr(module, "LEAD", 2)
+    most = 2 * module.AHEAD * workers.count
+    early = []
+    for number, _ in workers.each(slow_first, 0, range(10 * most)):
+        if number == 0:
+            break
+        early.append(number)
+    assert early
+    assert max(early) < most
+
+
+@pytest.mark.slow
 def test_a_killed_worker_costs_its_own_pieces_only(workers: Executor, tmp_path: Path) -> None:
     assert sorted(workers.each(kills_once, str(tmp_path), range(20))) == [(k, k) for k in range(20)]
     assert (tmp_path / "killed").exists()
@@ -217,7 +249,7 @@ def test_a_scheduler_without_workers_is_named(monkeypatch: pytest.MonkeyPatch) -
     with (
         distributed.LocalCluster(n_workers=0, host="127.0.0.1", dashboard_address="127.0.0.1:0") as empty,
         pytest.raises(InputError, match="no worker"),
-        executor(cluster=empty.scheduler_address, pieces=1, piece_s=1.0),
+        executor(cluster=empty.scheduler_address, pieces=2, piece_s=1.0),
     ):
         pass
 
@@ -227,6 +259,6 @@ def test_no_scheduler_answers() -> None:
     pytest.importorskip("distributed")
     with (
         pytest.raises(InputError, match="no dask scheduler answers"),
-        executor(cluster="tcp://127.0.0.1:9", pieces=1, piece_s=1.0),
+        executor(cluster="tcp://127.0.0.1:9", pieces=2, piece_s=1.0),
     ):
         pass
