@@ -14,13 +14,16 @@ A message states what was required, what was given, where, and what to do about 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 MOST_NAMES = 2000
 """Most files of a folder that are looked at for a name."""
+
+WORST = (70, 7, 6, 5, 4, 3, 2, 0)
+"""Exit codes from the worst to the best."""
 
 NoMissionReason = Literal["infeasible", "not_found", "time", "separation", "battery", "too_many_items"]
 
@@ -38,6 +41,11 @@ class Problem:
     def as_dict(self) -> dict[str, str]:
         """What ``--json`` says of it."""
         return {"where": self.where, "message": self.message}
+
+
+def worst_of(codes: Collection[int]) -> int:
+    """The exit code of work on many missions: the worst of theirs; 0 if there are none."""
+    return next((code for code in WORST if code in codes), 0)
 
 
 class GcsplanError(Exception):

@@ -20,8 +20,9 @@ from gcsplan import __version__
 from gcsplan.app import outputs
 from gcsplan.app.executor import Executor
 from gcsplan.app.model import Plan
+from gcsplan.app.named_files import named_files
 from gcsplan.app.pipeline import plan, require_passing
-from gcsplan.errors import GcsplanError, InputError, NoMission, UsageError
+from gcsplan.errors import GcsplanError, InputError, NoMission, UsageError, worst_of
 from gcsplan.export.outdir import retire_outputs, settle_outputs, write_outputs, write_whole
 from gcsplan.mission_file.read_files import files_of
 from gcsplan.mission_file.samples import file_of, is_sample
@@ -36,9 +37,6 @@ PIECE_S = 1.5
 
 POINTS = 60
 """Most points of a track on the index page."""
-
-WORST = (70, 7, 6, 5, 4, 3, 2, 0)
-"""Exit codes from the worst to the best."""
 
 MOST_MISSIONS = 100_000
 
@@ -96,13 +94,7 @@ def missions_of(given: Sequence[str]) -> list[tuple[str, Path]]:
 def _named(text: str) -> list[Path]:
     if is_sample(text):
         return [file_of(text)]
-    path = Path(text)
-    if path.is_dir():
-        return sorted(p for p in path.rglob("*.yaml") if p.is_file())
-    if not path.exists() and any(c in text for c in "*?["):
-        root = Path(path.anchor) if path.is_absolute() else Path()
-        return sorted(p for p in root.glob(str(path.relative_to(path.anchor))) if p.is_file())
-    return [path]
+    return named_files(text, (".yaml",))
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,5 +227,4 @@ def _tracks(planned: Plan) -> list[list[list[float]]]:
 
 def exit_code(records: Sequence[Record]) -> int:
     """The worst code of all missions."""
-    codes = {r.code for r in records}
-    return next((code for code in WORST if code in codes), 0)
+    return worst_of({r.code for r in records})

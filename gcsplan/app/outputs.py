@@ -182,6 +182,11 @@ def _of_search(v: VehiclePlan) -> dict[str, Any]:
     return {"raw_violations": v.solution.raw_violations, "repaired": v.solution.repaired}
 
 
+def flat(figures: Any) -> dict[str, Any]:
+    """The fields of a dataclass with slots, by name; unlike `asdict` it copies nothing."""
+    return {name: getattr(figures, name) for name in figures.__slots__}
+
+
 def verdict_of(name: str, verdict: Verdict) -> dict[str, Any]:
     """A verdict as plain values, for ``check --json``."""
     lowest, nearest = verdict.lowest, verdict.nearest
@@ -198,7 +203,7 @@ def verdict_of(name: str, verdict: Verdict) -> dict[str, Any]:
         "min_zone_clearance_m": nearest.zone_clearance_m if nearest else None,
         "nearest_zone": nearest.nearest_zone if nearest else None,
         "max_climb_deg": verdict.max_climb_deg,
-        "violations": [asdict(f) for f in verdict.findings],
+        "violations": [flat(f) for f in verdict.findings],
         "not_judged": list(verdict.not_judged),
         "notes": list(verdict.notes),
     }

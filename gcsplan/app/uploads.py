@@ -18,7 +18,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from gcsplan.app.checking import Checked, check_files, split_name
+from gcsplan.app.check_sites import Checked, split_name
+from gcsplan.app.checking import check_files
 from gcsplan.app.fencing import not_fenced, upload_fences
 from gcsplan.app.ground import MissionGround
 from gcsplan.app.model import Plan

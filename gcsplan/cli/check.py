@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gcsplan.cli import completion
-from gcsplan.cli.ending import complain, emit, printable
+from gcsplan.cli.ending import complain
 from gcsplan.cli.options import (
+    ClusterOption,
+    JobsOption,
     JsonOption,
     ListZonesOption,
     RequireWayHomeOption,
@@ -19,16 +21,21 @@ from gcsplan.cli.options import (
     WayHomeOption,
     require_html,
 )
-from gcsplan.errors import InputError, UsageError
+from gcsplan.errors import InputError, UsageError, worst_of
 
 if TYPE_CHECKING:
-    from gcsplan.app.checking import Batch, Checked, Returns
+    from gcsplan.app.archive import Archive, Form, Shown
+    from gcsplan.app.check_sites import Checked, Returns
+    from gcsplan.app.checking import Batch
     from gcsplan.mavlink.mission.return_route import Route
     from gcsplan.mission_file.from_options import WorldOptions
     from gcsplan.mission_file.places import Degrees
     from gcsplan.units import Units
 
 Number = float | None
+
+TABLES = 20
+"""Most files of which tables are printed; of more, findings and a summary."""
 
 
 def check(
@@ -38,7 +45,7 @@ def check(
             metavar="[MISSION.yaml] FILE",
             autocompletion=completion.missions,
             help="A mission file, in whose world they are checked (or --dem and --min-agl), and .waypoints or .plan "
-            "files; NAME=FILE says for which vehicle of the mission a file is.",
+            "files, folders of them, or patterns; NAME=FILE says for which vehicle of the mission a file is.",
         ),
     ],
     dem: Annotated[
@@ -105,6 +112,11 @@ def check(
         Path | None, typer.Option(metavar="FILE.html", help="Also write the report: map, profiles, tables.")
     ] = None,
     list_zones: ListZonesOption = False,
+    jobs: JobsOption = None,
+    cluster: ClusterOption = None,
+    json_lines: Annotated[
+        bool, typer.Option("--json-lines", help="A line of JSON for each file as it is judged, then the summary.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
     """Check whether .waypoints or .plan files, of any origin, fly safely.
@@ -113,13 +125,18 @@ def check(
 
     Or with options alone:    gcsplan check *.plan --dem dem.tif --vertical-datum EGM96 --zones zones.kml --min-agl 60
 
+    Thousands of files:                gcsplan check mission.yaml archive/ --json-lines
+
     Every leg is judged along its whole length, as the autopilot flies it: jumps, loiters, take-off, landing, speeds,
-    each altitude frame. The exit code is 0 if all pass, 4 on a violation or if anything could not be judged, 2 if a
-    file cannot be read. A return that is not safe is a warning, unless a safe one is required.
+    each altitude frame. The exit code is 0 if all pass, 4 on a violation or if anything could not be judged, else 2 if
+    a file cannot be read. A return that is not safe is a warning, unless a safe one is required.
 
     With --list-zones a FILE may also be a file of zones.
     """
-    from gcsplan.app import checking, outputs
+    from gcsplan.app import check_sites, checking
+    from gcsplan.app.archive import Shown
+    from gcsplan.app.archive_words import told_of_batch
+    from gcsplan.cli.check_many import Document, Lines, Rows, tell, tell_archive
     from gcsplan.export.outdir import steady
     from gcsplan.units import units_of
 
@@ -140,23 +157,40 @@ def check(
     }  # fmt: skip
     given = {k: v for k, v in given.items() if v not in (None, [])}
     require_html(report)
-    make = _in_mission if _is_mission(files[0]) else _with_options
-    with steady(checking.split_name(file)[1] for file in files if not _is_mission(file)):
-        batch = make(files, given, checking.Returns(way_home, require_way_home))
-    failed = checking.failure(batch.checked, allow_unjudged=allow_unjudged, unreadable=batch.unreadable)
+    if as_json and json_lines:
+        raise UsageError("--json is one document and --json-lines one for each file: give one of them")
+    asked, rows = check_sites.Returns(way_home, require_way_home), as_json or json_lines
+    mission, arguments = (files[0], files[1:]) if _is_mission(files[0]) else (None, files)
+    arguments = [file for argument in arguments for file in _named(argument)]
+    form: Form = "whole" if as_json else "row" if json_lines else "lines"
+    shown = Shown(form, allow_unjudged, units_of(units), len(arguments) > 1)
+    archive = _archive(mission, arguments, given, asked, shown)
+    printer = Document() if as_json else Rows() if json_lines else Lines(summed=not quiet)
+    reading = steady(check_sites.split_name(file)[1] for file in arguments)
+    if report is None and (rows or quiet or len(arguments) > TABLES):
+        raise typer.Exit(tell_archive(archive, printer, jobs, cluster, reading))
+    with reading:
+        batch = checking.check_at(archive.site, archive.name, arguments, check_sites.Wanted(archive.asked.returns))
     if report is not None:
         _report(batch, report, units_of(units))
-    if as_json:
-        verdicts = [outputs.verdict_of(str(c.file), c.verdict) | checking.more_of(c) for c in batch.checked]
-        document = {"name": batch.name, "inputs": dict(batch.inputs), "notes": list(batch.notes), "verdicts": verdicts}
-        emit(document, failed)
-        for _, error in batch.unreadable:
-            complain(error)
-    elif quiet:
-        _say_findings(batch, allow_unjudged, units_of(units))
-    else:
-        _say_all(batch, units_of(units))
-    raise typer.Exit(0 if failed is None else int(failed["code"]))
+    if rows or quiet or len(arguments) > TABLES:
+        told = told_of_batch(batch, form, allow_unjudged=allow_unjudged, units=units_of(units))
+        raise typer.Exit(tell((batch.name, batch.inputs, batch.notes), told, printer, len(arguments)))
+    _say_all(batch, units_of(units))
+    failing = [f for c in batch.checked if (f := checking.failing_of(c, allow_unjudged=allow_unjudged)) is not None]
+    raise typer.Exit(worst_of({*(f.code for f in failing), *(error.exit_code for _, error in batch.unreadable)}))
+
+
+def _named(argument: str) -> list[str]:
+    """The files that an argument names: a file, a folder, or a pattern."""
+    from gcsplan.app.named_files import named_files, names_several
+
+    if not names_several(argument):
+        return [argument]
+    found = [str(path) for path in named_files(argument, (".waypoints", ".plan"))]
+    if not found:
+        raise UsageError(f"{argument} holds no .waypoints or .plan file")
+    return found
 
 
 def _is_mission(argument: str) -> bool:
@@ -165,20 +199,20 @@ def _is_mission(argument: str) -> bool:
     return Path(argument).suffix.lower() in (".yaml", ".yml") or is_sample(argument)
 
 
-def _in_mission(files: list[str], given: dict[str, object], returns: Returns) -> Batch:
-    from gcsplan.app import checking, pipeline
-
-    if given:
-        raise UsageError(f"{', '.join(given)}: the mission file says that; leave it out, or give no mission file")
-    if len(files) < 2:
-        raise UsageError(f"which files are to be checked in the world of {files[0]}? Give .waypoints or .plan files")
-    return checking.check_batch(pipeline.load_mission(Path(files[0])), files[1:], returns=returns)
-
-
-def _with_options(files: list[str], given: dict[str, object], returns: Returns) -> Batch:
-    from gcsplan.app import checking
+def _archive(
+    mission: str | None, files: list[str], given: dict[str, object], returns: Returns, shown: Shown
+) -> Archive:
+    """The files in the world of a mission file, or in that of the options."""
+    from gcsplan.app import pipeline
+    from gcsplan.app.archive import Archive
     from gcsplan.vehicle import Autopilot
 
+    if mission is not None:
+        if given:
+            raise UsageError(f"{', '.join(given)}: the mission file says that; leave it out, or give no mission file")
+        if not files:
+            raise UsageError(f"which files are to be checked in the world of {mission}? Give .waypoints or .plan files")
+        return Archive.in_mission(pipeline.load_mission(Path(mission)), files, returns, shown)
     missing = [name for name in ("--dem", "--min-agl") if name not in given]
     if missing:
         raise UsageError(
@@ -188,7 +222,7 @@ def _with_options(files: list[str], given: dict[str, object], returns: Returns) 
     if name is not None and name not in tuple(Autopilot):
         raise UsageError(f"--autopilot {name}: {', '.join(Autopilot)} is wanted")
     pilot = None if name is None else Autopilot(str(name))
-    return checking.check_with_options(_options(given), pilot, files, returns=returns)
+    return Archive.with_options(_options(given), pilot, files, returns, shown)
 
 
 def _options(given: dict[str, object]) -> WorldOptions:
@@ -251,18 +285,6 @@ def _say_all(batch: Batch, units: Units) -> None:
     say_warnings({str(c.file): c.way_home for c in batch.checked}, units)
     for _, error in batch.unreadable:
         complain(error)
-
-
-def _say_findings(batch: Batch, allow_unjudged: bool, units: Units) -> None:
-    from gcsplan.app.checking import finding_lines
-    from gcsplan.cli.console import remark, say
-
-    for c in batch.checked:
-        for line in finding_lines(c, allow_unjudged=allow_unjudged, units=units):
-            say(printable(line))
-    for argument, error in batch.unreadable:
-        for problem in error.problems:
-            remark(printable(f"{problem}" if problem.where.startswith(argument) else f"{argument}: {problem}"))
 
 
 def _report(batch: Batch, file: Path, units: Units) -> None:

@@ -110,7 +110,9 @@ def speak_plainly() -> None:
 
 
 def explained(error: Exception) -> GcsplanError:
-    """The GcsplanError for any other exception."""
+    """The GcsplanError for an exception; of another kind, unless it is one already."""
+    if isinstance(error, GcsplanError):
+        return error
     describe = getattr(error, "format_message", None)  # click's usage errors, in whichever click typer uses
     if describe is not None:
         context = getattr(error, "ctx", None)

@@ -71,7 +71,7 @@ def upload(
     A file is sent only with a passing verdict in --mission's world, or with --unchecked. The file's name (uav1.plan) or
     NAME= states which vehicle of the mission it is for.
     """
-    from gcsplan.app import checking, fencing, pipeline, uploads
+    from gcsplan.app import check_sites, checking, fencing, pipeline, uploads
     from gcsplan.app import way_home as returns
     from gcsplan.app.upload_job import UploadOptions
     from gcsplan.cli.console import say_notes, say_notes_of, transfer_progress, upload_table, verdict_table
@@ -97,8 +97,8 @@ def upload(
             )
         source = pipeline.load_mission(mission)
         uploads.targets([to], [r.vehicle for r in source.vehicles])  # report a wrong URL before any table
-        with steady(checking.split_name(file)[1] for file in files):
-            checked = checking.check_files(source, files, returns=checking.Returns(way_home, require_way_home))
+        with steady(check_sites.split_name(file)[1] for file in files):
+            checked = checking.check_files(source, files, returns=check_sites.Returns(way_home, require_way_home))
         if not as_json:
             for c in checked:
                 say_notes(c.notes)
@@ -117,7 +117,7 @@ def upload(
     else:
         if len(files) > 1:
             raise UsageError("--unchecked takes one FILE, for the vehicle --sysid; send the others one by one")
-        require_settled([checking.split_name(files[0])[1]])
+        require_settled([check_sites.split_name(files[0])[1]])
         jobs = [uploads.unchecked_job(files[0], to, sysid or 1)]
     names = [job.name for job in jobs]
     with talking(names), transfer_progress(names) as moved_on:
@@ -162,14 +162,14 @@ def verify(
 
     With --mission what is on board is also judged, as a whole, with the vehicle's parameters: exit 4 if it is not safe.
     """
-    from gcsplan.app import checking, pipeline, shifts, uploads
+    from gcsplan.app import check_sites, pipeline, shifts, uploads
     from gcsplan.cli.console import upload_table
     from gcsplan.export.outdir import require_settled
 
     if mission is not None and sysid is not None:
         raise UsageError("--sysid goes without --mission: with it the vehicle's number is the mission file's")
     shifts.require_tolerance(tolerance_m, judged=mission is not None)
-    require_settled([checking.split_name(file)[1]])
+    require_settled([check_sites.split_name(file)[1]])
     source = None if mission is None else pipeline.load_mission(mission)
     done = uploads.verify_file(file, to, sysid or 1, source=source, tolerance_m=tolerance_m, timeout_s=timeout)
     if as_json:

@@ -55,6 +55,11 @@ def write_summary(summary: Mapping[str, Any], *, clocks: bool = False) -> str:
     return json.dumps(_plain(summary, "", clocks), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
+def json_of(value: Mapping[str, Any], key: str, *, lines: bool = True) -> str:
+    """The JSON text of an element of the list ``key``, as `write_summary` writes it there, or on one line."""
+    return json.dumps(_plain(value, key, True), indent=2 if lines else None, ensure_ascii=False, allow_nan=False)
+
+
 def _plain(value: Any, key: str, clocks: bool) -> Any:
     if isinstance(value, Mapping):
         first = [k for k in ORDER.get(key, ()) if k in value]
