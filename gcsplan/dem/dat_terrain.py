@@ -48,6 +48,11 @@ class DatTile:
     notes: tuple[str, ...]
     vertical: VerticalDatum | None = None
 
+    @property
+    def stored_bytes(self) -> int:
+        """The size of the file."""
+        return self.path.stat().st_size
+
     def sha256(self) -> str:
         """The file's hash."""
         return sha256_of(self.path)

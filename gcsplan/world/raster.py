@@ -13,7 +13,7 @@ import os
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +54,9 @@ UNITS_M = {
 CACHE_BYTES = MAX_BLOCK_BYTES
 """Unpacked blocks that GDAL caches, bytes; its default is a twentieth of the machine's memory."""
 
+MOST_HEADERS = 20_000
+"""Most headers of files that this process remembers; one takes some kilobytes."""
+
 _STRIP_CELLS = 4_000_000
 
 
@@ -82,16 +85,29 @@ class Raster:
     notes: tuple[str, ...] = ()
 
 
+_headers: dict[tuple[object, ...], tuple[Raster, tuple[float, float]]] = {}
+"""Headers of files, with scale and offset that make metres of their numbers."""
+
+
 def open_raster(path: Path, *, where: str, crs: str | None = None, height_unit: str | None = None) -> Raster:
     """Header of the raster at ``path`` (GeoTIFF, SRTM .hgt or .hgt.zip, ESRI .asc).
 
-    ``crs`` overrides the file's; ``height_unit`` states the unit if the file does not. Raises InputError for anything
+    ``crs`` overrides the file's; ``height_unit`` states the unit if the file does not. A file that has not changed
+    since this process opened it is not opened again: many missions use the same tiles. Raises InputError for anything
     that is not a readable, georeferenced, north-up raster of real numbers.
     """
     require_file(path, where=where)
+    about = path.stat()
+    key = (path.absolute(), crs, height_unit, about.st_size, about.st_mtime_ns, about.st_ino)
     try:
-        with gdal(path) as dataset:
-            return _header(dataset, path, where=where, crs=crs, height_unit=height_unit)
+        if key not in _headers:
+            with gdal(path) as dataset:
+                found = _header(dataset, path, where=where, crs=crs, height_unit=height_unit)
+            if len(_headers) >= MOST_HEADERS:
+                _headers.clear()
+            _headers[key] = found
+        header, to_metres = _headers[key]
+        return replace(header, read=_reader(path, *to_metres, where=where))
     except InputError:
         raise
     except Exception as why:
@@ -229,7 +245,9 @@ def require_numbers(dataset: Any, path: Path, *, where: str) -> None:
         )
 
 
-def _header(dataset: Any, path: Path, *, where: str, crs: str | None, height_unit: str | None) -> Raster:
+def _header(
+    dataset: Any, path: Path, *, where: str, crs: str | None, height_unit: str | None
+) -> tuple[Raster, tuple[float, float]]:
     notes = []
     if dataset.count < 1:
         raise InputError(f"{path} holds no raster band", where=where)
@@ -268,17 +286,23 @@ def _header(dataset: Any, path: Path, *, where: str, crs: str | None, height_uni
     if not (math.isfinite(scale) and math.isfinite(offset)) or scale == 0.0:
         raise InputError(f"{path} has a broken scale {scale} or offset {offset}", where=where)
 
+    to_metres = (scale * factor, offset * factor)
+    header = Raster(
+        path.name, system, t.c, t.f, t.a, -t.e, dataset.width, dataset.height, system.vertical,
+        _reader(path, *to_metres, where=where), path.stat().st_size, lambda: sha256_of(path), tuple(notes),
+    )  # fmt: skip
+    return header, to_metres
+
+
+def _reader(path: Path, scale: float, offset: float, *, where: str) -> Reader:
     def read(col: int, row: int, cols: int, rows: int) -> Iterator[tuple[int, Floats]]:
         try:
             with gdal(path) as opened:
-                yield from _strips(opened, col, row, cols, rows, scale * factor, offset * factor)
+                yield from _strips(opened, col, row, cols, rows, scale, offset)
         except Exception as why:
             raise InputError(_unreadable(path, why), where=where) from None
 
-    return Raster(
-        path.name, system, t.c, t.f, t.a, -t.e, dataset.width, dataset.height, system.vertical, read,
-        path.stat().st_size, lambda: sha256_of(path), tuple(notes),
-    )  # fmt: skip
+    return read
 
 
 def _require_grid(t: Any, dataset: Any, path: Path, *, where: str) -> None:

@@ -26,6 +26,7 @@ from gcsplan.world.obstacles import canopy_on
 from gcsplan.world.peaks import Peak, flat_grid, peaks_grid
 from gcsplan.world.raster import SAMPLE, Raster, open_raster, require_file, sample_jacksboro, sha256_of
 from gcsplan.world.surface import Surface
+from gcsplan.world.tiles import Tile, hash_of, tiles_of
 
 Box = tuple[float, float, float, float]
 HeightUnit = Literal["m", "ft", "us_ft"]
@@ -91,25 +92,6 @@ class Terrain(OpenTerrain, Protocol):
         ``most_cells``: raise InputError if the surface needs more cells, or a grid coarser than it should be; None:
         only the general limits apply.
         """
-
-
-class Tile(Protocol):
-    """What reports say of one file, and the datum that it states."""
-
-    @property
-    def name(self) -> str:
-        """The file's name."""
-
-    @property
-    def vertical(self) -> VerticalDatum | None:
-        """What its heights are above; None if it does not say."""
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What a user should know of it."""
-
-    def sha256(self) -> str:
-        """Its hash."""
 
 
 class Tiles(Protocol):
@@ -219,6 +201,7 @@ class _RasterTerrain:
                 "the DEM holds nothing but voids around the mission; give one with data here",
                 where=place(self._where, "dem"),
             )
+        read_hash = hash_of(rasters, window)
         notes = [n for r in rasters for n in r.notes] + list(window.notes)
         datum = self._datum.name
         if self._datum.note:
@@ -231,7 +214,7 @@ class _RasterTerrain:
         rows, cols = ground.shape
         size = window.grid.metres_per_cell(*(0.5 * np.add(window.plane_box[:2], window.plane_box[2:])))
         info |= {
-            "dem_sha256": _combined([r.sha256() for r in rasters]),
+            "dem_sha256": read_hash,
             "vertical_datum": datum,
             "resolution_m": _rounded(float(size.max())),
             "bare_dem": spec.obstacle_height_m == 0.0 and spec.canopy is None,
@@ -315,7 +298,8 @@ def _rasters(spec: TerrainSpec, where: str) -> list[Raster]:
         return [sample_jacksboro()]
     if any(d.startswith("sample:") for d in spec.dem):
         raise InputError(f"the only sample is {SAMPLE}, given {spec.dem[0]}", where=where)
-    return [_open(path, spec, where, i, len(spec.dem)) for i, path in enumerate(spec.dem)]
+    paths = tiles_of(spec.dem, where=where)
+    return [_open(path, spec, where, i, len(paths)) for i, path in enumerate(paths)]
 
 
 def _open(path: str, spec: TerrainSpec, where: str, index: int, count: int) -> Raster:
@@ -360,11 +344,6 @@ def _take_off_geoid(window: Window, geoid: GeoidGrid, mosaic: Tiles) -> None:
 def _sampled(count: int, step: int) -> Indices:
     """0, step, 2·step … and the last index."""
     return np.unique(np.append(np.arange(0, count, step), count - 1))
-
-
-def _combined(hashes: Sequence[str]) -> str:
-    """The hash of a single file; for several files the hash of their hashes, in the order given."""
-    return hashes[0] if len(hashes) == 1 else hashlib.sha256("\n".join(hashes).encode()).hexdigest()
 
 
 def _rounded(metres: float) -> float:

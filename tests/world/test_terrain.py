@@ -8,6 +8,7 @@ import struct
 import subprocess
 import sys
 import time
+import tracemalloc
 import warnings
 import zipfile
 from collections.abc import Sequence
@@ -745,6 +746,7 @@ def test_a_small_file_that_unpacks_into_a_large_block_is_refused(
     monkeypatch.setattr(raster, "MAX_BLOCK_BYTES", 64 * 64 * 4 * 3)
     open_raster(path, where="m")
     monkeypatch.setattr(raster, "MAX_BLOCK_BYTES", 64 * 64 * 4 * 3 - 1)
+    monkeypatch.setattr(raster, "_headers", {})  # opened a moment ago
     with pytest.raises(InputError, match="TILED"):
         open_raster(path, where="m")
 
@@ -1035,3 +1037,54 @@ def test_a_unit_that_proj_does_not_know_is_no_line_of_a_library(tmp_path: Path) 
         [sys.executable, "-c", code, str(odd)], capture_output=True, text=True, timeout=60.0, check=False
     )
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def tile_of(folder: Path, col: int, row: int, *, written: bool) -> Path:
+    """A tile of 0.2° with 3600 × 3600 nodes: 52 MB that take some kilobytes on the disk where nothing is written."""
+    path = folder / f"t{col:02d}{row:02d}.tif"
+    shape = {"width": 3600, "height": 3600, "tiled": True, "blockxsize": 256, "blockysize": 256}
+    at = from_origin(8.0 + 0.2 * col, 48.0 - 0.2 * row, 0.2 / 3600, 0.2 / 3600)
+    with rasterio.open(
+        path, "w", driver="GTiff", count=1, dtype="float32", crs="EPSG:4326", transform=at, sparse_ok=True,
+        compress="deflate", **shape,
+    ) as file:  # fmt: skip
+        if written:
+            file.write(np.full((3600, 3600), 100.0 + 10 * col + row, np.float32), 1)
+    return path
+
+
+def test_many_tiles_are_read_by_windows(tmp_path: Path) -> None:
+    """36 tiles, 1.9 GB if they were read: the memory is that of the window, and the hash that of what was read."""
+    for col in range(6):
+        for row in range(6):
+            tile_of(tmp_path, col, row, written=(col, row) == (2, 3))
+    frame, box = Frame(47.3, 8.5), (-3000.0, -3000.0, 3000.0, 3000.0)
+    spec = TerrainSpec(dem=(str(tmp_path),), vertical_datum="EGM96")
+
+    def load() -> Surface:
+        return load_terrain(spec, frame, box, where="m")
+
+    first = load()
+    tracemalloc.start()
+    again = load()
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 6 * again.ground_m.nbytes < 500e6
+    assert np.unique(again.ground_m).tolist() == [123.0]
+    assert first.info == again.info
+
+    tiles = open_terrain(spec, where="m")._mosaic.rasters  # type: ignore[attr-defined]
+    assert len(tiles) == 36
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("gcsplan.world.tiles.HASHED_BYTES", 0)
+        patch.setattr("gcsplan.world.raster.sha256_of", lambda path: pytest.fail(f"{path} is read whole"))
+        read = load().info["dem_sha256"]
+        assert read == load().info["dem_sha256"] != first.info["dem_sha256"]
+        tile_of(tmp_path, 0, 0, written=True)  # far away, but of another size
+        assert load().info["dem_sha256"] != read
+    (tmp_path / "t0203.tif").unlink()
+    with pytest.raises(InputError, match=r"nothing but voids|does not cover|damaged or empty"):
+        load()
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="a folder without tiles"):
+        load_terrain(TerrainSpec(dem=(str(tmp_path / "empty"),)), frame, box, where="m")
