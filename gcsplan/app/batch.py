@@ -108,7 +108,12 @@ class Batch:
     def run(self, workers: Executor, todo: Sequence[int], told: Callable[[Record], None]) -> None:
         """Plan the missions with the numbers ``todo``; each is written, then ``told``, as it is done."""
         items = [(self.missions[k][0], str(self.missions[k][1])) for k in todo]
-        for number, record in workers.each(record_of, self.options, items):
+
+        def lost(item: tuple[str, str], why: GcsplanError) -> Record:
+            row = _refusal(item[0], why.exit_code, why.reason, str(why))
+            return Record(item[0], key_of(Path(item[1]), self.options), why.exit_code, (row,))
+
+        for number, record in workers.each(record_of, self.options, items, lost=lost):
             told(self._written(record, todo[number]))
 
     def known(self) -> tuple[list[Record], list[int]]:

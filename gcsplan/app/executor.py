@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import os
+import queue
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -15,12 +16,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from gcsplan import __version__
 from gcsplan.errors import GcsplanError, InputError, UsageError
 
-__all__ = ["Executor", "Inline", "executor", "in_order", "require_same_inputs"]
+__all__ = ["Executor", "Inline", "Lost", "executor", "in_order", "require_same_inputs"]
 
 Shared = TypeVar("Shared")
 Item = TypeVar("Item")
@@ -29,30 +31,55 @@ Result = TypeVar("Result")
 ANSWER_S = 15.0
 """Seconds within which a scheduler must answer."""
 
-AHEAD = 4
+AHEAD = 2
 """Pieces that are handed out for each worker at a time, so that none waits, and little is lost if the work ends."""
 
 LEAD = 8
 """How far results may run ahead of a piece that is slow, as a multiple of the pieces that are handed out: so many of
 them at most wait to be put in order."""
+LOOK_S, DESERTED_S = 2.0, 300.0
+"""Seconds after which it is looked whether there still are workers, and for which a cluster may have none."""
+
+JOB_BYTES = 2 << 30
+"""Memory for each process of this machine, at least, if nobody says how many: a mission's budget and its terrain."""
 
 MOST_JOBS = 512
 SILENT = 60
 """Level of the logs of dask's own processes: above all, since what matters is raised here."""
 
+ENDED = "the dask scheduler has ended, or does not answer any more"
 MISSING = "needs dask.distributed, which is not installed: pip install 'gcsplan[cluster]'"
+
+
+Lost = Callable[[Item, GcsplanError], Result]
+"""The result of a piece that no worker outlives."""
 
 
 class Executor(Protocol):
     """Does pieces of work."""
 
+    @property
+    def count(self) -> int:
+        """How many pieces are done at the same time."""
+        ...
+
+    @property
+    def dashboard(self) -> str:
+        """Address of the page that shows what the workers do; empty if there is none."""
+        ...
+
     def each(
-        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item]
-    ) -> Iterator[tuple[int, Result]]:
+        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item], *,
+        lost: Lost[Item, Result] | None = None, finish: bool = False,
+    ) -> Iterator[tuple[int, Result]]:  # fmt: skip
         """Yield (number of the item, result) as results come; the order is free.
 
-        An error of ``function`` is raised, and what still waits is given up. Raises GcsplanError if a worker dies over
-        the same piece again and again.
+        An error of ``function`` is raised, and what still waits is given up. A piece whose worker dies is done again;
+        if workers die over it again and again, ``lost(item, error)`` is its result, or without ``lost`` the
+        GcsplanError is raised, after all others are done. With ``finish``, Ctrl-C gives up what waits, but what workers
+        have begun is finished and yielded before KeyboardInterrupt is raised; a second Ctrl-C ends at once.
+
+        Raises InputError if the cluster ends or stays without workers.
         """
         ...
 
@@ -61,9 +88,20 @@ class Executor(Protocol):
 class Inline:
     """Does the work in this process, in order."""
 
+    @property
+    def count(self) -> int:
+        """See `Executor.count`."""
+        return 1
+
+    @property
+    def dashboard(self) -> str:
+        """See `Executor.dashboard`."""
+        return ""
+
     def each(
-        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item]
-    ) -> Iterator[tuple[int, Result]]:
+        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item], *,
+        lost: Lost[Item, Result] | None = None, finish: bool = False,
+    ) -> Iterator[tuple[int, Result]]:  # fmt: skip
         """See `Executor.each`."""
         for number, item in enumerate(items):
             yield number, function(shared, item)
@@ -77,48 +115,109 @@ class Dask:
 
     @property
     def dashboard(self) -> str:
-        """Address of the page that shows what the workers do; empty if its library is not installed."""
+        """See `Executor.dashboard`; it needs the library bokeh."""
         return str(self.client.dashboard_link or "") if find_spec("bokeh") else ""
 
     @property
     def count(self) -> int:
-        """How many pieces are done at the same time."""
+        """See `Executor.count`."""
         return max(1, int(sum(self.client.nthreads().values())))
 
     def each(
-        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item]
-    ) -> Iterator[tuple[int, Result]]:
+        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item], *,
+        lost: Lost[Item, Result] | None = None, finish: bool = False,
+    ) -> Iterator[tuple[int, Result]]:  # fmt: skip
         """See `Executor.each`."""
+        suspects: list[int] = []
+        yield from self._together(function, shared, items, range(len(items)), suspects, finish)
+        # A dead worker is blamed on every piece that it had been given: alone, each shows whether it is to blame.
+        for number in suspects:
+            guilty: list[int] = []
+            yield from self._together(function, shared, items, [number], guilty, finish)
+            if guilty:
+                error = GcsplanError(
+                    f"workers died over piece {number + 1} of {len(items)} again and again; did it need more memory "
+                    "than a worker has? Fewer processes (--jobs) have more each"
+                )
+                if lost is None:
+                    raise error
+                yield number, lost(items[number], error)
+
+    def _together(
+        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item],
+        asked: Sequence[int], suspects: list[int], finish: bool,
+    ) -> Iterator[tuple[int, Result]]:  # fmt: skip
+        """The pieces ``asked``; ``suspects`` gets those that were with a worker that died, too often."""
         distributed = import_module("distributed")
         client = self.client
         # A task, not scattered data: if the worker that holds the value dies, the scheduler makes it again.
         kept = client.submit(_itself, shared, pure=False)
         numbers: dict[Any, int] = {}
         begun, most = 0, AHEAD * self.count
-        done = distributed.as_completed(loop=client.loop)
+        done: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
         def hand_out() -> None:
             nonlocal begun
-            while begun < min(len(items), min(numbers.values(), default=begun) + LEAD * most) and len(numbers) < most:
-                future = client.submit(_done, function, __version__, kept, items[begun], pure=False, priority=-begun)
-                numbers[future] = begun
-                begun += 1
-                done.add(future)
+            first = min(numbers.values(), default=asked[begun] if begun < len(asked) else 0)
+            while begun < len(asked) and asked[begun] < first + LEAD * most and len(numbers) < most:
+                number, begun = asked[begun], begun + 1
+                future = client.submit(_done, function, __version__, kept, items[number], pure=False, priority=-number)
+                numbers[future] = number
+                future.add_done_callback(done.put)
 
+        stopped = False
         try:
             hand_out()
-            for future in done:
-                number = numbers.pop(future)
+            while numbers:
                 try:
-                    result = future.result()
-                except distributed.KilledWorker as error:
-                    raise GcsplanError(
-                        f"workers died over piece {number + 1} of {len(items)} again and again (out of memory?)"
-                    ) from error
-                hand_out()
-                yield number, result
+                    future = self._next(done)
+                except KeyboardInterrupt:
+                    if stopped or not finish:
+                        raise
+                    stopped = True
+                    self._keep_begun(numbers)
+                    continue
+                number = numbers.pop(future, None)
+                if number is None:  # given up
+                    continue
+                try:
+                    answers = [future.result()]
+                except distributed.KilledWorker:
+                    suspects.append(number)
+                    answers = []
+                except distributed.CancelledError as error:
+                    raise InputError(ENDED) from error
+                if not stopped:
+                    hand_out()
+                for result in answers:
+                    yield number, result
+            if stopped:
+                raise KeyboardInterrupt
         finally:
-            client.cancel([kept, *numbers])
+            if client.status == "running":
+                client.cancel([kept, *numbers])
+
+    def _keep_begun(self, numbers: dict[Any, int]) -> None:
+        """Give up the pieces that no worker has begun."""
+        begun = {key for stacks in self.client.call_stack(list(numbers)).values() for key in stacks}
+        waiting = [f for f in numbers if not f.done() and f.key not in begun]
+        for future in waiting:
+            del numbers[future]
+        self.client.cancel(waiting)
+
+    def _next(self, done: queue.SimpleQueue[Any]) -> Any:
+        """The next piece that is done. Raises InputError if there has been nobody for too long who could do one."""
+        deserted_s = 0.0
+        while True:
+            try:
+                return done.get(timeout=LOOK_S)
+            except queue.Empty:
+                pass
+            if self.client.status != "running":
+                raise InputError(ENDED)
+            deserted_s = 0.0 if self.client.nthreads() else deserted_s + LOOK_S
+            if deserted_s > DESERTED_S:
+                raise InputError(f"the dask scheduler has had no worker for {DESERTED_S:g} s: start some")
 
 
 def _done(function: Callable[[Shared, Item], Result], version: str, shared: Shared, item: Item) -> Result:
@@ -159,8 +258,13 @@ def _itself(value: Shared) -> Shared:
 
 
 def sane_jobs() -> int:
-    """Processes for ``--jobs`` if it is not given: as many as there are cores for this process."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+    """Processes for ``--jobs`` if it is not given: one for each core of this process, as far as the memory reaches."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
+    try:
+        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):  # not on every system
+        return cores
+    return max(1, min(cores, memory // JOB_BYTES))
 
 
 @contextmanager
@@ -169,9 +273,10 @@ def executor(
 ) -> Iterator[Executor]:
     """The executor for ``pieces`` of work of about ``piece_s`` seconds each; one piece is done in this process.
 
-    ``cluster`` is the address of a dask scheduler or a ``distributed.Client``, whose workers do the work. Otherwise
-    ``jobs`` processes of this machine do it (None: one for each core), if what they gain is more than the ``start_s``
-    seconds that it takes to start them; else this process alone does, and dask is not imported.
+    ``cluster`` is the address of a dask scheduler, the file that describes it (``dask scheduler --scheduler-file``),
+    one of dask's cluster objects, or a ``distributed.Client``; its workers do the work. Otherwise ``jobs`` processes of
+    this machine do it (None: one for each core), if what they gain is more than the ``start_s`` seconds that it takes
+    to start them; else this process alone does, and dask is not imported.
 
     Raises InputError if dask is not installed and needed, or if no scheduler answers, UsageError for wrong ``jobs``.
     """
@@ -210,8 +315,10 @@ def _connected(cluster: Any) -> Iterator[Any]:
     if isinstance(cluster, distributed.Client):
         yield cluster
         return
+    named = isinstance(cluster, str) and Path(cluster).is_file()
+    where = {"scheduler_file": cluster} if named else {"address": cluster}
     try:
-        client = distributed.Client(cluster, timeout=ANSWER_S, set_as_default=False)
+        client = distributed.Client(**where, timeout=ANSWER_S, set_as_default=False)
     except (OSError, ValueError) as error:  # TimeoutError is an OSError
         raise InputError(f"no dask scheduler answers: {error}", where=f"--cluster {cluster}") from error
     try:
@@ -232,19 +339,28 @@ def _wait_for_workers(client: Any, cluster: Any) -> None:
 
 @contextmanager
 def _processes(count: int) -> Iterator[Any]:
-    """Workers of this machine, one thread each; their scheduler listens on the loopback address alone."""
+    """Workers of this machine, one thread each; their scheduler listens on the loopback address alone.
+
+    Each may take its share of the memory. Above it the worker is ended; it is never halted, since a planner's memory
+    does not shrink while it waits. A worker that ends is started again, as often as it takes.
+    """
     distributed = _distributed("--jobs")
-    try:
-        with _deaf():
-            local = distributed.LocalCluster(
-                n_workers=count, threads_per_worker=1, processes=True, host="127.0.0.1",
-                dashboard_address="127.0.0.1:0", memory_limit=0, silence_logs=SILENT,
-            )  # fmt: skip
-    except RuntimeError as error:
-        words = "the processes of --jobs do not start; a script that asks for them needs `if __name__ == '__main__':`"
-        raise GcsplanError(f"{words} ({error})") from error
-    with local, distributed.Client(local, set_as_default=False) as client:
-        yield client
+    settings: dict[str, object] = {f"distributed.worker.memory.{key}": False for key in ("target", "spill", "pause")}
+    settings["distributed.deploy.lost-worker-timeout"] = "1 day"
+    with import_module("dask").config.set(settings):
+        try:
+            with _deaf():
+                local = distributed.LocalCluster(
+                    n_workers=count, threads_per_worker=1, processes=True, host="127.0.0.1",
+                    dashboard_address="127.0.0.1:0", memory_limit=1.0 / count, silence_logs=SILENT,
+                )  # fmt: skip
+        except RuntimeError as error:
+            words = (
+                "the processes of --jobs do not start; a script that asks for them needs `if __name__ == '__main__':`"
+            )
+            raise GcsplanError(f"{words} ({error})") from error
+        with local, distributed.Client(local, set_as_default=False) as client:
+            yield client
 
 
 @contextmanager

@@ -6,46 +6,36 @@ results hold no terrain: the caller puts them into its own.
 
 from __future__ import annotations
 
-import hashlib
-import pickle
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from gcsplan.app.executor import Executor, require_same_inputs
+from gcsplan.app.executor import Executor
 from gcsplan.app.leaving_out import LeavingOut
 from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.refusals import plan_or_explain
+from gcsplan.app.sites import Site, site_of, widened, world_of
 from gcsplan.check.verdict import Verdict
-from gcsplan.errors import GcsplanError, InputError, NoMission
+from gcsplan.errors import GcsplanError, NoMission
 from gcsplan.mavlink.build.order import Order
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.mission_file.load import load_content
-from gcsplan.mission_file.request import Content, MissionFile
 from gcsplan.planners.problem import Problem, Solution
 from gcsplan.planners.registry import get as get_planner
-from gcsplan.world.airspace import Airspace
-from gcsplan.world.world import World
 
-__all__ = ["planned_by", "world_of"]
+__all__ = ["planned_by"]
 
 PIECE_S = 0.6
 """Seconds that planning a vehicle takes, about: the median of 60 over mountains with margins."""
 
-_briefs: dict[str, Brief] = {}
-"""What this process has read for others; the last one only, for terrain is large."""
-
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What all vehicles of a mission share: the content, what its terrain and zones must be, and the planner."""
+    """What all vehicles of a mission share: its terrain and zones, and the planner."""
 
-    content: Content
-    inputs: Mapping[str, object]
+    site: Site
     planner: str
     objective: str
     seed: int
     options: Mapping[str, object]
-    key: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,11 +52,6 @@ class Answer:
     level: int
 
 
-def world_of(source: MissionFile) -> World:
-    """The frame and airspace of a mission file."""
-    return World(source.frame, Airspace(source.surface, source.zones, scale=source.airspace_scale))
-
-
 def planned_by(
     workers: Executor,
     brief: Brief,
@@ -81,9 +66,7 @@ def planned_by(
     """
     leaving = leaving or LeavingOut(allowed=False)
     source = brief.source
-    assert source.content is not None
-    asked = Asked(source.content, source.inputs, planner, brief.objective, brief.seed, dict(brief.options))
-    asked = replace(asked, key=hashlib.sha256(pickle.dumps(asked)).hexdigest())
+    asked = Asked(site_of(source), planner, brief.objective, brief.seed, dict(brief.options))
     names = [r.vehicle.name for r in source.vehicles]
     answers: dict[int, Answer] = {}
     refused: dict[int, GcsplanError] = {}
@@ -120,21 +103,13 @@ def answer_of(asked: Asked, name: str) -> Answer | GcsplanError:
 
 
 def _brief_of(asked: Asked) -> Brief:
-    known = _briefs.get(asked.key)
-    if known is not None:
-        return known
-    source = load_content(asked.content)
-    require_same_inputs(source.inputs, asked.inputs, str(source.path))
-    _briefs.clear()
+    source, world = asked.site.read()
     run = get_planner(asked.planner).plan
-    brief = Brief(source, world_of(source), run, asked.objective, asked.seed, asked.options)
-    return _briefs.setdefault(asked.key, brief)
+    return Brief(source, world, run, asked.objective, asked.seed, asked.options)
 
 
 def _restored(brief: Brief, number: int, answer: Answer) -> VehiclePlan:
-    source = brief.source if brief.source.at_level is None else brief.source.at_level(answer.level)
-    if source is None:
-        raise InputError("the terrain that a worker planned over cannot be read here", where=str(brief.source.path))
+    source = widened(brief.source, answer.level)
     over = brief if source is brief.source else replace(brief, source=source, world=world_of(source))
     problem = replace(answer.problem, airspace=over.world.airspace)
     return VehiclePlan(

@@ -14,13 +14,14 @@ from os import PathLike
 from typing import Any
 
 from gcsplan.app.executor import Inline, executor
-from gcsplan.app.fleet_jobs import PIECE_S, planned_by, world_of
+from gcsplan.app.fleet_jobs import PIECE_S, planned_by
 from gcsplan.app.fleet_planning import fleet_of
 from gcsplan.app.gate import GateTime
 from gcsplan.app.leaving_out import LeavingOut
 from gcsplan.app.model import Brief, FleetPlan, Plan, VehiclePlan
 from gcsplan.app.planning import over_one_terrain
 from gcsplan.app.refusals import plan_or_explain
+from gcsplan.app.sites import world_of
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed, InputError, NoMission
 from gcsplan.mission_file import MissionFile, load_mission
@@ -134,11 +135,12 @@ def _planned(
 
     def told(_: str, done: int) -> None:
         if progress is not None:  # of no single vehicle, for several are planned at once
-            progress("", Progress(time.perf_counter() - begun_s, None, None, f"{done} of {count} planned"))
+            progress("", Progress(time.perf_counter() - begun_s, None, None, f"{done} of {count} planned{watched}"))
 
     with executor(jobs, cluster, pieces=count, piece_s=PIECE_S) as workers:
         if isinstance(workers, Inline):
             return _one_by_one(brief, progress, leaving)
+        watched = f", workers at {workers.dashboard}" if workers.dashboard else ""
         return planned_by(workers, brief, planner, told, leaving)
 
 

@@ -15,13 +15,16 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from gcsplan.app.executor import Executor, Inline, executor
 from gcsplan.app.model import Plan, VehiclePlan
+from gcsplan.app.sites import Site, site_of
 from gcsplan.errors import UsageError
-from gcsplan.sim.outcome import Part, Rehearsal, Terms
+from gcsplan.sim.outcome import Part, Rehearsal, Tally, Terms
 
 if TYPE_CHECKING:
+    from gcsplan.sim.rehearsal import Block, Flights
     from gcsplan.sim.wind import Weather
 
 __all__ = ["Part", "Rehearsal", "Terms", "parts_of", "rehearse", "rehearse_in_sitl", "seats_of", "terms_of"]
@@ -64,14 +67,49 @@ def rehearse(
     seed: int = 1,
     airspeed_m_s: float | None = None,
     progress: Callable[[int, int], None] | None = None,
+    jobs: int | None = 1,
+    cluster: Any = None,
+    watch: Callable[[Executor], None] | None = None,
 ) -> Rehearsal:
-    """Upload to one simulated vehicle per UAV, fly all of them in simulated time, and judge; see `sim.rehearsal`."""
-    from gcsplan.sim.rehearsal import rehearse as run
+    """Upload to one simulated vehicle per UAV, fly all of them in simulated time, and judge; see `sim.rehearsal`.
 
-    return run(
+    ``jobs`` processes or the workers of ``cluster`` share the runs (`executor`); a few runs are flown in this process.
+    The result does not depend on it. ``watch`` is called with the executor before the work begins.
+    """
+    from gcsplan.sim.rehearsal import concluded, different, flown, prepared
+
+    flights = prepared(
         parts_of(planned), planned.world, terms_of(planned), weather=weather, runs=runs, seed=seed,
-        airspeed_m_s=airspeed_m_s, progress=progress,
+        airspeed_m_s=airspeed_m_s,
     )  # fmt: skip
+    count = different(flights, runs)
+    tallies: dict[int, Tally] = {}
+    with executor(jobs, cluster if count > 1 else None, pieces=count, piece_s=flights.run_s) as workers:
+        if watch is not None:
+            watch(workers)
+        here = isinstance(workers, Inline)
+        blocks = flights.blocks(count, workers.count)
+        done = (
+            ((k, flown(flights, planned.world, block)) for k, block in enumerate(blocks))
+            if here
+            else workers.each(block_of, (site_of(planned.source), flights), blocks)
+        )
+        for number, tally in done:
+            tallies[number] = tally
+            if progress is not None:
+                progress(sum(blocks[k][1] for k in tallies), runs)
+    return concluded(flights, runs, [tallies[k] for k in range(len(blocks))])
+
+
+def block_of(shared: tuple[Site, Flights], block: Block) -> Tally:
+    """Fly and judge a block of runs, in whatever process, over the terrain that it reads itself."""
+    from gcsplan.sim.rehearsal import flown
+
+    site, flights = shared
+    tally = flown(flights, site.read()[1], block)
+    if block[0]:
+        tally.flown = ()  # those of the first run alone are shown
+    return tally
 
 
 def rehearse_in_sitl(

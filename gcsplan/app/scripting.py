@@ -244,17 +244,22 @@ def rehearse(
     runs: int = 1,
     seed: int = 1,
     progress: Callable[[int, int], None] | None = None,
+    jobs: int | None = 1,
+    cluster: Any = None,
 ) -> Rehearsal:
     """Upload a plan to simulated vehicles, fly what they store in simulated time, and judge that; all on this machine.
 
     Wind, gusts and position noise (`gcsplan.sim.wind.Weather`) are drawn from ``seed``, anew for each of ``runs``.
-    ``progress(done, runs)`` is called from time to time. The result's ``safe`` is True if the arrivals were in order,
-    and the separation and every limit were kept on the flown tracks; ``error()`` states what was not kept. Raises what
-    an upload raises, CheckFailed as `upload` does for a return that is required, and InputError for invalid weather.
+    ``progress(done, runs)`` is called from time to time. ``jobs`` processes or the workers of ``cluster`` share the
+    runs, as in `plan`, with the same result. The result's ``safe`` is True if the arrivals were in order, and the
+    separation and every limit were kept on the flown tracks; ``error()`` states what was not kept. Raises what an
+    upload raises, CheckFailed as `upload` does for a return that is required, and InputError for invalid weather.
     """
     from gcsplan.app import rehearsing
     from gcsplan.sim.wind import Weather
 
     returns.judged(planned, asked=False)
     weather = Weather(wind_m_s, from_deg, gusts_m_s, noise_m)
-    return rehearsing.rehearse(planned, weather=weather, runs=runs, seed=seed, progress=progress)
+    return rehearsing.rehearse(
+        planned, weather=weather, runs=runs, seed=seed, progress=progress, jobs=jobs, cluster=cluster
+    )

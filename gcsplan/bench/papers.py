@@ -7,7 +7,6 @@ there.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -44,9 +43,9 @@ def run(
         algorithms: names of the papers' own algorithms; None: all.
         runs: runs of each algorithm in each scenario; None: the paper's number (30 if it names none).
         seed: seed from which the seeds of all runs are derived.
-        jobs: local processes; None: all cores. Unused with ``cluster``.
+        jobs: local processes; None: one for each core. Unused with ``cluster``.
         out: directory of the runs (`KEPT`) and the report; created if missing.
-        cluster: address of a dask.distributed scheduler that does the runs instead (extra ``cluster``).
+        cluster: a dask scheduler whose workers do the runs instead (`app.executor`).
         done: called with the number of finished runs and of all runs.
         missions: directory of the scenarios' mission files; None: the usual folders.
         readings: whether ``algorithms`` None means other readings of the papers, too.
@@ -58,8 +57,7 @@ def run(
     Raises:
         InputError: for what cannot be run or written, and for a cluster that does not answer.
     """
-    jobs = (os.cpu_count() or 1) if jobs is None else jobs
-    if (runs is not None and not 1 <= runs <= MOST_RUNS) or jobs < 1 or seed < 0:
+    if (runs is not None and not 1 <= runs <= MOST_RUNS) or (jobs is not None and jobs < 1) or seed < 0:
         raise InputError(
             f"1 to {MOST_RUNS} runs, 1 job or more and a seed of 0 or more are wanted, given {runs}, {jobs}, {seed}"
         )

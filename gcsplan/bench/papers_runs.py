@@ -9,26 +9,22 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import multiprocessing
 import os
-import signal
 import time
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from gcsplan.app.executor import executor
 from gcsplan.arrays import Floats
 from gcsplan.bench.papers_scenarios import SCENARIOS, Contender, Set, prepare, settings_of
-from gcsplan.errors import GcsplanError, InputError, NoMission
+from gcsplan.errors import InputError, NoMission
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.registry import get as get_planner
@@ -47,13 +43,13 @@ OPTIMA = {"optimal": "length", "optimal-energy": "energy"}
 POINTS_OF_HISTORY = 100
 DRAWN_M = 1e-4
 """Part of a path's length by which the points kept for the map may be off its curve."""
-ANSWER_S = 20.0
-"""Seconds within which a cluster's scheduler must answer."""
+PIECE_S = 5.0
+"""Seconds that a run takes, about."""
 CLOSE = 0.01
 """A run has converged when its cost is within this part of its final cost."""
 
 CODE = (
-    "*.py", "app/pipeline.py", "app/problems.py", "bench/papers_readings.py", "bench/papers_runs.py",
+    "*.py", "app/pipeline.py", "app/problems.py", "app/sites.py", "bench/papers_readings.py", "bench/papers_runs.py",
     "bench/papers_scenarios.py",
     "mavlink/build/*.py", "mavlink/mission/mission.py", "mission_file/*.py", "native/*.py", "optimisers/*.py",
     "planners/**/*.py", "world/*.py",
@@ -274,57 +270,12 @@ def _nearest_m(found: Found, problem: Problem) -> float | None:
     return float(np.maximum(np.min(wall, axis=0), 0.0).mean())
 
 
-def carry_out(todo: Sequence[PaperRun], jobs: int, cluster: str | None, keep: Callable[[Record], None]) -> None:
+def carry_out(todo: Sequence[PaperRun], jobs: int | None, cluster: str | None, keep: Callable[[Record], None]) -> None:
     """Do every job and ``keep`` each record at once; after Ctrl-C, runs in progress are finished and kept."""
-    if cluster is not None:
-        _over_cluster(todo, cluster, keep)
-    elif jobs == 1 or len(todo) <= 1:
-        for job in todo:
-            keep(work(job))
-    else:
-        _over_processes(todo, jobs, keep)
-
-
-def _over_processes(todo: Sequence[PaperRun], jobs: int, keep: Callable[[Record], None]) -> None:
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(jobs, len(todo)), mp_context=context, initializer=_deaf) as pool:
-        waiting = {pool.submit(work, job) for job in todo}
-        try:
-            for future in as_completed(waiting):
-                waiting.discard(future)
-                keep(future.result())
-        except BrokenProcessPool as error:
-            raise GcsplanError("a process that did runs has died (out of memory?); the same command goes on") from error
-        except BaseException:
-            for future in as_completed({f for f in waiting if not f.cancel()}):
-                if future.exception() is None:
-                    keep(future.result())
-            raise
-
-
-def _deaf() -> None:
-    """Ignore Ctrl-C, which the parent handles, so that a run in progress is finished."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def _over_cluster(todo: Sequence[PaperRun], address: str, keep: Callable[[Record], None]) -> None:
-    try:
-        distributed = import_module("distributed")
-    except ImportError:
-        raise InputError(
-            "--cluster needs dask.distributed, which is not installed: pip install 'gcsplan[cluster]'"
-        ) from None
-    try:
-        client = distributed.Client(address, timeout=ANSWER_S, set_as_default=False)
-    except (OSError, ValueError) as error:  # TimeoutError is an OSError
-        raise InputError(f"no cluster answers: {error}", where=f"--cluster {address}") from error
-    try:
-        futures = client.map(work, todo, pure=False)
-        for future in distributed.as_completed(futures, loop=client.loop):
-            try:
-                record = future.result()
-            except distributed.KilledWorker as error:
-                raise GcsplanError("a worker of the cluster has died; the same command goes on") from error
+    with executor(jobs, cluster, pieces=len(todo), piece_s=PIECE_S) as workers:
+        for _, record in workers.each(_piece, None, todo, finish=True):
             keep(record)
-    finally:
-        client.close()  # this cancels whatever is still waiting
+
+
+def _piece(_: None, job: PaperRun) -> Record:
+    return work(job)

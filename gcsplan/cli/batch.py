@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
 
 SHOWN = 20
 """Missions without a plan that are printed at most; the table has all of them."""
-LINE_S = 5.0
 
 
 def batch(
@@ -56,28 +54,23 @@ def batch(
     from gcsplan.app.batch import PIECE_S, Batch, BatchOptions, exit_code, missions_of
     from gcsplan.app.executor import executor
     from gcsplan.cli.console import remark, say
+    from gcsplan.cli.work_display import WorkDisplay
 
     options = BatchOptions(planner, objective, seed, report, allow_unjudged)
     work = Batch(missions_of(missions), out, options)
     done, todo = work.known()
     if done:
         remark(f"{len(done)} of {len(work.missions)} missions are done and unchanged")
-    begun_s = said_s = time.perf_counter()
+    display = WorkDisplay(len(work.missions), "missions")
 
     def told(record: Record) -> None:
-        nonlocal said_s
         done.append(record)
-        now_s = time.perf_counter()
-        if now_s - said_s >= LINE_S:
-            said_s = now_s
-            bad = sum(r.code != 0 for r in done)
-            remark(f"{len(done)} of {len(work.missions)} missions, {bad} without a plan, {now_s - begun_s:.0f} s")
+        display.done(len(done), f", {sum(r.code != 0 for r in done)} without a plan")
 
     try:
         if todo:
             with executor(jobs, cluster, pieces=len(todo), piece_s=PIECE_S) as workers:
-                if (link := getattr(workers, "dashboard", "")) and len(todo) > 1:
-                    remark(f"the workers can be watched at {link}")
+                display.workers(workers)
                 work.run(workers, todo, told)
     finally:
         order = {name: k for k, (name, _) in enumerate(work.missions)}
@@ -94,8 +87,8 @@ def batch(
         if len(bad) > SHOWN:
             say(f"… and {len(bad) - SHOWN} more; the table has all of them")
         count = sum(row["code"] == 0 for r in done for row in r.rows)
-        took_s = time.perf_counter() - begun_s
-        say(f"{len(done) - len(bad)} of {len(done)} missions planned, {count} vehicles, in {took_s:.1f} s")
+        took = f"{count} vehicles, in {display.elapsed_s:.1f} s"
+        say(f"{len(done) - len(bad)} of {len(done)} missions planned, {took}")
         say(f"written to {out}/: {', '.join(written)}")
     raise typer.Exit(exit_code(done))
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from gcsplan.cli.ending import emit, put
-from gcsplan.cli.options import JobsOption, JsonOption
+from gcsplan.cli.options import ClusterOption, JobsOption, JsonOption
 from gcsplan.errors import UsageError
 
 bench_app = typer.Typer(
@@ -183,10 +183,8 @@ def bench_papers(
     ] = None,
     runs: Annotated[int | None, typer.Option(metavar="N", help="Of each [the paper's number, 30 where none].")] = None,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of all runs.")] = 1,
-    jobs: Annotated[int | None, typer.Option(metavar="N", help="Local processes [all cores].")] = None,
-    cluster: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A dask.distributed scheduler instead (extra `cluster`).")
-    ] = None,
+    jobs: JobsOption = None,
+    cluster: ClusterOption = None,
     missions: Annotated[Path | None, typer.Option(metavar="DIR", help="Where the mission files are.")] = None,
     readings: Annotated[
         bool, typer.Option("--readings/--no-readings", help="Run other readings of the papers too.")

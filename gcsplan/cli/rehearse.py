@@ -9,6 +9,8 @@ import typer
 
 from gcsplan.cli.ending import complain, emit, talking
 from gcsplan.cli.options import (
+    ClusterOption,
+    JobsOption,
     JsonOption,
     MissionArgument,
     PlannerOption,
@@ -63,6 +65,8 @@ def rehearse(
             "arducopter and arduplane.",
         ),
     ] = None,
+    jobs: JobsOption = None,
+    cluster: ClusterOption = None,
     speedup: Annotated[
         float | None, typer.Option(metavar="X", help="With --sitl-binary: how fast its clock runs [default: 5]")
     ] = None,
@@ -93,6 +97,7 @@ def rehearse(
     from gcsplan.cli.console import remark, say, say_notes
     from gcsplan.cli.home_words import say_homes
     from gcsplan.cli.planning_display import planning_display
+    from gcsplan.cli.work_display import WorkDisplay
     from gcsplan.export.outdir import write_whole
     from gcsplan.sim.wind import Weather
 
@@ -109,7 +114,7 @@ def rehearse(
     names = [r.vehicle.name for r in source.vehicles]
     addresses = rehearsing.seats_of(sitl or [], names)
     with planning_display(names, source.planner.objective) as progress:
-        planned = pipeline.plan(source, planner=planner, progress=progress)
+        planned = pipeline.plan(source, planner=planner, progress=progress, jobs=jobs, cluster=cluster)
     pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
     homes = returns.judged(planned, asked=way_home or report is not None, option=require_way_home)
     if in_sitl:
@@ -119,7 +124,11 @@ def rehearse(
                 report=None if as_json else lambda name, what: remark(f"{name} {what}"), weather=weather, seed=seed,
             )  # fmt: skip
     else:
-        result = rehearsing.rehearse(planned, weather=weather, runs=runs, seed=seed, airspeed_m_s=airspeed)
+        display = WorkDisplay(runs, "runs")
+        result = rehearsing.rehearse(
+            planned, weather=weather, runs=runs, seed=seed, airspeed_m_s=airspeed, jobs=jobs, cluster=cluster,
+            watch=display.workers, progress=lambda done, _: display.done(done),
+        )  # fmt: skip
     error: GcsplanError | None = result.error(allow_unjudged=allow_unjudged)
     if planned.left_out:
         complain(refusal := refusal_of(planned.left_out))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -232,10 +232,12 @@ def _number(value: float | None) -> float | None:
 
 @dataclass
 class Tally:
-    """Accumulates the runs of a rehearsal; `result` returns the `Rehearsal`."""
+    """Accumulates the runs of a rehearsal; `result` returns the `Rehearsal`.
+
+    ``stood_s``: the longest that each vehicle stood in the air in a run. ``flown``: the traces of the first run.
+    """
 
     parts: Sequence[Part]
-    world: World
     terms: Terms
     runs: int = 0
     order_kept: int = 0
@@ -251,9 +253,10 @@ class Tally:
         self._arrive: list[list[float]] = [[] for _ in self.parts]
         self._end: list[list[float]] = [[] for _ in self.parts]
         self._lowest: list[Judged | None] = [None] * len(self.parts)
+        self.stood_s = [0.0] * len(self.parts)
 
-    def add(self, traces: Sequence[Trace]) -> None:
-        """Add one run; ``traces`` are in the order of the parts."""
+    def add(self, traces: Sequence[Trace], world: World, stood_s: Sequence[float] | None = None) -> None:
+        """Add one run; ``traces``, and ``stood_s`` in the air, are in the order of the parts."""
         self.runs += 1
         self.flown = self.flown or tuple(traces)
         self._seen = set()
@@ -264,14 +267,45 @@ class Tally:
             if not arrived:
                 why = f": {trace.why}" if trace.why else ""
                 self.breach("arrival", (trace.name,), f"{trace.name} never arrived at its goal{why}", math.inf)
-            judged = examine(trace, part.vehicle, self.world)
-            before = self._lowest[i]
-            if before is None or math.isnan(before.min_agl_m) or judged.min_agl_m < before.min_agl_m:
-                self._lowest[i] = judged
+            judged = examine(trace, part.vehicle, world)
+            self._lower(i, judged)
+            if stood_s is not None:
+                self.stood_s[i] = max(self.stood_s[i], stood_s[i])
             for f in judged.findings:
                 self.breach(f.kind, (trace.name,), f.message, f.by, f.zone)
         self._order(traces)
         self._separation(traces)
+
+    def join(self, later: Tally) -> None:
+        """Add the runs of another tally of the same parts, which come after these: as if all had been added here."""
+        for mine, more in ((self._arrive, later._arrive), (self._end, later._end)):
+            for i, times in enumerate(more):
+                mine[i] += times
+        for i, judged in enumerate(later._lowest):
+            if judged is not None:
+                self._lower(i, judged)
+            self.stood_s[i] = max(self.stood_s[i], later.stood_s[i])
+        for key, found in later._breaches.items():
+            was = self._breaches.get(key)
+            worst = found if was is None or found.by > was.by else was
+            self._breaches[key] = replace(worst, runs=found.runs + (was.runs if was is not None else 0))
+        if self.runs == 0 or (later.terms.order and later.order_kept < later.runs):
+            self.order_flown = later.order_flown
+        self.flown = self.flown or later.flown
+        self.runs += later.runs
+        self.order_kept += later.order_kept
+        self.separation_kept += later.separation_kept
+        self._nearer(later.closest)
+        self.notes += later.notes
+
+    def _lower(self, i: int, judged: Judged) -> None:
+        before = self._lowest[i]
+        if before is None or math.isnan(before.min_agl_m) or judged.min_agl_m < before.min_agl_m:
+            self._lowest[i] = judged
+
+    def _nearer(self, meeting: Meeting | None) -> None:
+        if meeting is not None and (self.closest is None or meeting.distance_m < self.closest.distance_m):
+            self.closest = meeting
 
     def breach(self, kind: str, vehicles: tuple[str, ...], message: str, by: float, more: object = None) -> None:
         """Record a breach; of one kind, vehicle set and ``more``, keep the worst and count each run once."""
@@ -302,8 +336,7 @@ class Tally:
         needed = self.terms.separation_m
         found = meetings(traces, needed or 0.0, MEETING_STEP_S, pad_clear_s=self.terms.pad_clear_s)
         in_air = [m for m in found if m.kind == "air"]
-        if in_air and (self.closest is None or in_air[0].distance_m < self.closest.distance_m):
-            self.closest = in_air[0]
+        self._nearer(in_air[0] if in_air else None)
         if needed is None:
             return
         close = [m for m in found if m.distance_m < needed - 1e-6]

@@ -7,7 +7,9 @@ no code with their planning. Separation is judged on the flown paths, limits by 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from gcsplan.errors import GcsplanError, InputError
 from gcsplan.mavlink.link.link import Link
@@ -22,10 +24,40 @@ from gcsplan.sim.vehicle import LoopbackVehicle
 from gcsplan.sim.wind import Weather
 from gcsplan.world.world import World
 
-__all__ = ["Part", "Rehearsal", "Terms", "rehearse"]
+__all__ = ["Block", "Flights", "Part", "Rehearsal", "Terms", "concluded", "different", "flown", "prepared", "rehearse"]
 
 MOST_LANES = 240
 """Most vehicles, over all runs, that are simulated at once; this bounds the memory."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Flights:
+    """What all runs of a rehearsal share: the vehicles' parts, the tracks that they fly, and the weather."""
+
+    parts: Sequence[Part]
+    terms: Terms
+    tracks: Sequence[Track]
+    weather: Weather
+    seed: int
+
+    def blocks(self, runs: int, at_once: int) -> list[Block]:
+        """All runs in blocks for ``at_once`` processes; each keeps the bound of `MOST_LANES`."""
+        size = max(1, min(MOST_LANES // len(self.parts), -(-runs // at_once)))
+        return [(first, min(size, runs - first)) for first in range(0, runs, size)]
+
+    @property
+    def run_s(self) -> float:
+        """Seconds of processor time that a run takes, about, in a block as large as they get."""
+        flown_s = max(p.depart_s + p.verdict.time_s for p in self.parts)
+        most = max(1, MOST_LANES // len(self.parts))
+        return LANE_S * len(self.parts) + STEPS_S * flown_s / most if math.isfinite(flown_s) else LANE_S
+
+
+Block = tuple[int, int]
+"""The number of its first run, and how many runs it has."""
+
+LANE_S, STEPS_S = 0.02, 2e-3
+"""Seconds of processor time, about: to judge a vehicle in a run, and for each simulated second of a block."""
 
 
 def rehearse(
@@ -39,35 +71,71 @@ def rehearse(
     airspeed_m_s: float | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Rehearsal:
-    """Upload, fly and judge. ``progress(done, runs)`` is called after each run.
+    """Upload, fly and judge. ``progress(done, runs)`` is called after each block of runs.
 
     ``airspeed_m_s``: highest airspeed of every vehicle, None: a little more than its own fastest cruise (`kinematics`).
     In still air all runs are the same, so only one is flown. Raises what an upload raises, and InputError for two
     vehicles with the same name or system id, or a mission that flies nowhere.
     """
-    weather = weather or Weather()
+    flights = prepared(parts, world, terms, weather=weather, runs=runs, seed=seed, airspeed_m_s=airspeed_m_s)
+    blocks = flights.blocks(different(flights, runs), 1)
+    tallies = []
+    for first, count in blocks:
+        tallies.append(flown(flights, world, (first, count)))
+        if progress is not None:
+            progress(first + count, runs)
+    return concluded(flights, runs, tallies)
+
+
+def prepared(
+    parts: Sequence[Part],
+    world: World,
+    terms: Terms,
+    *,
+    weather: Weather | None = None,
+    runs: int = 1,
+    seed: int = 1,
+    airspeed_m_s: float | None = None,
+) -> Flights:
+    """Upload, and make the tracks of what the vehicles stored. Raises as `rehearse`."""
     if runs < 1:
         raise InputError(f"at least one run is wanted, given {runs}")
     stored = on_board(parts)
     tracks = [_track(part, mission, world, airspeed_m_s) for part, mission in zip(parts, stored, strict=True)]
-    tally = Tally(parts, world, terms)
-    if weather.calm and runs > 1:
-        tally.notes.append("without wind, gusts and noise every run is the same: one was flown")
-        runs = 1
+    return Flights(parts, terms, tracks, weather or Weather(), seed)
+
+
+def different(flights: Flights, runs: int) -> int:
+    """How many of ``runs`` are flown: one if nothing makes them differ."""
+    return 1 if flights.weather.calm else runs
+
+
+def flown(flights: Flights, world: World, block: Block) -> Tally:
+    """Fly and judge a block of runs. A run does not depend on its block."""
+    first, count = block
+    parts = flights.parts
+    tally = Tally(parts, flights.terms)
     departs = [part.depart_s for part in parts]
-    at_once = max(1, MOST_LANES // len(parts))
-    stood = [0.0] * len(parts)
-    for first in range(0, runs, at_once):
-        count = min(at_once, runs - first)
-        flown = fly(tracks, departs, weather=weather, runs=count, seed=seed, first_run=first)
-        for r in range(count):
-            lanes = range(r * len(parts), (r + 1) * len(parts))
-            tally.add([flown.trace(lane, leaves=part.leaves) for lane, part in zip(lanes, parts, strict=True)])
-            stood = [max(s, float(flown.hold_s[lane])) for s, lane in zip(stood, lanes, strict=True)]
-            if progress is not None:
-                progress(first + r + 1, runs)
-    energy = [energy_of(t.points, s, p.vehicle) for t, s, p in zip(tracks, stood, parts, strict=True)]
-    return tally.result("gcsplan", seed, weather.as_dict(), energy, [t.not_flown for t in tracks])
+    flight = fly(flights.tracks, departs, weather=flights.weather, runs=count, seed=flights.seed, first_run=first)
+    for r in range(count):
+        lanes = range(r * len(parts), (r + 1) * len(parts))
+        traces = [flight.trace(lane, leaves=part.leaves) for lane, part in zip(lanes, parts, strict=True)]
+        tally.add(traces, world, [float(flight.hold_s[lane]) for lane in lanes])
+    return tally
+
+
+def concluded(flights: Flights, runs: int, tallies: Sequence[Tally]) -> Rehearsal:
+    """The result of all blocks, given in their order."""
+    tally = Tally(flights.parts, flights.terms)
+    if runs > different(flights, runs):
+        tally.notes.append("without wind, gusts and noise every run is the same: one was flown")
+    for one in tallies:
+        tally.join(one)
+    energy = [
+        energy_of(t.points, s, p.vehicle) for t, s, p in zip(flights.tracks, tally.stood_s, flights.parts, strict=True)
+    ]
+    not_flown = [t.not_flown for t in flights.tracks]
+    return tally.result("gcsplan", flights.seed, flights.weather.as_dict(), energy, not_flown)
 
 
 def on_board(parts: Sequence[Part]) -> list[Mission]:

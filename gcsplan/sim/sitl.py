@@ -139,9 +139,9 @@ def rehearse_sitl(
         flights = [PumpJob(c, _fly(c, p, s, world, said)) for c, p, s in zip(channels, parts, states, strict=True)]
         logs = _all(flights)
         _all([PumpJob(c, change_steps(c, s, was)) for c, s, was in zip(channels, states, calm, strict=True)])
-    tally = Tally(parts, world, terms)
+    tally = Tally(parts, terms)
     traces = [_trace(log, part, world) for log, part in zip(logs, parts, strict=True)]
-    tally.add(traces)
+    tally.add(traces, world)
     tally.notes.append(f"every vehicle was released {LIFT_S:g} s before its departure, for its motors to spin up")
     tally.notes += [
         f"{t.name} left the ground {t.begin_s - p.depart_s:+.1f} s from its departure"

@@ -16,7 +16,7 @@ from gcsplan.app import batch as module
 from gcsplan.app.batch import Batch, BatchOptions, Record, exit_code, key_of, missions_of
 from gcsplan.app.executor import Dask, Inline, executor
 from gcsplan.cli.main import app
-from gcsplan.errors import UsageError
+from gcsplan.errors import GcsplanError, UsageError
 from gcsplan.export.table import csv_text, parquet_bytes
 from gcsplan.mission_file.read_files import files_of
 from gcsplan.report.index_page import render_index
@@ -212,3 +212,17 @@ def test_processes_make_the_same_files(folder: Path, tmp_path: Path) -> None:
         if file.suffix in (".waypoints", ".plan", ".kml", ".geojson", ".csv"):
             assert (shared / file).read_bytes() == (alone / file).read_bytes(), file
     assert not Batch(missions_of([str(folder)]), shared, BatchOptions()).known()[1]
+
+
+def test_a_mission_that_no_worker_outlives_is_a_row_and_stops_nobody(folder: Path, tmp_path: Path) -> None:
+    class Deadly(Inline):
+        def each(self, function: Any, shared: Any, items: Any, *, lost: Any = None, finish: bool = False) -> Any:
+            for number, item in enumerate(items):
+                dies = item[0] == "good"
+                yield number, lost(item, GcsplanError("workers died")) if dies else function(shared, item)
+
+    work = Batch(missions_of([str(folder)]), tmp_path / "out", BatchOptions())
+    done: list[Record] = []
+    work.run(Deadly(), work.known()[1], done.append)
+    assert {r.mission: r.code for r in done} == {"good": 70, "north/good": 0, "north/broken": 2, "shut": 2}
+    assert "workers died" in next(r for r in done if r.mission == "good").rows[0]["message"]

@@ -47,7 +47,17 @@ def kills_once(marks: str, item: int) -> int:
 
 
 def kills_always(shared: int, item: int) -> int:
-    os.kill(os.getpid(), signal.SIGKILL)
+    """End the worker at every item, or at the one that is ``shared``."""
+    if shared in (0, item):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return item
+
+
+def interrupts(parent: int, item: int) -> int:
+    """Press Ctrl-C in the process ``parent`` while item 1 is worked on, and go on for a while."""
+    if item == 1:
+        os.kill(parent, signal.SIGINT)
+        time.sleep(2.0)
     return item
 
 
@@ -131,7 +141,7 @@ def test_a_wrong_number_of_processes_is_refused(jobs: int) -> None:
 class Pickled(Inline):
     """What goes in and out passes through pickle, as between processes."""
 
-    def each(self, function: Any, shared: Any, items: Any) -> Any:
+    def each(self, function: Any, shared: Any, items: Any, **_: Any) -> Any:
         for number, item in enumerate(items):
             args = pickle.loads(pickle.dumps((function, shared, item)))
             yield number, pickle.loads(pickle.dumps(args[0](*args[1:])))
@@ -151,7 +161,7 @@ def test_planning_with_an_executor_is_planning(monkeypatch: pytest.MonkeyPatch) 
 
 def test_the_first_refusal_in_the_file_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
     class Backwards(Inline):
-        def each(self, function: Any, shared: Any, items: Any) -> Any:
+        def each(self, function: Any, shared: Any, items: Any, **_: Any) -> Any:
             yield from reversed(list(Inline.each(self, function, shared, items)))
 
     ring = {"name": "ring", "floor_agl_m": 0, "ceiling_agl_m": 500}
@@ -213,6 +223,25 @@ def test_a_piece_that_kills_every_worker_is_named() -> None:
 
 
 @pytest.mark.slow
+def test_a_piece_that_kills_every_worker_costs_no_other(workers: Executor) -> None:
+    found = workers.each(kills_always, 3, range(8), lost=lambda item, why: -item)
+    assert sorted(found) == [(k, -3 if k == 3 else k) for k in range(8)]
+
+
+@pytest.mark.slow
+def test_after_ctrl_c_what_is_begun_is_finished(workers: Executor) -> None:
+    found: list[tuple[int, int]] = []
+    with pytest.raises(KeyboardInterrupt):
+        found.extend(workers.each(interrupts, os.getpid(), range(40)))
+    assert (1, 1) not in found
+    with pytest.raises(KeyboardInterrupt):
+        found.extend(workers.each(interrupts, os.getpid(), range(40), finish=True))
+    assert (1, 1) in found
+    assert len(found) < 40
+    assert sorted(workers.each(square, 0, range(3))) == [(0, 0), (1, 1), (2, 4)]
+
+
+@pytest.mark.slow
 def test_a_fleet_planned_by_processes_is_the_same(workers: Executor) -> None:
     assert isinstance(workers, Dask)
     assert told(plan(fleet(), cluster=workers.client)) == told(plan(fleet()))
@@ -252,6 +281,30 @@ def test_a_scheduler_without_workers_is_named(monkeypatch: pytest.MonkeyPatch) -
         executor(cluster=empty.scheduler_address, pieces=2, piece_s=1.0),
     ):
         pass
+
+
+@pytest.mark.slow
+def test_a_scheduler_is_found_by_its_file_or_its_object_and_its_end_is_told(tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    file = tmp_path / "scheduler.json"
+    found: list[Any] = []
+    with distributed.LocalCluster(
+        n_workers=1,
+        threads_per_worker=1,
+        processes=False,
+        protocol="tcp",
+        host="127.0.0.1",
+        dashboard_address="127.0.0.1:0",
+    ) as local:
+        with executor(cluster=local, pieces=1, piece_s=1.0) as one:
+            assert list(one.each(square, 1, [2])) == [(0, 5)]
+        with distributed.Client(local, set_as_default=False) as client:
+            client.write_scheduler_file(str(file))
+        with (
+            executor(cluster=str(file), pieces=1, piece_s=1.0) as one,
+            pytest.raises(InputError, match="the dask scheduler has ended"),
+        ):
+            found.extend((k, local.close()) for k, _ in one.each(square, 1, range(100)))
 
 
 @pytest.mark.slow

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import pickle
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
@@ -15,6 +16,7 @@ import pytest
 import typer
 from pymavlink.dialects.v20 import ardupilotmega as mav
 
+from gcsplan.app.executor import Inline
 from gcsplan.app.model import Plan
 from gcsplan.app.pipeline import plan
 from gcsplan.app.rehearsing import parts_of, rehearse, rehearse_in_sitl, seats_of, terms_of
@@ -30,6 +32,7 @@ from gcsplan.sim.sitl import rehearse_sitl, require_here
 from gcsplan.sim.sitl_instances import parameters_of, sitl_instances
 from gcsplan.sim.telemetry import Telemetry
 from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.wind import Weather
 
 FLEET = """
 version: 1
@@ -302,3 +305,39 @@ def test_a_mission_that_did_not_pass_is_not_sent_to_them(planned: Plan, monkeypa
     bad = replace(part, mission=replace(part.mission, items=part.mission.items[:-1]))
     with flying([part], planned, monkeypatch) as seats, pytest.raises(CheckFailed, match="another mission"):
         rehearse_sitl([bad], planned.world, Terms(), seats)
+
+
+# -- an executor --------------------------------------------------------------------------------------------------
+
+
+class TwoAtOnce(Inline):
+    """Two workers that are this process; pieces come back in the wrong order, through pickle."""
+
+    count = 2  # type: ignore[assignment]
+
+    def each(self, function: Any, shared: Any, items: Any, **_: Any) -> Any:
+        for number in reversed(range(len(items))):
+            sent = pickle.loads(pickle.dumps((function, shared, items[number])))
+            yield number, pickle.loads(pickle.dumps(sent[0](*sent[1:])))
+
+
+@pytest.mark.parametrize("runs", [2, 7])
+def test_whoever_flies_the_runs_the_result_is_the_same(planned: Plan, monkeypatch: Any, runs: int) -> None:
+    """Strong noise, so that limits are broken in some runs and the order is lost in some."""
+    asked: dict[str, Any] = {"weather": Weather(3.0, None, 2.0, 15.0), "runs": runs, "seed": 4}
+    alone = rehearse(planned, **asked)
+    assert not alone.safe
+
+    @contextmanager
+    def two(*_: Any, **__: Any) -> Iterator[TwoAtOnce]:
+        yield TwoAtOnce()
+
+    monkeypatch.setattr("gcsplan.app.rehearsing.executor", two)
+    monkeypatch.setattr("gcsplan.app.rehearsing.Inline", ())
+    told: list[int] = []
+    shared = rehearse(planned, **asked, progress=lambda done, _: told.append(done))
+    assert json.dumps(shared.as_dict()) == json.dumps(alone.as_dict())
+    assert shared.breaches == alone.breaches
+    assert [t.points.tolist() for t in shared.flown] == [t.points.tolist() for t in alone.flown]
+    assert told[-1] == runs
+    assert len(told) == 2

@@ -18,6 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import false_discovery_control, mannwhitneyu
 
+from gcsplan.app import executor
 from gcsplan.bench import papers_runs, papers_speed
 from gcsplan.bench.papers import KEPT, plain, run
 from gcsplan.bench.papers_judge import FEW
@@ -413,8 +414,8 @@ def test_a_cluster_gives_the_same_numbers(
     finished: tuple[dict[str, Any], Path], missions: Path, tmp_path: Path, monkeypatch: Any
 ) -> None:
     distributed = pytest.importorskip("distributed")
-    monkeypatch.setattr(papers_runs, "ANSWER_S", 0.5)
-    with pytest.raises(InputError, match="no cluster answers"):
+    monkeypatch.setattr(executor, "ANSWER_S", 0.5)
+    with pytest.raises(InputError, match="no dask scheduler answers"):
         run([SCENARIO], PAIR, 1, out=tmp_path, missions=missions, cluster="tcp://127.0.0.1:1")
     monkeypatch.undo()
     with distributed.LocalCluster(
