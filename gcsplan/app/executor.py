@@ -319,7 +319,8 @@ def _connected(cluster: Any) -> Iterator[Any]:
     where = {"scheduler_file": cluster} if named else {"address": cluster}
     try:
         client = distributed.Client(**where, timeout=ANSWER_S, set_as_default=False)
-    except (OSError, ValueError) as error:  # TimeoutError is an OSError
+    # TimeoutError is an OSError; TLS without keys is a TypeError.
+    except (OSError, ValueError, TypeError) as error:
         raise InputError(f"no dask scheduler answers: {error}", where=f"--cluster {cluster}") from error
     try:
         if not client.nthreads():
@@ -347,6 +348,7 @@ def _processes(count: int) -> Iterator[Any]:
     distributed = _distributed("--jobs")
     settings: dict[str, object] = {f"distributed.worker.memory.{key}": False for key in ("target", "spill", "pause")}
     settings["distributed.deploy.lost-worker-timeout"] = "1 day"
+    settings["distributed.worker.profile.enabled"] = False  # it takes a fifth of a worker's time
     with import_module("dask").config.set(settings):
         try:
             with _deaf():

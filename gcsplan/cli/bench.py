@@ -251,3 +251,28 @@ def bench_metabox(
         emit(result | {"rows": metabox_report.rows(result), "files": [str(file) for file in files]})
     else:
         put(metabox_report.report(result))
+
+
+@bench_app.command("scale", short_help="Cost against size, and what a cluster would do.")
+def bench_scale(
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Tables and picture go there.")] = Path(
+        "bench-scale"
+    ),
+    axes: Annotated[
+        str, typer.Option(metavar="LIST", help="Of missions,vehicles,zones,cells,workers.")
+    ] = "missions,vehicles,zones,cells,workers",
+    missions: Annotated[int, typer.Option(metavar="N", help="Missions of the longest batch.")] = 40,
+    workers: Annotated[int, typer.Option(metavar="N", help="Processes that share a batch, at most.")] = 2,
+    kill: Annotated[bool, typer.Option("--kill", help="Also kill a worker in the middle of a batch.")] = False,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of missions and hills.")] = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure time and memory against missions, vehicles, zones, cells of the DEM and workers (extra `cluster`)."""
+    from gcsplan.bench import papers
+    from gcsplan.bench import scale as bench
+    from gcsplan.cli.console import remark
+
+    papers.ready(out)  # find a bad directory before the long run
+    result = bench.run(axes.split(","), missions, workers, seed, kill=kill, tell=remark)
+    bench.write(result, out)
+    _tell(result, bench.report, as_json)

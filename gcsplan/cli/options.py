@@ -75,7 +75,9 @@ JobsOption = Annotated[
 ]
 ClusterOption = Annotated[
     str | None,
-    typer.Option("--cluster", metavar="ADDRESS", help="A dask scheduler whose workers do the work, tcp://HOST:PORT."),
+    typer.Option(
+        "--cluster", metavar="ADDRESS", help="A dask scheduler whose workers do the work: tcp://HOST:PORT or its file."
+    ),
 ]
 LeaveOutOption = Annotated[
     bool,

@@ -315,3 +315,8 @@ def test_no_scheduler_answers() -> None:
         executor(cluster="tcp://127.0.0.1:9", pieces=2, piece_s=1.0),
     ):
         pass
+    with (
+        pytest.raises(InputError, match="TLS"),
+        executor(cluster="tls://127.0.0.1:9", pieces=1, piece_s=1.0),
+    ):
+        pass
