@@ -32,10 +32,11 @@ def draw(result: dict[str, Any]) -> bytes:
 
 
 def _panel(place: Axes, axis: str, rows: list[dict[str, Any]]) -> None:
-    sizes = [max(row["size"], 1) for row in rows]
+    sizes = [row["size"] for row in rows]
     place.plot(sizes, [row["cpu_s"] for row in rows], "o-", color=TIME_COLOUR, label="processor time, s")
     place.plot(sizes, [row["wall_s"] for row in rows], "o:", color=TIME_COLOUR, alpha=0.6, label="wall, s")
-    place.set(xscale="log", yscale="log", xlabel="cells of the DEM" if axis == "cells" else axis, ylabel="s")
+    place.set(yscale="log", xlabel="cells of the DEM" if axis == "cells" else axis, ylabel="s")
+    place.set_xscale("symlog" if min(sizes) < 1 else "log")
     place.grid(alpha=0.3)
     memory = place.twinx()
     memory.plot(sizes, [row["peak_mb"] for row in rows], "s--", color=MEMORY_COLOUR, ms=4, label="most memory, MB")
