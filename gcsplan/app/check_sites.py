@@ -44,6 +44,7 @@ CIRCLES = frozenset({LOITER_UNLIM, LOITER_TURNS, LOITER_TIME, LOITER_TO_ALT})
 DEFAULT_CIRCLE_M = 150.0
 """Radius of a circle, m, whose own radius is not stated: more than a plane's own circle needs at any altitude."""
 
+
 @dataclass(frozen=True, slots=True)
 class Checked:
     """One file, its vehicle, and the verdict in ``world``.
