@@ -23,7 +23,7 @@ from gcsplan.app.planning import over_one_terrain
 from gcsplan.app.refusals import plan_or_explain
 from gcsplan.app.sites import world_of
 from gcsplan.check.verdict import Verdict
-from gcsplan.errors import CheckFailed, InputError, NoMission
+from gcsplan.errors import CheckFailed, InputError, NoMission, unknown_name
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.planners.problem import Progress
 from gcsplan.planners.registry import VOLUME_KEYS
@@ -89,6 +89,7 @@ def plan(
     number = settings.seed if seed is None else seed
     merged = _options(source, name) | dict(options or {})
     by_priority = bool(entry.optimiser) and (merged.get("cost") or entry.defaults.get("cost")) == "msfoa"
+    _require_warm_start(source, name, merged)
     brief = Brief(source, world_of(source), entry.plan, goal, number, merged, by_priority and len(source.vehicles) > 1)
     if leave_out is None:
         leave_out = source.arrival is not None and source.arrival.leave_out
@@ -127,8 +128,9 @@ def _planned(
     brief: Brief, planner: str, progress: Callable[[str, Progress], None] | None, jobs: int | None, cluster: Any,
     leaving: LeavingOut,
 ) -> list[VehiclePlan]:  # fmt: skip
-    """Every vehicle's own plan, in this process or by workers. By priority each needs those before it."""
-    if brief.by_priority:
+    """Every vehicle's own plan, in this process or by workers. By priority, or to begin around another vehicle's path,
+    each needs those before it."""
+    if brief.by_priority or _leader(brief) is not None:
         return _one_by_one(brief, progress, leaving)
     count = len(brief.source.vehicles)
     begun_s = time.perf_counter()
@@ -147,22 +149,44 @@ def _planned(
 def _one_by_one(
     brief: Brief, progress: Callable[[str, Progress], None] | None, leaving: LeavingOut
 ) -> list[VehiclePlan]:
-    """Every vehicle's own plan, in the file's order. By priority (MSFOA), each knows the paths before it."""
+    """Every vehicle's own plan, in the file's order. By priority (MSFOA), each knows the paths before it; otherwise the
+    vehicle around whose path the others begin is planned first."""
     requests = {r.vehicle.name: r for r in brief.source.vehicles}
-    arrival = brief.source.arrival
+    arrival, leader = brief.source.arrival, _leader(brief)
     plans: dict[str, VehiclePlan] = {}
-    for name in arrival.order if brief.by_priority and arrival is not None else requests:
+    order = list(arrival.order if brief.by_priority and arrival is not None else requests)
+    if leader is not None and not brief.by_priority:
+        order.sort(key=lambda name: name != leader)
+    for name in order:
         request = requests[name]
         report = None if progress is None else lambda what, who=name: progress(who, what)
         more: dict[str, object] = {}
         if brief.by_priority:
             earlier = tuple(plan.solution.path.points for plan in plans.values())
             more = {"earlier": earlier, "speed_m_s": request.vehicle.speed_max_m_s}
+        if leader in plans:
+            more["around"] = plans[leader].solution.path.points
         try:
             plans[name] = plan_or_explain(brief, request, report, options=more)
         except NoMission as why:
             leaving.leave(name, why)
     return [plans[name] for name in requests if name in plans]
+
+
+def _leader(brief: Brief) -> str | None:
+    """The vehicle around whose path the other vehicles' searches begin; None if there is none."""
+    name = brief.options.get("warm_start")
+    return next((r.vehicle.name for r in brief.source.vehicles if r.vehicle.name == name), None)
+
+
+def _require_warm_start(source: MissionFile, planner: str, options: Mapping[str, object]) -> None:
+    """Raise InputError unless ``warm_start`` is a path that will be there."""
+    asked = options.get("warm_start")
+    known = ("optimal", *(r.vehicle.name for r in source.vehicles))
+    if asked is not None and get_planner(planner).optimiser and asked not in known:
+        raise unknown_name(
+            f"warm_start is `optimal` or the name of a vehicle of the file, given {asked!r}", str(asked), known
+        )
 
 
 def _options(source: MissionFile, planner: str) -> dict[str, object]:

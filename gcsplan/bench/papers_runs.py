@@ -30,7 +30,8 @@ from gcsplan.planners.problem import Problem
 from gcsplan.planners.registry import get as get_planner
 from gcsplan.planners.swarm import aco
 from gcsplan.planners.swarm.bspline import fewer
-from gcsplan.planners.swarm.planner import Found, Settings, search
+from gcsplan.planners.swarm.planner import Found, search
+from gcsplan.planners.swarm.settings import Settings
 from gcsplan.world.path import Path as FlownPath
 from gcsplan.world.zones import Circle
 

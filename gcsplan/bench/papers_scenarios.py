@@ -17,7 +17,7 @@ from gcsplan.mavlink.build.order import Margins
 from gcsplan.mission_file import MissionFile, samples
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.registry import get as get_planner
-from gcsplan.planners.swarm.planner import Settings
+from gcsplan.planners.swarm.settings import Settings
 from gcsplan.world.world import World
 
 FOLDERS = (Path("missions", "papers"), *(folder / "papers" for folder in samples.FOLDERS))
@@ -203,4 +203,4 @@ def settings_of(contender: Contender, source: MissionFile) -> Settings:
     """The settings of a contender: its planner's defaults, overridden by the mission's keys, then by its options."""
     options = _merged(dict(source.planner.extras), contender.options)
     speed_m_s = float(np.max([r.vehicle.speed_max_m_s for r in source.vehicles]))
-    return Settings.of(get_planner(contender.planner).defaults, {**options, "speed_m_s": speed_m_s})
+    return Settings.of(get_planner(contender.planner), {**options, "speed_m_s": speed_m_s})

@@ -45,6 +45,29 @@ SHOWN = 15
 """Names of written files that are printed at most; a fleet has hundreds of files."""
 
 
+EncodingOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        autocompletion=completion.encodings,
+        help="A swarm's encoding: paper (its paper's), box, sections, sections-whole, polar, polar-signed, "
+        "bspline, offsets.",
+    ),
+]
+CostOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME", autocompletion=completion.costs, help="A swarm's cost: krill, ssgwo, msfoa, abo, ib-abc."
+    ),
+]
+WarmStartOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME", help="A swarm begins around this path: `optimal`, the default planner's, or a vehicle's."
+    ),
+]
+
+
 def plan(
     mission: MissionArgument,
     out: Annotated[
@@ -53,20 +76,9 @@ def plan(
     planner: PlannerOption = None,
     objective: ObjectiveOption = None,
     seed: SeedOption = None,
-    encoding: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            autocompletion=completion.encodings,
-            help="A swarm's encoding: box, sections, sections-whole, polar, polar-signed, bspline, offsets.",
-        ),
-    ] = None,
-    cost: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME", autocompletion=completion.costs, help="A swarm's cost: krill, ssgwo, msfoa, abo, ib-abc."
-        ),
-    ] = None,
+    encoding: EncodingOption = None,
+    cost: CostOption = None,
+    warm_start: WarmStartOption = None,
     upload: Annotated[
         list[str] | None,
         typer.Option(
@@ -155,7 +167,7 @@ def plan(
         with planning_display(names, objective or source.planner.objective) as progress:
             planned = pipeline.plan(
                 source, planner=planner, objective=objective, seed=seed,
-                options={k: v for k, v in (("encoding", encoding), ("cost", cost)) if v is not None},
+                options=_given(encoding=encoding, cost=cost, warm_start=warm_start),
                 progress=progress, gate_utc=None if gate is None else gate.start,
                 jobs=jobs, cluster=cluster, leave_out=leave_out or None,
             )  # fmt: skip
@@ -212,6 +224,11 @@ def _left_out(planned: Plan, mission: Path) -> dict[str, Any] | None:
     refusal = refusal_of(planned.left_out)
     complain(refusal)
     return refusal.as_dict() | {"where": str(mission)}
+
+
+def _given(**options: object) -> dict[str, object]:
+    """The options that are given."""
+    return {key: value for key, value in options.items() if value is not None}
 
 
 def _list_zones(mission: Path, units: Units, upload: list[str] | None, as_json: bool) -> None:

@@ -44,7 +44,7 @@ Speed = Annotated[float, Field(gt=0.0, le=300.0), AfterValidator(_no_trifle)]
 Accel = Annotated[float, Field(gt=0.0, le=100.0), AfterValidator(_no_trifle)]
 Seconds = Annotated[float, Field(ge=0.0, le=86400.0)]
 Text = Annotated[str, Field(min_length=1, max_length=300)]
-Encoding = Literal["box", "sections", "sections-whole", "polar", "polar-signed", "bspline", "offsets"]
+Encoding = Literal["paper", "box", "sections", "sections-whole", "polar", "polar-signed", "bspline", "offsets"]
 SwarmCost = Literal["krill", "ssgwo", "msfoa", "abo", "ib-abc"]
 
 
@@ -310,7 +310,7 @@ class PlannerKeys(Keys):
     budget_mb: Annotated[float, Field(ge=64.0, le=1e6)] = 1024.0
     """Memory for the searches, in addition to the terrain itself."""
     encoding: Encoding | None = None
-    """How the numbers of a swarm become a path."""
+    """How the numbers of a swarm become a path; `paper` is the encoding of the planner's own paper."""
     cost: SwarmCost | None = None
     """The paper whose cost a swarm minimises."""
     points: Annotated[int, Field(ge=1, le=1000)] | None = None
@@ -321,6 +321,8 @@ class PlannerKeys(Keys):
     """Number of iterations of a swarm."""
     evaluations: Annotated[int, Field(ge=1, le=1_000_000_000)] | None = None
     """Most paths that a swarm may try."""
+    warm_start: Text | None = None
+    """A swarm begins around this path: `optimal`, that of the default planner, or the name of another vehicle."""
     parameters: Annotated[dict[str, Any], AfterValidator(_plain_values)] | None = None
     """A swarm's own parameters, by name."""
 

@@ -272,6 +272,18 @@ _ENTRIES = (
         least_population=4,
     ),
     Entry(
+        name="lshade",
+        summary="differential evolution with learnt settings and a shrinking population",
+        update="lshade:lshade",
+        paper="Tanabe, Fukunaga 2014, CEC, 1658-1665",
+        equations="algorithms 1, 2",
+        population=100,
+        iterations=400,
+        evaluations_per_iteration="P, falling to 4",
+        defaults=_set(memory=6, archive_share=2.6, best_share=0.11, least=4),
+        least_population=4,
+    ),
+    Entry(
         name="po",
         summary="parrot optimizer: budgerigars with α = β = 1",
         update="budgerigars:abo",

@@ -27,12 +27,15 @@ RATES = {
     "pull": 80e-6,
     "sighted": 1e-6,
     "walked": 0.7e-6,
+    "drawn": 15e-6,
+    "mend": 0.1,
 }
 """Counted seconds of each unit of work, rounded from a fit over plans of all kinds: ``node`` prepared of a lattice,
 ``portal`` of a mesh, interval ``opened`` on a portal, call of the exact ``check`` with the use of its result, ``leg``
 checked, piece of ground ``cut`` beside a leg, ``cell`` of terrain that a leg crosses, ``piece`` of a tube, ``place``
 whose floor is read, ``corner`` of an outline triangulated, ``label`` of the lattice search, point of a line to ``pull``
-(for each size of move), node ``sighted`` from an end of a leg, and node ``walked`` to from there."""
+(for each size of move), node ``sighted`` from an end of a leg, node ``walked`` to from there, path ``drawn`` by a
+swarm, and curve to ``mend``."""
 COUNTED = 0.4
 """Part of the budget's seconds that may be spent as counted work."""
 FIRST, FIRST_S = 3.0, 0.5

@@ -11,6 +11,11 @@ from typing import cast
 from gcsplan.errors import unknown_name
 from gcsplan.planners.problem import Problem, Solution
 
+ENCODING = "offsets"
+"""A swarm's encoding unless another is asked for: the best of all over real terrain (`gcsplan bench swarms`)."""
+PAPER = "paper"
+"""Asked for as encoding: that of the planner's own paper."""
+
 VOLUME_KEYS = ("west_m", "south_m", "bottom_m", "east_m", "north_m", "top_m")
 """Keys of a swarm's ``parameters`` for the six sides of the flight volume, metres in the plane and metres AMSL."""
 
@@ -21,7 +26,7 @@ class Entry:
 
     ``paper`` is its source, empty if it is gcsplan's own. ``optimiser`` names a swarm's optimiser in
     `gcsplan.optimisers.registry`, empty otherwise. ``defaults`` are fields of `Problem`; for a swarm, keys of
-    ``Problem.options``.
+    ``Problem.options``. ``space``: the ``encoding`` and ``points`` of a swarm's paper, which stand for `PAPER`.
     """
 
     name: str
@@ -30,24 +35,31 @@ class Entry:
     paper: str = ""
     defaults: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
     optimiser: str = ""
+    space: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
 
     def plan(self, problem: Problem) -> Solution:
         """A safe path for ``problem``. Raises NoMission if none exists or none was found."""
         run = import_module(self.module).plan
         if self.optimiser:
-            return cast(Solution, run(problem, self.optimiser, self.defaults))
+            return cast(Solution, run(problem, self))
         return cast(Solution, run(problem))
 
 
 def _swarm(name: str, summary: str, paper: str, system: Mapping[str, object], **own: object) -> Entry:
-    """The table's row for an optimiser: its paper's encoding and cost (``system``), then its ``own`` defaults."""
+    """The table's row for an optimiser: its paper's search space and cost (``system``), then its ``own`` defaults."""
+    both = {**system, **own}
+    space = {key: both[key] for key in ("encoding", "points")}
+    if name != "aco":  # ants know their own sections alone
+        del both["points"]
+        both["encoding"] = ENCODING
     return Entry(
         name=name,
         summary=summary,
         module="gcsplan.planners.swarm.aco" if name == "aco" else "gcsplan.planners.swarm.planner",
         paper=paper,
-        defaults=MappingProxyType({**system, **own}),
+        defaults=MappingProxyType(both),
         optimiser=name,
+        space=MappingProxyType(space),
     )
 
 
@@ -66,6 +78,11 @@ _IB_ABC: Mapping[str, object] = {
     "encoding": "sections", "cost": "ib-abc", "points": 10, "population": 20, "iterations": 200,
 }  # fmt: skip
 
+
+# D: the papers of these do not plan paths.
+_BASELINE: Mapping[str, object] = {
+    "encoding": ENCODING, "cost": "krill", "points": None, "population": 100, "evaluations": 10_000,
+}  # fmt: skip
 
 _ENTRIES = (
     Entry(
@@ -90,6 +107,14 @@ _ENTRIES = (
     _swarm("msfoa", "fruit flies, competing swarms", _MSFOA_PAPER, _MSFOA, encoding="polar"),
     _swarm("pso", "particle swarm", f"Shi, Eberhart 1998; as in {_MSFOA_PAPER}", _MSFOA),
     _swarm("de", "differential evolution rand/1/bin", f"Storn, Price 1997; as in {_MSFOA_PAPER}", _MSFOA),
+    _swarm("lshade", "differential evolution, learnt settings", "Tanabe, Fukunaga 2014, CEC", _BASELINE),
+    _swarm(
+        "cmaes",
+        "CMA-ES with restarts, by the package cma",
+        "Hansen, Ostermeier 2001; Auger, Hansen 2005",
+        _BASELINE,
+        population=30,
+    ),
     _swarm("po", "parrot optimizer", f"Lian 2024; as in {_ABO_PAPER}", _ABO),
     _swarm("abo", "adaptive budgerigars", _ABO_PAPER, _ABO),
 )

@@ -17,7 +17,7 @@ from gcsplan.bench.papers_scenarios import SCENARIOS, choose
 from gcsplan.optimisers.registry import get as get_optimiser
 from gcsplan.planners.registry import get as get_planner
 from gcsplan.planners.swarm.encodings import get_encoding
-from gcsplan.planners.swarm.planner import Settings
+from gcsplan.planners.swarm.settings import Settings
 
 SCENARIO, TWIN = "ssgwo-table3", "ssgwo-table3-tall"
 
@@ -147,7 +147,7 @@ def test_every_reading_runs_under_a_name_of_its_own_with_options_that_exist() ->
         for contender in scenario.paper.readings:
             base = next(c for c in scenario.paper.contenders if c.name == contender.name.partition(":")[0])
             assert contender.options != base.options
-            told = Settings.of(get_planner(contender.planner).defaults, contender.options)
+            told = Settings.of(get_planner(contender.planner), contender.options)
             get_encoding(told.encoding)
             get_optimiser(get_planner(contender.planner).optimiser).with_defaults(told.split()[1])
 

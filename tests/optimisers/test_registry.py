@@ -141,6 +141,10 @@ def test_an_iteration_evaluates_as_many_as_its_row_says(name: str) -> None:
     )
     if each is not None:
         assert set(per_iteration) == {each}
+    elif name == "lshade":
+        assert per_iteration[0] == n
+        assert per_iteration[-1] < n / 2
+        assert (np.diff(per_iteration) < 0).all()
     else:
         assert name in ("krill", "abc", "b-abc", "ib-abc")
         assert (per_iteration >= 2 * n).all()

@@ -323,3 +323,68 @@ def msfoa(
                 if of[lead] < f[g]:
                     centres[g], f[g] = some[lead], of[lead]
     return search.points
+
+
+def lshade(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator, memory: int, least: int) -> list[Point]:
+    """L-SHADE (Tanabe, Fukunaga 2014, algorithms 1 and 2), one member after the other, p 0.11, archive 2.6 N."""
+    search = Search(cost)
+    x, f = first(search, rng, n, dim)
+    m_cr: list[float | None] = [0.5] * memory
+    m_f = [0.5] * memory
+    archive: list[Point] = []
+    k = 0
+    for t in range(rounds):
+        size = max(least, round(n + (least - n) * t / rounds))
+        order = sorted(range(len(x)), key=lambda i: f[i])
+        if size < len(x):
+            x, f = [x[i] for i in order[:size]], [f[i] for i in order[:size]]
+            order = list(range(size))
+        most = round(2.6 * size)
+        if len(archive) > most:
+            archive = [archive[i] for i in rng.permutation(len(archive))[:most]]
+        slots = rng.integers(0, memory, size=size)
+        normal = rng.normal([0.0 if m_cr[r] is None else m_cr[r] for r in slots], 0.1)  # type: ignore[misc]
+        uniform = rng.random(size)
+        best = rng.integers(0, max(2, round(0.11 * size)), size=size)
+        first_other = rng.integers(0, size - 1, size=size)
+        second_other = rng.integers(0, size + len(archive) - 2, size=size)
+        chance = rng.random((size, dim))
+        forced = rng.integers(0, dim, size=size)
+        tried = []
+        used = []
+        for i in range(size):
+            rate = 0.0 if m_cr[slots[i]] is None else min(1.0, max(0.0, float(normal[i])))
+            middle = m_f[slots[i]]
+            lowest = 0.5 + math.atan(-middle / 0.1) / math.pi  # the share of the Cauchy distribution that is below 0
+            scale = min(1.0, middle + 0.1 * math.tan(math.pi * (lowest + (1.0 - lowest) * uniform[i] - 0.5)))
+            used.append((rate, scale))
+            one = [j for j in range(size) if j != i][first_other[i]]
+            two = [j for j in range(size + len(archive)) if j not in (i, one)][second_other[i]]
+            other = x[two] if two < size else archive[two - size]
+            child = []
+            for d in range(dim):
+                v = x[i][d] + scale * (x[order[best[i]]][d] - x[i][d] + x[one][d] - other[d])
+                v = x[i][d] / 2.0 if v < 0.0 else (1.0 + x[i][d]) / 2.0 if v > 1.0 else v
+                child.append(v if chance[i][d] < rate or d == forced[i] else x[i][d])
+            tried.append(child)
+        children, costs = search.all(tried)
+        won = [i for i in range(size) if costs[i] < f[i]]
+        gains = [f[i] - costs[i] for i in won]
+        archive += [x[i] for i in won]
+        for i in range(size):
+            if costs[i] <= f[i]:
+                x[i], f[i] = children[i], costs[i]
+        if won:
+            w = [g / sum(gains) for g in gains]
+            rates, scales = [used[i][0] for i in won], [used[i][1] for i in won]
+            if m_cr[k] is None or max(rates) == 0.0:
+                m_cr[k] = None
+            else:
+                m_cr[k] = sum(a * r * r for a, r in zip(w, rates, strict=True)) / sum(
+                    a * r for a, r in zip(w, rates, strict=True)
+                )
+            m_f[k] = sum(a * s * s for a, s in zip(w, scales, strict=True)) / sum(
+                a * s for a, s in zip(w, scales, strict=True)
+            )
+            k = (k + 1) % memory
+    return search.points

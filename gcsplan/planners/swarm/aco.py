@@ -10,21 +10,21 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices
-from gcsplan.errors import unknown_name
+from gcsplan.errors import InputError, unknown_name
 from gcsplan.optimisers.driver import History, Result
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
-from gcsplan.planners.refusal import check_ends
+from gcsplan.planners.registry import Entry
 from gcsplan.planners.swarm import scene_kernels as k
-from gcsplan.planners.swarm.encodings import LATERAL, Code
-from gcsplan.planners.swarm.objectives import Cost, Earlier, get_objective
-from gcsplan.planners.swarm.planner import Found, Settings, finish, judged
+from gcsplan.planners.swarm.encodings import LATERAL
+from gcsplan.planners.swarm.objectives import Cost
+from gcsplan.planners.swarm.planner import Found, cost_of, judged, until_found
 from gcsplan.planners.swarm.scene import Scene
+from gcsplan.planners.swarm.settings import Settings
 
 ACROSS = UPWARD = 21
 EDGE_PARTS = 16
@@ -43,29 +43,28 @@ class Rule:
     most: float = 50.0
 
 
-def plan(problem: Problem, optimiser: str, defaults: Mapping[str, object]) -> Solution:
+def plan(problem: Problem, row: Entry) -> Solution:
     """A path that `Airspace.examine` passes: few way points along the best ant's curve, or a repair of that curve.
 
-    Raises Refusal (NoMission, ``not_found``) if no ant arrives or the curve cannot be repaired.
+    Raises Refusal (NoMission, ``not_found``) if within the budget no ant arrives or no curve can be repaired.
     """
-    begun = time.perf_counter()
-    check_ends(problem)
-    return finish(problem, search(problem, Settings.of(defaults, problem.options)), begun)
+    if problem.options.get("warm_start") is not None:
+        raise InputError("aco takes no warm_start: ants begin without trails; leave it away, or take another planner")
+    return until_found(problem, row, search)
 
 
 def search(problem: Problem, settings: Settings) -> Found:
     """Run the ants once. Raises InputError for unknown options, Refusal if no ant arrives."""
-    volume, parameters = settings.split()
+    parameters = settings.split()[1]
     for name in parameters:
         if name not in Rule.__dataclass_fields__:
             raise unknown_name(f"aco has no parameter {name!r}", name, Rule.__dataclass_fields__)
     rule = Rule(**{key: float(value) for key, value in parameters.items()})
-    scene = Scene.of(problem, volume)
-    code = Code.of("sections", scene, settings.points)
-    earlier = [Earlier.at_speed(points, settings.speed_m_s) for points in settings.earlier]
-    cost = Cost(problem, code, get_objective(settings.cost), earlier=earlier, speed_m_s=settings.speed_m_s)
+    cost = cost_of(problem, replace(settings, encoding="sections"))
+    code, scene = cost.code, cost.code.scene
     layers = make_layers(scene, code.points)
     result, nodes = march(problem, cost, layers, open_between(scene, layers), rule, settings)
+    problem.budget.spend("drawn", result.evaluations)
     if nodes is None:
         raise Refusal(
             f"no mission: no ant of {result.evaluations} came through the {sum(code.points)} sections on allowed "

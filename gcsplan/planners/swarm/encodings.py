@@ -1,4 +1,4 @@
-"""Encodings: seven mappings, by name, from a vector in the unit box to the control points of a path.
+"""Encodings: seven mappings, by name, from a vector in the unit box to the control points of a path, and back.
 
 Each encodes one stage, from a terminal to the next; a path with via points is its stages one after the other. The
 variables of one way point are adjacent, so that an optimiser can change them together (its parameter ``group``).
@@ -26,20 +26,36 @@ Decode = Callable[[Scene, Floats, Floats, Floats, Floats], None]
 """Arguments: scene, from (3,), to (3,), u (n, K, variables); points are written to the last argument (n, K, 3)."""
 
 
+Encode = Callable[[Scene, Floats, Floats, Floats], Floats]
+"""Arguments: scene, from (3,), to (3,), points (K, 3); returns numbers (K, variables), outside of [0, 1] if the
+encoding does not reach a point."""
+
+
 @dataclass(frozen=True, slots=True)
 class Encoding:
-    """``variables``: number for each way point; ``points``: default number of way points; ``decode`` maps one stage."""
+    """``variables``: number for each way point; ``points``: default number of way points; ``decode`` maps one stage,
+    ``encode`` is its inverse; ``fixed``: way points stay at their stations along the track."""
 
     name: str
     summary: str
     variables: int
     points: int
     decode: Decode
+    encode: Encode
+    fixed: bool = False
+
+    def stations(self, count: int) -> Floats | None:
+        """The parts of the track (count,) at which way points stay; None if they can move along it."""
+        return _stations(count) if self.fixed else None
 
 
 def _box(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
     np.multiply(u, scene.high - scene.low, out=out)
     out += scene.low
+
+
+def _from_box(scene: Scene, a: Floats, b: Floats, points: Floats) -> Floats:
+    return (points - scene.low) / (scene.high - scene.low)
 
 
 def _polar(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
@@ -53,12 +69,28 @@ def _polar_signed(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) ->
     _polar(scene, a, b, np.abs(2.0 * u - 1.0), out)
 
 
+def _from_polar(scene: Scene, a: Floats, b: Floats, points: Floats) -> Floats:
+    # Of all hidden variables with this radius, two equal ones.
+    return np.repeat(np.clip(_from_box(scene, a, b, points), 0.0, 1.0) / np.sqrt(2.0), 2, axis=-1)
+
+
+def _from_polar_signed(scene: Scene, a: Floats, b: Floats, points: Floats) -> Floats:
+    return 0.5 * (1.0 + _from_polar(scene, a, b, points))
+
+
 def _frame(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     """The vector from a to b in the plane, and the same rotated left by 90 degrees."""
     ahead = b[:2] - a[:2]
     if not ahead.any():
         ahead = np.array([1.0, 0.0])
     return ahead, np.array([-ahead[1], ahead[0]])
+
+
+def along_and_aside(a: Floats, b: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """Parts of the track from ``a`` to ``b`` at which points (..., 2 or more) are, along it and to its left."""
+    ahead, left = _frame(a, b)
+    square, d = float(ahead @ ahead), points[..., :2] - a[:2]
+    return d @ ahead / square, d @ left / square
 
 
 def _flat(scene: Scene, a: Floats, b: Floats, along: Floats, aside: Floats, out: Floats) -> None:
@@ -74,6 +106,10 @@ def _altitude(scene: Scene, u: Floats, out: Floats) -> None:
     out[..., 2] = scene.low[2] + u * (scene.high[2] - scene.low[2])
 
 
+def _of_altitude(scene: Scene, points: Floats) -> Floats:
+    return np.asarray((points[..., 2] - scene.low[2]) / (scene.high[2] - scene.low[2]))
+
+
 def _stations(count: int) -> Floats:
     return np.arange(1, count + 1) / (count + 1.0)
 
@@ -82,6 +118,13 @@ def _sections(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> Non
     _flat(scene, a, b, _stations(u.shape[1]), 2.0 * LATERAL * (u[..., 0] - 0.5), out)
     low, high = scene.room(out)
     out[..., 2] = low + u[..., 1] * (high - low)
+
+
+def _from_sections(scene: Scene, a: Floats, b: Floats, points: Floats) -> Floats:
+    aside = along_and_aside(a, b, points)[1]
+    low, high = scene.room(points)
+    up = np.divide(points[..., 2] - low, high - low, out=np.zeros_like(low), where=high > low)
+    return np.stack([0.5 + aside / (2.0 * LATERAL), up], axis=-1)
 
 
 def _sections_whole(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
@@ -95,6 +138,11 @@ def _offsets(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None
     _altitude(scene, u[..., 1], out)
 
 
+def _from_offsets(scene: Scene, a: Floats, b: Floats, points: Floats) -> Floats:
+    aside = along_and_aside(a, b, points)[1]
+    return np.stack([0.5 + aside / (2.0 * OFFSET), _of_altitude(scene, points)], axis=-1)
+
+
 def _bspline(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None:
     count = u.shape[1]
     along = _stations(count) + 2.0 * (u[..., 0] - 0.5) / (count + 1.0)
@@ -102,17 +150,29 @@ def _bspline(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) -> None
     _altitude(scene, u[..., 2], out)
 
 
+def _from_bspline(scene: Scene, a: Floats, b: Floats, points: Floats) -> Floats:
+    count = len(points)
+    along, aside = along_and_aside(a, b, points)
+    moved = 0.5 + (along - _stations(count)) * (count + 1.0) / 2.0
+    return np.stack([moved, 0.5 + aside / (2.0 * LATERAL), _of_altitude(scene, points)], axis=-1)
+
+
 ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
     {
         e.name: e
         for e in (
-            Encoding("box", "each point anywhere in the flight volume", 3, 5, _box),
-            Encoding("sections", "a point on each of K planes across the track, floor to ceiling", 2, 10, _sections),
-            Encoding("sections-whole", "sections, with each coordinate a whole metre", 2, 10, _sections_whole),
-            Encoding("polar", "a box whose coordinates are the radii of two hidden variables", 6, 5, _polar),
-            Encoding("polar-signed", "polar, where the hidden variables may be negative", 6, 5, _polar_signed),
-            Encoding("bspline", "few points, each about its own station of the track", 3, 8, _bspline),
-            Encoding("offsets", "at each of K stations the offset to the side and the altitude", 2, 8, _offsets),
+            Encoding("box", "each point anywhere in the flight volume", 3, 5, _box, _from_box),
+            Encoding("sections", "a point on each of K planes across the track, floor to ceiling", 2, 10, _sections,
+                     _from_sections, fixed=True),
+            Encoding("sections-whole", "sections, with each coordinate a whole metre", 2, 10, _sections_whole,
+                     _from_sections, fixed=True),
+            Encoding("polar", "a box whose coordinates are the radii of two hidden variables", 6, 5, _polar,
+                     _from_polar),
+            Encoding("polar-signed", "polar, where the hidden variables may be negative", 6, 5, _polar_signed,
+                     _from_polar_signed),
+            Encoding("bspline", "few points, each about its own station of the track", 3, 8, _bspline, _from_bspline),
+            Encoding("offsets", "at each of K stations the offset to the side and the altitude", 2, 5, _offsets,
+                     _from_offsets, fixed=True),
         )
     }
 )  # fmt: skip

@@ -1,32 +1,36 @@
 """Planning by a swarm: an optimiser, an encoding and a cost search for a curve, and the exact check judges it.
 
-If few way points close to the curve pass the exact check, they are the path. Otherwise the curve is repaired (`repair`)
-or the mission refused, and a note or the refusal states what was wrong. Nothing sampled passes a mission.
+If few way points close to the curve pass the exact check, they are the path. Otherwise the curve is repaired
+(`repair`), and a note states what was wrong. A curve that cannot be repaired is thrown away, and the search begins
+again with another seed, until the mission's budget is spent; then the mission is refused. Nothing sampled passes a
+mission.
 """
 
 from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from types import MappingProxyType
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices
-from gcsplan.errors import unknown_name
 from gcsplan.optimisers.driver import Result, State, minimise
+from gcsplan.optimisers.registry import Entry as Row
 from gcsplan.optimisers.registry import get as get_optimiser
+from gcsplan.planners.budget import Budget
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
 from gcsplan.planners.refusal import check_ends
-from gcsplan.planners.registry import VOLUME_KEYS
+from gcsplan.planners.registry import Entry
+from gcsplan.planners.swarm import cmaes, warm_start
 from gcsplan.planners.swarm.bspline import fewer
 from gcsplan.planners.swarm.encodings import Code
 from gcsplan.planners.swarm.objectives import Cost, Earlier, get_objective
 from gcsplan.planners.swarm.repair import repair, violations
 from gcsplan.planners.swarm.scene import Scene
+from gcsplan.planners.swarm.settings import Settings
 from gcsplan.world.airspace import Violation
 from gcsplan.world.path import Path
 
@@ -36,45 +40,10 @@ CORRIDORS = (2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 0.0)
 THRESHOLD = 1.5
 """Cost at which MSFOA switches from global to local search, as a multiple of JL + JH of the straight line (D)."""
 
+SEARCHES = 20
+"""Most searches of one plan, each with another seed."""
+
 COLLISIONS = frozenset({"min_agl", "terrain_clearance", "zone"})
-
-
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """Settings of a search; None stands for the default of the optimiser or of the encoding.
-
-    ``parameters``: those of the optimiser, and the sides of the flight volume (`VOLUME_KEYS`). ``earlier``: polylines
-    (N, 3) of vehicles that have the right of way and depart at the same time; all fly at ``speed_m_s``. For ants
-    ``points`` is the number of sections.
-    """
-
-    encoding: str = "box"
-    cost: str = "krill"
-    points: int | None = None
-    population: int | None = None
-    iterations: int | None = None
-    evaluations: int | None = None
-    parameters: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
-    earlier: Sequence[Floats] = ()
-    speed_m_s: float = 15.0
-
-    @classmethod
-    def of(cls, defaults: Mapping[str, object], options: Mapping[str, object]) -> Settings:
-        """Settings of a planner's ``defaults``, replaced by ``options``. Raises InputError for an unknown key."""
-        known = cls.__dataclass_fields__
-        for key in options:
-            if key not in known:
-                raise unknown_name(f"swarm planners know no option {key!r}", key, known)
-        given = {key: value for key, value in options.items() if value is not None}
-        both = {**defaults, **given}
-        if "points" not in given and both.get("encoding") != defaults.get("encoding"):
-            both["points"] = None  # the paper's number belongs to the paper's encoding
-        return cls(**both)  # type: ignore[arg-type]
-
-    def split(self) -> tuple[dict[str, float], dict[str, Any]]:
-        """The flight volume's sides, and the optimiser's own parameters."""
-        volume = {key: float(value) for key, value in self.parameters.items() if key in VOLUME_KEYS}
-        return volume, {key: value for key, value in self.parameters.items() if key not in VOLUME_KEYS}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -101,21 +70,34 @@ class Found:
         return len({v.leg for v in self.violations if v.kind in COLLISIONS})
 
 
-def search(problem: Problem, optimiser: str, settings: Settings) -> Found:
-    """Run ``optimiser`` once. Raises InputError for options that it does not accept."""
-    volume, parameters = settings.split()
-    scene = Scene.of(problem, volume)
+def row_of(optimiser: str) -> Row:
+    """The row of an optimiser: of the table, or of an adapter. Raises InputError if it is unknown."""
+    return cmaes.ENTRY if optimiser == cmaes.ENTRY.name else get_optimiser(optimiser)
+
+
+def cost_of(problem: Problem, settings: Settings) -> Cost:
+    """The objective of a search. Raises InputError for options that it does not accept."""
+    scene = Scene.of(problem, settings.split()[0])
     code = Code.of(settings.encoding, scene, settings.points)
     earlier = [Earlier.at_speed(points, settings.speed_m_s) for points in settings.earlier]
-    cost = Cost(problem, code, get_objective(settings.cost), earlier=earlier, speed_m_s=settings.speed_m_s)
-    own = get_optimiser(optimiser).defaults
-    if "threshold" in own and parameters.get("threshold") is None:
+    return Cost(problem, code, get_objective(settings.cost), earlier=earlier, speed_m_s=settings.speed_m_s)
+
+
+def search(problem: Problem, optimiser: str, settings: Settings) -> Found:
+    """Run ``optimiser`` once. Raises InputError for options that it does not accept."""
+    parameters = settings.split()[1]
+    cost = cost_of(problem, settings)
+    row = row_of(optimiser)
+    if "threshold" in row.defaults and parameters.get("threshold") is None:
         parameters["threshold"] = THRESHOLD * cost.straight_cost()
-    if "feedback" in own:
+    if "feedback" in row.defaults:
         # D: IB-ABC changes one way point, all its coordinates together.
-        parameters.setdefault("group", code.encoding.variables)
+        parameters.setdefault("group", cost.code.encoding.variables)
+    start = None
+    if settings.around is not None:
+        start = warm_start.members(cost, settings.around, problem.seed, settings.population or row.population)
     result = minimise(
-        optimiser,
+        row,
         cost,
         cost.dim,
         population=settings.population,
@@ -123,11 +105,18 @@ def search(problem: Problem, optimiser: str, settings: Settings) -> Found:
         evaluations=settings.evaluations,
         seed=problem.seed,
         parameters=parameters,
+        start=start,
         tell=None if problem.progress is None else _teller(problem),
     )
-    curve = cost.curve.samples(code.controls(result.x[None]))[0]
-    curve[cost.curve.terminals] = scene.terminals
-    return judged(problem, result, scene, curve, cost.curve.terminals, cost.stride)
+    problem.budget.spend("drawn", result.evaluations)
+    return drawn(problem, cost, result)
+
+
+def drawn(problem: Problem, cost: Cost, result: Result) -> Found:
+    """The curve of a search's best numbers, judged."""
+    curve = cost.curve.samples(cost.code.controls(result.x[None]))[0]
+    curve[cost.curve.terminals] = cost.code.scene.terminals
+    return judged(problem, result, cost.code.scene, curve, cost.curve.terminals, cost.stride)
 
 
 def judged(problem: Problem, result: Result, scene: Scene, curve: Floats, terminals: Indices, stride: int) -> Found:
@@ -141,41 +130,70 @@ def judged(problem: Problem, result: Result, scene: Scene, curve: Floats, termin
     return Found(result, scene, curve, terminals, found, float(pitch.mean()), float(yaw.mean()) if len(yaw) else 0.0)
 
 
-def plan(problem: Problem, optimiser: str, defaults: Mapping[str, object]) -> Solution:
-    """A path that `Airspace.examine` passes: few way points along the curve that ``optimiser`` found, or its repair.
+def plan(problem: Problem, row: Entry) -> Solution:
+    """A path that `Airspace.examine` passes: few way points along the curve that the optimiser found, or its repair.
 
-    Raises Refusal (NoMission, ``not_found``) if the curve cannot be repaired, InputError for bad options.
+    Raises Refusal (NoMission, ``not_found``) if no curve within the budget can be repaired, InputError for bad options.
+    """
+    return until_found(problem, row, lambda again, settings: search(again, row.optimiser, settings))
+
+
+def until_found(problem: Problem, row: Entry, once: Callable[[Problem, Settings], Found]) -> Solution:
+    """The first solution of the searches ``once``, each with a seed of its own; the first with the problem's.
+
+    At most `SEARCHES`, and none is begun when the budget for a first path is spent. The first search always runs to
+    its end, for its size is the user's. Raises the last search's Refusal.
     """
     begun = time.perf_counter()
     check_ends(problem)
-    return finish(problem, search(problem, optimiser, Settings.of(defaults, problem.options)), begun)
+    settings = warm_start.resolved(problem, Settings.of(row, problem.options))
+    budget = Budget(problem.budget_s, problem.budget_mb, problem.budget.clocked)
+    for number in range(SEARCHES):
+        seed = problem.seed if number == 0 else int(np.random.SeedSequence([problem.seed, number]).generate_state(1)[0])
+        try:
+            again = replace(problem, seed=seed, budget=budget)
+            solution = finish(again, once(again, settings), begun)
+        except Refusal as refusal:
+            if number + 1 < SEARCHES and budget.goes_on():
+                continue
+            if number == 0:
+                raise
+            raise Refusal(
+                f"{refusal.message} ({number + 1} searches, each with another seed, ended without a path; more "
+                f"budget_s allows more)",
+                reason="not_found",
+                place=None if refusal.east_m is None or refusal.north_m is None else (refusal.east_m, refusal.north_m),
+            ) from None
+        if number == 0:
+            return solution
+        before = "1 search" if number == 1 else f"{number} searches"
+        note = f"{before} of {row.optimiser} ended without a path before this one"
+        return replace(solution, notes=(note, *solution.notes))
+    raise AssertionError("the last search returns or raises")
 
 
 def finish(problem: Problem, found: Found, begun: float) -> Solution:
     """Make a solution of a search's curve, repaired if needed. Raises Refusal if it cannot be repaired."""
     searched_s = time.perf_counter() - begun
     name, wrong = found.result.optimiser, found.violations
-    few = way_points_beside(problem, found)
-    notes: tuple[str, ...]
-    if few is not None:
-        points, notes = few, ()
-        if wrong:  # the curve broke a limit that the fewer way points keep
-            notes = (f"the curve that {name} found breaks {summary_of(problem, wrong)}; its way points pass",)
-    else:
-        mended = repair(problem, found.scene, found.curve, found.terminals)
-        if mended is None:
-            raise Refusal(
-                f"no mission: the curve that {name} found breaks {summary_of(problem, wrong)}, and pushing it sideways "
-                f"and giving it new altitudes does not repair it: try another encoding (bspline, sections), seed or "
-                f"more iterations, or the planner optimal",
-                reason="not_found",
-                place=(wrong[0].east_m, wrong[0].north_m) if wrong else None,
-            )
-        points = mended.points
+    ended = settle(problem, found)
+    if ended is None:
+        raise Refusal(
+            f"no mission: the curve that {name} found breaks {summary_of(problem, wrong)}, and pushing it sideways "
+            f"and giving it new altitudes does not repair it: try another encoding (bspline, sections), seed or "
+            f"more iterations, or the planner optimal",
+            reason="not_found",
+            place=(wrong[0].east_m, wrong[0].north_m) if wrong else None,
+        )
+    points, pushed_m = ended
+    notes: tuple[str, ...] = ()
+    if pushed_m is not None:
         how = "it was given new altitudes"
-        if mended.pushed_m > 0.0:
-            how = f"it was pushed sideways by up to {mended.pushed_m:.0f} m and given new altitudes"
+        if pushed_m > 0.0:
+            how = f"it was pushed sideways by up to {pushed_m:.0f} m and given new altitudes"
         notes = (f"the curve that {name} found breaks {summary_of(problem, wrong)}; {how}, and it passes the check",)
+    elif wrong:  # the curve broke a limit that the fewer way points keep
+        notes = (f"the curve that {name} found breaks {summary_of(problem, wrong)}; its way points pass",)
     return Solution(
         path=Path(points),
         stopped_by="evaluations" if found.result.stopped_by == "evaluations" else "exhausted",
@@ -183,8 +201,21 @@ def finish(problem: Problem, found: Found, begun: float) -> Solution:
         first_path_s=searched_s,
         notes=notes,
         raw_violations=len(wrong),
-        repaired=few is None,
+        repaired=pushed_m is not None,
     )
+
+
+def settle(problem: Problem, found: Found) -> tuple[Floats, float | None] | None:
+    """Way points (N, 3) that pass the exact check, and the metres by which a repair pushed their track.
+
+    The metres are None if nothing was repaired: the search's own curve is legal. None if it cannot be repaired.
+    """
+    few = way_points_beside(problem, found)
+    if few is not None:
+        return few, None
+    problem.budget.spend("mend", 1)
+    mended = repair(problem, found.scene, found.curve, found.terminals)
+    return None if mended is None else (mended.points, mended.pushed_m)
 
 
 def way_points_beside(problem: Problem, found: Found) -> Floats | None:

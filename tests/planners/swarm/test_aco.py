@@ -11,9 +11,9 @@ from gcsplan.errors import InputError, NoMission
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.planners.registry import get
 from gcsplan.planners.swarm.aco import _walk, make_layers, open_between, search
-from gcsplan.planners.swarm.planner import Settings
 from gcsplan.planners.swarm.repair import violations
 from gcsplan.planners.swarm.scene import Scene
+from gcsplan.planners.swarm.settings import Settings
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Zone
@@ -27,7 +27,7 @@ def mission(**options: object) -> Problem:
 
 
 def settings(**options: object) -> Settings:
-    return Settings.of(get("aco").defaults, options)
+    return Settings.of(get("aco"), options)
 
 
 def test_layers_are_stops_and_sections_of_21_by_21() -> None:

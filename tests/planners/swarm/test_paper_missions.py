@@ -15,7 +15,7 @@ from gcsplan.errors import InputError, NoMission
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.mission_file.schema import Encoding, SwarmCost
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.registry import get
+from gcsplan.planners.registry import PAPER, get
 from gcsplan.planners.swarm.encodings import ENCODINGS
 from gcsplan.planners.swarm.objectives import OBJECTIVES
 from gcsplan.planners.swarm.repair import violations
@@ -162,7 +162,9 @@ def test_the_default_planner_flies_them(name: str) -> None:
 
 def test_a_mission_file_hands_swarm_keys_on_and_refuses_unknown_ones() -> None:
     file = FOLDER / "ssgwo-table3.yaml"
-    text = file.read_text(encoding="utf-8").replace("  cost: ssgwo\n", "  cost: abo\n  encoding: bspline\n")
+    text = file.read_text(encoding="utf-8").replace(
+        "  cost: ssgwo\n  encoding: paper\n", "  cost: abo\n  encoding: bspline\n"
+    )
     asked = load_mission(file, text=text).planner
     assert (asked.name, asked.extras["cost"], asked.extras["encoding"]) == ("ssgwo", "abo", "bspline")
     assert asked.extras["parameters"]["east_m"] == 800
@@ -171,5 +173,5 @@ def test_a_mission_file_hands_swarm_keys_on_and_refuses_unknown_ones() -> None:
 
 
 def test_the_schema_knows_every_encoding_and_cost() -> None:
-    assert get_args(Encoding) == tuple(ENCODINGS)
+    assert get_args(Encoding) == (PAPER, *ENCODINGS)
     assert get_args(SwarmCost) == tuple(OBJECTIVES)

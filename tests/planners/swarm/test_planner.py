@@ -13,9 +13,11 @@ from gcsplan.errors import InputError, NoMission
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.planners.registry import TABLE, get, names
 from gcsplan.planners.swarm import planner as swarm_planner
-from gcsplan.planners.swarm.planner import Settings, search
+from gcsplan.planners.swarm.encodings import ENCODINGS
+from gcsplan.planners.swarm.planner import search
 from gcsplan.planners.swarm.repair import repair, violations
 from gcsplan.planners.swarm.scene import Scene
+from gcsplan.planners.swarm.settings import Settings
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Level, Zone
@@ -80,7 +82,7 @@ def test_a_cost_that_sees_nothing_cannot_pass_a_path_through_a_zone(monkeypatch:
         return Objective(name, "", "", 0, lambda terms, unit: terms[:, k.LENGTH])
 
     monkeypatch.setattr(swarm_planner, "get_objective", blind)
-    found = search(problem, "de", Settings.of(get("de").defaults, problem.options))
+    found = search(problem, "de", Settings.of(get("de"), problem.options))
     assert found.collisions > 0
     assert any(v.kind == "zone" for v in found.violations)
     solution = get("de").plan(problem)
@@ -101,9 +103,47 @@ def test_a_curve_that_cannot_be_mended_is_refused_by_name() -> None:
     assert refusal.value.reason == "not_found"
 
 
+class Luck:
+    """Searches that find nothing to repair until a number of them is done."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, in_vain: int) -> None:
+        self.in_vain, self.seeds = in_vain, list[int]()
+        self.settle = swarm_planner.settle
+        monkeypatch.setattr(swarm_planner, "settle", self)
+
+    def __call__(self, problem: Problem, found: swarm_planner.Found) -> object:
+        self.seeds.append(problem.seed)
+        problem.budget.spend("mend", 1)
+        return None if len(self.seeds) <= self.in_vain else self.settle(problem, found)
+
+
+def test_a_planner_searches_again_with_other_seeds(monkeypatch: pytest.MonkeyPatch) -> None:
+    luck = Luck(monkeypatch, 2)
+    problem = toy(iterations=10)
+    solution = get("de").plan(problem)
+    assert luck.seeds[0] == problem.seed
+    assert len(set(luck.seeds)) == 3
+    assert solution.notes[0] == "2 searches of de ended without a path before this one"
+    assert violations(problem, solution.path.points) == ()
+    assert solution.path.points.tobytes() == get("de").plan(replace(problem, seed=luck.seeds[2])).path.points.tobytes()
+
+
+@pytest.mark.parametrize(("budget_s", "searches"), [(0.01, 1), (1.0, 12), (1e4, swarm_planner.SEARCHES)])
+def test_searches_end_with_the_budget_or_their_number(
+    budget_s: float, searches: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    luck = Luck(monkeypatch, 10**6)
+    problem = replace(toy(iterations=2, population=20), budget_s=budget_s)
+    with pytest.raises(NoMission, match="the curve that de found breaks") as refusal:
+        get("de").plan(problem)
+    # Every repair counts 0.1 s, and 0.4 (3 budget_s + 0.5) counted seconds are allowed until a first path.
+    assert len(luck.seeds) == pytest.approx(searches, abs=2 if searches == 12 else 2 * (searches == 1))
+    assert (f"({len(luck.seeds)} searches" in str(refusal.value)) == (len(luck.seeds) > 1)
+
+
 def test_few_way_points_stay_within_the_corridor_of_the_curve() -> None:
     problem = toy(encoding="bspline", points=4, cost="krill")
-    found = search(problem, "de", Settings.of(get("de").defaults, problem.options))
+    found = search(problem, "de", Settings.of(get("de"), problem.options))
     points = swarm_planner.way_points_beside(problem, found)
     assert points is not None
     assert 2 < len(points) < len(found.curve) / 2
@@ -146,27 +186,41 @@ def test_what_is_repaired_passes_on_real_ground(seed: int) -> None:
 
 
 def test_settings_come_from_the_row_and_the_options() -> None:
-    defaults = get("ssgwo").defaults
-    assert Settings.of(defaults, {}).points == 30
-    assert Settings.of(defaults, {"encoding": "box", "iterations": None}).points == 30
-    swapped = Settings.of(defaults, {"encoding": "bspline"})
-    assert swapped.points is None
-    assert swapped.iterations == 500
-    assert Settings.of(defaults, {"encoding": "bspline", "points": 6}).points == 6
+    row = get("ssgwo")
+    assert (Settings.of(row, {}).encoding, Settings.of(row, {}).points) == ("offsets", None)
+    for encoding in ("paper", "box"):  # the paper's number of points belongs to the paper's encoding
+        own = Settings.of(row, {"encoding": encoding, "iterations": None})
+        assert (own.encoding, own.points, own.iterations) == ("box", 30, 500)
+    assert Settings.of(row, {"encoding": "paper", "points": 6}).points == 6
+    assert Settings.of(row, {"encoding": "bspline"}).points is None
+    assert Settings.of(row, {"encoding": "bspline", "points": 6}).points == 6
     with pytest.raises(InputError, match=r"no option 'encodings'\. Did you mean 'encoding'"):
-        Settings.of(defaults, {"encodings": "box"})
+        Settings.of(row, {"encodings": "box"})
+
+
+@pytest.mark.parametrize("name", SWARMS)
+def test_a_papers_encoding_is_that_of_the_papers_table(name: str) -> None:
+    told = Settings.of(get(name), {"encoding": "paper"})
+    assert told.encoding in ENCODINGS
+    assert Settings.of(get(name), {}).encoding == "offsets"
+    if name in ("foa", "msfoa"):
+        assert told.encoding == "polar"
+    elif name in ("ib-abc", "b-abc"):
+        assert (told.encoding, told.points) == ("sections", 10)
+    elif name not in ("lshade", "cmaes"):
+        assert told.encoding == "box"
 
 
 def test_parameters_are_the_optimisers_and_the_volumes() -> None:
     problem = toy(iterations=2, parameters={"east_m": 1900.0, "step": 0.2})
-    assert search(problem, "krill", Settings.of(get("krill").defaults, problem.options)).scene.high[0] == 1900.0
+    assert search(problem, "krill", Settings.of(get("krill"), problem.options)).scene.high[0] == 1900.0
     with pytest.raises(InputError, match="krill has no parameter 'stepp'"):
         get("krill").plan(toy(parameters={"stepp": 0.2}))
 
 
 def test_a_budget_of_evaluations_is_kept_exactly() -> None:
     problem = toy(evaluations=777, encoding="bspline")
-    found = search(problem, "gwo", Settings.of(get("gwo").defaults, problem.options))
+    found = search(problem, "gwo", Settings.of(get("gwo"), problem.options))
     assert found.result.evaluations == 777
 
 
@@ -175,9 +229,9 @@ def test_an_earlier_vehicle_bends_the_path_of_the_next() -> None:
     plain = replace(plain, airspace=Airspace(plain.airspace.surface))
     first = get("de").plan(plain).path.points
     options = {**plain.options, "earlier": (first,), "speed_m_s": 15.0}
-    settings = Settings.of(get("de").defaults, options)
+    settings = Settings.of(get("de"), options)
     second = search(plain, "de", settings)
-    alone = search(plain, "de", Settings.of(get("de").defaults, plain.options))
+    alone = search(plain, "de", Settings.of(get("de"), plain.options))
     assert second.result.cost > alone.result.cost
     assert second.length_m > 0.0
     assert not np.allclose(second.curve, alone.curve)
@@ -189,7 +243,7 @@ def test_every_swarms_row_names_its_source_and_a_known_optimiser() -> None:
     assert names()[0] == "optimal"
     swarms = [row for row in TABLE.values() if row.optimiser]
     assert len(swarms) >= 17
-    assert all(row.paper and row.optimiser in {*OPTIMISERS, "aco"} for row in swarms)
+    assert all(row.paper and row.optimiser in {*OPTIMISERS, "aco", "cmaes"} for row in swarms)
 
 
 def test_the_scene_of_a_mission_over_unknown_ground_is_made() -> None:
