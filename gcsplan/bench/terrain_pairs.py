@@ -125,11 +125,9 @@ def sample() -> Terrain:
 def draw_pair(rng: np.random.Generator, number: int, limits: Limits, zones: int, *, ceiling: bool) -> Pair:
     """Pair ``number`` of `PAIRS`, with its ceiling (if ``ceiling``) and its zones; ``limits`` have no ceiling."""
     pairs = sets = 0
-    step = (WAY_M[1] - WAY_M[0]) / PAIRS
-    way = WAY_M[0] + (number + rng.uniform()) * step
-    steepest_deg = round(float(rng.uniform(*STEEPEST_DEG)), 1)
+    way, steepest_deg = stratum(rng, number)
     while True:
-        pair = _place(rng, number, way, steepest_deg)
+        pair = place(rng, number, way, steepest_deg)
         airspace = Airspace(pair.surface, scale=pair.scale)
         cells = Cells.of(airspace, limits)
         top = draw_ceiling(rng, pair, cells, limits) if ceiling else None
@@ -147,17 +145,29 @@ def draw_pair(rng: np.random.Generator, number: int, limits: Limits, zones: int,
         pairs += 1
 
 
+def stratum(rng: np.random.Generator, number: int) -> tuple[float, float]:
+    """The straight distance of pair ``number``, m, in its stratum of `WAY_M`, and its climb limit, degrees."""
+    step = (WAY_M[1] - WAY_M[0]) / PAIRS
+    way = WAY_M[0] + (number + rng.uniform()) * step
+    return way, round(float(rng.uniform(*STEEPEST_DEG)), 1)
+
+
 def draw_ceiling(rng: np.random.Generator, pair: Pair, cells: Cells, limits: Limits) -> float | None:
-    """A max AMSL at x.5 m, above the lowest that joins start and goal and below the straight line's highest floor.
+    """`draw_above` the lowest altitude that joins start and goal."""
+    return draw_above(rng, pair, cells.lowest_join(pair.surface, pair.start, pair.goal), limits)
+
+
+def draw_above(rng: np.random.Generator, pair: Pair, lowest_m: float, limits: Limits) -> float | None:
+    """A max AMSL at x.5 m, some metres (`ABOVE_JOIN_M`) above ``lowest_m`` and below the straight line's highest floor.
 
     The half metre keeps it off all sums of whole metres, the heights of this DEM. None if there is none.
     """
-    least = cells.lowest_join(pair.surface, pair.start, pair.goal) + ABOVE_JOIN_M[0]
+    least = lowest_m + ABOVE_JOIN_M[0]
     t = np.linspace(0.0, 1.0, 1 + math.ceil(math.dist(pair.start, pair.goal) / 5.0))
     e, n = (pair.start[i] + t * (pair.goal[i] - pair.start[i]) for i in (0, 1))
     needed = float(pair.surface.top_at(e, n).max()) + limits.min_agl_m + limits.altitude_error_m
     most = min(least - ABOVE_JOIN_M[0] + ABOVE_JOIN_M[1], needed - 1.0)
-    if not math.ceil(least - 0.5) + 0.5 <= most:
+    if math.isinf(least) or not math.ceil(least - 0.5) + 0.5 <= most:
         return None
     choices = np.arange(math.ceil(least - 0.5) + 0.5, most + 1e-9)
     return float(rng.choice(choices)) + limits.altitude_error_m
@@ -194,7 +204,7 @@ def draw_zones(
     return zones
 
 
-def _place(rng: np.random.Generator, number: int, way_m: float, steepest_deg: float) -> Pair:
+def place(rng: np.random.Generator, number: int, way_m: float, steepest_deg: float) -> Pair:
     """A pair without ceiling and zones, over the part of the sample that a mission between its points would load."""
     whole = Frame(*MIDDLE_DEG)
     while True:

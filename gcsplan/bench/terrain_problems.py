@@ -11,7 +11,9 @@ Kinds:
   4021 nodes);
 - ``many``: a pair of ``main`` with a thousand small zones;
 - ``turn``: all of ``main`` with a turn radius of 100 m, and again of 200 m;
-- ``everyday``: missions of ``gcsplan bench everyday`` without vias, half of them with clearance and errors.
+- ``everyday``: missions of ``gcsplan bench everyday`` without vias, half of them with clearance and errors;
+- ``room``: 20 pairs as in ``main``, each with 0, 10 and 20 zones, whose ceilings and zones leave a wide corridor
+  (`terrain_room`), for planners that search by samples; always with the clearance and errors of a real mission.
 
 Starts and goals are at the lowest legal altitude, rounded up to a centimetre. Clearance and errors are zero, so that
 other planners need only a yes or no; ``errors`` sets those of a real mission. Everyday missions have their own.
@@ -40,6 +42,7 @@ from gcsplan.bench.terrain_pairs import (
     draw_zones,
     sample,
 )
+from gcsplan.bench.terrain_room import draw_with_room
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Objective, Problem
 from gcsplan.world.airspace import Airspace
@@ -47,7 +50,7 @@ from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.zones import Circle, Polygon
 
-ZONES = (0, 10, 40)
+ZONES, ROOM_ZONES = (0, 10, 40), (0, 10, 20)
 BAND_M, BAND_DEG = (60.0, 120.0), (10.0, 15.0)
 FINER, LARGE_PAIRS = 10, (1, 5, 9, 13, 17)
 MANY_PAIR, MANY_ZONES = 10, 1000
@@ -125,7 +128,9 @@ def key_of(problem: Problem) -> str:
 @cache
 def pair_of(seed: int, number: int, limits: Limits, kind: str = "main") -> Pair:
     """Pair ``number``; each has its own random numbers, so that none depends on how many are requested."""
-    rng = np.random.default_rng([seed, number, 0 if kind == "main" else 1])
+    rng = np.random.default_rng([seed, number, {"main": 0, "band": 1, "room": 3}[kind]])
+    if kind == "room":
+        return draw_with_room(rng, number, limits, max(ROOM_ZONES))
     return draw_pair(rng, number, limits, max(ZONES) if kind == "main" else 0, ceiling=kind == "main")
 
 
@@ -213,13 +218,23 @@ def _everyday(seed: int, limits: Limits, count: int | None) -> Iterator[NamedPro
             yield NamedProblem(f"everyday {one.name}, {one.kind}", problem, "everyday", one.kind, (0, one.redraws))
 
 
+def _room(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:
+    for zones in ROOM_ZONES:
+        for number in _spread(count):
+            pair = pair_of(seed, number, REAL_ERRORS, "room")
+            airspace = Airspace(pair.surface, pair.zones[:zones], scale=pair.scale)
+            problem = _problem(pair, airspace, _held(pair, REAL_ERRORS))
+            name = f"room {seed}/{number:02d}, {zones} zones"
+            yield NamedProblem(name, problem, "room", f"room, {zones} zones", pair.redraws)
+
+
 _KINDS: dict[str, Callable[[int, Limits, int | None], Iterator[NamedProblem]]] = {
     "main": _main, "energy": _energy, "band": _band, "large": _large, "many": _many, "turn": _turn,
-    "everyday": _everyday,
+    "everyday": _everyday, "room": _room,
 }  # fmt: skip
 KINDS = tuple(_KINDS)
-MOUNTAINS = KINDS[:-1]
-"""The kinds over real mountains."""
+MOUNTAINS = KINDS[:-2]
+"""The kinds over real mountains that are measured unless others are named."""
 
 
 def _spread(count: int | None) -> list[int]:

@@ -1,4 +1,6 @@
-"""mealpy's swarms on a problem: a B-spline of eight control points, penalties on samples, the exact check at the end.
+"""mealpy's swarms: on a problem, with an encoding and a cost of their own; and on any cost (`minimised`).
+
+On a problem: a B-spline of eight control points, penalties on samples, the exact check at the end.
 
 A control point is a station on the straight line (evenly spaced), a distance to its side and an altitude, which suits
 swarms far better than free points in space. Samples are held to slightly tighter limits than the problem's, so that the
@@ -7,6 +9,7 @@ path between two samples is likely to pass the exact check, which alone decides.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 from collections.abc import Callable
@@ -19,10 +22,13 @@ from gcsplan.arrays import Floats
 from gcsplan.bench.terrain_measure import passes
 from gcsplan.bench.terrain_ompl import CURE, Found, box_of
 from gcsplan.errors import InputError
+from gcsplan.optimisers.driver import History, Result
 from gcsplan.planners.problem import Problem
 from gcsplan.world.zones import Circle, Level
 
 SWARMS = {"GWO": "OriginalGWO", "PSO": "OriginalPSO", "DE": "OriginalDE", "ABC": "OriginalABC", "FOA": "OriginalFOA"}
+BASELINES = {"DE": SWARMS["DE"]}
+"""Those of `gcsplan bench swarms`."""
 POPULATION, EPOCHS = 30, 500
 CONTROL, SAMPLES = 8, 200
 SPARE_M, SPARE_SLOPE = 5.0, 0.95
@@ -138,3 +144,40 @@ def _amsl(level: Level | None, ground: Floats, without: float) -> Floats:
     return np.asarray(
         np.nan_to_num(ground) + level.value_m if level.datum == "agl" else np.full(ground.shape, level.value_m)
     )
+
+
+def minimised(cost: Callable[[Floats], Floats], dim: int, name: str, evaluations: int, seed: int) -> Result:
+    """Run mealpy's swarm ``name`` (of `BASELINES`) on a batch cost over the unit box, for exactly ``evaluations``.
+
+    Raises InputError if mealpy is missing.
+    """
+    try:
+        mealpy = import_module("mealpy")
+    except ImportError:
+        raise InputError(CURE) from None
+    best, trace = np.full(dim, 0.5), [(0, 0, math.inf)]
+
+    class Spent(Exception):
+        pass
+
+    def one(x: Floats) -> float:
+        nonlocal best
+        count, _, least = trace[-1]
+        if count == evaluations:
+            raise Spent
+        value = float(cost(np.clip(np.asarray(x, dtype=np.float64), 0.0, 1.0)[None])[0])
+        if value < least:
+            best = np.clip(x, 0.0, 1.0)
+        trace.append((count + 1, 0, min(value, least)))
+        return value
+
+    # Its L-SHADE draws from numpy's global generator, and no swarm takes fewer evaluations than members a round.
+    np.random.seed(seed)  # noqa: NPY002
+    model = getattr(getattr(mealpy, name), BASELINES[name])(epoch=evaluations // POPULATION + 1, pop_size=POPULATION)
+    bounds = mealpy.FloatVar(lb=[0.0] * dim, ub=[1.0] * dim)
+    with contextlib.suppress(Spent):
+        model.solve({"bounds": bounds, "minmax": "min", "obj_func": one, "log_to": None}, seed=seed)
+    counts, rounds, costs = (np.array(column) for column in zip(*trace, strict=True))
+    return Result(
+        best, trace[-1][2], trace[-1][0], 0, History(counts, rounds, costs), "evaluations", f"mealpy {name}"
+    )  # fmt: skip

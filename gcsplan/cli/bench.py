@@ -145,6 +145,42 @@ def bench_terrain(
     Console(file=RESULTS, width=200).print(terrain_report.table(result.lines, f"terrain, seed {seed}"))
 
 
+@bench_app.command("swarms", short_help="Swarms over real terrain, beside optimal.")
+def bench_swarms(
+    out: Annotated[
+        Path, typer.Option("-o", "--out", metavar="DIR", help="Tables go there; the same command goes on there.")
+    ] = Path("bench-swarms"),
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the missions.")] = 1,
+    count: Annotated[int | None, typer.Option(metavar="N", help="Missions of each group [default: all 20]")] = None,
+    evaluations: Annotated[int, typer.Option(metavar="N", help="Paths that each search may try.")] = 10_000,
+    method: Annotated[
+        list[str] | None,
+        typer.Option("--method", metavar="NAME", help="krill, cmaes, 'mealpy DE', …; repeatable [all]."),
+    ] = None,
+    encodings: Annotated[bool, typer.Option("--encodings", help="Compare encodings instead.")] = False,
+    warm: Annotated[bool, typer.Option("--warm", help="Searches around the path of `optimal`, too.")] = False,
+    jobs: Annotated[int, typer.Option(metavar="N", help="Processes.")] = 1,
+) -> None:
+    """Search 60 missions with room by every swarm: raw legal, repaired or refused, and the length over `optimal`."""
+    from rich.console import Console
+
+    from gcsplan.bench import swarms
+    from gcsplan.cli.console import RESULTS, remark
+
+    result = swarms.run(
+        out,
+        seed=seed,
+        count=count,
+        evaluations=evaluations,
+        names=method,
+        encodings=encodings,
+        warm=warm,
+        jobs=jobs,
+        tell=remark,
+    )
+    Console(file=RESULTS, width=200).print(result.table())
+
+
 @bench_app.command("everyday", short_help="A working day's missions, beside a visibility graph.")
 def bench_everyday(
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Tables go there.")] = Path("bench-everyday"),

@@ -12,7 +12,7 @@ from gcsplan.errors import unknown_name
 from gcsplan.planners.problem import Problem, Solution
 
 ENCODING = "offsets"
-"""A swarm's encoding unless another is asked for: the best of all over real terrain (`gcsplan bench swarms`)."""
+"""A swarm's encoding unless another is asked for: the best for most over real terrain (docs/benchmarks.md)."""
 PAPER = "paper"
 """Asked for as encoding: that of the planner's own paper."""
 
