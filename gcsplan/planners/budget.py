@@ -24,6 +24,7 @@ RATES = {
     "place": 0.5e-6,
     "corner": 12e-6,
     "label": 12e-6,
+    "interval": 1.5e-6,
     "pull": 80e-6,
     "sighted": 1e-6,
     "walked": 0.7e-6,
@@ -33,9 +34,9 @@ RATES = {
 """Counted seconds of each unit of work, rounded from a fit over plans of all kinds: ``node`` prepared of a lattice,
 ``portal`` of a mesh, interval ``opened`` on a portal, call of the exact ``check`` with the use of its result, ``leg``
 checked, piece of ground ``cut`` beside a leg, ``cell`` of terrain that a leg crosses, ``piece`` of a tube, ``place``
-whose floor is read, ``corner`` of an outline triangulated, ``label`` of the lattice search, point of a line to ``pull``
-(for each size of move), node ``sighted`` from an end of a leg, node ``walked`` to from there, path ``drawn`` by a
-swarm, and curve to ``mend``."""
+whose floor is read, ``corner`` of an outline triangulated, ``label`` of the lattice search, altitude ``interval``
+examined for one track length, point of a line to ``pull`` (for each size of move), node ``sighted`` from an end of a
+leg, node ``walked`` to from there, path ``drawn`` by a swarm, and curve to ``mend``."""
 COUNTED = 0.4
 """Part of the budget's seconds that may be spent as counted work."""
 FIRST, FIRST_S = 3.0, 0.5

@@ -47,8 +47,9 @@ class Corridor:
 class Nearby:
     """The cells that tracks shorter than ``limit_m`` may meet; guides from the start (``away``) and goal (``left``).
 
-    For all cells of the guides' mesh (cells,): the lowest and the highest altitude that can be flown at, and lower
-    bounds of the track from the start to the cell (``away_m``) and from there to the goal (``left_m``).
+    For all cells of the guides' mesh (cells,): the lowest and the highest altitude that can be flown at, and bounds of
+    the shortest tracks from the start to the cell and from there to the goal: the least (``away_m``, ``left_m``), and
+    the greatest to any place that tracks may meet (``away_most_m``, ``left_most_m``; inf where it is not known).
     """
 
     limit_m: float
@@ -58,6 +59,8 @@ class Nearby:
     high_m: Floats
     away_m: Floats
     left_m: Floats
+    away_most_m: Floats
+    left_most_m: Floats
 
 
 def joined(ways: list[Floats], heights: list[float | None]) -> PinnedTrack:

@@ -288,14 +288,15 @@ class Leg:
                 high[cell, nth],
                 close.away_m[cell],
                 close.left_m[cell],
-                mesh.middles_from(a.place)[cell],
-                mesh.middles_from(b.place)[cell],
-                mesh.half_m(),
+                np.column_stack([close.away_m, close.away_most_m])[cell],
+                np.column_stack([close.left_m, close.left_most_m])[cell],
                 Terminal(mesh.cells_at(a.place), a.amsl_m),
                 Terminal(mesh.cells_at(b.place), b.amsl_m),
             )
             self._reached = close, Reached(every, self.problem.limits, close.limit_m)
-        return self._reached[1].within(limit, self._near(close, limit))
+        found = self._reached[1].within(limit, self._near(close, limit))
+        self.problem.budget.spend("interval", self._reached[1].looked_at)
+        return found
 
     def _near(self, close: Nearby, limit_m: float) -> Bools:
         """(cells,) which cells of the guides' mesh tracks no longer than ``limit_m`` may meet."""
@@ -310,8 +311,9 @@ class Leg:
             if found is None:  # every cell of a piece is as near as the piece's entrance, or as the straight line
                 mesh = left.mesh
                 ends = (away, self.start), (left, self.goal)
-                ways = (np.maximum(guide.cells(), mesh.straight_to(end.place)) for guide, end in ends)
-                found = Nearby(limit_m, away, left, *ranges(mesh, self.top_m), *ways)
+                away_m, left_m = (np.maximum(guide.cells(), mesh.straight_to(end.place)) for guide, end in ends)
+                unknown = np.full(len(mesh.piece), math.inf)
+                found = Nearby(limit_m, away, left, *ranges(mesh, self.top_m), away_m, left_m, unknown, unknown)
             self._close = found
         return self._close
 
@@ -325,7 +327,8 @@ class Leg:
             away = mesh.flood(a, b, limit_m, math.inf, left)[1]
         except Exhausted:
             return None
-        return Nearby(limit_m, away, left, *ranges(mesh, self.top_m), away.cells(), left.cells())
+        ways = away.cells(), left.cells(), away.farthest(), left.farthest()
+        return Nearby(limit_m, away, left, *ranges(mesh, self.top_m), *ways)
 
     def _over(self, cells: Bools) -> tuple[Plane, Bools]:
         """The finer lattice over ``cells`` of the first-look lattice, or over more, and which of its cells they are."""

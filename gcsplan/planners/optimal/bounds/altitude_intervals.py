@@ -1,12 +1,12 @@
 """Which altitude intervals a short enough track can reach, and continue from to the goal, within the climb limits.
 
 After s metres of its track a path is at altitude z. If it climbs no steeper than c and descends no steeper than d, then
-z - c s never rises and z + d s never falls. Nor do s - r and s + t ever fall, where r and t are the straight distances
-from the start and to the goal. In an interval, z lies within it and s is at least the shortest track to it; so each
-interval limits these four quantities. The extreme value of each on arrival is that of the chain of intervals whose
-worst member is best, found like a shortest path. An interval is shut if by these values no altitude in it can be
-reached in time, or the goal cannot be reached from it; shut intervals restrict the others. If none is left, no track is
-that short.
+z - c s never rises and z + d s never falls. Nor do s - r and s + t ever fall, where r and t are the lengths of the
+shortest tracks from the start and to the goal past what certainly stands in the way. In an interval, z lies within it
+and s is at least the shortest track to it; so each interval limits these four quantities. The extreme value of each on
+arrival is that of the chain of intervals whose worst member is best, found like a shortest path. An interval is shut if
+by these values no altitude in it can be reached in time, or the goal cannot be reached from it; shut intervals restrict
+the others. If none is left, no track is that short.
 """
 
 from __future__ import annotations
@@ -44,8 +44,8 @@ class AltitudeIntervals:
 
     ``shape``: rows and columns of cells; ``cell`` (N,), rising: the cell of each interval. For each interval (N,):
     ``low_m`` and ``high_m``, the lowest and the highest altitude; ``away_m`` and ``left_m``, least metres of track from
-    the start to it and from it to the goal; ``from_start_m`` and ``to_goal_m``, straight metres between the cell's
-    middle and ``start``, ``goal``. No place of a cell is nearer or farther than its middle by more than ``half_m``.
+    the start to it and from it to the goal. ``from_start_m`` and ``to_goal_m`` (N, 2): least and greatest length of the
+    shortest tracks in the plane between ``start`` or ``goal`` and the places in the cell that such tracks meet.
     """
 
     shape: tuple[int, int]
@@ -56,7 +56,6 @@ class AltitudeIntervals:
     left_m: Floats
     from_start_m: Floats
     to_goal_m: Floats
-    half_m: float
     start: Terminal
     goal: Terminal
 
@@ -125,9 +124,9 @@ class AltitudeIntervals:
             shut = out == np.inf
             return np.where(shut, 0.0, out)
 
-        near, far = self.from_start_m - self.half_m, self.from_start_m + self.half_m
+        near, far = self.from_start_m.T
         away = np.maximum(away, least(away - far, latest - near, -math.inf) + near)
-        near, far = self.to_goal_m - self.half_m, self.to_goal_m + self.half_m
+        near, far = self.to_goal_m.T
         away = np.maximum(away, least(away + near, latest + far, -math.inf) - far)
         falls = rises = None
         if math.isfinite(up):
@@ -155,6 +154,8 @@ class Reached:
         self._limits, self._most_m = limits, limit_m
         self._known: dict[float, AltitudeIntervals] = {limit_m: every}
         self._asked: set[float] = set()
+        self.looked_at = 0
+        """Intervals that the last call of `within` began with."""
 
     def known(self, limit_m: float, near: Bools) -> AltitudeIntervals:
         """The intervals that tracks shorter than ``limit_m`` may enter by the results so far, of the cells that are
@@ -164,10 +165,13 @@ class Reached:
 
     def within(self, limit_m: float, near: Bools) -> AltitudeIntervals:
         """`known`, computed for this very length."""
+        self.looked_at = 0
         if limit_m in self._asked and limit_m in self._known:
             return self._known[limit_m]
         self._asked.add(limit_m)
-        found = self._known[limit_m] = self.known(limit_m, near).reached(self._limits, limit_m)
+        found = self.known(limit_m, near)
+        self.looked_at = len(found.cell)
+        found = self._known[limit_m] = found.reached(self._limits, limit_m)
         if len(self._known) > KEPT:
             del self._known[next(m for m in self._known if m not in (self._most_m, limit_m))]
         return found

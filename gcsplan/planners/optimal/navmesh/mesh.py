@@ -18,6 +18,8 @@ BENT_M = LOOSE.bent_m
 """Metres that a raster's line may bow between the corners of a block, at most."""
 ASIDE = 0.25
 """Cells that a place may lie beside its computed position on a lattice, at most."""
+BESIDE = 1e-3
+"""Cells that a place may lie beside a piece that tracks from it begin in, at most, east and north."""
 MOST_OPENED, ANYHOW, OF_PORTAL = 3_000_000, 100_000, 64
 """Intervals that a search may open before it is given up: at most `MOST_OPENED`, and at most `ANYHOW` plus `OF_PORTAL`
 per portal. If the goal is farther than the limit, and many tracks lead around many corners, it would open many more."""
@@ -46,17 +48,13 @@ class Mesh(Portals):
 
     def straight_to(self, place: Place) -> Floats:
         """(cells,) a lower bound of the distance from a place to each cell, m; for meshes as fine as their plane."""
-        return self.middles_from(place) - 0.5 * self._widths().ravel() - BENT_M
-
-    def middles_from(self, place: Place) -> Floats:
-        """(cells,) straight distance from a place to each cell's middle, m; for meshes as fine as their plane."""
         x, y = (at - own for at, own in zip(self.places(), place, strict=True))
         middle = (0.25 * (z[:-1, :-1] + z[:-1, 1:] + z[1:, :-1] + z[1:, 1:]) for z in (x, y))
-        return np.asarray(np.hypot(*middle).ravel())
+        return np.asarray((np.hypot(*middle) - 0.5 * self._widths()).ravel() - BENT_M)
 
-    def half_m(self) -> float:
-        """Metres that any place of any cell is from the cell's middle, at most; for meshes as fine as their plane."""
-        return 0.5 * float(self._widths().max()) + BENT_M
+    def widest_m(self) -> float:
+        """Metres between any two places of one cell, at most; for meshes as fine as their plane."""
+        return float(self._widths().max()) + 2.0 * BENT_M
 
     def _widths(self) -> Floats:
         """(rows - 1, cols - 1) metres between opposite corners of each cell, along the longer diagonal."""
@@ -93,13 +91,13 @@ class Mesh(Portals):
         return np.array(sorted(found), np.int64)
 
     def pieces_at(self, place: Place) -> list[int]:
-        """The free pieces at a place: in its own cell, and in cells no farther than a thousandth of a cell."""
+        """The free pieces at a place: in its own cell, and in cells no farther than `BESIDE`."""
         found: list[int] = []
         rows, cols = self.excess.shape
         c, r = self.plane.at(place)
         c, r = self.fineness * (c - self.col), self.fineness * (r - self.row)
-        for dj in (0.0, -1e-3, 1e-3):
-            for di in (0.0, -1e-3, 1e-3):
+        for dj in (0.0, -BESIDE, BESIDE):
+            for di in (0.0, -BESIDE, BESIDE):
                 i, j = math.floor(c + di), math.floor(r + dj)
                 if not (0 <= i < cols - 1 and 0 <= j < rows - 1):
                     continue
@@ -200,3 +198,12 @@ class Guide:
     def cells(self) -> Floats:
         """(cells,) the lower bound of the distance to each of the mesh's cells, m."""
         return np.asarray(np.append(self.entered, np.inf)[self.mesh.piece].min(axis=1))
+
+    def farthest(self) -> Floats:
+        """(cells,) an upper bound of the distance over the mesh to every place of each cell's pieces that the search
+        came to, m; inf where it came to none. Each piece must be a part of one cell."""
+        # The place itself may lie beside the pieces at it, see `Mesh.pieces_at`.
+        across = (1.0 + 2.0 * BESIDE) * self.mesh.widest_m()
+        entered = np.append(np.where(np.isfinite(self.entered), self.entered + across, -np.inf), -np.inf)
+        most = entered[self.mesh.piece].max(axis=1)
+        return np.asarray(np.where(np.isneginf(most), np.inf, most))

@@ -56,10 +56,14 @@ def random_intervals(rng: np.random.Generator, rows: int, cols: int) -> Altitude
     left = CELL_M * np.hypot(rows - 1 - row, cols - 1 - col)
     half = CELL_M * math.sqrt(0.5)
     stops = [Terminal(np.array([k]), float(rng.choice([0.0, 20.0, 50.0]))) for k in (0, goal)]
-    near: list[Floats] = [np.maximum(x - half, 0.0) for x in (away, left)]
-    return AltitudeIntervals(
-        (rows, cols), at, np.array(low), np.array(high), near[0], near[1], away, left, half, stops[0], stops[1]
-    )
+    return AltitudeIntervals((rows, cols), at, np.array(low), np.array(high), *tracks(away, left, half), *stops)
+
+
+def tracks(away: Floats, left: Floats, half_m: float) -> tuple[Floats, Floats, Floats, Floats]:
+    """Least metres of track to cells and from there, and the ranges of both, from distances of the cells' middles."""
+    near_start, near_goal = (np.maximum(x - half_m, 0.0) for x in (away, left))
+    from_start, to_goal = (np.column_stack([x - half_m, x + half_m]) for x in (away, left))
+    return near_start, near_goal, from_start, to_goal
 
 
 @pytest.mark.first_quick
@@ -155,7 +159,7 @@ def test_intervals_of_the_shortest_track_of_brute_force_are_never_shut() -> None
                 assert here.any(), (seed, longer, k, z)
         found += 1
         straight_m = CELL_M * math.hypot(s.shape[0] - 1, s.shape[1] - 1)
-        above += not len(s.reached(limits, straight_m + 2.0 * s.half_m).cell)
+        above += not len(s.reached(limits, straight_m + CELL_M * math.sqrt(2.0)).cell)
     # The test means something only if there are tracks, and altitude limits that lengthen them.
     assert found >= len(seeds) / 2
     assert above >= 3
@@ -172,9 +176,7 @@ def test_climbing_out_from_under_a_ceiling_takes_its_length(free: str, limited: 
     away: Floats = CELL_M * at.astype(np.float64)
     left: Floats = away[::-1].copy()
     stops = Terminal(at[:1], None if free == "start" else 5.0), Terminal(at[-1:], None if free == "goal" else 55.0)
-    half = 0.5 * CELL_M
-    near: list[Floats] = [np.maximum(x - half, 0.0) for x in (away, left)]
-    s = AltitudeIntervals((1, cols), at, low, high, near[0], near[1], away, left, half, stops[0], stops[1])
+    s = AltitudeIntervals((1, cols), at, low, high, *tracks(away, left, 0.5 * CELL_M), *stops)
     limits = Limits(
         0.0, max_climb_deg=math.degrees(math.atan(0.1)), max_descent_deg=90.0 if limited == "climb" else 30.0
     )
@@ -276,3 +278,25 @@ def test_a_ridge_right_behind_a_low_ceiling_is_farther_than_the_plane_tells() ->
     assert len(leg.intervals(track_m).cell)
     # The straight track plus the climb's length: from 60 m under the zone's edge to 310 m over the ridge.
     assert max(proved) <= 2950.0 + 2500.0
+
+
+@pytest.mark.parametrize("around_m", [300.0, 600.0])
+def test_the_way_around_a_wall_does_not_make_up_for_a_climb_before_it(around_m: float) -> None:
+    """A step across the map that takes 1380 m of track to climb, and behind it a wall with the goal on its far side.
+
+    The goal is 425 m from the step in a straight line, and farther around the tip of the wall.
+    """
+    heights = np.zeros((31, 31))
+    heights[:, 10:12] = 140.0
+    top = 500.0 + around_m
+    wall = np.array([[780.0, -2000.0], [820.0, -2000.0], [820.0, top], [780.0, top]])
+    descent_deg = math.degrees(math.atan(0.9))
+    limits = Limits(10.0, max_amsl_m=400.0, max_climb_deg=math.degrees(math.atan(0.1)), max_descent_deg=descent_deg)
+    zones = [Zone("wall", Polygon(wall), None, None)]
+    leg = world(zones, heights, limits, (225.0, 500.0, 12.0), (1000.0, 500.0, 12.0))
+    leg.flood(0.0)
+    leg.flood(1.3)
+    # 12 m to 150 m at 0.1, then from the step to the tip, past it, and to the goal.
+    least_m = 1380.0 + (780.0 - 550.0) + 40.0 + math.dist((820.0, top), (1000.0, 500.0))
+    assert not len(leg.intervals(least_m - 100.0).cell)
+    assert len(leg.intervals(least_m + 150.0).cell)
