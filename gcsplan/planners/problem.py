@@ -54,7 +54,8 @@ class Problem:
 
     ``widen(margin_m, budget_mb)``: the same problem over more terrain, at least ``margin_m`` around all terminals (inf:
     twice as far as here) if memory allows; None if it does not, or if there is no more terrain; `Surface.goes_on` shows
-    which.
+    which. ``leaving``: if a bound above this cost is found, the search ends, because paths that leave the surface may
+    cost as little: more terrain is needed first.
     """
 
     airspace: Airspace
@@ -74,6 +75,7 @@ class Problem:
     progress: Callable[[Progress], None] | None = None
     options: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
     widen: Callable[[float, float], Problem | None] | None = None
+    leaving: float = math.inf
 
     def leg_costs(self, start: Floats, end: Floats) -> Floats:
         """(...) costs of straight legs between points (..., 3); `cost` of a path is their sum."""

@@ -62,7 +62,8 @@ def govern(incumbent: Incumbent, searches: list[Search], without: Collection[str
     left = [s for s in searches if s.name not in without]
     budget = incumbent.budget
     for _ in range(MOST_STEPS):
-        if incumbent.proved_infeasible or incumbent.gap <= incumbent.nearer or not budget.goes_on():
+        ended = incumbent.proved_infeasible or incumbent.gap <= incumbent.nearer or incumbent.needs_terrain
+        if ended or not budget.goes_on():
             return
         chosen: Search | None = None
         best, size = -math.inf, (0.0, 0.0)

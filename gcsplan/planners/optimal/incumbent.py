@@ -193,8 +193,13 @@ class Incumbent:
         return self.gap <= self.wanted
 
     def goes_on(self) -> bool:
-        """Whether the gap is larger than wanted, and budget is left to close it."""
-        return not self.done() and self.budget.goes_on()
+        """Whether the gap is larger than wanted, more bound is of use, and budget is left."""
+        return not self.done() and not self.needs_terrain and self.budget.goes_on()
+
+    @property
+    def needs_terrain(self) -> bool:
+        """Whether a path is known, and only paths that leave the surface may still be better; see `Problem.leaving`."""
+        return self.best is not None and self.bound > self.problem.leaving * (1.0 + self.wanted)
 
     @property
     def is_steep(self) -> bool:

@@ -36,10 +36,10 @@ def plan_over(problem: Problem, plan_window: Window) -> Solution:
     begun = time.perf_counter()
     best: Solution | None = None
     refused: NoPath | None = None
-    now = problem
+    now, widest = problem, problem.widen is None
     for _ in range(MOST_WINDOWS):
         leaving = exit_cost(now)
-        asked = replace(now, progress=_reported(now, begun, leaving))
+        asked = replace(now, progress=_reported(now, begun, leaving), leaving=math.inf if widest else leaving)
         try:
             found = plan_window(asked)
         except NoPath as no_path:
@@ -60,9 +60,9 @@ def plan_over(problem: Problem, plan_window: Window) -> Solution:
             best = best if best is None or not problem.budget.clocked_out else replace(best, stopped_by="time")
             break
         wider = widened(now, math.inf if best is None else now.cost(best.path))
-        if wider is None:
+        if wider is None and (widest or best is None):
             break
-        now = wider
+        now, widest = wider or now, wider is None  # without more terrain, this window is searched to the end
     if best is None:
         assert refused is not None
         raise refused
@@ -131,7 +131,8 @@ def binds(problem: Problem, found: Solution, leaving: float) -> bool:
 
 def better(now: Problem, best: Solution | None, found: Solution) -> Solution:
     """The better of two solutions: ``found`` over the present terrain, or ``best`` over less terrain. If the path of
-    ``best`` is cheaper, it is returned with the bound of ``found`` if it is legal here, else with its own."""
+    ``best`` is cheaper, it is returned with the bound of ``found`` if it is legal here; else with its own if it is
+    cheaper by more than the wanted gap."""
     if best is None or now.cost(found.path) <= now.cost(best.path):
         return found
     points, limits = best.path.points, now.limits
@@ -140,4 +141,5 @@ def better(now: Problem, best: Solution | None, found: Solution) -> Solution:
         cost = now.cost(best.path)
         near = found.lower_bound is not None and cost <= found.lower_bound * (1.0 + now.gap_percent / 100.0)
         return replace(found, path=best.path, stopped_by="gap" if near else found.stopped_by)
-    return best
+    little = now.gap_percent / 100.0
+    return found if now.cost(found.path) <= now.cost(best.path) * (1.0 + little) else best
