@@ -23,7 +23,7 @@ RATES = {
     "piece": 0.3e-6,
     "place": 0.5e-6,
     "corner": 12e-6,
-    "label": 12e-6,
+    "label": 5e-6,
     "interval": 1.5e-6,
     "pull": 80e-6,
     "sighted": 1e-6,

@@ -351,16 +351,16 @@ class _Work:
         if router.opened > MOST_OPENED // 4:
             return []
         prices = [climbing_weight(p)] if p.objective == "energy" else []
-        ways = [way for way in (router.way(weight=w) for w in prices) if way is not None]
+        ways = [way for way in (router.way(weight=w, briefly=True) for w in prices) if way is not None]
         s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.line.points, axis=0).T))])
         floor = router.lattice.floor_m
         for f in DETOURS:
-            if time.perf_counter() > deadline_s:
+            if time.perf_counter() > deadline_s or router.opened > MOST_OPENED // 4:
                 break
             place = [np.interp(f * s[-1], s, self.line.points[:, k]) for k in range(2)]
             router.lattice.floor_m = floor.copy()
             router.lattice.shut(np.array(place), DETOUR_STEPS * router.lattice.step_m)
-            way = router.way(weight=prices[0] if prices else 0.0)
+            way = router.way(weight=prices[0] if prices else 0.0, briefly=True)
             if way is not None:
                 ways.append(way)
         router.lattice.floor_m = floor

@@ -89,16 +89,16 @@ class Router:
         links = [make_links(problem, lattice, s, z) for s, z in zip(terminals, heights, strict=True)]
         return cls(problem, lattice, terminals, links)
 
-    def way(self, cap_m: float = math.inf, weight: float = 0.0) -> Floats | None:
-        """Places (N, 2) of the best track over the lattice under ``cap_m``, through every terminal; None if there is
-        none."""
+    def way(self, cap_m: float = math.inf, weight: float = 0.0, *, briefly: bool = False) -> Floats | None:
+        """Places (N, 2) of the best track over the lattice under ``cap_m``, through every terminal; None if none is
+        found. ``briefly``: the last search of `MOST` labels is left out, because a path is known already."""
         direct = not self.problem.via
         found = self.labels(cap_m, weight, FORWARD if direct else MOST)
         if not found and direct and self.opened_last > FORWARD:
             back = self._leg(-1, 0, cap_m, weight, BACKWARD)
             if back:
                 return np.ascontiguousarray(back[0].places[::-1])
-            if self.opened_last > BACKWARD:
+            if self.opened_last > BACKWARD and not briefly:
                 found = self.labels(cap_m, weight, MOST)
         return found[0].places if found else None
 
