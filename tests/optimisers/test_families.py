@@ -26,8 +26,8 @@ Cost = Callable[[Floats], Floats]
 
 
 def test_every_optimiser_has_a_second_implementation() -> None:
-    """The two others are the same rules: PO is ABO with α = β = 1, and SSGWO as printed is a reading."""
-    assert set(TABLE) - set(FAMILIES) == {"po", "ssgwo-printed"}
+    """The others: PO is ABO with α = β = 1, SSGWO as printed is a reading, L-SHADE is compared point by point."""
+    assert set(TABLE) - set(FAMILIES) == {"po", "ssgwo-printed", "lshade"}
     assert (TABLE["po"].update, TABLE["po"].defaults) == (TABLE["abo"].update, TABLE["abo"].defaults)
 
 
