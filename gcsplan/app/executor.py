@@ -18,6 +18,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
+from uuid import uuid4
 
 from gcsplan import __version__
 from gcsplan.errors import GcsplanError, InputError, UsageError
@@ -152,6 +153,7 @@ class Dask:
         client = self.client
         # A task, not scattered data: if the worker that holds the value dies, the scheduler makes it again.
         kept = client.submit(_itself, shared, pure=False)
+        name = function.__name__  # the scheduler knows by the name how long such pieces take, and spreads them by it
         numbers: dict[Any, int] = {}
         begun, most = 0, AHEAD * self.count
         done: queue.SimpleQueue[Any] = queue.SimpleQueue()
@@ -161,7 +163,9 @@ class Dask:
             first = min(numbers.values(), default=asked[begun] if begun < len(asked) else 0)
             while begun < len(asked) and asked[begun] < first + LEAD * most and len(numbers) < most:
                 number, begun = asked[begun], begun + 1
-                future = client.submit(_done, function, __version__, kept, items[number], pure=False, priority=-number)
+                future = client.submit(
+                    _done, function, __version__, kept, items[number], key=f"{name}-{uuid4().hex}", priority=-number
+                )
                 numbers[future] = number
                 future.add_done_callback(done.put)
 

@@ -22,7 +22,9 @@ Document = dict[str, Any]
 
 MIDDLE_DEG = (36.575, -84.255)
 HALF_M = 11_000.0
-"""Half the side of the square of depots around `MIDDLE_DEG`, m: places around them are within the sample terrain."""
+"""Half the side of the square of depots around `MIDDLE_DEG`, m."""
+REACH_M = 14_000.0
+"""The same of the square of goals, which is within the sample terrain."""
 
 METRES_PER_DEGREE = 111_200.0
 PADS = 10
@@ -114,7 +116,7 @@ def _goals(rng: np.random.Generator, depots: Floats, starts: Floats, zones: Floa
             to = rng.uniform(0.0, 2.0 * math.pi)
             goal = middle + far_m * np.array([math.cos(to), math.sin(to)])
             outside = (np.hypot(*(zones - goal).T) >= radius_m).all()
-            if outside and np.hypot(*(taken - goal).T).min() >= APART_M:
+            if outside and np.abs(goal).max() <= REACH_M and np.hypot(*(taken - goal).T).min() >= APART_M:
                 taken[count + k] = goal
                 break
         else:

@@ -55,6 +55,7 @@ def kills_always(shared: int, item: int) -> int:
 
 def interrupts(parent: int, item: int) -> int:
     """Press Ctrl-C in the process ``parent`` while item 1 is worked on, and go on for a while."""
+    time.sleep(0.05)  # the parent waits then, and nothing swallows its KeyboardInterrupt, such as a destructor
     if item == 1:
         os.kill(parent, signal.SIGINT)
         time.sleep(2.0)
@@ -296,12 +297,12 @@ def test_a_scheduler_is_found_by_its_file_or_its_object_and_its_end_is_told(tmp_
         host="127.0.0.1",
         dashboard_address="127.0.0.1:0",
     ) as local:
-        with executor(cluster=local, pieces=1, piece_s=1.0) as one:
+        with executor(cluster=local, pieces=2, piece_s=1.0) as one:
             assert list(one.each(square, 1, [2])) == [(0, 5)]
         with distributed.Client(local, set_as_default=False) as client:
             client.write_scheduler_file(str(file))
         with (
-            executor(cluster=str(file), pieces=1, piece_s=1.0) as one,
+            executor(cluster=str(file), pieces=2, piece_s=1.0) as one,
             pytest.raises(InputError, match="the dask scheduler has ended"),
         ):
             found.extend((k, local.close()) for k, _ in one.each(square, 1, range(100)))
@@ -317,6 +318,6 @@ def test_no_scheduler_answers() -> None:
         pass
     with (
         pytest.raises(InputError, match="TLS"),
-        executor(cluster="tls://127.0.0.1:9", pieces=1, piece_s=1.0),
+        executor(cluster="tls://127.0.0.1:9", pieces=2, piece_s=1.0),
     ):
         pass

@@ -64,7 +64,8 @@ def test_samples_and_the_exact_separation_agree() -> None:
 @pytest.mark.slow
 def test_a_fleet_of_120_is_planned_kept_apart_and_uploaded(tmp_path: Path) -> None:
     result = run(120, tmp_path, interval_s=2.0, jobs=1, upload=True)
-    assert result["placed"] >= 119
+    assert result["placed"] >= 116
+    assert set(result["left_out"]) <= {"battery"}
     assert result["placed"] + sum(result["left_out"].values()) == 120
     assert result["too_near"] == 0
     assert result["least_m"] >= 30.0
