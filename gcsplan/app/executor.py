@@ -16,7 +16,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any, Protocol, TypeVar
 from uuid import uuid4
 
@@ -319,7 +318,7 @@ def _connected(cluster: Any) -> Iterator[Any]:
     if isinstance(cluster, distributed.Client):
         yield cluster
         return
-    named = isinstance(cluster, str) and Path(cluster).is_file()
+    named = isinstance(cluster, str) and os.path.isfile(cluster)
     where = {"scheduler_file": cluster} if named else {"address": cluster}
     try:
         client = distributed.Client(**where, timeout=ANSWER_S, set_as_default=False)

@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection
 from pathlib import Path
+
+from gcsplan.errors import InputError
 
 __all__ = ["named_files", "names_several"]
 
 
 def names_several(text: str) -> bool:
     """Whether ``text`` is a folder or a pattern, and no file of that name."""
-    path = Path(text)
-    return path.is_dir() or (any(c in text for c in "*?[") and not path.exists())
+    # os.path answers False for names that no disk can hold, where pathlib raises OSError.
+    return os.path.isdir(text) or (any(c in text for c in "*?[") and not os.path.exists(text))
 
 
 def named_files(text: str, suffixes: Collection[str]) -> list[Path]:
-    """The files of a folder, and of those in it, that end in ``suffixes``, or of a pattern, sorted; else ``text``."""
+    """The files of a folder, and of those in it, that end in ``suffixes``, or of a pattern, sorted; else ``text``.
+
+    Raises InputError for a pattern that is none, or a folder that cannot be read.
+    """
     path = Path(text)
     if not names_several(text):
         return [path]
-    if path.is_dir():
-        return sorted(p for p in path.rglob("*") if p.suffix in suffixes and p.is_file())
     root = Path(path.anchor) if path.is_absolute() else Path()
-    return sorted(p for p in root.glob(str(path.relative_to(path.anchor))) if p.is_file())
+    try:
+        if path.is_dir():
+            return sorted(p for p in path.rglob("*") if p.suffix in suffixes and p.is_file())
+        return sorted(p for p in root.glob(str(path.relative_to(path.anchor))) if p.is_file())
+    except (OSError, ValueError) as why:
+        raise InputError(f"cannot be searched for files: {why}", where=text) from why

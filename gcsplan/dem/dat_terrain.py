@@ -9,6 +9,7 @@ files by up to what the ground rises within two spacings, and never below it.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -64,7 +65,7 @@ def dat_files(paths: Sequence[str], *, where: str) -> list[Path]:
     others = []
     for text in paths:
         path = Path(text)
-        inside = sorted(p for p in path.iterdir() if is_dat(p)) if path.is_dir() else []
+        inside = sorted(p for p in path.iterdir() if is_dat(p)) if os.path.isdir(path) else []
         if is_dat(path) or inside:
             found += inside or [path]
         else:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
@@ -71,9 +72,12 @@ def tiles_of(paths: Sequence[str], *, where: str) -> list[str]:
 
 def _in_folder(path: str, where: str) -> list[str]:
     """The rasters in a folder, or the file itself."""
-    if not Path(path).is_dir():
+    if not os.path.isdir(path):  # not pathlib's, which raises for a name that no disk can hold
         return [path]
-    found = sorted(str(p) for p in Path(path).iterdir() if p.name.lower().endswith(RASTERS) and p.is_file())
+    try:
+        found = sorted(str(p) for p in Path(path).iterdir() if p.name.lower().endswith(RASTERS) and p.is_file())
+    except OSError as why:
+        raise InputError(f"{path} cannot be read: {why.strerror or why}", where=where) from why
     if not found:
         raise InputError(f"{path} is a folder without tiles ({', '.join(RASTERS)}, .DAT); give a file", where=where)
     return found
