@@ -45,6 +45,8 @@ def toy(limits: Limits = LIMITS, **options: object) -> Problem:
 
 @pytest.mark.parametrize("name", SWARMS)
 def test_every_swarm_solves_a_toy_map_and_says_what_it_did(name: str) -> None:
+    if name == "cmaes":
+        pytest.importorskip("cma")
     problem = toy(encoding="bspline", points=4, iterations=10, population=20)
     solution = get(name).plan(problem)
     assert violations(problem, solution.path.points) == ()
