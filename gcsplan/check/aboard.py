@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from gcsplan.arrays import Floats
 from gcsplan.check.pace import Pace
+from gcsplan.check.spline import Direction
 from gcsplan.check.stretch import Flight, Place, Stretch, StretchKind
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
@@ -38,7 +38,7 @@ class Aboard:
         self.pace = Pace.of(vehicle)
         self.circle_m = 0.0
         self.mission, self.items, self.first_seq = mission, mission.items, mission.first_seq
-        self.direction: Floats | None = None
+        self.direction: Direction | None = None
         self.jumped_from: int | None = None
         lat, lon = mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7
         ground = ground_amsl(lat, lon)

@@ -78,12 +78,17 @@ class _Off:
     meant: bool = False
 
 
+NOT_OFF = _Off()
+
+
 class _Cutter:
     """Goes through a flight leg by leg, with the offset that the vehicle may have at the beginning of each."""
 
     def __init__(self, flight: Flight, mission: Mission, vehicle: Vehicle, tuning: Tuning) -> None:
-        self.mission, self.tuning, self.limits = mission, tuning, vehicle.limits
+        limits = vehicle.limits
+        self.mission, self.tuning, self.limits = mission, tuning, limits
         self.copter = mission.autopilot is Autopilot.ARDUCOPTER
+        self.included = self.copter and tuning.copter_radius_m <= min(limits.track_error_m, limits.altitude_error_m)
         self.twins: dict[tuple[object, ...], list[Stretch]] = {}
         for s in flight.instead:
             self.twins.setdefault(_way(s), []).append(s)
@@ -120,6 +125,8 @@ class _Cutter:
 
     def _leave(self, s: Stretch, after: Stretch, off: _Off, stops: bool) -> _Off:
         """How far off the beginning of ``after`` the vehicle may begin it; ``off``: the same for ``s``."""
+        if self.included:
+            return NOT_OFF
         turn, long_m = _turn(s, after), flat_m(s.start, s.end)
         sine = 1.0 if after.column else math.sin(min(turn, 0.5 * math.pi))
         rise_m = abs(s.end[2] - s.start[2])
@@ -182,8 +189,10 @@ class _Cutter:
 
     def _before(self, s: Stretch, after: Stretch, begun: _Off, stops: bool) -> Iterator[Stretch]:
         """The end of ``s`` from where the vehicle turns: its course from there need not lie beside ``after``."""
-        radius_m, long_m = self._radius_m(s, after, turn := _turn(s, after), stops), flat_m(s.start, s.end)
         aside_m, height_m = self._beyond(begun, after)
+        if aside_m <= 0.0 and height_m <= 0.0:
+            return
+        radius_m, long_m = self._radius_m(s, after, turn := _turn(s, after), stops), flat_m(s.start, s.end)
         if self.copter or radius_m >= long_m:
             yield from self._parts(s, (0.5 if self.copter else 0.0, 1.0), (aside_m, height_m), fading=False)
             return

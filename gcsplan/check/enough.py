@@ -22,9 +22,11 @@ UPWARD = {"min_agl": 1.0, "terrain_clearance": 1.0, "max_agl": -1.0}
 """The direction in which a leg is moved to keep a limit of height: 1 up, −1 down."""
 
 TRIES = 8
-FINER = 7
-LEAST_PART = 0.8
-"""The bisection for the depth begins at this part of a depth that is enough."""
+LEAST_PART = 0.95
+"""The part of a depth that suffices which is tried next, at least: the kernel's depth is mostly exact to 1 %."""
+
+FINE_PART = 1 / 200
+"""A depth that suffices is the answer if this part less of it does not."""
 
 CENTIMETRE = 0.01
 
@@ -59,18 +61,15 @@ def _lift(v: Violation, broken: Indices, legs: Legs, limits: Limits, air: Airspa
         )  # fmt: skip
         return air.deepest(moved, alone, v.kind)
 
-    by = rounded_up(v.by)
+    low, by = 0.0, rounded_up(v.by)
     for _ in range(TRIES):
         missing = left(by)
         if missing <= 0.0:
             break
-        by = rounded_up(by + max(missing, CENTIMETRE))
-    low = LEAST_PART * by
-    if left(low) <= 0.0:
-        low, by = 0.0, rounded_up(low)
-    for _ in range(FINER):
-        half = rounded_up(0.5 * (low + by))
-        if not low < half < by:
+        low, by = by, rounded_up(by + max(missing, CENTIMETRE))
+    for _ in range(TRIES):
+        less = rounded_up(max(0.5 * (low + by), LEAST_PART * by))
+        if by - low <= FINE_PART * by or not low < less < by:
             break
-        low, by = (low, half) if left(half) <= 0.0 else (half, by)
+        low, by = (low, less) if left(less) <= 0.0 else (less, by)
     return by

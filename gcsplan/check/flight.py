@@ -28,8 +28,6 @@ from collections.abc import Callable, Hashable
 from dataclasses import replace
 from itertools import pairwise
 
-import numpy as np
-
 from gcsplan.check.aboard import Aboard
 from gcsplan.check.arc_waypoint import fly_arc
 from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth, circle_words
@@ -39,7 +37,7 @@ from gcsplan.check.geodesy import flat_m
 from gcsplan.check.route import fly_all
 from gcsplan.check.rtl.model import RULES, return_pieces
 from gcsplan.check.rtl.run_on import about_turn_m
-from gcsplan.check.spline import chords, towards
+from gcsplan.check.spline import NO_DIRECTION, chords, towards
 from gcsplan.check.stretch import Flight, Place, StretchKind
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
@@ -84,7 +82,7 @@ class _Pilot(Aboard):
 
     @property
     def state(self) -> Hashable:
-        return self.at, self.airborne, self.known, self.pace, self.circle_m, str(self.direction)
+        return self.at, self.airborne, self.known, self.pace, self.circle_m, self.direction
 
     def fly(self, seq: int, item: MissionItem) -> None:
         flown = len(self.flight.stretches)
@@ -218,15 +216,15 @@ class _Pilot(Aboard):
         if not copter or target is None or terrain or not known or after is None or after.command == cmd.ARC_WAYPOINT:
             self._lose(seq, item)
             return
-        here, arrives = self.at, np.zeros(3)
+        here, arrives = self.at, NO_DIRECTION
         self.at = target  # "altitude 0" in the item after it means the altitude here
         beyond = self.target(after) if self.has_place(after) else None
         self.at = here
         if beyond is not None and self.hold(item) == 0.0:
             arrives = towards(here if after.command == cmd.SPLINE_WAYPOINT else target, beyond)
-        before = self.direction if self.direction is not None else np.zeros(3)
-        for leaves, fly in ((before, self.add), (np.zeros(3), self.instead)):
-            if fly == self.instead and not before.any():
+        before = self.direction or NO_DIRECTION
+        for leaves, fly in ((before, self.add), (NO_DIRECTION, self.instead)):
+            if fly == self.instead and not any(before):
                 break
             places, bulge_m, steep = chords(here, target, leaves, arrives)
             for (a, b), slopes in zip(pairwise(places), steep, strict=True):

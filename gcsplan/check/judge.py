@@ -37,6 +37,9 @@ from gcsplan.world.world import World
 TERRAIN_ERROR_M = 30.0
 """ArduPilot shifts all terrain by up to this, m, when it arms; terrain-frame legs are judged with it as an error."""
 
+NEAR_DEG = FARTHEST_M / 111_700.0
+"""Degrees of latitude, or of longitude anywhere, that are surely no more than `FARTHEST_M`."""
+
 HIGHEST_M = 20_000.0
 """Above any aircraft that gcsplan plans for, m; keeps absurd numbers out of the exact check."""
 
@@ -142,8 +145,12 @@ def _unread(stretches: Sequence[Stretch], plane: PlaneLegs) -> list[Finding]:
 
 def _is_too_far(stretch: Stretch, world: World) -> bool:
     """Whether it leads beyond `FARTHEST_M` from the frame's origin, off the globe, or beyond `HIGHEST_M` up or down."""
-    lat0, lon0 = math.radians(world.frame.lat_deg), math.radians(world.frame.lon_deg)
+    frame = world.frame
+    lat0, lon0 = math.radians(frame.lat_deg), math.radians(frame.lon_deg)
     for lat_deg, lon_deg, amsl_m in (stretch.start, stretch.end):
+        beside_deg = abs(lat_deg - frame.lat_deg) + abs(lon_deg - frame.lon_deg)
+        if beside_deg <= NEAR_DEG and abs(lat_deg) <= 90.0 and abs(amsl_m) <= HIGHEST_M:
+            continue
         lat, lon = math.radians(lat_deg), math.radians(lon_deg)
         h = math.sin(0.5 * (lat - lat0)) ** 2 + math.cos(lat) * math.cos(lat0) * math.sin(0.5 * (lon - lon0)) ** 2
         away_m = 2.0 * EARTH_RADIUS_M * math.asin(math.sqrt(min(max(h, 0.0), 1.0)))

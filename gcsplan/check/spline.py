@@ -26,21 +26,26 @@ LOOKS, BESIDE, STILL = 16, 1e-5, 1e-6
 fastest speed below which a curve counts as standing still."""
 
 
-def towards(a: Place, b: Place) -> Floats:
-    """The vector (3,) from ``a`` to ``b``: east, north, up, metres."""
-    return np.array([*offset_m(a, b), b[2] - a[2]])
+Direction = tuple[float, float, float]
+"""East, north, up, metres."""
+
+NO_DIRECTION: Direction = (0.0, 0.0, 0.0)
+
+
+def towards(a: Place, b: Place) -> Direction:
+    """The vector from ``a`` to ``b``."""
+    return *offset_m(a, b), b[2] - a[2]
 
 
 Slopes = list[tuple[float, float]]
 
 
-def chords(start: Place, end: Place, leaves: Floats, arrives: Floats) -> tuple[list[Place], float, Slopes]:
+def chords(start: Place, end: Place, leaving: Direction, arriving: Direction) -> tuple[list[Place], float, Slopes]:
     """The curve's points from ``start`` to ``end`` (both exact), its bulge beyond the chords, m, and its slopes.
 
-    ``leaves``, ``arrives``: (3,) directions with their lengths, metres. The slopes are, for each chord, the steepest
-    rise over run of the curve over it, up and down (negative).
+    The slopes are, for each chord, the steepest rise over run of the curve over it, up and down (negative).
     """
-    way = towards(start, end)
+    way, leaves, arrives = (np.array(d) for d in (towards(start, end), leaving, arriving))
     both = float(np.linalg.norm(leaves) + np.linalg.norm(arrives))
     most = LONGEST * float(np.linalg.norm(way))
     if both > most:

@@ -22,8 +22,8 @@ FARTHEST_M = 150_000.0
 
 EARTH_RADIUS_M = 6_371_008.8  # mean radius R1 of WGS84 (IUGG)
 
-BOW_PARTS = np.arange(1, 16) / 16.0
-"""Parts of a leg at which `Frame.bow_m` measures."""
+BOW_PARTS = np.arange(17) / 16.0
+"""Parts of a leg at which `Frame.bow_m` measures; at the ends the distance is 0."""
 
 
 class Frame:
@@ -82,8 +82,7 @@ class Frame:
         span = (b[:, 1] - a[:, 1] + 180.0) % 360.0 - 180.0
         part = BOW_PARTS[:, None]
         curved = self.to_plane(a[:, 0] + part * (b[:, 0] - a[:, 0]), a[:, 1] + part * span)
-        pa, pb = self.to_plane(a[:, 0], a[:, 1]), self.to_plane(b[:, 0], b[:, 1])
-        straight = pa + part[..., None] * (pb - pa)
+        straight = curved[0] + part[..., None] * (curved[-1] - curved[0])
         return np.asarray(1.02 * np.linalg.norm(curved - straight, axis=-1).max(axis=0))
 
 
