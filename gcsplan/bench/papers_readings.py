@@ -34,12 +34,11 @@ def _with(**parameters: object) -> Options:
     return MappingProxyType({"parameters": parameters})
 
 
-_ONE_BEE = ("one-bee-at-a-time", "each bee of ABC starts from what the bee before it left")
+_BEES = ("all-bees-at-once", "all bees of one kind start from what the kind before left (ABC)")
 _OFFSETS = MappingProxyType({"encoding": "offsets"})
 _SECTIONS = MappingProxyType({"encoding": "sections"})
 _WHOLE = MappingProxyType({"encoding": "sections-whole"})
 _POLAR, _BOX = MappingProxyType({"encoding": "polar"}), MappingProxyType({"encoding": "box"})
-_ALL = {"leaders": "all"}
 FIELD_M = 800.0
 """Side of SSGWO's map, in which SOGWO's published code would measure its distances."""
 
@@ -47,19 +46,16 @@ READINGS: Mapping[str, tuple[Reading, ...]] = MappingProxyType({
     "krill": (
         _of("one-krill-at-a-time", "each krill sees where those before it went (fig. 9)", krill=_with(moves="one")),
         _of("printed-crowd", "it goes where food over n_f is less than δ times its own", krill=_with(crowd="printed")),
-        _of(*_ONE_BEE, abc=_with(bees="one")),
+        _of(*_BEES, abc=_with(bees="together")),
     ),
     "ssgwo": (
-        _of("leaders-all", "every wolf moves by eq. 23 over eq. 9-11 and is tried by eq. 24", ssgwo=_with(**_ALL)),
-        _of("leaders-all-trial-alpha", "the same, and eq. 24 tries α alone", ssgwo=_with(**_ALL, trial="alpha")),
+        _of("leaders-apart", "leaders move by eq. 17-19, and only to improve", ssgwo=_with(leaders="apart")),
+        _of("trial-alpha", "eq. 24 tries α alone, all others move anyway", ssgwo=_with(trial="alpha")),
         _of("printed", "eq. 13 and 17-23 as printed, for all wolves", ssgwo=_with(factor="printed", leaders="printed")),
         _of("published-sogwo", "SOGWO's opposition as in its authors' code, distances in metres",
             sogwo=_with(alike="distances", span=FIELD_M)),
         _of("offsets", "all wolves search lateral offsets and altitudes at stations", ssgwo=_OFFSETS, gwo=_OFFSETS,
             mgwo=_OFFSETS, igwo=_OFFSETS, sogwo=_OFFSETS),
-        _of("offsets-leaders-all", "offsets, and SSGWO with leaders-all",
-            ssgwo=MappingProxyType({"encoding": "offsets", "parameters": _ALL}), gwo=_OFFSETS, mgwo=_OFFSETS,
-            igwo=_OFFSETS, sogwo=_OFFSETS),
         _of("sections", "all wolves search points on planes across the track", ssgwo=_SECTIONS, gwo=_SECTIONS,
             mgwo=_SECTIONS, igwo=_SECTIONS, sogwo=_SECTIONS),
     ),
@@ -77,7 +73,6 @@ READINGS: Mapping[str, tuple[Reading, ...]] = MappingProxyType({
         _of("all-in-a-box", "MSFOA and FOA search the box, as their rivals do", msfoa=_BOX, foa=_BOX),
         _of("all-polar", "the rivals search hidden variables, as MSFOA and FOA do", pso=_POLAR, de=_POLAR, abc=_POLAR,
             iffo=_POLAR, mfoa=_POLAR),
-        # ABC one bee at a time is not among these: 60,000 costs one by one take as long as ten other runs.
     ),
     "abo": (
         _of("inertia-1", "PSO with inertia 1 throughout", pso=_with(inertia_first=1.0, inertia_last=1.0)),
@@ -93,11 +88,11 @@ READINGS: Mapping[str, tuple[Reading, ...]] = MappingProxyType({
         _of("20-iterations", "“iteration cycle 20” is the number of iterations",
             **{name.replace("-", "_"): MappingProxyType({"iterations": 20})
                for name in ("ib-abc", "b-abc", "abc", "gwo")}),
-        _of("phi-to-1", "φ of eq. 7 and 9 from −1 to 1, as printed", ib_abc=_with(scale=1.0), b_abc=_with(scale=1.0)),
+        _of("phi-to-half", "φ of eq. 7 and 9 from −½ to ½", ib_abc=_with(scale=0.5), b_abc=_with(scale=0.5)),
         _of("counts-from-0", "the first Tr is 0, so no bee moves in the first cycle", ib_abc=_with(counts_from="zero")),
         _of("whole-metres", "way points are whole metres (section 2.2)", ib_abc=_WHOLE, b_abc=_WHOLE, abc=_WHOLE,
             gwo=_WHOLE),
-        _of(*_ONE_BEE, abc=_with(bees="one")),
+        _of(*_BEES, abc=_with(bees="together")),
     ),
 })  # fmt: skip
 """By paper."""

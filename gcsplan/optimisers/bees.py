@@ -1,8 +1,8 @@
 """Artificial bees: ABC (Karaboga 2005), and IB-ABC with B-ABC (Tan et al. 2023).
 
-All bees of one kind fly at once, from the sources that the kind before left; in the papers they fly one by one, which
-ABC's parameter ``bees`` can have. ``group`` is the number of adjacent variables that form one element (the coordinates
-of a way point; 1 on functions). An element is changed as a whole.
+ABC's bees fly one by one, as in the papers; with ``bees`` "together", and in IB-ABC, all bees of one kind fly at once,
+from the sources that the kind before left. ``group`` is the number of adjacent variables that form one element (the
+coordinates of a way point; 1 on functions). An element is changed as a whole.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def abc(run: Run, *, limit: int, group: int, bees: str) -> Steps:
 
     Each bee tries to change one element of its source: vⱼ = xⱼ + φ·(xⱼ − x_kj), k another source. Each bee that does
     not improve its source adds one to the source's failures; a scout replaces a source of more than ``limit`` failures.
-    ``bees`` is "together", or "one": each bee starts from what the bee before it left.
+    ``bees`` is "one": each bee starts from what the bee before it left; or "together", in a fraction of the time.
     """
     require("abc", "bees", bees, ("together", "one"))
     x = run.first()

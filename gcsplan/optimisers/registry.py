@@ -112,7 +112,7 @@ _ENTRIES = (
         population=50,
         iterations=500,
         evaluations_per_iteration="2P, and 1 for a scout",
-        defaults=_set(limit=20, group=1, bees="together"),
+        defaults=_set(limit=20, group=1, bees="one"),
         least_population=2,
     ),
     Entry(
@@ -124,7 +124,7 @@ _ENTRIES = (
         population=20,
         iterations=200,
         evaluations_per_iteration="2P, and P/2 for scouts",
-        defaults=_set(feedback=False, scale=0.5, spent_share=0.5, group=1, counts_from="one"),
+        defaults=_set(feedback=False, scale=1.0, spent_share=0.5, group=1, counts_from="one"),
         least_population=3,
     ),
     Entry(
@@ -136,7 +136,7 @@ _ENTRIES = (
         population=20,
         iterations=200,
         evaluations_per_iteration="2P, and P/2 for scouts",
-        defaults=_set(feedback=True, scale=0.5, spent_share=0.5, group=1, counts_from="one"),
+        defaults=_set(feedback=True, scale=1.0, spent_share=0.5, group=1, counts_from="one"),
         least_population=3,
     ),
     Entry(
@@ -186,13 +186,13 @@ _ENTRIES = (
     ),
     Entry(
         name="ssgwo",
-        summary="grey wolves with relative distances and simulated annealing; leaders apart",
+        summary="grey wolves with relative distances and simulated annealing",
         update="wolves:ssgwo",
         paper=_SSGWO,
         equations="9-11, 13-25",
         population=30,
         iterations=500,
-        defaults=_set(origin=0.0, factor="cosine", leaders="apart", trial="every"),
+        defaults=_set(origin=0.0, factor="cosine", leaders="all", trial="every"),
         least_population=5,
     ),
     Entry(

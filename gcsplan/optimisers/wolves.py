@@ -89,10 +89,10 @@ def sogwo(run: Run, *, origin: float, alike: str, span: float) -> Steps:
 def ssgwo(run: Run, *, origin: float, factor: str, leaders: str, trial: str) -> Steps:
     """Hybrid of GWO and simulated annealing (Feng et al. 2024), eq. 13-25.
 
-    ``factor`` is "cosine" or "printed" (eq. 13). ``leaders`` is "apart": non-leaders move by eq. 23 over eq. 9-11,
-    leaders by eq. 17-19 and only to improve; "all": every wolf moves by eq. 23 over eq. 9-11, whose A and C are what
-    Algorithm 1 updates; or "printed": every wolf moves by eq. 23 over eq. 17-19. ``trial`` is "every": eq. 24 decides
-    for each wolf; or "alpha": for α alone, as its letters say, while all others move anyway.
+    ``factor`` is "cosine" or "printed" (eq. 13). ``leaders`` is "all": every wolf moves by eq. 23 over eq. 9-11, whose
+    A and C are what Algorithm 1 updates; "apart": the leaders move by eq. 17-19, and only to improve; or "printed":
+    every wolf moves by eq. 23 over eq. 17-19. ``trial`` is "every": eq. 24 decides for each wolf; or "alpha": for α
+    alone, as its letters say, while all others move anyway.
     """
     require("ssgwo", "factor", factor, tuple(FACTORS))
     require("ssgwo", "leaders", leaders, ("apart", "all", "printed"))
@@ -106,9 +106,9 @@ def ssgwo(run: Run, *, origin: float, factor: str, leaders: str, trial: str) -> 
         order = np.argsort(f, kind="stable")
         first, others = order[:PACK], order[PACK:]
         tried = np.empty_like(x)
+        # E eq. 17-19: as printed they do not contain X_i, and with b ≥ 0 they move β and δ away from α; Algorithm 1
+        # updates A and C, which only eq. 6-11 use.
         if leaders == "apart":
-            # E eq. 17-19: as printed they do not contain X_i, and with b ≥ 0 they move β and δ away from α; Algorithm 1
-            # updates A and C, which only eq. 6-11 use. So the others move by eq. 6-11, only the leaders by eq. 17-19.
             told = tell(run.rng, x[others], x[first], a, origin)
             tried[others] = _weighed(told, nearness(x, x[first])[:, others])  # eq. 23
             tried[first] = scattered(run.rng, x, first, others, a, 1)[:, 0]

@@ -72,11 +72,11 @@ def test_differential_evolution_crosses_a_mutant_of_three_others_and_reflects_it
     assert reflected > 0
 
 
-def test_bees_try_one_element_onlookers_where_the_fitness_is_and_a_spent_source_is_left() -> None:
+def test_bees_that_fly_together_try_one_element_onlookers_where_the_fitness_is_and_a_spent_source_is_left() -> None:
     group, dim, limit = 2, 5, 3
     x = crowd(N, dim)
     f = bowl(x)
-    play = Play("abc", bowl, x, T=40, limit=limit, group=group)
+    play = Play("abc", bowl, x, T=40, limit=limit, group=group, bees="together")
     failures = [0] * N
     scouts = 0
     for _ in range(12):
@@ -161,7 +161,7 @@ def test_ib_abc_moves_one_way_point_by_feedback_and_sends_scouts_when_all_are_st
                     value = before[i, d]
                     if d // group == elements[i, 0]:
                         start = before[m, d] if following else before[i, d]  # eq. 9, eq. 7
-                        value = start + 0.5 * phi[i, 0] * (before[k, d] - before[i, d]) * mu
+                        value = start + phi[i, 0] * (before[k, d] - before[i, d]) * mu
                     assert tried[i, d] == pytest.approx(clip(value), abs=1e-12)
             f_tried = bowl(tried)
             for i in range(n):

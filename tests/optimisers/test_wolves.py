@@ -148,11 +148,11 @@ def taken(f: float, f_new: float, temperature: float, rand: float) -> bool:
     return f_new < f or rand < math.exp(-(f_new - f) / temperature)
 
 
-def test_ssgwo_moves_wolves_by_eq_23_leaders_by_eq_17_to_19_and_anneals_the_wolves_alone() -> None:
+def test_ssgwo_with_leaders_apart_moves_wolves_by_eq_23_leaders_by_eq_17_to_19_and_anneals_the_wolves_alone() -> None:
     n, long = 12, 60
     x = crowd(n, D, seed=5)
     f = bowl(x)
-    play = Play("ssgwo", bowl, x, T=long)
+    play = Play("ssgwo", bowl, x, T=long, leaders="apart")
     temperature = float(np.std(f))
     uphill = 0
     for t in range(40):

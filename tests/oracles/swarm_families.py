@@ -152,31 +152,25 @@ def igwo(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator) ->
 
 
 def ssgwo(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator) -> None:
-    """Feng's wolves, leaders apart: eq. 23 over eq. 9-11, eq. 17-19 for leaders, annealing by eq. 24 and 25."""
+    """Feng's wolves: each by eq. 23 over eq. 9-11, annealing by eq. 24 and 25."""
     x = rng.uniform(size=(n, dim))
     f = cost(x)
     temperature = math.sqrt(sum((v - f.mean()) ** 2 for v in f) / n)
     for t in range(rounds):
         a = 1.0 + math.cos(math.pi * t / rounds)
-        order = sorted(range(n), key=lambda i: f[i])
-        others = order[3:]
-        leaders = x[order[:3]]
+        leaders = x[sorted(range(n), key=lambda i: f[i])[:3]]
         means = [np.mean([np.linalg.norm(k - y) for y in x]) for k in leaders]
         tried = x.copy()
-        for i in others:
+        for i in range(n):
             near = np.array(
                 [m / max(np.linalg.norm(k - x[i]), 1e-9 * m) for k, m in zip(leaders, means, strict=True)]
             )  # eq. 14-16
             tried[i] = near @ led(leaders, x[i], a, rng) / near.sum()
-        one_, two = rng.choice(others, 2, replace=False)
-        spans = (x[one_] - x[two], leaders[0] - leaders[1], leaders[0] - leaders[2])
-        for i, span in zip(order[:3], spans, strict=True):
-            tried[i] = x[i] - a * rng.uniform(0.0, 2.0, size=dim) * span
         tried = box(tried)
         costs = cost(tried)
         for i in range(n):
             worse = costs[i] - f[i]
-            if worse < 0.0 or (i in others and rng.uniform() < math.exp(-worse / temperature)):
+            if worse < 0.0 or rng.uniform() < math.exp(-worse / temperature):
                 x[i], f[i] = tried[i], costs[i]
         temperature *= 0.95
 
@@ -285,7 +279,7 @@ def krill(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator) -
 
 
 def abc(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator) -> None:
-    """Karaboga's bees, all of a kind at once, limit 20, one scout a round."""
+    """Karaboga's bees, one by one, limit 20, one scout a round."""
     x = rng.uniform(size=(n, dim))
     f = cost(x)
     failures = [0] * n
@@ -293,17 +287,13 @@ def abc(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator) -> 
         for onlooking in (False, True):
             fitness = np.where(f >= 0.0, 1.0 / (1.0 + np.abs(f)), 1.0 + np.abs(f))
             bees = rng.choice(n, size=n, p=fitness / fitness.sum()) if onlooking else np.arange(n)
-            tried = x[bees].copy()
-            for row, i in enumerate(bees):
+            for i in bees:
                 d, k = rng.integers(dim), rng.choice([j for j in range(n) if j != i])
-                tried[row, d] = min(1.0, max(0.0, x[i, d] + rng.uniform(-1.0, 1.0) * (x[i, d] - x[k, d])))
-            costs = cost(tried)
-            for i in set(bees.tolist()):
-                rows = [row for row in range(n) if bees[row] == i]
-                least = min(rows, key=lambda row: costs[row])
-                failures[i] += len(rows)
-                if costs[least] < f[i]:
-                    x[i], f[i], failures[i] = tried[least], costs[least], 0
+                tried = x[i].copy()
+                tried[d] = min(1.0, max(0.0, x[i, d] + rng.uniform(-1.0, 1.0) * (x[i, d] - x[k, d])))
+                failures[i] += 1
+                if (found := one(cost, tried)) < f[i]:
+                    x[i], f[i], failures[i] = tried, found, 0
         spent = failures.index(max(failures))
         if failures[spent] > 20:
             x[spent], failures[spent] = rng.uniform(size=dim), 0
@@ -311,7 +301,7 @@ def abc(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator) -> 
 
 
 def ib_abc(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator, feedback: bool = True) -> None:
-    """Tan's bees, eq. 7-10: φ up to 0.5, γ 0.5, counts from 1 to D; without feedback B-ABC."""
+    """Tan's bees, eq. 7-10: φ up to 1, γ 0.5, counts from 1 to D; without feedback B-ABC."""
     x = rng.uniform(size=(n, dim))
     f = cost(x)
     count = np.ones(n)
@@ -325,7 +315,7 @@ def ib_abc(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator, 
             tried = x.copy()
             for i in range(n):
                 k, m = rng.choice([j for j in range(n) if j != i], 2, replace=False)
-                d, phi = rng.integers(dim), rng.uniform(-0.5, 0.5)
+                d, phi = rng.integers(dim), rng.uniform(-1.0, 1.0)
                 mu = count[i] / (count[i] + count[k]) if feedback else 1.0
                 tried[i, d] = min(1.0, max(0.0, x[m if following else i, d] + phi * (x[k, d] - x[i, d]) * mu))
             costs = cost(tried)

@@ -146,7 +146,7 @@ def one_bee(
 
 
 def ib_abc_from_zero(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator) -> list[Point]:
-    """IB-ABC with Tr from 0: φ up to 0.5, γ 0.5; all bees of a kind at once."""
+    """IB-ABC with Tr from 0: φ up to 1, γ 0.5; all bees of a kind at once."""
     search = Search(cost)
     x, f = first(search, rng, n, dim)
     count = [0.0] * n
@@ -160,7 +160,7 @@ def ib_abc_from_zero(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.G
         better = [False] * n
         for following in (False, True):
             one, two = rng.integers(0, n - 1, size=n), rng.integers(0, n - 2, size=n)
-            phi = 0.5 * rng.uniform(-1.0, 1.0, size=(n, 1))[:, 0]
+            phi = rng.uniform(-1.0, 1.0, size=(n, 1))[:, 0]
             element = rng.integers(0, dim, size=(n, 1))[:, 0]
             tried = []
             for i in range(n):
