@@ -19,9 +19,10 @@ import numpy as np
 from gcsplan import __version__
 from gcsplan.app import outputs
 from gcsplan.app.executor import Executor
+from gcsplan.app.flying import flyable
 from gcsplan.app.model import Plan
 from gcsplan.app.named_files import named_files
-from gcsplan.app.pipeline import plan, require_passing
+from gcsplan.app.pipeline import plan
 from gcsplan.errors import GcsplanError, InputError, NoMission, UsageError, worst_of
 from gcsplan.export.outdir import retire_outputs, settle_outputs, write_outputs, write_whole
 from gcsplan.mission_file.read_files import files_of
@@ -181,11 +182,10 @@ def record_of(options: BatchOptions, item: tuple[str, str]) -> Record:
         planned = plan(
             file, planner=options.planner, objective=options.objective, seed=options.seed,
         )  # fmt: skip
-        verdicts = {v.name: v.verdict for v in planned.vehicles}
-        require_passing(verdicts, allow_unjudged=options.allow_unjudged)
-        files = outputs.outputs_of(planned)
+        planned, homes = flyable(planned, allow_unjudged=options.allow_unjudged, asked=options.report)
+        files = outputs.outputs_of(planned, homes)
         if options.report:
-            files["report.html"] = outputs.report_of(planned)
+            files["report.html"] = outputs.report_of(planned, (), homes)
     except GcsplanError as why:
         return Record(name, key, why.exit_code, (_refusal(name, why.exit_code, why.reason, str(why)),))
     except Exception as why:  # a bug of ours in one mission must not cost the others

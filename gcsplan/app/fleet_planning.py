@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -35,7 +36,7 @@ LATER_S = 600.0
 SEPARATION_M = 30.0
 """Separation that is judged if the file has no `arrival`, m."""
 
-__all__ = ["crew_of", "fleet_of", "route_of"]
+__all__ = ["crew_of", "fleet_of", "route_of", "without"]
 
 
 def fleet_of(
@@ -92,6 +93,17 @@ def fleet_of(
     return tuple(flown), FleetPlan(
         plan.mode, order, plan.interval_s, tuple(slots), tuple(motions), found, tuple(notes),
         None if gate is None else gate.start,
+    )  # fmt: skip
+
+
+def without(fleet: FleetPlan, kept: Sequence[VehiclePlan], arrival: ArrivalRequest | None) -> FleetPlan:
+    """The time table of the vehicles that are ``kept``; the turns of the others stay empty."""
+    names = [v.name for v in kept]
+    motions = tuple(fleet.motion(name) for name in names)
+    return replace(
+        fleet, order=tuple(name for name in fleet.order if name in names),
+        slots=tuple(fleet.slot(name) for name in names), motions=motions,
+        separation=_separation(motions, kept, arrival),
     )  # fmt: skip
 
 

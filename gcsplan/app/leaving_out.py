@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from gcsplan.errors import NoMission
+from gcsplan.errors import CheckFailed, NoMission
 from gcsplan.figures import counted
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ MOST_SHOWN = 5
 
 @dataclass(frozen=True, slots=True)
 class LeftOut:
-    """A vehicle without a mission: its name, the word for scripts of `NoMission.reason`, and why."""
+    """A vehicle without a mission that may fly: its name, the error's word for scripts, and why."""
 
     name: str
     reason: str
@@ -36,7 +36,7 @@ class LeavingOut:
         self.allowed = allowed
         self.found: list[LeftOut] = []
 
-    def leave(self, name: str, why: NoMission) -> None:
+    def leave(self, name: str, why: NoMission | CheckFailed) -> None:
         """Leave a vehicle out; raises ``why`` if that is not allowed."""
         if not self.allowed:
             raise why
@@ -51,7 +51,7 @@ class LeavingOut:
 def refusal_of(left_out: Sequence[LeftOut]) -> NoMission:
     """The error that a plan ends with which leaves vehicles out: all names, and why, of the first of them."""
     names = ", ".join(v.name for v in left_out)
-    lines = [f"  {v.name}: {v.message}" for v in left_out[:MOST_SHOWN]]
+    lines = [f"  {v.name}: {v.message}".replace("\n", "\n    ") for v in left_out[:MOST_SHOWN]]
     if len(left_out) > MOST_SHOWN:
         lines.append(f"  and {len(left_out) - MOST_SHOWN} more: summary.json says why (left_out)")
     head = f"{counted(len(left_out), 'vehicle')} without a mission, left out: {names}"

@@ -101,7 +101,10 @@ class FleetPlan:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A planned mission file. ``planner`` is the one that was used, ``left_out`` are vehicles without a mission."""
+    """A planned mission file.
+
+    ``planner`` is the one that was used, ``left_out`` are vehicles without a mission; ``leaves_out``: they are allowed.
+    """
 
     source: MissionFile
     world: World
@@ -112,3 +115,4 @@ class Plan:
     notes: tuple[str, ...] = ()
     fleet: FleetPlan | None = None
     left_out: tuple[LeftOut, ...] = ()
+    leaves_out: bool = False

@@ -104,7 +104,7 @@ def plan(
     if len(flown) > 1 and source.arrival is None:
         notes.append("the file asks for no `arrival`: the separation between vehicles is not judged")
     notes += fleet.notes
-    return Plan(source, brief.world, name, goal, number, flown, tuple(notes), fleet, tuple(leaving.found))
+    return Plan(source, brief.world, name, goal, number, flown, tuple(notes), fleet, tuple(leaving.found), leave_out)
 
 
 def require_within_hours(source: MissionFile, flown: Sequence[VehiclePlan], fleet: FleetPlan) -> None:

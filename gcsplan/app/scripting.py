@@ -24,12 +24,13 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 from gcsplan.app import outputs, uploads
 from gcsplan.app import way_home as returns
 from gcsplan.app.checking import check_files, check_mission
+from gcsplan.app.flying import flyable
 from gcsplan.app.model import Plan
 from gcsplan.app.pipeline import require_passing
 from gcsplan.app.upload_job import LINK, JobResult, ProgressCall, UploadOptions
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
-from gcsplan.errors import CheckFailed, UsageError
+from gcsplan.errors import CheckFailed, NoMission, UsageError
 from gcsplan.export.outdir import retire_outputs, settle_outputs, steady, write_outputs, write_whole
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import MissionFile, load_mission
@@ -127,9 +128,10 @@ def write(
 
     Outputs of an earlier plan in ``folder`` are removed; any other file in the way is moved to its ``previous/``.
     Raises CheckFailed if a verdict does not pass (with ``allow_unjudged``, what could not be judged passes), or if the
-    mission file says ``way_home: required`` and a return is unsafe or not judged. The
-    earlier outputs are moved to ``previous/`` then, so that no old mission is flown by mistake. Raises InputError if
-    ``folder`` cannot be written; nothing has changed then.
+    mission file says ``way_home: required`` and a return is unsafe or not judged. Where the plan may leave vehicles
+    out, such a vehicle is left out; NoMission is raised if none is left. With either error the earlier outputs are
+    moved to ``previous/``, so that no old mission is flown by mistake. Raises InputError if ``folder`` cannot be
+    written; nothing has changed then.
 
     Examples:
         >>> import tempfile
@@ -148,9 +150,8 @@ def write(
     system = units_of(units)
     settle_outputs(folder)
     try:
-        require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
-        homes = returns.judged(planned, asked=report or way_home)
-    except CheckFailed:
+        planned, homes = flyable(planned, allow_unjudged=allow_unjudged, asked=report or way_home)
+    except (CheckFailed, NoMission):
         retire_outputs(folder)
         raise
     files = outputs.outputs_of(planned, homes)

@@ -138,8 +138,9 @@ def plan(
     a whole fleet, unless it may be left out.
     """
     from gcsplan.app import outputs, pipeline
+    from gcsplan.app.flying import flyable
     from gcsplan.app.gate import GateTime
-    from gcsplan.app.way_home import is_required, judged
+    from gcsplan.app.way_home import is_required
     from gcsplan.cli.console import plan_table, release_table, remark, say_notes_of, upload_table
     from gcsplan.cli.home_words import say_homes
     from gcsplan.cli.planning_display import planning_display
@@ -171,8 +172,9 @@ def plan(
                 progress=progress, gate_utc=None if gate is None else gate.start,
                 jobs=jobs, cluster=cluster, leave_out=leave_out or None,
             )  # fmt: skip
-        pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
-        homes = judged(planned, asked=report or way_home or rally, option=require_way_home)
+        planned, homes = flyable(
+            planned, allow_unjudged=allow_unjudged, asked=report or way_home or rally, require_way_home=require_way_home
+        )
         orders: list[UploadJob] = []
         if upload or fence or fence_infinite:
             where = targets or dict.fromkeys((v.name for v in planned.vehicles), "")

@@ -91,7 +91,7 @@ def rehearse(
     required and there is none.
     """
     from gcsplan.app import pipeline, rehearsing
-    from gcsplan.app import way_home as returns
+    from gcsplan.app.flying import flyable
     from gcsplan.app.leaving_out import refusal_of
     from gcsplan.app.report_page import render_rehearsal
     from gcsplan.cli.console import remark, say, say_notes
@@ -115,8 +115,9 @@ def rehearse(
     addresses = rehearsing.seats_of(sitl or [], names)
     with planning_display(names, source.planner.objective) as progress:
         planned = pipeline.plan(source, planner=planner, progress=progress, jobs=jobs, cluster=cluster)
-    pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=allow_unjudged)
-    homes = returns.judged(planned, asked=way_home or report is not None, option=require_way_home)
+    planned, homes = flyable(
+        planned, allow_unjudged=allow_unjudged, asked=way_home or report is not None, require_way_home=require_way_home
+    )
     if in_sitl:
         with talking(names):
             result = rehearsing.rehearse_in_sitl(

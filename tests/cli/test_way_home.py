@@ -56,6 +56,7 @@ def flyable(folder: Path) -> list[str]:
     return [f.name for f in folder.glob("*") if f.suffix in (".plan", ".waypoints")]
 
 
+LOW_AND_HIGH: dict[str, dict[str, float]] = {"low": {}, "high": {"rtl_rel_home_m": 200.0}}
 COMMANDS = ["plan", "check", "upload", "rehearse"]
 
 
@@ -99,6 +100,50 @@ def test_a_return_that_is_required_decides_the_same_way_in_every_command(
     code, text, _ = run(*arguments(command, write(tmp_path, "high", rtl_rel_home_m=200.0, **key), planned), *option)
     assert code == 0, text
     assert "warning" not in text
+
+
+def test_a_batch_writes_no_mission_without_the_safe_return_that_its_file_requires(run: Any, tmp_path: Path) -> None:
+    missions = [write(tmp_path, name, way_home="required", **more) for name, more in LOW_AND_HIGH.items()]
+    code, text, _ = run("batch", *missions, "-o", "out", "--report")
+    assert code == 4, text
+    assert flyable(tmp_path / "out" / "low") == []
+    assert sorted(flyable(tmp_path / "out" / "high")) == ["uav1.plan", "uav1.waypoints"]
+    assert "a safe return is required" in (tmp_path / "out" / "results.csv").read_text()
+    told = json.loads((tmp_path / "out" / "high" / "summary.json").read_text())
+    assert told["vehicles"][0]["way_home"]["safe"] is True
+
+
+def test_who_has_no_safe_return_is_left_out_where_vehicles_may_be(run: Any, tmp_path: Path) -> None:
+    beside = UAV1 | {
+        "name": "uav2", "sysid": 2, "start": {"east_m": 0, "north_m": 400}, "goal": {"east_m": 2000, "north_m": 400},
+        "rtl_rel_home_m": 200.0,
+    }  # fmt: skip
+    third = beside | {
+        "name": "uav3",
+        "sysid": 3,
+        "start": {"east_m": 0, "north_m": 800},
+        "goal": {"east_m": 2000, "north_m": 800},
+    }
+    file = tmp_path / "three.yaml"
+    arrival = {"mode": "sequence", "interval_s": 5, "separation_m": 30}
+    whole = HILL | {"vehicles": [beside, UAV1, third], "arrival": arrival, "way_home": "required"}
+    file.write_text(yaml.safe_dump(whole))
+    code, text, _ = run("plan", file, "-o", "out")
+    assert code == 4, text
+    assert flyable(tmp_path / "out") == []
+    code, text, _ = run("plan", file, "-o", "out", "--leave-out")
+    assert code == 3, text
+    assert "1 vehicle without a mission, left out: uav1" in text
+    assert "set RTL_ALT " in text
+    assert sorted({name.split(".")[0] for name in flyable(tmp_path / "out")}) == ["uav2", "uav3"]
+    told = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert [v["name"] for v in told["vehicles"]] == ["uav2", "uav3"]
+    assert [(v["name"], v["reason"]) for v in told["left_out"]] == [("uav1", "violation")]
+    assert told["fleet"]["order"] == ["uav2", "uav3"]
+    file.write_text(yaml.safe_dump(whole | {"vehicles": [UAV1], "arrival": {"leave_out": True} | arrival}))
+    code, text, _ = run("plan", file, "-o", "out")
+    assert code == 3, text
+    assert flyable(tmp_path / "out") == []
 
 
 def test_what_could_not_be_judged_is_refused_where_a_safe_return_is_required(

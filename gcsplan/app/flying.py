@@ -1,0 +1,54 @@
+"""Whether a planned mission may fly: every command that writes or sends a plan asks `flyable` before."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from gcsplan.app.fleet_planning import without
+from gcsplan.app.leaving_out import LeavingOut
+from gcsplan.app.model import Plan
+from gcsplan.app.pipeline import require_passing
+from gcsplan.app.way_home import homes_of, is_required, require
+from gcsplan.errors import CheckFailed
+
+if TYPE_CHECKING:
+    from gcsplan.check.rtl.verdict import WayHome
+
+__all__ = ["flyable"]
+
+
+def flyable(
+    plan: Plan, *, allow_unjudged: bool = False, asked: bool = False, require_way_home: bool = False
+) -> tuple[Plan, dict[str, WayHome]]:
+    """The plan, and the way home of each vehicle where that is asked for or required; else none.
+
+    A mission does not fly if it breaks a limit, if something in it could not be judged (unless ``allow_unjudged``), or
+    if a safe return is required and there is none. One that does not fly refuses the plan; where vehicles may be left
+    out of it, the plan that is returned is that of the others.
+
+    Raises CheckFailed if the plan is refused, NoMission if all vehicles are left out.
+    """
+    required = is_required(plan.source, require_way_home)
+    homes = homes_of(plan) if asked or required else {}
+    if not plan.leaves_out:
+        require_passing({v.name: v.verdict for v in plan.vehicles}, allow_unjudged=allow_unjudged)
+        require(homes, required=required)
+        return plan, homes
+    leaving = LeavingOut(allowed=True)
+    for v in plan.vehicles:
+        try:
+            require_passing({v.name: v.verdict}, allow_unjudged=allow_unjudged)
+            require({v.name: homes[v.name]} if homes else {}, required=required)
+        except CheckFailed as why:
+            leaving.leave(v.name, why)
+    if not leaving.found:
+        return plan, homes
+    left_out = (*plan.left_out, *leaving.found)
+    gone = {v.name for v in leaving.found}
+    vehicles = tuple(v for v in plan.vehicles if v.name not in gone)
+    leaving.found[:] = left_out
+    leaving.require_some(vehicles)
+    fleet = None if plan.fleet is None else without(plan.fleet, vehicles, plan.source.arrival)
+    homes = {name: home for name, home in homes.items() if name not in gone}
+    return replace(plan, vehicles=vehicles, fleet=fleet, left_out=left_out), homes
