@@ -27,7 +27,7 @@ from gcsplan.planners.problem import Problem
 from gcsplan.world.zones import Circle, Level
 
 SWARMS = {"GWO": "OriginalGWO", "PSO": "OriginalPSO", "DE": "OriginalDE", "ABC": "OriginalABC", "FOA": "OriginalFOA"}
-BASELINES = {"DE": SWARMS["DE"]}
+BASELINES = {"DE": SWARMS["DE"], "GWO": SWARMS["GWO"]}
 """Those of `gcsplan bench swarms`."""
 POPULATION, EPOCHS = 30, 500
 CONTROL, SAMPLES = 8, 200
