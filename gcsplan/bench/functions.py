@@ -12,16 +12,14 @@ from __future__ import annotations
 
 import csv
 import io
-import multiprocessing
-import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from gcsplan.app.executor import executor
 from gcsplan.arrays import Floats
 from gcsplan.bench.functions_printed import PRINTED, RUNS, WOLVES, Printed
 from gcsplan.errors import InputError
@@ -34,6 +32,9 @@ CLAIMED = "ssgwo"  # the paper claims that it has the least mean, alone or share
 SETTINGS = ("middle", "shifted")
 DIM, POPULATION, ITERATIONS = 30, 30, 500  # table 1 and section 5.1
 MOST_RUNS = 10_000
+PART_S = 2.0
+"""Seconds that ten runs take, about."""
+
 LEAST_RUNS_TO_JUDGE = 30
 SIGNIFICANCE = 0.05
 VERDICTS = {True: "reproduced", False: "not reproduced", None: "too small to tell"}
@@ -65,14 +66,13 @@ def run(
 ) -> dict[str, Any]:
     """Run every algorithm on every function in both settings, ``runs`` times each; same seed, same numbers.
 
-    ``jobs`` is the number of processes (all cores if None). ``done`` is called with the number of finished parts and of
-    all parts. The result has ``settings`` of the experiment, ``rows`` (mean, std, median, best of each, with table
-    2's), ``costs`` (of each run), and ``claims`` (table 2's rankings, each reproduced or not). Raises InputError for
-    invalid arguments.
+    ``jobs`` processes do the work (None: one for each core, where that pays). ``done`` is called with the number of
+    finished parts and of all parts. The result has ``settings`` of the experiment, ``rows`` (mean, std, median, best of
+    each, with table 2's), ``costs`` (of each run), and ``claims`` (table 2's rankings, each reproduced or not). Raises
+    InputError for invalid arguments.
     """
-    jobs = (os.cpu_count() or 1) if jobs is None else jobs
-    if not 1 <= runs <= MOST_RUNS or jobs < 1:
-        raise InputError(f"1 to {MOST_RUNS} runs and 1 job or more are wanted, given {runs} and {jobs}")
+    if not 1 <= runs <= MOST_RUNS:
+        raise InputError(f"1 to {MOST_RUNS} runs are wanted, given {runs}")
     unknown = [name for name in functions if name not in FUNCTIONS]
     if unknown or not functions or not algorithms:
         raise InputError(f"functions must be of {', '.join(FUNCTIONS)}, given {', '.join(unknown) or 'none'}")
@@ -86,11 +86,13 @@ def run(
         for chunk in _chunks(runs, 10)
     ]
     found: dict[tuple[str, str, str], dict[int, tuple[float, int]]] = {}
-    for count, (part, costs) in enumerate(_carry_out(parts, jobs), start=1):
-        kept = found.setdefault((part.function, part.algorithm, part.setting), {})
-        kept.update(zip(part.runs, costs, strict=True))
-        if done is not None:
-            done(count, len(parts))
+    with executor(jobs, pieces=len(parts), piece_s=PART_S) as workers:
+        for count, (number, costs) in enumerate(workers.each(_work, None, parts), start=1):
+            part = parts[number]
+            kept = found.setdefault((part.function, part.algorithm, part.setting), {})
+            kept.update(zip(part.runs, costs, strict=True))
+            if done is not None:
+                done(count, len(parts))
     costs_of = {key: np.array([kept[k][0] for k in range(runs)]) for key, kept in found.items()}
     evaluations = {key: max(kept[k][1] for k in range(runs)) for key, kept in found.items()}
     order = [(f, a, s) for f in functions for a in algorithms for s in SETTINGS]
@@ -184,20 +186,7 @@ def _chunks(count: int, size: int) -> Iterator[range]:
     return (range(first, min(first + size, count)) for first in range(0, count, size))
 
 
-def _carry_out(parts: Sequence[_Job], jobs: int) -> Iterator[tuple[_Job, list[tuple[float, int]]]]:
-    if jobs == 1 or len(parts) == 1:
-        yield from ((part, _work(part)) for part in parts)
-        return
-    with ProcessPoolExecutor(min(jobs, len(parts)), mp_context=multiprocessing.get_context("spawn")) as pool:
-        waiting = {pool.submit(_work, part): part for part in parts}
-        try:
-            for future in as_completed(waiting):
-                yield waiting[future], future.result()
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _work(job: _Job) -> list[tuple[float, int]]:
+def _work(_: None, job: _Job) -> list[tuple[float, int]]:
     """Cost and evaluations of each run of a job."""
     function = FUNCTIONS[job.function]
     place = tuple(FUNCTIONS).index(job.function)

@@ -7,10 +7,8 @@ raw legal, repaired or refused, by the planners' own steps. The missions are the
 from __future__ import annotations
 
 import json
-import multiprocessing
 import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
@@ -19,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from gcsplan.app.executor import executor
 from gcsplan.bench import swarms_report as report
 from gcsplan.bench import terrain_swarms
 from gcsplan.bench.papers_runs import code_digest
@@ -35,6 +34,9 @@ from gcsplan.planners.swarm.planner import Found, cost_of, drawn, search, settle
 from gcsplan.planners.swarm.settings import Settings
 
 EVALUATIONS = 10_000
+ATTEMPT_S = 0.5
+"""Seconds that an attempt takes, about."""
+
 SYSTEMS = ("krill", "ssgwo", "msfoa", "abo", "ib-abc")
 ENCODINGS = ("paper", "sections", "bspline", "offsets")
 KEPT = "swarms.jsonl"
@@ -63,17 +65,17 @@ def run(
     names: Sequence[str] | None = None,
     encodings: bool = False,
     warm: bool = False,
-    jobs: int = 1,
+    jobs: int | None = 1,
     tell: Callable[[str], None] = lambda words: None,
 ) -> report.Result:
     """Measure, and write ``swarms.md`` and ``swarms.csv`` to ``directory``.
 
     ``count``: missions of each group; ``names``: labels of methods; None: all. ``encodings``: compare encodings
-    instead; ``warm``: with warm starts. Attempts are kept in the directory, and
-    the same command goes on there. Raises InputError for an unknown name, and if mealpy or cma is not installed.
+    instead; ``warm``: with warm starts; ``jobs``: see `app.executor`. Attempts are kept in the directory, and the same
+    command goes on there. Raises InputError for an unknown name, and if mealpy or cma is not installed.
     """
-    if evaluations < 1 or jobs < 1 or (count is not None and count < 1):
-        raise InputError("evaluations, jobs and count must be 1 or more")
+    if evaluations < 1 or (count is not None and count < 1):
+        raise InputError("evaluations and count must be 1 or more")
     known = list(dict.fromkeys(m.label for m in methods(encodings=encodings, warm=warm)))
     for name in names or ():
         if name not in known:
@@ -85,9 +87,11 @@ def run(
     jobs_of = [Job(seed, evaluations, one.name, method) for method in [None, *asked] for one in named]
     kept = Kept(directory / KEPT)
     left = [job for job in jobs_of if job.key not in kept.known]
-    for done, (job, answer) in enumerate(_carried_out(left, jobs), 1):
-        kept.add(job.key, answer)
-        tell(f"{done} of {len(left)}: {job.mission}, {job.method.label if job.method else OPTIMAL}")
+    with executor(jobs, pieces=len(left), piece_s=ATTEMPT_S) as workers:
+        for done, (number, answer) in enumerate(workers.each(answer_of, None, left), 1):
+            job = left[number]
+            kept.add(job.key, answer)
+            tell(f"{done} of {len(left)}: {job.mission}, {job.method.label if job.method else OPTIMAL}")
     optima: dict[str, report.Optimum] = {}
     attempts: list[Attempt] = []
     for job in jobs_of:
@@ -135,25 +139,12 @@ class Kept:
             file.write("\n" + json.dumps({"key": key, "answer": answer}))
 
 
-def _carried_out(todo: Sequence[Job], jobs: int) -> Iterator[tuple[Job, dict[str, Any]]]:
-    if jobs == 1 or len(todo) <= 1:
-        yield from ((job, answer_of(job)) for job in todo)
-        return
-    with ProcessPoolExecutor(min(jobs, len(todo)), mp_context=multiprocessing.get_context("spawn")) as pool:
-        waiting = {pool.submit(answer_of, job): job for job in todo}
-        try:
-            for future in as_completed(waiting):
-                yield waiting[future], future.result()
-        finally:
-            pool.shutdown(cancel_futures=True)
-
-
 @lru_cache(maxsize=2)
 def _missions(seed: int) -> dict[str, NamedProblem]:
     return {one.name: one for one in problems("room", seed)}
 
 
-def answer_of(job: Job) -> dict[str, Any]:
+def answer_of(_: None, job: Job) -> dict[str, Any]:
     """Do one job, in whatever process."""
     one = _missions(job.seed)[job.mission]
     if job.method is None:

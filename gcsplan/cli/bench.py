@@ -92,7 +92,7 @@ def bench_fleet(
 def bench_functions(
     runs: Annotated[int, typer.Option(metavar="N", help="Runs of each (paper: 50).")] = 50,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of all runs.")] = 1,
-    jobs: Annotated[int | None, typer.Option(metavar="N", help="Processes [default: all cores]")] = None,
+    jobs: JobsOption = None,
     out: Annotated[Path | None, typer.Option("-o", "--out", metavar="DIR", help="CSV and Markdown go there.")] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -159,7 +159,7 @@ def bench_swarms(
     ] = None,
     encodings: Annotated[bool, typer.Option("--encodings", help="Compare encodings instead.")] = False,
     warm: Annotated[bool, typer.Option("--warm", help="Searches around the path of `optimal`, too.")] = False,
-    jobs: Annotated[int, typer.Option(metavar="N", help="Processes.")] = 1,
+    jobs: JobsOption = None,
 ) -> None:
     """Search 60 missions with room by every swarm: raw legal, repaired or refused, and the length over `optimal`."""
     from rich.console import Console

@@ -131,6 +131,7 @@ def test_rankings_among_values_that_doubles_cannot_tell_apart_are_left_open() ->
 
 @pytest.mark.slow
 def test_the_benchmark_gives_the_same_numbers_over_processes_as_in_one(tmp_path: Path) -> None:
+    pytest.importorskip("distributed")
     asked = {"runs": 12, "seed": 3, "algorithms": ("gwo", "de"), "functions": ("f1", "f6"), "dim": 4, "iterations": 12}
     parts: list[tuple[int, int]] = []
     alone = run(jobs=1, population=8, done=lambda k, n: parts.append((k, n)), **asked)
