@@ -31,6 +31,8 @@ RIM = 12.0
 """Depth, in cells, to which a zone is looked at that may be too high to climb over so near an end."""
 ALIKE = 12.0
 """A bound's floors make use of the track error only if a cell's diagonal is less than this many times the error."""
+BORDER_HAIR_M, SHUT_M = 0.1, 1e6
+"""Metres by which less than the demanded distance from a border is shut, and by which shut nodes exceed the cap."""
 LEARN_M, LEARN_HAIR_M = 2.0, 0.05
 """Longest step, m, at which `learn` checks a track, and metres by which nodes are raised above what was missing."""
 NODE_BYTES = 150.0
@@ -102,6 +104,8 @@ class ClearanceGrid:
             np.array(ends or []).reshape(-1, 4), low, self._around, self._excess, self._floor, self._ground, self._x,
             self._y, self._diagonal,
         )  # fmt: skip
+        if low:
+            self._shut_border()
         if exact:
             self._be_exact()
         self._zones, self._edges = plane.zones(low, under, over)
@@ -114,6 +118,29 @@ class ClearanceGrid:
         self._held: list[Cone] = []
         self._lift: Floats
         self._either: Int8s
+
+    def _shut_border(self) -> None:
+        """Shut the cells along the terrain's own borders that lie wholly within the distance in which the exact check
+        demands known ground: no legal track meets them."""
+        plane, limits = self.plane, self.plane.problem.limits
+        surface = plane.problem.airspace.surface
+        rows, cols = surface.ground_m.shape
+        reach_m = limits.horizontal_clearance_m + limits.track_error_m - plane.fit.bent_m - BORDER_HAIR_M
+        if reach_m <= 0.0 or all(surface.goes_on):
+            return
+        corners = [(plane.x[j, i], plane.y[j, i]) for j in (0, -1) for i in (0, -1)]
+        east_m, north_m = 1.01 * np.max([surface.grid.metres_per_cell(*at) for at in corners], axis=0)
+        step = plane.stride / (plane.parts * self.fineness)  # all that follows is in cells of the terrain model
+        col = plane.col0 + step * (self.col * self.fineness + np.arange(self.shape[1]))
+        row = plane.row1 - step * (self.row * self.fineness + np.arange(self.shape[0]))
+        within = [
+            (away + step) * cell_m <= reach_m
+            for away, cell_m in ((col, east_m), (row, north_m), (cols - 1 - col, east_m), (rows - 1 - row, north_m))
+        ]
+        west, north, east, south = (np.flatnonzero(w & ~on) for w, on in zip(within, surface.goes_on, strict=True))
+        for part in (np.s_[:, west], np.s_[north], np.s_[:, east], np.s_[south]):
+            excess = self._excess[part]
+            self._excess[part] = np.where(np.isfinite(excess), SHUT_M, excess)
 
     def _be_exact(self) -> None:
         """Set the floors of the nodes that are looked at to those of the exact check."""

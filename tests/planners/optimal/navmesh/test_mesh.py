@@ -4,6 +4,7 @@ and it passes all places that are free in the mesh for paths."""
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -394,3 +395,27 @@ def test_nodes_that_are_looked_at_lie_around_the_cells_that_are_wanted(rows: int
                 assert found[j].tolist() == [some[0], some[-1] + 1]
             else:
                 assert found[j, 0] >= found[j, 1]
+
+
+@pytest.mark.parametrize("goes_on", [(False,) * 4, (True, False, True, False), (True,) * 4])
+@pytest.mark.parametrize("shear", [0.0, 0.4])
+def test_no_track_runs_nearer_to_the_terrains_border_than_ground_must_be_known(
+    goes_on: tuple[bool, bool, bool, bool], shear: float
+) -> None:
+    limits = Limits(min_agl_m=20.0, horizontal_clearance_m=60.0, track_error_m=5.0, altitude_error_m=2.0)
+    surface = replace(terrain(np.random.default_rng(3), 0.0, turned_grid(11.0, shear)), goes_on=goes_on)
+    problem = Problem(Airspace(surface), limits, (0.0, 0.0, 300.0), (1.0, 0.0, 300.0))
+    plane = make_plane(problem, EVERYWHERE)
+    side = np.linspace(0.02, 19.98, 120)
+    at = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
+    places = surface.grid.to_plane(at[:, 0], at[:, 1])
+    high = np.column_stack([places, np.full(len(places), 300.0)])
+    legal = problem.airspace.clear(Legs.between(high, high + np.array([LEG_M, 0.0, 0.0]), limits), limits)
+    for fineness in (1, 4):
+        mesh = mesh_of(plane, 300.0, True, fineness)
+        free = np.array([bool(mesh.pieces_at((float(e), float(n)))) for e, n in places])
+        assert not (legal & ~free).any()
+        if fineness == 4 and not any(goes_on):
+            assert (free & ~legal).sum() < 0.5 * (~legal).sum()
+        if all(goes_on):
+            assert free.all()
