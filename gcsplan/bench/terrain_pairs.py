@@ -9,7 +9,7 @@ Whether the climb limit and the other zones leave a path is for the planners to 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -19,7 +19,7 @@ from gcsplan.mission_file.world import make_box
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.frame import Frame, centre_of
 from gcsplan.world.limits import Limits
-from gcsplan.world.surface import Surface
+from gcsplan.world.surface import NO_SIDES, Surface
 from gcsplan.world.terrain import Terrain, TerrainSpec, open_terrain
 from gcsplan.world.zones import Circle, Level, Zone
 
@@ -219,7 +219,7 @@ def place(rng: np.random.Generator, number: int, way_m: float, steepest_deg: flo
     (e0, n0), (e1, n1) = np.round(frame.to_plane(degrees[:, 0], degrees[:, 1]), 2).tolist()
     box = make_box([(e0, n0), (e1, n1)], [], local=False)
     scale = frame.scale_at(max(math.hypot(e, n) for e in (box[0], box[2]) for n in (box[1], box[3])))
-    surface = sample().load(frame, box)
+    surface = replace(sample().load(frame, box), goes_on=NO_SIDES)  # the window is the whole world, for rivals too
     return Pair(number, frame, (e0, n0), (e1, n1), surface, scale, None, steepest_deg, (), (0, 0))
 
 
