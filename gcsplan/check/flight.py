@@ -37,7 +37,7 @@ from gcsplan.check.geodesy import flat_m
 from gcsplan.check.route import fly_all
 from gcsplan.check.rtl.model import RULES, return_pieces
 from gcsplan.check.rtl.run_on import about_turn_m
-from gcsplan.check.spline import NO_DIRECTION, chords, towards
+from gcsplan.check.spline import NO_DIRECTION, chords, mean_speed_m_s, towards
 from gcsplan.check.stretch import Flight, Place, StretchKind
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
@@ -49,6 +49,8 @@ PLANE_LOW_M = 20.0  # ArduPlane setup_glide_slope: below this height above home 
 COPTER_CIRCLE_RADIUS_M = 10.0  # ArduCopter CIRCLE_RADIUS, default
 LEAST_CLIMB_M = {Autopilot.ARDUCOPTER: 1.0, Autopilot.PX4: 2.5}  # takeoff_start; MIS_TAKEOFF_ALT, default
 TAKE_OFF_ELSEWHERE_M = 30.0
+PASSES_TO = (cmd.WAYPOINT, cmd.SPLINE_WAYPOINT, cmd.LOITER_UNLIM, cmd.LOITER_TIME)
+"""ArduCopter does not stop at a spline's end before these (mode_auto.cpp, `set_next_wp`)."""
 
 
 def follow(
@@ -222,14 +224,17 @@ class _Pilot(Aboard):
         self.at = here
         if beyond is not None and self.hold(item) == 0.0:
             arrives = towards(here if after.command == cmd.SPLINE_WAYPOINT else target, beyond)
-        before = self.direction or NO_DIRECTION
+        before, pace = self.direction or NO_DIRECTION, self.pace
+        stops = not any(before), not any(arrives) or after.command not in PASSES_TO
+        slower = mean_speed_m_s(here, target, (before, arrives), stops, self.vehicle, pace.speed_m_s, pace.rates_m_s)
+        self.pace = replace(pace, speed_m_s=slower)
         for leaves, fly in ((before, self.add), (NO_DIRECTION, self.instead)):
             if fly == self.instead and not any(before):
                 break
             places, bulge_m, steep = chords(here, target, leaves, arrives)
             for (a, b), slopes in zip(pairwise(places), steep, strict=True):
                 fly(seq, "cruise", a, b, band_m=bulge_m, reach_m=bulge_m, on_path=True, steep=slopes)
-        self.at, self.direction = target, None if self.hold(item) else arrives
+        self.pace, self.at, self.direction = pace, target, None if self.hold(item) else arrives
         if hold_s := self.hold(item):
             self.add(seq, "loiter", target, target, hold_s=hold_s)
         self.note("splines are judged as ArduCopter 4.1 and later fly them")
