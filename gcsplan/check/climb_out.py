@@ -57,6 +57,10 @@ SPARED = 0.5
 STEEPEST_DEG = 45.0
 """No aircraft climbs out more steeply; 30° were flown in simulation, with TECS_PITCH_MAX 25."""
 
+OVER_M, OVER_FROM, OVER_FOR_M = 16.0, 0.15, 150.0
+"""How far above the altitude of its take-off an aircraft with much power gets, for it levels off late: 1.5 s of its
+climb (16 m flown at 10.5 m/s, 3 m at 4.6); from which part of its climb-out on; and how many metres after its turn."""
+
 MOST_PARTS = 24
 """Most level bands into which the space above a climb-out is divided."""
 
@@ -136,6 +140,7 @@ def turns_early(pilot: Aboard, seq: int, after: MissionItem) -> None:
     if aside_m <= pilot.vehicle.limits.track_error_m:
         return
     parts = min(math.ceil(aside_m / max(pilot.vehicle.limits.track_error_m, 1.0)), MOST_PARTS)
+    half = over_m(pilot.vehicle.limits) / 2.0
     for k in range(parts):
         share = first + (1.0 - first) * (k + 0.5) / parts
         start = (home[0] + share * (end[0] - home[0]), home[1] + share * (end[1] - home[1]), end[2])
@@ -145,6 +150,10 @@ def turns_early(pilot: Aboard, seq: int, after: MissionItem) -> None:
         swing_m = 0.5 * (1.0 - cosine) * about_turn_m(pilot.vehicle, pilot.pace.speed_m_s, end[2])
         gap_m = 0.5 * (1.0 - first) * math.hypot(*ahead) / parts * math.sqrt(max(0.0, 1.0 - cosine**2))
         pilot.instead(seq, "cruise", start, target, reach_m=swing_m + gap_m)
+        if half > 0.0:
+            near = min(1.0, OVER_FOR_M / max(flat_m(start, target), 1.0))
+            low, high = (*start[:2], end[2] + half), (*_between(start, target, near), end[2] + half)
+            pilot.instead(seq, "takeoff", low, high, column=True, reach_m=swing_m + gap_m, band_m=half)
     pilot.note(
         f"item {seq}: it turns towards the next item as soon as it is high enough, so all straight ways there from the "
         f"climb-out are judged"
@@ -165,7 +174,18 @@ def above_slant(ground: Place, top: Place, limits: Limits) -> list[tuple[Place, 
             (ground[0] + f * (top[0] - ground[0]), ground[1] + f * (top[1] - ground[1]), top[2] - half) for f in (a, b)
         )
         found.append((low, high, half))
+    if (half := over_m(limits) / 2.0) > 0.0:
+        found.append(((*_between(ground, top, OVER_FROM), top[2] + half), (*top[:2], top[2] + half), half))
     return found
+
+
+def over_m(limits: Limits) -> float:
+    """How far above its take-off's altitude, and beyond the altitude error, an aircraft may get."""
+    return max(0.0, OVER_M - limits.altitude_error_m)
+
+
+def _between(a: Place, b: Place, part: float) -> tuple[float, float]:
+    return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])
 
 
 def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bool:
