@@ -5,7 +5,7 @@ course over ground on which it was launched and holds its nose on that heading, 
 climbs with the pitch of param1 (4° if that is 0). With an airspeed sensor that is the least pitch: with power to spare
 it climbs at up to TECS_PITCH_MAX (15°; its path is steeper still: 23° flown), so the space between the slant and the
 item's altitude is judged too. At the item's altitude, wherever that is, it turns and flies straight to the next item,
-not along the leg from the item's place: `turns_early`. The mission holds no heading, so the climb-out is judged towards
+not along the leg from the item's place (`early_turn`). The mission holds no heading, so the climb-out is judged towards
 the item's place, as maps draw it; if the item has no place, towards the next item.
 
 A NAV_LAND glides straight from the way point before it (AP_Landing_Slope.cpp), towards a point before and above its
@@ -28,11 +28,9 @@ from gcsplan.arrays import Floats
 from gcsplan.check.aboard import Aboard
 from gcsplan.check.circles import circle_growth
 from gcsplan.check.geodesy import degree_m, flat_m, offset_m
-from gcsplan.check.rtl.run_on import about_turn_m
 from gcsplan.check.spline import towards
 from gcsplan.check.stretch import Place, Stretch
 from gcsplan.check.verdict import Finding
-from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.units import Quantity, UnitText
@@ -54,12 +52,9 @@ SPARED = 0.5
 """The part of its height that the aircraft needs as clearance while it is too low for the full altitude error."""
 
 
-STEEPEST_DEG = 45.0
-"""No aircraft climbs out more steeply; 30° were flown in simulation, with TECS_PITCH_MAX 25."""
-
-OVER_M, OVER_FROM, OVER_FOR_M = 16.0, 0.15, 150.0
+OVER_M, OVER_FROM = 16.0, 0.15
 """How far above the altitude of its take-off an aircraft with much power gets, for it levels off late: 1.5 s of its
-climb (16 m flown at 10.5 m/s, 3 m at 4.6); from which part of its climb-out on; and how many metres after its turn."""
+climb (16 m flown at 10.5 m/s, 3 m at 4.6); and from which part of its climb-out on."""
 
 MOST_PARTS = 24
 """Most level bands into which the space above a climb-out is divided."""
@@ -87,9 +82,9 @@ def climb_out(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | N
     """NAV_TAKEOFF: straight ahead until the item's altitude is reached; ``after``: the next item that is flown to."""
     lat, lon, ground = pilot.home
     top = pilot.altitude(item, (lat, lon, ground))
-    ahead = _place(pilot, item)
+    ahead = place_of(pilot, item)
     if ahead is None and after is not None:
-        ahead = _place(pilot, after)
+        ahead = place_of(pilot, after)
         pilot.note(f"item {seq} gives no place: the take-off is judged as launched towards the item after it")
     pilot.airborne = True
     frame = m.FRAME_SYNONYMS.get(item.frame, item.frame)
@@ -120,44 +115,6 @@ def climb_out(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | N
     for low, high, band_m in above_slant(pilot.home, end, pilot.vehicle.limits):
         pilot.instead(seq, "takeoff", low, high, column=True, band_m=band_m)
     pilot.at, pilot.direction = end, towards(pilot.home, end)
-    if after is not None:
-        turns_early(pilot, seq, after)
-
-
-def turns_early(pilot: Aboard, seq: int, after: MissionItem) -> None:
-    """The ways to the next item from all places of the climb-out at which the aircraft may be at its altitude."""
-    goal = _place(pilot, after)
-    target = pilot.target(after) if goal is not None else None
-    if target is None or after.command == cmd.LOITER_TO_ALT:
-        return
-    home, end = pilot.home, pilot.at
-    first = min((end[2] - home[2]) / math.tan(math.radians(STEEPEST_DEG)) / flat_m(home, end), 1.0)
-    ahead = offset_m(home, end)
-    place = (home[0] + first * (end[0] - home[0]), home[1] + first * (end[1] - home[1]), end[2])
-    way, rest = offset_m(place, target), offset_m(place, end)
-    part = min(max((rest[0] * way[0] + rest[1] * way[1]) / max(way[0] ** 2 + way[1] ** 2, 1e-9), 0.0), 1.0)
-    aside_m = math.hypot(rest[0] - part * way[0], rest[1] - part * way[1])
-    if aside_m <= pilot.vehicle.limits.track_error_m:
-        return
-    parts = min(math.ceil(aside_m / max(pilot.vehicle.limits.track_error_m, 1.0)), MOST_PARTS)
-    half = over_m(pilot.vehicle.limits) / 2.0
-    for k in range(parts):
-        share = first + (1.0 - first) * (k + 0.5) / parts
-        start = (home[0] + share * (end[0] - home[0]), home[1] + share * (end[1] - home[1]), end[2])
-        turn = offset_m(start, target)
-        length = math.hypot(*ahead) * math.hypot(*turn)
-        cosine = (ahead[0] * turn[0] + ahead[1] * turn[1]) / max(length, 1e-9)
-        swing_m = 0.5 * (1.0 - cosine) * about_turn_m(pilot.vehicle, pilot.pace.speed_m_s, end[2])
-        gap_m = 0.5 * (1.0 - first) * math.hypot(*ahead) / parts * math.sqrt(max(0.0, 1.0 - cosine**2))
-        pilot.instead(seq, "cruise", start, target, reach_m=swing_m + gap_m)
-        if half > 0.0:
-            near = min(1.0, OVER_FOR_M / max(flat_m(start, target), 1.0))
-            low, high = (*start[:2], end[2] + half), (*_between(start, target, near), end[2] + half)
-            pilot.instead(seq, "takeoff", low, high, column=True, reach_m=swing_m + gap_m, band_m=half)
-    pilot.note(
-        f"item {seq}: it turns towards the next item as soon as it is high enough, so all straight ways there from the "
-        f"climb-out are judged"
-    )
 
 
 def above_slant(ground: Place, top: Place, limits: Limits) -> list[tuple[Place, Place, float]]:
@@ -175,7 +132,7 @@ def above_slant(ground: Place, top: Place, limits: Limits) -> list[tuple[Place, 
         )
         found.append((low, high, half))
     if (half := over_m(limits) / 2.0) > 0.0:
-        found.append(((*_between(ground, top, OVER_FROM), top[2] + half), (*top[:2], top[2] + half), half))
+        found.append(((*between(ground, top, OVER_FROM), top[2] + half), (*top[:2], top[2] + half), half))
     return found
 
 
@@ -184,7 +141,7 @@ def over_m(limits: Limits) -> float:
     return max(0.0, OVER_M - limits.altitude_error_m)
 
 
-def _between(a: Place, b: Place, part: float) -> tuple[float, float]:
+def between(a: Place, b: Place, part: float) -> tuple[float, float]:
     return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])
 
 
@@ -380,7 +337,7 @@ def _low(s: Stretch, east: float, north: float, amsl: float, by: float, world: W
     return Finding(s.seq, "min_agl", message, lat, lon, amsl, -by, 0.0, by, "m")
 
 
-def _place(pilot: Aboard, item: MissionItem) -> Place | None:
+def place_of(pilot: Aboard, item: MissionItem) -> Place | None:
     if not pilot.has_place(item):
         return None
     place = (item.lat_deg, item.lon_deg, 0.0)

@@ -33,11 +33,12 @@ from gcsplan.check.arc_waypoint import fly_arc
 from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth, circle_words
 from gcsplan.check.climb_out import REACHED_M, circle_up, climb_out, glide, is_wing
 from gcsplan.check.commands import flown_otherwise, moves_nothing, why_lost
+from gcsplan.check.early_turn import turns_early
 from gcsplan.check.geodesy import flat_m
 from gcsplan.check.route import fly_all
 from gcsplan.check.rtl.model import RULES, return_pieces
 from gcsplan.check.rtl.run_on import about_turn_m
-from gcsplan.check.spline import NO_DIRECTION, chords, mean_speed_m_s, towards
+from gcsplan.check.spline import NO_DIRECTION, chords, slowed, towards
 from gcsplan.check.stretch import Flight, Place, StretchKind
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
@@ -49,8 +50,6 @@ PLANE_LOW_M = 20.0  # ArduPlane setup_glide_slope: below this height above home 
 COPTER_CIRCLE_RADIUS_M = 10.0  # ArduCopter CIRCLE_RADIUS, default
 LEAST_CLIMB_M = {Autopilot.ARDUCOPTER: 1.0, Autopilot.PX4: 2.5}  # takeoff_start; MIS_TAKEOFF_ALT, default
 TAKE_OFF_ELSEWHERE_M = 30.0
-PASSES_TO = (cmd.WAYPOINT, cmd.SPLINE_WAYPOINT, cmd.LOITER_UNLIM, cmd.LOITER_TIME)
-"""ArduCopter does not stop at a spline's end before these (mode_auto.cpp, `set_next_wp`)."""
 
 
 def follow(
@@ -149,7 +148,8 @@ class _Pilot(Aboard):
             return
         if item.command == cmd.TAKEOFF and self.autopilot is Autopilot.ARDUPLANE:
             if is_wing(self.vehicle):
-                climb_out(self, seq, item, self._next(seq))
+                climb_out(self, seq, item, after := self._next(seq))
+                turns_early(self, seq, after)
                 return
             self.flight.not_judged.append(
                 f"item {seq}: a runway take-off (NAV_TAKEOFF on ArduPlane) leaves straight ahead on a heading that "
@@ -218,16 +218,13 @@ class _Pilot(Aboard):
         if not copter or target is None or terrain or not known or after is None or after.command == cmd.ARC_WAYPOINT:
             self._lose(seq, item)
             return
-        here, arrives = self.at, NO_DIRECTION
-        self.at = target  # "altitude 0" in the item after it means the altitude here
+        here, self.at, arrives = self.at, target, NO_DIRECTION  # altitude 0 in the next item means the one here
         beyond = self.target(after) if self.has_place(after) else None
         self.at = here
         if beyond is not None and self.hold(item) == 0.0:
             arrives = towards(here if after.command == cmd.SPLINE_WAYPOINT else target, beyond)
         before, pace = self.direction or NO_DIRECTION, self.pace
-        stops = not any(before), not any(arrives) or after.command not in PASSES_TO
-        slower = mean_speed_m_s(here, target, (before, arrives), stops, self.vehicle, pace.speed_m_s, pace.rates_m_s)
-        self.pace = replace(pace, speed_m_s=slower)
+        self.pace = slowed(pace, self.vehicle, (here, target), (before, arrives), after.command)
         for leaves, fly in ((before, self.add), (NO_DIRECTION, self.instead)):
             if fly == self.instead and not any(before):
                 break

@@ -14,14 +14,17 @@ down within a bend, not ahead of it. `mean_speed_m_s` is the speed of the whole 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.check.geodesy import degree_m, offset_m
+from gcsplan.check.pace import Pace
 from gcsplan.check.stretch import Place
 from gcsplan.fleet.curved import FULL_ACCEL
 from gcsplan.fleet.scurve import along_slope, curves
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.vehicle import Vehicle
 
 LONGEST = 4.0  # SPLINE_FACTOR
@@ -34,6 +37,9 @@ fastest speed below which a curve counts as standing still."""
 
 SPARED = 0.5
 """TANGENTIAL_ACCEL_SCALER, LATERAL_ACCEL_SCALER: the part of the accelerations that a curve is flown with."""
+
+PASSES_TO = (cmd.WAYPOINT, cmd.SPLINE_WAYPOINT, cmd.LOITER_UNLIM, cmd.LOITER_TIME)
+"""ArduCopter does not stop at a spline's end before these (mode_auto.cpp, `set_next_wp`)."""
 
 SAMPLES, ROUNDS = 256, 12
 """Samples of a curve, and steps of the search for its mean speed, each of which halves the error."""
@@ -75,6 +81,12 @@ def _cubic(start: Place, end: Place, leaving: Direction, arriving: Direction) ->
     if both > most:
         leaves, arrives = leaves * (most / both), arrives * (most / both)
     return leaves, 3.0 * way - 2.0 * leaves - arrives, leaves + arrives - 2.0 * way
+
+
+def slowed(pace: Pace, vehicle: Vehicle, ends: tuple[Place, Place], ways: tuple[Direction, Direction], to: int) -> Pace:
+    """The pace of a spline, as a leg of its length. ``to``: the command after it; others see `mean_speed_m_s`."""
+    stops = not any(ways[0]), not any(ways[1]) or to not in PASSES_TO
+    return replace(pace, speed_m_s=mean_speed_m_s(*ends, ways, stops, vehicle, pace.speed_m_s, pace.rates_m_s))
 
 
 def mean_speed_m_s(
