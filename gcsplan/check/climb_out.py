@@ -3,9 +3,10 @@
 What ArduPlane does (commands_logic.cpp, `do_takeoff`, `verify_takeoff`; takeoff.cpp): once it is fast, it records the
 course over ground on which it was launched and holds its nose on that heading, so a cross wind carries it aside. It
 climbs with the pitch of param1 (4° if that is 0). With an airspeed sensor that is the least pitch: with power to spare
-it climbs at up to PTCH_LIM_MAX_DEG, so the space between the slant and the item's altitude is judged too. At the item's
-altitude it turns towards the next item. The mission holds no heading, so the climb-out is judged towards the item's
-place, as maps draw it; if the item has no place, towards the next item.
+it climbs at up to TECS_PITCH_MAX (15°; its path is steeper still: 23° flown), so the space between the slant and the
+item's altitude is judged too. At the item's altitude, wherever that is, it turns and flies straight to the next item,
+not along the leg from the item's place (`early_turn`). The mission holds no heading, so the climb-out is judged towards
+the item's place, as maps draw it; if the item has no place, towards the next item.
 
 A NAV_LAND glides straight from the way point before it (AP_Landing_Slope.cpp), towards a point before and above its
 place from which the flare is flat: a few metres below the line between the two.
@@ -51,6 +52,10 @@ SPARED = 0.5
 """The part of its height that the aircraft needs as clearance while it is too low for the full altitude error."""
 
 
+OVER_M, OVER_FROM = 16.0, 0.15
+"""How far above the altitude of its take-off an aircraft with much power gets, for it levels off late: 1.5 s of its
+climb (16 m flown at 10.5 m/s, 3 m at 4.6); and from which part of its climb-out on."""
+
 MOST_PARTS = 24
 """Most level bands into which the space above a climb-out is divided."""
 
@@ -77,9 +82,9 @@ def climb_out(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | N
     """NAV_TAKEOFF: straight ahead until the item's altitude is reached; ``after``: the next item that is flown to."""
     lat, lon, ground = pilot.home
     top = pilot.altitude(item, (lat, lon, ground))
-    ahead = _place(pilot, item)
+    ahead = place_of(pilot, item)
     if ahead is None and after is not None:
-        ahead = _place(pilot, after)
+        ahead = place_of(pilot, after)
         pilot.note(f"item {seq} gives no place: the take-off is judged as launched towards the item after it")
     pilot.airborne = True
     frame = m.FRAME_SYNONYMS.get(item.frame, item.frame)
@@ -126,7 +131,18 @@ def above_slant(ground: Place, top: Place, limits: Limits) -> list[tuple[Place, 
             (ground[0] + f * (top[0] - ground[0]), ground[1] + f * (top[1] - ground[1]), top[2] - half) for f in (a, b)
         )
         found.append((low, high, half))
+    if (half := over_m(limits) / 2.0) > 0.0:
+        found.append(((*between(ground, top, OVER_FROM), top[2] + half), (*top[:2], top[2] + half), half))
     return found
+
+
+def over_m(limits: Limits) -> float:
+    """How far above its take-off's altitude, and beyond the altitude error, an aircraft may get."""
+    return max(0.0, OVER_M - limits.altitude_error_m)
+
+
+def between(a: Place, b: Place, part: float) -> tuple[float, float]:
+    return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])
 
 
 def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bool:
@@ -321,7 +337,7 @@ def _low(s: Stretch, east: float, north: float, amsl: float, by: float, world: W
     return Finding(s.seq, "min_agl", message, lat, lon, amsl, -by, 0.0, by, "m")
 
 
-def _place(pilot: Aboard, item: MissionItem) -> Place | None:
+def place_of(pilot: Aboard, item: MissionItem) -> Place | None:
     if not pilot.has_place(item):
         return None
     place = (item.lat_deg, item.lon_deg, 0.0)

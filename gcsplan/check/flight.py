@@ -33,11 +33,12 @@ from gcsplan.check.arc_waypoint import fly_arc
 from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth, circle_words
 from gcsplan.check.climb_out import REACHED_M, circle_up, climb_out, glide, is_wing
 from gcsplan.check.commands import flown_otherwise, moves_nothing, why_lost
+from gcsplan.check.early_turn import turns_early
 from gcsplan.check.geodesy import flat_m
 from gcsplan.check.route import fly_all
 from gcsplan.check.rtl.model import RULES, return_pieces
 from gcsplan.check.rtl.run_on import about_turn_m
-from gcsplan.check.spline import NO_DIRECTION, chords, towards
+from gcsplan.check.spline import NO_DIRECTION, chords, slowed, towards
 from gcsplan.check.stretch import Flight, Place, StretchKind
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
@@ -147,7 +148,8 @@ class _Pilot(Aboard):
             return
         if item.command == cmd.TAKEOFF and self.autopilot is Autopilot.ARDUPLANE:
             if is_wing(self.vehicle):
-                climb_out(self, seq, item, self._next(seq))
+                climb_out(self, seq, item, after := self._next(seq))
+                turns_early(self, seq, after)
                 return
             self.flight.not_judged.append(
                 f"item {seq}: a runway take-off (NAV_TAKEOFF on ArduPlane) leaves straight ahead on a heading that "
@@ -216,20 +218,20 @@ class _Pilot(Aboard):
         if not copter or target is None or terrain or not known or after is None or after.command == cmd.ARC_WAYPOINT:
             self._lose(seq, item)
             return
-        here, arrives = self.at, NO_DIRECTION
-        self.at = target  # "altitude 0" in the item after it means the altitude here
+        here, self.at, arrives = self.at, target, NO_DIRECTION  # altitude 0 in the next item means the one here
         beyond = self.target(after) if self.has_place(after) else None
         self.at = here
         if beyond is not None and self.hold(item) == 0.0:
             arrives = towards(here if after.command == cmd.SPLINE_WAYPOINT else target, beyond)
-        before = self.direction or NO_DIRECTION
+        before, pace = self.direction or NO_DIRECTION, self.pace
+        self.pace = slowed(pace, self.vehicle, (here, target), (before, arrives), after.command)
         for leaves, fly in ((before, self.add), (NO_DIRECTION, self.instead)):
             if fly == self.instead and not any(before):
                 break
             places, bulge_m, steep = chords(here, target, leaves, arrives)
             for (a, b), slopes in zip(pairwise(places), steep, strict=True):
                 fly(seq, "cruise", a, b, band_m=bulge_m, reach_m=bulge_m, on_path=True, steep=slopes)
-        self.at, self.direction = target, None if self.hold(item) else arrives
+        self.pace, self.at, self.direction = pace, target, None if self.hold(item) else arrives
         if hold_s := self.hold(item):
             self.add(seq, "loiter", target, target, hold_s=hold_s)
         self.note("splines are judged as ArduCopter 4.1 and later fly them")

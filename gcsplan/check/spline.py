@@ -6,17 +6,26 @@ lengths together exceed `LONGEST` times the distance (ArduCopter 4.1 and later: 
 no direction if the aircraft stopped. It arrives parallel to the leg after it or, if that is a spline too, to the line
 from this curve's beginning to that one's end. In simulation ArduCopter 4.6.0 flew within 1.2 m of these chords, 57 m
 beside the straight line.
+
+It has half of the accelerations of a straight leg, across and along (SplineCurve.cpp, `calc_dt_speed_max`), and slows
+down within a bend, not ahead of it. `mean_speed_m_s` is the speed of the whole curve.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.check.geodesy import degree_m, offset_m
+from gcsplan.check.pace import Pace
 from gcsplan.check.stretch import Place
+from gcsplan.fleet.curved import FULL_ACCEL
+from gcsplan.fleet.scurve import along_slope, curves
+from gcsplan.mavlink.mission import commands as cmd
+from gcsplan.vehicle import Vehicle
 
 LONGEST = 4.0  # SPLINE_FACTOR
 BULGE_M = 0.25
@@ -25,6 +34,15 @@ LOOKS, BESIDE, STILL = 16, 1e-5, 1e-6
 """Samples per piece; offset of the samples on both sides of a place, as a part of the curve; and the part of its
 fastest speed below which a curve counts as standing still."""
 
+
+SPARED = 0.5
+"""TANGENTIAL_ACCEL_SCALER, LATERAL_ACCEL_SCALER: the part of the accelerations that a curve is flown with."""
+
+PASSES_TO = (cmd.WAYPOINT, cmd.SPLINE_WAYPOINT, cmd.LOITER_UNLIM, cmd.LOITER_TIME)
+"""ArduCopter does not stop at a spline's end before these (mode_auto.cpp, `set_next_wp`)."""
+
+SAMPLES, ROUNDS = 256, 12
+"""Samples of a curve, and steps of the search for its mean speed, each of which halves the error."""
 
 Direction = tuple[float, float, float]
 """East, north, up, metres."""
@@ -45,13 +63,7 @@ def chords(start: Place, end: Place, leaving: Direction, arriving: Direction) ->
 
     The slopes are, for each chord, the steepest rise over run of the curve over it, up and down (negative).
     """
-    way, leaves, arrives = (np.array(d) for d in (towards(start, end), leaving, arriving))
-    both = float(np.linalg.norm(leaves) + np.linalg.norm(arrives))
-    most = LONGEST * float(np.linalg.norm(way))
-    if both > most:
-        leaves, arrives = leaves * (most / both), arrives * (most / both)
-    square = 3.0 * way - 2.0 * leaves - arrives
-    cube = leaves + arrives - 2.0 * way
+    leaves, square, cube = _cubic(start, end, leaving, arriving)
     bend = max(float(np.linalg.norm(2.0 * square)), float(np.linalg.norm(2.0 * square + 6.0 * cube)))
     pieces = int(min(max(4, math.ceil(math.sqrt(bend / (8.0 * BULGE_M)))), MOST_PIECES))
     t = np.linspace(0.0, 1.0, pieces + 1)[1:-1, None]
@@ -59,6 +71,74 @@ def chords(start: Place, end: Place, leaving: Direction, arriving: Direction) ->
     east_m, north_m = degree_m(0.5 * (start[0] + end[0]))
     inner = [(start[0] + n / north_m, start[1] + e / east_m, start[2] + u) for e, n, u in points.tolist()]
     return [start, *inner, end], bend / (8.0 * pieces**2), _slopes(leaves, square, cube, pieces)
+
+
+def _cubic(start: Place, end: Place, leaving: Direction, arriving: Direction) -> tuple[Floats, Floats, Floats]:
+    """The coefficients of t, t² and t³, (3,) each, of the way from ``start``; t is 0 there and 1 at ``end``."""
+    way, leaves, arrives = (np.array(d) for d in (towards(start, end), leaving, arriving))
+    both = float(np.linalg.norm(leaves) + np.linalg.norm(arrives))
+    most = LONGEST * float(np.linalg.norm(way))
+    if both > most:
+        leaves, arrives = leaves * (most / both), arrives * (most / both)
+    return leaves, 3.0 * way - 2.0 * leaves - arrives, leaves + arrives - 2.0 * way
+
+
+def slowed(pace: Pace, vehicle: Vehicle, ends: tuple[Place, Place], ways: tuple[Direction, Direction], to: int) -> Pace:
+    """The pace of a spline, as a leg of its length. ``to``: the command after it; others see `mean_speed_m_s`."""
+    stops = not any(ways[0]), not any(ways[1]) or to not in PASSES_TO
+    return replace(pace, speed_m_s=mean_speed_m_s(*ends, ways, stops, vehicle, pace.speed_m_s, pace.rates_m_s))
+
+
+def mean_speed_m_s(
+    start: Place, end: Place, ways: tuple[Direction, Direction], stops: tuple[bool, bool], vehicle: Vehicle,
+    speed_m_s: float, rates_m_s: tuple[float, float],
+) -> float:  # fmt: skip
+    """The speed at which an S-curve as long as the spline takes as long as the spline; ``speed_m_s`` at most.
+
+    ``ways``: its directions at its beginning and its end; ``stops``: whether the vehicle stops there.
+    """
+    if not vehicle.lays_curves or not speed_m_s > 0.0:
+        return speed_m_s
+    level, upright = FULL_ACCEL * vehicle.accel_m_s2, vehicle.vertical_accel_m_s2
+    leaves, square, cube = _cubic(start, end, *ways)
+    t = np.linspace(0.0, 1.0, SAMPLES + 1)[:, None]
+    points = leaves * t + square * t**2 + cube * t**3
+    run = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    length = float(run.sum())
+    if length <= 0.0:
+        return speed_m_s
+    velocity, bend = leaves + 2.0 * square * t + 3.0 * cube * t**2, 2.0 * square + 6.0 * cube * t
+    pace = np.linalg.norm(velocity, axis=1)
+    unit = np.divide(velocity, pace[:, None], out=np.zeros_like(velocity), where=pace[:, None] > STILL)
+    across = bend - unit * (bend * unit).sum(axis=1)[:, None]
+    along = _limit(unit, level, upright, upright) * SPARED
+    turning = _limit(across, level, upright, upright) * SPARED
+    most = np.minimum(_limit(unit, speed_m_s, *rates_m_s), 1e3)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        bent = pace * np.sqrt(turning / np.linalg.norm(across, axis=1))
+    most = np.where(pace > STILL, np.fmin(most, bent), most)
+    away = np.linalg.norm(points - points[-1], axis=1)
+    last = 0.0 if stops[1] else float(most[-1])
+    most = np.minimum(most, np.sqrt(2.0 * along * away + last**2))
+    now, seconds = 0.0 if stops[0] else float(most[0]), 0.0
+    for top, gain, step in zip(most[1:].tolist(), (2.0 * along[:-1] * run).tolist(), run.tolist(), strict=True):
+        then = min(max(top, math.sqrt(max(now * now - gain, 0.0))), math.sqrt(now * now + gain))
+        seconds += 2.0 * step / max(now + then, 1e-3)
+        now = then
+    mean = length / seconds
+    accel = np.array([level])
+    for _ in range(ROUNDS):
+        begins_s = float(curves(np.array([length]), np.array([mean]), accel, vehicle.leg_jerk_m_s3).start_s[0])
+        left_s = seconds - 0.5 * sum(stops) * begins_s
+        mean = 0.5 * (mean + min(length / max(left_s, length / speed_m_s), speed_m_s))
+    return min(mean, speed_m_s)
+
+
+def _limit(way: Floats, level: float, up: float, down: float) -> Floats:
+    """(N,) the largest length along directions (N, 3) whose parts keep limits; ``level`` without a direction."""
+    run = np.hypot(way[:, 0], way[:, 1])
+    each = along_slope(run, way[:, 2], *(np.full(len(way), x) for x in (level, up, down)))
+    return np.where(np.isfinite(each), each, level)
 
 
 def _slopes(leaves: Floats, square: Floats, cube: Floats, pieces: int) -> Slopes:

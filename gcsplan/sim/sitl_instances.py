@@ -20,7 +20,8 @@ from gcsplan.vehicle import Autopilot
 from gcsplan.world.world import World
 
 _BASE_PORT = 5760
-_FIRST_INSTANCE, _LAST_INSTANCE = 20, 900
+_FIRST_INSTANCE, _LAST_INSTANCE = 20, 255
+"""An SITL keeps its number in a byte: 320 would listen at the port of 64 (SITL_State.h)."""
 _START_S, _STOP_S = 30.0, 10.0
 SPEEDUP = 5.0
 """Factor by which the instances' clocks run faster than real time, if the machine is fast enough."""
@@ -33,11 +34,14 @@ def sitl_instances(
     """Start one instance for each part, each in its own directory; yield the URLs by vehicle; stop all at the end.
 
     ``binary``: an arducopter or arduplane, or a folder that holds them. ``world``: its terrain is the ground; None: the
-    ground is flat at the altitude of home. Raises UsageError for a file that cannot be executed, LinkError if an
-    instance does not start.
+    ground is flat at the altitude of home. Raises UsageError for a file that cannot be executed and for too many
+    vehicles, LinkError if an instance does not start.
     """
     if not 0.1 <= speedup <= 100.0:
         raise UsageError(f"--speedup {speedup:g}: 0.1 to 100 times as fast as ours is wanted")
+    most = _LAST_INSTANCE - _FIRST_INSTANCE + 1
+    if len(parts) > most:
+        raise UsageError(f"--sitl-binary flies at most {most} vehicles at once, and there are {len(parts)}")
     programs = {kind: _program(binary, kind) for kind in dict.fromkeys(p.vehicle.autopilot for p in parts)}
     with ExitStack() as stack:
         directory = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="gcsplan-sitl-")))

@@ -459,7 +459,9 @@ def test_a_zone_above_the_slant_is_hit_by_one_that_climbs_steeper() -> None:
 
 def test_what_lies_above_a_slant_is_level_and_reaches_from_within_two_errors_of_it_to_the_top() -> None:
     limits = wing().limits
-    found = above_slant((0.0, 0.0, 10.0), (100.0, 0.0, 90.0), limits)
+    *found, over = above_slant((0.0, 0.0, 10.0), (100.0, 0.0, 90.0), limits)
+    assert over[1][2] - over[2] == pytest.approx(90.0)
+    assert over[1][2] + over[2] + limits.altitude_error_m == pytest.approx(106.0)
     for low, high, half in found:
         assert low[2] == high[2]
         assert low[2] + half == pytest.approx(90.0)

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 from pyproj import Geod
 
+from gcsplan.check.judge import judge
 from gcsplan.check.spline import _slopes, chords, towards
+from gcsplan.mavlink.mission import commands as cmd
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.limits import Limits
+from tests.support.worlds import world
 
 WGS84 = Geod(ellps="WGS84")
 LOOKS = 200_000
@@ -70,3 +77,40 @@ def test_metres_of_a_curve_are_the_ellipsoids(lat: float, bearing: float) -> Non
     a, b = places[1], places[2]
     _, _, run_m = WGS84.inv(a[1], a[0], b[1], b[0])
     assert (b[2] - a[2]) / run_m == pytest.approx(0.5, rel=1e-5)
+
+
+WIDE = ((0, 150), (150, 300), (350, 250), (420, 60), (600, 0), (700, 150), (880, 150), (1000, 0))
+NARROW = ((0, 60), (40, 100), (90, 90), (120, 40), (160, 40), (190, 80), (240, 80), (270, 40))
+LEVEL, HILLY = (40,) * 8, (40, 55, 45, 60, 50, 40, 52, 45)
+
+
+@pytest.mark.parametrize(
+    ("places", "heights", "speed_m_s", "flown_s"),
+    [
+        (WIDE, LEVEL, 5.0, 328.2), (WIDE, LEVEL, 10.0, 170.9), (WIDE, LEVEL, 15.0, 133.3),
+        (WIDE, HILLY, 5.0, 328.3), (WIDE, HILLY, 10.0, 171.0), (WIDE, HILLY, 15.0, 133.7),
+        (NARROW, HILLY, 5.0, 98.9), (NARROW, HILLY, 10.0, 82.5), (NARROW, HILLY, 15.0, 82.5),
+    ],
+)  # fmt: skip
+def test_splines_take_as_long_as_an_arducopter_flew(
+    places: tuple[tuple[int, int], ...], heights: tuple[int, ...], speed_m_s: float, flown_s: float
+) -> None:
+    """Six splines between two way points, from the top of the take-off, as ArduCopter 4.7.0-dev flew them in SITL."""
+    where = world(half_m=3000.0)
+
+    def at(command: int, east: float, north: float, up: float, hold_s: float = 0.0) -> MissionItem:
+        lat, lon = (float(x) for x in where.frame.to_degrees(east, north))
+        return MissionItem(command, m.RELATIVE, (hold_s, 0, 0, 0), m.degrees_e7(lat), m.degrees_e7(lon), up)
+
+    ways = [at(cmd.SPLINE_WAYPOINT, *en, up) for en, up in zip(places, heights, strict=True)]
+    ways[0] = at(cmd.WAYPOINT, *places[0], heights[0])
+    ways[-1] = at(cmd.WAYPOINT, *places[-1], heights[-1], 2.0)
+    beyond = at(cmd.WAYPOINT, places[-1][0], places[-1][1] - 80, heights[-1])
+    items = (at(cmd.TAKEOFF, 0, 0, 40), *ways, beyond, at(cmd.LAND, places[-1][0], places[-1][1] - 80, 0))
+    craft = Vehicle(
+        "uav1", 1, Autopilot.ARDUCOPTER, Limits(10.0), speed_max_m_s=speed_m_s, leg_jerk_m_s3=1.0,
+        lean_angle_deg=45.0 if speed_m_s > 9.0 else 30.0,
+    )  # fmt: skip
+    verdict = judge(Mission(Autopilot.ARDUCOPTER, Home.at(36.6, -84.3, 300.0), items), craft, where)
+    told_s = sum(leg.time_s - leg.hold_s for leg in verdict.legs if 1 < leg.seq <= 9)
+    assert told_s == pytest.approx(flown_s, rel=0.01)

@@ -101,6 +101,16 @@ def test_a_taken_port_is_passed_over_without_a_call() -> None:
         taken.close()
 
 
+def test_an_sitl_counts_its_instances_in_a_byte(tmp_path: Path) -> None:
+    """Number 256 would listen at the port of number 0."""
+    assert sitl_instances._LAST_INSTANCE < 256
+    with (
+        pytest.raises(UsageError, match="at most 236 vehicles at once, and there are 237"),
+        sitl_instances.sitl_instances(tmp_path, [a_part(ramp())] * 237),
+    ):
+        pass
+
+
 def test_a_folder_without_the_vehicles_program_is_named(tmp_path: Path) -> None:
     where = ramp()
     (tmp_path / "arduplane").touch(mode=0o755)

@@ -14,10 +14,11 @@ from gcsplan.figures import raised
 from gcsplan.mavlink.link.numbers import finite, whole
 from gcsplan.mavlink.link.preflight import distance_m
 from gcsplan.mavlink.mission.autopilots import PX4, profile_of
+from gcsplan.mavlink.mission.commands import RTL
 from gcsplan.mavlink.mission.mission import GLOBAL, RELATIVE, Mission
 from gcsplan.mavlink.mission.return_altitude import RETURN_PARAMETERS, on_board, returns_otherwise
 from gcsplan.mavlink.mission.return_route import Route, takes_another_route
-from gcsplan.vehicle import DEFAULT_LEAN_DEG, Autopilot, fastest_at_m_s, lean_for_deg
+from gcsplan.vehicle import COPTER_RETURN_WAITS_S, DEFAULT_LEAN_DEG, Autopilot, fastest_at_m_s, lean_for_deg
 
 Values = Mapping[str, float]
 
@@ -26,6 +27,7 @@ _COPTER = (
     _RETURN[Autopilot.ARDUCOPTER],
     ("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ALT_MAX",), ("FENCE_RADIUS",),
     ("FS_THR_ENABLE",), ("FS_GCS_ENABLE",), ("BATT_FS_LOW_ACT",), ("BATT_FS_CRT_ACT",),
+    ("RTL_LOIT_TIME",),
     ("WPNAV_RADIUS", "WP_RADIUS_M"),  # cm; renamed and in metres since 4.7
     ("ANGLE_MAX", "ATC_ANGLE_MAX"),  # hundredths of a degree; renamed and in degrees since 4.7
 )  # fmt: skip
@@ -62,7 +64,7 @@ _FAILSAFES = {
     "BATT_FS_LOW_ACT": "a low battery", "COM_LOW_BAT_ACT": "a low battery",
 }  # fmt: skip
 _ALTITUDE_FENCE, _CIRCLE_FENCE, _POLYGON_FENCE = 1, 2, 4  # bits of FENCE_TYPE; the circle is the one around home
-_SAME_M = 0.5
+_SAME_M, _SAME_S = 0.5, 0.5
 
 
 def decode_value(message: Any, mav_autopilot: int) -> float:
@@ -145,6 +147,7 @@ def judge_parameters(
         found += _return_altitude(values, rtl_rel_home_m, advised_rel_home_m)
     found += [words] if (words := takes_another_route(values, mission, route)) else []
     found += [words] if (words := returns_otherwise(values)) else []
+    found += _waits(values, mission, route)
     found += _fences(values, _extent(mission))
     found += _lean(values, mission)
     off = [f"{_FAILSAFES[name]} ({name})" for name in _FAILSAFES if values.get(name) == 0]
@@ -195,6 +198,18 @@ def _return_altitude(values: Values, checked_m: float | None, advised_m: float |
     if abs(height_m - wanted_m) > _SAME_M:
         return [f"the return is at {height_m:g} m above home ({name}), as judged: set {parameter.setting(wanted_m)}"]
     return []
+
+
+def _waits(values: Values, mission: Mission, route: Route | None) -> list[str]:
+    """That a return waits over home for another time than is counted; one along the mission does not wait."""
+    waits_s = values.get("RTL_LOIT_TIME", 1000.0 * COPTER_RETURN_WAITS_S) / 1000.0
+    returns = route != "mission" or any(item.command == RTL for item in mission.items)
+    if not returns or abs(waits_s - COPTER_RETURN_WAITS_S) < _SAME_S:
+        return []
+    return [
+        f"RTL_LOIT_TIME is {1000.0 * waits_s:g} on board: a return waits {waits_s:g} s over home before it descends, "
+        f"and times and battery count {COPTER_RETURN_WAITS_S:g} s"
+    ]
 
 
 def _lean(values: Values, mission: Mission) -> list[str]:
