@@ -4,7 +4,7 @@ It is a circle's arc, seen from above, from where the leg begins to the item's p
 anticlockwise if negative (SCurve.cpp, `calculate_track`). Its radius follows from the chord. The altitude changes
 evenly along it, and the speed is at most the root of 5 m/s² (WPNAV_ACCEL_C) times the radius. Below `STRAIGHT_DEG` it
 flies straight. The circle is one in ArduPilot's plane around home, which is not quite ours. Older versions refuse the
-item on upload. No such arc has been flown here.
+item on upload. No released autopilot has flown such an arc here; see docs/concepts/flown.md for what has.
 """
 
 from __future__ import annotations
