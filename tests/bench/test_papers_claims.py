@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -158,3 +160,11 @@ def test_readings_run_in_the_papers_own_scenarios_and_not_in_their_twins() -> No
         assert any(":" in c.name for c in contenders) <= (not scenario.twin_of)
     assert not any(":" in c.name for _, contenders in choose(None, None, readings=False) for c in contenders)
     assert [c.name for c in choose(["abo"], ["pso:inertia-1"])[0][1]] == ["pso:inertia-1"]
+
+
+def test_the_page_in_the_documents_has_every_claim_but_those_on_time_once() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "concepts" / "papers-claims.md").read_text(encoding="utf-8")
+    table = page.split("\n## Claims\n")[1].split("\n## ")[0]
+    told = re.findall(r"^\| ([a-z-]+-\d+) \|", table, re.MULTILINE)
+    assert told == [claim.number for claim in CLAIMS if claim.measure != "time"]
+    assert re.search(r"at commit [0-9a-f]{7,40} \(code [0-9a-f]{16}, seed 1, 30 runs", page)
