@@ -43,6 +43,9 @@ LOOK_S, DESERTED_S = 2.0, 300.0
 JOB_BYTES = 2 << 30
 """Memory for each process of this machine, at least, if nobody says how many: a mission's budget and its terrain."""
 
+KEPT_FREE_BYTES = 1 << 28
+"""Most free memory that a process of this machine keeps."""
+
 MOST_JOBS = 512
 SILENT = 60
 """Level of the logs of dask's own processes: above all, since what matters is raised here."""
@@ -352,6 +355,9 @@ def _processes(count: int) -> Iterator[Any]:
     settings: dict[str, object] = {f"distributed.worker.memory.{key}": False for key in ("target", "spill", "pause")}
     settings["distributed.deploy.lost-worker-timeout"] = "1 day"
     settings["distributed.worker.profile.enabled"] = False  # it takes a fifth of a worker's time
+    # dask gives freed memory back at once; kept, it is not asked of the system again for every large array.
+    settings["distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_"] = KEPT_FREE_BYTES
+    settings["distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_"] = KEPT_FREE_BYTES // 8
     with import_module("dask").config.set(settings):
         try:
             with _deaf():
