@@ -9,7 +9,7 @@ from gcsplan.app.fleet_planning import without
 from gcsplan.app.leaving_out import LeavingOut
 from gcsplan.app.model import Plan
 from gcsplan.app.pipeline import require_passing
-from gcsplan.app.way_home import homes_of, is_required, require
+from gcsplan.app.way_home import homes_of, is_required, judged, require
 from gcsplan.errors import CheckFailed
 
 if TYPE_CHECKING:
@@ -29,26 +29,23 @@ def flyable(
 
     Raises CheckFailed if the plan is refused, NoMission if all vehicles are left out.
     """
-    required = is_required(plan.source, require_way_home)
-    homes = homes_of(plan) if asked or required else {}
     if not plan.leaves_out:
         require_passing({v.name: v.verdict for v in plan.vehicles}, allow_unjudged=allow_unjudged)
-        require(homes, required=required)
-        return plan, homes
-    leaving = LeavingOut(allowed=True)
+        return plan, judged(plan, asked=asked, option=require_way_home)
+    required = is_required(plan.source, require_way_home)
+    homes = homes_of(plan) if asked or required else {}
+    leaving = LeavingOut(allowed=True, found=plan.left_out)
     for v in plan.vehicles:
         try:
             require_passing({v.name: v.verdict}, allow_unjudged=allow_unjudged)
             require({v.name: homes[v.name]} if homes else {}, required=required)
         except CheckFailed as why:
             leaving.leave(v.name, why)
-    if not leaving.found:
-        return plan, homes
-    left_out = (*plan.left_out, *leaving.found)
     gone = {v.name for v in leaving.found}
     vehicles = tuple(v for v in plan.vehicles if v.name not in gone)
-    leaving.found[:] = left_out
+    if len(vehicles) == len(plan.vehicles):
+        return plan, homes
     leaving.require_some(vehicles)
     fleet = None if plan.fleet is None else without(plan.fleet, vehicles, plan.source.arrival)
     homes = {name: home for name, home in homes.items() if name not in gone}
-    return replace(plan, vehicles=vehicles, fleet=fleet, left_out=left_out), homes
+    return replace(plan, vehicles=vehicles, fleet=fleet, left_out=tuple(leaving.found)), homes

@@ -30,11 +30,11 @@ class LeftOut:
 
 
 class LeavingOut:
-    """The vehicles that are left out of a plan, if that is allowed."""
+    """The vehicles that are left out of a plan, if that is allowed; ``found``: those that are already."""
 
-    def __init__(self, *, allowed: bool) -> None:
+    def __init__(self, *, allowed: bool, found: Sequence[LeftOut] = ()) -> None:
         self.allowed = allowed
-        self.found: list[LeftOut] = []
+        self.found = list(found)
 
     def leave(self, name: str, why: NoMission | CheckFailed) -> None:
         """Leave a vehicle out; raises ``why`` if that is not allowed."""
