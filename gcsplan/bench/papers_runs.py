@@ -30,7 +30,8 @@ from gcsplan.planners.problem import Problem
 from gcsplan.planners.registry import get as get_planner
 from gcsplan.planners.swarm import aco
 from gcsplan.planners.swarm.bspline import fewer
-from gcsplan.planners.swarm.planner import Found, search
+from gcsplan.planners.swarm.planner import Found, scene_of, search
+from gcsplan.planners.swarm.scene import Scene
 from gcsplan.planners.swarm.settings import Settings
 from gcsplan.world.path import Path as FlownPath
 from gcsplan.world.zones import Circle
@@ -185,31 +186,37 @@ def seed_of(seed: int, number: int, vehicle: int) -> int:
     return int(np.random.SeedSequence([seed, number, vehicle]).generate_state(1)[0])
 
 
-def _search(problem: Problem, contender: Contender, settings: Settings) -> Found:
+def _search(problem: Problem, contender: Contender, settings: Settings, scene: Scene) -> Found:
     if contender.planner == "aco":
-        return aco.search(problem, settings)
-    return search(problem, get_planner(contender.planner).optimiser, settings)
+        return aco.search(problem, settings, scene)
+    return search(problem, get_planner(contender.planner).optimiser, settings, scene)
 
 
-@lru_cache(maxsize=256)
-def _warm(scenario: str, text: str, algorithm: str) -> None:
-    """Compile and load everything that this contender needs, so that no run's time contains it."""
+@lru_cache(maxsize=4)
+def _warm(scenario: str, text: str, algorithm: str) -> list[Scene]:
+    """The scenes of a contender's vehicles; it also compiles and loads all that a run needs.
+
+    So no run's time contains them, and the runs of a contender, which follow each other, share them.
+    """
     job = PaperRun(scenario, algorithm, text, 1, 0, "")
     ready = prepare(scenario, text)
+    settings = settings_of(job.contender, ready.source)
+    scenes = [scene_of(problem, settings) for problem in ready.problems]
     with suppress(NoMission):  # a single iteration of ants may not reach the goal
-        _search(ready.problems[0], job.contender, replace(settings_of(job.contender, ready.source), iterations=1))
+        _search(ready.problems[0], job.contender, replace(settings, iterations=1), scenes[0])
+    return scenes
 
 
 def _swarm(job: PaperRun, ready: Set) -> Record:
     contender = job.contender
     settings = settings_of(contender, ready.source)
-    _warm(job.scenario, job.text, job.algorithm)
+    scenes = _warm(job.scenario, job.text, job.algorithm)
     by_priority = SCENARIOS[job.scenario].paper.fleet == "priority"
     found: list[Found] = []
     began = time.thread_time()
-    for vehicle, problem in enumerate(ready.problems):
+    for vehicle, (problem, scene) in enumerate(zip(ready.problems, scenes, strict=True)):
         own = replace(settings, earlier=tuple(f.curve for f in found)) if by_priority else settings
-        found.append(_search(replace(problem, seed=seed_of(job.seed, job.number, vehicle)), contender, own))
+        found.append(_search(replace(problem, seed=seed_of(job.seed, job.number, vehicle)), contender, own, scene))
     took = time.thread_time() - began
     history = _history(found)
     cost = sum(f.result.cost for f in found)

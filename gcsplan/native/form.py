@@ -48,8 +48,14 @@ def read_forms(text: str) -> tuple[Form, ...]:
             raise ValueError(
                 f"a form is f8, i8 or b1, or an array of these, f4, i4 or i1, such as f8[,], given {word!r}"
             )
-        forms.append(Form(letters, _SHAPES[shape]))
+        forms.append(_form(letters, _SHAPES[shape]))
     return tuple(forms)
+
+
+@functools.cache
+def _form(letters: str, dimensions: int) -> Form:
+    """One object for each form, so that tuples of forms are compared by identity, at every call of a kernel."""
+    return Form(letters, dimensions)
 
 
 def slots_of(form: Form, argument: Any) -> tuple[Any, ...]:

@@ -162,7 +162,7 @@ class _Book:
         if raw.shape != (len(batch),):
             raise GcsplanError(f"the cost must have shape ({len(batch)},), one number a row; given {raw.shape}")
         run.evaluations += len(batch)
-        costs = np.where(np.isfinite(raw), np.clip(raw, -WORST, WORST), WORST)
+        costs = np.where(np.isfinite(raw), raw.clip(-WORST, WORST), WORST)
         lead = int(costs.argmin())
         if self.best_x is None or costs[lead] < min(self.best, WORST):
             self.best_x = batch[lead].copy()

@@ -27,11 +27,12 @@ def krill(run: Run, *, sight: float, step: float, crowding: float, attempts: int
     f = yield x
     everyone = np.arange(len(x))
     rule = _Rule(run.rng, sight, step, crowding, attempts, crowd == "printed")
+    seen = rule.sees(x, everyone)
     for _ in run.cycles():
         for who in (everyone,) if moves == "together" else everyone[:, None]:
-            moved, f_moved = yield from rule.moved(x, f, who)
-            x, f = x.copy(), f.copy()
-            x[who], f[who] = moved, f_moved
+            x[who], f[who] = yield from rule.moved(x, f, seen, who)
+            seen[who] = rule.sees(x, who)
+            seen[:, who] = seen[who].T
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +46,20 @@ class _Rule:
     attempts: int
     printed: bool
 
-    def moved(self, x: Floats, f: Floats, who: Indices) -> Generator[Floats, Floats, tuple[Floats, Floats]]:
-        """New places and costs of the krill ``who`` (m,) among all at ``x`` (n, dim) of costs ``f``."""
+    def sees(self, x: Floats, who: Indices) -> Bools:
+        """(m, n) which of all krill at ``x`` (n, dim) those of ``who`` (m,) have in sight; none sees itself."""
+        seen = np.asarray(rms_distances(x[who], x) < self.sight)
+        seen[np.arange(len(who)), who] = False
+        return seen
+
+    def moved(
+        self, x: Floats, f: Floats, seen: Bools, who: Indices
+    ) -> Generator[Floats, Floats, tuple[Floats, Floats]]:
+        """New places and costs of the krill ``who`` (m,) among all at ``x`` (n, dim) of costs ``f``.
+
+        ``seen`` (n, n): which krill each of them has in sight.
+        """
         n, m = len(x), len(who)
-        seen = rms_distances(x) < self.sight
-        seen[np.arange(n), np.arange(n)] = False
         around = seen.sum(axis=1)
         met = (around > 0)[who]
 
@@ -93,7 +103,7 @@ class _Rule:
 def towards(rng: np.random.Generator, x: Floats, target: Floats, step: float) -> Floats:
     """Move each of ``x`` (n, dim) by a random part of one step towards its target (eq. 6)."""
     way = target - x
-    length = np.sqrt((way * way).mean(axis=1, keepdims=True))
+    length = np.sqrt(np.add.reduce(way * way, axis=1, keepdims=True) / x.shape[1])
     return x + rng.random((len(x), 1)) * step * way / np.where(length > 0.0, length, 1.0)
 
 

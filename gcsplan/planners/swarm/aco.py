@@ -53,14 +53,14 @@ def plan(problem: Problem, row: Entry) -> Solution:
     return until_found(problem, row, search)
 
 
-def search(problem: Problem, settings: Settings) -> Found:
-    """Run the ants once. Raises InputError for unknown options, Refusal if no ant arrives."""
+def search(problem: Problem, settings: Settings, scene: Scene | None = None) -> Found:
+    """Run the ants once; ``scene`` as in `cost_of`. Raises InputError for unknown options, Refusal if none arrives."""
     parameters = settings.split()[1]
     for name in parameters:
         if name not in Rule.__dataclass_fields__:
             raise unknown_name(f"aco has no parameter {name!r}", name, Rule.__dataclass_fields__)
     rule = Rule(**{key: float(value) for key, value in parameters.items()})
-    cost = cost_of(problem, replace(settings, encoding="sections"))
+    cost = cost_of(problem, replace(settings, encoding="sections"), scene)
     code, scene = cost.code, cost.code.scene
     layers = make_layers(scene, code.points)
     result, nodes = march(problem, cost, layers, open_between(scene, layers), rule, settings)

@@ -97,8 +97,8 @@ def _flat(scene: Scene, a: Floats, b: Floats, along: Floats, aside: Floats, out:
     """Write points, from their parts along the track and to its left, to ``out`` (n, K, 2 or more); clipped to the
     map."""
     ahead, left = _frame(a, b)
-    for i in range(2):
-        np.clip(a[i] + along * ahead[i] + aside * left[i], scene.low[i], scene.high[i], out=out[..., i])
+    flat = a[:2] + along[..., None] * ahead + aside[..., None] * left
+    flat.clip(scene.low[:2], scene.high[:2], out=out[..., :2])
 
 
 def _altitude(scene: Scene, u: Floats, out: Floats) -> None:

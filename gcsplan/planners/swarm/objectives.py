@@ -61,20 +61,27 @@ class Objective:
     weigh: Weigh
 
 
-def forbidden(terms: Floats, straight_m: float, skip: Sequence[int] = ()) -> Floats:
+BROKEN = np.array([k.BELOW, k.ABOVE, k.UNKNOWN, k.INSIDE, k.STEEP, k.SUNK, k.PROUD, k.DEEP])
+"""Terms of broken limits: metres of path, then depths integrated along it (m²)."""
+
+METRES, DEPTHS = np.array([1.0] * 5 + [0.0] * 3), np.array([0.0] * 5 + [20.0] * 3)
+
+NOT_ABOS = np.array([0.0, 1.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0])
+"""1 for each of `BROKEN` that ABO does not count itself."""
+
+
+def forbidden(terms: Floats, straight_m: float, counts: float | Floats = 1.0) -> Floats:
     """Metres (n,) of path that break a limit, plus a measure of how deeply; 0 if no limit is broken.
 
-    ``skip``: terms that the objective counts itself.
+    ``counts``: 0 for each of `BROKEN` that the objective counts itself, otherwise 1.
     """
-    out = np.zeros(len(terms))
-    for term in (k.BELOW, k.ABOVE, k.UNKNOWN, k.INSIDE, k.STEEP):
-        if term not in skip:
-            out += terms[:, term]
-    # Depths integrated along the path (m²), divided by its straight length, rank paths through the same hill.
-    for term in (k.SUNK, k.PROUD, k.DEEP):
-        if term not in skip:
-            out += terms[:, term] * (20.0 / straight_m)
-    return out
+    # Depths divided by the straight length rank paths through the same hill.
+    return _sums(terms.take(BROKEN, axis=1) * (counts * (METRES + DEPTHS / straight_m)))
+
+
+def _sums(rows: Floats) -> Floats:
+    """Sums (n,) of rows (n, m), whose numbers are added one by one: a row has the same sum alone and in any array."""
+    return np.asarray(np.add.accumulate(rows, axis=1)[:, -1])
 
 
 def _krill(terms: Floats, unit: Unit) -> Floats:
@@ -128,10 +135,14 @@ def _msfoa(terms: Floats, unit: Unit) -> Floats:
 def _abo(terms: Floats, unit: Unit) -> Floats:
     """ABO, eq. 4–7: length, and P = 100 for each sample under ground (D: under the floor) or outside of the volume."""
     own = terms[:, k.LENGTH] + PENALTY * (terms[:, k.UNDER] + terms[:, k.OUTSIDE])
-    return np.asarray(own + PENALTY * forbidden(terms, unit.straight_m, (k.BELOW, k.SUNK, k.UNKNOWN)))
+    return np.asarray(own + PENALTY * forbidden(terms, unit.straight_m, NOT_ABOS))
 
 
-IB_ABC_WEIGHTS = (0.4, 0.2, 0.2, 0.2)  # D: λ of eq. 6
+IB_ABC_TERMS = np.array([k.LENGTH, k.BEND, k.EXPOSED, k.SPHERE])
+IB_ABC_WEIGHTS = np.array([0.4, 0.2, 0.2, 0.2])  # D: λ of eq. 6
+LEAST, NONE = np.array([1.0, math.pi, 1.0, 1.0]), np.array([1e-9, 1e-3, 1e-9, 1e-9])
+"""What a term is divided by where the straight line has none of it, that is at most ``NONE``: float noise turns the
+line by some 1e-8 rad at each node (arccos)."""
 
 
 def _ib_abc(terms: Floats, unit: Unit) -> Floats:
@@ -141,15 +152,9 @@ def _ib_abc(terms: Floats, unit: Unit) -> Floats:
     segment with d_safe; here the distance to obstacle or ground, and Z is AGL. E eq. 5 charges W_t, which is zero at
     the centre; here R_t - W_t.
     """
-    out = np.zeros(len(terms))
-    own = (k.LENGTH, k.BEND, k.EXPOSED, k.SPHERE)
-    # Float noise turns a straight line by some 1e-8 rad per node (arccos): less than 1e-3 in all counts as 0.
-    for weight, term, least, none in zip(
-        IB_ABC_WEIGHTS, own, (1.0, math.pi, 1.0, 1.0), (1e-9, 1e-3, 1e-9, 1e-9), strict=True
-    ):
-        straight = float(unit.straight[term])
-        out += weight * terms[:, term] / (straight if straight > none else least)
-    return np.asarray(out + PENALTY * forbidden(terms, unit.straight_m) / unit.straight_m)
+    straight = unit.straight[IB_ABC_TERMS]
+    own = _sums(IB_ABC_WEIGHTS * terms.take(IB_ABC_TERMS, axis=1) / np.where(straight > NONE, straight, LEAST))
+    return np.asarray(own + PENALTY * forbidden(terms, unit.straight_m) / unit.straight_m)
 
 
 OBJECTIVES: Mapping[str, Objective] = MappingProxyType(

@@ -75,18 +75,26 @@ def row_of(optimiser: str) -> Row:
     return cmaes.ENTRY if optimiser == cmaes.ENTRY.name else get_optimiser(optimiser)
 
 
-def cost_of(problem: Problem, settings: Settings) -> Cost:
-    """The objective of a search. Raises InputError for options that it does not accept."""
-    scene = Scene.of(problem, settings.split()[0])
+def scene_of(problem: Problem, settings: Settings) -> Scene:
+    """The scene of a search; it depends on neither seed nor earlier vehicles. Raises InputError for a bad volume."""
+    return Scene.of(problem, settings.split()[0])
+
+
+def cost_of(problem: Problem, settings: Settings, scene: Scene | None = None) -> Cost:
+    """The objective of a search. Raises InputError for options that it does not accept.
+
+    ``scene``: that of `scene_of`, where it is there already.
+    """
+    scene = scene_of(problem, settings) if scene is None else scene
     code = Code.of(settings.encoding, scene, settings.points)
     earlier = [Earlier.at_speed(points, settings.speed_m_s) for points in settings.earlier]
     return Cost(problem, code, get_objective(settings.cost), earlier=earlier, speed_m_s=settings.speed_m_s)
 
 
-def search(problem: Problem, optimiser: str, settings: Settings) -> Found:
-    """Run ``optimiser`` once. Raises InputError for options that it does not accept."""
+def search(problem: Problem, optimiser: str, settings: Settings, scene: Scene | None = None) -> Found:
+    """Run ``optimiser`` once; ``scene`` as in `cost_of`. Raises InputError for options that it does not accept."""
     parameters = settings.split()[1]
-    cost = cost_of(problem, settings)
+    cost = cost_of(problem, settings, scene)
     row = row_of(optimiser)
     if "threshold" in row.defaults and parameters.get("threshold") is None:
         parameters["threshold"] = THRESHOLD * cost.straight_cost()

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices, Singles
 from gcsplan.errors import InputError
+from gcsplan.native.form import Held
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.registry import VOLUME_KEYS
 from gcsplan.planners.swarm import scene_kernels as k
@@ -142,14 +144,20 @@ class Scene:
         return out.reshape(points.shape[:-1])
 
     def room(self, points: Floats) -> tuple[Floats, Floats]:
-        """Lowest and highest legal altitude at points, clipped to the volume; the lowest is never above the highest."""
-        n = self.numbers
-        floor = np.nan_to_num(self.floor(points), nan=float(self.high[2]))
-        high = np.full(floor.shape, n[k.MAX_AMSL])
-        if self.ceiling_follows_ground:
-            np.minimum(high, np.nan_to_num(self.ground(points), nan=FAR) + n[k.MAX_AGL], out=high)
-        high = np.clip(high, self.low[2], self.high[2])
-        return np.minimum(np.clip(floor, self.low[2], self.high[2]), high), high
+        """Lowest and highest legal altitude at points, clipped to the volume; the lowest is never above the highest.
+
+        Over unknown ground the lowest is the volume's top.
+        """
+        flat = np.ascontiguousarray(points).reshape(-1, points.shape[-1])
+        low, high = np.empty(len(flat)), np.empty(len(flat))
+        k.rooms(self._ground, flat, self.ceiling_follows_ground, low, high)
+        shape = points.shape[:-1]
+        return low.reshape(shape), high.reshape(shape)
+
+    @cached_property
+    def _ground(self) -> Held:
+        """What `rooms` reads, prepared for the many calls that each have few points."""
+        return Held(k.GROUND, self.heights, self.quadratic, self.floors, self.floor_map, self.numbers)
 
     def _terminals(self, problem: Problem, flat: Floats) -> Floats:
         """Start, via points and goal (M, 3). A via of free altitude is put on the line between its neighbours of fixed

@@ -9,8 +9,11 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Singles
 from gcsplan.planners.swarm.compiled import device, kernel
 
-SCENE = "f4[,] f8[,] f4[,] f8[,] f8[] f8[,] f8[,]"
-"""Forms of a scene's heights, quadratic, floors, floor_map, numbers, zones and corners."""
+GROUND = "f4[,] f8[,] f4[,] f8[,] f8[]"
+"""Forms of a scene's heights, quadratic, floors, floor_map and numbers."""
+
+SCENE = f"{GROUND} f8[,] f8[,]"
+"""The same, and those of its zones and corners."""
 
 # Indices of a scene's numbers.
 (
@@ -53,6 +56,27 @@ def heights_at(heights: Singles, quadratic: Floats, numbers: Floats, points: Flo
     """Write bilinear heights under points (N, 2 or more) to ``out`` (N,)."""
     for k in range(len(points)):
         out[k] = height_at(heights, quadratic, numbers, points[k, 0], points[k, 1])
+
+
+@kernel(f"{GROUND} f8[,] b1 f8[] f8[]")
+def rooms(
+    heights: Singles, quadratic: Floats, floors: Singles, floor_map: Floats, numbers: Floats, points: Floats,
+    follows: bool, low: Floats, high: Floats,
+) -> None:  # fmt: skip
+    """Write the lowest and highest legal altitudes (N,) at points (N, 2 or more), as `Scene.room` has them.
+
+    ``follows``: the ceiling follows the ground.
+    """
+    bottom, top = numbers[BOTTOM], numbers[TOP]
+    for k in range(len(points)):
+        e, n = points[k, 0], points[k, 1]
+        floor, ceiling = height_at(floors, floor_map, numbers, e, n), numbers[MAX_AMSL]
+        if follows:
+            ground = height_at(heights, quadratic, numbers, e, n)
+            if ground == ground:
+                ceiling = min(ceiling, ground + numbers[MAX_AGL])
+        high[k] = min(max(ceiling, bottom), top)
+        low[k] = min(max(floor, bottom), high[k]) if floor == floor else high[k]
 
 
 @device
