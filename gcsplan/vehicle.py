@@ -71,6 +71,20 @@ class Energy:
 
 
 @dataclass(frozen=True, slots=True)
+class ClimbOut:
+    """A fixed wing's take-off as it was flown, means from leaving the ground to its altitude: climb rate and speed over
+    ground in still air, both in m/s."""
+
+    climb_m_s: float
+    speed_m_s: float
+
+    @property
+    def space_m_s(self) -> float:
+        """Speed along its path."""
+        return math.hypot(self.climb_m_s, self.speed_m_s)
+
+
+@dataclass(frozen=True, slots=True)
 class Vehicle:
     """An airframe with its limits. Speeds are in m/s: over ground (cruise; of a fixed wing, the airspeed that it
     indicates) and vertical (climb, descent).
@@ -82,6 +96,7 @@ class Vehicle:
     a sharp corner at full speed. A climb or descent rate of ``inf`` means that the cruise speed is the speed in space,
     whatever the slope: the ideal vehicle of the papers. ``lean_angle_deg`` is an ArduCopter's largest lean angle, and
     ``vel_max_m_s`` a PX4's MPC_XY_VEL_MAX: they have bounded ``speed_max_m_s`` already; None: they bound nothing.
+    ``climb_out``: a fixed wing's, if it is known.
     """
 
     name: str
@@ -102,6 +117,7 @@ class Vehicle:
     leg_jerk_m_s3: float = math.inf
     lean_angle_deg: float | None = None
     vel_max_m_s: float | None = None
+    climb_out: ClimbOut | None = None
 
     @property
     def lays_curves(self) -> bool:

@@ -13,7 +13,7 @@ from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth
 from gcsplan.check.verdict import LegFigures
 from gcsplan.world.world import World
 
-__all__ = ["circling_m", "climb_out_and_glide"]
+__all__ = ["circling_m", "climb_out_and_glide", "climb_out_m_s"]
 
 
 def climb_out_and_glide(v: VehiclePlan, world: World) -> tuple[Floats | None, Floats | None]:
@@ -24,6 +24,15 @@ def climb_out_and_glide(v: VehiclePlan, world: World) -> tuple[Floats | None, Fl
     first = next(i for i, leg in enumerate(legs) if leg.on_path)
     down = [leg for leg in legs[first:] if leg.kind == "land"]
     return _line(legs[:first], world), _line(down, world) if down else None
+
+
+def climb_out_m_s(v: VehiclePlan) -> Floats | None:
+    """Speeds (K - 1,) of the parts of the climb-out, m/s; None: those of any leg, also for what is not a fixed wing."""
+    if v.order.wing is None or v.request.vehicle.climb_out is None:
+        return None
+    legs = v.verdict.legs
+    first = next(i for i, leg in enumerate(legs) if leg.on_path)
+    return np.array([leg.length_m / leg.time_s if leg.time_s > 0.0 else 1.0 for leg in legs[:first]])
 
 
 def circling_m(v: VehiclePlan) -> float:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from gcsplan.app.climb_out import circling_m, climb_out_and_glide
+from gcsplan.app.climb_out import circling_m, climb_out_and_glide, climb_out_m_s
 from gcsplan.app.detours import Detours
 from gcsplan.app.gate import SLACK_S, GateTime, gated
 from gcsplan.app.leaving_out import LeavingOut, least_to_leave
@@ -180,6 +180,7 @@ def route_of(v: VehiclePlan, world: World) -> Route:
         holds_s=holds,
         items=items,
         climb_out=climb_out,
+        climb_out_m_s=climb_out_m_s(v),
         glide=glide,
         pace=pace,
     )  # fmt: skip

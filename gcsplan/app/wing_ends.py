@@ -16,7 +16,8 @@ import numpy as np
 from gcsplan.app.problems import lowest_amsl
 from gcsplan.arrays import Floats
 from gcsplan.check.circles import circle_growth
-from gcsplan.check.climb_out import REACHED_M, above_slant, circle_missing_m, flared, slant_shortage
+from gcsplan.check.climb_out import REACHED_M, above_slant, circle_missing_m, over_m, slant_shortage
+from gcsplan.check.glide import flared
 from gcsplan.errors import NoMission
 from gcsplan.mavlink.build.fixed_wing import pitch_deg
 from gcsplan.mavlink.build.order import MARGINS
@@ -75,10 +76,11 @@ def starts(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator
     given = request.takeoff_heading_deg
     heading = None if given is None else math.radians(90.0 - given)
     found = False
-    for end in _ends(problem, request.start, slope, request.takeoff_agl_m, sharp, heading, 0.0):
+    over = over_m(request.vehicle)
+    for end in _ends(problem, request.start, slope, request.takeoff_agl_m, sharp, heading, 0.0, over):
         found = True
         yield end
-    for end in () if found else _circles(problem, request.start, slope, request.takeoff_agl_m, sharp, heading):
+    for end in () if found else _circles(problem, request.start, slope, request.takeoff_agl_m, sharp, heading, over):
         found = True
         yield end
     if not found:
@@ -100,7 +102,7 @@ def goals(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[
     slope = request.vehicle.limits.max_descent_slope * (1.0 - MARGINS.slope)
     found = False
     for end in _ends(
-        problem, request.goal, slope, request.approach_agl_m, sharp[::-1], None, request.vehicle.speed_max_m_s
+        problem, request.goal, slope, request.approach_agl_m, sharp[::-1], None, request.vehicle.speed_max_m_s, 0.0
     ):
         found = True
         yield end
@@ -120,16 +122,17 @@ def _ends(
     sharp: Floats,
     heading: float | None,
     lands_m_s: float,
+    over: float,
 ) -> Iterator[FlightEnd]:
     """The legal ends at ``place`` (on the ground), seen outwards from it; ``sharp`` (N, 3) is the path from there.
 
-    ``lands_m_s`` is the speed of a landing, 0 for a take-off.
+    ``lands_m_s`` is the speed of a landing, 0 for a take-off; ``over``: how far a take-off gets above its altitude, m.
     """
     ground, radius = np.array(place), problem.turn_radius_m
     run_m = radius * math.tan(0.5 * SHARPEST) + 20.0
     aim = _along(sharp, (float(sharp[0, 2]) - place[2]) / slope + run_m + 2.0 * radius)
     for one in _headings(ground, aim, heading):
-        end = _end(problem, ground, one, slope, agl_m, aim, run_m, lands_m_s)
+        end = _end(problem, ground, one, slope, agl_m, aim, run_m, lands_m_s, over)
         if end is not None:
             yield end
 
@@ -153,6 +156,7 @@ def _end(
     aim: Floats,
     run_m: float,
     lands_m_s: float,
+    over: float,
 ) -> FlightEnd | None:
     """The shortest legal end on a heading; None if there is none."""
     air, limits = problem.airspace, problem.limits
@@ -170,7 +174,7 @@ def _end(
         if needed > z:
             length += max((needed - z) / slope, 1.0) if needed - z < 50.0 else LONGER_M
             continue
-        if not _slant_clear(ground, top, limits, air, lands_m_s):
+        if not _slant_clear(ground, top, limits, air, lands_m_s, over):
             return None
         if air.clear(Legs.of_path(np.vstack([top, chain]), slanted), slanted).all():
             return FlightEnd(ground, top, chain, heading)
@@ -178,14 +182,14 @@ def _end(
     return None
 
 
-def _slant_clear(ground: Floats, top: Floats, limits: Limits, air: Airspace, lands_m_s: float) -> bool:
+def _slant_clear(ground: Floats, top: Floats, limits: Limits, air: Airspace, lands_m_s: float, over: float) -> bool:
     lines = [np.array([ground, top])]
     if lands_m_s > 0.0:
         below = flared(_three(top), _three(ground), math.dist(top[:2], ground[:2]), lands_m_s)
         lines += [np.array([b, a]) for a, b in pairwise(below)]
     elif not all(
         _column_clear(np.array(a), np.array(b), 0.0, limits, air, band_m)
-        for a, b, band_m in above_slant(_three(ground), _three(top), limits)
+        for a, b, band_m in above_slant(_three(ground), _three(top), limits, over)
     ):
         return False
     return all(
@@ -218,6 +222,7 @@ def _circles(
     agl_m: float | None,
     sharp: Floats,
     heading: float | None,
+    over: float,
 ) -> Iterator[FlightEnd]:
     """Short climb-outs that continue in circles, up to where the first leg is legal in any direction."""
     air, limits, radius = problem.airspace, problem.limits, circle_m(problem)
@@ -227,7 +232,7 @@ def _circles(
         way = np.array([math.cos(one), math.sin(one)])
         for low_m in CIRCLES_FROM_M:
             top = np.array([*(ground[:2] + low_m / slope * way), place[2] + low_m])
-            if not _slant_clear(ground, top, limits, air, 0.0):
+            if not _slant_clear(ground, top, limits, air, 0.0, over):
                 break
             for side in (0.5 * math.pi, -0.5 * math.pi, 0.0):  # middle left, right (both on the circle) or ahead
                 towards = np.array([math.cos(one + side), math.sin(one + side)])

@@ -14,6 +14,9 @@ from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.atmosphere import true_per_indicated
 
+PLANE_GLIDE_SLOPE_MIN_M = 15.0  # ArduPlane GLIDE_SLOPE_MIN, default
+PLANE_LOW_M = 20.0  # ArduPlane setup_glide_slope: below this height above home it climbs at once
+
 PX4_SLOW_BELOW_M = 5.0
 """MPC_LAND_ALT2, default: below this height over home a landing PX4 is as slow as MPC_LAND_SPEED."""
 
@@ -69,6 +72,17 @@ class Aboard:
     def add(self, seq: int, kind: StretchKind, start: Place, end: Place, **more: object) -> None:
         """Add the next stretch; ``more`` are fields of `Stretch`."""
         self.flight.stretches.append(self.stretch(seq, kind, start, end, more))
+
+    def at_once(
+        self, seq: int, kind: StretchKind, here: Place, target: Place, *, terrain: bool, reach_m: float = 0.0
+    ) -> None:
+        """The altitudes of a leg whose slope an ArduPlane does not fly: it makes for those of ``target`` at once."""
+        start = self.read(*target[:2]) + here[2] - self.read(*here[:2]) if terrain else here[2]
+        rise = target[2] - start
+        if abs(rise) < PLANE_GLIDE_SLOPE_MIN_M or (rise > 0 and here[2] - self.home[2] <= PLANE_LOW_M):
+            middle = 0.5 * rise
+            low, high = (*here[:2], here[2] + middle), (*target[:2], target[2] - middle)
+            self.instead(seq, kind, low, high, terrain=terrain, reach_m=reach_m, band_m=abs(middle))
 
     def stretch(self, seq: int, kind: StretchKind, start: Place, end: Place, more: dict[str, object]) -> Stretch:
         """One stretch at the present pace."""

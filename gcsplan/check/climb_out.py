@@ -1,4 +1,4 @@
-"""A fixed wing's climb-out and glide: straight and slanting, where a multicopter has its columns.
+"""A fixed wing's climb-out: straight and slanting, where a multicopter has a column; and what lines up and down keep.
 
 What ArduPlane does (commands_logic.cpp, `do_takeoff`, `verify_takeoff`; takeoff.cpp): once it is fast, it records the
 course over ground on which it was launched and holds its nose on that heading, so a cross wind carries it aside. It
@@ -8,12 +8,9 @@ item's altitude is judged too. At the item's altitude, wherever that is, it turn
 not along the leg from the item's place (`early_turn`). The mission holds no heading, so the climb-out is judged towards
 the item's place, as maps draw it; if the item has no place, towards the next item.
 
-A NAV_LAND glides straight from the way point before it (AP_Landing_Slope.cpp), towards a point before and above its
-place from which the flare is flat: a few metres below the line between the two.
-
-Both are exempt from min AGL, climb angle and terrain clearance, as columns are; never from zones, their clearance and
-ceilings. They must keep a clearance over bare ground: the altitude error, but near the ends, where the aircraft is
-close to the ground, half of its height above the touch point.
+Climb-outs and glides (`glide`) are exempt from min AGL, climb angle and terrain clearance, as columns are; never from
+zones, their clearance and ceilings. They must keep a clearance over bare ground: the altitude error, but near the ends,
+where the aircraft is close to the ground, half of its height above the touch point.
 """
 
 from __future__ import annotations
@@ -28,6 +25,7 @@ from gcsplan.arrays import Floats
 from gcsplan.check.aboard import Aboard
 from gcsplan.check.circles import circle_growth
 from gcsplan.check.geodesy import degree_m, flat_m, offset_m
+from gcsplan.check.pace import Pace
 from gcsplan.check.spline import towards
 from gcsplan.check.stretch import Place, Stretch
 from gcsplan.check.verdict import Finding
@@ -36,6 +34,7 @@ from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.units import Quantity, UnitText
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace, Legs
+from gcsplan.world.atmosphere import true_per_indicated
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
 from gcsplan.world.world import World
@@ -52,18 +51,19 @@ SPARED = 0.5
 """The part of its height that the aircraft needs as clearance while it is too low for the full altitude error."""
 
 
-OVER_M, OVER_FROM = 16.0, 0.15
-"""How far above the altitude of its take-off an aircraft with much power gets, for it levels off late: 1.5 s of its
-climb (16 m flown at 10.5 m/s, 3 m at 4.6); and from which part of its climb-out on."""
+OVER_M, OVER_S, OVER_FROM = 16.0, 2.0, 0.15
+"""How far above the altitude of its take-off an aircraft with much power gets, for it levels off late: flown were 11 to
+18 m, 1.4 to 1.8 s of its mean climb rate. Metres if that rate is not known, otherwise its seconds; and from which part
+of its climb-out on."""
+
+SLOWS_M_S2 = 1.5
+"""How quickly an aircraft that climbed with more than its cruise speed loses the rest: ten flights, within 1.4 s."""
 
 MOST_PARTS = 24
 """Most level bands into which the space above a climb-out is divided."""
 
 REACHED_M = 5.0
 """LOITER_TO_ALT counts an altitude as reached within this, m (navigation.cpp, `loiter_angle_update`)."""
-
-FLARE_S, FLARE_MOST_M, LAND_SINK_M_S = 2.0, 6.0, 0.25
-"""Defaults of LAND_FLARE_SEC, of twice LAND_FLARE_ALT, and of TECS_LAND_SINK."""
 
 CHORD_M = 2.0
 """How far the chords of a climbing circle may lie inside it, m."""
@@ -102,25 +102,60 @@ def climb_out(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | N
     for _ in range(2):  # metres per degree change with the latitude, so the first end is millimetres off
         part = run_m / flat_m((lat, lon, 0.0), end)
         end = (lat + part * (end[0] - lat), lon + part * (end[1] - lon), top)
+    known, counted = pilot.vehicle.climb_out, "that climb: with power to spare it is seconds early (climb_out_m_s)"
+    if known is not None:
+        counted = f"{known.climb_m_s:g} m/s up"
     pilot.note(
         f"item {seq}: the take-off is judged as a straight climb at {climb_deg:g}° on a heading of "
         f"{_bearing(pilot.home, ahead):.0f}° over {run_m:.0f} m: launch it that way; ArduPlane holds the heading that "
-        f"it is launched on, and turns when it is high enough"
+        f"it is launched on, and turns when it is high enough; times count {counted}"
     )
     pilot.note(
         f"item {seq}: in a cross wind it drifts aside, by up to {run_m / max(pilot.pace.speed_m_s, 1.0):.0f} m for "
         f"each m/s, as its nose holds the heading: launch into the wind, or let track_error_m hold that"
     )
-    pilot.add(seq, "takeoff", pilot.home, end, column=True)
-    for low, high, band_m in above_slant(pilot.home, end, pilot.vehicle.limits):
+    _fly_slant(pilot, seq, end)
+    for low, high, band_m in above_slant(pilot.home, end, pilot.vehicle.limits, over_m(pilot.vehicle)):
         pilot.instead(seq, "takeoff", low, high, column=True, band_m=band_m)
     pilot.at, pilot.direction = end, towards(pilot.home, end)
 
 
-def above_slant(ground: Place, top: Place, limits: Limits) -> list[tuple[Place, Place, float]]:
+def _fly_slant(pilot: Aboard, seq: int, end: Place) -> None:
+    """The climb-out: as steep as its pitch, or as it is known to be flown; both must be legal.
+
+    A known one climbs at its own speed, slows down level, and is at cruise speed at ``end`` if that is far enough.
+    """
+    known = pilot.vehicle.climb_out
+    if known is None:
+        pilot.add(seq, "takeoff", pilot.home, end, column=True)
+        return
+    pilot.instead(seq, "takeoff", pilot.home, end, column=True)
+    home, pace = pilot.home, pilot.pace
+    run_m, fast_m_s = flat_m(home, end), known.space_m_s
+    cruise_m_s = pace.speed_m_s * float(true_per_indicated(end[2]))
+    up_m = min((end[2] - home[2]) * known.speed_m_s / known.climb_m_s, run_m)
+    slowing_m = min(max(fast_m_s**2 - cruise_m_s**2, 0.0) / (2.0 * SLOWS_M_S2), run_m - up_m)
+    last_m_s = math.sqrt(max(fast_m_s**2 - 2.0 * SLOWS_M_S2 * slowing_m, 0.0))
+    at = home
+    for to_m, true_m_s in (
+        (up_m, fast_m_s),
+        (up_m + slowing_m, 0.5 * (fast_m_s + last_m_s)),  # its mean: as a speed changes evenly
+        (run_m, cruise_m_s),
+    ):
+        to = (*between(home, end, to_m / run_m), end[2])
+        if flat_m(at, to) > SAME_M:
+            indicated = true_m_s / float(true_per_indicated(0.5 * (at[2] + to[2])))
+            pilot.pace = Pace(indicated, (true_m_s, true_m_s))  # rates that bound nothing
+            pilot.add(seq, "takeoff", at, to, column=True)
+            at = to
+    pilot.pace = pace
+
+
+def above_slant(ground: Place, top: Place, limits: Limits, over_m: float) -> list[tuple[Place, Place, float]]:
     """The space between a climb-out and the altitude of its end, as level lines and half the heights of their bands.
 
-    A place may be any three numbers. The altitude errors cover the gaps between the bands and the slant.
+    A place may be any three numbers. The altitude errors cover the gaps between the bands and the slant. ``over_m``:
+    how far above its end the space reaches, from the altitude error on (`over_m`).
     """
     rise = top[2] - ground[2]
     parts = min(max(1, math.ceil(0.5 * rise / max(limits.altitude_error_m, 0.1))), MOST_PARTS)
@@ -131,14 +166,15 @@ def above_slant(ground: Place, top: Place, limits: Limits) -> list[tuple[Place, 
             (ground[0] + f * (top[0] - ground[0]), ground[1] + f * (top[1] - ground[1]), top[2] - half) for f in (a, b)
         )
         found.append((low, high, half))
-    if (half := over_m(limits) / 2.0) > 0.0:
+    if (half := over_m / 2.0) > 0.0:
         found.append(((*between(ground, top, OVER_FROM), top[2] + half), (*top[:2], top[2] + half), half))
     return found
 
 
-def over_m(limits: Limits) -> float:
+def over_m(vehicle: Vehicle) -> float:
     """How far above its take-off's altitude, and beyond the altitude error, an aircraft may get."""
-    return max(0.0, OVER_M - limits.altitude_error_m)
+    over = OVER_M if vehicle.climb_out is None else OVER_S * vehicle.climb_out.climb_m_s
+    return max(0.0, over - vehicle.limits.altitude_error_m)
 
 
 def between(a: Place, b: Place, part: float) -> tuple[float, float]:
@@ -166,7 +202,7 @@ def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bo
     pilot.instead(seq, "takeoff", low, target, column=True, reach_m=reach_m)
     # A climb that is steeper than judged reaches these altitudes before the circle.
     middle, half = 0.5 * (low[2] + target[2]), 0.5 * (target[2] - low[2])
-    start, end = ((*place[:2], middle) for place in (before.start, before.end))
+    start, end = ((*place[:2], middle) for place in (pilot.home, pilot.at))
     pilot.instead(seq, "takeoff", start, end, column=True, band_m=half)
     pilot.note(f"item {seq}: the take-off goes on in circles, judged as {reach_m:.0f} m wide all the way up")
     pilot.low_m, pilot.around_m = min(REACHED_M, target[2] - low[2]), reach_m
@@ -187,55 +223,6 @@ def _helix(begin: Place, top: Place, radius_m: float, turns: float, slope: float
         flat = radius_m * math.sin(now) / north_m, radius_m * math.cos(now) / east_m
         places.append((top[0] + flat[0], top[1] + flat[1], z))
     return places
-
-
-def glide(pilot: Aboard, seq: int, item: MissionItem) -> None:
-    """NAV_LAND: a straight descent from the present place to the place of the item."""
-    target = pilot.target(item) if pilot.has_place(item) else None
-    pilot.landed = True
-    if target is None:
-        pilot.flight.not_judged.append(f"item {seq}: a landing of a fixed wing without a place is not judged")
-        return
-    ground = pilot.ground(*target[:2])
-    off_m = target[2] - ground
-    if not abs(off_m) <= max(1.0, pilot.vehicle.limits.altitude_error_m):
-        words = (
-            "is unknown" if math.isnan(ground) else f"lies {abs(off_m):.1f} m {'below' if off_m > 0 else 'above'} it"
-        )
-        pilot.flight.not_judged.append(
-            f"item {seq}: the glide leads to the item's altitude, and the ground there {words}: it is not judged"
-        )
-        return
-    end = (*target[:2], ground)
-    pilot.note(
-        f"item {seq}: the landing is judged as a straight glide from the way point before it, and as ArduPlane's "
-        f"defaults (LAND_FLARE_SEC, LAND_FLARE_ALT) flare it"
-    )
-    pilot.add(seq, "land", pilot.at, end, column=True)
-    for a, b in pairwise(flared(pilot.at, end, flat_m(pilot.at, end), pilot.pace.speed_m_s)):
-        pilot.instead(seq, "land", a, b, column=True)
-    pilot.at = end
-
-
-def flared(top: Place, ground: Place, run_m: float, speed_m_s: float) -> list[Place]:
-    """The second half of a glide as it is flown below its line: to the beginning of the flare, then to the ground.
-
-    A place may be any three numbers. Empty if the glide stays on its line. AP_Landing_Slope.cpp,
-    `type_slope_setup_landing_glide_slope`, with the defaults.
-    """
-    fall = top[2] - ground[2]
-    sink_m_s = speed_m_s * fall / max(run_m, 1.0)
-    high_m = min(FLARE_S * sink_m_s, FLARE_MOST_M)
-    part = min(0.5, speed_m_s * high_m / max(0.5 * (LAND_SINK_M_S + sink_m_s), 0.1) / max(run_m, 1.0))
-    if high_m >= part * fall:
-        return []
-
-    def at(down: float, z: float) -> Place:
-        return top[0] + down * (ground[0] - top[0]), top[1] + down * (ground[1] - top[1]), z
-
-    aim = at(1.0 - part, ground[2] + high_m)
-    middle = at(0.5, top[2] - 0.5 * (fall - high_m) / (1.0 - part))
-    return [aim, ground] if part == 0.5 else [middle, aim, ground]
 
 
 def slants(stretches: Sequence[Stretch]) -> list[Stretch]:

@@ -9,6 +9,7 @@ from gcsplan.check.climb_out import MOST_PARTS, between, over_m, place_of
 from gcsplan.check.geodesy import flat_m, offset_m
 from gcsplan.check.rtl.run_on import about_turn_m
 from gcsplan.mavlink.mission import commands as cmd
+from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import MissionItem
 
 STEEPEST_DEG = 45.0
@@ -35,7 +36,8 @@ def turns_early(pilot: Aboard, seq: int, after: MissionItem | None) -> None:
     if aside_m <= pilot.vehicle.limits.track_error_m:
         return
     parts = min(math.ceil(aside_m / max(pilot.vehicle.limits.track_error_m, 1.0)), MOST_PARTS)
-    half = over_m(pilot.vehicle.limits) / 2.0
+    half = over_m(pilot.vehicle) / 2.0
+    terrain = m.FRAME_SYNONYMS.get(after.frame, after.frame) == m.TERRAIN
     for k in range(parts):
         share = first + (1.0 - first) * (k + 0.5) / parts
         start = (home[0] + share * (end[0] - home[0]), home[1] + share * (end[1] - home[1]), end[2])
@@ -44,7 +46,8 @@ def turns_early(pilot: Aboard, seq: int, after: MissionItem | None) -> None:
         cosine = (ahead[0] * turn[0] + ahead[1] * turn[1]) / max(length, 1e-9)
         swing_m = 0.5 * (1.0 - cosine) * about_turn_m(pilot.vehicle, pilot.pace.speed_m_s, end[2])
         gap_m = 0.5 * (1.0 - first) * math.hypot(*ahead) / parts * math.sqrt(max(0.0, 1.0 - cosine**2))
-        pilot.instead(seq, "cruise", start, target, reach_m=swing_m + gap_m)
+        pilot.instead(seq, "cruise", start, target, terrain=terrain, reach_m=swing_m + gap_m)
+        pilot.at_once(seq, "cruise", start, target, terrain=terrain, reach_m=swing_m + gap_m)
         if half > 0.0:
             near = min(1.0, OVER_FOR_M / max(flat_m(start, target), 1.0))
             low, high = (*start[:2], end[2] + half), (*between(start, target, near), end[2] + half)

@@ -31,10 +31,11 @@ from itertools import pairwise
 from gcsplan.check.aboard import Aboard
 from gcsplan.check.arc_waypoint import fly_arc
 from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth, circle_words
-from gcsplan.check.climb_out import REACHED_M, circle_up, climb_out, glide, is_wing
+from gcsplan.check.climb_out import REACHED_M, circle_up, climb_out, is_wing
 from gcsplan.check.commands import flown_otherwise, moves_nothing, why_lost
 from gcsplan.check.early_turn import turns_early
 from gcsplan.check.geodesy import flat_m
+from gcsplan.check.glide import glide
 from gcsplan.check.route import fly_all
 from gcsplan.check.rtl.model import RULES, return_pieces
 from gcsplan.check.rtl.run_on import about_turn_m
@@ -45,8 +46,6 @@ from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 
-PLANE_GLIDE_SLOPE_MIN_M = 15.0  # ArduPlane GLIDE_SLOPE_MIN, default
-PLANE_LOW_M = 20.0  # ArduPlane setup_glide_slope: below this height above home it climbs at once
 COPTER_CIRCLE_RADIUS_M = 10.0  # ArduCopter CIRCLE_RADIUS, default
 LEAST_CLIMB_M = {Autopilot.ARDUCOPTER: 1.0, Autopilot.PX4: 2.5}  # takeoff_start; MIS_TAKEOFF_ALT, default
 TAKE_OFF_ELSEWHERE_M = 30.0
@@ -258,12 +257,7 @@ class _Pilot(Aboard):
             low, on = (*here[:2], here[2] - self.low_m), (half[0], half[1], half[2] - self.low_m)
             self.instead(seq, kind, low, on, reach_m=self.around_m)
         self.low_m = 0.0
-        start = self.read(*target[:2]) + here[2] - self.read(*here[:2]) if terrain else here[2]
-        rise = target[2] - start
-        if abs(rise) < PLANE_GLIDE_SLOPE_MIN_M or (rise > 0 and here[2] - self.home[2] <= PLANE_LOW_M):
-            middle = 0.5 * rise
-            low, high = (*here[:2], here[2] + middle), (*target[:2], target[2] - middle)
-            self.instead(seq, kind, low, high, terrain=terrain, band_m=abs(middle))
+        self.at_once(seq, kind, here, target, terrain=terrain)
 
     def _loiter(self, seq: int, item: MissionItem) -> None:
         turns = item.command == cmd.LOITER_TURNS

@@ -21,6 +21,7 @@ from gcsplan.fleet.legs import Motion, at_own_speed, legs
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.speeds import POSITION_ERROR_M, column
 from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.atmosphere import true_per_indicated
 
 __all__ = [
     "POSITION_ERROR_M", "Course", "End", "Route", "flown_corners", "motion_error_m", "speed_for", "upright",
@@ -56,6 +57,7 @@ class Route:
 
     A fixed wing has no columns: ``climb_out`` (K, 3) leads from the ground to the first point, ``glide`` (K, 3) from
     the last point down to the ground if it lands. After a return it circles over home and stays in the air.
+    ``climb_out_m_s`` (K - 1,) are true speeds along the climb-out, if they are not those of any leg.
     """
 
     name: str
@@ -67,6 +69,7 @@ class Route:
     holds_s: Floats | None = None
     items: Indices | None = None
     climb_out: Floats | None = None
+    climb_out_m_s: Floats | None = None
     glide: Floats | None = None
     pace: Floats | None = None
 
@@ -256,8 +259,13 @@ class _Motion:
 def _takeoff(route: Route, vehicle: Vehicle) -> Motion | None:
     ground, top = route.start_ground_amsl_m, route.points[0]
     if route.climb_out is not None:
-        way = legs(route.climb_out, vehicle, np.zeros(len(route.climb_out) - 1, dtype=np.intp))
+        owner, own = np.zeros(len(route.climb_out) - 1, dtype=np.intp), route.climb_out_m_s
+        if own is not None:
+            indicated = own / true_per_indicated(0.5 * (route.climb_out[1:, 2] + route.climb_out[:-1, 2]))
+            way = legs(route.climb_out, vehicle, owner, pace=indicated, rates_m_s=np.column_stack([own, own]))
+            return None if way is None else at_own_speed(way, 1.0)
         # The mission sets its speed after the climb-out, which is flown at the vehicle's own.
+        way = legs(route.climb_out, vehicle, owner)
         return None if way is None else at_own_speed(way, vehicle.speed_max_m_s)
     return None if ground is None else next(iter(upright(top[:2], ground, float(top[2]), vehicle, 0, ground)), None)
 

@@ -135,6 +135,8 @@ def _vehicle(draft: Draft) -> Iterator[Row]:
     yield VehicleKeys, "descent_m_s", "1.5", True
     if wing:
         yield VehicleKeys, "turn_radius_m", f"{WING_RADIUS_M:g}", True
+        yield VehicleKeys, "climb_out_m_s", "5", False
+        yield VehicleKeys, "climb_out_speed_m_s", "19", False
     yield VehicleKeys, "link", _word(draft.link or "udpout:127.0.0.1:14560"), draft.link is not None
     battery = {key: EnergyKeys.model_fields[key].default for key in ("vertical_j_per_m", "horizontal_j_per_m")}
     values = ", ".join(f"{key}: {value:g}" for key, value in battery.items())

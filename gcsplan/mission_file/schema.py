@@ -245,6 +245,10 @@ class VehicleKeys(LimitKeys):
     """Jerk of ArduPilot's S-curves (WPNAV_JERK). On PX4, if absent, 4 (`MPC_JERK_AUTO`)."""
     turn_radius_m: Length = 0.0
     """Above 0: a fixed wing, whose corners are planned and judged as arcs."""
+    climb_out_m_s: Speed | None = None
+    """Climb rate of a fixed wing's take-off, mean from leaving the ground to its altitude; if absent, not counted."""
+    climb_out_speed_m_s: Speed | None = None
+    """Its mean speed over ground meanwhile, in still air; if absent, what the fastest cruise speed leaves."""
     energy: EnergyKeys = EnergyKeys()
     """Energy that flying takes."""
     link: Text | None = None

@@ -15,6 +15,7 @@ from gcsplan.vehicle import (
     LARGEST_LEAN_DEG,
     PX4_VEL_MAX_M_S,
     Autopilot,
+    ClimbOut,
     Energy,
     Vehicle,
     fastest_at_m_s,
@@ -106,12 +107,13 @@ def make_vehicle(
         )
     if limits is not None:
         _check_heights(keys, limits, where, problems, obstacle_m)
+    climb_out = _climb_out(keys, limits, where, problems)
     if len(problems) > before or limits is None:
         return None
     return Vehicle(
         name=keys.name, sysid=keys.sysid, autopilot=Autopilot(keys.autopilot), limits=limits,
         speed_min_m_s=slow, speed_max_m_s=fast, turn_radius_m=keys.turn_radius_m,
-        energy=Energy(**keys.energy.model_dump()), link=keys.link,
+        energy=Energy(**keys.energy.model_dump()), link=keys.link, climb_out=climb_out,
         **(_wing_motion(keys, limits) if keys.turn_radius_m > 0.0 else _motion(keys, notes, local=local)),
     )  # fmt: skip
 
@@ -207,6 +209,38 @@ def _check_wing(keys: VehicleKeys, limits: Limits | None, where: str, problems: 
     if limits is not None and limits.max_descent_deg > STEEPEST_WING_DEG:
         words = f"a fixed wing descends at {STEEPEST_WING_DEG:g}° at most, given {limits.max_descent_deg:g}"
         problems.append(Problem(f"{where}.max_descent_deg", words))
+
+
+def _climb_out(keys: VehicleKeys, limits: Limits | None, where: str, problems: list[Problem]) -> ClimbOut | None:
+    """How a fixed wing climbs out, if the file says so; it must not be less steep than its climb-out is judged."""
+    rate, speed = keys.climb_out_m_s, keys.climb_out_speed_m_s
+    if rate is None:
+        if speed is not None:
+            problems.append(
+                Problem(f"{where}.climb_out_m_s", "is missing; climb_out_speed_m_s is the speed of its climb")
+            )
+        return None
+    if keys.turn_radius_m <= 0.0:
+        words = f"is a fixed wing's, which has a turn_radius_m above 0: leave it out, or use climb_m_s, given {rate:g}"
+        problems.append(Problem(f"{where}.climb_out_m_s", words))
+        return None
+    fast = keys.speed_m_s[1]
+    if speed is None and rate >= fast:
+        words = f"must be below the fastest speed {fast:g}, or climb_out_speed_m_s be given too, given {rate:g}"
+        problems.append(Problem(f"{where}.climb_out_m_s", words))
+        return None
+    over_ground = math.sqrt(fast * fast - rate * rate) if speed is None else speed
+    steep_deg = math.degrees(math.atan2(rate, over_ground))
+    if limits is not None and steep_deg < math.floor(limits.max_climb_deg + 1e-9):
+        words = (
+            f"at {over_ground:.1f} m/s over ground is a climb of {steep_deg:.1f}°, and the climb-out is judged at "
+            f"max_climb_deg {limits.max_climb_deg:g}, which the aircraft does not reach: "
+        )
+        least = math.floor(steep_deg)
+        words += f"write max_climb_deg: {least}" if least >= 1 else "it needs more power"
+        problems.append(Problem(f"{where}.climb_out_m_s", words))
+        return None
+    return ClimbOut(rate, over_ground)
 
 
 def _wing_motion(keys: VehicleKeys, limits: Limits) -> dict[str, float]:

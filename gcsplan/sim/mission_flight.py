@@ -109,6 +109,7 @@ class _Ways:
         self.command = np.concatenate([t.command_m_s for t in tracks])
         self.level = np.concatenate([t.level for t in tracks])
         self.accel = np.concatenate([t.accel_m_s2 for t in tracks])
+        self.column = np.concatenate([t.column for t in tracks])
         self.airspeed = np.concatenate([t.airspeed_m_s for t in tracks])
         # Pieces whose speed changes at once are flown by the clock: what each takes at its speed, and when it begins.
         with np.errstate(divide="ignore"):
@@ -207,7 +208,8 @@ class _Lanes:
         k, v, s = self.piece, self.v, self.s
         command = ways.command[k]
         slower = np.maximum(command, self.command - self._slowing * b)
-        self.command = np.where((v > 0.0) & (command < self.command), slower, command)
+        # The speeds of a wing's climb-out are those that it flies, its slowing down included.
+        self.command = np.where((v > 0.0) & (command < self.command) & ~ways.column[k], slower, command)
         accel = ways.accel[k]
         over_ground = self.command if wind is None else self._over_ground(k, wind)
         # The limits at the end of the step count, because a step may lead into a corner or out of one.

@@ -22,8 +22,9 @@ from gcsplan.app.pipeline import plan
 from gcsplan.app.wing_ends import starts
 from gcsplan.arrays import Floats
 from gcsplan.check.arcs import REMAINS, SAG_M, SETTLES_S, bend
-from gcsplan.check.climb_out import above_slant, flared, slant_shortage
+from gcsplan.check.climb_out import above_slant, over_m, slant_shortage
 from gcsplan.check.flight import follow
+from gcsplan.check.glide import flared
 from gcsplan.check.judge import judge
 from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.check.tracking import l1_off_m, tracking_m
@@ -40,8 +41,9 @@ from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.mission_file import VehicleRequest, load_mission
 from gcsplan.planners.problem import Problem
 from gcsplan.sim.kinematics import Kinematics
+from gcsplan.sim.mission_flight import fly
 from gcsplan.sim.track import make_track
-from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.vehicle import Autopilot, ClimbOut, Vehicle
 from gcsplan.world.atmosphere import true_per_indicated
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
@@ -459,7 +461,7 @@ def test_a_zone_above_the_slant_is_hit_by_one_that_climbs_steeper() -> None:
 
 def test_what_lies_above_a_slant_is_level_and_reaches_from_within_two_errors_of_it_to_the_top() -> None:
     limits = wing().limits
-    *found, over = above_slant((0.0, 0.0, 10.0), (100.0, 0.0, 90.0), limits)
+    *found, over = above_slant((0.0, 0.0, 10.0), (100.0, 0.0, 90.0), limits, over_m(wing()))
     assert over[1][2] - over[2] == pytest.approx(90.0)
     assert over[1][2] + over[2] + limits.altitude_error_m == pytest.approx(106.0)
     for low, high, half in found:
@@ -645,6 +647,9 @@ def text_of(**changes: str) -> str:
         ({"autopilot": "px4"}, "turn_radius_m", "at a distance of its own"),
         ({"turn_radius_m": "20"}, "turn_radius_m", "give at least 41, or a lower speed"),
         ({"max_climb_deg": "60"}, "max_climb_deg", "climbs at 1 to 45°"),
+        ({"end": "loiter\n    climb_out_speed_m_s: 20"}, "climb_out_m_s", "is missing"),
+        ({"end": "loiter\n    climb_out_m_s: 20"}, "climb_out_m_s", "must be below the fastest speed 20"),
+        ({"end": "loiter\n    climb_out_m_s: 2"}, "climb_out_m_s", "a climb of 5.7°"),
     ],
 )
 def test_a_mission_file_says_what_a_fixed_wing_cannot_be(changes: dict[str, str], key: str, words: str) -> None:
@@ -726,6 +731,26 @@ def test_it_flies_at_one_speed_from_the_ground_to_the_goal_and_arrives_flying(la
     assert motion.points[0, 2] == pytest.approx(v.request.start[2], abs=0.01)
     assert motion.points[-1, 2] == pytest.approx(v.request.goal[2], abs=0.05)
     assert motion.arrive_s < motion.times_s[-1] - 10.0
+
+
+def test_a_known_climb_out_has_one_time_in_plan_fleet_and_simulation(circling: Plan) -> None:
+    text = text_of(end="loiter\n    climb_out_m_s: 9.5\n    climb_out_speed_m_s: 25")
+    known = plan(load_mission(MISSIONS / "m.yaml", text=text))
+    [v], [without] = known.vehicles, circling.vehicles
+    craft, legs = v.request.vehicle, v.verdict.legs
+    assert craft.climb_out == ClimbOut(9.5, 25.0)
+    out = [leg for leg in legs if leg.kind == "takeoff"]
+    assert len(out) == 3
+    assert sum(leg.horizontal_m for leg in out) == pytest.approx(without.verdict.legs[0].horizontal_m, rel=0.2)
+    course = Course(route_of(v, known.world), craft)
+    assert course.takeoff is not None
+    took_s = sum(leg.time_s for leg in out)
+    assert course.takeoff.time_s(14.0) == pytest.approx(took_s, abs=1e-6)
+    to_goal_s = course.time_to_goal_s(SPEED_M_S)
+    assert to_goal_s == pytest.approx(sum(leg.time_s for leg in legs if leg.kind != "loiter"), rel=1e-3)
+    on_board = replace(v.mission, items=tuple(stored(item, Autopilot.ARDUPLANE) for item in v.mission.items))
+    flown = fly([make_track(on_board, craft, known.world, Kinematics.of(craft))], [0.0])
+    assert flown.arrive_s[0] == pytest.approx(to_goal_s, rel=1e-3)
 
 
 @pytest.mark.slow

@@ -28,6 +28,7 @@ _COPTER = (
     ("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ALT_MAX",), ("FENCE_RADIUS",),
     ("FS_THR_ENABLE",), ("FS_GCS_ENABLE",), ("BATT_FS_LOW_ACT",), ("BATT_FS_CRT_ACT",),
     ("RTL_LOIT_TIME",),
+    ("RTL_ALT_FINAL", "RTL_ALT_FINAL_M"),  # cm; renamed and in metres since 4.7
     ("WPNAV_RADIUS", "WP_RADIUS_M"),  # cm; renamed and in metres since 4.7
     ("ANGLE_MAX", "ATC_ANGLE_MAX"),  # hundredths of a degree; renamed and in degrees since 4.7
 )  # fmt: skip
@@ -56,6 +57,7 @@ FENCE_GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
 """Parameters that are read before a fence is sent."""
 
 _LEAN_ANGLE = {"ANGLE_MAX": 0.01, "ATC_ANGLE_MAX": 1.0}
+_RETURN_ENDS = {"RTL_ALT_FINAL": 100.0, "RTL_ALT_FINAL_M": 1.0}
 _SAME_DEG = 0.05
 _FAILSAFES = {
     "FS_THR_ENABLE": "loss of radio control", "THR_FAILSAFE": "loss of radio control",
@@ -147,7 +149,7 @@ def judge_parameters(
         found += _return_altitude(values, rtl_rel_home_m, advised_rel_home_m)
     found += [words] if (words := takes_another_route(values, mission, route)) else []
     found += [words] if (words := returns_otherwise(values)) else []
-    found += _waits(values, mission, route)
+    found += _over_home(values, mission, route)
     found += _fences(values, _extent(mission))
     found += _lean(values, mission)
     off = [f"{_FAILSAFES[name]} ({name})" for name in _FAILSAFES if values.get(name) == 0]
@@ -200,16 +202,24 @@ def _return_altitude(values: Values, checked_m: float | None, advised_m: float |
     return []
 
 
-def _waits(values: Values, mission: Mission, route: Route | None) -> list[str]:
-    """That a return waits over home for another time than is counted; one along the mission does not wait."""
-    waits_s = values.get("RTL_LOIT_TIME", 1000.0 * COPTER_RETURN_WAITS_S) / 1000.0
-    returns = route != "mission" or any(item.command == RTL for item in mission.items)
-    if not returns or abs(waits_s - COPTER_RETURN_WAITS_S) < _SAME_S:
+def _over_home(values: Values, mission: Mission, route: Route | None) -> list[str]:
+    """That a return waits over home for another time than is counted, or does not land; one by the mission does."""
+    if route == "mission" and not any(item.command == RTL for item in mission.items):
         return []
-    return [
-        f"RTL_LOIT_TIME is {1000.0 * waits_s:g} on board: a return waits {waits_s:g} s over home before it descends, "
-        f"and times and battery count {COPTER_RETURN_WAITS_S:g} s"
-    ]
+    found = []
+    waits_s = values.get("RTL_LOIT_TIME", 1000.0 * COPTER_RETURN_WAITS_S) / 1000.0
+    if abs(waits_s - COPTER_RETURN_WAITS_S) >= _SAME_S:
+        found.append(
+            f"RTL_LOIT_TIME is {1000.0 * waits_s:g} on board: a return waits {waits_s:g} s over home before it "
+            f"descends, and times and battery count {COPTER_RETURN_WAITS_S:g} s"
+        )
+    for name, metre in _RETURN_ENDS.items():
+        if values.get(name, 0.0) > 0.0:
+            found.append(
+                f"{name} is {values[name]:g} on board: a return ends in a hover {values[name] / metre:g} m above home, "
+                f"until the battery is empty or it is landed by hand; it was judged as a landing, which {name} 0 makes"
+            )
+    return found
 
 
 def _lean(values: Values, mission: Mission) -> list[str]:

@@ -451,12 +451,13 @@ def test_parameters_that_fit_say_nothing() -> None:
         "FS_GCS_ENABLE": 1.0,
         "BATT_FS_LOW_ACT": 2.0,
         "RTL_LOIT_TIME": 5000.0,
+        "RTL_ALT_FINAL": 0.0,
     }
     assert judge_parameters(values, mission(), rtl_rel_home_m=60.0) == []
 
 
 def test_a_return_along_the_mission_does_not_wait_over_home() -> None:
-    values = {"FS_THR_ENABLE": 6.0, "RTL_LOIT_TIME": 0.0}
+    values = {"FS_THR_ENABLE": 6.0, "RTL_LOIT_TIME": 0.0, "RTL_ALT_FINAL": 1000.0}
     assert judge_parameters(values, mission(), route="mission") == []
 
 
@@ -477,6 +478,8 @@ def test_a_return_along_the_mission_does_not_wait_over_home() -> None:
         ({"RTL_RETURN_ALT": 60.0, "GF_ACTION": 1.0, "GF_MAX_VER_DIST": 50.0}, "ends at 50 m (GF_MAX_VER_DIST)"),
         ({"RTL_ALT": 6000.0, "RTL_LOIT_TIME": 20000.0}, "waits 20 s over home before it descends, and times and"),
         ({"RTL_ALT": 6000.0, "RTL_LOIT_TIME": 0.0}, "RTL_LOIT_TIME is 0 on board: a return waits 0 s"),
+        ({"RTL_ALT": 6000.0, "RTL_ALT_FINAL": 1000.0}, "ends in a hover 10 m above home, until"),
+        ({"RTL_ALT_M": 60.0, "RTL_ALT_FINAL_M": 10.0}, "ends in a hover 10 m above home, until"),
         ({"RTL_RETURN_ALT": 60.0, "RTL_TYPE": 2.0}, "RTL_TYPE is 2 on board: the return is not straight home"),
         ({"RTL_RETURN_ALT": 60.0, "RTL_CONE_ANG": 80.0}, "RTL_CONE_ANG is 80 on board"),
         ({"RTL_RETURN_ALT": 60.0, "NAV_DLL_ACT": 0.0}, "no failsafe action on board for loss of the ground station"),

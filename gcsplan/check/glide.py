@@ -1,0 +1,68 @@
+"""A fixed wing's landing: a straight glide, and the flare at its end.
+
+A NAV_LAND glides straight from the way point before it (AP_Landing_Slope.cpp), towards a point before and above its
+place from which the flare is flat: a few metres below the line between the two. What a glide keeps from the ground is
+that of a climb-out (`climb_out`).
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+from gcsplan.check.aboard import Aboard
+from gcsplan.check.geodesy import flat_m
+from gcsplan.check.stretch import Place
+from gcsplan.mavlink.mission.mission import MissionItem
+
+FLARE_S, FLARE_MOST_M, LAND_SINK_M_S = 2.0, 6.0, 0.25
+"""Defaults of LAND_FLARE_SEC, of twice LAND_FLARE_ALT, and of TECS_LAND_SINK."""
+
+
+def glide(pilot: Aboard, seq: int, item: MissionItem) -> None:
+    """NAV_LAND: a straight descent from the present place to the place of the item."""
+    target = pilot.target(item) if pilot.has_place(item) else None
+    pilot.landed = True
+    if target is None:
+        pilot.flight.not_judged.append(f"item {seq}: a landing of a fixed wing without a place is not judged")
+        return
+    ground = pilot.ground(*target[:2])
+    off_m = target[2] - ground
+    if not abs(off_m) <= max(1.0, pilot.vehicle.limits.altitude_error_m):
+        words = (
+            "is unknown" if math.isnan(ground) else f"lies {abs(off_m):.1f} m {'below' if off_m > 0 else 'above'} it"
+        )
+        pilot.flight.not_judged.append(
+            f"item {seq}: the glide leads to the item's altitude, and the ground there {words}: it is not judged"
+        )
+        return
+    end = (*target[:2], ground)
+    pilot.note(
+        f"item {seq}: the landing is judged as a straight glide from the way point before it, and as ArduPlane's "
+        f"defaults (LAND_FLARE_SEC, LAND_FLARE_ALT) flare it"
+    )
+    pilot.add(seq, "land", pilot.at, end, column=True)
+    for a, b in pairwise(flared(pilot.at, end, flat_m(pilot.at, end), pilot.pace.speed_m_s)):
+        pilot.instead(seq, "land", a, b, column=True)
+    pilot.at = end
+
+
+def flared(top: Place, ground: Place, run_m: float, speed_m_s: float) -> list[Place]:
+    """The second half of a glide as it is flown below its line: to the beginning of the flare, then to the ground.
+
+    A place may be any three numbers. Empty if the glide stays on its line. AP_Landing_Slope.cpp,
+    `type_slope_setup_landing_glide_slope`, with the defaults.
+    """
+    fall = top[2] - ground[2]
+    sink_m_s = speed_m_s * fall / max(run_m, 1.0)
+    high_m = min(FLARE_S * sink_m_s, FLARE_MOST_M)
+    part = min(0.5, speed_m_s * high_m / max(0.5 * (LAND_SINK_M_S + sink_m_s), 0.1) / max(run_m, 1.0))
+    if high_m >= part * fall:
+        return []
+
+    def at(down: float, z: float) -> Place:
+        return top[0] + down * (ground[0] - top[0]), top[1] + down * (ground[1] - top[1]), z
+
+    aim = at(1.0 - part, ground[2] + high_m)
+    middle = at(0.5, top[2] - 0.5 * (fall - high_m) / (1.0 - part))
+    return [aim, ground] if part == 0.5 else [middle, aim, ground]
