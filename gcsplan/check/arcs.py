@@ -27,6 +27,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.check.circles import circle_growth
+from gcsplan.check.climbed import climbed
 from gcsplan.check.geodesy import flat_m
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.check.tracking import tracking_m, true_m_s
@@ -121,7 +122,7 @@ def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tunin
             for i in banded:
                 other.remove(i)
             new += legs.banded(k, banded[0]) if banded else legs.instead(k)
-    flight.stretches[:] = bent
+    flight.stretches[:] = climbed(bent, vehicle)
     flight.instead[:] = other + new
     error_m = vehicle.limits.track_error_m
     note = (

@@ -25,7 +25,6 @@ from gcsplan.arrays import Floats
 from gcsplan.check.aboard import Aboard
 from gcsplan.check.circles import circle_growth
 from gcsplan.check.geodesy import degree_m, flat_m, offset_m
-from gcsplan.check.pace import Pace
 from gcsplan.check.spline import towards
 from gcsplan.check.stretch import Place, Stretch
 from gcsplan.check.verdict import Finding
@@ -34,7 +33,6 @@ from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.units import Quantity, UnitText
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.atmosphere import true_per_indicated
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
 from gcsplan.world.world import World
@@ -55,9 +53,6 @@ OVER_M, OVER_S, OVER_FROM = 16.0, 2.0, 0.15
 """How far above the altitude of its take-off an aircraft with much power gets, for it levels off late: flown were 11 to
 18 m, 1.4 to 1.8 s of its mean climb rate. Metres if that rate is not known, otherwise its seconds; and from which part
 of its climb-out on."""
-
-SLOWS_M_S2 = 1.5
-"""How quickly an aircraft that climbed with more than its cruise speed loses the rest: ten flights, within 1.4 s."""
 
 MOST_PARTS = 24
 """Most level bands into which the space above a climb-out is divided."""
@@ -114,41 +109,10 @@ def climb_out(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | N
         f"item {seq}: in a cross wind it drifts aside, by up to {run_m / max(pilot.pace.speed_m_s, 1.0):.0f} m for "
         f"each m/s, as its nose holds the heading: launch into the wind, or let track_error_m hold that"
     )
-    _fly_slant(pilot, seq, end)
+    pilot.add(seq, "takeoff", pilot.home, end, column=True)
     for low, high, band_m in above_slant(pilot.home, end, pilot.vehicle.limits, over_m(pilot.vehicle)):
         pilot.instead(seq, "takeoff", low, high, column=True, band_m=band_m)
     pilot.at, pilot.direction = end, towards(pilot.home, end)
-
-
-def _fly_slant(pilot: Aboard, seq: int, end: Place) -> None:
-    """The climb-out: as steep as its pitch, or as it is known to be flown; both must be legal.
-
-    A known one climbs at its own speed, slows down level, and is at cruise speed at ``end`` if that is far enough.
-    """
-    known = pilot.vehicle.climb_out
-    if known is None:
-        pilot.add(seq, "takeoff", pilot.home, end, column=True)
-        return
-    pilot.instead(seq, "takeoff", pilot.home, end, column=True)
-    home, pace = pilot.home, pilot.pace
-    run_m, fast_m_s = flat_m(home, end), known.space_m_s
-    cruise_m_s = pace.speed_m_s * float(true_per_indicated(end[2]))
-    up_m = min((end[2] - home[2]) * known.speed_m_s / known.climb_m_s, run_m)
-    slowing_m = min(max(fast_m_s**2 - cruise_m_s**2, 0.0) / (2.0 * SLOWS_M_S2), run_m - up_m)
-    last_m_s = math.sqrt(max(fast_m_s**2 - 2.0 * SLOWS_M_S2 * slowing_m, 0.0))
-    at = home
-    for to_m, true_m_s in (
-        (up_m, fast_m_s),
-        (up_m + slowing_m, 0.5 * (fast_m_s + last_m_s)),  # its mean: as a speed changes evenly
-        (run_m, cruise_m_s),
-    ):
-        to = (*between(home, end, to_m / run_m), end[2])
-        if flat_m(at, to) > SAME_M:
-            indicated = true_m_s / float(true_per_indicated(0.5 * (at[2] + to[2])))
-            pilot.pace = Pace(indicated, (true_m_s, true_m_s))  # rates that bound nothing
-            pilot.add(seq, "takeoff", at, to, column=True)
-            at = to
-    pilot.pace = pace
 
 
 def above_slant(ground: Place, top: Place, limits: Limits, over_m: float) -> list[tuple[Place, Place, float]]:

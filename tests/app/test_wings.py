@@ -741,7 +741,9 @@ def test_a_known_climb_out_has_one_time_in_plan_fleet_and_simulation(circling: P
     assert craft.climb_out == ClimbOut(9.5, 25.0)
     out = [leg for leg in legs if leg.kind == "takeoff"]
     assert len(out) == 3
-    assert sum(leg.horizontal_m for leg in out) == pytest.approx(without.verdict.legs[0].horizontal_m, rel=0.2)
+    assert (
+        sum(leg.time_s for leg in out) < sum(leg.time_s for leg in without.verdict.legs if leg.kind == "takeoff") - 3.0
+    )
     course = Course(route_of(v, known.world), craft)
     assert course.takeoff is not None
     took_s = sum(leg.time_s for leg in out)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -132,7 +133,7 @@ def test_a_known_climb_out_takes_the_time_that_was_flown(
     legs = judge(mission, craft, where).legs
     told = [sum(leg.time_s for leg in legs if leg.seq <= seq) - run_m / cruise for seq in (1, 2)]
     assert told == pytest.approx(flown_s, abs=1.4), name
-    assert legs[0].climb_deg == pytest.approx(math.degrees(math.atan2(rate, over_ground)), abs=0.1)
+    assert legs[0].horizontal_m / legs[0].time_s == pytest.approx(over_ground, rel=1e-3)
     assert sum(leg.horizontal_m for leg in legs if leg.seq == 1) == pytest.approx(ahead_m, abs=0.1)
 
 
@@ -148,4 +149,21 @@ def test_a_known_climb_out_is_judged_as_slant_too() -> None:
     """What it meets on the slant of its pitch it meets still: with less power than usual it flies there."""
     mast = Zone("mast", Circle(0.0, 300.0, 8.0), ceiling=Level(338.0, "amsl"))
     for climbs in (None, ClimbOut(9.5, 25.0)):
-        assert [f.kind for f in verdict(0.0, 1500.0, mast, climbs=climbs).findings] == ["zone"]
+        assert {f.kind for f in verdict(0.0, 1500.0, mast, climbs=climbs).findings} == {"zone"}
+
+
+@pytest.mark.parametrize(
+    "climbs", [ClimbOut(9.5, 25.0), ClimbOut(2.9, 20.0), ClimbOut(2.82, 20.0), ClimbOut(4.0, 28.0)]
+)
+@pytest.mark.parametrize("to", [(1000.0, 560.0), (600.0, 1100.0), (0.0, 1500.0)])
+def test_a_known_climb_out_changes_times_alone(to: tuple[float, float], climbs: ClimbOut) -> None:
+    """Also where the turn at its end is an arc that begins on it, and where hardly any of it is level."""
+    plain, known = verdict(*to), verdict(*to, climbs=climbs)
+    assert (known.findings, known.not_judged) == ((), ())
+    for what in ("horizontal_m", "length_m", "energy_j"):
+        assert math.fsum(getattr(leg, what) for leg in known.legs) == pytest.approx(
+            math.fsum(getattr(leg, what) for leg in plain.legs), rel=1e-9
+        )
+    assert all(a.end == b.start for a, b in pairwise(known.legs))
+    late_s = sum(leg.time_s for leg in plain.legs) - sum(leg.time_s for leg in known.legs)
+    assert -0.5 < late_s < 8.0
