@@ -146,8 +146,8 @@ def standing(judged: Mapping[str, Sequence[Mapping[str, Any]]], paper: str) -> I
         return
     count = Counter(c["verdict"] for c in claims.values())
     yield (
-        f"Of {len(claims)} claims {count[HOLDS]} hold, {count[REVERSED]} are reversed, {count[TIE]} show no "
-        f"difference, and {count[IMPOSSIBLE]} cannot be true as printed."
+        f"{len(claims)} claims: holds {count[HOLDS]}, reversed {count[REVERSED]}, no difference {count[TIE]}, "
+        f"impossible as printed {count[IMPOSSIBLE]}."
     )
     for measure in dict.fromkeys(c["measure"] for c in told):
         parts = []
