@@ -93,6 +93,7 @@ _TABLES: dict[Autopilot, dict[str, Parameter]] = {
         "WP_LOITER_RAD": _i(60, INT16),
         "NAVL1_DAMPING": _r(0.75),
         "NAVL1_PERIOD": _r(17.0),
+        "TECS_PITCH_MAX": _i(15, INT8),
         "WP_RADIUS": _i(90, INT16),
     },
     Autopilot.PX4: {

@@ -14,7 +14,7 @@ from gcsplan.figures import raised
 from gcsplan.mavlink.link.numbers import finite, whole
 from gcsplan.mavlink.link.preflight import distance_m
 from gcsplan.mavlink.mission.autopilots import PX4, profile_of
-from gcsplan.mavlink.mission.commands import RTL
+from gcsplan.mavlink.mission.commands import RTL, TAKEOFF
 from gcsplan.mavlink.mission.mission import GLOBAL, RELATIVE, Mission
 from gcsplan.mavlink.mission.return_altitude import RETURN_PARAMETERS, on_board, returns_otherwise
 from gcsplan.mavlink.mission.return_route import Route, takes_another_route
@@ -36,7 +36,7 @@ _PLANE = (
     _RETURN[Autopilot.ARDUPLANE],
     ("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ALT_MAX",),
     ("RTL_AUTOLAND",), ("THR_FAILSAFE",), ("FS_LONG_ACTN",), ("FS_GCS_ENABL",), ("BATT_FS_LOW_ACT",),
-    ("WP_RADIUS",), ("NAVL1_PERIOD",), ("NAVL1_DAMPING",),
+    ("WP_RADIUS",), ("NAVL1_PERIOD",), ("NAVL1_DAMPING",), ("TECS_PITCH_MAX",),
 )  # fmt: skip
 _PX4 = (
     _RETURN[Autopilot.PX4], ("GF_ACTION",), ("GF_MAX_VER_DIST",), ("GF_MAX_HOR_DIST",),
@@ -59,6 +59,7 @@ FENCE_GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
 _LEAN_ANGLE = {"ANGLE_MAX": 0.01, "ATC_ANGLE_MAX": 1.0}
 _RETURN_ENDS = {"RTL_ALT_FINAL": 100.0, "RTL_ALT_FINAL_M": 1.0}
 _SAME_DEG = 0.05
+_FLOWN_PITCH_DEG = 15.0  # TECS_PITCH_MAX, default
 _FAILSAFES = {
     "FS_THR_ENABLE": "loss of radio control", "THR_FAILSAFE": "loss of radio control",
     "NAV_RCL_ACT": "loss of radio control", "FS_GCS_ENABLE": "loss of the ground station",
@@ -152,6 +153,7 @@ def judge_parameters(
     found += _over_home(values, mission, route)
     found += _fences(values, _extent(mission))
     found += _lean(values, mission)
+    found += _climb_out(values, mission)
     off = [f"{_FAILSAFES[name]} ({name})" for name in _FAILSAFES if values.get(name) == 0]
     if off:
         found.append("no failsafe action on board for " + ", ".join(off))
@@ -220,6 +222,19 @@ def _over_home(values: Values, mission: Mission, route: Route | None) -> list[st
                 f"until the battery is empty or it is landed by hand; it was judged as a landing, which {name} 0 makes"
             )
     return found
+
+
+def _climb_out(values: Values, mission: Mission) -> list[str]:
+    """That a plane may climb out more steeply than those that were flown to judge how far it rises too high."""
+    pitch_deg = values.get("TECS_PITCH_MAX", _FLOWN_PITCH_DEG)
+    takes_off = any(item.command == TAKEOFF for item in mission.items)
+    if mission.autopilot is not Autopilot.ARDUPLANE or not takes_off or 0.0 < pitch_deg <= _FLOWN_PITCH_DEG + _SAME_DEG:
+        return []
+    return [
+        f"TECS_PITCH_MAX is {pitch_deg:g} on board: with more than {_FLOWN_PITCH_DEG:g}° (0: with PTCH_LIM_MAX_DEG) an "
+        f"aircraft with power to spare rises further above its take-off's altitude than the 16 m that are judged "
+        f"unless climb_out_m_s tells its climb: set {_FLOWN_PITCH_DEG:g}, or give climb_out_m_s"
+    ]
 
 
 def _lean(values: Values, mission: Mission) -> list[str]:

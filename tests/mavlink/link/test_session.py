@@ -489,6 +489,15 @@ def test_parameters_that_do_not_fit_are_told_in_words(values: dict[str, float], 
     assert words in " / ".join(judge_parameters(values, mission(), rtl_rel_home_m=60.0))
 
 
+def test_a_plane_that_climbs_out_more_steeply_than_was_judged_is_told() -> None:
+    climbs = replace(mission(PLANE), items=(MissionItem(22, 3, (8.0, 0.0, 0.0, 0.0), 366_000_000, -843_800_000, 80.0),))
+    assert judge_parameters({"TECS_PITCH_MAX": 15.0}, climbs) == []
+    for pitch_deg in (25.0, 0.0):
+        [told] = judge_parameters({"TECS_PITCH_MAX": pitch_deg}, climbs)
+        assert told.startswith(f"TECS_PITCH_MAX is {pitch_deg:g} on board")
+        assert judge_parameters({"TECS_PITCH_MAX": pitch_deg}, mission(PLANE)) == []
+
+
 @pytest.mark.parametrize(
     ("values", "words"),
     [
