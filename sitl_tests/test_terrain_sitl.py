@@ -1,11 +1,10 @@
 """A real ArduCopter asks for terrain, gets the mission's own, and reads it as it was sent.
 
-Needs the path of an arducopter binary: the vehicle must start in the mission's terrain, with no terrain of its own.
+Needs an arducopter binary: the vehicle must start in the mission's terrain, with no terrain of its own.
 """
 
 from __future__ import annotations
 
-import os
 import socket
 import subprocess
 import time
@@ -18,11 +17,10 @@ from gcsplan.app.terrain_link import compare, serve
 from gcsplan.dem.dat_file import read_dat
 from gcsplan.mavlink.link.terrain import Compared
 from gcsplan.mission_file import load_mission
+from gcsplan.vehicle import Autopilot
 from sitl_tests import sitl
 
-pytestmark = pytest.mark.skipif(
-    not os.path.isfile(sitl.wanted()), reason=f"no autopilot: set {sitl.VARIABLE} to the path of an arducopter binary"
-)
+pytestmark = sitl.needs(Autopilot.ARDUCOPTER, program=True)
 
 MISSION = {
     "version": 1, "terrain": {"dem": "sample:jacksboro"}, "limits": {"min_agl_m": 60},
@@ -47,7 +45,19 @@ def free_instance() -> int:
 def copter(tmp_path: Path) -> Iterator[str]:
     number = free_instance()
     said = tmp_path / "output.txt"
-    command = [sitl.wanted(), "--model", "+", "--speedup", "8", "-I", str(number), "--home", "36.59,-84.25,552,0"]
+    program = sitl.binary(Autopilot.ARDUCOPTER)
+    assert program is not None
+    command = [
+        str(program.resolve()),
+        "--model",
+        "+",
+        "--speedup",
+        "8",
+        "-I",
+        str(number),
+        "--home",
+        "36.59,-84.25,552,0",
+    ]
     with said.open("wb") as out:
         process = subprocess.Popen(command, cwd=tmp_path, stdin=subprocess.DEVNULL, stdout=out, stderr=out)
         try:
