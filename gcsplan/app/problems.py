@@ -104,6 +104,8 @@ def unsafe(verdict: Verdict, vehicle: Vehicle) -> NoMission:
             "\n  an rtl leads straight home at the return altitude: end: land and end: loiter end the mission at the "
             "goal, and rtl_rel_home_m is the altitude"
         )
+        if vehicle.turn_radius_m > 0.0:
+            words += "; a fixed wing climbs to it on the way, and begins higher with a higher approach_agl_m"
     return NoMission(
         f"{vehicle.name}: a path was found, but the mission as {vehicle.autopilot} flies it breaks limits:\n{words}",
         reason="infeasible",

@@ -38,6 +38,9 @@ def climbed(stretches: Sequence[Stretch], vehicle: Vehicle) -> list[Stretch]:
     pieces, at_m = [], 0.0
     for s in out:
         length = flat_m(s.start, s.end)
+        if length <= SAME_M:
+            pieces.append(s)
+            continue
         within = {x for x in (up_m, up_m + slow_m) if at_m + SAME_M < x < at_m + length - SAME_M}
         for a, b in pairwise([at_m, *sorted(within), at_m + length]):
             took_s = _seconds(b, up_m, known, cruise_m_s) - _seconds(a, up_m, known, cruise_m_s)

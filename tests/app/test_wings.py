@@ -756,6 +756,20 @@ def test_a_known_climb_out_has_one_time_in_plan_fleet_and_simulation(circling: P
 
 
 @pytest.mark.slow
+def test_a_return_that_begins_too_low_is_refused_and_a_higher_end_cures_it() -> None:
+    """Beside the ridge: a plane climbs on its way home."""
+
+    def loaded(more: str) -> Plan:
+        text = text_of(end=f"rtl{more}", goal="[36.6095, -84.3300]").replace("way_home: required", "")
+        return plan(load_mission(MISSIONS / "m.yaml", text=text))
+
+    with pytest.raises(NoMission, match="begins higher with a higher approach_agl_m"):
+        loaded("")
+    [v] = loaded("\n    approach_agl_m: 320").vehicles
+    assert v.verdict.safe is True
+
+
+@pytest.mark.slow
 def test_the_simulated_aircraft_takes_as_long_as_planned(landing: Plan) -> None:
     (v,) = landing.vehicles
     craft = v.request.vehicle
