@@ -50,6 +50,43 @@ def unknown_near(
 
 
 @device
+def break_of_piece(
+    u0: float, v0: float, u1: float, v1: float, za: float, kb: float, kc: float, kd: float, ax: float, ay: float,
+    dx: float, dy: float, sx: float, sy: float, r: float, w0: float, dw: float, need: float, bar: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """An upper bound of the break of a demand by a piece of a cell, where on the segment, and how far the heights of
+    the piece's corners differ; -inf first if the bound does not exceed ``bar`` or the piece is not within reach.
+
+    The piece is ``u0`` to ``u1`` and ``v0`` to ``v1`` of a cell with sides ``sx``, ``sy`` and height
+    ``za + kb·u + kc·v + kd·u·v``; the segment leads from (``ax``, ``ay``), m from the cell's first corner, by (``dx``,
+    ``dy``), with heights ``w0`` to ``w0 + dw``. The bound is the lower of two: that of the highest corner; and that of
+    the plane that is tangent at the piece's middle, raised by what the piece bulges above it, which within ``r`` of a
+    place is higher by at most ``r`` times its slope. The second is nearly exact for small pieces.
+    """
+    p, q = za + kb * u0 + kc * v0 + kd * u0 * v0, za + kb * u1 + kc * v0 + kd * u1 * v0
+    s, t = za + kb * u0 + kc * v1 + kd * u0 * v1, za + kb * u1 + kc * v1 + kd * u1 * v1
+    high = max(max(p, q), max(s, t))
+    if not high + need - min(w0, w0 + dw) > bar:
+        return -math.inf, 0.0, 0.0
+    first, last = within(ax, ay, dx, dy, u0 * sx, v0 * sy, u1 * sx, v1 * sy, r)
+    if first > last:
+        return -math.inf, 0.0, 0.0
+    at = first if dw > 0.0 else last
+    bound = high + need - (w0 + at * dw)
+    u, v = 0.5 * (u0 + u1), 0.5 * (v0 + v1)
+    gx, gy = (kb + kd * v) / sx, (kc + kd * u) / sy
+    plane = za + kb * u + kc * v + kd * u * v + 0.25 * abs(kd) * (u1 - u0) * (v1 - v0)
+    plane += r * math.sqrt(gx * gx + gy * gy) + gx * (ax - u * sx) + gy * (ay - v * sy) + need - w0
+    per_t = gx * dx + gy * dy - dw
+    worst = last if per_t > 0.0 else first
+    if plane + worst * per_t < bound:
+        bound, at = plane + worst * per_t, worst
+    if not bound > bar:
+        return -math.inf, 0.0, 0.0
+    return bound, at, high - min(min(p, q), min(s, t))
+
+
+@device
 def deepest(
     m: Floats, z: Floats, sign: float, e0: float, n0: float, h0: float, e1: float, n1: float, h1: float, need: float,
     reach: float, best: float, stack: Floats, full: bool,
@@ -91,17 +128,13 @@ def deepest(
             while children:
                 before = size
                 for _ in range(children):
-                    p, q = za + kb * u0 + kc * v0 + kd * u0 * v0, za + kb * um + kc * v0 + kd * um * v0
-                    s, t = za + kb * u0 + kc * vm + kd * u0 * vm, za + kb * um + kc * vm + kd * um * vm
-                    high = max(max(p, q), max(s, t))
-                    if high + need - lowest > bar:
-                        ta, tb = within(x0, y0, dx, dy, (i + u0) * sx, (j + v0) * sy, (i + um) * sx, (j + vm) * sy, r)
-                        if ta <= tb:
-                            tl = ta if dw > 0.0 else tb
-                            stack[size, 0], stack[size, 1], stack[size, 2], stack[size, 3] = u0, v0, um, vm
-                            stack[size, 4], stack[size, 5] = high + need - (w0 + tl * dw), tl
-                            stack[size, 6] = high - min(min(p, q), min(s, t))
-                            size += 1
+                    bound, tl, spread = break_of_piece(
+                        u0, v0, um, vm, za, kb, kc, kd, x0 - i * sx, y0 - j * sy, dx, dy, sx, sy, r, w0, dw, need, bar
+                    )
+                    if bound > bar:
+                        stack[size, 0], stack[size, 1], stack[size, 2], stack[size, 3] = u0, v0, um, vm
+                        stack[size, 4], stack[size, 5], stack[size, 6] = bound, tl, spread
+                        size += 1
                     u0, v0, um, vm = ul, vl, u1, v1
                 # The deeper half is searched first.
                 if size == before + 2 and stack[before, 4] > stack[before + 1, 4]:

@@ -115,14 +115,34 @@ def test_on_a_slope_the_track_error_costs_its_rise(scale: float) -> None:
     """The ground rises 0.5 m per metre to the east: within 8 m of the line it is up to 4 m higher than below it."""
     airspace = world(np.tile(np.arange(0, 1050, 50.0), (21, 1)), scale=scale)
     need = 0.5 * 1000.0 + 60.0 + 0.5 * 8.0 * scale
-    assert not kinds(airspace, leg([1000, 100, need + 0.006], [1000, 1900, need + 0.006], track=8.0), Limits(60.0))
+    over = leg([1000, 100, need + 1e-4], [1000, 1900, need + 1e-4], track=8.0)
+    assert not kinds(airspace, over, Limits(60.0))
+    assert airspace.clear_counted(over, Limits(60.0))[1] < 100  # not cut into pieces of a millimetre
     v = only(airspace, leg([1000, 100, need - 0.001], [1000, 1900, need - 0.001], track=8.0), Limits(60.0))
-    assert v.by == pytest.approx(0.001, abs=0.006)
+    assert v.by == pytest.approx(0.001, abs=1e-6)
     # For max AGL the downhill side counts.
     roof = 0.5 * 1000.0 + 120.0 - 0.5 * 8.0 * scale
     limits = Limits(0.0, max_agl_m=120.0)
-    assert not kinds(airspace, leg([1000, 100, roof - 0.006], [1000, 1900, roof - 0.006], track=8.0), limits)
+    assert not kinds(airspace, leg([1000, 100, roof - 1e-4], [1000, 1900, roof - 1e-4], track=8.0), limits)
     assert kinds(airspace, leg([1000, 100, roof + 0.001], [1000, 1900, roof + 0.001], track=8.0), limits) == {"max_agl"}
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_beside_a_line_over_bent_ground_what_is_nearer_than_the_reach_counts(seed: int) -> None:
+    """A leg in one cell whose corners do not lie in a plane, held against the heights at 200,000 places beside it."""
+    rng = np.random.default_rng([47, seed])
+    airspace = world(rng.uniform(0.0, 60.0, (4, 4)))
+    start, end = rng.uniform(120.0, 180.0, (2, 2))
+    reach, climb = rng.uniform(2.0, 19.0), rng.uniform(-20.0, 20.0)
+    along, (around, away) = rng.random(200_000), rng.random((2, 200_000))
+    turn, away_m = 2.0 * np.pi * around, np.where(away < 0.5, reach, reach * np.sqrt(away))
+    beside = start + along[:, None] * (end - start) + away_m[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    ground = airspace.surface.ground_at(*beside.T)
+    need = float(np.max(ground - along * climb)) + 10.0
+    limits = Limits(10.0, max_climb_deg=90.0, max_descent_deg=90.0)
+    for more_m, legal in ((-0.01, False), (0.25, True)):
+        legs = leg([*start, need + more_m], [*end, need + more_m + climb], track=reach)
+        assert (not kinds(airspace, legs, limits)) is legal, (seed, more_m)
 
 
 def test_beside_a_cliff_the_horizontal_clearance_binds() -> None:
