@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats
+from gcsplan.planners.optimal.navmesh.clearance import Cone
 from gcsplan.planners.optimal.navmesh.mesh import Guide
 
 Spare = tuple[float, float]
@@ -28,6 +29,13 @@ class End:
     def place(self) -> tuple[float, float]:
         """(east_m, north_m)."""
         return self.east_m, self.north_m
+
+    def cone(self, slope: float, spare_m: float) -> list[Cone]:
+        """The cone of the altitudes that paths with ``spare_m`` metres to spare can reach near here, climbing or
+        descending by ``slope``; none if the altitude is free or the slope is not limited."""
+        if self.amsl_m is None or not math.isfinite(slope):
+            return []
+        return [(self.east_m, self.north_m, self.amsl_m + slope * spare_m, slope)]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -9,7 +9,7 @@ corridor of the few tracks that may be short enough.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -58,6 +58,9 @@ class Leg:
         self.straight_m = math.dist(start.place, goal.place)
         self.length_m = math.inf
         """A lower bound of every track's length below the highest cap; inf: it is proved that there is no track."""
+        self._flown_m = 0.0
+        """A lower bound of the track's length of every path below the highest cap; it counts what paths can climb to,
+        so that it may exceed `length_m`."""
         self.seen = False
         """Whether the leg was flooded."""
         self.reach_m = 0.0
@@ -79,8 +82,8 @@ class Leg:
 
     @property
     def lower_m(self) -> float:
-        """The best known lower bound of every track's length, metres."""
-        return self.length_m if self.seen else self.straight_m
+        """The best known lower bound of the length of every path's track, metres."""
+        return max(self.length_m, self._flown_m) if self.seen else self.straight_m
 
     def flood(self, slack: float, within_m: float = math.inf) -> None:
         """Flood all cells that are free below the highest cap, as far as tracks lead that are longer than the shortest
@@ -179,7 +182,8 @@ class Leg:
         between nodes, and are raised at these places, where earlier tracks lacked altitude.
         """
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
-        cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, *spare_m)
+        climb_m, descent_m = spare_m
+        cones = self.start.cone(limits.max_climb_slope, climb_m) + self.goal.cone(limits.max_descent_slope, descent_m)
         try:
             clearance, guide = self._clearance(cap_m, False, within, limit, cones, under, over, shut is not None)
             for place, by in shut or ():
@@ -192,12 +196,33 @@ class Leg:
             pass
         return None
 
-    def bound(self, cap_m: float, within: Corridor | None, limit_m: float, climbs: bool = False) -> float:
-        """A lower bound of every track's length below ``cap_m``, at most ``limit_m`` and `reach_m`.
+    def bound(
+        self,
+        cap_m: float,
+        within: Corridor | None,
+        limit_m: float,
+        climbs: bool = False,
+        suffices: Callable[[float], bool] = lambda _: False,
+    ) -> float:
+        """A lower bound of the length of every path's track below ``cap_m``, at most ``limit_m`` and `reach_m`.
 
-        ``climbs``: near the ends, allow only altitudes that tracks shorter than ``limit_m`` can climb to.
+        ``climbs``: near the ends, allow only altitudes that tracks shorter than ``limit_m`` can climb to. It is raised
+        in rounds; the last is the first whose bound ``suffices``.
         """
-        limit, limits = min(limit_m, self.reach_m), self.problem.limits
+        limit = min(limit_m, self.reach_m)
+        if self.lower_m >= limit:
+            return limit
+        found = max(self._bound(cap_m, within, limit, climbs, suffices), self.lower_m)
+        if cap_m >= self.top_m:
+            self._flown_m = found
+        return found
+
+    def _bound(
+        self, cap_m: float, within: Corridor | None, limit: float, climbs: bool, suffices: Callable[[float], bool]
+    ) -> float:
+        limits = self.problem.limits
+        climb, descent = (limits.max_climb_slope, limits.max_descent_slope) if climbs else (math.inf, math.inf)
+        # Not `lower_m`, which counts laps: near the ends, a path that flew laps has climbed for as many metres.
         known = self.length_m
         try:
             clearance, guide = self._clearance(cap_m, True, within, limit, roughly=limit > MUCH_LONGER * known)
@@ -205,7 +230,7 @@ class Leg:
             return known
         for _ in range(RAISED):
             spare = max(limit - known, 0.0)
-            cones = self._cones(limits.max_climb_slope, limits.max_descent_slope, spare, spare) if climbs else []
+            cones = self.start.cone(climb, spare) + self.goal.cone(descent, spare)
             clearance.hold(cones)
             try:
                 way = clearance.mesh().track(self.start.place, self.goal.place, limit, guide)
@@ -217,7 +242,7 @@ class Leg:
             # The cones raised walls, tracks got longer, and less length is left to climb with: tighten the cones again.
             enough = not cones or way.length_m < known + WORTHWHILE * spare or not self.problem.budget.goes_on()
             known = max(known, way.length_m)
-            if enough:
+            if enough or suffices(known):
                 break
         return known
 
@@ -349,16 +374,6 @@ class Leg:
             except Exhausted:
                 self._ahead = Guide(mesh, self.start.place, np.zeros(len(mesh.joins)), np.zeros(len(mesh.start) - 1))
         return self._ahead
-
-    def _cones(self, climb: float, descent: float, at_start_m: float, at_goal_m: float) -> list[Cone]:
-        """Cones of the altitudes that can be reached near the ends by paths with ``at_start_m``, ``at_goal_m`` metres
-        to spare there; none where an end's altitude is free or the slope is not limited."""
-        ends = ((self.start, climb, at_start_m), (self.goal, descent, at_goal_m))
-        return [
-            (end.east_m, end.north_m, end.amsl_m + slope * spare_m, slope)
-            for end, slope, spare_m in ends
-            if end.amsl_m is not None and math.isfinite(slope)
-        ]
 
     def _lattice(self, detour: float) -> Plane:
         """The first-look lattice for tracks of ``detour`` times the straight track."""

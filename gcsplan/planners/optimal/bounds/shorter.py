@@ -13,12 +13,12 @@ from functools import partial
 
 from gcsplan.planners.optimal.bounds.climb_bound import climb_bound, rise_bound
 from gcsplan.planners.optimal.cap_search import Layer, search_caps
+from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.optimal.plane_search import PlaneSearch
 
-CLOSER, LEFT, SURE, FLAT = 8, 0.05, 0.4, 0.12
-"""Most cuts of the interval between bound and best path; the part of the gap below which an interval is not cut; the
-part of that for the expected gain, where it is known how bounds rise; and the part of the interval at which it is first
-cut if path and bound are far apart."""
+CLOSER, LEFT, FLAT = 8, 0.05, 0.2
+"""Most cuts of the interval between bound and best path; the part of the gap below which neither an interval is cut nor
+a gain is worth the work; and the part of the interval at which it is first cut if path and bound are far apart."""
 FALLS = -0.25
 """Change of the bound of shorter paths per metre of their greatest length, assumed until two such bounds are known."""
 CLIMBED = (0.98, 0.9, 0.75, 0.5)
@@ -29,8 +29,10 @@ PIECES = 4
 
 def halve(plane: PlaneSearch, *, far: bool = False) -> None:
     """Raise the lower bound of the length until the gap is as small as wanted, if possible; unless ``far``, the value
-    for that is tried first. The interval between bound and path is halved until two bounds predict the best cut."""
+    for that is tried first. The interval between bound and path is halved until bounds predict the best cut."""
     incumbent = plane.incumbent
+    if plane.by_intervals:
+        _raise_by_intervals(plane)
     low, high = incumbent.bound, incumbent.cost
     shorter: list[tuple[float, float]] = []  # lengths that were tried, and the bounds of all paths shorter than them
     part = FLAT if far else 0.5
@@ -38,12 +40,12 @@ def halve(plane: PlaneSearch, *, far: bool = False) -> None:
         nearer = incumbent.cost / (1.0 + incumbent.nearer)
         at_once = k == 0 and not far
         enough = low >= nearer if at_once else incumbent.done()
-        least = max(2e-5 * low, LEFT * (incumbent.cost - low))
-        where = _meeting(shorter, low, high)
-        if enough or high - low < least or where - low < SURE * least or not incumbent.budget.goes_on():
+        least = _least_step(plane)
+        where = _meeting(shorter)
+        if enough or high - low < least or where - low < least or not incumbent.budget.goes_on():
             break
         # No path is shorter than `low`; is any shorter than `middle`?
-        middle = where if math.isfinite(where) else low + part * (high - low)
+        middle = where if where < high else low + part * (high - low)
         middle = max(middle, nearer if at_once else 0.0)
         found = _bound_shorter(plane, middle)
         if found < middle:
@@ -55,25 +57,54 @@ def halve(plane: PlaneSearch, *, far: bool = False) -> None:
         incumbent.raise_bound(low)
 
 
-def _meeting(shorter: list[tuple[float, float]], low: float, high: float) -> float:
+def _least_step(plane: PlaneSearch) -> float:
+    """Metres of a bound that are worth the work."""
+    return max(2e-5 * plane.incumbent.bound, LEFT * (plane.incumbent.cost - plane.incumbent.bound))
+
+
+def _meeting(shorter: list[tuple[float, float]]) -> float:
     """The length that should equal the bound of all shorter paths, extrapolated from the last two lengths tried, or
-    from one with the slope `FALLS`; inf if that gives none between ``low`` and ``high``."""
-    if not shorter or (len(shorter) == 1 and shorter[0][1] < shorter[0][0]):
+    from one with the slope `FALLS`; inf if they do not tell."""
+    if not shorter:
         return math.inf
     (a, of_a), (b, of_b) = shorter[0], shorter[-1]
     slope = (of_b - of_a) / (b - a) if b != a else FALLS
-    at = (of_b - slope * b) / (1.0 - slope)
-    return at if slope <= 0.0 and low <= at < high else math.inf
+    return (of_b - slope * b) / (1.0 - slope) if slope <= 0.0 else math.inf
+
+
+def _raise_by_intervals(plane: PlaneSearch) -> None:
+    """Raise the lower bound to the greatest length for which no altitude interval is left, by bisection."""
+    incumbent = plane.incumbent
+    high = incumbent.cost
+    middle = incumbent.bound + _least_step(plane)
+    while high - incumbent.bound >= _least_step(plane) and not incumbent.done() and incumbent.budget.goes_on():
+        if all(len(leg.intervals(limit).cell) for leg, limit in _limits(plane, _longest_track(plane, middle))):
+            high = middle
+        else:
+            incumbent.raise_bound(middle)
+        middle = 0.5 * (incumbent.bound + high)
+
+
+def _limits(plane: PlaneSearch, most_m: float) -> list[tuple[Leg, float]]:
+    """The legs, and the greatest lengths of their tracks if those of all legs are ``most_m`` long at most."""
+    spare = most_m - sum(leg.lower_m for leg in plane.legs)
+    return [(leg, leg.lower_m + spare) for leg in plane.legs]
 
 
 def _bound_shorter(plane: PlaneSearch, longest_m: float) -> float:
     """A lower bound of all paths shorter than ``longest_m``: from their tracks on the fine lattice, then their climb;
     ``longest_m`` or more if there are none."""
     most_m = _longest_track(plane, longest_m)
-    spare = most_m - sum(leg.length_m for leg in plane.legs)
+
+    def least(tracks: list[float]) -> float:
+        if sum(tracks) >= most_m * (1.0 - 1e-12):
+            return longest_m
+        # The length to spare is what the legs' bounds leave, which is less now that these are better.
+        return _least_of_pieces(plane, tracks, max(most_m - sum(tracks), 0.0), partial(rise_bound, plane.legs))
+
+    one = len(plane.legs) == 1
     tracks = []
-    for leg in plane.legs:
-        limit = leg.length_m + spare
+    for leg, limit in _limits(plane, most_m):
         wanted = leg.corridor(limit)
         if plane.by_intervals:
             intervals = leg.intervals(limit)
@@ -81,12 +112,8 @@ def _bound_shorter(plane: PlaneSearch, longest_m: float) -> float:
                 tracks.append(min(limit, leg.reach_m))
                 continue
             wanted = wanted.within(intervals.cells)
-        tracks.append(leg.bound(plane.top_m, wanted, limit, True))
-    if sum(tracks) >= most_m * (1.0 - 1e-12):
-        return longest_m
-    # The length to spare is what the legs' bounds leave, which is less now that these are better.
-    spare = max(most_m - sum(tracks), 0.0)
-    return _least_of_pieces(plane, tracks, spare, partial(rise_bound, plane.legs))
+        tracks.append(leg.bound(plane.top_m, wanted, limit, True, lambda track: one and least([track]) >= longest_m))
+    return least(tracks)
 
 
 def _longest_track(plane: PlaneSearch, longest_m: float) -> float:
@@ -96,7 +123,7 @@ def _longest_track(plane: PlaneSearch, longest_m: float) -> float:
         return longest_m
     climbing = rise_bound(legs, [longest_m], [longest_m]) - longest_m
     for part in CLIMBED:
-        shorter = max(longest_m - part * climbing, legs[0].length_m)
+        shorter = max(longest_m - part * climbing, legs[0].lower_m)
         if rise_bound(legs, [shorter], [longest_m]) >= longest_m:
             return shorter
     return longest_m
