@@ -44,8 +44,6 @@ MUCH_LONGER, ROUGHLY = 1.1, 3
 RAISED, WORTHWHILE = 4, 0.05
 """Most times that walls near the ends are raised for one bound; and the part of the spare metres by which a round must
 raise the bound for another to follow."""
-
-
 Lacking = tuple[Floats, float]
 """A place (2,) at which a track lacked altitude, and by how many metres."""
 
@@ -59,8 +57,7 @@ class Leg:
         self.length_m = math.inf
         """A lower bound of every track's length below the highest cap; inf: it is proved that there is no track."""
         self._flown_m = 0.0
-        """A lower bound of the track's length of every path below the highest cap; it counts what paths can climb to,
-        so that it may exceed `length_m`."""
+        """The same for the tracks of paths, which are longer where they fly laps to climb."""
         self.seen = False
         """Whether the leg was flooded."""
         self.reach_m = 0.0
@@ -182,8 +179,8 @@ class Leg:
         between nodes, and are raised at these places, where earlier tracks lacked altitude.
         """
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
-        climb_m, descent_m = spare_m
-        cones = self.start.cone(limits.max_climb_slope, climb_m) + self.goal.cone(limits.max_descent_slope, descent_m)
+        cones = self.start.cone(limits.max_climb_slope, spare_m[0])
+        cones += self.goal.cone(limits.max_descent_slope, spare_m[1])
         try:
             clearance, guide = self._clearance(cap_m, False, within, limit, cones, under, over, shut is not None)
             for place, by in shut or ():
@@ -228,10 +225,13 @@ class Leg:
             clearance, guide = self._clearance(cap_m, True, within, limit, roughly=limit > MUCH_LONGER * known)
         except Exhausted:
             return known
-        for _ in range(RAISED):
+        for k in range(RAISED):
             spare = max(limit - known, 0.0)
             cones = self.start.cone(climb, spare) + self.goal.cone(descent, spare)
-            clearance.hold(cones)
+            if k == 0:
+                clearance.hold(cones)
+            elif not clearance.obstructs(cones, self.last_track):
+                break  # that track is still the shortest
             try:
                 way = clearance.mesh().track(self.start.place, self.goal.place, limit, guide)
             except Exhausted as given_up:

@@ -223,6 +223,18 @@ class ClearanceGrid:
         # Altitudes that a path cannot reach so soon do not lead over a zone either: lay the zones anew.
         self._laid = False
 
+    def obstructs(self, cones: list[Cone], track: Floats) -> bool:
+        """`hold` the altitude to ``cones``; return whether that shuts anything in the cells that a track (N, 2)
+        crosses."""
+        cell_m = self.plane.stride * float(self.plane.problem.airspace.surface.grid.metres_per_cell(*track[0]).min())
+        places = sampled(track, 0.5 * cell_m / (self.plane.parts * self.fineness))
+        at = (self.plane.all_at(places) - [self.col, self.row]) * self.fineness
+        i, j = np.floor(at).astype(np.intp).clip(0, [self.shape[1] - 2, self.shape[0] - 2]).T
+        corners = np.stack([j, j, j + 1, j + 1]), np.stack([i, i + 1, i, i + 1])
+        before = self._excess[corners]
+        self.hold(cones)
+        return bool(np.any(self._excess[corners] > np.maximum(before, 0.0)))
+
     def mesh(self, *, single: bool = False) -> Mesh:
         """Make the mesh of the free cells. ``single``: each free cell is a piece of its own."""
         if not self._laid:
