@@ -10,22 +10,23 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 RATES = {
-    "node": 0.2e-6,
+    "node": 0.12e-6,
     "portal": 0.1e-6,
-    "opened": 0.8e-6,
-    "check": 1e-3,
-    "leg": 0.8e-6,
+    "opened": 0.5e-6,
+    "check": 0.6e-3,
+    "leg": 0.5e-6,
     "cut": 0.11e-6,
     "cell": 0.02e-6,
     "piece": 0.3e-6,
-    "place": 0.5e-6,
+    "place": 0.3e-6,
     "corner": 12e-6,
-    "label": 5e-6,
+    "label": 3e-6,
     "interval": 1.5e-6,
-    "pull": 80e-6,
+    "pull": 120e-6,
     "sighted": 1e-6,
     "walked": 0.7e-6,
     "drawn": 15e-6,
@@ -94,17 +95,20 @@ class Budget:
             return self.begun_s + FIRST * self.seconds + FIRST_S
         return self._first_s + max(self.seconds - SPARE_S, 0.5 * self.seconds)
 
-    def goes_on(self, part: float = 1.0) -> bool:
-        """Whether counted work and time are left; records which of them ran out. ``part``: the part of the counted work
-        after the first path that may be spent by now."""
-        allowed = COUNTED * self.seconds
-        if self.left <= (1.0 - part) * allowed:
+    def goes_on(self) -> bool:
+        """Whether counted work and time are left; records which of them ran out."""
+        if self.left <= 0.0:
             self.ran_out = True
             return False
         if time.perf_counter() > self.deadline_s:
             self.clocked_out = True
             return False
         return True
+
+    def share(self, part: float) -> Callable[[], bool]:
+        """A function that returns False once ``part`` of the counted work left now is spent, or `goes_on` does."""
+        most = self.spent + part * self.left
+        return lambda: self.spent < most and self.goes_on()
 
     def fits(self, seconds: float, megabytes: float) -> bool:
         """Whether that many counted seconds and megabytes are left."""

@@ -35,6 +35,8 @@ PAST_FINE, ROUNDS = 9, 2
 """Most tracks past obstacles that are tried on the finer lattice at once, and how often that is repeated."""
 FINER = 4
 """Parts a side into which cells are cut once more, for walls and zones that the first lattice rounds off."""
+OF_REST = 0.25
+"""Part of the counted work left that a roadmap may take if a path is known: what it will take is not known before."""
 MOST_CELLS = 50_000
 """Most cells of all corridors for which altitude intervals are computed."""
 
@@ -102,7 +104,7 @@ class Searches:
         nodes, of, far, twice = self._nodes, self._of, gap(FAR), gap(TWICE * i.wanted)
         rows = [
             Search("straight", 1.0, lambda: self._straight is None, of(2e-3, 0.0), self._fly_straight),
-            Search("outlines", 1.0, self._has_outlines, of(3e-3, 2e-3), self._look_at_outlines),
+            Search("outlines", 1.0, self._has_outlines, of(2e-3, 1.2e-3), self._look_at_outlines),
             Search(
                 "outline_bound", 0.9, self._has_ceilings, self._size_of_overflights, self._bound_overflights, again=True
             ),
@@ -238,7 +240,8 @@ class Searches:
         from gcsplan.planners.optimal.sources.local_roadmap import small_path  # most missions do not need it
 
         incumbent = self.incumbent
-        incumbent.offer(small_path(self.problem, incumbent.best, incumbent.budget.goes_on))
+        in_time = incumbent.budget.share(1.0 if incumbent.best is None else OF_REST)
+        incumbent.offer(small_path(self.problem, incumbent.best, in_time))
 
     def _look_finely(self) -> None:
         self.plane.try_below(self.plane.top_m, fine=True)
