@@ -27,8 +27,8 @@ RATES = {
     "label": 3e-6,
     "interval": 1.5e-6,
     "pull": 120e-6,
-    "sighted": 1e-6,
-    "walked": 0.7e-6,
+    "sighted": 0.5e-6,
+    "walked": 0.4e-6,
     "drawn": 15e-6,
     "mend": 0.1,
 }

@@ -33,9 +33,9 @@ TWICE = 2.0
 """Times the wanted gap from which on costlier bounds are worth their work."""
 PAST_FINE, ROUNDS = 9, 2
 """Most tracks past obstacles that are tried on the finer lattice at once, and how often that is repeated."""
-FINER = 4
+FINER = 3
 """Parts a side into which cells are cut once more, for walls and zones that the first lattice rounds off."""
-OF_REST = 0.25
+OF_REST = 0.5
 """Part of the counted work left that a roadmap may take if a path is known: what it will take is not known before."""
 MOST_CELLS = 50_000
 """Most cells of all corridors for which altitude intervals are computed."""

@@ -42,6 +42,8 @@ def halve(plane: PlaneSearch, *, far: bool = False) -> None:
         enough = low >= nearer if at_once else incumbent.done()
         least = _least_step(plane)
         where = _meeting(shorter)
+        if where - low < least and len(plane.legs) > 1:
+            where = math.inf  # a better bound of one leg leaves the others less to spare: a prediction is soon too low
         if enough or high - low < least or where - low < least or not incumbent.budget.goes_on():
             break
         # No path is shorter than `low`; is any shorter than `middle`?
@@ -53,8 +55,9 @@ def halve(plane: PlaneSearch, *, far: bool = False) -> None:
         part = 0.5 if found < middle else min(2.0 * part, 0.5)
         if found != middle:
             shorter = [*shorter[-1:], (middle, found)]
-        low = max(low, min(found, middle))
-        incumbent.raise_bound(low)
+        plane.raise_tracks()
+        incumbent.raise_bound(min(found, middle))
+        low = incumbent.bound
 
 
 def _least_step(plane: PlaneSearch) -> float:

@@ -1,0 +1,30 @@
+"""Bounds of the length over several legs, of which each that is better leaves the others fewer metres."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gcsplan.planners.budget import Budget
+from gcsplan.planners.optimal.planner import search
+from gcsplan.planners.problem import Problem, Via
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.limits import Limits
+from tests.support.planner_worlds import Floats, ground
+
+
+def test_bound_over_several_legs_goes_on_while_legs_get_better() -> None:
+    """Before each ridge the climb takes more metres than there are. With one cut after a prediction, and without what
+    the legs' own bounds prove, the gap was 31 %."""
+
+    def ridges(east: Floats, north: Floats) -> Floats:
+        away = np.minimum(np.abs(east - 600.0), np.abs(east - 1350.0))
+        return np.maximum(0.0, 80.0 - 0.5 * away) * (np.abs(north - 1100.0) < 400.0)
+
+    limits = Limits(min_agl_m=10.0, max_climb_deg=10.0, max_descent_deg=10.0)
+    problem = Problem(
+        Airspace(ground(ridges), ()), limits, (400.0, 1000.0, 20.0), (1550.0, 1000.0, 20.0),
+        via=(Via(975.0, 1000.0, 15.0),), budget=Budget(4.0, 500.0),
+    )  # fmt: skip
+    found = search(problem).incumbent
+    assert found.best is not None
+    assert found.gap < 0.2
