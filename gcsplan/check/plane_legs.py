@@ -167,13 +167,8 @@ def _cell_cuts(ends: Floats, surface: Surface, run_m: float) -> Floats:
             if a != b:
                 cuts.append((k + (lines - a) / (b - a)) / parts)
     t = np.unique(np.clip(np.concatenate(cuts), 0.0, 1.0))
-    kept = np.concatenate([[True], np.diff(t) * run_m > SHORTEST_M])
-    kept[-1] = True
-    if not kept.all():
-        t = t[kept]
-        if len(t) > 2 and (t[-1] - t[-2]) * run_m <= SHORTEST_M:
-            t = np.delete(t, -2)
-    return np.asarray(t)
+    far = np.diff(t) * run_m > SHORTEST_M
+    return np.concatenate([t[:1], t[1:-1][far[:-1] & (1.0 - t[1:-1] > SHORTEST_M / run_m)], t[-1:]])
 
 
 def steep_report(plane: PlaneLegs, report: LegReport, limits: Limits) -> LegReport:

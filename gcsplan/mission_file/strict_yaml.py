@@ -23,6 +23,8 @@ MAX_ALIASES = 200
 MAX_NODES = 500_000
 """Most values, with every alias expanded."""
 
+_TOO_DEEP = f"the file is nested more than {MAX_DEPTH} levels deep"
+
 _TAG = "tag:yaml.org,2002:"
 _PLAIN = "plain"
 _NULL = re.compile(r"(?:~|null|Null|NULL|)\Z")
@@ -66,6 +68,8 @@ def read_yaml(text: str, *, where: str) -> Any:
         if context and why.context_mark is not None and mark is not why.context_mark:
             context += f" (begun in line {why.context_mark.line + 1})"
         problem = " ".join(x for x in (context, why.problem) if x)
+        if "nesting depth" in problem:  # since PyYAML 6.0.4 its scanner, which reads ahead, has a limit of its own
+            raise InputError(_TOO_DEEP, where=_place(where, mark)) from None
         begun = None if why.context_mark is None else why.context_mark.line
         hint = "" if mark is None else cure(text, mark.line, begun)
         raise InputError(f"this is not YAML: {problem}{hint}", where=_place(where, mark)) from None
@@ -108,9 +112,9 @@ def _measure(text: str, where: str) -> None:
             depth += 1
         elif isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
-        for what, count, most in (
-            ("levels deep", depth, MAX_DEPTH), ("aliases", aliases, MAX_ALIASES), ("values", nodes, MAX_NODES),
-        ):  # fmt: skip
+        if depth > MAX_DEPTH:
+            raise InputError(_TOO_DEEP, where=_place(where, event.start_mark))
+        for what, count, most in (("aliases", aliases, MAX_ALIASES), ("values", nodes, MAX_NODES)):
             if count > most:
                 raise InputError(f"the file has more than {most} {what}", where=_place(where, event.start_mark))
 

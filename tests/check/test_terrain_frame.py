@@ -110,6 +110,31 @@ def test_a_leg_follows_what_the_autopilot_interpolates(at: tuple[float, float]) 
             assert abs(height - (read + 80.0 + 30.0 * one)) < allowed + 0.06
 
 
+def test_a_leg_that_ends_on_a_line_of_posts_has_no_steep_end() -> None:
+    """A border that is crossed a hair before the end made a piece of 1e-12 m, whose slope was noise: 20.8°."""
+    where = fine_world(lambda e, n: 300.0 + 0.01 * e)
+    rng = np.random.default_rng(6)
+    shortest = []
+    for _ in range(40):
+        xy = np.array([rng.uniform(-2000, 0, 2), rng.uniform(200, 2000, 2)])
+        ((_, _, surface),) = where.vehicle_terrain.pieces(xy)
+        east, north = xy[1]
+        line = math.ceil(surface.grid(east, north)[0])
+        low, high = east, east + 200.0
+        while (middle := 0.5 * (low + high)) not in (low, high):  # the first float beyond the line of posts
+            low, high = (middle, high) if surface.grid(middle, north)[0] <= line else (low, middle)
+        for past_m in (0.0, 1e-12, 1e-9, 1e-6, 9e-4):
+            xy[1, 0] = high + past_m
+            z = surface.ground_at(xy[:, 0], xy[:, 1]) + 90.0
+            followed = follow_ground(np.column_stack([xy, z]), where.vehicle_terrain)
+            assert followed is not None
+            starts, ends, _, steep = followed
+            shortest.append(np.hypot(*(ends - starts)[:, :2].T).min())
+            assert np.abs(steep).max() < 0.03
+            np.testing.assert_array_equal((starts[0, :2], ends[-1, :2]), xy)
+    assert min(shortest) > 0.9e-3
+
+
 def test_ground_that_the_vehicle_does_not_get_is_not_flown_over() -> None:
     """Beside a void a part of 4 × 4 posts is unknown as a whole, far beyond the void itself."""
     flat = fine_world(lambda e, n: 300.0 + 0 * e)
