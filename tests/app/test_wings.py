@@ -671,7 +671,7 @@ def circling() -> Plan:
 
 @pytest.fixture(scope="module")
 def landing() -> Plan:
-    text = text_of(end="land\n    takeoff_heading_deg: 60").replace("min_agl_m: 120", "min_agl_m: 60")
+    text = text_of(end="land", takeoff_heading_deg="60").replace("min_agl_m: 120", "min_agl_m: 60")
     return plan(load_mission(MISSIONS / "m.yaml", text=text))
 
 
@@ -784,7 +784,7 @@ def test_the_simulated_aircraft_takes_as_long_as_planned(landing: Plan) -> None:
 
 
 def test_where_no_climb_out_is_legal_on_the_wanted_heading_the_refusal_names_it() -> None:
-    source = load_mission(MISSIONS / "m.yaml", text=text_of(end="loiter\n    takeoff_heading_deg: 210"))
+    source = load_mission(MISSIONS / "m.yaml", text=text_of(takeoff_heading_deg="210"))
     with pytest.raises(NoMission, match="no climb-out on takeoff_heading_deg 210") as caught:
         plan(source)
     assert caught.value.reason == "infeasible"
