@@ -19,6 +19,7 @@ UNIT = Unit(
         "optimal.navmesh.mesh_kernels",
         "optimal.navmesh.polyanya",
         "optimal.navmesh.polyanya_nodes",
+        "optimal.navmesh.shut_kernels",
         "optimal.navmesh.zone_kernels",
         "profile.taut_kernels",
     ),

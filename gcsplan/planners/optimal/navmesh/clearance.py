@@ -19,6 +19,7 @@ from gcsplan.planners.optimal.navmesh.grid import Plane, box_of
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.mesh_kernels import WALL, make_pieces, make_portals, sort_portals
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
+from gcsplan.planners.optimal.navmesh.shut_kernels import stamp_beside
 from gcsplan.planners.optimal.navmesh.zone_kernels import lift_lids, stamp_zones
 from gcsplan.planners.profile.track import divided
 
@@ -110,10 +111,10 @@ class ClearanceGrid:
             self._be_exact()
         self._zones, self._edges = plane.zones(low, under, over)
         self._boxes = plane.boxes(self.row, self.col, fineness, rows, cols)
-        self._steep, self._exact, self._reach_m = steep, exact, plane.problem.airspace.beside_m(limits)
+        self._coarse, self._steep, self._exact = (ground, x, y), steep, exact
         self._up, self._down = (self._array(name, self.shape) for name in ("up", "down"))
         self._of = self._array("of", (self._diagonal.size,), np.int32)
-        self._values = np.empty((1 + plane.shapes.cells * fineness**2, WALL))
+        self._values = np.empty((1 + (plane.shapes.cells + low * plane.shapes.looking) * fineness**2, WALL))
         self._laid = False
         self._held: list[Cone] = []
         self._lift: Floats
@@ -269,11 +270,17 @@ class ClearanceGrid:
 
     def _lay(self) -> None:
         """Give the cells the walls of the zones."""
-        stamp_zones(
-            self._around, self._span, self._excess, self._floor, self._ground, self._steep, self.fineness,
-            self._reach_m, self._exact, self._up, self._down, self._x, self._y, self._zones, self._edges, self._boxes,
-            self.low, self._of, self._values,
+        reach_m, near_m = self.plane.reach_m()
+        count = stamp_zones(
+            self._around, self._span, self._excess, self._floor, self._ground, self._steep, self.fineness, reach_m,
+            self._exact, self._up, self._down, self._x, self._y, self._zones, self._edges, self._boxes, self.low,
+            self._of, self._values,
         )  # fmt: skip
+        if self.low and self.plane.stride == 1:
+            stamp_beside(
+                self._span, self._excess, self._floor, *self._coarse, self.fineness, self._zones, self._edges,
+                self._boxes, reach_m, near_m, self._of, self._values, count,
+            )  # fmt: skip
         self._laid = True
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from gcsplan.arrays import Floats, Int32s
 from gcsplan.planners.optimal.navmesh.interval_kernels import cut_intervals
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
-from gcsplan.planners.optimal.navmesh.zone_kernels import narrow_ranges
+from gcsplan.planners.optimal.navmesh.shut_kernels import narrow_ranges
 
 
 def ranges(mesh: Mesh, top_m: float) -> tuple[Floats, Floats]:
@@ -32,10 +32,10 @@ def intervals(mesh: Mesh, low_m: Floats, high_m: Floats, most: int, spare_m: flo
     return count, low, high
 
 
-def _laid(mesh: Mesh) -> tuple[Floats, Floats, Floats, Floats, Floats, Int32s, bool]:
+def _laid(mesh: Mesh) -> tuple[Floats, Floats, Floats, Floats, Floats, Int32s, bool, float, float]:
     """What the zone kernels take: ground, x and y of the mesh's nodes, numbers and forms of the shapes that are
-    certainly shut, their boxes on the mesh, and whether the ground is the terrain model's own."""
+    certainly shut, their boxes on the mesh, whether the ground is the terrain model's own, and `Plane.reach_m`."""
     plane, (rows, cols) = mesh.plane, mesh.excess.shape
     ground = np.ascontiguousarray(plane.grounds[0][mesh.row : mesh.row + rows, mesh.col : mesh.col + cols])
     boxes = plane.boxes(mesh.row, mesh.col, 1, rows, cols)
-    return ground, *mesh.places(), *plane.shapes.low, boxes, plane.stride == 1
+    return ground, *mesh.places(), *plane.shapes.low, boxes, plane.stride == 1, *plane.reach_m()

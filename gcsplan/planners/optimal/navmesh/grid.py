@@ -20,7 +20,7 @@ from gcsplan.arrays import Bools, Floats, Int32s
 from gcsplan.planners.optimal.navmesh.buffers import Scratch
 from gcsplan.planners.optimal.navmesh.terrain_nodes import Extent, nodes, places, slopes
 from gcsplan.planners.optimal.navmesh.zone_kernels import PAIR, TOP, TOP_2, UNDER, UNDER_2
-from gcsplan.planners.optimal.navmesh.zone_shapes import LOOSE, Fit, Shapes, make_shapes
+from gcsplan.planners.optimal.navmesh.zone_shapes import LOOSE, TOUCH_M, Fit, Shapes, make_shapes
 from gcsplan.planners.problem import Problem
 
 Box = tuple[float, float, float, float]
@@ -71,6 +71,11 @@ class Plane:
             zones[~over[first], TOP] = np.inf
             zones[~over[other] & (zones[:, PAIR] > 0.0), TOP_2] = np.inf
         return zones, edges
+
+    def reach_m(self) -> tuple[float, float]:
+        """Metres by which zones are grown, and a little less: between nodes that are within that reach for certain."""
+        reach_m = self.problem.airspace.beside_m(self.problem.limits)
+        return reach_m, reach_m - 2.0 * self.fit.bent_m - TOUCH_M
 
     def boxes(self, row: int, col: int, fineness: int, rows: int, cols: int) -> Int32s:
         """(K, 4) the shapes' boxes on a part of the lattice that begins at cell (``row``, ``col``), cut ``fineness``

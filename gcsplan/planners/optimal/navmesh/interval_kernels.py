@@ -11,13 +11,14 @@ import numpy as np
 from gcsplan.arrays import Floats, Int32s, Int64s
 from gcsplan.planners.compiled import device, kernel
 from gcsplan.planners.optimal.navmesh.polyanya_nodes import pop, push
-from gcsplan.planners.optimal.navmesh.zone_kernels import PAIR, over_ground, shut_over
+from gcsplan.planners.optimal.navmesh.shut_kernels import over_ground, shut_over
+from gcsplan.planners.optimal.navmesh.zone_kernels import PAIR
 
 
-@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 f8 i4[] f8[,] f8[,]")
+@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 f8 f8 f8 i4[] f8[,] f8[,]")
 def cut_intervals(
-    ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Int32s, exact: bool, spare: float,
-    count: Int32s, low: Floats, high: Floats,
+    ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Int32s, exact: bool, reach: float,
+    near: float, spare: float, count: Int32s, low: Floats, high: Floats,
 ) -> None:  # fmt: skip
     """Cut away, from the ``count`` (cells,) intervals of each cell, ``low`` to ``high`` (cells, most), the altitudes
     that a zone certainly shuts over the whole cell, except for ``spare`` metres at its top and bottom.
@@ -32,7 +33,7 @@ def cut_intervals(
                 cell = j * (x.shape[1] - 1) + i
                 if count[cell] == 0:
                     continue
-                bottom, top = shut_over(ground, x, y, zones, edges, z, j, i)
+                bottom, top = shut_over(ground, x, y, zones, edges, z, reach, near, j, i)
                 if top - spare > bottom + spare:
                     count[cell] = _cut(low, high, cell, count[cell], bottom + spare, top - spare)
 

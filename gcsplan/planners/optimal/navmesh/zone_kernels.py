@@ -12,8 +12,10 @@ from gcsplan.planners.optimal.navmesh.clearance_kernels import blank
 from gcsplan.planners.optimal.navmesh.mesh_kernels import NEXT
 
 EAST, NORTH, RADIUS, BOTTOM, TOP, BOTTOM_AGL, TOP_AGL, FIRST, LAST, UNDER = range(10)
-PAIR, BOTTOM_2, TOP_2, BOTTOM_2_AGL, TOP_2_AGL, UNDER_2, NUMBERS = range(10, 17)
-"""Columns of the array ``zones``, and their number; those with a 2 are of the second zone of a pair that cross."""
+PAIR, BOTTOM_2, TOP_2, BOTTOM_2_AGL, TOP_2_AGL, UNDER_2, THIN, LOOKS, OWN_BOTTOM, OWN_TOP, NUMBERS = range(10, 21)
+"""Columns of the array ``zones``, and their number; those with a 2 are of the second zone of a pair that cross. Where
+its bottom and top are no more than ``THIN`` apart, there is no zone: ground lifts a floor over a ceiling AMSL. A zone
+that ``LOOKS`` follows its own ground, also beside it: ``OWN_BOTTOM``, ``OWN_TOP`` are its levels over that."""
 BESIDE = 2.0
 """Datum of a level over all ground within reach, for paths; 1: over the ground below; 0: AMSL."""
 MOST_BESIDE = 6
@@ -65,12 +67,17 @@ def _open(
         _level_at(zones, z, BOTTOM, ground, up, down, j, i), _level_at(zones, z, TOP, ground, up, down, j, i)
     )  # fmt: skip
     under = zones[z, UNDER] > 0.0
+    none = under and top - bottom <= zones[z, THIN]
     if zones[z, PAIR] == 0.0:
-        return top <= allowed or (under and floor <= bottom)
+        return none or top <= allowed or (under and floor <= bottom)
     bottom_2, top_2 = (
         _level_at(zones, z, BOTTOM_2, ground, up, down, j, i), _level_at(zones, z, TOP_2, ground, up, down, j, i)
     )  # fmt: skip
     under_2 = zones[z, UNDER_2] > 0.0
+    if none:
+        bottom, top = np.inf, -np.inf
+    if under_2 and top_2 - bottom_2 <= zones[z, THIN]:
+        bottom_2, top_2 = np.inf, -np.inf
     if max(top, top_2) <= allowed or (under and under_2 and floor <= min(bottom, bottom_2)):
         return True
     if under_2 and top <= min(bottom_2, allowed) and floor <= bottom_2:
@@ -143,7 +150,7 @@ def stamp_zones(
                         jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
                         wall[k] = _level_at(zones, z, TOP, ground, up, down, jj, ii) - floor[jj, ii] + excess[jj, ii]
                         wall[k] += -twist if low else twist
-                    count = _put(of, values, cell, wall, count)
+                    count = put(of, values, cell, wall, count)
                     continue
                 if low and ways > 0:
                     if deepest > 0.0 and zones[z, PAIR] == 0.0:
@@ -153,7 +160,7 @@ def stamp_zones(
                     more = _more_between(zones, edges, z, wall, deepest, shallowest, x, y, j, i)
                     for k in range(4):
                         wall[k] += more
-                count = _put(of, values, cell, wall, count)
+                count = put(of, values, cell, wall, count)
     return count
 
 
@@ -232,7 +239,10 @@ def lift_lids(
             continue
         for j in range(boxes[z, 2], boxes[z, 3] + 2):
             for i in range(max(boxes[z, 0], around[j, 0]), min(boxes[z, 1] + 2, around[j, 1])):
-                more = level(zones, z, TOP, ground[j, i]) - floor[j, i]
+                top = level(zones, z, TOP, ground[j, i])
+                more = top - floor[j, i]
+                if zones[z, UNDER] > 0.0 and top - level(zones, z, BOTTOM, ground[j, i]) <= zones[z, THIN]:
+                    continue
                 if not 0.0 < more <= cap - floor[j, i] or not 0.0 < depth(zones, edges, z, x[j, i], y[j, i]) <= rim:
                     continue
                 lift[j, i] = max(lift[j, i], more)
@@ -241,60 +251,7 @@ def lift_lids(
 
 
 @device
-def over_ground(zones: Floats, z: int) -> bool:
-    """Whether a zone has a level over ground (AGL) past which a path may fly."""
-    under_agl = zones[z, UNDER] > 0.0 and zones[z, BOTTOM_AGL] > 0.0
-    return bool(under_agl or (zones[z, TOP] < np.inf and zones[z, TOP_AGL] > 0.0))
-
-
-@device
-def shut_over(
-    ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, z: int, j: int, i: int
-) -> tuple[float, float]:
-    """The altitudes (bottom, top) that a zone shuts everywhere over a cell which lies wholly in it: below and above
-    them, some place of the cell may be free. (inf, -inf), so nothing is shut, if it does not lie wholly in the zone, or
-    that is not known."""
-    bottom, top = -np.inf, np.inf
-    for k in range(4):
-        jj, ii = j + (k >> 1), i + (k & 1)
-        unknown = over_ground(zones, z) and math.isnan(ground[jj, ii])
-        if unknown or depth(zones, edges, z, x[jj, ii], y[jj, ii]) <= 0.0:
-            return np.inf, -np.inf
-        top = min(top, level(zones, z, TOP, ground[jj, ii]))
-        if zones[z, UNDER] > 0.0:
-            bottom = max(bottom, level(zones, z, BOTTOM, ground[jj, ii]))
-    return bottom, top
-
-
-@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 f8[,] f8[,]")
-def narrow_ranges(
-    ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Int32s, exact: bool, low: Floats,
-    high: Floats,
-) -> None:  # fmt: skip
-    """Raise the lowest, and lower the highest, altitude that can be flown at somewhere in each cell (``low``, ``high``:
-    (rows - 1, cols - 1)) where a zone can be passed on one side only; inf and -inf where it can be passed on neither.
-
-    ``exact``: whether the lattice's cells are the terrain model's own, or parts of them. Over other lattices, levels
-    over ground are not known.
-    """
-    for _ in range(2):  # what one zone shuts may leave one side of another only
-        for z in range(len(zones)):
-            if zones[z, PAIR] > 0.0 or (over_ground(zones, z) and not exact):
-                continue
-            for j in range(boxes[z, 2], boxes[z, 3] + 1):
-                for i in range(boxes[z, 0], boxes[z, 1] + 1):
-                    if low[j, i] > high[j, i]:
-                        continue
-                    bottom, top = shut_over(ground, x, y, zones, edges, z, j, i)
-                    under, over = bottom >= low[j, i], top <= high[j, i]
-                    if not under:
-                        low[j, i] = top if over else np.inf
-                    if not over:
-                        high[j, i] = bottom if under else -np.inf
-
-
-@device
-def _put(of: Int32s, values: Floats, cell: int, wall: Floats, count: int) -> int:
+def put(of: Int32s, values: Floats, cell: int, wall: Floats, count: int) -> int:
     """Store a cell's wall, its values at the corners, if it is above 0 at any; return how many walls there are."""
     if max(max(wall[0], wall[1]), max(wall[2], wall[3])) <= 0.0:
         return count
@@ -340,10 +297,11 @@ def _in_part(
         g = ground[jj, ii]
         shut = level(zones, z, TOP, g) - floor[jj, ii] + excess[jj, ii] - spare
         if under:
-            shut = min(shut, floor[jj, ii] - level(zones, z, BOTTOM, g))
+            bottom = level(zones, z, BOTTOM, g)
+            shut = min(min(shut, floor[jj, ii] - bottom), level(zones, z, TOP, g) - bottom - zones[z, THIN] - spare)
         # The whole cell is inside if its corners are, so depth does not matter then.
         wall[k] = shut if least > 0.0 else min(shut, wall[k])
-    return _put(of, values, j * (excess.shape[1] - 1) + i, wall, count)
+    return put(of, values, j * (excess.shape[1] - 1) + i, wall, count)
 
 
 @device

@@ -15,10 +15,14 @@ from gcsplan.planners.optimal.navmesh.zone_kernels import (
     EAST,
     FIRST,
     LAST,
+    LOOKS,
     NORTH,
     NUMBERS,
+    OWN_BOTTOM,
+    OWN_TOP,
     PAIR,
     RADIUS,
+    THIN,
     TOP,
     TOP_2_AGL,
     TOP_AGL,
@@ -54,7 +58,7 @@ class Shapes:
 
     A form is a half-plane a - b x - c y > 0, or a disc (radius, x, y, 1). ``boxes`` (K, 4): first and last column,
     first and last row of the cells that each part may touch; ``owner`` (K, 2): indices of its zones (twice the same,
-    or both of a crossing); ``cells``: number of cells in all boxes.
+    or both of a crossing); ``cells``: number of cells in all boxes; ``looking``: in those of zones that `LOOKS`.
     """
 
     low: tuple[Floats, Floats]
@@ -62,6 +66,7 @@ class Shapes:
     boxes: Int32s
     owner: Indices
     cells: int
+    looking: int
 
 
 def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Shapes:
@@ -98,7 +103,9 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
         forms: list[Floats] = []
         for k, (row, (_, zone, part)) in enumerate(zip(rows, found, strict=False)):
             grow = (0.0 if moved[k] == 0.0 and _follows(zone) else reach) + sign * off_m
-            row[[BOTTOM, TOP]] = -np.inf, np.inf
+            row[[BOTTOM, TOP, OWN_BOTTOM, OWN_TOP]] = -np.inf, np.inf, -np.inf, np.inf
+            row[LOOKS] = sign < 0.0 and moved[k] > 0.0
+            row[THIN] = 2.0 * (limits.altitude_error_m - off_m) if sign < 0.0 else -np.inf
             for level, at, more in ((zone.floor, BOTTOM, -1.0), (zone.ceiling, TOP, 1.0)):
                 if level is not None:
                     over_ground = level.datum == "agl"
@@ -106,6 +113,7 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
                     off = sign * off_m if over_ground or sign < 0.0 else -TOUCH_M
                     row[at] = level.value_m + more * (limits.altitude_error_m + off)
                     row[at + 2] = over_ground
+                    row[OWN_BOTTOM if at == BOTTOM else OWN_TOP] = row[at]
                     if over_ground and moved[k] > 0.0 and there and sign > 0.0:
                         row[at + 2] = BESIDE
                     elif over_ground:
@@ -125,7 +133,7 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
         for k, (a, b) in enumerate(pairs, len(found)):
             # Where two zones cross, an altitude that is free of one may lie in the other.
             rows[k] = rows[a]
-            rows[k, [RADIUS, PAIR]] = -1.0, 1.0
+            rows[k, [RADIUS, PAIR, LOOKS]] = -1.0, 1.0, 0.0
             rows[k, BOTTOM_2 : TOP_2_AGL + 1] = rows[b, BOTTOM : TOP_AGL + 1]
             rows[k, UNDER_2] = rows[b, UNDER]
             forms.append(np.vstack([forms[a], forms[b]]))
@@ -138,7 +146,7 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
     size = (boxes[:, 1] - boxes[:, 0] + 1).clip(0) * (boxes[:, 3] - boxes[:, 2] + 1).clip(0)
     numbers = [number for number, *_ in found]
     owner = np.array([(n, n) for n in numbers] + [(numbers[a], numbers[b]) for a, b in pairs], np.intp).reshape(-1, 2)
-    return Shapes(both[0], both[1], boxes, owner, int(size.sum()))
+    return Shapes(both[0], both[1], boxes, owner, int(size.sum()), int(size[both[0][0][:, LOOKS] > 0.0].sum()))
 
 
 def _follows(zone: Zone) -> bool:
