@@ -171,15 +171,16 @@ class Incumbent:
         spare_m = max(climbed_m - self.rise(-math.inf), 0.0)
         return min(max(self.known_m) + 0.5 * spare_m + ROUNDING_M, else_m)
 
-    def longest(self, else_m: float) -> float:
-        """An upper bound, metres, of the track length of every path better than the best; ``else_m`` if none is
-        known."""
+    def longest(self, else_m: float, cost: float | None = None, climbed_m: float = -math.inf) -> float:
+        """An upper bound, metres, of the track length of every path cheaper than ``cost`` (None: than the best) that
+        climbs and descends at least ``climbed_m`` in all; ``else_m`` if none is known."""
         p = self.problem
-        if self.best is None or (p.objective == "energy" and p.horizontal_j_per_m == 0.0):
+        cost = self.cost if cost is None else cost
+        if math.isinf(cost) or (p.objective == "energy" and p.horizontal_j_per_m == 0.0):
             return else_m
         if p.objective == "energy":
-            return (self.cost - p.vertical_j_per_m * self.rise(-math.inf)) / p.horizontal_j_per_m
-        return self.cost
+            return (cost - p.vertical_j_per_m * max(self.rise(-math.inf), climbed_m)) / p.horizontal_j_per_m
+        return cost
 
     # ------------------------------------------------------------------------------------------------- where it stands
 

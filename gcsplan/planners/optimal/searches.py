@@ -5,13 +5,14 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gcsplan.errors import InputError
 from gcsplan.planners.lattice.planner import plan_band
-from gcsplan.planners.optimal.bounds.shorter import bound_by_caps, halve, raise_climb
+from gcsplan.planners.optimal.bounds.shorter import bound_by_caps, halve
 from gcsplan.planners.optimal.cap_search import above_all
 from gcsplan.planners.optimal.governor import Search, Size
 from gcsplan.planners.optimal.incumbent import Incumbent
@@ -20,6 +21,7 @@ from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.plane_search import SLACKS, PlaneSearch
 from gcsplan.planners.optimal.sources.bound_corridor import follow
 from gcsplan.planners.optimal.sources.contour import pulled_tight, traverse
+from gcsplan.planners.optimal.sources.section_dp import tightened
 from gcsplan.planners.problem import Problem, Refusal, terminals_of
 from gcsplan.planners.profile.track import Obstruction, fly, make_track
 
@@ -29,8 +31,6 @@ if TYPE_CHECKING:
 FAR, MUCH = 5e-3, 5e-2
 """Gaps, as parts: beyond which other sources of paths are tried; and beyond which small worlds are searched before time
 is spent on a bound."""
-TWICE = 2.0
-"""Times the wanted gap from which on costlier bounds are worth their work."""
 PAST_FINE, ROUNDS = 9, 2
 """Most tracks past obstacles that are tried on the finer lattice at once, and how often that is repeated."""
 FINER = 3
@@ -43,8 +43,8 @@ MOST_CELLS = 50_000
 
 NAMES = (
     "straight", "outlines", "outline_bound", "track_bound", "cap_search", "corridor_first", "lattice_first",
-    "roadmap_first", "roadmap_near", "fine_tracks", "detours", "bound_corridor", "contour_climb", "lattice",
-    "local_roadmap", "cap_pairs", "length_bound", "altitude_intervals", "refinement",
+    "roadmap_first", "roadmap_near", "fine_tracks", "detours", "bound_corridor", "section_descent", "contour_climb",
+    "lattice", "local_roadmap", "cap_pairs", "energy_bound", "length_bound", "altitude_intervals", "refinement",
 )  # fmt: skip
 """The names of all searches; which of them a mission has depends on its objective and limits."""
 
@@ -101,7 +101,7 @@ class Searches:
         def on(run: Callable[[PlaneSearch], object]) -> Callable[[], object]:
             return self._over(lambda: run(self.plane))
 
-        nodes, of, far, twice = self._nodes, self._of, gap(FAR), gap(TWICE * i.wanted)
+        nodes, of, far = self._nodes, self._of, gap(FAR)
         rows = [
             Search("straight", 1.0, lambda: self._straight is None, of(2e-3, 0.0), self._fly_straight),
             Search("outlines", 1.0, self._has_outlines, of(2e-3, 1.2e-3), self._look_at_outlines),
@@ -122,23 +122,27 @@ class Searches:
             Search("roadmap_first", 0.1, self._small_lacks, of(1.0, 0.0), self._search_small),
             Search("roadmap_near", 0.5, small(MUCH), of(0.5, 0.0), self._search_small),
             Search("fine_tracks", 0.9, known, nodes(0.5), self._over(self._look_finely), nearer=True),
-            Search("bound_corridor", 0.2, twice, nodes(3.0), on(follow)),
+            Search("bound_corridor", 0.2, known, nodes(3.0), on(follow)),
+            Search("section_descent", 0.1, known, of(0.1, 0.0), self._tighten),
             Search("contour_climb", 0.075, self._is_slanted, nodes(8.0), self._over(self._climb_aslant)),
             Search("local_roadmap", 0.01, small(FAR), of(0.5, 0.0), self._search_small),
         ]
         if energy:
-            return [
-                *rows,
-                Search("cap_pairs", 0.5, known, nodes(3.0), self._over(self._bound_caps), again=True),
+            rows += [
+                Search("cap_pairs", 0.5, known, nodes(3.0), on(bound_by_caps), again=True),
+                Search("energy_bound", 0.5, known, nodes(1.0), on(halve), again=True),
                 Search("detours", 0.3, far, nodes(4.0), on(lambda plane: plane.past(PAST_FINE, fine=True))),
                 Search("lattice", 0.02, far, of(0.5, 0.0), self._search_lattice_again),
             ]
+        else:
+            rows += [
+                Search("length_bound", 0.9, known, nodes(1.0), on(halve), again=True, nearer=True),
+                Search("detours", 0.3, known, nodes(4.0), self._over(self._past_finely)),
+            ]
         return [
             *rows,
-            Search("length_bound", 0.9, known, nodes(1.0), on(halve), again=True, nearer=True),
-            Search("detours", 0.3, known, nodes(4.0), self._over(self._past_finely)),
             Search("altitude_intervals", 0.08, self._has_intervals, nodes(8.0), self._over(self._bound_by_intervals)),
-            Search("refinement", 0.07, twice, nodes(8.0), self._over(self._refine)),
+            Search("refinement", 0.07, known, nodes(8.0), self._over(self._refine)),
         ]
 
     def _over(self, run: Callable[[], object]) -> Callable[[], object]:
@@ -223,13 +227,19 @@ class Searches:
 
     def _search_lattice(self, *, known: bool = False) -> None:
         incumbent = self.incumbent
-        try:
-            found = plan_band(self.problem, incumbent.tell, incumbent.budget.begun_s, known=known)
-        except Refusal:
+        problems = [self.problem]
+        if self.problem.objective == "energy" and incumbent.best is None:
+            # A line that is pulled to climb less may become illegal where a shorter one is not.
+            problems.append(replace(self.problem, objective="length"))
+        for problem in problems:
+            try:
+                found = plan_band(problem, incumbent.tell, incumbent.budget.begun_s, known=known)
+            except Refusal:
+                continue
+            if found.lower_bound is not None and problem is self.problem:
+                incumbent.raise_bound(min(found.lower_bound, self.problem.cost(found.path)))
+            incumbent.take(found.path.points)
             return
-        if found.lower_bound is not None:
-            incumbent.raise_bound(min(found.lower_bound, self.problem.cost(found.path)))
-        incumbent.take(found.path.points)
 
     # -------------------------------------------------------------------- better paths, and bounds
 
@@ -246,14 +256,16 @@ class Searches:
     def _look_finely(self) -> None:
         self.plane.try_below(self.plane.top_m, fine=True)
 
+    def _tighten(self) -> None:
+        incumbent = self.incumbent
+        assert incumbent.best is not None
+        points, pinned = tightened(self.problem, incumbent.best, incumbent.goes_on)
+        incumbent.take_simpler(points, pinned, fine=True, longer=False)
+
     def _past_finely(self) -> None:
         for _ in range(ROUNDS):
             if not self.incumbent.goes_on() or not self.plane.past(PAST_FINE, fine=True):
                 break
-
-    def _bound_caps(self) -> None:
-        bound_by_caps(self.plane)
-        raise_climb(self.plane)
 
     def _is_slanted(self) -> bool:
         incumbent = self.incumbent
@@ -266,7 +278,7 @@ class Searches:
             incumbent.take_longer(found, fine=True)
         # If finer lines are better, still finer ones may be, too; for length they are hardly worth the work.
         for level in (0, 1) if energy else (0,):
-            if incumbent.best is None or incumbent.gap <= TWICE * incumbent.wanted or not incumbent.budget.goes_on():
+            if incumbent.best is None or not incumbent.goes_on():
                 break
             tight = pulled_tight(self.problem, incumbent.best, level, incumbent.budget.deadline_s)
             if tight is None or not incumbent.take_simpler(*tight, fine=True, longer=True):
@@ -274,7 +286,7 @@ class Searches:
 
     def _has_intervals(self) -> bool:
         incumbent = self.incumbent
-        return incumbent.best is not None and incumbent.gap > TWICE * incumbent.wanted and incumbent.climbs
+        return incumbent.best is not None and incumbent.climbs
 
     def _bound_by_intervals(self) -> None:
         plane = self.plane

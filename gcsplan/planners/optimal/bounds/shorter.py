@@ -8,8 +8,7 @@ left, and the bound of the cheaper paths its lower end.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Iterator
 
 from gcsplan.planners.optimal.bounds.climb_bound import climb_bound, rise_bound
 from gcsplan.planners.optimal.cap_search import Layer, search_caps
@@ -20,7 +19,7 @@ CLOSER, LEFT, FLAT = 8, 0.05, 0.2
 """Most cuts of the interval between bound and best path; the part of the gap below which neither an interval is cut nor
 a gain is worth the work; and the part of the interval at which it is first cut if path and bound are far apart."""
 FALLS = -0.25
-"""Change of the bound of shorter paths per metre of their greatest length, assumed until two such bounds are known."""
+"""Change of the bound of cheaper paths with their greatest cost, assumed until two such bounds are known."""
 CLIMBED = (0.98, 0.9, 0.75, 0.5)
 """Parts of the extra length that climbing costs the longest tracks, tried in turn as that of shorter tracks."""
 PIECES = 4
@@ -28,55 +27,55 @@ PIECES = 4
 
 
 def halve(plane: PlaneSearch, *, far: bool = False) -> None:
-    """Raise the lower bound of the length until the gap is as small as wanted, if possible; unless ``far``, the value
-    for that is tried first. The interval between bound and path is halved until bounds predict the best cut."""
+    """Raise the lower bound of the cost until the gap is as small as wanted, if possible; unless ``far``, the value for
+    that is tried first. The interval between bound and path is halved until bounds predict the best cut."""
     incumbent = plane.incumbent
     if plane.by_intervals:
         _raise_by_intervals(plane)
     low, high = incumbent.bound, incumbent.cost
-    shorter: list[tuple[float, float]] = []  # lengths that were tried, and the bounds of all paths shorter than them
+    cheaper: list[tuple[float, float]] = []  # costs that were tried, and the bounds of all paths cheaper than them
     part = FLAT if far else 0.5
     for k in range(CLOSER):
         nearer = incumbent.cost / (1.0 + incumbent.nearer)
         at_once = k == 0 and not far
         enough = low >= nearer if at_once else incumbent.done()
         least = _least_step(plane)
-        where = _meeting(shorter)
+        where = _meeting(cheaper)
         if where - low < least and len(plane.legs) > 1:
             where = math.inf  # a better bound of one leg leaves the others less to spare: a prediction is soon too low
         if enough or high - low < least or where - low < least or not incumbent.budget.goes_on():
             break
-        # No path is shorter than `low`; is any shorter than `middle`?
+        # No path is cheaper than `low`; is any cheaper than `middle`?
         middle = where if where < high else low + part * (high - low)
         middle = max(middle, nearer if at_once else 0.0)
-        found = _bound_shorter(plane, middle)
+        found = _bound_cheaper(plane, middle)
         if found < middle:
             high = middle
         part = 0.5 if found < middle else min(2.0 * part, 0.5)
         if found != middle:
-            shorter = [*shorter[-1:], (middle, found)]
+            cheaper = [*cheaper[-1:], (middle, found)]
         plane.raise_tracks()
         incumbent.raise_bound(min(found, middle))
         low = incumbent.bound
 
 
 def _least_step(plane: PlaneSearch) -> float:
-    """Metres of a bound that are worth the work."""
+    """By how much a bound must rise for that to be worth the work."""
     return max(2e-5 * plane.incumbent.bound, LEFT * (plane.incumbent.cost - plane.incumbent.bound))
 
 
-def _meeting(shorter: list[tuple[float, float]]) -> float:
-    """The length that should equal the bound of all shorter paths, extrapolated from the last two lengths tried, or
-    from one with the slope `FALLS`; inf if they do not tell."""
-    if not shorter:
+def _meeting(cheaper: list[tuple[float, float]]) -> float:
+    """The cost that should equal the bound of all cheaper paths, extrapolated from the last two costs tried, or from
+    one with the slope `FALLS`; inf if they do not tell."""
+    if not cheaper:
         return math.inf
-    (a, of_a), (b, of_b) = shorter[0], shorter[-1]
+    (a, of_a), (b, of_b) = cheaper[0], cheaper[-1]
     slope = (of_b - of_a) / (b - a) if b != a else FALLS
     return (of_b - slope * b) / (1.0 - slope) if slope <= 0.0 else math.inf
 
 
 def _raise_by_intervals(plane: PlaneSearch) -> None:
-    """Raise the lower bound to the greatest length for which no altitude interval is left, by bisection."""
+    """Raise the lower bound to the greatest cost for which no altitude interval is left, by bisection."""
     incumbent = plane.incumbent
     high = incumbent.cost
     middle = incumbent.bound + _least_step(plane)
@@ -94,16 +93,16 @@ def _limits(plane: PlaneSearch, most_m: float) -> list[tuple[Leg, float]]:
     return [(leg, leg.lower_m + spare) for leg in plane.legs]
 
 
-def _bound_shorter(plane: PlaneSearch, longest_m: float) -> float:
-    """A lower bound of all paths shorter than ``longest_m``: from their tracks on the fine lattice, then their climb;
-    ``longest_m`` or more if there are none."""
-    most_m = _longest_track(plane, longest_m)
+def _bound_cheaper(plane: PlaneSearch, cost: float) -> float:
+    """A lower bound of all paths cheaper than ``cost``: from their tracks on the fine lattice, then their climb;
+    ``cost`` or more if there are none."""
+    most_m = _longest_track(plane, cost)
 
     def least(tracks: list[float]) -> float:
         if sum(tracks) >= most_m * (1.0 - 1e-12):
-            return longest_m
+            return cost
         # The length to spare is what the legs' bounds leave, which is less now that these are better.
-        return _least_of_pieces(plane, tracks, max(most_m - sum(tracks), 0.0), partial(rise_bound, plane.legs))
+        return _least_of_pieces(plane, tracks, max(most_m - sum(tracks), 0.0))
 
     one = len(plane.legs) == 1
     tracks = []
@@ -115,13 +114,18 @@ def _bound_shorter(plane: PlaneSearch, longest_m: float) -> float:
                 tracks.append(min(limit, leg.reach_m))
                 continue
             wanted = wanted.within(intervals.cells)
-        tracks.append(leg.bound(plane.top_m, wanted, limit, True, lambda track: one and least([track]) >= longest_m))
+        tracks.append(leg.bound(plane.top_m, wanted, limit, True, lambda track: one and least([track]) >= cost))
     return least(tracks)
 
 
-def _longest_track(plane: PlaneSearch, longest_m: float) -> float:
-    """An upper bound of the track length of paths shorter than ``longest_m``: less than that, because paths climb."""
-    legs = plane.legs
+def _longest_track(plane: PlaneSearch, cost: float) -> float:
+    """An upper bound of the track length of paths cheaper than ``cost``: climbing leaves less than that for it."""
+    legs, incumbent = plane.legs, plane.incumbent
+    longest_m = incumbent.longest(sum(leg.reach_m for leg in legs), cost)
+    if plane.problem.objective == "energy":
+        limits = [limit for _, limit in _limits(plane, longest_m)]
+        climbed_m = climb_bound(legs, [leg.lower_m for leg in legs], limits)
+        return min(longest_m, incumbent.longest(longest_m, cost, climbed_m))
     if len(legs) > 1:
         return longest_m
     climbing = rise_bound(legs, [longest_m], [longest_m]) - longest_m
@@ -132,16 +136,18 @@ def _longest_track(plane: PlaneSearch, longest_m: float) -> float:
     return longest_m
 
 
-def _least_of_pieces(
-    plane: PlaneSearch, tracks_m: list[float], spare_m: float, cost: Callable[[list[float], list[float]], float]
-) -> float:
-    """A lower bound of the cost of paths whose tracks are longer than ``tracks_m`` by at most ``spare_m`` in all.
-    ``cost(least, most)``: a lower bound for tracks between these lengths, leg by leg."""
+def _least_of_pieces(plane: PlaneSearch, tracks_m: list[float], spare_m: float) -> float:
+    """A lower bound of the cost of paths whose tracks are longer than ``tracks_m`` by at most ``spare_m`` in all."""
+    p, legs = plane.problem, plane.legs
     found = math.inf
     for least, most in _pieces(tracks_m, spare_m):
         if plane.incumbent.least(sum(least)) >= found:
             break  # longer tracks cost no less
-        found = min(found, cost(least, most))
+        if p.objective == "energy":
+            piece = p.horizontal_j_per_m * sum(least) + p.vertical_j_per_m * climb_bound(legs, least, most)
+        else:
+            piece = rise_bound(legs, least, most)
+        found = min(found, piece)
     return found
 
 
@@ -154,21 +160,6 @@ def _pieces(tracks_m: list[float], spare_m: float) -> Iterator[tuple[list[float]
         return
     for k in range(PIECES):
         yield [tracks_m[0] + spare_m * k / PIECES], [tracks_m[0] + spare_m * (k + 1) / PIECES]
-
-
-def raise_climb(plane: PlaneSearch) -> None:
-    """Raise the lower bound of the energy by what short enough tracks must climb and descend, piece by piece."""
-    p, legs = plane.problem, plane.legs
-    if plane.incumbent.gap <= plane.incumbent.nearer or not plane.incumbent.budget.goes_on():
-        return
-    limits = [plane.limit(leg) for leg in legs]
-    known = [leg.bound(plane.top_m, leg.corridor(m), m, True) for leg, m in zip(legs, limits, strict=True)]
-    spare = max(plane.longest() - sum(known), 0.0)
-
-    def least_j(least: list[float], most: list[float]) -> float:
-        return p.horizontal_j_per_m * sum(least) + p.vertical_j_per_m * climb_bound(legs, least, most)
-
-    plane.incumbent.raise_bound(_least_of_pieces(plane, known, spare, least_j))
 
 
 def bound_by_caps(plane: PlaneSearch) -> None:

@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.planners.optimal.sources.section_dp import FIXED, FREE, UPRIGHT, cheapest, cost_of, drawn
+from gcsplan.planners.optimal.sources.section_dp import FIXED, FREE, UPRIGHT, cheapest, cost_of, drawn, kinds_of
 from gcsplan.planners.problem import Problem
 
 WINDING = 1.06
@@ -57,7 +57,7 @@ def path_over(
             return None
         roadmaps.append(roadmap(columns[k], columns[k + 1], limit))
         reached.append(roadmaps[k].beyond(reached[k]))
-    tried = [] if known is None else [(known, _kinds_of(problem, known))]
+    tried = [] if known is None else [(known, kinds_of(problem, known))]
     if np.isfinite(reached[-1]).any():
         # The altitudes at the vias, from the last terminal back, and the paths between them.
         at, parts = 0, []
@@ -80,19 +80,6 @@ def path_over(
         if cost < best:
             best, out = cost, (points, kinds != FREE)
     return out
-
-
-def _kinds_of(problem: Problem, points: Floats) -> Indices:
-    """(N,) kinds of the points of a path that passes start, vias and goal."""
-    kinds = np.full(len(points), FREE)
-    at = 0
-    for via in problem.via:
-        off = np.hypot(points[at:, 0] - via.east_m, points[at:, 1] - via.north_m)
-        off += 0.0 if via.amsl_m is None else np.abs(points[at:, 2] - via.amsl_m)
-        at += int(np.argmax(off <= off.min() + 1e-6))
-        kinds[at] = UPRIGHT if via.amsl_m is None else FIXED
-    kinds[[0, -1]] = FIXED
-    return kinds
 
 
 def terminals_by_leg(problem: Problem, points: Floats) -> Floats:

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gcsplan.arrays import Floats, Indices
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import divided
 
@@ -26,6 +26,28 @@ ASIDE, UP = (0.0, -1.0, 1.0), (0.0, -1.0, -0.25, 0.25, 1.0)
 """Candidate places of a point, in moves to the side and up."""
 FAR_AHEAD = 24
 """Most points that one leg may replace."""
+SIZE, FEW = 0.004, 4
+"""Twice the first moves of `tightened`, as a part of the path's length, and how often they are halved."""
+
+
+def tightened(problem: Problem, points: Floats, in_time: Callable[[], bool]) -> tuple[Floats, Bools]:
+    """A path (N, 3) drawn together with moves that suit its length, and (N,) which of its points are terminals."""
+    size_m = SIZE * float(np.hypot(*np.diff(points[:, :2], axis=0).T).sum())
+    found, kinds = drawn(problem, points, kinds_of(problem, points), size_m, in_time, FEW)
+    return found, kinds != FREE
+
+
+def kinds_of(problem: Problem, points: Floats) -> Indices:
+    """(N,) kinds of the points of a path that passes start, vias and goal."""
+    kinds = np.full(len(points), FREE)
+    at = 0
+    for via in problem.via:
+        off = np.hypot(points[at:, 0] - via.east_m, points[at:, 1] - via.north_m)
+        off += 0.0 if via.amsl_m is None else np.abs(points[at:, 2] - via.amsl_m)
+        at += int(np.argmax(off <= off.min() + 1e-6))
+        kinds[at] = UPRIGHT if via.amsl_m is None else FIXED
+    kinds[[0, -1]] = FIXED
+    return kinds
 
 
 def drawn(
@@ -58,21 +80,22 @@ def drawn(
 def cheapest(problem: Problem, points: Floats, kinds: Indices) -> tuple[Floats, Indices]:
     """The cheapest path over some points of a legal one, in order: all of its terminals, and of the others what
     helps."""
-    n = len(points)
-    first, last = np.triu_indices(n, 1)
+    n, ahead = len(points), min(FAR_AHEAD, len(points) - 1)
     terminals = np.concatenate([[0], np.cumsum(kinds != FREE)])
-    near = (terminals[last] == terminals[first + 1]) & (last - first <= FAR_AHEAD)
-    first, last = first[near], last[near]
-    legal = last == first + 1
-    legal[~legal] = problem.legal(points[first[~legal]], points[last[~legal]])
-    first, last = first[legal], last[legal]
-    leg = np.full((n, n), np.inf)
-    leg[first, last] = problem.leg_costs(points[first], points[last])
+    last, back = (x.ravel() for x in np.meshgrid(np.arange(1, n), np.arange(1, ahead + 1), indexing="ij"))
+    near = (back <= last) & (terminals[last] == terminals[np.maximum(last - back, 0) + 1])
+    last, back = last[near], back[near]
+    legal = back == 1
+    legal[~legal] = problem.legal(points[last[~legal] - back[~legal]], points[last[~legal]])
+    last, back = last[legal], back[legal]
+    leg = np.full((n, ahead + 1), np.inf)
+    leg[last, back] = problem.leg_costs(points[last - back], points[last])
     cost, before = np.zeros(n), np.zeros(n, np.intp)
     for k in range(1, n):
-        over = cost[:k] + leg[:k, k]
-        before[k] = over.argmin()
-        cost[k] = over[before[k]]
+        most = min(k, ahead)
+        over = cost[k - most : k] + leg[k, most:0:-1]
+        before[k] = k - most + over.argmin()
+        cost[k] = over.min()
     keep = [n - 1]
     while keep[-1] > 0:
         keep.append(int(before[keep[-1]]))
