@@ -38,6 +38,8 @@ LEARN_M, LEARN_HAIR_M = 2.0, 0.05
 """Longest step, m, at which `learn` checks a track, and metres by which nodes are raised above what was missing."""
 NODE_BYTES = 150.0
 """Bytes of a node that is looked at, with the cells and pieces beside it."""
+MOST_MEET = 8
+"""Most pieces of a lattice that meet at one node: two triangles of each of the four cells around it."""
 MANY = 8
 """If a mesh has more possible names per portal than this, names are renumbered without gaps: searches allocate arrays
 with an entry for every name."""
@@ -264,8 +266,8 @@ class ClearanceGrid:
             used, names[corner] = np.unique(names[corner], return_inverse=True)
             named = len(used)
         return Mesh(
-            start, ends[:n], names, joins[:n], order, named, self.plane, self.fineness, self.row, self.col, excess,
-            self._floor, diagonal, span, piece,
+            start, ends[:n], names, joins[:n], order, named, MOST_MEET, self.plane, self.fineness, self.row, self.col,
+            excess, self._floor, diagonal, span, piece,
         )  # fmt: skip
 
     def _lay(self) -> None:

@@ -174,7 +174,9 @@ class Triangles(Portals):
         joins = np.ascontiguousarray(np.stack([here // 3, other // 3], axis=-1), np.int32)
         start, of_piece = np.zeros(len(corner) + 1, np.int32), np.empty(2 * len(here), np.int32)
         sort_portals(joins, start, of_piece)
-        super().__init__(start, np.ascontiguousarray(ends), names, joins, of_piece, named)
+        super().__init__(
+            start, np.ascontiguousarray(ends), names, joins, of_piece, named, int(np.bincount(first).max())
+        )
 
     def pieces_at(self, place: Place) -> list[int]:
         """The triangles in which, or on whose border, a place lies."""

@@ -51,16 +51,14 @@ BAND = 0.005
 """Width of a band of estimated lengths, as a share of the straight distance to the goal."""
 BANDS = 1e8
 """Weight of the band's number in a heap key: metres, more than any track. The digits below it order a band's nodes."""
-MOST_TURNS = 8
-"""Pieces that meet at one place, at most: a track that passes more of them turns in a circle around it."""
 
 
 @kernel(
-    "i4[] f8[,] i8[,] i4[,] i4[] f8[] i8[] i4[] i4[] f8[,] f8[,] i4[] f8[] i4[] f8 f8 i8 f8[] f8[]"
+    "i4[] f8[,] i8[,] i4[,] i4[] i8 f8[] i8[] i4[] i4[] f8[,] f8[,] i4[] f8[] i4[] f8 f8 i8 f8[] f8[]"
     " f8[,] i4[,] i8[,] f8[] i4[] f8[,]"
 )
 def search(
-    start: Int32s, ends: Floats, names: Int64s, joins: Int32s, order: Int32s, best: Floats, origin: Int64s,
+    start: Int32s, ends: Floats, names: Int64s, joins: Int32s, order: Int32s, fan: int, best: Floats, origin: Int64s,
     first: Int32s, widest: Int32s, span: Floats, sources_at: Floats, sources_piece: Int32s, goal: Floats,
     goal_piece: Int32s, limit: float, slack: float, most: int, remaining: Floats, met: Floats,
     node: Floats, link: Int32s, name: Int64s, heap: Floats, ids: Int32s, out: Floats,
@@ -71,13 +69,13 @@ def search(
     ``out[1, 2]``; 0: no track is shorter than ``limit``; -1: too little room in the arrays; -2: stopped after ``most``
     nodes, when all tracks shorter than ``out[0, 0]`` had been looked at. ``out[2, 2]``: number of nodes opened.
 
-    ``start``, ``ends``, ``names``, ``joins``, ``order``: see `Portals`. ``sources_at`` (K, 3): x, y, cost so far, each
-    in piece ``sources_piece`` (K,); the goal is in any of ``goal_piece``. ``remaining`` (pieces,): lower bound of the
-    distance from a piece's entrance to the goal. ``slack`` >= 0: go on when the goal is reached, up to 1 + ``slack``
-    times the length. ``met`` (portals,), inf before, receives the least cost at which each portal is met. ``remaining``
-    and ``met`` may be empty. Work arrays: ``best``, ``origin`` (names,), ``first`` (2 * portals,), ``widest``
-    (portals,), all zeros; ``span`` (portals, 2), ``node`` (room, 8), ``link`` (room, 6), ``name`` (room, 3), ``heap``,
-    ``ids`` (room,); ``out`` (any, 3).
+    ``start`` to ``fan``: see `Portals`. ``sources_at`` (K, 3): x, y, cost so far, each in piece ``sources_piece`` (K,);
+    the goal is in any of ``goal_piece``. ``remaining`` (pieces,): lower bound of the distance from a piece's entrance
+    to the goal. ``slack`` >= 0: go on when the goal is reached, up to 1 + ``slack`` times the length. ``met``
+    (portals,), inf before, receives the least cost at which each portal is met. ``remaining`` and ``met`` may be empty.
+    Work arrays: ``best``, ``origin`` (names,), ``first`` (2 * portals,), ``widest`` (portals,), all zeros; ``span``
+    (portals, 2), ``node`` (room, 8), ``link`` (room, 6), ``name`` (room, 3), ``heap``, ``ids`` (room,); ``out``
+    (any, 3).
     """
     room = len(heap)
     gx, gy = goal[0], goal[1]
@@ -143,8 +141,8 @@ def search(
         width_r = math.sqrt((qx - rx) ** 2 + (qy - ry) ** 2)
         if width_l < SAME_M or width_r < SAME_M:
             all_round = True  # the root is a corner of this convex piece and sees all of it
-            if turns >= MOST_TURNS:
-                continue
+            if turns >= fan:
+                continue  # it turns in a circle around the root
             turns += 1
         else:
             turns = 0
@@ -287,7 +285,7 @@ def search(
                 node[count, RIGHT_X], node[count, RIGHT_Y] = x0, y0
                 node[count, AHEAD] = ahead
                 link[count, PIECE], link[count, CAME] = -1 if to_goal else behind, piece
-                link[count, PARENT], link[count, TURNS] = parent, turns
+                link[count, PARENT], link[count, TURNS] = parent, turns if nroot == root else 0
                 name[count, LEFT], name[count, RIGHT], name[count, ROOT] = n1, n0, nroot
                 if to_goal:
                     if ncost + ahead < shortest:

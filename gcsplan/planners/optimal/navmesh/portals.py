@@ -38,7 +38,7 @@ class GroundTrack:
 class Portals:
     """Portals as `polyanya.search` takes them: ``order[start[p] : start[p + 1]]`` lists those of piece p; ``ends``
     (portals, 4) is x, y of both ends, ``names`` (portals, 2) the names of both, all less than ``named``, and ``joins``
-    (portals, 2) the pieces at the left and at the right."""
+    (portals, 2) the pieces at the left and at the right. ``fan``: most pieces that meet at one place."""
 
     start: Int32s
     ends: Floats
@@ -46,6 +46,7 @@ class Portals:
     joins: Int32s
     order: Int32s
     named: int
+    fan: int
 
     @property
     def pieces(self) -> int:
@@ -84,9 +85,10 @@ class Portals:
             first, widest, span = np.zeros(2 * portals, np.int32), np.zeros(portals, np.int32), np.empty((portals, 2))
             out = np.empty((capacity + 2, 3))  # a track has no more corners than nodes, beside its two ends
             n = search(
-                self.start, self.ends, self.names, self.joins, self.order, best, origin, first, widest, span, sources,
-                np.array(start_pieces, np.int32), np.array(goal, np.float64), np.array(goal_pieces, np.int32), limit_m,
-                slack, most, remaining, met, node, link, name, np.empty(capacity), np.empty(capacity, np.int32), out,
+                self.start, self.ends, self.names, self.joins, self.order, self.fan, best, origin, first, widest, span,
+                sources, np.array(start_pieces, np.int32), np.array(goal, np.float64),
+                np.array(goal_pieces, np.int32), limit_m, slack, most, remaining, met, node, link, name,
+                np.empty(capacity), np.empty(capacity, np.int32), out,
             )  # fmt: skip
             if n != -1:
                 break

@@ -26,7 +26,7 @@ ASIDE, UP = (0.0, -1.0, 1.0), (0.0, -1.0, -0.25, 0.25, 1.0)
 """Candidate places of a point, in moves to the side and up."""
 FAR_AHEAD = 24
 """Most points that one leg may replace."""
-SIZE, FEW = 0.004, 4
+SIZE, FEW = 0.016, 5
 """Twice the first moves of `tightened`, as a part of the path's length, and how often they are halved."""
 
 

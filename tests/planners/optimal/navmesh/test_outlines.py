@@ -78,6 +78,25 @@ def test_bound_and_path_enclose_the_visibility_graphs_track(seed: int) -> None:
     assert all(shapely.distance(s, line) >= reach_m - 0.03 for s in shapes)
 
 
+@pytest.mark.parametrize("seed", [*range(12), 321, 322, 345, 349, 376])
+def test_any_number_of_triangles_may_meet_at_a_corner(seed: int) -> None:
+    """A slit between a wall's end and a disc: the triangles between them fan out from the wall's corners, one for each
+    chord. A track that turned at a corner was given up after eight of them, and the bound was too high."""
+    rng = np.random.default_rng([8, seed])
+    half_m, radius_m, slit_m = rng.uniform(30.0, 100.0), rng.uniform(100.0, 250.0), rng.uniform(3.0, 15.0)
+    wall = np.array([(-half_m, -600.0), (half_m, -600.0), (half_m, 0.0), (-half_m, 0.0)])
+    zones = [Zone("wall", Polygon(wall)), Zone("disc", Circle(0.0, float(radius_m + slit_m), float(radius_m)))]
+    east, west = rng.uniform(150.0, 300.0, 2) + half_m
+    places = [(float(east), float(rng.uniform(-500.0, -200.0))), (float(-west), float(rng.uniform(50.0, 180.0)))]
+    if math.dist(places[1], (0.0, radius_m + slit_m)) < radius_m + 5.0:
+        pytest.skip("the goal lies in the disc")
+    oracle = Plane.of(zones, 0.0).shortest(places)
+    for outer in (False, True):
+        track = Solids(zones, 0.0, 1.0, [2e-3] * 2, Budget.endless(), outer=outer).shortest(*places, np.ones(2, bool))
+        assert track is not None
+        assert track.length_m == pytest.approx(oracle, rel=3e-4, abs=0.05)
+
+
 @pytest.mark.first_quick
 @pytest.mark.parametrize("seed", [2, 3, *(pytest.param(k, marks=pytest.mark.slow) for k in range(4, 30))])
 def test_plans_on_flat_ground_are_certified_to_a_hair(seed: int) -> None:

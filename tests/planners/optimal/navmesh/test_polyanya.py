@@ -90,7 +90,7 @@ def mesh_of(
     )
     named = 8 * (nx * ny + 1)
     return Mesh(
-        start, ends[:n], names[:n], joins[:n], order, named, plane, 1, 0, 0, excess, excess, diagonal, span, piece
+        start, ends[:n], names[:n], joins[:n], order, named, 8, plane, 1, 0, 0, excess, excess, diagonal, span, piece
     )
 
 
@@ -487,7 +487,7 @@ def ring(count: int, radius_m: float = 1e5, width_m: float = 0.1) -> tuple[Porta
     k = np.arange(1, count, dtype=np.int32)  # the portals between the pieces k - 1 and k
     start = np.array([0, *range(1, 2 * count - 2, 2), 2 * count - 2], np.int32)
     ends, names = np.hstack([outer[1:-1], inner[1:-1]]), np.column_stack([2 * k, 2 * k + 1]).astype(np.int64)
-    return Portals(start, ends, names, np.column_stack([k - 1, k]), np.repeat(k - 1, 2), 2 * count), inner
+    return Portals(start, ends, names, np.column_stack([k - 1, k]), np.repeat(k - 1, 2), 2 * count, 4), inner
 
 
 def test_a_track_may_have_any_number_of_corners(monkeypatch: pytest.MonkeyPatch) -> None:
