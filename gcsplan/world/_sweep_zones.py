@@ -319,7 +319,7 @@ def meets(
     where = t0 + where * (t1 - t0)
     polygon = zone[k, RADIUS] < 0.0
     bound = reach - TOUCH_M
-    if polygon and bound <= 0.0 and dist <= 0.0:
+    if polygon and bound <= 0.0 and dist <= TOUCH_M:  # both ends may lie on the border, outside by a rounding
         if not enters(zone, vertex, k, ax, ay, bx, by, events):
             return False, 0.0, where
     elif not dist < bound:

@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from gcsplan.arrays import Floats
@@ -56,6 +57,29 @@ def kinds(airspace: Airspace, legs: Legs, limits: Limits) -> set[str]:
 
 
 # --- heights over the ground -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_leg_from_border_to_border_through_a_polygon_is_seen(seed: int) -> None:
+    """Both ends lie on the border up to a rounding, perhaps outside, and then no edge seems to cross the leg."""
+    rng = np.random.default_rng([13, seed])
+    for _ in range(20):
+        count = int(rng.integers(3, 10))
+        turn = np.sort(rng.uniform(0.0, 2.0 * math.pi, count))
+        radius = rng.uniform(100.0, 350.0, count)[:, None]
+        ring = np.array([500.0, 500.0]) + radius * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+        shape = shapely.Polygon(ring)
+        if not shape.is_valid or not shapely.LinearRing(ring).is_ccw:
+            continue
+        airspace = flat([Zone("block", Polygon(ring), None, Level(100.0, "amsl"))])
+        edge, f = rng.integers(0, count, (300, 2)), rng.random((300, 2, 1))
+        ends = ring[edge] + f * (np.roll(ring, -1, axis=0)[edge] - ring[edge])
+        lines = shapely.linestrings(ends)
+        inside = shapely.length(shapely.intersection(shapely.buffer(shape, -1e-3), lines)) > 1e-3
+        places = np.concatenate([ends, np.full((300, 2, 1), 60.0)], axis=2)
+        legs = Legs.between(places[:, 0], places[:, 1], Limits(0.0))
+        assert not airspace.clear(legs, Limits(0.0))[inside].any()
+        assert inside.sum() > 50
 
 
 def test_min_agl_at_the_limit_is_legal_and_a_millimetre_below_is_not() -> None:
