@@ -2,8 +2,8 @@
 
 A zone whose levels follow the ground shuts, at a place within reach of it, what lies between its levels over *its own*
 ground within reach. Over a steep slope that is far more than what the ground below the place tells: under a zone whose
-floor is a few metres above the lowest legal altitude nothing is left. Ground that is within reach of all corners of a
-cell is within reach of every place in it.
+floor is a few metres above the lowest legal altitude nothing is left. What holds for the corners of a cell and those of
+another one within reach holds for every place of the two: the zone's parts are convex, and so is what is within reach.
 """
 
 from __future__ import annotations
@@ -30,66 +30,84 @@ from gcsplan.planners.optimal.navmesh.zone_kernels import (
     put,
 )
 
-BESIDE_STEPS = 4
-"""Places on each side of a cell's middle at which ground within reach is read."""
+BESIDE_STEPS = 5
+"""Cells on each side of a cell whose ground is read, at most; of more, only every second, third … is."""
 
 
 @device
-def _at(a: Floats, row: float, col: float) -> float:
-    """A value at a place between the nodes of a lattice, bilinear."""
-    jj, ii = min(int(row), len(a) - 2), min(int(col), a.shape[1] - 2)
-    v, u = row - jj, col - ii
+def _at(a: Floats, fineness: int, j: int, i: int) -> float:
+    """A value at node (j, i) of a lattice ``fineness`` times finer than ``a``; bilinear between the nodes of that."""
+    jj, ii = min(j // fineness, len(a) - 2), min(i // fineness, a.shape[1] - 2)
+    v, u = j / fineness - jj, i / fineness - ii
     south = a[jj, ii] + u * (a[jj, ii + 1] - a[jj, ii])
     return float(south + v * (a[jj + 1, ii] + u * (a[jj + 1, ii + 1] - a[jj + 1, ii]) - south))
 
 
 @device
-def _shut_beside(
+def _covers(
+    x: Floats, y: Floats, fineness: int, zones: Floats, edges: Floats, z: int, reach: float, near: float, j: int,
+    i: int, jj: int, ii: int,
+) -> bool:  # fmt: skip
+    """Whether cell (jj, ii) lies wholly in a zone, and each of its corners within ``near`` of that of cell (j, i)."""
+    for k in range(4):
+        v, u = k >> 1, k & 1
+        px, py = _at(x, fineness, jj + v, ii + u), _at(y, fineness, jj + v, ii + u)
+        dx, dy = px - _at(x, fineness, j + v, i + u), py - _at(y, fineness, j + v, i + u)
+        if dx * dx + dy * dy > near * near or depth(zones, edges, z, px, py) <= reach:
+            return False
+    return True
+
+
+@device
+def _lowest_and_highest(
     ground: Floats, x: Floats, y: Floats, fineness: int, zones: Floats, edges: Floats, z: int, reach: float,
     near: float, j: int, i: int,
-) -> tuple[float, float]:  # fmt: skip
-    """The altitudes (bottom, top) that a zone's own ground shuts everywhere over a cell; (inf, -inf) if none are known.
+) -> tuple[int, int, int, int]:  # fmt: skip
+    """Of the cells whose ground is a zone's own and within reach of cell (j, i): row and column of the one with the
+    lowest ground and of the one with the highest; all -1 if there is none.
 
     ``ground``, ``x``, ``y``: at the nodes of a lattice of which cell (j, i) is a part, ``fineness`` times finer.
-    ``reach``: metres by which the zone is grown; ``near``: a little less, from all places of the cell to that ground.
-    Places of the zone within ``near`` of all four corners count, and all ground between two such places does, too.
+    ``reach``: metres by which the zone is grown; ``near``: a little less, from each place of the cell to that ground.
     """
-    row, col, side = j / fineness, i / fineness, 1.0 / fineness
-    cx, cy = _at(x, row + 0.5 * side, col + 0.5 * side), _at(y, row + 0.5 * side, col + 0.5 * side)
-    half = 0.0
-    for k in range(4):
-        v, u = row + (k >> 1) * side, col + (k & 1) * side
-        half = max(half, math.sqrt((_at(x, v, u) - cx) ** 2 + (_at(y, v, u) - cy) ** 2))
-    room = near - half
-    if room < half or depth(zones, edges, z, cx, cy) <= reach - room:
-        return np.inf, -np.inf
-    ex, ey = _at(x, row, col + side) - _at(x, row, col), _at(y, row, col + side) - _at(y, row, col)
-    nx, ny = _at(x, row + side, col) - _at(x, row, col), _at(y, row + side, col) - _at(y, row, col)
-    across = room / BESIDE_STEPS * side / math.sqrt(ex * ex + ey * ey)
-    along = room / BESIDE_STEPS * side / math.sqrt(nx * nx + ny * ny)
+    ex = _at(x, fineness, j, i + 1) - _at(x, fineness, j, i)
+    ey = _at(y, fineness, j, i + 1) - _at(y, fineness, j, i)
+    nx = _at(x, fineness, j + 1, i) - _at(x, fineness, j, i)
+    ny = _at(y, fineness, j + 1, i) - _at(y, fineness, j, i)
+    across, along = math.sqrt(ex * ex + ey * ey), math.sqrt(nx * nx + ny * ny)
+    low_j = low_i = high_j = high_i = -1
+    if depth(zones, edges, z, _at(x, fineness, j, i), _at(y, fineness, j, i)) <= reach - near:
+        return low_j, low_i, high_j, high_i
+    rows, cols = int(near / along), int(near / across)
+    every = 1 + max(max(rows, cols) - 1, 0) // BESIDE_STEPS
     least, most = np.inf, -np.inf
-    for q in range(-BESIDE_STEPS, BESIDE_STEPS + 1):
-        v = row + 0.5 * side + q * along
-        if not 0.0 <= v <= len(x) - 1:
+    for q in range(-(rows // every), rows // every + 1):
+        jj = j + q * every
+        if not 0 <= jj < (len(x) - 1) * fineness:
             continue
-        for p in range(-BESIDE_STEPS, BESIDE_STEPS + 1):
-            u = col + 0.5 * side + p * across
-            if not 0.0 <= u <= x.shape[1] - 1:
+        for p in range(-(cols // every), cols // every + 1):
+            ii = i + p * every
+            if not 0 <= ii < (x.shape[1] - 1) * fineness:
                 continue
-            height = _at(ground, v, u)
-            if not (height < least or height > most):  # also if it is unknown
+            height = _at(ground, fineness, jj, ii) + _at(ground, fineness, jj + 1, ii + 1)
+            # False as well where ground is unknown.
+            if not ((height < least or height > most) and height + _at(ground, fineness, jj, ii + 1) < np.inf):
                 continue
-            at_x, at_y = _at(x, v, u), _at(y, v, u)
-            off = (at_x - cx) ** 2 + (at_y - cy) ** 2
-            if off <= room * room and depth(zones, edges, z, at_x, at_y) > reach:
-                least, most = min(least, height), max(most, height)
-    if most == -np.inf:
-        return np.inf, -np.inf
-    bottom = -np.inf
-    if zones[z, UNDER] > 0.0:
-        bottom = zones[z, OWN_BOTTOM] + (least if zones[z, BOTTOM_AGL] > 0.0 else 0.0)
-    top = zones[z, OWN_TOP] + (most if zones[z, TOP_AGL] > 0.0 else 0.0)
-    return (bottom, top) if top - bottom > zones[z, THIN] else (np.inf, -np.inf)
+            if not _covers(x, y, fineness, zones, edges, z, reach, near, j, i, jj, ii):
+                continue
+            if height < least:
+                least, low_j, low_i = height, jj, ii
+            if height > most:
+                most, high_j, high_i = height, jj, ii
+    return low_j, low_i, high_j, high_i
+
+
+@device
+def _bulge(ground: Floats, fineness: int, j: int, i: int) -> float:
+    """Metres by which a cell's bilinear ground differs from its triangles, at most."""
+    return 0.25 * abs(
+        _at(ground, fineness, j, i) + _at(ground, fineness, j + 1, i + 1) - _at(ground, fineness, j, i + 1)
+        - _at(ground, fineness, j + 1, i)
+    )  # fmt: skip
 
 
 @kernel("i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] i8 f8[,] f8[,] i4[,] f8 f8 i4[] f8[,] i8")
@@ -98,7 +116,8 @@ def stamp_beside(
     edges: Floats, boxes: Int32s, reach: float, near: float, of: Int32s, values: Floats, count: int,
 ) -> int:  # fmt: skip
     """Give walls to the cells that a zone's own ground shuts in part or whole, after the ``count`` walls of
-    `zone_kernels.stamp_zones`; return how many there are then. ``ground``, ``x``, ``y``: as in `_shut_beside`."""
+    `zone_kernels.stamp_zones`; return how many there are then. ``ground``, ``x``, ``y``: as in
+    `_lowest_and_highest`."""
     wall = values[len(values) - 1]
     for z in range(len(zones)):
         if zones[z, LOOKS] == 0.0:
@@ -107,14 +126,48 @@ def stamp_beside(
             for i in range(max(boxes[z, 0], span[j, 0]), min(boxes[z, 1] + 1, span[j, 1])):
                 if min(min(excess[j, i], excess[j, i + 1]), min(excess[j + 1, i], excess[j + 1, i + 1])) > 0.0:
                     continue  # nothing there is free anyway
-                bottom, top = _shut_beside(ground, x, y, fineness, zones, edges, z, reach, near, j, i)
-                if top == -np.inf:
+                low_j, low_i, high_j, high_i = _lowest_and_highest(
+                    ground, x, y, fineness, zones, edges, z, reach, near, j, i
+                )
+                if low_j < 0:
                     continue
+                low_off, high_off = _bulge(ground, fineness, low_j, low_i), _bulge(ground, fineness, high_j, high_i)
                 for k in range(4):
-                    jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
-                    wall[k] = min(top - floor[jj, ii] + excess[jj, ii], floor[jj, ii] - bottom)
+                    v, u = k >> 1, (k ^ (k >> 1)) & 1
+                    bottom = _own(zones, z, OWN_BOTTOM, _at(ground, fineness, low_j + v, low_i + u) + low_off)
+                    top = _own(zones, z, OWN_TOP, _at(ground, fineness, high_j + v, high_i + u) - high_off)
+                    wall[k] = top - floor[j + v, i + u] + excess[j + v, i + u]
+                    if zones[z, UNDER] > 0.0:
+                        wall[k] = min(min(wall[k], floor[j + v, i + u] - bottom), top - bottom - zones[z, THIN])
                 count = put(of, values, j * (excess.shape[1] - 1) + i, wall, count)
     return count
+
+
+@device
+def _own(zones: Floats, z: int, level: int, ground: float) -> float:
+    """The altitude of a zone's level, `OWN_BOTTOM` or `OWN_TOP`, over its own ground of altitude ``ground``."""
+    over = zones[z, BOTTOM_AGL if level == OWN_BOTTOM else TOP_AGL] > 0.0
+    return float(zones[z, level] + (ground if over else 0.0))
+
+
+@device
+def _shut_beside(
+    ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, z: int, reach: float, near: float, j: int,
+    i: int,
+) -> tuple[float, float]:  # fmt: skip
+    """The altitudes (bottom, top) that a zone's own ground within reach shuts everywhere over a cell; (inf, -inf) if
+    none are known."""
+    low_j, low_i, high_j, high_i = _lowest_and_highest(ground, x, y, 1, zones, edges, z, reach, near, j, i)
+    if low_j < 0:
+        return np.inf, -np.inf
+    low, high = -np.inf, np.inf
+    for k in range(4):
+        v, u = k >> 1, k & 1
+        low, high = max(low, ground[low_j + v, low_i + u]), min(high, ground[high_j + v, high_i + u])
+    bottom, top = -np.inf, _own(zones, z, OWN_TOP, high)
+    if zones[z, UNDER] > 0.0:
+        bottom = _own(zones, z, OWN_BOTTOM, low)
+    return (bottom, top) if top - bottom > zones[z, THIN] else (np.inf, -np.inf)
 
 
 @device
@@ -133,7 +186,7 @@ def shut_over(
     them, some place of the cell may be free. (inf, -inf), so nothing is shut, if it does not lie wholly in the zone, or
     that is not known."""
     if zones[z, LOOKS] > 0.0:
-        bottom, top = _shut_beside(ground, x, y, 1, zones, edges, z, reach, near, j, i)
+        bottom, top = _shut_beside(ground, x, y, zones, edges, z, reach, near, j, i)
         if top > -np.inf:
             return bottom, top
     bottom, top = -np.inf, np.inf
