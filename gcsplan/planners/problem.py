@@ -23,6 +23,8 @@ Objective = Literal["length", "energy"]
 ENDS_M = 25.0
 """Metres by which floors and ceilings over a line, which are conservative, are too strict in rough ground at worst. So
 they do not decide whether start and goal themselves are legal (`refusal.check_ends` does)."""
+PASSED_M = 1e-3
+"""Metres within which a path passes a via."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,6 +176,19 @@ class Refusal(NoMission):
 def terminals_of(problem: Problem) -> list[tuple[float, float]]:
     """(east_m, north_m) of the start, every via, and the goal."""
     return [problem.start[:2], *((v.east_m, v.north_m) for v in problem.via), problem.goal[:2]]
+
+
+def passes_vias(problem: Problem, points: Floats) -> bool:
+    """Whether a path (N, 3) has a point at each via, in order, within `PASSED_M` of its place and altitude."""
+    at = 0
+    for via in problem.via:
+        off_m = np.hypot(points[at:, 0] - via.east_m, points[at:, 1] - via.north_m)
+        if via.amsl_m is not None:
+            off_m = np.maximum(off_m, np.abs(points[at:, 2] - via.amsl_m))
+        if not (off_m <= PASSED_M).any():
+            return False
+        at += int(np.argmax(off_m <= PASSED_M))
+    return True
 
 
 def straight_way_m(problem: Problem) -> float:

@@ -12,7 +12,7 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.lattice.planner import straight_bound
 from gcsplan.planners.optimal.corridor import PinnedTrack
-from gcsplan.planners.problem import Problem, Progress, Solution, Step, straight_way_m
+from gcsplan.planners.problem import Problem, Progress, Solution, Step, passes_vias, straight_way_m
 from gcsplan.planners.profile.climb_laps import with_laps
 from gcsplan.planners.profile.exact import Judge, Unsettled, settle, way_points
 from gcsplan.planners.profile.track import Flown, Obstruction, Track, fly, make_track
@@ -114,7 +114,7 @@ class Incumbent:
         """Keep a path that passes the exact check if it is the best so far, and return whether it is; ``pinned`` (N,):
         which points are terminals."""
         cost = self.problem.cost(Path(points))
-        if cost >= self.cost:
+        if cost >= self.cost or not passes_vias(self.problem, points):
             return False
         self._first()
         self.best, self.cost, self.pinned = points, cost, pinned

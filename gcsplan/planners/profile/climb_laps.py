@@ -369,7 +369,7 @@ def _with_detour(problem: Problem, track: Track, detour: _Detour) -> Track:
     inner = detour.inner
     pins, heights = np.zeros(len(inner), bool), np.full(len(inner), np.nan)
     for k in at[track.pinned[at]]:  # a pinned vertex moves to the nearer end of the detour; the goal to its last point
-        last = track.s_m[k] - detour.s0_m > detour.s1_m - track.s_m[k] or not after.any()
+        last = track.s_m[k] - detour.s0_m > detour.s1_m - track.s_m[k] or k == len(track.points) - 1
         pins[-int(last)], heights[-int(last)] = True, track.pin_m[k]
     return sampled_track(
         problem,
