@@ -125,7 +125,8 @@ def _longest_track(plane: PlaneSearch, cost: float) -> float:
     if plane.problem.objective == "energy":
         limits = [limit for _, limit in _limits(plane, longest_m)]
         climbed_m = climb_bound(legs, [leg.lower_m for leg in legs], limits)
-        return min(longest_m, incumbent.longest(longest_m, cost, climbed_m))
+        # Where the climb alone costs more, no length is left: that of the shortest tracks, which nothing undercuts.
+        return max(min(longest_m, incumbent.longest(longest_m, cost, climbed_m)), sum(leg.lower_m for leg in legs))
     if len(legs) > 1:
         return longest_m
     climbing = rise_bound(legs, [longest_m], [longest_m]) - longest_m

@@ -9,10 +9,13 @@ import pytest
 
 from gcsplan.bench.terrain_problems import problems
 from gcsplan.planners.budget import Budget
+from gcsplan.planners.optimal.bounds.shorter import _bound_cheaper, _longest_track
+from gcsplan.planners.optimal.plane_search import PlaneSearch
 from gcsplan.planners.optimal.planner import search
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
+from gcsplan.world.surface import GridMap, Surface
 from tests.support.planner_worlds import Floats, ground
 
 
@@ -32,6 +35,26 @@ def test_bound_over_several_legs_goes_on_while_legs_get_better() -> None:
     found = search(problem).incumbent
     assert found.best is not None
     assert found.gap < 0.2
+
+
+def test_a_cost_that_the_climb_alone_exceeds_leaves_no_track() -> None:
+    """Few metres of track and a climb that costs most: the length left for the track was negative."""
+    axis = np.arange(0.0, 2001.0, 50.0)
+    east, _ = np.meshgrid(axis, axis)
+    hills = np.where(np.abs(east - 1000.0) < 60.0, 150.0, 0.0)
+    problem = Problem(
+        Airspace(Surface(hills, hills, GridMap.affine(0.0, 2000.0, 50.0, 50.0)), ()), Limits(10.0),
+        (800.0, 1000.0, 30.0), (1200.0, 1000.0, 25.0), objective="energy", vertical_j_per_m=6000.0,
+        horizontal_j_per_m=1.0,
+    )  # fmt: skip
+    found = search(problem).incumbent
+    assert found.best is not None
+    assert found.bound <= found.cost * (1.0 + 1e-9)
+    plane = PlaneSearch(found)
+    assert plane.reach_longest()
+    for part in (0.01, 0.5, 0.9):
+        assert _longest_track(plane, part * found.cost) >= sum(leg.lower_m for leg in plane.legs)
+        assert 0.0 < _bound_cheaper(plane, part * found.cost) <= found.cost * (1.0 + 1e-9)
 
 
 @pytest.mark.slow
