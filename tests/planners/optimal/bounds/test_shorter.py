@@ -45,7 +45,7 @@ def test_a_cost_that_the_climb_alone_exceeds_leaves_no_track() -> None:
     problem = Problem(
         Airspace(Surface(hills, hills, GridMap.affine(0.0, 2000.0, 50.0, 50.0)), ()), Limits(10.0),
         (800.0, 1000.0, 30.0), (1200.0, 1000.0, 25.0), objective="energy", vertical_j_per_m=6000.0,
-        horizontal_j_per_m=1.0,
+        horizontal_j_per_m=1.0, budget=Budget(1.0, 200.0),
     )  # fmt: skip
     found = search(problem).incumbent
     assert found.best is not None
