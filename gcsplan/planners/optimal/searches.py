@@ -272,12 +272,12 @@ class Searches:
         return incumbent.best is not None and incumbent.gap > FAR and incumbent.climbs
 
     def _climb_aslant(self) -> None:
-        incumbent, energy = self.incumbent, self.problem.objective == "energy"
+        incumbent = self.incumbent
         found = traverse(self.problem, self.plane.longest())
         if found is not None:
             incumbent.take_longer(found, fine=True)
-        # If finer lines are better, still finer ones may be, too; for length they are hardly worth the work.
-        for level in (0, 1) if energy else (0,):
+        # Other lines around the path climb less, on finer lattices still less; none of them is shorter.
+        for level in (0, 1) if self.problem.objective == "energy" else ():
             if incumbent.best is None or not incumbent.goes_on():
                 break
             tight = pulled_tight(self.problem, incumbent.best, level, incumbent.budget.deadline_s)
