@@ -41,7 +41,13 @@ class _Results:
     """Standard output as a file for rich: a full disk or a closed output is our error, not one of rich."""
 
     def write(self, text: str) -> int:
-        put(text)
+        try:
+            if text:
+                put(text)
+        except BaseException:  # rich would keep what it could not write, and write it before the next words
+            console.begin_capture()
+            console.end_capture()
+            raise
         return len(text)
 
     def flush(self) -> None:

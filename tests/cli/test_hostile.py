@@ -270,11 +270,15 @@ def test_a_standard_output_that_takes_nothing_is_an_error_of_its_own(
         def write(self, text: str, /) -> int:
             raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(sys, "stdout", Full() if stream == "full" else None)
-    for arguments in (("check", "m.yaml", "uav1.waypoints", "--json"), ("check", "m.yaml", "uav1.waypoints")):
-        code, _, err = run(*arguments)
-        assert code == 2
-        assert err.splitlines()[-1].startswith("gcsplan: standard output: cannot be written")
+    check = ("check", "m.yaml", "uav1.waypoints")
+    whole = run(*check)
+    with monkeypatch.context() as patch:
+        patch.setattr(sys, "stdout", Full() if stream == "full" else None)
+        for arguments in ((*check, "--json"), check):
+            code, _, err = run(*arguments)
+            assert code == 2
+            assert err.splitlines()[-1].startswith("gcsplan: standard output: cannot be written")
+    assert run(*check) == whole  # without the words that could not be written
 
 
 def test_ctrl_c_says_so_in_words_and_in_json(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
