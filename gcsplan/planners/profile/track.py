@@ -317,8 +317,8 @@ def _sections(problem: Problem, track: Track, known: Sequence[tuple[float, float
         here = np.array([k[0] for k in known])
         s = np.sort(np.concatenate([s, *(b.s_m for b in tube.bands), track.s_m[fixed], close, here]))
         s = s[np.concatenate([[True], s[1:] - s[:-1] > 1e-9])]
-    low = _edge(s, tube.s_m, tube.floor_m, True)
-    high = _edge(s, tube.s_m, tube.ceiling_m, False)
+    low = values_at(s, tube.s_m, tube.floor_m, True)
+    high = values_at(s, tube.s_m, tube.ceiling_m, False)
     if len(close):
         near = np.flatnonzero((s <= CLOSE_M) | (s >= s[-1] - CLOSE_M))
         east, north = (np.interp(s[near], track.s_m, track.points[:, i]) for i in range(2))
@@ -334,8 +334,8 @@ def _sections(problem: Problem, track: Track, known: Sequence[tuple[float, float
         i = int(np.searchsorted(s, b.s_m[0] - 1e-9))
         j = int(np.searchsorted(s, b.s_m[-1] + 1e-9))
         spans.append((i, j))
-        bottom = _edge(s[i:j], b.s_m, b.bottom_m, False)
-        top = _edge(s[i:j], b.s_m, b.top_m, True)
+        bottom = values_at(s[i:j], b.s_m, b.bottom_m, False)
+        top = values_at(s[i:j], b.s_m, b.top_m, True)
         if i == 0:
             _forgive(top, bottom, 0, z0)
         if j == len(s):
@@ -374,8 +374,9 @@ def _forgive(low: Floats, high: Floats, k: int, z: float) -> None:
         high[k] = z
 
 
-def _edge(s: Floats, at: Floats, value: Floats, highest: bool) -> Floats:
-    """Values of a piecewise-linear function with jumps at rising ``s``; at a jump the higher (lower) limit."""
+def values_at(s: Floats, at: Floats, value: Floats, highest: bool) -> Floats:
+    """Values at rising ``s`` of a piecewise-linear function with jumps, whose pieces between breakpoints ``at`` (K + 1,)
+    have the ``value`` (K, 2) at their ends; at a jump the higher one, or the lower one (not ``highest``)."""
     out = np.empty(len(s))
     edge(*(np.ascontiguousarray(a, np.float64) for a in (s, at, value)), highest, out)
     return out
