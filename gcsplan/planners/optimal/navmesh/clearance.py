@@ -34,8 +34,9 @@ ALIKE = 12.0
 """A bound's floors make use of the track error only if a cell's diagonal is less than this many times the error."""
 BORDER_HAIR_M, SHUT_M = 0.1, 1e6
 """Metres by which less than the demanded distance from a border is shut, and by which shut nodes exceed the cap."""
-LEARN_M, LEARN_HAIR_M = 2.0, 0.05
-"""Longest step, m, at which `learn` checks a track, and metres by which nodes are raised above what was missing."""
+LEARN_M, LEARN_SPARE_M, LEARN_HAIR_M = 2.0, 0.03, 0.05
+"""Longest step, m, at which `learn` checks a track; metres that must be free there; metres by which nodes are raised
+above what was missing."""
 NODE_BYTES = 150.0
 """Bytes of a node that is looked at, with the cells and pieces beside it."""
 MOST_MEET = 8
@@ -160,10 +161,11 @@ class ClearanceGrid:
         return np.asarray(floor) - self.cap_m
 
     def learn(self, track: Floats) -> bool:
-        """Raise the nodes of the cells in which the exact check shuts a track (N, 2); return whether there are any."""
+        """Raise the nodes of the cells in which the exact check shuts a track (N, 2), or leaves less than
+        `LEARN_SPARE_M`; return whether there are any."""
         places = sampled(track, LEARN_M)
         over = self._too_high(*places.T)
-        shut = np.isfinite(over) & (over > 0.0)
+        shut = np.isfinite(over) & (over > -LEARN_SPARE_M)
         self.lift(places[shut], over[shut])
         return bool(shut.any())
 
@@ -274,14 +276,14 @@ class ClearanceGrid:
         """Give the cells the walls of the zones."""
         reach_m, near_m = self.plane.reach_m()
         count = stamp_zones(
-            self._around, self._span, self._excess, self._floor, self._ground, self._steep, self.fineness, reach_m,
-            self._exact, self._up, self._down, self._x, self._y, self._zones, self._edges, self._boxes, self.low,
-            self._of, self._values,
+            self._around, self._span, self._excess, self._floor, self._ground, *self._coarse, self._steep,
+            self.fineness, reach_m, self._exact, self._up, self._down, self._x, self._y, self._zones, self._edges,
+            self._boxes, self.low, self._of, self._values,
         )  # fmt: skip
         if self.low and self.plane.stride == 1:
             stamp_beside(
                 self._span, self._excess, self._floor, *self._coarse, self.fineness, self._zones, self._edges,
-                self._boxes, reach_m, near_m, self._of, self._values, count,
+                self._boxes, reach_m, near_m, np.empty((8, 4)), self._of, self._values, count,
             )  # fmt: skip
         self._laid = True
 

@@ -14,10 +14,13 @@ import numpy as np
 
 from gcsplan.arrays import Floats, Int32s
 from gcsplan.planners.compiled import device, kernel
+from gcsplan.planners.optimal.navmesh.mesh_kernels import NEXT
 from gcsplan.planners.optimal.navmesh.zone_kernels import (
     BOTTOM,
     BOTTOM_AGL,
     LOOKS,
+    ONE,
+    OTHER,
     OWN_BOTTOM,
     OWN_TOP,
     PAIR,
@@ -28,19 +31,11 @@ from gcsplan.planners.optimal.navmesh.zone_kernels import (
     depth,
     level,
     put,
+    value_at,
 )
 
 BESIDE_STEPS = 5
 """Cells on each side of a cell whose ground is read, at most; of more, only every second, third … is."""
-
-
-@device
-def _at(a: Floats, fineness: int, j: int, i: int) -> float:
-    """A value at node (j, i) of a lattice ``fineness`` times finer than ``a``; bilinear between the nodes of that."""
-    jj, ii = min(j // fineness, len(a) - 2), min(i // fineness, a.shape[1] - 2)
-    v, u = j / fineness - jj, i / fineness - ii
-    south = a[jj, ii] + u * (a[jj, ii + 1] - a[jj, ii])
-    return float(south + v * (a[jj + 1, ii] + u * (a[jj + 1, ii + 1] - a[jj + 1, ii]) - south))
 
 
 @device
@@ -51,8 +46,8 @@ def _covers(
     """Whether cell (jj, ii) lies wholly in a zone, and each of its corners within ``near`` of that of cell (j, i)."""
     for k in range(4):
         v, u = k >> 1, k & 1
-        px, py = _at(x, fineness, jj + v, ii + u), _at(y, fineness, jj + v, ii + u)
-        dx, dy = px - _at(x, fineness, j + v, i + u), py - _at(y, fineness, j + v, i + u)
+        px, py = value_at(x, fineness, jj + v, ii + u), value_at(y, fineness, jj + v, ii + u)
+        dx, dy = px - value_at(x, fineness, j + v, i + u), py - value_at(y, fineness, j + v, i + u)
         if dx * dx + dy * dy > near * near or depth(zones, edges, z, px, py) <= reach:
             return False
     return True
@@ -69,13 +64,13 @@ def _lowest_and_highest(
     ``ground``, ``x``, ``y``: at the nodes of a lattice of which cell (j, i) is a part, ``fineness`` times finer.
     ``reach``: metres by which the zone is grown; ``near``: a little less, from each place of the cell to that ground.
     """
-    ex = _at(x, fineness, j, i + 1) - _at(x, fineness, j, i)
-    ey = _at(y, fineness, j, i + 1) - _at(y, fineness, j, i)
-    nx = _at(x, fineness, j + 1, i) - _at(x, fineness, j, i)
-    ny = _at(y, fineness, j + 1, i) - _at(y, fineness, j, i)
+    ex = value_at(x, fineness, j, i + 1) - value_at(x, fineness, j, i)
+    ey = value_at(y, fineness, j, i + 1) - value_at(y, fineness, j, i)
+    nx = value_at(x, fineness, j + 1, i) - value_at(x, fineness, j, i)
+    ny = value_at(y, fineness, j + 1, i) - value_at(y, fineness, j, i)
     across, along = math.sqrt(ex * ex + ey * ey), math.sqrt(nx * nx + ny * ny)
     low_j = low_i = high_j = high_i = -1
-    if depth(zones, edges, z, _at(x, fineness, j, i), _at(y, fineness, j, i)) <= reach - near:
+    if depth(zones, edges, z, value_at(x, fineness, j, i), value_at(y, fineness, j, i)) <= reach - near:
         return low_j, low_i, high_j, high_i
     rows, cols = int(near / along), int(near / across)
     every = 1 + max(max(rows, cols) - 1, 0) // BESIDE_STEPS
@@ -88,9 +83,9 @@ def _lowest_and_highest(
             ii = i + p * every
             if not 0 <= ii < (x.shape[1] - 1) * fineness:
                 continue
-            height = _at(ground, fineness, jj, ii) + _at(ground, fineness, jj + 1, ii + 1)
+            height = value_at(ground, fineness, jj, ii) + value_at(ground, fineness, jj + 1, ii + 1)
             # False as well where ground is unknown.
-            if not ((height < least or height > most) and height + _at(ground, fineness, jj, ii + 1) < np.inf):
+            if not ((height < least or height > most) and height + value_at(ground, fineness, jj, ii + 1) < np.inf):
                 continue
             if not _covers(x, y, fineness, zones, edges, z, reach, near, j, i, jj, ii):
                 continue
@@ -104,42 +99,102 @@ def _lowest_and_highest(
 @device
 def _bulge(ground: Floats, fineness: int, j: int, i: int) -> float:
     """Metres by which a cell's bilinear ground differs from its triangles, at most."""
-    return 0.25 * abs(
-        _at(ground, fineness, j, i) + _at(ground, fineness, j + 1, i + 1) - _at(ground, fineness, j, i + 1)
-        - _at(ground, fineness, j + 1, i)
-    )  # fmt: skip
+    straight = value_at(ground, fineness, j, i) + value_at(ground, fineness, j + 1, i + 1)
+    return 0.25 * abs(straight - value_at(ground, fineness, j, i + 1) - value_at(ground, fineness, j + 1, i))
 
 
-@kernel("i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] i8 f8[,] f8[,] i4[,] f8 f8 i4[] f8[,] i8")
+@device
+def _levels(
+    ground: Floats, x: Floats, y: Floats, fineness: int, zones: Floats, edges: Floats, z: int, reach: float,
+    near: float, j: int, i: int, of: Floats, first: int,
+) -> bool:  # fmt: skip
+    """Fill rows ``first`` to ``first`` + 2 of ``of`` with functions, given at the corners of a cell and linear between,
+    of a zone: at a place where the third, how deep it lies in the zone, is above 0, the zone shuts all altitudes from
+    the first to the second. Returns whether they are known. ``ground``, ``x``, ``y``: as in `_lowest_and_highest`."""
+    low_j, low_i, high_j, high_i = -1, -1, -1, -1
+    looks = zones[z, LOOKS] > 0.0
+    if looks:
+        low_j, low_i, high_j, high_i = _lowest_and_highest(ground, x, y, fineness, zones, edges, z, reach, near, j, i)
+    if low_j < 0 if looks else over_ground(zones, z):
+        return False
+    low_off = _bulge(ground, fineness, low_j, low_i) if looks else 0.0
+    high_off = _bulge(ground, fineness, high_j, high_i) if looks else 0.0
+    for k in range(4):
+        v, u = k >> 1, (k ^ (k >> 1)) & 1
+        low = value_at(ground, fineness, low_j + v, low_i + u) + low_off if looks else 0.0
+        high = value_at(ground, fineness, high_j + v, high_i + u) - high_off if looks else 0.0
+        of[first, k] = _own(zones, z, OWN_BOTTOM, low) if zones[z, UNDER] > 0.0 else -np.inf
+        of[first + 1, k] = _own(zones, z, OWN_TOP, high)
+        of[first + 2, k] = np.inf
+        if not looks:
+            of[first + 2, k] = depth(
+                zones, edges, z, value_at(x, fineness, j + v, i + u), value_at(y, fineness, j + v, i + u)
+            )
+        elif zones[z, UNDER] > 0.0:
+            of[first + 2, k] = of[first + 1, k] - of[first, k] - zones[z, THIN]
+    return True
+
+
+@device
+def _is_shut(of: Int32s, values: Floats, cell: int) -> bool:
+    """Whether one of a cell's walls shuts all of it."""
+    n = of[cell]
+    while n > 0:
+        if min(min(values[n - 1, 0], values[n - 1, 1]), min(values[n - 1, 2], values[n - 1, 3])) > 0.0:
+            return True
+        n = int(values[n - 1, NEXT])
+    return False
+
+
+@device
+def _wall_of_two(of: Floats, one: int, other: int, floor: float, allowed: float, k: int) -> float:
+    """How far a place is from having a free altitude, m, where a zone (its functions begin at row ``one`` of ``of``)
+    lies below another and they shut all altitudes together: the least of what each must exceed."""
+    wall = min(min(floor - of[one, k], of[one + 1, k] - of[other, k]), of[other + 1, k] - allowed)
+    return float(min(wall, min(of[one + 2, k], of[other + 2, k])))
+
+
+@kernel("i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] i8 f8[,] f8[,] i4[,] f8 f8 f8[,] i4[] f8[,] i8")
 def stamp_beside(
     span: Int32s, excess: Floats, floor: Floats, ground: Floats, x: Floats, y: Floats, fineness: int, zones: Floats,
-    edges: Floats, boxes: Int32s, reach: float, near: float, of: Int32s, values: Floats, count: int,
+    edges: Floats, boxes: Int32s, reach: float, near: float, room: Floats, of: Int32s, values: Floats, count: int,
 ) -> int:  # fmt: skip
-    """Give walls to the cells that a zone's own ground shuts in part or whole, after the ``count`` walls of
-    `zone_kernels.stamp_zones`; return how many there are then. ``ground``, ``x``, ``y``: as in
-    `_lowest_and_highest`."""
+    """Give walls to the cells that a zone's own ground shuts in part or whole, by itself or together with another zone,
+    after the ``count`` walls of `zone_kernels.stamp_zones`; return how many there are then. ``ground``, ``x``, ``y``:
+    as in `_lowest_and_highest`; ``room`` (8, 4): a work array."""
     wall = values[len(values) - 1]
     for z in range(len(zones)):
         if zones[z, LOOKS] == 0.0:
             continue
+        pair = zones[z, PAIR] > 0.0
+        one, other = int(zones[z, ONE]) if pair else z, int(zones[z, OTHER]) if pair else z
+        if zones[one, LOOKS] > zones[other, LOOKS]:
+            one, other = other, one  # where the one that is read fast does not come, the other is not read
         for j in range(boxes[z, 2], boxes[z, 3] + 1):
             for i in range(max(boxes[z, 0], span[j, 0]), min(boxes[z, 1] + 1, span[j, 1])):
-                if min(min(excess[j, i], excess[j, i + 1]), min(excess[j + 1, i], excess[j + 1, i + 1])) > 0.0:
-                    continue  # nothing there is free anyway
-                low_j, low_i, high_j, high_i = _lowest_and_highest(
-                    ground, x, y, fineness, zones, edges, z, reach, near, j, i
-                )
-                if low_j < 0:
+                cell = j * (excess.shape[1] - 1) + i
+                shut = min(min(excess[j, i], excess[j, i + 1]), min(excess[j + 1, i], excess[j + 1, i + 1])) > 0.0
+                if shut or _is_shut(of, values, cell):
                     continue
-                low_off, high_off = _bulge(ground, fineness, low_j, low_i), _bulge(ground, fineness, high_j, high_i)
+                if not _levels(ground, x, y, fineness, zones, edges, one, reach, near, j, i, room, 0):
+                    continue
+                if max(max(room[2, 0], room[2, 1]), max(room[2, 2], room[2, 3])) <= 0.0:
+                    continue
+                if pair and not _levels(ground, x, y, fineness, zones, edges, other, reach, near, j, i, room, 3):
+                    continue
+                most_upper = most_lower = -np.inf
                 for k in range(4):
-                    v, u = k >> 1, (k ^ (k >> 1)) & 1
-                    bottom = _own(zones, z, OWN_BOTTOM, _at(ground, fineness, low_j + v, low_i + u) + low_off)
-                    top = _own(zones, z, OWN_TOP, _at(ground, fineness, high_j + v, high_i + u) - high_off)
-                    wall[k] = top - floor[j + v, i + u] + excess[j + v, i + u]
-                    if zones[z, UNDER] > 0.0:
-                        wall[k] = min(min(wall[k], floor[j + v, i + u] - bottom), top - bottom - zones[z, THIN])
-                count = put(of, values, j * (excess.shape[1] - 1) + i, wall, count)
+                    jj, ii = j + (k >> 1), i + ((k ^ (k >> 1)) & 1)
+                    high = floor[jj, ii] - excess[jj, ii]
+                    if pair:
+                        room[6, k] = _wall_of_two(room, 0, 3, floor[jj, ii], high, k)
+                        room[7, k] = _wall_of_two(room, 3, 0, floor[jj, ii], high, k)
+                        most_upper, most_lower = max(most_upper, room[6, k]), max(most_lower, room[7, k])
+                    else:
+                        room[6, k] = min(min(room[1, k] - high, floor[jj, ii] - room[0, k]), room[2, k])
+                for k in range(4):
+                    wall[k] = room[7 if most_lower > most_upper else 6, k]
+                count = put(of, values, cell, wall, count)
     return count
 
 

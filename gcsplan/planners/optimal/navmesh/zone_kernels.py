@@ -12,10 +12,13 @@ from gcsplan.planners.optimal.navmesh.clearance_kernels import blank
 from gcsplan.planners.optimal.navmesh.mesh_kernels import NEXT
 
 EAST, NORTH, RADIUS, BOTTOM, TOP, BOTTOM_AGL, TOP_AGL, FIRST, LAST, UNDER = range(10)
-PAIR, BOTTOM_2, TOP_2, BOTTOM_2_AGL, TOP_2_AGL, UNDER_2, THIN, LOOKS, OWN_BOTTOM, OWN_TOP, NUMBERS = range(10, 21)
+PAIR, BOTTOM_2, TOP_2, BOTTOM_2_AGL, TOP_2_AGL, UNDER_2, THIN, LOOKS, OWN_BOTTOM, OWN_TOP = range(10, 20)
+ONE, OTHER, RISE, NUMBERS = range(20, 24)
 """Columns of the array ``zones``, and their number; those with a 2 are of the second zone of a pair that cross. Where
 its bottom and top are no more than ``THIN`` apart, there is no zone: ground lifts a floor over a ceiling AMSL. A zone
-that ``LOOKS`` follows its own ground, also beside it: ``OWN_BOTTOM``, ``OWN_TOP`` are its levels over that."""
+that ``LOOKS`` follows its own ground, also beside it: ``OWN_BOTTOM``, ``OWN_TOP`` are its levels over that; a pair does
+if one of its zones does. ``ONE``, ``OTHER``: the rows of the zones of a pair. ``RISE``: metres that ground may rise or
+fall within reach anywhere at a zone; 0 where the slopes at nodes tell better (see `BESIDE`)."""
 BESIDE = 2.0
 """Datum of a level over all ground within reach, for paths; 1: over the ground below; 0: AMSL."""
 MOST_BESIDE = 6
@@ -58,6 +61,15 @@ def _level_at(zones: Floats, z: int, at: int, ground: Floats, up: Floats, down: 
 
 
 @device
+def value_at(a: Floats, fineness: int, j: int, i: int) -> float:
+    """A value at node (j, i) of a lattice ``fineness`` times finer than ``a``; bilinear between the nodes of that."""
+    jj, ii = min(j // fineness, len(a) - 2), min(i // fineness, a.shape[1] - 2)
+    v, u = j / fineness - jj, i / fineness - ii
+    south = a[jj, ii] + u * (a[jj, ii + 1] - a[jj, ii])
+    return float(south + v * (a[jj + 1, ii] + u * (a[jj + 1, ii + 1] - a[jj + 1, ii]) - south))
+
+
+@device
 def _open(
     zones: Floats, z: int, floors: Floats, excess: Floats, ground: Floats, up: Floats, down: Floats, j: int, i: int
 ) -> bool:
@@ -85,11 +97,14 @@ def _open(
     return under and top_2 <= min(bottom, allowed) and floor <= bottom
 
 
-@kernel("i4[,] i4[,] f8[,] f8[,] f8[,] f8[,] i8 f8 b1 f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 i4[] f8[,]")
+@kernel(
+    "i4[,] i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i8 f8 b1 f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 i4[] "
+    "f8[,]"
+)
 def stamp_zones(
-    around: Int32s, span: Int32s, excess: Floats, floor: Floats, ground: Floats, steep: Floats, fineness: int,
-    reach: float, exact: bool, up: Floats, down: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats,
-    boxes: Int32s, low: bool, of: Int32s, values: Floats,
+    around: Int32s, span: Int32s, excess: Floats, floor: Floats, ground: Floats, coarse: Floats, coarse_x: Floats,
+    coarse_y: Floats, steep: Floats, fineness: int, reach: float, exact: bool, up: Floats, down: Floats, x: Floats,
+    y: Floats, zones: Floats, edges: Floats, boxes: Int32s, low: bool, of: Int32s, values: Floats,
 ) -> int:  # fmt: skip
     """Give the cells that zones shut walls of their own; return how many walls there are.
 
@@ -100,7 +115,7 @@ def stamp_zones(
 
     For paths, ground within ``reach`` decides levels of datum `BESIDE`. How far it rises and falls at each node
     (``up``, ``down``: work arrays) is guessed from ``steep``, the slopes at the nodes of a lattice ``fineness`` times
-    coarser, or, if ``exact``, read from the nodes around.
+    coarser, or, if ``exact``, read from that lattice's ground ``coarse`` at ``coarse_x``, ``coarse_y``.
     """
     for j in range(len(span)):
         for i in range(around[j, 0], min(around[j, 1], excess.shape[1] - 1)):
@@ -109,10 +124,14 @@ def stamp_zones(
     wall = values[len(values) - 1]
     for z in range(len(zones)):
         if _looks_beside(zones, z):
-            if exact and zones[z, PAIR] == 0.0:
-                _look_beside(around, excess, ground, x, y, zones, edges, boxes, z, reach, up, down)
+            own = _looking(zones, z) if exact else -1
+            if own >= 0:
+                _look_beside(
+                    around, excess, ground, coarse, coarse_x, coarse_y, fineness, zones, edges, boxes, z, own, reach,
+                    up, down,
+                )  # fmt: skip
             else:
-                _guess_beside(around, steep, fineness, boxes, z, reach, up, down)
+                _guess_beside(around, steep, fineness, zones, boxes, z, reach, up, down)
         west = east = north_west = north_east = 0.0
         west_open = east_open = north_west_open = north_east_open = False
         for j in range(boxes[z, 2], boxes[z, 3] + 1):
@@ -173,13 +192,35 @@ def _looks_beside(zones: Floats, z: int) -> bool:
 
 
 @device
+def _looking(zones: Floats, z: int) -> int:
+    """The row of the zone whose own ground decides, of a zone or a pair; -1 if both of a pair have such ground."""
+    if zones[z, PAIR] == 0.0:
+        return z
+    one, other = int(zones[z, ONE]), int(zones[z, OTHER])
+    if _looks_beside(zones, one):
+        return -1 if _looks_beside(zones, other) else one
+    return other
+
+
+@device
 def _guess_beside(
-    around: Int32s, steep: Floats, fineness: int, boxes: Int32s, z: int, reach: float, up: Floats, down: Floats
+    around: Int32s,
+    steep: Floats,
+    fineness: int,
+    zones: Floats,
+    boxes: Int32s,
+    z: int,
+    reach: float,
+    up: Floats,
+    down: Floats,
 ) -> None:
-    """Set ``up`` and ``down`` at a zone's nodes to the most that ground of slope ``steep`` rises and falls within
-    reach."""
+    """Set ``up`` and ``down`` at a zone's nodes to the most that ground rises and falls within reach: the zone's `RISE`
+    if it is known, or else by the slope ``steep``."""
     for j in range(boxes[z, 2], boxes[z, 3] + 2):
         for i in range(max(boxes[z, 0], around[j, 0]), min(boxes[z, 1] + 2, around[j, 1])):
+            if zones[z, RISE] > 0.0:
+                up[j, i] = down[j, i] = zones[z, RISE]
+                continue
             jj, ii = min(j // fineness, len(steep) - 2), min(i // fineness, steep.shape[1] - 2)
             v, u = j / fineness - jj, i / fineness - ii
             south, north = steep[jj, ii] * (1.0 - u), steep[jj + 1, ii] * (1.0 - u)
@@ -190,37 +231,45 @@ def _guess_beside(
 
 @device
 def _look_beside(
-    around: Int32s, excess: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Int32s,
-    z: int, reach: float, up: Floats, down: Floats,
+    around: Int32s, excess: Floats, ground: Floats, coarse: Floats, x: Floats, y: Floats, fineness: int, zones: Floats,
+    edges: Floats, boxes: Int32s, z: int, own: int, reach: float, up: Floats, down: Floats,
 ) -> None:  # fmt: skip
-    """Set ``up`` and ``down`` at nodes to how far the zone's own ground within reach rises above, and falls below, the
-    ground there. The zone is grown by ``reach``, so its own ground is where it is deeper than that. Only nodes with
-    known ground count; 0 if there is none."""
-    row, col = min(boxes[z, 2], len(x) - 2), min(boxes[z, 0], x.shape[1] - 2)
-    col = min(max(col, around[row, 0]), x.shape[1] - 2)
-    across = math.sqrt((x[row, col + 1] - x[row, col]) ** 2 + (y[row, col + 1] - y[row, col]) ** 2)
-    along = math.sqrt((x[row + 1, col] - x[row, col]) ** 2 + (y[row + 1, col] - y[row, col]) ** 2)
+    """Set ``up`` and ``down`` at nodes of a zone's box to how far the ground of zone ``own`` within reach rises above,
+    and falls below, the ground there; 0 where none is known. That zone is grown by ``reach``, so its own ground is
+    where it is deeper than that, or less deep by a step from place to place: at its rim, few places are within reach.
+
+    ``ground``: at the nodes; ``coarse``, ``x``, ``y``: at those of a lattice ``fineness`` times coarser.
+    """
+    across = math.sqrt((x[0, 1] - x[0, 0]) ** 2 + (y[0, 1] - y[0, 0]) ** 2) / fineness
+    along = math.sqrt((x[1, 0] - x[0, 0]) ** 2 + (y[1, 0] - y[0, 0]) ** 2) / fineness
     rows, cols = int(reach / along), int(reach / across)
     every = 1 + max(rows, cols) // (MOST_BESIDE + 1)
+    own_depth = reach - every * max(across, along)
     for j in range(boxes[z, 2], boxes[z, 3] + 2):
         for i in range(max(boxes[z, 0], around[j, 0]), min(boxes[z, 1] + 2, around[j, 1])):
             up[j, i] = down[j, i] = 0.0
             if excess[j, i] == np.inf:
                 continue
+            here_x, here_y = value_at(x, fineness, j, i), value_at(y, fineness, j, i)
+            if depth(zones, edges, own, here_x, here_y) <= 0.0:
+                continue
             most, least = -np.inf, np.inf
             for q in range(-(rows // every), rows // every + 1):
                 jj = j + q * every
-                if not 0 <= jj < len(x):
+                if not 0 <= jj <= (len(x) - 1) * fineness:
                     continue
                 for p in range(-(cols // every), cols // every + 1):
                     ii = i + p * every
-                    if not around[jj, 0] <= ii < around[jj, 1] or excess[jj, ii] == np.inf:
+                    if not 0 <= ii <= (x.shape[1] - 1) * fineness:
                         continue
-                    if least <= ground[jj, ii] <= most:
+                    height = value_at(coarse, fineness, jj, ii)
+                    # False as well where ground is unknown.
+                    if not (height < least or height > most):
                         continue
-                    off = (x[jj, ii] - x[j, i]) ** 2 + (y[jj, ii] - y[j, i]) ** 2
-                    if off <= reach * reach and depth(zones, edges, z, x[jj, ii], y[jj, ii]) > reach:
-                        most, least = max(most, ground[jj, ii]), min(least, ground[jj, ii])
+                    at_x, at_y = value_at(x, fineness, jj, ii), value_at(y, fineness, jj, ii)
+                    off = (at_x - here_x) ** 2 + (at_y - here_y) ** 2
+                    if off <= reach * reach and depth(zones, edges, own, at_x, at_y) > own_depth:
+                        most, least = max(most, height), min(least, height)
             if most > -np.inf:
                 up[j, i], down[j, i] = most - ground[j, i], ground[j, i] - least
 

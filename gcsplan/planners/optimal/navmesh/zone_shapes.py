@@ -18,10 +18,13 @@ from gcsplan.planners.optimal.navmesh.zone_kernels import (
     LOOKS,
     NORTH,
     NUMBERS,
+    ONE,
+    OTHER,
     OWN_BOTTOM,
     OWN_TOP,
     PAIR,
     RADIUS,
+    RISE,
     THIN,
     TOP,
     TOP_2_AGL,
@@ -74,8 +77,8 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
 
     A level over ground (AGL) counts from the ground in the zone itself, also where it limits flight beside the zone,
     within reach. There, the ground below gives the level with an error of as much as the ground rises within reach. So
-    such a zone is laid down twice: as it is, and grown by the reach with its levels moved by that rise. The rise is the
-    most anywhere at the zone, or, for paths on cells no smaller than the reach, what it is around each node (`BESIDE`).
+    such a zone is laid down twice: as it is, and grown by the reach with its levels moved by that rise. For bounds, the
+    rise is the most anywhere at the zone; for paths, what it is around each node (`BESIDE`), as far as that is known.
     """
     air, limits = problem.airspace, problem.limits
     reach = air.beside_m(limits)
@@ -114,11 +117,11 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
                     row[at] = level.value_m + more * (limits.altitude_error_m + off)
                     row[at + 2] = over_ground
                     row[OWN_BOTTOM if at == BOTTOM else OWN_TOP] = row[at]
-                    if over_ground and moved[k] > 0.0 and there and sign > 0.0:
+                    if over_ground and moved[k] > 0.0 and sign > 0.0:
                         row[at + 2] = BESIDE
                     elif over_ground:
-                        row[at] += more * sign * moved[k]
-            row[UNDER] = zone.floor is not None
+                        row[at] -= more * moved[k]
+            row[UNDER], row[RISE] = zone.floor is not None, 0.0 if there else moved[k]
             row[RADIUS] = -1.0
             if part is None:
                 assert isinstance(zone.shape, Circle)
@@ -133,7 +136,8 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
         for k, (a, b) in enumerate(pairs, len(found)):
             # Where two zones cross, an altitude that is free of one may lie in the other.
             rows[k] = rows[a]
-            rows[k, [RADIUS, PAIR, LOOKS]] = -1.0, 1.0, 0.0
+            rows[k, [RADIUS, PAIR, ONE, OTHER]] = -1.0, 1.0, a, b
+            rows[k, [LOOKS, RISE]] = rows[[a, b]][:, [LOOKS, RISE]].max(axis=0)
             rows[k, BOTTOM_2 : TOP_2_AGL + 1] = rows[b, BOTTOM : TOP_AGL + 1]
             rows[k, UNDER_2] = rows[b, UNDER]
             forms.append(np.vstack([forms[a], forms[b]]))

@@ -33,10 +33,16 @@ def legal(problem: Problem, places: Floats, amsl_m: Floats) -> Bools:
 
 
 def over_ground(rng: np.random.Generator, count: int) -> list[Zone]:
-    """Zones whose levels follow the ground; of some, one level is above sea level or missing."""
+    """Zones whose levels follow the ground; of some, one level is above sea level or missing, of every fifth both."""
     out = []
     for k in range(count):
         floor, ceiling = np.sort(rng.uniform(25.0, 200.0, 2)).tolist()
+        if k % 5 == 4:
+            lid = bool(rng.integers(2))
+            level = Level(float(rng.uniform(250.0, 450.0)), "amsl")
+            shape = Circle(*rng.uniform(0.3 * SIZE_M, 0.7 * SIZE_M, 2).tolist(), float(rng.uniform(100.0, 250.0)))
+            out.append(Zone(f"z{k}", shape, None if lid else level, level if lid else None))
+            continue
         datum: Literal["agl", "amsl"] = "amsl" if k % 4 == 3 else "agl"
         top = Level(ceiling + (200.0 if datum == "amsl" else 0.0), datum)
         at = rng.uniform(0.2 * SIZE_M, 0.8 * SIZE_M, 2).tolist()
@@ -108,3 +114,21 @@ def test_a_steep_slope_shuts_what_is_left_below_a_zone_and_above_it(slope: float
     assert bool(left) == open_
     for fineness in (1, 3):
         assert free(mesh_of(plane, cap, True, fineness), at[None]).all() == open_
+
+
+@pytest.mark.parametrize(("slope", "open_"), [(0.05, True), (0.5, False)])
+def test_a_steep_slope_shuts_what_is_left_between_two_zones(slope: float, open_: bool) -> None:
+    """3 m are left over a lid above sea level and under the floor above ground of another zone."""
+    n = round(SIZE_M / STEP_M) + 1
+    z = 200.0 + slope * STEP_M * np.arange(n) * np.ones((n, 1))
+    surface = Surface(z, z, GridMap.affine(0.0, SIZE_M, STEP_M, STEP_M))
+    at = np.array([303.0, 303.0])
+    ground = float(surface.ground_at(*at))
+    lid = Zone("lid", Circle(300.0, 300.0, 200.0), None, Level(ground + 90.0, "amsl"))
+    high = Zone("high", Circle(300.0, 300.0, 200.0), Level(90.0 + 10.0 + 3.0 + 33.0 * 0.05, "agl"), None)
+    problem = Problem(Airspace(surface, [lid, high]), LIMITS, (10.0, 10.0, 400.0), (590.0, 590.0, 400.0))
+    plane = make_plane(problem, EVERYWHERE, 5)
+    tries = np.arange(ground, TOP_M, 0.1)
+    assert legal(problem, np.tile(at, (len(tries), 1)), tries).any() == open_
+    for fineness in (1, 3):
+        assert free(mesh_of(plane, TOP_M, True, fineness), at[None]).all() == open_
