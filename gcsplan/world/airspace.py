@@ -54,10 +54,11 @@ from gcsplan.world.zones import Polygon, Zone
 
 __all__ = ["Airspace", "Band", "Kind", "LegReport", "Legs", "Tube", "Violation"]
 
-RINGS = ((0.0, 1), (1.0 / 3.0, 8), (2.0 / 3.0, 16), (1.0, 32))
+RINGS = ((0.0, 1), (1.0 / 3.0, 8), (2.0 / 3.0, 16), (0.9, 32), (1.0, 64))
 """Circles of points at which `Airspace.own_ground` reads ground: their radius, as a part of the reach, and how many."""
 RING_POINTS = sum(n for _, n in RINGS)
-_OFFSETS = np.array([(r * math.cos(math.tau * k / n), r * math.sin(math.tau * k / n)) for r, n in RINGS for k in range(n)])
+_TURNS = [(r, math.tau * k / n) for r, n in RINGS for k in range(n)]
+_OFFSETS = np.array([(r * math.cos(turn), r * math.sin(turn)) for r, turn in _TURNS])
 NEAR_M, NEAR_PART = 0.01, 0.01
 """The kernel finds the nearest place of a zone over ground to this many metres, or this part of the distance
 (`_sweep_zones.nearest_conflict`)."""

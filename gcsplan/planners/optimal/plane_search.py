@@ -136,7 +136,8 @@ class PlaneSearch:
             return False
         track = make_track(incumbent.problem, *terminals)
         flown = fly(incumbent.problem, track)
-        if isinstance(flown, Flown) or flown.kind == "pinched":  # by centimetres: cells shut what lacks more
+        # What is pinched lacks centimetres, for cells shut what lacks more.
+        if isinstance(flown, Flown) or flown.kind == "pinched" or shut is not None:
             found = incumbent.exact(track, flown)
             if found is not None or isinstance(flown, Flown):
                 return found is not None and incumbent.take_simpler(*found, fine=fine, longer=False)

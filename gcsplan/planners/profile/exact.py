@@ -10,21 +10,16 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.profile.taut_string import Profile
-from gcsplan.planners.profile.track import Flown, Track, distances, fly, make_track, values_at
-from gcsplan.world.airspace import RING_POINTS, Band, Legs, Tube, Violation
+from gcsplan.planners.profile.track import Flown, Track, distances, fly, make_track
+from gcsplan.planners.profile.zone_levels import SAMPLE_M, ZoneLevels
+from gcsplan.world.airspace import Legs, Tube, Violation
 
-SAMPLE_M = 12.0
-"""Metres between the samples of floor and ceiling along a track; the profile bends only at them, at pins and zones."""
 TIGHT_M, TIGHT_SAMPLE_M = 1.0, 1.0
 """Where ceiling minus floor is less than `TIGHT_M` metres, samples are `TIGHT_SAMPLE_M` metres apart."""
 SPARE_M = 0.05
 """Metres kept from floor and ceiling where they are far enough apart: the exact check is fast away from its limits."""
 CORRECTIONS, CORRECTED_M = 24, 0.03
 """Most corrections of a profile after violations in the exact check; metres added to the size of each violation."""
-BAND_SPARE_M, BAND_STEP_M = 0.05, 0.1
-"""Metres added to levels of zones that are read from the ground around samples; and by how much a level is corrected
-after its first violation in the exact check, which tells no height. Each further correction is as much as all before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,14 +96,12 @@ def settle(
     """Way points (N, 3) over a track that pass the exact check, and (N,) whether they must stay.
 
     The profile is drawn over floors sampled point by point, which are closer to the true ground than bounds over whole
-    pieces of the track, and so are the levels of zones above ground. Where the exact check finds ground (or a maximum
-    AGL, or such a zone) violated between two samples, the floor (ceiling, level) of that piece is corrected and the
-    profile drawn again, up to `CORRECTIONS` times. `Unsettled` if none passes.
+    pieces of the track, and so are the levels of zones above ground, where those bounds leave no way. Where the exact
+    check finds ground (or a maximum AGL, or such a zone) violated between two samples, the floor (ceiling, level) of
+    that piece is corrected and the profile drawn again, up to `CORRECTIONS` times. `Unsettled` if none passes.
     """
     track = sampled_track(problem, points, pinned, pin_m)
-    levels = [_Levels.of(problem, track, band) for band in track.tube.bands]
-    tube = replace(track.tube, bands=tuple(of.band for of in levels))
-    track = replace(track, tube=tube)
+    tube, levels = track.tube, tuple[ZoneLevels, ...]()
     worst: Violation | None = None
 
     def refused(
@@ -122,6 +115,11 @@ def settle(
 
     for _ in range(CORRECTIONS):
         flown = fly(problem, track)
+        if not isinstance(flown, Flown) and not levels:
+            levels = tuple(ZoneLevels.of(problem, track, band) for band in tube.bands)
+            if any(of.follows_ground for of in levels):
+                track = replace(track, tube=replace(tube, bands=tuple(of.band for of in levels)))
+                flown = fly(problem, track)
         if not isinstance(flown, Flown):
             return refused(
                 track.place(0.5 * (flown.s0_m + flown.s1_m)), flown.by, flown.kind, flown.s1_m - flown.s0_m, flown.zone
@@ -141,65 +139,13 @@ def settle(
                 tube.floor_m[k] = np.maximum(tube.floor_m[k], z + apart_m)
             elif v.kind == "max_agl":
                 tube.ceiling_m[k] = np.minimum(tube.ceiling_m[k], z - apart_m)
-            elif not any([of.correct(flown.profile, s[leg], s[leg + 1]) for of in levels if of.band.zone == v.zone]):
+            elif not sum(of.correct(flown.profile, s[leg], s[leg + 1]) for of in levels if of.band.zone == v.zone):
                 place = np.array([v.east_m, v.north_m])
                 return refused(
                     place, math.inf if v.kind == "coverage" else v.by, "zone" if v.zone >= 0 else "pinched", 0.0, v.zone
                 )
     assert worst is not None
     return refused(np.array([worst.east_m, worst.north_m]), worst.by, "pinched", 0.0, -1)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class _Levels:
-    """A band with levels read from the zone's own ground around samples of the track, and what they are at most.
-
-    ``most`` (2, K, 2): the tube's own bottom and top, which hold for certain; ``moved`` (K,): the corrections so far,
-    infinite where nothing is left to correct.
-    """
-
-    band: Band
-    most: Floats
-    moved: Floats
-
-    @classmethod
-    def of(cls, problem: Problem, track: Track, band: Band) -> _Levels:
-        """A band's levels at samples no farther than `SAMPLE_M` apart; the band as it is if they are AMSL."""
-        air, zone = problem.airspace, problem.airspace.zones[band.zone]
-        levels = zone.floor, zone.ceiling
-        if not any(level is not None and level.datum == "agl" for level in levels):
-            return cls(band, np.stack([band.bottom_m, band.top_m]), np.full(len(band.bottom_m), math.inf))
-        parts = max(1, math.ceil((band.s1_m - band.s0_m) / SAMPLE_M))
-        s = np.unique(np.concatenate([band.s_m, np.linspace(band.s0_m, band.s1_m, parts + 1)]))
-        problem.budget.spend("place", len(s) * RING_POINTS)
-        places = np.stack([np.interp(s, track.s_m, track.points[:, k]) for k in range(2)], axis=-1)
-        ground = air.own_ground(band.zone, places, air.beside_m(problem.limits))
-        most, found = [], []
-        for k, (level, tubes, spare_m) in enumerate(zip(levels, (band.bottom_m, band.top_m), (-1.0, 1.0), strict=True)):
-            whole = values_at(s, band.s_m, tubes, k == 1)
-            here = whole
-            if level is not None and level.datum == "agl":
-                here = ground[k] + level.value_m + spare_m * (problem.limits.altitude_error_m + BAND_SPARE_M)
-                here = np.minimum(here, whole) if k == 1 else np.maximum(here, whole)
-            most.append(np.stack([whole[:-1], whole[1:]], axis=-1))
-            found.append(np.stack([here[:-1], here[1:]], axis=-1))
-        closer = Band(band.zone, band.s0_m, band.s1_m, s, *found)
-        return cls(closer, np.stack(most), np.zeros(len(s) - 1))
-
-    def correct(self, profile: Profile, s0_m: float, s1_m: float) -> bool:
-        """Widen the pieces of the band whose levels ``profile`` touches between two places along the track; return
-        whether any could be widened."""
-        band = self.band
-        z = np.stack([profile.at(band.s_m[:-1]), profile.at(band.s_m[1:])], axis=-1)
-        apart_m = np.maximum(band.bottom_m - z, z - band.top_m).min(axis=1)
-        touched = (band.s_m[1:] > s0_m) & (band.s_m[:-1] < s1_m) & np.isfinite(self.moved) & (apart_m < BAND_STEP_M)
-        step_m = np.maximum(self.moved, BAND_STEP_M)[touched]
-        self.moved[touched] += step_m
-        band.bottom_m[touched] = np.maximum(band.bottom_m[touched] - step_m[:, None], self.most[0, touched])
-        band.top_m[touched] = np.minimum(band.top_m[touched] + step_m[:, None], self.most[1, touched])
-        ended = (band.bottom_m <= self.most[0]).all(axis=1) & (band.top_m >= self.most[1]).all(axis=1)
-        self.moved[ended] = math.inf
-        return bool(touched.any())
 
 
 def sampled_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> Track:

@@ -375,8 +375,8 @@ def _forgive(low: Floats, high: Floats, k: int, z: float) -> None:
 
 
 def values_at(s: Floats, at: Floats, value: Floats, highest: bool) -> Floats:
-    """Values at rising ``s`` of a piecewise-linear function with jumps, whose pieces between breakpoints ``at`` (K + 1,)
-    have the ``value`` (K, 2) at their ends; at a jump the higher one, or the lower one (not ``highest``)."""
+    """Values at rising ``s`` of a piecewise-linear function with jumps: its pieces between breakpoints ``at`` (K + 1,)
+    have the ``value`` (K, 2) at their ends. At a jump it is the higher one, or the lower one (not ``highest``)."""
     out = np.empty(len(s))
     edge(*(np.ascontiguousarray(a, np.float64) for a in (s, at, value)), highest, out)
     return out

@@ -18,7 +18,8 @@ from gcsplan.planners.optimal.corridor import joined
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.optimal.plane_search import PlaneSearch
-from gcsplan.planners.profile.track import distances
+from gcsplan.planners.profile.track import distances, make_track
+from gcsplan.planners.profile.zone_levels import widest_free
 from gcsplan.world.path import Path
 
 Point = tuple[float, float, float]
@@ -26,9 +27,9 @@ Point = tuple[float, float, float]
 STEP_M = 8.0
 """Metres between the places of a track at which the exact check's floor is read."""
 OPEN_M = 8.0
-"""Metres from floor to cap at both ends of a stretch: where there are as many, the slit has ended."""
+"""Metres that are free below the cap at both ends of a stretch: where there are as many, the slit has ended."""
 UNDER_M = 0.5
-"""Metres below the cap at which stretches begin and end, if there is room."""
+"""Metres below the highest free altitude at which stretches begin and end, if there is room."""
 REACHED = 0.95
 """Part of the climb limit at which the track from or to a terminal is taken to climb."""
 APART_M = 1e-3
@@ -86,8 +87,8 @@ def _end(plane: PlaneSearch, leg: Leg, along_m: float, whole_m: float) -> Floats
     end = leg.start if along_m <= 0.0 else leg.goal
     if end.amsl_m is not None:
         return np.array([*end.place, end.amsl_m])
-    over_m = float(plane.problem.floors(*np.array([end.place]).T)[0]) - plane.top_m
-    return np.array([*end.place, _height(plane, leg, along_m, whole_m - along_m, over_m)])
+    low_m = float(plane.problem.floors(*np.array([end.place]).T)[0])
+    return np.array([*end.place, _height(plane, leg, along_m, whole_m - along_m, low_m, plane.top_m)])
 
 
 def _sampled(way: Floats) -> tuple[Floats, Floats, Floats]:
@@ -126,12 +127,26 @@ def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
 def _along(
     plane: PlaneSearch, leg: Leg, ends: list[Floats], places: Floats, s: Floats, whole_m: float
 ) -> Floats | None:
-    """(N, 3) way points from one of ``ends`` to the other along a track, past its shut stretches; None if that fails.
+    """(N, 3) way points from one of ``ends`` to the other along a track, past the stretches that terrain shuts, or else
+    those that terrain and zones shut; None if that fails.
 
     ``places`` (N, 2) of the track, ``s`` (N,) metres along it; ``whole_m``: its whole length.
     """
-    over = plane.problem.floors(places[:, 0], places[:, 1]) - plane.top_m
-    stretches = _stretches(over)
+    floor = plane.problem.floors(*places.T)
+    found = _past(plane, leg, ends, places, s, whole_m, floor, np.full_like(floor, plane.top_m))
+    if found is None and plane.incumbent.budget.goes_on():
+        low, high = _free(plane, places, floor)
+        if ((low > high) & (floor <= plane.top_m)).any():
+            found = _past(plane, leg, ends, places, s, whole_m, low, high)
+    return found
+
+
+def _past(
+    plane: PlaneSearch, leg: Leg, ends: list[Floats], places: Floats, s: Floats, whole_m: float, low: Floats,
+    high: Floats,
+) -> Floats | None:  # fmt: skip
+    """`_along` past the stretches that are shut; ``low``, ``high`` (N,): what is free at the places."""
+    stretches = _stretches(low - high)
     if len(stretches) > MOST:
         return None
     cuts = sorted({0, len(s) - 1, *(k for stretch in stretches for k in stretch)})
@@ -140,7 +155,7 @@ def _along(
     for first, last in pairwise(cuts):
         goal = ends[1]
         if last < len(s) - 1:
-            height = _height(plane, leg, *map(float, (s[last], whole_m - s[last], over[last])))
+            height = _height(plane, leg, *map(float, (s[last], whole_m - s[last], low[last], high[last])))
             goal = np.array([*places[last], height])
         part = replace(plane.problem, start=_point(start), goal=_point(goal), via=(), progress=None, objective="length")
         sub = Incumbent(part)
@@ -189,8 +204,8 @@ def _point(place: Floats) -> Point:
 
 
 def _stretches(over: Floats) -> list[tuple[int, int]]:
-    """First and last index of each stretch with less than `OPEN_M` from floor to cap, and somewhere none; ``over``:
-    floor minus cap (N,)."""
+    """First and last index of each stretch with less than `OPEN_M` of free altitudes, and somewhere none; ``over``: the
+    lowest minus the highest free altitude (N,)."""
     out: list[tuple[int, int]] = []
     tight = over > -OPEN_M
     for k in np.flatnonzero(over > 0.0).tolist():
@@ -201,12 +216,21 @@ def _stretches(over: Floats) -> list[tuple[int, int]]:
     return out
 
 
-def _height(plane: PlaneSearch, leg: Leg, from_start_m: float, to_goal_m: float, over_m: float) -> float:
-    """The altitude AMSL at which a path passes a place between two stretches: below the cap by `UNDER_M`, or by half
-    the height from floor to cap if that is less; no higher than can be reached from start and goal; at a terminal, the
-    terminal's."""
+def _free(plane: PlaneSearch, places: Floats, floor: Floats) -> tuple[Floats, Floats]:
+    """(N,) the lowest and the highest altitude that are free below the cap and between zones at places (N, 2) of a
+    track, over a ``floor`` (N,)."""
+    problem = plane.problem
+    ends = np.isin(np.arange(len(places)), [0, len(places) - 1])
+    track = make_track(problem, places, ends, np.full(len(places), math.nan))
+    return widest_free(problem, track, distances(places), floor, plane.top_m, OPEN_M)
+
+
+def _height(plane: PlaneSearch, leg: Leg, from_start_m: float, to_goal_m: float, low_m: float, high_m: float) -> float:
+    """The altitude AMSL at which a path passes a place between two stretches: below the highest free altitude by
+    `UNDER_M`, or by half the height from the lowest if that is less; no higher than can be reached from start and goal;
+    at a terminal, the terminal's."""
     limits = plane.problem.limits
-    z = plane.top_m - min(UNDER_M, max(-0.5 * over_m, 0.0))
+    z = high_m - min(UNDER_M, max(0.5 * (high_m - low_m), 0.0))
     for terminal, way_m, slope in (
         (leg.start, from_start_m, limits.max_climb_slope),
         (leg.goal, to_goal_m, limits.max_descent_slope),

@@ -1,0 +1,108 @@
+"""Levels of zones along a track, and the widest free altitudes between them.
+
+Where a zone follows ground, a tube takes the steepest slope around each whole piece for the zone's levels, which may be
+metres too much on a slope. Here they are read from the zone's own ground around samples of the track. That is no proof:
+the exact check judges what is flown between them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from gcsplan.arrays import Floats
+from gcsplan.planners.problem import Problem
+from gcsplan.planners.profile.taut_string import Profile
+from gcsplan.planners.profile.track import Track, values_at
+from gcsplan.world.airspace import RING_POINTS, Band
+
+SAMPLE_M = 12.0
+"""Metres between samples along a track, at most."""
+SPARE_M, STEP_M = 0.05, 0.04
+"""Metres added to the levels that are read; and by how much a level is corrected after its first violation in the exact
+check, which tells no height. Each further correction is as much as all before."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ZoneLevels:
+    """A band with levels read from the zone's own ground around samples of the track, and what they are at most.
+
+    ``most`` (2, K, 2): the tube's own bottom and top, which hold for certain; ``moved`` (K,): the corrections so far,
+    infinite where nothing is left to correct.
+    """
+
+    band: Band
+    most: Floats
+    moved: Floats
+
+    @classmethod
+    def of(cls, problem: Problem, track: Track, band: Band) -> ZoneLevels:
+        """A band's levels at samples no farther than `SAMPLE_M` apart; the band as it is if they are AMSL."""
+        air, zone = problem.airspace, problem.airspace.zones[band.zone]
+        levels = zone.floor, zone.ceiling
+        if not any(level is not None and level.datum == "agl" for level in levels):
+            return cls(band, np.stack([band.bottom_m, band.top_m]), np.full(len(band.bottom_m), math.inf))
+        parts = max(1, math.ceil((band.s1_m - band.s0_m) / SAMPLE_M))
+        s = np.unique(np.concatenate([band.s_m, np.linspace(band.s0_m, band.s1_m, parts + 1)]))
+        problem.budget.spend("place", len(s) * RING_POINTS)
+        places = np.stack([np.interp(s, track.s_m, track.points[:, k]) for k in range(2)], axis=-1)
+        ground = air.own_ground(band.zone, places, air.beside_m(problem.limits))
+        most, found = [], []
+        for k, (level, tubes, spare_m) in enumerate(zip(levels, (band.bottom_m, band.top_m), (-1.0, 1.0), strict=True)):
+            whole = values_at(s, band.s_m, tubes, k == 1)
+            here = whole
+            if level is not None and level.datum == "agl":
+                here = ground[k] + level.value_m + spare_m * (problem.limits.altitude_error_m + SPARE_M)
+                here = np.minimum(here, whole) if k == 1 else np.maximum(here, whole)
+            most.append(np.stack([whole[:-1], whole[1:]], axis=-1))
+            found.append(np.stack([here[:-1], here[1:]], axis=-1))
+        closer = Band(band.zone, band.s0_m, band.s1_m, s, *found)
+        return cls(closer, np.stack(most), np.zeros(len(s) - 1))
+
+    @property
+    def follows_ground(self) -> bool:
+        """Whether a level is read from the ground."""
+        return bool(np.isfinite(self.moved).any())
+
+    def correct(self, profile: Profile, s0_m: float, s1_m: float) -> bool:
+        """Widen the pieces of the band whose levels ``profile`` touches between two places along the track; return
+        whether any could be widened."""
+        band = self.band
+        z = np.stack([profile.at(band.s_m[:-1]), profile.at(band.s_m[1:])], axis=-1)
+        apart_m = np.maximum(band.bottom_m - z, z - band.top_m).min(axis=1)
+        touched = (band.s_m[1:] > s0_m) & (band.s_m[:-1] < s1_m) & np.isfinite(self.moved) & (apart_m < STEP_M)
+        step_m = np.maximum(self.moved, STEP_M)[touched]
+        self.moved[touched] += step_m
+        bottom, top = band.bottom_m[touched] - step_m[:, None], band.top_m[touched] + step_m[:, None]
+        least, most = self.most[:, touched]
+        # At a zone's rim no sample may have seen ground under it: then nothing less than the tube's level is known.
+        band.bottom_m[touched] = np.where(np.isfinite(bottom), np.maximum(bottom, least), least)
+        band.top_m[touched] = np.where(np.isfinite(top), np.minimum(top, most), most)
+        ended = (band.bottom_m <= self.most[0]).all(axis=1) & (band.top_m >= self.most[1]).all(axis=1)
+        self.moved[ended] = math.inf
+        return bool(touched.any())
+
+
+def widest_free(
+    problem: Problem, track: Track, s_m: Floats, floor_m: Floats, cap_m: float, enough_m: float
+) -> tuple[Floats, Floats]:
+    """(N,) the lowest and the highest altitude of the widest free interval at places ``s_m`` (N,) along a track, from
+    the floors there to a cap, between the zones; of those that are ``enough_m`` wide, the highest. The lowest altitude
+    is above the highest where none is free."""
+    bands = []
+    for band in (ZoneLevels.of(problem, track, of).band for of in track.tube.bands):
+        within = (s_m >= band.s0_m) & (s_m <= band.s1_m)
+        bottom, top = (values_at(s_m, band.s_m, of, k == 1) for k, of in enumerate((band.bottom_m, band.top_m)))
+        bands.append((np.where(within, bottom, math.inf), np.where(within, top, -math.inf)))
+    low, high = floor_m, np.full_like(floor_m, -math.inf)
+    for start in (floor_m, *(top for _, top in bands)):
+        begin, end = np.maximum(start, floor_m), np.full_like(floor_m, cap_m)
+        for bottom, top in bands:
+            end = np.where(top > begin, np.minimum(end, bottom), end)
+        with np.errstate(invalid="ignore"):  # both may be infinite, and then nothing is free
+            wide, known = np.minimum(end - begin, enough_m), np.minimum(high - low, enough_m)
+        better = (wide > known) | ((wide == known) & (begin > low))
+        low, high = np.where(better, begin, low), np.where(better, end, high)
+    return low, high
