@@ -15,8 +15,9 @@ from gcsplan.planners.border import enclosed, goes_on, within_m
 from gcsplan.planners.cures import floor_words, rounded_up
 from gcsplan.planners.lattice.lattice import levels_of, near_zone
 from gcsplan.planners.problem import Problem, Refusal, terminals_of
-from gcsplan.world.airspace import Airspace
+from gcsplan.world.airspace import Airspace, Legs, Violation
 from gcsplan.world.limits import Limits
+from gcsplan.world.zones import Zone
 
 
 class NoPath(Refusal):
@@ -81,7 +82,9 @@ def _check_end(problem: Problem, name: str, place: tuple[float, float], amsl: fl
             f"{highest} ({_ceiling_words(limits, air, place)}): raise that limit, or move {name}",
             untried=True,
         )
-    if amsl is not None and amsl < low - 1e-6:
+    broken = () if amsl is None else _broken(problem, (*place, amsl))
+    # `low` is a bound, which lies above the lowest legal altitude by up to some decimetres beside steep ground.
+    if amsl is not None and amsl < low - 1e-6 and any(v.kind in ("min_agl", "terrain_clearance") for v in broken):
         raise refuse(
             f"{name} at {amsl:.1f} m AMSL is under the lowest legal altitude there, {lowest} ({floor_words(limits)})"
         )
@@ -91,23 +94,41 @@ def _check_end(problem: Problem, name: str, place: tuple[float, float], amsl: fl
             f"({_ceiling_words(limits, air, place)}): raise that limit, or lower {name}",
             untried=True,
         )
-    here, reach = np.array([place]), air.beside_m(limits)
+    reach = air.beside_m(limits)
+    shut = [air.zones[v.zone] for v in broken if v.zone >= 0]
+    if amsl is None:
+        shut = _shut_by(problem, place, low, high)
+    if shut:
+        raise refuse(
+            f"{name} lies in no-fly zone {shut[0].name!r} or within {reach:.1f} m of it "
+            f"(horizontal_clearance_m + track_error_m): move {name}, or shrink the zone"
+        )
+
+
+def _broken(problem: Problem, place: tuple[float, float, float]) -> tuple[Violation, ...]:
+    """What the exact check finds at a place."""
+    here = np.array([place])
+    return problem.airspace.examine(Legs.between(here, here, problem.limits), problem.limits).violations
+
+
+def _shut_by(problem: Problem, place: tuple[float, float], low: float, high: float) -> list[Zone]:
+    """The zones that shut all altitudes from ``low`` to ``high`` at a place, each by itself. Those with a level over
+    ground count only inside their shape: beside it, ground elsewhere decides."""
+    air, limits, here, found = problem.airspace, problem.limits, np.array([place]), []
     for zone in air.zones:
-        if not near_zone(here, here, zone, reach, air.scale)[0]:
-            continue
         bottom, top, *over_ground = levels_of(limits, zone).tolist()
+        reach = 0.0 if any(over_ground) else air.beside_m(limits)
+        if not near_zone(here, here, zone, reach, air.scale if reach > 0.0 else 1.0)[0]:
+            continue
         ground = float(air.surface.ground_at(*place)) if any(over_ground) else 0.0
         # Over unknown ground, a zone's floor or ceiling AGL cannot be evaluated, so the zone has no open side there.
         if over_ground[0]:
             bottom = -math.inf if math.isnan(ground) else bottom + ground
         if over_ground[1]:
             top = math.inf if math.isnan(ground) else top + ground
-        at = amsl is not None and bottom + 1e-6 < amsl < top - 1e-6
-        if at or (amsl is None and bottom < low and (top > high or math.isinf(top))):
-            raise refuse(
-                f"{name} lies in no-fly zone {zone.name!r} or within {reach:.1f} m of it "
-                f"(horizontal_clearance_m + track_error_m): move {name}, or shrink the zone"
-            )
+        if bottom < low and (top > high or math.isinf(top)):
+            found.append(zone)
+    return found
 
 
 def _ceiling_words(limits: Limits, air: Airspace, place: tuple[float, float]) -> str:

@@ -10,7 +10,8 @@ import pytest
 from gcsplan.planners.cures import with_cures
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Refusal, Via
-from gcsplan.world.airspace import Airspace
+from gcsplan.planners.refusal import check_ends
+from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
@@ -72,6 +73,29 @@ def test_start_within_a_zones_clearance_names_the_zone() -> None:
     )
     assert e.reason == "infeasible"
     assert "the start lies in no-fly zone 'village' or within 60.0 m" in e.message
+
+
+@pytest.mark.parametrize("way", ["goal", "via"])
+@pytest.mark.parametrize("aside", [1.0, -1.0])
+def test_beside_a_zone_above_ground_its_own_ground_decides(aside: float, way: str) -> None:
+    """Within 60 m of a zone that lies down a slope (``aside`` 1) a place over the zone's ceiling is legal, though it is
+    under the ceiling over the ground below; up the slope (-1) it is the other way round."""
+    surface = ground(lambda east, north: 0.5 * (2000.0 - north) * np.ones_like(east))
+    zone = Zone("lid", Circle(1500.0, 1000.0 + 130.0 * aside, 100.0), None, Level(60.0, "agl"))
+    limits = replace(LOW, horizontal_clearance_m=60.0)
+    air = Airspace(surface, (zone,))
+    at = (1500.0, 1000.0, 500.0 + 60.0 - 3.0 * aside)
+    leg = Legs.between(np.array([at]), np.array([at]), limits)
+    assert bool(air.clear(leg, limits)[0]) == (aside > 0.0)
+    if way == "goal":
+        problem = Problem(air, limits, (200.0, 1000.0, 560.0), at)
+    else:
+        problem = Problem(air, limits, (200.0, 1000.0, 560.0), (200.0, 1400.0, 560.0), via=(Via(*at),))
+    if aside > 0.0:
+        check_ends(problem)
+        return
+    with pytest.raises(Refusal, match="lies in no-fly zone 'lid'"):
+        check_ends(problem)
 
 
 def test_start_inside_a_polygon_names_it() -> None:
