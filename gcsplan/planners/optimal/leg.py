@@ -9,7 +9,8 @@ corridor of the few tracks that may be short enough.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -36,7 +37,7 @@ at least `LARGE` nodes, so that the lattice needs no more than half a gigabyte b
 MOST_ALONE = 50_000
 """Most cells of the finer lattice that `refine` cuts again, into four parts for ``cut`` 2."""
 LEARNT = 10
-"""Most searches for one track over nodes that are only as high as in the exact check; see ``shut`` of `track`."""
+"""Most searches for one track over nodes that are only as high as in the exact check; see ``narrow`` of `track`."""
 BESIDE = 8
 """Cells that the finer lattice extends beyond the requested ones, because later tracks may lie beside them."""
 MUCH_LONGER, ROUGHLY = 1.1, 3
@@ -44,8 +45,15 @@ MUCH_LONGER, ROUGHLY = 1.1, 3
 RAISED, WORTHWHILE = 4, 0.05
 """Most times that walls near the ends are raised for one bound; and the part of the spare metres by which a round must
 raise the bound for another to follow."""
-Lacking = tuple[Floats, float]
-"""A place (2,) at which a track lacked altitude, and by how many metres."""
+
+
+@dataclass(slots=True)
+class Narrow:
+    """What earlier tracks through slits lacked: places (2,) and by how many metres they were pinched there; and metres
+    that tracks are to keep from the levels of zones over ground."""
+
+    pinched: list[tuple[Floats, float]] = field(default_factory=list)
+    zones_m: float = 0.0
 
 
 class Leg:
@@ -91,16 +99,14 @@ class Leg:
         self._ahead = self._close = self._reached = None
         self.closer = 1
         self.seen = True
-        detours: tuple[float, ...] = DETOURS
+        detours = (*(d for d in DETOURS if d < self.farthest), self.farthest)
         limited = math.isfinite(within_m)
         if limited:
             asked = max(within_m / self.straight_m, LEAST_DETOUR) * (1.0 + 1e-9)
             much = asked > DETOURS[0] and self._is_most(asked)
             detours = (self._detour if self._detour >= asked else math.inf if much else asked,)
         for detour in detours:
-            if detour > self.farthest:
-                break
-            if not limited and math.isfinite(detour):
+            if not limited and detour < self.farthest:
                 if detour * self.straight_m < self.length_m * (1.0 + slack) < math.inf:
                     continue
                 if detour != self._detour and detour > DETOURS[0] and self._is_most(detour):
@@ -136,12 +142,12 @@ class Leg:
         ends: list[Cone] | None = None,
         under: Bools | None = None,
         over: Bools | None = None,
-        exact: bool = False,
+        narrow: Narrow | None = None,
         roughly: bool = False,
     ) -> tuple[ClearanceGrid, Guide]:
         """The clearance grid, and a guide with distances to the goal: on the finer lattice ``within`` a corridor, or
         else on the first-look lattice for tracks shorter than ``limit_m``. ``roughly``: cells are `ROUGHLY` times
-        larger; the other arguments are those of `ClearanceGrid`. Raises Exhausted."""
+        larger; ``narrow``: as in `track`; the other arguments are those of `ClearanceGrid`. Raises Exhausted."""
         if within is None:
             plane, fineness, guide = self.plane, 1, self._guide
             cells = guide.reach(self.start.place, limit_m)
@@ -158,7 +164,8 @@ class Leg:
                 plane, cells = self._over(cells)
         if roughly:
             fineness = -(-fineness // ROUGHLY)
-        return ClearanceGrid(plane, cap_m, low, fineness, cells, ends, under, over, exact=exact), guide
+        exact_m = None if narrow is None else narrow.zones_m
+        return ClearanceGrid(plane, cap_m, low, fineness, cells, ends, under, over, exact_m=exact_m), guide
 
     def track(
         self,
@@ -168,26 +175,26 @@ class Leg:
         under: Bools | None,
         spare_m: Spare = (0.0, 0.0),
         over: Bools | None = None,
-        shut: Sequence[Lacking] | None = None,
+        narrow: Narrow | None = None,
     ) -> GroundTrack | None:
         """The shortest track that is legal below ``cap_m`` by the mesh for paths, if it is shorter than ``limit_m`` and
         `reach_m`; None if there is none or the search is exhausted.
 
         ``within``: the corridor to search on the finer lattice; None: the first-look lattice. ``spare_m``: metres that
         may be added near start and goal to climb. ``under``, ``over`` (zones,): which zones may be passed below, above;
-        None for all. ``shut``: if not None, nodes are only as high as in the exact check, which may miss a little
-        between nodes, and are raised at these places, where earlier tracks lacked altitude.
+        None for all. ``narrow``: if not None, nodes are only as high as in the exact check, which may miss a little
+        between nodes, and are raised where earlier tracks lacked altitude.
         """
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
         cones = self.start.cone(limits.max_climb_slope, spare_m[0])
         cones += self.goal.cone(limits.max_descent_slope, spare_m[1])
         try:
-            clearance, guide = self._clearance(cap_m, False, within, limit, cones, under, over, shut is not None)
-            for place, by in shut or ():
+            clearance, guide = self._clearance(cap_m, False, within, limit, cones, under, over, narrow)
+            for place, by in narrow.pinched if narrow else ():
                 clearance.lift(place[None], np.array([by]))
-            for _ in range(1 if shut is None else LEARNT):
+            for _ in range(1 if narrow is None else LEARNT):
                 way = clearance.mesh().track(self.start.place, self.goal.place, limit, guide)
-                if way is None or shut is None or not clearance.learn(way.points):
+                if way is None or narrow is None or not clearance.learn(way.points):
                     return way
         except Exhausted:
             pass

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 
@@ -12,7 +12,7 @@ import numpy as np
 from gcsplan.planners.optimal.cap_search import above_all
 from gcsplan.planners.optimal.corridor import End, PinnedTrack, joined
 from gcsplan.planners.optimal.incumbent import Incumbent
-from gcsplan.planners.optimal.leg import Lacking, Leg
+from gcsplan.planners.optimal.leg import Leg, Narrow
 from gcsplan.planners.optimal.sources.detours import Choice, DetourSearch
 from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.planners.profile.track import Flown, fly, make_track
@@ -23,9 +23,10 @@ ZONES_SHUT = 8
 """Most tracks that are tried below a cap if a zone can be passed neither over nor under on the first."""
 PAST = 12
 """Most tracks past obstacles that are tried on the first-look lattice."""
-DARED_M, PINCHED_M = (0.05, 0.1, 0.2, 0.4), 1.0
-"""Metres by which the nodes beside a track through a slit are raised, in turn, beyond the altitude that it lacked; and
-the most it may lack for another track to be searched."""
+DARED_M, PINCHED_M, MET_M = (0.05, 0.1, 0.2, 0.4), 1.0, 5.0
+"""Metres by which the nodes beside a track through a slit are raised, in turn, beyond the altitude that it lacked, or
+that later tracks keep from zones over ground; and the most it may be pinched, or be inside of a zone, for another track
+to be searched."""
 PROVED = 1e-8
 """A gap, as a part, that is smaller is due to rounding: the best path is proved optimal."""
 NODE_S, NODE_MB = 1.2e-6, 3e-4
@@ -59,19 +60,17 @@ class PlaneSearch:
         self.choice = self._open
         """The choice of open zone sides with which the last path past obstacles was found."""
 
-    def terminals(
-        self, choice: Choice, cap_m: float, fine: bool, shut: Sequence[Lacking] | None = None
-    ) -> PinnedTrack | None:
+    def terminals(self, choice: Choice, cap_m: float, fine: bool, narrow: Narrow | None = None) -> PinnedTrack | None:
         """The shortest track below a cap with a choice of zone sides, through all terminals; None if a leg has none.
 
-        ``fine``: on the finer lattice; ``shut``: see `Leg.track`.
+        ``fine``: on the finer lattice; ``narrow``: see `Leg.track`.
         """
         ways = []
         for leg in self.legs:
             limit = self.limit(leg)
             wanted = leg.corridor(limit) if fine and leg.cells_of.has_fine else None
             spare_m = choice.most_m
-            way = leg.track(cap_m - choice.lower_m, wanted, limit, choice.under, spare_m, choice.over, shut)
+            way = leg.track(cap_m - choice.lower_m, wanted, limit, choice.under, spare_m, choice.over, narrow)
             if way is None:
                 return None
             ways.append(way.points)
@@ -127,17 +126,17 @@ class PlaneSearch:
                 leg.flood((limit / leg.length_m - 1.0) * (1.0 + 1e-9), limit)
         return incumbent.gap > PROVED
 
-    def try_below(self, cap_m: float, *, fine: bool, shut: Sequence[Lacking] | None = None) -> bool:
-        """Look for a path below a cap; return whether it is the best so far. ``shut``: see `Leg.track`."""
+    def try_below(self, cap_m: float, *, fine: bool, narrow: Narrow | None = None) -> bool:
+        """Look for a path below a cap; return whether it is the best so far. ``narrow``: see `Leg.track`."""
         incumbent = self.incumbent
         incumbent.unsettled = None
-        terminals = self.terminals(self.choice, cap_m, fine, shut)
+        terminals = self.terminals(self.choice, cap_m, fine, narrow)
         if terminals is None:
             return False
         track = make_track(incumbent.problem, *terminals)
         flown = fly(incumbent.problem, track)
         # What is pinched lacks centimetres, for cells shut what lacks more.
-        if isinstance(flown, Flown) or flown.kind == "pinched" or shut is not None:
+        if isinstance(flown, Flown) or flown.kind == "pinched" or narrow is not None:
             found = incumbent.exact(track, flown)
             if found is not None or isinstance(flown, Flown):
                 return found is not None and incumbent.take_simpler(*found, fine=fine, longer=False)
@@ -147,14 +146,19 @@ class PlaneSearch:
     def narrow_passage(self) -> bool:
         """Look for a path through slits that only the exact check finds open, because a lattice also reserves what the
         ground may rise beside a track. Returns whether the path is the best so far."""
-        shut: list[Lacking] = []
+        narrow = Narrow()
         for more_m in DARED_M:
-            if self.try_below(self.top_m, fine=True, shut=shut):
+            if self.try_below(self.top_m, fine=True, narrow=narrow):
                 return True
             lacks = self.incumbent.unsettled
-            if lacks is None or lacks.kind != "pinched" or not lacks.by < PINCHED_M or not self.incumbent.goes_on():
+            if lacks is None or not self.incumbent.goes_on():
                 break
-            shut.append((lacks.place, lacks.by + more_m))
+            if lacks.kind == "zone" and lacks.by < MET_M:
+                narrow.zones_m = more_m
+            elif lacks.kind == "pinched" and lacks.by < PINCHED_M:
+                narrow.pinched.append((lacks.place, lacks.by + more_m))
+            else:
+                break
         return False
 
     def past(

@@ -53,8 +53,9 @@ class ClearanceGrid:
     ``cap_m``, ``low`` as in `mesh_of`; ``ends``: the cones in which paths climb from the ends of the leg, see
     `clearance_kernels.fill`; ``under``, ``over`` (zones,): which zones may be passed below their floors, above their
     ceilings; None for all. ``whole``: the mesh is kept and can be read at all its nodes; other grids are valid only
-    until the plane's next one. ``exact``: floors are those of the exact check at the nodes, without a margin for what
-    lies between them. Raises Exhausted if the nodes take more memory than the budget leaves.
+    until the plane's next one. ``exact_m``: if not None, floors are those of the exact check at the nodes, without a
+    margin for what lies between them, and these metres are kept from levels of zones that follow the ground. Raises
+    Exhausted if the nodes take more memory than the budget leaves.
     """
 
     def __init__(
@@ -68,7 +69,7 @@ class ClearanceGrid:
         under: Bools | None = None,
         over: Bools | None = None,
         whole: bool = False,
-        exact: bool = False,
+        exact_m: float | None = None,
     ) -> None:
         limits, scale = plane.problem.limits, plane.problem.airspace.scale
         whole = whole or wanted is None
@@ -110,11 +111,11 @@ class ClearanceGrid:
         )  # fmt: skip
         if low:
             self._shut_border()
-        if exact:
+        if exact_m is not None:
             self._be_exact()
         self._zones, self._edges = plane.zones(low, under, over)
         self._boxes = plane.boxes(self.row, self.col, fineness, rows, cols)
-        self._coarse, self._steep, self._exact = (ground, x, y), steep, exact
+        self._coarse, self._steep, self._exact_m = (ground, x, y), steep, exact_m
         self._up, self._down = (self._array(name, self.shape) for name in ("up", "down"))
         self._of = self._array("of", (self._diagonal.size,), np.int32)
         self._values = np.empty((1 + (plane.shapes.cells + low * plane.shapes.looking) * fineness**2, WALL))
@@ -277,8 +278,8 @@ class ClearanceGrid:
         reach_m, near_m = self.plane.reach_m()
         count = stamp_zones(
             self._around, self._span, self._excess, self._floor, self._ground, *self._coarse, self._steep,
-            self.fineness, reach_m, self._exact, self._up, self._down, self._x, self._y, self._zones, self._edges,
-            self._boxes, self.low, self._of, self._values,
+            self.fineness, reach_m, -1.0 if self._exact_m is None else self._exact_m, self._up, self._down, self._x,
+            self._y, self._zones, self._edges, self._boxes, self.low, self._of, self._values,
         )  # fmt: skip
         if self.low and self.plane.stride == 1:
             stamp_beside(

@@ -21,8 +21,9 @@ if one of its zones does. ``ONE``, ``OTHER``: the rows of the zones of a pair. `
 fall within reach anywhere at a zone; 0 where the slopes at nodes tell better (see `BESIDE`)."""
 BESIDE = 2.0
 """Datum of a level over all ground within reach, for paths; 1: over the ground below; 0: AMSL."""
-MOST_BESIDE = 6
-"""Nodes on each side that are looked at for `BESIDE`, at most; of more, only every second, third … is."""
+RINGS, AROUND, RIM = 4, 32, 0.1
+"""Circles around a node at which ground is read for `BESIDE`, with the node itself, and places on the largest; and the
+part of the reach by which they may lie outside of the zone: at its rim, few places lie within."""
 
 
 @device
@@ -61,9 +62,9 @@ def _level_at(zones: Floats, z: int, at: int, ground: Floats, up: Floats, down: 
 
 
 @device
-def value_at(a: Floats, fineness: int, j: int, i: int) -> float:
-    """A value at node (j, i) of a lattice ``fineness`` times finer than ``a``; bilinear between the nodes of that."""
-    jj, ii = min(j // fineness, len(a) - 2), min(i // fineness, a.shape[1] - 2)
+def value_at(a: Floats, fineness: int, j: float, i: float) -> float:
+    """The value at place (j, i) of a lattice ``fineness`` times finer than ``a``: bilinear between its nodes."""
+    jj, ii = min(int(j / fineness), len(a) - 2), min(int(i / fineness), a.shape[1] - 2)
     v, u = j / fineness - jj, i / fineness - ii
     south = a[jj, ii] + u * (a[jj, ii + 1] - a[jj, ii])
     return float(south + v * (a[jj + 1, ii] + u * (a[jj + 1, ii + 1] - a[jj + 1, ii]) - south))
@@ -98,12 +99,12 @@ def _open(
 
 
 @kernel(
-    "i4[,] i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i8 f8 b1 f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 i4[] "
+    "i4[,] i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i8 f8 f8 f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 i4[] "
     "f8[,]"
 )
 def stamp_zones(
     around: Int32s, span: Int32s, excess: Floats, floor: Floats, ground: Floats, coarse: Floats, coarse_x: Floats,
-    coarse_y: Floats, steep: Floats, fineness: int, reach: float, exact: bool, up: Floats, down: Floats, x: Floats,
+    coarse_y: Floats, steep: Floats, fineness: int, reach: float, exact: float, up: Floats, down: Floats, x: Floats,
     y: Floats, zones: Floats, edges: Floats, boxes: Int32s, low: bool, of: Int32s, values: Floats,
 ) -> int:  # fmt: skip
     """Give the cells that zones shut walls of their own; return how many walls there are.
@@ -115,7 +116,8 @@ def stamp_zones(
 
     For paths, ground within ``reach`` decides levels of datum `BESIDE`. How far it rises and falls at each node
     (``up``, ``down``: work arrays) is guessed from ``steep``, the slopes at the nodes of a lattice ``fineness`` times
-    coarser, or, if ``exact``, read from that lattice's ground ``coarse`` at ``coarse_x``, ``coarse_y``.
+    coarser, or, if ``exact`` is 0 or more, read from that lattice's ground ``coarse`` at ``coarse_x``, ``coarse_y``, to
+    which so many metres are added.
     """
     for j in range(len(span)):
         for i in range(around[j, 0], min(around[j, 1], excess.shape[1] - 1)):
@@ -124,11 +126,11 @@ def stamp_zones(
     wall = values[len(values) - 1]
     for z in range(len(zones)):
         if _looks_beside(zones, z):
-            own = _looking(zones, z) if exact else -1
+            own = _looking(zones, z) if exact >= 0.0 else -1
             if own >= 0:
                 _look_beside(
                     around, excess, ground, coarse, coarse_x, coarse_y, fineness, zones, edges, boxes, z, own, reach,
-                    up, down,
+                    exact, up, down,
                 )  # fmt: skip
             else:
                 _guess_beside(around, steep, fineness, zones, boxes, z, reach, up, down)
@@ -232,46 +234,43 @@ def _guess_beside(
 @device
 def _look_beside(
     around: Int32s, excess: Floats, ground: Floats, coarse: Floats, x: Floats, y: Floats, fineness: int, zones: Floats,
-    edges: Floats, boxes: Int32s, z: int, own: int, reach: float, up: Floats, down: Floats,
+    edges: Floats, boxes: Int32s, z: int, own: int, reach: float, more: float, up: Floats, down: Floats,
 ) -> None:  # fmt: skip
     """Set ``up`` and ``down`` at nodes of a zone's box to how far the ground of zone ``own`` within reach rises above,
-    and falls below, the ground there; 0 where none is known. That zone is grown by ``reach``, so its own ground is
-    where it is deeper than that, or less deep by a step from place to place: at its rim, few places are within reach.
+    and falls below, the ground there, and ``more``; 0 where none is known. That zone is grown by ``reach``, so its own
+    ground is where it is deeper than that.
 
     ``ground``: at the nodes; ``coarse``, ``x``, ``y``: at those of a lattice ``fineness`` times coarser.
     """
-    across = math.sqrt((x[0, 1] - x[0, 0]) ** 2 + (y[0, 1] - y[0, 0]) ** 2) / fineness
-    along = math.sqrt((x[1, 0] - x[0, 0]) ** 2 + (y[1, 0] - y[0, 0]) ** 2) / fineness
-    rows, cols = int(reach / along), int(reach / across)
-    every = 1 + max(rows, cols) // (MOST_BESIDE + 1)
-    own_depth = reach - every * max(across, along)
+    ex, ey = (x[0, 1] - x[0, 0]) / fineness, (y[0, 1] - y[0, 0]) / fineness
+    nx, ny = (x[1, 0] - x[0, 0]) / fineness, (y[1, 0] - y[0, 0]) / fineness
+    area = ex * ny - ey * nx
+    own_depth = reach * (1.0 - RIM)
     for j in range(boxes[z, 2], boxes[z, 3] + 2):
         for i in range(max(boxes[z, 0], around[j, 0]), min(boxes[z, 1] + 2, around[j, 1])):
             up[j, i] = down[j, i] = 0.0
             if excess[j, i] == np.inf:
                 continue
-            here_x, here_y = value_at(x, fineness, j, i), value_at(y, fineness, j, i)
-            if depth(zones, edges, own, here_x, here_y) <= 0.0:
+            if depth(zones, edges, own, value_at(x, fineness, j, i), value_at(y, fineness, j, i)) <= 0.0:
                 continue
             most, least = -np.inf, np.inf
-            for q in range(-(rows // every), rows // every + 1):
-                jj = j + q * every
-                if not 0 <= jj <= (len(x) - 1) * fineness:
-                    continue
-                for p in range(-(cols // every), cols // every + 1):
-                    ii = i + p * every
-                    if not 0 <= ii <= (x.shape[1] - 1) * fineness:
+            for ring in range(RINGS):
+                away, count = reach * ring / (RINGS - 1), max(AROUND * ring // (RINGS - 1), 1)
+                for k in range(count):
+                    turn = 2.0 * math.pi * k / count
+                    dx, dy = away * math.cos(turn), away * math.sin(turn)
+                    jj, ii = j + (ex * dy - ey * dx) / area, i + (ny * dx - nx * dy) / area
+                    if not (0.0 <= jj <= (len(x) - 1) * fineness and 0.0 <= ii <= (x.shape[1] - 1) * fineness):
                         continue
                     height = value_at(coarse, fineness, jj, ii)
                     # False as well where ground is unknown.
                     if not (height < least or height > most):
                         continue
                     at_x, at_y = value_at(x, fineness, jj, ii), value_at(y, fineness, jj, ii)
-                    off = (at_x - here_x) ** 2 + (at_y - here_y) ** 2
-                    if off <= reach * reach and depth(zones, edges, own, at_x, at_y) > own_depth:
+                    if depth(zones, edges, own, at_x, at_y) > own_depth:
                         most, least = max(most, height), min(least, height)
             if most > -np.inf:
-                up[j, i], down[j, i] = most - ground[j, i], ground[j, i] - least
+                up[j, i], down[j, i] = most - ground[j, i] + more, ground[j, i] - least + more
 
 
 @kernel("i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] f8 f8 f8[,] i1[,]")

@@ -32,6 +32,8 @@ UNDER_M = 0.5
 """Metres below the highest free altitude at which stretches begin and end, if there is room."""
 REACHED = 0.95
 """Part of the climb limit at which the track from or to a terminal is taken to climb."""
+ASIDE_M = 0.3
+"""Metres by which places are moved away from zones."""
 APART_M = 1e-3
 """Metres; places nearer to each other count as one."""
 SLACKS = (0.008, 0.15)
@@ -73,7 +75,7 @@ def _first(plane: PlaneSearch) -> bool:
         leg.bound(plane.top_m, leg.corridor(leg.reach_m), leg.reach_m)  # its track is nearer to open slits
         at, s, places = _sampled(leg.last_track)
         start, goal = (_end(plane, leg, end, at[-1]) for end in (0.0, at[-1]))
-        part = _along(plane, leg, [start if before is None else before, goal], places, s, at[-1])
+        part = _along(plane, leg, [start if before is None else before, goal], places, s, at[-1], math.inf)
         if part is None:
             return False
         parts.append(part)
@@ -113,9 +115,10 @@ def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
         if a < begun or (b - a) - (s[high] - s[low]) < WORTH * (plane.longest() - at[-1]):
             continue
         ends = [np.array([np.interp(x, on_path, path[:, k]) for k in range(3)]) for x in (a, b)]
-        part = _along(plane, leg, ends, places[low : high + 1], s[low : high + 1], at[-1])
         known = np.vstack([ends[0], path[(on_path > a) & (on_path < b)], ends[1]])
-        if part is not None and plane.problem.cost(Path(part)) < plane.problem.cost(Path(known)):
+        cost = plane.problem.cost(Path(known))
+        part = _along(plane, leg, ends, places[low : high + 1], s[low : high + 1], at[-1], cost)
+        if part is not None:
             better.append((a, b, part))
     out, begin = [], -math.inf
     for a, b, part in better:
@@ -125,20 +128,24 @@ def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
 
 
 def _along(
-    plane: PlaneSearch, leg: Leg, ends: list[Floats], places: Floats, s: Floats, whole_m: float
+    plane: PlaneSearch, leg: Leg, ends: list[Floats], places: Floats, s: Floats, whole_m: float, cost: float
 ) -> Floats | None:
     """(N, 3) way points from one of ``ends`` to the other along a track, past the stretches that terrain shuts, or else
-    those that terrain and zones shut; None if that fails.
+    those that terrain and zones shut; None if that fails or does not cost less than ``cost``.
 
     ``places`` (N, 2) of the track, ``s`` (N,) metres along it; ``whole_m``: its whole length.
     """
     floor = plane.problem.floors(*places.T)
     found = _past(plane, leg, ends, places, s, whole_m, floor, np.full_like(floor, plane.top_m))
-    if found is None and plane.incumbent.budget.goes_on():
-        low, high = _free(plane, places, floor)
-        if ((low > high) & (floor <= plane.top_m)).any():
-            found = _past(plane, leg, ends, places, s, whole_m, low, high)
-    return found
+    if found is not None and plane.problem.cost(Path(found)) < cost:
+        return found
+    if not plane.incumbent.budget.goes_on():
+        return None
+    places, low, high = _freer(plane, places)
+    if not ((low > high) & (floor <= plane.top_m)).any():
+        return None
+    found = _past(plane, leg, ends, places, s, whole_m, low, high)
+    return found if found is not None and plane.problem.cost(Path(found)) < cost else None
 
 
 def _past(
@@ -216,13 +223,28 @@ def _stretches(over: Floats) -> list[tuple[int, int]]:
     return out
 
 
-def _free(plane: PlaneSearch, places: Floats, floor: Floats) -> tuple[Floats, Floats]:
+def _freer(plane: PlaneSearch, places: Floats) -> tuple[Floats, Floats, Floats]:
+    """The places (N, 2) of a track, moved by `ASIDE_M` where one side of it is shut and the other is free, and `_free`
+    of them: a bound's track touches zones, and where it does no stretch can begin or end."""
+    ahead = np.gradient(places, axis=0)
+    aside = np.stack([-ahead[:, 1], ahead[:, 0]], axis=-1) / np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
+    tried = [places + off * aside for off in (0.0, ASIDE_M, -ASIDE_M)]
+    free = [_free(plane, at) for at in tried]
+    shut = [low > high for low, high in free]
+    side = np.where(shut[1] & ~shut[2], 2, np.where(shut[2] & ~shut[1], 1, 0))
+    side[[0, -1]] = 0
+    rows = np.arange(len(places))
+    low, high = (np.stack([of[k] for of in free])[side, rows] for k in range(2))
+    return np.stack(tried)[side, rows], low, high
+
+
+def _free(plane: PlaneSearch, places: Floats) -> tuple[Floats, Floats]:
     """(N,) the lowest and the highest altitude that are free below the cap and between zones at places (N, 2) of a
-    track, over a ``floor`` (N,)."""
+    track."""
     problem = plane.problem
     ends = np.isin(np.arange(len(places)), [0, len(places) - 1])
     track = make_track(problem, places, ends, np.full(len(places), math.nan))
-    return widest_free(problem, track, distances(places), floor, plane.top_m, OPEN_M)
+    return widest_free(problem, track, distances(places), problem.floors(*places.T), plane.top_m, OPEN_M)
 
 
 def _height(plane: PlaneSearch, leg: Leg, from_start_m: float, to_goal_m: float, low_m: float, high_m: float) -> float:
