@@ -114,6 +114,7 @@ class Searches:
                 *rows,
                 Search("track_bound", 1.0, lambda: i.bound < i.cost, nodes(1.0), self._bound_tracks),
                 Search("lattice", 0.5, lambda: True, of(1.0, 0.0), self._search_lattice),
+                Search("section_descent", 0.1, known, of(0.1, 0.0), self._tighten),
             ]
         rows += [
             Search("cap_search", 1.0, missing, nodes(1.0), self._look_first),
