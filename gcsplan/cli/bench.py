@@ -131,7 +131,8 @@ def bench_terrain(
     from rich.console import Console
 
     from gcsplan.bench import terrain, terrain_report
-    from gcsplan.cli.console import RESULTS, remark
+    from gcsplan.cli.console import remark
+    from gcsplan.cli.screens import RESULTS
 
     try:
         budgets = [float(s) for s in seconds.split(",")]
@@ -165,7 +166,8 @@ def bench_swarms(
     from rich.console import Console
 
     from gcsplan.bench import swarms
-    from gcsplan.cli.console import RESULTS, remark
+    from gcsplan.cli.console import remark
+    from gcsplan.cli.screens import RESULTS
 
     result = swarms.run(
         out,

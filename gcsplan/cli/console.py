@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, TextIO, cast
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from gcsplan.check.verdict import by_item
-from gcsplan.cli.ending import put
+from gcsplan.cli.screens import RESULTS, aside, console
 from gcsplan.figures import floored, steepened
 from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Unit, Units, charge, duration, in_units
 from gcsplan.world.model_words import what_is_not_in
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
     from gcsplan.mavlink.protocol.machine import Progress as Transfer
     from gcsplan.vehicle import Energy
 
-PLAIN_WIDTH = 130  # columns of a log file or a pipe, whose width is unknown
 WIDEST = 100_000
 MOST_WHOLE = 30
 """Most vehicles whose table has all columns, and whose transfers have a bar each."""
@@ -35,44 +33,6 @@ BRIEF = ("vehicle", "length", "battery", "lowest", "speed", "departs", "arrives"
 """How the names of the columns begin that the table of a larger fleet has."""
 MOST_NOTES, MOST_NAMES = 120, 110
 """Most notes on vehicles that are printed, and most names in one line."""
-
-
-class _Results:
-    """Standard output as a file for rich: a full disk or a closed output is our error, not one of rich."""
-
-    def write(self, text: str) -> int:
-        try:
-            if text:
-                put(text)
-        except BaseException:  # rich would keep what it could not write, and write it before the next words
-            console.begin_capture()
-            console.end_capture()
-            raise
-        return len(text)
-
-    def flush(self) -> None:
-        """`put` has flushed already."""
-
-    def isatty(self) -> bool:
-        return sys.stdout is not None and sys.stdout.isatty()
-
-    def fileno(self) -> int:
-        return sys.stdout.fileno()
-
-    @property
-    def encoding(self) -> str:
-        return getattr(sys.stdout, "encoding", None) or "utf-8"
-
-
-RESULTS = cast(TextIO, _Results())
-
-console = Console(file=RESULTS, highlight=False, soft_wrap=True)
-"""Results."""
-aside = Console(stderr=True, highlight=False, soft_wrap=True)
-"""Notes, progress and errors."""
-for screen in (console, aside):
-    if not screen.is_terminal:
-        screen.width = PLAIN_WIDTH
 
 
 def number(value: float | None, decimals: int = 0, unit: Unit | None = None) -> str:

@@ -168,7 +168,7 @@ def _named(text: str) -> Sequence[Cell]:
 @contextmanager
 def _progress() -> Iterator[Progress | None]:
     """Bars of what is being brought, on a terminal only."""
-    from gcsplan.cli.console import aside
+    from gcsplan.cli.screens import aside
 
     if not aside.is_terminal:
         yield None

@@ -9,7 +9,8 @@ from rich.markup import escape
 
 from gcsplan.app.way_home import warnings
 from gcsplan.check.rtl.words import NO_RETURN, STILL_NO_RETURN
-from gcsplan.cli.console import aside, console, rows_table, say
+from gcsplan.cli.console import rows_table, say
+from gcsplan.cli.screens import aside, console
 from gcsplan.figures import raised
 from gcsplan.mavlink.mission.return_altitude import setting
 from gcsplan.units import Reach, Unit, Units, in_units

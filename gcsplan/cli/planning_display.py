@@ -15,6 +15,7 @@ from rich.live import Live
 from rich.text import Text
 
 from gcsplan.cli import console as words
+from gcsplan.cli.screens import aside
 from gcsplan.native import notice
 from gcsplan.planners.problem import Progress
 
@@ -70,7 +71,7 @@ def planning_display(names: Sequence[str], objective: str = "length") -> Iterato
     On a terminal it is one line that is redrawn several times a second and disappears at the end; elsewhere a line on
     standard error every `LINE_S` seconds. The compilation of kernels, which happens once, is reported there at once.
     """
-    board, screen = PlanningBoard(names, objective), words.aside
+    board, screen = PlanningBoard(names, objective), aside
     if screen.is_terminal and not screen.is_dumb_terminal:
         with _redrawn(board, screen), notice.told(board.note):
             yield board.report

@@ -19,7 +19,8 @@ def show_zones(files: Sequence[Path], units: Units, *, as_json: bool) -> None:
     from rich.markup import escape
 
     from gcsplan.app.zone_list import list_zones
-    from gcsplan.cli.console import console, new_table, say, say_notes
+    from gcsplan.cli.console import new_table, say, say_notes
+    from gcsplan.cli.screens import console
     from gcsplan.figures import counted
 
     zones, notes = list_zones(files)

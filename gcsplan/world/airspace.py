@@ -54,11 +54,6 @@ from gcsplan.world.zones import Polygon, Zone
 
 __all__ = ["Airspace", "Band", "Kind", "LegReport", "Legs", "Tube", "Violation"]
 
-RINGS = ((0.0, 1), (1.0 / 3.0, 8), (2.0 / 3.0, 16), (0.9, 32), (1.0, 64))
-"""Circles of points at which `Airspace.own_ground` reads ground: their radius, as a part of the reach, and how many."""
-RING_POINTS = sum(n for _, n in RINGS)
-_TURNS = [(r, math.tau * k / n) for r, n in RINGS for k in range(n)]
-_OFFSETS = np.array([(r * math.cos(turn), r * math.sin(turn)) for r, turn in _TURNS])
 NEAR_M, NEAR_PART = 0.01, 0.01
 """The kernel finds the nearest place of a zone over ground to this many metres, or this part of the distance
 (`_sweep_zones.nearest_conflict`)."""
@@ -256,23 +251,6 @@ class Airspace:
             return self._held(of_top, reach_m, points[:-1], points[1:])
 
         return make_tube(points, limits, self._field, self._zones, extrema, self._surfaces, self._grounds, self.scale)
-
-    def own_ground(self, zone: int, places: Floats, reach_m: float) -> tuple[Floats, Floats]:
-        """(N,) lowest and highest ground under a zone within ``reach_m`` of places (N, 2), as far as `RINGS` of points
-        around each show; inf and -inf where none of them is under the zone or known."""
-        shape = self.zones[zone].shape
-        around = places[:, None] + reach_m * _OFFSETS
-        flat = around.reshape(-1, 2)
-        if isinstance(shape, Polygon):
-            import shapely  # many missions have no polygons
-
-            within = shapely.contains_xy(shapely.Polygon(shape.vertices), flat)
-        else:
-            within = np.hypot(flat[:, 0] - shape.east_m, flat[:, 1] - shape.north_m) <= shape.radius_m
-        ground = self.surface.ground_at(*flat.T)
-        within &= np.isfinite(ground)
-        low, high = np.where(within, ground, np.inf), np.where(within, ground, -np.inf)
-        return low.reshape(len(places), -1).min(axis=1), high.reshape(len(places), -1).max(axis=1)
 
     def straight_cells(self, bow_m: float) -> int:
         """How many cells of the terrain model in a row have lines that are straight in the plane within ``bow_m``."""

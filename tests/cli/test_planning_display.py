@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from gcsplan.cli import console
+from gcsplan.cli import console as words
 from gcsplan.cli import main as cli
 from gcsplan.cli import planning_display as display
 from gcsplan.cli.planning_display import PlanningBoard, planning_display
@@ -26,7 +26,9 @@ def screen(monkeypatch: pytest.MonkeyPatch, *, terminal: bool, width: int = 100)
     monkeypatch.setenv("TERM", "xterm-256color")
     monkeypatch.delenv("NO_COLOR", raising=False)
     shown = io.StringIO()
-    monkeypatch.setattr(console, "aside", Console(file=shown, force_terminal=terminal, width=width))
+    screen = Console(file=shown, force_terminal=terminal, width=width)
+    for module in (display, words):
+        monkeypatch.setattr(module, "aside", screen)
     return shown
 
 
@@ -80,7 +82,9 @@ def test_no_color_is_respected(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TERM", "xterm-256color")
     monkeypatch.setenv("NO_COLOR", "1")
     shown = io.StringIO()
-    monkeypatch.setattr(console, "aside", Console(file=shown, force_terminal=True, width=100))
+    screen = Console(file=shown, force_terminal=True, width=100)
+    for module in (display, words):
+        monkeypatch.setattr(module, "aside", screen)
     with planning_display(["uav1"]) as report:
         report("uav1", Progress(0.0, 2.0, 1.0, "bound"))
         wait_until(lambda: "bound" in shown.getvalue())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -69,6 +69,15 @@ class Nearby:
     left_m: Floats
     away_most_m: Floats
     left_most_m: Floats
+
+
+@dataclass(slots=True)
+class Narrow:
+    """What earlier tracks through slits lacked: places (2,) and by how many metres they were pinched there; and metres
+    that tracks are to keep from the levels of zones over ground."""
+
+    pinched: list[tuple[Floats, float]] = field(default_factory=list)
+    zones_m: float = 0.0
 
 
 def joined(ways: list[Floats], heights: list[float | None]) -> PinnedTrack:

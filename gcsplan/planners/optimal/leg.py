@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.bounds.altitude_intervals import MOST, SPARE_M, AltitudeIntervals, Reached, Terminal
 from gcsplan.planners.optimal.cells import choose, fits_memory
-from gcsplan.planners.optimal.corridor import Corridor, End, Nearby, Spare
+from gcsplan.planners.optimal.corridor import Corridor, End, Narrow, Nearby, Spare
 from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid, Cone, mesh_of
 from gcsplan.planners.optimal.navmesh.free_altitudes import intervals, ranges
 from gcsplan.planners.optimal.navmesh.grid import Box, Plane, box_of, extent, finer_plane, make_plane, on_finer
@@ -45,15 +44,6 @@ MUCH_LONGER, ROUGHLY = 1.1, 3
 RAISED, WORTHWHILE = 4, 0.05
 """Most times that walls near the ends are raised for one bound; and the part of the spare metres by which a round must
 raise the bound for another to follow."""
-
-
-@dataclass(slots=True)
-class Narrow:
-    """What earlier tracks through slits lacked: places (2,) and by how many metres they were pinched there; and metres
-    that tracks are to keep from the levels of zones over ground."""
-
-    pinched: list[tuple[Floats, float]] = field(default_factory=list)
-    zones_m: float = 0.0
 
 
 class Leg:

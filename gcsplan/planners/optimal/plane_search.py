@@ -10,9 +10,9 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.planners.optimal.cap_search import above_all
-from gcsplan.planners.optimal.corridor import End, PinnedTrack, joined
+from gcsplan.planners.optimal.corridor import End, Narrow, PinnedTrack, joined
 from gcsplan.planners.optimal.incumbent import Incumbent
-from gcsplan.planners.optimal.leg import Leg, Narrow
+from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.optimal.sources.detours import Choice, DetourSearch
 from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.planners.profile.track import Flown, fly, make_track

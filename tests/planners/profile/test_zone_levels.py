@@ -14,6 +14,7 @@ from gcsplan.planners.profile.track import Flown, fly, make_track
 from gcsplan.planners.profile.zone_levels import ZoneLevels, widest_free
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
+from gcsplan.world.own_ground import own_ground
 from gcsplan.world.path import Path
 from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
@@ -44,9 +45,9 @@ def test_ground_under_a_zone_is_that_of_dense_samples(shape: str, seed: int) -> 
     surface = rough(seed)
     corners = 600.0 + 150.0 * np.array([[-1.0, -1.0], [1.2, -0.8], [0.1, 0.0], [0.9, 1.1]])
     form = Circle(600.0, 600.0, 170.0) if shape == "disc" else Polygon(corners)
-    air = Airspace(surface, [Zone("z", form, Level(80.0, "agl"), None)])
+    zone = Zone("z", form, Level(80.0, "agl"), None)
     places = rng.uniform(400.0, 800.0, (300, 2))
-    low, high = air.own_ground(0, places, REACH_M)
+    low, high = own_ground(surface, zone, places, REACH_M)
     side = np.arange(-REACH_M, REACH_M + 0.1, 0.75)
     off = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
     off = off[np.hypot(*off.T) <= REACH_M]

@@ -14,13 +14,13 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Int8s, Int32s
 from gcsplan.planners.optimal.navmesh.buffers import Scratch
 from gcsplan.planners.optimal.navmesh.clearance_kernels import fill
-from gcsplan.planners.optimal.navmesh.climb_cones import hold_down, look_around, walk_around
+from gcsplan.planners.optimal.navmesh.climb_cones import hold_down, lift_lids, look_around, walk_around
 from gcsplan.planners.optimal.navmesh.grid import Plane, box_of
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.mesh_kernels import WALL, make_pieces, make_portals, sort_portals
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.navmesh.shut_kernels import stamp_beside
-from gcsplan.planners.optimal.navmesh.zone_kernels import lift_lids, stamp_zones
+from gcsplan.planners.optimal.navmesh.zone_kernels import stamp_zones
 from gcsplan.planners.profile.track import divided
 
 Cone = tuple[float, float, float, float]

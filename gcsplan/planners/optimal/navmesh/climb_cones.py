@@ -16,6 +16,7 @@ from gcsplan.planners.compiled import device, kernel
 from gcsplan.planners.optimal.navmesh.clearance_kernels import blank
 from gcsplan.planners.optimal.navmesh.mesh_kernels import stands
 from gcsplan.planners.optimal.navmesh.polyanya_nodes import pop, push
+from gcsplan.planners.optimal.navmesh.zone_kernels import BOTTOM, PAIR, THIN, TOP, UNDER, depth, level
 
 BESIDE = 5
 """Nodes on each side of those that a cone could shut for which the distance must be known, too."""
@@ -25,6 +26,31 @@ LONG = 40.0
 """Cells after which a straight line is ended at the node it has reached: checking long lines is most of the work."""
 SHUT = 3
 """Value of ``seen`` at a node that lies in a wall."""
+
+
+@kernel("i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] f8 f8 f8[,] i1[,]")
+def lift_lids(
+    around: Int32s, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Int32s,
+    cap: float, rim: float, lift: Floats, either: Int8s,
+) -> None:  # fmt: skip
+    """Set ``lift`` at each node of ``around`` to how far, m, zones there that can be flown over below ``cap`` are
+    higher than the floor; 0 where there is none. Only nodes at most ``rim`` deep in a zone count: a path that does not
+    get past those gets no farther in. Set ``either`` (zeros before) to 1 where one of them can be flown under, too."""
+    blank(lift, around, 0.0)
+    for z in range(len(zones)):
+        if zones[z, PAIR] > 0.0 or zones[z, TOP] == np.inf:
+            continue
+        for j in range(boxes[z, 2], boxes[z, 3] + 2):
+            for i in range(max(boxes[z, 0], around[j, 0]), min(boxes[z, 1] + 2, around[j, 1])):
+                top = level(zones, z, TOP, ground[j, i])
+                more = top - floor[j, i]
+                if zones[z, UNDER] > 0.0 and top - level(zones, z, BOTTOM, ground[j, i]) <= zones[z, THIN]:
+                    continue
+                if not 0.0 < more <= cap - floor[j, i] or not 0.0 < depth(zones, edges, z, x[j, i], y[j, i]) <= rim:
+                    continue
+                lift[j, i] = max(lift[j, i], more)
+                if zones[z, UNDER] > 0.0 and floor[j, i] <= level(zones, z, BOTTOM, ground[j, i]):
+                    either[j, i] = 1
 
 
 @kernel("i4[,] f8[,] f8[,] f8[,] i4[] f8[,] f8[,] f8[,] f8[] i1[,] f8[,]")
@@ -130,7 +156,7 @@ def hold_down(
 
     No path short enough to matter is higher at a node than the cone's height plus its slope times the length of a free
     track to the node. A node is changed only if such lengths to it and to all nodes around it are known. ``lone``: no
-    other end's cone comes near this one's; ``lift``, ``either``: see `zone_kernels.lift_lids`.
+    other end's cone comes near this one's; ``lift``, ``either``: see `lift_lids`.
     """
     left, right, low, high = _box(x, y, cone)
     height, slope, cap = cone[4], cone[5], cone[6]

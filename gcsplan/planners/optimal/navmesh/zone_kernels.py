@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 
-from gcsplan.arrays import Floats, Int8s, Int32s
+from gcsplan.arrays import Floats, Int32s
 from gcsplan.planners.compiled import device, kernel
-from gcsplan.planners.optimal.navmesh.clearance_kernels import blank
 from gcsplan.planners.optimal.navmesh.mesh_kernels import NEXT
 
 EAST, NORTH, RADIUS, BOTTOM, TOP, BOTTOM_AGL, TOP_AGL, FIRST, LAST, UNDER = range(10)
@@ -125,15 +124,14 @@ def stamp_zones(
     count = 0
     wall = values[len(values) - 1]
     for z in range(len(zones)):
-        if _looks_beside(zones, z):
-            own = _looking(zones, z) if exact >= 0.0 else -1
-            if own >= 0:
-                _look_beside(
-                    around, excess, ground, coarse, coarse_x, coarse_y, fineness, zones, edges, boxes, z, own, reach,
-                    exact, up, down,
-                )  # fmt: skip
-            else:
-                _guess_beside(around, steep, fineness, zones, boxes, z, reach, up, down)
+        own = _looking(zones, z) if exact >= 0.0 else -1
+        if own >= 0:
+            _look_beside(
+                around, excess, ground, coarse, coarse_x, coarse_y, fineness, zones, edges, boxes, z, own, reach, exact,
+                up, down,
+            )  # fmt: skip
+        elif _looks_beside(zones, z):
+            _guess_beside(around, steep, fineness, zones, boxes, z, reach, up, down)
         west = east = north_west = north_east = 0.0
         west_open = east_open = north_west_open = north_east_open = False
         for j in range(boxes[z, 2], boxes[z, 3] + 1):
@@ -195,13 +193,13 @@ def _looks_beside(zones: Floats, z: int) -> bool:
 
 @device
 def _looking(zones: Floats, z: int) -> int:
-    """The row of the zone whose own ground decides, of a zone or a pair; -1 if both of a pair have such ground."""
+    """The row of the one zone whose own ground decides, of a zone or a pair; -1 if none does, or both of a pair."""
     if zones[z, PAIR] == 0.0:
-        return z
+        return z if _looks_beside(zones, z) else -1
     one, other = int(zones[z, ONE]), int(zones[z, OTHER])
     if _looks_beside(zones, one):
         return -1 if _looks_beside(zones, other) else one
-    return other
+    return other if _looks_beside(zones, other) else -1
 
 
 @device
@@ -271,31 +269,6 @@ def _look_beside(
                         most, least = max(most, height), min(least, height)
             if most > -np.inf:
                 up[j, i], down[j, i] = most - ground[j, i] + more, ground[j, i] - least + more
-
-
-@kernel("i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] f8 f8 f8[,] i1[,]")
-def lift_lids(
-    around: Int32s, floor: Floats, ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Int32s,
-    cap: float, rim: float, lift: Floats, either: Int8s,
-) -> None:  # fmt: skip
-    """Set ``lift`` at each node of ``around`` to how far, m, zones there that can be flown over below ``cap`` are
-    higher than the floor; 0 where there is none. Only nodes at most ``rim`` deep in a zone count: a path that does not
-    get past those gets no farther in. Set ``either`` (zeros before) to 1 where one of them can be flown under, too."""
-    blank(lift, around, 0.0)
-    for z in range(len(zones)):
-        if zones[z, PAIR] > 0.0 or zones[z, TOP] == np.inf:
-            continue
-        for j in range(boxes[z, 2], boxes[z, 3] + 2):
-            for i in range(max(boxes[z, 0], around[j, 0]), min(boxes[z, 1] + 2, around[j, 1])):
-                top = level(zones, z, TOP, ground[j, i])
-                more = top - floor[j, i]
-                if zones[z, UNDER] > 0.0 and top - level(zones, z, BOTTOM, ground[j, i]) <= zones[z, THIN]:
-                    continue
-                if not 0.0 < more <= cap - floor[j, i] or not 0.0 < depth(zones, edges, z, x[j, i], y[j, i]) <= rim:
-                    continue
-                lift[j, i] = max(lift[j, i], more)
-                if zones[z, UNDER] > 0.0 and floor[j, i] <= level(zones, z, BOTTOM, ground[j, i]):
-                    either[j, i] = 1
 
 
 @device
