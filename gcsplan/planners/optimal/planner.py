@@ -41,7 +41,7 @@ from gcsplan.planners.refusal import check_ends, explain
 from gcsplan.world.path import Path
 
 TURNS_NOTE = "the lower bound is that of paths with sharp corners: it ignores turn_radius_m"
-BAND_NOTE = "the lower bound knows ground, zones and ceilings, but not the room between min and max AGL"
+BAND_NOTE = "the lower bound knows the room between min and max AGL only cell by cell of the terrain"
 
 
 def plan(problem: Problem) -> Solution:

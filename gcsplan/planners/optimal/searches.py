@@ -110,40 +110,35 @@ class Searches:
             ),
         ]
         if band:
-            return [
-                *rows,
-                Search("track_bound", 1.0, lambda: i.bound < i.cost, nodes(1.0), self._bound_tracks),
-                Search("lattice", 0.5, lambda: True, of(1.0, 0.0), self._search_lattice),
-                Search("section_descent", 0.1, known, of(0.1, 0.0), self._tighten),
-            ]
-        rows += [
-            Search("cap_search", 1.0, missing, nodes(1.0), self._look_first),
-            Search("corridor_first", 0.5, missing, nodes(4.0), on(follow)),
-            Search("lattice_first", 0.5, missing, of(1.0, 0.0), self._search_lattice),
-            Search("roadmap_first", 0.1, self._small_lacks, of(1.0, 0.0), self._search_small),
-            Search("roadmap_near", 0.5, small(MUCH), of(0.5, 0.0), self._search_small),
-            Search("fine_tracks", 0.9, known, nodes(0.5), self._over(self._look_finely), nearer=True),
-            Search("bound_corridor", 0.2, known, nodes(3.0), on(follow)),
-            Search("section_descent", 0.1, known, of(0.1, 0.0), self._tighten),
-            Search("contour_climb", 0.075, self._is_slanted, nodes(8.0), self._over(self._climb_aslant)),
-            Search("local_roadmap", 0.01, small(FAR), of(0.5, 0.0), self._search_small),
-        ]
-        if energy:
             rows += [
-                Search("cap_pairs", 0.5, known, nodes(3.0), on(bound_by_caps), again=True),
-                Search("energy_bound", 0.5, known, nodes(1.0), on(halve), again=True),
-                Search("detours", 0.3, far, nodes(4.0), on(lambda plane: plane.past(PAST_FINE, fine=True))),
-                Search("lattice", 0.02, far, of(0.5, 0.0), self._search_lattice_again),
+                Search("track_bound", 1.0, lambda: i.bound < i.cost, nodes(1.0), self._bound_tracks),
+                Search("lattice", 0.9, lambda: True, of(0.5, 0.0), self._search_lattice),
             ]
         else:
             rows += [
-                Search("length_bound", 0.9, known, nodes(1.0), on(halve), again=True, nearer=True),
-                Search("detours", 0.3, known, nodes(4.0), self._over(self._past_finely)),
+                Search("cap_search", 1.0, missing, nodes(1.0), self._look_first),
+                Search("corridor_first", 0.5, missing, nodes(4.0), on(follow)),
+                Search("lattice_first", 0.5, missing, of(1.0, 0.0), self._search_lattice),
+                Search("roadmap_first", 0.6, self._small_lacks, of(1.0, 0.0), self._search_small),
+                Search("roadmap_near", 0.5, small(MUCH), of(0.5, 0.0), self._search_small),
+                Search("fine_tracks", 0.9, known, nodes(0.5), self._over(self._look_finely), nearer=True),
+                Search("bound_corridor", 0.2, known, nodes(3.0), on(follow)),
+                Search("contour_climb", 0.075, self._is_slanted, nodes(8.0), self._over(self._climb_aslant)),
+                Search("local_roadmap", 0.01, small(FAR), of(0.5, 0.0), self._search_small),
+                # Under a maximum AGL it takes as long as all others, for a tenth of the gap.
+                Search("refinement", 0.07, known, nodes(8.0), self._over(self._refine)),
             ]
+            rows += [
+                Search("cap_pairs", 0.5, known, nodes(3.0), on(bound_by_caps), again=True),
+                Search("detours", 0.3, far, nodes(4.0), on(lambda plane: plane.past(PAST_FINE, fine=True))),
+                Search("lattice", 0.02, far, of(0.5, 0.0), self._search_lattice_again),
+            ] if energy else [Search("detours", 0.3, known, nodes(4.0), self._over(self._past_finely))]  # fmt: skip
+        name, share = ("energy_bound", 0.5) if energy else ("length_bound", 0.9)
         return [
             *rows,
+            Search("section_descent", 0.9 if band else 0.1, known, of(0.1, 0.0), self._tighten),
+            Search(name, share, known, nodes(1.0), on(halve), again=True, nearer=not energy),
             Search("altitude_intervals", 0.08, self._has_intervals, nodes(8.0), self._over(self._bound_by_intervals)),
-            Search("refinement", 0.07, known, nodes(8.0), self._over(self._refine)),
         ]
 
     def _over(self, run: Callable[[], object]) -> Callable[[], object]:

@@ -13,8 +13,14 @@ from gcsplan.planners.optimal.navmesh.shut_kernels import narrow_ranges
 def ranges(mesh: Mesh, top_m: float) -> tuple[Floats, Floats]:
     """(cells,) the lowest and the highest altitude, at most ``top_m``, that can be flown at in each cell; lowest above
     highest where there is none. ``mesh`` must be for bounds and as fine as its plane."""
-    low = mesh.lowest().reshape(mesh.excess.shape[0] - 1, -1)
-    high = np.full(low.shape, top_m)
+    plane, (rows, cols) = mesh.plane, mesh.excess.shape
+    low, high = mesh.lowest().reshape(rows - 1, cols - 1), np.full((rows - 1, cols - 1), top_m)
+    limits = plane.problem.limits
+    if limits.max_agl_m is not None:
+        ground = plane.grounds[1][mesh.row : mesh.row + rows, mesh.col : mesh.col + cols]
+        pairs = np.maximum(ground[:-1], ground[1:])
+        most = np.maximum(pairs[:, :-1], pairs[:, 1:])
+        np.fmin(high, most + (limits.max_agl_m - limits.altitude_error_m + plane.fit.spare_m), out=high)
     narrow_ranges(*_laid(mesh), low, high)
     return low.ravel(), high.ravel()
 
