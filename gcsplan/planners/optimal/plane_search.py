@@ -16,6 +16,7 @@ from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.optimal.sources.detours import Choice, DetourSearch
 from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.planners.profile.track import Flown, fly, make_track
+from gcsplan.planners.profile.zone_levels import follow_ground
 
 SLACKS = (0.008, 0.15, 0.6)
 """While no path is known, tracks longer than the shortest by these parts of it are searched, in turn."""
@@ -135,11 +136,15 @@ class PlaneSearch:
             return False
         track = make_track(incumbent.problem, *terminals)
         flown = fly(incumbent.problem, track)
-        # What is pinched lacks centimetres, for cells shut what lacks more.
-        if isinstance(flown, Flown) or flown.kind == "pinched" or narrow is not None:
+        if isinstance(flown, Flown):
             found = incumbent.exact(track, flown)
-            if found is not None or isinstance(flown, Flown):
-                return found is not None and incumbent.take_simpler(*found, fine=fine, longer=False)
+            return found is not None and incumbent.take_simpler(*found, fine=fine, longer=False)
+        # What is pinched lacks centimetres, for cells shut what lacks more; at zones above ground less may be shut than
+        # the bounds of the tube say.
+        if flown.kind == "pinched" or narrow is not None or follow_ground(incumbent.problem, track):
+            found = incumbent.exact(track, flown)
+            if found is not None:
+                return incumbent.take_simpler(*found, fine=fine, longer=False)
         past = flown.kind == "zone" or incumbent.best is None
         return past and self.past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=terminals)
 

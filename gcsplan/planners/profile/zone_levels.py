@@ -26,6 +26,13 @@ SPARE_M, STEP_M = 0.05, 0.04
 check, which tells no height. Each further correction is as much as all before."""
 
 
+def follow_ground(problem: Problem, track: Track) -> bool:
+    """Whether a zone along a track has a level above ground (AGL): its band there is wider than what the exact check
+    shuts."""
+    zones = (problem.airspace.zones[band.zone] for band in track.tube.bands)
+    return any(level is not None and level.datum == "agl" for zone in zones for level in (zone.floor, zone.ceiling))
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class ZoneLevels:
     """A band with levels read from the zone's own ground around samples of the track, and what they are at most.
