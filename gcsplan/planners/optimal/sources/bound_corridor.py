@@ -225,7 +225,7 @@ def _stretches(over: Floats) -> list[tuple[int, int]]:
 
 def _freer(plane: PlaneSearch, places: Floats) -> tuple[Floats, Floats, Floats]:
     """The places (N, 2) of a track, moved by `ASIDE_M` where one side of it is shut and the other is free, and `_free`
-    of them: a bound's track touches zones, and where it does no stretch can begin or end."""
+    of all but its ends: a bound's track touches zones, and where it does no stretch can begin or end."""
     ahead = np.gradient(places, axis=0)
     aside = np.stack([-ahead[:, 1], ahead[:, 0]], axis=-1) / np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
     tried = [places + off * aside for off in (0.0, ASIDE_M, -ASIDE_M)]
@@ -235,6 +235,7 @@ def _freer(plane: PlaneSearch, places: Floats) -> tuple[Floats, Floats, Floats]:
     side[[0, -1]] = 0
     rows = np.arange(len(places))
     low, high = (np.stack([of[k] for of in free])[side, rows] for k in range(2))
+    low[[0, -1]] = -math.inf  # the ends of the track give way to those of the path
     return np.stack(tried)[side, rows], low, high
 
 

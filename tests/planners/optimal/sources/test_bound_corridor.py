@@ -10,8 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gcsplan.bench.terrain_problems import problems
 from gcsplan.planners.lattice.planner import plan_band
 from gcsplan.planners.optimal.plane_search import PlaneSearch
+from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.optimal.sources import bound_corridor
 from gcsplan.planners.problem import Via
 from gcsplan.world.path import Path
@@ -91,3 +93,17 @@ def test_the_nearest_place_of_a_track_is_as_near_as_any(some: list[tuple[float, 
         assert far <= np.hypot(*(dense - place).T).min() + 1e-6
         there = [np.interp(at, s, line[:, k]) for k in range(2)]
         assert math.dist(there, place) == pytest.approx(far, abs=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("seed", "name", "most_m"),
+    [(301, "main 301/02, 40 zones", 11_690.0), (302, "main 302/05, 40 zones", 15_260.0)],
+)
+def test_slits_beside_zones_above_ground_are_found(seed: int, name: str, most_m: float) -> None:
+    """Without them the paths are 13,330 and 15,639 m long: slits of some metres on slopes, between zones."""
+    (problem,) = (found.problem for found in problems("main", seed, errors=True) if found.name == name)
+    solution = plan(problem)
+    assert faults(problem, solution.path) == []
+    assert solution.lower_bound is not None
+    assert solution.lower_bound < solution.path.length_m < most_m
