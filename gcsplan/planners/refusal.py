@@ -117,10 +117,10 @@ def _shut_by(problem: Problem, place: tuple[float, float], low: float, high: flo
     air, limits, here, found = problem.airspace, problem.limits, np.array([place]), []
     for zone in air.zones:
         bottom, top, *over_ground = levels_of(limits, zone).tolist()
-        reach = 0.0 if any(over_ground) else air.beside_m(limits)
-        if not near_zone(here, here, zone, reach, air.scale if reach > 0.0 else 1.0)[0]:
+        reach, scale = (0.0, 1.0) if zone.follows_ground else (air.beside_m(limits), air.scale)
+        if not near_zone(here, here, zone, reach, scale)[0]:
             continue
-        ground = float(air.surface.ground_at(*place)) if any(over_ground) else 0.0
+        ground = float(air.surface.ground_at(*place)) if zone.follows_ground else 0.0
         # Over unknown ground, a zone's floor or ceiling AGL cannot be evaluated, so the zone has no open side there.
         if over_ground[0]:
             bottom = -math.inf if math.isnan(ground) else bottom + ground

@@ -51,6 +51,11 @@ class Zone:
     ceiling: Level | None = None
 
     @property
+    def follows_ground(self) -> bool:
+        """Whether the floor or the ceiling is above ground (AGL)."""
+        return any(level is not None and level.datum == "agl" for level in (self.floor, self.ceiling))
+
+    @property
     def bounds(self) -> tuple[float, float, float, float]:
         """West, south, east, north of the shape, metres."""
         s = self.shape

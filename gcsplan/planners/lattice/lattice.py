@@ -17,7 +17,7 @@ from gcsplan.arrays import Bools, Floats, Int64s
 from gcsplan.planners.problem import ENDS_M, Problem, terminals_of
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
-from gcsplan.world.zones import Circle, Level, Zone
+from gcsplan.world.zones import Circle, Zone
 
 STEPS = np.array([(1, 0), (0, 1), (1, 1), (-1, 1), (2, 1), (1, 2), (-1, 2), (-2, 1)], dtype=np.int64)
 """Half of the 16 directions, in nodes (east, north); edge ``node * 8 + k`` goes from ``node`` by ``STEPS[k]``."""
@@ -102,7 +102,7 @@ def _ground_of_zones(problem: Problem, x: Floats, y: Floats, wanted: Bools, besi
     """Ground altitude where ``wanted`` and within ``beside_m`` of the box of a zone with a level AGL; 0 elsewhere."""
     asked = np.zeros(wanted.shape, np.bool_)
     for zone in problem.airspace.zones:
-        if any(isinstance(level, Level) and level.datum == "agl" for level in (zone.floor, zone.ceiling)):
+        if zone.follows_ground:
             w, s, e, n = zone.bounds
             cols = slice(*np.searchsorted(x, (w - beside_m, e + beside_m)))
             rows = slice(*np.searchsorted(y, (s - beside_m, n + beside_m)))

@@ -139,11 +139,13 @@ def settle(
                 tube.floor_m[k] = np.maximum(tube.floor_m[k], z + apart_m)
             elif v.kind == "max_agl":
                 tube.ceiling_m[k] = np.minimum(tube.ceiling_m[k], z - apart_m)
-            elif not sum(of.correct(flown.profile, s[leg], s[leg + 1]) for of in levels if of.band.zone == v.zone):
-                place = np.array([v.east_m, v.north_m])
-                return refused(
-                    place, math.inf if v.kind == "coverage" else v.by, "zone" if v.zone >= 0 else "pinched", 0.0, v.zone
-                )
+            else:
+                own = [of for of in levels if of.band.zone == v.zone]
+                corrected = [of.correct(flown.profile, s[leg], s[leg + 1]) for of in own]
+                if not any(corrected):
+                    by = math.inf if v.kind == "coverage" else v.by
+                    kind: Literal["zone", "pinched"] = "zone" if v.zone >= 0 else "pinched"
+                    return refused(np.array([v.east_m, v.north_m]), by, kind, 0.0, v.zone)
     assert worst is not None
     return refused(np.array([worst.east_m, worst.north_m]), worst.by, "pinched", 0.0, -1)
 

@@ -29,8 +29,7 @@ check, which tells no height. Each further correction is as much as all before."
 def follow_ground(problem: Problem, track: Track) -> bool:
     """Whether a zone along a track has a level above ground (AGL): its band there is wider than what the exact check
     shuts."""
-    zones = (problem.airspace.zones[band.zone] for band in track.tube.bands)
-    return any(level is not None and level.datum == "agl" for zone in zones for level in (zone.floor, zone.ceiling))
+    return any(problem.airspace.zones[band.zone].follows_ground for band in track.tube.bands)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -49,8 +48,7 @@ class ZoneLevels:
     def of(cls, problem: Problem, track: Track, band: Band) -> ZoneLevels:
         """A band's levels at samples no farther than `SAMPLE_M` apart; the band as it is if they are AMSL."""
         air, zone = problem.airspace, problem.airspace.zones[band.zone]
-        levels = zone.floor, zone.ceiling
-        if not any(level is not None and level.datum == "agl" for level in levels):
+        if not zone.follows_ground:
             return cls(band, np.stack([band.bottom_m, band.top_m]), np.full(len(band.bottom_m), math.inf))
         parts = max(1, math.ceil((band.s1_m - band.s0_m) / SAMPLE_M))
         s = np.unique(np.concatenate([band.s_m, np.linspace(band.s0_m, band.s1_m, parts + 1)]))
@@ -58,7 +56,8 @@ class ZoneLevels:
         places = np.stack([np.interp(s, track.s_m, track.points[:, k]) for k in range(2)], axis=-1)
         ground = own_ground(air.surface, zone, places, air.beside_m(problem.limits))
         most, found = [], []
-        for k, (level, tubes, spare_m) in enumerate(zip(levels, (band.bottom_m, band.top_m), (-1.0, 1.0), strict=True)):
+        sides = (zone.floor, band.bottom_m, -1.0), (zone.ceiling, band.top_m, 1.0)
+        for k, (level, tubes, spare_m) in enumerate(sides):
             whole = values_at(s, band.s_m, tubes, k == 1)
             here = whole
             if level is not None and level.datum == "agl":

@@ -105,7 +105,7 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
         rows = np.zeros((len(found) + len(pairs), NUMBERS))
         forms: list[Floats] = []
         for k, (row, (_, zone, part)) in enumerate(zip(rows, found, strict=False)):
-            grow = (0.0 if moved[k] == 0.0 and _follows(zone) else reach) + sign * off_m
+            grow = (0.0 if moved[k] == 0.0 and zone.follows_ground else reach) + sign * off_m
             row[[BOTTOM, TOP, OWN_BOTTOM, OWN_TOP]] = -np.inf, np.inf, -np.inf, np.inf
             row[LOOKS] = sign < 0.0 and moved[k] > 0.0
             row[THIN] = 2.0 * (limits.altitude_error_m - off_m) if sign < 0.0 else -np.inf
@@ -153,15 +153,10 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
     return Shapes(both[0], both[1], boxes, owner, int(size.sum()), int(size[both[0][0][:, LOOKS] > 0.0].sum()))
 
 
-def _follows(zone: Zone) -> bool:
-    """Whether the floor or the ceiling of a zone follows the ground (AGL)."""
-    return any(level is not None and level.datum == "agl" for level in (zone.floor, zone.ceiling))
-
-
 def _rise(problem: Problem, zone: Zone, reach: float, box: tuple[float, float, float, float]) -> float:
     """Metres by which the ground under a zone may differ from the ground at a place within reach, at most; 0 if neither
     floor nor ceiling follows the ground."""
-    if reach <= 0.0 or not _follows(zone):
+    if reach <= 0.0 or not zone.follows_ground:
         return 0.0
     surface = problem.airspace.surface
     west, south = (max(a, b) - reach for a, b in zip(zone.bounds[:2], box[:2], strict=True))

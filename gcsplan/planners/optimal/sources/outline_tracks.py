@@ -20,7 +20,6 @@ from gcsplan.planners.optimal.navmesh.outlines import Outline, Solids
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.sources.detours import Choice, DetourSearch
 from gcsplan.planners.problem import Problem, terminals_of
-from gcsplan.world.zones import Zone
 
 TRACKS = 24
 """Most tracks that are tried."""
@@ -103,7 +102,9 @@ class OutlineTracks:
             air, limits = self.problem.airspace, self.problem.limits
             reach_m, wider_m = air.beside_m(limits), air.beside_over_ground_m(limits) if outer else 0.0
             hair_m = [HAIR_M if air.surface.grid.error_m == 0.0 else HAIR_BENT_M] * len(air.zones)
-            hair_m = [h + max(wider_m - reach_m, 0.0) * _over_ground(z) for h, z in zip(hair_m, air.zones, strict=True)]
+            hair_m = [
+                h + max(wider_m - reach_m, 0.0) * z.follows_ground for h, z in zip(hair_m, air.zones, strict=True)
+            ]
             solids = Solids(air.zones, reach_m, air.scale, hair_m, self.incumbent.budget, outer=outer)
             for hint in self._hints:
                 solids.look_along(hint, which)
@@ -126,7 +127,7 @@ def _sides(problem: Problem) -> tuple[Bools, Floats]:
     """(zones,) which zones can perhaps be passed under at some place, and the least altitude AMSL over each, inf over
     those without a top."""
     limits, surface, zones = problem.limits, problem.airspace.surface, problem.airspace.zones
-    high = float(np.nanmax(surface.ground_m)) if any(_over_ground(z) for z in zones) else 0.0
+    high = float(np.nanmax(surface.ground_m)) if any(z.follows_ground for z in zones) else 0.0
     low = float(np.nanmin(surface.ground_m))
     lowest = limits.min_agl_m + limits.altitude_error_m
     under, tops_m = np.zeros(len(zones), np.bool_), np.full(len(zones), math.inf)
@@ -139,7 +140,3 @@ def _sides(problem: Problem) -> tuple[Bools, Floats]:
         if zone.ceiling is not None:
             tops_m[k] = zone.ceiling.value_m + limits.altitude_error_m + (low if zone.ceiling.datum == "agl" else 0.0)
     return under, tops_m
-
-
-def _over_ground(zone: Zone) -> bool:
-    return any(level is not None and level.datum == "agl" for level in (zone.floor, zone.ceiling))
