@@ -7,17 +7,18 @@ That shuts nodes, so tracks get longer and leave less length to climb with, and 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from itertools import combinations, product
 
 import numpy as np
 
-from gcsplan.arrays import Bools, Floats, Int8s, Int32s
+from gcsplan.arrays import Bools, Floats, Indices, Int8s, Int32s
 from gcsplan.planners.optimal.navmesh.buffers import Scratch
 from gcsplan.planners.optimal.navmesh.clearance_kernels import fill
 from gcsplan.planners.optimal.navmesh.climb_cones import hold_down, lift_lids, look_around, walk_around
 from gcsplan.planners.optimal.navmesh.grid import Plane, box_of
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
-from gcsplan.planners.optimal.navmesh.mesh_kernels import WALL, make_pieces, make_portals, sort_portals
+from gcsplan.planners.optimal.navmesh.mesh_kernels import NEXT, WALL, make_pieces, make_portals, sort_portals
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.navmesh.shut_kernels import stamp_beside
 from gcsplan.planners.optimal.navmesh.zone_kernels import stamp_zones
@@ -32,8 +33,8 @@ RIM = 12.0
 """Depth, in cells, to which a zone is looked at that may be too high to climb over so near an end."""
 ALIKE = 12.0
 """A bound's floors make use of the track error only if a cell's diagonal is less than this many times the error."""
-BORDER_HAIR_M, SHUT_M = 0.1, 1e6
-"""Metres by which less than the demanded distance from a border is shut, and by which shut nodes exceed the cap."""
+BORDER_HAIR_M = 0.1
+"""Metres by which less than the demanded distance from a border is shut for bounds, and more for paths."""
 LEARN_M, LEARN_SPARE_M, LEARN_HAIR_M = 2.0, 0.03, 0.05
 """Longest step, m, at which `learn` checks a track; metres that must be free there; metres by which nodes are raised
 above what was missing."""
@@ -109,8 +110,6 @@ class ClearanceGrid:
             np.array(ends or []).reshape(-1, 4), low, self._around, self._excess, self._floor, self._ground, self._x,
             self._y, self._diagonal,
         )  # fmt: skip
-        if low:
-            self._shut_border()
         if exact_m is not None:
             self._be_exact()
         self._zones, self._edges = plane.zones(low, under, over)
@@ -118,34 +117,53 @@ class ClearanceGrid:
         self._coarse, self._steep, self._exact_m = (ground, x, y), steep, exact_m
         self._up, self._down = (self._array(name, self.shape) for name in ("up", "down"))
         self._of = self._array("of", (self._diagonal.size,), np.int32)
-        self._values = np.empty((1 + (plane.shapes.cells + low * plane.shapes.looking) * fineness**2, WALL))
+        self._border = list(self._border_walls())
+        walls = (plane.shapes.cells + low * plane.shapes.looking) * fineness**2 + sum(len(k) for k, _ in self._border)
+        self._values = np.empty((1 + walls, WALL))
         self._laid = False
         self._held: list[Cone] = []
         self._lift: Floats
         self._either: Int8s
 
-    def _shut_border(self) -> None:
-        """Shut the cells along the terrain's own borders that lie wholly within the distance in which the exact check
-        demands known ground: no legal track meets them."""
+    def _border_walls(self) -> Iterator[tuple[Indices, Floats]]:
+        """For each border of the terrain, the cells (K,) nearer to it than ground must be known, and the excess (K, 4)
+        of walls at their corners that stand as far in: no legal track crosses them.
+
+        For bounds, a border beyond which there is more terrain has none.
+        """
         plane, limits = self.plane, self.plane.problem.limits
         surface = plane.problem.airspace.surface
         rows, cols = surface.ground_m.shape
-        reach_m = limits.horizontal_clearance_m + limits.track_error_m - plane.fit.bent_m - BORDER_HAIR_M
-        if reach_m <= 0.0 or all(surface.goes_on):
-            return
         corners = [(plane.x[j, i], plane.y[j, i]) for j in (0, -1) for i in (0, -1)]
-        east_m, north_m = 1.01 * np.max([surface.grid.metres_per_cell(*at) for at in corners], axis=0)
+        cell_m = np.array([surface.grid.metres_per_cell(*at) for at in corners])
+        hair_m = plane.fit.bent_m + BORDER_HAIR_M
+        if self.low:
+            reach_m = limits.horizontal_clearance_m + limits.track_error_m - hair_m
+            east_m, north_m = 1.01 * cell_m.max(axis=0)
+        else:
+            reach_m = plane.problem.airspace.beside_m(limits) + hair_m
+            east_m, north_m = 0.99 * cell_m.min(axis=0)
         step = plane.stride / (plane.parts * self.fineness)  # all that follows is in cells of the terrain model
         col = plane.col0 + step * (self.col * self.fineness + np.arange(self.shape[1]))
         row = plane.row1 - step * (self.row * self.fineness + np.arange(self.shape[0]))
-        within = [
-            (away + step) * cell_m <= reach_m
-            for away, cell_m in ((col, east_m), (row, north_m), (cols - 1 - col, east_m), (rows - 1 - row, north_m))
-        ]
-        west, north, east, south = (np.flatnonzero(w & ~on) for w, on in zip(within, surface.goes_on, strict=True))
-        for part in (np.s_[:, west], np.s_[north], np.s_[:, east], np.s_[south]):
-            excess = self._excess[part]
-            self._excess[part] = np.where(np.isfinite(excess), SHUT_M, excess)
+        away_m = east_m * col, north_m * row, east_m * (cols - 1 - col), north_m * (rows - 1 - row)
+        first, last = self._span.T
+        for side, more in enumerate(surface.goes_on):
+            wall = reach_m - away_m[side]
+            near = np.maximum(wall[:-1], wall[1:]) > 0.0
+            if (self.low and more) or not near.any():
+                continue
+            if side % 2 == 0:
+                k = np.flatnonzero(near)
+                j, i = np.nonzero((first[:, None] <= k) & (k < last[:, None]))
+                i = k[i]
+                at = np.stack([i, i + 1, i + 1, i], axis=-1)
+            else:
+                k, i = np.flatnonzero(near), np.arange(self.shape[1] - 1)
+                j, i = np.nonzero((first[k, None] <= i) & (i < last[k, None]))
+                j = k[j]
+                at = np.stack([j, j, j + 1, j + 1], axis=-1)
+            yield j * (self.shape[1] - 1) + i, wall[at]
 
     def _be_exact(self) -> None:
         """Set the floors of the nodes that are looked at to those of the exact check."""
@@ -282,10 +300,15 @@ class ClearanceGrid:
             self._y, self._zones, self._edges, self._boxes, self.low, self._of, self._values,
         )  # fmt: skip
         if self.low and self.plane.stride == 1:
-            stamp_beside(
+            count = stamp_beside(
                 self._span, self._excess, self._floor, *self._coarse, self.fineness, self._zones, self._edges,
                 self._boxes, reach_m, near_m, np.empty((8, 4)), self._of, self._values, count,
             )  # fmt: skip
+        for cells, walls in self._border:
+            own = self._values[count : count + len(cells)]
+            own[:, :NEXT], own[:, NEXT] = walls, self._of[cells]
+            self._of[cells] = np.arange(count + 1, count + 1 + len(cells))
+            count += len(cells)
         self._laid = True
 
 

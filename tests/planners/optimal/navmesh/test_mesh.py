@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -205,7 +206,7 @@ def test_ways_in_the_mesh_for_paths_pass_the_exact_check(world: str, limits: str
         for fineness in (1, 4):
             mesh = mesh_of(plane, cap, False, fineness)
             found = [np.zeros((0, 2))]
-            for a, b in zip(places[:24:2], places[1:24:2], strict=True):
+            for a, b in zip(places[:32:2], places[1:32:2], strict=True):
                 way = mesh.track((float(a[0]), float(a[1])), (float(b[0]), float(b[1])))
                 if way is not None:
                     # The ends may lie in the blocked part of a triangle that is partly free.
@@ -411,11 +412,18 @@ def test_no_track_runs_nearer_to_the_terrains_border_than_ground_must_be_known(
     places = surface.grid.to_plane(at[:, 0], at[:, 1])
     high = np.column_stack([places, np.full(len(places), 300.0)])
     legal = problem.airspace.clear(Legs.between(high, high + np.array([LEG_M, 0.0, 0.0]), limits), limits)
-    for fineness in (1, 4):
-        mesh = mesh_of(plane, 300.0, True, fineness)
+    corners = surface.grid.to_plane(np.array([0.0, 20.0, 20.0, 0.0]), np.array([0.0, 0.0, 20.0, 20.0]))
+    sides = [shapely.LineString([corners[k], corners[k - 1]]) for k in range(4)]  # west, north, east, south
+    for fineness, low in product((1, 3, 4), (True, False)):
+        mesh = mesh_of(plane, 300.0, low, fineness)
+        ends = shapely.points(mesh.ends.reshape(-1, 2))  # of the portals: tracks meet nothing nearer to a border
+        nearest_m = [shapely.distance(side, ends).min() for side in sides]
+        if not low:
+            assert shear or min(nearest_m) >= 65.0
+            continue
         free = np.array([bool(mesh.pieces_at((float(e), float(n)))) for e, n in places])
         assert not (legal & ~free).any()
-        if fineness == 4 and not any(goes_on):
-            assert (free & ~legal).sum() < 0.5 * (~legal).sum()
+        for least_m, more in zip(nearest_m, goes_on, strict=True):
+            assert more or shear or 63.0 <= least_m <= 65.0
         if all(goes_on):
             assert free.all()
