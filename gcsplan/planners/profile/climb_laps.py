@@ -35,12 +35,13 @@ ROUNDS = 6
 TRIED, LOOKED_AT, FORGIVEN = 12, 9, 0.1
 """For one piece that is too steep: most laps over which a profile is drawn; points of each lap at which the floor is
 read first; and by how much the floor may be too high there, as a part of the missing height."""
-GENTLER = (1.0, 0.98, 0.94)
-"""Parts of the climb limit that laps are planned with, in turn: with the full limit the exact check may still fail."""
+TIGHT, SPARE = 1.0 + 1e-5, 1.02
+"""Lengths of laps, as multiples of the length that the height needs: on open ground, and where floors are rough."""
+LONGER = ((1.0, TIGHT), (1.0, SPARE), (0.98, SPARE), (0.94, SPARE))
+"""Parts of the climb limit that laps are planned with, and their lengths, in turn: the exact check may refuse shorter
+ones."""
 FAR_M = 1e6
 """An altitude above everything."""
-SPARE = 1.02
-"""Length of laps, as a multiple of the length that the height needs."""
 
 
 def climb_tracks(problem: Problem, place: tuple[float, float], from_amsl: float, to_amsl: float) -> Floats | None:
@@ -148,11 +149,13 @@ def pins_of(problem: Problem, points: Floats) -> tuple[Bools, Floats]:
     return pinned, pin_m
 
 
-def extend(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> tuple[Track, Flown] | None:
+def extend(
+    problem: Problem, points: Floats, pinned: Bools, pin_m: Floats, length: float = SPARE
+) -> tuple[Track, Flown] | None:
     """Insert laps into a track (N, 2) where its profile is too steep; return track and profile, None if no laps help.
 
-    ``pinned`` (N,) vertices that stay, ``pin_m`` (N,) their altitudes (NaN: free), as in `Track`. A track that needs no
-    laps is returned without any.
+    ``pinned`` (N,) vertices that stay, ``pin_m`` (N,) their altitudes (NaN: free), as in `Track`. ``length``: that of
+    laps, as a multiple of what the height needs. A track that needs no laps is returned without any.
     """
     track = sampled_track(problem, points, pinned, pin_m)
     lack = lacking(problem, track)
@@ -162,7 +165,7 @@ def extend(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> tu
         if not lack.steep:
             flown = fly(problem, track)
             return (track, flown) if isinstance(flown, Flown) else None
-        better = _lengthened(problem, track, lack)
+        better = _lengthened(problem, track, lack, length)
         if better is None:
             return None
         track, lack = better
@@ -179,19 +182,19 @@ def with_laps(
     """Way points (M, 3) over a track (N, 2) with laps where it is too steep, and (M,) whether they must stay.
 
     ``exact`` makes way points of a track and its profile, or returns None if the exact check refuses them; then longer
-    laps are tried (`GENTLER`). None if no laps help.
+    laps are tried (`LONGER`). None if no laps help.
     """
     limits = problem.limits
-    for part in GENTLER:
+    for part, length in LONGER:
         gentler = replace(
             limits, max_climb_deg=part * limits.max_climb_deg, max_descent_deg=part * limits.max_descent_deg
         )
-        longer = extend(replace(problem, limits=gentler), points, pinned, pin_m)
-        if longer is None:
-            return None
-        found = exact(*longer)
+        longer = extend(replace(problem, limits=gentler), points, pinned, pin_m, length)
+        found = None if longer is None else exact(*longer)
         if found is not None:
             return found
+        if longer is None and length == SPARE:
+            break
     return None
 
 
@@ -219,15 +222,15 @@ def climb_needed_deg(problem: Problem, track: Track) -> float | None:
     return math.ceil(10.0 * high - 1e-9) / 10.0
 
 
-def _lengthened(problem: Problem, track: Track, lack: Lacking) -> tuple[Track, Lacking] | None:
+def _lengthened(problem: Problem, track: Track, lack: Lacking, length: float) -> tuple[Track, Lacking] | None:
     """Insert laps along the piece that lacks most height: the first that are enough, otherwise those that help most.
 
-    Return the longer track and what it still lacks; None if no laps help.
+    ``length``: see `extend`. Return the longer track and what it still lacks; None if no laps help.
     """
     why, limits = lack.steep[0], problem.limits
     needed = why.by / (limits.max_climb_slope if why.kind == "climb" else limits.max_descent_slope)
     best: tuple[Track, Lacking] | None = None
-    for detour in _promising(problem, track, lack, SPARE * needed + 1.0):
+    for detour in _promising(problem, track, lack, length * needed):
         tried = _with_detour(problem, track, detour)
         left = lacking(problem, tried)
         if isinstance(left, Closed):

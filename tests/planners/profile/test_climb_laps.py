@@ -26,14 +26,14 @@ def problem_of(start: tuple[float, float, float], goal: tuple[float, float, floa
 @pytest.mark.parametrize("at_start", [False, True])
 def test_a_via_right_before_a_steep_end_is_passed(via_m: float | None, apart_m: float, at_start: bool) -> None:
     """A bend from the via to the goal moved the via's pin to the goal: the path left the via out, cheaper than its
-    bound."""
+    bound. On open ground such a bend is as long as the climb needs, and no longer."""
     ends = (-400.0, -100.0, 30.0), (apart_m, 0.0, 20.0)
     via = Via(0.0, 0.0, via_m), Via(-200.0, 0.0, None)
     problem = problem_of(ends[1], ends[0], *via) if at_start else problem_of(*ends, *via[::-1])
     found = plan(problem)
     assert passes_vias(problem, found.path.points)
     assert found.lower_bound is not None
-    assert problem.cost(found.path) >= found.lower_bound * (1.0 - 1e-9)
+    assert 1.0 - 1e-9 <= problem.cost(found.path) / found.lower_bound <= 1.0 + 1e-5
 
 
 def test_a_path_that_leaves_a_via_out_is_not_taken() -> None:
