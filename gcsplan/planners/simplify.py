@@ -17,6 +17,8 @@ PARTS = np.array([1.0, 0.5, 0.22, 0.1, 0.04, 0.015])
 """How far a point is moved towards the line between its neighbours, as parts of the distance to that line."""
 ROUNDS = 24
 """Most rounds of moves; each round moves the points of odd and then of even index."""
+SHARE = 0.3
+"""Part of the counted work left that the moves of one path may take: legs along a zone over a slope take long."""
 LITTLE = 2e-6
 """A round that gains at most this part of the cost is the last."""
 
@@ -27,10 +29,12 @@ OPEN, LEGAL, SHUT = 0, 1, 2
 def polished(problem: Problem, points: Floats, pinned: Bools) -> tuple[Floats, Bools]:
     """Move free points towards the lines between their neighbours as far as is legal: in space, in the plane alone, or
     in altitude alone. Returns the points (N, 3) and ``pinned`` (N,), which of them are terminals, unchanged."""
-    cost = _cost(problem, points)
+    cost, in_time = _cost(problem, points), problem.budget.share(SHARE)
     points = points.copy()
     still = np.zeros(len(points), np.bool_)
     for k in range(2 * ROUNDS):
+        if not in_time():
+            break
         _move(problem, points, pinned, still, k % 2)
         if k % 2:
             now = _cost(problem, points)

@@ -189,7 +189,7 @@ def judge(
                 if gap > 0.0 and gap >= best and gap >= reach:
                     continue
             broken, dist, at = meets(
-                m, ground, zone, zs.vertex, k, e0, n0, h0, e1, n1, h1, altitude[i], reach, stack, events, full
+                m, ground, zone, zs.vertex, k, e0, n0, h0, e1, n1, h1, altitude[i], reach, stack, events, full, out
             )
             if broken:
                 fine = False

@@ -18,6 +18,8 @@ ANGLE_DEG = 1e-7
 RESOLUTION_M = 0.005
 """Height, m, to which branch and bound resolves what lies within reach; cases that are closer are refused."""
 
+CUT = 11
+"""Index in `judge`'s work array ``out`` of the pieces of ground cut so far, of all legs."""
 BOW_M = 0.05
 """A leg is mapped to the grid in parts whose plane-straight and grid-straight lines differ by at most this, m."""
 

@@ -16,7 +16,7 @@ import math
 
 from gcsplan.arrays import Floats, Singles
 from gcsplan.world._compiled import device
-from gcsplan.world._shared import BEND, BOW_M, ERROR_M, TOUCH_M
+from gcsplan.world._shared import BEND, BOW_M, CUT, ERROR_M, TOUCH_M
 from gcsplan.world._sweep import parts_of, slab, to_grid
 from gcsplan.world._sweep_beside import bar_above, beside_point, deepest, unknown_near
 
@@ -26,7 +26,6 @@ GROUP_M, GROUP_BOW_M = 500.0, 0.003  # longest stretch, m, and its bow, that the
 
 # Indices of `sweep`'s results in ``out``.
 LOW, LOW_AT, DEPTH, DEPTH_AT, UNKNOWN, UNKNOWN_AT, STEEPEST, REACH = range(8)
-CUT = 11  # pieces cut by the second tier so far, of all legs
 
 
 @device

@@ -19,6 +19,7 @@ from gcsplan.world._shared import (
     CEILING_AGL,
     COL0,
     COL1,
+    CUT,
     EAST,
     EAST_E,
     ERROR_M,
@@ -160,12 +161,13 @@ def at_heights(h0: float, dh: float, floor_m: float, ceiling_m: float, altitude_
 @device
 def nearest_conflict(
     m: Floats, z: Floats, zone: Floats, vertex: Floats, k: int, e0: float, n0: float, h0: float, e1: float, n1: float,
-    h1: float, altitude_m: float, cutoff: float, stack: Floats, full: bool,
+    h1: float, altitude_m: float, cutoff: float, stack: Floats, full: bool, out: Floats,
 ) -> tuple[float, float]:  # fmt: skip
     """Least distance from a short segment to a point of a zone's shape where it meets the zone's heights, and where.
 
     Only distances below ``cutoff`` are found, else inf. Over unknown ground the zone is met at any height. Without
-    ``full`` the first one found ends the search; with it the least is resolved to 1 cm or a hundredth.
+    ``full`` the first one found ends the search; with it the least is resolved to 1 cm or a hundredth. ``out[CUT]``
+    counts the pieces of ground that are cut.
     """
     rows, cols = z.shape
     dh = h1 - h0
@@ -247,6 +249,7 @@ def nearest_conflict(
                     wide, tall = (u1 - u0) * sx, (v1 - v0) * sy
                     across = math.hypot(wide, tall)
                     worked += 1
+                    out[CUT] += 1.0
                     if (
                         (across <= ACROSS_M and stack[size, 6] + rise * across <= RESOLUTION_M)
                         or across <= SMALLEST_M
@@ -303,7 +306,7 @@ def glimpsed(
 @inlined
 def meets(
     m: Floats, z: Floats, zone: Floats, vertex: Floats, k: int, e0: float, n0: float, h0: float, e1: float, n1: float,
-    h1: float, altitude_m: float, reach: float, stack: Floats, events: Floats, full: bool,
+    h1: float, altitude_m: float, reach: float, stack: Floats, events: Floats, full: bool, out: Floats,
 ) -> tuple[bool, float, float]:  # fmt: skip
     """Whether a leg breaks a zone; its signed distance from the shape at the worst point, and where on the leg.
 
@@ -340,7 +343,7 @@ def meets(
             ta, tb = t0 + (t1 - t0) * p / parts, t0 + (t1 - t0) * (p + 1) / parts
             d, w = nearest_conflict(
                 m, z, zone, vertex, k, e0 + ta * de, n0 + ta * dn, h0 + ta * (h1 - h0),
-                e0 + tb * de, n0 + tb * dn, h0 + tb * (h1 - h0), altitude_m, min(cutoff, best), stack, full,
+                e0 + tb * de, n0 + tb * dn, h0 + tb * (h1 - h0), altitude_m, min(cutoff, best), stack, full, out,
             )  # fmt: skip
             if d < best:
                 best, at = d, ta + w * (tb - ta)

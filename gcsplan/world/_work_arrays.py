@@ -8,7 +8,7 @@ import numpy as np
 
 from gcsplan.native.form import Held
 from gcsplan.world._compiled import WORK
-from gcsplan.world._sweep_terrain import CUT
+from gcsplan.world._shared import CUT
 
 
 class WorkArrays(threading.local):
