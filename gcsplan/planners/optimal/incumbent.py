@@ -76,8 +76,8 @@ class Incumbent:
         flown = fly(self.problem, track)
         if isinstance(flown, Flown) and (found := self.exact(track, flown)) is not None:
             return self.take_simpler(*found, fine=fine, longer=False)
-        found = with_laps(self.problem, *terminals, self.exact)
-        return found is not None and self.take_simpler(*found, fine=fine, longer=True)
+        laps = with_laps(self.problem, *terminals, self.exact)
+        return sum(self.take_simpler(*path, fine=fine, longer=True) for path in laps) > 0
 
     def exact(self, track: Track, flown: Flown | Obstruction) -> tuple[Floats, Bools] | None:
         """Way points over a track that pass the exact check, and which must stay: of the profile ``flown``, or else of

@@ -35,11 +35,11 @@ ROUNDS = 6
 TRIED, LOOKED_AT, FORGIVEN = 12, 9, 0.1
 """For one piece that is too steep: most laps over which a profile is drawn; points of each lap at which the floor is
 read first; and by how much the floor may be too high there, as a part of the missing height."""
-TIGHT, SPARE = 1.0 + 1e-5, 1.02
-"""Lengths of laps, as multiples of the length that the height needs: on open ground, and where floors are rough."""
-LONGER = ((1.0, TIGHT), (1.0, SPARE), (0.98, SPARE), (0.94, SPARE))
-"""Parts of the climb limit that laps are planned with, and their lengths, in turn: the exact check may refuse shorter
-ones."""
+GENTLER = (1.0, 0.98, 0.94)
+"""Parts of the climb limit that laps are planned with, in turn: with the full limit the exact check may still fail."""
+TIGHT, SPARE = (1.0 + 1e-5, 0.0), (1.02, 1.0)
+"""Length of laps, as a multiple of the length that the height needs, and metres more: as short as open ground allows,
+and what rough ground may need, where there is also more to be drawn together."""
 FAR_M = 1e6
 """An altitude above everything."""
 
@@ -54,7 +54,7 @@ def climb_tracks(problem: Problem, place: tuple[float, float], from_amsl: float,
     up = to_amsl > from_amsl
     slope = problem.limits.max_climb_slope if up else problem.limits.max_descent_slope
     # With a limit steeper than 45 degrees, or none, laps still climb at 45 degrees.
-    length = SPARE * abs(to_amsl - from_amsl) / min(slope, 1.0)
+    length = SPARE[0] * abs(to_amsl - from_amsl) / min(slope, 1.0)
     part = replace(problem, start=(*place, from_amsl), goal=(*place, to_amsl), via=())
     judge = Judge(problem)
     for one, count in laps(problem, length, None):
@@ -150,12 +150,12 @@ def pins_of(problem: Problem, points: Floats) -> tuple[Bools, Floats]:
 
 
 def extend(
-    problem: Problem, points: Floats, pinned: Bools, pin_m: Floats, length: float = SPARE
+    problem: Problem, points: Floats, pinned: Bools, pin_m: Floats, length: tuple[float, float] = SPARE
 ) -> tuple[Track, Flown] | None:
     """Insert laps into a track (N, 2) where its profile is too steep; return track and profile, None if no laps help.
 
     ``pinned`` (N,) vertices that stay, ``pin_m`` (N,) their altitudes (NaN: free), as in `Track`. ``length``: that of
-    laps, as a multiple of what the height needs. A track that needs no laps is returned without any.
+    laps, see `SPARE`. A track that needs no laps is returned without any.
     """
     track = sampled_track(problem, points, pinned, pin_m)
     lack = lacking(problem, track)
@@ -178,24 +178,24 @@ def with_laps(
     pinned: Bools,
     pin_m: Floats,
     exact: Callable[[Track, Flown], tuple[Floats, Bools] | None],
-) -> tuple[Floats, Bools] | None:
-    """Way points (M, 3) over a track (N, 2) with laps where it is too steep, and (M,) whether they must stay.
+) -> list[tuple[Floats, Bools]]:
+    """Paths over a track (N, 2) with laps where it is too steep: way points (M, 3), and (M,) whether they must stay.
 
     ``exact`` makes way points of a track and its profile, or returns None if the exact check refuses them; then longer
-    laps are tried (`LONGER`). None if no laps help.
+    laps are tried. At most two paths; none if no laps help.
     """
     limits = problem.limits
-    for part, length in LONGER:
-        gentler = replace(
-            limits, max_climb_deg=part * limits.max_climb_deg, max_descent_deg=part * limits.max_descent_deg
-        )
-        longer = extend(replace(problem, limits=gentler), points, pinned, pin_m, length)
-        found = None if longer is None else exact(*longer)
-        if found is not None:
-            return found
-        if longer is None and length == SPARE:
+    found = []
+    for part in GENTLER:
+        climb_deg, descent_deg = part * limits.max_climb_deg, part * limits.max_descent_deg
+        gentler = replace(problem, limits=replace(limits, max_climb_deg=climb_deg, max_descent_deg=descent_deg))
+        for length in (TIGHT, SPARE) if part == GENTLER[0] else (SPARE,):
+            longer = extend(gentler, points, pinned, pin_m, length)
+            if longer is not None:
+                found.append(exact(*longer))
+        if not found or any(path is not None for path in found):
             break
-    return None
+    return [path for path in found if path is not None]
 
 
 def climb_needed_deg(problem: Problem, track: Track) -> float | None:
@@ -222,7 +222,9 @@ def climb_needed_deg(problem: Problem, track: Track) -> float | None:
     return math.ceil(10.0 * high - 1e-9) / 10.0
 
 
-def _lengthened(problem: Problem, track: Track, lack: Lacking, length: float) -> tuple[Track, Lacking] | None:
+def _lengthened(
+    problem: Problem, track: Track, lack: Lacking, length: tuple[float, float]
+) -> tuple[Track, Lacking] | None:
     """Insert laps along the piece that lacks most height: the first that are enough, otherwise those that help most.
 
     ``length``: see `extend`. Return the longer track and what it still lacks; None if no laps help.
@@ -230,7 +232,7 @@ def _lengthened(problem: Problem, track: Track, lack: Lacking, length: float) ->
     why, limits = lack.steep[0], problem.limits
     needed = why.by / (limits.max_climb_slope if why.kind == "climb" else limits.max_descent_slope)
     best: tuple[Track, Lacking] | None = None
-    for detour in _promising(problem, track, lack, length * needed):
+    for detour in _promising(problem, track, lack, length[0] * needed + length[1]):
         tried = _with_detour(problem, track, detour)
         left = lacking(problem, tried)
         if isinstance(left, Closed):
