@@ -15,7 +15,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.taut_string import Profile
-from gcsplan.planners.profile.track import Track, values_at
+from gcsplan.planners.profile.track import Track, distances, divided, make_track, values_at
 from gcsplan.world.airspace import Band
 from gcsplan.world.own_ground import POINTS, own_ground
 
@@ -61,7 +61,7 @@ class ZoneLevels:
             whole = values_at(s, band.s_m, tubes, k == 1)
             here = whole
             if level is not None and level.datum == "agl":
-                here = ground[k] + level.value_m + spare_m * (problem.limits.altitude_error_m + SPARE_M)
+                here = _filled(s, ground[k]) + level.value_m + spare_m * (problem.limits.altitude_error_m + SPARE_M)
                 here = np.minimum(here, whole) if k == 1 else np.maximum(here, whole)
             most.append(np.stack([whole[:-1], whole[1:]], axis=-1))
             found.append(np.stack([here[:-1], here[1:]], axis=-1))
@@ -84,12 +84,19 @@ class ZoneLevels:
         self.moved[touched] += step_m
         bottom, top = band.bottom_m[touched] - step_m[:, None], band.top_m[touched] + step_m[:, None]
         least, most = self.most[:, touched]
-        # At a zone's rim no sample may have seen ground under it: then nothing less than the tube's level is known.
+        # Where no sample saw ground under the zone, nothing less than the tube's level is known.
         band.bottom_m[touched] = np.where(np.isfinite(bottom), np.maximum(bottom, least), least)
         band.top_m[touched] = np.where(np.isfinite(top), np.minimum(top, most), most)
         ended = (band.bottom_m <= self.most[0]).all(axis=1) & (band.top_m >= self.most[1]).all(axis=1)
         self.moved[ended] = math.inf
         return bool(touched.any())
+
+
+def _filled(s_m: Floats, ground: Floats) -> Floats:
+    """Ground (N,) along a track, where none is known that of the nearest places: at a zone's rim, little of its ground
+    is within reach, and samples may miss that."""
+    known = np.isfinite(ground)
+    return np.asarray(np.interp(s_m, s_m[known], ground[known]) if known.any() else ground)
 
 
 def widest_free(
@@ -113,3 +120,13 @@ def widest_free(
         better = (wide > known) | ((wide == known) & (begin > low))
         low, high = np.where(better, begin, low), np.where(better, end, high)
     return low, high
+
+
+def shut_places(problem: Problem, points: Floats, cap_m: float, step_m: float) -> Floats:
+    """(K, 2) the places of a track (N, 2), ``step_m`` apart at most, over which no altitude is free below a cap."""
+    leg, part, parts = divided(points, step_m)
+    places = np.vstack([points[leg] + (part / parts)[:, None] * (points[leg + 1] - points[leg]), points[-1:]])
+    ends = np.isin(np.arange(len(places)), [0, len(places) - 1])
+    track = make_track(problem, places, ends, np.full(len(places), math.nan))
+    low, high = widest_free(problem, track, distances(places), problem.floors(*places.T), cap_m, 0.0)
+    return np.asarray(places[low > high])

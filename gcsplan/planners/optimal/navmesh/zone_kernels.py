@@ -20,7 +20,7 @@ if one of its zones does. ``ONE``, ``OTHER``: the rows of the zones of a pair. `
 fall within reach anywhere at a zone; 0 where the slopes at nodes tell better (see `BESIDE`)."""
 BESIDE = 2.0
 """Datum of a level over all ground within reach, for paths; 1: over the ground below; 0: AMSL."""
-RINGS, AROUND, RIM = 4, 32, 0.1
+RINGS, AROUND, RIM = 4, 32, 0.01
 """Circles around a node at which ground is read for `BESIDE`, with the node itself, and places on the largest; and the
 part of the reach by which they may lie outside of the zone: at its rim, few places lie within."""
 
@@ -235,8 +235,8 @@ def _look_beside(
     edges: Floats, boxes: Int32s, z: int, own: int, reach: float, more: float, up: Floats, down: Floats,
 ) -> None:  # fmt: skip
     """Set ``up`` and ``down`` at nodes of a zone's box to how far the ground of zone ``own`` within reach rises above,
-    and falls below, the ground there, and ``more``; 0 where none is known. That zone is grown by ``reach``, so its own
-    ground is where it is deeper than that.
+    and falls below, the ground there, and ``more``; 0 where none is known, and -inf where the zone does not reach. That
+    zone is grown by ``reach``, so its own ground is where it is deeper than that.
 
     ``ground``: at the nodes; ``coarse``, ``x``, ``y``: at those of a lattice ``fineness`` times coarser.
     """
@@ -250,6 +250,7 @@ def _look_beside(
             if excess[j, i] == np.inf:
                 continue
             if depth(zones, edges, own, value_at(x, fineness, j, i), value_at(y, fineness, j, i)) <= 0.0:
+                up[j, i] = down[j, i] = -np.inf
                 continue
             most, least = -np.inf, np.inf
             for ring in range(RINGS):

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.planners.optimal.navmesh.clearance import AROUND, _around, mesh_of
+from gcsplan.planners.optimal.navmesh.clearance import AROUND, ClearanceGrid, _around, mesh_of
 from gcsplan.planners.optimal.navmesh.grid import Plane, make_plane
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.zone_shapes import convex_parts
@@ -427,3 +427,25 @@ def test_no_track_runs_nearer_to_the_terrains_border_than_ground_must_be_known(
             assert more or shear or 63.0 <= least_m <= 65.0
         if all(goes_on):
             assert free.all()
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.2, -0.3])
+def test_the_rim_of_a_zone_over_a_slope_is_no_wall_where_the_zone_can_be_passed_over(turn: float) -> None:
+    n = round(SIZE_M / STEP_M) + 1
+    z = np.tile(0.5 * STEP_M * np.arange(n), (n, 1))
+    surface = Surface(z, z, GridMap.affine(0.0, SIZE_M, STEP_M, STEP_M))
+    zone = Zone("lid", Circle(300.0, 300.0, 150.0), None, Level(60.0, "agl"))
+    limits = LIMITS["clearance"]
+    problem = problem_of(surface, [zone], limits)
+    reach_m = problem.airspace.beside_m(limits)
+    ways = np.stack([np.cos(turn), np.sin(turn)]) * np.array([[150.0 + reach_m - 8.0], [150.0 + reach_m + 8.0]])
+    inside, outside = np.array([300.0, 300.0]) + ways
+    # Over the zone's own ground, which lies lower than the ground outside.
+    cap_m = 0.5 * 450.0 + 60.0 + limits.altitude_error_m + 1.5
+    line = np.linspace(inside, outside, 60)
+    assert legal(problem, line, cap_m).all()
+    plane = make_plane(problem, EVERYWHERE, 20)
+    mesh = ClearanceGrid(plane, cap_m, False, 1, None, exact_m=0.0, whole=True).mesh()
+    way = mesh.track((float(inside[0]), float(inside[1])), (float(outside[0]), float(outside[1])))
+    assert way is not None
+    assert way.length_m == pytest.approx(16.0, abs=1e-6)
