@@ -20,6 +20,8 @@ LEAST_M = 1.0
 straight, so smaller cells gain nothing."""
 MOST_FIRST, NODE_BYTES = 1.5e6, 400.0
 """Most nodes of the first-look lattice, and bytes of one with its mesh and a search over it."""
+MUCH = 0.5
+"""A lattice that needs more than this part of the terrain model's nodes is made over all of it."""
 BOX_NODE_BYTES = 50.0
 """Bytes of a node in the box of the finer lattice, whether it is searched or not."""
 
@@ -83,3 +85,19 @@ def fits_memory(problem: Problem, cells: Bools, beside: int, ratio: int) -> bool
     row, col, last_row, last_col = box_of(cells)
     nodes = (last_row - row + 2 * beside) * (last_col - col + 2 * beside) * ratio**2
     return nodes * BOX_NODE_BYTES <= 1e6 * problem.budget.left_mb
+
+
+def box_around(a: tuple[float, float], b: tuple[float, float], detour: float) -> Box:
+    """The box that contains all tracks from ``a`` to ``b`` of at most ``detour`` times the straight track; infinite for
+    inf."""
+    if math.isinf(detour):
+        return -math.inf, -math.inf, math.inf, math.inf
+    (x0, y0), (x1, y1), straight_m = a, b, math.dist(a, b)
+    more = max(0.5 * straight_m * math.sqrt(detour**2 - 1.0), 0.5 * (detour - 1.0) * straight_m) + 1.0
+    return min(x0, x1) - more, min(y0, y1) - more, max(x0, x1) + more, max(y0, y1) + more
+
+
+def needs_most(problem: Problem, box: Box) -> bool:
+    """Whether a lattice over a box needs more than the part `MUCH` of the terrain model's nodes."""
+    col0, row0, col1, row1 = extent(problem, box)
+    return (col1 - col0) * (row1 - row0) > MUCH * problem.airspace.surface.ground_m.size

@@ -15,12 +15,13 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.bounds.altitude_intervals import MOST, SPARE_M, AltitudeIntervals, Reached, Terminal
-from gcsplan.planners.optimal.cells import choose, fits_memory
+from gcsplan.planners.optimal.cells import box_around, choose, fits_memory, needs_most
 from gcsplan.planners.optimal.corridor import Corridor, End, Narrow, Nearby, Spare
 from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid, Cone, mesh_of
 from gcsplan.planners.optimal.navmesh.free_altitudes import intervals, ranges
-from gcsplan.planners.optimal.navmesh.grid import Box, Plane, box_of, extent, finer_plane, make_plane, on_finer
+from gcsplan.planners.optimal.navmesh.grid import Box, Plane, box_of, finer_plane, make_plane, on_finer
 from gcsplan.planners.optimal.navmesh.mesh import Guide, Mesh
+from gcsplan.planners.optimal.navmesh.necks import Looks
 from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundTrack
 from gcsplan.planners.optimal.navmesh.zone_shapes import CLOSE, LOOSE
 from gcsplan.planners.problem import Problem
@@ -28,8 +29,6 @@ from gcsplan.planners.problem import Problem
 DETOURS, LEAST_DETOUR = (1.25, 2.5, math.inf), 1.02
 """Lengths of tracks, in multiples of the straight track, that each lattice holds before it is widened; and the length
 that the narrowest lattice holds."""
-MUCH = 0.5
-"""A lattice that needs more than this part of the terrain model's nodes is made over all of it."""
 MOST_NODES, MOST_BESIDE, LARGE = 16e6, 6e6, 4e6
 """Most nodes of the finest lattice in the box around a corridor: the first number; the second if the terrain model has
 at least `LARGE` nodes, so that the lattice needs no more than half a gigabyte besides it."""
@@ -71,7 +70,8 @@ class Leg:
         self.last_track = np.array([start.place, goal.place])  # of flood or bound
         self._close: Nearby | None = None
         self._reached: tuple[Nearby, Reached] | None = None
-        self.cells_of = choose(problem, start.place, self.straight_m, self._box(DETOURS[0]))
+        self.cells_of = choose(problem, start.place, self.straight_m, self._around(DETOURS[0]))
+        self._looks = Looks(problem, top_m, start.place, goal.place)
         self.closer = 1
         """Parts a side into which the finer lattice's cells are cut once more; see `refine`."""
 
@@ -93,17 +93,22 @@ class Leg:
         limited = math.isfinite(within_m)
         if limited:
             asked = max(within_m / self.straight_m, LEAST_DETOUR) * (1.0 + 1e-9)
-            much = asked > DETOURS[0] and self._is_most(asked)
+            much = asked > DETOURS[0] and needs_most(self.problem, self._around(asked))
             detours = (self._detour if self._detour >= asked else math.inf if much else asked,)
         for detour in detours:
             if not limited and detour < self.farthest:
                 if detour * self.straight_m < self.length_m * (1.0 + slack) < math.inf:
                     continue
-                if detour != self._detour and detour > DETOURS[0] and self._is_most(detour):
+                if detour != self._detour and detour > DETOURS[0] and needs_most(self.problem, self._around(detour)):
                     continue
             within = min(detour * self.straight_m if math.isfinite(detour) else math.inf, within_m)
             if detour != self._detour:
-                self.cells_of = choose(self.problem, self.start.place, self.straight_m, self._box(detour))
+                self.cells_of = choose(
+                    self.problem,
+                    self.start.place,
+                    self.straight_m,
+                    self._around(detour),
+                )
                 self.plane, self._twin = self._lattice(detour), None
                 self._detour = detour
                 self._mesh = mesh_of(self.plane, self.top_m, True)
@@ -197,23 +202,26 @@ class Leg:
         limit_m: float,
         climbs: bool = False,
         suffices: Callable[[float], bool] = lambda _: False,
+        closely: bool = False,
     ) -> float:
         """A lower bound of the length of every path's track below ``cap_m``, at most ``limit_m`` and `reach_m`.
 
         ``climbs``: near the ends, allow only altitudes that tracks shorter than ``limit_m`` can climb to. It is raised
-        in rounds; the last is the first whose bound ``suffices``.
+        in rounds; the last is the first whose bound ``suffices``. ``closely``: where the exact check shuts the track,
+        look at the cells around it (`necks`).
         """
         limit = min(limit_m, self.reach_m)
         if self.lower_m >= limit:
             return limit
-        found = max(self._bound(cap_m, within, limit, climbs, suffices), self.lower_m)
+        found = max(self._bound(cap_m, within, limit, climbs, suffices, closely), self.lower_m)
         if cap_m >= self.top_m:
             self._flown_m = found
         return found
 
     def _bound(
-        self, cap_m: float, within: Corridor | None, limit: float, climbs: bool, suffices: Callable[[float], bool]
-    ) -> float:
+        self, cap_m: float, within: Corridor | None, limit: float, climbs: bool, suffices: Callable[[float], bool],
+        closely: bool,
+    ) -> float:  # fmt: skip
         limits = self.problem.limits
         climb, descent = (limits.max_climb_slope, limits.max_descent_slope) if climbs else (math.inf, math.inf)
         # Not `lower_m`, which counts laps: near the ends, a path that flew laps has climbed for as many metres.
@@ -230,7 +238,7 @@ class Leg:
             elif not clearance.obstructs(cones, self.last_track):
                 break  # that track is still the shortest
             try:
-                way = clearance.mesh().track(self.start.place, self.goal.place, limit, guide)
+                way = self._looks.track(clearance, limit, guide, closely)
             except Exhausted as given_up:
                 return max(known, min(limit, given_up.seen_m))
             if way is None:
@@ -372,6 +380,10 @@ class Leg:
                 self._ahead = Guide(mesh, self.start.place, np.zeros(len(mesh.joins)), np.zeros(len(mesh.start) - 1))
         return self._ahead
 
+    def _around(self, detour: float) -> Box:
+        """The box that contains all tracks of at most ``detour`` times the straight track."""
+        return box_around(self.start.place, self.goal.place, detour)
+
     def _lattice(self, detour: float) -> Plane:
         """The first-look lattice for tracks of ``detour`` times the straight track."""
         reach = None
@@ -379,19 +391,5 @@ class Leg:
             a, b = self.start.place, self.goal.place
             cell = self.cells_of.stride * float(self.problem.airspace.surface.grid.metres_per_cell(*a).max())
             reach = a, b, detour * self.straight_m + 4.0 * cell
-        return make_plane(
-            self.problem, self._box(detour), self.cells_of.parts, self.cells_of.stride, self.cells_of.stride, reach
-        )
-
-    def _box(self, detour: float) -> Box:
-        """The box that contains all tracks of at most ``detour`` times the straight track; infinite for inf."""
-        if math.isinf(detour):
-            return -math.inf, -math.inf, math.inf, math.inf
-        (x0, y0), (x1, y1), d = self.start.place, self.goal.place, self.straight_m
-        more = max(0.5 * d * math.sqrt(detour**2 - 1.0), 0.5 * (detour - 1.0) * d) + 1.0
-        return min(x0, x1) - more, min(y0, y1) - more, max(x0, x1) + more, max(y0, y1) + more
-
-    def _is_most(self, detour: float) -> bool:
-        """Whether a lattice for such tracks needs more than the part `MUCH` of the terrain model's nodes."""
-        col0, row0, col1, row1 = extent(self.problem, self._box(detour))
-        return (col1 - col0) * (row1 - row0) > MUCH * self.problem.airspace.surface.ground_m.size
+        parts, stride = self.cells_of.parts, self.cells_of.stride
+        return make_plane(self.problem, self._around(detour), parts, stride, stride, reach)

@@ -24,10 +24,9 @@ ZONES_SHUT = 8
 """Most tracks that are tried below a cap if a zone can be passed neither over nor under on the first."""
 PAST = 12
 """Most tracks past obstacles that are tried on the first-look lattice."""
-DARED_M, PINCHED_M, MET_M = (0.05, 0.1, 0.2, 0.4), 1.0, 5.0
+DARED_M, PINCHED_M = (0.05, 0.1, 0.2, 0.4, 0.8), 1.0
 """Metres by which the nodes beside a track through a slit are raised, in turn, beyond the altitude that it lacked, or
-that later tracks keep from zones over ground; and the most it may be pinched, or be inside of a zone, for another track
-to be searched."""
+that later tracks keep from zones over ground; and the most it may be pinched for another track to be searched."""
 PROVED = 1e-8
 """A gap, as a part, that is smaller is due to rounding: the best path is proved optimal."""
 NODE_S, NODE_MB = 1.2e-6, 3e-4
@@ -151,14 +150,16 @@ class PlaneSearch:
     def narrow_passage(self) -> bool:
         """Look for a path through slits that only the exact check finds open, because a lattice also reserves what the
         ground may rise beside a track. Returns whether the path is the best so far."""
-        narrow = Narrow()
+        narrow, before_m = Narrow(), math.nan
         for more_m in DARED_M:
             if self.try_below(self.top_m, fine=True, narrow=narrow):
                 return True
             lacks = self.incumbent.unsettled
-            if lacks is None or not self.incumbent.goes_on():
+            # Where the last change did not matter, the next one will not.
+            if lacks is None or math.isclose(lacks.by, before_m, rel_tol=1e-3) or not self.incumbent.goes_on():
                 break
-            if lacks.kind == "zone" and lacks.by < MET_M:
+            before_m = lacks.by
+            if lacks.kind == "zone":
                 narrow.zones_m = more_m
             elif lacks.kind == "pinched" and lacks.by < PINCHED_M:
                 narrow.pinched.append((lacks.place, lacks.by + more_m))

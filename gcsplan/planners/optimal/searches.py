@@ -135,11 +135,14 @@ class Searches:
                     Search("lattice", 0.02, far, of(0.5, 0.0), self._search_lattice_again),
                 ]
             else:
-                rows += [Search("detours", 0.3, known, nodes(4.0), self._over(self._past_finely))]
+                rows += [
+                    Search("detours", 0.3, known, nodes(4.0), self._over(self._past_finely)),
+                    Search("lattice", 0.5, gap(MUCH), of(1.0, 0.0), self._search_lattice),
+                ]
         name, share = ("energy_bound", 0.5) if energy else ("length_bound", 0.9)
         return [
             *rows,
-            Search("section_descent", 0.9 if band else 0.1, known, of(0.1, 0.0), self._tighten),
+            Search("section_descent", 0.9 if band else 0.1, known, of(0.1, 0.0), self._tighten, again=True),
             Search(name, share, known, nodes(1.0), on(halve), again=True, nearer=not energy),
             Search("altitude_intervals", 0.08, self._has_intervals, nodes(8.0), self._over(self._bound_by_intervals)),
         ]

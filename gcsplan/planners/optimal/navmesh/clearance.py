@@ -117,13 +117,20 @@ class ClearanceGrid:
         self._coarse, self._steep, self._exact_m = (ground, x, y), steep, exact_m
         self._up, self._down = (self._array(name, self.shape) for name in ("up", "down"))
         self._of = self._array("of", (self._diagonal.size,), np.int32)
-        self._border = list(self._border_walls())
-        walls = (plane.shapes.cells + low * plane.shapes.looking) * fineness**2 + sum(len(k) for k, _ in self._border)
-        self._values = np.empty((1 + walls, WALL))
+        self._of_zones = (plane.shapes.cells + low * plane.shapes.looking) * fineness**2
+        self._walls: list[tuple[Indices, Floats]] = []
+        self._values: Floats
+        self.add_walls(*self._border_walls())
         self._laid = False
         self._held: list[Cone] = []
         self._lift: Floats
         self._either: Int8s
+
+    def add_walls(self, *more: tuple[Indices, Floats]) -> None:
+        """Give cells (K,) walls of their own, of the excess (K, 4) at their corners, see `mesh_kernels.make_pieces`."""
+        self._walls += more
+        self._values = np.empty((1 + self._of_zones + sum(len(cells) for cells, _ in self._walls), WALL))
+        self._laid = False
 
     def _border_walls(self) -> Iterator[tuple[Indices, Floats]]:
         """For each border of the terrain, the cells (K,) nearer to it than ground must be known, and the excess (K, 4)
@@ -259,15 +266,17 @@ class ClearanceGrid:
         self.hold(cones)
         return bool(np.any(self._excess[corners] > np.maximum(before, 0.0)))
 
-    def mesh(self, *, single: bool = False) -> Mesh:
-        """Make the mesh of the free cells. ``single``: each free cell is a piece of its own."""
+    def mesh(self, *, single: bool = False, alone: Bools | None = None) -> Mesh:
+        """Make the mesh of the free cells. ``single``: each free cell is a piece of its own; ``alone`` (rows - 1,
+        cols - 1): some of them."""
         if not self._laid:
             self._lay()
         rows, cols = self.shape
         excess, of, values, diagonal, span = self._excess, self._of, self._values, self._diagonal, self._span
         piece = self._array("piece", (diagonal.size, 2), np.int32)
         block = 1 if single else self.plane.block * self.fineness
-        count = make_pieces(excess, of, values, diagonal, self._around, span, piece, block)
+        apart = np.empty(0, np.bool_) if alone is None else alone.ravel()
+        count = make_pieces(excess, of, values, diagonal, self._around, span, piece, block, apart)
         capacity, part = 2 * count + 1024, np.empty(2)
         while True:
             ends, names, joins = (
@@ -304,7 +313,7 @@ class ClearanceGrid:
                 self._span, self._excess, self._floor, *self._coarse, self.fineness, self._zones, self._edges,
                 self._boxes, reach_m, near_m, np.empty((8, 4)), self._of, self._values, count,
             )  # fmt: skip
-        for cells, walls in self._border:
+        for cells, walls in self._walls:
             own = self._values[count : count + len(cells)]
             own[:, :NEXT], own[:, NEXT] = walls, self._of[cells]
             self._of[cells] = np.arange(count + 1, count + 1 + len(cells))

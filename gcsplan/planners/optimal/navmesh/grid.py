@@ -124,7 +124,7 @@ def make_plane(
     become one. The lattice is a multiple of ``whole`` cells of the terrain model wide and long. ``reach``: only cells
     whose distances to two places add up to no more than that are looked at.
     """
-    return _lattice(problem, extent(problem, box), parts, stride, whole, reach, fit)
+    return lattice(problem, extent(problem, box), parts, stride, whole, reach, fit)
 
 
 def extent(problem: Problem, box: Box) -> Extent:
@@ -149,7 +149,7 @@ def finer_plane(plane: Plane, cells: Bools, parts: int, stride: int, fit: Fit) -
     span = plane.stride / plane.parts  # a cell's width, in cells of the terrain model
     col0, col1 = plane.col0 + math.floor(span * col), min(plane.col0 + math.ceil(span * last_col), cols - 1)
     row0, row1 = max(plane.row1 - math.ceil(span * last_row), 0), plane.row1 - math.floor(span * row)
-    finer = _lattice(plane.problem, (col0, row0, col1, row1), parts, stride, plane.stride, None, fit)
+    finer = lattice(plane.problem, (col0, row0, col1, row1), parts, stride, plane.stride, None, fit)
     return finer, on_finer(plane, cells, finer)
 
 
@@ -173,10 +173,10 @@ def on_finer(plane: Plane, cells: Bools, finer: Plane) -> Bools:
     return out
 
 
-def _lattice(
+def lattice(
     problem: Problem, over: Extent, parts: int, stride: int, whole: int, reach: Reach | None, fit: Fit
 ) -> Plane:
-    """Make the lattice over an `extent`."""
+    """Make the lattice over an `extent`; the other arguments are those of `make_plane`."""
     surface = problem.airspace.surface
     col0, _, _, row1 = over
     grounds = nodes(surface.ground_m, over, parts, stride, whole)

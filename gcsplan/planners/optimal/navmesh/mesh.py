@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -40,6 +40,8 @@ class Mesh(Portals):
     diagonal: Int8s
     span: Int32s
     piece: Int32s
+    parts_of: Int32s = field(default_factory=lambda: np.empty((0, 2), np.int32))
+    """(K, 2) the two pieces (or -1) of the cell that each of the last K pieces is a part of, see `necks`."""
 
     def lowest(self) -> Floats:
         """(cells,) the lowest floor at each cell's corners; -inf if one of them is not looked at."""
@@ -170,6 +172,9 @@ class Guide:
         least_of_cells(
             self.mesh.piece, self.entered, cols, finer.piece, finer.span, fine_cols, ratio, row, col, out
         )  # fmt: skip
+        if len(finer.parts_of):
+            whole = np.append(out[: len(out) - len(finer.parts_of)], np.inf)
+            out[len(out) - len(finer.parts_of) :] = whole[finer.parts_of].min(axis=1)
         return out
 
     def reach(self, place: Place, limit_m: float) -> Bools:

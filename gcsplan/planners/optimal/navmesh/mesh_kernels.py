@@ -49,10 +49,10 @@ def _cut_own(of: Int32s, values: Floats, k: int, start: int, end: int, t: Floats
     return True
 
 
-@kernel("f8[,] i4[] f8[,] i1[] i4[,] i4[,] i4[,] i8")
+@kernel("f8[,] i4[] f8[,] i1[] i4[,] i4[,] i4[,] i8 b1[]")
 def make_pieces(
     excess: Floats, of: Int32s, values: Floats, diagonal: Int8s, around: Int32s, span: Int32s, piece: Int32s,
-    block: int,
+    block: int, alone: Bools,
 ) -> int:  # fmt: skip
     """Number the pieces in ``piece`` (cells, 2: lower and upper triangle, -1 where nothing is free); return how many.
 
@@ -61,6 +61,7 @@ def make_pieces(
     own wall; 0: it has none. Such a row holds the wall's excess at this node, at the one in the next column, in the
     next column and row, and in the next row, and the number of the cell's next wall. ``diagonal`` (cells,): 0 cuts a
     cell from this node to the opposite one, 1 along the other diagonal. ``block``: columns after which a run ends.
+    ``alone`` (cells,): cells that are no part of a run; empty if there are none.
     """
     count = 0
     ny, nx = excess.shape
@@ -86,9 +87,10 @@ def make_pieces(
                 a, b, c, d = values[n - 1, 0], values[n - 1, 1], values[n - 1, 2], values[n - 1, 3]
                 n = int(values[n - 1, NEXT])
             if whole:
-                if not running or i % block == 0:
+                apart = len(alone) > 0 and alone[k]
+                if not running or i % block == 0 or apart:
                     count += 1
-                    running = True
+                    running = not apart
                 piece[k, 0] = piece[k, 1] = count - 1
                 continue
             running = False

@@ -64,7 +64,7 @@ def mesh_of(
     piece = np.empty((cells, 2), np.int32)
     span = np.tile(np.array([0, nx - 1], np.int32), (ny - 1, 1))
     around = np.tile(np.array([0, nx], np.int32), (ny, 1))
-    count = make_pieces(excess, of, values, diagonal, around, span, piece, block)
+    count = make_pieces(excess, of, values, diagonal, around, span, piece, block, np.empty(0, np.bool_))
     room = 32 * cells + 64
     ends, names, joins = np.empty((room, 4)), np.empty((room, 2), np.int64), np.empty((room, 2), np.int32)
     n = make_portals(excess, of, values, diagonal, span, piece, x, y, ends, names, joins, np.empty(2))

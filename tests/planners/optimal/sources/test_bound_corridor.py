@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gcsplan.arrays import Floats
 from gcsplan.bench.terrain_problems import problems
 from gcsplan.planners.lattice.planner import plan_band
 from gcsplan.planners.optimal.plane_search import PlaneSearch
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.optimal.sources import bound_corridor
-from gcsplan.planners.problem import Via
+from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.path import Path
+from tests.planners.optimal.navmesh.test_necks import ridge as pass_over_a_ridge
 from tests.planners.optimal.sources.test_notches import MIDDLE_M, ROUND_M, STRAIGHT_M, ridge
 from tests.support.planner_worlds import faults
 from tests.support.searches import improve, looked
@@ -95,13 +99,41 @@ def test_the_nearest_place_of_a_track_is_as_near_as_any(some: list[tuple[float, 
         assert math.dist(there, place) == pytest.approx(far, abs=1e-6)
 
 
+@pytest.mark.parametrize("across", [False, True])
+@pytest.mark.parametrize("aside_m", [0.0, 1.37, -2.9])
+def test_a_track_is_moved_aside_to_the_line_on_which_a_pass_is_open(aside_m: float, across: bool) -> None:
+    """The pass is open by 1.2 cm in height, and by centimetres in width."""
+    problem, cap_m = pass_over_a_ridge(0.012, across)
+    north = 585.0 if across else 600.0
+    track = np.array([[600.0 + aside_m + 2.0, north - 60.0], [600.0 + aside_m, north], [604.0 + aside_m, north + 60.0]])
+    plane = cast(PlaneSearch, SimpleNamespace(problem=problem, top_m=cap_m))
+    assert (_dense(track, problem) > cap_m).any()
+    moved = bound_corridor._lowest(plane, track)
+    assert (moved[[0, -1]] == track[[0, -1]]).all()
+    assert (_dense(moved, problem) <= cap_m).all()
+    assert len(moved) < 40
+
+
+def _dense(track: Floats, problem: Problem) -> Floats:
+    """The exact check's floors at places a centimetre apart."""
+    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(track, axis=0).T))])
+    t = np.linspace(0.0, s[-1], 12_001)
+    return problem.floors(*(np.interp(t, s, track[:, k]) for k in range(2)))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "name", "most_m"),
-    [(301, "main 301/02, 40 zones", 11_690.0), (302, "main 302/05, 40 zones", 15_260.0)],
+    [
+        (301, "main 301/02, 40 zones", 11_690.0),
+        (302, "main 302/05, 40 zones", 15_260.0),
+        (502, "main 502/12, 0 zones", 20_580.0),
+        (603, "main 603/02, 10 zones", 10_020.0),
+        (603, "main 603/02, 40 zones", 10_590.0),
+    ],
 )
-def test_slits_beside_zones_above_ground_are_found(seed: int, name: str, most_m: float) -> None:
-    """Without them the paths are 13,330 and 15,639 m long: slits of some metres on slopes, between zones."""
+def test_slits_and_passes_that_are_open_by_little_are_found(seed: int, name: str, most_m: float) -> None:
+    """Without them the paths are 13,330, 15,639, 23,617 and 11,495 m long, and the last mission has none."""
     (problem,) = (found.problem for found in problems("main", seed, errors=True) if found.name == name)
     solution = plan(problem)
     assert faults(problem, solution.path) == []

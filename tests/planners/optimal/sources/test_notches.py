@@ -7,6 +7,7 @@ import pytest
 
 from gcsplan.planners.optimal import planner as optimal
 from gcsplan.planners.optimal.plane_search import PlaneSearch
+from gcsplan.planners.optimal.sources import bound_corridor
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
@@ -54,6 +55,7 @@ def test_a_path_leads_through_what_is_open_by_centimetres(
     assert problem.cost(found.path) < 1.003 * found.lower_bound
     assert faults(problem, found.path) == []
     monkeypatch.setattr(PlaneSearch, "narrow_passage", lambda self: False)
+    monkeypatch.setattr(bound_corridor, "_lowest", lambda plane, track: track)
     assert problem.cost(optimal.plan(problem).path) > ROUND_M, "the notch is too wide to show anything"
 
 
