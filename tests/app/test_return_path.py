@@ -99,6 +99,7 @@ def test_a_path_back_keeps_the_descent_limit_where_the_way_out_climbs() -> None:
         "no_fly": [],
         "limits": WALL["limits"] | {"max_climb_deg": 25, "max_descent_deg": 12},  # type: ignore[operator]
         "vehicles": [UAV1 | {"return_route": "mission"}],
+        "planner": {"budget_s": 1},
     }
     done = plan(load_mission(Path("hill.yaml"), text=yaml.safe_dump(asked)))
     assert done.vehicles[0].verdict.safe is True, done.vehicles[0].verdict.describe()
