@@ -94,11 +94,11 @@ class Necks:
         self._necks: list[Neck] = []
 
     def look(self, plane: Plane, places: Floats) -> bool:
-        """Look at the cells around the places (N, 2) of a track; return whether any was not looked at before. Raises
-        Exhausted."""
+        """Look at the cells around the places (N, 2) of a track, as long as the budget lasts; return whether any was
+        not looked at before. Raises Exhausted."""
         apart = np.flatnonzero(np.hypot(*np.diff(places, axis=0).T) > AROUND_M) + 1
-        looked = [self._look(plane, group) for group in np.split(places, apart)]
-        return any(looked)
+        budget = plane.problem.budget
+        return sum(budget.goes_on() and self._look(plane, group) for group in np.split(places, apart)) > 0
 
     def _look(self, plane: Plane, places: Floats) -> bool:
         width_m = float(plane.problem.airspace.surface.grid.metres_per_cell(*places[0]).min()) / self.parts
