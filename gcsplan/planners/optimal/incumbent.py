@@ -77,7 +77,8 @@ class Incumbent:
         if isinstance(flown, Flown) and (found := self.exact(track, flown)) is not None:
             return self.take_simpler(*found, fine=fine, longer=False)
         laps = with_laps(self.problem, *terminals, self.exact)
-        return sum(self.take_simpler(*path, fine=fine, longer=True) for path in laps) > 0
+        taken = [self.take_simpler(*path, fine=fine, longer=True) for path in laps]
+        return any(taken)
 
     def exact(self, track: Track, flown: Flown | Obstruction) -> tuple[Floats, Bools] | None:
         """Way points over a track that pass the exact check, and which must stay: of the profile ``flown``, or else of

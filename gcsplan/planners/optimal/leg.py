@@ -21,7 +21,7 @@ from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid, Cone, mesh
 from gcsplan.planners.optimal.navmesh.free_altitudes import intervals, ranges
 from gcsplan.planners.optimal.navmesh.grid import Box, Plane, box_of, finer_plane, make_plane, on_finer
 from gcsplan.planners.optimal.navmesh.mesh import Guide, Mesh
-from gcsplan.planners.optimal.navmesh.necks import Looks
+from gcsplan.planners.optimal.navmesh.necks import LegNecks
 from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundTrack
 from gcsplan.planners.optimal.navmesh.zone_shapes import CLOSE, LOOSE
 from gcsplan.planners.problem import Problem
@@ -71,7 +71,7 @@ class Leg:
         self._close: Nearby | None = None
         self._reached: tuple[Nearby, Reached] | None = None
         self.cells_of = choose(problem, start.place, self.straight_m, self._around(DETOURS[0]))
-        self._looks = Looks(problem, top_m, start.place, goal.place)
+        self._necks = LegNecks(problem, top_m, start.place, goal.place)
         self.closer = 1
         """Parts a side into which the finer lattice's cells are cut once more; see `refine`."""
 
@@ -103,12 +103,7 @@ class Leg:
                     continue
             within = min(detour * self.straight_m if math.isfinite(detour) else math.inf, within_m)
             if detour != self._detour:
-                self.cells_of = choose(
-                    self.problem,
-                    self.start.place,
-                    self.straight_m,
-                    self._around(detour),
-                )
+                self.cells_of = choose(self.problem, self.start.place, self.straight_m, self._around(detour))
                 self.plane, self._twin = self._lattice(detour), None
                 self._detour = detour
                 self._mesh = mesh_of(self.plane, self.top_m, True)
@@ -238,7 +233,7 @@ class Leg:
             elif not clearance.obstructs(cones, self.last_track):
                 break  # that track is still the shortest
             try:
-                way = self._looks.track(clearance, limit, guide, closely)
+                way = self._necks.track(clearance, limit, guide, closely)
             except Exhausted as given_up:
                 return max(known, min(limit, given_up.seen_m))
             if way is None:

@@ -115,6 +115,12 @@ def divided(points: Floats, step_m: float) -> tuple[Indices, Indices, Indices]:
     return leg, np.arange(len(leg)) - np.repeat(np.cumsum(parts) - parts, parts), parts[leg]
 
 
+def denser(points: Floats, step_m: float) -> Floats:
+    """The same track or path (M, 2 or 3) with a point every ``step_m`` at least."""
+    leg, part, parts = divided(points, step_m)
+    return np.vstack([points[leg] + (part / parts)[:, None] * (points[leg + 1] - points[leg]), points[-1:]])
+
+
 def make_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> Track:
     """A track with its tube; of points within 1 mm of the one before only one is kept, preferably the pinned one."""
     keep = np.ones(len(points), bool)

@@ -15,7 +15,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.taut_string import Profile
-from gcsplan.planners.profile.track import Track, distances, divided, make_track, values_at
+from gcsplan.planners.profile.track import Track, denser, distances, make_track, values_at
 from gcsplan.world.airspace import Band
 from gcsplan.world.own_ground import POINTS, own_ground
 
@@ -122,11 +122,15 @@ def widest_free(
     return low, high
 
 
-def shut_places(problem: Problem, points: Floats, cap_m: float, step_m: float) -> Floats:
-    """(K, 2) the places of a track (N, 2), ``step_m`` apart at most, over which no altitude is free below a cap."""
-    leg, part, parts = divided(points, step_m)
-    places = np.vstack([points[leg] + (part / parts)[:, None] * (points[leg + 1] - points[leg]), points[-1:]])
+def free_below(problem: Problem, places: Floats, cap_m: float, enough_m: float) -> tuple[Floats, Floats]:
+    """`widest_free` at the vertices (N, 2) of a track."""
     ends = np.isin(np.arange(len(places)), [0, len(places) - 1])
     track = make_track(problem, places, ends, np.full(len(places), math.nan))
-    low, high = widest_free(problem, track, distances(places), problem.floors(*places.T), cap_m, 0.0)
+    return widest_free(problem, track, distances(places), problem.floors(*places.T), cap_m, enough_m)
+
+
+def shut_places(problem: Problem, points: Floats, cap_m: float, step_m: float) -> Floats:
+    """(K, 2) the places of a track (N, 2), ``step_m`` apart at most, over which no altitude is free below a cap."""
+    places = denser(points, step_m)
+    low, high = free_below(problem, places, cap_m, 0.0)
     return np.asarray(places[low > high])

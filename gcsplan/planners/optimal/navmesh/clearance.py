@@ -120,8 +120,8 @@ class ClearanceGrid:
         self._of_zones = (plane.shapes.cells + low * plane.shapes.looking) * fineness**2
         self._walls: list[tuple[Indices, Floats]] = []
         self._values: Floats
+        self._laid: bool
         self.add_walls(*self._border_walls())
-        self._laid = False
         self._held: list[Cone] = []
         self._lift: Floats
         self._either: Int8s

@@ -55,7 +55,7 @@ class Neck:
     range: Floats
 
 
-class Looks:
+class LegNecks:
     """The necks of all lattices of one leg from ``start`` to ``goal``, below ``top_m``."""
 
     def __init__(self, problem: Problem, top_m: float, start: Place, goal: Place) -> None:
@@ -98,7 +98,8 @@ class Necks:
         not looked at before. Raises Exhausted."""
         apart = np.flatnonzero(np.hypot(*np.diff(places, axis=0).T) > AROUND_M) + 1
         budget = plane.problem.budget
-        return sum(budget.goes_on() and self._look(plane, group) for group in np.split(places, apart)) > 0
+        looked = [budget.goes_on() and self._look(plane, group) for group in np.split(places, apart)]
+        return any(looked)
 
     def _look(self, plane: Plane, places: Floats) -> bool:
         width_m = float(plane.problem.airspace.surface.grid.metres_per_cell(*places[0]).min()) / self.parts

@@ -18,8 +18,8 @@ from gcsplan.planners.optimal.corridor import joined
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.optimal.plane_search import PlaneSearch
-from gcsplan.planners.profile.track import distances, divided, make_track
-from gcsplan.planners.profile.zone_levels import widest_free
+from gcsplan.planners.profile.track import denser, distances
+from gcsplan.planners.profile.zone_levels import free_below
 from gcsplan.world.path import Path
 
 Point = tuple[float, float, float]
@@ -223,8 +223,7 @@ def _lowest(plane: PlaneSearch, track: Floats) -> Floats:
     """
     import shapely  # most missions need none here
 
-    leg, part, parts = divided(track, DENSE_M)
-    places = np.vstack([track[leg] + (part / parts)[:, None] * (track[leg + 1] - track[leg]), track[-1:]])
+    places = denser(track, DENSE_M)
     shut = np.flatnonzero(plane.problem.floors(*places.T) > plane.top_m)
     if not len(shut):
         return track
@@ -318,12 +317,13 @@ def _stretches(over: Floats) -> list[tuple[int, int]]:
 
 
 def _freer(plane: PlaneSearch, places: Floats) -> tuple[Floats, Floats, Floats]:
-    """The places (N, 2) of a track, moved by `ASIDE_M` where one side of it is shut and the other is free, and `_free`
-    of all but its ends: a bound's track touches zones, and where it does no stretch can begin or end."""
+    """The places (N, 2) of a track, moved by `ASIDE_M` where one side of it is shut and the other is free, and what
+    `free_below` tells of all but its ends: a bound's track touches zones, and where it does no stretch can begin or
+    end."""
     ahead = np.gradient(places, axis=0)
     aside = np.stack([-ahead[:, 1], ahead[:, 0]], axis=-1) / np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
     tried = [places + off * aside for off in (0.0, ASIDE_M, -ASIDE_M)]
-    free = [_free(plane, at) for at in tried]
+    free = [free_below(plane.problem, at, plane.top_m, OPEN_M) for at in tried]
     shut = [low > high for low, high in free]
     side = np.where(shut[1] & ~shut[2], 2, np.where(shut[2] & ~shut[1], 1, 0))
     side[[0, -1]] = 0
@@ -331,15 +331,6 @@ def _freer(plane: PlaneSearch, places: Floats) -> tuple[Floats, Floats, Floats]:
     low, high = (np.stack([of[k] for of in free])[side, rows] for k in range(2))
     low[[0, -1]] = -math.inf  # the ends of the track give way to those of the path
     return np.stack(tried)[side, rows], low, high
-
-
-def _free(plane: PlaneSearch, places: Floats) -> tuple[Floats, Floats]:
-    """(N,) the lowest and the highest altitude that are free below the cap and between zones at places (N, 2) of a
-    track."""
-    problem = plane.problem
-    ends = np.isin(np.arange(len(places)), [0, len(places) - 1])
-    track = make_track(problem, places, ends, np.full(len(places), math.nan))
-    return widest_free(problem, track, distances(places), problem.floors(*places.T), plane.top_m, OPEN_M)
 
 
 def _height(plane: PlaneSearch, leg: Leg, from_start_m: float, to_goal_m: float, low_m: float, high_m: float) -> float:
