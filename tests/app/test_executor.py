@@ -244,6 +244,17 @@ def test_after_ctrl_c_what_is_begun_is_finished(workers: Executor) -> None:
 
 
 @pytest.mark.slow
+def test_a_piece_handed_out_just_before_ctrl_c_is_no_error(workers: Executor) -> None:
+    """The scheduler may not have heard of it yet."""
+    assert isinstance(workers, Dask)
+    for _ in range(20):
+        numbers = {workers.client.submit(square, 0, 2, pure=False): 0}
+        workers._keep_begun(numbers)
+        assert all(kept.result(timeout=60) == 4 for kept in numbers)
+    assert sorted(workers.each(square, 0, range(3))) == [(0, 0), (1, 1), (2, 4)]
+
+
+@pytest.mark.slow
 def test_a_fleet_planned_by_processes_is_the_same(workers: Executor) -> None:
     assert isinstance(workers, Dask)
     assert told(plan(fleet(), cluster=workers.client)) == told(plan(fleet()))
