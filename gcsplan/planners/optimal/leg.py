@@ -291,10 +291,11 @@ class Leg:
             return np.full(1, -math.inf), np.full(1, math.inf), np.zeros(1), np.zeros(1)
         close = self._closer(min(limit_m, self.reach_m))
         near = self._near(close, limit_m)
+        of: Nearby | AltitudeIntervals = close
         if self._reached is not None and self._reached[0] is close and limit_m <= close.limit_m:
-            of = self._reached[1].known(limit_m, near)
-            return of.low_m, of.high_m, of.away_m, of.left_m
-        return close.low_m[near], close.high_m[near], close.away_m[near], close.left_m[near]
+            of = self._reached[1].known(limit_m)
+            near = near[of.cell]
+        return of.low_m[near], of.high_m[near], of.away_m[near], of.left_m[near]
 
     def intervals(self, limit_m: float) -> AltitudeIntervals:
         """The altitude intervals that tracks shorter than ``limit_m`` and `reach_m` may enter within the climb and

@@ -157,19 +157,18 @@ class Reached:
         self.looked_at = 0
         """Intervals that the last call of `within` began with."""
 
-    def known(self, limit_m: float, near: Bools) -> AltitudeIntervals:
-        """The intervals that tracks shorter than ``limit_m`` may enter by the results so far, of the cells that are
-        ``near`` (cells,)."""
-        found = self._known[min(m for m in self._known if m >= limit_m)]
-        return found.only(near[found.cell])
+    def known(self, limit_m: float) -> AltitudeIntervals:
+        """The intervals that tracks shorter than ``limit_m`` may enter by the results so far."""
+        return self._known[min(m for m in self._known if m >= limit_m)]
 
     def within(self, limit_m: float, near: Bools) -> AltitudeIntervals:
-        """`known`, computed for this very length."""
+        """`known`, computed for this very length, of the cells that are ``near`` (cells,)."""
         self.looked_at = 0
         if limit_m in self._asked and limit_m in self._known:
             return self._known[limit_m]
         self._asked.add(limit_m)
-        found = self.known(limit_m, near)
+        found = self.known(limit_m)
+        found = found.only(near[found.cell])
         self.looked_at = len(found.cell)
         found = self._known[limit_m] = found.reached(self._limits, limit_m)
         if len(self._known) > KEPT:

@@ -11,8 +11,9 @@ import math
 
 import numpy as np
 
-from gcsplan.arrays import Floats, Indices
+from gcsplan.arrays import Floats
 from gcsplan.planners.optimal.leg import Leg
+from gcsplan.planners.optimal.navmesh.interval_kernels import range_along
 from gcsplan.planners.profile.taut_string import Blocked, Profile, taut_string
 
 STEPS = 400
@@ -23,34 +24,12 @@ def altitude_ranges(leg: Leg, track_m: float, limit_m: float) -> tuple[Floats, F
     """Metres along a leg (M,), and floor and ceiling there (M,), for all tracks of ``track_m`` to ``limit_m`` metres.
 
     A longer track is mapped to ``track_m`` by moving its points towards its start by at most what it is longer. So the
-    floor at a place is the lowest, and the ceiling the highest, within that distance.
+    floor at a place is the lowest, and the ceiling the highest, within that distance; inf and -inf where no cell is.
     """
-    low, high, away, left = leg.cells(limit_m)
-    met = np.isfinite(away) & np.isfinite(left) & (low <= high)
-    low, high, away, left = low[met], high[met], away[met], left[met]
     at = np.linspace(0.0, track_m, STEPS + 1)[1:-1]
-    slack = max(limit_m - track_m, 0.0)
-    # Place k is in a cell's range from its nearest to its farthest, moved by the slack.
-    first = np.searchsorted(at, away - slack, "left")
-    last = np.searchsorted(at, limit_m - left, "right")
-    return at, _least(low, first, last, len(at)), -_least(-high, first, last, len(at))
-
-
-def _least(value: Floats, first: Indices, last: Indices, size: int) -> Floats:
-    """(size,) the least ``value`` of all ranges ``first`` : ``last`` that contain a place; inf if none does."""
-    # Each range is two overlapping blocks whose size is a power of two; minima pass from larger blocks to smaller ones.
-    keep = last > first
-    value, first, last = value[keep], first[keep], last[keep]
-    levels = max(size, 1).bit_length()
-    table = np.full((levels, size), np.inf)
-    k = np.floor(np.log2(last - first)).astype(np.intp)
-    np.minimum.at(table, (k, first), value)
-    np.minimum.at(table, (k, last - (1 << k)), value)
-    for level in range(levels - 1, 0, -1):
-        half = 1 << (level - 1)
-        np.minimum(table[level - 1], table[level], out=table[level - 1])
-        np.minimum(table[level - 1, half:], table[level, : size - half], out=table[level - 1, half:])
-    return np.asarray(table[0])
+    low, high = (np.full((STEPS.bit_length(), len(at)), fill) for fill in (np.inf, -np.inf))
+    range_along(*leg.cells(limit_m), limit_m, max(limit_m - track_m, 0.0), track_m / STEPS, low, high)
+    return at, low[0], high[0]
 
 
 def rise_bound(legs: list[Leg], tracks_m: list[float], limits_m: list[float]) -> float:

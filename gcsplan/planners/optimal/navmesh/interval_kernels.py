@@ -1,10 +1,13 @@
-"""Kernels for altitude intervals: cut them out of the altitudes over a cell, and carry values from one to another.
+"""Kernels for altitude intervals: cut them out of the altitudes over a cell, and carry values from one to another; and
+for the altitudes that the cells leave to a track, place by place.
 
 From an interval a path can enter those intervals over the neighbouring cells that share an altitude with it. It never
 enters another one over the same cell, because a zone that covers the whole cell lies between them.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -13,6 +16,9 @@ from gcsplan.planners.compiled import device, kernel
 from gcsplan.planners.optimal.navmesh.polyanya_nodes import pop, push
 from gcsplan.planners.optimal.navmesh.shut_kernels import over_ground, shut_over
 from gcsplan.planners.optimal.navmesh.zone_kernels import PAIR
+
+ROUNDING = 1e-9
+"""Part of a step between places by which a cell's range is widened at both ends."""
 
 
 @kernel("f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 f8 f8 f8 i4[] f8[,] f8[,]")
@@ -101,3 +107,40 @@ def spread(
                 elif own[t] <= most[t]:
                     out[t] = own[t]
                     size = push(keys, ids, size, own[t], t)
+
+
+@kernel("f8[] f8[] f8[] f8[] f8 f8 f8 f8[,] f8[,]")
+def range_along(
+    low: Floats, high: Floats, away: Floats, left: Floats, limit: float, slack: float, step: float, lows: Floats,
+    highs: Floats,
+) -> None:  # fmt: skip
+    """Compute the least of ``low`` (K,) and the greatest of ``high`` (K,) of the cells that a track may be in, at each
+    of several places, 1 to ``size`` times ``step`` from its start: rows 0 of ``lows`` and ``highs`` (levels, size),
+    which are inf and -inf before, and stay so at a place that no cell has.
+
+    A track is in a cell no sooner than ``away`` - ``slack``, and no later than ``limit`` - ``left``. The first two to
+    the power of ``levels`` must be more than ``size``.
+    """
+    levels, size = lows.shape
+    # Each range of places is two overlapping blocks whose size is a power of two; then larger blocks pass their values
+    # to smaller ones.
+    for k in range(len(low)):
+        if not (away[k] + left[k] < math.inf and low[k] <= high[k]):
+            continue
+        first = math.ceil(max((away[k] - slack) / step - ROUNDING, 1.0)) - 1
+        last = math.floor(min((limit - left[k]) / step + ROUNDING, float(size)))
+        if last <= first:
+            continue
+        level = 0
+        while 2 << level <= last - first:
+            level += 1
+        second = last - (1 << level)
+        lows[level, first], lows[level, second] = min(lows[level, first], low[k]), min(lows[level, second], low[k])
+        highs[level, first] = max(highs[level, first], high[k])
+        highs[level, second] = max(highs[level, second], high[k])
+    for level in range(levels - 1, 0, -1):
+        half = 1 << (level - 1)
+        for k in range(size - 2 * half + 1):
+            for i in (k, k + half):
+                lows[level - 1, i] = min(lows[level - 1, i], lows[level, k])
+                highs[level - 1, i] = max(highs[level - 1, i], highs[level, k])
