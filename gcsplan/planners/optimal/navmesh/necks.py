@@ -10,26 +10,27 @@ bounds as before. Pieces of one cell overlap in the plane, which does not matter
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid
-from gcsplan.planners.optimal.navmesh.clearance_kernels import SPARE
 from gcsplan.planners.optimal.navmesh.grid import Plane, lattice
 from gcsplan.planners.optimal.navmesh.mesh import Guide, Mesh
 from gcsplan.planners.optimal.navmesh.mesh_kernels import sort_portals
 from gcsplan.planners.optimal.navmesh.portals import GroundTrack, Place
 from gcsplan.planners.optimal.navmesh.terrain_nodes import Extent
-from gcsplan.planners.optimal.navmesh.zone_shapes import CLOSE
+from gcsplan.planners.optimal.navmesh.walls_beside import walls_beside
+from gcsplan.planners.optimal.navmesh.zone_shapes import Fit
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.zone_levels import shut_places
 
 FINE_M, BESIDE_ZONES_M, MOST_PARTS = 0.75, 1.5, 24
 """Width of the finer cells, m; at zones that follow ground, where much ground is read for each; and most of them along
 a side of a cell."""
+FIT = Fit(2e-4, 1e-3, 0.07)
+"""Its lattice is small, and its nodes need not lie on straight lines for long."""
 AROUND_M = 30.0
 """Metres around a shut place within which cells are looked at."""
 MOST_NODES = 1e6
@@ -38,7 +39,7 @@ NEW = np.iinfo(np.int64).min
 """The name of the ends of a new portal until it gets one."""
 SAME_M = 1e-4
 """Ends of portals that are no farther apart are at one place."""
-LOOKS, LOOK_M = 24, 4.0
+LOOKS, LOOK_M = 24, 1.0
 """Most times that necks are looked at for one track; and the step, m, at which it is read where it is shut."""
 FAN = 24
 """Most pieces of a mesh with necks that a track passes while it turns at one node."""
@@ -150,7 +151,7 @@ class Necks:
         nodes = max(col1 - col0, 0) * max(row1 - row0, 0) * (self.parts * ratio) ** 2
         if not 0 < nodes <= MOST_NODES:
             return None
-        finer = lattice(problem, over, self.parts * ratio, 1, 1, None, CLOSE)
+        finer = lattice(problem, over, self.parts * ratio, 1, 1, None, FIT)
         first = np.array([-finer.row1, finer.col0]) * self.parts
         size = finer.inside.shape[0] // ratio, finer.inside.shape[1] // ratio
         own, around = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
@@ -160,7 +161,7 @@ class Necks:
             mask[row, col] = True
         finely = np.repeat(np.repeat(around, ratio, axis=0), ratio, axis=1)
         clearance = ClearanceGrid(finer, self.cap_m, True, 1, finely, whole=True)
-        clearance.add_walls(*_uphill_walls(clearance, self.cap_m))
+        clearance.add_walls(*walls_beside(clearance))
         mesh = clearance.mesh(single=True)
         return Neck(cells, *_openings(mesh, own, ratio, first))
 
@@ -235,53 +236,6 @@ def _follows_ground(problem: Problem, over: Extent) -> bool:
     (west, south), (east, north) = corners.min(axis=0) - reach_m, corners.max(axis=0) + reach_m
     boxes = [zone.bounds for zone in problem.airspace.zones if zone.follows_ground]
     return any(b[0] < east and b[2] > west and b[1] < north and b[3] > south for b in boxes)
-
-
-def _uphill_walls(clearance: ClearanceGrid, cap_m: float) -> Iterator[tuple[Indices, Floats]]:
-    """Cells of a fine lattice for bounds, and the excess of walls at their corners, from the terrain of cells as far
-    away as the track error reaches: on a pass, the ground at both sides is higher than that below.
-
-    A place in a cell and the one at the same part of the other cell are no farther apart than corners are.
-    """
-    from scipy.ndimage import maximum_filter  # most missions have no necks
-
-    plane, limits = clearance.plane, clearance.plane.problem.limits
-    rows, cols = clearance.shape
-    part = np.s_[clearance.row : clearance.row + rows, clearance.col : clearance.col + cols]
-    more = limits.min_agl_m + limits.altitude_error_m - plane.fit.spare_m - cap_m
-    excess, x, y = plane.tops[0][part] + more, plane.x[part], plane.y[part]
-    wide = np.hypot(x[0, 1] - x[0, 0], y[0, 1] - y[0, 0]), np.hypot(x[1, 0] - x[0, 0], y[1, 0] - y[0, 0])
-    reach_m = SPARE * limits.track_error_m - 2.0 * plane.fit.bent_m
-    most = [int(reach_m / width) for width in wide]
-    least = np.minimum(np.minimum(excess[:-1, :-1], excess[:-1, 1:]), np.minimum(excess[1:, :-1], excess[1:, 1:]))
-    highest = maximum_filter(np.nan_to_num(excess, nan=-np.inf), size=(2 * most[1] + 3, 2 * most[0] + 3))[:-1, :-1]
-    j, i = np.nonzero((least <= 0.0) & (highest > 0.0))
-    corners = [(j, i), (j, i + 1), (j + 1, i + 1), (j + 1, i)]
-    for b, a in _farthest(reach_m, wide, most):
-        inside = (j + b >= 0) & (j + b < rows - 1) & (i + a >= 0) & (i + a < cols - 1)
-        away = np.stack([excess[jj[inside] + b, ii[inside] + a] for jj, ii in corners], axis=-1)
-        apart_m = np.stack(
-            [
-                np.hypot(*(z[jj[inside] + b, ii[inside] + a] - z[jj[inside], ii[inside]] for z in (x, y)))
-                for jj, ii in corners
-            ]
-        )
-        twist = 0.25 * np.abs(away[:, 0] + away[:, 2] - away[:, 1] - away[:, 3])
-        walls = away - twist[:, None]
-        stands = (walls.max(axis=1) > 0.0) & (apart_m.max(axis=0) <= reach_m)  # not where ground is unknown
-        yield (j[inside] * (cols - 1) + i[inside])[stands], walls[stands]
-
-
-def _farthest(reach_m: float, wide: tuple[float, float], most: list[int]) -> list[tuple[int, int]]:
-    """Steps of whole rows and columns, no longer than ``reach_m`` but nearly so, in all directions; ``wide``: metres of
-    a column and of a row."""
-    found = []
-    for b in range(-most[1], most[1] + 1):
-        for a in range(-most[0], most[0] + 1):
-            length = math.hypot(a * wide[0], b * wide[1])
-            if 0.0 < length <= reach_m < math.hypot((abs(a) + 1) * wide[0], (abs(b) + 1) * wide[1]):
-                found.append((b, a))
-    return found
 
 
 def _openings(mesh: Mesh, own: Bools, ratio: int, first: Indices) -> tuple[Indices, Floats]:
