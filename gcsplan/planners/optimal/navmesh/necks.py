@@ -20,15 +20,13 @@ from gcsplan.planners.optimal.navmesh.grid import Plane, lattice
 from gcsplan.planners.optimal.navmesh.mesh import Guide, Mesh
 from gcsplan.planners.optimal.navmesh.mesh_kernels import sort_portals
 from gcsplan.planners.optimal.navmesh.portals import GroundTrack, Place
-from gcsplan.planners.optimal.navmesh.terrain_nodes import Extent
 from gcsplan.planners.optimal.navmesh.walls_beside import walls_beside
 from gcsplan.planners.optimal.navmesh.zone_shapes import Fit
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.zone_levels import shut_places
 
-FINE_M, BESIDE_ZONES_M, MOST_PARTS = 0.75, 1.5, 24
-"""Width of the finer cells, m; at zones that follow ground, where much ground is read for each; and most of them along
-a side of a cell."""
+FINE_M, MOST_PARTS = 1.5, 24
+"""Width of the finer cells, m, and most of them along a side of a cell."""
 FIT = Fit(2e-4, 1e-3, 0.07)
 """Its lattice is small, and its nodes need not lie on straight lines for long."""
 AROUND_M = 30.0
@@ -145,13 +143,11 @@ class Necks:
         rows, cols = problem.airspace.surface.ground_m.shape
         col0, row0 = max(math.floor(low[1]), 0), max(math.floor(-high[0]), 0)
         col1, row1 = min(math.ceil(high[1]), cols - 1), min(math.ceil(-low[0]), rows - 1)
-        over = col0, row0, col1, row1
-        fine_m = BESIDE_ZONES_M if _follows_ground(problem, over) else FINE_M
-        ratio = min(MOST_PARTS, max(2, round(width_m / fine_m)))
+        ratio = min(MOST_PARTS, max(2, round(width_m / FINE_M)))
         nodes = max(col1 - col0, 0) * max(row1 - row0, 0) * (self.parts * ratio) ** 2
         if not 0 < nodes <= MOST_NODES:
             return None
-        finer = lattice(problem, over, self.parts * ratio, 1, 1, None, FIT)
+        finer = lattice(problem, (col0, row0, col1, row1), self.parts * ratio, 1, 1, None, FIT)
         first = np.array([-finer.row1, finer.col0]) * self.parts
         size = finer.inside.shape[0] // ratio, finer.inside.shape[1] // ratio
         own, around = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
@@ -226,16 +222,6 @@ class Necks:
         open_ = (left >= 0) & (right >= 0) & _looked_at(mesh).ravel()[cells].all(axis=1)
         open_ &= keys[order][place] == asked
         return cut[order][place[open_]], openings[open_], cells[open_]
-
-
-def _follows_ground(problem: Problem, over: Extent) -> bool:
-    """Whether a zone with a level above ground may reach into an extent of the terrain model."""
-    col0, row0, col1, row1 = over
-    corners = problem.airspace.surface.grid.to_plane([col0, col0, col1, col1], [row0, row1, row0, row1])
-    reach_m = problem.airspace.beside_m(problem.limits)
-    (west, south), (east, north) = corners.min(axis=0) - reach_m, corners.max(axis=0) + reach_m
-    boxes = [zone.bounds for zone in problem.airspace.zones if zone.follows_ground]
-    return any(b[0] < east and b[2] > west and b[1] < north and b[3] > south for b in boxes)
 
 
 def _openings(mesh: Mesh, own: Bools, ratio: int, first: Indices) -> tuple[Indices, Floats]:
