@@ -38,7 +38,8 @@ NEW = np.iinfo(np.int64).min
 SAME_M = 1e-4
 """Ends of portals that are no farther apart are at one place."""
 LOOKS, LOOK_M = 24, 1.0
-"""Most times that necks are looked at for one track; and the step, m, at which it is read where it is shut."""
+"""Most times that necks are looked at for one track; and the least step, m, at which it is read where it is shut. The
+step is the track error if that is more: even the sharpest ridge shuts twice as much of a track."""
 FAN = 24
 """Most pieces of a mesh with necks that a track passes while it turns at one node."""
 
@@ -73,11 +74,12 @@ class LegNecks:
         if plane.stride > 1 or necks is None or clearance.cap_m > self.top_m:
             return clearance.mesh().track(self.start, self.goal, limit_m, guide)
         self._necks[parts] = necks
+        step_m = max(LOOK_M, self.problem.limits.track_error_m)
         for _ in range(LOOKS):
             way = necks.mesh(clearance).track(self.start, self.goal, limit_m, guide)
             if way is None or not closely or not self.problem.budget.goes_on():
                 break
-            shut = shut_places(self.problem, way.points, self.top_m, LOOK_M)
+            shut = shut_places(self.problem, way.points, self.top_m, step_m)
             if not len(shut) or not necks.look(plane, shut):
                 break
         return way
