@@ -13,12 +13,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from gcsplan.arrays import Bools, Floats, Indices
+from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.corridor import joined
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.optimal.plane_search import PlaneSearch
-from gcsplan.planners.profile.track import denser, distances
+from gcsplan.planners.optimal.sources.pass_line import over_pass
+from gcsplan.planners.profile.track import distances
 from gcsplan.planners.profile.zone_levels import free_below
 from gcsplan.world.path import Path
 
@@ -46,16 +47,6 @@ part of what the longest useful track is longer than the bound's."""
 FAR, CLOSE_BY = 5e-3, (3e-3, 3e-2, math.inf)
 """The gap, as a part, from which cells are looked at through which the bound's track is shut; and the parts by which
 tracks may be longer than the bound for that, in turn."""
-DENSE_M, BEFORE_M, MOST_PLACES = 0.5, 15.0, 600
-"""A track through a pass: its step, m; how far before and behind the pass it may be moved; and its most places."""
-SIDE_M, TRIED, MOST_ASIDE, WITHIN_M = 6.0, 49, 3, 1e-3
-"""How far it may be moved aside, m; the places tried for that; how many of them from step to step; and how closely the
-lowest floor is found, m."""
-STRAIGHT_M = 2e-3
-"""Metres by which its places may be left aside where it is straight."""
-SPARE_M, DEAR, LITTLE = 0.1, 100.0, 1e-6
-"""Metres below the cap at which a floor is low enough; metres aside that a metre lower is worth; and what decides
-between floors that are alike."""
 MOST = 24
 """Most stretches of a track; a track with more is not tried."""
 AT_ONCE = 512
@@ -206,7 +197,7 @@ def _past(
             for _ in found.first_looks(SLACKS):
                 pass
         if sub.best is None and not sub.proved_infeasible and found.legs:
-            lowest = _lowest(plane, np.vstack([start[:2], places[first + 1 : last], goal[:2]]))
+            lowest = over_pass(plane.problem, plane.top_m, np.vstack([start[:2], places[first + 1 : last], goal[:2]]))
             if not sub.take_along(joined([lowest], [])):
                 found.narrow_passage()
         if sub.best is None or not plane.incumbent.budget.goes_on():
@@ -214,67 +205,6 @@ def _past(
         out.append(sub.best if not out else sub.best[1:])
         start = goal
     return np.vstack(out)
-
-
-def _lowest(plane: PlaneSearch, track: Floats) -> Floats:
-    """A track (N, 2) moved aside where terrain shuts it, to where the exact check's floor is low and without jumps.
-
-    A pass that is open by centimetres is open on a line only.
-    """
-    import shapely  # most missions need none here
-
-    places = denser(track, DENSE_M)
-    shut = np.flatnonzero(plane.problem.floors(*places.T) > plane.top_m)
-    if not len(shut):
-        return track
-    near = round(BEFORE_M / DENSE_M)
-    first, last = max(int(shut[0]) - near, 0), min(int(shut[-1]) + near, len(places) - 1)
-    if last - first > MOST_PLACES:
-        return track
-    known, places = places, places[first : last + 1]
-    # All in one direction: across a bend of the track, places would come apart.
-    aside = (places[-1] - places[0])[::-1] * [-1.0, 1.0]
-    aside /= max(float(np.hypot(*aside)), 1e-9)
-
-    def moved(by: Floats) -> Floats:
-        return np.asarray(places[:, None] + by[..., None] * aside)
-
-    def over(at: Floats) -> Floats:
-        floor = plane.problem.floors(*at.reshape(-1, 2).T).reshape(at.shape[:-1])
-        return np.asarray(np.maximum(floor - plane.top_m, -SPARE_M))
-
-    steps = np.linspace(-1.0, 1.0, TRIED)
-    width = 2.0 * SIDE_M / (TRIED - 1)
-    at = moved(np.tile(SIDE_M * steps, (len(places), 1)))
-    # From each place of a row to those of the next that are a few places aside, by way of the middle.
-    beside = np.arange(TRIED)[:, None] + np.arange(-MOST_ASIDE, MOST_ASIDE + 1)
-    there = beside.clip(0, TRIED - 1)
-    high = over(at)
-    ways = over(0.5 * (at[:-1, :, None] + at[1:, there])) + high[1:, there]
-    ways = DEAR * ways + width * np.abs(beside - np.arange(TRIED)[:, None])
-    ways[:, beside != there] = np.inf
-    left, back = np.where(steps == 0.0, 0.0, np.inf), list[Indices]()
-    for row in ways[::-1]:  # from the end
-        whole = row + left[there]
-        back.append(there[np.arange(TRIED), whole.argmin(axis=1)])
-        left = whole.min(axis=1)
-    chosen = [TRIED // 2]
-    for to in reversed(back):
-        chosen.append(int(to[chosen[-1]]))
-    off = SIDE_M * steps[chosen]
-    while width > WITHIN_M:
-        tried = off[:, None] + width * steps
-        best = (over(moved(tried)) + LITTLE * np.abs(steps)).argmin(axis=1)
-        off = tried[np.arange(len(off)), best]
-        width *= 4.0 / (TRIED - 1)
-    # The line goes on before and behind the pass, so that no leg cuts its corner.
-    tight = over(moved(off[:, None]))[:, 0] > -SPARE_M
-    for step in (1, -1):
-        further = np.where(np.roll(tight, step) & ~tight, np.roll(off, step), off)
-        off = np.where(over(moved(further[:, None]))[:, 0] <= 0.0, further, off)
-    off[[0, -1]] = 0.0
-    line = np.vstack([known[:first], moved(off[:, None])[:, 0], known[last + 1 :]])
-    return np.asarray(shapely.LineString(line).simplify(STRAIGHT_M).coords)
 
 
 def _nearest(places: Floats, track: Floats) -> tuple[Floats, Floats]:

@@ -18,6 +18,7 @@ from gcsplan.planners.lattice.planner import plan_band
 from gcsplan.planners.optimal.plane_search import PlaneSearch
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.optimal.sources import bound_corridor
+from gcsplan.planners.optimal.sources.pass_line import over_pass
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.path import Path
 from tests.planners.optimal.navmesh.test_necks import ridge as pass_over_a_ridge
@@ -108,7 +109,7 @@ def test_a_track_is_moved_aside_to_the_line_on_which_a_pass_is_open(aside_m: flo
     track = np.array([[600.0 + aside_m + 2.0, north - 60.0], [600.0 + aside_m, north], [604.0 + aside_m, north + 60.0]])
     plane = cast(PlaneSearch, SimpleNamespace(problem=problem, top_m=cap_m))
     assert (_dense(track, problem) > cap_m).any()
-    moved = bound_corridor._lowest(plane, track)
+    moved = over_pass(plane.problem, plane.top_m, track)
     assert (moved[[0, -1]] == track[[0, -1]]).all()
     assert (_dense(moved, problem) <= cap_m).all()
     assert len(moved) < 40

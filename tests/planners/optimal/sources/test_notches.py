@@ -55,7 +55,7 @@ def test_a_path_leads_through_what_is_open_by_centimetres(
     assert problem.cost(found.path) < 1.003 * found.lower_bound
     assert faults(problem, found.path) == []
     monkeypatch.setattr(PlaneSearch, "narrow_passage", lambda self: False)
-    monkeypatch.setattr(bound_corridor, "_lowest", lambda plane, track: track)
+    monkeypatch.setattr(bound_corridor, "over_pass", lambda problem, cap_m, track: track)
     assert problem.cost(optimal.plan(problem).path) > ROUND_M, "the notch is too wide to show anything"
 
 
