@@ -35,7 +35,7 @@ TWICE = 2.0
 """Times the wanted gap beyond which cells are cut finer: that closes a third, and takes as long as all the rest."""
 PAST_FINE, ROUNDS = 9, 2
 """Most tracks past obstacles that are tried on the finer lattice at once, and how often that is repeated."""
-FINER = 3
+FINER = 2
 """Parts a side into which cells are cut once more, for walls and zones that the first lattice rounds off."""
 OF_REST = 0.5
 """Part of the counted work left that a roadmap may take if a path is known: what it will take is not known before."""
