@@ -46,8 +46,7 @@ MOST_CELLS = 50_000
 NAMES = (
     "straight", "outlines", "outline_bound", "track_bound", "cap_search", "corridor_first", "lattice_first",
     "roadmap_first", "roadmap_near", "fine_tracks", "detours", "bound_corridor", "section_descent", "contour_climb",
-    "lattice", "lattice_near", "local_roadmap", "cap_pairs", "energy_bound", "length_bound", "altitude_intervals",
-    "refinement",
+    "lattice", "local_roadmap", "cap_pairs", "energy_bound", "length_bound", "altitude_intervals", "refinement",
 )  # fmt: skip
 """The names of all searches; which of them a mission has depends on its objective and limits."""
 
@@ -135,18 +134,13 @@ class Searches:
                 rows += [
                     Search("cap_pairs", 0.5, known, nodes(3.0), on(bound_by_caps), again=True),
                     Search("detours", 0.3, far, nodes(4.0), on(lambda plane: plane.past(PAST_FINE, fine=True))),
-                    Search("lattice_near", 0.02, far, of(0.5, 0.0), self._search_lattice_near),
+                    Search("lattice", 0.02, far, of(0.5, 0.0), self._search_lattice_again),
                 ]
             else:
-                lattice = Search("lattice", 0.5, gap(MUCH), of(1.0, 0.0), self._search_lattice)
                 rows += [
                     Search("detours", 0.3, known, nodes(4.0), self._over(self._past_finely)),
-                    lattice,
-                    Search(
-                        "lattice_near", 0.1, lambda: lattice.seen is None and far(), of(1.0, 0.0),
-                        self._search_lattice,
-                    ),
-                ]  # fmt: skip
+                    Search("lattice", 0.2, far, of(1.0, 0.0), self._search_lattice),
+                ]
         name, share = ("energy_bound", 0.5) if energy else ("length_bound", 0.9)
         return [
             *rows,
@@ -311,5 +305,5 @@ class Searches:
         if sum(leg.refine(plane.limit(leg), FINER, cut) for leg in plane.legs):
             halve(plane, far=True)
 
-    def _search_lattice_near(self) -> None:
+    def _search_lattice_again(self) -> None:
         self._search_lattice(known=True)

@@ -12,7 +12,7 @@ from itertools import combinations, product
 
 import numpy as np
 
-from gcsplan.arrays import Bools, Floats, Indices, Int8s, Int32s
+from gcsplan.arrays import Bools, Floats, Indices, Int8s, Int32s, Int64s
 from gcsplan.planners.optimal.navmesh.buffers import Scratch
 from gcsplan.planners.optimal.navmesh.clearance_kernels import fill
 from gcsplan.planners.optimal.navmesh.climb_cones import hold_down, lift_lids, look_around, walk_around
@@ -21,7 +21,7 @@ from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.mesh_kernels import NEXT, WALL, make_pieces, make_portals, sort_portals
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.navmesh.shut_kernels import stamp_beside
-from gcsplan.planners.optimal.navmesh.zone_kernels import stamp_zones
+from gcsplan.planners.optimal.navmesh.zone_kernels import LOOKS, PAIR, stamp_zones
 from gcsplan.planners.profile.track import divided
 
 Cone = tuple[float, float, float, float]
@@ -122,6 +122,7 @@ class ClearanceGrid:
         self._values: Floats
         self._laid: bool
         self.add_walls(*self._border_walls())
+        self._own: tuple[Int32s, Int64s, Int64s] | None = None
         self._held: list[Cone] = []
         self._lift: Floats
         self._either: Int8s
@@ -309,16 +310,30 @@ class ClearanceGrid:
             self._y, self._zones, self._edges, self._boxes, self.low, self._of, self._values,
         )  # fmt: skip
         if self.low and self.plane.stride == 1:
+            if self._own is None:
+                self._own = self._no_own_ground()
+            read = self._own[2]
+            before = int(read[0])
             count = stamp_beside(
                 self._span, self._excess, self._floor, *self._coarse, self.fineness, self._zones, self._edges,
-                self._boxes, reach_m, near_m, np.empty((8, 4)), self._of, self._values, count,
+                self._boxes, reach_m, near_m, np.empty((8, 4)), *self._own, self._of, self._values, count,
             )  # fmt: skip
+            self.plane.problem.budget.spend("read", float(read[0] - before))
         for cells, walls in self._walls:
             own = self._values[count : count + len(cells)]
             own[:, :NEXT], own[:, NEXT] = walls, self._of[cells]
             self._of[cells] = np.arange(count + 1, count + 1 + len(cells))
             count += len(cells)
         self._laid = True
+
+    def _no_own_ground(self) -> tuple[Int32s, Int64s, Int64s]:
+        """Where `stamp_beside` keeps the zones' own ground, all of it unknown yet: see `shut_kernels._own_ground`."""
+        looks = (self._zones[:, LOOKS] > 0.0) & (self._zones[:, PAIR] == 0.0)
+        wide, high = ((self._boxes[:, k + 1] - self._boxes[:, k] + 1).clip(0).astype(np.int64) for k in (0, 2))
+        end = np.cumsum(np.where(looks, wide * high, 0))
+        own = self._array("own", (int(end[-1]) if len(end) else 0, 4), np.int32)
+        own[:] = -2
+        return own, np.append(0, end[:-1]), np.zeros(1, np.int64)
 
 
 def mesh_of(

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from gcsplan.arrays import Floats, Int32s
+from gcsplan.arrays import Floats, Int32s, Int64s
 from gcsplan.planners.compiled import device, kernel
 from gcsplan.planners.optimal.navmesh.mesh_kernels import NEXT
 from gcsplan.planners.optimal.navmesh.zone_kernels import (
@@ -57,9 +57,9 @@ def _covers(
 def _lowest_and_highest(
     ground: Floats, x: Floats, y: Floats, fineness: int, zones: Floats, edges: Floats, z: int, reach: float,
     near: float, j: int, i: int,
-) -> tuple[int, int, int, int]:  # fmt: skip
+) -> tuple[int, int, int, int, int]:  # fmt: skip
     """Of the cells whose ground is a zone's own and within reach of cell (j, i): row and column of the one with the
-    lowest ground and of the one with the highest; all -1 if there is none.
+    lowest ground and of the one with the highest, all -1 if there is none; and the number of cells that were read.
 
     ``ground``, ``x``, ``y``: at the nodes of a lattice of which cell (j, i) is a part, ``fineness`` times finer.
     ``reach``: metres by which the zone is grown; ``near``: a little less, from each place of the cell to that ground.
@@ -71,7 +71,7 @@ def _lowest_and_highest(
     across, along = math.sqrt(ex * ex + ey * ey), math.sqrt(nx * nx + ny * ny)
     low_j = low_i = high_j = high_i = -1
     if depth(zones, edges, z, value_at(x, fineness, j, i), value_at(y, fineness, j, i)) <= reach - near:
-        return low_j, low_i, high_j, high_i
+        return low_j, low_i, high_j, high_i, 1
     rows, cols = int(near / along), int(near / across)
     every = 1 + max(max(rows, cols) - 1, 0) // BESIDE_STEPS
     least, most = np.inf, -np.inf
@@ -93,7 +93,7 @@ def _lowest_and_highest(
                 least, low_j, low_i = height, jj, ii
             if height > most:
                 most, high_j, high_i = height, jj, ii
-    return low_j, low_i, high_j, high_i
+    return low_j, low_i, high_j, high_i, (2 * (rows // every) + 1) * (2 * (cols // every) + 1)
 
 
 @device
@@ -104,17 +104,39 @@ def _bulge(ground: Floats, fineness: int, j: int, i: int) -> float:
 
 
 @device
+def _own_ground(
+    ground: Floats, x: Floats, y: Floats, fineness: int, zones: Floats, edges: Floats, boxes: Int32s, z: int,
+    reach: float, near: float, j: int, i: int, own: Int32s, own_at: Int64s, read: Int64s,
+) -> tuple[int, int, int, int]:  # fmt: skip
+    """`_lowest_and_highest`, read once for each zone and cell: ``own`` (K, 4) keeps it from row ``own_at`` of the zone
+    on for all cells of its box, rows of a box first; -2 where it is not known yet. ``read`` (1,) counts cells read."""
+    width = boxes[z, 1] - boxes[z, 0] + 1
+    at = own_at[z] + (j - boxes[z, 2]) * width + i - boxes[z, 0]
+    if own[at, 0] < -1:
+        low_j, low_i, high_j, high_i, count = _lowest_and_highest(
+            ground, x, y, fineness, zones, edges, z, reach, near, j, i
+        )
+        own[at, 0], own[at, 1], own[at, 2], own[at, 3] = low_j, low_i, high_j, high_i
+        read[0] += count
+    return own[at, 0], own[at, 1], own[at, 2], own[at, 3]
+
+
+@device
 def _levels(
-    ground: Floats, x: Floats, y: Floats, fineness: int, zones: Floats, edges: Floats, z: int, reach: float,
-    near: float, j: int, i: int, of: Floats, first: int,
+    ground: Floats, x: Floats, y: Floats, fineness: int, zones: Floats, edges: Floats, boxes: Int32s, z: int,
+    reach: float, near: float, j: int, i: int, of: Floats, first: int, own: Int32s, own_at: Int64s, read: Int64s,
 ) -> bool:  # fmt: skip
     """Fill rows ``first`` to ``first`` + 2 of ``of`` with functions, given at the corners of a cell and linear between,
     of a zone: at a place where the third, how deep it lies in the zone, is above 0, the zone shuts all altitudes from
-    the first to the second. Returns whether they are known. ``ground``, ``x``, ``y``: as in `_lowest_and_highest`."""
+    the first to the second. Returns whether they are known. Other arguments: as in `_own_ground`."""
     low_j, low_i, high_j, high_i = -1, -1, -1, -1
     looks = zones[z, LOOKS] > 0.0
     if looks:
-        low_j, low_i, high_j, high_i = _lowest_and_highest(ground, x, y, fineness, zones, edges, z, reach, near, j, i)
+        if not (boxes[z, 0] <= i <= boxes[z, 1] and boxes[z, 2] <= j <= boxes[z, 3]):
+            return False
+        low_j, low_i, high_j, high_i = _own_ground(
+            ground, x, y, fineness, zones, edges, boxes, z, reach, near, j, i, own, own_at, read
+        )
     if low_j < 0 if looks else over_ground(zones, z):
         return False
     low_off = _bulge(ground, fineness, low_j, low_i) if looks else 0.0
@@ -154,14 +176,15 @@ def _wall_of_two(of: Floats, one: int, other: int, floor: float, allowed: float,
     return float(min(wall, min(of[one + 2, k], of[other + 2, k])))
 
 
-@kernel("i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] i8 f8[,] f8[,] i4[,] f8 f8 f8[,] i4[] f8[,] i8")
+@kernel("i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] i8 f8[,] f8[,] i4[,] f8 f8 f8[,] i4[,] i8[] i8[] i4[] f8[,] i8")
 def stamp_beside(
     span: Int32s, excess: Floats, floor: Floats, ground: Floats, x: Floats, y: Floats, fineness: int, zones: Floats,
-    edges: Floats, boxes: Int32s, reach: float, near: float, room: Floats, of: Int32s, values: Floats, count: int,
+    edges: Floats, boxes: Int32s, reach: float, near: float, room: Floats, own: Int32s, own_at: Int64s, read: Int64s,
+    of: Int32s, values: Floats, count: int,
 ) -> int:  # fmt: skip
     """Give walls to the cells that a zone's own ground shuts in part or whole, by itself or together with another zone,
     after the ``count`` walls of `zone_kernels.stamp_zones`; return how many there are then. ``ground``, ``x``, ``y``:
-    as in `_lowest_and_highest`; ``room`` (8, 4): a work array."""
+    as in `_lowest_and_highest`; ``room`` (8, 4): a work array; ``own``, ``own_at``, ``read``: as in `_own_ground`."""
     wall = values[len(values) - 1]
     for z in range(len(zones)):
         if zones[z, LOOKS] == 0.0:
@@ -176,11 +199,15 @@ def stamp_beside(
                 shut = min(min(excess[j, i], excess[j, i + 1]), min(excess[j + 1, i], excess[j + 1, i + 1])) > 0.0
                 if shut or _is_shut(of, values, cell):
                     continue
-                if not _levels(ground, x, y, fineness, zones, edges, one, reach, near, j, i, room, 0):
+                if not _levels(
+                    ground, x, y, fineness, zones, edges, boxes, one, reach, near, j, i, room, 0, own, own_at, read
+                ):
                     continue
                 if max(max(room[2, 0], room[2, 1]), max(room[2, 2], room[2, 3])) <= 0.0:
                     continue
-                if pair and not _levels(ground, x, y, fineness, zones, edges, other, reach, near, j, i, room, 3):
+                if pair and not _levels(
+                    ground, x, y, fineness, zones, edges, boxes, other, reach, near, j, i, room, 3, own, own_at, read
+                ):
                     continue
                 most_upper = most_lower = -np.inf
                 for k in range(4):
@@ -212,7 +239,7 @@ def _shut_beside(
 ) -> tuple[float, float]:  # fmt: skip
     """The altitudes (bottom, top) that a zone's own ground within reach shuts everywhere over a cell; (inf, -inf) if
     none are known."""
-    low_j, low_i, high_j, high_i = _lowest_and_highest(ground, x, y, 1, zones, edges, z, reach, near, j, i)
+    low_j, low_i, high_j, high_i, _ = _lowest_and_highest(ground, x, y, 1, zones, edges, z, reach, near, j, i)
     if low_j < 0:
         return np.inf, -np.inf
     low, high = -np.inf, np.inf
