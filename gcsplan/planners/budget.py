@@ -112,6 +112,11 @@ class Budget:
         most = self.spent + part * self.left
         return lambda: self.spent < most and self.goes_on()
 
+    @property
+    def stopped_by(self) -> str:
+        """What stopped the plan: time, budget, or exhausted where neither did."""
+        return "time" if self.clocked_out else "budget" if self.ran_out else "exhausted"
+
     def fits(self, seconds: float, megabytes: float) -> bool:
         """Whether that many counted seconds and megabytes are left."""
         return seconds <= self.left and megabytes <= self.left_mb

@@ -12,11 +12,13 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats
+from gcsplan.planners.budget import Budget
 from gcsplan.planners.lattice.corridor_raster import Guide, Line, line_of, make_guide
 from gcsplan.planners.lattice.routes import LEVELS, Level, Router, climbing_weight
 from gcsplan.planners.problem import Problem, Refusal, Solution, straight_way_m, terminals_of
@@ -43,47 +45,54 @@ MOST_OPENED = 200_000
 """Labels expanded on one lattice after which it is given up; such searches wind up and down to gain height."""
 DETOURS, DETOUR_STEPS = (0.2, 0.4, 0.6, 0.8), 4.0
 """Where along the first track a disc is closed to find other tracks, as parts; its radius, in lattice steps."""
-WITHOUT = 3.0
-"""No search for a first path begins later than this multiple of ``budget_s``."""
+BETTER = 0.5
+"""Part of the work left that other tracks and kicks may take once there is a path."""
 KICKS = 10
 KICK_PARTS = (0.02, 0.05)
 
 BOUND_NOTE = "the lower bound is the straight line from terminal to terminal: true, but not tight"
 
 
-def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True, known: bool = False) -> Solution:
+def plan_band(
+    problem: Problem,
+    tell: Tell,
+    begun: float,
+    *,
+    climbs: bool = True,
+    known: bool = False,
+    goes_on: Callable[[], bool] | None = None,
+) -> Solution:
     """A path under a maximum AGL and the climb limit that `Airspace.examine` passes.
 
     Start, goal and vias must be legal by themselves. ``tell(phase, cost)`` reports progress; ``begun`` is the
-    `time.perf_counter` of the call. Deterministic: stops on counted work; ``budget_s`` is a last stop for all that
-    comes after the first path, and `WITHOUT` times that where there is none, if the problem's budget is ``clocked``.
-    ``climbs``: laps over start and goal are allowed; ``known``: a path is known already, so only one search is made.
-    Raises Refusal if no path is found.
+    `time.perf_counter` of the call. ``climbs``: laps over start and goal are allowed; ``known``: a path is known
+    already, so only one search is made; ``goes_on``: whether there is work left for more, by default by the problem's
+    budget. Raises Refusal if no path is found.
     """
+    goes_on = problem.budget.goes_on if goes_on is None else goes_on
     bound = straight_bound(problem)
     terminals = terminals_of(problem)
     if all(math.dist(terminals[0], x) < 1e-3 for x in terminals):
-        return _solution(problem, _on_the_spot(problem), bound, begun, time.perf_counter() - begun, False)
+        return _solution(problem, _on_the_spot(problem), bound, begun, time.perf_counter() - begun)
     way = straight_way_m(problem)
     best = straight(problem, way)
     if best is not None and problem.cost(Path(best)) <= bound * (1.0 + 1e-9):
-        return _solution(problem, best, bound, begun, time.perf_counter() - begun, False)
+        return _solution(problem, best, bound, begun, time.perf_counter() - begun)
     first_s = math.inf if best is None else time.perf_counter() - begun
     router: Router | None = None
-    timed_out = False
-    last_s = problem.budget_s if problem.budget.clocked else math.inf
-    deadline_s, given_up_s = begun + last_s, begun + WITHOUT * last_s
     for level in LEVELS[:1] if known else LEVELS if climbs else LEVELS[:2]:
-        if best is None and time.perf_counter() > given_up_s:
+        if best is None and not goes_on():
             break
         tell("search", None if best is None else problem.cost(Path(best)))
-        work = _Work.at(problem, level, way)
+        work = _Work(problem, Router.at(problem, level), way, goes_on)
         router = work.router
         cut = router.cut_off() if climbs else (False, False)
-        found = None if any(cut) else work.first(1 if known else SEARCHES, given_up_s)
+        found = None if any(cut) else work.first(1 if known else SEARCHES)
         if found is None and climbs and best is None and not known and (any(cut) or level is LEVELS[0]):
             ends = cut if any(cut) else (True, True)
-            found = with_climbs(problem, ends, lambda p: plan_band(p, tell, begun, climbs=False).path.points)
+            found = with_climbs(
+                problem, ends, lambda p: plan_band(p, tell, begun, climbs=False, goes_on=goes_on).path.points
+            )
         if found is not None:
             best = found if best is None else min(best, found, key=lambda p: problem.cost(Path(p)))
         # A path longer than the detours that this lattice holds may have a shorter rival outside it: try the next one.
@@ -91,14 +100,14 @@ def plan_band(problem: Problem, tell: Tell, begun: float, *, climbs: bool = True
             first_s = min(first_s, time.perf_counter() - begun)
             tell("pull", problem.cost(Path(best)))
             if work.line is not None:
-                better, timed_out = work.improve(deadline_s, tell)
+                better = work.improve(tell)
                 if better is not None and problem.cost(Path(better)) < problem.cost(Path(best)):
                     best = better
             break
     if best is None:
         raise _not_found(problem, router)
     tell("done", problem.cost(Path(best)))
-    return _solution(problem, best, bound, begun, first_s, timed_out)
+    return _solution(problem, best, bound, begun, first_s)
 
 
 def _not_found(problem: Problem, router: Router | None) -> Refusal:
@@ -121,15 +130,13 @@ def _stopped_by(problem: Problem, why: Obstruction) -> str:
     return f"a {why.kind} steeper than max_{why.kind}_deg, by {why.by:.1f} m of height in {run_m:.0f} m"
 
 
-def _solution(
-    problem: Problem, points: Floats, bound: float, begun: float, first_s: float, timed_out: bool
-) -> Solution:
+def _solution(problem: Problem, points: Floats, bound: float, begun: float, first_s: float) -> Solution:
     path = Path(points)
     near = problem.cost(path) - bound <= problem.gap_percent / 100.0 * max(bound, 1e-9)
     return Solution(
         path=path,
         lower_bound=bound,
-        stopped_by="gap" if near else "time" if timed_out else "exhausted",
+        stopped_by="gap" if near else problem.budget.stopped_by,
         planning_s=time.perf_counter() - begun,
         first_path_s=first_s,
         notes=() if near else (BOUND_NOTE,),
@@ -200,19 +207,19 @@ def _flat(points: Floats) -> float:
     return float(np.hypot(*np.diff(points[:, :2], axis=0).T).sum())
 
 
-def pulled(problem: Problem, points: Floats, level: Level, deadline_s: float) -> Floats | None:
+def pulled(problem: Problem, points: Floats, level: Level) -> Floats | None:
     """Way points of the best line found from a path (N, 3): the line pulled from its track, and others around it.
 
     Zones are passed over or under as that path passes them. The result need not be cheaper; None if it is not legal.
     """
     way = straight_way_m(problem)
-    work = _Work.at(problem, level, way)
+    work = _Work(problem, Router.at(problem, level), way, problem.budget.goes_on)
     pinned, pin_m = pins_of(problem, points)
     work.over = _sides(problem, points, pinned, pin_m)
     flat = np.ascontiguousarray(points[:, :2])
     work.guide = work._guide([flat])
     work.line = work.guide.pull(line_of(flat, pinned, pin_m), work._steps(FINE_STEPS), FINE_GAIN * way)
-    return work.improve(deadline_s, lambda _phase, _cost: None)[0]
+    return work.improve(lambda _phase, _cost: None)
 
 
 def _sides(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> dict[int, bool]:
@@ -230,8 +237,9 @@ def _sides(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> di
 class _Work:
     """One lattice, the tracks found on it, and the lines pulled from them."""
 
-    def __init__(self, problem: Problem, router: Router, way_m: float) -> None:
+    def __init__(self, problem: Problem, router: Router, way_m: float, goes_on: Callable[[], bool]) -> None:
         self.problem = problem
+        self.goes_on = goes_on
         self.router = router
         self.way_m = way_m
         self.guide: Guide | None = None
@@ -240,18 +248,13 @@ class _Work:
         self.over: dict[int, bool] = {}
         """Zones known to be passed over (True) or under (False), by index."""
 
-    @classmethod
-    def at(cls, problem: Problem, level: Level, way_m: float) -> _Work:
-        """Build the lattice of ``level``."""
-        return cls(problem, Router.at(problem, level), way_m)
-
-    def first(self, searches: int, deadline_s: float = math.inf) -> Floats | None:
+    def first(self, searches: int) -> Floats | None:
         """Way points of the first track that can be made legal, of ``searches`` at most; None if none can.
 
-        After each failure the lattice is corrected. No search begins after the deadline.
+        After each failure the lattice is corrected.
         """
         for _ in range(searches):
-            if self.router.opened > MOST_OPENED or time.perf_counter() > deadline_s:
+            if self.router.opened > MOST_OPENED or not self.goes_on():
                 return None
             way = self.router.way()
             if way is None:
@@ -273,12 +276,16 @@ class _Work:
                 self.router.climb_factor *= 0.95
         return None
 
-    def improve(self, deadline_s: float, tell: Tell) -> tuple[Floats | None, bool]:
-        """Way points of the best line from several tracks and kicks (None if it is not legal), and whether time ran
-        out."""
+    def improve(self, tell: Tell) -> Floats | None:
+        """Way points of the best line from several tracks and kicks; None if it is not legal."""
         assert self.line is not None
         assert self.guide is not None
-        ways = self._others(deadline_s)
+        half = self.problem.budget.share(BETTER)
+
+        def in_time() -> bool:
+            return half() and self.goes_on()
+
+        ways = self._others(in_time)
         if ways:
             self.guide = self._guide([self.line.points, *ways])
         guide = self.guide
@@ -287,7 +294,7 @@ class _Work:
             line = guide.pull(self._line(way), self._steps(COARSE_STEPS), COARSE_GAIN * self.way_m)
             if line.missing <= 0.0:
                 lines.append(line)
-            if time.perf_counter() > deadline_s:
+            if not in_time():
                 break
         lines.sort(key=lambda line: line.cost)
         best = lines[0]
@@ -295,7 +302,7 @@ class _Work:
         rng = np.random.default_rng(self.problem.seed)
         for line in lines[:2]:
             for _ in range(KICKS):
-                if time.perf_counter() > deadline_s:
+                if not in_time():
                     break
                 kicked = guide.pull(self._kicked(line, rng), self._steps(FINE_STEPS), COARSE_GAIN * self.way_m)
                 if kicked.missing <= 0.0 and kicked.cost < line.cost:
@@ -304,10 +311,9 @@ class _Work:
             if line.value < best.value:
                 best = line
         found, self.line = self._mend(best)
-        late = time.perf_counter() > deadline_s
         if isinstance(found, Unsettled):
-            return None, late
-        return fewer(self.problem, *found, WORTH * self.way_m * _unit(self.problem))[0], late
+            return None
+        return fewer(self.problem, *found, WORTH * self.way_m * _unit(self.problem))[0]
 
     def _line(self, way: Floats) -> Line:
         track = self.router.track_of(way)
@@ -342,9 +348,11 @@ class _Work:
                 guide.strict()
             steps = FINE_STEPS if attempt < 2 else COARSE_STEPS
             line = guide.pull(line, self._steps(steps), COARSE_GAIN * self.way_m)
+            if not self.goes_on():
+                break
         return found, line
 
-    def _others(self, deadline_s: float) -> list[Floats]:
+    def _others(self, in_time: Callable[[], bool]) -> list[Floats]:
         """Other tracks over the lattice: with a price on climbing (energy), and around discs closed on the first."""
         assert self.line is not None
         router, p = self.router, self.problem
@@ -355,7 +363,7 @@ class _Work:
         s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.line.points, axis=0).T))])
         floor = router.lattice.floor_m
         for f in DETOURS:
-            if time.perf_counter() > deadline_s or router.opened > MOST_OPENED // 4:
+            if not in_time() or router.opened > MOST_OPENED // 4:
                 break
             place = [np.interp(f * s[-1], s, self.line.points[:, k]) for k in range(2)]
             router.lattice.floor_m = floor.copy()
@@ -392,6 +400,7 @@ def plan(problem: Problem) -> Solution:
     from gcsplan.planners.problem import Progress
 
     begun = time.perf_counter()
+    problem = replace(problem, budget=Budget(problem.budget_s, problem.budget_mb, problem.budget.clocked))
 
     def tell(phase: str, cost: float | None) -> None:
         if problem.progress is not None:

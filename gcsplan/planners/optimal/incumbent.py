@@ -231,11 +231,10 @@ class Incumbent:
             self.cost = self.problem.cost(Path(self.best))
         self.tell("done")
         budget = self.budget
-        stopped = "time" if budget.clocked_out else "budget" if budget.ran_out else "exhausted"
         return Solution(
             path=Path(self.best),
             lower_bound=self.bound,
-            stopped_by="gap" if self.done() else stopped,
+            stopped_by="gap" if self.done() else budget.stopped_by,
             planning_s=time.perf_counter() - budget.begun_s,
             first_path_s=self.first_s,
             search=tuple(self.steps),

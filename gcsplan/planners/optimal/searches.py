@@ -38,7 +38,8 @@ PAST_FINE, ROUNDS = 9, 2
 FINER = 2
 """Parts a side into which cells are cut once more, for walls and zones that the first lattice rounds off."""
 OF_REST = 0.5
-"""Part of the counted work left that a roadmap may take if a path is known: what it will take is not known before."""
+"""Part of the counted work left that roadmap and lattice may take if a path is known: what they take is not known
+before."""
 MOST_CELLS = 50_000
 """Most cells of all corridors for which altitude intervals are computed."""
 
@@ -231,13 +232,14 @@ class Searches:
 
     def _search_lattice(self, *, known: bool = False) -> None:
         incumbent = self.incumbent
+        in_time = incumbent.budget.share(1.0 if incumbent.best is None else OF_REST)
         problems = [self.problem]
         if self.problem.objective == "energy" and incumbent.best is None:
             # A line that is pulled to climb less may become illegal where a shorter one is not.
             problems.append(replace(self.problem, objective="length"))
         for problem in problems:
             try:
-                found = plan_band(problem, incumbent.tell, incumbent.budget.begun_s, known=known)
+                found = plan_band(problem, incumbent.tell, incumbent.budget.begun_s, known=known, goes_on=in_time)
             except Refusal:
                 continue
             if found.lower_bound is not None and problem is self.problem:
@@ -284,7 +286,7 @@ class Searches:
         for level in (0, 1) if self.problem.objective == "energy" else ():
             if incumbent.best is None or not incumbent.goes_on():
                 break
-            tight = pulled_tight(self.problem, incumbent.best, level, incumbent.budget.deadline_s)
+            tight = pulled_tight(self.problem, incumbent.best, level)
             if tight is None or not incumbent.take_simpler(*tight, fine=True, longer=True):
                 break
 

@@ -30,8 +30,8 @@ def traverse(problem: Problem, longest_m: float) -> PinnedTrack | None:
     return track.points, track.pinned, track.pin_m
 
 
-def pulled_tight(problem: Problem, points: Floats, level: int, deadline_s: float) -> tuple[Floats, Bools] | None:
-    """Way points of a better line than the path ``points``, and which of them are terminals; None if none is found by
-    ``deadline_s`` (`time.perf_counter`). ``level``: index of the lattice in `LEVELS` that supplies other lines."""
-    found = pulled(problem, points, LEVELS[level], deadline_s)
+def pulled_tight(problem: Problem, points: Floats, level: int) -> tuple[Floats, Bools] | None:
+    """Way points of a better line than the path ``points``, and which of them are terminals; None if none is found.
+    ``level``: index of the lattice in `LEVELS` that supplies other lines."""
+    found = pulled(problem, points, LEVELS[level])
     return None if found is None else (found, pins_of(problem, found)[0])

@@ -80,7 +80,7 @@ def test_a_line_is_pulled_on_the_side_of_a_zone_that_its_path_passes_it_on() -> 
     for path, side in ((under, False), (over, True)):
         assert faults(p, Path(path)) == []
         assert _sides(p, path, ends, free) == {0: side}
-        better = pulled(p, path, LEVELS[0], math.inf)
+        better = pulled(p, path, LEVELS[0])
         assert better is not None
         assert faults(p, Path(better)) == []
         assert p.cost(Path(better)) < p.cost(Path(path))
