@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 FAR, MUCH = 5e-3, 5e-2
 """Gaps, as parts: beyond which other sources of paths are tried; and beyond which small worlds are searched before time
 is spent on a bound."""
-TWICE = 2.0
-"""Times the wanted gap beyond which cells are cut finer: that closes a third, and takes as long as all the rest."""
+REFINED = 1.75
+"""Times the wanted gap beyond which cells are cut finer, which takes as long as all other searches together."""
 PAST_FINE, ROUNDS = 9, 2
 """Most tracks past obstacles that are tried on the finer lattice at once, and how often that is repeated."""
 FINER = 2
@@ -129,7 +129,7 @@ class Searches:
                 Search("contour_climb", 0.075, self._is_slanted, nodes(8.0), self._over(self._climb_aslant)),
                 Search("local_roadmap", 0.01, small(FAR), of(0.5, 0.0), self._search_small),
                 # Under a maximum AGL it takes twice as long as all others together, for a tenth or two of the gap.
-                Search("refinement", 0.07, gap(TWICE * i.wanted), nodes(8.0), self._over(self._refine)),
+                Search("refinement", 0.07, gap(REFINED * i.wanted), nodes(8.0), self._over(self._refine)),
             ]
             if energy:
                 rows += [
