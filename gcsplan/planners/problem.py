@@ -194,3 +194,29 @@ def passes_vias(problem: Problem, points: Floats) -> bool:
 def straight_way_m(problem: Problem) -> float:
     """Length in metres of the straight track from terminal to terminal."""
     return sum(math.dist(a, b) for a, b in pairwise(terminals_of(problem)))
+
+
+def straight_bound(problem: Problem) -> float:
+    """A lower bound of the cost: the straight line from terminal to terminal, free altitudes left free."""
+    known: list[tuple[float, float]] = [(0.0, problem.start[2])]  # (metres along the track, altitude)
+    way, last = 0.0, problem.start[:2]
+    for v in problem.via:
+        way += math.dist(last, (v.east_m, v.north_m))
+        last = (v.east_m, v.north_m)
+        if v.amsl_m is not None:
+            known.append((way, v.amsl_m))
+    way += math.dist(last, problem.goal[:2])
+    known.append((way, problem.goal[2]))
+    if problem.objective == "energy":
+        return sum(
+            problem.vertical_j_per_m * abs(b[1] - a[1])
+            + problem.horizontal_j_per_m * max(b[0] - a[0], _run(problem, a, b))
+            for a, b in pairwise(known)
+        )
+    return sum(math.hypot(max(b[0] - a[0], _run(problem, a, b)), b[1] - a[1]) for a, b in pairwise(known))
+
+
+def _run(problem: Problem, a: tuple[float, float], b: tuple[float, float]) -> float:
+    """Least metres of track that the climb or descent from ``a`` to ``b`` (metres along, altitude) needs."""
+    limits, rise = problem.limits, b[1] - a[1]
+    return max(rise / limits.max_climb_slope, -rise / limits.max_descent_slope)

@@ -13,7 +13,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.lattice.corridor_raster import Guide, Line, line_of, make_guide
 from gcsplan.planners.lattice.routes import LEVELS, Level, Router, climbing_weight
-from gcsplan.planners.problem import Problem, Refusal, Solution, straight_way_m, terminals_of
+from gcsplan.planners.problem import Problem, Refusal, Solution, straight_bound, straight_way_m, terminals_of
 from gcsplan.planners.profile.climb_laps import climb_tracks, pins_of, with_climbs
 from gcsplan.planners.profile.exact import Judge, Unsettled, settle
 from gcsplan.planners.profile.track import Flown, Obstruction, distances, fly, make_track
@@ -141,32 +140,6 @@ def _solution(problem: Problem, points: Floats, bound: float, begun: float, firs
         first_path_s=first_s,
         notes=() if near else (BOUND_NOTE,),
     )
-
-
-def straight_bound(problem: Problem) -> float:
-    """A lower bound of the cost: the straight line from terminal to terminal, free altitudes left free."""
-    known: list[tuple[float, float]] = [(0.0, problem.start[2])]  # (metres along the track, altitude)
-    way, last = 0.0, problem.start[:2]
-    for v in problem.via:
-        way += math.dist(last, (v.east_m, v.north_m))
-        last = (v.east_m, v.north_m)
-        if v.amsl_m is not None:
-            known.append((way, v.amsl_m))
-    way += math.dist(last, problem.goal[:2])
-    known.append((way, problem.goal[2]))
-    if problem.objective == "energy":
-        return sum(
-            problem.vertical_j_per_m * abs(b[1] - a[1])
-            + problem.horizontal_j_per_m * max(b[0] - a[0], _run(problem, a, b))
-            for a, b in pairwise(known)
-        )
-    return sum(math.hypot(max(b[0] - a[0], _run(problem, a, b)), b[1] - a[1]) for a, b in pairwise(known))
-
-
-def _run(problem: Problem, a: tuple[float, float], b: tuple[float, float]) -> float:
-    """Least metres of track that the climb or descent from ``a`` to ``b`` (metres along, altitude) needs."""
-    limits, rise = problem.limits, b[1] - a[1]
-    return max(rise / limits.max_climb_slope, -rise / limits.max_descent_slope)
 
 
 def _on_the_spot(problem: Problem) -> Floats:

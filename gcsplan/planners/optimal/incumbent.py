@@ -10,12 +10,12 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.budget import Budget
-from gcsplan.planners.lattice.planner import straight_bound
 from gcsplan.planners.optimal.corridor import PinnedTrack
-from gcsplan.planners.problem import Problem, Progress, Solution, Step, passes_vias, straight_way_m
+from gcsplan.planners.problem import Problem, Progress, Solution, Step, passes_vias, straight_bound, straight_way_m
 from gcsplan.planners.profile.climb_laps import with_laps
 from gcsplan.planners.profile.exact import Judge, Unsettled, settle, way_points
 from gcsplan.planners.profile.track import Flown, Obstruction, Track, fly, make_track
+from gcsplan.planners.profile.zone_levels import follow_ground
 from gcsplan.planners.simplify import fewer, polished
 from gcsplan.world.path import Path
 
@@ -65,7 +65,8 @@ class Incumbent:
         """Look for a path over a track; return whether it is the best so far."""
         track = make_track(self.problem, *terminals)
         flown = fly(self.problem, track)
-        if not isinstance(flown, Flown) and flown.kind != "pinched":
+        # At zones above ground less may be shut than the bounds of the tube say.
+        if not isinstance(flown, Flown) and flown.kind != "pinched" and not follow_ground(self.problem, track):
             return False
         found = self.exact(track, flown)
         return found is not None and self.take_simpler(*found, fine=fine, longer=False)

@@ -140,7 +140,7 @@ class Searches:
             else:
                 rows += [
                     Search("detours", 0.3, known, nodes(4.0), self._over(self._past_finely)),
-                    Search("lattice", 0.2, far, of(1.0, 0.0), self._search_lattice),
+                    Search("lattice", 0.5, far, of(0.3, 0.0), self._search_lattice),
                 ]
         name, share = ("energy_bound", 0.5) if energy else ("length_bound", 0.9)
         return [

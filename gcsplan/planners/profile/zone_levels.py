@@ -79,8 +79,11 @@ class ZoneLevels:
         band = self.band
         z = np.stack([profile.at(band.s_m[:-1]), profile.at(band.s_m[1:])], axis=-1)
         apart_m = np.maximum(band.bottom_m - z, z - band.top_m).min(axis=1)
-        touched = (band.s_m[1:] > s0_m) & (band.s_m[:-1] < s1_m) & np.isfinite(self.moved) & (apart_m < STEP_M)
-        step_m = np.maximum(self.moved, STEP_M)[touched]
+        here = (band.s_m[1:] > s0_m) & (band.s_m[:-1] < s1_m) & np.isfinite(self.moved)
+        # A level that was read too low may lie under a profile that keeps more from it for another reason.
+        nearest_m = float(apart_m[here].min(initial=math.inf))
+        touched = here & (apart_m < max(nearest_m, 0.0) + STEP_M)
+        step_m = np.maximum(self.moved, np.maximum(apart_m, 0.0) + STEP_M)[touched]
         self.moved[touched] += step_m
         bottom, top = band.bottom_m[touched] - step_m[:, None], band.top_m[touched] + step_m[:, None]
         least, most = self.most[:, touched]

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from gcsplan.errors import NoMission
 from gcsplan.planners.lattice import pull_kernels
-from gcsplan.planners.lattice.planner import _sides, plan, straight_bound
-from gcsplan.planners.problem import Problem, Progress, Via
+from gcsplan.planners.lattice.planner import _sides, plan
+from gcsplan.planners.problem import Problem, Progress, Via, straight_bound
 from gcsplan.planners.profile.climb_laps import climb_needed_deg, climb_tracks, extend, laps, pins_of
 from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
 from gcsplan.planners.profile.taut_string import Profile, taut_string

@@ -158,7 +158,7 @@ def _along(
     floor = plane.problem.floors(*places.T)
     free = [(places, floor, np.full_like(floor, plane.top_m))]
     moved, low, high = _freer(plane, places)
-    if ((low > high) & (floor <= plane.top_m)).any():
+    if (moved != places).any() or ((low > high) & (floor <= plane.top_m)).any():
         free.insert(0, (moved, low, high))
     for at, lowest, highest in free:
         found = _past(plane, leg, ends, at, s, whole_m, lowest, highest)

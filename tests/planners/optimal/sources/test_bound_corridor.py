@@ -131,6 +131,7 @@ def _dense(track: Floats, problem: Problem) -> Floats:
         (502, "main 502/12, 0 zones", 20_580.0),
         (603, "main 603/02, 10 zones", 10_020.0),
         (603, "main 603/02, 40 zones", 10_590.0),
+        (711, "main 711/01, 40 zones", 6_600.0),
     ],
 )
 def test_slits_and_passes_that_are_open_by_little_are_found(seed: int, name: str, most_m: float) -> None:
