@@ -37,9 +37,9 @@ PAST_FINE, ROUNDS = 9, 2
 """Most tracks past obstacles that are tried on the finer lattice at once, and how often that is repeated."""
 FINER = 2
 """Parts a side into which cells are cut once more, for walls and zones that the first lattice rounds off."""
-OF_REST = 0.5
+OF_REST, EARLY_OF_REST = 0.5, 0.2
 """Part of the counted work left that roadmap and lattice may take if a path is known: what they take is not known
-before."""
+before; and the part for the lattice before others have tried to close a large gap."""
 MOST_CELLS = 50_000
 """Most cells of all corridors for which altitude intervals are computed."""
 
@@ -138,9 +138,13 @@ class Searches:
                     Search("lattice", 0.02, far, of(0.5, 0.0), self._search_lattice_again),
                 ]
             else:
+                # Where path and bound are far apart it finds other valleys; else it gains little, and may take seconds.
+                early = Search("lattice", 0.5, gap(MUCH), of(0.3, 0.0), self._search_lattice)
+                late = replace(early, share=0.02, applies=lambda: early.seen is None and far())
                 rows += [
                     Search("detours", 0.3, known, nodes(4.0), self._over(self._past_finely)),
-                    Search("lattice", 0.5, far, of(0.3, 0.0), self._search_lattice),
+                    early,
+                    late,
                 ]
         name, share = ("energy_bound", 0.5) if energy else ("length_bound", 0.9)
         return [
@@ -232,7 +236,8 @@ class Searches:
 
     def _search_lattice(self, *, known: bool = False) -> None:
         incumbent = self.incumbent
-        in_time = incumbent.budget.share(1.0 if incumbent.best is None else OF_REST)
+        part = OF_REST if incumbent.gap <= MUCH else EARLY_OF_REST
+        in_time = incumbent.budget.share(1.0 if incumbent.best is None else part)
         problems = [self.problem]
         if self.problem.objective == "energy" and incumbent.best is None:
             # A line that is pulled to climb less may become illegal where a shorter one is not.
