@@ -205,7 +205,7 @@ class Dask:
 
     def _keep_begun(self, numbers: dict[Any, int]) -> None:
         """Give up the pieces that no worker has begun."""
-        # All that runs, not these pieces by name: of one that was handed out just now the scheduler may not know yet.
+        # Of all that runs: asked for by name, a piece that the scheduler has not heard of yet is an error.
         begun = {key for stacks in self.client.call_stack().values() for key in stacks}
         waiting = [f for f in numbers if not f.done() and f.key not in begun]
         for future in waiting:

@@ -29,13 +29,13 @@ AGAIN = 0.02
 class Search:
     """One source of paths or bounds.
 
-    ``share``: the part of the gap that it closes on average, measured by ``gcsplan bench``; a first path counts as all
-    of it. ``applies``: whether it may help now; ``size``: what it takes; ``again``: whether it may run once more after
-    a better path was found.
+    ``share``: the part of the gap that it closes on average, measured by ``gcsplan bench``, or a function that tells it
+    from the gap; a first path counts as all of it. ``applies``: whether it may help now; ``size``: what it takes;
+    ``again``: whether it may run once more after a better path was found.
     """
 
     name: str
-    share: float
+    share: float | Callable[[float], float]
     applies: Callable[[], bool]
     size: Callable[[], Size]
     run: Callable[[], object]
@@ -70,7 +70,8 @@ def govern(incumbent: Incumbent, searches: list[Search], without: Collection[str
         for search in left:
             if (search.nearer or not incumbent.done()) and search.is_open(incumbent):
                 asked = search.size()
-                worth = search.share / max(asked[0], LEAST_S)
+                share = search.share(incumbent.gap) if callable(search.share) else search.share
+                worth = share / max(asked[0], LEAST_S)
                 if worth > best:
                     chosen, best, size = search, worth, asked
         if chosen is None:

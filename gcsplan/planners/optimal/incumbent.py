@@ -15,7 +15,7 @@ from gcsplan.planners.problem import Problem, Progress, Solution, Step, passes_v
 from gcsplan.planners.profile.climb_laps import with_laps
 from gcsplan.planners.profile.exact import Judge, Unsettled, settle, way_points
 from gcsplan.planners.profile.track import Flown, Obstruction, Track, fly, make_track
-from gcsplan.planners.profile.zone_levels import follow_ground
+from gcsplan.planners.profile.zone_levels import may_pass
 from gcsplan.planners.simplify import fewer, polished
 from gcsplan.world.path import Path
 
@@ -65,8 +65,7 @@ class Incumbent:
         """Look for a path over a track; return whether it is the best so far."""
         track = make_track(self.problem, *terminals)
         flown = fly(self.problem, track)
-        # At zones above ground less may be shut than the bounds of the tube say.
-        if not isinstance(flown, Flown) and flown.kind != "pinched" and not follow_ground(self.problem, track):
+        if not isinstance(flown, Flown) and not may_pass(self.problem, track, flown):
             return False
         found = self.exact(track, flown)
         return found is not None and self.take_simpler(*found, fine=fine, longer=False)

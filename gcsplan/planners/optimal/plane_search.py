@@ -16,7 +16,7 @@ from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.optimal.sources.detours import Choice, DetourSearch
 from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.planners.profile.track import Flown, fly, make_track
-from gcsplan.planners.profile.zone_levels import follow_ground
+from gcsplan.planners.profile.zone_levels import may_pass
 
 SLACKS = (0.008, 0.15, 0.6)
 """While no path is known, tracks longer than the shortest by these parts of it are searched, in turn."""
@@ -138,9 +138,7 @@ class PlaneSearch:
         if isinstance(flown, Flown):
             found = incumbent.exact(track, flown)
             return found is not None and incumbent.take_simpler(*found, fine=fine, longer=False)
-        # What is pinched lacks centimetres, for cells shut what lacks more; at zones above ground less may be shut than
-        # the bounds of the tube say.
-        if flown.kind == "pinched" or narrow is not None or follow_ground(incumbent.problem, track):
+        if narrow is not None or may_pass(incumbent.problem, track, flown):
             found = incumbent.exact(track, flown)
             if found is not None:
                 return incumbent.take_simpler(*found, fine=fine, longer=False)

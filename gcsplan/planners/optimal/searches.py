@@ -138,13 +138,10 @@ class Searches:
                     Search("lattice", 0.02, far, of(0.5, 0.0), self._search_lattice_again),
                 ]
             else:
-                # Where path and bound are far apart it finds other valleys; else it gains little, and may take seconds.
-                early = Search("lattice", 0.5, gap(MUCH), of(0.3, 0.0), self._search_lattice)
-                late = replace(early, share=0.02, applies=lambda: early.seen is None and far())
                 rows += [
                     Search("detours", 0.3, known, nodes(4.0), self._over(self._past_finely)),
-                    early,
-                    late,
+                    # Where path and bound are far apart it finds other valleys; else it gains little, and takes long.
+                    Search("lattice", lambda x: 0.5 if x > MUCH else 0.02, far, of(0.3, 0.0), self._search_lattice),
                 ]
         name, share = ("energy_bound", 0.5) if energy else ("length_bound", 0.9)
         return [

@@ -15,7 +15,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.taut_string import Profile
-from gcsplan.planners.profile.track import Track, denser, distances, make_track, values_at
+from gcsplan.planners.profile.track import Obstruction, Track, denser, distances, make_track, values_at
 from gcsplan.world.airspace import Band
 from gcsplan.world.own_ground import POINTS, own_ground
 
@@ -26,10 +26,12 @@ SPARE_M, STEP_M = 0.05, 0.04
 check, which tells no height. Each further correction is as much as all before."""
 
 
-def follow_ground(problem: Problem, track: Track) -> bool:
-    """Whether a zone along a track has a level above ground (AGL): its band there is wider than what the exact check
-    shuts."""
-    return any(problem.airspace.zones[band.zone].follows_ground for band in track.tube.bands)
+def may_pass(problem: Problem, track: Track, shut: Obstruction) -> bool:
+    """Whether the exact check may pass a path over a track that is ``shut`` by its tube: what is pinched lacks
+    centimetres there, for cells shut what lacks more, and bands of zones above ground (AGL) are wider than what the
+    exact check shuts."""
+    follows = any(problem.airspace.zones[band.zone].follows_ground for band in track.tube.bands)
+    return shut.kind == "pinched" or follows
 
 
 @dataclass(frozen=True, eq=False, slots=True)

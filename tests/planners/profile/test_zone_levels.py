@@ -10,6 +10,7 @@ import pytest
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
+from gcsplan.planners.profile.taut_string import Profile
 from gcsplan.planners.profile.track import Flown, fly, make_track
 from gcsplan.planners.profile.zone_levels import ZoneLevels, widest_free
 from gcsplan.world.airspace import Airspace
@@ -128,6 +129,20 @@ def test_corrections_end_at_the_levels_of_the_tube() -> None:
         assert count < 40
         assert (levels.band.top_m >= before).all()
     assert (levels.band.top_m == levels.most[1]).any(axis=1).sum() > 5
+
+
+def test_a_level_read_too_low_is_corrected_under_a_profile_that_keeps_more_from_it() -> None:
+    problem, track = over_a_slope(1.5)
+    long = make_track(problem, track, ends(track), np.full(2, math.nan))
+    (band,) = long.tube.bands
+    levels = ZoneLevels.of(problem, long, band)
+    top = levels.band.top_m
+    top -= 0.8
+    before = top.copy()
+    highest = np.maximum(np.append(top[:, 0], top[-1, 1]), np.append(top[0, 0], top[:, 1]))
+    profile = Profile(levels.band.s_m, highest + 0.1)
+    assert levels.correct(profile, band.s0_m, band.s1_m)
+    assert (levels.band.top_m > before + 0.1).any()
 
 
 def _without_zones(problem: Problem, track: Floats) -> tuple[Problem, Floats, Floats, Floats]:
