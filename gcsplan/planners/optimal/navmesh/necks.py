@@ -91,8 +91,10 @@ class Necks:
 
     def __init__(self, plane: Plane, fineness: int, cap_m: float, but_at: Floats) -> None:
         self.cap_m, self.parts = cap_m, plane.parts * fineness
-        self._but = _grown(self._at(plane, but_at), 1)
+        self._seen = _grown(self._at(plane, but_at), 1)
+        """Cells that are not looked at again."""
         self._necks: list[Neck] = []
+        self._openings = np.zeros((0, 7))
 
     def look(self, plane: Plane, places: Floats) -> bool:
         """Look at the cells around the places (N, 2) of a track, as long as the budget lasts; return whether any was
@@ -104,16 +106,13 @@ class Necks:
 
     def _look(self, plane: Plane, places: Floats) -> bool:
         width_m = float(plane.problem.airspace.surface.grid.metres_per_cell(*places[0]).min()) / self.parts
-        found = _grown(self._at(plane, places), max(1, math.ceil(AROUND_M / width_m))) - self._but
-        beside = _grown(found, 1)
-        joined = [neck for neck in self._necks if not beside.isdisjoint(map(tuple, neck.cells.tolist()))]
-        known = {(row, col) for neck in joined for row, col in neck.cells.tolist()}
-        if found <= known:
-            return False
-        neck = self._neck(plane, np.array(sorted(found | known), np.intp), width_m)
+        found = _grown(self._at(plane, places), max(1, math.ceil(AROUND_M / width_m))) - self._seen
+        neck = self._neck(plane, np.array(sorted(found), np.intp), width_m) if found else None
         if neck is None:
             return False
-        self._necks = [*(other for other in self._necks if other not in joined), neck]
+        self._seen |= found
+        self._necks.append(neck)
+        self._openings = _joined(self._necks)
         return True
 
     def mesh(self, clearance: ClearanceGrid) -> Mesh:
@@ -203,7 +202,7 @@ class Necks:
     def _portals(self, clearance: ClearanceGrid, mesh: Mesh, cut: Indices) -> tuple[Indices, Floats, Indices]:
         """The portals (N,) of a mesh, of those ``cut``, in which openings lie; those openings (N, 7), with row and
         column in the mesh, and with the range; and the cells (N, 2) at both sides."""
-        openings = np.vstack([np.column_stack([neck.openings, neck.range]) for neck in self._necks])
+        openings = self._openings.copy()
         at = self._local(clearance, openings[:, :2].astype(np.intp))
         openings[:, :2] = at
         aside = openings[:, 2] == 0.0
@@ -255,7 +254,36 @@ def _openings(mesh: Mesh, own: Bools, ratio: int, first: Indices) -> tuple[Indic
     low, high = np.full(len(key), ratio), np.zeros(len(key), np.intp)
     np.minimum.at(low, group.ravel(), at)
     np.maximum.at(high, group.ravel(), at + 1)
-    return key, np.stack([low, high], axis=-1) / ratio
+    # Another neck's nodes may lie a little beside these, so that an opening's end lies in the next finer cell there.
+    more = (key[:, 3:] < 0).any(axis=1)
+    return key, np.stack([low - more, high + more], axis=-1).clip(0, ratio) / ratio
+
+
+def _joined(necks: list[Neck]) -> Floats:
+    """(N, 7) the openings of all necks, with the range in the last two columns: those of two necks on the edge between
+    them become one for each pair of parts that may meet there."""
+    openings = np.vstack([np.column_stack([neck.openings, neck.range]) for neck in necks])
+    at, aside = openings[:, :2].astype(np.int64), openings[:, 2] == 0.0
+    next_at = at + np.stack([~aside, aside], axis=-1)
+    known = np.unique(_numbers(np.vstack([neck.cells for neck in necks])))
+    edge = 2 * _numbers(at) + openings[:, 2].astype(np.int64)
+    first, second = ((openings[:, 3 + k] < 0.0) & np.isin(_numbers(of), known) for k, of in enumerate((at, next_at)))
+    left, right = np.flatnonzero(second), np.flatnonzero(first)
+    right = right[np.argsort(edge[right], kind="stable")]
+    begin, end = (np.searchsorted(edge[right], edge[left], side) for side in ("left", "right"))
+    count = end - begin
+    one = np.repeat(left, count)
+    other = right[np.arange(len(one)) - np.repeat(np.cumsum(count) - count - begin, count)]
+    pairs = openings[one]
+    pairs[:, 4] = openings[other, 4]
+    pairs[:, 5] = np.maximum(openings[one, 5], openings[other, 5])
+    pairs[:, 6] = np.minimum(openings[one, 6], openings[other, 6])
+    return np.vstack([openings[~first & ~second], pairs[pairs[:, 6] >= pairs[:, 5]]])
+
+
+def _numbers(cells: Indices) -> Indices:
+    """(K,) one number for each of cells (K, 2)."""
+    return np.asarray(cells[:, 0].astype(np.int64) << 32) + cells[:, 1]
 
 
 def _names(names: Indices, joins: Indices, ends: Floats, cut: Floats, first: int) -> Indices:
