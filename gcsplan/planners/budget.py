@@ -26,7 +26,7 @@ RATES = {
     "corner": 12e-6,
     "label": 3e-6,
     "interval": 1.5e-6,
-    "read": 0.04e-6,
+    "read": 0.015e-6,
     "pull": 70e-6,
     "sighted": 0.5e-6,
     "walked": 0.4e-6,

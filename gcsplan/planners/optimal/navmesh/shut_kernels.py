@@ -39,6 +39,12 @@ BESIDE_STEPS = 5
 
 
 @device
+def _node(a: Floats, fineness: int, j: int, i: int) -> float:
+    """`value_at` a node; fast where the lattice is that of ``a``."""
+    return float(a[j, i]) if fineness == 1 else value_at(a, fineness, j, i)
+
+
+@device
 def _covers(
     x: Floats, y: Floats, fineness: int, zones: Floats, edges: Floats, z: int, reach: float, near: float, j: int,
     i: int, jj: int, ii: int,
@@ -46,8 +52,8 @@ def _covers(
     """Whether cell (jj, ii) lies wholly in a zone, and each of its corners within ``near`` of that of cell (j, i)."""
     for k in range(4):
         v, u = k >> 1, k & 1
-        px, py = value_at(x, fineness, jj + v, ii + u), value_at(y, fineness, jj + v, ii + u)
-        dx, dy = px - value_at(x, fineness, j + v, i + u), py - value_at(y, fineness, j + v, i + u)
+        px, py = _node(x, fineness, jj + v, ii + u), _node(y, fineness, jj + v, ii + u)
+        dx, dy = px - _node(x, fineness, j + v, i + u), py - _node(y, fineness, j + v, i + u)
         if dx * dx + dy * dy > near * near or depth(zones, edges, z, px, py) <= reach:
             return False
     return True
@@ -64,13 +70,13 @@ def _lowest_and_highest(
     ``ground``, ``x``, ``y``: at the nodes of a lattice of which cell (j, i) is a part, ``fineness`` times finer.
     ``reach``: metres by which the zone is grown; ``near``: a little less, from each place of the cell to that ground.
     """
-    ex = value_at(x, fineness, j, i + 1) - value_at(x, fineness, j, i)
-    ey = value_at(y, fineness, j, i + 1) - value_at(y, fineness, j, i)
-    nx = value_at(x, fineness, j + 1, i) - value_at(x, fineness, j, i)
-    ny = value_at(y, fineness, j + 1, i) - value_at(y, fineness, j, i)
+    ex = _node(x, fineness, j, i + 1) - _node(x, fineness, j, i)
+    ey = _node(y, fineness, j, i + 1) - _node(y, fineness, j, i)
+    nx = _node(x, fineness, j + 1, i) - _node(x, fineness, j, i)
+    ny = _node(y, fineness, j + 1, i) - _node(y, fineness, j, i)
     across, along = math.sqrt(ex * ex + ey * ey), math.sqrt(nx * nx + ny * ny)
     low_j = low_i = high_j = high_i = -1
-    if depth(zones, edges, z, value_at(x, fineness, j, i), value_at(y, fineness, j, i)) <= reach - near:
+    if depth(zones, edges, z, _node(x, fineness, j, i), _node(y, fineness, j, i)) <= reach - near:
         return low_j, low_i, high_j, high_i, 1
     rows, cols = int(near / along), int(near / across)
     every = 1 + max(max(rows, cols) - 1, 0) // BESIDE_STEPS
@@ -83,9 +89,9 @@ def _lowest_and_highest(
             ii = i + p * every
             if not 0 <= ii < (x.shape[1] - 1) * fineness:
                 continue
-            height = value_at(ground, fineness, jj, ii) + value_at(ground, fineness, jj + 1, ii + 1)
+            height = _node(ground, fineness, jj, ii) + _node(ground, fineness, jj + 1, ii + 1)
             # False as well where ground is unknown.
-            if not ((height < least or height > most) and height + value_at(ground, fineness, jj, ii + 1) < np.inf):
+            if not ((height < least or height > most) and height + _node(ground, fineness, jj, ii + 1) < np.inf):
                 continue
             if not _covers(x, y, fineness, zones, edges, z, reach, near, j, i, jj, ii):
                 continue
@@ -99,8 +105,8 @@ def _lowest_and_highest(
 @device
 def _bulge(ground: Floats, fineness: int, j: int, i: int) -> float:
     """Metres by which a cell's bilinear ground differs from its triangles, at most."""
-    straight = value_at(ground, fineness, j, i) + value_at(ground, fineness, j + 1, i + 1)
-    return 0.25 * abs(straight - value_at(ground, fineness, j, i + 1) - value_at(ground, fineness, j + 1, i))
+    straight = _node(ground, fineness, j, i) + _node(ground, fineness, j + 1, i + 1)
+    return 0.25 * abs(straight - _node(ground, fineness, j, i + 1) - _node(ground, fineness, j + 1, i))
 
 
 @device
@@ -143,14 +149,14 @@ def _levels(
     high_off = _bulge(ground, fineness, high_j, high_i) if looks else 0.0
     for k in range(4):
         v, u = k >> 1, (k ^ (k >> 1)) & 1
-        low = value_at(ground, fineness, low_j + v, low_i + u) + low_off if looks else 0.0
-        high = value_at(ground, fineness, high_j + v, high_i + u) - high_off if looks else 0.0
+        low = _node(ground, fineness, low_j + v, low_i + u) + low_off if looks else 0.0
+        high = _node(ground, fineness, high_j + v, high_i + u) - high_off if looks else 0.0
         of[first, k] = _own(zones, z, OWN_BOTTOM, low) if zones[z, UNDER] > 0.0 else -np.inf
         of[first + 1, k] = _own(zones, z, OWN_TOP, high)
         of[first + 2, k] = np.inf
         if not looks:
             of[first + 2, k] = depth(
-                zones, edges, z, value_at(x, fineness, j + v, i + u), value_at(y, fineness, j + v, i + u)
+                zones, edges, z, _node(x, fineness, j + v, i + u), _node(y, fineness, j + v, i + u)
             )
         elif zones[z, UNDER] > 0.0:
             of[first + 2, k] = of[first + 1, k] - of[first, k] - zones[z, THIN]
