@@ -12,12 +12,10 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.planners.budget import Budget
 from gcsplan.planners.lattice.corridor_raster import Guide, Line, line_of, make_guide
 from gcsplan.planners.lattice.routes import LEVELS, Level, Router, climbing_weight
 from gcsplan.planners.problem import Problem, Refusal, Solution, straight_bound, straight_way_m, terminals_of
@@ -40,10 +38,13 @@ NARROW, FINE_M = 0.02, 12.0
 """The same around a nearly finished line, as a part of the straight track; spacing of the raster there, in metres."""
 MENDS, SEARCHES = 6, 6
 """Most exact checks of one line, with a repair after each refusal; most searches on one lattice for a legal track."""
+CLOSER, LEAST_DETOUR = (15_000, 40_000, 120_000), 1.02
+"""If a path is known: about how many nodes the lattices have, in turn; and the least detour that they hold."""
 MOST_OPENED = 200_000
 """Labels expanded on one lattice after which it is given up; such searches wind up and down to gain height."""
-DETOURS, DETOUR_STEPS = (0.2, 0.4, 0.6, 0.8), 4.0
-"""Where along the first track a disc is closed to find other tracks, as parts; its radius, in lattice steps."""
+DETOURS, DETOUR_STEPS, DETOUR_PART = (0.2, 0.4, 0.6, 0.8), 4.0, 0.03
+"""Where along the first track a disc is closed to find other tracks, as parts; its radius, in lattice steps, and at
+least as a part of the straight track."""
 BETTER = 0.5
 """Part of the work left that other tracks and kicks may take once there is a path."""
 KICKS = 10
@@ -58,15 +59,13 @@ def plan_band(
     begun: float,
     *,
     climbs: bool = True,
-    known: bool = False,
     goes_on: Callable[[], bool] | None = None,
 ) -> Solution:
     """A path under a maximum AGL and the climb limit that `Airspace.examine` passes.
 
     Start, goal and vias must be legal by themselves. ``tell(phase, cost)`` reports progress; ``begun`` is the
-    `time.perf_counter` of the call. ``climbs``: laps over start and goal are allowed; ``known``: a path is known
-    already, so only one search is made; ``goes_on``: whether there is work left for more, by default by the problem's
-    budget. Raises Refusal if no path is found.
+    `time.perf_counter` of the call. ``climbs``: laps over start and goal are allowed; ``goes_on``:
+    whether there is work left for more, by default by the problem's budget. Raises Refusal if no path is found.
     """
     goes_on = problem.budget.goes_on if goes_on is None else goes_on
     bound = straight_bound(problem)
@@ -79,15 +78,15 @@ def plan_band(
         return _solution(problem, best, bound, begun, time.perf_counter() - begun)
     first_s = math.inf if best is None else time.perf_counter() - begun
     router: Router | None = None
-    for level in LEVELS[:1] if known else LEVELS if climbs else LEVELS[:2]:
+    for level in LEVELS if climbs else LEVELS[:2]:
         if best is None and not goes_on():
             break
         tell("search", None if best is None else problem.cost(Path(best)))
         work = _Work(problem, Router.at(problem, level), way, goes_on)
         router = work.router
         cut = router.cut_off() if climbs else (False, False)
-        found = None if any(cut) else work.first(1 if known else SEARCHES)
-        if found is None and climbs and best is None and not known and (any(cut) or level is LEVELS[0]):
+        found = None if any(cut) else work.first(SEARCHES)
+        if found is None and climbs and best is None and (any(cut) or level is LEVELS[0]):
             ends = cut if any(cut) else (True, True)
             found = with_climbs(
                 problem, ends, lambda p: plan_band(p, tell, begun, climbs=False, goes_on=goes_on).path.points
@@ -107,6 +106,36 @@ def plan_band(
         raise _not_found(problem, router)
     tell("done", problem.cost(Path(best)))
     return _solution(problem, best, bound, begun, first_s)
+
+
+def cheaper(
+    problem: Problem, tell: Tell, known: Floats, longest_m: float, goes_on: Callable[[], bool]
+) -> Floats | None:
+    """Way points (N, 3) of a path that is cheaper than a ``known`` one (N, 3); None if none is found.
+
+    The lattices lie in the ellipse of all tracks that may be; the next one is finer. ``tell``, ``goes_on``: as in
+    `plan_band`.
+    """
+    way, cost = straight_way_m(problem), problem.cost(Path(known))
+    detour = max(longest_m / way, LEAST_DETOUR)
+    for nodes in CLOSER:
+        if not goes_on():
+            break
+        tell("search", cost)
+        work = _Work(problem, Router.at(problem, Level(detour, nodes)), way, goes_on, _weight(problem))
+        found = [work.first(SEARCHES)]
+        if work.line is None or work.line.cost > cost:
+            work.begin(known)
+        found.append(work.improve(tell))
+        best = min((p for p in found if p is not None), key=lambda p: problem.cost(Path(p)), default=None)
+        if best is not None and problem.cost(Path(best)) < cost:
+            return best
+    return None
+
+
+def _weight(problem: Problem) -> float:
+    """Metres of track that cost as much as one metre of height."""
+    return climbing_weight(problem) if problem.objective == "energy" else 0.0
 
 
 def _not_found(problem: Problem, router: Router | None) -> Refusal:
@@ -180,21 +209,6 @@ def _flat(points: Floats) -> float:
     return float(np.hypot(*np.diff(points[:, :2], axis=0).T).sum())
 
 
-def pulled(problem: Problem, points: Floats, level: Level) -> Floats | None:
-    """Way points of the best line found from a path (N, 3): the line pulled from its track, and others around it.
-
-    Zones are passed over or under as that path passes them. The result need not be cheaper; None if it is not legal.
-    """
-    way = straight_way_m(problem)
-    work = _Work(problem, Router.at(problem, level), way, problem.budget.goes_on)
-    pinned, pin_m = pins_of(problem, points)
-    work.over = _sides(problem, points, pinned, pin_m)
-    flat = np.ascontiguousarray(points[:, :2])
-    work.guide = work._guide([flat])
-    work.line = work.guide.pull(line_of(flat, pinned, pin_m), work._steps(FINE_STEPS), FINE_GAIN * way)
-    return work.improve(lambda _phase, _cost: None)
-
-
 def _sides(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> dict[int, bool]:
     """For each zone within reach of a path, by index: whether the path passes over it."""
     track = make_track(problem, points[:, :2], pinned, pin_m)
@@ -210,8 +224,12 @@ def _sides(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> di
 class _Work:
     """One lattice, the tracks found on it, and the lines pulled from them."""
 
-    def __init__(self, problem: Problem, router: Router, way_m: float, goes_on: Callable[[], bool]) -> None:
+    def __init__(
+        self, problem: Problem, router: Router, way_m: float, goes_on: Callable[[], bool], weight: float = 0.0
+    ) -> None:
         self.problem = problem
+        self.weight = weight
+        """The price of climbing for the first track: metres of track for each metre of height."""
         self.goes_on = goes_on
         self.router = router
         self.way_m = way_m
@@ -229,7 +247,7 @@ class _Work:
         for _ in range(searches):
             if self.router.opened > MOST_OPENED or not self.goes_on():
                 return None
-            way = self.router.way()
+            way = self.router.way(weight=self.weight)
             if way is None:
                 return None
             line = self._line(way)
@@ -239,15 +257,23 @@ class _Work:
             if not isinstance(found, Unsettled):
                 self.line = line
                 return found[0]
-            self.router.last_place = found.place
             self.router.last = Obstruction(found.kind, 0.0, found.span_m, found.by, found.zone)
-            if found.kind == "pinched":
-                self.router.lattice.raise_floor(found.place, found.by + 0.5)
-            elif found.kind == "zone":
-                self.router.lattice.raise_floor(found.place, math.inf)
+            found = found.past or found
+            self.router.last_place = found.place
+            if found.kind in ("pinched", "zone"):
+                by_m = found.by + 0.5 if found.kind == "pinched" else math.inf
+                self.router.lattice.raise_floor(found.place, by_m)
             else:
                 self.router.climb_factor *= 0.95
         return None
+
+    def begin(self, points: Floats) -> None:
+        """Take the line pulled from the track of a path (N, 3). Zones are passed over or under as that path does."""
+        pinned, pin_m = pins_of(self.problem, points)
+        self.over = _sides(self.problem, points, pinned, pin_m)
+        flat = np.ascontiguousarray(points[:, :2])
+        self.guide = self._guide([flat])
+        self.line = self.guide.pull(line_of(flat, pinned, pin_m), self._steps(FINE_STEPS), FINE_GAIN * self.way_m)
 
     def improve(self, tell: Tell) -> Floats | None:
         """Way points of the best line from several tracks and kicks; None if it is not legal."""
@@ -312,11 +338,12 @@ class _Work:
             if not isinstance(found, Unsettled):
                 break
             guide.learn(found.samples)
-            if found.kind == "pinched" and math.isfinite(found.by):
-                guide.narrow(found.place, 0.5 * found.by + 0.3)
-                guide.narrow(found.place, 0.5 * found.by + 0.3, ceiling=True)
-            elif found.kind in ("pinched", "zone"):
-                guide.narrow(found.place, 1e4)
+            why = found.past or found
+            if why.kind == "pinched" and math.isfinite(why.by):
+                guide.narrow(why.place, 0.5 * why.by + 0.3)
+                guide.narrow(why.place, 0.5 * why.by + 0.3, ceiling=True)
+            elif why.kind in ("pinched", "zone"):
+                guide.narrow(why.place, 1e4)
             elif attempt:
                 guide.strict()
             steps = FINE_STEPS if attempt < 2 else COARSE_STEPS
@@ -331,7 +358,8 @@ class _Work:
         router, p = self.router, self.problem
         if router.opened > MOST_OPENED // 4:
             return []
-        prices = [climbing_weight(p)] if p.objective == "energy" else []
+        weight = _weight(p)
+        prices = [] if weight == self.weight else [weight]
         ways = [way for way in (router.way(weight=w, briefly=True) for w in prices) if way is not None]
         s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.line.points, axis=0).T))])
         floor = router.lattice.floor_m
@@ -340,8 +368,8 @@ class _Work:
                 break
             place = [np.interp(f * s[-1], s, self.line.points[:, k]) for k in range(2)]
             router.lattice.floor_m = floor.copy()
-            router.lattice.shut(np.array(place), DETOUR_STEPS * router.lattice.step_m)
-            way = router.way(weight=prices[0] if prices else 0.0, briefly=True)
+            router.lattice.shut(np.array(place), max(DETOUR_STEPS * router.lattice.step_m, DETOUR_PART * self.way_m))
+            way = router.way(weight=weight, briefly=True)
             if way is not None:
                 ways.append(way)
         router.lattice.floor_m = floor
@@ -366,17 +394,3 @@ class _Work:
             math.inf,
             math.inf,
         )
-
-
-def plan(problem: Problem) -> Solution:
-    """Plan by `plan_band` alone."""
-    from gcsplan.planners.problem import Progress
-
-    begun = time.perf_counter()
-    problem = replace(problem, budget=Budget(problem.budget_s, problem.budget_mb, problem.budget.clocked))
-
-    def tell(phase: str, cost: float | None) -> None:
-        if problem.progress is not None:
-            problem.progress(Progress(time.perf_counter() - begun, cost, None, phase))
-
-    return plan_band(problem, tell, begun)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gcsplan.errors import InputError
-from gcsplan.planners.lattice.planner import plan_band
+from gcsplan.planners.lattice.planner import cheaper, plan_band
 from gcsplan.planners.optimal.bounds.shorter import bound_by_caps, halve
 from gcsplan.planners.optimal.cap_search import above_all
 from gcsplan.planners.optimal.governor import Search, Size
@@ -20,7 +20,6 @@ from gcsplan.planners.optimal.level_world import in_window
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.plane_search import SLACKS, PlaneSearch
 from gcsplan.planners.optimal.sources.bound_corridor import follow
-from gcsplan.planners.optimal.sources.contour import pulled_tight, traverse
 from gcsplan.planners.optimal.sources.section_dp import tightened
 from gcsplan.planners.problem import Problem, Refusal, terminals_of
 from gcsplan.planners.profile.track import Obstruction, fly, make_track
@@ -28,16 +27,16 @@ from gcsplan.planners.profile.track import Obstruction, fly, make_track
 if TYPE_CHECKING:
     from gcsplan.planners.optimal.sources.outline_tracks import OutlineTracks
 
-FAR, MUCH = 5e-3, 5e-2
-"""Gaps, as parts: beyond which other sources of paths are tried; and beyond which small worlds are searched before time
-is spent on a bound."""
+FAR, WIDE, MUCH = 5e-3, 1e-2, 5e-2
+"""Gaps, as parts, beyond which other sources of paths are tried; beyond which reachable altitudes are searched before
+others have tried to close the gap; and beyond which small worlds are searched before time is spent on a bound."""
 REFINED = 1.75
 """Times the wanted gap beyond which cells are cut finer, which takes as long as all other searches together."""
 PAST_FINE, ROUNDS = 9, 2
 """Most tracks past obstacles that are tried on the finer lattice at once, and how often that is repeated."""
 FINER = 2
 """Parts a side into which cells are cut once more, for walls and zones that the first lattice rounds off."""
-OF_REST, EARLY_OF_REST = 0.5, 0.2
+OF_REST, EARLY_OF_REST = 0.5, 0.25
 """Part of the counted work left that roadmap and lattice may take if a path is known: what they take is not known
 before; and the part for the lattice before others have tried to close a large gap."""
 MOST_CELLS = 50_000
@@ -46,7 +45,7 @@ MOST_CELLS = 50_000
 
 NAMES = (
     "straight", "outlines", "outline_bound", "track_bound", "cap_search", "corridor_first", "lattice_first",
-    "roadmap_first", "roadmap_near", "fine_tracks", "detours", "bound_corridor", "section_descent", "contour_climb",
+    "roadmap_first", "roadmap_near", "fine_tracks", "detours", "bound_corridor", "section_descent",
     "lattice", "local_roadmap", "cap_pairs", "energy_bound", "length_bound", "altitude_intervals", "refinement",
 )  # fmt: skip
 """The names of all searches; which of them a mission has depends on its objective and limits."""
@@ -126,7 +125,8 @@ class Searches:
                 Search("roadmap_near", 0.5, small(MUCH), of(0.5, 0.0), self._search_small),
                 Search("fine_tracks", 0.9, known, nodes(0.5), self._over(self._look_finely), nearer=True),
                 Search("bound_corridor", 0.2, known, nodes(3.0), on(follow)),
-                Search("contour_climb", 0.075, self._is_slanted, nodes(8.0), self._over(self._climb_aslant)),
+                # Where path and bound are far apart it finds other valleys; else it gains little, and takes long.
+                Search("lattice", lambda x: 0.5 if x > WIDE else 0.02, far, of(0.3, 0.0), self._search_lattice),
                 Search("local_roadmap", 0.01, small(FAR), of(0.5, 0.0), self._search_small),
                 # Under a maximum AGL it takes twice as long as all others together, for a tenth or two of the gap.
                 Search("refinement", 0.07, gap(REFINED * i.wanted), nodes(8.0), self._over(self._refine)),
@@ -135,14 +135,9 @@ class Searches:
                 rows += [
                     Search("cap_pairs", 0.5, known, nodes(3.0), on(bound_by_caps), again=True),
                     Search("detours", 0.3, far, nodes(4.0), on(lambda plane: plane.past(PAST_FINE, fine=True))),
-                    Search("lattice", 0.02, far, of(0.5, 0.0), self._search_lattice_again),
                 ]
             else:
-                rows += [
-                    Search("detours", 0.3, known, nodes(4.0), self._over(self._past_finely)),
-                    # Where path and bound are far apart it finds other valleys; else it gains little, and takes long.
-                    Search("lattice", lambda x: 0.5 if x > MUCH else 0.02, far, of(0.3, 0.0), self._search_lattice),
-                ]
+                rows.append(Search("detours", 0.3, known, nodes(4.0), self._over(self._past_finely)))
         name, share = ("energy_bound", 0.5) if energy else ("length_bound", 0.9)
         return [
             *rows,
@@ -231,22 +226,24 @@ class Searches:
             if not self.incumbent.budget.goes_on():
                 break
 
-    def _search_lattice(self, *, known: bool = False) -> None:
+    def _search_lattice(self) -> None:
         incumbent = self.incumbent
-        part = OF_REST if incumbent.gap <= MUCH else EARLY_OF_REST
-        in_time = incumbent.budget.share(1.0 if incumbent.best is None else part)
-        problems = [self.problem]
-        if self.problem.objective == "energy" and incumbent.best is None:
-            # A line that is pulled to climb less may become illegal where a shorter one is not.
-            problems.append(replace(self.problem, objective="length"))
-        for problem in problems:
+        if incumbent.best is not None:
+            in_time = incumbent.budget.share(OF_REST if incumbent.gap <= WIDE else EARLY_OF_REST)
+            found = cheaper(self.problem, incumbent.tell, incumbent.best, self.plane.longest(), in_time)
+            if found is not None:
+                incumbent.take(found)
+            return
+        # A line that is pulled to climb less may become illegal where a shorter one is not.
+        energy = self.problem.objective == "energy"
+        for problem in [self.problem, *([replace(self.problem, objective="length")] if energy else [])]:
             try:
-                found = plan_band(problem, incumbent.tell, incumbent.budget.begun_s, known=known, goes_on=in_time)
+                first = plan_band(problem, incumbent.tell, incumbent.budget.begun_s)
             except Refusal:
                 continue
-            if found.lower_bound is not None and problem is self.problem:
-                incumbent.raise_bound(min(found.lower_bound, self.problem.cost(found.path)))
-            incumbent.take(found.path.points)
+            if first.lower_bound is not None and problem is self.problem:
+                incumbent.raise_bound(min(first.lower_bound, self.problem.cost(first.path)))
+            incumbent.take(first.path.points)
             return
 
     # -------------------------------------------------------------------- better paths, and bounds
@@ -275,23 +272,6 @@ class Searches:
             if not self.incumbent.goes_on() or not self.plane.past(PAST_FINE, fine=True):
                 break
 
-    def _is_slanted(self) -> bool:
-        incumbent = self.incumbent
-        return incumbent.best is not None and incumbent.gap > FAR and incumbent.climbs
-
-    def _climb_aslant(self) -> None:
-        incumbent = self.incumbent
-        found = traverse(self.problem, self.plane.longest())
-        if found is not None:
-            incumbent.take_longer(found, fine=True)
-        # Other lines around the path climb less, on finer lattices still less; none of them is shorter.
-        for level in (0, 1) if self.problem.objective == "energy" else ():
-            if incumbent.best is None or not incumbent.goes_on():
-                break
-            tight = pulled_tight(self.problem, incumbent.best, level)
-            if tight is None or not incumbent.take_simpler(*tight, fine=True, longer=True):
-                break
-
     def _has_intervals(self) -> bool:
         incumbent = self.incumbent
         return incumbent.best is not None and incumbent.climbs
@@ -308,6 +288,3 @@ class Searches:
         cut = 2 if self.incumbent.gap > FAR else 1
         if sum(leg.refine(plane.limit(leg), FINER, cut) for leg in plane.legs):
             halve(plane, far=True)
-
-    def _search_lattice_again(self) -> None:
-        self._search_lattice(known=True)

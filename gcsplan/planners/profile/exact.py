@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.profile.track import Flown, Track, distances, fly, make_track
+from gcsplan.planners.profile.track import Flown, Kind, Obstruction, Track, distances, fly, make_track, values_at
 from gcsplan.planners.profile.zone_levels import SAMPLE_M, ZoneLevels
-from gcsplan.world.airspace import Legs, Tube, Violation
+from gcsplan.world.airspace import Band, Legs, Tube, Violation
 
 TIGHT_M, TIGHT_SAMPLE_M = 1.0, 1.0
 """Where ceiling minus floor is less than `TIGHT_M` metres, samples are `TIGHT_SAMPLE_M` metres apart."""
@@ -27,16 +26,19 @@ class Unsettled:
     """Why no profile over a track passes: the ``place`` (east, north), the ``kind`` of obstruction, and ``by`` how many
     metres it fails.
 
-    ``samples`` (K, 4): east, north, floor, ceiling along the track, with all corrections so far. ``span_m``: length of
-    the piece that is too steep, along the track; ``zone``: index of the zone that is met, -1 if it is none.
+    ``samples`` (K, 4): east, north, floor, ceiling along the track, past its zones, with all corrections so far.
+    ``span_m``: length of the piece that is too steep, along the track; ``zone``: index of the zone that is met, -1 if
+    it is none.
     """
 
     place: Floats
     by: float
-    kind: Literal["pinched", "climb", "descent", "zone"]
+    kind: Kind
     samples: Floats
     span_m: float = 0.0
     zone: int = -1
+    past: Unsettled | None = None
+    """Of a zone: why the profile past it fails that lacks least."""
 
 
 @dataclass(eq=False, slots=True)
@@ -104,14 +106,18 @@ def settle(
     tube, levels = track.tube, tuple[ZoneLevels, ...]()
     worst: Violation | None = None
 
-    def refused(
-        place: Floats, by: float, kind: Literal["pinched", "climb", "descent", "zone"], span_m: float, zone: int
-    ) -> Unsettled:
+    def refused(place: Floats, by: float, kind: Kind, zone: int, span_m: float = 0.0) -> Unsettled:
         s = tube.s_m[1:-1]
         east, north = (np.interp(s, track.s_m, track.points[:, k]) for k in range(2))
         floor = np.maximum(tube.floor_m[:-1, 1], tube.floor_m[1:, 0])
         ceiling = np.minimum(tube.ceiling_m[:-1, 1], tube.ceiling_m[1:, 0])
+        for band in track.tube.bands:
+            _pass(s, floor, ceiling, band)
         return Unsettled(place, by, kind, np.stack([east, north, floor, ceiling], axis=-1), span_m, zone)
+
+    def shut(by: Obstruction) -> Unsettled:
+        found = refused(track.place(0.5 * (by.s0_m + by.s1_m)), by.by, by.kind, by.zone, by.s1_m - by.s0_m)
+        return found if by.past is None else replace(found, past=shut(by.past))
 
     for _ in range(CORRECTIONS):
         flown = fly(problem, track)
@@ -121,9 +127,7 @@ def settle(
                 track = replace(track, tube=replace(tube, bands=tuple(of.band for of in levels)))
                 flown = fly(problem, track)
         if not isinstance(flown, Flown):
-            return refused(
-                track.place(0.5 * (flown.s0_m + flown.s1_m)), flown.by, flown.kind, flown.s1_m - flown.s0_m, flown.zone
-            )
+            return shut(flown)
         found, pins = way_points(problem, track, flown)
         violations = judge.violations(found)
         if not violations:
@@ -144,10 +148,22 @@ def settle(
                 corrected = [of.correct(flown.profile, s[leg], s[leg + 1]) for of in own]
                 if not any(corrected):
                     by = math.inf if v.kind == "coverage" else v.by
-                    kind: Literal["zone", "pinched"] = "zone" if v.zone >= 0 else "pinched"
-                    return refused(np.array([v.east_m, v.north_m]), by, kind, 0.0, v.zone)
+                    return refused(np.array([v.east_m, v.north_m]), by, "zone" if v.zone >= 0 else "pinched", v.zone)
     assert worst is not None
-    return refused(np.array([worst.east_m, worst.north_m]), worst.by, "pinched", 0.0, -1)
+    return refused(np.array([worst.east_m, worst.north_m]), worst.by, "pinched", -1)
+
+
+def _pass(s_m: Floats, floor: Floats, ceiling: Floats, band: Band) -> None:
+    """Lower the ceiling (N,) at places along a track to below a band, or raise the floor to above it, in place:
+    whichever lacks less, and nothing if neither is possible."""
+    inside = (s_m >= band.s0_m) & (s_m <= band.s1_m)
+    bottom, top = (values_at(s_m[inside], band.s_m, of, k == 1) for k, of in enumerate((band.bottom_m, band.top_m)))
+    with np.errstate(invalid="ignore"):  # over unknown ground both are infinite: neither is possible
+        under, over = ((a - b).max(initial=-math.inf) for a, b in ((floor[inside], bottom), (top, ceiling[inside])))
+    if under <= over and under < math.inf:
+        ceiling[inside] = np.minimum(ceiling[inside], bottom)
+    elif over < math.inf:
+        floor[inside] = np.maximum(floor[inside], top)
 
 
 def sampled_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> Track:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from heapq import heappop, heappush
 from typing import Literal
 
@@ -38,16 +38,20 @@ BRANCHES = 64
 Sides = tuple[bool | None, ...]
 """For each band of a tube: True over it, False under it, None not chosen."""
 
+Kind = Literal["pinched", "climb", "descent", "zone"]
+
 
 @dataclass(frozen=True, slots=True)
 class Obstruction:
     """Why a track has no legal profile, where along it, and by how many metres; ``zone`` -1: terrain or limits."""
 
-    kind: Literal["pinched", "climb", "descent", "zone"]
+    kind: Kind
     s0_m: float
     s1_m: float
     by: float
     zone: int = -1
+    past: Obstruction | None = None
+    """Of a zone: what stops the profile past it that lacks least, of those that were tried."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -171,6 +175,7 @@ def fly(
     if isinstance(root, Blocked):
         return Obstruction(root.kind, root.s0_m, root.s1_m, root.by)
     first: Obstruction | None = None
+    least: Blocked | None = None
     open_set = [(cost_of(root), 0, none, root)]
     count = 0
     while open_set:
@@ -190,7 +195,11 @@ def fly(
             found = solve(choice)
             if not isinstance(found, Blocked):
                 heappush(open_set, (cost_of(found), count, choice, found))
-    return first or Obstruction("zone", 0.0, horizontal, 0.0)
+            elif least is None or found.by < least.by:
+                least = found
+    shut = first or Obstruction("zone", 0.0, horizontal, 0.0)
+    past = None if least is None else Obstruction(least.kind, least.s0_m, least.s1_m, least.by, shut.zone)
+    return replace(shut, past=past)
 
 
 def lacking(problem: Problem, track: Track) -> Lacking | Closed:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -11,9 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import NoMission
+from gcsplan.planners.budget import Budget
 from gcsplan.planners.lattice import pull_kernels
-from gcsplan.planners.lattice.planner import _sides, plan
-from gcsplan.planners.problem import Problem, Progress, Via, straight_bound
+from gcsplan.planners.lattice.planner import _sides, plan_band
+from gcsplan.planners.problem import Problem, Progress, Solution, Via, straight_bound
 from gcsplan.planners.profile.climb_laps import climb_needed_deg, climb_tracks, extend, laps, pins_of
 from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
 from gcsplan.planners.profile.taut_string import Profile, taut_string
@@ -45,6 +47,18 @@ def band_mission(seed: int, degrees: float, zones: tuple[Zone, ...] = (), object
     z = 0.5 * (low + high)
     start, goal = ((float(p[0]), float(p[1]), float(h)) for p, h in zip((a, b), z, strict=True))
     return Problem(air, limits, start, goal, objective="energy" if objective == "energy" else "length")
+
+
+def plan(problem: Problem) -> Solution:
+    """Plan by the lattice alone."""
+    begun = time.perf_counter()
+    problem = replace(problem, budget=Budget(problem.budget_s, problem.budget_mb, problem.budget.clocked))
+
+    def tell(phase: str, cost: float | None) -> None:
+        if problem.progress is not None:
+            problem.progress(Progress(time.perf_counter() - begun, cost, None, phase))
+
+    return plan_band(problem, tell, begun)
 
 
 def disc(middle: Floats, radius_m: float) -> Circle:

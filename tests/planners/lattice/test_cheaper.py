@@ -1,4 +1,5 @@
-"""Contour climbs: a steep slope is climbed aslant, because a zone a few metres above it prevents anything else."""
+"""Paths that are cheaper than a known one: a steep slope is climbed aslant, because a zone a few metres above it
+prevents anything else; and a line is pulled on the sides of zones that its path passes."""
 
 from __future__ import annotations
 
@@ -9,10 +10,9 @@ import numpy as np
 import pytest
 
 from gcsplan.planners.lattice.corridor_raster import make_guide
-from gcsplan.planners.lattice.planner import _sides, pulled
-from gcsplan.planners.lattice.routes import LEVELS
+from gcsplan.planners.lattice.planner import _sides, _weight, cheaper
+from gcsplan.planners.lattice.routes import LEVELS, Router
 from gcsplan.planners.optimal import planner as optimal
-from gcsplan.planners.optimal.sources.contour import traverse
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
@@ -62,9 +62,10 @@ def test_a_slope_under_a_low_zone_is_climbed_aslant(objective: str) -> None:
 @pytest.mark.first_quick
 @pytest.mark.parametrize("objective", ["length", "energy"])
 def test_the_track_over_the_lattice_has_way_enough_to_climb(objective: str) -> None:
-    found = traverse(replace(under_a_lid(), objective="energy" if objective == "energy" else "length"), 2200.0)
+    p = replace(under_a_lid(), objective="energy" if objective == "energy" else "length")
+    found = Router.at(p, LEVELS[0]).way(weight=_weight(p))
     assert found is not None
-    track_m = float(np.hypot(*np.diff(found[0], axis=0).T).sum())
+    track_m = float(np.hypot(*np.diff(found, axis=0).T).sum())
     assert 1200.0 + 5.0 * (SLOPE * 400.0 - ROOM_M) - 1.0 <= track_m <= 2200.0
 
 
@@ -80,7 +81,7 @@ def test_a_line_is_pulled_on_the_side_of_a_zone_that_its_path_passes_it_on() -> 
     for path, side in ((under, False), (over, True)):
         assert faults(p, Path(path)) == []
         assert _sides(p, path, ends, free) == {0: side}
-        better = pulled(p, path, LEVELS[0])
+        better = cheaper(p, lambda *_: None, path, 1700.0, p.budget.goes_on)
         assert better is not None
         assert faults(p, Path(better)) == []
         assert p.cost(Path(better)) < p.cost(Path(path))
@@ -90,12 +91,11 @@ def test_a_line_is_pulled_on_the_side_of_a_zone_that_its_path_passes_it_on() -> 
         assert room == pytest.approx((100.0, 400.0) if side else (10.0, 40.0))
 
 
-@pytest.mark.slow
-def test_a_path_over_such_a_track_is_better_than_one_with_laps() -> None:
+def test_a_path_that_climbs_aslant_is_better_than_one_with_laps() -> None:
     p = under_a_lid()
     below = looked(p).incumbent
-    found = traverse(p, 2200.0)
-    assert found is not None
-    assert below.take_longer(found, fine=True)
     assert below.best is not None
-    assert faults(p, Path(below.best)) == []
+    found = cheaper(p, below.tell, below.best, 2200.0, p.budget.goes_on)
+    assert found is not None
+    assert p.cost(Path(found)) < below.cost
+    assert faults(p, Path(found)) == []
