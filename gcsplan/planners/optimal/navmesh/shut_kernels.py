@@ -34,8 +34,11 @@ from gcsplan.planners.optimal.navmesh.zone_kernels import (
     value_at,
 )
 
-BESIDE_STEPS = 5
-"""Cells on each side of a cell whose ground is read, at most; of more, only every second, third … is."""
+RINGS = ((1.0, 32), (0.8, 16), (0.5, 8), (0.25, 4), (0.0, 1))
+"""Circles around a cell on which ground is read, as parts of the reach, and cells on each: on a slope, the lowest and
+the highest lie on the largest."""
+DISC = np.array([(r * math.sin(a), r * math.cos(a)) for r, n in RINGS for a in np.arange(n) * (2.0 * math.pi / n)])
+"""Those cells: rows and columns away, for a reach of 1."""
 
 
 @device
@@ -78,28 +81,22 @@ def _lowest_and_highest(
     low_j = low_i = high_j = high_i = -1
     if depth(zones, edges, z, _node(x, fineness, j, i), _node(y, fineness, j, i)) <= reach - near:
         return low_j, low_i, high_j, high_i, 1
-    rows, cols = int(near / along), int(near / across)
-    every = 1 + max(max(rows, cols) - 1, 0) // BESIDE_STEPS
     least, most = np.inf, -np.inf
-    for q in range(-(rows // every), rows // every + 1):
-        jj = j + q * every
-        if not 0 <= jj < (len(x) - 1) * fineness:
+    for n in range(len(DISC)):
+        jj, ii = j + int(DISC[n, 0] * near / along), i + int(DISC[n, 1] * near / across)
+        if not (0 <= jj < (len(x) - 1) * fineness and 0 <= ii < (x.shape[1] - 1) * fineness):
             continue
-        for p in range(-(cols // every), cols // every + 1):
-            ii = i + p * every
-            if not 0 <= ii < (x.shape[1] - 1) * fineness:
-                continue
-            height = _node(ground, fineness, jj, ii) + _node(ground, fineness, jj + 1, ii + 1)
-            # False as well where ground is unknown.
-            if not ((height < least or height > most) and height + _node(ground, fineness, jj, ii + 1) < np.inf):
-                continue
-            if not _covers(x, y, fineness, zones, edges, z, reach, near, j, i, jj, ii):
-                continue
-            if height < least:
-                least, low_j, low_i = height, jj, ii
-            if height > most:
-                most, high_j, high_i = height, jj, ii
-    return low_j, low_i, high_j, high_i, (2 * (rows // every) + 1) * (2 * (cols // every) + 1)
+        height = _node(ground, fineness, jj, ii) + _node(ground, fineness, jj + 1, ii + 1)
+        # False as well where ground is unknown.
+        if not ((height < least or height > most) and height + _node(ground, fineness, jj, ii + 1) < np.inf):
+            continue
+        if not _covers(x, y, fineness, zones, edges, z, reach, near, j, i, jj, ii):
+            continue
+        if height < least:
+            least, low_j, low_i = height, jj, ii
+        if height > most:
+            most, high_j, high_i = height, jj, ii
+    return low_j, low_i, high_j, high_i, len(DISC)
 
 
 @device
