@@ -126,7 +126,7 @@ class Searches:
                 Search("fine_tracks", 0.9, known, nodes(0.5), self._over(self._look_finely), nearer=True),
                 Search("bound_corridor", 0.2, known, nodes(3.0), on(follow)),
                 # Where path and bound are far apart it finds other valleys; else it gains little, and takes long.
-                Search("lattice", lambda x: 0.5 if x > WIDE else 0.02, far, of(0.3, 0.0), self._search_lattice),
+                Search("lattice", lambda x: 0.25 if x > WIDE else 0.02, far, of(0.3, 0.0), self._search_lattice),
                 Search("local_roadmap", 0.01, small(FAR), of(0.5, 0.0), self._search_small),
                 # Under a maximum AGL it takes twice as long as all others together, for a tenth or two of the gap.
                 Search("refinement", 0.07, gap(REFINED * i.wanted), nodes(8.0), self._over(self._refine)),
