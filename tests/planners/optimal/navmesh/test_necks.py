@@ -84,16 +84,18 @@ def ridge(gap_m: float, across: bool) -> tuple[Problem, float]:
     return problem, lowest + gap_m
 
 
+@pytest.mark.parametrize("at_once", [True, False])
 @pytest.mark.parametrize("across", [False, True])
 @pytest.mark.parametrize("gap_m", [0.02, -0.03])
-def test_a_pass_is_open_or_shut_by_centimetres(gap_m: float, across: bool) -> None:
+def test_a_pass_is_open_or_shut_by_centimetres(gap_m: float, across: bool, at_once: bool) -> None:
     problem, cap_m = ridge(gap_m, across)
     plane = make_plane(problem, EVERYWHERE, 2)
     ends = np.array([problem.start[:2], problem.goal[:2]])
     start, goal = problem.start[:2], problem.goal[:2]
-    bare, mesh = with_necks(
-        plane, cap_m, 1, ends, [np.array([[600.0, north] for north in np.arange(560.0, 640.0, 4.0)])]
-    )
+    places = np.array([[600.0, north] for north in np.arange(560.0, 640.0, 4.0)])
+    # Looked at place by place, the pass leads from neck to neck.
+    looks = [places] if at_once else [*places[:, None], *(places + np.array([90.0, 0.0]))[:, None]]
+    bare, mesh = with_necks(plane, cap_m, 1, ends, looks)
     assert bare.track(start, goal) is not None  # cells of 15 m do not show the ridge
     way = mesh.track(start, goal)
     assert (way is not None) == (gap_m > 0.0)
