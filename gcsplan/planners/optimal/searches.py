@@ -20,6 +20,7 @@ from gcsplan.planners.optimal.level_world import in_window
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.plane_search import SLACKS, PlaneSearch
 from gcsplan.planners.optimal.sources.bound_corridor import follow
+from gcsplan.planners.optimal.sources.contour import traverse
 from gcsplan.planners.optimal.sources.section_dp import tightened
 from gcsplan.planners.problem import Problem, Refusal, terminals_of
 from gcsplan.planners.profile.track import Obstruction, fly, make_track
@@ -45,7 +46,7 @@ MOST_CELLS = 50_000
 
 NAMES = (
     "straight", "outlines", "outline_bound", "track_bound", "cap_search", "corridor_first", "lattice_first",
-    "roadmap_first", "roadmap_near", "fine_tracks", "detours", "bound_corridor", "section_descent",
+    "roadmap_first", "roadmap_near", "fine_tracks", "detours", "bound_corridor", "section_descent", "contour_climb",
     "lattice", "local_roadmap", "cap_pairs", "energy_bound", "length_bound", "altitude_intervals", "refinement",
 )  # fmt: skip
 """The names of all searches; which of them a mission has depends on its objective and limits."""
@@ -125,6 +126,7 @@ class Searches:
                 Search("roadmap_near", 0.5, small(MUCH), of(0.5, 0.0), self._search_small),
                 Search("fine_tracks", 0.9, known, nodes(0.5), self._over(self._look_finely), nearer=True),
                 Search("bound_corridor", 0.2, known, nodes(3.0), on(follow)),
+                Search("contour_climb", 0.075, self._is_slanted, nodes(8.0), self._over(self._climb_aslant)),
                 # Where path and bound are far apart it finds other valleys; else it gains little, and takes long.
                 Search("lattice", lambda x: 0.25 if x > WIDE else 0.02, far, of(0.3, 0.0), self._search_lattice),
                 Search("local_roadmap", 0.01, small(FAR), of(0.5, 0.0), self._search_small),
@@ -271,6 +273,15 @@ class Searches:
         for _ in range(ROUNDS):
             if not self.incumbent.goes_on() or not self.plane.past(PAST_FINE, fine=True):
                 break
+
+    def _is_slanted(self) -> bool:
+        incumbent = self.incumbent
+        return incumbent.best is not None and incumbent.gap > FAR and incumbent.climbs
+
+    def _climb_aslant(self) -> None:
+        found = traverse(self.problem, self.plane.longest())
+        if found is not None:
+            self.incumbent.take_longer(found, fine=True)
 
     def _has_intervals(self) -> bool:
         incumbent = self.incumbent
