@@ -59,15 +59,14 @@ def plan_band(
     begun: float,
     *,
     climbs: bool = True,
-    goes_on: Callable[[], bool] | None = None,
 ) -> Solution:
     """A path under a maximum AGL and the climb limit that `Airspace.examine` passes.
 
     Start, goal and vias must be legal by themselves. ``tell(phase, cost)`` reports progress; ``begun`` is the
-    `time.perf_counter` of the call. ``climbs``: laps over start and goal are allowed; ``goes_on``:
-    whether there is work left for more, by default by the problem's budget. Raises Refusal if no path is found.
+    `time.perf_counter` of the call. ``climbs``: laps over start and goal are allowed. Raises Refusal if no path is
+    found.
     """
-    goes_on = problem.budget.goes_on if goes_on is None else goes_on
+    goes_on = problem.budget.goes_on
     bound = straight_bound(problem)
     terminals = terminals_of(problem)
     if all(math.dist(terminals[0], x) < 1e-3 for x in terminals):
@@ -85,12 +84,10 @@ def plan_band(
         work = _Work(problem, Router.at(problem, level), way, goes_on)
         router = work.router
         cut = router.cut_off() if climbs else (False, False)
-        found = None if any(cut) else work.first(SEARCHES)
+        found = None if any(cut) else work.first()
         if found is None and climbs and best is None and (any(cut) or level is LEVELS[0]):
             ends = cut if any(cut) else (True, True)
-            found = with_climbs(
-                problem, ends, lambda p: plan_band(p, tell, begun, climbs=False, goes_on=goes_on).path.points
-            )
+            found = with_climbs(problem, ends, lambda p: plan_band(p, tell, begun, climbs=False).path.points)
         if found is not None:
             best = found if best is None else min(best, found, key=lambda p: problem.cost(Path(p)))
         # A path longer than the detours that this lattice holds may have a shorter rival outside it: try the next one.
@@ -113,8 +110,8 @@ def cheaper(
 ) -> Floats | None:
     """Way points (N, 3) of a path that is cheaper than a ``known`` one (N, 3); None if none is found.
 
-    The lattices lie in the ellipse of all tracks that may be; the next one is finer. ``tell``, ``goes_on``: as in
-    `plan_band`.
+    The lattices hold tracks of up to about ``longest_m`` metres; the next one is finer. ``tell``: as in `plan_band`;
+    ``goes_on``: whether there is work left.
     """
     way, cost = straight_way_m(problem), problem.cost(Path(known))
     detour = max(longest_m / way, LEAST_DETOUR)
@@ -122,8 +119,8 @@ def cheaper(
         if not goes_on():
             break
         tell("search", cost)
-        work = _Work(problem, Router.at(problem, Level(detour, nodes)), way, goes_on, _weight(problem))
-        found = [work.first(SEARCHES)]
+        work = _Work(problem, Router.at(problem, Level(detour, nodes)), way, goes_on, climbing_weight(problem))
+        found = [work.first()]
         if work.line is None or work.line.cost > cost:
             work.begin(known)
         found.append(work.improve(tell))
@@ -131,11 +128,6 @@ def cheaper(
         if best is not None and problem.cost(Path(best)) < cost:
             return best
     return None
-
-
-def _weight(problem: Problem) -> float:
-    """Metres of track that cost as much as one metre of height."""
-    return climbing_weight(problem) if problem.objective == "energy" else 0.0
 
 
 def _not_found(problem: Problem, router: Router | None) -> Refusal:
@@ -239,12 +231,12 @@ class _Work:
         self.over: dict[int, bool] = {}
         """Zones known to be passed over (True) or under (False), by index."""
 
-    def first(self, searches: int) -> Floats | None:
-        """Way points of the first track that can be made legal, of ``searches`` at most; None if none can.
+    def first(self) -> Floats | None:
+        """Way points of the first track that can be made legal, of `SEARCHES` at most; None if none can.
 
         After each failure the lattice is corrected.
         """
-        for _ in range(searches):
+        for _ in range(SEARCHES):
             if self.router.opened > MOST_OPENED or not self.goes_on():
                 return None
             way = self.router.way(weight=self.weight)
@@ -257,12 +249,13 @@ class _Work:
             if not isinstance(found, Unsettled):
                 self.line = line
                 return found[0]
-            self.router.last = Obstruction(found.kind, 0.0, found.span_m, found.by, found.zone)
-            found = found.past or found
             self.router.last_place = found.place
-            if found.kind in ("pinched", "zone"):
-                by_m = found.by + 0.5 if found.kind == "pinched" else math.inf
-                self.router.lattice.raise_floor(found.place, by_m)
+            self.router.last = Obstruction(found.kind, 0.0, found.span_m, found.by, found.zone)
+            why = found.past or found
+            if why.kind == "pinched":
+                self.router.lattice.raise_floor(why.place, why.by + 0.5)
+            elif why.kind == "zone":
+                self.router.lattice.raise_floor(why.place, math.inf)
             else:
                 self.router.climb_factor *= 0.95
         return None
@@ -358,7 +351,7 @@ class _Work:
         router, p = self.router, self.problem
         if router.opened > MOST_OPENED // 4:
             return []
-        weight = _weight(p)
+        weight = climbing_weight(p)
         prices = [] if weight == self.weight else [weight]
         ways = [way for way in (router.way(weight=w, briefly=True) for w in prices) if way is not None]
         s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.line.points, axis=0).T))])

@@ -60,7 +60,9 @@ def frame_of(problem: Problem, level: Level) -> tuple[tuple[float, float, float,
 
 
 def climbing_weight(problem: Problem) -> float:
-    """Metres of track that cost as much energy as one metre of height."""
+    """Metres of track that cost as much as one metre of height; 0 if that has no price."""
+    if problem.objective != "energy":
+        return 0.0
     return problem.vertical_j_per_m / max(problem.horizontal_j_per_m, 1e-9)
 
 

@@ -106,18 +106,18 @@ def settle(
     tube, levels = track.tube, tuple[ZoneLevels, ...]()
     worst: Violation | None = None
 
-    def refused(place: Floats, by: float, kind: Kind, zone: int, span_m: float = 0.0) -> Unsettled:
+    def samples() -> Floats:
         s = tube.s_m[1:-1]
         east, north = (np.interp(s, track.s_m, track.points[:, k]) for k in range(2))
         floor = np.maximum(tube.floor_m[:-1, 1], tube.floor_m[1:, 0])
         ceiling = np.minimum(tube.ceiling_m[:-1, 1], tube.ceiling_m[1:, 0])
         for band in track.tube.bands:
             _pass(s, floor, ceiling, band)
-        return Unsettled(place, by, kind, np.stack([east, north, floor, ceiling], axis=-1), span_m, zone)
+        return np.stack([east, north, floor, ceiling], axis=-1)
 
-    def shut(by: Obstruction) -> Unsettled:
-        found = refused(track.place(0.5 * (by.s0_m + by.s1_m)), by.by, by.kind, by.zone, by.s1_m - by.s0_m)
-        return found if by.past is None else replace(found, past=shut(by.past))
+    def shut(by: Obstruction, along: Floats) -> Unsettled:
+        middle, span_m = track.place(0.5 * (by.s0_m + by.s1_m)), by.s1_m - by.s0_m
+        return Unsettled(middle, by.by, by.kind, along, span_m, by.zone)
 
     for _ in range(CORRECTIONS):
         flown = fly(problem, track)
@@ -127,7 +127,9 @@ def settle(
                 track = replace(track, tube=replace(tube, bands=tuple(of.band for of in levels)))
                 flown = fly(problem, track)
         if not isinstance(flown, Flown):
-            return shut(flown)
+            along = samples()
+            unsettled = shut(flown, along)
+            return unsettled if flown.past is None else replace(unsettled, past=shut(flown.past, along))
         found, pins = way_points(problem, track, flown)
         violations = judge.violations(found)
         if not violations:
@@ -148,9 +150,10 @@ def settle(
                 corrected = [of.correct(flown.profile, s[leg], s[leg + 1]) for of in own]
                 if not any(corrected):
                     by = math.inf if v.kind == "coverage" else v.by
-                    return refused(np.array([v.east_m, v.north_m]), by, "zone" if v.zone >= 0 else "pinched", v.zone)
+                    kind: Kind = "zone" if v.zone >= 0 else "pinched"
+                    return Unsettled(np.array([v.east_m, v.north_m]), by, kind, samples(), zone=v.zone)
     assert worst is not None
-    return refused(np.array([worst.east_m, worst.north_m]), worst.by, "pinched", -1)
+    return Unsettled(np.array([worst.east_m, worst.north_m]), worst.by, "pinched", samples())
 
 
 def _pass(s_m: Floats, floor: Floats, ceiling: Floats, band: Band) -> None:

@@ -94,7 +94,6 @@ class Necks:
         self._seen = _grown(self._at(plane, but_at), 1)
         """Cells that are not looked at again."""
         self._necks: list[Neck] = []
-        self._openings = np.zeros((0, 7))
 
     def look(self, plane: Plane, places: Floats) -> bool:
         """Look at the cells around the places (N, 2) of a track, as long as the budget lasts; return whether any was
@@ -112,7 +111,6 @@ class Necks:
             return False
         self._seen |= found
         self._necks.append(neck)
-        self._openings = _joined(self._necks)
         return True
 
     def mesh(self, clearance: ClearanceGrid) -> Mesh:
@@ -202,7 +200,7 @@ class Necks:
     def _portals(self, clearance: ClearanceGrid, mesh: Mesh, cut: Indices) -> tuple[Indices, Floats, Indices]:
         """The portals (N,) of a mesh, of those ``cut``, in which openings lie; those openings (N, 7), with row and
         column in the mesh, and with the range; and the cells (N, 2) at both sides."""
-        openings = self._openings.copy()
+        openings = _joined(self._necks)
         at = self._local(clearance, openings[:, :2].astype(np.intp))
         openings[:, :2] = at
         aside = openings[:, 2] == 0.0

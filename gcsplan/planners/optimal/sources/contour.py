@@ -20,7 +20,7 @@ def traverse(problem: Problem, longest_m: float) -> PinnedTrack | None:
     """The best track on a lattice of reachable altitudes that holds tracks of up to about ``longest_m`` metres; None if
     there is none."""
     router = Router.at(problem, Level(max(longest_m / straight_way_m(problem), 1.0), NODES))
-    way = router.way(weight=climbing_weight(problem) if problem.objective == "energy" else 0.0, briefly=True)
+    way = router.way(weight=climbing_weight(problem), briefly=True)
     if way is None:
         return None
     track = router.track_of(way)
