@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gcsplan.arrays import Bools, Floats
+from gcsplan.arrays import Bools, Floats, Int64s
 from gcsplan.planners.optimal.navmesh.clearance import Cone
 from gcsplan.planners.optimal.navmesh.mesh import Guide
 
@@ -55,14 +55,16 @@ class Corridor:
 class Nearby:
     """The cells that tracks shorter than ``limit_m`` may meet; guides from the start (``away``) and goal (``left``).
 
-    For all cells of the guides' mesh (cells,): the lowest and the highest altitude that can be flown at, and bounds of
-    the shortest tracks from the start to the cell and from there to the goal: the least (``away_m``, ``left_m``), and
-    the greatest to any place that tracks may meet (``away_most_m``, ``left_most_m``; inf where it is not known).
+    For each of these ``cell`` (K,), rising numbers of cells of the guides' mesh: the lowest and the highest altitude
+    that can be flown at, and bounds of the shortest tracks from the start to the cell and from there to the goal: the
+    least (``away_m``, ``left_m``), and the greatest to any place that tracks may meet (``away_most_m``,
+    ``left_most_m``; inf where it is not known).
     """
 
     limit_m: float
     away: Guide
     left: Guide
+    cell: Int64s
     low_m: Floats
     high_m: Floats
     away_m: Floats

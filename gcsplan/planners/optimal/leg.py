@@ -290,11 +290,10 @@ class Leg:
         if limit_m > self.reach_m * (1.0 + 1e-6):  # a longer track may meet cells that were not flooded
             return np.full(1, -math.inf), np.full(1, math.inf), np.zeros(1), np.zeros(1)
         close = self._closer(min(limit_m, self.reach_m))
-        near = self._near(close, limit_m)
         of: Nearby | AltitudeIntervals = close
         if self._reached is not None and self._reached[0] is close and limit_m <= close.limit_m:
             of = self._reached[1].known(limit_m)
-            near = near[of.cell]
+        near = close.away.cells_between(close.left, limit_m)[of.cell]
         return of.low_m[near], of.high_m[near], of.away_m[near], of.left_m[near]
 
     def intervals(self, limit_m: float) -> AltitudeIntervals:
@@ -304,29 +303,24 @@ class Leg:
         close = self._closer(limit)
         if self._reached is None or self._reached[0] is not close:
             mesh, a, b = close.left.mesh, self.start, self.goal
-            near = self._near(close, close.limit_m)
-            count, low, high = intervals(mesh, close.low_m, close.high_m, MOST, SPARE_M)
-            cell, nth = np.nonzero((np.arange(MOST) < count[:, None]) & near[:, None])
+            count, low, high = intervals(mesh, close.cell, close.low_m, close.high_m, MOST, SPARE_M)
+            k, nth = np.nonzero(np.arange(MOST) < count[:, None])
             every = AltitudeIntervals(
                 (mesh.excess.shape[0] - 1, mesh.excess.shape[1] - 1),
-                cell,
-                low[cell, nth],
-                high[cell, nth],
-                close.away_m[cell],
-                close.left_m[cell],
-                np.column_stack([close.away_m, close.away_most_m])[cell],
-                np.column_stack([close.left_m, close.left_most_m])[cell],
+                close.cell[k],
+                low[k, nth],
+                high[k, nth],
+                close.away_m[k],
+                close.left_m[k],
+                np.column_stack([close.away_m[k], close.away_most_m[k]]),
+                np.column_stack([close.left_m[k], close.left_most_m[k]]),
                 Terminal(mesh.cells_at(a.place), a.amsl_m),
                 Terminal(mesh.cells_at(b.place), b.amsl_m),
             )
             self._reached = close, Reached(every, self.problem.limits, close.limit_m)
-        found = self._reached[1].within(limit, self._near(close, limit))
+        found = self._reached[1].within(limit, close.away.cells_between(close.left, limit))
         self.problem.budget.spend("interval", self._reached[1].looked_at)
         return found
-
-    def _near(self, close: Nearby, limit_m: float) -> Bools:
-        """(cells,) which cells of the guides' mesh tracks no longer than ``limit_m`` may meet."""
-        return close.left.mesh.of_plane(close.away.between(close.left, limit_m)).ravel()
 
     def _closer(self, limit_m: float) -> Nearby:
         """Distances and altitudes cell by cell, for tracks shorter than ``limit_m``; by whole mesh pieces if that is
@@ -335,11 +329,12 @@ class Leg:
             away, left = self._from_start(), self._guide
             found = self._each_cell(self.plane, away.between(left, limit_m), limit_m, away)
             if found is None:  # every cell of a piece is as near as the piece's entrance, or as the straight line
-                mesh = left.mesh
+                mesh, cell = left.mesh, np.flatnonzero(away.cells_between(left, limit_m))
                 ends = (away, self.start), (left, self.goal)
-                away_m, left_m = (np.maximum(guide.cells(), mesh.straight_to(end.place)) for guide, end in ends)
-                unknown = np.full(len(mesh.piece), math.inf)
-                found = Nearby(limit_m, away, left, *ranges(mesh, self.top_m), away_m, left_m, unknown, unknown)
+                away_m, left_m = (np.maximum(of.least(cell), mesh.straight_to(end.place, cell)) for of, end in ends)
+                unknown = np.full(len(cell), math.inf)
+                free = ranges(mesh, self.top_m, cell)
+                found = Nearby(limit_m, away, left, cell, *free, away_m, left_m, unknown, unknown)
             self._close = found
         return self._close
 
@@ -353,8 +348,9 @@ class Leg:
             away = mesh.flood(a, b, limit_m, math.inf, left)[1]
         except Exhausted:
             return None
-        ways = away.cells(), left.cells(), away.farthest(), left.farthest()
-        return Nearby(limit_m, away, left, *ranges(mesh, self.top_m), *ways)
+        cell = np.flatnonzero(away.cells_between(left, limit_m))
+        ways = away.least(cell), left.least(cell), away.most(cell), left.most(cell)
+        return Nearby(limit_m, away, left, cell, *ranges(mesh, self.top_m, cell), *ways)
 
     def _over(self, cells: Bools) -> tuple[Plane, Bools]:
         """The finer lattice over ``cells`` of the first-look lattice, or over more, and which of its cells they are."""

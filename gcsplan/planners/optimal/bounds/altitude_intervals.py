@@ -109,7 +109,8 @@ class AltitudeIntervals:
         ``high_m`` and ``away_m`` are narrowed accordingly."""
         if not len(self.cell):
             return self
-        first = np.searchsorted(self.cell, np.arange(self.shape[0] * self.shape[1] + 1))
+        count = np.bincount(self.cell, minlength=self.shape[0] * self.shape[1])
+        first = np.concatenate([np.zeros(1, np.int64), np.cumsum(count)])
         sources = np.concatenate([np.arange(first[k], first[k + 1]) for k in self.start.cells.tolist()])
         n = len(self.cell) + 1
         room = np.empty(n), np.empty(n, np.int32), np.empty(n, np.int64)

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from gcsplan.arrays import Floats, Int32s
+from gcsplan.arrays import Floats, Int32s, Int64s
 from gcsplan.planners.optimal.navmesh.interval_kernels import cut_intervals
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.shut_kernels import narrow_ranges
 
 
-def ranges(mesh: Mesh, top_m: float) -> tuple[Floats, Floats]:
-    """(cells,) the lowest and the highest altitude, at most ``top_m``, that can be flown at in each cell; lowest above
-    highest where there is none. ``mesh`` must be for bounds and as fine as its plane."""
+def ranges(mesh: Mesh, top_m: float, cells: Int64s) -> tuple[Floats, Floats]:
+    """(K,) the lowest and the highest altitude, at most ``top_m``, that can be flown at in each of ``cells`` (K,);
+    lowest above highest where there is none. ``mesh`` must be for bounds and as fine as its plane."""
     plane, (rows, cols) = mesh.plane, mesh.excess.shape
-    low, high = mesh.lowest().reshape(rows - 1, cols - 1), np.full((rows - 1, cols - 1), top_m)
+    low, high = np.full((rows - 1, cols - 1), np.inf), np.full((rows - 1, cols - 1), top_m)
+    low.ravel()[cells] = mesh.lowest(cells)
     limits = plane.problem.limits
     if limits.max_agl_m is not None:
         ground = plane.grounds[1][mesh.row : mesh.row + rows, mesh.col : mesh.col + cols]
@@ -22,19 +23,24 @@ def ranges(mesh: Mesh, top_m: float) -> tuple[Floats, Floats]:
         most = np.maximum(pairs[:, :-1], pairs[:, 1:])
         np.fmin(high, most + (limits.max_agl_m - limits.altitude_error_m + plane.fit.spare_m), out=high)
     narrow_ranges(*_laid(mesh), low, high)
-    return low.ravel(), high.ravel()
+    return low.ravel()[cells], high.ravel()[cells]
 
 
-def intervals(mesh: Mesh, low_m: Floats, high_m: Floats, most: int, spare_m: float) -> tuple[Int32s, Floats, Floats]:
-    """Cut the range of each cell, ``low_m`` to ``high_m`` from `ranges`, into the altitude intervals that zones leave.
+def intervals(
+    mesh: Mesh, cells: Int64s, low_m: Floats, high_m: Floats, most: int, spare_m: float
+) -> tuple[Int32s, Floats, Floats]:
+    """Cut the range of each of ``cells``, ``low_m`` to ``high_m`` from `ranges`, into the altitude intervals that zones
+    leave.
 
-    Returns the number of intervals (cells,), at most ``most``, and their lower and upper ends (cells, most), each
-    ``spare_m`` further out. ``mesh``: as for `ranges`.
+    Returns the number of intervals (K,), at most ``most``, and their lower and upper ends (K, most), each ``spare_m``
+    further out. ``mesh``: as for `ranges`.
     """
-    low, high = np.empty((len(low_m), most)), np.empty((len(low_m), most))
+    low, high = np.empty((len(cells), most)), np.empty((len(cells), most))
     low[:, 0], high[:, 0] = low_m - spare_m, high_m + spare_m
     count = (low_m <= high_m).astype(np.int32)
-    cut_intervals(*_laid(mesh), spare_m, count, low, high)
+    number = np.full(len(mesh.piece), -1, np.int32)
+    number[cells] = np.arange(len(cells))
+    cut_intervals(*_laid(mesh), spare_m, number, count, low, high)
     return count, low, high
 
 

@@ -21,27 +21,28 @@ ROUNDING = 1e-9
 """Part of a step between places by which a cell's range is widened at both ends."""
 
 
-@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 f8 f8 f8 i4[] f8[,] f8[,]")
+@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 f8 f8 f8 i4[] i4[] f8[,] f8[,]")
 def cut_intervals(
     ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Int32s, exact: bool, reach: float,
-    near: float, spare: float, count: Int32s, low: Floats, high: Floats,
+    near: float, spare: float, number: Int32s, count: Int32s, low: Floats, high: Floats,
 ) -> None:  # fmt: skip
-    """Cut away, from the ``count`` (cells,) intervals of each cell, ``low`` to ``high`` (cells, most), the altitudes
+    """Cut away, from the ``count`` (K,) intervals of each of some cells, ``low`` to ``high`` (K, most), the altitudes
     that a zone certainly shuts over the whole cell, except for ``spare`` metres at its top and bottom.
 
-    An interval that would become two is left whole if ``low`` has no column left. ``exact``: as in `narrow_ranges`.
+    ``number`` (cells,): from 0 to K - 1 for those cells, -1 for others. An interval that would become two is left whole
+    if ``low`` has no column left. ``exact``: as in `narrow_ranges`.
     """
     for z in range(len(zones)):
         if zones[z, PAIR] > 0.0 or (over_ground(zones, z) and not exact):
             continue
         for j in range(boxes[z, 2], boxes[z, 3] + 1):
             for i in range(boxes[z, 0], boxes[z, 1] + 1):
-                cell = j * (x.shape[1] - 1) + i
-                if count[cell] == 0:
+                k = number[j * (x.shape[1] - 1) + i]
+                if k < 0 or count[k] == 0:
                     continue
                 bottom, top = shut_over(ground, x, y, zones, edges, z, reach, near, j, i)
                 if top - spare > bottom + spare:
-                    count[cell] = _cut(low, high, cell, count[cell], bottom + spare, top - spare)
+                    count[k] = _cut(low, high, k, count[k], bottom + spare, top - spare)
 
 
 @device

@@ -43,27 +43,33 @@ class Mesh(Portals):
     parts_of: Int32s = field(default_factory=lambda: np.empty((0, 2), np.int32))
     """(K, 2) the two pieces (or -1) of the cell that each of the last K pieces is a part of, see `necks`."""
 
-    def lowest(self) -> Floats:
-        """(cells,) the lowest floor at each cell's corners; -inf if one of them is not looked at."""
-        f = np.where(np.isposinf(self.excess), -np.inf, self.floor)
-        return np.minimum(np.minimum(f[:-1, :-1], f[:-1, 1:]), np.minimum(f[1:, :-1], f[1:, 1:])).ravel()
+    def lowest(self, cells: Int64s) -> Floats:
+        """(K,) the lowest floor at each cell's corners; -inf if one of them is not looked at."""
+        at = self._corners(cells)
+        return np.asarray(np.where(np.isposinf(self.excess[at]), -np.inf, self.floor[at]).min(axis=0))
 
-    def straight_to(self, place: Place) -> Floats:
-        """(cells,) a lower bound of the distance from a place to each cell, m; for meshes as fine as their plane."""
-        x, y = (at - own for at, own in zip(self.places(), place, strict=True))
-        middle = (0.25 * (z[:-1, :-1] + z[:-1, 1:] + z[1:, :-1] + z[1:, 1:]) for z in (x, y))
-        return np.asarray((np.hypot(*middle) - 0.5 * self._widths()).ravel() - BENT_M)
+    def straight_to(self, place: Place, cells: Int64s) -> Floats:
+        """(K,) a lower bound of the distance from a place to each cell, m; for meshes as fine as their plane."""
+        x, y = self._corner_places(cells)
+        middle = np.hypot(x.mean(axis=0) - place[0], y.mean(axis=0) - place[1])
+        return np.asarray(middle - 0.5 * self.widths(cells) - BENT_M)
 
-    def widest_m(self) -> float:
-        """Metres between any two places of one cell, at most; for meshes as fine as their plane."""
-        return float(self._widths().max()) + 2.0 * BENT_M
+    def widths(self, cells: Int64s) -> Floats:
+        """(K,) metres between opposite corners of each cell, along the longer diagonal; for meshes as fine as their
+        plane."""
+        x, y = self._corner_places(cells)
+        return np.asarray(np.maximum(np.hypot(x[3] - x[0], y[3] - y[0]), np.hypot(x[2] - x[1], y[2] - y[1])))
 
-    def _widths(self) -> Floats:
-        """(rows - 1, cols - 1) metres between opposite corners of each cell, along the longer diagonal."""
-        x, y = self.places()
-        across = np.hypot(x[1:, 1:] - x[:-1, :-1], y[1:, 1:] - y[:-1, :-1])
-        other = np.hypot(x[1:, :-1] - x[:-1, 1:], y[1:, :-1] - y[:-1, 1:])
-        return np.asarray(np.maximum(across, other))
+    def _corners(self, cells: Int64s) -> tuple[Int64s, Int64s]:
+        """(4, K) each: rows and columns of the nodes at the corners of cells, row by row."""
+        j, i = np.divmod(cells, self.excess.shape[1] - 1)
+        return np.stack([j, j, j + 1, j + 1]), np.stack([i, i + 1, i, i + 1])
+
+    def _corner_places(self, cells: Int64s) -> tuple[Floats, Floats]:
+        """(4, K) each: x and y of the corners of cells, row by row; for meshes as fine as their plane."""
+        j, i = self._corners(cells)
+        at = j + self.row, i + self.col
+        return self.plane.x[at], self.plane.y[at]
 
     def places(self) -> tuple[Floats, Floats]:
         """(rows, cols) x and y of the plane's nodes that the mesh covers; for meshes as fine as their plane."""
@@ -186,8 +192,13 @@ class Guide:
         return self.mesh.over_plane(out)
 
     def between(self, other: Guide, limit_m: float) -> Bools:
-        """(rows - 1, cols - 1) the plane's cells that tracks from this guide's place to the place of another guide over
-        the same mesh may enter, if they are no longer than ``limit_m``.
+        """(rows - 1, cols - 1) as `cells_between`, of all the plane's cells."""
+        cells = self.cells_between(other, limit_m)
+        return self.mesh.over_plane(cells.reshape(self.mesh.excess.shape[0] - 1, -1))
+
+    def cells_between(self, other: Guide, limit_m: float) -> Bools:
+        """(cells,) which of the mesh's cells tracks from this guide's place to the place of another guide over the same
+        mesh may enter, if they are no longer than ``limit_m``.
 
         Such a track meets the portal through which it enters a piece, so it is no shorter than the sum of the distances
         from both places to that portal. It may leave through the same portal: a shortest track does so where a finer
@@ -198,17 +209,21 @@ class Guide:
         met[[*mesh.pieces_at(self.place), *mesh.pieces_at(other.place)]] = True
         out = np.zeros(len(mesh.piece), np.bool_)
         within(mesh.joins, self.met, other.met, limit_m, met, mesh.piece, out)
-        return mesh.over_plane(out.reshape(mesh.excess.shape[0] - 1, -1))
+        return out
 
-    def cells(self) -> Floats:
-        """(cells,) the lower bound of the distance to each of the mesh's cells, m."""
-        return np.asarray(np.append(self.entered, np.inf)[self.mesh.piece].min(axis=1))
+    def least(self, cells: Int64s) -> Floats:
+        """(K,) the lower bound of the distance to each of ``cells`` (K,) of the mesh, m."""
+        return np.asarray(np.minimum(*self._entered(cells)))
 
-    def farthest(self) -> Floats:
-        """(cells,) an upper bound of the distance over the mesh to every place of each cell's pieces that the search
-        came to, m; inf where it came to none. Each piece must be a part of one cell."""
+    def most(self, cells: Int64s) -> Floats:
+        """(K,) an upper bound of the distance over the mesh to every place of each cell's pieces that the search came
+        to, m; inf where it came to none. Each piece must be a part of one cell."""
+        entered = self._entered(cells)
+        most = np.fmax(*np.where(np.isfinite(entered), entered, np.nan))
         # The place itself may lie beside the pieces at it, see `Mesh.pieces_at`.
-        across = (1.0 + 2.0 * BESIDE) * self.mesh.widest_m()
-        entered = np.append(np.where(np.isfinite(self.entered), self.entered + across, -np.inf), -np.inf)
-        most = entered[self.mesh.piece].max(axis=1)
-        return np.asarray(np.where(np.isneginf(most), np.inf, most))
+        across = (1.0 + 2.0 * BESIDE) * (self.mesh.widths(cells) + 2.0 * BENT_M)
+        return np.asarray(np.where(np.isnan(most), np.inf, most + across))
+
+    def _entered(self, cells: Int64s) -> Floats:
+        """(2, K) `entered` of the two pieces of each cell; inf for a piece that it does not have."""
+        return np.asarray(np.append(self.entered, np.inf)[self.mesh.piece[cells].T])

@@ -215,7 +215,8 @@ def test_every_altitude_that_is_legal_in_a_cell_lies_in_one_of_its_intervals(see
     problem = leg.problem
     plane = make_plane(problem, EVERYWHERE)
     mesh = mesh_of(plane, 250.0, True, single=True)
-    count, low, high = intervals(mesh, *ranges(mesh, 250.0), MOST, 1e-3)
+    every = np.arange(len(mesh.piece))
+    count, low, high = intervals(mesh, every, *ranges(mesh, 250.0, every), MOST, 1e-3)
     x, y = mesh.places()
     many = 0
     for j, i in product(range(12), range(12)):

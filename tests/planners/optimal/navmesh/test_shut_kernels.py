@@ -56,7 +56,8 @@ def over_ground(rng: np.random.Generator, count: int) -> list[Zone]:
 
 
 def intervals_of(mesh: Mesh) -> tuple[Floats, Floats, Floats]:
-    return intervals(mesh, *ranges(mesh, TOP_M), MOST, 1e-3)
+    every = np.arange(len(mesh.piece))
+    return intervals(mesh, every, *ranges(mesh, TOP_M, every), MOST, 1e-3)
 
 
 @pytest.mark.draws
@@ -109,10 +110,10 @@ def test_a_steep_slope_shuts_what_is_left_below_a_zone_and_above_it(slope: float
     ground = float(surface.ground_at(*at))
     cap = TOP_M if under else ground + 113.0
     mesh = mesh_of(plane, cap, True, single=True)
-    count, low, high = intervals(mesh, *ranges(mesh, cap), MOST, 1e-3)
     c, r = plane.at((float(at[0]), float(at[1])))
-    cell = math.floor(r) * (mesh.excess.shape[1] - 1) + math.floor(c)
-    left = [(a, b) for a, b in zip(low[cell, : count[cell]], high[cell, : count[cell]], strict=True) if b - a > 0.01]
+    cell = np.array([math.floor(r) * (mesh.excess.shape[1] - 1) + math.floor(c)])
+    (count,), (low,), (high,) = intervals(mesh, cell, *ranges(mesh, cap, cell), MOST, 1e-3)
+    left = [(a, b) for a, b in zip(low[:count], high[:count], strict=True) if b - a > 0.01]
     tries = np.arange(ground, cap, 0.25)
     assert legal(problem, np.tile(at, (len(tries), 1)), tries).any() == open_
     assert bool(left) == open_
