@@ -80,6 +80,12 @@ class Leg:
         """The best known lower bound of the length of every path's track, metres."""
         return max(self.length_m, self._flown_m) if self.seen else self.straight_m
 
+    @property
+    def nearby_cells(self) -> float:
+        """How many cells of the finer lattice short enough tracks may meet, by the last look at them; before that, the
+        number of first-look cells, because a corridor is a small part of these."""
+        return self.cells_of.nodes if self._close is None else len(self._close.cell) * self.cells_of.ratio**2
+
     def flood(self, slack: float, within_m: float = math.inf) -> None:
         """Flood all cells that are free below the highest cap, as far as tracks lead that are longer than the shortest
         by at most ``slack`` (a part of it), and no longer than ``within_m``. Sets `length_m` and `reach_m`.

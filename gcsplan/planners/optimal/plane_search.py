@@ -202,6 +202,11 @@ class PlaneSearch:
         nodes = sum(leg.cells_of.nodes for leg in self.legs)
         return looks * nodes * NODE_S, max((leg.cells_of.nodes for leg in self.legs), default=0.0) * NODE_MB
 
+    def size_nearby(self, cell_s: float) -> tuple[float, float]:
+        """As `size`, of a search over the cells of the finer lattices that short enough tracks may meet: ``cell_s``
+        counted seconds for each."""
+        return sum(leg.nearby_cells for leg in self.legs) * cell_s, self.size(1.0)[1]
+
     def longest(self) -> float:
         """An upper bound, metres, of the track length of every path better than the best."""
         return self.incumbent.longest(sum(leg.reach_m for leg in self.legs))

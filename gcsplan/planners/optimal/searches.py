@@ -40,6 +40,8 @@ FINER = 2
 OF_REST, EARLY_OF_REST = 0.5, 0.25
 """Part of the counted work left that roadmap and lattice may take if a path is known: what they take is not known
 before; and the part for the lattice before others have tried to close a large gap."""
+INTERVAL_S, REFINED_S = 1e-6, 1e-5
+"""Counted seconds that altitude intervals and refinement take for each cell of the finer lattice near short tracks."""
 MOST_CELLS = 50_000
 """Most cells of all corridors for which altitude intervals are computed."""
 
@@ -104,6 +106,9 @@ class Searches:
         def on(run: Callable[[PlaneSearch], object]) -> Callable[[], object]:
             return self._over(lambda: run(self.plane))
 
+        def near(cell_s: float) -> Callable[[], Size]:
+            return lambda: self.plane.size_nearby(cell_s)
+
         nodes, of, far = self._nodes, self._of, gap(FAR)
         rows = [
             Search("straight", 1.0, lambda: self._straight is None, of(2e-3, 0.0), self._fly_straight),
@@ -131,7 +136,7 @@ class Searches:
                 Search("lattice", lambda x: 0.25 if x > WIDE else 0.02, far, of(0.3, 0.0), self._search_lattice),
                 Search("local_roadmap", 0.01, small(FAR), of(0.5, 0.0), self._search_small),
                 # Under a maximum AGL it takes twice as long as all others together, for a tenth or two of the gap.
-                Search("refinement", 0.07, gap(REFINED * i.wanted), nodes(8.0), self._over(self._refine)),
+                Search("refinement", 0.07, gap(REFINED * i.wanted), near(REFINED_S), self._over(self._refine)),
             ]
             if energy:
                 rows += [
@@ -145,7 +150,9 @@ class Searches:
             *rows,
             Search("section_descent", 0.9 if band else 0.1, known, of(0.1, 0.0), self._tighten, again=True),
             Search(name, share, known, nodes(1.0), on(halve), again=True, nearer=not energy),
-            Search("altitude_intervals", 0.08, self._has_intervals, nodes(8.0), self._over(self._bound_by_intervals)),
+            Search(
+                "altitude_intervals", 0.08, self._has_intervals, near(INTERVAL_S), self._over(self._bound_by_intervals)
+            ),
         ]
 
     def _over(self, run: Callable[[], object]) -> Callable[[], object]:
