@@ -40,8 +40,9 @@ FINER = 2
 OF_REST, EARLY_OF_REST = 0.5, 0.25
 """Part of the counted work left that roadmap and lattice may take if a path is known: what they take is not known
 before; and the part for the lattice before others have tried to close a large gap."""
-INTERVAL_S, REFINED_S = 1e-6, 1e-5
-"""Counted seconds that altitude intervals and refinement take for each cell of the finer lattice near short tracks."""
+INTERVAL_S, REFINED_S = 1e-6, 6e-6
+"""Counted seconds that altitude intervals take on average, and refinement in one of ten missions at most, for each cell
+of the finer lattice near short tracks: refinement gains something if it ends with the budget, too."""
 MOST_CELLS = 50_000
 """Most cells of all corridors for which altitude intervals are computed."""
 
@@ -136,7 +137,7 @@ class Searches:
                 Search("lattice", lambda x: 0.25 if x > WIDE else 0.02, far, of(0.3, 0.0), self._search_lattice),
                 Search("local_roadmap", 0.01, small(FAR), of(0.5, 0.0), self._search_small),
                 # Under a maximum AGL it takes twice as long as all others together, for a tenth or two of the gap.
-                Search("refinement", 0.07, gap(REFINED * i.wanted), near(REFINED_S), self._over(self._refine)),
+                Search("refinement", 0.04, gap(REFINED * i.wanted), near(REFINED_S), self._over(self._refine)),
             ]
             if energy:
                 rows += [
