@@ -30,6 +30,40 @@ TALL, WIDE, WIDER = 64, 1024, 4
 of the reach around them, in cells."""
 
 
+class Lines:
+    """Lines of the plane from ``start`` to ``end`` (N, 2 or more), and the tiles of a surface that they meet: found
+    once, whatever the number of reaches for which these are examined."""
+
+    def __init__(self, start: Floats, end: Floats) -> None:
+        self._start, self._end = start, end
+        self._tiles: Bools | None = None
+
+    def tiles(self, grid: GridMap, field: Field, shape: tuple[int, ...]) -> Bools:
+        """Which of a surface's tiles, in rows and columns by ``shape``, the lines meet; perhaps a few more."""
+        if self._tiles is None:
+            self._tiles = self._met(grid, field, shape)
+        return self._tiles
+
+    def _met(self, grid: GridMap, field: Field, shape: tuple[int, ...]) -> Bools:
+        start, end = self._start[:, :2], self._end[:, :2]
+        length = np.hypot(*(end - start).T)
+        parts = np.ceil(length / (SPACING * min(field.step_x, field.step_y))).astype(np.intp) + 1
+        line = np.repeat(np.arange(len(parts)), parts)
+        nth = np.arange(len(line)) - np.repeat(np.cumsum(parts) - parts, parts)
+        t = nth / np.maximum(parts[line] - 1, 1)
+        places = start[line] + t[:, None] * (end - start)[line]
+        cells = grid(*places.T)[:, ::-1] / TILE
+        beside, most = (0.5 * SPACING + BOW) / TILE, np.array(shape) - 1.0
+        low, high = (np.floor(cells + d).clip(0.0, most).astype(np.intp) for d in (-beside, beside))
+        found = np.zeros(shape, np.bool_)
+        found[low[:, 0], low[:, 1]] = True
+        wide = (low != high).any(axis=1)  # most places are far from the border of their tile
+        low, high = low[wide], high[wide]
+        for rows, cols in product((low, high), repeat=2):
+            found[rows[:, 0], cols[:, 1]] = True
+        return found
+
+
 class Neighbourhood:
     """The local extrema of a surface (rows, cols) for a reach. Tiles that have not been examined count as unknown."""
 
@@ -49,33 +83,16 @@ class Neighbourhood:
         """Pickle the inputs only: a copy in another process examines its tiles anew."""
         return Neighbourhood, (self._grid, self._field, self._heights, self._reach_m)
 
-    def along(self, start: Floats, end: Floats) -> Held:
-        """The extrema in the kernels' form, examined along lines between places (N, 2 or more) of the plane."""
+    def along(self, lines: Lines) -> Held:
+        """The extrema in the kernels' form, examined along lines."""
         if self._seen.size and not self._seen.all():
-            tiles = self._tiles(start, end)
+            tiles = lines.tiles(self._grid, self._field, self._seen.shape)
             with self._lock:  # a caller who waits here finds the tiles done
                 for i, j in np.argwhere(tiles & ~self._seen).tolist():
                     rows, cols = (slice(k * TILE, (k + 1) * TILE) for k in (i, j))
                     _look_at(self._field, self._heights, self.extrema, rows, cols)
                     self._seen[i, j] = True
         return self._held
-
-    def _tiles(self, start: Floats, end: Floats) -> Bools:
-        """Which tiles the lines meet; perhaps a few more."""
-        found = np.zeros(self._seen.shape, np.bool_)
-        length = np.hypot(*(end - start)[:, :2].T)
-        parts = np.ceil(length / (SPACING * min(self._field.step_x, self._field.step_y))).astype(np.intp) + 1
-        line = np.repeat(np.arange(len(parts)), parts)
-        nth = np.arange(len(line)) - np.repeat(np.cumsum(parts) - parts, parts)
-        t = nth / np.maximum(parts[line] - 1, 1)
-        places = start[line, :2] + t[:, None] * (end - start)[line, :2]
-        cells = self._grid(*places.T)[:, ::-1]
-        most = np.array(found.shape) - 1
-        beside = 0.5 * SPACING + BOW
-        low, high = (np.clip((cells + d) // TILE, 0, most).astype(np.intp) for d in (-beside, beside))
-        for rows, cols in product((low, high), repeat=2):
-            found[rows[:, 0], cols[:, 1]] = True
-        return found
 
 
 def extrema_around(field: Field, heights: Floats, reach_m: float) -> LocalExtrema:

@@ -24,7 +24,7 @@ from gcsplan.native.form import Held
 from gcsplan.world._compiled import FOUND, ONE_SURFACE, SURFACE, ZONES
 from gcsplan.world._entries import around, judge
 from gcsplan.world._field import Field
-from gcsplan.world._neighbourhood import Neighbourhood
+from gcsplan.world._neighbourhood import Lines, Neighbourhood
 from gcsplan.world._shapes import deepest_in_circle, deepest_inside
 from gcsplan.world._shared import (
     ANGLE_DEG,
@@ -247,8 +247,10 @@ class Airspace:
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not np.isfinite(points).all():
             raise ValueError(f"a track is (N, 2) finite metres with N >= 2, given shape {points.shape}")
 
+        lines = Lines(points[:-1], points[1:])
+
         def extrema(of_top: bool, reach_m: float) -> Held:
-            return self._held(of_top, reach_m, points[:-1], points[1:])
+            return self._held(of_top, reach_m, lines)
 
         return make_tube(points, limits, self._field, self._zones, extrema, self._surfaces, self._grounds, self.scale)
 
@@ -264,19 +266,19 @@ class Airspace:
         e, n = np.broadcast_arrays(np.asarray(east_m, dtype=np.float64), np.asarray(north_m, dtype=np.float64))
         out = np.empty(e.size)
         points = np.stack([e.ravel(), n.ravel()], axis=-1)
-        held = self._held(sign > 0.0, reach_m, points, points)
+        held = self._held(sign > 0.0, reach_m, Lines(points, points))
         around(self._tops if sign > 0.0 else self._bare, held, sign, points, reach_m, out)
         return out.reshape(e.shape)
 
-    def _held(self, of_top: bool, reach_m: float, start: Floats, end: Floats) -> Held:
-        """The kernels' extrema of top or ground for a reach, along lines (N, 2 or more); one for each size in cells."""
+    def _held(self, of_top: bool, reach_m: float, lines: Lines) -> Held:
+        """The kernels' extrema of top or ground for a reach, along lines; one for each size in cells."""
         f = self._field
         of_top = of_top and self.surface.top_m is not self.surface.ground_m
         key = (of_top, math.ceil(reach_m / f.step_x), math.ceil(reach_m / f.step_y))
         if key not in self._neighbourhoods:
             heights = self._heights[of_top]
             self._neighbourhoods[key] = Neighbourhood(self.surface.grid, f, heights, reach_m)
-        return self._neighbourhoods[key].along(start, end)
+        return self._neighbourhoods[key].along(lines)
 
     def _judge(
         self,
@@ -289,12 +291,12 @@ class Airspace:
         f = self._field
         spare = 0.0 if f.affine else BOW_M + f.error_m
         near_m = float(legs.track_error_m.max(initial=0.0)) * self.scale + spare
-        lines = legs.start, legs.end
-        near = self._held(True, near_m, *lines)
-        far = self._held(True, near_m + limits.horizontal_clearance_m * self.scale, *lines)
+        lines = Lines(legs.start, legs.end)
+        near = self._held(True, near_m, lines)
+        far = self._held(True, near_m + limits.horizontal_clearance_m * self.scale, lines)
         return int(
             judge(
-                self._surfaces, near, far, self._held(False, near_m, *lines), self._held_zones,
+                self._surfaces, near, far, self._held(False, near_m, lines), self._held_zones,
                 legs.start, legs.end, legs.column, legs.track_error_m, legs.altitude_error_m,
                 *Demands.of(limits, self.scale), full, ok, found,
                 work_arrays(self._zones.most_corners, len(self.zones)),
