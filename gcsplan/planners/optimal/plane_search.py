@@ -146,8 +146,9 @@ class PlaneSearch:
         return past and self.past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=terminals)
 
     def narrow_passage(self) -> bool:
-        """Look for a path through slits that only the exact check finds open, because a lattice also reserves what the
-        ground may rise beside a track. Returns whether the path is the best so far."""
+        """Look for a path over nodes that are only as high as in the exact check: through slits that are shut in the
+        other lattices, because these reserve what the ground may rise beside a track, and nearer to terrain. Returns
+        whether the path is the best so far."""
         narrow, before_m = Narrow(), math.nan
         for more_m in DARED_M:
             if self.try_below(self.top_m, fine=True, narrow=narrow):

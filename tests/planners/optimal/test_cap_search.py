@@ -19,6 +19,9 @@ from gcsplan.planners.optimal.cap_search import MOST_CAPS, Layer, search_caps
 from gcsplan.planners.optimal.corridor import End
 from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.optimal.navmesh.interval_kernels import range_along
+from gcsplan.planners.optimal.plane_search import PlaneSearch
+from gcsplan.planners.optimal.planner import plan
+from gcsplan.planners.optimal.searches import NAMES
 from gcsplan.planners.problem import Objective, Problem, Via
 from gcsplan.planners.profile.track import Flown, fly, make_track
 from gcsplan.world.airspace import Airspace, Legs
@@ -26,7 +29,7 @@ from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.zones import Circle, Level, Zone
 from tests.support.effort import draws
-from tests.support.planner_worlds import ground
+from tests.support.planner_worlds import faults, ground
 from tests.support.searches import improve, looked
 
 HORIZONTAL, VERTICAL = 100.0, 120.0
@@ -309,3 +312,18 @@ def test_no_path_past_vias_costs_less_than_the_bound(objective: Objective, climb
         near += bool(costs) and min(costs) < 1.15 * below.bound
     assert compared > 10
     assert near >= 1
+
+
+@pytest.mark.parametrize(("seed", "least_percent"), [(1, 0.04), (13, 0.1), (29, 0.2)])
+def test_with_a_track_error_fine_tracks_pass_as_near_to_terrain_as_the_exact_check_allows(
+    seed: int, least_percent: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    limits = Limits(min_agl_m=20.0, track_error_m=5.0, altitude_error_m=2.0, horizontal_clearance_m=10.0)
+    problem = hills(seed, limits)
+    ceiling_m = float(np.percentile(problem.airspace.surface.ground_m, 70)) + 24.0
+    others = tuple(name for name in NAMES if name not in ("straight", "cap_search", "fine_tracks"))
+    problem = replace(problem, limits=replace(limits, max_amsl_m=ceiling_m), options={"without": others})
+    near = plan(problem).path
+    assert faults(problem, near) == []
+    monkeypatch.setattr(PlaneSearch, "narrow_passage", lambda self: False)
+    assert problem.cost(plan(problem).path) > (1.0 + 0.01 * least_percent) * problem.cost(near)
