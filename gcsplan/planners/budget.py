@@ -10,26 +10,27 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 RATES = {
-    "node": 0.12e-6,
-    "portal": 0.1e-6,
-    "opened": 0.5e-6,
-    "check": 0.6e-3,
-    "leg": 0.5e-6,
-    "cut": 0.11e-6,
+    "node": 0.06e-6,
+    "portal": 0.07e-6,
+    "opened": 0.25e-6,
+    "check": 0.4e-3,
+    "leg": 0.1e-6,
+    "cut": 0.1e-6,
     "cell": 0.02e-6,
-    "piece": 0.3e-6,
+    "piece": 1e-6,
     "place": 0.3e-6,
     "corner": 12e-6,
-    "label": 3e-6,
-    "interval": 1.5e-6,
-    "read": 0.015e-6,
-    "pull": 70e-6,
-    "sighted": 0.5e-6,
-    "walked": 0.4e-6,
+    "label": 2.4e-6,
+    "interval": 1.1e-6,
+    "read": 0.025e-6,
+    "pull": 50e-6,
+    "sighted": 0.35e-6,
+    "walked": 0.5e-6,
     "drawn": 15e-6,
     "mend": 0.1,
 }
@@ -67,6 +68,8 @@ class Budget:
     """Whether counted work ran out."""
     _first_s: float | None = None
     _first_spent: float = 0.0
+    _kept: float = 0.0
+    """Counted seconds that the search in progress may not spend, see `keeping`."""
 
     def spend(self, what: str, count: float) -> None:
         """Count ``count`` units of the work ``what``, a key of `RATES`."""
@@ -86,7 +89,7 @@ class Budget:
     def left(self) -> float:
         """Counted seconds left."""
         allowed = self.seconds if self._first_s is not None else FIRST * self.seconds + FIRST_S
-        return COUNTED * allowed - (self.spent - self._first_spent)
+        return COUNTED * allowed - (self.spent - self._first_spent) - self._kept
 
     @property
     def deadline_s(self) -> float:
@@ -100,7 +103,7 @@ class Budget:
     def goes_on(self) -> bool:
         """Whether counted work and time are left; records which of them ran out."""
         if self.left <= 0.0:
-            self.ran_out = True
+            self.ran_out = self.ran_out or self._kept == 0.0
             return False
         if time.perf_counter() > self.deadline_s:
             self.clocked_out = True
@@ -111,6 +114,17 @@ class Budget:
         """A function that returns False once ``part`` of the counted work left now is spent, or `goes_on` does."""
         most = self.spent + part * self.left
         return lambda: self.spent < most and self.goes_on()
+
+    @contextmanager
+    def keeping(self, part: float) -> Iterator[None]:
+        """Keep ``part`` of the counted work left now for later: what runs within takes the rest for all there is."""
+        kept = self._kept
+        if math.isfinite(self.left):
+            self._kept += part * max(self.left, 0.0)
+        try:
+            yield
+        finally:
+            self._kept = kept
 
     @property
     def stopped_by(self) -> str:

@@ -29,7 +29,7 @@ DARED_M, PINCHED_M = (0.05, 0.1, 0.2, 0.4, 0.8), 1.0
 that later tracks keep from zones over ground; and the most it may be pinched for another track to be searched."""
 PROVED = 1e-8
 """A gap, as a part, that is smaller is due to rounding: the best path is proved optimal."""
-NODE_S, NODE_MB = 1.2e-6, 3e-4
+NODE_S, NODE_MB = 0.8e-6, 3e-4
 """Counted seconds and megabytes of a searched node, with what a search keeps of it."""
 SMALL = 50.0
 """A world is small if the straight line of each leg is at most this many cells of the terrain model long."""

@@ -38,9 +38,9 @@ PAST_FINE, ROUNDS = 9, 2
 FINER = 2
 """Parts a side into which cells are cut once more, for walls and zones that the first lattice rounds off."""
 OF_REST, EARLY_OF_REST = 0.5, 0.25
-"""Part of the counted work left that roadmap and lattice may take if a path is known: what they take is not known
-before; and the part for the lattice before others have tried to close a large gap."""
-INTERVAL_S, REFINED_S = 1e-6, 6e-6
+"""Part of the counted work left that bound corridor, roadmap and lattice may take if a path is known: what they take
+is not known before; and the part for the lattice before others have tried to close a large gap."""
+INTERVAL_S, REFINED_S = 0.7e-6, 4e-6
 """Counted seconds that altitude intervals take on average, and refinement in one of ten missions at most, for each cell
 of the finer lattice near short tracks: refinement gains something if it ends with the budget, too."""
 MOST_CELLS = 50_000
@@ -131,7 +131,7 @@ class Searches:
                 Search("roadmap_first", 0.6, self._small_lacks, of(1.0, 0.0), self._search_small),
                 Search("roadmap_near", 0.5, small(MUCH), of(0.5, 0.0), self._search_small),
                 Search("fine_tracks", 0.9, known, nodes(0.5), self._over(self._look_finely), nearer=True),
-                Search("bound_corridor", 0.2, known, nodes(3.0), on(follow)),
+                Search("bound_corridor", 0.2, known, nodes(3.0), on(self._follow_bound)),
                 Search("contour_climb", 0.075, self._is_slanted, nodes(8.0), self._over(self._climb_aslant)),
                 # Where path and bound are far apart it finds other valleys; else it gains little, and takes long.
                 Search("lattice", lambda x: 0.25 if x > WIDE else 0.02, far, of(0.3, 0.0), self._search_lattice),
@@ -272,6 +272,10 @@ class Searches:
         # With a track error, the lattice for paths keeps metres from the terrain that the exact check leaves open.
         if self.problem.limits.track_error_m == 0.0 or not self.plane.narrow_passage():
             self.plane.try_below(self.plane.top_m, fine=True)
+
+    def _follow_bound(self, plane: PlaneSearch) -> None:
+        with self.incumbent.budget.keeping(1.0 - OF_REST):
+            follow(plane)
 
     def _tighten(self) -> None:
         incumbent = self.incumbent

@@ -21,7 +21,7 @@ from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.mesh_kernels import NEXT, WALL, make_pieces, make_portals, sort_portals
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.navmesh.shut_kernels import stamp_beside
-from gcsplan.planners.optimal.navmesh.zone_kernels import LOOKS, PAIR, stamp_zones
+from gcsplan.planners.optimal.navmesh.zone_kernels import LOOKS, PAIR, disc_of, stamp_zones
 from gcsplan.planners.profile.track import divided
 
 Cone = tuple[float, float, float, float]
@@ -304,21 +304,23 @@ class ClearanceGrid:
     def _lay(self) -> None:
         """Give the cells the walls of the zones."""
         reach_m, near_m = self.plane.reach_m()
+        spend, read = self.plane.problem.budget.spend, np.zeros(1, np.int64)
         count = stamp_zones(
             self._around, self._span, self._excess, self._floor, self._ground, *self._coarse, self._steep,
-            self.fineness, reach_m, -1.0 if self._exact_m is None else self._exact_m, self._up, self._down, self._x,
-            self._y, self._zones, self._edges, self._boxes, self.low, self._of, self._values,
+            self.fineness, reach_m, -1.0 if self._exact_m is None else self._exact_m, disc_of(reach_m), read, self._up,
+            self._down, self._x, self._y, self._zones, self._edges, self._boxes, self.low, self._of, self._values,
         )  # fmt: skip
+        spend("read", float(read[0]))
         if self.low and self.plane.stride == 1:
             if self._own is None:
                 self._own = self._no_own_ground()
-            read = self._own[2]
-            before = int(read[0])
+            own_read = self._own[2]
+            before = int(own_read[0])
             count = stamp_beside(
                 self._span, self._excess, self._floor, *self._coarse, self.fineness, self._zones, self._edges,
                 self._boxes, reach_m, near_m, np.empty((8, 4)), *self._own, self._of, self._values, count,
             )  # fmt: skip
-            self.plane.problem.budget.spend("read", float(read[0] - before))
+            spend("read", float(own_read[0] - before))
         for cells, walls in self._walls:
             own = self._values[count : count + len(cells)]
             own[:, :NEXT], own[:, NEXT] = walls, self._of[cells]

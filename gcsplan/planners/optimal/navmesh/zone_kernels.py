@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from gcsplan.arrays import Floats, Int32s
+from gcsplan.arrays import Floats, Int32s, Int64s
 from gcsplan.planners.compiled import device, kernel
 from gcsplan.planners.optimal.navmesh.mesh_kernels import NEXT
 
@@ -20,6 +20,8 @@ if one of its zones does. ``ONE``, ``OTHER``: the rows of the zones of a pair. `
 fall within reach anywhere at a zone; 0 where the slopes at nodes tell better (see `BESIDE`)."""
 BESIDE = 2.0
 """Datum of a level over all ground within reach, for paths; 1: over the ground below; 0: AMSL."""
+STAMPED = 10
+"""Places read for `BESIDE` that take as long as one cell that a zone may shut."""
 RINGS, AROUND, RIM = 4, 32, 0.01
 """Circles around a node at which ground is read for `BESIDE`, with the node itself, and places on the largest; and the
 part of the reach by which they may lie outside of the zone: at its rim, few places lie within."""
@@ -98,13 +100,14 @@ def _open(
 
 
 @kernel(
-    "i4[,] i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i8 f8 f8 f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 i4[] "
-    "f8[,]"
+    "i4[,] i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] i8 f8 f8 f8[,] i8[] f8[,] f8[,] f8[,] f8[,] f8[,] f8[,] "
+    "i4[,] b1 i4[] f8[,]"
 )
 def stamp_zones(
     around: Int32s, span: Int32s, excess: Floats, floor: Floats, ground: Floats, coarse: Floats, coarse_x: Floats,
-    coarse_y: Floats, steep: Floats, fineness: int, reach: float, exact: float, up: Floats, down: Floats, x: Floats,
-    y: Floats, zones: Floats, edges: Floats, boxes: Int32s, low: bool, of: Int32s, values: Floats,
+    coarse_y: Floats, steep: Floats, fineness: int, reach: float, exact: float, disc: Floats, read: Int64s, up: Floats,
+    down: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Int32s, low: bool, of: Int32s,
+    values: Floats,
 ) -> int:  # fmt: skip
     """Give the cells that zones shut walls of their own; return how many walls there are.
 
@@ -115,8 +118,7 @@ def stamp_zones(
 
     For paths, ground within ``reach`` decides levels of datum `BESIDE`. How far it rises and falls at each node
     (``up``, ``down``: work arrays) is guessed from ``steep``, the slopes at the nodes of a lattice ``fineness`` times
-    coarser, or, if ``exact`` is 0 or more, read from that lattice's ground ``coarse`` at ``coarse_x``, ``coarse_y``, to
-    which so many metres are added.
+    coarser, or, if ``exact`` is 0 or more, read there (`_look_beside`), and so many metres are added. ``read``: counts.
     """
     for j in range(len(span)):
         for i in range(around[j, 0], min(around[j, 1], excess.shape[1] - 1)):
@@ -124,11 +126,10 @@ def stamp_zones(
     count = 0
     wall = values[len(values) - 1]
     for z in range(len(zones)):
-        own = _looking(zones, z) if exact >= 0.0 else -1
-        if own >= 0:
+        if exact >= 0.0 and _looking(zones, z) >= 0:
             _look_beside(
-                around, excess, ground, coarse, coarse_x, coarse_y, fineness, zones, edges, boxes, z, own, reach, exact,
-                up, down,
+                around, excess, ground, coarse, coarse_x, coarse_y, fineness, zones, edges, boxes, z, reach, exact,
+                disc, up, down, read,
             )  # fmt: skip
         elif _looks_beside(zones, z):
             _guess_beside(around, steep, fineness, zones, boxes, z, reach, up, down)
@@ -140,6 +141,7 @@ def stamp_zones(
                 cell = j * (excess.shape[1] - 1) + i
                 if min(min(excess[j, i], excess[j, i + 1]), min(excess[j + 1, i], excess[j + 1, i + 1])) > 0.0:
                     continue  # nothing there is free anyway
+                read[0] += STAMPED
                 under = zones[z, UNDER] > 0.0
                 first = 0
                 if before == i - 1:  # the western nodes are the eastern ones of the cell before
@@ -232,44 +234,65 @@ def _guess_beside(
 @device
 def _look_beside(
     around: Int32s, excess: Floats, ground: Floats, coarse: Floats, x: Floats, y: Floats, fineness: int, zones: Floats,
-    edges: Floats, boxes: Int32s, z: int, own: int, reach: float, more: float, up: Floats, down: Floats,
+    edges: Floats, boxes: Int32s, z: int, reach: float, more: float, disc: Floats, up: Floats, down: Floats,
+    read: Int64s,
 ) -> None:  # fmt: skip
-    """Set ``up`` and ``down`` at nodes of a zone's box to how far the ground of zone ``own`` within reach rises above,
-    and falls below, the ground there, and ``more``; 0 where none is known, and -inf where the zone does not reach. That
-    zone is grown by ``reach``, so its own ground is where it is deeper than that.
+    """Set ``up`` and ``down`` at nodes of a zone's box to how far the own ground of the zone `_looking` within reach
+    rises above, and falls below, the ground there, and ``more``; 0 where none is known, and -inf where the zone does
+    not reach. It is grown by ``reach``, so its own ground is where it is deeper than that. Nodes of cells without any
+    free place are left out.
 
-    ``ground``: at the nodes; ``coarse``, ``x``, ``y``: at those of a lattice ``fineness`` times coarser.
+    ``ground``: at the nodes; ``coarse``, ``x``, ``y``: at those of a lattice ``fineness`` times coarser; ``disc`` (N,
+    2): the places around a node, m east and north, at which it is read. ``read`` (1,) counts them.
     """
     ex, ey = (x[0, 1] - x[0, 0]) / fineness, (y[0, 1] - y[0, 0]) / fineness
     nx, ny = (x[1, 0] - x[0, 0]) / fineness, (y[1, 0] - y[0, 0]) / fineness
     area = ex * ny - ey * nx
-    own_depth = reach * (1.0 - RIM)
+    own, own_depth = _looking(zones, z), reach * (1.0 - RIM)
     for j in range(boxes[z, 2], boxes[z, 3] + 2):
         for i in range(max(boxes[z, 0], around[j, 0]), min(boxes[z, 1] + 2, around[j, 1])):
             up[j, i] = down[j, i] = 0.0
-            if excess[j, i] == np.inf:
+            if excess[j, i] == np.inf or not _is_near_free(excess, around, j, i):
                 continue
             if depth(zones, edges, own, value_at(x, fineness, j, i), value_at(y, fineness, j, i)) <= 0.0:
                 up[j, i] = down[j, i] = -np.inf
                 continue
             most, least = -np.inf, np.inf
-            for ring in range(RINGS):
-                away, count = reach * ring / (RINGS - 1), max(AROUND * ring // (RINGS - 1), 1)
-                for k in range(count):
-                    turn = 2.0 * math.pi * k / count
-                    dx, dy = away * math.cos(turn), away * math.sin(turn)
-                    jj, ii = j + (ex * dy - ey * dx) / area, i + (ny * dx - nx * dy) / area
-                    if not (0.0 <= jj <= (len(x) - 1) * fineness and 0.0 <= ii <= (x.shape[1] - 1) * fineness):
-                        continue
-                    height = value_at(coarse, fineness, jj, ii)
-                    # False as well where ground is unknown.
-                    if not (height < least or height > most):
-                        continue
-                    at_x, at_y = value_at(x, fineness, jj, ii), value_at(y, fineness, jj, ii)
-                    if depth(zones, edges, own, at_x, at_y) > own_depth:
-                        most, least = max(most, height), min(least, height)
+            read[0] += len(disc)
+            for k in range(len(disc)):
+                dx, dy = disc[k, 0], disc[k, 1]
+                jj, ii = j + (ex * dy - ey * dx) / area, i + (ny * dx - nx * dy) / area
+                if not (0.0 <= jj <= (len(x) - 1) * fineness and 0.0 <= ii <= (x.shape[1] - 1) * fineness):
+                    continue
+                height = value_at(coarse, fineness, jj, ii)
+                # False as well where ground is unknown.
+                if not (height < least or height > most):
+                    continue
+                at_x, at_y = value_at(x, fineness, jj, ii), value_at(y, fineness, jj, ii)
+                if depth(zones, edges, own, at_x, at_y) > own_depth:
+                    most, least = max(most, height), min(least, height)
             if most > -np.inf:
                 up[j, i], down[j, i] = most - ground[j, i] + more, ground[j, i] - least + more
+
+
+@device
+def _is_near_free(excess: Floats, around: Int32s, j: int, i: int) -> bool:
+    """Whether any node of the cells at a node is free."""
+    for q in range(max(j - 1, 0), min(j + 2, len(excess))):
+        for p in range(max(i - 1, around[q, 0]), min(i + 2, around[q, 1])):
+            if excess[q, p] <= 0.0:
+                return True
+    return False
+
+
+def disc_of(reach_m: float) -> Floats:
+    """(N, 2) metres east and north of the places around a node at which ground is read for `BESIDE`."""
+    places = [(0.0, 0.0)]
+    for ring in range(1, RINGS):
+        away_m, count = reach_m * ring / (RINGS - 1), AROUND * ring // (RINGS - 1)
+        turns = (2.0 * math.pi * k / count for k in range(count))
+        places += [(away_m * math.cos(turn), away_m * math.sin(turn)) for turn in turns]
+    return np.array(places)
 
 
 @device

@@ -60,8 +60,9 @@ def test_the_gap_closes_in_tenths_of_a_second(name: str) -> None:
 
 def test_a_via_in_between_may_be_reached_at_any_altitude() -> None:
     p = mission(box(-150, -300, 150, 300, 100))
-    free = plan(Problem(p.airspace, p.limits, START, GOAL, (Via(300.0, 40.0, None),)))
-    high = plan(Problem(p.airspace, p.limits, START, GOAL, (Via(300.0, 40.0, 90.0),)))
+    free, high = (
+        plan(Problem(p.airspace, p.limits, START, GOAL, (Via(300.0, 40.0, z),), gap_percent=0.01)) for z in (None, 90.0)
+    )
     for found in (free, high):
         assert found.path.length_m <= found.lower_bound * (1.0 + 2.5e-4)
     assert high.path.length_m > free.path.length_m

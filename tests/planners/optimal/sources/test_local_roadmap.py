@@ -138,8 +138,8 @@ def test_a_roadmap_asks_for_time_between_blocks_of_legs(monkeypatch: pytest.Monk
 
     assert small_path(p, None, in_time) is None  # too few legs were checked to reach the goal
     assert len(asked) >= 6
-    legs = np.diff(asked[:6]) / RATES["leg"]
-    assert (legs < 3000.0).all()  # the check itself counts 1,250
+    legs = (np.diff(asked[:6]) - RATES["check"]) / RATES["leg"]
+    assert (legs < 1750.0).all()
 
 
 def test_long_missions_and_stops_in_one_place_are_left_alone() -> None:
