@@ -113,7 +113,7 @@ class Searches:
         nodes, of, far = self._nodes, self._of, gap(FAR)
         rows = [
             Search("straight", 1.0, lambda: self._straight is None, of(2e-3, 0.0), self._fly_straight),
-            Search("outlines", 1.0, self._has_outlines, of(2e-3, 1.2e-3), self._look_at_outlines),
+            Search("outlines", 1.0, self._has_outlines, of(1.3e-3, 0.8e-3), self._look_at_outlines),
             Search(
                 "outline_bound", 0.9, self._has_ceilings, self._size_of_overflights, self._bound_overflights, again=True
             ),
