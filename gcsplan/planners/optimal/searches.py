@@ -43,6 +43,8 @@ is not known before; and the part for the lattice before others have tried to cl
 INTERVAL_S, REFINED_S = 0.7e-6, 4e-6
 """Counted seconds that altitude intervals take on average, and refinement in one of ten missions at most, for each cell
 of the finer lattice near short tracks: refinement gains something if it ends with the budget, too."""
+KEPT = 0.1
+"""Part of the counted work left that the bound corridor keeps for others even beyond a gap of `MUCH`."""
 MOST_CELLS = 50_000
 """Most cells of all corridors for which altitude intervals are computed."""
 
@@ -274,7 +276,8 @@ class Searches:
             self.plane.try_below(self.plane.top_m, fine=True)
 
     def _follow_bound(self, plane: PlaneSearch) -> None:
-        with self.incumbent.budget.keeping(1.0 - OF_REST):
+        # Where path and bound are that far apart, a slit is open that nothing else finds.
+        with self.incumbent.budget.keeping(KEPT if self.incumbent.gap > MUCH else 1.0 - OF_REST):
             follow(plane)
 
     def _tighten(self) -> None:
