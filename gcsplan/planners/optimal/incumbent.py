@@ -34,10 +34,11 @@ little then, since a zone that is passed low must be flown around, and one that 
 
 
 class Incumbent:
-    """Best path, bound and budget of one problem; ``laps``: paths may fly laps even if a path without laps is known."""
+    """Best path, bound and budget of one problem; ``sharp``: paths are flown with sharp corners. If not, their corners
+    become arcs afterwards: then paths fly no laps if one without laps is known, and leave room for arcs at terrain."""
 
-    def __init__(self, problem: Problem, laps: bool = True) -> None:
-        self.problem, self.laps = problem, laps
+    def __init__(self, problem: Problem, sharp: bool = True) -> None:
+        self.problem, self.sharp = problem, sharp
         self.budget: Budget = problem.budget
         self.wanted = problem.gap_percent / 100.0
         self.nearer = NEARER * self.wanted

@@ -182,7 +182,7 @@ class PlaneSearch:
         search stops at the first better path only if ``first``.
         """
         incumbent = self.incumbent
-        laps = incumbent.climbs and (incumbent.best is None or (incumbent.laps and cap_m is None))
+        laps = incumbent.climbs and (incumbent.best is None or (incumbent.sharp and cap_m is None))
         spare_m = self.longest() - sum(leg.length_m for leg in self.legs) if laps else 0.0
         below_m = self.top_m if cap_m is None else cap_m
         search = DetourSearch(incumbent, lambda choice: self.terminals(choice, below_m, fine), fine)

@@ -65,21 +65,21 @@ def _within(problem: Problem) -> Solution:
     return _sharp(problem)
 
 
-def search(problem: Problem, laps: bool = True) -> Searches:
+def search(problem: Problem, sharp: bool = True) -> Searches:
     """Run all searches on a problem; the result, with best path and bound, is in the ``incumbent`` of what returns."""
-    incumbent = Incumbent(problem, laps)
+    incumbent = Incumbent(problem, sharp)
     incumbent.tell("search")
     searches = Searches(incumbent)
     govern(incumbent, searches.table(), left_out(problem))
     return searches
 
 
-def _sharp(problem: Problem, laps: bool = True) -> Solution:
-    """`_within` for paths with sharp corners. Raises Refusal."""
+def _sharp(problem: Problem, sharp: bool = True) -> Solution:
+    """`_within` for paths with sharp corners; ``sharp``: whether they stay so, see `Incumbent`. Raises Refusal."""
     check_ends(problem)
     if all(math.dist(terminals_of(problem)[0], x) < 1e-3 for x in terminals_of(problem)):
         return plan_band(problem, Incumbent(problem).tell, problem.budget.begun_s)  # a climb on the spot
-    searches = search(problem, laps)
+    searches = search(problem, sharp)
     incumbent = searches.incumbent
     if incumbent.best is None:
         raise explain(problem, proved=True if incumbent.proved_infeasible else None)
@@ -95,12 +95,12 @@ def _turning(problem: Problem) -> Solution:
     from gcsplan.planners.turns.planner import rounded, with_more_clearance  # few missions have wings
 
     # Laps are short and have sharp corners: rounding them to arcs loses what they gain.
-    sharp = _sharp(replace(problem, turn_radius_m=0.0), laps=False)
+    sharp = _sharp(replace(problem, turn_radius_m=0.0), sharp=False)
     points = sharp.path.points
 
     def replan(extra_m: float) -> tuple[Floats, Bools] | None:
         try:
-            again = _sharp(with_more_clearance(problem, extra_m), laps=False).path.points
+            again = _sharp(with_more_clearance(problem, extra_m), sharp=False).path.points
         except NoMission:
             return None
         return again, _terminals(problem, again)

@@ -272,7 +272,8 @@ class Searches:
 
     def _look_finely(self) -> None:
         # With a track error, the lattice for paths keeps metres from the terrain that the exact check leaves open.
-        if self.problem.limits.track_error_m == 0.0 or not self.plane.narrow_passage():
+        near = self.incumbent.sharp and self.problem.limits.track_error_m > 0.0
+        if not near or not self.plane.narrow_passage():
             self.plane.try_below(self.plane.top_m, fine=True)
 
     def _follow_bound(self, plane: PlaneSearch) -> None:

@@ -75,7 +75,7 @@ class OutlineTracks:
             incumbent.raise_track_bound(_length_m(tracks))
         zones = len(self.under)
         root = Choice(np.ones(zones, np.bool_), np.ones(zones, np.bool_))
-        laps = incumbent.climbs and incumbent.laps
+        laps = incumbent.climbs and incumbent.sharp
         roots = [root]
         if laps and math.isfinite(incumbent.cost):
             roots.insert(0, replace(root, most_m=(incumbent.cost - incumbent.bound,) * 2))
