@@ -41,8 +41,8 @@ OF_REST, EARLY_OF_REST = 0.5, 0.25
 """Part of the counted work left that bound corridor, roadmap and lattice may take if a path is known: what they take
 is not known before; and the part for the lattice before others have tried to close a large gap."""
 INTERVAL_S, REFINED_S = 0.7e-6, 4e-6
-"""Counted seconds that altitude intervals take on average, and refinement in one of ten missions at most, for each cell
-of the finer lattice near short tracks: refinement gains something if it ends with the budget, too."""
+"""Counted seconds for each cell of the finer lattice near short tracks: what altitude intervals take on average, and
+the least that refinement takes in nine of ten missions. Refinement raises bounds even if it ends with the budget."""
 KEPT = 0.1
 """Part of the counted work left that the bound corridor keeps for others even beyond a gap of `MUCH`."""
 MOST_CELLS = 50_000

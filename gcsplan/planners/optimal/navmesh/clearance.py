@@ -21,7 +21,7 @@ from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.mesh_kernels import NEXT, WALL, make_pieces, make_portals, sort_portals
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.navmesh.shut_kernels import stamp_beside
-from gcsplan.planners.optimal.navmesh.zone_kernels import LOOKS, PAIR, disc_of, stamp_zones
+from gcsplan.planners.optimal.navmesh.zone_kernels import LOOKS, PAIR, PLACES, stamp_zones
 from gcsplan.planners.profile.track import divided
 
 Cone = tuple[float, float, float, float]
@@ -307,7 +307,7 @@ class ClearanceGrid:
         spend, read = self.plane.problem.budget.spend, np.zeros(1, np.int64)
         count = stamp_zones(
             self._around, self._span, self._excess, self._floor, self._ground, *self._coarse, self._steep,
-            self.fineness, reach_m, -1.0 if self._exact_m is None else self._exact_m, disc_of(reach_m), read, self._up,
+            self.fineness, reach_m, -1.0 if self._exact_m is None else self._exact_m, reach_m * PLACES, read, self._up,
             self._down, self._x, self._y, self._zones, self._edges, self._boxes, self.low, self._of, self._values,
         )  # fmt: skip
         spend("read", float(read[0]))

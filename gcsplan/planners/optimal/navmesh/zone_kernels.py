@@ -22,9 +22,12 @@ BESIDE = 2.0
 """Datum of a level over all ground within reach, for paths; 1: over the ground below; 0: AMSL."""
 STAMPED = 10
 """Places read for `BESIDE` that take as long as one cell that a zone may shut."""
-RINGS, AROUND, RIM = 4, 32, 0.01
-"""Circles around a node at which ground is read for `BESIDE`, with the node itself, and places on the largest; and the
-part of the reach by which they may lie outside of the zone: at its rim, few places lie within."""
+RINGS = ((0.0, 1), (1.0 / 3.0, 10), (2.0 / 3.0, 21), (1.0, 32))
+"""Circles around a node on which ground is read for `BESIDE`, as parts of the reach, and places on each."""
+PLACES = np.array([(r * math.cos(a), r * math.sin(a)) for r, n in RINGS for a in np.arange(n) * (2.0 * math.pi / n)])
+"""Those places: metres east and north of the node, for a reach of 1."""
+RIM = 0.01
+"""Part of the reach by which they may lie outside of the zone: at its rim, few places lie within."""
 
 
 @device
@@ -118,7 +121,7 @@ def stamp_zones(
 
     For paths, ground within ``reach`` decides levels of datum `BESIDE`. How far it rises and falls at each node
     (``up``, ``down``: work arrays) is guessed from ``steep``, the slopes at the nodes of a lattice ``fineness`` times
-    coarser, or, if ``exact`` is 0 or more, read there (`_look_beside`), and so many metres are added. ``read``: counts.
+    coarser; or, if ``exact`` is 0 or more, read (`_look_beside`), with ``exact`` metres more. ``read`` counts the work.
     """
     for j in range(len(span)):
         for i in range(around[j, 0], min(around[j, 1], excess.shape[1] - 1)):
@@ -239,8 +242,8 @@ def _look_beside(
 ) -> None:  # fmt: skip
     """Set ``up`` and ``down`` at nodes of a zone's box to how far the own ground of the zone `_looking` within reach
     rises above, and falls below, the ground there, and ``more``; 0 where none is known, and -inf where the zone does
-    not reach. It is grown by ``reach``, so its own ground is where it is deeper than that. Nodes of cells without any
-    free place are left out.
+    not reach. The zone is grown by ``reach``, so its own ground is where it is deeper than that. Nodes of cells without
+    any free place are left out.
 
     ``ground``: at the nodes; ``coarse``, ``x``, ``y``: at those of a lattice ``fineness`` times coarser; ``disc`` (N,
     2): the places around a node, m east and north, at which it is read. ``read`` (1,) counts them.
@@ -283,16 +286,6 @@ def _is_near_free(excess: Floats, around: Int32s, j: int, i: int) -> bool:
             if excess[q, p] <= 0.0:
                 return True
     return False
-
-
-def disc_of(reach_m: float) -> Floats:
-    """(N, 2) metres east and north of the places around a node at which ground is read for `BESIDE`."""
-    places = [(0.0, 0.0)]
-    for ring in range(1, RINGS):
-        away_m, count = reach_m * ring / (RINGS - 1), AROUND * ring // (RINGS - 1)
-        turns = (2.0 * math.pi * k / count for k in range(count))
-        places += [(away_m * math.cos(turn), away_m * math.sin(turn)) for turn in turns]
-    return np.array(places)
 
 
 @device
