@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import yaml
 
+from gcsplan.app import executor
 from gcsplan.bench import scale
 from gcsplan.bench.scale_missions import DEGREE_M, make_missions, make_mosaic, mission
 from gcsplan.errors import UsageError
@@ -69,7 +70,8 @@ def test_a_batch_by_two_processes_has_the_same_bytes_and_a_killed_one_costs_its_
     assert killed["same_bytes"]
     assert (two["done_again"], two["killed"]) == (0, 0)
     assert killed["killed"] == 1
-    assert killed["done_again"] <= 2  # what it had begun, and had been given
+    # What was handed out and not yet fetched: begun, or done with its result still at the worker.
+    assert killed["done_again"] <= executor.AHEAD * 2
     files = scale.write(result, tmp_path)
     assert {file.name for file in files} == {"scale.json", "scale.csv", "scale.md", "scale.png"}
     assert json.loads((tmp_path / "scale.json").read_text())["rows"][0]["axis"] == "zones"
