@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -69,7 +69,7 @@ class Budget:
     _first_s: float | None = None
     _first_spent: float = 0.0
     _kept: float = 0.0
-    """Counted seconds that the search in progress may not spend, see `keeping`."""
+    """Counted seconds that the search in progress may not spend, see `allow`."""
 
     def spend(self, what: str, count: float) -> None:
         """Count ``count`` units of the work ``what``, a key of `RATES`."""
@@ -110,17 +110,12 @@ class Budget:
             return False
         return True
 
-    def share(self, part: float) -> Callable[[], bool]:
-        """A function that returns False once ``part`` of the counted work left now is spent, or `goes_on` does."""
-        most = self.spent + part * self.left
-        return lambda: self.spent < most and self.goes_on()
-
     @contextmanager
-    def keeping(self, part: float) -> Iterator[None]:
-        """Keep ``part`` of the counted work left now for later: what runs within takes the rest for all there is."""
+    def allow(self, part: float) -> Iterator[None]:
+        """Let what runs within spend ``part`` of the counted work left now: it takes that for all there is."""
         kept = self._kept
         if math.isfinite(self.left):
-            self._kept += part * max(self.left, 0.0)
+            self._kept += (1.0 - part) * max(self.left, 0.0)
         try:
             yield
         finally:

@@ -29,18 +29,19 @@ OPEN, LEGAL, SHUT = 0, 1, 2
 def polished(problem: Problem, points: Floats, pinned: Bools) -> tuple[Floats, Bools]:
     """Move free points towards the lines between their neighbours as far as is legal: in space, in the plane alone, or
     in altitude alone. Returns the points (N, 3) and ``pinned`` (N,), which of them are terminals, unchanged."""
-    cost, in_time = _cost(problem, points), problem.budget.share(SHARE)
+    cost = _cost(problem, points)
     points = points.copy()
     still = np.zeros(len(points), np.bool_)
-    for k in range(2 * ROUNDS):
-        if not in_time():
-            break
-        _move(problem, points, pinned, still, k % 2)
-        if k % 2:
-            now = _cost(problem, points)
-            if cost - now <= LITTLE * cost:
+    with problem.budget.allow(SHARE):
+        for k in range(2 * ROUNDS):
+            if not problem.budget.goes_on():
                 break
-            cost = now
+            _move(problem, points, pinned, still, k % 2)
+            if k % 2:
+                now = _cost(problem, points)
+                if cost - now <= LITTLE * cost:
+                    break
+                cost = now
     return points, pinned
 
 

@@ -40,12 +40,12 @@ def test_work_before_the_first_path_is_counted_by_itself() -> None:
     assert not budget.clocked_out
 
 
-def test_a_search_that_keeps_a_part_of_the_work_leaves_it_to_the_next() -> None:
+def test_a_search_that_may_take_a_part_of_the_work_leaves_the_rest_to_the_next() -> None:
     budget = Budget(10.0, 100.0)
     budget.found_first()
     whole = budget.left
-    with budget.keeping(0.25):
-        with budget.keeping(0.5):
+    with budget.allow(0.75):
+        with budget.allow(0.5):
             assert budget.left == pytest.approx(0.375 * whole)
             budget.spent += 0.3751 * whole
             assert not budget.goes_on()
@@ -55,7 +55,7 @@ def test_a_search_that_keeps_a_part_of_the_work_leaves_it_to_the_next() -> None:
     assert budget.left == pytest.approx(0.2498 * whole)
     assert budget.goes_on()
     assert not budget.ran_out
-    with Budget.endless().keeping(0.5):
+    with Budget.endless().allow(0.5):
         pass
 
 

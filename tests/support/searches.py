@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.governor import govern
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.plane_search import PlaneSearch
 from gcsplan.planners.optimal.searches import Searches
 from gcsplan.planners.problem import Problem
+
+
+def spent_budget() -> Budget:
+    """A budget of which nothing is left."""
+    budget = Budget(0.0, 100.0)
+    budget.found_first()
+    return budget
 
 
 def plane_of(problem: Problem) -> PlaneSearch:

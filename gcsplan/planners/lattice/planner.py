@@ -66,7 +66,6 @@ def plan_band(
     `time.perf_counter` of the call. ``climbs``: laps over start and goal are allowed. Raises Refusal if no path is
     found.
     """
-    goes_on = problem.budget.goes_on
     bound = straight_bound(problem)
     terminals = terminals_of(problem)
     if all(math.dist(terminals[0], x) < 1e-3 for x in terminals):
@@ -78,10 +77,10 @@ def plan_band(
     first_s = math.inf if best is None else time.perf_counter() - begun
     router: Router | None = None
     for level in LEVELS if climbs else LEVELS[:2]:
-        if best is None and not goes_on():
+        if best is None and not problem.budget.goes_on():
             break
         tell("search", None if best is None else problem.cost(Path(best)))
-        work = _Work(problem, Router.at(problem, level), way, goes_on)
+        work = _Work(problem, Router.at(problem, level), way)
         router = work.router
         cut = router.cut_off() if climbs else (False, False)
         found = None if any(cut) else work.first()
@@ -105,21 +104,18 @@ def plan_band(
     return _solution(problem, best, bound, begun, first_s)
 
 
-def cheaper(
-    problem: Problem, tell: Tell, known: Floats, longest_m: float, goes_on: Callable[[], bool]
-) -> Floats | None:
+def cheaper(problem: Problem, tell: Tell, known: Floats, longest_m: float) -> Floats | None:
     """Way points (N, 3) of a path that is cheaper than a ``known`` one (N, 3); None if none is found.
 
-    The lattices hold tracks of up to about ``longest_m`` metres; the next one is finer. ``tell``: as in `plan_band`;
-    ``goes_on``: whether there is work left.
+    The lattices hold tracks of up to about ``longest_m`` metres; the next one is finer. ``tell``: as in `plan_band`.
     """
     way, cost = straight_way_m(problem), problem.cost(Path(known))
     detour = max(longest_m / way, LEAST_DETOUR)
     for nodes in CLOSER:
-        if not goes_on():
+        if not problem.budget.goes_on():
             break
         tell("search", cost)
-        work = _Work(problem, Router.at(problem, Level(detour, nodes)), way, goes_on, climbing_weight(problem))
+        work = _Work(problem, Router.at(problem, Level(detour, nodes)), way, climbing_weight(problem))
         found = [work.first()]
         if work.line is None or work.line.cost > cost:
             work.begin(known)
@@ -216,13 +212,10 @@ def _sides(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> di
 class _Work:
     """One lattice, the tracks found on it, and the lines pulled from them."""
 
-    def __init__(
-        self, problem: Problem, router: Router, way_m: float, goes_on: Callable[[], bool], weight: float = 0.0
-    ) -> None:
+    def __init__(self, problem: Problem, router: Router, way_m: float, weight: float = 0.0) -> None:
         self.problem = problem
         self.weight = weight
         """The price of climbing for the first track: metres of track for each metre of height."""
-        self.goes_on = goes_on
         self.router = router
         self.way_m = way_m
         self.guide: Guide | None = None
@@ -237,7 +230,7 @@ class _Work:
         After each failure the lattice is corrected.
         """
         for _ in range(SEARCHES):
-            if self.router.opened > MOST_OPENED or not self.goes_on():
+            if self.router.opened > MOST_OPENED or not self.problem.budget.goes_on():
                 return None
             way = self.router.way(weight=self.weight)
             if way is None:
@@ -270,14 +263,19 @@ class _Work:
 
     def improve(self, tell: Tell) -> Floats | None:
         """Way points of the best line from several tracks and kicks; None if it is not legal."""
+        with self.problem.budget.allow(BETTER):
+            best = self._best_line(tell)
+        found, self.line = self._mend(best)
+        if isinstance(found, Unsettled):
+            return None
+        return fewer(self.problem, *found, WORTH * self.way_m * _unit(self.problem))[0]
+
+    def _best_line(self, tell: Tell) -> Line:
+        """The best line of several tracks, after kicks."""
         assert self.line is not None
         assert self.guide is not None
-        half = self.problem.budget.share(BETTER)
-
-        def in_time() -> bool:
-            return half() and self.goes_on()
-
-        ways = self._others(in_time)
+        budget = self.problem.budget
+        ways = self._others()
         if ways:
             self.guide = self._guide([self.line.points, *ways])
         guide = self.guide
@@ -286,7 +284,7 @@ class _Work:
             line = guide.pull(self._line(way), self._steps(COARSE_STEPS), COARSE_GAIN * self.way_m)
             if line.missing <= 0.0:
                 lines.append(line)
-            if not in_time():
+            if not budget.goes_on():
                 break
         lines.sort(key=lambda line: line.cost)
         best = lines[0]
@@ -294,7 +292,7 @@ class _Work:
         rng = np.random.default_rng(self.problem.seed)
         for line in lines[:2]:
             for _ in range(KICKS):
-                if not in_time():
+                if not budget.goes_on():
                     break
                 kicked = guide.pull(self._kicked(line, rng), self._steps(FINE_STEPS), COARSE_GAIN * self.way_m)
                 if kicked.missing <= 0.0 and kicked.cost < line.cost:
@@ -302,10 +300,7 @@ class _Work:
             line = guide.pull(line, self._steps(FINE_STEPS), FINE_GAIN * self.way_m)
             if line.value < best.value:
                 best = line
-        found, self.line = self._mend(best)
-        if isinstance(found, Unsettled):
-            return None
-        return fewer(self.problem, *found, WORTH * self.way_m * _unit(self.problem))[0]
+        return best
 
     def _line(self, way: Floats) -> Line:
         track = self.router.track_of(way)
@@ -341,11 +336,11 @@ class _Work:
                 guide.strict()
             steps = FINE_STEPS if attempt < 2 else COARSE_STEPS
             line = guide.pull(line, self._steps(steps), COARSE_GAIN * self.way_m)
-            if not self.goes_on():
+            if not self.problem.budget.goes_on():
                 break
         return found, line
 
-    def _others(self, in_time: Callable[[], bool]) -> list[Floats]:
+    def _others(self) -> list[Floats]:
         """Other tracks over the lattice: with a price on climbing (energy), and around discs closed on the first."""
         assert self.line is not None
         router, p = self.router, self.problem
@@ -357,7 +352,7 @@ class _Work:
         s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.line.points, axis=0).T))])
         floor = router.lattice.floor_m
         for f in DETOURS:
-            if not in_time() or router.opened > MOST_OPENED // 4:
+            if not p.budget.goes_on() or router.opened > MOST_OPENED // 4:
                 break
             place = [np.interp(f * s[-1], s, self.line.points[:, k]) for k in range(2)]
             router.lattice.floor_m = floor.copy()

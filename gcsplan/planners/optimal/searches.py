@@ -43,8 +43,8 @@ is not known before; and the part for the lattice before others have tried to cl
 INTERVAL_S, REFINED_S = 0.7e-6, 4e-6
 """Counted seconds for each cell of the finer lattice near short tracks: what altitude intervals take on average, and
 the least that refinement takes in nine of ten missions. Refinement raises bounds even if it ends with the budget."""
-KEPT = 0.1
-"""Part of the counted work left that the bound corridor keeps for others even beyond a gap of `MUCH`."""
+NEARLY_ALL = 0.9
+"""Part of the counted work left that the bound corridor may take beyond a gap of `MUCH`."""
 MOST_CELLS = 50_000
 """Most cells of all corridors for which altitude intervals are computed."""
 
@@ -241,8 +241,8 @@ class Searches:
     def _search_lattice(self) -> None:
         incumbent = self.incumbent
         if incumbent.best is not None:
-            in_time = incumbent.budget.share(OF_REST if incumbent.gap <= WIDE else EARLY_OF_REST)
-            found = cheaper(self.problem, incumbent.tell, incumbent.best, self.plane.longest(), in_time)
+            with incumbent.budget.allow(OF_REST if incumbent.gap <= WIDE else EARLY_OF_REST):
+                found = cheaper(self.problem, incumbent.tell, incumbent.best, self.plane.longest())
             if found is not None:
                 incumbent.take(found)
             return
@@ -267,8 +267,9 @@ class Searches:
         from gcsplan.planners.optimal.sources.local_roadmap import small_path  # most missions do not need it
 
         incumbent = self.incumbent
-        in_time = incumbent.budget.share(1.0 if incumbent.best is None else OF_REST)
-        incumbent.offer(small_path(self.problem, incumbent.best, in_time))
+        with incumbent.budget.allow(1.0 if incumbent.best is None else OF_REST):
+            found = small_path(self.problem, incumbent.best)
+        incumbent.offer(found)
 
     def _look_finely(self) -> None:
         # With a track error, the lattice for paths keeps metres from the terrain that the exact check leaves open.
@@ -278,13 +279,13 @@ class Searches:
 
     def _follow_bound(self, plane: PlaneSearch) -> None:
         # Where path and bound are that far apart, a slit is open that nothing else finds.
-        with self.incumbent.budget.keeping(KEPT if self.incumbent.gap > MUCH else 1.0 - OF_REST):
+        with self.incumbent.budget.allow(NEARLY_ALL if self.incumbent.gap > MUCH else OF_REST):
             follow(plane)
 
     def _tighten(self) -> None:
         incumbent = self.incumbent
         assert incumbent.best is not None
-        points, pinned = tightened(self.problem, incumbent.best, incumbent.goes_on)
+        points, pinned = tightened(self.problem, incumbent.best)
         incumbent.take_simpler(points, pinned, fine=True, longer=False)
 
     def _past_finely(self) -> None:

@@ -30,7 +30,7 @@ def test_a_line_is_pulled_on_the_side_of_a_zone_that_its_path_passes_it_on() -> 
     for path, side in ((under, False), (over, True)):
         assert faults(p, Path(path)) == []
         assert _sides(p, path, ends, free) == {0: side}
-        better = cheaper(p, lambda *_: None, path, 1700.0, p.budget.goes_on)
+        better = cheaper(p, lambda *_: None, path, 1700.0)
         assert better is not None
         assert faults(p, Path(better)) == []
         assert p.cost(Path(better)) < p.cost(Path(path))
@@ -44,7 +44,7 @@ def test_a_path_that_climbs_aslant_is_better_than_one_with_laps() -> None:
     p = under_a_lid()
     below = looked(p).incumbent
     assert below.best is not None
-    found = cheaper(p, below.tell, below.best, 2200.0, p.budget.goes_on)
+    found = cheaper(p, below.tell, below.best, 2200.0)
     assert found is not None
     assert p.cost(Path(found)) < below.cost
     assert faults(p, Path(found)) == []

@@ -9,7 +9,6 @@ from its floor up; legs between neighbours pass the exact check, and the best pa
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -37,21 +36,20 @@ WORTH = 0.03
 """Part of the cost that a first search must gain for a second one, nearer to the path that it found."""
 
 
-def small_path(problem: Problem, known: Floats | None, in_time: Callable[[], bool]) -> tuple[Floats, Bools] | None:
+def small_path(problem: Problem, known: Floats | None) -> tuple[Floats, Bools] | None:
     """(N, 3) a path whose legs the exact check passes, and (N,) its terminals; None if no cheaper one was found.
 
-    ``known`` (M, 3): the best path so far, None without one. ``in_time`` returns False when the search must end; apart
-    from that it is deterministic.
+    ``known`` (M, 3): the best path so far, None without one.
     """
 
     def between(starts: Floats, goals: Floats, limit: float) -> Roadmap:
-        return _roadmap(problem, starts, goals, limit, in_time)
+        return _roadmap(problem, starts, goals, limit)
 
     found: tuple[Floats, Bools] | None = None
     best = math.inf if known is None else cost_of(problem, known)
     for _ in range(2):
         terminals = terminals_by_leg(problem, _straight(problem) if known is None else known)
-        better = path_over(problem, terminals, best, known, in_time, between)
+        better = path_over(problem, terminals, best, known, between)
         if better is None:
             break
         before, found, known = best, better, better[0]
@@ -73,7 +71,7 @@ def _straight(problem: Problem) -> Floats:
     return np.column_stack([flat, np.where(known, heights, free)])
 
 
-def _roadmap(problem: Problem, starts: Floats, goals: Floats, limit: float, in_time: Callable[[], bool]) -> Roadmap:
+def _roadmap(problem: Problem, starts: Floats, goals: Floats, limit: float) -> Roadmap:
     """The roadmap for paths from one of ``starts`` (K, 3) to one of ``goals`` that cost ``limit`` at most."""
     air, limits = problem.airspace, problem.limits
     ends = np.vstack([starts, goals])
@@ -119,7 +117,7 @@ def _roadmap(problem: Problem, starts: Floats, goals: Floats, limit: float, in_t
     both = both[:, (both[0] >= 0) & (both[0] < both[1])]
     count = len(ends) + len(flat)
     once = np.stack(np.divmod(np.unique(both[0] * count + both[1]), count))
-    return Roadmap.of(problem, np.vstack([ends, flat]), once, (len(starts), len(goals)), spacing_m, in_time)
+    return Roadmap.of(problem, np.vstack([ends, flat]), once, (len(starts), len(goals)), spacing_m)
 
 
 def _near(places: Floats) -> Indices:

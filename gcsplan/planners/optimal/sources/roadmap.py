@@ -37,7 +37,6 @@ def path_over(
     terminals: Floats,
     best: float,
     known: Floats | None,
-    in_time: Callable[[], bool],
     roadmap: Callable[[Floats, Floats, float], Roadmap],
 ) -> tuple[Floats, Bools] | None:
     """(N, 3) a path cheaper than ``best`` over roadmaps from terminal to terminal, and (N,) which of its points are
@@ -45,7 +44,7 @@ def path_over(
 
     ``terminals`` (K, 3) from `terminals_by_leg`; ``best``: the cost to beat, inf without a path; ``known`` (M, 3): the
     best path so far, which is drawn together as well. ``roadmap(starts, goals, limit)`` makes the roadmap between two
-    terminals. ``in_time`` returns False when the search must end.
+    terminals.
     """
     straight = problem.leg_costs(terminals[:-1], terminals[1:])
     spare = WINDING * best - float(straight.sum())
@@ -53,7 +52,7 @@ def path_over(
     columns = [terminals[:1], *(_altitudes(problem, k, terminals) for k in vias), terminals[-1:]]
     roadmaps, reached = [], [np.zeros(1)]
     for k, limit in enumerate((straight + spare).tolist()):
-        if not in_time():
+        if not problem.budget.goes_on():
             return None
         roadmaps.append(roadmap(columns[k], columns[k + 1], limit))
         reached.append(roadmaps[k].beyond(reached[k]))
@@ -63,7 +62,7 @@ def path_over(
         at, parts = 0, []
         for k in range(len(roadmaps) - 1, -1, -1):
             before, paths = roadmaps[k].paths(reached[k], at)
-            parts.append(_best(problem, paths, roadmaps[k].spacing_m, in_time))
+            parts.append(_best(problem, paths, roadmaps[k].spacing_m))
             at = before
         parts.reverse()
         points = np.vstack([parts[0], *(part[1:] for part in parts[1:])])
@@ -75,7 +74,7 @@ def path_over(
     size_m = min(x.spacing_m for x in roadmaps)
     out: tuple[Floats, Bools] | None = None
     for points, kinds in tried:
-        points, kinds = drawn(problem, points, kinds, size_m, in_time)
+        points, kinds = drawn(problem, points, kinds, size_m)
         cost = cost_of(problem, points)
         if cost < best:
             best, out = cost, (points, kinds != FREE)
@@ -103,7 +102,7 @@ def _altitudes(problem: Problem, k: int, terminals: Floats) -> Floats:
     return np.column_stack([np.broadcast_to(terminals[k, :2], (len(levels), 2)), levels])
 
 
-def _best(problem: Problem, paths: list[Floats], spacing_m: float, in_time: Callable[[], bool]) -> Floats:
+def _best(problem: Problem, paths: list[Floats], spacing_m: float) -> Floats:
     """The cheapest of some paths between two terminals, each drawn together."""
     simpler = []
     for path in paths:
@@ -113,9 +112,9 @@ def _best(problem: Problem, paths: list[Floats], spacing_m: float, in_time: Call
     simpler.sort(key=lambda path: cost_of(problem, path[0]))
     tight: list[Floats] = []
     for points, kinds in simpler[:DRAWN]:
-        if tight and not in_time():
+        if tight and not problem.budget.goes_on():
             break
-        tight.append(drawn(problem, points, kinds, spacing_m, in_time, halvings=2)[0])
+        tight.append(drawn(problem, points, kinds, spacing_m, halvings=2)[0])
     return min(tight, key=lambda path: cost_of(problem, path))
 
 
@@ -131,21 +130,13 @@ class Roadmap:
     graph: csr_array
 
     @classmethod
-    def of(
-        cls,
-        problem: Problem,
-        nodes: Floats,
-        pairs: Indices,
-        ends: tuple[int, int],
-        spacing_m: float,
-        in_time: Callable[[], bool],
-    ) -> Roadmap:
+    def of(cls, problem: Problem, nodes: Floats, pairs: Indices, ends: tuple[int, int], spacing_m: float) -> Roadmap:
         """The roadmap of the legal legs among ``pairs`` (2, E) of ``nodes``, in both directions; ``ends``: how many
-        places the two terminals have. Legs that are not checked while ``in_time`` are left out."""
+        places the two terminals have. Legs that the budget leaves unchecked are left out."""
         a, b = pairs
         limits = problem.limits
-        there = _legal(problem, nodes, a, b, in_time)
-        back = there if limits.max_climb_deg == limits.max_descent_deg else _legal(problem, nodes, b, a, in_time)
+        there = _legal(problem, nodes, a, b)
+        back = there if limits.max_climb_deg == limits.max_descent_deg else _legal(problem, nodes, b, a)
         cost = problem.leg_costs(nodes[a], nodes[b])
         rows, columns = np.concatenate([a[there], b[back]]), np.concatenate([b[there], a[back]])
         graph = csr_array((np.concatenate([cost[there], cost[back]]), (rows, columns)), shape=(len(nodes), len(nodes)))
@@ -177,11 +168,11 @@ class Roadmap:
         return start, out
 
 
-def _legal(problem: Problem, nodes: Floats, a: Indices, b: Indices, in_time: Callable[[], bool]) -> Bools:
-    """(E,) which legs from nodes ``a`` to nodes ``b`` pass the exact check; False once time is over."""
+def _legal(problem: Problem, nodes: Floats, a: Indices, b: Indices) -> Bools:
+    """(E,) which legs from nodes ``a`` to nodes ``b`` pass the exact check; False once the budget is spent."""
     out = np.zeros(len(a), np.bool_)
     for k in range(0, len(a), AT_ONCE):
-        if not in_time():
+        if not problem.budget.goes_on():
             break
         some = slice(k, k + AT_ONCE)
         out[some] = problem.legal(nodes[a[some]], nodes[b[some]])

@@ -8,7 +8,6 @@ edge or along a hillside, where a point alone would be stuck.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -30,10 +29,10 @@ SIZE, FEW = 0.016, 5
 """Twice the first moves of `tightened`, as a part of the path's length, and how often they are halved."""
 
 
-def tightened(problem: Problem, points: Floats, in_time: Callable[[], bool]) -> tuple[Floats, Bools]:
+def tightened(problem: Problem, points: Floats) -> tuple[Floats, Bools]:
     """A path (N, 3) drawn together with moves that suit its length, and (N,) which of its points are terminals."""
     size_m = SIZE * float(np.hypot(*np.diff(points[:, :2], axis=0).T).sum())
-    found, kinds = drawn(problem, points, kinds_of(problem, points), size_m, in_time, FEW)
+    found, kinds = drawn(problem, points, kinds_of(problem, points), size_m, FEW)
     return found, kinds != FREE
 
 
@@ -51,19 +50,14 @@ def kinds_of(problem: Problem, points: Floats) -> Indices:
 
 
 def drawn(
-    problem: Problem,
-    points: Floats,
-    kinds: Indices,
-    size_m: float,
-    in_time: Callable[[], bool],
-    halvings: int = HALVINGS,
+    problem: Problem, points: Floats, kinds: Indices, size_m: float, halvings: int = HALVINGS
 ) -> tuple[Floats, Indices]:
     """A legal path (N, 3) of points of ``kinds`` (N,) made cheaper by moves of half ``size_m`` and less."""
     cost = cost_of(problem, points)
     for k in range(halvings):
         move_m = size_m * 0.5 ** (k + 1)
         for _ in range(ROUNDS):
-            if not in_time():
+            if not problem.budget.goes_on():
                 return points, kinds
             finer, its_kinds = _divided(points, kinds, 1.5 * math.sqrt(size_m * move_m))
             moved = _moved(problem, finer, its_kinds, move_m)

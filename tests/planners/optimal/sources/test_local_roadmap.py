@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcsplan.planners.budget import RATES
+from gcsplan.planners.budget import RATES, Budget
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.optimal.sources import roadmap
 from gcsplan.planners.optimal.sources.local_roadmap import small_path
@@ -23,11 +23,7 @@ from tests.oracles.optima_polish import cost_of
 from tests.oracles.optima_witnesses import known
 from tests.oracles.optima_worlds import Case, make, plane_ground
 from tests.support.planner_worlds import Floats, random_mission
-from tests.support.searches import plane_of
-
-
-def in_time() -> bool:
-    return True
+from tests.support.searches import plane_of, spent_budget
 
 
 def flat(discs: list[tuple[float, float, float]], via: tuple[Via, ...] = (), clearance_m: float = 0.0) -> Case:
@@ -58,7 +54,7 @@ def test_a_first_path_is_legal_by_brute_force_and_near_the_best_that_patience_fo
     case = make(family, seed)
     best = known(family, seed, case)
     assert best is not None
-    found = small_path(case.problem, None, in_time)
+    found = small_path(case.problem, None)
     assert found is not None
     points, pinned = found
     assert faults(case, Path(points)) == []
@@ -79,7 +75,7 @@ def test_a_slit_between_cylinders_is_flown_through(gap_m: float, clearance_m: fl
     discs += [(1000.0, float(north[0]) - radii[0] - 150.0 + 1.0, 150.0)]
     discs += [(1000.0, float(north[1]) + radii[1] + 150.0 - 1.0, 150.0)]
     case = flat(discs, clearance_m=clearance_m)
-    found = small_path(case.problem, None, in_time)
+    found = small_path(case.problem, None)
     assert found is not None
     assert faults(case, Path(found[0])) == []
     grown = np.array(discs) + np.array([0.0, 0.0, clearance_m])
@@ -93,21 +89,21 @@ def test_only_a_cheaper_path_is_returned_and_the_same_one_each_time() -> None:
     case = flat([(1000.0, 1000.0, 80.0)])
     p = case.problem
     detour: Floats = np.array([p.start, (1000.0, 1300.0, 10.05), p.goal])
-    first, again = (small_path(p, detour, in_time) for _ in range(2))
+    first, again = (small_path(p, detour) for _ in range(2))
     assert first is not None
     assert again is not None
     assert first[0].tobytes() == again[0].tobytes()
     assert cost_of(p, first[0]) < cost_of(p, detour)
-    optimum = small_path(p, first[0], in_time)
+    optimum = small_path(p, first[0])
     assert optimum is None or cost_of(p, optimum[0]) < cost_of(p, first[0])
-    assert small_path(p, detour, lambda: False) is None
+    assert small_path(replace(p, budget=spent_budget()), detour) is None
 
 
 @pytest.mark.slow
 def test_stops_are_passed_in_their_order_at_their_heights() -> None:
     via = (Via(1100.0, 1150.0, 40.0), Via(900.0, 850.0))
     case = flat([(1000.0, 1000.0, 80.0)], via)
-    found = small_path(case.problem, None, in_time)
+    found = small_path(case.problem, None)
     assert found is not None
     assert faults(case, Path(found[0])) == []
     stops = found[0][found[1]]
@@ -120,23 +116,24 @@ def test_worlds_with_very_many_zones_are_searched_as_well() -> None:
     rng = np.random.default_rng(5)
     discs = [(float(e), float(n), 4.0) for e, n in rng.uniform(0.0, 2000.0, (900, 2)) if abs(e - 1000.0) < 280.0]
     case = flat(discs)
-    found = small_path(case.problem, None, in_time)
+    found = small_path(case.problem, None)
     assert found is not None
     assert faults(case, Path(found[0])) == []
     p = case.problem
     assert cost_of(p, found[0]) <= 1.01 * shortest_past_discs(p.start[:2], p.goal[:2], np.array(discs))
 
 
-def test_a_roadmap_asks_for_time_between_blocks_of_legs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_roadmap_asks_for_budget_between_blocks_of_legs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(roadmap, "AT_ONCE", 500)
-    p = flat([(1000.0, 1000.0, 100.0)]).problem
     asked: list[float] = []
 
-    def in_time() -> bool:
-        asked.append(p.budget.spent)
-        return len(asked) < 6
+    class Counted(Budget):
+        def goes_on(self) -> bool:
+            asked.append(self.spent)
+            return len(asked) < 6
 
-    assert small_path(p, None, in_time) is None  # too few legs were checked to reach the goal
+    p = replace(flat([(1000.0, 1000.0, 100.0)]).problem, budget=Counted(10.0, 100.0))
+    assert small_path(p, None) is None  # too few legs were checked to reach the goal
     assert len(asked) >= 6
     legs = (np.diff(asked[:6]) - RATES["check"]) / RATES["leg"]
     assert (legs < 1750.0).all()

@@ -16,6 +16,7 @@ from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.zones import Circle, Zone
+from tests.support.searches import spent_budget
 
 HILL_M = 120.0
 
@@ -63,12 +64,12 @@ def test_a_path_is_drawn_together_and_stays_legal() -> None:
         [problem.start, (600.0, 1300.0, 150.0), (1000.0, 1250.0, 150.0), (1400.0, 1200.0, 150.0), problem.goal]
     )
     assert problem.legal(wide[:-1], wide[1:]).all()
-    found, pinned = tightened(problem, wide, lambda: True)
+    found, pinned = tightened(problem, wide)
     assert problem.legal(found[:-1], found[1:]).all()
     assert pinned.sum() == 2
     assert problem.cost(Path(found)) < 0.98 * problem.cost(Path(wide))
     np.testing.assert_array_equal(found[[0, -1]], wide[[0, -1]])
-    same, _ = tightened(problem, wide, lambda: False)
+    same, _ = tightened(replace(problem, budget=spent_budget()), wide)
     np.testing.assert_array_equal(same, wide)
 
 
@@ -77,7 +78,7 @@ def test_a_free_via_keeps_its_place() -> None:
     path = np.array(
         [problem.start, (500.0, 1300.0, 120.0), (1000.0, 1200.0, 150.0), (1500.0, 1200.0, 120.0), problem.goal]
     )
-    found, pinned = tightened(problem, path, lambda: True)
+    found, pinned = tightened(problem, path)
     assert problem.legal(found[:-1], found[1:]).all()
     (at,) = np.flatnonzero(pinned)[1:-1]
     assert tuple(found[at, :2]) == (1000.0, 1200.0)
