@@ -51,20 +51,21 @@ def choose(problem: Problem, place: tuple[float, float], straight_m: float, box:
     surface = problem.airspace.surface
     size = surface.grid.metres_per_cell(*place)
     col0, row0, col1, row1 = extent(problem, box)
-    area_m2 = float((col1 - col0) * (row1 - row0) * size[0] * size[1])
-    most = min(MOST_FIRST, 1e6 * problem.budget.left_mb / NODE_BYTES)
-    wanted_m = max(_wanted_m(problem, straight_m), LEAST_M, math.sqrt(area_m2 / most))
+    cells = float((col1 - col0) * (row1 - row0))
+    fitting = 1e6 * problem.budget.left_mb / NODE_BYTES
+    most = min(MOST_FIRST, fitting)
     cell_m, finest_m = float(size.max()), max(min(FINE_M, straight_m / FINE_PARTS), LEAST_M)
+    wanted_m = max(_wanted_m(problem, straight_m), LEAST_M, cell_m * math.sqrt(cells / most))
     parts = max(1, round(cell_m / wanted_m))
     # Merged cells only bound the heights between their nodes, so cells are merged only if that saves many nodes.
     fine_stride = 1 if parts > 1 or finest_m < 2.0 * cell_m else round(finest_m / cell_m)
     stride = fine_stride * max(1, round(wanted_m / cell_m / fine_stride))
-    if parts > 1 or stride < 3:
+    if parts > 1 or (stride < 3 and cells <= fitting):
         stride = fine_stride = 1
     ratio, cut = stride // fine_stride, 1
     if stride == 1:
         ratio = cut = max(1, min(MOST_FINE, round(cell_m / parts / finest_m)))
-    return Cells(parts, stride, fine_stride, ratio, cut, area_m2 / (cell_m / parts * stride) ** 2)
+    return Cells(parts, stride, fine_stride, ratio, cut, cells * (parts / stride) ** 2)
 
 
 def _wanted_m(problem: Problem, straight_m: float) -> float:

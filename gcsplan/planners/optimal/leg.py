@@ -22,7 +22,7 @@ from gcsplan.planners.optimal.navmesh.free_altitudes import intervals, ranges
 from gcsplan.planners.optimal.navmesh.grid import Box, Plane, box_of, finer_plane, make_plane, on_finer
 from gcsplan.planners.optimal.navmesh.mesh import Guide, Mesh
 from gcsplan.planners.optimal.navmesh.necks import LegNecks
-from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundTrack
+from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundTrack, Place
 from gcsplan.planners.optimal.navmesh.zone_shapes import CLOSE, LOOSE
 from gcsplan.planners.problem import Problem
 
@@ -119,7 +119,7 @@ class Leg:
             except Exhausted as given_up:
                 # The searched part is the same as a finished flood with a shorter limit.
                 self.length_m = self.reach_m = given_up.seen_m * (1.0 - 1e-9)
-                self._guide = self._mesh.flood(a, b, self.reach_m, slack)[1]
+                self._guide = _guide(self._mesh, a, b, self.reach_m)
                 return
             if way is not None:
                 self.length_m, self.last_track = way.length_m, way.points
@@ -347,9 +347,9 @@ class Leg:
     def _each_cell(self, plane: Plane, wanted: Bools, limit_m: float, ahead: Guide) -> Nearby | None:
         """Flood the ``wanted`` cells of a lattice, each as a piece of its own; None if that is too much work.
         ``ahead``: distances from the start over a mesh that has at least the same free cells."""
-        mesh = mesh_of(plane, self.top_m, True, 1, wanted, single=True)
         a, b = self.start.place, self.goal.place
         try:
+            mesh = mesh_of(plane, self.top_m, True, 1, wanted, single=True)
             left = mesh.flood(b, a, limit_m, math.inf, ahead)[1]
             away = mesh.flood(a, b, limit_m, math.inf, left)[1]
         except Exhausted:
@@ -371,11 +371,7 @@ class Leg:
     def _from_start(self) -> Guide:
         """Distances from the start over the coarse mesh, as far as the flood from the goal went."""
         if self._ahead is None:
-            mesh = self._guide.mesh
-            try:
-                _, self._ahead = mesh.flood(self.start.place, self.goal.place, self.reach_m, math.inf, self._guide)
-            except Exhausted:
-                self._ahead = Guide(mesh, self.start.place, np.zeros(len(mesh.joins)), np.zeros(len(mesh.start) - 1))
+            self._ahead = _guide(self._guide.mesh, self.start.place, self.goal.place, self.reach_m, self._guide)
         return self._ahead
 
     def _around(self, detour: float) -> Box:
@@ -391,3 +387,12 @@ class Leg:
             reach = a, b, detour * self.straight_m + 4.0 * cell
         parts, stride = self.cells_of.parts, self.cells_of.stride
         return make_plane(self.problem, self._around(detour), parts, stride, stride, reach)
+
+
+def _guide(mesh: Mesh, start: Place, goal: Place, limit_m: float, ahead: Guide | None = None) -> Guide:
+    """Distances from ``start`` over a mesh, for tracks to ``goal`` shorter than ``limit_m``; zeros, which are bounds as
+    well, if the budget leaves too little to find them."""
+    try:
+        return mesh.flood(start, goal, limit_m, math.inf, ahead)[1]
+    except Exhausted:
+        return Guide(mesh, start, np.zeros(len(mesh.joins)), np.zeros(mesh.pieces))

@@ -145,6 +145,12 @@ class PlaneSearch:
         past = flown.kind == "zone" or incumbent.best is None
         return past and self.past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=terminals)
 
+    def look_finely(self) -> bool:
+        """Look for a path on the finer lattice; return whether it is the best so far."""
+        # With a track error, that lattice keeps metres from the terrain that the exact check leaves open.
+        near = self.incumbent.sharp and self.problem.limits.track_error_m > 0.0
+        return (near and self.narrow_passage()) or self.try_below(self.top_m, fine=True)
+
     def narrow_passage(self) -> bool:
         """Look for a path over nodes that are only as high as in the exact check: through slits that are shut in the
         other lattices, because these reserve what the ground may rise beside a track, and nearer to terrain. Returns

@@ -272,10 +272,7 @@ class Searches:
         incumbent.offer(found)
 
     def _look_finely(self) -> None:
-        # With a track error, the lattice for paths keeps metres from the terrain that the exact check leaves open.
-        near = self.incumbent.sharp and self.problem.limits.track_error_m > 0.0
-        if not near or not self.plane.narrow_passage():
-            self.plane.try_below(self.plane.top_m, fine=True)
+        self.plane.look_finely()
 
     def _follow_bound(self, plane: PlaneSearch) -> None:
         # Where path and bound are that far apart, a slit is open that nothing else finds.

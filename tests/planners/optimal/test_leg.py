@@ -6,12 +6,16 @@ import numpy as np
 import pytest
 
 from gcsplan.planners.budget import Budget
+from gcsplan.planners.optimal.corridor import End
 from gcsplan.planners.optimal.incumbent import Incumbent
+from gcsplan.planners.optimal.leg import Leg
+from gcsplan.planners.optimal.navmesh import mesh
 from gcsplan.planners.optimal.plane_search import PlaneSearch
-from gcsplan.planners.optimal.planner import search
-from gcsplan.planners.problem import Problem
+from gcsplan.planners.optimal.planner import plan, search
+from gcsplan.planners.problem import Problem, Refusal
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
+from gcsplan.world.surface import GridMap, Surface
 from tests.support.planner_worlds import Floats, ground
 
 
@@ -43,3 +47,45 @@ def test_bound_of_a_climb_in_front_of_a_ridge_holds_whatever_bounds_came_before(
         found_m = leg.bound(plane.top_m, leg.corridor(limit_m), limit_m, True)
         assert found_m <= known_m * (1.0 + 1e-9), (part, found_m, known_m)
         assert found_m <= limit_m
+
+
+@pytest.mark.parametrize("cell_m", [(20.0, 20.0), (20.0, 10.0)])
+def test_little_memory_makes_cells_larger_instead_of_failing(cell_m: tuple[float, float]) -> None:
+    """Half a million nodes and a goal behind a ring wall, so that the lattice grows to the whole model."""
+    j, i = np.mgrid[:500, :500]
+    away = np.hypot(i - 250, j - 250)
+    z = np.where((away > 20) & (away < 26), 200.0, 0.0)
+    surface = Surface(z, z, GridMap.affine(0.0, 499.0 * cell_m[1], *cell_m), {})
+    middle, outside = (250 * cell_m[0], 249 * cell_m[1], 50.0), (250 * cell_m[0], 300 * cell_m[1], 50.0)
+    limits = Limits(min_agl_m=5.0, max_amsl_m=100.0)
+    for budget_mb in (1024.0, 64.0, 20.0, 2.0):
+        with pytest.raises(Refusal) as refused:
+            plan(Problem(Airspace(surface, ()), limits, middle, outside, budget_mb=budget_mb))
+        assert refused.value.reason == "infeasible" or budget_mb < 10.0
+
+
+def test_bounds_hold_if_the_work_ends_during_a_flood(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Mazes; the work that a flood may do beyond the budget is made so small that it ends on its way."""
+    rng = np.random.default_rng(1)
+    blocks = np.kron(rng.uniform(0.0, 100.0, (101, 101)), np.ones((4, 4)))[:400, :400]
+    z = np.where(blocks > 45.0, 100.0, 0.0)
+    for east, north in ((50, 50), (350, 350)):
+        z[393 - north : 406 - north, east - 6 : east + 7] = 0.0
+    air = Airspace(Surface(z, z, GridMap.affine(0.0, 399.0 * 20.0, 20.0, 20.0), {}), ())
+    ends = End(1000.0, 1000.0, 35.0), End(7000.0, 7000.0, 35.0)
+
+    def flooded(part: float) -> Leg:
+        budget = Budget.endless(clocked=False) if part == 1.0 else Budget(0.0, 1e6, clocked=False)
+        monkeypatch.setattr(mesh, "ANYHOW", int(part * 9415))
+        if part < 1.0:
+            budget.found_first()
+        limits = Limits(min_agl_m=5.0, max_amsl_m=60.0)
+        leg = Leg(Problem(air, limits, (1000.0, 1000.0, 35.0), (7000.0, 7000.0, 35.0), budget=budget), *ends, 60.0)
+        leg.flood(0.15)
+        return leg
+
+    whole = flooded(1.0)
+    for part in (0.0, 0.02, 0.1, 0.3, 0.6):
+        leg = flooded(part)
+        assert leg.straight_m * 0.999 <= leg.length_m <= whole.length_m
+        assert leg.corridor(leg.length_m).cells.any()

@@ -67,7 +67,8 @@ def search(
 
     Returns the number of corners, ends included, with the source's number in ``out[0, 2]`` and the length in
     ``out[1, 2]``; 0: no track is shorter than ``limit``; -1: too little room in the arrays; -2: stopped after ``most``
-    nodes, when all tracks shorter than ``out[0, 0]`` had been looked at. ``out[2, 2]``: number of nodes opened.
+    nodes, when all tracks shorter than ``out[0, 0]`` had been looked at and none led to the goal. ``out[2, 2]``: number
+    of nodes opened.
 
     ``start`` to ``fan``: see `Portals`. ``sources_at`` (K, 3): x, y, cost so far, each in piece ``sources_piece`` (K,);
     the goal is in any of ``goal_piece``. ``remaining`` (pieces,): lower bound of the distance from a piece's entrance
@@ -135,7 +136,8 @@ def search(
             all_round = False
             opened += 1
             if opened > most:
-                out[0, 0], out[2, 2] = math.floor(key / BANDS) * band, opened
+                # With ``slack``, a track that is known already may be shorter.
+                out[0, 0], out[2, 2] = min(math.floor(key / BANDS) * band, shortest), opened
                 return -2
         width_l = math.sqrt((lx - rx) ** 2 + (ly - ry) ** 2)
         width_r = math.sqrt((qx - rx) ** 2 + (qy - ry) ** 2)

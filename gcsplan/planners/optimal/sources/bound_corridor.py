@@ -19,6 +19,7 @@ from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.optimal.plane_search import PlaneSearch
 from gcsplan.planners.optimal.sources.pass_line import over_pass
+from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import distances
 from gcsplan.planners.profile.zone_levels import free_below
 from gcsplan.world.path import Path
@@ -47,6 +48,8 @@ part of what the longest useful track is longer than the bound's."""
 FAR, CLOSE_BY = 5e-3, (3e-3, 3e-2, math.inf)
 """The gap, as a part, from which cells are looked at through which the bound's track is shut; and the parts by which
 tracks may be longer than the bound for that, in turn."""
+SHORTER = 0.7
+"""Most of a leg's straight track for a piece to be searched on finer cells."""
 MOST = 24
 """Most stretches of a track; a track with more is not tried."""
 AT_ONCE = 512
@@ -135,8 +138,10 @@ def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
             continue
         ends = [np.array([np.interp(x, on_path, path[:, k]) for k in range(3)]) for x in (a, b)]
         known = np.vstack([ends[0], path[(on_path > a) & (on_path < b)], ends[1]])
-        cost = plane.problem.cost(Path(known))
-        part = _along(plane, leg, ends, places[low : high + 1], s[low : high + 1], at[-1], cost)
+        part = _finer(plane, leg, ends, known) if plane.incumbent.gap > FAR else None
+        if part is None:
+            cost = plane.problem.cost(Path(known))
+            part = _along(plane, leg, ends, places[low : high + 1], s[low : high + 1], at[-1], cost)
         if part is not None:
             better.append((a, b, part))
     out, begin = [], -math.inf
@@ -144,6 +149,24 @@ def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
         out += [path[(on_path > begin + APART_M) & (on_path < a - APART_M)], part]
         begin = b
     return np.vstack([*out, path[on_path > begin + APART_M]]) if out else None
+
+
+def _part(plane: PlaneSearch, problem: Problem, start: Floats, goal: Floats) -> PlaneSearch:
+    """Lattices of a problem like the plane's, but between two points (3,) on a path."""
+    part = replace(problem, start=_point(start), goal=_point(goal), via=(), progress=None)
+    sub = Incumbent(part, plane.incumbent.sharp)
+    sub.first_s = 0.0  # a path of a piece is not the mission's first path, which would start the next budget
+    return PlaneSearch(sub)
+
+
+def _finer(plane: PlaneSearch, leg: Leg, ends: list[Floats], known: Floats) -> Floats | None:
+    """(N, 3) way points from one of ``ends`` to the other that cost less than the ``known`` ones, found on the finer
+    cells of a shorter leg; None if there are none or the leg is hardly shorter."""
+    if math.dist(ends[0][:2], ends[1][:2]) > SHORTER * leg.straight_m:
+        return None
+    found = _part(plane, plane.problem, ends[0], ends[1])
+    found.incumbent.take(known, np.isin(np.arange(len(known)), (0, len(known) - 1)))
+    return found.incumbent.best if found.reach_longest() and found.look_finely() else None
 
 
 def _along(
@@ -185,10 +208,8 @@ def _past(
         if last < len(s) - 1:
             height = _height(plane, leg, *map(float, (s[last], whole_m - s[last], low[last], high[last])))
             goal = np.array([*places[last], height])
-        part = replace(plane.problem, start=_point(start), goal=_point(goal), via=(), progress=None, objective="length")
-        sub = Incumbent(part)
-        sub.first_s = 0.0  # a path of a piece is not the mission's first path, which would start the next budget
-        found = PlaneSearch(sub)
+        found = _part(plane, replace(plane.problem, objective="length"), start, goal)
+        sub = found.incumbent
         for piece in found.legs:
             piece.farthest = FARTHEST
         if (first, last) not in stretches:
