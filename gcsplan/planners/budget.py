@@ -51,7 +51,7 @@ SPARE_S = 0.5
 
 @dataclass(eq=False)
 class Budget:
-    """Seconds and megabytes that one plan may take, and the counted work spent so far.
+    """Seconds that one plan may take, megabytes that each of its searches may take, and the counted work so far.
 
     ``clocked``: whether the clock stops it too; if not, counted work alone does.
     """
@@ -128,12 +128,7 @@ class Budget:
 
     def fits(self, seconds: float, megabytes: float) -> bool:
         """Whether that many counted seconds and megabytes are left."""
-        return seconds <= self.left and megabytes <= self.left_mb
-
-    @property
-    def left_mb(self) -> float:
-        """Megabytes that the next search may take."""
-        return self.megabytes
+        return seconds <= self.left and megabytes <= self.megabytes
 
     @classmethod
     def endless(cls, *, clocked: bool = True) -> Budget:

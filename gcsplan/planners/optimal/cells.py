@@ -52,7 +52,7 @@ def choose(problem: Problem, place: tuple[float, float], straight_m: float, box:
     size = surface.grid.metres_per_cell(*place)
     col0, row0, col1, row1 = extent(problem, box)
     cells = float((col1 - col0) * (row1 - row0))
-    fitting = 1e6 * problem.budget.left_mb / NODE_BYTES
+    fitting = 1e6 * problem.budget.megabytes / NODE_BYTES
     most = min(MOST_FIRST, fitting)
     cell_m, finest_m = float(size.max()), max(min(FINE_M, straight_m / FINE_PARTS), LEAST_M)
     wanted_m = max(_wanted_m(problem, straight_m), LEAST_M, cell_m * math.sqrt(cells / most))
@@ -85,7 +85,7 @@ def fits_memory(problem: Problem, cells: Bools, beside: int, ratio: int) -> bool
     into memory."""
     row, col, last_row, last_col = box_of(cells)
     nodes = (last_row - row + 2 * beside) * (last_col - col + 2 * beside) * ratio**2
-    return nodes * BOX_NODE_BYTES <= 1e6 * problem.budget.left_mb
+    return nodes * BOX_NODE_BYTES <= 1e6 * problem.budget.megabytes
 
 
 def box_around(a: tuple[float, float], b: tuple[float, float], detour: float) -> Box:

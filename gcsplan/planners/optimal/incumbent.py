@@ -62,14 +62,14 @@ class Incumbent:
 
     # ------------------------------------------------------------------------------------------------- paths
 
-    def take_along(self, terminals: PinnedTrack, *, fine: bool = True) -> bool:
+    def take_along(self, terminals: PinnedTrack) -> bool:
         """Look for a path over a track; return whether it is the best so far."""
         track = make_track(self.problem, *terminals)
         flown = fly(self.problem, track)
         if not isinstance(flown, Flown) and not may_pass(self.problem, track, flown):
             return False
         found = self.exact(track, flown)
-        return found is not None and self.take_simpler(*found, fine=fine, longer=False)
+        return found is not None and self.take_simpler(*found, fine=True, longer=False)
 
     def take_longer(self, terminals: PinnedTrack, fine: bool) -> bool:
         """Look for a path over a track, with laps where it is too steep; return whether it is the best so far."""

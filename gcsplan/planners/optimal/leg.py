@@ -14,11 +14,11 @@ from collections.abc import Callable
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.planners.optimal.bounds.altitude_intervals import MOST, SPARE_M, AltitudeIntervals, Reached, Terminal
+from gcsplan.planners.optimal.bounds.altitude_intervals import SPARE_M, AltitudeIntervals, Reached, Terminal
 from gcsplan.planners.optimal.cells import box_around, choose, fits_memory, needs_most
 from gcsplan.planners.optimal.corridor import Corridor, End, Narrow, Nearby, Spare
 from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid, Cone, mesh_of
-from gcsplan.planners.optimal.navmesh.free_altitudes import intervals, ranges
+from gcsplan.planners.optimal.navmesh.free_altitudes import MOST, intervals, ranges
 from gcsplan.planners.optimal.navmesh.grid import Box, Plane, box_of, finer_plane, make_plane, on_finer
 from gcsplan.planners.optimal.navmesh.mesh import Guide, Mesh
 from gcsplan.planners.optimal.navmesh.necks import LegNecks
@@ -309,7 +309,7 @@ class Leg:
         close = self._closer(limit)
         if self._reached is None or self._reached[0] is not close:
             mesh, a, b = close.left.mesh, self.start, self.goal
-            count, low, high = intervals(mesh, close.cell, close.low_m, close.high_m, MOST, SPARE_M)
+            count, low, high = intervals(mesh, close.cell, close.low_m, close.high_m, SPARE_M)
             k, nth = np.nonzero(np.arange(MOST) < count[:, None])
             every = AltitudeIntervals(
                 (mesh.excess.shape[0] - 1, mesh.excess.shape[1] - 1),

@@ -20,8 +20,6 @@ from gcsplan.arrays import Bools, Floats, Int64s
 from gcsplan.planners.optimal.navmesh.interval_kernels import spread
 from gcsplan.world.limits import Limits
 
-MOST = 4
-"""Most intervals over one cell; zones that would make more are ignored."""
 SPARE_M = 1e-3
 """Metres by which intervals and the altitudes of the ends are widened, for rounding and for intervals that touch."""
 KEPT = 4

@@ -21,6 +21,7 @@ from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.navmesh.crossing import Climb, Crossing, crossing
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.sources.outline_tracks import OutlineTracks
+from gcsplan.planners.profile.track import distances
 from gcsplan.world.limits import Limits
 
 MOST_CASES = 48
@@ -85,7 +86,7 @@ class _Stretch:
         at_m, z_m = [*at_m, sum(map(_length_m, parts))], [*z_m, self.to_m]
         begins_m = np.concatenate([[0.0], np.cumsum([_length_m(part) for part in parts])])
         return [
-            np.column_stack([part, np.interp(begin + _along_m(part), at_m, z_m)])
+            np.column_stack([part, np.interp(begin + distances(part[:, :2]), at_m, z_m)])
             for part, begin in zip(parts, begins_m.tolist(), strict=False)
         ]
 
@@ -134,7 +135,7 @@ class Overflight:
         """The zone below whose top a case's way is deepest, out of those that may be passed over or around; None if
         there is none."""
         outlines, way = self.outlines, np.concatenate(case.ways)
-        line, along_m = shapely.LineString(way[:, :2]), _along_m(way)
+        line, along_m = shapely.LineString(way[:, :2]), distances(way[:, :2])
         deepest_m, found = LOWER_M, None
         for k in np.flatnonzero(outlines.over & ~outlines.under & ~case.shut).tolist():
             inside = line.intersection(outlines.outline(k).shape) if k not in case.over else shapely.LineString()
@@ -233,11 +234,6 @@ class Overflight:
             if not any(finer) and not met:
                 break
         return found
-
-
-def _along_m(way: Floats) -> Floats:
-    """(N,) metres along the track of a way (N, 2) or (N, 3)."""
-    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way[:, :2], axis=0).T))])
 
 
 def _length_m(track: Floats) -> float:

@@ -91,7 +91,7 @@ class ClearanceGrid:
         self._diagonal = np.zeros((rows - 1) * (cols - 1), np.int8)
         looked_at = float((self._around[:, 1] - self._around[:, 0]).clip(0).sum())
         plane.problem.budget.spend("node", looked_at)
-        if looked_at * NODE_BYTES > 1e6 * plane.problem.budget.left_mb:
+        if looked_at * NODE_BYTES > 1e6 * plane.problem.budget.megabytes:
             raise Exhausted(0.0)
         more = limits.min_agl_m + limits.altitude_error_m
         if low:

@@ -7,35 +7,37 @@ import numpy as np
 from gcsplan.arrays import Floats, Int32s, Int64s
 from gcsplan.planners.optimal.navmesh.interval_kernels import cut_intervals
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
-from gcsplan.planners.optimal.navmesh.shut_kernels import narrow_ranges
+
+MOST = 4
+"""Most intervals over one cell; zones that would make more are ignored."""
 
 
 def ranges(mesh: Mesh, top_m: float, cells: Int64s) -> tuple[Floats, Floats]:
     """(K,) the lowest and the highest altitude, at most ``top_m``, that can be flown at in each of ``cells`` (K,);
     lowest above highest where there is none. ``mesh`` must be for bounds and as fine as its plane."""
     plane, (rows, cols) = mesh.plane, mesh.excess.shape
-    low, high = np.full((rows - 1, cols - 1), np.inf), np.full((rows - 1, cols - 1), top_m)
-    low.ravel()[cells] = mesh.lowest(cells)
+    low, high = mesh.lowest(cells), np.full(len(cells), top_m)
     limits = plane.problem.limits
     if limits.max_agl_m is not None:
         ground = plane.grounds[1][mesh.row : mesh.row + rows, mesh.col : mesh.col + cols]
         pairs = np.maximum(ground[:-1], ground[1:])
-        most = np.maximum(pairs[:, :-1], pairs[:, 1:])
-        np.fmin(high, most + (limits.max_agl_m - limits.altitude_error_m + plane.fit.spare_m), out=high)
-    narrow_ranges(*_laid(mesh), low, high)
-    return low.ravel()[cells], high.ravel()[cells]
+        most = np.maximum(pairs[:, :-1], pairs[:, 1:]).ravel()[cells]
+        high = np.fmin(high, most + (limits.max_agl_m - limits.altitude_error_m + plane.fit.spare_m))
+    count, lows, highs = intervals(mesh, cells, low, high, 0.0)
+    there = np.arange(MOST) < count[:, None]
+    return np.where(there, lows, np.inf).min(axis=1), np.where(there, highs, -np.inf).max(axis=1)
 
 
 def intervals(
-    mesh: Mesh, cells: Int64s, low_m: Floats, high_m: Floats, most: int, spare_m: float
+    mesh: Mesh, cells: Int64s, low_m: Floats, high_m: Floats, spare_m: float
 ) -> tuple[Int32s, Floats, Floats]:
     """Cut the range of each of ``cells``, ``low_m`` to ``high_m`` from `ranges`, into the altitude intervals that zones
     leave.
 
-    Returns the number of intervals (K,), at most ``most``, and their lower and upper ends (K, most), each ``spare_m``
+    Returns the number of intervals (K,), at most `MOST`, and their lower and upper ends (K, `MOST`), each ``spare_m``
     further out. ``mesh``: as for `ranges`.
     """
-    low, high = np.empty((len(cells), most)), np.empty((len(cells), most))
+    low, high = np.empty((len(cells), MOST)), np.empty((len(cells), MOST))
     low[:, 0], high[:, 0] = low_m - spare_m, high_m + spare_m
     count = (low_m <= high_m).astype(np.int32)
     number = np.full(len(mesh.piece), -1, np.int32)

@@ -30,7 +30,8 @@ def cut_intervals(
     that a zone certainly shuts over the whole cell, except for ``spare`` metres at its top and bottom.
 
     ``number`` (cells,): from 0 to K - 1 for those cells, -1 for others. An interval that would become two is left whole
-    if ``low`` has no column left. ``exact``: as in `narrow_ranges`.
+    if ``low`` has no column left. ``exact``: whether the lattice's cells are the terrain model's own, or parts of them.
+    Over other lattices, levels over ground are not known.
     """
     for z in range(len(zones)):
         if zones[z, PAIR] > 0.0 or (over_ground(zones, z) and not exact):

@@ -83,11 +83,6 @@ class Mesh(Portals):
         out[self.row : self.row + cells.shape[0], self.col : self.col + cells.shape[1]] = cells
         return out
 
-    def of_plane(self, cells: Bools) -> Bools:
-        """The part that the mesh covers of a mask of all the plane's cells."""
-        rows, cols = self.excess.shape
-        return cells[self.row : self.row + rows - 1, self.col : self.col + cols - 1]
-
     def cells_at(self, place: Place) -> Int64s:
         """The numbers of the cells that a place may lie in, rising; for meshes as fine as their plane."""
         rows, cols = self.excess.shape
@@ -143,7 +138,7 @@ class Mesh(Portals):
     ) -> GroundTrack | None:
         budget = self.plane.problem.budget
         most = min(MOST_OPENED, ANYHOW + OF_PORTAL * len(self.joins))
-        most = int(min(most, budget.left_mb * 1e6 / NODE_BYTES, max(budget.left, 0.0) / RATES["opened"] + ANYHOW))
+        most = int(min(most, budget.megabytes * 1e6 / NODE_BYTES, max(budget.left, 0.0) / RATES["opened"] + ANYHOW))
         budget.spend("portal", len(self.joins))
         opened = float(most)
         try:

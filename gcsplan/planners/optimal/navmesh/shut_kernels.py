@@ -284,30 +284,3 @@ def shut_over(
         if zones[z, UNDER] > 0.0:
             bottom = max(bottom, level(zones, z, BOTTOM, ground[jj, ii]))
     return (bottom, top) if top - bottom > zones[z, THIN] else (np.inf, -np.inf)
-
-
-@kernel("f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 f8 f8 f8[,] f8[,]")
-def narrow_ranges(
-    ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, boxes: Int32s, exact: bool, reach: float,
-    near: float, low: Floats, high: Floats,
-) -> None:  # fmt: skip
-    """Raise the lowest, and lower the highest, altitude that can be flown at somewhere in each cell (``low``, ``high``:
-    (rows - 1, cols - 1)) where a zone can be passed on one side only; inf and -inf where it can be passed on neither.
-
-    ``exact``: whether the lattice's cells are the terrain model's own, or parts of them. Over other lattices, levels
-    over ground are not known.
-    """
-    for _ in range(2):  # what one zone shuts may leave one side of another only
-        for z in range(len(zones)):
-            if zones[z, PAIR] > 0.0 or (over_ground(zones, z) and not exact):
-                continue
-            for j in range(boxes[z, 2], boxes[z, 3] + 1):
-                for i in range(boxes[z, 0], boxes[z, 1] + 1):
-                    if low[j, i] > high[j, i]:
-                        continue
-                    bottom, top = shut_over(ground, x, y, zones, edges, z, reach, near, j, i)
-                    under, over = bottom >= low[j, i], top <= high[j, i]
-                    if not under:
-                        low[j, i] = top if over else np.inf
-                    if not over:
-                        high[j, i] = bottom if under else -np.inf

@@ -257,14 +257,8 @@ def _point(place: Floats) -> Point:
 def _stretches(over: Floats) -> list[tuple[int, int]]:
     """First and last index of each stretch with less than `OPEN_M` of free altitudes, and somewhere none; ``over``: the
     lowest minus the highest free altitude (N,)."""
-    out: list[tuple[int, int]] = []
-    tight = over > -OPEN_M
-    for k in np.flatnonzero(over > 0.0).tolist():
-        if out and k <= out[-1][1]:
-            continue
-        before, after = np.flatnonzero(~tight[:k]), np.flatnonzero(~tight[k:])
-        out.append((int(before[-1]) if len(before) else 0, k + int(after[0]) if len(after) else len(over) - 1))
-    return out
+    runs = [run for run in _runs(over > -OPEN_M) if (over[run[0] : run[1] + 1] > 0.0).any()]
+    return [(max(first - 1, 0), min(last + 1, len(over) - 1)) for first, last in runs]
 
 
 def _freer(plane: PlaneSearch, places: Floats) -> tuple[Floats, Floats, Floats]:

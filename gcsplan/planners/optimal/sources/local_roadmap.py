@@ -13,6 +13,8 @@ import math
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
+from gcsplan.planners.optimal.navmesh.grid import extent
+from gcsplan.planners.optimal.navmesh.terrain_nodes import Extent
 from gcsplan.planners.optimal.sources.roadmap import Roadmap, path_over, terminals_by_leg
 from gcsplan.planners.optimal.sources.section_dp import cost_of
 from gcsplan.planners.problem import Problem, terminals_of
@@ -195,8 +197,9 @@ def _heights(problem: Problem, ends: Floats, low: Floats, high: Floats) -> tuple
 
 def _places(problem: Problem, low: Floats, high: Floats, count: int, spacing_m: float) -> tuple[Floats, Indices]:
     """(N, 2) places in a box, about ``count``, and (2, E) pairs of them to be linked however far apart."""
-    part = _part(problem, low, high)
-    c, r = (a.ravel() for a in np.meshgrid(np.arange(*part[1], dtype=float), np.arange(*part[0], dtype=float)))
+    part = extent(problem, (low[0], low[1], high[0], high[1]))
+    c0, r0, c1, r1 = part
+    c, r = (a.ravel() for a in np.meshgrid(np.arange(c0, c1 + 1.0), np.arange(r0, r1 + 1.0)))
     model = _within(problem.airspace.surface.grid.to_plane(c, r), low, high)
     parts = [_within(_saddles(problem, part), low, high)[: count // 4]]
     if len(model) <= 1.3 * count:
@@ -218,20 +221,10 @@ def _within(places: Floats, low: Floats, high: Floats) -> Floats:
     return places[((places >= low) & (places <= high)).all(axis=1)]
 
 
-def _part(problem: Problem, low: Floats, high: Floats) -> tuple[tuple[int, int], tuple[int, int]]:
-    """First row of the terrain model that a box may meet and the one after the last, and columns."""
-    surface = problem.airspace.surface
-    east, north = np.meshgrid(*(np.linspace(low[k], high[k], 5) for k in range(2)))
-    at = surface.grid(east.ravel(), north.ravel())
-    (c0, r0), (c1, r1) = np.floor(at.min(axis=0)).astype(int) - 1, np.ceil(at.max(axis=0)).astype(int) + 2
-    rows, cols = surface.ground_m.shape
-    return (max(int(r0), 0), min(int(r1), rows)), (max(int(c0), 0), min(int(c1), cols))
-
-
-def _saddles(problem: Problem, part: tuple[tuple[int, int], tuple[int, int]]) -> Floats:
+def _saddles(problem: Problem, part: Extent) -> Floats:
     """(N, 2) saddles of the surface inside cells, the sharpest first: passes that nodes alone do not show."""
-    (r0, r1), (c0, c1) = part
-    z = problem.airspace.surface.top_m[r0:r1, c0:c1]
+    c0, r0, c1, r1 = part
+    z = problem.airspace.surface.top_m[r0 : r1 + 1, c0 : c1 + 1]
     a, b, c, d = z[:-1, :-1], z[:-1, 1:], z[1:, :-1], z[1:, 1:]
     twist = a + d - b - c
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats
-from gcsplan.planners.optimal.bounds.altitude_intervals import MOST, AltitudeIntervals, Reached, Terminal
+from gcsplan.planners.optimal.bounds.altitude_intervals import AltitudeIntervals, Reached, Terminal
 from gcsplan.planners.optimal.corridor import End
 from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.optimal.navmesh.clearance import mesh_of
@@ -216,7 +216,7 @@ def test_every_altitude_that_is_legal_in_a_cell_lies_in_one_of_its_intervals(see
     plane = make_plane(problem, EVERYWHERE)
     mesh = mesh_of(plane, 250.0, True, single=True)
     every = np.arange(len(mesh.piece))
-    count, low, high = intervals(mesh, every, *ranges(mesh, 250.0, every), MOST, 1e-3)
+    count, low, high = intervals(mesh, every, *ranges(mesh, 250.0, every), 1e-3)
     x, y = mesh.places()
     many = 0
     for j, i in product(range(12), range(12)):

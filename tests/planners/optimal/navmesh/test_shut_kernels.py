@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.planners.optimal.bounds.altitude_intervals import MOST
 from gcsplan.planners.optimal.navmesh.clearance import mesh_of
-from gcsplan.planners.optimal.navmesh.free_altitudes import intervals, ranges
+from gcsplan.planners.optimal.navmesh.free_altitudes import MOST, intervals, ranges
 from gcsplan.planners.optimal.navmesh.grid import make_plane
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.problem import Problem
@@ -57,7 +56,7 @@ def over_ground(rng: np.random.Generator, count: int) -> list[Zone]:
 
 def intervals_of(mesh: Mesh) -> tuple[Floats, Floats, Floats]:
     every = np.arange(len(mesh.piece))
-    return intervals(mesh, every, *ranges(mesh, TOP_M, every), MOST, 1e-3)
+    return intervals(mesh, every, *ranges(mesh, TOP_M, every), 1e-3)
 
 
 @pytest.mark.draws
@@ -112,7 +111,7 @@ def test_a_steep_slope_shuts_what_is_left_below_a_zone_and_above_it(slope: float
     mesh = mesh_of(plane, cap, True, single=True)
     c, r = plane.at((float(at[0]), float(at[1])))
     cell = np.array([math.floor(r) * (mesh.excess.shape[1] - 1) + math.floor(c)])
-    (count,), (low,), (high,) = intervals(mesh, cell, *ranges(mesh, cap, cell), MOST, 1e-3)
+    (count,), (low,), (high,) = intervals(mesh, cell, *ranges(mesh, cap, cell), 1e-3)
     left = [(a, b) for a, b in zip(low[:count], high[:count], strict=True) if b - a > 0.01]
     tries = np.arange(ground, cap, 0.25)
     assert legal(problem, np.tile(at, (len(tries), 1)), tries).any() == open_
