@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+from gcsplan.app.attempts import of_all, within_budget
 from gcsplan.app.leaving_out import LeavingOut
 from gcsplan.app.margins import larger, on_path
 from gcsplan.app.model import Brief, VehiclePlan
@@ -13,7 +15,7 @@ from gcsplan.errors import InputError, NoMission
 from gcsplan.mavlink.build.multirotor import acceptance_radius_m
 from gcsplan.mavlink.build.order import MARGINS, Order
 from gcsplan.mission_file import VehicleRequest
-from gcsplan.planners.problem import Progress
+from gcsplan.planners.problem import Progress, Solution
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.limits import Limits
 from gcsplan.world.world import World
@@ -49,16 +51,20 @@ def plan_vehicle(
 
         return plan_wing(brief, request, limited, world, merged, progress)
     margins, failed = MARGINS, None
+    tried: list[Solution] = []
+    begun_s = time.perf_counter()
     for _ in range(ATTEMPTS):
         try:
             problem, notes = make_problem(
                 source, limited, world, brief.objective, brief.seed, margins, progress, merged
             )
+            problem = within_budget(problem, tried, begun_s)
             solution = run_planner(brief.run, problem, vehicle, world)
         except NoMission:
             if failed is None:
                 raise
             break  # there is no path with margins this large: report what the last mission broke
+        tried.append(solution)
         over = looked_over(brief, solution)
         for spaced in (True, False):  # first without way points nearer than the acceptance radii, where that is legal
             order = Order(
@@ -66,6 +72,7 @@ def plan_vehicle(
             )
             mission, verdict = built(over, request, solution, order)
             if not verdict.findings:
+                solution = of_all(tried, problem)
                 return VehiclePlan(
                     request, problem, solution, mission, verdict, vehicle.speed_max_m_s, notes, order, over
                 )

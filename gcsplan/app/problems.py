@@ -108,7 +108,7 @@ def unsafe(verdict: Verdict, vehicle: Vehicle) -> NoMission:
             words += "; a fixed wing climbs to it on the way, and begins higher with a higher approach_agl_m"
     return NoMission(
         f"{vehicle.name}: a path was found, but the mission as {vehicle.autopilot} flies it breaks limits:\n{words}",
-        reason="infeasible",
+        reason="not_found",
     )
 
 

@@ -10,11 +10,13 @@ turns at the joints are corners like any other. Then the mission is built, and j
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from gcsplan.app.attempts import of_all, within_budget
 from gcsplan.app.margins import larger, on_path
 from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.problems import built, looked_over, make_problem, run_planner, unsafe
@@ -60,22 +62,27 @@ def plan_wing(
     """
     source, vehicle = brief.source, request.vehicle
     margins = replace(MARGINS, track_m=MARGINS.track_m + ACCEPTED_M + CHORDS_M)
-    sharp: Floats | None = None
+    sharp: Solution | None = None
     failed: VehiclePlan | None = None
+    tried: list[Solution] = []
+    begun_s = time.perf_counter()
     for _ in range(ATTEMPTS):
         problem, notes = make_problem(source, limited, world, brief.objective, brief.seed, margins, progress, options)
         try:
-            problem = _with_goal_circle(problem, limited)
+            problem = _with_goal_circle(within_budget(problem, tried, begun_s), limited)
             if sharp is None:
                 straight = replace(problem, turn_radius_m=0.0, progress=None)
-                sharp = run_planner(brief.run, straight, vehicle, world).path.points
-            plan = _joined(brief, request, limited, problem, sharp, world)
+                sharp = run_planner(brief.run, straight, vehicle, world)
+            plan = _joined(brief, request, limited, problem, sharp.path.points, world)
         except NoMission:
             if failed is None:
                 raise
             break  # there is no path with margins this large: report what the last mission broke
+        tried.append(plan.solution)
         if not plan.verdict.findings:
-            return replace(plan, notes=(*notes, *plan.notes))
+            # The bound of later attempts holds for their ends and limits; that of the first path holds for all.
+            bounded = [replace(s, lower_bound=sharp.lower_bound) for s in tried] if failed else tried
+            return replace(plan, solution=of_all(bounded, problem), notes=(*notes, *plan.notes))
         failed = plan
         findings = on_path(plan.mission, plan.verdict)
         if not findings:

@@ -53,12 +53,14 @@ SPARE_S = 0.5
 class Budget:
     """Seconds that one plan may take, megabytes that each of its searches may take, and the counted work so far.
 
-    ``clocked``: whether the clock stops it too; if not, counted work alone does.
+    ``clocked``: whether the clock stops it too; if not, counted work alone does. ``until_s``: the latest stop by the
+    clock, on the scale of `time.perf_counter`, whatever the other numbers allow.
     """
 
     seconds: float
     megabytes: float
     clocked: bool = True
+    until_s: float = math.inf
     begun_s: float = field(default_factory=time.perf_counter)
     spent: float = 0.0
     """Counted seconds so far."""
@@ -97,8 +99,8 @@ class Budget:
         if not self.clocked:
             return math.inf
         if self._first_s is None:
-            return self.begun_s + FIRST * self.seconds + FIRST_S
-        return self._first_s + max(self.seconds - SPARE_S, 0.5 * self.seconds)
+            return min(self.begun_s + FIRST * self.seconds + FIRST_S, self.until_s)
+        return min(self._first_s + max(self.seconds - SPARE_S, 0.5 * self.seconds), self.until_s)
 
     def goes_on(self) -> bool:
         """Whether counted work and time are left; records which of them ran out."""
@@ -131,6 +133,6 @@ class Budget:
         return seconds <= self.left and megabytes <= self.megabytes
 
     @classmethod
-    def endless(cls, *, clocked: bool = True) -> Budget:
+    def endless(cls, *, clocked: bool = True, until_s: float = math.inf) -> Budget:
         """A budget without limits. A problem that carries one without ``clocked`` is planned without a clock."""
-        return cls(math.inf, math.inf, clocked)
+        return cls(math.inf, math.inf, clocked, until_s)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
 
+from gcsplan.app import planning
 from gcsplan.app.model import Plan
 from gcsplan.app.outputs import outputs_of, summary_of
 from gcsplan.app.pipeline import plan, require_passing
+from gcsplan.check.verdict import Finding, Verdict
 from gcsplan.errors import CheckFailed, InputError, NoMission
 from gcsplan.mavlink.files.formats import read_plan, read_waypoints
 from gcsplan.mavlink.mission import commands as cmd
@@ -197,3 +200,28 @@ def test_a_verdict_that_is_not_safe_is_not_let_through() -> None:
     with pytest.raises(CheckFailed, match="the wind"):
         require_passing({"uav1": unjudged})
     require_passing({"uav1": unjudged}, allow_unjudged=True)
+
+
+def test_a_plan_with_larger_margins_keeps_the_bound_of_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only the first plan's limits are those of the mission file: a shorter path may be legal under them than under
+    later ones."""
+    (once,) = planned().vehicles
+    real, built = planning.built, list[float]()
+
+    def low_at_first(*args: Any) -> tuple[m.Mission, Verdict]:
+        mission, verdict = real(*args)
+        built.append(verdict.length_m)
+        seq = mission.first_seq + next(k for k, i in enumerate(mission.items) if i.command == cmd.WAYPOINT)
+        low = Finding(seq, "min_agl", "too low", 0.0, 0.0, 0.0, value=25.0, limit=30.0, by=5.0, unit="m")
+        return mission, replace(verdict, findings=(low,)) if len(built) <= 2 else verdict
+
+    monkeypatch.setattr(planning, "built", low_at_first)
+    (again,) = planned().vehicles
+    assert len(built) >= 3
+    assert again.problem.limits.altitude_error_m > once.problem.limits.altitude_error_m + 5.0
+    assert again.solution.lower_bound == once.solution.lower_bound
+    assert len(again.solution.search) > len(once.solution.search)
+    assert again.problem.budget_s == 0.5 * once.problem.budget_s
+    assert again.gap_percent == pytest.approx(100.0 * (again.cost / once.solution.lower_bound - 1.0))
+    assert any("planned 2 times" in note for note in again.solution.notes)
+    assert once.solution.notes == ()

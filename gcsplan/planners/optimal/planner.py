@@ -54,7 +54,9 @@ def plan(problem: Problem) -> Solution:
     ``options``: ``without``, names of searches to leave out. If no path is found, raises Refusal (a NoMission), which
     names the binding constraint and says whether it is proved that there is no path.
     """
-    problem = replace(problem, budget=Budget(problem.budget_s, problem.budget_mb, problem.budget.clocked))
+    problem = replace(
+        problem, budget=Budget(problem.budget_s, problem.budget_mb, problem.budget.clocked, problem.budget.until_s)
+    )
     return plan_over(problem, _within)
 
 

@@ -155,7 +155,7 @@ def until_found(problem: Problem, row: Entry, once: Callable[[Problem, Settings]
     begun = time.perf_counter()
     check_ends(problem)
     settings = warm_start.resolved(problem, Settings.of(row, problem.options))
-    budget = Budget(problem.budget_s, problem.budget_mb, problem.budget.clocked)
+    budget = Budget(problem.budget_s, problem.budget_mb, problem.budget.clocked, problem.budget.until_s)
     for number in range(SEARCHES):
         seed = problem.seed if number == 0 else int(np.random.SeedSequence([problem.seed, number]).generate_state(1)[0])
         try:
