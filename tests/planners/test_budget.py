@@ -154,3 +154,39 @@ def test_memory_stays_within_its_budget_even_without_outlines(kind: str, megabyt
         capture_output=True, text=True, timeout=120, check=True,
     )  # fmt: skip
     assert float(told.stdout) < megabytes + 60.0, told.stderr
+
+
+HIGH = """
+import resource
+from gcsplan.planners.optimal.planner import plan
+from gcsplan.planners.problem import Problem, Via
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.limits import Limits
+from gcsplan.world.surface import GridMap, Surface
+from gcsplan.world.zones import Circle, Zone
+import numpy as np
+level = np.zeros((2, 2))
+surface = Surface(level, level, GridMap.affine(-3.4e3, 3.4e3, 6.8e3, 6.8e3), {})
+discs = [
+    (-345, 346, 8), (-328, 441, 24), (28, 46, 10), (371, 274, 48), (-33, 134, 51), (245, 162, 52), (239, -145, 31),
+    (321, -26, 17), (149, -100, 30), (289, 323, 10), (484, 114, 37), (395, 350, 13),
+]
+zones = [Zone(str(k), Circle(float(e), float(n), float(r))) for k, (e, n, r) in enumerate(discs)]
+limits = Limits(
+    30.0, horizontal_clearance_m=30.0, track_error_m=3.0, altitude_error_m=5.0, max_climb_deg=10.0, max_descent_deg=10.0
+)
+vias = Via(-258.0, -185.0, 250.0), Via(-81.0, -236.0, 60.0), Via(260.0, -42.0, 120.0)
+ends = (176.0, 288.0, 35.0), (-105.0, -296.0, 35.0)
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+found = plan(Problem(Airspace(surface, zones), limits, *ends, vias))
+print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024.0, found.planning_s)
+"""
+
+
+@pytest.mark.slow
+def test_legs_whose_laps_leave_much_to_spare_share_memory_and_work() -> None:
+    """Laps to climb to a via make all tracks of all legs a kilometre longer than the shortest, past small zones."""
+    told = subprocess.run([sys.executable, "-c", HIGH], capture_output=True, text=True, timeout=120, check=True)
+    megabytes, seconds = map(float, told.stdout.split())
+    assert megabytes < 700.0
+    assert seconds < 11.0

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from gcsplan.arrays import Bools
 from gcsplan.planners.optimal.navmesh.grid import Box, box_of, extent
 from gcsplan.planners.problem import Problem
@@ -18,10 +20,13 @@ but a cell is cut into at most `MOST_FINE` parts a side."""
 LEAST_M = 1.0
 """Smallest cells, metres: zone walls are drawn at their true place between nodes, and the ground within a cell is
 straight, so smaller cells gain nothing."""
-MOST_FIRST, NODE_BYTES = 1.5e6, 400.0
-"""Most nodes of the first-look lattice, and bytes of one with its mesh and a search over it."""
+MOST_FIRST, MANY, NODE_BYTES = 1.5e6, 1e5, 400.0
+"""Most nodes of the first-look lattices of all legs, unless a leg has fewer than `MANY`; and bytes of a node with its
+mesh and a search over it."""
 MUCH = 0.5
 """A lattice that needs more than this part of the terrain model's nodes is made over all of it."""
+MOST_SEARCHED = 1.5e6
+"""Most cells of the finer lattices of all legs that are searched for one track; in long corridors they are larger."""
 BOX_NODE_BYTES = 50.0
 """Bytes of a node in the box of the finer lattice, whether it is searched or not."""
 
@@ -52,8 +57,9 @@ def choose(problem: Problem, place: tuple[float, float], straight_m: float, box:
     size = surface.grid.metres_per_cell(*place)
     col0, row0, col1, row1 = extent(problem, box)
     cells = float((col1 - col0) * (row1 - row0))
-    fitting = 1e6 * problem.budget.megabytes / NODE_BYTES
-    most = min(MOST_FIRST, fitting)
+    legs = len(problem.via) + 1  # all of them keep their lattices
+    fitting = 1e6 * problem.budget.megabytes / NODE_BYTES / legs
+    most = min(max(MOST_FIRST / legs, MANY), fitting)
     cell_m, finest_m = float(size.max()), max(min(FINE_M, straight_m / FINE_PARTS), LEAST_M)
     wanted_m = max(_wanted_m(problem, straight_m), LEAST_M, cell_m * math.sqrt(cells / most))
     parts = max(1, round(cell_m / wanted_m))
@@ -86,6 +92,12 @@ def fits_memory(problem: Problem, cells: Bools, beside: int, ratio: int) -> bool
     row, col, last_row, last_col = box_of(cells)
     nodes = (last_row - row + 2 * beside) * (last_col - col + 2 * beside) * ratio**2
     return nodes * BOX_NODE_BYTES <= 1e6 * problem.budget.megabytes
+
+
+def most_parts(problem: Problem, cells: Bools) -> int:
+    """Most parts a side into which ``cells`` of one leg may be cut to be searched."""
+    each = MOST_SEARCHED / (len(problem.via) + 1) / max(int(np.count_nonzero(cells)), 1)
+    return max(int(math.sqrt(each)), 1)
 
 
 def box_around(a: tuple[float, float], b: tuple[float, float], detour: float) -> Box:

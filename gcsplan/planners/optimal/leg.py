@@ -15,7 +15,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.bounds.altitude_intervals import SPARE_M, AltitudeIntervals, Reached, Terminal
-from gcsplan.planners.optimal.cells import box_around, choose, fits_memory, needs_most
+from gcsplan.planners.optimal.cells import box_around, choose, fits_memory, most_parts, needs_most
 from gcsplan.planners.optimal.corridor import Corridor, End, Narrow, Nearby, Spare
 from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid, Cone, mesh_of
 from gcsplan.planners.optimal.navmesh.free_altitudes import MOST, intervals, ranges
@@ -160,6 +160,7 @@ class Leg:
                 plane, cells = self._over(cells)
         if roughly:
             fineness = -(-fineness // ROUGHLY)
+        fineness = min(fineness, most_parts(self.problem, cells))
         exact_m = None if narrow is None else narrow.zones_m
         return ClearanceGrid(plane, cap_m, low, fineness, cells, ends, under, over, exact_m=exact_m), guide
 

@@ -67,6 +67,8 @@ class PlaneSearch:
         """
         ways = []
         for leg in self.legs:
+            if not self.incumbent.budget.goes_on():
+                return None
             limit = self.limit(leg)
             wanted = leg.corridor(limit) if fine and leg.cells_of.has_fine else None
             spare_m = choice.most_m
@@ -205,9 +207,9 @@ class PlaneSearch:
     # -------------------------------------------------------------------- bounds
 
     def size(self, looks: float) -> tuple[float, float]:
-        """Counted seconds of ``looks`` searches over the lattices of all legs, and megabytes of the largest lattice."""
+        """Counted seconds of ``looks`` searches over the lattices of all legs, and megabytes of those."""
         nodes = sum(leg.cells_of.nodes for leg in self.legs)
-        return looks * nodes * NODE_S, max((leg.cells_of.nodes for leg in self.legs), default=0.0) * NODE_MB
+        return looks * nodes * NODE_S, nodes * NODE_MB
 
     def size_nearby(self, cell_s: float) -> tuple[float, float]:
         """As `size`, of a search over the cells of the finer lattices that short enough tracks may meet: ``cell_s``
