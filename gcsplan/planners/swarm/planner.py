@@ -24,8 +24,8 @@ from gcsplan.planners.budget import Budget
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
 from gcsplan.planners.refusal import check_ends
 from gcsplan.planners.registry import Entry
+from gcsplan.planners.simplify import thinned
 from gcsplan.planners.swarm import cmaes, warm_start
-from gcsplan.planners.swarm.bspline import fewer
 from gcsplan.planners.swarm.encodings import Code
 from gcsplan.planners.swarm.objectives import Cost, Earlier, get_objective
 from gcsplan.planners.swarm.repair import repair, violations
@@ -231,7 +231,7 @@ def way_points_beside(problem: Problem, found: Found) -> Floats | None:
     if any(v.kind in COLLISIONS for v in found.violations):
         return None
     for part in CORRIDORS:
-        points = found.curve[fewer(found.curve, found.terminals, part * found.scene.straight_m)].copy()
+        points = found.curve[thinned(found.curve, found.terminals, part * found.scene.straight_m)].copy()
         points[0], points[-1] = problem.start, problem.goal
         if not violations(problem, points):
             return points

@@ -22,6 +22,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import distances
+from gcsplan.planners.simplify import thinned
 from gcsplan.planners.turns.arc_path import ArcPath, through, unlooped
 from gcsplan.planners.turns.repair import Patience, Tried, cost_of, mended, polished
 from gcsplan.world.path import Path
@@ -174,27 +175,9 @@ def _right(a: Floats, b: Floats) -> Floats:
 
 
 def _corners(flat: Floats, must: Bools, slack_m: float) -> Indices:
-    """Indices of the points that remain without those near a straight line (Ramer, Douglas and Peucker); ``must`` stay,
-    and points within 1 mm of the one before are dropped."""
-    keep = must.copy()
-    terminals = np.flatnonzero(must)
-    spans = list(zip(terminals[:-1].tolist(), terminals[1:].tolist(), strict=True))
-    while spans:
-        i, j = spans.pop()
-        if j - i < 2:
-            continue
-        chord, off = flat[j] - flat[i], flat[i + 1 : j] - flat[i]
-        length = float(np.hypot(*chord))
-        if length < 1e-9:
-            away = np.hypot(off[:, 0], off[:, 1])
-        else:
-            along = np.clip(off @ chord / length**2, 0.0, 1.0)
-            away = np.hypot(*(off - along[:, None] * chord).T)
-        worst = int(np.argmax(away))
-        if away[worst] > slack_m:
-            keep[i + 1 + worst] = True
-            spans += [(i, i + 1 + worst), (i + 1 + worst, j)]
-    index = np.flatnonzero(keep)
+    """Indices of the points that remain without those near a straight line; ``must`` stay, and points within 1 mm of
+    the one before are dropped."""
+    index = thinned(flat, np.flatnonzero(must), slack_m)
     apart = np.concatenate([[True], distances(flat[index])[1:] - distances(flat[index])[:-1] > 1e-3])
     apart[-1] = True
     return np.asarray(index[apart])
