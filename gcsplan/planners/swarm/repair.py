@@ -132,7 +132,7 @@ def _push(
     legal = (source >= 0) & (source < m)
     source = np.clip(source, 0, m - 1)
     low, high = _room(problem, scene, places, margin_m)
-    low, high = _pin(problem, scene, low, high, at_terminal)
+    _pin(problem, low, high, at_terminal)
     up, down = min(problem.limits.max_climb_slope, 1e6), min(problem.limits.max_descent_slope, 1e6)
     cost = np.where(np.arange(m) == SIDES, 0.0, np.inf)
     least, most = np.full(m, problem.start[2]), np.full(m, problem.start[2])
@@ -217,12 +217,11 @@ def k_keep(max_agl_m: float | None) -> float:
     return 0.0 if max_agl_m is None else 0.02 * max_agl_m
 
 
-def _pin(problem: Problem, scene: Scene, low: Floats, high: Floats, at_terminal: Indices) -> tuple[Floats, Floats]:
-    """Close the ribbon at terminals except in its middle, and there all but the altitude of the terminal, if fixed."""
-    low, high = low.copy(), high.copy()
+def _pin(problem: Problem, low: Floats, high: Floats, at_terminal: Indices) -> None:
+    """Close the ribbon at terminals except in its middle, and there all but the altitude of the terminal, if fixed;
+    in place."""
     heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
     for i, z in zip(at_terminal, heights, strict=True):
         here = low[i, SIDES], high[i, SIDES]
         low[i], high[i] = np.inf, -np.inf
         low[i, SIDES], high[i, SIDES] = here if z is None else (z, z)
-    return low, high
