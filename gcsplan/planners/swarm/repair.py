@@ -204,17 +204,13 @@ def _room(problem: Problem, scene: Scene, places: Floats, margin_m: float) -> tu
     flat = np.ascontiguousarray(places.reshape(-1, 2))
     air, limits = problem.airspace, problem.limits
     low = air.floor_amsl(flat[:, 0], flat[:, 1], limits) + margin_m
-    high = air.ceiling_amsl(flat[:, 0], flat[:, 1], limits) - k_keep(limits.max_agl_m)
+    # The ground between two places is not read, so more is kept from a ceiling that follows it.
+    high = air.ceiling_amsl(flat[:, 0], flat[:, 1], limits) - 0.02 * (limits.max_agl_m or 0.0)
     shut = np.empty(len(flat), np.bool_)
     ground = np.nan_to_num(scene.ground(flat))
     k.shut_by_zones(flat, ground, low, np.minimum(high, 1e8), scene.zones, scene.corners, shut)
     low = np.where(shut, np.inf, low)
     return low.reshape(places.shape[:-1]), high.reshape(places.shape[:-1])
-
-
-def k_keep(max_agl_m: float | None) -> float:
-    """Metres kept from a ceiling that follows the ground, because the ground between two places is not read; else 0."""
-    return 0.0 if max_agl_m is None else 0.02 * max_agl_m
 
 
 def _pin(problem: Problem, low: Floats, high: Floats, at_terminal: Indices) -> None:
