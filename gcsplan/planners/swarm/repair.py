@@ -188,9 +188,10 @@ def _ribbon(flat: Floats, terminals: Indices, half_m: float) -> tuple[Floats, Fl
     return base, np.stack([-ahead[:, 1], ahead[:, 0]], axis=-1) / long[:, None], np.array(at_terminal)
 
 
-def _smoothed(track: Floats, reach_m: float, count: int = 400) -> Floats:
+def _smoothed(track: Floats, reach_m: float) -> Floats:
     """A track (n, 2) averaged along itself over ``reach_m`` to either side; over less near its ends, which stay."""
     s = distances(track)
+    count = 400  # parts of the track
     at = np.linspace(0.0, s[-1], count + 1)
     even = np.stack([np.interp(at, s, track[:, i]) for i in range(2)], axis=-1)
     total = np.vstack([np.zeros((1, 2)), np.cumsum(even, axis=0)])
