@@ -52,11 +52,8 @@ Weigh = Callable[[Floats, Unit], Floats]
 @dataclass(frozen=True, slots=True)
 class Objective:
     """One cost. ``weigh``: from terms (n, TERMS) to costs (n,); ``wanted``: bits of the optional groups of terms that
-    it needs; ``equations``: of its paper."""
+    it needs."""
 
-    name: str
-    summary: str
-    equations: str
     wanted: int
     weigh: Weigh
 
@@ -159,18 +156,13 @@ def _ib_abc(terms: Floats, unit: Unit) -> Floats:
 
 OBJECTIVES: Mapping[str, Objective] = MappingProxyType(
     {
-        o.name: o
-        for o in (
-            Objective("krill", "length or energy", "krill 12, 13", 0, _krill),
-            Objective("ssgwo", "length, angles, nearness to obstacles", "SSGWO 26-34", k.YAWS | k.NODES_NEAR, _ssgwo),
-            Objective("msfoa", "height, length, threat, terrain, turns, slopes, nearness to earlier vehicles",
-                      "MSFOA 20-30", k.ANGLES | k.SAMPLES_NEAR | k.HEIGHTS, _msfoa),
-            Objective("abo", "length, samples under ground or out of the volume", "ABO 4-7", k.COUNTS, _abo),
-            Objective("ib-abc", "length, smoothness, concealment, threat", "IB-ABC 2-6",
-                      k.ANGLES | k.BENDS | k.SAMPLES_NEAR | k.HIDING, _ib_abc),
-        )
+        "krill": Objective(0, _krill),
+        "ssgwo": Objective(k.YAWS | k.NODES_NEAR, _ssgwo),
+        "msfoa": Objective(k.ANGLES | k.SAMPLES_NEAR | k.HEIGHTS, _msfoa),
+        "abo": Objective(k.COUNTS, _abo),
+        "ib-abc": Objective(k.ANGLES | k.BENDS | k.SAMPLES_NEAR | k.HIDING, _ib_abc),
     }
-)  # fmt: skip
+)
 
 
 def get_objective(name: str) -> Objective:
