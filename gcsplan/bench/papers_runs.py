@@ -28,8 +28,8 @@ from gcsplan.errors import InputError, NoMission
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.registry import get as get_planner
+from gcsplan.planners.simplify import thinned
 from gcsplan.planners.swarm import aco
-from gcsplan.planners.swarm.bspline import fewer
 from gcsplan.planners.swarm.planner import Found, scene_of, search
 from gcsplan.planners.swarm.scene import Scene
 from gcsplan.planners.swarm.settings import Settings
@@ -240,7 +240,7 @@ def _swarm(job: PaperRun, ready: Set) -> Record:
         "yaw_deg": float(np.mean([f.yaw_deg for f in found])),
         "nearest_m": None if None in near else float(np.mean(near)),  # type: ignore[arg-type]
         "history": history,
-        "paths": [np.round(f.curve[fewer(f.curve, f.terminals, DRAWN_M * f.length_m)], 2).tolist() for f in found],
+        "paths": [np.round(f.curve[thinned(f.curve, f.terminals, DRAWN_M * f.length_m)], 2).tolist() for f in found],
     }
 
 

@@ -8,14 +8,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.problem import Objective, Problem
-from gcsplan.planners.simplify import fewer, polished
+from gcsplan.planners.simplify import fewer, polished, thinned
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.zones import Circle, Level, Zone
+from tests.support.effort import draws
 from tests.support.planner_worlds import faults, ground
 
 LIMITS = Limits(
@@ -172,3 +175,18 @@ def test_a_polished_path_past_one_wall_is_nearly_the_shortest() -> None:
     assert problem.cost(Path(again)) <= problem.cost(Path(few)) * (1.0 + 1e-12)
     assert len(few) < len(points)
     assert all(math.dist(a, b) > 0.0 for a, b in itertools.pairwise(again))
+
+
+@given(seed=st.integers(0, 2**31), part=st.floats(1e-4, 0.3))
+@settings(max_examples=draws(40))
+def test_a_thinned_line_keeps_every_point_within_the_corridor(seed: int, part: float) -> None:
+    points = np.random.default_rng(seed).normal(0.0, 0.1, (71, 3)).cumsum(axis=0)
+    kept = np.array([0, 40, 70])
+    chosen = thinned(points, kept, part)
+    assert set(kept) <= set(chosen)
+    assert (np.diff(chosen) > 0).all()
+    for i, j in itertools.pairwise(chosen):
+        a, d = points[i], points[j] - points[i]
+        for q in points[i : j + 1]:
+            t = min(max(float((q - a) @ d / max(d @ d, 1e-300)), 0.0), 1.0)
+            assert np.linalg.norm(q - a - t * d) <= part + 1e-9

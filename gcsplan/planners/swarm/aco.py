@@ -22,7 +22,7 @@ from gcsplan.planners.registry import Entry
 from gcsplan.planners.swarm import scene_kernels as k
 from gcsplan.planners.swarm.encodings import LATERAL
 from gcsplan.planners.swarm.objectives import Cost
-from gcsplan.planners.swarm.planner import Found, cost_of, judged, until_found
+from gcsplan.planners.swarm.planner import Found, cost_of, drawn, until_found
 from gcsplan.planners.swarm.scene import Scene
 from gcsplan.planners.swarm.settings import Settings
 
@@ -71,9 +71,7 @@ def search(problem: Problem, settings: Settings, scene: Scene | None = None) -> 
             f"edges: try more points, or another planner",
             reason="not_found",
         )
-    curve = cost.curve.samples(nodes[None])[0]
-    curve[cost.curve.terminals] = scene.terminals
-    return judged(problem, result, scene, curve, cost.curve.terminals, cost.stride)
+    return drawn(problem, cost, result, nodes)
 
 
 def make_layers(scene: Scene, points: tuple[int, ...]) -> list[Floats]:

@@ -83,33 +83,3 @@ def _basis(controls: int, samples: int) -> Floats:
         rest = np.where(width > 0.0, 1.0 - share, 0.0)
         basis = share[:, :-1] * basis[:, :-1] + rest[:, 1:] * basis[:, 1:]
     return np.ascontiguousarray(basis.T)
-
-
-def fewer(points: Floats, kept: Indices, corridor_m: float) -> Indices:
-    """Indices of a subset of ``points`` (S, 3) whose polyline is within ``corridor_m`` of every point; ``kept`` stay.
-
-    Douglas and Peucker 1973, between neighbours of ``kept``.
-    """
-    chosen = [int(kept[0])]
-    for a, b in zip(kept[:-1].tolist(), kept[1:].tolist(), strict=True):
-        stack, inside = [(a, b)], []
-        while stack:
-            i, j = stack.pop()
-            if j - i < 2:
-                continue
-            off = _distances(points[i + 1 : j], points[i], points[j])
-            worst = int(off.argmax())
-            if off[worst] > corridor_m:
-                middle = i + 1 + worst
-                inside.append(middle)
-                stack += [(i, middle), (middle, j)]
-        chosen += [*sorted(inside), b]
-    return np.array(chosen)
-
-
-def _distances(points: Floats, a: Floats, b: Floats) -> Floats:
-    """Distances (N,) of points from the segment a–b."""
-    d = b - a
-    square = float(d @ d)
-    t = np.clip((points - a) @ d / square, 0.0, 1.0) if square > 0.0 else np.zeros(len(points))
-    return np.asarray(np.linalg.norm(points - (a + t[:, None] * d), axis=1))

@@ -36,8 +36,6 @@ class Encoding:
     """``variables``: number for each way point; ``points``: default number of way points; ``decode`` maps one stage,
     ``encode`` is its inverse; ``fixed``: way points stay at their stations along the track."""
 
-    name: str
-    summary: str
     variables: int
     points: int
     decode: Decode
@@ -159,23 +157,22 @@ def _from_bspline(scene: Scene, a: Floats, b: Floats, points: Floats) -> Floats:
 
 ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
     {
-        e.name: e
-        for e in (
-            Encoding("box", "each point anywhere in the flight volume", 3, 5, _box, _from_box),
-            Encoding("sections", "a point on each of K planes across the track, floor to ceiling", 2, 10, _sections,
-                     _from_sections, fixed=True),
-            Encoding("sections-whole", "sections, with each coordinate a whole metre", 2, 10, _sections_whole,
-                     _from_sections, fixed=True),
-            Encoding("polar", "a box whose coordinates are the radii of two hidden variables", 6, 5, _polar,
-                     _from_polar),
-            Encoding("polar-signed", "polar, where the hidden variables may be negative", 6, 5, _polar_signed,
-                     _from_polar_signed),
-            Encoding("bspline", "few points, each about its own station of the track", 3, 8, _bspline, _from_bspline),
-            Encoding("offsets", "at each of K stations the offset to the side and the altitude", 2, 5, _offsets,
-                     _from_offsets, fixed=True),
-        )
+        # Each point anywhere in the flight volume.
+        "box": Encoding(3, 5, _box, _from_box),
+        # A point on each of K planes across the track, floor to ceiling.
+        "sections": Encoding(2, 10, _sections, _from_sections, fixed=True),
+        # The same, with each coordinate a whole metre.
+        "sections-whole": Encoding(2, 10, _sections_whole, _from_sections, fixed=True),
+        # A box whose coordinates are the radii of two hidden variables.
+        "polar": Encoding(6, 5, _polar, _from_polar),
+        # The same, where the hidden variables may be negative.
+        "polar-signed": Encoding(6, 5, _polar_signed, _from_polar_signed),
+        # Few points, each about its own station of the track.
+        "bspline": Encoding(3, 8, _bspline, _from_bspline),
+        # At each of K stations the offset to the side and the altitude.
+        "offsets": Encoding(2, 5, _offsets, _from_offsets, fixed=True),
     }
-)  # fmt: skip
+)
 
 
 def get_encoding(name: str) -> Encoding:

@@ -22,15 +22,15 @@ from gcsplan.planners.swarm import cost_kernels as k
 from gcsplan.planners.swarm.bspline import Curve, curve
 from gcsplan.planners.swarm.curve_kernels import CURVE
 from gcsplan.planners.swarm.encodings import Code, shares
-from gcsplan.planners.swarm.scene import Scene
+from gcsplan.planners.swarm.scene import SAMPLES, Scene
 from gcsplan.planners.swarm.scene_kernels import SCENE, clocks_of, nearness
 
 PENALTY = 100.0
 """Cost of a metre that is not allowed, in metres (D in all costs; C and PC of MSFOA, P of ABO, μ_obs of SSGWO are 100
 too)."""
 
-NODES, SAMPLES = 30, 200
-"""SSGWO's number of nodes, at which angles and nearness are measured; approximate number of samples of a path."""
+NODES = 30
+"""SSGWO's number of nodes, at which angles and nearness are measured."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,11 +52,8 @@ Weigh = Callable[[Floats, Unit], Floats]
 @dataclass(frozen=True, slots=True)
 class Objective:
     """One cost. ``weigh``: from terms (n, TERMS) to costs (n,); ``wanted``: bits of the optional groups of terms that
-    it needs; ``equations``: of its paper."""
+    it needs."""
 
-    name: str
-    summary: str
-    equations: str
     wanted: int
     weigh: Weigh
 
@@ -159,18 +156,13 @@ def _ib_abc(terms: Floats, unit: Unit) -> Floats:
 
 OBJECTIVES: Mapping[str, Objective] = MappingProxyType(
     {
-        o.name: o
-        for o in (
-            Objective("krill", "length or energy", "krill 12, 13", 0, _krill),
-            Objective("ssgwo", "length, angles, nearness to obstacles", "SSGWO 26-34", k.YAWS | k.NODES_NEAR, _ssgwo),
-            Objective("msfoa", "height, length, threat, terrain, turns, slopes, nearness to earlier vehicles",
-                      "MSFOA 20-30", k.ANGLES | k.SAMPLES_NEAR | k.HEIGHTS, _msfoa),
-            Objective("abo", "length, samples under ground or out of the volume", "ABO 4-7", k.COUNTS, _abo),
-            Objective("ib-abc", "length, smoothness, concealment, threat", "IB-ABC 2-6",
-                      k.ANGLES | k.BENDS | k.SAMPLES_NEAR | k.HIDING, _ib_abc),
-        )
+        "krill": Objective(0, _krill),
+        "ssgwo": Objective(k.YAWS | k.NODES_NEAR, _ssgwo),
+        "msfoa": Objective(k.ANGLES | k.SAMPLES_NEAR | k.HEIGHTS, _msfoa),
+        "abo": Objective(k.COUNTS, _abo),
+        "ib-abc": Objective(k.ANGLES | k.BENDS | k.SAMPLES_NEAR | k.HIDING, _ib_abc),
     }
-)  # fmt: skip
+)
 
 
 def get_objective(name: str) -> Objective:
@@ -189,10 +181,10 @@ class Earlier:
     clock_s: Floats
 
     @classmethod
-    def at_speed(cls, points: Floats, speed_m_s: float, step_m: float = 5.0) -> Earlier:
-        """A polyline (N, 3) flown at constant speed from time 0, as points no further apart than ``step_m``."""
+    def at_speed(cls, points: Floats, speed_m_s: float) -> Earlier:
+        """A polyline (N, 3) flown at constant speed from time 0, as points no further apart than 5 m."""
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-        at = np.linspace(0.0, s[-1], max(2, math.ceil(s[-1] / step_m) + 1))
+        at = np.linspace(0.0, s[-1], max(2, math.ceil(s[-1] / 5.0) + 1))
         dense = np.stack([np.interp(at, s, points[:, i]) for i in range(3)], axis=-1)
         return cls(np.ascontiguousarray(dense), np.ascontiguousarray(at / speed_m_s))
 
@@ -216,10 +208,9 @@ class Cost:
         *,
         earlier: Sequence[Earlier] = (),
         speed_m_s: float = 15.0,
-        apart_m: float = APART_M,
     ) -> None:
         self.code, self.objective = code, objective
-        self.earlier, self.speed_m_s, self.apart_m = tuple(earlier), speed_m_s, apart_m
+        self.earlier, self.speed_m_s = tuple(earlier), speed_m_s
         scene = code.scene
         self.curve, self.stride = sampled(scene, code.points)
         wanted = objective.wanted | (k.CEILING if scene.ceiling_follows_ground else 0)
@@ -256,7 +247,7 @@ class Cost:
             clocks, near = np.empty(paths.shape[:2]), np.empty(len(paths))
             clocks_of(paths, self.speed_m_s, clocks)
             for other in self.earlier:
-                nearness(paths, clocks, other.points, other.clock_s, self.apart_m, SOON_S, near)
+                nearness(paths, clocks, other.points, other.clock_s, APART_M, SOON_S, near)
                 total = total + PC * C * near
         return np.asarray(total)
 

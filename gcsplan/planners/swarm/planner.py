@@ -24,8 +24,8 @@ from gcsplan.planners.budget import Budget
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
 from gcsplan.planners.refusal import check_ends
 from gcsplan.planners.registry import Entry
+from gcsplan.planners.simplify import thinned
 from gcsplan.planners.swarm import cmaes, warm_start
-from gcsplan.planners.swarm.bspline import fewer
 from gcsplan.planners.swarm.encodings import Code
 from gcsplan.planners.swarm.objectives import Cost, Earlier, get_objective
 from gcsplan.planners.swarm.repair import repair, violations
@@ -120,17 +120,14 @@ def search(problem: Problem, optimiser: str, settings: Settings, scene: Scene | 
     return drawn(problem, cost, result)
 
 
-def drawn(problem: Problem, cost: Cost, result: Result) -> Found:
-    """The curve of a search's best numbers, judged."""
-    curve = cost.curve.samples(cost.code.controls(result.x[None]))[0]
-    curve[cost.curve.terminals] = cost.code.scene.terminals
-    return judged(problem, result, cost.code.scene, curve, cost.curve.terminals, cost.stride)
-
-
-def judged(problem: Problem, result: Result, scene: Scene, curve: Floats, terminals: Indices, stride: int) -> Found:
-    """The curve of a search with its violations; ``stride``: samples from node to node."""
-    curve = np.ascontiguousarray(curve)
-    d = np.diff(curve[::stride], axis=0)
+def drawn(problem: Problem, cost: Cost, result: Result, controls: Floats | None = None) -> Found:
+    """The curve of a search's best numbers, or of its control points ``controls`` (N, 3), with its violations."""
+    if controls is None:
+        controls = cost.code.controls(result.x[None])[0]
+    scene, terminals = cost.code.scene, cost.curve.terminals
+    curve = cost.curve.samples(controls)
+    curve[terminals] = scene.terminals
+    d = np.diff(curve[:: cost.stride], axis=0)
     pitch = np.degrees(np.abs(np.arctan2(d[:, 2], np.hypot(d[:, 0], d[:, 1]))))
     turn = np.diff(np.arctan2(d[:, 1], d[:, 0]))
     yaw = np.degrees(np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi))
@@ -231,7 +228,7 @@ def way_points_beside(problem: Problem, found: Found) -> Floats | None:
     if any(v.kind in COLLISIONS for v in found.violations):
         return None
     for part in CORRIDORS:
-        points = found.curve[fewer(found.curve, found.terminals, part * found.scene.straight_m)].copy()
+        points = found.curve[thinned(found.curve, found.terminals, part * found.scene.straight_m)].copy()
         points[0], points[-1] = problem.start, problem.goal
         if not violations(problem, points):
             return points

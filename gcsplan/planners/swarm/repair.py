@@ -132,7 +132,7 @@ def _push(
     legal = (source >= 0) & (source < m)
     source = np.clip(source, 0, m - 1)
     low, high = _room(problem, scene, places, margin_m)
-    low, high = _pin(problem, scene, low, high, at_terminal)
+    _pin(problem, low, high, at_terminal)
     up, down = min(problem.limits.max_climb_slope, 1e6), min(problem.limits.max_descent_slope, 1e6)
     cost = np.where(np.arange(m) == SIDES, 0.0, np.inf)
     least, most = np.full(m, problem.start[2]), np.full(m, problem.start[2])
@@ -188,9 +188,10 @@ def _ribbon(flat: Floats, terminals: Indices, half_m: float) -> tuple[Floats, Fl
     return base, np.stack([-ahead[:, 1], ahead[:, 0]], axis=-1) / long[:, None], np.array(at_terminal)
 
 
-def _smoothed(track: Floats, reach_m: float, count: int = 400) -> Floats:
+def _smoothed(track: Floats, reach_m: float) -> Floats:
     """A track (n, 2) averaged along itself over ``reach_m`` to either side; over less near its ends, which stay."""
     s = distances(track)
+    count = 400  # parts of the track
     at = np.linspace(0.0, s[-1], count + 1)
     even = np.stack([np.interp(at, s, track[:, i]) for i in range(2)], axis=-1)
     total = np.vstack([np.zeros((1, 2)), np.cumsum(even, axis=0)])
@@ -204,7 +205,8 @@ def _room(problem: Problem, scene: Scene, places: Floats, margin_m: float) -> tu
     flat = np.ascontiguousarray(places.reshape(-1, 2))
     air, limits = problem.airspace, problem.limits
     low = air.floor_amsl(flat[:, 0], flat[:, 1], limits) + margin_m
-    high = air.ceiling_amsl(flat[:, 0], flat[:, 1], limits) - k_keep(limits.max_agl_m)
+    # The ground between two places is not read, so more is kept from a ceiling that follows it.
+    high = air.ceiling_amsl(flat[:, 0], flat[:, 1], limits) - 0.02 * (limits.max_agl_m or 0.0)
     shut = np.empty(len(flat), np.bool_)
     ground = np.nan_to_num(scene.ground(flat))
     k.shut_by_zones(flat, ground, low, np.minimum(high, 1e8), scene.zones, scene.corners, shut)
@@ -212,17 +214,11 @@ def _room(problem: Problem, scene: Scene, places: Floats, margin_m: float) -> tu
     return low.reshape(places.shape[:-1]), high.reshape(places.shape[:-1])
 
 
-def k_keep(max_agl_m: float | None) -> float:
-    """Metres kept from a ceiling that follows the ground, because the ground between two places is not read; else 0."""
-    return 0.0 if max_agl_m is None else 0.02 * max_agl_m
-
-
-def _pin(problem: Problem, scene: Scene, low: Floats, high: Floats, at_terminal: Indices) -> tuple[Floats, Floats]:
-    """Close the ribbon at terminals except in its middle, and there all but the altitude of the terminal, if fixed."""
-    low, high = low.copy(), high.copy()
+def _pin(problem: Problem, low: Floats, high: Floats, at_terminal: Indices) -> None:
+    """Close the ribbon at terminals except in its middle, and there all but the altitude of the terminal, if fixed;
+    in place."""
     heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
     for i, z in zip(at_terminal, heights, strict=True):
         here = low[i, SIDES], high[i, SIDES]
         low[i], high[i] = np.inf, -np.inf
         low[i, SIDES], high[i, SIDES] = here if z is None else (z, z)
-    return low, high

@@ -30,6 +30,9 @@ KEEP_M = 0.05
 KEEP_SLOPE = 0.999
 """Part of a slope limit that the sampled cost allows."""
 
+SAMPLES = 200
+"""Approximate number of samples of a path."""
+
 FAR = 1e9
 
 FLOOR_NODES = 160_000
@@ -57,7 +60,7 @@ class Scene:
     straight_m: float
 
     @classmethod
-    def of(cls, problem: Problem, volume: Mapping[str, float] | None = None, samples: int = 200) -> Scene:
+    def of(cls, problem: Problem, volume: Mapping[str, float] | None = None) -> Scene:
         """The scene of ``problem``. Raises InputError if ``volume`` (`VOLUME_KEYS`) does not contain the terminals."""
         surface, limits = problem.airspace.surface, problem.limits
         flat = np.array([problem.start[:2], *((v.east_m, v.north_m) for v in problem.via), problem.goal[:2]])
@@ -113,7 +116,7 @@ class Scene:
             )
         straight = float(np.linalg.norm(np.diff(terminals, axis=0), axis=1).sum())
         # Between two samples a chord enters a circle by at most spacing² / 8R.
-        spacing = 1.5 * straight / samples
+        spacing = 1.5 * straight / SAMPLES
         numbers[k.SPACING] = spacing
         zones = scene.zones.copy()
         zones[:, k.REACH] += np.minimum(spacing**2 / (8.0 * zones[:, k.ZR]), 0.2 * zones[:, k.ZR]) + KEEP_M

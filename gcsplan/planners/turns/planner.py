@@ -22,6 +22,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import distances
+from gcsplan.planners.simplify import thinned
 from gcsplan.planners.turns.arc_path import ArcPath, through, unlooped
 from gcsplan.planners.turns.repair import Patience, Tried, cost_of, mended, polished
 from gcsplan.world.path import Path
@@ -40,6 +41,9 @@ WORTH, GOOD, DEAR = 3e-3, 1e-2, 3e-2
 """Extra cost over the path with corners, as a part, above which the result is polished; above which the next arc path
 is tried; and above which a path with more clearance is planned."""
 
+TRIES = 1000
+"""Most tracks tried in each repair and in each polishing of an arc path."""
+
 SLACKS_M = (0.5, 4.0, 20.0)
 """Points of the path within this many metres of the straight line between others are not corners; tried in turn."""
 
@@ -51,40 +55,29 @@ class Rounded:
     ``way_points`` (M, 3): for the autopilot. At each but the first and the last, where the legs turn, it flies the arc
     of the turn radius that is tangent to both legs. Arcs of neighbours may touch but do not overlap. Altitude is linear
     along the track between way points; that of a way point is reached in the middle of its arc. ``flown`` (K, 3): that
-    path, arcs as chords; ``widen_m`` (K - 1,) how far the arc may lie outside each chord. ``length_m``: of the path
-    along the arcs themselves; ``cost`` in the problem's objective.
+    path, arcs as chords; ``cost`` in the problem's objective, along the arcs themselves.
     """
 
     way_points: Floats
     flown: Floats
-    widen_m: Floats
-    length_m: float
     cost: float
 
 
-def rounded(
-    problem: Problem,
-    points: Floats,
-    pinned: Bools,
-    replan: Replan | None = None,
-    *,
-    patience: int = 1000,
-) -> Rounded | None:
+def rounded(problem: Problem, points: Floats, pinned: Bools, replan: Replan | None = None) -> Rounded | None:
     """Round a legal path with corners, ``points`` (N, 3), by turns of ``problem.turn_radius_m``; None if not found.
 
     ``pinned`` (N,): points that must be passed, the vias; the ends always are. ``replan`` plans a path with more
-    clearance if the given one cannot be rounded cheaply. ``patience``: most tracks tried in each repair and in each
-    polishing of an arc path. Raises ValueError for a turn radius of 0 or less.
+    clearance if the given one cannot be rounded cheaply. Raises ValueError for a turn radius of 0 or less.
     """
     if problem.turn_radius_m <= 0.0:
         raise ValueError(f"turn_radius_m must be greater than 0, given {problem.turn_radius_m:g}")
-    found = _rounded(problem, points, pinned, patience)
+    found = _rounded(problem, points, pinned)
     dear = (1.0 + DEAR) * problem.cost(Path(points))
     for level in LEVELS if replan is not None else ():
         if replan is None or (found is not None and found.cost <= dear):
             break
         again = replan(level * problem.turn_radius_m)
-        other = None if again is None else _rounded(problem, *again, patience)
+        other = None if again is None else _rounded(problem, *again)
         if other is not None and (found is None or other.cost < found.cost):
             found = other
     return found
@@ -108,15 +101,15 @@ def with_more_clearance(problem: Problem, extra_m: float) -> Problem:
     )  # fmt: skip
 
 
-def _rounded(problem: Problem, points: Floats, pinned: Bools, patience: int) -> Rounded | None:
+def _rounded(problem: Problem, points: Floats, pinned: Bools) -> Rounded | None:
     given = problem.cost(Path(points))
     best: Tried | None = None
     cost = math.inf
     for arc_path in _arc_paths(problem, points, pinned):
-        found = mended(problem, arc_path, Patience(patience))
+        found = mended(problem, arc_path, Patience(TRIES))
         if found is None:
             continue
-        found = polished(problem, found, (1.0 + WORTH) * given, Patience(patience))
+        found = polished(problem, found, (1.0 + WORTH) * given, Patience(TRIES))
         assert found.risen is not None
         if cost_of(problem, found.risen) < cost:
             best, cost = found, cost_of(problem, found.risen)
@@ -124,9 +117,7 @@ def _rounded(problem: Problem, points: Floats, pinned: Bools, patience: int) -> 
             break
     if best is None or best.risen is None:
         return None
-    risen = best.risen
-    length = float(np.hypot(np.diff(risen.true_m), np.diff(risen.flown[:, 2])).sum())
-    return Rounded(risen.way_points, risen.flown, risen.widen_m, length, cost)
+    return Rounded(best.risen.way_points, best.risen.flown, cost)
 
 
 def _arc_paths(problem: Problem, points: Floats, pinned: Bools) -> Iterator[ArcPath]:
@@ -174,27 +165,9 @@ def _right(a: Floats, b: Floats) -> Floats:
 
 
 def _corners(flat: Floats, must: Bools, slack_m: float) -> Indices:
-    """Indices of the points that remain without those near a straight line (Ramer, Douglas and Peucker); ``must`` stay,
-    and points within 1 mm of the one before are dropped."""
-    keep = must.copy()
-    terminals = np.flatnonzero(must)
-    spans = list(zip(terminals[:-1].tolist(), terminals[1:].tolist(), strict=True))
-    while spans:
-        i, j = spans.pop()
-        if j - i < 2:
-            continue
-        chord, off = flat[j] - flat[i], flat[i + 1 : j] - flat[i]
-        length = float(np.hypot(*chord))
-        if length < 1e-9:
-            away = np.hypot(off[:, 0], off[:, 1])
-        else:
-            along = np.clip(off @ chord / length**2, 0.0, 1.0)
-            away = np.hypot(*(off - along[:, None] * chord).T)
-        worst = int(np.argmax(away))
-        if away[worst] > slack_m:
-            keep[i + 1 + worst] = True
-            spans += [(i, i + 1 + worst), (i + 1 + worst, j)]
-    index = np.flatnonzero(keep)
+    """Indices of the points that remain without those near a straight line; ``must`` stay, and points within 1 mm of
+    the one before are dropped."""
+    index = thinned(flat, np.flatnonzero(must), slack_m)
     apart = np.concatenate([[True], distances(flat[index])[1:] - distances(flat[index])[:-1] > 1e-3])
     apart[-1] = True
     return np.asarray(index[apart])

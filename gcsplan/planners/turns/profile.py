@@ -19,7 +19,7 @@ from gcsplan.planners.profile.track import Flown, Obstruction, Track, fly
 from gcsplan.planners.profile.tubes import cut, join
 from gcsplan.planners.turns.arc_path import Outline
 from gcsplan.planners.turns.kernels import CHORD_M, level, straighten
-from gcsplan.world.airspace import Band, Legs, Tube, Violation
+from gcsplan.world.airspace import Band, Legs, Tube
 
 CORRECTIONS, CORRECTED_M = 8, 0.01
 """Most corrections of a profile after violations in the exact check; metres added to the size of each violation."""
@@ -29,12 +29,10 @@ CORRECTIONS, CORRECTED_M = 8, 0.01
 class Risen:
     """A legal flight over an outline: ``flown`` (K, 3) its chords, divided where the profile bends on a leg.
 
-    ``widen_m`` (K - 1,) how far arcs lie outside their chords; ``true_m`` (K,) metres along legs and arcs themselves;
-    ``way_points`` (M, 3).
+    ``true_m`` (K,) metres along legs and arcs themselves; ``way_points`` (M, 3).
     """
 
     flown: Floats
-    widen_m: Floats
     true_m: Floats
     way_points: Floats
 
@@ -49,12 +47,12 @@ def rise(problem: Problem, track: Track, line: Outline) -> Risen | Obstruction:
             return blocked if known else found
         nodes = _representable(line, found.profile)
         s, flown, widen = _dense(line, nodes)
-        violations = _violations(problem, flown, widen)
+        violations = problem.airspace.examine(_legs(problem, flown, widen), problem.limits).violations
         if not violations:
             nodes = _thinned(problem, line, nodes)
-            s, flown, widen = _dense(line, nodes)
+            s, flown, _ = _dense(line, nodes)
             flown[0], flown[-1] = problem.start, problem.goal
-            return Risen(flown, widen, np.interp(s, line.s_m, line.true_m), _way_points(line, nodes))
+            return Risen(flown, np.interp(s, line.s_m, line.true_m), _way_points(line, nodes))
         for v in violations:
             at = float(s[v.leg] + v.fraction * (s[v.leg + 1] - s[v.leg]))
             blocked = Obstruction("zone" if v.zone >= 0 else "pinched", at, at, v.by, v.zone)
@@ -160,10 +158,6 @@ def _dense(line: Outline, nodes: Floats) -> tuple[Floats, Floats, Floats]:
     points = np.stack([*places, np.interp(s, nodes[:, 0], nodes[:, 1])], axis=-1)
     chord = np.searchsorted(corner, 0.5 * (s[:-1] + s[1:])) - 1
     return s, points, line.widen_m[chord]
-
-
-def _violations(problem: Problem, flown: Floats, widen: Floats) -> tuple[Violation, ...]:
-    return problem.airspace.examine(_legs(problem, flown, widen), problem.limits).violations
 
 
 def _legs(problem: Problem, flown: Floats, widen: Floats) -> Legs:

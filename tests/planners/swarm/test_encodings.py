@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import replace
 
@@ -14,7 +13,7 @@ from scipy.interpolate import BSpline
 
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem, Via
-from gcsplan.planners.swarm.bspline import curve, fewer
+from gcsplan.planners.swarm.bspline import curve
 from gcsplan.planners.swarm.encodings import ENCODINGS, LATERAL, OFFSET, Code, get_encoding, shares
 from gcsplan.planners.swarm.scene import GROWN, Scene
 from gcsplan.world.airspace import Airspace
@@ -219,19 +218,3 @@ def test_what_kernels_have_of_a_basis_is_the_whole_of_it(points: tuple[int, ...]
     np.testing.assert_allclose(line.samples(controls), np.einsum("cs,ncd->nsd", line.basis, controls), atol=1e-12)
     np.testing.assert_array_equal(line.samples(controls)[:, line.terminals[0]], controls[:, 0])
     np.testing.assert_array_equal(line.samples(controls)[:, line.terminals[-1]], controls[:, -1])
-
-
-@given(seed=st.integers(0, 2**31), part=st.floats(1e-4, 0.3))
-@settings(max_examples=draws(40))
-def test_fewer_points_keep_every_sample_within_the_corridor(seed: int, part: float) -> None:
-    rng = np.random.default_rng(seed)
-    line = curve((4, 3), (40, 30))
-    points = line.samples(rng.random((10, 3)))
-    chosen = fewer(points, line.terminals, part)
-    assert set(line.terminals) <= set(chosen)
-    assert (np.diff(chosen) > 0).all()
-    for i, j in itertools.pairwise(chosen):
-        a, d = points[i], points[j] - points[i]
-        for q in points[i : j + 1]:
-            t = min(max(float((q - a) @ d / max(d @ d, 1e-300)), 0.0), 1.0)
-            assert np.linalg.norm(q - a - t * d) <= part + 1e-9

@@ -319,16 +319,16 @@ def test_a_vehicle_with_the_right_of_way_is_kept_apart_from_in_time() -> None:
     same = Earlier.at_speed(path, 15.0)
     late = Earlier(same.points, same.clock_s + 10.0)
     for other, more in ((same, True), (late, False)):
-        cost = Cost(p, code, OBJECTIVES["krill"], earlier=(other,), speed_m_s=15.0, apart_m=20.0)
+        cost = Cost(p, code, OBJECTIVES["krill"], earlier=(other,), speed_m_s=15.0)
         assert bool(cost.of_controls(controls)[0] > alone) is more
     clock = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]) / 15.0
     wanted = sum(
         (0.5 - abs(t - s)) ** 3
         for q, t in zip(path.tolist(), clock, strict=True)
         for r, s in zip(same.points.tolist(), same.clock_s, strict=True)
-        if math.dist(q, r) < 20.0 and abs(t - s) < 0.5
+        if math.dist(q, r) < 30.0 and abs(t - s) < 0.5
     )
-    cost = Cost(p, code, OBJECTIVES["krill"], earlier=(same,), speed_m_s=15.0, apart_m=20.0)
+    cost = Cost(p, code, OBJECTIVES["krill"], earlier=(same,), speed_m_s=15.0)
     assert cost.of_controls(controls)[0] - alone == pytest.approx(100.0 * 100.0 * wanted)
 
 

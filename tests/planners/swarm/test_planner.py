@@ -81,7 +81,7 @@ def test_a_cost_that_sees_nothing_cannot_pass_a_path_through_a_zone(monkeypatch:
         from gcsplan.planners.swarm import cost_kernels as k
         from gcsplan.planners.swarm.objectives import Objective
 
-        return Objective(name, "", "", 0, lambda terms, unit: terms[:, k.LENGTH])
+        return Objective(0, lambda terms, unit: terms[:, k.LENGTH])
 
     monkeypatch.setattr(swarm_planner, "get_objective", blind)
     found = search(problem, "de", Settings.of(get("de"), problem.options))
