@@ -28,6 +28,8 @@ from gcsplan.world.zones import Zone
 
 BYTES_PER_NODE = 64.0
 """Memory that a wider window takes for each of its nodes, terrain included: 58 bytes were measured."""
+SPOT_M = 0.02
+"""Metres by which two altitudes of one place are set apart; wire numbers are rounded to half a centimetre."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +167,8 @@ def make_problem(
     via = tuple(
         Via(e, n, None if agl is None else float(air.surface.ground_at(e, n)) + agl) for e, n, agl in request.via
     )
+    if vehicle.turn_radius_m <= 0.0:
+        via = _apart(via, (*request.start[:2], start_amsl), (*request.goal[:2], goal_amsl), notes)
     settings = source.planner
     own = world.airspace.zones[len(source.zones) :]
     wider = Wider(source, world, request, own, objective, seed, given)
@@ -192,6 +196,25 @@ def make_problem(
             "are cut and the landing place is overshot while braking: track_error_m must hold both"
         )
     return problem, tuple(notes)
+
+
+def _apart(
+    via: tuple[Via, ...], start: tuple[float, float, float], goal: tuple[float, float, float], notes: list[str]
+) -> tuple[Via, ...]:
+    """``via`` with those moved aside by `SPOT_M` that are one place with the terminal before them, or with the goal
+    behind them, at another altitude: planners need a leg between two altitudes. Adds a note for each."""
+    out: list[Via] = []
+    for k, v in enumerate(via):
+        before = Via(*start) if not out else out[-1]
+        beside = [before, Via(*goal)] if k == len(via) - 1 else [before]
+        same = [x for x in beside if math.dist((x.east_m, x.north_m), (v.east_m, v.north_m)) < SPOT_M]
+        if any(v.amsl_m is not None and x.amsl_m is not None and abs(x.amsl_m - v.amsl_m) > SPOT_M for x in same):
+            v = replace(v, east_m=v.east_m + SPOT_M)
+            notes.append(
+                f"via point {k + 1} is moved {100.0 * SPOT_M:g} cm to the east: the climb there is on the spot"
+            )
+        out.append(v)
+    return tuple(out)
 
 
 def _wanted_agl_m(agl_m: float | None, amsl_m: float | None, ground_m: float) -> float | None:

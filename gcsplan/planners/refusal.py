@@ -59,8 +59,9 @@ def check_ends(problem: Problem) -> None:
         if math.dist(a, b) < 1e-3 and z0 is not None and z1 is not None and abs(z1 - z0) > 1e-3:
             raise Refusal(
                 f"no mission: {names[k]} and {names[k + 1]} are one place, {abs(z1 - z0):.1f} m apart in height, and a "
-                f"climb on the spot is planned only from a start to a goal above or below it: move one of them",
-                reason="infeasible",
+                f"climb on the spot is planned only from a start to a goal above or below it: move one of them aside "
+                "by a centimetre or more",
+                reason="not_found",
                 place=a,
             )
 

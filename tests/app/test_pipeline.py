@@ -225,3 +225,21 @@ def test_a_plan_with_larger_margins_keeps_the_bound_of_the_first(monkeypatch: py
     assert again.gap_percent == pytest.approx(100.0 * (again.cost / once.solution.lower_bound - 1.0))
     assert any("planned 2 times" in note for note in again.solution.notes)
     assert once.solution.notes == ()
+
+
+@pytest.mark.parametrize("climb_deg", [90.0, 30.0])
+def test_vias_over_one_place_are_climbs_on_the_spot(climb_deg: float) -> None:
+    """Over the start, twice over a place on the way, and over the goal."""
+    a, b = [36.6, -84.3], [36.6, -84.28]
+    middle = [36.603, -84.29]
+    vias = [[*a, 100.0], [*middle, 60.0], [*middle, 110.0], [*b, 90.0]]
+    craft = OVER_A_ZONE["vehicles"][0] | {"autopilot": "arducopter", "via": vias}
+    limits = {"min_agl_m": 40, "max_climb_deg": climb_deg}
+    asked = OVER_A_ZONE | {"no_fly": [], "limits": limits, "vehicles": [craft]}
+    (v,) = plan(load_mission(DATA / "crossing.yaml", text=yaml.safe_dump(asked))).vehicles
+    assert v.verdict.safe is True
+    points = v.solution.path.points
+    assert np.ptp(points[:, 2]) >= 60.0
+    assert sum("on the spot" in note for note in v.notes) == 3
+    assert v.gap_percent is not None
+    assert v.gap_percent < 1.0
