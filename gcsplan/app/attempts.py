@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from gcsplan.planners.budget import Budget
+from gcsplan.planners.budget import FIRST, FIRST_S, Budget
 from gcsplan.planners.problem import Problem, Solution
 
 __all__ = ["of_all", "within_budget"]
@@ -13,10 +13,11 @@ __all__ = ["of_all", "within_budget"]
 
 def within_budget(problem: Problem, tried: Sequence[Solution], begun_s: float) -> Problem:
     """The problem of the next attempt: with half the counted work of the last one, so that all together take less than
-    twice the first one's, and with the clock's last stop of the first one, which began at ``begun_s``."""
+    twice the first one's. A path whose mission breaks a limit is none: the clock stops them all when it stops a plan
+    without a path that began at ``begun_s``."""
     if not tried:
         return problem
-    until_s = begun_s + tried[0].first_path_s + problem.budget_s
+    until_s = begun_s + FIRST * problem.budget_s + FIRST_S
     budget = Budget.endless(clocked=problem.budget.clocked, until_s=until_s)
     return replace(problem, budget_s=problem.budget_s * 0.5 ** len(tried), budget=budget)
 

@@ -69,7 +69,7 @@ def _within(problem: Problem) -> Solution:
 
 def search(problem: Problem, sharp: bool = True) -> Searches:
     """Run all searches on a problem; the result, with best path and bound, is in the ``incumbent`` of what returns."""
-    incumbent = Incumbent(problem, sharp)
+    incumbent = Incumbent(_under_one_ceiling(problem), sharp)
     incumbent.tell("search")
     searches = Searches(incumbent)
     govern(incumbent, searches.table(), left_out(problem))
@@ -86,9 +86,19 @@ def _sharp(problem: Problem, sharp: bool = True) -> Solution:
     if incumbent.best is None:
         raise explain(problem, proved=True if incumbent.proved_infeasible else None)
     found = incumbent.solution()
-    if problem.limits.max_agl_m is not None and found.stopped_by != "gap":
+    if incumbent.problem.limits.max_agl_m is not None and found.stopped_by != "gap":
         found = replace(found, notes=(BAND_NOTE,))
     return found
+
+
+def _under_one_ceiling(problem: Problem) -> Problem:
+    """The same problem with a maximum altitude AMSL instead of AGL, if the ground is level: more searches apply."""
+    limits, surface = problem.limits, problem.airspace.surface
+    if limits.max_agl_m is None or np.ptp(surface.ground_m) > 0.0 or np.ptp(surface.top_m) > 0.0:
+        return problem
+    most_m = float(surface.ground_m[0, 0]) + limits.max_agl_m
+    most_m = most_m if limits.max_amsl_m is None else min(most_m, limits.max_amsl_m)
+    return replace(problem, limits=replace(limits, max_agl_m=None, max_amsl_m=most_m))
 
 
 def _turning(problem: Problem) -> Solution:

@@ -162,6 +162,26 @@ def test_band_over_the_ground_is_followed_up_and_down_a_hill() -> None:
     assert gentle.path.length_m > s.path.length_m
 
 
+def test_a_maximum_agl_over_level_ground_is_a_maximum_amsl() -> None:
+    """Same bytes, and the searches of the plane apply: only a band over uneven ground is searched on a lattice."""
+    level = ground(200.0)
+    zones = [
+        Zone(
+            f"z{k}", Circle(600.0 + 200.0 * k, 1000.0 + 150.0 * (-1) ** k, 160.0), None, Level(240.0 + 20.0 * k, "amsl")
+        )
+        for k in range(5)
+    ]
+    limits = Limits(min_agl_m=30.0, max_agl_m=120.0, altitude_error_m=5.0, max_climb_deg=12.0, max_descent_deg=12.0)
+    p = Problem(Airspace(level, zones), limits, (200.0, 1000.0, 240.0), (1800.0, 1000.0, 240.0), gap_percent=0.01)
+    found = plan(p)
+    same = plan(replace(p, limits=replace(limits, max_agl_m=None, max_amsl_m=320.0)))
+    assert found.path.points.tobytes() == same.path.points.tobytes()
+    assert found.lower_bound == same.lower_bound
+    assert {"track_bound"}.isdisjoint(step.name for step in found.search)
+    assert faults(p, found.path) == []
+    assert found.notes == ()
+
+
 def test_zone_with_a_low_ceiling_is_flown_over_and_one_with_a_high_floor_under() -> None:
     over = Zone("mast", Circle(600.0, 1000.0, 150.0), None, Level(60.0, "agl"))
     under = Zone("airway", Circle(1400.0, 1000.0, 150.0), Level(40.0, "agl"), Level(900.0, "agl"))
