@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gcsplan.arrays import Bools, Floats, Indices
+from gcsplan.arrays import Bools, Floats, Indices, Int64s
 from gcsplan.planners.lattice import pull_kernels
 from gcsplan.planners.lattice.lattice import near_zone
 from gcsplan.planners.problem import Problem, terminals_of
@@ -69,7 +69,7 @@ class Guide:
     ceiling_m: Floats
     circles: Floats
     edges: Floats
-    work: tuple[Floats, ...]
+    work: tuple[Floats | Int64s, ...]
     margin_m: float = MARGIN_M
     slope_part: float = SLOPE_PART
 

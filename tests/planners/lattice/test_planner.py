@@ -8,22 +8,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from gcsplan.errors import NoMission
 from gcsplan.planners.budget import Budget
-from gcsplan.planners.lattice import pull_kernels
 from gcsplan.planners.lattice.planner import _sides, plan_band
 from gcsplan.planners.problem import Problem, Progress, Solution, Via, straight_bound
 from gcsplan.planners.profile.climb_laps import climb_needed_deg, climb_tracks, extend, laps, pins_of
 from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
-from gcsplan.planners.profile.taut_string import Profile, taut_string
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
-from tests.support.effort import draws
 from tests.support.planner_worlds import FIELD, Floats, faults, ground, jacksboro
 
 BAND = replace(FIELD, max_agl_m=120.0)
@@ -147,25 +142,6 @@ def test_the_bound_knows_how_long_a_climb_takes() -> None:
     assert straight_bound(p) == pytest.approx(300.0 / math.sin(math.radians(15.0)))
     energy = straight_bound(replace(p, objective="energy"))
     assert energy == pytest.approx(120.0 * 300.0 + 100.0 * 300.0 / math.tan(math.radians(15.0)))
-
-
-@settings(max_examples=draws(60))
-@given(st.integers(0, 10**6), st.integers(2, 40))
-def test_the_kernels_string_is_the_taut_string(seed: int, count: int) -> None:
-    rng = np.random.default_rng(seed)
-    s = np.concatenate([[0.0], np.cumsum(rng.uniform(1.0, 30.0, count - 1))])
-    low = rng.uniform(0.0, 20.0, count)
-    high = low + rng.uniform(0.0, 15.0, count)
-    z0, z1 = rng.uniform(-5.0, 30.0, 2)
-    low[[0, -1]] = high[[0, -1]] = z0, z1
-    at, z = np.empty(count), np.empty(count)
-    n = pull_kernels.funnel(s, low, high, count, np.empty((4, count + 1)), at, z)
-    mine = Profile(s[at[:n].astype(int)], z[:n])
-    best = taut_string(s, low, high, float(z0), float(z1))
-    assert isinstance(best, Profile)
-    assert mine.length_m == pytest.approx(best.length_m, abs=1e-9)
-    assert (mine.at(s) >= low - 1e-9).all()
-    assert (mine.at(s) <= high + 1e-9).all()
 
 
 # Climbs on the spot.
