@@ -138,7 +138,7 @@ class Guide:
             points, pinned, pin_m, amsl, n, float(p.start[2]), float(p.goal[2]), self.floor_m, self.ceiling_m,
             self.circles, self.edges, spec, steps_m, gain_m * unit, rounds, AROUND_M, *self.work,
         )  # fmt: skip
-        cost, missing, _ = self.work[-1]
+        cost, missing = self.work[-1]
         return Line(
             points[:count].copy(),
             pinned[:count] > 0.0,

@@ -102,7 +102,7 @@ def evaluate(p, n, za, zb, floor, ceiling, circles, edges, spec, doors, at, chai
     low[count - 1] = high[count - 1] = zb
     corners = draw(s[:count], low[:count], high[:count], za, zb, at, chains)
     z = chains[0]
-    cost, d = spec[HORIZONTAL] * way if spec[ENERGY] > 0.0 else 0.0, 0
+    cost = spec[HORIZONTAL] * way if spec[ENERGY] > 0.0 else 0.0
     out_z[0] = za
     for k in range(corners - 1):
         a, b = at[0, k], at[0, k + 1]
@@ -165,9 +165,8 @@ def pull(  # type: ignore[no-untyped-def]
     ``pinned``, ``pz`` (MOST_POINTS,): vertices that stay, and altitudes at which to pass them (NaN: free). ``zs``
     receives the altitudes of the vertices. A move is evaluated over a part of the track, ``around_m`` or three vertices
     to each side, whose ends keep their altitudes, and is kept if it saves ``gain``. ``doors`` and what follows: see
-    `workspace`; ``total`` receives the cost, the missing metres and the number of trials.
+    `workspace`; ``total`` receives the cost and the missing metres.
     """
-    trials = 0
     for phase in range(len(steps) + 1):
         last = phase == len(steps)
         step = 0.0 if last else steps[phase]
@@ -221,12 +220,11 @@ def pull(  # type: ignore[no-untyped-def]
                     cost, missing = evaluate(
                         cand, n, start_z, end_z, floor, ceiling, circles, edges, spec, doors, at, chains, cand_z
                     )
-                    trials += 1
                     value = cost + spec[PENALTY] * missing
                     if move < 0:
                         base = value
                         if i == 0:
-                            total[0], total[1], total[2] = cost, missing, trials
+                            total[0], total[1] = cost, missing
                             for k in range(n):
                                 zs[k] = cand_z[k]
                         continue
@@ -263,5 +261,5 @@ def workspace() -> tuple[Floats | Int64s, ...]:
         np.empty((3, MOST_DOORS + 1)),
         np.empty((MOST_POINTS + 2, 4)),
         np.empty(MOST_POINTS + 2),
-        np.zeros(3),
+        np.zeros(2),
     )
