@@ -198,30 +198,6 @@ def with_laps(
     return [path for path in found if path is not None]
 
 
-def climb_needed_deg(problem: Problem, track: Track) -> float | None:
-    """Smallest limit of climb and descent angle under which a track is legal, rounded up to 0.1 degrees; None if none.
-
-    Climb and descent limits are both raised to it, and a limit that is already higher is kept.
-    """
-    low = min(problem.limits.max_climb_deg, problem.limits.max_descent_deg)
-
-    def holds(angle: float) -> bool:
-        limits = replace(
-            problem.limits,
-            max_climb_deg=max(problem.limits.max_climb_deg, angle),
-            max_descent_deg=max(problem.limits.max_descent_deg, angle),
-        )
-        return isinstance(fly(replace(problem, limits=limits), track), Flown)
-
-    high = 89.9
-    if not holds(high):
-        return None
-    while high - low > 0.1:
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if holds(middle) else (middle, high)
-    return math.ceil(10.0 * high - 1e-9) / 10.0
-
-
 def _lengthened(
     problem: Problem, track: Track, lack: Lacking, length: tuple[float, float]
 ) -> tuple[Track, Lacking] | None:
