@@ -349,7 +349,7 @@ class _Work:
         weight = climbing_weight(p)
         prices = [] if weight == self.weight else [weight]
         ways = [way for way in (router.way(weight=w, briefly=True) for w in prices) if way is not None]
-        s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.line.points, axis=0).T))])
+        s = distances(self.line.points)
         floor = router.lattice.floor_m
         for f in DETOURS:
             if not p.budget.goes_on() or router.opened > MOST_OPENED // 4:
@@ -365,7 +365,7 @@ class _Work:
 
     def _kicked(self, line: Line, rng: np.random.Generator) -> Line:
         """The line with a random bump to one side."""
-        s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line.points, axis=0).T))])
+        s = distances(line.points)
         at, side = rng.uniform(0.05, 0.95) * s[-1], rng.choice([-1.0, 1.0]) * rng.uniform(*KICK_PARTS) * self.way_m
         half = rng.uniform(0.04, 0.15) * s[-1]
         i = int(np.clip(np.searchsorted(s, at, "right") - 1, 0, len(s) - 2))

@@ -10,7 +10,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.planners.lattice.lattice import Lattice, Links, make_lattice, make_links
 from gcsplan.planners.lattice.search import Label, search
-from gcsplan.planners.problem import Problem, terminals_of
+from gcsplan.planners.problem import Problem, straight_way_m, terminals_of
 from gcsplan.planners.profile.track import Obstruction, Track, make_track
 
 SHUT_IN = 200
@@ -46,7 +46,7 @@ def frame_of(problem: Problem, level: Level) -> tuple[tuple[float, float, float,
     """Box (west, south, east, north) and spacing of a lattice for ``level``."""
     west, south, east, north = coverage(problem)
     terminals = np.array(terminals_of(problem))
-    way = float(np.hypot(*np.diff(terminals, axis=0).T).sum())
+    way = straight_way_m(problem)
     # No ellipse of a finite detour reaches farther from its ends than this; without one: four times the straight track.
     out = (0.5 * (level.detour - 1.0) if math.isfinite(level.detour) else 4.0) * way + 1.0
     if math.isfinite(level.detour):
