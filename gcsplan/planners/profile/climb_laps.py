@@ -16,7 +16,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import NoMission
-from gcsplan.planners.problem import ENDS_M, Problem
+from gcsplan.planners.problem import ENDS_M, Problem, Refusal
 from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
 from gcsplan.planners.profile.track import Closed, Flown, Lacking, Track, distances, fly, lacking
 from gcsplan.planners.simplify import fewer
@@ -67,6 +67,24 @@ def climb_tracks(problem: Problem, place: tuple[float, float], from_amsl: float,
         if not isinstance(found, Unsettled):
             return fewer(part, *found, 0.0)[0]
     return None
+
+
+def on_the_spot(problem: Problem) -> Floats:
+    """Way points (N, 3) from start to goal where all terminals are at one place; raises Refusal if no laps fit."""
+    place, low, high = problem.start[:2], problem.start[2], problem.goal[2]
+    found = None if problem.via else climb_tracks(problem, place, low, high)
+    if found is None:
+        kind, angle = (
+            ("climb", problem.limits.max_climb_deg) if high > low else ("descent", problem.limits.max_descent_deg)
+        )
+        raise Refusal(
+            f"no mission: start and goal are one place, {abs(high - low):.1f} m apart in height, and no {kind} in legs "
+            f"out and back, or in laps, was found there within max_{kind}_deg {angle:g} and turn_radius_m "
+            f"{problem.turn_radius_m:g}: move one of them, or allow more",
+            reason="not_found",
+            place=place,
+        )
+    return found
 
 
 def highest(problem: Problem, place: tuple[float, float], amsl_m: float, *, down: bool = False) -> float:
