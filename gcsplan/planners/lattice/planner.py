@@ -17,10 +17,10 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.lattice.corridor_raster import Guide, Line, line_of, make_guide
 from gcsplan.planners.lattice.routes import LEVELS, Level, Router, climbing_weight
-from gcsplan.planners.problem import Problem, Refusal, straight_bound, straight_way_m, terminals_of
+from gcsplan.planners.problem import Problem, Refusal, straight_way_m
 from gcsplan.planners.profile.climb_laps import pins_of, with_climbs
 from gcsplan.planners.profile.exact import Judge, Unsettled, settle
-from gcsplan.planners.profile.track import Flown, Obstruction, distances, fly, make_track
+from gcsplan.planners.profile.track import Obstruction, distances, make_track
 from gcsplan.planners.simplify import fewer
 from gcsplan.world.path import Path
 
@@ -57,9 +57,7 @@ def plan_band(problem: Problem, tell: Tell, *, climbs: bool = True) -> Floats:
     ``climbs``: laps over start and goal are allowed. Raises Refusal if no path is found.
     """
     way = straight_way_m(problem)
-    best = straight(problem, way)
-    if best is not None and problem.cost(Path(best)) <= straight_bound(problem) * (1.0 + 1e-9):
-        return best
+    best: Floats | None = None
     router: Router | None = None
     for level in LEVELS if climbs else LEVELS[:2]:
         if best is None and not problem.budget.goes_on():
@@ -128,18 +126,6 @@ def _stopped_by(problem: Problem, why: Obstruction) -> str:
         return f"ground that comes too near to the ceiling, by {why.by:.1f} m"
     run_m = why.s1_m - why.s0_m
     return f"a {why.kind} steeper than max_{why.kind}_deg, by {why.by:.1f} m of height in {run_m:.0f} m"
-
-
-def straight(problem: Problem, way_m: float) -> Floats | None:
-    """Way points (N, 3) straight from terminal to terminal; None if that is not legal."""
-    terminals = np.array(terminals_of(problem))
-    pin_m = np.array([math.nan, *(math.nan if v.amsl_m is None else v.amsl_m for v in problem.via), math.nan])
-    pinned = np.ones(len(terminals), bool)
-    if not isinstance(fly(problem, make_track(problem, terminals, pinned, pin_m)), Flown):
-        return None
-    judge = Judge(problem)
-    found = settle(problem, judge, terminals, pinned, pin_m)
-    return None if isinstance(found, Unsettled) else fewer(problem, *found, WORTH * _unit(problem) * way_m)[0]
 
 
 def _unit(problem: Problem) -> float:
