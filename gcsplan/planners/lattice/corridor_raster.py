@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from gcsplan.arrays import Bools, Floats, Indices, Int64s
 from gcsplan.planners.lattice import pull_kernels
 from gcsplan.planners.lattice.lattice import near_zone
 from gcsplan.planners.problem import Problem, terminals_of
+from gcsplan.planners.profile.track import denser
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Level, Zone
 
@@ -184,12 +184,9 @@ def make_guide(
     near = np.zeros((len(y), len(x)), bool)
     r = math.ceil(radius_m / step)
     for way in ways:
-        for a, b in pairwise(way):
-            n = max(1, math.ceil(math.dist(a, b) / (0.4 * radius_m)))
-            for f in np.linspace(0.0, 1.0, n + 1):
-                place = a + f * (b - a)
-                i, j = round((place[0] - west) / step), round((place[1] - south) / step)
-                near[max(j - r, 0) : j + r + 1, max(i - r, 0) : i + r + 1] = True
+        for place in denser(way, 0.4 * radius_m):
+            i, j = round((place[0] - west) / step), round((place[1] - south) / step)
+            near[max(j - r, 0) : j + r + 1, max(i - r, 0) : i + r + 1] = True
     jj, ii = np.nonzero(near)
     floor, ceiling = np.full(near.shape, SHUT_M), np.full(near.shape, -SHUT_M)
     floor[jj, ii] = np.minimum(problem.floors(x[ii], y[jj]), SHUT_M)
