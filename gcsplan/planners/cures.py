@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.planners.lattice.routes import Level, Router
 from gcsplan.planners.problem import Problem, Refusal
+from gcsplan.planners.profile.track import denser
 from gcsplan.planners.trials import DEGREES, LEAST_DEG, Least, Plan, Trials, metres_from, two_digits
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
@@ -30,8 +30,6 @@ ROUNDED_M = 0.05
 """Metres that rounding way points to whole centimetres may cost below a ceiling; generous."""
 LEVEL = Level(math.inf, 40_000)
 """Lattice on which the altitude of the lowest pass is estimated."""
-PIECES = 2_000
-"""Most places along one leg at which the ground is read."""
 
 
 def with_cures(problem: Problem, bare: Refusal, plan: Plan) -> Refusal:
@@ -279,11 +277,7 @@ def _list(names: Sequence[str], last: str = "and") -> str:
 def _over_highest_ground(problem: Problem, path: Floats) -> tuple[float, Place]:
     """The path's altitude AMSL over the highest ground under it, and that place (east_m, north_m)."""
     step_m = 0.25 * float(problem.airspace.surface.grid.metres_per_cell(*problem.start[:2]).min())
-    pieces = [path[:1]]
-    for a, b in pairwise(path):
-        n = min(max(1, math.ceil(math.dist(a[:2], b[:2]) / step_m)), PIECES)
-        pieces.append(a + np.linspace(0.0, 1.0, n + 1)[1:, None] * (b - a))
-    at = np.vstack(pieces)
+    at = denser(path, step_m)
     k = int(np.nanargmax(problem.airspace.surface.ground_at(at[:, 0], at[:, 1])))
     return float(at[k, 2]), (float(at[k, 0]), float(at[k, 1]))
 

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
-from gcsplan.arrays import Bools, Floats, Indices
+from gcsplan.arrays import Bools, Floats, Indices, Int64s
 from gcsplan.planners.lattice import pull_kernels
 from gcsplan.planners.lattice.lattice import near_zone
 from gcsplan.planners.problem import Problem, terminals_of
+from gcsplan.planners.profile.track import denser
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Level, Zone
 
@@ -69,7 +69,7 @@ class Guide:
     ceiling_m: Floats
     circles: Floats
     edges: Floats
-    work: tuple[Floats, ...]
+    work: tuple[Floats | Int64s, ...]
     margin_m: float = MARGIN_M
     slope_part: float = SLOPE_PART
 
@@ -138,7 +138,7 @@ class Guide:
             points, pinned, pin_m, amsl, n, float(p.start[2]), float(p.goal[2]), self.floor_m, self.ceiling_m,
             self.circles, self.edges, spec, steps_m, gain_m * unit, rounds, AROUND_M, *self.work,
         )  # fmt: skip
-        cost, missing, _ = self.work[-1]
+        cost, missing = self.work[-1]
         return Line(
             points[:count].copy(),
             pinned[:count] > 0.0,
@@ -184,12 +184,9 @@ def make_guide(
     near = np.zeros((len(y), len(x)), bool)
     r = math.ceil(radius_m / step)
     for way in ways:
-        for a, b in pairwise(way):
-            n = max(1, math.ceil(math.dist(a, b) / (0.4 * radius_m)))
-            for f in np.linspace(0.0, 1.0, n + 1):
-                place = a + f * (b - a)
-                i, j = round((place[0] - west) / step), round((place[1] - south) / step)
-                near[max(j - r, 0) : j + r + 1, max(i - r, 0) : i + r + 1] = True
+        for place in denser(way, 0.4 * radius_m):
+            i, j = round((place[0] - west) / step), round((place[1] - south) / step)
+            near[max(j - r, 0) : j + r + 1, max(i - r, 0) : i + r + 1] = True
     jj, ii = np.nonzero(near)
     floor, ceiling = np.full(near.shape, SHUT_M), np.full(near.shape, -SHUT_M)
     floor[jj, ii] = np.minimum(problem.floors(x[ii], y[jj]), SHUT_M)

@@ -10,7 +10,6 @@ parts of the first one, and by kicks that move a line out of its local optimum.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 
 import numpy as np
@@ -18,10 +17,10 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.lattice.corridor_raster import Guide, Line, line_of, make_guide
 from gcsplan.planners.lattice.routes import LEVELS, Level, Router, climbing_weight
-from gcsplan.planners.problem import Problem, Refusal, Solution, straight_bound, straight_way_m, terminals_of
-from gcsplan.planners.profile.climb_laps import climb_tracks, pins_of, with_climbs
+from gcsplan.planners.problem import Problem, Refusal, straight_way_m
+from gcsplan.planners.profile.climb_laps import pins_of, with_climbs
 from gcsplan.planners.profile.exact import Judge, Unsettled, settle
-from gcsplan.planners.profile.track import Flown, Obstruction, distances, fly, make_track
+from gcsplan.planners.profile.track import Obstruction, distances, make_track
 from gcsplan.planners.simplify import fewer
 from gcsplan.world.path import Path
 
@@ -50,31 +49,15 @@ BETTER = 0.5
 KICKS = 10
 KICK_PARTS = (0.02, 0.05)
 
-BOUND_NOTE = "the lower bound is the straight line from terminal to terminal: true, but not tight"
 
+def plan_band(problem: Problem, tell: Tell, *, climbs: bool = True) -> Floats:
+    """Way points (N, 3) of a path under a maximum AGL and the climb limit that `Airspace.examine` passes.
 
-def plan_band(
-    problem: Problem,
-    tell: Tell,
-    begun: float,
-    *,
-    climbs: bool = True,
-) -> Solution:
-    """A path under a maximum AGL and the climb limit that `Airspace.examine` passes.
-
-    Start, goal and vias must be legal by themselves. ``tell(phase, cost)`` reports progress; ``begun`` is the
-    `time.perf_counter` of the call. ``climbs``: laps over start and goal are allowed. Raises Refusal if no path is
-    found.
+    Start, goal and vias must be legal by themselves, and not all at one place. ``tell(phase, cost)`` reports progress.
+    ``climbs``: laps over start and goal are allowed. Raises Refusal if no path is found.
     """
-    bound = straight_bound(problem)
-    terminals = terminals_of(problem)
-    if all(math.dist(terminals[0], x) < 1e-3 for x in terminals):
-        return _solution(problem, _on_the_spot(problem), bound, begun, time.perf_counter() - begun)
     way = straight_way_m(problem)
-    best = straight(problem, way)
-    if best is not None and problem.cost(Path(best)) <= bound * (1.0 + 1e-9):
-        return _solution(problem, best, bound, begun, time.perf_counter() - begun)
-    first_s = math.inf if best is None else time.perf_counter() - begun
+    best: Floats | None = None
     router: Router | None = None
     for level in LEVELS if climbs else LEVELS[:2]:
         if best is None and not problem.budget.goes_on():
@@ -86,12 +69,11 @@ def plan_band(
         found = None if any(cut) else work.first()
         if found is None and climbs and best is None and (any(cut) or level is LEVELS[0]):
             ends = cut if any(cut) else (True, True)
-            found = with_climbs(problem, ends, lambda p: plan_band(p, tell, begun, climbs=False).path.points)
+            found = with_climbs(problem, ends, lambda p: plan_band(p, tell, climbs=False))
         if found is not None:
             best = found if best is None else min(best, found, key=lambda p: problem.cost(Path(p)))
         # A path longer than the detours that this lattice holds may have a shorter rival outside it: try the next one.
         if best is not None and (work.line is None or _flat(best) <= level.detour * way):
-            first_s = min(first_s, time.perf_counter() - begun)
             tell("pull", problem.cost(Path(best)))
             if work.line is not None:
                 better = work.improve(tell)
@@ -101,7 +83,7 @@ def plan_band(
     if best is None:
         raise _not_found(problem, router)
     tell("done", problem.cost(Path(best)))
-    return _solution(problem, best, bound, begun, first_s)
+    return best
 
 
 def cheaper(problem: Problem, tell: Tell, known: Floats, longest_m: float) -> Floats | None:
@@ -144,49 +126,6 @@ def _stopped_by(problem: Problem, why: Obstruction) -> str:
         return f"ground that comes too near to the ceiling, by {why.by:.1f} m"
     run_m = why.s1_m - why.s0_m
     return f"a {why.kind} steeper than max_{why.kind}_deg, by {why.by:.1f} m of height in {run_m:.0f} m"
-
-
-def _solution(problem: Problem, points: Floats, bound: float, begun: float, first_s: float) -> Solution:
-    path = Path(points)
-    near = problem.cost(path) - bound <= problem.gap_percent / 100.0 * max(bound, 1e-9)
-    return Solution(
-        path=path,
-        lower_bound=bound,
-        stopped_by="gap" if near else problem.budget.stopped_by,
-        planning_s=time.perf_counter() - begun,
-        first_path_s=first_s,
-        notes=() if near else (BOUND_NOTE,),
-    )
-
-
-def _on_the_spot(problem: Problem) -> Floats:
-    """Way points (N, 3) from start to goal where both are at one place; raises Refusal if no laps fit."""
-    place, low, high = problem.start[:2], problem.start[2], problem.goal[2]
-    found = None if problem.via else climb_tracks(problem, place, low, high)
-    if found is None:
-        kind, angle = (
-            ("climb", problem.limits.max_climb_deg) if high > low else ("descent", problem.limits.max_descent_deg)
-        )
-        raise Refusal(
-            f"no mission: start and goal are one place, {abs(high - low):.1f} m apart in height, and no {kind} in legs "
-            f"out and back, or in laps, was found there within max_{kind}_deg {angle:g} and turn_radius_m "
-            f"{problem.turn_radius_m:g}: move one of them, or allow more",
-            reason="not_found",
-            place=place,
-        )
-    return found
-
-
-def straight(problem: Problem, way_m: float) -> Floats | None:
-    """Way points (N, 3) straight from terminal to terminal; None if that is not legal."""
-    terminals = np.array(terminals_of(problem))
-    pin_m = np.array([math.nan, *(math.nan if v.amsl_m is None else v.amsl_m for v in problem.via), math.nan])
-    pinned = np.ones(len(terminals), bool)
-    if not isinstance(fly(problem, make_track(problem, terminals, pinned, pin_m)), Flown):
-        return None
-    judge = Judge(problem)
-    found = settle(problem, judge, terminals, pinned, pin_m)
-    return None if isinstance(found, Unsettled) else fewer(problem, *found, WORTH * _unit(problem) * way_m)[0]
 
 
 def _unit(problem: Problem) -> float:
@@ -349,7 +288,7 @@ class _Work:
         weight = climbing_weight(p)
         prices = [] if weight == self.weight else [weight]
         ways = [way for way in (router.way(weight=w, briefly=True) for w in prices) if way is not None]
-        s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(self.line.points, axis=0).T))])
+        s = distances(self.line.points)
         floor = router.lattice.floor_m
         for f in DETOURS:
             if not p.budget.goes_on() or router.opened > MOST_OPENED // 4:
@@ -365,7 +304,7 @@ class _Work:
 
     def _kicked(self, line: Line, rng: np.random.Generator) -> Line:
         """The line with a random bump to one side."""
-        s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line.points, axis=0).T))])
+        s = distances(line.points)
         at, side = rng.uniform(0.05, 0.95) * s[-1], rng.choice([-1.0, 1.0]) * rng.uniform(*KICK_PARTS) * self.way_m
         half = rng.uniform(0.04, 0.15) * s[-1]
         i = int(np.clip(np.searchsorted(s, at, "right") - 1, 0, len(s) - 2))

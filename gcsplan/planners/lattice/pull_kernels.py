@@ -4,8 +4,6 @@ A track is a few vertices; floor and ceiling along its legs are sampled from two
 samples is a taut string (see `taut_string`), and its cost is the cost of the track. Where no profile keeps the limits,
 the metres that are missing are added to the cost, so the same moves that shorten a track also repair an illegal one.
 The result is a guide and is checked exactly elsewhere.
-
-All kernels are in one file, because numba's cache notices changes only in the file that a kernel is in.
 """
 
 from __future__ import annotations
@@ -14,69 +12,15 @@ import math
 
 import numpy as np
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Int64s
 from gcsplan.planners.compiled import device, kernel
+from gcsplan.planners.profile.taut_kernels import draw
 
 MOST_POINTS = 400
 MOST_DOORS = 6000
 
 # Indices of the kernels' parameters in `spec`.
 WEST, SOUTH, PER_STEP, SPACING, MARGIN, UP, DOWN, VERTICAL, HORIZONTAL, ENERGY, PENALTY, REACH = range(12)
-
-
-@device
-def funnel(s, low, high, n, chain, at, z):  # type: ignore[no-untyped-def]
-    """Pull a string through doors 0 … n - 1, the first and last of no height; return its number of vertices.
-
-    Their door indices go to ``at``, their altitudes to ``z``. ``chain`` (4, n + 1) is a working array: the chain to the
-    high edge of the latest door (it hangs under ceilings) and the chain to its low edge, each door indices and
-    altitudes.
-    """
-    top = bottom = low[0]
-    for i in range(1, n):
-        top, bottom = max(top, low[i]), min(bottom, high[i])
-    at[0], z[0], count = 0.0, low[0], 1
-    # Rows 0 and 1: the high chain; rows 2 and 3: the low chain; the head of both is the apex.
-    head0 = tail0 = head1 = tail1 = 0
-    chain[0, 0] = chain[2, 0] = 0.0
-    chain[1, 0] = chain[3, 0] = low[0]
-    for i in range(1, n):
-        for side in range(2):
-            own, other = 2 * side, 2 - 2 * side
-            sign = 1.0 - 2.0 * side
-            edge = sign * (min(high[i], top) if side == 0 else max(low[i], bottom))
-            head, tail = (head0, tail0) if side == 0 else (head1, tail1)
-            ohead, otail = (head1, tail1) if side == 0 else (head0, tail0)
-            t = tail
-            while t > head:
-                sa, sb = s[int(chain[own, t - 1])], s[int(chain[own, t])]
-                za, zb = sign * chain[own + 1, t - 1], sign * chain[own + 1, t]
-                if (zb - za) * (s[i] - sb) < (edge - zb) * (sb - sa):
-                    break
-                t -= 1
-            if t == head:
-                # The straight line from the apex may cross the other chain: the apex then moves along that chain.
-                while ohead < otail:
-                    sa, sb = s[int(chain[other, ohead])], s[int(chain[other, ohead + 1])]
-                    za, zb = sign * chain[other + 1, ohead], sign * chain[other + 1, ohead + 1]
-                    if (zb - za) * (s[i] - sa) <= (edge - za) * (sb - sa):
-                        break
-                    ohead += 1
-                    at[count], z[count] = chain[other, ohead], chain[other + 1, ohead]
-                    count += 1
-                t = head = 0
-                chain[own, 0], chain[own + 1, 0] = chain[other, ohead], chain[other + 1, ohead]
-            tail = t + 1
-            chain[own, tail], chain[own + 1, tail] = i, sign * edge
-            if side == 0:
-                head0, tail0, head1 = head, tail, ohead
-            else:
-                head1, tail1, head0 = head, tail, ohead
-    for k in range(head0 + 1, tail0 + 1):
-        if chain[0, k] != at[count - 1]:
-            at[count], z[count] = chain[0, k], chain[1, k]
-            count += 1
-    return count
 
 
 @device
@@ -115,11 +59,11 @@ def walled(ax, ay, bx, by, circles, edges, reach):  # type: ignore[no-untyped-de
 
 
 @device
-def evaluate(p, n, za, zb, floor, ceiling, circles, edges, spec, doors, chain, at, z, out_z):  # type: ignore[no-untyped-def]
+def evaluate(p, n, za, zb, floor, ceiling, circles, edges, spec, doors, at, chains, out_z):  # type: ignore[no-untyped-def]
     """Cost of a track p[:n] flown from altitude ``za`` to ``zb``, and the metres that it lacks to be legal.
 
     A row of ``p`` is east, north, pinned, and the altitude at which to pass (NaN: free). ``out_z`` receives the
-    altitudes of the vertices; ``doors``, ``chain``, ``at`` and ``z`` are working arrays.
+    altitudes of the vertices; ``doors``, ``at`` and ``chains`` are working arrays.
     """
     s, low, high, vertex = doors[0], doors[1], doors[2], doors[3]
     rows, cols = floor.shape
@@ -156,11 +100,12 @@ def evaluate(p, n, za, zb, floor, ceiling, circles, edges, spec, doors, chain, a
             count += 1
         way += length
     low[count - 1] = high[count - 1] = zb
-    corners = funnel(s, low, high, count, chain, at, z)
-    cost, d = spec[HORIZONTAL] * way if spec[ENERGY] > 0.0 else 0.0, 0
+    corners = draw(s[:count], low[:count], high[:count], za, zb, at, chains)
+    z = chains[0]
+    cost = spec[HORIZONTAL] * way if spec[ENERGY] > 0.0 else 0.0
     out_z[0] = za
     for k in range(corners - 1):
-        a, b = int(at[k]), int(at[k + 1])
+        a, b = at[0, k], at[0, k + 1]
         run, rise = s[b] - s[a], z[k + 1] - z[k]
         missing += max(rise - spec[UP] * run, -rise - spec[DOWN] * run, 0.0)
         cost += spec[VERTICAL] * abs(rise) if spec[ENERGY] > 0.0 else math.sqrt(run * run + rise * rise)
@@ -210,21 +155,18 @@ def aim(move, turn, a, v, b, step, bend):  # type: ignore[no-untyped-def]
     return 1, 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.0, 0.0, 0
 
 
-@kernel(
-    "f8[,] f8[] f8[] f8[] i8 f8 f8 f8[,] f8[,] f8[,] f8[,] f8[] f8[] f8 i8 f8 f8[,] f8[,] f8[] f8[] f8[,] f8[] f8[]"
-)
+@kernel("f8[,] f8[] f8[] f8[] i8 f8 f8 f8[,] f8[,] f8[,] f8[,] f8[] f8[] f8 i8 f8 f8[,] i8[,] f8[,] f8[,] f8[] f8[]")
 def pull(  # type: ignore[no-untyped-def]
     p, pinned, pz, zs, count, za, zb, floor, ceiling, circles, edges, spec, steps, gain, rounds, around_m,
-    doors, chain, at, z, cand, cand_z, total,
+    doors, at, chains, cand, cand_z, total,
 ):  # fmt: skip
     """Make the track p[:count] cheaper, in place, by moves of ``steps`` metres in turn; return the new count.
 
     ``pinned``, ``pz`` (MOST_POINTS,): vertices that stay, and altitudes at which to pass them (NaN: free). ``zs``
     receives the altitudes of the vertices. A move is evaluated over a part of the track, ``around_m`` or three vertices
     to each side, whose ends keep their altitudes, and is kept if it saves ``gain``. ``doors`` and what follows: see
-    `workspace`; ``total`` receives the cost, the missing metres and the number of trials.
+    `workspace`; ``total`` receives the cost and the missing metres.
     """
-    trials = 0
     for phase in range(len(steps) + 1):
         last = phase == len(steps)
         step = 0.0 if last else steps[phase]
@@ -276,14 +218,13 @@ def pull(  # type: ignore[no-untyped-def]
                     start_z = za if w0 == 0 else zs[w0]
                     end_z = zb if w1 == count - 1 else zs[w1]
                     cost, missing = evaluate(
-                        cand, n, start_z, end_z, floor, ceiling, circles, edges, spec, doors, chain, at, z, cand_z
+                        cand, n, start_z, end_z, floor, ceiling, circles, edges, spec, doors, at, chains, cand_z
                     )
-                    trials += 1
                     value = cost + spec[PENALTY] * missing
                     if move < 0:
                         base = value
                         if i == 0:
-                            total[0], total[1], total[2] = cost, missing, trials
+                            total[0], total[1] = cost, missing
                             for k in range(n):
                                 zs[k] = cand_z[k]
                         continue
@@ -312,14 +253,13 @@ def pull(  # type: ignore[no-untyped-def]
     return count
 
 
-def workspace() -> tuple[Floats, ...]:
+def workspace() -> tuple[Floats | Int64s, ...]:
     """Working arrays of `pull`: its arguments from ``doors`` to ``total``."""
     return (
         np.empty((4, MOST_DOORS)),
-        np.empty((4, MOST_DOORS + 1)),
-        np.empty(MOST_DOORS),
-        np.empty(MOST_DOORS),
+        np.empty((3, MOST_DOORS + 1), np.int64),
+        np.empty((3, MOST_DOORS + 1)),
         np.empty((MOST_POINTS + 2, 4)),
         np.empty(MOST_POINTS + 2),
-        np.zeros(3),
+        np.zeros(2),
     )

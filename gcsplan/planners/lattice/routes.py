@@ -9,8 +9,8 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.planners.lattice.lattice import Lattice, Links, make_lattice, make_links
-from gcsplan.planners.lattice.search import Found, Label, search
-from gcsplan.planners.problem import Problem, terminals_of
+from gcsplan.planners.lattice.search import Label, search
+from gcsplan.planners.problem import Problem, straight_way_m, terminals_of
 from gcsplan.planners.profile.track import Obstruction, Track, make_track
 
 SHUT_IN = 200
@@ -46,7 +46,7 @@ def frame_of(problem: Problem, level: Level) -> tuple[tuple[float, float, float,
     """Box (west, south, east, north) and spacing of a lattice for ``level``."""
     west, south, east, north = coverage(problem)
     terminals = np.array(terminals_of(problem))
-    way = float(np.hypot(*np.diff(terminals, axis=0).T).sum())
+    way = straight_way_m(problem)
     # No ellipse of a finite detour reaches farther from its ends than this; without one: four times the straight track.
     out = (0.5 * (level.detour - 1.0) if math.isfinite(level.detour) else 4.0) * way + 1.0
     if math.isfinite(level.detour):
@@ -68,11 +68,13 @@ def climbing_weight(problem: Problem) -> float:
 
 @dataclass(eq=False, slots=True)
 class Router:
-    """A lattice with its terminals and links; ``last``, ``last_place``: what the exact check found last, and where."""
+    """A lattice with its terminals, their altitudes (None: free) and links; ``last``, ``last_place``: what the exact
+    check found last, and where."""
 
     problem: Problem
     lattice: Lattice
     terminals: list[tuple[float, float]]
+    heights: list[float | None]
     links: list[Links]
     climb_factor: float = 1.0
     last: Obstruction | None = None
@@ -89,77 +91,63 @@ class Router:
         terminals = terminals_of(problem)
         heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
         links = [make_links(problem, lattice, s, z) for s, z in zip(terminals, heights, strict=True)]
-        return cls(problem, lattice, terminals, links)
+        return cls(problem, lattice, terminals, heights, links)
 
     def way(self, cap_m: float = math.inf, weight: float = 0.0, *, briefly: bool = False) -> Floats | None:
         """Places (N, 2) of the best track over the lattice under ``cap_m``, through every terminal; None if none is
         found. ``briefly``: the last search of `MOST` labels is left out, because a path is known already."""
         direct = not self.problem.via
-        found = self.labels(cap_m, weight, FORWARD if direct else MOST)
+        found = self._labels(cap_m, weight, FORWARD if direct else MOST)
         if not found and direct and self.opened_last > FORWARD:
-            back = self._leg(-1, 0, cap_m, weight, BACKWARD)
+            back = self._leg(self._at(-1), -1, 0, cap_m, weight, BACKWARD)
             if back:
                 return np.ascontiguousarray(back[0].places[::-1])
             if self.opened_last > BACKWARD and not briefly:
-                found = self.labels(cap_m, weight, MOST)
+                found = self._labels(cap_m, weight, MOST)
         return found[0].places if found else None
 
-    def _leg(self, here: int, there: int, cap_m: float, weight: float, most_opened: int) -> tuple[Label, ...]:
-        """Labels at one end, searched from the other: from the start (``here`` 0), or backwards from the goal (-1)."""
+    def _at(self, end: int) -> tuple[Label, ...]:
+        """The label at the start (``end`` 0) or at the goal (-1), from which a search begins."""
+        z = self.problem.goal[2] if end else self.problem.start[2]
+        return (Label(0.0, z, z, z, z, np.array([self.terminals[end]])),)
+
+    def _labels(self, cap_m: float, weight: float, most_opened: int) -> tuple[Label, ...]:
+        """Labels at the goal, through all vias, cheapest first."""
+        labels = self._at(0)
+        for there in range(1, len(self.terminals)):
+            labels = self._leg(labels, there - 1, there, cap_m, weight, most_opened)
+            if not labels:
+                break
+        return labels
+
+    def _leg(
+        self, labels: tuple[Label, ...], here: int, there: int, cap_m: float, weight: float, most_opened: int
+    ) -> tuple[Label, ...]:
+        """Labels at the terminal ``there``, searched from ``labels`` at the terminal ``here``; from the goal (-1) to
+        the start (0) backwards."""
         p = self.problem
-        up, down = p.limits.max_climb_slope * self.climb_factor, p.limits.max_descent_slope * self.climb_factor
-        heights = {0: p.start[2], -1: p.goal[2]}
-        z = heights[here]
+        slopes = p.limits.max_climb_slope * self.climb_factor, p.limits.max_descent_slope * self.climb_factor
+        climb, descent = slopes[::-1] if here < 0 else slopes
+        amsl_m = self.heights[there]
         found = search(
             self.lattice,
-            [Label(0.0, z, z, z, z, np.array([self.terminals[here]]))],
+            list(labels),
             self.terminals[here],
             self.terminals[there],
             self.links[here],
             self.links[there],
-            (heights[there], heights[there]),
+            (-math.inf, math.inf) if amsl_m is None else (amsl_m, amsl_m),
             cap_m=cap_m,
-            climb_slope=up if here == 0 else down,
-            descent_slope=down if here == 0 else up,
+            climb_slope=climb,
+            descent_slope=descent,
             weight=weight,
+            want=4 if amsl_m is None else 1,
             most_opened=most_opened,
         )
         self.opened += found.opened
         p.budget.spend("label", found.opened)
         self.opened_last = found.opened
         return found.labels
-
-    def labels(self, cap_m: float, weight: float, most_opened: int = MOST) -> tuple[Label, ...]:
-        """Labels at the goal, through all vias, cheapest first."""
-        p = self.problem
-        z = p.start[2]
-        labels: tuple[Label, ...] = (Label(0.0, z, z, z, z, np.array([self.terminals[0]])),)
-        ranges = [*((-math.inf, math.inf) if v.amsl_m is None else (v.amsl_m, v.amsl_m) for v in p.via)]
-        ranges.append((p.goal[2], p.goal[2]))
-        for k, goal_m in enumerate(ranges):
-            free = math.isinf(goal_m[0])
-            found: Found = search(
-                self.lattice,
-                list(labels),
-                self.terminals[k],
-                self.terminals[k + 1],
-                self.links[k],
-                self.links[k + 1],
-                goal_m,
-                cap_m=cap_m,
-                climb_slope=p.limits.max_climb_slope * self.climb_factor,
-                descent_slope=p.limits.max_descent_slope * self.climb_factor,
-                weight=weight,
-                want=4 if free else 1,
-                most_opened=most_opened,
-            )
-            labels = found.labels
-            self.opened += found.opened
-            p.budget.spend("label", found.opened)
-            self.opened_last = found.opened
-            if not labels:
-                break
-        return labels
 
     def cut_off(self) -> tuple[bool, bool]:
         """Whether the start, and the goal, is shut in on this lattice: a search from it ends after `SHUT_IN` labels."""

@@ -20,7 +20,7 @@ from gcsplan.planners.lattice import search_kernels
 from gcsplan.planners.lattice.lattice import LINK_DOORS, STEPS, Lattice, Links
 
 LABELS_A_NODE = 8
-"""Most labels that a node keeps; a search that drops more reports that it is not complete."""
+"""Most labels that a node keeps; more are dropped."""
 
 FIRST_CAPACITY = 32_768
 """Labels for which arrays are allocated at first."""
@@ -41,11 +41,9 @@ class Label:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Found:
-    """``labels`` at the goal, cheapest first (none: no track on this lattice); ``complete`` False if labels were
-    dropped, so that no labels prove nothing; ``opened``: number of labels expanded."""
+    """``labels`` at the goal, cheapest first (none: no track was found); ``opened``: number of labels expanded."""
 
     labels: tuple[Label, ...]
-    complete: bool
     opened: int
 
 
@@ -117,7 +115,7 @@ def search(
         places = np.vstack([starts[k].places, inner, np.asarray(goal)[None]])
         cost, *altitudes = (float(x) for x in value[g])
         out.append(Label(cost, altitudes[0], altitudes[1], altitudes[2], altitudes[3], places))
-    return Found(tuple(out), bool(state[search_kernels.COMPLETE]), int(state[search_kernels.OPENED]))
+    return Found(tuple(out), int(state[search_kernels.OPENED]))
 
 
 def _run(
@@ -135,7 +133,7 @@ def _run(
     value[:n] = starts
     order = np.argsort(starts[:, 0], kind="stable")
     keys[:n], ids[:n] = starts[order, 0], order  # a sorted array is a heap
-    state = np.array([n, n, 0, 0, 1], np.int64)
+    state = np.array([n, n, 0, 0], np.int64)
     first, held = np.full(nodes + 2, -1), np.zeros(nodes + 2, np.int64)
     goals = np.zeros(want, np.int64)
     v, door = np.empty(5), np.empty((LINK_DOORS + 1, 4))

@@ -13,7 +13,7 @@ from gcsplan.planners.compiled import device, kernel
 
 COST, LOW, HIGH, CHEAP_LOW, CHEAP_HIGH = range(5)
 AT, PARENT, NEXT, ALIVE = range(4)
-COUNT, SIZE, OPENED, REACHED, COMPLETE = range(5)
+COUNT, SIZE, OPENED, REACHED = range(4)
 """Indices in the state, which is kept between calls."""
 STEP, GOAL_X, GOAL_Y, GOAL_LOW, GOAL_HIGH, CAP, UP, DOWN, WEIGHT, SPARE = range(10)
 """Indices in the parameters of the search (``terms``)."""
@@ -116,7 +116,7 @@ def doors_of(x, y, dx, dy, k, floor, ceiling, ground, step, door):  # type: igno
 
 @device
 def admit(to, v, value, name, first, held, most, terms):  # type: ignore[no-untyped-def]
-    """1 if a label with numbers ``v`` may stay at a node, 0 if another dominates it, -1 if the node has too many.
+    """Whether a label with numbers ``v`` may stay at a node: no other dominates it, and the node has not too many.
 
     A label dominates another if it reaches as much and costs no more at any altitude. Labels that ``v`` dominates are
     dropped.
@@ -130,7 +130,7 @@ def admit(to, v, value, name, first, held, most, terms):  # type: ignore[no-unty
             and o[HIGH] >= v[HIGH] - terms[SPARE]
             and o[COST] + weight * farther(v[CHEAP_LOW], v[CHEAP_HIGH], o[CHEAP_LOW], o[CHEAP_HIGH]) <= v[COST]
         ):
-            return 0
+            return False
         if (
             v[LOW] <= o[LOW]
             and v[HIGH] >= o[HIGH]
@@ -145,7 +145,7 @@ def admit(to, v, value, name, first, held, most, terms):  # type: ignore[no-unty
         else:
             before = other
         other = following
-    return 1 if held[to] < most else -1
+    return held[to] < most
 
 
 @kernel(
@@ -186,7 +186,6 @@ def reach(  # type: ignore[no-untyped-def]
             continue
         state[OPENED] += 1
         if state[OPENED] > most_opened:
-            state[COMPLETE] = 0
             break
         x, y = node % nx, node // nx
         moves = 16 if node < nodes else 0
@@ -236,10 +235,7 @@ def reach(  # type: ignore[no-untyped-def]
                     is_open = is_open and through(v, door[q, 0], low, high, terms)
                 if not is_open:
                     continue
-                stays = admit(to, v, value, name, first, held, most_held, terms) if count < len(keys) else -1
-                if stays < 0:
-                    state[COMPLETE] = 0
-                if stays <= 0:
+                if count >= len(keys) or not admit(to, v, value, name, first, held, most_held, terms):
                     continue
                 name[count, AT], name[count, PARENT], name[count, NEXT], name[count, ALIVE] = to, item, first[to], 1
                 for q in range(5):

@@ -31,12 +31,12 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import NoMission
 from gcsplan.planners.budget import Budget
-from gcsplan.planners.lattice.planner import plan_band
 from gcsplan.planners.optimal.governor import govern
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.searches import Searches, left_out
 from gcsplan.planners.optimal.window import plan_over
 from gcsplan.planners.problem import Problem, Refusal, Solution, terminals_of
+from gcsplan.planners.profile.climb_laps import on_the_spot
 from gcsplan.planners.refusal import check_ends, explain
 from gcsplan.world.path import Path
 
@@ -80,7 +80,9 @@ def _sharp(problem: Problem, sharp: bool = True) -> Solution:
     """`_within` for paths with sharp corners; ``sharp``: whether they stay so, see `Incumbent`. Raises Refusal."""
     check_ends(problem)
     if all(math.dist(terminals_of(problem)[0], x) < 1e-3 for x in terminals_of(problem)):
-        return plan_band(problem, Incumbent(problem).tell, problem.budget.begun_s)  # a climb on the spot
+        incumbent = Incumbent(problem)
+        incumbent.take(on_the_spot(problem))
+        return incumbent.solution()
     searches = search(problem, sharp)
     incumbent = searches.incumbent
     if incumbent.best is None:

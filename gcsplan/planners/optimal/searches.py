@@ -250,12 +250,10 @@ class Searches:
         energy = self.problem.objective == "energy"
         for problem in [self.problem, *([replace(self.problem, objective="length")] if energy else [])]:
             try:
-                first = plan_band(problem, incumbent.tell, incumbent.budget.begun_s)
+                found = plan_band(problem, incumbent.tell)
             except Refusal:
                 continue
-            if first.lower_bound is not None and problem is self.problem:
-                incumbent.raise_bound(min(first.lower_bound, self.problem.cost(first.path)))
-            incumbent.take(first.path.points)
+            incumbent.take(found)
             return
 
     # -------------------------------------------------------------------- better paths, and bounds

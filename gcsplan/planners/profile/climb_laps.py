@@ -16,7 +16,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import NoMission
-from gcsplan.planners.problem import ENDS_M, Problem
+from gcsplan.planners.problem import ENDS_M, Problem, Refusal
 from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
 from gcsplan.planners.profile.track import Closed, Flown, Lacking, Track, distances, fly, lacking
 from gcsplan.planners.simplify import fewer
@@ -67,6 +67,24 @@ def climb_tracks(problem: Problem, place: tuple[float, float], from_amsl: float,
         if not isinstance(found, Unsettled):
             return fewer(part, *found, 0.0)[0]
     return None
+
+
+def on_the_spot(problem: Problem) -> Floats:
+    """Way points (N, 3) from start to goal where all terminals are at one place; raises Refusal if no laps fit."""
+    place, low, high = problem.start[:2], problem.start[2], problem.goal[2]
+    found = None if problem.via else climb_tracks(problem, place, low, high)
+    if found is None:
+        kind, angle = (
+            ("climb", problem.limits.max_climb_deg) if high > low else ("descent", problem.limits.max_descent_deg)
+        )
+        raise Refusal(
+            f"no mission: start and goal are one place, {abs(high - low):.1f} m apart in height, and no {kind} in legs "
+            f"out and back, or in laps, was found there within max_{kind}_deg {angle:g} and turn_radius_m "
+            f"{problem.turn_radius_m:g}: move one of them, or allow more",
+            reason="not_found",
+            place=place,
+        )
+    return found
 
 
 def highest(problem: Problem, place: tuple[float, float], amsl_m: float, *, down: bool = False) -> float:
@@ -196,30 +214,6 @@ def with_laps(
         if not found or any(path is not None for path in found):
             break
     return [path for path in found if path is not None]
-
-
-def climb_needed_deg(problem: Problem, track: Track) -> float | None:
-    """Smallest limit of climb and descent angle under which a track is legal, rounded up to 0.1 degrees; None if none.
-
-    Climb and descent limits are both raised to it, and a limit that is already higher is kept.
-    """
-    low = min(problem.limits.max_climb_deg, problem.limits.max_descent_deg)
-
-    def holds(angle: float) -> bool:
-        limits = replace(
-            problem.limits,
-            max_climb_deg=max(problem.limits.max_climb_deg, angle),
-            max_descent_deg=max(problem.limits.max_descent_deg, angle),
-        )
-        return isinstance(fly(replace(problem, limits=limits), track), Flown)
-
-    high = 89.9
-    if not holds(high):
-        return None
-    while high - low > 0.1:
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if holds(middle) else (middle, high)
-    return math.ceil(10.0 * high - 1e-9) / 10.0
 
 
 def _lengthened(

@@ -58,17 +58,6 @@ class Blocked:
     by: float
 
 
-def doors(floor_m: Floats, ceiling_m: Floats) -> tuple[Floats, Floats]:
-    """Lowest and highest altitude (M + 1,) at each breakpoint of M pieces, whose values at both ends are (M, 2)."""
-    low = np.empty(len(floor_m) + 1)
-    high = np.empty(len(ceiling_m) + 1)
-    low[0], low[-1] = floor_m[0, 0], floor_m[-1, 1]
-    high[0], high[-1] = ceiling_m[0, 0], ceiling_m[-1, 1]
-    np.maximum(floor_m[:-1, 1], floor_m[1:, 0], out=low[1:-1])
-    np.minimum(ceiling_m[:-1, 1], ceiling_m[1:, 0], out=high[1:-1])
-    return low, high
-
-
 def taut_string(
     s_m: Floats,
     low_m: Floats,

@@ -56,11 +56,10 @@ class Obstruction:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Flown:
-    """A legal profile over a track, its cost, and for each band of the tube whether the profile passes over it."""
+    """A legal profile over a track, and its cost."""
 
     profile: Profile
     cost: float
-    over: Sides
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -180,17 +179,17 @@ def fly(
     count = 0
     while open_set:
         cost, _, over, profile = heappop(open_set)
-        hit = sections.hits(profile, over)
-        if not hit:
-            return Flown(profile, cost, over)
-        deepest = max(hit, key=lambda h: h.depth_m)
-        band = tube.bands[deepest.band]
+        hit = sections.deepest(profile, over)
+        if hit is None:
+            return Flown(profile, cost)
+        k, depth_m = hit
+        band = tube.bands[k]
         if first is None:
-            first = Obstruction("zone", band.s0_m, band.s1_m, deepest.depth_m, band.zone)
+            first = Obstruction("zone", band.s0_m, band.s1_m, depth_m, band.zone)
         if count >= BRANCHES:
             break
         for side in (True, False):
-            choice = (*over[: deepest.band], side, *over[deepest.band + 1 :])
+            choice = (*over[:k], side, *over[k + 1 :])
             count += 1
             found = solve(choice)
             if not isinstance(found, Blocked):
@@ -238,8 +237,8 @@ def lacking(problem: Problem, track: Track) -> Lacking | Closed:
     count = 0
     while open_set and count < BRANCHES:
         cost, _, over, (_, profile, more) = heappop(open_set)
-        hit = sections.hits(profile, over)
-        if not hit:
+        hit = sections.deepest(profile, over)
+        if hit is None:
             s, rise = profile.s_m, np.diff(profile.amsl_m)
             missing = more * np.where(rise > 0.0, up, down)
             steep = tuple(
@@ -251,23 +250,15 @@ def lacking(problem: Problem, track: Track) -> Lacking | Closed:
             if steep:
                 zones = sections.zones(tube, over, steep[0].s0_m, steep[0].s1_m)
             return Lacking(profile, cost, float(more[missing > 0.0].sum()), steep, zones)
-        deepest = max(hit, key=lambda h: h.depth_m)
-        deepest_zone = deepest_zone or (tube.bands[deepest.band].zone,)
+        k = hit[0]
+        deepest_zone = deepest_zone or (tube.bands[k].zone,)
         for side in (True, False):
-            choice = (*over[: deepest.band], side, *over[deepest.band + 1 :])
+            choice = (*over[:k], side, *over[k + 1 :])
             count += 1
             found = solve(choice)
             if found is not None:
                 heappush(open_set, (found[0], count, choice, found))
     return closed
-
-
-@dataclass(frozen=True, slots=True)
-class _Hit:
-    """A band that a profile runs into, and how many metres deep."""
-
-    band: int
-    depth_m: float
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -299,9 +290,10 @@ class _Sections:
         chosen = (b for b, side in zip(tube.bands, over, strict=True) if side is not None)
         return tuple({b.zone: None for b in chosen if b.s0_m < s1_m + BESIDE_M and b.s1_m > s0_m - BESIDE_M})
 
-    def hits(self, profile: Profile, over: Sides) -> list[_Hit]:
-        """Bands without a chosen side that ``profile`` does not clear by `KEEP_M`."""
-        out = []
+    def deepest(self, profile: Profile, over: Sides) -> tuple[int, float] | None:
+        """Of the bands without a chosen side the one that ``profile`` runs into deepest, and how many metres deep; None
+        if it clears all of them by `KEEP_M`."""
+        hits: list[tuple[int, float]] = []
         if any(side is None for side in over):
             z = profile.at(self.s_m)
             for k, side in enumerate(over):
@@ -309,8 +301,8 @@ class _Sections:
                     i, j = self.spans[k]
                     up, down = float((self.tops[k] - z[i:j]).max()), float((z[i:j] - self.bottoms[k]).max())
                     if up > -KEEP_M and down > -KEEP_M:
-                        out.append(_Hit(k, min(up, down)))
-        return out
+                        hits.append((k, min(up, down)))
+        return max(hits, key=lambda hit: hit[1], default=None)
 
 
 def _narrow(low: Floats, high: Floats) -> None:

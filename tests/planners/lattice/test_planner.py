@@ -8,22 +8,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from gcsplan.errors import NoMission
 from gcsplan.planners.budget import Budget
-from gcsplan.planners.lattice import pull_kernels
 from gcsplan.planners.lattice.planner import _sides, plan_band
-from gcsplan.planners.problem import Problem, Progress, Solution, Via, straight_bound
-from gcsplan.planners.profile.climb_laps import climb_needed_deg, climb_tracks, extend, laps, pins_of
-from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
-from gcsplan.planners.profile.taut_string import Profile, taut_string
+from gcsplan.planners.optimal import planner as optimal
+from gcsplan.planners.problem import Problem, Progress, Via, straight_bound
+from gcsplan.planners.profile.climb_laps import climb_tracks, extend, laps, pins_of
+from gcsplan.planners.profile.exact import Judge, Unsettled, settle
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
-from tests.support.effort import draws
 from tests.support.planner_worlds import FIELD, Floats, faults, ground, jacksboro
 
 BAND = replace(FIELD, max_agl_m=120.0)
@@ -49,8 +45,8 @@ def band_mission(seed: int, degrees: float, zones: tuple[Zone, ...] = (), object
     return Problem(air, limits, start, goal, objective="energy" if objective == "energy" else "length")
 
 
-def plan(problem: Problem) -> Solution:
-    """Plan by the lattice alone."""
+def plan(problem: Problem) -> Path:
+    """A path by the lattice alone."""
     begun = time.perf_counter()
     problem = replace(problem, budget=Budget(problem.budget_s, problem.budget_mb, problem.budget.clocked))
 
@@ -58,7 +54,7 @@ def plan(problem: Problem) -> Solution:
         if problem.progress is not None:
             problem.progress(Progress(time.perf_counter() - begun, cost, None, phase))
 
-    return plan_band(problem, tell, begun)
+    return Path(plan_band(problem, tell))
 
 
 def disc(middle: Floats, radius_m: float) -> Circle:
@@ -73,17 +69,16 @@ def is_clear(problem: Problem, points: Floats) -> bool:
 @pytest.mark.parametrize(("seed", "degrees"), [(1, 10.0), pytest.param(2, 10.0, marks=pytest.mark.slow), (3, 15.0)])
 def test_crosses_real_ground_between_60_and_120_m(seed: int, degrees: float) -> None:
     p = band_mission(seed, degrees)
-    solution = plan(p)
-    assert not p.airspace.examine(Legs.of_path(solution.path.points, p.limits), p.limits).violations
-    assert faults(p, solution.path) == []
-    assert solution.lower_bound is not None
-    assert solution.lower_bound <= solution.path.length_m <= 1.15 * solution.lower_bound
+    path = plan(p)
+    assert not p.airspace.examine(Legs.of_path(path.points, p.limits), p.limits).violations
+    assert faults(p, path) == []
+    assert straight_bound(p) <= path.length_m <= 1.15 * straight_bound(p)
 
 
 def test_a_plan_is_the_same_every_time_and_tells_of_its_progress() -> None:
     told: list[Progress] = []
     p = replace(band_mission(4, 15.0), progress=told.append)
-    first, second = plan(p).path.points, plan(p).path.points
+    first, second = plan(p).points, plan(p).points
     assert np.array_equal(first, second)
     assert told[0].phase == "search"
     assert told[-1].phase == "done"
@@ -103,10 +98,10 @@ def test_zones_in_the_band_are_passed_over_under_and_around() -> None:
         Zone("field", Polygon(a + 0.62 * along - 250.0 * across + corners)),
     )
     p = replace(bare, airspace=Airspace(jacksboro(), zones))
-    solution = plan(p)
-    assert is_clear(p, solution.path.points)
+    path = plan(p)
+    assert is_clear(p, path.points)
     circles = replace(p, airspace=Airspace(jacksboro(), zones[:3]))
-    assert faults(circles, solution.path) == []
+    assert faults(circles, path) == []
 
 
 def test_a_path_with_two_points_at_one_place_has_sides() -> None:
@@ -125,7 +120,7 @@ def test_vias_are_passed_at_their_altitudes() -> None:
     middle = 0.5 * (np.array(p.start[:2]) + np.array(p.goal[:2])) + 400.0
     low = float(p.airspace.floor_amsl(middle[0], middle[1], p.limits))
     p = replace(p, via=(Via(float(middle[0]), float(middle[1]), low + 8.0),))
-    points = plan(p).path.points
+    points = plan(p).points
     assert is_clear(p, points)
     off = np.linalg.norm(points - np.array([*middle, low + 8.0]), axis=1)
     assert off.min() < 1e-6
@@ -136,10 +131,9 @@ def test_energy_is_worth_a_detour_around_climbs() -> None:
     p = band_mission(7, 15.0, objective="energy")
     thrifty = plan(p)
     short = plan(replace(p, objective="length"))
-    assert is_clear(p, thrifty.path.points)
-    assert p.cost(thrifty.path) <= 1.005 * p.cost(short.path)
-    assert thrifty.lower_bound is not None
-    assert thrifty.lower_bound <= p.cost(thrifty.path)
+    assert is_clear(p, thrifty.points)
+    assert p.cost(thrifty) <= 1.005 * p.cost(short)
+    assert straight_bound(p) <= p.cost(thrifty)
 
 
 def test_the_bound_knows_how_long_a_climb_takes() -> None:
@@ -147,25 +141,6 @@ def test_the_bound_knows_how_long_a_climb_takes() -> None:
     assert straight_bound(p) == pytest.approx(300.0 / math.sin(math.radians(15.0)))
     energy = straight_bound(replace(p, objective="energy"))
     assert energy == pytest.approx(120.0 * 300.0 + 100.0 * 300.0 / math.tan(math.radians(15.0)))
-
-
-@settings(max_examples=draws(60))
-@given(st.integers(0, 10**6), st.integers(2, 40))
-def test_the_kernels_string_is_the_taut_string(seed: int, count: int) -> None:
-    rng = np.random.default_rng(seed)
-    s = np.concatenate([[0.0], np.cumsum(rng.uniform(1.0, 30.0, count - 1))])
-    low = rng.uniform(0.0, 20.0, count)
-    high = low + rng.uniform(0.0, 15.0, count)
-    z0, z1 = rng.uniform(-5.0, 30.0, 2)
-    low[[0, -1]] = high[[0, -1]] = z0, z1
-    at, z = np.empty(count), np.empty(count)
-    n = pull_kernels.funnel(s, low, high, count, np.empty((4, count + 1)), at, z)
-    mine = Profile(s[at[:n].astype(int)], z[:n])
-    best = taut_string(s, low, high, float(z0), float(z1))
-    assert isinstance(best, Profile)
-    assert mine.length_m == pytest.approx(best.length_m, abs=1e-9)
-    assert (mine.at(s) >= low - 1e-9).all()
-    assert (mine.at(s) <= high + 1e-9).all()
 
 
 # Climbs on the spot.
@@ -238,16 +213,12 @@ def test_laps_too_wide_for_the_pit_are_not_flown() -> None:
     p = pit_problem(turn_radius_m=400.0)
     stops = np.array([p.start[:2], p.goal[:2]])
     assert extend(p, stops, np.ones(2, bool), np.full(2, np.nan)) is None
-    track = sampled_track(p, stops, np.ones(2, bool), np.full(2, np.nan))
-    needed = climb_needed_deg(p, track)
-    # The pit's rim is 320 m away and 200 m higher.
-    assert needed == pytest.approx(math.degrees(math.atan(200.0 / 320.0)), abs=0.3)
 
 
 def test_out_of_a_pit_under_max_agl_the_way_winds_up() -> None:
     p = pit_problem(limits=replace(STEEP, max_agl_m=60.0))
-    solution = plan(p)
-    assert faults(p, solution.path) == []
+    path = plan(p)
+    assert faults(p, path) == []
 
 
 @pytest.mark.slow
@@ -258,17 +229,17 @@ def test_pits_narrower_than_the_search_sees_are_left_and_entered_in_laps() -> No
 
     air = Airspace(ground(pits, size_m=8000.0, step_m=20.0))
     p = Problem(air, replace(STEEP, max_climb_deg=10.0), (1000.0, 4000.0, 10.0), (7000.0, 4000.0, 10.0))
-    solution = plan(p)
-    assert faults(p, solution.path) == []
+    path = plan(p)
+    assert faults(p, path) == []
     # Both climbs add length, neither more than twice the necessary one.
-    assert solution.path.length_m < 6000.0 + 2.0 * 150.0 / math.sin(math.radians(10.0))
+    assert path.length_m < 6000.0 + 2.0 * 150.0 / math.sin(math.radians(10.0))
 
 
 @pytest.mark.parametrize("down", [False, True])
 def test_start_and_goal_over_one_place(down: bool) -> None:
     ends = ((500.0, 1000.0, 12.0), (500.0, 1000.0, 180.0))
     p = pit_problem(start=ends[down], goal=ends[not down])
-    solution = plan(p)
+    solution = optimal.plan(p)
     assert is_clear(p, solution.path.points)
     assert solution.lower_bound is not None
     assert solution.lower_bound <= solution.path.length_m <= 1.05 * solution.lower_bound
@@ -282,7 +253,7 @@ def test_no_room_to_climb_over_one_place_is_refused_with_its_limit() -> None:
         limits=limits, airspace=Airspace(ground(0.0), walls), goal=(500.0, 1000.0, 500.0), turn_radius_m=30.0
     )
     with pytest.raises(NoMission, match=r"490\.0 m apart in height.*max_climb_deg 2"):
-        plan(p)
+        optimal.plan(p)
     assert climb_tracks(p, p.start[:2], 10.0, 500.0) is None
 
 

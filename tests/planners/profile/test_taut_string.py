@@ -9,7 +9,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from gcsplan.arrays import Floats
-from gcsplan.planners.profile.taut_string import Blocked, Profile, doors, taut_string
+from gcsplan.planners.profile.taut_string import Blocked, Profile, taut_string
 
 Doors = tuple[Floats, Floats, Floats, float, float]
 
@@ -138,12 +138,6 @@ def test_floor_that_touches_the_ceiling_is_passed_at_that_very_height() -> None:
     found = taut_string(np.arange(3.0), np.array([0.0, 5.0, 0.0]), np.array([9.0, 5.0, 9.0]), 1.0, 1.0)
     assert isinstance(found, Profile)
     assert found.at(np.array([1.0]))[0] == 5.0
-
-
-def test_doors_take_the_narrower_side_of_a_jump() -> None:
-    low, high = doors(np.array([[0.0, 1.0], [5.0, 2.0]]), np.array([[9.0, 8.0], [10.0, 7.0]]))
-    assert low.tolist() == [0.0, 5.0, 2.0]
-    assert high.tolist() == [9.0, 8.0, 7.0]
 
 
 def test_open_doors_leave_a_straight_line() -> None:

@@ -33,7 +33,7 @@ def through(over_m: float, **more: object) -> PlaneSearch:
     plane = looked(problem)
     below = plane.incumbent
     assert below.best is None
-    below.take(plan_band(problem, below.tell, below.budget.begun_s).path.points)
+    below.take(plan_band(problem, below.tell))
     assert below.cost > ROUND_M
     for leg in plane.legs:
         limit_m = 1.05 * leg.straight_m
