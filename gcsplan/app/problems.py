@@ -164,11 +164,7 @@ def make_problem(
     goal_agl_m = _wanted_agl_m(request.approach_agl_m, request.goal_amsl_m, request.goal[2])
     start_amsl = end_point("start", request.start, "takeoff_agl_m", start_agl_m)
     goal_amsl = end_point("goal", request.goal, "approach_agl_m", goal_agl_m)
-    via = tuple(
-        Via(e, n, None if agl is None else float(air.surface.ground_at(e, n)) + agl) for e, n, agl in request.via
-    )
-    if vehicle.turn_radius_m <= 0.0:
-        via = _apart(via, (*request.start[:2], start_amsl), (*request.goal[:2], goal_amsl), notes)
+    via = _vias(air, request, (start_amsl, goal_amsl), notes)
     settings = source.planner
     own = world.airspace.zones[len(source.zones) :]
     wider = Wider(source, world, request, own, objective, seed, given)
@@ -198,15 +194,19 @@ def make_problem(
     return problem, tuple(notes)
 
 
-def _apart(
-    via: tuple[Via, ...], start: tuple[float, float, float], goal: tuple[float, float, float], notes: list[str]
+def _vias(
+    air: Airspace, request: VehicleRequest, ends_amsl_m: tuple[float, float], notes: list[str]
 ) -> tuple[Via, ...]:
-    """``via`` with those moved aside by `SPOT_M` that are one place with the terminal before them, or with the goal
-    behind them, at another altitude: planners need a leg between two altitudes. Adds a note for each."""
+    """The via points. Planners need a leg between two altitudes: for a multicopter, a via that is one place with the
+    terminal before it, or with the goal behind it, at another altitude is moved aside by `SPOT_M`, with a note."""
+    start, goal = (Via(*end[:2], z) for end, z in zip((request.start, request.goal), ends_amsl_m, strict=True))
+    via = [Via(e, n, None if agl is None else float(air.surface.ground_at(e, n)) + agl) for e, n, agl in request.via]
+    if request.vehicle.turn_radius_m > 0.0:
+        return tuple(via)
     out: list[Via] = []
     for k, v in enumerate(via):
-        before = Via(*start) if not out else out[-1]
-        beside = [before, Via(*goal)] if k == len(via) - 1 else [before]
+        before = out[-1] if out else start
+        beside = [before, goal] if k == len(via) - 1 else [before]
         same = [x for x in beside if math.dist((x.east_m, x.north_m), (v.east_m, v.north_m)) < SPOT_M]
         if any(v.amsl_m is not None and x.amsl_m is not None and abs(x.amsl_m - v.amsl_m) > SPOT_M for x in same):
             v = replace(v, east_m=v.east_m + SPOT_M)
