@@ -42,7 +42,8 @@ PART_OF_SLOPE = 0.9993
 """Factor on the slope limits: arcs are judged by their chords, which are shorter, and so steeper."""
 
 ACCEPTED_M, CHORDS_M = 1.0, 0.2
-"""Metres by which a turn begins early (acceptance radii are whole metres), and by which arcs are judged wider."""
+"""Metres by which a turn begins early or late (acceptance radii are whole metres), and by which arcs are judged
+wider."""
 
 
 def plan_wing(
