@@ -14,6 +14,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from gcsplan.app import wings
 from gcsplan.app.checking import check_files
 from gcsplan.app.fleet_planning import route_of
 from gcsplan.app.model import Plan
@@ -733,13 +734,40 @@ def test_any_vias_far_apart_are_passed_over_flat_ground(count: int, most_deg: fl
         assert_past_vias(over_flat(*places, radius_m=radius_m, end=end), places[:-1])
 
 
-@pytest.mark.parametrize("apart", [2.2, 3.3, 5.0])
+@pytest.mark.parametrize("apart", [1.98, 2.2, 3.3, 5.0])
 def test_a_survey_in_rows_of_a_few_radii_is_flown(apart: float) -> None:
     rows: list[tuple[float, float]] = []
     for k in range(4):
         row = [(900.0, k * apart * 80.0), (2100.0, k * apart * 80.0)]
         rows += row if k % 2 == 0 else row[::-1]
     assert_past_vias(over_flat(*rows, (-400.0, 3.5 * apart * 80.0)), rows)
+
+
+def test_a_via_nearer_than_the_climb_out_is_long_is_reached_by_a_detour() -> None:
+    places = [(600.0, 0.0), (2000.0, 300.0), (3500.0, 0.0)]
+    assert_past_vias(over_flat(*places), places[:-1])
+
+
+def test_neither_end_stays_the_same_while_all_others_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    def ends(first: str, most: int) -> object:
+        return lambda *_: (f"{first}{k}" for k in range(most))
+
+    monkeypatch.setattr(wings, "starts", ends("s", 3))
+    monkeypatch.setattr(wings, "goals", ends("g", 2))
+    nothing = np.zeros((2, 3))
+    found = [f"{a}{b}" for a, b in wings._pairs(None, None, nothing)]  # type: ignore[arg-type]
+    assert found == ["s0g0", "s0g1", "s1g0", "s1g1", "s2g0", "s2g1"]
+
+
+@pytest.mark.parametrize(
+    ("leg", "words"), [(0, "another takeoff_heading_deg"), (4, "put vias farther apart, or allow tighter turns")]
+)
+def test_a_refusal_says_whether_the_ends_or_the_vias_leave_no_room(
+    leg: int, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(wings, "_unfitting", lambda *_: np.array([leg]))
+    with pytest.raises(NoMission, match=words):
+        over_flat((2000.0, 0.0), (2000.0, 1500.0), (4000.0, 1500.0))
 
 
 @pytest.fixture(scope="module")
