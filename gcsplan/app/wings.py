@@ -13,6 +13,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import count, islice
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from gcsplan.app.margins import larger, on_path
 from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.problems import built, looked_over, make_problem, run_planner, unsafe
 from gcsplan.app.wing_ends import FlightEnd, circle_m, goals, starts
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.check.arcs import UNFITTING
 from gcsplan.check.circles import circle_growth
 from gcsplan.errors import NoMission
@@ -40,11 +41,18 @@ ATTEMPTS = 5
 MOST_JOINTS = 8
 """Most pairs of climb-out and approach for which a path is searched."""
 
+MOST_REFUSED = 3
+"""Most pairs without a path: it may be that another climb-out leaves room for the first turn."""
+
+JOINTS = "none that joins the climb-out and the approach: give another takeoff_heading_deg, or move start or goal"
+APART = "none whose turns all fit between its way points: put vias farther apart, or allow tighter turns"
+
 PART_OF_SLOPE = 0.9993
 """Factor on the slope limits: arcs are judged by their chords, which are shorter, and so steeper."""
 
 ACCEPTED_M, CHORDS_M = 1.0, 0.2
-"""Metres by which a turn begins early (acceptance radii are whole metres), and by which arcs are judged wider."""
+"""Metres by which a turn begins early or late (acceptance radii are whole metres), and by which arcs are judged
+wider."""
 
 
 def plan_wing(
@@ -97,31 +105,56 @@ def _joined(
 ) -> VehiclePlan:
     """The mission with the first pair of ends that a path can be joined to; it may still break limits."""
     vehicle = request.vehicle
+    refused: list[NoMission] = []
+    why = ""
     for tried, (start, goal) in enumerate(_pairs(problem, limited, sharp)):
         if tried == MOST_JOINTS:
             break
         inner = _inner(problem, start, goal)
-        solution = _whole(problem, run_planner(brief.run, inner, vehicle, world), start, goal)
+        try:
+            found = run_planner(brief.run, inner, vehicle, world)
+        except NoMission as refusal:
+            refused.append(refusal)
+            if refusal.reason != "not_found" or len(refused) == MOST_REFUSED:
+                raise refused[0] from refused[0].__cause__
+            continue
+        solution = _whole(problem, found, start, goal)
         order = _order(brief, limited, start, goal)
-        if not _fits(solution.path.points, order, vehicle.turn_radius_m):
+        unfit = _unfitting(solution.path.points, order, vehicle.turn_radius_m)
+        if len(unfit):
+            last = len(solution.path.points) - (0 if goal is None else len(goal.chain))
+            inside = (unfit > len(start.chain)) & (unfit < last)
+            why = APART if inside.any() else JOINTS
             continue
         over = looked_over(brief, solution)
         mission, verdict = built(over, request, solution, order)
-        if any(words.endswith(UNFITTING) for words in verdict.not_judged):
+        crowded = [words for words in verdict.not_judged if words.endswith(UNFITTING)]
+        if crowded:
+            why = f"{APART}\n  {crowded[0]}"
             continue
         speed = vehicle.speed_max_m_s
         return VehiclePlan(request, inner, solution, mission, verdict, speed, tuple(_words(start, goal)), order, over)
+    if refused and not why:
+        raise refused[0] from refused[0].__cause__
     raise NoMission(
-        f"{vehicle.name}: paths with turns of turn_radius_m {vehicle.turn_radius_m:g} were found, but none that joins "
-        f"the climb-out and the approach: give another takeoff_heading_deg, or move start or goal",
+        f"{vehicle.name}: paths with turns of turn_radius_m {vehicle.turn_radius_m:g} were found, but {why or JOINTS}",
         reason="not_found",
     )
 
 
 def _pairs(problem: Problem, limited: VehicleRequest, sharp: Floats) -> Iterator[tuple[FlightEnd, FlightEnd | None]]:
-    for start in starts(problem, limited, sharp):
-        for goal in goals(problem, limited, sharp):
-            yield start, goal
+    """All pairs of ends, the most natural ones first; neither end stays the same while all others are gone through."""
+    left, right = starts(problem, limited, sharp), goals(problem, limited, sharp)
+    begins: list[FlightEnd] = []
+    finishes: list[FlightEnd | None] = []
+    for total in count():
+        begins += islice(left, 1)
+        finishes += islice(right, 1)
+        if total > len(begins) + len(finishes) - 2:
+            return
+        for k in range(total + 1):
+            if k < len(begins) and total - k < len(finishes):
+                yield begins[k], finishes[total - k]
 
 
 def _with_goal_circle(problem: Problem, request: VehicleRequest) -> Problem:
@@ -195,13 +228,13 @@ def _order(brief: Brief, request: VehicleRequest, start: FlightEnd, goal: Flight
     return Order(request.end, brief.source.altitude_frame, wing=wing)
 
 
-def _fits(points: Floats, order: Order, radius: float) -> bool:
-    """Whether the arcs at all corners, joints included, fit between their way points."""
+def _unfitting(points: Floats, order: Order, radius: float) -> Indices:
+    """The legs between whose corners, joints included, the arcs do not fit; leg 0 leaves the climb-out."""
     assert order.wing is not None
     whole = np.array([order.wing.leaves, *points, *([] if order.wing.touch is None else [order.wing.touch])])
     tangent = tangents_m(whole, radius)
     run = np.hypot(*np.diff(whole[:, :2], axis=0).T)
-    return bool((tangent[:-1] + tangent[1:] <= run + 0.05).all())
+    return np.flatnonzero(tangent[:-1] + tangent[1:] > run + 0.05)
 
 
 def _words(start: FlightEnd, goal: FlightEnd | None) -> Sequence[str]:

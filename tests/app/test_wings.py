@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path as FilePath
@@ -14,6 +14,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from gcsplan.app import wings
 from gcsplan.app.checking import check_files
 from gcsplan.app.fleet_planning import route_of
 from gcsplan.app.model import Plan
@@ -32,7 +33,7 @@ from gcsplan.check.tuning import DEFAULTS, Tuning
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
 from gcsplan.fleet.timing import Course
-from gcsplan.mavlink.build.fixed_wing import build_wing, flown_m, parted, tangents_m, thinned
+from gcsplan.mavlink.build.fixed_wing import accepted_m, build_wing, flown_m, parted, tangents_m, thinned
 from gcsplan.mavlink.build.order import Order, Wing
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
@@ -585,6 +586,14 @@ def test_a_mission_takes_off_ahead_turns_at_its_acceptance_radii_and_ends_as_ask
         assert flown.items[-1].params[2] == 100.0
 
 
+@pytest.mark.parametrize(
+    ("tangent_m", "run_m", "accepted"),
+    [(33.14, 900.0, 34), (33.14, 33.14, 33), (33.14, 33.9, 33), (33.14, 34.0, 34), (33.0, 33.0, 33), (0.4, 0.4, 1)],
+)
+def test_no_corner_is_accepted_from_before_its_leg(tangent_m: float, run_m: float, accepted: float) -> None:
+    assert accepted_m(tangent_m, run_m) == accepted
+
+
 def test_a_corner_that_needs_more_acceptance_than_a_byte_holds_is_two_on_the_same_arc() -> None:
     craft, turn = wing(300.0), math.radians(120.0)
     points = np.array(
@@ -662,6 +671,103 @@ def test_the_terrain_frame_is_refused_for_a_fixed_wing() -> None:
     text = text_of().replace("altitude_frame: relative", "altitude_frame: terrain")
     with pytest.raises(InputError, match="use altitude_frame: relative or amsl"):
         load_mission(MISSIONS / "m.yaml", text=text)
+
+
+FLAT_TEXT = """
+version: 1
+frame: {origin: [47.0, 8.0], amsl_m: 0}
+terrain: {flat_m: 100}
+limits: {min_agl_m: 80, horizontal_clearance_m: 30, track_error_m: 10, altitude_error_m: 8}
+no_fly: []
+"""
+
+
+def over_flat(*places: tuple[float, float], radius_m: float = 80.0, end: str = "loiter") -> Plan:
+    """The plan of a fixed wing from the origin past all but the last of ``places``, over flat and empty ground."""
+    where = [f"{{east_m: {e:.3f}, north_m: {n:.3f}}}" for e, n in places]
+    speed = "[12, 15]" if radius_m < 60.0 else "[14, 18]"
+    text = FLAT_TEXT + (
+        f"vehicles: [{{name: uav1, sysid: 1, autopilot: arduplane, turn_radius_m: {radius_m}, end: {end}, "
+        f"speed_m_s: {speed}, max_climb_deg: 8, start: {{east_m: 0, north_m: 0}}, via: [{', '.join(where[:-1])}], "
+        f"goal: {where[-1]}}}]"
+    )
+    return plan(load_mission(MISSIONS / "m.yaml", text=text))
+
+
+def assert_past_vias(found: Plan, vias: Sequence[tuple[float, float]]) -> None:
+    """Assert that the mission is safe, and that its arcs and legs as judged lead through each via, in order."""
+    (v,) = found.vehicles
+    assert v.verdict.safe is True, v.verdict.describe()
+    assert not v.verdict.not_judged
+    places = np.array([leg.end for leg in v.verdict.legs])
+    line = np.column_stack([*found.world.frame.to_plane(places[:, 0], places[:, 1]).T])
+    passed = 0
+    for via in vias:
+        away = [_away(np.array(via), a, b) for a, b in pairwise(line[passed:])]
+        near = next((k for k, m in enumerate(away) if m <= 0.3), None)
+        assert near is not None, (via, min(away))
+        passed += near
+
+
+def around(seed: int, count: int, most_deg: float) -> list[tuple[float, float]]:
+    """Places 800 to 2500 m apart, with turns of up to ``most_deg`` at each but the last."""
+    rng = np.random.default_rng(seed)
+    heading, here, places = float(rng.uniform(0.0, 2.0 * math.pi)), np.zeros(2), []
+    for _ in range(count + 1):
+        heading += math.radians(float(rng.uniform(-most_deg, most_deg)))
+        here = here + rng.uniform(800.0, 2500.0) * np.array([math.cos(heading), math.sin(heading)])
+        places.append((float(here[0]), float(here[1])))
+    return places
+
+
+def test_two_vias_with_right_angles_are_passed_over_flat_ground() -> None:
+    places = [(2000.0, 0.0), (2000.0, 1500.0), (4000.0, 1500.0)]
+    assert_past_vias(over_flat(*places), places[:-1])
+
+
+@pytest.mark.parametrize("most_deg", [12.0, 35.0, 115.0])
+@pytest.mark.parametrize("count", [2, 3, 4])
+def test_any_vias_far_apart_are_passed_over_flat_ground(count: int, most_deg: float) -> None:
+    for seed in range(3):
+        places = around(seed, count, most_deg)
+        radius_m, end = (80.0, 40.0)[seed % 2], ("loiter", "loiter", "land")[seed % 3]
+        assert_past_vias(over_flat(*places, radius_m=radius_m, end=end), places[:-1])
+
+
+@pytest.mark.parametrize("apart", [1.98, 2.2, 3.3, 5.0])
+def test_a_survey_in_rows_of_a_few_radii_is_flown(apart: float) -> None:
+    rows: list[tuple[float, float]] = []
+    for k in range(4):
+        row = [(900.0, k * apart * 80.0), (2100.0, k * apart * 80.0)]
+        rows += row if k % 2 == 0 else row[::-1]
+    assert_past_vias(over_flat(*rows, (-400.0, 3.5 * apart * 80.0)), rows)
+
+
+def test_a_via_nearer_than_the_climb_out_is_long_is_reached_by_a_detour() -> None:
+    places = [(600.0, 0.0), (2000.0, 300.0), (3500.0, 0.0)]
+    assert_past_vias(over_flat(*places), places[:-1])
+
+
+def test_neither_end_stays_the_same_while_all_others_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    def ends(first: str, most: int) -> object:
+        return lambda *_: (f"{first}{k}" for k in range(most))
+
+    monkeypatch.setattr(wings, "starts", ends("s", 3))
+    monkeypatch.setattr(wings, "goals", ends("g", 2))
+    nothing = np.zeros((2, 3))
+    found = [f"{a}{b}" for a, b in wings._pairs(None, None, nothing)]  # type: ignore[arg-type]
+    assert found == ["s0g0", "s0g1", "s1g0", "s1g1", "s2g0", "s2g1"]
+
+
+@pytest.mark.parametrize(
+    ("leg", "words"), [(0, "another takeoff_heading_deg"), (4, "put vias farther apart, or allow tighter turns")]
+)
+def test_a_refusal_says_whether_the_ends_or_the_vias_leave_no_room(
+    leg: int, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(wings, "_unfitting", lambda *_: np.array([leg]))
+    with pytest.raises(NoMission, match=words):
+        over_flat((2000.0, 0.0), (2000.0, 1500.0), (4000.0, 1500.0))
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,9 @@
 - NAV_TAKEOFF: param1 is the minimum pitch in whole degrees; ArduPlane holds the heading of its launch. The item's
   location is the end of the climb-out, which shows that heading to the launching person and to the check.
 - NAV_WAYPOINT: param2, the acceptance radius, is the tangent length of the corner, rounded up to whole metres: the
-  turn begins there. ArduPlane stores it in one byte, so a corner that needs more becomes two way points on one arc.
+  turn begins there. Where an arc takes all of its leg, as behind a via, it is rounded down: a way point that lies
+  within its own radius when the leg begins would be passed over. ArduPlane stores it in one byte, so a corner that
+  needs more becomes two way points on one arc.
 - No DO_LAND_START before a landing: with it ArduPlane does not arm unless RTL_AUTOLAND is set.
 """
 
@@ -24,14 +26,14 @@ from gcsplan.vehicle import Vehicle
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
 
-__all__ = ["build_wing", "flown_m", "parted", "pitch_deg", "tangents_m", "thinned"]
+__all__ = ["accepted_m", "build_wing", "flown_m", "parted", "pitch_deg", "tangents_m", "thinned"]
 
 
 FARTHEST_ACCEPTED_M = 255.0
 """Largest acceptance radius that ArduPlane stores, in metres (one byte)."""
 
 ROUNDED_M = 1e-3
-"""Metres: a tangent that exceeds whole metres by less is not rounded up, so a turn begins at most this much late."""
+"""Metres: a tangent that exceeds whole metres by less is not rounded up."""
 
 LEAST_ACCEPTED_M = 1.0
 
@@ -106,6 +108,17 @@ def parted(points: Floats, radius_m: float) -> Floats:
         points = np.vstack([points[:k], pair, points[k + 1 :]])
 
 
+def accepted_m(tangent_m: float, run_m: float) -> float:
+    """The acceptance radius of a corner at the end of a leg of ``run_m``: whole metres, and not above ``run_m``.
+
+    So a turn begins less than a metre early, or, where its arc begins with the leg, less than a metre late.
+    """
+    accepted = math.ceil(tangent_m - ROUNDED_M)
+    if accepted > run_m:
+        accepted = math.floor(run_m)
+    return min(max(LEAST_ACCEPTED_M, accepted), FARTHEST_ACCEPTED_M)
+
+
 def build_wing(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[float, float], order: Order) -> Mission:
     """Return the mission that flies ``path`` (fly-by way points) between the ends in ``order.wing``."""
     wing = order.wing
@@ -124,6 +137,7 @@ def build_wing(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[float
     # The first point turns from the climb-out into the path, the last one from the path into the glide.
     whole = np.array([wing.leaves, *points, *([] if wing.touch is None else [wing.touch])])
     tangent = tangents_m(whole, radius)[1 : len(points) + 1]
+    run = np.hypot(*np.diff(whole[:, :2], axis=0).T)
     places = world.frame.to_degrees(points[:, 0], points[:, 1])
 
     def item(
@@ -147,7 +161,7 @@ def build_wing(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[float
         if i == len(points) - 1 and order.end == "loiter":
             items.append(item(cmd.LOITER_UNLIM, places[i], frame, int(cm[i]), (0.0, 0.0, wing.circle_m, 0.0)))
             continue
-        accepted = min(max(LEAST_ACCEPTED_M, math.ceil(float(tangent[i]) - ROUNDED_M)), FARTHEST_ACCEPTED_M)
+        accepted = accepted_m(float(tangent[i]), float(run[i]))
         items.append(item(cmd.WAYPOINT, places[i], frame, int(cm[i]), (0.0, accepted, 0.0, 0.0)))
     if wing.touch is not None:
         touch = world.frame.to_degrees(wing.touch[0], wing.touch[1])

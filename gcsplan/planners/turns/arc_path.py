@@ -3,7 +3,7 @@
 Every turn follows the edge of a disc, on its left or on its right, and legs are the tangents between neighbouring
 discs. So turns never overlap however close the discs are, and a turn of any size is one arc. For an autopilot each arc
 is then divided into turns of at most `MOST_DEG`; the way point of a turn is where its tangents meet. The arc of a disc
-with a pin passes through that point and is divided there.
+with a pin passes through that point, and is divided there unless the turn is slight.
 """
 
 from __future__ import annotations
@@ -25,6 +25,12 @@ ROUNDS = 12
 NO_TURN = 1e-9
 """Turns up to this many radians count as none."""
 
+DAMPED = 40
+"""Rounds more in which pinned discs go half of the way to where they belong, if they swing to and fro."""
+
+MISSED_M = 1e-3
+"""Metres by which an arc may end before its pin, or begin behind it."""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ArcPath:
@@ -32,8 +38,8 @@ class ArcPath:
 
     ``pin`` (K, 2): the point that a disc must touch, NaN where free; ``pin_m`` (K,) its altitude, NaN where free.
     ``heading`` (K + 1,) of the legs, radians from east to north; ``turn`` (K,) >= 0 radians. ``gap_m``: metres by which
-    neighbours are too close for a tangent, summed; where it is not 0 no such arc path exists, and ``heading`` and
-    ``turn`` are meaningless.
+    neighbours are too close for a tangent, summed, or by which arcs miss their pins; where it is not 0 no such arc path
+    exists, and ``heading`` and ``turn`` are meaningless.
     """
 
     ends: Floats
@@ -92,7 +98,8 @@ def tight(arc_path: ArcPath) -> ArcPath:
     """The arc path around its discs where they are; free discs that it need not touch are removed, pinned ones moved so
     that they touch their pins."""
     arc_path = _drawn(arc_path)
-    for _ in range(len(arc_path.sense) + ROUNDS):
+    straight = len(arc_path.sense) + ROUNDS
+    for k in range(straight + DAMPED):
         loose = (arc_path.turn <= NO_TURN) & ~arc_path.pinned
         if arc_path.gap_m == 0.0 and loose.any():
             worst = np.zeros(len(loose), bool)
@@ -101,10 +108,12 @@ def tight(arc_path: ArcPath) -> ArcPath:
             continue
         if not arc_path.pinned.any():
             break
-        laid = _pins_laid(arc_path)
+        laid = _pins_laid(arc_path, 1.0 if k < straight else 0.5)
         if np.abs(laid.centre - arc_path.centre).max() < 1e-9:
             break
         arc_path = laid
+    if arc_path.gap_m == 0.0 and arc_path.pinned.any():
+        arc_path = replace(arc_path, gap_m=float(missed_m(arc_path).sum()))
     return arc_path
 
 
@@ -169,6 +178,26 @@ def outline(arc_path: ArcPath) -> Outline:
     )  # fmt: skip
 
 
+def lacking_m(arc_path: ArcPath) -> Floats:
+    """(K + 1,) metres by which the neighbours at the ends of each leg are too close for a tangent; less than 0 where
+    they are not, and -inf where they never are."""
+    way = np.vstack([arc_path.ends[:1], arc_path.centre, arc_path.ends[1:]])
+    side = np.concatenate([[0.0], arc_path.sense, [0.0]])
+    needed = arc_path.radius_m * np.abs(np.diff(side))
+    return np.asarray(np.where(needed > 0.0, needed - np.hypot(*np.diff(way, axis=0).T), -np.inf))
+
+
+def missed_m(arc_path: ArcPath) -> Floats:
+    """(K,) metres along each disc from its arc to its pin; 0 without a pin, and where the arc reaches it."""
+    spoke = arc_path.pin - arc_path.centre
+    begin = arc_path.heading[:-1] - 0.5 * math.pi * arc_path.sense
+    at = arc_path.sense * (np.arctan2(spoke[:, 1], spoke[:, 0]) - begin)
+    middle = 0.5 * arc_path.turn
+    off = np.abs((at - middle + math.pi) % (2.0 * math.pi) - math.pi) - middle
+    off_m = arc_path.radius_m * np.where(arc_path.pinned, off, 0.0)
+    return np.where(off_m > MISSED_M, off_m, 0.0)
+
+
 def _headings(points: Floats) -> Floats:
     d = np.diff(points, axis=0)
     return np.arctan2(d[:, 1], d[:, 0])
@@ -200,13 +229,20 @@ def _drawn(arc_path: ArcPath, *, parted: bool = False) -> ArcPath:
     return replace(arc_path, centre=centre, heading=heading, turn=turn, gap_m=float(gap[0]))
 
 
-def _pins_laid(arc_path: ArcPath) -> ArcPath:
-    """Place pinned discs so that the middle of their turn is at the pin; on the other side if the turn is negative."""
+def _pins_laid(arc_path: ArcPath, part: float = 1.0) -> ArcPath:
+    """Place pinned discs so that the middle of their turn is at the pin; on the other side if the turn is negative.
+
+    ``part``: how far they are turned around their pins towards there; less than all of it ends a swinging to and fro.
+    """
     if arc_path.gap_m > 0.0:
         return arc_path
     sense = np.where(arc_path.pinned & (arc_path.turn < 0.0), -arc_path.sense, arc_path.sense)
     # Not `_middles`: for a turn of more than 180 degrees that takes the middle of the shorter turn the other way.
     middle = arc_path.heading[:-1] + 0.5 * arc_path.sense * arc_path.turn
+    if part < 1.0:
+        spoke = arc_path.sense[:, None] * (arc_path.pin - arc_path.centre)
+        now = np.arctan2(spoke[:, 0], -spoke[:, 1])
+        middle = now + part * ((middle - now + math.pi) % (2.0 * math.pi) - math.pi)
     normal = np.stack([-np.sin(middle), np.cos(middle)], axis=-1)
     centre = np.where(
         arc_path.pinned[:, None], arc_path.pin + arc_path.radius_m * sense[:, None] * normal, arc_path.centre

@@ -8,5 +8,8 @@ from gcsplan.native.unit import Unit
 
 UNIT = Unit("turns", Path(__file__).parent, "gcsplan.planners.turns", ("kernels",))
 
+device = UNIT.device
+"""Marks a function that only kernels call."""
+
 kernel = UNIT.kernel
 """Marks a function that Python calls. It allocates nothing: its caller passes all arrays."""

@@ -7,11 +7,15 @@ import math
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Int64s
-from gcsplan.planners.turns.compiled import kernel
+from gcsplan.planners.turns.compiled import device, kernel
 
 END_M, FORGIVEN_M = 60.0, 25.0
 """Within `END_M` metres of start and goal, floors that are exceeded by less than `FORGIVEN_M` metres are ignored (see
 `profile.track`)."""
+
+SLIGHT = 0.5
+"""A turn of up to so many radians past a pin is not divided there: way points that are near to each other are moved by
+rounding on the wire so far that their arcs overlap."""
 
 CHORD_M = 0.05
 """Most metres by which an arc lies outside its chords."""
@@ -78,6 +82,15 @@ def part_neighbours(ends: Floats, radius: float, centre: Floats, sense: Floats, 
             centre[k, 1] += part * dy / d
 
 
+@device
+def _turn_to_pin(east: float, north: float, begin: float, sense: float, whole: float) -> float:
+    """The turn of an arc as far as to its pin, seen from its centre; -1 without a pin. ``begin``: see the caller."""
+    if east != east:
+        return -1.0
+    t = sense * (math.atan2(north, east) - begin)
+    return min(max((t + 0.5 * math.pi) % (2.0 * math.pi) - 0.5 * math.pi, 0.0), whole)
+
+
 @kernel("f8[,] f8 f8[,] f8[] f8[,] f8[] f8[] f8 f8 f8[,] f8[] f8[] i8[,] f8[,] i8[] i8[]")
 def fill_outline(
     ends: Floats, radius: float, centre: Floats, sense: Floats, pin: Floats, heading: Floats, turn: Floats,
@@ -94,22 +107,26 @@ def fill_outline(
     n, turns = 1, 0
     for k in range(len(sense)):
         whole = turn[k]
-        if whole <= 0.0:
+        straight = whole <= 1e-12
+        if straight and pin[k, 0] != pin[k, 0]:
             continue
         # Angle, seen from the centre, at which the arc begins; it runs in the direction of ``sense``.
         begin = heading[k] - sense[k] * 0.5 * math.pi
         x = centre[k, 0] + radius * math.cos(begin)
         y = centre[k, 1] + radius * math.sin(begin)
+        if straight:
+            x, y = pin[k, 0], pin[k, 1]
         way = math.hypot(x - points[n - 1, 0], y - points[n - 1, 1])
         if way > 1e-6:
             points[n, 0], points[n, 1] = x, y
             true_m[n] = true_m[n - 1] + way
             n += 1
-        cut = -1.0
-        if pin[k, 0] == pin[k, 0]:
-            t = sense[k] * (math.atan2(pin[k, 1] - centre[k, 1], pin[k, 0] - centre[k, 0]) - begin)
-            cut = (t + 0.5 * math.pi) % (2.0 * math.pi) - 0.5 * math.pi
-            cut = min(max(cut, 0.0), whole)
+        if straight:
+            pin_at[k] = n - 1
+            continue
+        cut = _turn_to_pin(pin[k, 0] - centre[k, 0], pin[k, 1] - centre[k, 1], begin, sense[k], whole)
+        alone = whole <= SLIGHT and abs(cut - 0.5 * whole) < 1e-6
+        cut = -1.0 if alone else cut
         for part in range(2):
             if part == 0:
                 t0, t1 = 0.0, whole if cut < 0.0 else cut
@@ -142,7 +159,9 @@ def fill_outline(
                 corners[turns, 1] = centre[k, 1] + out * math.sin(at)
                 disc[turns] = k
                 turns += 1
-        if cut >= 0.0:
+        if alone:
+            pin_at[k] = arcs[turns - 1, 1]
+        if cut >= 0.0 or alone:
             points[pin_at[k], 0], points[pin_at[k], 1] = pin[k, 0], pin[k, 1]
     way = math.hypot(ends[1, 0] - points[n - 1, 0], ends[1, 1] - points[n - 1, 1])
     if way > 1e-6:

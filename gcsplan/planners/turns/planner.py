@@ -6,7 +6,8 @@ around discs (`arc_path`) that touch the corners from the obstacle's side, and t
 is checked as flown, with arcs as chords, widened by how far the arc lies outside them. Its altitude profile is drawn
 anew (`turns.profile`), and discs are moved where ground or zones are in the way (`turns.repair`).
 
-- A via is passed exactly: it lies on its arc and is a way point there, between the two that make the arc.
+- A via is passed exactly: it lies on its arc and is a way point there, between the two that make the arc. At a slight
+  turn the arc has one way point, just outside of the via, and the via is the middle of the arc.
 - Start and goal have no heading of their own.
 - No lower bound is computed here; that of the path with corners holds for every path with arcs too.
 """
@@ -24,6 +25,7 @@ from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import distances
 from gcsplan.planners.simplify import thinned
 from gcsplan.planners.turns.arc_path import ArcPath, through, unlooped
+from gcsplan.planners.turns.detours import with_detours
 from gcsplan.planners.turns.repair import Patience, Tried, cost_of, mended, polished
 from gcsplan.world.path import Path
 
@@ -128,6 +130,7 @@ def _arc_paths(problem: Problem, points: Floats, pinned: Bools) -> Iterator[ArcP
         if len(arc_path.sense) in counts:
             continue
         counts.add(len(arc_path.sense))
+        arc_path = with_detours(arc_path)
         open_ = unlooped(arc_path)
         if len(open_.sense) not in counts:
             counts.add(len(open_.sense))

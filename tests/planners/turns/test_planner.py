@@ -274,6 +274,40 @@ def test_a_via_is_passed_exactly_at_its_altitude_and_is_a_way_point() -> None:
     assert np.linalg.norm(found.flown - corners[1], axis=1).min() < 1e-6
 
 
+@pytest.mark.parametrize("aside_m", [0.0, 1e-7, 1.0, 50.0])
+def test_a_via_on_a_nearly_straight_way_is_passed_at_its_altitude(aside_m: float) -> None:
+    corners = at_100((500, 500), (1500, 500 + aside_m), (2500, 500))
+    corners[1, 2] = 150.0
+    problem = problem_of(corners, via=(Via(1500.0, 500.0 + aside_m, 150.0),))
+    found = rounded(problem, corners, np.array([False, True, False]))
+    assert found is not None
+    assert_sound(problem, found)
+    assert np.linalg.norm(found.flown - corners[1], axis=1).min() < 1e-6
+    assert len(found.way_points) == 3  # none so near to another that rounding on the wire turns the leg between them
+
+
+@pytest.mark.parametrize("apart_m", [20.0, 100.0, 139.0, 150.0, 198.0])
+def test_vias_less_than_two_radii_apart_are_both_passed_with_a_detour(apart_m: float) -> None:
+    vias = [(3000.0, 1000.0), (3000.0, 1000.0 + apart_m)]
+    corners = at_100((1000, 1000), *vias, (1000, 1000 + apart_m))
+    problem = problem_of(corners, via=tuple(Via(*v, None) for v in vias))
+    found = rounded(problem, corners, np.array([False, True, True, False]))
+    assert found is not None
+    curve = assert_sound(problem, found)
+    near = [np.hypot(*(curve.points[:, :2] - v).T) for v in vias]
+    assert [a.min() < 0.51 for a in near] == [True, True]
+    assert np.argmin(near[0]) < np.argmin(near[1])
+
+
+def test_a_via_within_a_turn_radius_of_the_start_is_passed_with_a_detour() -> None:
+    corners = at_100((1000, 1000), (940, 1000), (3000, 1000))
+    problem = problem_of(corners, via=(Via(940.0, 1000.0, None),))
+    found = rounded(problem, corners, np.array([False, True, False]))
+    assert found is not None
+    curve = assert_sound(problem, found)
+    assert np.hypot(*(curve.points[:, :2] - corners[1, :2]).T).min() < 0.51
+
+
 @pytest.mark.first_quick
 @pytest.mark.parametrize("goal", [(500.0, 900.0), (500.0, 520.0), (900.0, 500.0)])
 def test_a_via_is_passed_even_where_the_way_goes_straight_back(goal: tuple[float, float]) -> None:
