@@ -25,7 +25,7 @@ from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import distances
 from gcsplan.planners.simplify import thinned
 from gcsplan.planners.turns.arc_path import ArcPath, through, unlooped
-from gcsplan.planners.turns.detours import with_detours
+from gcsplan.planners.turns.loop_discs import with_detours
 from gcsplan.planners.turns.repair import Patience, Tried, cost_of, mended, polished
 from gcsplan.world.path import Path
 
