@@ -138,10 +138,10 @@ def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
             continue
         ends = [np.array([np.interp(x, on_path, path[:, k]) for k in range(3)]) for x in (a, b)]
         known = np.vstack([ends[0], path[(on_path > a) & (on_path < b)], ends[1]])
-        part = _finer(plane, leg, ends, known) if plane.incumbent.gap > FAR else None
-        if part is None:
-            cost = plane.problem.cost(Path(known))
-            part = _along(plane, leg, ends, places[low : high + 1], s[low : high + 1], at[-1], cost)
+        cost = plane.problem.cost(Path(known))
+        part = _along(plane, leg, ends, places[low : high + 1], s[low : high + 1], at[-1], cost)
+        if part is None and plane.incumbent.gap > FAR:
+            part = _finer(plane, leg, ends, known)
         if part is not None:
             better.append((a, b, part))
     out, begin = [], -math.inf
