@@ -22,25 +22,25 @@ def within_budget(problem: Problem, tried: Sequence[Solution], begun_s: float) -
     return replace(problem, budget_s=problem.budget_s * 0.5 ** len(tried), budget=budget)
 
 
-def of_all(tried: Sequence[Solution], problem: Problem) -> Solution:
-    """The last of some solutions, with the lower bound of the first: only that holds under the mission's own limits.
+def of_all(tried: Sequence[Solution], problem: Problem, bound: float | None) -> Solution:
+    """The last of some solutions, with a lower ``bound`` under the limits of the first: those of the later ones are
+    tighter than the mission's own, and so are their bounds.
 
     ``problem``: that of the last one. Times and searches are those of all.
     """
     first, last = tried[0], tried[-1]
     if first is last:
         return last
-    bound, stopped_by = first.lower_bound, last.stopped_by
+    stopped_by = last.stopped_by
     if "time" in (s.stopped_by for s in tried):
         stopped_by = "time"
     elif stopped_by == "gap" and (
         bound is None or problem.cost(last.path) > bound * (1.0 + problem.gap_percent / 100.0)
     ):
         stopped_by = "exhausted"
-    note = (
-        f"planned {len(tried)} times, each time with larger margins: the first mission breaks a limit as it is flown; "
-        "the lower bound is that of the first plan"
-    )
+    note = f"planned {len(tried)} times, each time with larger margins: the first mission breaks a limit as it is flown"
+    if bound is not None:
+        note += "; the lower bound is one under the limits of the first plan"
     return replace(
         last,
         lower_bound=bound,

@@ -30,6 +30,8 @@ from gcsplan.mavlink.build.fixed_wing import flown_m, tangents_m, thinned
 from gcsplan.mavlink.build.order import MARGINS, Order, Wing
 from gcsplan.mission_file import VehicleRequest
 from gcsplan.planners.problem import Problem, Progress, Solution
+from gcsplan.vehicle import Vehicle
+from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
 
@@ -70,8 +72,9 @@ def plan_wing(
     """
     source, vehicle = brief.source, request.vehicle
     margins = replace(MARGINS, track_m=MARGINS.track_m + ACCEPTED_M + CHORDS_M)
-    sharp: Solution | None = None
+    sharp: Floats | None = None
     failed: VehiclePlan | None = None
+    first: Limits | None = None
     tried: list[Solution] = []
     begun_s = time.perf_counter()
     for _ in range(ATTEMPTS):
@@ -80,17 +83,17 @@ def plan_wing(
             problem = _with_goal_circle(within_budget(problem, tried, begun_s), limited)
             if sharp is None:
                 straight = replace(problem, turn_radius_m=0.0, progress=None)
-                sharp = run_planner(brief.run, straight, vehicle, world)
-            plan = _joined(brief, request, limited, problem, sharp.path.points, world)
+                sharp = run_planner(brief.run, straight, vehicle, world).path.points
+            plan = _joined(brief, request, limited, problem, sharp, world, first)
+            first = first or problem.limits
         except NoMission:
             if failed is None:
                 raise
             break  # there is no path with margins this large: report what the last mission broke
         tried.append(plan.solution)
         if not plan.verdict.findings:
-            # The bound of later attempts holds for their ends and limits; that of the first path holds for all.
-            bounded = [replace(s, lower_bound=sharp.lower_bound) for s in tried] if failed else tried
-            return replace(plan, solution=of_all(bounded, problem), notes=(*notes, *plan.notes))
+            solution = of_all(tried, problem, plan.solution.lower_bound)
+            return replace(plan, solution=solution, notes=(*notes, *plan.notes))
         failed = plan
         findings = on_path(plan.mission, plan.verdict)
         if not findings:
@@ -101,9 +104,13 @@ def plan_wing(
 
 
 def _joined(
-    brief: Brief, request: VehicleRequest, limited: VehicleRequest, problem: Problem, sharp: Floats, world: World
-) -> VehiclePlan:
-    """The mission with the first pair of ends that a path can be joined to; it may still break limits."""
+    brief: Brief, request: VehicleRequest, limited: VehicleRequest, problem: Problem, sharp: Floats, world: World,
+    first: Limits | None,
+) -> VehiclePlan:  # fmt: skip
+    """The mission with the first pair of ends that a path can be joined to; it may still break limits.
+
+    ``first``: the limits of the first attempt, None in that attempt: bounds hold for those.
+    """
     vehicle = request.vehicle
     refused: list[NoMission] = []
     why = ""
@@ -132,6 +139,9 @@ def _joined(
         if crowded:
             why = f"{APART}\n  {crowded[0]}"
             continue
+        if first is not None and not verdict.findings:
+            bound = _bound_under(first, brief, inner, vehicle, world)
+            solution = _whole(problem, replace(found, lower_bound=bound), start, goal)
         speed = vehicle.speed_max_m_s
         return VehiclePlan(request, inner, solution, mission, verdict, speed, tuple(_words(start, goal)), order, over)
     if refused and not why:
@@ -205,6 +215,15 @@ def _whole(problem: Problem, solution: Solution, start: FlightEnd, goal: FlightE
     bound = None if solution.lower_bound is None else solution.lower_bound + max(ends_m, 0.0) * per_m
     note = "the lower bound is that of missions with this climb-out" + (" and this approach" if goal else "")
     return replace(solution, path=Path(points), flown=None, lower_bound=bound, notes=(*solution.notes, note))
+
+
+def _bound_under(limits: Limits, brief: Brief, inner: Problem, vehicle: Vehicle, world: World) -> float | None:
+    """A lower bound of the planner's part under other ``limits`` than its own; None if the planner has none."""
+    loose = replace(inner, limits=limits, turn_radius_m=0.0, progress=None, widen=None)
+    try:
+        return run_planner(brief.run, loose, vehicle, world).lower_bound
+    except NoMission:
+        return None
 
 
 def _slowed(points: Floats, leaves: Floats, problem: Problem) -> Floats:

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path as FilePath
+from typing import Any
 
 import numpy as np
 import pytest
@@ -46,6 +47,7 @@ from gcsplan.sim.mission_flight import fly
 from gcsplan.sim.track import make_track
 from gcsplan.vehicle import Autopilot, ClimbOut, Vehicle
 from gcsplan.world.atmosphere import true_per_indicated
+from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Zone
@@ -894,3 +896,25 @@ def test_where_no_climb_out_is_legal_on_the_wanted_heading_the_refusal_names_it(
     with pytest.raises(NoMission, match="no climb-out on takeoff_heading_deg 210") as caught:
         plan(source)
     assert caught.value.reason == "infeasible"
+
+
+def test_a_wing_that_is_planned_again_has_a_bound_under_the_first_limits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of its last ends; the limits of the last plan are tighter, and its bound may be higher than a safe mission."""
+    real, asked = wings._bound_under, list[tuple[Limits, Problem, float | None]]()
+
+    def bound_under(limits: Limits, brief: Any, inner: Problem, *more: Any) -> float | None:
+        asked.append((limits, inner, real(limits, brief, inner, *more)))
+        return asked[-1][2]
+
+    monkeypatch.setattr(wings, "_bound_under", bound_under)
+    (v,) = plan(load_mission(MISSIONS / "m.yaml", text=text_of())).vehicles
+    ((limits, inner, bound),) = asked
+    assert inner.limits.altitude_error_m > limits.altitude_error_m
+    assert bound is not None
+    assert v.solution.lower_bound is not None
+    assert bound <= v.solution.lower_bound <= v.verdict.length_m
+    tight = real(inner.limits, v.brief, inner, v.request.vehicle, v.brief.world)  # type: ignore[arg-type,union-attr]
+    assert tight is not None
+    assert bound <= tight * (1.0 + 1e-3)
+    assert any("this climb-out" in note for note in v.solution.notes)
+    assert any("planned 2 times" in note for note in v.solution.notes)
