@@ -207,12 +207,12 @@ def _vias(
     for k, v in enumerate(via):
         before = out[-1] if out else start
         beside = [before, goal] if k == len(via) - 1 else [before]
-        same = [x for x in beside if math.dist((x.east_m, x.north_m), (v.east_m, v.north_m)) < SPOT_M]
+        same = [x for x in beside if math.dist((x.east_m, x.north_m), (v.east_m, v.north_m)) < 0.5 * SPOT_M]
         if any(v.amsl_m is not None and x.amsl_m is not None and abs(x.amsl_m - v.amsl_m) > SPOT_M for x in same):
-            v = replace(v, east_m=v.east_m + SPOT_M)
-            notes.append(
-                f"via point {k + 1} is moved {100.0 * SPOT_M:g} cm to the east: the climb there is on the spot"
-            )
+            # Not all to the same side: the one before may have been moved from the same place.
+            east_m, north_m = (SPOT_M, 0.0) if k % 2 == 0 else (0.0, SPOT_M)
+            v = replace(v, east_m=v.east_m + east_m, north_m=v.north_m + north_m)
+            notes.append(f"via point {k + 1} is moved {100.0 * SPOT_M:g} cm aside: the climb there is on the spot")
         out.append(v)
     return tuple(out)
 

@@ -227,12 +227,14 @@ def test_a_plan_with_larger_margins_keeps_the_bound_of_the_first(monkeypatch: py
     assert once.solution.notes == ()
 
 
-@pytest.mark.parametrize("climb_deg", [90.0, 30.0])
-def test_vias_over_one_place_are_climbs_on_the_spot(climb_deg: float) -> None:
-    """Over the start, twice over a place on the way, and over the goal."""
-    a, b = [36.6, -84.3], [36.6, -84.28]
-    middle = [36.603, -84.29]
-    vias = [[*a, 100.0], [*middle, 60.0], [*middle, 110.0], [*b, 90.0]]
+A, MIDDLE, B = [36.6, -84.3], [36.603, -84.29], [36.6, -84.28]
+FOUR = [[*A, 100.0], [*MIDDLE, 60.0], [*MIDDLE, 110.0], [*B, 90.0]]
+SEVEN = [*FOUR[:1], [*A, 70.0], *FOUR[1:3], [*MIDDLE, 80.0], [*B, 90.0], [*B, 120.0]]
+
+
+@pytest.mark.parametrize(("climb_deg", "vias"), [(90.0, FOUR), (30.0, FOUR), (90.0, SEVEN)])
+def test_vias_over_one_place_are_climbs_on_the_spot(climb_deg: float, vias: list[list[float]]) -> None:
+    """Over the start, at two or three altitudes over a place on the way, and over the goal."""
     craft = OVER_A_ZONE["vehicles"][0] | {"autopilot": "arducopter", "via": vias}
     limits = {"min_agl_m": 40, "max_climb_deg": climb_deg}
     asked = OVER_A_ZONE | {"no_fly": [], "limits": limits, "vehicles": [craft]}
