@@ -132,6 +132,10 @@ class Budget:
         """Whether that many counted seconds and megabytes are left."""
         return seconds <= self.left and megabytes <= self.megabytes
 
+    def anew(self, seconds: float, megabytes: float) -> Budget:
+        """A budget that begins now, with the same stops by the clock as this one."""
+        return Budget(seconds, megabytes, self.clocked, self.until_s)
+
     @classmethod
     def endless(cls, *, clocked: bool = True, until_s: float = math.inf) -> Budget:
         """A budget without limits. A problem that carries one without ``clocked`` is planned without a clock."""

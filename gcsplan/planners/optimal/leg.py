@@ -119,7 +119,7 @@ class Leg:
             except Exhausted as given_up:
                 # The searched part is the same as a finished flood with a shorter limit.
                 self.length_m = self.reach_m = given_up.seen_m * (1.0 - 1e-9)
-                self._guide = _guide(self._mesh, a, b, self.reach_m)
+                self._guide = _flooded(self._mesh, a, b, self.reach_m)
                 return
             if way is not None:
                 self.length_m, self.last_track = way.length_m, way.points
@@ -372,7 +372,7 @@ class Leg:
     def _from_start(self) -> Guide:
         """Distances from the start over the coarse mesh, as far as the flood from the goal went."""
         if self._ahead is None:
-            self._ahead = _guide(self._guide.mesh, self.start.place, self.goal.place, self.reach_m, self._guide)
+            self._ahead = _flooded(self._guide.mesh, self.start.place, self.goal.place, self.reach_m, self._guide)
         return self._ahead
 
     def _around(self, detour: float) -> Box:
@@ -390,7 +390,7 @@ class Leg:
         return make_plane(self.problem, self._around(detour), parts, stride, stride, reach)
 
 
-def _guide(mesh: Mesh, start: Place, goal: Place, limit_m: float, ahead: Guide | None = None) -> Guide:
+def _flooded(mesh: Mesh, start: Place, goal: Place, limit_m: float, ahead: Guide | None = None) -> Guide:
     """Distances from ``start`` over a mesh, for tracks to ``goal`` shorter than ``limit_m``; zeros, which are bounds as
     well, if the budget leaves too little to find them."""
     try:

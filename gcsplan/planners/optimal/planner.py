@@ -30,7 +30,6 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import NoMission
-from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.governor import govern
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.searches import Searches, left_out
@@ -54,9 +53,7 @@ def plan(problem: Problem) -> Solution:
     ``options``: ``without``, names of searches to leave out. If no path is found, raises Refusal (a NoMission), which
     names the binding constraint and says whether it is proved that there is no path.
     """
-    problem = replace(
-        problem, budget=Budget(problem.budget_s, problem.budget_mb, problem.budget.clocked, problem.budget.until_s)
-    )
+    problem = replace(problem, budget=problem.budget.anew(problem.budget_s, problem.budget_mb))
     return plan_over(problem, _within)
 
 

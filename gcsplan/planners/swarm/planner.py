@@ -20,7 +20,6 @@ from gcsplan.arrays import Floats, Indices
 from gcsplan.optimisers.driver import Result, State, minimise
 from gcsplan.optimisers.registry import Entry as Row
 from gcsplan.optimisers.registry import get as get_optimiser
-from gcsplan.planners.budget import Budget
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
 from gcsplan.planners.refusal import check_ends
 from gcsplan.planners.registry import Entry
@@ -152,7 +151,7 @@ def until_found(problem: Problem, row: Entry, once: Callable[[Problem, Settings]
     begun = time.perf_counter()
     check_ends(problem)
     settings = warm_start.resolved(problem, Settings.of(row, problem.options))
-    budget = Budget(problem.budget_s, problem.budget_mb, problem.budget.clocked, problem.budget.until_s)
+    budget = problem.budget.anew(problem.budget_s, problem.budget_mb)
     for number in range(SEARCHES):
         seed = problem.seed if number == 0 else int(np.random.SeedSequence([problem.seed, number]).generate_state(1)[0])
         try:

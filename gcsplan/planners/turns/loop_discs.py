@@ -1,4 +1,4 @@
-"""Detours of arc paths: free discs beside pins that are too close to their neighbours for turns of this radius.
+"""Loops of arc paths: free discs beside pins that are too close to their neighbours for turns of this radius.
 
 The arc of a pinned disc passes its pin in the middle. Between pins less than some 1.4 radii apart, or between a pin and
 an end that lies in its disc, there is no such arc path. With a free disc between them, which is flown around in a loop,
@@ -15,7 +15,7 @@ import numpy as np
 from gcsplan.planners.turns.arc_path import ArcPath, inserted, lacking_m, missed_m
 
 WAYS, RUNS = 12, (0.0, 0.75, 2.0, 4.0)
-"""Headings at which a detour leaves its pin or arrives there, and how far from it, in turn radii."""
+"""Headings at which a loop leaves its pin or arrives there, and how far from it, in turn radii."""
 
 RUNS_AT_ENDS = (2.0, 4.0)
 """Likewise at start and goal, where a turn from another heading or to another one may have to fit."""
@@ -24,12 +24,12 @@ SPARE_M = 1e-6
 """Metres that turns to different sides must leave between them: discs that just touch may overlap by rounding."""
 
 
-def with_detours(arc_path: ArcPath) -> ArcPath:
+def with_loops(arc_path: ArcPath) -> ArcPath:
     """``arc_path`` with free discs beside pins where legs are too short; the same if there are none, or none helps."""
     for _ in range(len(arc_path.sense) + 1 if arc_path.pinned.any() else 0):
         short = _short_legs(arc_path)
         for leg in short:
-            found = min(_detours(arc_path, leg), key=_badness, default=arc_path)
+            found = min(_loops(arc_path, leg), key=_badness, default=arc_path)
             if _badness(found)[0] < len(short):
                 arc_path = found
                 break
@@ -56,7 +56,7 @@ def _badness(arc_path: ArcPath) -> tuple[int, float]:
     return len(_short_legs(arc_path)), float(legs.sum() + arc_path.radius_m * np.abs(arc_path.turn).sum())
 
 
-def _detours(arc_path: ArcPath, leg: int) -> Iterator[ArcPath]:
+def _loops(arc_path: ArcPath, leg: int) -> Iterator[ArcPath]:
     """Yield ``arc_path`` with one free disc more on a leg, on either side, near the beginning or the end of the leg."""
     places = np.where(arc_path.pinned[:, None], arc_path.pin, arc_path.centre)
     stops = np.vstack([arc_path.ends[:1], places, arc_path.ends[1:]])

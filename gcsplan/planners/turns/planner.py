@@ -25,7 +25,7 @@ from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import distances
 from gcsplan.planners.simplify import thinned
 from gcsplan.planners.turns.arc_path import ArcPath, through, unlooped
-from gcsplan.planners.turns.loop_discs import with_detours
+from gcsplan.planners.turns.loop_discs import with_loops
 from gcsplan.planners.turns.repair import Patience, Tried, cost_of, mended, polished
 from gcsplan.world.path import Path
 
@@ -130,7 +130,7 @@ def _arc_paths(problem: Problem, points: Floats, pinned: Bools) -> Iterator[ArcP
         if len(arc_path.sense) in counts:
             continue
         counts.add(len(arc_path.sense))
-        arc_path = with_detours(arc_path)
+        arc_path = with_loops(arc_path)
         open_ = unlooped(arc_path)
         if len(open_.sense) not in counts:
             counts.add(len(open_.sense))

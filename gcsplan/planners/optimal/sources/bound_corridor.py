@@ -2,7 +2,9 @@
 
 The track of a bound is as short as a track can be. Where the exact check shuts it, the stretch is a few hundred metres
 long at most, and metres or centimetres are missing. Beside it there may be an open slit that the cells are too large to
-show. Each such stretch is planned as a problem of its own, so small that its cells are a metre or two wide.
+show. Each such stretch is planned as a problem of its own, so small that its cells are a metre or two wide. If that
+finds nothing and the gap is large, the piece between the places where the track leaves and meets the path is searched
+as a leg of its own, whose cells are finer than those of the whole leg.
 """
 
 from __future__ import annotations
@@ -46,8 +48,8 @@ BESIDE_M, WORTH = 10.0, 0.03
 """Metres from the path beyond which a track has left it; and the least that a stretch must gain to be planned, as a
 part of what the longest useful track is longer than the bound's."""
 FAR, CLOSE_BY = 5e-3, (3e-3, 3e-2, math.inf)
-"""The gap, as a part, from which cells are looked at through which the bound's track is shut; and the parts by which
-tracks may be longer than the bound for that, in turn."""
+"""The gap, as a part, from which cells are looked at through which the bound's track is shut, and
+pieces on finer cells; and the parts by which tracks may be longer than the bound for the former, in turn."""
 SHORTER = 0.7
 """Most of a leg's straight track for a piece to be searched on finer cells."""
 MOST = 24
