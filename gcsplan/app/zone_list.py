@@ -18,6 +18,9 @@ from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Level
 
+WIDEST_DEG = 160.0
+"""No plane holds a zone that is wider, degrees of longitude."""
+
 MISSIONS = (".yaml", ".yml")
 
 
@@ -93,7 +96,8 @@ def _in_plane(draft: ZoneDraft) -> np.ndarray[Any, np.dtype[np.float64]]:
     if draft.local:
         return points
     lat = points[:, 0]
-    turned = (points[:, 1] - points[0, 1] + 180.0) % 360.0 - 180.0
-    lon = points[0, 1] + 0.5 * (turned.min() + turned.max())
-    middle = min(max(0.5 * float(lat.min() + lat.max()), -85.0), 85.0), math.remainder(float(lon), 360.0)
+    west, east = float(points[:, 1].min()), float(points[:, 1].max())
+    if east - west > WIDEST_DEG:
+        return np.full_like(points, np.nan)
+    middle = min(max(0.5 * float(lat.min() + lat.max()), -85.0), 85.0), math.remainder(0.5 * (west + east), 360.0)
     return Frame(*middle).to_plane(lat, points[:, 1])

@@ -118,10 +118,10 @@ def _rings(found: ZoneFile, rings: Any, said: Said, part: str, where: str, at: s
     if not isinstance(rings, list) or not rings or not isinstance(rings[0], list):
         found.problems.append(Problem(at, f"a polygon is a list of rings, given {shown(rings)}"))
         return
-    found.holes += len(rings) - 1
     outline = _positions(found, rings[0], f"{at}[0]")
     if outline is not None:
-        found.add_ring(said, part, where, outline, at.removeprefix(where).removeprefix("."), _unread(rings[0]))
+        found.add_ring(said, part, where, outline, at.removeprefix(where).removeprefix("."), _unread(rings[0]),
+                       holes=len(rings) - 1)  # fmt: skip
 
 
 def _line(found: ZoneFile, positions: Any, said: Said, part: str, where: str, at: str) -> None:

@@ -37,7 +37,7 @@ _SHAPES = (*_READ_SHAPES, "LinearRing", "Model", "Track", "MultiTrack")
 
 def read_kml(path: Path, data: bytes) -> ZoneFile:
     """The zones of KML text. Raises InputError if it is not KML."""
-    found = ZoneFile(path)
+    found = ZoneFile(path, great_circles=True)  # as Google Earth draws them
     try:
         root = defusedxml.ElementTree.fromstring(data, forbid_dtd=True)
     except DefusedXmlException:
@@ -110,14 +110,14 @@ def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
 
 def _polygon(found: ZoneFile, shape: Any, said: Said, part: str, where: str) -> None:
     outer = [e for e in _walk(shape, found.path) if _kind(e) == "outerBoundaryIs"]
-    found.holes += sum(_kind(e) == "innerBoundaryIs" for e in _walk(shape, found.path))
+    holes = sum(_kind(e) == "innerBoundaryIs" for e in _walk(shape, found.path))
     if len(outer) != 1:
         found.problems.append(Problem(where, f"a Polygon has one outerBoundaryIs, given {len(outer)}"))
         return
     points = _coordinates(found, outer[0], where)
     if points is not None:
         drawn = _unread(points) if said.of_levels else _drawn(shape, points)
-        found.add_ring(said, part, where, [p[:2] for p in points], "", drawn)
+        found.add_ring(said, part, where, [p[:2] for p in points], "", drawn, holes)
 
 
 def _drawn(shape: Any, points: list[Corner]) -> Drawn:

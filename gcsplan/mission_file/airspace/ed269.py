@@ -49,7 +49,7 @@ def _volumes_of(feature: Any) -> bool:
 def read_ed269(path: Path, whole: Any, policy: Policy) -> ZoneFile:
     """The zones of an ED-269 document; what is wrong is in their problems and faults."""
     key, features = _list_of(whole)
-    return read_features(AirspaceFile(path, policy, KINDS), features, key, _feature)
+    return read_features(AirspaceFile(path, policy, KINDS, great_circles=True), features, key, _feature)
 
 
 def _feature(file: AirspaceFile, feature: Any, where: str, fallback: str) -> None:
@@ -99,8 +99,7 @@ def _volume(file: AirspaceFile, zone: Published, part: str, volume: Any, where: 
         file.add_circle(zone, part, where, position(shape.get("center")), float(radius), limits)
     elif kind == "Polygon":
         ring, holes = outer_ring(shape.get("coordinates"))
-        file.found.holes += holes
-        file.add_ring(zone, part, where, ring, limits)
+        file.add_ring(zone, part, where, ring, limits, holes)
     else:
         raise MemberError(f"horizontalProjection must be a Polygon or a Circle, given {shown(kind)}")
 

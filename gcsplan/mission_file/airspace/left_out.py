@@ -15,6 +15,9 @@ from gcsplan.world.zones import Zone
 Box = tuple[float, float, float, float]
 """West, south, east, north, m."""
 
+TURNS = (-720.0, -360.0, 0.0, 360.0, 720.0)
+"""Whole turns by which a longitude may be written otherwise than the frame's, degrees."""
+
 NEAR_M = 5000.0
 """Zones this near to the mission's surroundings are named at least, m."""
 
@@ -81,9 +84,10 @@ def _is_near(draft: ZoneDraft, frame: Frame, window: Box) -> bool:
     tall = 0.0 if draft.radius_m is None else math.degrees(draft.radius_m / 6_300_000.0)
     lat = [p[0] for p in draft.points]
     wide = tall / math.cos(math.radians(min(max(map(abs, lat)) + tall, 89.0)))
-    lon = [(p[1] - frame.lon_deg + 180.0) % 360.0 - 180.0 for p in draft.points]
-    box = (min(lon) - wide, min(lat) - tall, max(lon) + wide, max(lat) + tall)
-    return box[0] <= window[2] and box[2] >= window[0] and box[1] <= window[3] and box[3] >= window[1]
+    lon = [p[1] - frame.lon_deg for p in draft.points]
+    west, east = min(lon) - wide, max(lon) + wide
+    level = min(lat) - tall <= window[3] and max(lat) + tall >= window[1]
+    return level and any(west + turn <= window[2] and east + turn >= window[0] for turn in TURNS)
 
 
 def _meets(zone: Zone, box: Box) -> bool:

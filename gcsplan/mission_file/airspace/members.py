@@ -115,5 +115,4 @@ def add_polygons(
         raise MemberError(f"a {kind} has a list of coordinates, given {shown(polygons)}")
     for i, rings in enumerate(polygons):
         ring, holes = outer_ring(rings)
-        file.found.holes += holes
-        file.add_ring(zone, part if len(polygons) == 1 else f"{part}/{i + 1}", where, ring, limits)
+        file.add_ring(zone, part if len(polygons) == 1 else f"{part}/{i + 1}", where, ring, limits, holes)

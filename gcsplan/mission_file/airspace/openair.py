@@ -19,6 +19,7 @@ from gcsplan.mission_file.airspace.times import Period, TimeError, read_instant
 from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
 from gcsplan.mission_file.zone_draft import MAX_VERTICES, Remark
 from gcsplan.mission_file.zone_file import ZoneFile
+from gcsplan.world.degree_shapes import MOST_LON_DEG
 
 SUFFIXES = (".openair", ".air", ".txt")
 
@@ -86,7 +87,7 @@ class _Block:
 
 def read_openair(path: Path, data: bytes, policy: Policy) -> ZoneFile:
     """The zones of OpenAir text; what is wrong is in their problems and faults."""
-    return _Reading(AirspaceFile(path, policy, KINDS)).read(_text(data))
+    return _Reading(AirspaceFile(path, policy, KINDS, great_circles=True)).read(_text(data))
 
 
 def _text(data: bytes) -> str:
@@ -309,7 +310,7 @@ def _degrees(parts: tuple[str | None, ...], side: str) -> float:
     if broken or max(minutes or 0.0, seconds or 0.0) > 60.0:  # 60 is what some programs write for a whole one
         raise _RecordError("degrees and minutes are whole numbers where others follow, minutes and seconds at most 60")
     value = whole + (minutes or 0.0) / 60.0 + (seconds or 0.0) / 3600.0
-    if value > (90.0 if side.upper() in "NS" else 180.0):
+    if value > (90.0 if side.upper() in "NS" else MOST_LON_DEG):
         raise _RecordError(f"{value:g} {side.upper()} is no place on Earth")
     return -value if side.upper() in "SW" else value
 
