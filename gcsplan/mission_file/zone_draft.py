@@ -149,7 +149,7 @@ def polygon(
     floor, ceiling = bounds.levels(where, problems)
     if len(problems) > before:
         return None
-    points, doubt = (points, ()) if local else across(points)
+    points, doubt = (points, ()) if local else across(points, holes)
     if not local and (wide := wide_fault(points, holes)):
         problems.append(Problem(at, f"zone {name[:60]!r}: {wide}"))
         return None

@@ -6,8 +6,8 @@ and projected.
 
 Longitudes count as they are written, from -360 to 360: an edge from 170 to 190 crosses the antimeridian, one from -95
 to 95 would go through 0. An edge of 180 degrees and more is refused (`wide_fault`), because files mean either way by
-it. The one exception are short edges such as from 179.9 to -179.9 in a ring that they make counter-clockwise, as RFC
-7946 has it: they cross the antimeridian for a mission near it (`across`), and refuse one elsewhere in between.
+it. The one exception are edges such as from 179.9 to -179.9 of a polygon that is no tall strip there: they cross the
+antimeridian for a mission near it, and refuse one on the other side (`across`).
 """
 
 from __future__ import annotations
@@ -60,8 +60,9 @@ MOST_LON_DEG = 360.0
 HALF_TURN_DEG = 180.0
 """From this longitude difference on nobody can tell on which side of the globe an edge runs."""
 
-ACROSS_DEG = 2.0
-"""An edge of a whole turn less this may be one across the antimeridian that is written without longitudes past it."""
+ACROSS_DEG, ACROSS_PART = 2.0, 0.5
+"""Edges of a whole turn less the first may cross the antimeridian, if the polygon then is wide by this part of its
+height: a mask of the world that leaves out a strip along the antimeridian is tall there, and narrow."""
 
 GREAT_CIRCLE_M = 1.0
 """An edge that lies nearer to its great circle is not told from it, m."""
@@ -229,29 +230,29 @@ def wide_fault(points: Sequence[Corner], holes: int = 0, *, closed: bool = True)
     )
 
 
-def across(points: Sequence[Corner]) -> tuple[Sequence[Corner], tuple[Corner, ...]]:
+def across(points: Sequence[Corner], holes: int = 0) -> tuple[Sequence[Corner], tuple[Corner, ...]]:
     """The corners of a polygon with longitudes past the antimeridian where it crosses it, and where it lies if not.
 
-    The second is a rectangle from which its surroundings are left out; it is empty, and the points are unchanged, if
-    they do not cross the antimeridian as `ACROSS_DEG` says.
+    The second is a rectangle from which its surroundings are left out. It is empty, and the points are unchanged, if
+    they do not cross the antimeridian as `ACROSS_DEG` says, or if there are ``holes``.
     """
     at = np.asarray(points, float)
-    if len(at) < 3 or not np.ptp(at[:, 1]) >= 360.0 - ACROSS_DEG:
+    if holes or len(at) < 3 or not np.ptp(at[:, 1]) >= 360.0 - ACROSS_DEG:
         return points, ()
     step = np.diff(at[:, 1], append=at[0, 1])
     short = (step + 180.0) % 360.0 - 180.0
     long = np.abs(step) >= HALF_TURN_DEG
     turned = unwrapped(points, float(at[0, 1]))
-    x, y = turned.T
-    area = float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
-    if not (long.any() and (np.abs(short[long]) <= ACROSS_DEG).all() and abs(short.sum()) < 1.0 and area > 0.0):
+    (west, south), (east, north) = turned.min(axis=0), turned.max(axis=0)
+    is_strip = east - west < ACROSS_PART * (north - south)
+    if is_strip or not (long.any() and (np.abs(short[long]) <= ACROSS_DEG).all() and abs(short.sum()) < 1.0):
         return points, ()
-    most = float(np.abs(y).max())
-    spare = math.degrees(1.1 * FAR_M / 6.35e6) / math.cos(math.radians(min(most + 2.0, 89.0)))
-    west, east = float(x.max()) + spare, float(x.min()) + 360.0 - spare
+    highest = min(max(abs(south), abs(north)) + 2.0, 89.0)
+    spare = math.degrees(1.1 * FAR_M / 6.35e6) / math.cos(math.radians(highest))
+    low, high = float(east) + spare, float(west) + 360.0 - spare
     ring = [(float(lat), float(lon)) for lon, lat in turned]
-    south, north = float(y.min()), float(y.max())
-    return ring, ((south, west), (south, east), (north, east), (north, west)) if west < east else ()
+    other = ((float(south), low), (float(south), high), (float(north), high), (float(north), low))
+    return ring, other if low < high else ()
 
 
 def _beyond(lon0: float, lon1: float) -> str:

@@ -19,7 +19,7 @@ from gcsplan.mission_file.zone_attributes import OVER_PRESSURE, UNDER_PRESSURE
 from gcsplan.mission_file.zone_draft import ACROSS, MAX_VERTICES, Bounds, Remark, ZoneDraft, check_degrees
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_levels import EXAMPLES, LevelError, Limit, read_level
-from gcsplan.world.degree_shapes import LARGEST_RADIUS_M, across, outline_of, unwrapped, wide_fault
+from gcsplan.world.degree_shapes import HALF_TURN_DEG, LARGEST_RADIUS_M, across, outline_of, unwrapped, wide_fault
 from gcsplan.world.zones import Level
 
 Corner = tuple[float, float]
@@ -182,10 +182,10 @@ class AirspaceFile:
             right = -90.0 <= lat <= 90.0 and -180.0 <= lon <= 180.0  # most are: no call for each of 100,000
             if not right and not check_degrees((lat, lon), where, self.found.problems):
                 return
-        ring, doubt = across(ring)
+        ring, doubt = across(ring, holes)
         wide = wide_fault(ring, holes)
         if wide:
-            self._add(zone, part, where, around(ring), None, limits, [Problem(where, wide)])
+            self._add(zone, part, where, self._around(ring), None, limits, [Problem(where, wide)])
             return
         outline, why = outline_of(ring)
         if not why:
@@ -194,7 +194,7 @@ class AirspaceFile:
         parts = enclosed(outline) if len(set(outline)) > 2 else []
         if not parts:
             if ring:
-                self._add(zone, part, where, around(ring), None, limits, [Problem(where, f"{why}; {CURE}")])
+                self._add(zone, part, where, self._around(ring), None, limits, [Problem(where, f"{why}; {CURE}")])
             else:
                 self.fault(where, "the polygon has no points")
             return
@@ -202,6 +202,23 @@ class AirspaceFile:
         for i, piece in enumerate(parts):
             name = part if len(parts) == 1 else f"{part}/{i + 1}"
             self._add(zone, name, where, tuple(piece), None, limits, [], doubt)
+
+    def _around(self, points: Sequence[Corner]) -> tuple[Corner, ...]:
+        """A rectangle with all points well inside, to tell whether a zone without an outline lies near.
+
+        A zone that is half a turn wide may lie on either side of its corners: then the rectangle goes around the globe,
+        and to the poles where they may be in it, or great circles come near them.
+        """
+        at = np.asarray(points, float)
+        (south, west), (north, east) = at.min(axis=0) - AROUND_DEG, at.max(axis=0) + AROUND_DEG
+        if east - west >= HALF_TURN_DEG:
+            west, east = -HALF_TURN_DEG, HALF_TURN_DEG
+            short = unwrapped([*points, points[0]], points[0][1])[:, 0]
+            if self.great_circles or abs(short[-1] - short[0]) > 1.0:
+                south, north = -90.0, 90.0
+        south, north = max(south, -90.0), min(north, 90.0)
+        corners = ((south, west), (south, east), (north, east), (north, west))
+        return tuple((float(lat), float(lon)) for lat, lon in corners)
 
     def _add(
         self, zone: Published, part: str, where: str, points: tuple[Corner, ...], radius_m: float | None,
@@ -220,24 +237,6 @@ class AirspaceFile:
             doubt=doubt,
         )  # fmt: skip
         self.found.add(draft, remarks)
-
-
-def around(points: Sequence[Corner]) -> tuple[Corner, ...]:
-    """A rectangle with all points well inside, to tell whether a zone without an outline lies near.
-
-    A zone that is half a turn wide, or whose corners go around a pole, may lie on either side of them: then the
-    rectangle goes around the globe, or is all of it.
-    """
-    at = np.asarray(points, float)
-    (south, west), (north, east) = at.min(axis=0) - AROUND_DEG, at.max(axis=0) + AROUND_DEG
-    short = unwrapped([*points, points[0]], points[0][1])[:, 0]
-    if abs(short[-1] - short[0]) > 1.0:
-        south, north = -90.0, 90.0
-    if east - west >= 180.0:
-        west, east = -180.0, 180.0
-    south, north = max(south, -90.0), min(north, 90.0)
-    corners = ((south, west), (south, east), (north, east), (north, west))
-    return tuple((float(lat), float(lon)) for lat, lon in corners)
 
 
 def enclosed(outline: Sequence[Corner]) -> list[list[Corner]]:
