@@ -314,6 +314,8 @@ def judged(
         misses=wanted.misses, times=wanted.times or asks_home,
     )  # fmt: skip
     verdict, fence_notes = own_fence(read.fence, verdict, vehicle, world)
+    if read.unread_fence:
+        verdict = replace(verdict, not_judged=(*verdict.not_judged, read.unread_fence))
     notes += fence_notes
     if verdict.legs and verdict.legs[-1].kind == "cruise" and not any("without end" in n for n in verdict.notes):
         notes.append("the mission ends in the air: what becomes of the vehicle after its last item is not in it")

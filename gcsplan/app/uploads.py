@@ -343,7 +343,8 @@ def verify_file(
         else:
             autopilot = None if file.suffix.lower() == ".plan" else _autopilot_of(link, sysid)
             read = read_mission_file(file, autopilot=autopilot)
-            job, notes = UploadJob(file.stem, link.url, replace(read.mission, sysid=sysid)), read.notes
+            job = UploadJob(file.stem, link.url, replace(read.mission, sysid=sysid))
+            notes = (*read.notes, *([read.unread_fence] if read.unread_fence else []))
         options = session.SessionOptions(
             listen_s=LISTEN_S, timeout_s=timeout_s, rtl_rel_home_m=job.rtl_rel_home_m,
             read_parameters=checked is not None,
