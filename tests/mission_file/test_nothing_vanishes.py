@@ -93,7 +93,7 @@ def test_an_openair_circle_needs_its_own_centre(tmp_path: Path) -> None:
     first = "AC P\nAN one\nV X=46:00:00 N 014:00:00 E\nDC 1\n"
     said = told(tmp_path / "z.openair", first + "AC P\nAN two\nDC 2\n")
     assert "line 7: zone 'two': 'DC 2': has no centre of its own" in said
-    arc = first + f"AC P\nAN two\nDA 2,0,180\nDP 46:00:00 N 013:57:30 E\n"
+    arc = first + "AC P\nAN two\nDA 2,0,180\nDP 46:00:00 N 013:57:30 E\n"
     assert "are drawn around that of the zone before: two (line 7: DA 2,0,180)" in told(tmp_path / "z.openair", arc)
     assert told(tmp_path / "z.openair", "V X=46:00:00 N 014:00:00 E\nAC P\nAN one\nDC 1") == ""
 
