@@ -8,6 +8,7 @@ from pathlib import PurePath
 
 from gcsplan.errors import Problem
 from gcsplan.figures import counted
+from gcsplan.mission_file.airspace.times import OUT_OF_HOURS
 from gcsplan.mission_file.zone_draft import ZoneDraft, one_line
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Zone
@@ -34,6 +35,11 @@ def faults_near(placed: Sequence[tuple[ZoneDraft, Zone]], box: Box) -> list[Prob
 def used(drafts: Sequence[ZoneDraft]) -> list[ZoneDraft]:
     """The zones that are no-fly."""
     return [d for d in drafts if not d.unused]
+
+
+def left_out_by_hours(drafts: Sequence[ZoneDraft]) -> bool:
+    """Whether a zone is not used because it does not apply in the hours of the mission."""
+    return any(d.unused.startswith(OUT_OF_HOURS) for d in drafts)
 
 
 def unused_notes(drafts: Sequence[ZoneDraft], frame: Frame, box: Box) -> list[str]:

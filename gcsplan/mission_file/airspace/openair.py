@@ -16,7 +16,7 @@ from gcsplan.errors import Problem
 from gcsplan.figures import counted
 from gcsplan.mission_file.airspace.arcs import Arc, ArcError, Corner, outline
 from gcsplan.mission_file.airspace.policy import UNREAD_TIMES, Policy, Published
-from gcsplan.mission_file.airspace.times import Period, TimeError, read_instant
+from gcsplan.mission_file.airspace.times import Period, TimeError, read_end, read_instant
 from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
 from gcsplan.mission_file.zone_draft import MAX_VERTICES, Remark
 from gcsplan.mission_file.zone_file import ZoneFile
@@ -308,7 +308,8 @@ def _times(texts: list[str]) -> tuple[tuple[Period, ...], str]:
         if len(ends) != 2:
             return (), f"AA {plain[:60]}"
         try:
-            start, end = (None if e.upper() == "NONE" else read_instant(e) for e in ends)
+            start = None if ends[0].upper() == "NONE" else read_instant(ends[0])
+            end = None if ends[1].upper() == "NONE" else read_end(ends[1])
             periods.append(Period(start, end))
         except TimeError as why:
             return (), str(why)
