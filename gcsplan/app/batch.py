@@ -54,6 +54,7 @@ class BatchOptions:
     seed: int | None = None
     report: bool = False
     allow_unjudged: bool = False
+    at: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +184,7 @@ def record_of(options: BatchOptions, item: tuple[str, str]) -> Record:
     key = key_of(Path(file), options)  # of what is planned now: since `known` read it, the file may have changed
     try:
         planned = plan(
-            file, planner=options.planner, objective=options.objective, seed=options.seed,
+            file, planner=options.planner, objective=options.objective, seed=options.seed, at=options.at,
         )  # fmt: skip
         planned, homes = flyable(planned, allow_unjudged=options.allow_unjudged, asked=options.report)
         files = outputs.outputs_of(planned, homes)

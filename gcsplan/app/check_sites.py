@@ -17,6 +17,7 @@ from typing import Protocol
 import numpy as np
 
 from gcsplan.app.fencing import own_fence
+from gcsplan.app.flight_hours import beyond_hours
 from gcsplan.app.option_words import all_in_options, home_in_options, verdict_in_options
 from gcsplan.app.pipeline import world_of
 from gcsplan.app.way_home import home_of
@@ -31,6 +32,7 @@ from gcsplan.mavlink.files.formats import read_mission_file
 from gcsplan.mavlink.mission.commands import LOITER_TIME, LOITER_TO_ALT, LOITER_TURNS, LOITER_UNLIM
 from gcsplan.mavlink.mission.mission import NO_POSITION, Home, Mission, MissionItem
 from gcsplan.mission_file import MissionFile, VehicleRequest
+from gcsplan.mission_file.airspace.times import Hours
 from gcsplan.mission_file.from_options import Extent, OpenWorld, WorldOptions
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.frame import FARTHEST_M
@@ -50,7 +52,8 @@ class Checked:
     """One file, its vehicle, and the verdict in ``world``.
 
     ``fence`` and ``rally`` are the file's own. ``terrain_error_m`` is the error that terrain-frame legs were judged
-    with. ``way_home`` is None unless it was requested; ``home_required``: the mission flies only with a safe return.
+    with. ``hours`` are those of the flight, if a zone was left out for them. ``way_home`` is None unless it was
+    requested; ``home_required``: the mission flies only with a safe return.
     """
 
     file: Path
@@ -65,6 +68,7 @@ class Checked:
     terrain_error_m: float = TERRAIN_ERROR_M
     way_home: WayHome | None = None
     home_required: bool = False
+    hours: Hours | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +137,7 @@ class MissionSite:
         error_m = source.terrain_error_m if source.altitude_frame == "terrain" else TERRAIN_ERROR_M
         if self._world is None:
             self._world = world_of(source)
-        return judged(request, file, read, self._world, error_m, wanted)
+        return judged(request, file, read, self._world, error_m, wanted, source.hours)
 
     @property
     def said(self) -> tuple[Mapping[str, object], tuple[str, ...]]:
@@ -183,7 +187,7 @@ class OptionsSite:
             world = self._tell(*self.opened.around(places_of(read.mission), beyond_m(read.mission)))
         file = Path(argument)
         request = _request(self.opened, read.mission, file.stem, world)
-        done = judged(request, file, read, world, self.options.terrain_error_m, wanted)
+        done = judged(request, file, read, world, self.options.terrain_error_m, wanted, self.opened.hours)
         verdict, home = verdict_in_options(done.verdict), home_in_options(done.way_home)
         return replace(done, verdict=verdict, way_home=home, notes=all_in_options(done.notes))
 
@@ -298,9 +302,13 @@ def _request(opened: OpenWorld, mission: Mission, name: str, world: World) -> Ve
 
 
 def judged(
-    request: VehicleRequest, file: Path, read: MissionFileRead, world: World, terrain_error_m: float, wanted: Wanted
-) -> Checked:
-    """Judge a mission that was read from ``file``, for a vehicle in a world. Raises InputError."""
+    request: VehicleRequest, file: Path, read: MissionFileRead, world: World, terrain_error_m: float, wanted: Wanted,
+    hours: Hours | None = None,
+) -> Checked:  # fmt: skip
+    """Judge a mission that was read from ``file``, for a vehicle in a world. Raises InputError.
+
+    ``hours``: those for which the world's zones were left out, from the departure on; a flight beyond is not judged.
+    """
     returns, asks_home = wanted.returns, wanted.returns.judged or wanted.returns.required
     vehicle, mission, notes = request.vehicle, read.mission, list(read.notes)
     if mission.autopilot is not vehicle.autopilot:
@@ -311,9 +319,11 @@ def judged(
     mission = replace(mission, name=vehicle.name, sysid=vehicle.sysid)
     verdict = judge(
         mission, vehicle, world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=terrain_error_m,
-        misses=wanted.misses, times=wanted.times or asks_home,
+        misses=wanted.misses, times=wanted.times or asks_home or hours is not None,
     )  # fmt: skip
     verdict, fence_notes = own_fence(read.fence, verdict, vehicle, world)
+    more = [words for words in (read.unread_fence, beyond_hours(verdict, hours)) if words]
+    verdict = replace(verdict, not_judged=(*verdict.not_judged, *more))
     notes += fence_notes
     if verdict.legs and verdict.legs[-1].kind == "cruise" and not any("without end" in n for n in verdict.notes):
         notes.append("the mission ends in the air: what becomes of the vehicle after its last item is not in it")
@@ -323,5 +333,5 @@ def judged(
         notes += home.notes
     return Checked(
         file, vehicle, request, mission, verdict, tuple(notes), world, read.fence, read.rally, terrain_error_m, home,
-        returns.required,
+        returns.required, hours,
     )  # fmt: skip

@@ -6,19 +6,19 @@ plan`.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from datetime import datetime, timedelta
+from datetime import datetime
 from os import PathLike
 from typing import Any
 
 from gcsplan.app.executor import Inline, executor
 from gcsplan.app.fleet_jobs import PIECE_S, planned_by
 from gcsplan.app.fleet_planning import fleet_of
+from gcsplan.app.flight_hours import require_within_hours
 from gcsplan.app.gate import GateTime
 from gcsplan.app.leaving_out import LeavingOut
-from gcsplan.app.model import Brief, FleetPlan, Plan, VehiclePlan
+from gcsplan.app.model import Brief, Plan, VehiclePlan
 from gcsplan.app.planning import over_one_terrain
 from gcsplan.app.refusals import plan_or_explain
 from gcsplan.app.sites import world_of
@@ -44,6 +44,7 @@ def plan(
     jobs: int | None = 1,
     cluster: Any = None,
     leave_out: bool | None = None,
+    at: str | Sequence[str] | None = None,
 ) -> Plan:
     """Plan every vehicle of a mission; nothing is written or sent.
 
@@ -59,6 +60,8 @@ def plan(
 
     ``leave_out``: a vehicle without a mission is left out, and the others are planned; ``left_out`` of the plan names
     those, and says why. Otherwise, the first such vehicle refuses the whole (None: as the mission's ``arrival`` says).
+
+    ``at``: when it is flown, in place of the mission's own key, for a ``source`` that is not read yet.
 
     Returns a `Plan`, whose ``vehicles`` are in the mission's order. In each of them, ``solution.path.points`` is the
     path, (N, 3) float64: east_m and north_m in the mission's plane, and amsl_m. ``mission`` holds the items as they are
@@ -79,7 +82,9 @@ def plan(
         (True, 900, (2, 3))
     """
     if not isinstance(source, MissionFile):
-        source = load_mission(source, departure=gate_utc)
+        source = load_mission(source, departure=gate_utc, at=at)
+    elif at is not None:
+        raise InputError("the mission is read already: give `at` to load_mission", where="at")
     settings = source.planner
     name = planner or settings.name
     entry = get_planner(name)
@@ -105,23 +110,6 @@ def plan(
         notes.append("the file asks for no `arrival`: the separation between vehicles is not judged")
     notes += fleet.notes
     return Plan(source, brief.world, name, goal, number, flown, tuple(notes), fleet, tuple(leaving.found), leave_out)
-
-
-def require_within_hours(source: MissionFile, flown: Sequence[VehiclePlan], fleet: FleetPlan) -> None:
-    """Raise InputError if a flight lasts beyond the hours for which zones were left out."""
-    hours = source.hours
-    if hours is None:
-        return
-    start = fleet.start_utc or hours.start
-    last_s, name = max((fleet.slot(v.name).arrive_s + v.verdict.time_s - v.verdict.arrive_s, v.name) for v in flown)
-    # A flight without end has no hours that hold it.
-    end = start + timedelta(seconds=math.ceil(min(last_s, 1e8)))
-    if start < hours.start or end > hours.end:
-        raise InputError(
-            f"zones were left out that do not apply from {hours}, but {name} flies from {start:%Y-%m-%d %H:%M}Z to "
-            f"{end:%Y-%m-%d %H:%M}Z; write at: [from, to] with all of the flight in it",
-            where=f"{source.path}: at",
-        )
 
 
 def _planned(

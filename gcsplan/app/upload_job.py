@@ -11,6 +11,7 @@ from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.build.fence import Fence
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.protocol.machine import Progress
+from gcsplan.mission_file.airspace.times import Hours
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.terrain_grid import Ground
 from gcsplan.world.world import World
@@ -39,7 +40,8 @@ class UploadJob:
     """One mission for one vehicle at one URL (`SIM` for a loopback vehicle of its own).
 
     ``way_home`` is None unless it was judged. ``home_required``: a vehicle that returns at another altitude is refused.
-    ``ground`` is what a vehicle that flies the terrain frame is sent.
+    ``ground`` is what a vehicle that flies the terrain frame is sent. ``hours``: those of the flight from its departure
+    on, if a zone was left out for them.
     """
 
     name: str
@@ -54,6 +56,7 @@ class UploadJob:
     way_home: WayHome | None = None
     home_required: bool = False
     ground: Ground | None = None
+    hours: Hours | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from gcsplan.app.fencing import against_fence
+from gcsplan.app.flight_hours import beyond_hours
 from gcsplan.app.way_home import against_on_board
 from gcsplan.check.judge import judge
 from gcsplan.check.tuning import Tuning
@@ -116,8 +117,10 @@ def judge_on_board(job: UploadJob, *, allow_unjudged: bool, simulated: bool = Fa
         spaced = world.with_posts(int(spacing)) if spacing >= 1.0 else world
         error_m = terrain_error_m(values, job.terrain_error_m)
         verdict = judge(flown, vehicle, spaced, rtl_rel_home_m=rtl_rel_home_m, terrain_error_m=error_m, tuning=tuning)
-        if verdict.safe is True or (verdict.safe is None and allow_unjudged):
-            return against_fence(job, flown, rtl_rel_home_m, tuning)
-        return verdict.describe()
+        if verdict.safe is False or (verdict.safe is None and not allow_unjudged):
+            return verdict.describe()
+        if not allow_unjudged and (beyond := beyond_hours(verdict, job.hours)):
+            return f"not judged: {beyond}"
+        return against_fence(job, flown, rtl_rel_home_m, tuning)
 
     return again

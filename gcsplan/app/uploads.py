@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 from gcsplan.app.check_sites import Checked, split_name
 from gcsplan.app.checking import check_files
 from gcsplan.app.fencing import not_fenced, upload_fences
+from gcsplan.app.flight_hours import hours_left
 from gcsplan.app.ground import MissionGround
 from gcsplan.app.model import Plan
 from gcsplan.app.rollback import rolled_back
@@ -113,6 +114,7 @@ def jobs_of(
         UploadJob(
             v.name, where[v.name], v.mission, v.verdict, v.request.vehicle, plan.world, v.request.rtl_rel_home_m,
             source.terrain_error_m, way_home=homes.get(v.name), home_required=home_required, ground=ground,
+            hours=hours_left(source, v, plan.fleet),
         )
         for v in plan.vehicles if v.name in where
     ]  # fmt: skip
@@ -135,7 +137,7 @@ def jobs_of_files(source: MissionFile, checked: Sequence[Checked], word: str) ->
 def _job(c: Checked, url: str) -> UploadJob:
     return UploadJob(
         c.vehicle.name, url, c.mission, c.verdict, c.vehicle, c.world, c.request.rtl_rel_home_m, c.terrain_error_m,
-        way_home=c.way_home, home_required=c.home_required,
+        way_home=c.way_home, home_required=c.home_required, hours=c.hours,
     )  # fmt: skip
 
 
@@ -343,7 +345,8 @@ def verify_file(
         else:
             autopilot = None if file.suffix.lower() == ".plan" else _autopilot_of(link, sysid)
             read = read_mission_file(file, autopilot=autopilot)
-            job, notes = UploadJob(file.stem, link.url, replace(read.mission, sysid=sysid)), read.notes
+            job = UploadJob(file.stem, link.url, replace(read.mission, sysid=sysid))
+            notes = (*read.notes, *([read.unread_fence] if read.unread_fence else []))
         options = session.SessionOptions(
             listen_s=LISTEN_S, timeout_s=timeout_s, rtl_rel_home_m=job.rtl_rel_home_m,
             read_parameters=checked is not None,

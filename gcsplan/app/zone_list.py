@@ -10,13 +10,18 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gcsplan.errors import InputError
+from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.airspace.left_out import listed
+from gcsplan.mission_file.airspace.policy import Policy
+from gcsplan.mission_file.airspace.times import hours_of, texts_of
 from gcsplan.mission_file.load import read_no_fly
 from gcsplan.mission_file.zone_draft import ZoneDraft, zone_notes
 from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Level
+
+WIDEST_DEG = 160.0
+"""No plane holds a zone that is wider, degrees of longitude."""
 
 MISSIONS = (".yaml", ".yml")
 
@@ -51,18 +56,24 @@ class ListedZone:
                 "source": self.source}  # fmt: skip
 
 
-def list_zones(files: Sequence[Path]) -> tuple[list[ListedZone], list[str]]:
+def list_zones(files: Sequence[Path], at: str | None = None) -> tuple[list[ListedZone], list[str]]:
     """The no-fly zones of mission files (.yaml) and of zone files, and the notes on them and others. Raises InputError.
 
+    ``at``: zones that do not apply then are not listed, but named.
     Zones that are too far from a mission to matter are listed, too: a mission's places are not read.
     """
     drafts: list[ZoneDraft] = []
     notes: list[str] = []
+    wrong: list[Problem] = []
+    texts = texts_of(at)
+    policy = Policy(hours=hours_of(None, None, "--at", wrong, instead=texts))
+    if wrong:
+        raise InputError.of(wrong)
     for file in files:
         if file.suffix.lower() in MISSIONS:
-            own, said = read_no_fly(file)
+            own, said = read_no_fly(file, texts)
         else:
-            found = read_zones(file, where=str(file))
+            found = read_zones(file, where=str(file), policy=policy)
             if found.problems:
                 raise InputError.of(found.problems)
             own, said = found.zones, [*found.notes]
@@ -93,7 +104,8 @@ def _in_plane(draft: ZoneDraft) -> np.ndarray[Any, np.dtype[np.float64]]:
     if draft.local:
         return points
     lat = points[:, 0]
-    turned = (points[:, 1] - points[0, 1] + 180.0) % 360.0 - 180.0
-    lon = points[0, 1] + 0.5 * (turned.min() + turned.max())
-    middle = min(max(0.5 * float(lat.min() + lat.max()), -85.0), 85.0), math.remainder(float(lon), 360.0)
+    west, east = float(points[:, 1].min()), float(points[:, 1].max())
+    if east - west > WIDEST_DEG:
+        return np.full_like(points, np.nan)
+    middle = min(max(0.5 * float(lat.min() + lat.max()), -85.0), 85.0), math.remainder(0.5 * (west + east), 360.0)
     return Frame(*middle).to_plane(lat, points[:, 1])

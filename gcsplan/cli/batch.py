@@ -9,6 +9,7 @@ import typer
 
 from gcsplan.cli.ending import emit
 from gcsplan.cli.options import (
+    AtOption,
     ClusterOption,
     JobsOption,
     JsonOption,
@@ -41,6 +42,7 @@ def batch(
     planner: PlannerOption = None,
     objective: ObjectiveOption = None,
     seed: SeedOption = None,
+    at: AtOption = None,
     report: Annotated[bool, typer.Option("--report", help="Also write a report.html for each mission.")] = False,
     allow_unjudged: UnjudgedOption = False,
     units: UnitsOption = UnitsName.METRIC,
@@ -56,7 +58,7 @@ def batch(
     from gcsplan.cli.console import remark, say
     from gcsplan.cli.work_display import WorkDisplay
 
-    options = BatchOptions(planner, objective, seed, report, allow_unjudged)
+    options = BatchOptions(planner, objective, seed, report, allow_unjudged, at)
     work = Batch(missions_of(missions), out, options)
     done, todo = work.known()
     if done:

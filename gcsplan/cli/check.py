@@ -10,6 +10,7 @@ import typer
 from gcsplan.cli import completion
 from gcsplan.cli.ending import complain
 from gcsplan.cli.options import (
+    AtOption,
     ClusterOption,
     JobsOption,
     JsonOption,
@@ -101,6 +102,7 @@ def check(
         str | None,
         typer.Option(metavar="ROUTE", help="straight home, or by the mission's return path or landing: mission."),
     ] = None,
+    at: AtOption = None,
     way_home: WayHomeOption = False,
     require_way_home: RequireWayHomeOption = False,
     units: UnitsOption = UnitsName.METRIC,
@@ -146,7 +148,7 @@ def check(
         named = [Path(f) for f in (*files, *(zones or [])) if Path(f).suffix.lower() not in (".waypoints", ".plan")]
         if not named:
             raise UsageError("--list-zones: of which zones? Give a mission file (.yaml) or a file of zones, too")
-        return show_zones(named, units_of(units), as_json=as_json)
+        return show_zones(named, units_of(units), as_json=as_json, at=at)
     given: dict[str, object] = {
         "--dem": dem, "--vertical-datum": vertical_datum, "--geoid-grid": geoid_grid, "--crs": crs,
         "--obstacle-height": obstacle_height, "--zones": zones, "--min-agl": min_agl, "--max-agl": max_agl,
@@ -164,7 +166,7 @@ def check(
     arguments = [file for argument in arguments for file in _named(argument)]
     form: Form = "whole" if as_json else "row" if json_lines else "lines"
     shown = Shown(form, allow_unjudged, units_of(units), len(arguments) > 1)
-    archive = _archive(mission, arguments, given, asked, shown)
+    archive = _archive(mission, arguments, given, asked, shown, at)
     printer = Document() if as_json else Rows() if json_lines else Lines(summed=not quiet)
     reading = steady(check_sites.split_name(file)[1] for file in arguments)
     if report is None and (rows or quiet or len(arguments) > TABLES):
@@ -200,7 +202,7 @@ def _is_mission(argument: str) -> bool:
 
 
 def _archive(
-    mission: str | None, files: list[str], given: dict[str, object], returns: Returns, shown: Shown
+    mission: str | None, files: list[str], given: dict[str, object], returns: Returns, shown: Shown, at: str | None
 ) -> Archive:
     """The files in the world of a mission file, or in that of the options."""
     from gcsplan.app import pipeline
@@ -212,7 +214,7 @@ def _archive(
             raise UsageError(f"{', '.join(given)}: the mission file says that; leave it out, or give no mission file")
         if not files:
             raise UsageError(f"which files are to be checked in the world of {mission}? Give .waypoints or .plan files")
-        return Archive.in_mission(pipeline.load_mission(Path(mission)), files, returns, shown)
+        return Archive.in_mission(pipeline.load_mission(Path(mission), at=at), files, returns, shown)
     missing = [name for name in ("--dem", "--min-agl") if name not in given]
     if missing:
         raise UsageError(
@@ -222,10 +224,11 @@ def _archive(
     if name is not None and name not in tuple(Autopilot):
         raise UsageError(f"--autopilot {name}: {', '.join(Autopilot)} is wanted")
     pilot = None if name is None else Autopilot(str(name))
-    return Archive.with_options(_options(given), pilot, files, returns, shown)
+    return Archive.with_options(_options(given, at), pilot, files, returns, shown)
 
 
-def _options(given: dict[str, object]) -> WorldOptions:
+def _options(given: dict[str, object], at: str | None = None) -> WorldOptions:
+    from gcsplan.mission_file.airspace.times import texts_of
     from gcsplan.mission_file.from_options import OPTIONS, WorldOptions
 
     def under(*keys: str) -> dict[str, object]:
@@ -246,6 +249,7 @@ def _options(given: dict[str, object]) -> WorldOptions:
         home=None if home is None else (home.lat_deg, home.lon_deg),
         rtl_rel_home_m=rtl if isinstance(rtl, float) else None,
         return_route=_route(route),
+        at=texts_of(at),
         notes=() if home is None or not home.note else (f"--home: {home.note}",),
     )
 

@@ -13,6 +13,7 @@ from gcsplan.cli.options import (
     LINKS,
     ArmedOption,
     AtomicOption,
+    AtOption,
     FenceInfiniteOption,
     FenceOption,
     FilesArgument,
@@ -53,6 +54,7 @@ def upload(
         ),
     ] = None,
     unchecked: Annotated[bool, typer.Option("--unchecked", help="Send without any check of safety.")] = False,
+    at: AtOption = None,
     sysid: UncheckedSysidOption = None,
     way_home: WayHomeOption = False,
     require_way_home: RequireWayHomeOption = False,
@@ -82,6 +84,8 @@ def upload(
 
     if (mission is None) == (not unchecked):
         raise UsageError("give either --mission FILE, in whose world the files are checked, or --unchecked")
+    if unchecked and at is not None:
+        raise UsageError("--at decides which zones of a mission file count: give --mission FILE instead of --unchecked")
     if unchecked and (fence or fence_infinite):
         raise UsageError("--fence is made of the zones of a mission file: give --mission FILE instead of --unchecked")
     if unchecked and (way_home or require_way_home):
@@ -95,7 +99,7 @@ def upload(
             raise UsageError(
                 "--sysid goes with --unchecked: with --mission each vehicle's number is the mission file's"
             )
-        source = pipeline.load_mission(mission)
+        source = pipeline.load_mission(mission, at=at)
         uploads.targets([to], [r.vehicle for r in source.vehicles])  # report a wrong URL before any table
         with steady(check_sites.split_name(file)[1] for file in files):
             checked = checking.check_files(source, files, returns=check_sites.Returns(way_home, require_way_home))
@@ -154,6 +158,7 @@ def verify(
             help="With --mission: take positions this far away, in metres, if what is on board is safe [default: 0]",
         ),
     ] = None,
+    at: AtOption = None,
     sysid: UnlessMissionSysidOption = None,
     timeout: TimeoutOption = 60.0,
     as_json: JsonOption = False,
@@ -168,9 +173,11 @@ def verify(
 
     if mission is not None and sysid is not None:
         raise UsageError("--sysid goes without --mission: with it the vehicle's number is the mission file's")
+    if mission is None and at is not None:
+        raise UsageError("--at decides which zones of a mission file count: give --mission FILE, too")
     shifts.require_tolerance(tolerance_m, judged=mission is not None)
     require_settled([check_sites.split_name(file)[1]])
-    source = None if mission is None else pipeline.load_mission(mission)
+    source = None if mission is None else pipeline.load_mission(mission, at=at)
     done = uploads.verify_file(file, to, sysid or 1, source=source, tolerance_m=tolerance_m, timeout_s=timeout)
     if as_json:
         emit(done.as_dict(), uploads.failure([done]))

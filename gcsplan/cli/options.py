@@ -51,6 +51,14 @@ ListZonesOption = Annotated[
         "--list-zones", help="Show what was understood of each zone: shape, size, floor, ceiling. Nothing else is done."
     ),
 ]
+AtOption = Annotated[
+    str | None,
+    typer.Option(
+        "--at", metavar="WHEN",
+        help="When it is flown, in place of the mission file's `at`: 2026-11-24T10:00Z, a day, or FROM/TO. Zones that "
+        "do not apply then are left out, and named; a flight beyond is not judged.",
+    ),
+]  # fmt: skip
 PlannerOption = Annotated[
     str | None,
     typer.Option(

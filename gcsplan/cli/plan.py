@@ -16,6 +16,7 @@ from gcsplan.cli.options import (
     LINKS,
     ArmedOption,
     AtomicOption,
+    AtOption,
     ClusterOption,
     JobsOption,
     JsonOption,
@@ -96,6 +97,7 @@ def plan(
             "second. ArduCopter alone; needs --allow-unjudged, for nobody knows how long it will wait.",
         ),
     ] = None,
+    at: AtOption = None,
     report: Annotated[
         bool, typer.Option("--report", help="Also write report.html: map, profiles, way home, fleet; one page.")
     ] = False,
@@ -150,14 +152,14 @@ def plan(
 
     system = units_of(units)
     if list_zones:
-        return _list_zones(mission, system, upload, as_json)
+        return _list_zones(mission, system, upload, as_json, at)
     directory = Path(file_of(mission).stem) if out is None else out
     gate = None if gate_utc is None else GateTime.parse(gate_utc, datetime.now(UTC))
     each = _require_options(planner, objective, png, directory)
     if settle_outputs(directory):
         remark(f"an earlier run was cut off while it wrote to {directory}: the outputs before it were put back")
     try:
-        source = pipeline.load_mission(mission, departure=None if gate is None else gate.start)
+        source = pipeline.load_mission(mission, departure=None if gate is None else gate.start, at=at)
         targets: dict[str, str] = {}
         if upload or fence or fence_infinite:  # otherwise the upload modules need not be imported
             from gcsplan.app import fencing, uploads
@@ -233,12 +235,12 @@ def _given(**options: object) -> dict[str, object]:
     return {key: value for key, value in options.items() if value is not None}
 
 
-def _list_zones(mission: Path, units: Units, upload: list[str] | None, as_json: bool) -> None:
+def _list_zones(mission: Path, units: Units, upload: list[str] | None, as_json: bool, at: str | None) -> None:
     from gcsplan.cli.zone_list import show_zones
 
     if upload:
         raise UsageError("--list-zones plans nothing, so that nothing can be sent; leave --upload out")
-    show_zones([mission], units, as_json=as_json)
+    show_zones([mission], units, as_json=as_json, at=at)
 
 
 def _require_options(planner: str | None, objective: str | None, png: Path | None, directory: Path) -> bool:

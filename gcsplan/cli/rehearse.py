@@ -9,6 +9,7 @@ import typer
 
 from gcsplan.cli.ending import complain, emit, talking
 from gcsplan.cli.options import (
+    AtOption,
     ClusterOption,
     JobsOption,
     JsonOption,
@@ -74,6 +75,7 @@ def rehearse(
         bool,
         typer.Option("--i-know", help="With --sitl: arm and start what is not on this machine, or is no simulator."),
     ] = False,
+    at: AtOption = None,
     way_home: WayHomeOption = False,
     require_way_home: RequireWayHomeOption = False,
     units: UnitsOption = UnitsName.METRIC,
@@ -110,7 +112,7 @@ def rehearse(
         raise UsageError("--noise-m, --airspeed and --runs are the built-in simulator's, not --sitl's")
     if speedup is not None and sitl_binary is None:
         raise UsageError("--speedup goes with --sitl-binary")
-    source = pipeline.load_mission(mission)
+    source = pipeline.load_mission(mission, at=at)
     names = [r.vehicle.name for r in source.vehicles]
     addresses = rehearsing.seats_of(sitl or [], names)
     with planning_display(names, source.planner.objective) as progress:

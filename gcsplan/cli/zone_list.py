@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from gcsplan.world.zones import Level
 
 
-def show_zones(files: Sequence[Path], units: Units, *, as_json: bool) -> None:
+def show_zones(files: Sequence[Path], units: Units, *, as_json: bool, at: str | None = None) -> None:
     """Print the zones of mission files and zone files, a row for each. Raises InputError."""
     from rich.markup import escape
 
@@ -23,7 +23,7 @@ def show_zones(files: Sequence[Path], units: Units, *, as_json: bool) -> None:
     from gcsplan.cli.screens import console
     from gcsplan.figures import counted
 
-    zones, notes = list_zones(files)
+    zones, notes = list_zones(files, at)
     if as_json:
         emit({"zones": [zone.as_dict() for zone in zones], "notes": notes})
         return

@@ -22,6 +22,9 @@ from gcsplan.world.zones import Level, Zone
 
 Position = list[float]
 
+GENERATOR = "gcsplan"
+"""The mark of the collection, by which its tracks and way points are known where it is read for its zones."""
+
 HEIGHTS = "the third coordinate is metres above mean sea level (AMSL), not above the ellipsoid"
 THIRD = {"third_coordinate": "amsl_m"}
 
@@ -46,7 +49,13 @@ def write_geojson(name: str, tracks: Sequence[Track], zones: Sequence[Zone], fra
     for zone in zones:
         about = {"kind": "no_fly", "name": zone.name, **_levels(zone)}
         features.append(_feature(_area(outline_deg(zone, frame)), about))
-    document = {"type": "FeatureCollection", "name": name, "heights": HEIGHTS, "features": features}
+    document = {
+        "type": "FeatureCollection",
+        "name": name,
+        "generator": GENERATOR,
+        "heights": HEIGHTS,
+        "features": features,
+    }
     return json.dumps(document, ensure_ascii=False) + "\n"
 
 

@@ -19,7 +19,9 @@ from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError, Problem
 from gcsplan.figures import counted
 from gcsplan.mavlink.mission.return_route import Route
-from gcsplan.mission_file.airspace.left_out import faults_near, unused_notes, used
+from gcsplan.mission_file.airspace.left_out import faults_near, left_out_by_hours, unused_notes, used
+from gcsplan.mission_file.airspace.policy import Policy
+from gcsplan.mission_file.airspace.times import Hours, hours_of
 from gcsplan.mission_file.complaints import read_section
 from gcsplan.mission_file.load import TERRAIN_ERROR_M
 from gcsplan.mission_file.schema import LimitKeys, TerrainKeys, VehicleKeys
@@ -52,7 +54,8 @@ OPTIONS = {
 class WorldOptions:
     """The values of the options, by the mission file's names. Paths are as written; None means not given.
 
-    ``home`` (latitude, longitude) is the home of every file, and ``notes`` say how options were read.
+    ``home`` (latitude, longitude) is the home of every file, ``at`` says when they fly, and ``notes`` say how options
+    were read.
     """
 
     terrain: Mapping[str, object] = field(default_factory=dict)
@@ -64,6 +67,7 @@ class WorldOptions:
     return_route: Route | None = None
     terrain_error_m: float = TERRAIN_ERROR_M
     notes: tuple[str, ...] = ()
+    at: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +85,9 @@ class OpenWorld:
         problems: list[Problem] = []
         self.options = options
         self.notes: list[str] = [*options.notes]
-        self._drafts = _drafts(options.zones, problems, self.notes)
+        hours = hours_of(None, None, "--at", problems, instead=options.at)
+        self._drafts = _drafts(options.zones, problems, self.notes, hours)
+        self.hours = hours if left_out_by_hours(self._drafts) else None
         self._terrain: OpenTerrain | None = None
         self._made: dict[str, Vehicle] = {}
         keys = read_section(TerrainKeys, dict(options.terrain), "", problems)
@@ -192,12 +198,12 @@ class OpenWorld:
         return low[0] - margin, low[1] - margin, high[0] + margin, high[1] + margin
 
 
-def _drafts(files: Sequence[str], problems: list[Problem], notes: list[str]) -> list[ZoneDraft]:
-    """The zones of all files, each with a unique name."""
+def _drafts(files: Sequence[str], problems: list[Problem], notes: list[str], hours: Hours | None) -> list[ZoneDraft]:
+    """The zones of all files, each with a unique name; those are not used that do not apply in the hours."""
     drafts: list[ZoneDraft] = []
     for file in files:
         try:
-            found = read_zones(Path(file), where="--zones")
+            found = read_zones(Path(file), where="--zones", policy=Policy(hours=hours, where="--zones"))
         except InputError as why:
             problems += why.problems
             continue

@@ -16,8 +16,8 @@ from typing import Any, get_args
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.figures import counted
-from gcsplan.mission_file.airspace.left_out import faults_near, unused_notes, used
-from gcsplan.mission_file.airspace.times import OUT_OF_HOURS, Hours, hours_of
+from gcsplan.mission_file.airspace.left_out import faults_near, left_out_by_hours, unused_notes, used
+from gcsplan.mission_file.airspace.times import Hours, hours_of, texts_of
 from gcsplan.mission_file.complaints import read_section, told_once, unknown_keys, with_lines
 from gcsplan.mission_file.content import read_content
 from gcsplan.mission_file.ground import Ground, Site, known_in_plane, opened
@@ -81,6 +81,7 @@ def load_mission(
     planner_names: Collection[str] | None = None,
     around: Sequence[tuple[float, float]] = (),
     departure: datetime | None = None,
+    at: str | Sequence[str] | None = None,
 ) -> MissionFile:
     """Read and judge a mission; nothing is planned yet.
 
@@ -92,7 +93,7 @@ def load_mission(
 
     ``planner_names`` replaces the table of planners. ``around`` are places (latitude, longitude) in degrees, besides
     the mission's own, for which terrain is loaded too if it covers them. ``departure`` is when the mission begins, if
-    it does not say so itself (``at``).
+    it does not say so itself (``at``). The argument ``at`` counts in place of that key.
 
     Returns a `MissionFile`: vehicles, zones and terrain in metres. Raises InputError with every problem that was found,
     each with its place (file and key, such as ``vehicles[1].speed_m_s``; a mission without a file is called
@@ -114,7 +115,7 @@ def load_mission(
         words = f"this gcsplan reads version 1, given {shown(raw['version'])}; write `version: 1`, or update gcsplan"
         raise InputError(words, where=f"{where}: version")
     names = None if planner_names is None else tuple(planner_names)
-    return load_content(Content(file, where, raw, written, names, tuple(around), departure))
+    return load_content(Content(file, where, raw, written, names, tuple(around), departure, texts_of(at)))
 
 
 def load_content(content: Content) -> MissionFile:
@@ -122,10 +123,10 @@ def load_content(content: Content) -> MissionFile:
     return _Reading(content).mission()
 
 
-def read_no_fly(source: str | os.PathLike[str]) -> tuple[list[ZoneDraft], list[str]]:
+def read_no_fly(source: str | os.PathLike[str], at: Sequence[str] | None = None) -> tuple[list[ZoneDraft], list[str]]:
     """All zones of a mission file, used or not, and the notes on them, whatever else is wrong. Raises InputError."""
     file, where, raw, written = read_content(source, None)
-    return _Reading(Content(file, where, raw, written)).zones_alone()
+    return _Reading(Content(file, where, raw, written, at=texts_of(at))).zones_alone()
 
 
 class _Reading:
@@ -159,7 +160,7 @@ class _Reading:
         names = check_unique(self._list("vehicles"), f"{self.where}vehicles", problems)
         arrival_keys = self._section(ArrivalKeys, "arrival")
         arrival = make_arrival(arrival_keys, names, f"{self.where}arrival", problems)
-        hours = hours_of(self.raw.get("at"), self.content.departure, f"{self.where}at", self.problems)
+        hours = self._hours()
         published = self._zones(hours)
         drafts = used(published)
 
@@ -197,17 +198,16 @@ class _Reading:
             airspace_scale=ground.scale, vehicles=ground.vehicles, arrival=arrival, planner=planner,
             altitude_frame=altitude_frame, terrain_error_m=terrain_error_m, local=self.local, inputs=inputs,
             notes=tuple(dict.fromkeys(self.notes)), way_home=way_home, geoid=site.terrain.geoid,
-            hours=hours if any(d.unused.startswith(OUT_OF_HOURS) for d in published) else None,
+            hours=hours if left_out_by_hours(published) else None,
             reaching=self._reaching, content=self.content,
         )  # fmt: skip
         return replace(source, wider=partial(site.wider, source), at_level=partial(site.at_level, source))
 
     def zones_alone(self) -> tuple[list[ZoneDraft], list[str]]:
         """All zones, far ones and those that are not used too, and the notes on them. Raises InputError."""
-        hours = hours_of(self.raw.get("at"), self.content.departure, f"{self.where}at", self.problems)
         self.problems = [p for p in self.problems if p.where.startswith(f"{self.where}no_fly")]
         self.notes = []
-        published = self._zones(hours)
+        published = self._zones(self._hours())
         if self.problems:
             raise self._refusal(self.problems)
         return published, list(dict.fromkeys(self.notes))
@@ -321,6 +321,10 @@ class _Reading:
             self.notes += _one_speed(one, keys)
             terminals.append(Terminals(keys, vehicle, start, goal, tuple(via)))
         return terminals
+
+    def _hours(self) -> Hours | None:
+        given, content = self.raw.get("at"), self.content
+        return hours_of(given, content.departure, f"{self.where}at", self.problems, instead=content.at)
 
     def _zones(self, hours: Hours | None) -> list[ZoneDraft]:
         where = f"{self.where}no_fly"

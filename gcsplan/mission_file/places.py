@@ -113,9 +113,9 @@ def read_angle(value: Any, letters: str) -> Any:
         raise ValueError(f"{value[:MAX_CHARS]!r} is read as a {name}: {why}; for example `{example}`") from None
 
 
-def range_fault(lat_deg: float, lon_deg: float) -> str:
+def range_fault(lat_deg: float, lon_deg: float, *, most_lon_deg: float = 180.0) -> str:
     """Why the numbers are no place on Earth, or an empty text."""
-    if abs(lat_deg) <= 90.0 and abs(lon_deg) <= 180.0:
+    if abs(lat_deg) <= 90.0 and abs(lon_deg) <= most_lon_deg:
         return ""
     if 90.0 < abs(lat_deg) <= 180.0 and abs(lon_deg) <= 90.0:
         return (
@@ -129,7 +129,9 @@ def range_fault(lat_deg: float, lon_deg: float) -> str:
         )
     if abs(lat_deg) > 90.0:
         return f"latitude must be within ±90°, given {lat_deg:g}"
-    return f"longitude must be within ±180°, given {lon_deg:g}"
+    turned = (lon_deg + 180.0) % 360.0 - 180.0
+    cure = f": write {turned:.10g}" if abs(lon_deg) <= 360.0 else ""
+    return f"longitude must be within ±{most_lon_deg:g}°, given {lon_deg:.10g}{cure}"
 
 
 def _plain(text: str) -> str:

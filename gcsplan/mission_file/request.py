@@ -100,6 +100,7 @@ class Content:
     planner_names: tuple[str, ...] | None = None
     around: tuple[tuple[float, float], ...] = ()
     departure: datetime | None = None
+    at: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True, eq=False)

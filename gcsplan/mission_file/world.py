@@ -25,6 +25,7 @@ from gcsplan.mission_file.zone_draft import (
     corridor,
     polygon,
 )
+from gcsplan.world.degree_shapes import MOST_LON_DEG
 from gcsplan.world.frame import FARTHEST_M, Frame, centre_of
 from gcsplan.world.peaks import Peak
 from gcsplan.world.surface import Surface
@@ -72,8 +73,9 @@ class Place:
 
 
 def make_place(
-    point: Degrees | LocalPoint, where: str, problems: list[Problem], notes: list[str], *, local: bool
-) -> Place | None:
+    point: Degrees | LocalPoint, where: str, problems: list[Problem], notes: list[str], *, local: bool,
+    most_lon_deg: float = 180.0,
+) -> Place | None:  # fmt: skip
     """A point of the file; None, and ``problems``, if it cannot be a place."""
     if isinstance(point, LocalPoint):
         if not local:
@@ -81,7 +83,7 @@ def make_place(
             return None
         return Place(where, None, (point.east_m, point.north_m), point.up_m, point.agl_m)
     degrees = (point.lat_deg, point.lon_deg)
-    if not check_degrees(degrees, where, problems):
+    if not check_degrees(degrees, where, problems, most_lon_deg):
         return None
     notes += place_notes(point, where)
     return Place(where, degrees, agl_m=point.agl_m)
@@ -256,7 +258,10 @@ def _own_zone(
     kind = "center" if keys.center is not None else "polygon" if keys.polygon is not None else "line"
     points = [keys.center] if keys.center is not None else keys.polygon or keys.line or []
     at = [f"{where}.{kind}" if kind == "center" else f"{where}.{kind}[{i}]" for i in range(len(points))]
-    places = [make_place(p, a, problems, notes, local=local) for p, a in zip(points, at, strict=True)]
+    places = [
+        make_place(p, a, problems, notes, local=local, most_lon_deg=MOST_LON_DEG)
+        for p, a in zip(points, at, strict=True)
+    ]
     if len(problems) == before and len({isinstance(p, LocalPoint) for p in points}) > 1:
         problems.append(Problem(f"{where}.{kind}", "give all corners in degrees, or all in local metres"))
     for size, owner, words in zip(SIZES, ("center", "line"), ("the radius", "half the corridor's width"), strict=True):

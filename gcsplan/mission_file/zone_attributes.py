@@ -26,6 +26,9 @@ from gcsplan.mission_file.zone_levels import (
 )
 from gcsplan.world.zones import Level
 
+MOST_SHOWN = 6
+"""Most attributes of one zone that a remark names."""
+
 NAMES = ("name", "title", "label", "designator", "identifier", "ident")
 OWN = ("flooraglm", "flooramslm", "ceilingaglm", "ceilingamslm")
 BOUNDS = {
@@ -39,6 +42,7 @@ REFERENCE_NAMES = ("reference", "ref", "datum", "code")
 
 READ = "floors and ceilings are read from other attributes than gcsplan's own"
 NOT_READ = "these attributes are not read, and limit nothing"
+TIMES_NOT_READ = "these attributes of times are not read: the zones count as always"
 _PRESSURE = "flight levels are pressure altitudes, which move with the weather"
 UNDER_PRESSURE = f"{_PRESSURE}: these zones count from the ground up, and no mission passes under them"
 OVER_PRESSURE = f"{_PRESSURE}: these zones have no upper end, and no mission passes over them"
@@ -57,6 +61,13 @@ _SHARED = re.compile(
 _SEEMS_A_LIMIT = re.compile(
     r"floor|ceil|lower|upper|altitude|height|elev|vertical|limit|radius|buffer|(?<![a-z])(?:alt|agl|amsl|msl)(?![a-z])"
 )
+_SEEMS_A_TIME = re.compile(
+    r"(?:valid|effective|activ\w*?|start|begin|end|expir\w*?|permanent)"
+    r"(?:from|to|until|till|on|at|date|time|datetime|day|days|hour|hours|times|period|span|stamp|utc|local)*"
+    r"|timespan|timestamp|\w*schedule|\w*applicability|(?:operating|opening|operational)?hours(?:ofoperation)?|weekdays?"
+)
+"""The name of an attribute that says when a zone applies, in lower case, letters alone."""
+
 _LIKE_A_LEVEL = re.compile(
     r"\d\s*(?:M|F|['\u2019\u2032])|FL\s*\d|^\s*(?:GND|SFC|GROUND|SURFACE|UNL\w*)\s*$", re.ASCII | re.IGNORECASE
 )
@@ -76,6 +87,7 @@ class Meaning:
     shared: bool
     used: bool
     seems_a_limit: bool
+    seems_a_time: bool = False
 
 
 @lru_cache(maxsize=4096)  # features repeat their attributes' names
@@ -85,7 +97,8 @@ def meaning_of(key: str) -> Meaning:
     plain = re.sub(r"[^a-z0-9]", "", lower)
     limit, shared = _LIMIT.fullmatch(plain), bool(_SHARED.fullmatch(plain))
     used = limit is not None or shared or lower in (*NAMES, *SIZES)
-    return Meaning(lower, plain in OWN, limit, shared, used, bool(_SEEMS_A_LIMIT.search(lower)))
+    is_time = not used and bool(_SEEMS_A_TIME.fullmatch(re.sub(r"[^a-z]", "", lower)))
+    return Meaning(lower, plain in OWN, limit, shared, used, bool(_SEEMS_A_LIMIT.search(lower)), is_time)
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,20 +137,25 @@ def read_attributes(given: Sequence[Attribute], name: str, problems: list[Proble
     """What the attributes say; ``name`` is for a zone without one. None, and ``problems``, if they cannot be read."""
     known: list[Attribute] = []
     ignored: list[Attribute] = []
+    times: list[Attribute] = []
     for a in given:
         if a.value is None or (isinstance(a.value, str) and not a.value.strip()):
             continue
         meaning = a.meaning
         if meaning.used:
             known.append(a)
+        elif meaning.seems_a_time:
+            times.append(a)
         elif meaning.seems_a_limit or _reads_as_level(a.value):
             ignored.append(a)
     reading = _Reading(_name(known) or name, problems)
     before = len(problems)
     radius_m, buffer_m = (reading.size_m([a for a in known if a.meaning.lower == size]) for size in SIZES)
     bounds = reading.bounds(known)
-    if ignored:
-        reading.remarks.append((NOT_READ, ", ".join(str(a) for a in ignored[:6]) + (", …" if len(ignored) > 6 else "")))
+    for sentence, some in ((NOT_READ, ignored), (TIMES_NOT_READ, times)):
+        if some:
+            more = ", …" if len(some) > MOST_SHOWN else ""
+            reading.remarks.append((sentence, ", ".join(str(a) for a in some[:MOST_SHOWN]) + more))
     if len(problems) > before:
         return None
     return Said(reading.name, radius_m, bounds, tuple(reading.remarks), reading.of_levels, buffer_m)

@@ -14,11 +14,14 @@ from gcsplan.mission_file.places import range_fault
 from gcsplan.world.degree_shapes import (
     LARGEST_BUFFER_M,
     LARGEST_RADIUS_M,
+    MOST_LON_DEG,
+    across,
     counter_clockwise,
     near_circle,
     near_corridors,
     near_polygons,
     outline_of,
+    wide_fault,
 )
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
@@ -35,6 +38,12 @@ MAX_LINE_POINTS = 20_000
 Remark = tuple[str, str]
 """What a user has to know about how a zone of a file was read: a sentence for all such zones, and what this one has."""
 
+ACROSS = "outlines with edges such as from 179.9 to -179.9 are read as across the 180° meridian"
+OTHER_SIDE = (
+    "its outline is read as across the 180° meridian, but if it goes around the other side the mission is in it: write "
+    "longitudes past 180 where it crosses (181 for -179), or cut it there in two"
+)
+
 SHOWN_ZONES = 20
 """Most zones named in one note."""
 
@@ -46,7 +55,9 @@ class ZoneDraft:
     ``points`` is the centre alone (with ``radius_m``), a line (with ``buffer_m``, the half-width of its corridor), or a
     polygon's vertices, not closed: (latitude, longitude) in degrees, or (east_m, north_m) if ``local``. ``where`` is
     its place in the user's file. ``unused`` is why a zone of an authority's file is not used; ``faults`` are what is
-    not understood of it, which refuses a mission near it.
+    not understood of it, which refuses a mission near it. ``great_circles``: its format does not say that edges are
+    straight in degrees, so that what they enclose along great circles belongs to the zone, too. ``doubt`` is where a
+    polygon that is read as across the antimeridian lies if it goes around the other side: a mission there is refused.
     """
 
     name: str
@@ -60,6 +71,8 @@ class ZoneDraft:
     buffer_m: float | None = None
     unused: str = ""
     faults: tuple[Problem, ...] = ()
+    great_circles: bool = False
+    doubt: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +140,7 @@ def circle(
 
 def polygon(
     name: str, where: str, points: Sequence[tuple[float, float]], bounds: Bounds, problems: list[Problem],
-    *, local: bool = False, key: str = "polygon",
+    *, local: bool = False, key: str = "polygon", holes: int = 0,
 ) -> ZoneDraft | None:  # fmt: skip
     """A prism; None, and new ``problems``, if its outline is not simple or its bounds contradict each other."""
     before = len(problems)
@@ -136,11 +149,16 @@ def polygon(
     floor, ceiling = bounds.levels(where, problems)
     if len(problems) > before:
         return None
+    points, doubt = (points, ()) if local else across(points, holes)
+    if not local and (wide := wide_fault(points, holes)):
+        problems.append(Problem(at, f"zone {name[:60]!r}: {wide}"))
+        return None
     ring, fault = outline_of(points, local=local)
     if fault:
         problems.append(Problem(at, fault))
         return None
-    return ZoneDraft(name, where, tuple(ring), local, None, floor, ceiling)
+    said = ((ACROSS, ""),) if doubt else ()
+    return ZoneDraft(name, where, tuple(ring), local, None, floor, ceiling, remarks=said, doubt=doubt)
 
 
 def corridor(
@@ -156,6 +174,8 @@ def corridor(
         problems.append(Problem(at, f"has {len(points)} points, more than {MAX_LINE_POINTS}; simplify or split it"))
     elif len(set(points)) < 2:
         problems.append(Problem(at, f"a line needs at least 2 different points, given {len(set(points))}"))
+    elif not local and (wide := wide_fault(points, closed=False)):
+        problems.append(Problem(at, wide))
     floor, ceiling = bounds.levels(where, problems)
     if len(problems) > before:
         return None
@@ -182,9 +202,14 @@ def _check_points(points: Sequence[tuple[float, float]], at: str, problems: list
         all(check_degrees(point, f"{at}[{i}]", problems) for i, point in enumerate(points))
 
 
-def check_degrees(point: tuple[float, float], where: str, problems: list[Problem]) -> bool:
-    """Whether (latitude, longitude) can be a place; if not, a problem is added, with a guess at swapped numbers."""
-    fault = range_fault(*point)
+def check_degrees(
+    point: tuple[float, float], where: str, problems: list[Problem], most_lon_deg: float = MOST_LON_DEG
+) -> bool:
+    """Whether (latitude, longitude) can be a place; if not, a problem is added, with a guess at swapped numbers.
+
+    The places of zones may have longitudes to `MOST_LON_DEG`, of other points to 180°.
+    """
+    fault = range_fault(*point, most_lon_deg=most_lon_deg)
     if fault:
         problems.append(Problem(where, fault))
     return not fault
@@ -205,6 +230,10 @@ def place_zones(drafts: Sequence[ZoneDraft], frame: Frame) -> tuple[list[tuple[Z
         for i, shape in enumerate(shapes):
             name = draft.name if len(shapes) == 1 else f"{draft.name}/{i + 1}"
             placed.append((draft, Zone(name, shape, draft.floor, draft.ceiling)))
+        if draft.doubt:
+            fault = Problem(draft.where, f"zone {draft.name[:60]!r}: {OTHER_SIDE}")
+            other = replace(draft, points=draft.doubt, faults=(fault,), remarks=())
+            placed += [(other, Zone(draft.name, shape)) for shape in near_polygons(other.points, frame)]
     return placed, far
 
 
@@ -249,7 +278,7 @@ def _shapes(draft: ZoneDraft, frame: Frame) -> Sequence[Circle | Polygon]:
         circle = near_circle(draft.points[0], draft.radius_m, frame, local=draft.local)
         return [circle] if circle is not None else []
     if draft.buffer_m is not None:
-        return near_corridors(draft.points, draft.buffer_m, frame, local=draft.local)
+        return near_corridors(draft.points, draft.buffer_m, frame, local=draft.local, great_circles=draft.great_circles)
     if draft.local:
         return [counter_clockwise(np.asarray(draft.points, float))]
-    return near_polygons(draft.points, frame)
+    return near_polygons(draft.points, frame, great_circles=draft.great_circles)

@@ -61,6 +61,8 @@ class ZoneFile:
     said: list[str] = field(default_factory=list)
     columns: tuple[str, ...] = ()
     unsized: list[Unsized] = field(default_factory=list)
+    great_circles: bool = False
+    """Whether the format leaves it open that edges are great circles."""
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -88,9 +90,11 @@ class ZoneFile:
         self.unsized = []
 
     def add_ring(
-        self, said: Said, part: str, where: str, ring: list[tuple[float, float]], key: str, drawn: Drawn = NOT_DRAWN
-    ) -> None:
-        """Add a polygon called ``part`` by its outline, (latitude, longitude)."""
+        self, said: Said, part: str, where: str, ring: list[tuple[float, float]], key: str, drawn: Drawn = NOT_DRAWN,
+        holes: int = 0,
+    ) -> None:  # fmt: skip
+        """Add a polygon called ``part`` by its outline, (latitude, longitude), and the number of its holes."""
+        self.holes += holes
         bounds = said.bounds
         remarks = [*said.remarks, *drawn.remarks]
         if drawn.ceiling is not None:
@@ -98,7 +102,7 @@ class ZoneFile:
         for size_m, words in ((said.radius_m, RADIUS_OF_POLYGON), (said.buffer_m, BUFFER_OF_POLYGON)):
             if size_m is not None:
                 remarks.append((words, f"{size_m:g} m"))
-        self.add(polygon(part[:200], where, ring, bounds, self.problems, key=key), remarks)
+        self.add(polygon(part[:200], where, ring, bounds, self.problems, key=key, holes=holes), remarks)
 
     def add_circle(self, said: Said, part: str, where: str, centre: Point, remarks: Sequence[Remark] = ()) -> None:
         """Add a circle called ``part`` by its centre, (latitude, longitude); its radius may come from the mission."""
@@ -133,5 +137,5 @@ class ZoneFile:
             raise InputError(f"the file has more than {MAX_ZONES} zones", where=where)
 
     def _remarked(self, draft: ZoneDraft, remarks: Sequence[Remark]) -> ZoneDraft:
-        of_file = tuple((f"{self.path.name}: {sentence}", detail) for sentence, detail in remarks)
-        return replace(draft, remarks=of_file)
+        of_file = tuple((f"{self.path.name}: {sentence}", detail) for sentence, detail in [*remarks, *draft.remarks])
+        return replace(draft, remarks=of_file, great_circles=self.great_circles)

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.errors import InputError, Problem
+from gcsplan.export.geojson import GENERATOR
+from gcsplan.figures import counted
 from gcsplan.mission_file.zone_attributes import Attribute, Said, is_number, read_attributes, shown
 from gcsplan.mission_file.zone_draft import SIZES
 from gcsplan.mission_file.zone_file import Drawn, ZoneFile
@@ -20,13 +22,49 @@ def read_geojson(path: Path, whole: Any) -> ZoneFile:
     if not isinstance(whole, dict):
         raise InputError("a GeoJSON file holds one object, for example a FeatureCollection", where=str(path))
     _require_wgs84(whole, path)
+    _require_whole(found, whole)
     features = whole.get("features") if whole.get("type") == "FeatureCollection" else [whole]
     if not isinstance(features, list) or not features:
         raise InputError("a FeatureCollection needs a list `features` that is not empty", where=str(path))
+    flown = [_is_flown(whole, feature) for feature in features]
     for i, feature in enumerate(features):
         where = f"{path}: features[{i}]" if whole.get("type") == "FeatureCollection" else f"{path}: feature"
-        _feature(found, feature, where, f"{path.stem}[{i}]")
+        if not flown[i]:
+            _feature(found, feature, where, f"{path.stem}[{i}]")
+    if any(flown):
+        found.said.append(
+            f"not used: {counted(sum(flown), 'track or way point', 'tracks and way points')} of a mission"
+        )
     return found
+
+
+def _is_flown(whole: dict[str, Any], feature: Any) -> bool:
+    """Whether a feature is a track or way point that gcsplan wrote beside the zones of its own mission.geojson.
+
+    The collection has `GENERATOR`. Before it did, its tracks and way points had the reference of their heights.
+    """
+    properties = feature.get("properties") if isinstance(feature, dict) else None
+    if not isinstance(properties, dict) or any(key.lower() in SIZES for key in properties):
+        return False
+    before = "heights" in whole and properties.get("third_coordinate") == "amsl_m" and "vehicle" in properties
+    geometry = feature.get("geometry")
+    drawn = {"track": ("LineString", "MultiLineString"), "waypoint": ("Point",)}.get(str(properties.get("kind")), ())
+    is_drawn = isinstance(geometry, dict) and geometry.get("type") in drawn
+    return is_drawn and (whole.get("generator") == GENERATOR or before)
+
+
+def _require_whole(found: ZoneFile, whole: dict[str, Any]) -> None:
+    """Refuse what a server sent in part: the zones of the rest would be missing."""
+    inner = whole.get("properties")
+    given = {**inner, **whole} if isinstance(inner, dict) else whole
+    matched: Any = given.get("numberMatched")
+    returned: Any = given.get("numberReturned")
+    if given.get("exceededTransferLimit") is True:
+        words = "the server sent a part of the features alone (exceededTransferLimit); ask for all, page by page"
+        found.problems.append(Problem(f"{found.path}: exceededTransferLimit", words))
+    elif is_number(matched) and is_number(returned) and matched > returned:
+        words = f"the server sent {returned} of {matched} features; ask for all, page by page"
+        found.problems.append(Problem(f"{found.path}: numberMatched", words))
 
 
 def _require_wgs84(whole: dict[str, Any], path: Path) -> None:
@@ -55,10 +93,6 @@ def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
     if not isinstance(properties, dict) or not isinstance(geometry, dict):
         what = "properties must be an object" if not isinstance(properties, dict) else "the feature has no geometry"
         found.problems.append(Problem(where, what))
-        return
-    # gcsplan's own mission.geojson contains tracks and way points beside the zones; they are skipped.
-    drawn = {"track": ("LineString", "MultiLineString"), "waypoint": ("Point",)}.get(str(properties.get("kind")), ())
-    if geometry.get("type") in drawn and not any(key.lower() in SIZES for key in properties):
         return
     said = read_attributes(_attributes(properties, geometry, where), fallback, found.problems)
     if said is None:
@@ -118,10 +152,10 @@ def _rings(found: ZoneFile, rings: Any, said: Said, part: str, where: str, at: s
     if not isinstance(rings, list) or not rings or not isinstance(rings[0], list):
         found.problems.append(Problem(at, f"a polygon is a list of rings, given {shown(rings)}"))
         return
-    found.holes += len(rings) - 1
     outline = _positions(found, rings[0], f"{at}[0]")
     if outline is not None:
-        found.add_ring(said, part, where, outline, at.removeprefix(where).removeprefix("."), _unread(rings[0]))
+        found.add_ring(said, part, where, outline, at.removeprefix(where).removeprefix("."), _unread(rings[0]),
+                       holes=len(rings) - 1)  # fmt: skip
 
 
 def _line(found: ZoneFile, positions: Any, said: Said, part: str, where: str, at: str) -> None:

@@ -8,6 +8,7 @@ altitudes describe how a globe draws the outline, and a remark says that they ar
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal
@@ -16,6 +17,7 @@ import defusedxml.ElementTree
 from defusedxml.common import DefusedXmlException
 
 from gcsplan.errors import InputError, Problem
+from gcsplan.figures import counted
 from gcsplan.mission_file.zone_attributes import Attribute, Said, as_figure, read_attributes
 from gcsplan.mission_file.zone_draft import SIZES
 from gcsplan.mission_file.zone_file import NOT_DRAWN, Drawn, ZoneFile
@@ -37,7 +39,7 @@ _SHAPES = (*_READ_SHAPES, "LinearRing", "Model", "Track", "MultiTrack")
 
 def read_kml(path: Path, data: bytes) -> ZoneFile:
     """The zones of KML text. Raises InputError if it is not KML."""
-    found = ZoneFile(path)
+    found = ZoneFile(path, great_circles=True)  # as Google Earth draws them
     try:
         root = defusedxml.ElementTree.fromstring(data, forbid_dtd=True)
     except DefusedXmlException:
@@ -45,14 +47,20 @@ def read_kml(path: Path, data: bytes) -> ZoneFile:
     except (ValueError, SyntaxError, LookupError) as why:  # ParseError is a SyntaxError; unknown encodings LookupError
         raise InputError(f"this is not KML: {str(why)[:200]}", where=str(path)) from None
     placemarks = 0
-    for element in _walk(root, path):
+    loose: Counter[str] = Counter()
+    for element in _walk(root, path, leaves=("Placemark",)):
         kind = _kind(element)
+        if kind in _SHAPES:
+            loose[kind] += 1
         if kind == "Placemark":
             placemarks += 1
             _placemark(found, element, placemarks)
-        elif kind in ("NetworkLink", "GroundOverlay"):
+        elif kind in ("NetworkLink", "NetworkLinkControl", "GroundOverlay"):
             found.problems.append(Problem(f"{path}: {kind}", f"a {kind} cannot be read as a zone; remove it"))
-    if not placemarks:
+    for kind, count in loose.items():
+        words = f"{counted(count, kind)} outside of a Placemark cannot be read as a zone; put each into a Placemark"
+        found.problems.append(Problem(f"{path}: {kind}", words))
+    if not placemarks and not found.problems:
         raise InputError("the KML holds no Placemark", where=str(path))
     return found
 
@@ -77,7 +85,7 @@ def _kind(element: Any) -> str:
 def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
     name = next((t for c in placemark if _kind(c) == "name" and (t := (c.text or "").strip())), "")
     where = f"{found.path}: Placemark {number}" + (f" ({name[:60]})" if name else "")
-    given = [Attribute("name", name, where), *_extended_data(placemark, where)]
+    given = [Attribute("name", name, where), *_extended_data(placemark, where), *_times(placemark, where)]
     said = read_attributes(given, f"{found.path.stem}[{number}]", found.problems)
     if said is None:
         return
@@ -110,14 +118,14 @@ def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
 
 def _polygon(found: ZoneFile, shape: Any, said: Said, part: str, where: str) -> None:
     outer = [e for e in _walk(shape, found.path) if _kind(e) == "outerBoundaryIs"]
-    found.holes += sum(_kind(e) == "innerBoundaryIs" for e in _walk(shape, found.path))
+    holes = sum(_kind(e) == "innerBoundaryIs" for e in _walk(shape, found.path))
     if len(outer) != 1:
         found.problems.append(Problem(where, f"a Polygon has one outerBoundaryIs, given {len(outer)}"))
         return
     points = _coordinates(found, outer[0], where)
     if points is not None:
         drawn = _unread(points) if said.of_levels else _drawn(shape, points)
-        found.add_ring(said, part, where, [p[:2] for p in points], "", drawn)
+        found.add_ring(said, part, where, [p[:2] for p in points], "", drawn, holes)
 
 
 def _drawn(shape: Any, points: list[Corner]) -> Drawn:
@@ -169,6 +177,13 @@ def _coordinates(found: ZoneFile, parent: Any, where: str) -> list[Corner] | Non
         found.problems.append(Problem(where, "has no coordinates"))
         return None
     return points
+
+
+def _times(placemark: Any, where: str) -> list[Attribute]:
+    """The times of a Placemark, which are not read."""
+    kinds = ("TimeSpan", "TimeStamp")
+    return [Attribute(_kind(e), " to ".join("".join(e.itertext()).split())[:60], where) for e in placemark
+            if _kind(e) in kinds]  # fmt: skip
 
 
 def _extended_data(placemark: Any, where: str) -> list[Attribute]:

@@ -174,8 +174,7 @@ def _feature(found: ZoneFile, geometry: shapely.Geometry | None, said: Said, whe
         xy = np.asarray(outline.coords)[:, :2]
         corners = [(float(lat), float(lon)) for lat, lon in to_degrees.line(xy, MAX_VERTICES)]
         if shape.geom_type == "Polygon":
-            found.holes += len(shape.interiors)
-            found.add_ring(said, part, where, corners, "", drawn)
+            found.add_ring(said, part, where, corners, "", drawn, len(shape.interiors))
         elif shape.geom_type == "Point":
             found.add_circle(said, part, where, corners[0], drawn.remarks)
         else:

@@ -3,6 +3,11 @@
 The plane cannot hold points a quarter of the globe away, and it bends long edges. So zones and fences are converted
 here: polygons and lines, straight in degrees from point to point, are cut in degrees to the mission's neighbourhood
 and projected.
+
+Longitudes count as they are written, from -360 to 360: an edge from 170 to 190 crosses the antimeridian, one from -95
+to 95 would go through 0. An edge of 180 degrees and more is refused (`wide_fault`), because files mean either way by
+it. The one exception are edges such as from 179.9 to -179.9 of a polygon that is no tall strip there: they cross the
+antimeridian for a mission near it, and refuse one on the other side (`across`).
 """
 
 from __future__ import annotations
@@ -49,6 +54,22 @@ MOST_POINTS = 1000
 FAR_M = 1.6 * FARTHEST_M
 """No mission goes farther than this from the frame's origin, m."""
 
+MOST_LON_DEG = 360.0
+"""Longitudes of zones lie within this, so that both conventions and zones across the antimeridian can be written."""
+
+HALF_TURN_DEG = 180.0
+"""From this longitude difference on nobody can tell on which side of the globe an edge runs."""
+
+ACROSS_DEG, ACROSS_PART = 2.0, 0.5
+"""Edges of a whole turn less the first may cross the antimeridian, if the polygon then is wide by this part of its
+height: a mask of the world that leaves out a strip along the antimeridian is tall there, and narrow."""
+
+GREAT_CIRCLE_M = 1.0
+"""An edge that lies nearer to its great circle is not told from it, m."""
+
+MOST_PIECES = 20_000
+"""Most pieces of one great circle."""
+
 
 def near_circle(centre: Corner, radius_m: float, frame: Frame, *, local: bool = False) -> Circle | None:
     """The circle around (latitude, longitude), or (east_m, north_m) if ``local``; None if it is too far away.
@@ -61,27 +82,34 @@ def near_circle(centre: Corner, radius_m: float, frame: Frame, *, local: bool = 
     return Circle(float(east), float(north), radius_m) if near else None
 
 
-def near_polygons(ring: Sequence[Corner], frame: Frame) -> list[Polygon]:
+def near_polygons(ring: Sequence[Corner], frame: Frame, *, great_circles: bool = False) -> list[Polygon]:
     """The parts of a polygon (latitude, longitude; simple, not closed) within `FAR_M`; none if it is too far away.
 
-    Its edges are cut to keep `EDGE_BOW_M`.
+    Its edges are cut to keep `EDGE_BOW_M`. With ``great_circles`` each edge may be the great circle as well as the line
+    that is straight in degrees, and all that either encloses belongs to the polygon.
     """
-    parts = _near_parts(unwrapped(ring, frame.lon_deg), frame)
+    rings = _turned(ring, frame.lon_deg)
+    parts = [p for one in (_with_great_circles(rings) if great_circles else [rings]) for p in _near_parts(one, frame)]
     cut = [_cut_edges(part, np.roll(part, -1, axis=0), frame) for part in parts]
     return [counter_clockwise(frame.to_plane(points[:, 1], points[:, 0])) for points in cut]
 
 
-def near_corridors(line: Sequence[Corner], buffer_m: float, frame: Frame, *, local: bool = False) -> list[Polygon]:
+def near_corridors(
+    line: Sequence[Corner], buffer_m: float, frame: Frame, *, local: bool = False, great_circles: bool = False
+) -> list[Polygon]:
     """Polygons that together hold every point within ``buffer_m`` of the line; none if it is too far away.
 
     ``line`` is (latitude, longitude), straight in degrees from point to point, or (east_m, north_m) if ``local``. The
     polygons have no holes: where a line surrounds a place, its parts have polygons of their own. They reach beyond the
-    buffer by at most 5 % and 0.1 m.
+    buffer by at most 5 % and 0.1 m. With ``great_circles`` the line along great circles has corridors, too.
     """
     if local:
         parts = [np.asarray(line, float)]
     else:
-        near = _near_parts(unwrapped(line, frame.lon_deg), frame, spare_m=buffer_m, is_line=True)
+        whole = unwrapped(line, frame.lon_deg)
+        bent = _great_circles(whole[:-1], whole[1:]) if great_circles else None
+        lines = [whole] if bent is None else [whole, np.concatenate([bent, whole[-1:]])]
+        near = [p for one in lines for p in _near_parts(one, frame, spare_m=buffer_m, is_line=True)]
         cut = [np.concatenate([_cut_edges(part[:-1], part[1:], frame), part[-1:]]) for part in near]
         parts = [frame.to_plane(points[:, 1], points[:, 0]) for points in cut]
     corridors = []
@@ -153,7 +181,7 @@ def counter_clockwise(vertices: Floats) -> Polygon:
 def outline_of(points: Sequence[Corner], *, local: bool = False) -> tuple[list[Corner], str]:
     """The corners, not closed and without repetitions, and why they are no simple polygon ("" if they are one).
 
-    ``points`` are (latitude, longitude), or (east_m, north_m) if ``local``.
+    ``points`` are (latitude, longitude), or (east_m, north_m) if ``local``. Of one in degrees `wide_fault` is empty.
     """
     ring = [p for i, p in enumerate(points) if i == 0 or p != points[i - 1]]
     if len(ring) > 1 and ring[0] == ring[-1]:
@@ -162,11 +190,135 @@ def outline_of(points: Sequence[Corner], *, local: bool = False) -> tuple[list[C
         return ring, f"a polygon needs at least 3 different points, given {len(set(ring))}"
     import shapely  # many missions have no polygons
 
-    shape = shapely.Polygon(np.asarray(ring) if local else unwrapped(ring, ring[0][1]))
+    shape = shapely.Polygon(np.asarray(ring, float) if local else np.asarray(ring, float)[:, ::-1])
     return ring, "" if shape.is_valid and shape.area > 0.0 else _why_invalid(shape, local)
 
 
-def unwrapped(points: Sequence[Corner], near_lon_deg: float) -> Floats:
+def wide_fault(points: Sequence[Corner], holes: int = 0, *, closed: bool = True) -> str:
+    """Why a polygon (or a line, if not ``closed``) in degrees is too wide to be read; empty if it is not.
+
+    An edge along a pole is a point, however far it goes in longitude.
+    """
+    at = np.asarray(points, float)
+    if len(at) < 2 or not (width := float(np.ptp(at[:, 1]))) >= HALF_TURN_DEG:
+        return ""
+    if holes:
+        return (
+            f"the polygon is {width:g}° of longitude wide and has a hole: it is a keep-in area, outside of which "
+            "all is no-fly, and gcsplan has none yet; leave it out, and draw what may not be flown near the mission as "
+            "polygons without holes"
+        )
+    ends = np.roll(at, -1, axis=0)[: None if closed else -1]
+    at = at[: len(ends)]
+    step = ends[:, 1] - at[:, 1]
+    long = (np.abs(step) >= HALF_TURN_DEG) & ~((np.abs(at[:, 0]) == 90.0) & (ends[:, 0] == at[:, 0]))
+    if not closed:  # nobody draws a line around the globe by one edge
+        long &= np.abs((step + 180.0) % 360.0 - 180.0) > ACROSS_DEG
+    if not long.any():
+        return "" if width <= MOST_LON_DEG else f"the {width:g}° of longitude are more than {MOST_LON_DEG:g}°; cut it"
+    k = int(long.argmax())
+    (lat0, lon0), (lat1, lon1) = at[k], ends[k]
+    cure = (
+        f"across the 180° meridian write {_beyond(lon0, lon1)} (or cut the zone there in two), the other way put a "
+        "corner between"
+    )
+    if round(float(np.sum((step + 180.0) % 360.0 - 180.0)) / 360.0):
+        cure += "; a zone that holds a pole has corners at the pole with the first and the last longitude"
+    return (
+        f"the edge from {lat0:.6g}, {lon0:.7g} to {lat1:.6g}, {lon1:.7g} spans {abs(step[k]):.6g}° of longitude, and "
+        f"from {HALF_TURN_DEG:g}° on it may run on either side of the globe: {cure}"
+    )
+
+
+def across(points: Sequence[Corner], holes: int = 0) -> tuple[Sequence[Corner], tuple[Corner, ...]]:
+    """The corners of a polygon with longitudes past the antimeridian where it crosses it, and where it lies if not.
+
+    The second is a rectangle from which its surroundings are left out. It is empty, and the points are unchanged, if
+    they do not cross the antimeridian as `ACROSS_DEG` says, or if there are ``holes``.
+    """
+    at = np.asarray(points, float)
+    if holes or len(at) < 3 or not np.ptp(at[:, 1]) >= 360.0 - ACROSS_DEG:
+        return points, ()
+    step = np.diff(at[:, 1], append=at[0, 1])
+    short = (step + 180.0) % 360.0 - 180.0
+    long = np.abs(step) >= HALF_TURN_DEG
+    turned = unwrapped(points, float(at[0, 1]))
+    (west, south), (east, north) = turned.min(axis=0), turned.max(axis=0)
+    is_strip = east - west < ACROSS_PART * (north - south)
+    if is_strip or not (long.any() and (np.abs(short[long]) <= ACROSS_DEG).all() and abs(short.sum()) < 1.0):
+        return points, ()
+    highest = min(max(abs(south), abs(north)) + 2.0, 89.0)
+    spare = math.degrees(1.1 * FAR_M / 6.35e6) / math.cos(math.radians(highest))
+    low, high = float(east) + spare, float(west) + 360.0 - spare
+    ring = [(float(lat), float(lon)) for lon, lat in turned]
+    other = ((float(south), low), (float(south), high), (float(north), high), (float(north), low))
+    return ring, other if low < high else ()
+
+
+def _beyond(lon0: float, lon1: float) -> str:
+    """Which longitude to write instead so that an edge runs the short way."""
+    west, east = min(lon0, lon1), max(lon0, lon1)
+    return (
+        f"{west + 360.0:.7g} for {west:.7g}" if west + 360.0 <= MOST_LON_DEG else f"{east - 360.0:.7g} for {east:.7g}"
+    )
+
+
+def _turned(points: Sequence[Corner], near_lon_deg: float) -> Floats:
+    """(N, 2) longitude, latitude, all turned by the same whole turns so that the first is near ``near_lon_deg``."""
+    p = np.asarray(points, float)
+    return np.stack([p[:, 1] + 360.0 * np.round((near_lon_deg - p[0, 1]) / 360.0), p[:, 0]], axis=-1)
+
+
+def _with_great_circles(ring: Floats) -> list[Floats]:
+    """The outlines of all that a ring (N, 2) longitude, latitude encloses by either kind of edges."""
+    bent = _great_circles(ring, np.roll(ring, -1, axis=0))
+    if bent is None:
+        return [ring]
+    import shapely
+
+    whole = shapely.union_all([shapely.Polygon(ring), shapely.make_valid(shapely.Polygon(bent))])
+    parts = [p for p in shapely.get_parts(whole) if p.geom_type == "Polygon"]
+    return [np.asarray(p.exterior.coords)[:-1] for p in parts]
+
+
+def _great_circles(begins: Floats, ends: Floats) -> Floats | None:
+    """The edges (N, 2) longitude, latitude along great circles, without the last end; None if all are as good as
+    straight.
+
+    On the sphere of geodetic latitudes; edges are shorter than half a turn, and those that end at a pole are meridians.
+    """
+    span, high = ends[:, 0] - begins[:, 0], np.maximum(np.abs(begins[:, 1]), np.abs(ends[:, 1]))
+    rough_m = np.tan(np.radians(np.minimum(high, 89.9))) * (METRES_OF_DEGREE * span) ** 2 / (7.0 * 6.3e6)
+    long = (rough_m > GREAT_CIRCLE_M) & (high < 89.999) & (np.abs(span) < HALF_TURN_DEG)
+    if not long.any():
+        return None
+    found: list[Floats] = []
+    any_bent = False
+    for begin, end, is_long in zip(begins, ends, long.tolist(), strict=True):
+        off_m = METRES_OF_DEGREE * _off_straight(begin, end, np.arange(1, 64) / 64.0) if is_long else np.zeros(1)
+        bow_m = float(np.abs(off_m).max())
+        if bow_m <= GREAT_CIRCLE_M:
+            found.append(begin[None])
+            continue
+        any_bent = True
+        part = np.arange(n := min(MOST_PIECES, math.ceil(4.0 * math.sqrt(bow_m / EDGE_BOW_M)))) / n
+        along = begin + part[:, None] * (end - begin)
+        along[:, 1] += _off_straight(begin, end, part)
+        found.append(along)
+    return np.concatenate(found) if any_bent else None
+
+
+def _off_straight(begin: Floats, end: Floats, part: Floats) -> Floats:
+    """By how many degrees of latitude the great circle lies north of the line straight in degrees, at parts of it."""
+    (lon0, lat0), (lon1, lat1) = begin, end
+    turn = math.radians(lon1 - lon0)
+    rise = math.tan(math.radians(lat0)) * np.sin((1.0 - part) * turn) + math.tan(math.radians(lat1)) * np.sin(
+        part * turn
+    )
+    return np.asarray(np.degrees(np.arctan(rise / math.sin(turn))) - (lat0 + part * (lat1 - lat0)))
+
+
+def unwrapped(points: Sequence[Corner] | Floats, near_lon_deg: float) -> Floats:
     """(N, 2) longitude, latitude; the first near ``near_lon_deg``, each within half a turn of the one before."""
     p = np.asarray(points, float)
     steps = np.diff(p[:, 1], prepend=near_lon_deg)

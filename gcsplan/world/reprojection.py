@@ -15,7 +15,7 @@ from pyproj.exceptions import ProjError
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.world.datum import WORST_SHIFT_M
-from gcsplan.world.degree_shapes import EDGE_BOW_M
+from gcsplan.world.degree_shapes import EDGE_BOW_M, unwrapped
 
 WGS84 = "WGS 84"
 METRES_OF_DEGREE = 111_700.0
@@ -35,6 +35,7 @@ class ToDegrees:
     def __init__(self, crs: str, middle: tuple[float, float], *, where: str) -> None:
         self._where = where
         self._operation: Transformer | None = None
+        self._degrees: tuple[float, float] | None = None
         self.note = ""
         try:
             horizontal = _horizontal(crs, where)
@@ -45,6 +46,10 @@ class ToDegrees:
             if not all(math.isfinite(x) for x in several.transform(*middle)):
                 raise ProjError("the shapes lie where it is not defined")
             self._operation = _used(several)
+            if horizontal.is_geographic:
+                unit = math.degrees(horizontal.axis_info[0].unit_conversion_factor)
+                meridian = horizontal.prime_meridian
+                self._degrees = unit, math.degrees(meridian.longitude * meridian.unit_conversion_factor)
         except ProjError as why:
             reason = str(why).splitlines()[0][:100]
             raise self._refused(f"there is no known way from its coordinate system to WGS 84 ({reason})") from None
@@ -59,6 +64,10 @@ class ToDegrees:
         if self._operation is None:
             return np.ascontiguousarray(xy[:, ::-1])
         lon, lat = self._operation.transform(xy[:, 0], xy[:, 1])
+        if (
+            self._degrees is not None
+        ):  # PROJ turns longitudes back to within 180°, and the side of an edge hangs on them
+            lon = lon + 360.0 * np.round((xy[:, 0] * self._degrees[0] + self._degrees[1] - lon) / 360.0)
         found = np.stack([np.asarray(lat, float), np.asarray(lon, float)], axis=-1)
         if not np.isfinite(found).all():
             x, y = xy[int(np.argmax(~np.isfinite(found).all(axis=1)))]
@@ -75,15 +84,18 @@ class ToDegrees:
             return ends
         begin, step = xy[:-1], np.diff(xy, axis=0)
         within = [self.points(begin + part * step) for part in MEASURED_AT]
-        straight = [ends[:-1] + part * _turn(ends[1:] - ends[:-1]) for part in MEASURED_AT]
-        off = np.stack([_turn(a - b) for a, b in zip(within, straight, strict=True)])
+        # In degrees a longitude is as it is written; from metres PROJ makes it one within 180°.
+        turn = _turn if self._degrees is None else np.asarray
+        straight = [ends[:-1] + part * turn(ends[1:] - ends[:-1]) for part in MEASURED_AT]
+        off = np.stack([turn(a - b) for a, b in zip(within, straight, strict=True)])
         off[..., 1] *= np.cos(np.radians(ends[:-1, 0]))
         bow_m = 1.2 * METRES_OF_DEGREE * np.hypot(off[..., 0], off[..., 1]).max(axis=0)
         pieces = np.maximum(1, np.ceil(np.sqrt(bow_m / EDGE_BOW_M))).astype(int)
         if pieces.sum() > len(xy) + most:
             raise self._refused("its edges are too long to be straight in degrees")
         cut = [b + s * (np.arange(n) / n)[:, None] for b, s, n in zip(begin, step, pieces, strict=True)]
-        return self.points(np.concatenate([*cut, xy[-1:]]))
+        found = self.points(np.concatenate([*cut, xy[-1:]]))
+        return found if self._degrees is not None else np.ascontiguousarray(unwrapped(found, found[0, 1])[:, ::-1])
 
     def _refused(self, words: str) -> InputError:
         return InputError(f"{words}; convert it with ogr2ogr -t_srs EPSG:4326", where=self._where)

@@ -206,12 +206,12 @@ def test_shapes_outside_their_own_crs_are_refused(tmp_path: Path) -> None:
 
 
 def test_what_is_no_zone_is_refused_feature_by_feature(tmp_path: Path) -> None:
-    shapes = [None, SQUARE, shapely.Point(200.0, 8.0), shapely.Polygon()]
+    shapes = [None, SQUARE, shapely.Point(400.0, 8.0), shapely.Polygon()]
     file = write(tmp_path / "z.gpkg", shapes, name=["a", "b", "c", "d"], radius_m=[5.0] * 4, top_m_agl=[50.0] * 4)
     found = read(file)
     assert [z.name for z in found.zones] == ["b"]
     assert sorted(p.message.split(";")[0] for p in found.problems) == [
-        "longitude must be within ±180°, given 200", "the feature has no geometry", "the feature has no geometry",
+        "longitude must be within ±360°, given 400", "the feature has no geometry", "the feature has no geometry",
     ]  # fmt: skip
 
 

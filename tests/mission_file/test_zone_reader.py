@@ -194,7 +194,7 @@ def test_a_polygon_across_the_antimeridian_is_one_zone(tmp_path: Path, lon_deg: 
         (collection(feature({"type": "Polygon", "coordinates": [[[0, 0], [1, 1], [1, 0], [0, 1]]]})),
          "crosses or touches itself at 0.500000, 0.500000"),
         (collection(feature({"type": "Polygon", "coordinates": [[[0, 0], [1, "x"], [1, 0]]]})), "[0][1]: a position"),
-        (collection(feature({"type": "Polygon", "coordinates": [[[0, 0], [200, 1], [1, 0]]]})), "within ±180"),
+        (collection(feature({"type": "Polygon", "coordinates": [[[0, 0], [400, 1], [1, 0]]]})), "within ±360"),
         (collection(5), "must be a Feature"),
         (collection(), "not empty"),
         ([], "one object"),

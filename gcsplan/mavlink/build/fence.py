@@ -22,7 +22,7 @@ from gcsplan.mavlink.mission.autopilots import max_items, profile_of
 from gcsplan.mavlink.mission.commands import CIRCLE_IN, CIRCLE_OUT, FENCE_RETURN_POINT, POLYGON_IN, POLYGON_OUT
 from gcsplan.mavlink.mission.mission import FENCE, GLOBAL, MissionItem, degrees_e7
 from gcsplan.vehicle import Autopilot
-from gcsplan.world.degree_shapes import LARGEST_RADIUS_M, near_circle, near_polygons, outline_of
+from gcsplan.world.degree_shapes import LARGEST_RADIUS_M, near_circle, near_polygons, outline_of, unwrapped
 from gcsplan.world.zones import Circle, Polygon, Zone
 
 if TYPE_CHECKING:
@@ -135,7 +135,8 @@ def _polygon_of(items: Sequence[MissionItem], index: int, frame: Frame) -> tuple
     whole = [c for c in corners if c.command == first.command and c.params[0] == count]
     if len(whole) < 3 or len(whole) != count:
         raise InputError(f"item {index} of the fence begins a polygon of {count:g} corners that is not whole")
-    ring, fault = outline_of([_corner(c, index + k) for k, c in enumerate(whole)])
+    places = [_corner(c, index + k) for k, c in enumerate(whole)]  # the wire has no longitudes past the antimeridian
+    ring, fault = outline_of([(float(lat), float(lon)) for lon, lat in unwrapped(places, places[0][1])])
     if fault:
         raise InputError(f"item {index} of the fence: {fault}")
     return len(whole), tuple(near_polygons(ring, frame))

@@ -69,13 +69,15 @@ PLACE_IS_A_HINT = (cmd.DO_RETURN_PATH_START, cmd.DO_LAND_START)
 class MissionFileRead:
     """A mission from a file, with remarks for the user (``notes``, whole sentences).
 
-    ``fence`` and ``rally`` are the wire items of the file's other two lists, empty if it has none.
+    ``fence`` and ``rally`` are the wire items of the file's other two lists, empty if it has none; ``unread_fence``
+    says what of its fence could not be read.
     """
 
     mission: Mission
     notes: tuple[str, ...] = ()
     fence: tuple[MissionItem, ...] = ()
     rally: tuple[MissionItem, ...] = ()
+    unread_fence: str = ""
 
 
 def in_degrees(command: int, frame: int) -> bool:

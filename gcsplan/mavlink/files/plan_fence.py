@@ -8,7 +8,7 @@ marks an area to stay out of. Fence points are in frame 0: no autopilot accepts 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from gcsplan.errors import InputError, Problem
@@ -17,6 +17,11 @@ from gcsplan.mavlink.mission.commands import CIRCLE_IN, CIRCLE_OUT, POLYGON_IN, 
 from gcsplan.mavlink.mission.mission import GLOBAL, RELATIVE, MissionItem
 
 MAX_PROBLEMS = 20
+
+FENCE_VERSION = RALLY_VERSION = 2
+FENCE_KEYS = frozenset({"circles", "polygons", "breachReturn"})
+RALLY_KEYS = frozenset({"points"})
+RESAVE = "open the file in QGroundControl and save it again"
 
 
 def json_number(value: float) -> float | int | None:
@@ -69,7 +74,7 @@ def fence_items(fence: object, where: str, notes: list[str]) -> tuple[MissionIte
 
     At most `MAX_PROBLEMS` mistakes are collected.
     """
-    if not isinstance(fence, dict):
+    if not isinstance(fence, dict) or fence.get("version", FENCE_VERSION) != FENCE_VERSION:
         return ()
     problems: list[Problem] = []
     items: list[MissionItem] = []
@@ -92,11 +97,29 @@ def fence_items(fence: object, where: str, notes: list[str]) -> tuple[MissionIte
     return tuple(items)
 
 
+def unread_keys(section: object, known: Collection[str], version: int, where: str) -> str:
+    """What of a section of a plan is not read: its keys beside the known ones, or all, if its version is another.
+
+    Empty if that is nothing; keys without a value count as nothing.
+    """
+    if section is None:
+        return ""
+    if not isinstance(section, dict):
+        return f"{where} is no object" if section else ""
+    keys = [key for key, value in section.items() if key != "version" and value not in (None, [], {}, "")]
+    given = section.get("version", version)
+    if given != version:
+        return f"{where} of version {str(given)[:20]} ({', '.join(k[:40] for k in keys[:8])})" if keys else ""
+    others = [f"{where}.{key[:40]}" for key in keys if key not in known]
+    return ", ".join(others[:8])
+
+
 def rally_items(rally: object, where: str) -> tuple[MissionItem, ...]:
     """Return the wire items of ``rallyPoints``, [latitude, longitude, metres above home] each. Raises InputError."""
     problems: list[Problem] = []
     items: list[MissionItem] = []
-    points = _list(rally.get("points"), f"{where}.points", problems) if isinstance(rally, dict) else []
+    is_known = isinstance(rally, dict) and rally.get("version", RALLY_VERSION) == RALLY_VERSION
+    points = _list(rally.get("points"), f"{where}.points", problems) if isinstance(rally, dict) and is_known else []
     for index, point in enumerate(points):
         at = f"{where}.points[{index}]"
         place = _place(point[:2] if isinstance(point, list) and len(point) == 3 else None, at, problems)

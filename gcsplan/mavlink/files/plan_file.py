@@ -29,7 +29,20 @@ from gcsplan.mavlink.files.file_items import (
     read_item,
     whole,
 )
-from gcsplan.mavlink.files.plan_fence import fence_items, fence_json, json_float, json_number, rally_items, rally_json
+from gcsplan.mavlink.files.plan_fence import (
+    FENCE_KEYS,
+    FENCE_VERSION,
+    RALLY_KEYS,
+    RALLY_VERSION,
+    RESAVE,
+    fence_items,
+    fence_json,
+    json_float,
+    json_number,
+    rally_items,
+    rally_json,
+    unread_keys,
+)
 from gcsplan.mavlink.files.plan_landing import LANDINGS, landing_entries
 from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA, COPTERS, PLANES, PX4
 from gcsplan.mavlink.mission.commands import DO_CHANGE_SPEED, DO_JUMP
@@ -39,6 +52,11 @@ from gcsplan.vehicle import Autopilot, Vehicle
 FIXED_WING, QUADROTOR = 1, 2  # MAV_TYPE
 ALTITUDE_MODE = {RELATIVE: 1, GLOBAL: 2, TERRAIN: 4}  # QGroundControl's AltMode; 0 is "mixed"
 MAX_PROBLEMS = 20
+KEYS = frozenset({"fileType", "geoFence", "groundStation", "mission", "rallyPoints", "version"})
+MISSION_KEYS = frozenset({
+    "cruiseSpeed", "firmwareType", "globalPlanAltitudeMode", "hoverSpeed", "items", "plannedHomePosition",
+    "vehicleType", "version",
+})  # fmt: skip
 
 
 def write_plan(
@@ -143,12 +161,20 @@ def parse_plan(text: str, *, autopilot: Autopilot | None, where: str, home_hint:
     items = found.finish()
     fence = fence_items(plan.get("geoFence"), f"{where}: geoFence", notes)
     rally = rally_items(plan.get("rallyPoints"), f"{where}: rallyPoints")
+    unread_fence = unread_keys(plan.get("geoFence"), FENCE_KEYS, FENCE_VERSION, "geoFence")
+    unread_rally = unread_keys(plan.get("rallyPoints"), RALLY_KEYS, RALLY_VERSION, "rallyPoints")
+    if unread_rally:
+        notes.append(f"the file's {unread_rally} was not read; {RESAVE}")
+    others = [*(k for k in plan if k not in KEYS), *(f"mission.{k}" for k in mission if k not in MISSION_KEYS)]
+    if others and not theirs:
+        notes.append(f"these keys of the file were not read: {', '.join(k[:40] for k in others[:8])}")
     for key, own in (("geoFence", fence), ("rallyPoints", rally)):
         if own:
             notes.append(
                 f"the file's {key} ({counted(len(own), 'item')}) is no part of the mission and is not sent with it"
             )
-    return MissionFileRead(Mission(pilot, home, items), tuple(notes), fence, rally)
+    unread = f"the file's {unread_fence} is not read: {RESAVE}" if unread_fence else ""
+    return MissionFileRead(Mission(pilot, home, items), tuple(notes), fence, rally, unread)
 
 
 def _json(text: str, where: str) -> Any:

@@ -83,7 +83,8 @@ class Arc:
             places = [(self.start + i * part, radius) for i in range(count + 1)]
         frame = _frame(self.centre)
         at = frame.to_degrees([r * math.sin(b) for b, r in places], [r * math.cos(b) for b, r in places])
-        corners = [(float(lat), float(lon)) for lat, lon in at]
+        centre_lon = self.centre[1]  # beyond the antimeridian, if that is where the circle goes
+        corners = [(float(lat), centre_lon + ((float(lon) - centre_lon + 180.0) % 360.0 - 180.0)) for lat, lon in at]
         return corners if self.ends is None else [self.ends[0], *corners, self.ends[1]]
 
 
@@ -107,8 +108,7 @@ def _drawn(pieces: Sequence[Corner | Arc], clockwise: bool | None) -> list[Corne
 
 
 def _is_clockwise(ring: Sequence[Corner]) -> bool:
-    first = ring[0][1]
-    points = [((lon - first + 180.0) % 360.0 - 180.0, lat) for lat, lon in ring]
+    points = [(lon, lat) for lat, lon in ring]
     area = sum(x0 * y1 - x1 * y0 for (x0, y0), (x1, y1) in zip(points, [*points[1:], points[0]], strict=True))
     return area < 0.0
 

@@ -13,6 +13,7 @@ from gcsplan.mission_file.airspace.members import (
     position,
     read_features,
     text_of,
+    unread,
     word,
 )
 from gcsplan.mission_file.airspace.policy import ASKED, UNREAD_TIMES, Policy, Published
@@ -24,6 +25,19 @@ from gcsplan.mission_file.zone_file import ZoneFile
 
 KINDS = ("PROHIBITED", "REQ_AUTHORISATION", "CONDITIONAL", "NO_RESTRICTION")
 FREE = frozenset({"NO_RESTRICTION"})
+MEMBERS = frozenset({
+    "identifier", "country", "name", "type", "restriction", "restrictionConditions", "region", "reason",
+    "otherReasonInfo", "regulationExemption", "uSpaceClass", "message", "applicability", "zoneAuthority", "geometry",
+    "extendedProperties", "limitedApplicability", "variant", "uspaceClass", "dataSource",
+})  # fmt: skip
+"""The members of a zone in ED-269 and ED-318."""
+
+VOLUME = frozenset({
+    "uomDimensions", "lowerLimit", "lowerVerticalReference", "upperLimit", "upperVerticalReference",
+    "horizontalProjection",
+})  # fmt: skip
+SHAPE = {"Circle": frozenset({"type", "center", "radius"}), "Polygon": frozenset({"type", "coordinates"})}
+
 CONDITIONS = "these zones may be entered under conditions, which are not judged: they are no-fly"
 
 
@@ -49,7 +63,10 @@ def _volumes_of(feature: Any) -> bool:
 def read_ed269(path: Path, whole: Any, policy: Policy) -> ZoneFile:
     """The zones of an ED-269 document; what is wrong is in their problems and faults."""
     key, features = _list_of(whole)
-    return read_features(AirspaceFile(path, policy, KINDS), features, key, _feature)
+    file = AirspaceFile(path, policy, KINDS, great_circles=True)
+    if isinstance(whole, dict) and key == "features" and whole.get("UASZoneList"):
+        file.fault(f"{path}: UASZoneList", "the file has a list of features, too; write the zones of both into one")
+    return read_features(file, features, key, _feature)
 
 
 def _feature(file: AirspaceFile, feature: Any, where: str, fallback: str) -> None:
@@ -73,8 +90,9 @@ def published(feature: dict[str, Any], kind: Any, key: str, times: Any, fallback
     identifier = text_of(feature.get("identifier"))
     name = text_of(feature.get("name")) or identifier or fallback
     restriction = word(kind, f"zone {name[:60]!r}: {key}").upper()
-    periods, unread = read_periods(times)
-    remarks: list[Remark] = [(UNREAD_TIMES, unread)] if unread else []
+    periods, why = read_periods(times)
+    remarks: list[Remark] = [(UNREAD_TIMES, why)] if why else []
+    remarks += unread(feature, MEMBERS)
     if restriction in ("REQ_AUTHORISATION", "REQ_AUTHORIZATION"):
         remarks.append((ASKED, authority_of(feature.get("zoneAuthority"))))
     elif restriction == "CONDITIONAL":
@@ -91,6 +109,8 @@ def _volume(file: AirspaceFile, zone: Published, part: str, volume: Any, where: 
     unit = volume.get("uomDimensions") or ""
     limits = Limits.read(_limit(volume, "lower", unit), _limit(volume, "upper", unit), where, policy=file.policy)
     kind = shape.get("type")
+    limits.remarks += unread(volume, VOLUME, all_of_them=True)
+    limits.remarks += unread(shape, SHAPE.get(str(kind), ()), all_of_them=True)
     if kind == "Circle":
         radius: Any = shape.get("radius")
         if not is_number(radius):
@@ -99,8 +119,7 @@ def _volume(file: AirspaceFile, zone: Published, part: str, volume: Any, where: 
         file.add_circle(zone, part, where, position(shape.get("center")), float(radius), limits)
     elif kind == "Polygon":
         ring, holes = outer_ring(shape.get("coordinates"))
-        file.found.holes += holes
-        file.add_ring(zone, part, where, ring, limits)
+        file.add_ring(zone, part, where, ring, limits, holes)
     else:
         raise MemberError(f"horizontalProjection must be a Polygon or a Circle, given {shown(kind)}")
 

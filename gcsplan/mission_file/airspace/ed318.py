@@ -7,7 +7,14 @@ from typing import Any
 
 from gcsplan.mission_file.airspace.ed269 import published
 from gcsplan.mission_file.airspace.layouts import ZONE, standard_properties
-from gcsplan.mission_file.airspace.members import MemberError, add_polygons, number_or_none, position, read_features
+from gcsplan.mission_file.airspace.members import (
+    MemberError,
+    add_polygons,
+    number_or_none,
+    position,
+    read_features,
+    unread,
+)
 from gcsplan.mission_file.airspace.policy import Policy, Published
 from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
 from gcsplan.mission_file.zone_attributes import is_number, shown
@@ -15,6 +22,8 @@ from gcsplan.mission_file.zone_file import ZoneFile
 
 KINDS = ("USPACE", "PROHIBITED", "REQ_AUTHORIZATION", "CONDITIONAL", "NO_RESTRICTION")
 REQUIRED = frozenset({"identifier", "country", "type", "variant"})
+SHAPE = frozenset({"type", "coordinates", "layer", "bbox"})
+LAYER_MEMBERS = frozenset({"lower", "lowerReference", "upper", "upperReference", "uom"})
 MOST_GEOMETRIES = 1000
 
 
@@ -72,6 +81,7 @@ def _geometry(file: AirspaceFile, zone: Published, part: str, geometry: Any, sha
         raise MemberError(f"the zone has no geometry, given {shown(geometry)}")
     limits = _limits(geometry.get("layer", shared), where, file.policy)
     kind = geometry.get("type")
+    limits.remarks += unread(geometry, SHAPE | ({"extent"} if kind == "Point" else set()), all_of_them=True)
     if kind == "Point":
         extent = geometry.get("extent")
         radius: Any = None
@@ -93,9 +103,12 @@ def _limits(layer: Any, where: str, policy: Policy) -> Limits:
     if not isinstance(layer, dict):
         raise MemberError(f"layer must be an object, given {shown(layer)}")
     unit = layer.get("uom") or "m"
+    remarks = unread(layer, LAYER_MEMBERS, all_of_them=True)
     given: list[Given | None] = []
     for side in ("lower", "upper"):
         value = number_or_none(layer.get(side), f"layer.{side}")
         words = (str(unit)[:40], str(layer.get(f"{side}Reference") or "")[:40])
         given.append(None if value is None else Given(value, words, (), side))
-    return Limits.read(given[0], given[1], where, policy=policy)
+    found = Limits.read(given[0], given[1], where, policy=policy)
+    found.remarks += remarks
+    return found

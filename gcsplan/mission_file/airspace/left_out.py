@@ -8,12 +8,16 @@ from pathlib import PurePath
 
 from gcsplan.errors import Problem
 from gcsplan.figures import counted
+from gcsplan.mission_file.airspace.times import OUT_OF_HOURS
 from gcsplan.mission_file.zone_draft import ZoneDraft, one_line
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Zone
 
 Box = tuple[float, float, float, float]
 """West, south, east, north, m."""
+
+TURNS = (-720.0, -360.0, 0.0, 360.0, 720.0)
+"""Whole turns by which a longitude may be written otherwise than the frame's, degrees."""
 
 NEAR_M = 5000.0
 """Zones this near to the mission's surroundings are named at least, m."""
@@ -31,6 +35,11 @@ def faults_near(placed: Sequence[tuple[ZoneDraft, Zone]], box: Box) -> list[Prob
 def used(drafts: Sequence[ZoneDraft]) -> list[ZoneDraft]:
     """The zones that are no-fly."""
     return [d for d in drafts if not d.unused]
+
+
+def left_out_by_hours(drafts: Sequence[ZoneDraft]) -> bool:
+    """Whether a zone is not used because it does not apply in the hours of the mission."""
+    return any(d.unused.startswith(OUT_OF_HOURS) for d in drafts)
 
 
 def unused_notes(drafts: Sequence[ZoneDraft], frame: Frame, box: Box) -> list[str]:
@@ -81,9 +90,10 @@ def _is_near(draft: ZoneDraft, frame: Frame, window: Box) -> bool:
     tall = 0.0 if draft.radius_m is None else math.degrees(draft.radius_m / 6_300_000.0)
     lat = [p[0] for p in draft.points]
     wide = tall / math.cos(math.radians(min(max(map(abs, lat)) + tall, 89.0)))
-    lon = [(p[1] - frame.lon_deg + 180.0) % 360.0 - 180.0 for p in draft.points]
-    box = (min(lon) - wide, min(lat) - tall, max(lon) + wide, max(lat) + tall)
-    return box[0] <= window[2] and box[2] >= window[0] and box[1] <= window[3] and box[3] >= window[1]
+    lon = [p[1] - frame.lon_deg for p in draft.points]
+    west, east = min(lon) - wide, max(lon) + wide
+    level = min(lat) - tall <= window[3] and max(lat) + tall >= window[1]
+    return level and any(west + turn <= window[2] and east + turn >= window[0] for turn in TURNS)
 
 
 def _meets(zone: Zone, box: Box) -> bool:

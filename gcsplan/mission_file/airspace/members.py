@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from itertools import chain
 from typing import Any
 
 from gcsplan.mission_file.airspace.policy import Published
 from gcsplan.mission_file.airspace.volumes import AirspaceFile, Corner, Limits
-from gcsplan.mission_file.zone_attributes import is_number, shown
+from gcsplan.mission_file.zone_attributes import MOST_SHOWN, NOT_READ, is_number, meaning_of, shown
+from gcsplan.mission_file.zone_draft import Remark
 from gcsplan.mission_file.zone_file import ZoneFile
 
 _NUMBER = re.compile(r"[-+]?\d{1,9}(\.\d{1,9})?", re.ASCII)
@@ -41,6 +42,17 @@ def authority_of(given: Any) -> str:
         parts.append(f"{before[:20]} before" if isinstance(before, str) and before.strip() else "")
         found.append(" ".join(dict.fromkeys(p[:60] for p in parts if p)))
     return "; ".join(f for f in found[:2] if f)
+
+
+def unread(given: dict[str, Any], known: Collection[str], *, all_of_them: bool = False) -> list[Remark]:
+    """A remark on the members that the format does not have: those that seem to limit the zone, or ``all_of_them``."""
+    found = []
+    for key, value in given.items():
+        meaning = meaning_of(key)
+        seems = all_of_them or meaning.limit is not None or meaning.seems_a_limit or meaning.seems_a_time
+        if key not in known and seems and value not in (None, "", [], {}):
+            found.append(f"{key[:40]} {shown(value)}")
+    return [(NOT_READ, ", ".join(found[:MOST_SHOWN]))] if found else []
 
 
 def position(given: Any) -> Corner:
@@ -115,5 +127,4 @@ def add_polygons(
         raise MemberError(f"a {kind} has a list of coordinates, given {shown(polygons)}")
     for i, rings in enumerate(polygons):
         ring, holes = outer_ring(rings)
-        file.found.holes += holes
-        file.add_ring(zone, part if len(polygons) == 1 else f"{part}/{i + 1}", where, ring, limits)
+        file.add_ring(zone, part if len(polygons) == 1 else f"{part}/{i + 1}", where, ring, limits, holes)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from gcsplan.mission_file.airspace.members import MemberError, add_polygons, number_or_none, read_features, text_of
 from gcsplan.mission_file.airspace.policy import Policy, Published
-from gcsplan.mission_file.airspace.times import ALWAYS, Period, TimeError, read_instant
+from gcsplan.mission_file.airspace.times import ALWAYS, Period, TimeError, read_end, read_instant
 from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
 from gcsplan.mission_file.zone_attributes import is_number, shown
 from gcsplan.mission_file.zone_draft import Remark
@@ -127,7 +129,7 @@ def _code(limit: dict[str, Any], key: str, names: dict[int, str]) -> str:
 def _times(members: dict[str, Any]) -> tuple[tuple[Period, ...], tuple[Remark, ...]]:
     """The span of a temporary activation; the hours of a week are local, and are not read."""
     try:
-        span = Period(*(_moment(members.get(key)) for key in ("activeFrom", "activeUntil")))
+        span = Period(_moment(members.get("activeFrom"), read_instant), _moment(members.get("activeUntil"), read_end))
     except TimeError as why:
         return (), ((UNREAD_SPAN, str(why)),)
     hours = members.get("hoursOfOperation")
@@ -145,9 +147,9 @@ def _is_limited(line: Any) -> bool:
     return isinstance(line, dict) and (line.get("startTime"), line.get("endTime")) != ("00:00", "00:00")
 
 
-def _moment(given: Any) -> Any:
+def _moment(given: Any, read: Callable[[str], datetime]) -> datetime | None:
     if given is None or given == "":
         return None
     if not isinstance(given, str):
         raise TimeError(f"{shown(given)} is no time")
-    return read_instant(given)
+    return read(given)

@@ -13,12 +13,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from gcsplan.errors import Problem
+from gcsplan.figures import counted
 from gcsplan.mission_file.airspace.arcs import Arc, ArcError, Corner, outline
 from gcsplan.mission_file.airspace.policy import UNREAD_TIMES, Policy, Published
-from gcsplan.mission_file.airspace.times import Period, TimeError, read_instant
+from gcsplan.mission_file.airspace.times import Period, TimeError, read_end, read_instant
 from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
 from gcsplan.mission_file.zone_draft import MAX_VERTICES, Remark
 from gcsplan.mission_file.zone_file import ZoneFile
+from gcsplan.world.degree_shapes import MOST_LON_DEG
 
 SUFFIXES = (".openair", ".air", ".txt")
 
@@ -43,6 +45,8 @@ IGNORED = frozenset({"AF", "AG", "AX", "AI", "AT", "SP", "SB"})
 DRAWN = frozenset({"DP", "DA", "DB", "DC", "DY"})
 
 SPARED = "limits without a unit or a reference are read as OpenAir's programs do, in feet above sea level"
+CARRIED = "arcs without a centre (V X=…) in their own zone are drawn around that of the zone before"
+BEHIND = "text behind a place is not read"
 UNPLACED = "text behind the height is not read"
 
 _RECORD = re.compile(r"(V|[A-Z]{2})\s+(\S.*)", re.IGNORECASE)
@@ -77,6 +81,8 @@ class _Block:
     mistakes: list[tuple[int, str]] = field(default_factory=list)
     lost: list[tuple[int, str]] = field(default_factory=list)
     clockwise: bool = True
+    has_centre: bool = False
+    remarks: list[Remark] = field(default_factory=list)
 
     @property
     def where(self) -> str:
@@ -86,7 +92,7 @@ class _Block:
 
 def read_openair(path: Path, data: bytes, policy: Policy) -> ZoneFile:
     """The zones of OpenAir text; what is wrong is in their problems and faults."""
-    return _Reading(AirspaceFile(path, policy, KINDS)).read(_text(data))
+    return _Reading(AirspaceFile(path, policy, KINDS, great_circles=True)).read(_text(data))
 
 
 def _text(data: bytes) -> str:
@@ -98,13 +104,19 @@ def _text(data: bytes) -> str:
 
 @dataclass
 class _Reading:
-    """One pass over one file. A centre holds until the next, in the next zone too: the format's own sample does so."""
+    """One pass over one file.
+
+    A centre holds for the arcs of the next zone too, as in the format's own sample, and a remark says so. A circle
+    needs its own: with the centre of the zone before it would be nowhere near where it belongs.
+    """
 
     file: AirspaceFile
     block: _Block | None = None
     centre: Corner | None = None
     passed: bool = False
     zones: int = 0
+    terrain: list[str] = field(default_factory=list)
+    number: int = 0
 
     def read(self, text: str) -> ZoneFile:
         for number, line in enumerate(text.splitlines(), start=1):
@@ -117,6 +129,7 @@ class _Reading:
             if match is None:
                 self._odd(number, record)
                 continue
+            self.number = number
             try:
                 self._record(number, match[1].upper(), match[2].strip())
             except (_RecordError, ArcError, TimeError) as why:
@@ -127,6 +140,10 @@ class _Reading:
                     of_limits = match[1].upper() in ("AL", "AH")
                     (self.block.mistakes if of_limits else self.block.lost).append((number, words))
         self._end()
+        if self.terrain:
+            more = f", and {len(self.terrain) - MOST_MISTAKES} more" if len(self.terrain) > MOST_MISTAKES else ""
+            shown = ", ".join(self.terrain[:MOST_MISTAKES])
+            self.file.found.said.append(f"not used, because they draw terrain: {shown}{more}")
         if not self.zones and not self.file.found.problems:
             self._fault(1, "the file holds no zone: an OpenAir zone begins with a line such as `AC R`")
         return self.file.finished()
@@ -150,6 +167,7 @@ class _Reading:
         elif code in ("TO", "TC"):  # terrain, which other records draw as they draw zones
             self._end()
             self.passed = True
+            self.terrain.append(f"line {number} ({code} {value[:40]})")
         elif self.passed or code in IGNORED:
             pass
         elif code == "V":
@@ -184,7 +202,9 @@ class _Reading:
         name, given = match[1].upper(), match[2].strip()
         if name == "X":
             self.centre = None  # an arc around the centre before would be elsewhere
-            self.centre = _places(given, 1)[0]
+            self.centre = self._places(given, 1)[0]
+            if self.block is not None:
+                self.block.has_centre = True
         elif name == "D":
             if given[:1] not in ("+", "-"):
                 raise _RecordError("the direction is + (clockwise) or -")
@@ -199,10 +219,16 @@ class _Reading:
         if len(block.pieces) > MAX_VERTICES:
             raise _RecordError(f"the zone has more than {MAX_VERTICES} points")
         if code == "DP":
-            block.pieces.append(_places(value, 1)[0])
+            block.pieces.append(self._places(value, 1)[0])
             return
         if self.centre is None:
             raise _RecordError("has no centre: a line such as V X=39:29.9 N 119:46.1 W must stand before it")
+        if not block.has_centre and self.zones:
+            if code == "DC":
+                raise _RecordError(
+                    "has no centre of its own, V X=… in this zone, and that of the zone before is not its"
+                )
+            block.remarks.append((CARRIED, f"line {self.number}: {code} {value[:40]}"))
         if code == "DC":
             block.circles.append((self.centre, _numbers(value, 1)[0] * NAUTICAL_MILE_M))
         elif code == "DA":
@@ -210,8 +236,15 @@ class _Reading:
             radius_m = radius * NAUTICAL_MILE_M
             block.pieces.append(Arc.by_bearings(self.centre, radius_m, start, end, block.clockwise))
         else:
-            first, last = _places(value, 2)
+            first, last = self._places(value, 2)
             block.pieces.append(Arc.by_ends(self.centre, first, last, block.clockwise))
+
+    def _places(self, text: str, count: int) -> list[Corner]:
+        """The first places of a text, after which none stands; a remark says what follows them."""
+        places, rest = _places(text, count)
+        if rest and self.block is not None:
+            self.block.remarks.append((BEHIND, f"line {self.number}: {rest[:40]}"))
+        return places
 
     def _end(self) -> None:
         """Add the zone that ends here."""
@@ -222,7 +255,7 @@ class _Reading:
         file = self.file
         where = f"{file.path}: {block.where}"
         periods, unread = _times(block.times)
-        remarks: tuple[Remark, ...] = ((UNREAD_TIMES, unread),) if unread else ()
+        remarks = (*dict(reversed(block.remarks)).items(), *([(UNREAD_TIMES, unread)] if unread else []))
         name = block.name or f"{file.path.stem}[{self.zones - 1}]"
         kinds = tuple(dict.fromkeys(block.kinds))
         restricts = any(k not in FREE | SILENT for k in kinds) or not any(k in FREE for k in kinds)
@@ -275,23 +308,27 @@ def _times(texts: list[str]) -> tuple[tuple[Period, ...], str]:
         if len(ends) != 2:
             return (), f"AA {plain[:60]}"
         try:
-            start, end = (None if e.upper() == "NONE" else read_instant(e) for e in ends)
+            start = None if ends[0].upper() == "NONE" else read_instant(ends[0])
+            end = None if ends[1].upper() == "NONE" else read_end(ends[1])
             periods.append(Period(start, end))
         except TimeError as why:
             return (), str(why)
     return tuple(periods), ""
 
 
-def _places(text: str, count: int) -> list[Corner]:
-    """The first places of a text; what follows them is a comment."""
-    places, at = [], 0
+def _places(text: str, count: int) -> tuple[list[Corner], str]:
+    """The first places of a text, and what follows them, which is no place."""
+    places: list[Corner] = []
+    at = 0
     for match in _matches(text):
+        if len(places) == count:
+            raise _RecordError(f"it has more than {counted(count, 'place')}; write a line for each")
         if text[at : match.start()].strip(" \t,"):
             break
         places.append((_degrees(match.group(1, 2, 3), match[4]), _degrees(match.group(5, 6, 7), match[8])))
         at = match.end()
-        if len(places) == count:
-            return places
+    if len(places) == count:
+        return places, text[at:].strip(" \t,")
     wanted = "a place such as 39:29.9 N 119:46.1 W" if count == 1 else "two places with a comma between them"
     raise _RecordError(f"it needs {wanted}")
 
@@ -309,7 +346,7 @@ def _degrees(parts: tuple[str | None, ...], side: str) -> float:
     if broken or max(minutes or 0.0, seconds or 0.0) > 60.0:  # 60 is what some programs write for a whole one
         raise _RecordError("degrees and minutes are whole numbers where others follow, minutes and seconds at most 60")
     value = whole + (minutes or 0.0) / 60.0 + (seconds or 0.0) / 3600.0
-    if value > (90.0 if side.upper() in "NS" else 180.0):
+    if value > (90.0 if side.upper() in "NS" else MOST_LON_DEG):
         raise _RecordError(f"{value:g} {side.upper()} is no place on Earth")
     return -value if side.upper() in "SW" else value
 

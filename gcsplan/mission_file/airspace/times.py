@@ -7,7 +7,7 @@ sunrise and sunset, count as always.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, time, timedelta
 from typing import Any
@@ -53,10 +53,8 @@ class Hours:
         texts = given if isinstance(given, list) else [given]
         if not 1 <= len(texts) <= 2 or not all(isinstance(t, str) for t in texts):
             raise TimeError(f"must be {WANTED}")
-        start, end = read_instant(texts[0]), read_instant(texts[-1])
-        if _DATE.fullmatch(texts[-1].strip()):
-            end += _DAY
-        elif len(texts) == 1:
+        start, end = read_instant(texts[0]), read_end(texts[-1])
+        if len(texts) == 1 and not _DATE.fullmatch(texts[-1].strip()):
             end += ALONE
         if not timedelta(0) < end - start <= LONGEST:
             words = "the end must lie behind the start" if end <= start else f"{LONGEST.days} days at most are wanted"
@@ -67,6 +65,18 @@ class Hours:
     def around(cls, departure: datetime) -> Hours:
         """The hours of a mission with a common start at ``departure``."""
         return cls(departure - BEFORE, departure + ALONE)
+
+
+def texts_of(at: str | Sequence[str] | None) -> tuple[str, ...] | None:
+    """The texts of an ``at`` that is given beside a mission: one, or from and to; ``FROM/TO`` is both."""
+    if at is None:
+        return None
+    return tuple(part.strip() for part in at.split("/")) if isinstance(at, str) else tuple(at)
+
+
+def read_end(text: str) -> datetime:
+    """The end of a period: as `read_instant`, but a day means all of it. Raises TimeError."""
+    return read_instant(text) + (_DAY if _DATE.fullmatch(text.strip()) else timedelta(0))
 
 
 def read_instant(text: str) -> datetime:
@@ -107,7 +117,8 @@ class Daily:
 class Period:
     """A time in which a zone applies; an end that is None is open, and without a schedule it applies throughout.
 
-    Raises TimeError if it ends before it begins: such a zone would never apply.
+    Raises TimeError if it never applies, because it ends before it begins, or its schedule has no time in it: nobody
+    publishes such a zone, so that something of it is not understood.
     """
 
     start: datetime | None = None
@@ -117,6 +128,9 @@ class Period:
     def __post_init__(self) -> None:
         if self.start is not None and self.end is not None and self.start > self.end:
             raise TimeError(f"it ends at {self.end:%Y-%m-%d %H:%M}Z, before it begins")
+        lasts = None if self.start is None or self.end is None else Hours(self.start, self.end)
+        if self.schedule and lasts is not None and not self.meets(lasts):
+            raise TimeError(f"its schedule has no time from {lasts}")
 
     def meets(self, hours: Hours) -> bool:
         """Whether the zone may apply at some moment of the hours."""
@@ -168,7 +182,7 @@ def _period(given: Any) -> Period:
     unknown = sorted(str(k)[:40] for k in given if k not in ("permanent", "startDateTime", "endDateTime", "schedule"))
     if unknown:
         raise TimeError(f"{unknown[0]!r} of a period is not known")
-    start, end = (_moment(given.get(key)) for key in ("startDateTime", "endDateTime"))
+    start, end = _moment(given.get("startDateTime")), _moment(given.get("endDateTime"), read_end)
     schedule = given.get("schedule")
     if schedule is None or schedule == []:
         return Period(start, end)
@@ -178,12 +192,12 @@ def _period(given: Any) -> Period:
     return Period(start, end, () if None in daily else tuple(d for d in daily if d is not None))
 
 
-def _moment(given: Any) -> datetime | None:
+def _moment(given: Any, read: Callable[[str], datetime] = read_instant) -> datetime | None:
     if given is None or given == "":
         return None
     if not isinstance(given, str):
         raise TimeError(f"{str(given)[:40]!r} is no time")
-    return read_instant(given)
+    return read(given)
 
 
 def _daily(given: Any) -> Daily | None:
@@ -199,24 +213,33 @@ def _daily(given: Any) -> Daily | None:
         if day not in (*WEEK, "ANY"):
             raise TimeError(f"{str(day)[:20]!r} is no day of the week")
         days |= set(range(7)) if day == "ANY" else {WEEK.index(day)}
-    return Daily(frozenset(days), _of_day(given.get("startTime"), "00:00Z"), _of_day(given.get("endTime"), "24:00Z"))
+    start, end = _of_day(given.get("startTime")), _of_day(given.get("endTime"))
+    # Without a beginning it is the day's midnight, and without an end the next, in the time zone of the other one.
+    offset = (start or end or (timedelta(0), timedelta(0)))[1]
+    first, last = start or (timedelta(0), offset), end or (_DAY, offset)
+    line = Daily(frozenset(days), first[0] - first[1], last[0] - last[1])
+    if (last[0] > first[0]) != (line.end > line.start) or line.end + _DAY <= line.start:
+        raise TimeError("a line of a schedule ends before it begins, in time zones that differ")
+    return line
 
 
-def _of_day(given: Any, otherwise: str) -> timedelta:
-    """The time from midnight UTC of a text such as ``06:00Z``, ``00:00:00.00Z`` or ``08:00+02:00``."""
-    text = otherwise if given is None or given == "" else given
-    if not isinstance(text, str) or len(text) > _MOST_CHARACTERS:
-        raise TimeError(f"{str(text)[:40]!r} is no time of day")
-    last = re.fullmatch(r"24:00(?::00(?:\.0+)?)?(Z|[+-]\d{2}:?\d{2})", text.strip(), re.ASCII)
+def _of_day(given: Any) -> tuple[timedelta, timedelta] | None:
+    """The time since midnight, and the offset from UTC, of ``06:00Z``, ``00:00:00.00Z`` or ``08:00+02:00``."""
+    if given is None or given == "":
+        return None
+    if not isinstance(given, str) or len(given) > _MOST_CHARACTERS:
+        raise TimeError(f"{str(given)[:40]!r} is no time of day")
+    text = given.strip()
+    last = re.fullmatch(r"24:00(?::00(?:\.0+)?)?(Z|[+-]\d{2}:?\d{2})", text, re.ASCII)
     try:
-        at = time.fromisoformat(f"00:00{last[1]}" if last else text.strip())
+        at = time.fromisoformat(f"00:00{last[1]}" if last else text)
     except ValueError:
         raise TimeError(f"{text[:40]!r} is no time of day") from None
     offset = at.utcoffset()
     if offset is None:
         raise TimeError(f"{text[:40]!r} has no time zone")
-    whole = timedelta(hours=at.hour, minutes=at.minute, seconds=at.second, microseconds=at.microsecond) - offset
-    return whole + _DAY if last else whole
+    whole = timedelta(hours=at.hour, minutes=at.minute, seconds=at.second, microseconds=at.microsecond)
+    return whole + (_DAY if last else timedelta(0)), offset
 
 
 def apply_in(periods: Sequence[Period], hours: Hours | None) -> bool:
@@ -224,8 +247,15 @@ def apply_in(periods: Sequence[Period], hours: Hours | None) -> bool:
     return hours is None or not periods or any(p.meets(hours) for p in periods)
 
 
-def hours_of(given: Any, departure: datetime | None, where: str, problems: list[Problem]) -> Hours | None:
-    """When a mission is flown: its ``at`` as given, if it has one, or else the departure that the caller states."""
+def hours_of(
+    given: Any, departure: datetime | None, where: str, problems: list[Problem],
+    *, instead: Sequence[str] | None = None,
+) -> Hours | None:  # fmt: skip
+    """When a mission is flown: its ``at`` as ``given``, if it has one, or else the departure that the caller states.
+
+    ``instead`` is an ``at`` from elsewhere, which counts in its place.
+    """
+    given, where = (given, where) if instead is None else (list(instead), "at")
     if given is None:
         return None if departure is None else Hours.around(departure)
     try:

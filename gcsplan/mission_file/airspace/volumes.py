@@ -16,10 +16,10 @@ import numpy as np
 from gcsplan.errors import Problem
 from gcsplan.mission_file.airspace.policy import Judge, Policy, Published
 from gcsplan.mission_file.zone_attributes import OVER_PRESSURE, UNDER_PRESSURE
-from gcsplan.mission_file.zone_draft import MAX_VERTICES, Bounds, Remark, ZoneDraft, check_degrees
+from gcsplan.mission_file.zone_draft import ACROSS, MAX_VERTICES, Bounds, Remark, ZoneDraft, check_degrees
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_levels import EXAMPLES, LevelError, Limit, read_level
-from gcsplan.world.degree_shapes import LARGEST_RADIUS_M, outline_of, unwrapped
+from gcsplan.world.degree_shapes import HALF_TURN_DEG, LARGEST_RADIUS_M, across, outline_of, unwrapped, wide_fault
 from gcsplan.world.zones import Level
 
 Corner = tuple[float, float]
@@ -141,11 +141,12 @@ class AirspaceFile:
     path: Path
     policy: Policy
     vocabulary: Sequence[str]
+    great_circles: bool = False
     found: ZoneFile = field(init=False)
     judge: Judge = field(init=False)
 
     def __post_init__(self) -> None:
-        self.found = ZoneFile(self.path)
+        self.found = ZoneFile(self.path, great_circles=self.great_circles)
         self.judge = Judge(self.policy, self.vocabulary)
 
     def finished(self) -> ZoneFile:
@@ -169,8 +170,11 @@ class AirspaceFile:
             words = f"the radius must be above 0 and at most {LARGEST_RADIUS_M:g} m, given {radius_m:g} m"
             self.fault(where, f"zone {zone.name[:60]!r}: {words}")
 
-    def add_ring(self, zone: Published, part: str, where: str, ring: Sequence[Corner], limits: Limits) -> None:
-        """Add a prism called ``part`` by its outline."""
+    def add_ring(
+        self, zone: Published, part: str, where: str, ring: Sequence[Corner], limits: Limits, holes: int = 0
+    ) -> None:
+        """Add a prism called ``part`` by its outline and the number of its holes."""
+        self.found.holes += holes
         if len(ring) > MAX_VERTICES:
             self.fault(where, f"has {len(ring)} points, more than {MAX_VERTICES}; simplify it")
             return
@@ -178,59 +182,74 @@ class AirspaceFile:
             right = -90.0 <= lat <= 90.0 and -180.0 <= lon <= 180.0  # most are: no call for each of 100,000
             if not right and not check_degrees((lat, lon), where, self.found.problems):
                 return
+        ring, doubt = across(ring, holes)
+        wide = wide_fault(ring, holes)
+        if wide:
+            self._add(zone, part, where, self._around(ring), None, limits, [Problem(where, wide)])
+            return
         outline, why = outline_of(ring)
         if not why:
-            self._add(zone, part, where, tuple(outline), None, limits, [])
+            self._add(zone, part, where, tuple(outline), None, limits, [], doubt)
             return
         parts = enclosed(outline) if len(set(outline)) > 2 else []
         if not parts:
             if ring:
-                self._add(zone, part, where, around(ring), None, limits, [Problem(where, f"{why}; {CURE}")])
+                self._add(zone, part, where, self._around(ring), None, limits, [Problem(where, f"{why}; {CURE}")])
             else:
                 self.fault(where, "the polygon has no points")
             return
         limits = Limits(limits.bounds, [*limits.remarks, (CROSSES, "")], limits.faults)
         for i, piece in enumerate(parts):
             name = part if len(parts) == 1 else f"{part}/{i + 1}"
-            self._add(zone, name, where, tuple(piece), None, limits, [])
+            self._add(zone, name, where, tuple(piece), None, limits, [], doubt)
+
+    def _around(self, points: Sequence[Corner]) -> tuple[Corner, ...]:
+        """A rectangle with all points well inside, to tell whether a zone without an outline lies near.
+
+        A zone that is half a turn wide may lie on either side of its corners: then the rectangle goes around the globe,
+        and to the poles where they may be in it, or great circles come near them.
+        """
+        at = np.asarray(points, float)
+        (south, west), (north, east) = at.min(axis=0) - AROUND_DEG, at.max(axis=0) + AROUND_DEG
+        if east - west >= HALF_TURN_DEG:
+            west, east = -HALF_TURN_DEG, HALF_TURN_DEG
+            short = unwrapped([*points, points[0]], points[0][1])[:, 0]
+            if self.great_circles or abs(short[-1] - short[0]) > 1.0:
+                south, north = -90.0, 90.0
+        south, north = max(south, -90.0), min(north, 90.0)
+        corners = ((south, west), (south, east), (north, east), (north, west))
+        return tuple((float(lat), float(lon)) for lat, lon in corners)
 
     def _add(
         self, zone: Published, part: str, where: str, points: tuple[Corner, ...], radius_m: float | None,
-        limits: Limits, faults: list[Problem],
+        limits: Limits, faults: list[Problem], doubt: tuple[Corner, ...] = (),
     ) -> None:  # fmt: skip
         faults = [Problem(p.where, f"zone {zone.name[:60]!r}: {p.message}") for p in (*limits.faults, *faults)]
         floor, ceiling = (None, None) if faults else limits.bounds.levels(where, [])
         remarks = [*zone.remarks, *limits.remarks]
         if faults:
             remarks.append((FAULTY, ""))
+        if doubt:
+            remarks.append((ACROSS, ""))
         draft = ZoneDraft(
             part[:200], where, points, False, radius_m, floor, ceiling,
             unused=self.judge.reason(zone), faults=tuple(faults),
+            doubt=doubt,
         )  # fmt: skip
         self.found.add(draft, remarks)
-
-
-def around(points: Sequence[Corner]) -> tuple[Corner, ...]:
-    """A rectangle with all points well inside, to tell whether a zone without an outline lies near."""
-    at = unwrapped(points, points[0][1])
-    (west, south), (east, north) = at.min(axis=0) - AROUND_DEG, at.max(axis=0) + AROUND_DEG
-    south, north = max(south, -90.0), min(north, 90.0)
-    corners = ((south, west), (south, east), (north, east), (north, west))
-    return tuple((float(lat), float((lon + 180.0) % 360.0 - 180.0)) for lat, lon in corners)
 
 
 def enclosed(outline: Sequence[Corner]) -> list[list[Corner]]:
     """The outlines of all that a line which crosses itself encloses, whichever way it runs around it."""
     import shapely
 
-    line = unwrapped([*outline, outline[0]], outline[0][1])
+    line = np.asarray([*outline, outline[0]], float)[:, ::-1]
     faces = shapely.get_parts(shapely.polygonize([shapely.union_all(shapely.LineString(line))]))
     whole = shapely.union_all(faces)
     outer = [shapely.Polygon(p.exterior) for p in shapely.get_parts(whole) if p.geom_type == "Polygon"]
     rings = []
     for face in shapely.get_parts(shapely.union_all(outer)):
-        points = np.asarray(face.exterior.coords)[:-1]
-        ring = [(float(lat), float((lon + 180.0) % 360.0 - 180.0)) for lon, lat in points]
+        ring = [(float(lat), float(lon)) for lon, lat in np.asarray(face.exterior.coords)[:-1]]
         if not outline_of(ring)[1]:
             rings.append(ring)
     return rings

@@ -1,0 +1,29 @@
+"""A short run of the campaign `zones`, and that it finds a planted fault."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gcsplan.mission_file import zone_draft
+from gcsplan.mission_file.airspace import volumes
+from gcsplan.world import degree_shapes
+from tests.campaigns import zones
+
+
+def test_some_inputs_of_the_campaign_find_nothing(tmp_path: Path) -> None:
+    assert [zones.attack(seed, tmp_path)[2] for seed in range(400, 412)] == [[]] * 12
+
+
+def test_the_campaign_finds_edges_the_short_way_around(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in (zone_draft, volumes):
+        monkeypatch.setattr(module, "wide_fault", lambda *_, **__: "")
+    monkeypatch.setattr(degree_shapes, "_turned", degree_shapes.unwrapped)
+    assert any(zones.attack(seed, tmp_path)[2] for seed in range(1, 25))
+
+
+def test_a_great_circle_by_the_plane_through_it() -> None:
+    assert zones.latitude_at(0.0, 50.0, 20.0, 50.0, 10.0, great_circles=True) == pytest.approx(50.4313, abs=1e-3)
+    assert zones.latitude_at(0.0, -50.0, -20.0, -50.0, -10.0, great_circles=True) == pytest.approx(-50.4313, abs=1e-3)
+    assert zones.latitude_at(0.0, 0.0, 90.0, 40.0, 45.0, great_circles=False) == 20.0

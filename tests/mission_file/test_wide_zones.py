@@ -1,0 +1,148 @@
+"""Polygons that are wide, across the antimeridian or at a pole, in every format: never the other side of the globe."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gcsplan.errors import InputError
+from gcsplan.mission_file import load_mission
+from gcsplan.mission_file.airspace.left_out import used
+from gcsplan.mission_file.zone_draft import zone_notes
+from gcsplan.mission_file.zone_reader import read_zones
+from gcsplan.world.frame import Frame
+from tests.campaigns.zones import answered
+from tests.support.zone_files import WRITERS, Ring
+
+INLINE = "mission file"
+FORMATS = [*WRITERS, INLINE]
+ZONE_LESS = {"version": 1, "terrain": {"flat_m": 100}, "limits": {"min_agl_m": 30}}
+
+
+def band(west: float, east: float, south: float, north: float, pieces: int = 1) -> list[tuple[float, float]]:
+    along = [west + (east - west) * i / pieces for i in range(pieces + 1)]
+    return [(x, south) for x in along] + [(x, north) for x in reversed(along)]
+
+
+def inline(ring: Ring, lon: float, lat: float) -> dict[str, Any]:
+    vehicle = {"name": "u", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15], "start": [lat, lon],
+               "goal": [lat + 0.01, lon]}  # fmt: skip
+    return ZONE_LESS | {"vehicles": [vehicle], "no_fly": [{"name": "z", "polygon": [[y, x] for x, y in ring]}]}
+
+
+def verdict(folder: Path, form: str, lon: float, lat: float, *rings: Ring) -> str:
+    """``inside``, ``free``, or why a mission at the place is refused."""
+    try:
+        if form == INLINE:
+            source = inline(rings[0], lon, lat)
+            return "inside" if load_mission(source).zones else "free"
+        found = read_zones(WRITERS[form](folder, [[ring] for ring in rings]), where="zones")
+    except InputError as why:
+        if why.problems[0].message.startswith("the start lies inside the no-fly zone 'z'"):
+            return "inside"
+        return "\n".join(p.message for p in why.problems)
+    if found.problems:
+        return found.problems[0].message
+    answer = answered(used(found.zones), Frame(lat, lon), lon, lat)
+    faults = [fault.message for draft in found.zones for fault in draft.faults]
+    return (faults[0] if faults else "on the other side") if answer is None else "inside" if answer else "free"
+
+
+@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("ring", [band(-170.0, 170.0, 30.0, 60.0), band(-95.0, 95.0, 30.0, 60.0)], ids=["340", "190"])
+def test_an_edge_of_half_a_turn_is_refused_and_says_what_to_write(tmp_path: Path, form: str, ring: Ring) -> None:
+    said = verdict(tmp_path, form, 14.49, 46.03, ring)
+    if form == "mercator":  # its edges are straight in metres, so that nobody can take them for the other side
+        assert said == "inside"
+        return
+    assert "of longitude, and from 180° on it may run on either side of the globe" in said
+    assert f"write {ring[0][0] + 360.0:g} for {ring[0][0]:g}" in said
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_a_wide_polygon_with_corners_between_is_read_as_drawn(tmp_path: Path, form: str) -> None:
+    ring = band(-170.0, 170.0, 30.0, 60.0, 4)
+    assert verdict(tmp_path, form, 14.49, 46.03, ring) == "inside"
+    if form != INLINE:  # where a zone so far away is a mistake
+        assert verdict(tmp_path, form, 176.0, 46.03, ring) == "free"
+
+
+@pytest.mark.parametrize("form", [form for form in WRITERS if form != "openair"])
+@pytest.mark.parametrize("pieces", [1, 3])
+def test_a_world_with_a_hole_is_called_a_keep_in_area(tmp_path: Path, form: str, pieces: int) -> None:
+    outer, hole = band(-180.0, 180.0, -85.0, 85.0, pieces), band(14.0, 15.0, 45.5, 46.5)
+    found = read_zones(WRITERS[form](tmp_path, [[outer, hole]]), where="zones")
+    said = [*found.problems, *(fault for draft in found.zones for fault in draft.faults)]
+    assert "is a keep-in area" in said[0].message
+    assert "zone 'z'" in said[0].message
+    if found.zones:  # an authority's file: a mission anywhere in it is refused
+        assert answered(found.zones, Frame(46.0, 14.5), 14.5, 46.0) is None
+
+
+@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("turn", [0.0, 360.0, -360.0])
+def test_longitudes_of_either_convention_are_read(tmp_path: Path, form: str, turn: float) -> None:
+    if (turn and form == "mercator") or (turn < 0.0 and form == "openair"):
+        pytest.skip("metres of Web Mercator have no turns, and OpenAir no longitudes below -180°")
+    lon = -20.0 if turn > 0.0 else 20.0
+    ring = [(x + turn, y) for x, y in band(lon - 0.05, lon + 0.05, 46.0, 46.1)]
+    assert verdict(tmp_path, form, lon, 46.05, ring) == "inside"
+
+
+@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("lon", [179.96, -179.96])
+def test_across_the_antimeridian(tmp_path: Path, form: str, lon: float) -> None:
+    """Past it, split at it, or as an edge from 179.9 to -179.9."""
+    past, south, north = band(179.9, 180.1, -16.1, -16.0), -16.1, -16.0
+    assert form == "mercator" or verdict(tmp_path, form, lon, -16.05, past) == "inside"
+    if form != INLINE:
+        split = band(179.9, 180.0, south, north), band(-180.0, -179.9, south, north)
+        assert verdict(tmp_path, form, lon, -16.05, *split) == "inside"
+    if form != "mercator":
+        written = [(x - 360.0 if x > 180.0 else x, y) for x, y in past]
+        assert verdict(tmp_path, form, lon, -16.05, written) == "inside"
+        if form != INLINE:
+            assert verdict(tmp_path, form, 14.0, -16.05, written) == "on the other side"
+            assert verdict(tmp_path, form, 14.0, 46.0, written) == "free"
+
+
+def test_a_polygon_read_as_across_the_antimeridian_says_so(tmp_path: Path) -> None:
+    ring = [(179.9, -16.1), (-179.9, -16.1), (-179.9, -16.0), (179.9, -16.0)]
+    found = read_zones(WRITERS["geojson"](tmp_path, [[ring]]), where="zones")
+    (note,) = zone_notes([(draft, None) for draft in found.zones])
+    assert "are read as across the 180° meridian: z" in note
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_a_mask_that_leaves_out_the_antimeridian_is_no_strip_across_it(tmp_path: Path, form: str) -> None:
+    assert "180" in verdict(tmp_path, form, 179.0, 10.0, band(-179.9, 179.9, -60.0, 60.0)) or form == "mercator"
+
+
+@pytest.mark.parametrize("form", [form for form in FORMATS if form != "mercator"])
+def test_a_zone_around_a_pole(tmp_path: Path, form: str) -> None:
+    """It goes to the pole, or is refused: without the pole it may be either cap."""
+    lons = [-180.0 + 60.0 * i for i in range(7)]
+    cap = [*((x, 70.0) for x in lons), (180.0, 90.0), (-180.0, 90.0)]
+    assert verdict(tmp_path, form, 14.0, 80.0, cap) == "inside"
+    said = verdict(tmp_path, form, 14.0, 80.0, [(x, 70.0) for x in lons[:-1]])
+    assert "has corners at the pole" in said
+
+
+@pytest.mark.parametrize("form", ["kml", "openair", "ed269"])
+def test_formats_without_straight_edges_hold_great_circles_too(tmp_path: Path, form: str) -> None:
+    """Between 0 and 20 degrees east the great circle along 50° N is 0.43° farther north in its middle."""
+    ring = band(0.0, 20.0, 48.0, 50.0)
+    assert verdict(tmp_path, form, 10.0, 50.4, ring) == "inside"
+    assert verdict(tmp_path, form, 10.0, 48.1, ring) == "inside"  # straight: its southern edge bends, too
+    assert verdict(tmp_path, form, 10.0, 50.5, ring) == "free"
+    assert verdict(tmp_path, "geojson", 10.0, 50.4, ring) == "free"
+
+
+def test_a_line_has_no_edge_of_half_a_turn_either(tmp_path: Path) -> None:
+    path = tmp_path / "z.geojson"
+    path.write_text('{"type": "LineString", "coordinates": [[-95, 46], [95, 46]]}')
+    (problem,) = read_zones(path, where="zones", buffer_m=50.0).problems or [None]
+    assert problem is not None
+    assert "spans 190° of longitude" in problem.message
