@@ -2,8 +2,8 @@
 
 The surface lies on the post grid of the tile that holds the middle of the mission, so that inside this tile its heights
 are those that the autopilot interpolates. A neighbouring tile has posts of its own that fit no common grid: there, and
-in the cells on the border, a node is as high as the highest post near it. The surface is then above the terrain of the
-files by up to what the ground rises within two spacings, and never below it.
+in the cells on the border, the ground lies between the lowest and the highest post near it. These are up to what the
+ground rises within two spacings away from the terrain of the files, which is never outside of them.
 """
 
 from __future__ import annotations
@@ -25,11 +25,14 @@ from gcsplan.errors import InputError
 from gcsplan.world.cell import Cell
 from gcsplan.world.datum import VerticalDatum
 from gcsplan.world.frame import Frame
+from gcsplan.world.height_unit import BY_FORMAT, HeightUnit
 from gcsplan.world.mosaic import FIT_ERROR_M, Window
 from gcsplan.world.raster import MAX_CELLS, require_file, sha256_of
 from gcsplan.world.surface import GridMap
-from gcsplan.world.terrain import Box, Terrain, TerrainSpec, place, terrain_of
+from gcsplan.world.terrain import NO_MORE_VOIDS, Box, Terrain, TerrainSpec, place, require_metres, terrain_of
 from gcsplan.world.terrain_grid import DEGREE_E7, METRES_OF_E7, STRIDE, TerrainGrid, cell_at, longitude_scale
+
+WHOLE_METRES = HeightUnit("whole metres", 1.0, BY_FORMAT)
 
 REACH = 2.1
 """Spacings around a node within which a post of another tile decides its height: a cell beside it, and its far end."""
@@ -48,6 +51,7 @@ class DatTile:
     path: Path
     notes: tuple[str, ...]
     vertical: VerticalDatum | None = None
+    unit: HeightUnit = WHOLE_METRES
 
     @property
     def stored_bytes(self) -> int:
@@ -90,6 +94,10 @@ class DatTerrain:
         for key in ("crs", "height_unit"):
             if getattr(spec, key) is not None:
                 raise InputError("a .DAT file states it itself; remove the key", where=place(where, key))
+        if spec.nodata not in (None, NO_MORE_VOIDS):
+            words = "a .DAT file marks its voids itself: `none` alone may stand here, if zeros are ground or sea"
+            raise InputError(words, where=place(where, "nodata"))
+        require_metres(spec, "the heights of .DAT files are", where=place(where, "vertical_datum"))
 
     def covers(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
         """True where a place lies in a block that its file holds (which may still be unknown there)."""
@@ -213,20 +221,24 @@ class DatMosaic:
         grid = GridMap.fit(in_window, _around(frame, self.grid, anchor, wide, x, y))
         if not grid.error_m <= FIT_ERROR_M:
             raise InputError("the mission is too wide for the posts of one tile; plan a smaller one", where=self.where)
-        heights = self._heights(anchor, x, y)
+        heights, low = self._heights(anchor, x, y, 1.0), -self._heights(anchor, x, y, -1.0)
         unknown = int(np.count_nonzero(np.isnan(heights)))
         notes = [f"{unknown} of {heights.size} DEM nodes around the mission are unknown (no block)"] if unknown else []
-        (left, low), (right, high) = ([float(getattr(h, side)()) for h in held] for side in ("min", "max"))
-        goes_on = (first[0] > left, last[1] < high, last[0] < right, first[1] > low)
-        return Window(heights, grid, x, y, tuple(notes), goes_on)
+        (left, south), (right, top) = ([float(getattr(h, side)()) for h in held] for side in ("min", "max"))
+        goes_on = (first[0] > left, last[1] < top, last[0] < right, first[1] > south)
+        one = np.array_equal(low, heights, equal_nan=True)
+        return Window(heights, grid, x, y, tuple(notes), goes_on, None if one else low)
 
-    def _heights(self, anchor: Cell, x: Floats, y: Floats) -> Floats:
-        """(rows, cols) heights of the nodes with these numbers of columns and rows, rows going south."""
+    def _heights(self, anchor: Cell, x: Floats, y: Floats, sign: float) -> Floats:
+        """(rows, cols) heights of the nodes with these numbers of columns and rows, rows going south, times ``sign``.
+
+        Where several posts count, the greatest of these numbers does: the greatest height, or for -1 the least.
+        """
         north, east = y[::-1], x
         inside, outside = self._sides(anchor, north, east)
-        heights = np.where(inside, self._posts(anchor, north, east), -np.inf)
+        heights = np.where(inside, self._posts(anchor, north, east, sign), -np.inf)
         if outside.any():
-            heights = np.maximum(heights, np.where(outside, self._raised(anchor, north, east), -np.inf))
+            heights = np.maximum(heights, np.where(outside, self._raised(anchor, north, east, sign), -np.inf))
         return np.ascontiguousarray(heights[::-1])
 
     def _sides(self, anchor: Cell, north: Floats, east: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -240,8 +252,9 @@ class DatMosaic:
         inside = rows_in & (east > -1.0) & (east < wide.max(axis=0) + 1.0)
         return inside, rows_out | (east < 1.0) | (east > wide.min(axis=0) - 1.0)
 
-    def _posts(self, cell: Cell, north: Floats, east: Floats) -> Floats:
-        """Heights of a tile's posts; NaN where it has none. The higher one counts where two blocks hold a post.
+    def _posts(self, cell: Cell, north: Floats, east: Floats, sign: float) -> Floats:
+        """Heights of a tile's posts times ``sign``; NaN where it has none. Where two blocks hold a post the greater one
+        of these numbers counts.
 
         The autopilot reads a point from the one block in whose stride it lies, up to and with the first post of the
         next one.
@@ -254,11 +267,11 @@ class DatMosaic:
             cols = slice(max(c0, 0), max(0, min(c0 + STRIDE[1] + 1, len(east))))
             if rows.start < rows.stop and cols.start < cols.stop:
                 part = heights[rows.start - r0 : rows.stop - r0, cols.start - c0 : cols.stop - c0]
-                out[rows, cols] = np.maximum(out[rows, cols], part)
+                out[rows, cols] = np.maximum(out[rows, cols], sign * part)
         return np.where(np.isinf(out), np.nan, out)
 
-    def _raised(self, anchor: Cell, north: Floats, east: Floats) -> Floats:
-        """The highest post of the other tiles around each node; NaN if one of them is unknown."""
+    def _raised(self, anchor: Cell, north: Floats, east: Floats, sign: float) -> Floats:
+        """The greatest post of the other tiles around each node, times ``sign``; NaN if one of them is unknown."""
         f = np.linspace(0.0, 1.0, 33)
         ends = [(a[0] - 3.0) + f * (a[-1] - a[0] + 6.0) for a in (north, east)]
         lat, lon = self.grid.post_e7(anchor, *np.meshgrid(*ends, indexing="ij"))
@@ -278,7 +291,7 @@ class DatMosaic:
             # Of posts beyond the tile's eastern border the autopilot reads the first alone, of its row or the next.
             last = np.pad(np.ceil(wide), ((1, 1), (0, 0)), mode="edge")
             most = np.maximum(np.maximum(last[:-2], last[1:-1]), last[2:])
-            posts = np.where(e <= most, self._posts(cell, n, e), -np.inf)
+            posts = np.where(e <= most, self._posts(cell, n, e, sign), -np.inf)
             posts_at = self.grid.post_e7(cell, *np.meshgrid(n, e, indexing="ij"))
             north_m, east_m = self.grid.offset_m(anchor, *posts_at)
             row, col = north_m / self.grid.spacing_m - north[0], east_m / self.grid.spacing_m - east[0]
