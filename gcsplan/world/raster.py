@@ -327,7 +327,7 @@ def _unit(dataset: Any, system: RasterCRS, said: Said, path: Path, *, where: str
         unit = unit_named(band)
         if unit is not None:
             stated.append(replace(unit, by=BY_FORMAT if dataset.driver == "SRTMHGT" else BY_FILE))
-        elif said.height_unit is None:
+        elif said.height_unit is None and (system.vertical_unit is None or band != system.vertical_unit.name):
             raise InputError(
                 f"{path} gives heights in {band!r}, which is not known; say the unit with `height_unit: m` "
                 "(or ft, us_ft)",
