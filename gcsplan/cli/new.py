@@ -96,7 +96,7 @@ def new(
         raise UsageError("give --dem or --flat, not both")
     said = terrain_keys(vertical_datum, height_unit, nodata)
     if said and flat is not None:
-        raise UsageError(f"{', '.join(as_options(said))}: goes with --dem: --flat is in metres above sea level")
+        raise UsageError(f"{', '.join(as_options(said))}: goes with --dem: --flat is above sea level, in metres")
     kind = _autopilot(autopilot)
     asks = not as_json and _on_a_terminal()
     seen: Seen | None = None if source is None else seen_at(source, sysid, kind)

@@ -93,10 +93,10 @@ def test_the_words_of_units(words: str, metres: float | None) -> None:
 def test_a_grid_in_feet_needs_the_unit_of_its_heights(tmp_path: Path) -> None:
     heights = np.round(hills(400, 400))
     # North Carolina's grid in US survey feet, around the frame's place.
-    path = tif(tmp_path / "a.tif", heights, Affine(300.0, 0.0, 360_000.0, 0.0, -300.0, 1_210_000.0), crs="EPSG:2264")
+    path = tif(tmp_path / "a.tif", heights, Affine(300.0, 0.0, 880_000.0, 0.0, -300.0, 710_000.0), crs="EPSG:2264")
     from gcsplan.world.frame import Frame
 
-    frame = Frame(36.10, -84.30)
+    frame = Frame(35.6, -82.5)
     error = refusal(path, frame=frame, box=(-500.0, -500.0, 500.0, 500.0), vertical_datum="NAVD88")
     assert "US survey feet" in str(error)
     assert "`height_unit: us_ft`" in str(error)
