@@ -23,7 +23,7 @@ def floored(value: float, decimals: int) -> float:
 
 def raised(value: float, decimals: int) -> float:
     """A greatest value, or what must at least be set or reached, rounded up; NaN and infinity are themselves."""
-    return -floored(-value, decimals)
+    return 0.0 - floored(-value, decimals)  # not -0.0, which is printed with its sign
 
 
 def steepened(degrees: float, decimals: int) -> float:

@@ -23,7 +23,7 @@ class MissionGround:
         """See `terrain_grid.Ground`. Raises InputError if the terrain cannot be read."""
         while True:
             plane = self.source.frame.to_plane(lat_deg, lon_deg)
-            heights = self.source.surface.ground_at(plane[..., 0], plane[..., 1])
+            heights = self.source.surface.high_at(plane[..., 0], plane[..., 1])
             unknown = np.isnan(heights)
             if not unknown.any() or not self._widened(plane[unknown]):
                 return heights

@@ -21,6 +21,7 @@ NEAR_M = 30.0
 
 OPTIONS = {
     "terrain": "--dem", "terrain.dem": "--dem", "terrain.vertical_datum": "--vertical-datum",
+    "terrain.height_unit": "--height-unit", "terrain.nodata": "--nodata",
     "terrain.flat_m": "--flat", "limits.min_agl_m": "--min-agl", "vehicles[0].start": "--start",
     "vehicles[0].goal": "--goal",
 }  # fmt: skip

@@ -133,6 +133,8 @@ def make_problem(
     given, margins = margins, replace(margins, bow_m=min(margins.bow_m, _largest_bow_m(world)))
     margins = replace(margins, track_m=margins.track_m + corner_m(vehicle))
     limits = _with_margins(vehicle.limits, margins, terrain=source.altitude_frame == "terrain", source=source)
+    spread_m = world.spread_m(*request.start_deg)  # of home's ground, from which altitudes count
+    limits = replace(limits, altitude_error_m=limits.altitude_error_m + spread_m)
     air = world.airspace
     datum = request.start[2]
     notes: list[str] = []
@@ -200,7 +202,7 @@ def _vias(
     """The via points. Planners need a leg between two altitudes: for a multicopter, a via that is one place with the
     terminal before it, or with the goal behind it, at another altitude is moved aside by `SPOT_M`, with a note."""
     start, goal = (Via(*end[:2], z) for end, z in zip((request.start, request.goal), ends_amsl_m, strict=True))
-    via = [Via(e, n, None if agl is None else float(air.surface.ground_at(e, n)) + agl) for e, n, agl in request.via]
+    via = [Via(e, n, None if agl is None else float(air.surface.high_at(e, n)) + agl) for e, n, agl in request.via]
     if request.vehicle.turn_radius_m > 0.0:
         return tuple(via)
     out: list[Via] = []

@@ -9,8 +9,9 @@ not along the leg from the item's place (`early_turn`). The mission holds no hea
 the item's place, as maps draw it; if the item has no place, towards the next item.
 
 Climb-outs and glides (`glide`) are exempt from min AGL, climb angle and terrain clearance, as columns are; never from
-zones, their clearance and ceilings. They must keep a clearance over bare ground: the altitude error, but near the ends,
-where the aircraft is close to the ground, half of its height above the touch point.
+zones, their clearance and ceilings. They must keep a clearance over the ground and what stands on it: the altitude
+error. Near the ends, where that is more than half of the height above the touch point, the aircraft is over the landing
+strip: there it keeps that half, over bare ground.
 """
 
 from __future__ import annotations
@@ -225,11 +226,11 @@ def slant_findings(stretches: Sequence[Stretch], vehicle: Vehicle, world: World)
 def slant_shortage(
     line: Floats, touch: Floats, reach_m: float, limits: Limits, air: Airspace
 ) -> tuple[float, float, float, float] | None:
-    """The worst place where ``line`` (2, 3), rising from ``touch`` (3,) or falling to it, is too near to bare ground.
+    """The worst place where ``line`` (2, 3), rising from ``touch`` (3,) or falling to it, is too near to the ground.
 
     Return (east, north, amsl, metres missing), or None if the line is high enough everywhere. The required clearance
     rises linearly from 0 at ``touch`` to the altitude error and then stays, so each of the two parts of the line,
-    lowered by its clearance, is straight.
+    lowered by its clearance, is straight. Over the strip, the lower part, bare ground counts; beyond it obstacles too.
     """
     a, b = (line[0], line[1]) if line[0, 2] <= line[1, 2] else (line[1], line[0])
     rise = float(b[2] - a[2])
@@ -243,19 +244,17 @@ def slant_shortage(
 
     split = min(max((error / SPARED - begun) / rise, 0.0), 1.0)
     middle = a + split * (b - a)
-    starts, ends, track, height = [], [], [], []
+    plain, bad = Limits(min_agl_m=0.0), []
     for p, q in ((a, middle), (middle, b)):
         if float(np.linalg.norm(q - p)) <= 1e-6:
             continue
-        starts.append(p - [0.0, 0.0, clearance(p[2])])
-        ends.append(q - [0.0, 0.0, clearance(q[2])])
+        start, end = p - [0.0, 0.0, clearance(p[2])], q - [0.0, 0.0, clearance(q[2])]
         low = p[2] - touch[2] < error / SPARED - 1e-9
         # So near to the touch point the aircraft is over the landing strip: no track error.
-        track.append(reach_m if low else limits.track_error_m + reach_m)
-        height.append(0.0)
-    plain = Limits(min_agl_m=0.0)
-    legs = Legs(np.array(starts), np.array(ends), np.zeros(len(starts), bool), np.array(track), np.array(height))
-    bad = [v for v in bare(air).examine(legs, plain).violations if v.kind in ("min_agl", "coverage") and v.by > BOUND_M]
+        track = np.array([reach_m if low else limits.track_error_m + reach_m])
+        leg = Legs(start[None], end[None], np.zeros(1, bool), track, np.zeros(1))
+        found = (bare(air) if low else air).examine(leg, plain).violations
+        bad += [v for v in found if v.kind in ("min_agl", "coverage") and v.by > BOUND_M]
     if not bad:
         return None
     worst = max(bad, key=lambda v: v.by)
@@ -263,19 +262,19 @@ def slant_shortage(
 
 
 def circle_missing_m(low: Floats, reach_m: float, limits: Limits, air: Airspace) -> float:
-    """By how much a circle around ``low`` (3,) is too near to bare ground, m; inf where the ground is unknown."""
+    """By how much a circle around ``low`` (3,) is too near to ground and what stands on it, m; inf where unknown."""
     plain = Limits(
         min_agl_m=0.0, track_error_m=limits.track_error_m + reach_m, altitude_error_m=limits.altitude_error_m
     )
-    return float(bare(air).floor_amsl(low[0], low[1], plain)) - float(low[2])
+    return float(air.floor_amsl(low[0], low[1], plain)) - float(low[2])
 
 
 def bare(air: Airspace) -> Airspace:
-    """The airspace over bare ground: what stands beside the landing strip does not count."""
+    """The airspace over the greatest bare ground: what stands beside the landing strip does not count."""
     surface = air.surface
-    if surface.top_m is surface.ground_m:
+    if surface.top_m is surface.high_m:
         return air
-    return Airspace(Surface(surface.ground_m, surface.ground_m, surface.grid), (), scale=air.scale)
+    return Airspace(Surface(surface.ground_m, surface.high, surface.grid, high_m=surface.high), (), scale=air.scale)
 
 
 def _low(s: Stretch, east: float, north: float, amsl: float, by: float, world: World) -> Finding:

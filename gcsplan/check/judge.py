@@ -19,6 +19,7 @@ from gcsplan.check.clock import seconds_of
 from gcsplan.check.corners import round_corners
 from gcsplan.check.enough import enough
 from gcsplan.check.flight import follow
+from gcsplan.check.home_height import why_unknown, with_error_of_home
 from gcsplan.check.misses import nearest_misses
 from gcsplan.check.plane_legs import PlaneLegs, legs_in_plane, steep_report
 from gcsplan.check.stretch import Flight, Stretch
@@ -64,6 +65,9 @@ def judge(
     table = profile_of(mission.autopilot)
     stored = replace(mission, items=tuple(table.stored(item) for item in mission.items))
     flight = follow(stored, vehicle, world.ground_amsl, world.read_amsl, rtl_rel_home_m=rtl_rel_home_m)
+    if (unsure := why_unknown(mission.home, vehicle, world)) is not None:
+        return Verdict(mission, (), (), (unsure, *flight.not_judged), tuple(flight.notes))
+    vehicle = with_error_of_home(vehicle, mission.home, world)
     findings: list[Finding] = []
     count = len(mission.wire_items())
     if table.max_items is not None and count > table.max_items:

@@ -69,6 +69,10 @@ def legs_in_plane(stretches: Sequence[Stretch], limits: Limits, world: World, te
         followed = follow_ground(plane[i], world.vehicle_terrain) if s.terrain else None
         if s.terrain and followed is None:
             unread.append(i)
+        if s.terrain and followed is not None and world.airspace.surface.differs:
+            begins, finishes, off_m, slopes = followed
+            spread = [world.vehicle_terrain.spread_at(p[:, 0], p[:, 1]) for p in (begins, finishes)]
+            followed = begins, finishes, off_m + np.maximum(*spread), slopes
         begins, finishes, off_m, slopes = followed or (
             plane[i, :1],
             plane[i, 1:],

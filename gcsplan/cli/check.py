@@ -12,15 +12,20 @@ from gcsplan.cli.ending import complain
 from gcsplan.cli.options import (
     AtOption,
     ClusterOption,
+    DatumOption,
+    HeightUnitOption,
     JobsOption,
     JsonOption,
     ListZonesOption,
+    NodataOption,
     RequireWayHomeOption,
     UnitsName,
     UnitsOption,
     UnjudgedOption,
     WayHomeOption,
+    as_options,
     require_html,
+    terrain_keys,
 )
 from gcsplan.errors import InputError, UsageError, worst_of
 
@@ -34,6 +39,9 @@ if TYPE_CHECKING:
     from gcsplan.units import Units
 
 Number = float | None
+
+READ_BY = {"vertical_datum": "--vertical-datum", "height_unit": "--height-unit", "nodata": "--nodata"}
+"""Keys of a mission's terrain, and the options that count before them."""
 
 TABLES = 20
 """Most files of which tables are printed; of more, findings and a summary."""
@@ -57,9 +65,9 @@ def check(
             help="Terrain; may be repeated. Or a source of dem fetch.",
         ),
     ] = None,
-    vertical_datum: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Of the terrain: EGM96, EGM2008, …")
-    ] = None,
+    vertical_datum: DatumOption = None,
+    height_unit: HeightUnitOption = None,
+    nodata: NodataOption = None,
     geoid_grid: Annotated[str | None, typer.Option(metavar="FILE", help="For an ellipsoidal DEM.")] = None,
     crs: Annotated[str | None, typer.Option(metavar="EPSG:N", help="Of a DEM that does not say.")] = None,
     obstacle_height: Annotated[Number, typer.Option(metavar="M", help="Of trees and houses, everywhere.")] = None,
@@ -150,9 +158,9 @@ def check(
             raise UsageError("--list-zones: of which zones? Give a mission file (.yaml) or a file of zones, too")
         return show_zones(named, units_of(units), as_json=as_json, at=at)
     given: dict[str, object] = {
-        "--dem": dem, "--vertical-datum": vertical_datum, "--geoid-grid": geoid_grid, "--crs": crs,
-        "--obstacle-height": obstacle_height, "--zones": zones, "--min-agl": min_agl, "--max-agl": max_agl,
-        "--max-amsl": max_amsl, "--clearance": clearance, "--track-error": track_error,
+        "--dem": dem, **as_options(terrain_keys(vertical_datum, height_unit, nodata)), "--geoid-grid": geoid_grid,
+        "--crs": crs, "--obstacle-height": obstacle_height, "--zones": zones, "--min-agl": min_agl,
+        "--max-agl": max_agl, "--max-amsl": max_amsl, "--clearance": clearance, "--track-error": track_error,
         "--altitude-error": altitude_error, "--max-climb": max_climb, "--max-descent": max_descent,
         "--autopilot": autopilot, "--home": home, "--speed": speed, "--climb-rate": climb_rate,
         "--descent-rate": descent_rate, "--rtl-altitude": rtl_altitude, "--return-route": return_route,
@@ -167,7 +175,7 @@ def check(
     form: Form = "whole" if as_json else "row" if json_lines else "lines"
     shown = Shown(form, allow_unjudged, units_of(units), len(arguments) > 1)
     archive = _archive(mission, arguments, given, asked, shown, at)
-    printer = Document() if as_json else Rows() if json_lines else Lines(summed=not quiet)
+    printer = Document() if as_json else Rows() if json_lines else Lines(shown.units, summed=not quiet)
     reading = steady(check_sites.split_name(file)[1] for file in arguments)
     if report is None and (rows or quiet or len(arguments) > TABLES):
         raise typer.Exit(tell_archive(archive, printer, jobs, cluster, reading))
@@ -210,11 +218,12 @@ def _archive(
     from gcsplan.vehicle import Autopilot
 
     if mission is not None:
+        terrain = {key: given.pop(option) for key, option in READ_BY.items() if option in given}
         if given:
             raise UsageError(f"{', '.join(given)}: the mission file says that; leave it out, or give no mission file")
         if not files:
             raise UsageError(f"which files are to be checked in the world of {mission}? Give .waypoints or .plan files")
-        return Archive.in_mission(pipeline.load_mission(Path(mission), at=at), files, returns, shown)
+        return Archive.in_mission(pipeline.load_mission(Path(mission), at=at, terrain=terrain), files, returns, shown)
     missing = [name for name in ("--dem", "--min-agl") if name not in given]
     if missing:
         raise UsageError(
@@ -242,7 +251,7 @@ def _options(given: dict[str, object], at: str | None = None) -> WorldOptions:
     zones, rtl, route = given.get("--zones"), given.get("--rtl-altitude"), given.get("--return-route")
     home = _home(str(given["--home"])) if "--home" in given else None
     return WorldOptions(
-        terrain=under("dem", "vertical_datum", "geoid_grid", "crs", "obstacle_height_m"),
+        terrain=under("dem", "vertical_datum", "height_unit", "nodata", "geoid_grid", "crs", "obstacle_height_m"),
         zones=tuple(str(z) for z in zones) if isinstance(zones, list) else (),
         limits={k: float(str(v)) for k, v in under(*limits).items()},
         vehicle=vehicle,
@@ -270,12 +279,13 @@ def _home(text: str) -> Degrees:
 
 
 def _say_all(batch: Batch, units: Units) -> None:
-    from gcsplan.cli.console import say, say_notes, verdict_table
+    from gcsplan.cli.console import say, say_heights, say_notes, verdict_table
     from gcsplan.cli.home_words import say_home, say_warnings
     from gcsplan.export.profile_text import profile_lines
     from gcsplan.units import in_units
 
     say_notes(batch.notes)
+    say_heights(batch.inputs, units)
     for c in batch.checked:
         say_notes(c.notes)
         name = f"{c.file} as {c.vehicle.name} ({c.vehicle.autopilot})"

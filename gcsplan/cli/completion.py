@@ -56,7 +56,7 @@ def missions(incomplete: str) -> list[str]:
 
 def dems(incomplete: str) -> list[str]:
     """The sample terrain, and files that begin alike."""
-    from gcsplan.world.raster import SAMPLE
+    from gcsplan.world.sample import SAMPLE
 
     return _with_files(incomplete, SAMPLE, [SAMPLE])
 

@@ -15,7 +15,7 @@ from gcsplan.check.verdict import by_item
 from gcsplan.cli.screens import RESULTS, aside, console
 from gcsplan.figures import floored, steepened
 from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Unit, Units, charge, duration, in_units
-from gcsplan.world.model_words import what_is_not_in
+from gcsplan.world.model_words import heights_line, what_is_not_in
 
 if TYPE_CHECKING:
     from gcsplan.app.gate import GateTime
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from gcsplan.check.rtl.verdict import WayHome
     from gcsplan.check.verdict import Verdict
     from gcsplan.mavlink.protocol.machine import Progress as Transfer
+    from gcsplan.mission_file import MissionFile
     from gcsplan.vehicle import Energy
 
 WIDEST = 100_000
@@ -103,8 +104,22 @@ def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) 
     if plan.fleet is not None:
         notes = [(slot.name, note) for slot in plan.fleet.slots for note in slot.notes]
         say_notes_of([(name, note.removeprefix(f"{name} ")) for name, note in notes])
+    say_heights(plan.source.inputs, units)
     if words := what_is_not_in(plan.source.inputs):
         console.print(words, style="yellow", markup=False)
+
+
+def say_heights(inputs: Mapping[str, object], units: Units) -> None:
+    """Print how the terrain's heights were read, in one line."""
+    if (line := heights_line(inputs)) is not None:
+        say(in_units(line, units))
+
+
+def say_world(source: MissionFile, units: Units) -> None:
+    """Print how a mission's world was read, on standard error: there is no result."""
+    say_notes(source.notes)
+    if (line := heights_line(source.inputs)) is not None:
+        remark(in_units(line, units))
 
 
 def _say_fleet(plan: Plan, units: Units) -> None:

@@ -13,7 +13,16 @@ import typer
 
 from gcsplan.cli import completion
 from gcsplan.cli.ending import emit, printable
-from gcsplan.cli.options import LINKS, JsonOption, SysidOption
+from gcsplan.cli.options import (
+    LINKS,
+    DatumOption,
+    HeightUnitOption,
+    JsonOption,
+    NodataOption,
+    SysidOption,
+    as_options,
+    terrain_keys,
+)
 from gcsplan.errors import InputError, UsageError
 
 if TYPE_CHECKING:
@@ -39,9 +48,9 @@ def new(
             help="The ground: a raster (.tif, .hgt, .asc) or sample:jacksboro; repeatable.",
         ),
     ] = None,
-    vertical_datum: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Of a raster that does not state it: EGM96 for SRTM, EGM2008, …")
-    ] = None,
+    vertical_datum: DatumOption = None,
+    height_unit: HeightUnitOption = None,
+    nodata: NodataOption = None,
     flat: Annotated[
         float | None, typer.Option(metavar="M", help="No raster: flat ground, M metres above sea level, everywhere.")
     ] = None,
@@ -85,8 +94,9 @@ def new(
     _require_file(out, force)
     if dem and flat is not None:
         raise UsageError("give --dem or --flat, not both")
-    if vertical_datum is not None and flat is not None:
-        raise UsageError("--vertical-datum goes with --dem: --flat is above sea level")
+    said = terrain_keys(vertical_datum, height_unit, nodata)
+    if said and flat is not None:
+        raise UsageError(f"{', '.join(as_options(said))}: goes with --dem: --flat is above sea level, in metres")
     kind = _autopilot(autopilot)
     asks = not as_json and _on_a_terminal()
     seen: Seen | None = None if source is None else seen_at(source, sysid, kind)
@@ -107,8 +117,8 @@ def new(
         kind = _ask(f"Autopilot ({', '.join(Autopilot)})", _autopilot, default="arducopter")
     draft = Draft(
         start=begin, goal=end, dem=tuple(_beside(d, out) for d in dem or ()), vertical_datum=vertical_datum,
-        flat_m=flat, autopilot=seen.autopilot if seen else kind or Autopilot.ARDUCOPTER, sysid=sysid,
-        min_agl_m=min_agl,
+        height_unit=height_unit, nodata=nodata, flat_m=flat,
+        autopilot=seen.autopilot if seen else kind or Autopilot.ARDUCOPTER, sysid=sysid, min_agl_m=min_agl,
     )  # fmt: skip
     draft = draft if seen is None else seen.onto(draft)
     text, notes = checked_text(draft, out)

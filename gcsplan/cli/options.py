@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -42,6 +44,25 @@ MissionArgument = Annotated[
     Path,
     typer.Argument(
         metavar="MISSION.yaml", autocompletion=completion.missions, help="The mission file, or sample:NAME."
+    ),
+]
+DatumOption = Annotated[
+    str | None,
+    typer.Option("--vertical-datum", metavar="NAME", help="Of the terrain: EGM96, EGM2008, NAVD88, EPSG:6360, …"),
+]
+HeightUnitOption = Annotated[
+    str | None,
+    typer.Option(
+        "--height-unit",
+        metavar="UNIT",
+        autocompletion=completion.words("m", "ft", "us_ft"),
+        help="Of the terrain's heights, in place of what the file states: m, ft or us_ft.",
+    ),
+]
+NodataOption = Annotated[
+    str | None,
+    typer.Option(
+        "--nodata", metavar="N|none", help="The terrain's number for no height; none: exact zeros are ground or sea."
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on standard output.")]
@@ -177,6 +198,27 @@ SimSysidOption = Annotated[
 MisbehaveOption = Annotated[
     str, typer.Option(metavar="HOW", help=f"Trouble, for example drop=0.1,corrupt=7,seed=3. Known: {MISBEHAVIOURS}.")
 ]
+
+
+def terrain_keys(datum: str | None, unit: str | None, nodata: str | None) -> dict[str, object]:
+    """The keys of ``terrain:`` that these options give. Raises UsageError."""
+    if unit not in (None, "m", "ft", "us_ft"):
+        raise UsageError(f"--height-unit {unit}: m, ft or us_ft is wanted")
+    number: object = nodata
+    if nodata not in (None, "none"):
+        try:
+            number = float(str(nodata))
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(float(str(number))):
+            raise UsageError(f"--nodata {nodata}: a number, or none, is wanted")
+    given = {"vertical_datum": datum, "height_unit": unit, "nodata": number}
+    return {key: value for key, value in given.items() if value is not None}
+
+
+def as_options(keys: Mapping[str, object]) -> dict[str, object]:
+    """The same by the names of the options."""
+    return {f"--{key.replace('_', '-')}": value for key, value in keys.items()}
 
 
 def require_html(file: Path | None) -> None:

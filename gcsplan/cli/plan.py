@@ -18,11 +18,14 @@ from gcsplan.cli.options import (
     AtomicOption,
     AtOption,
     ClusterOption,
+    DatumOption,
+    HeightUnitOption,
     JobsOption,
     JsonOption,
     LeaveOutOption,
     ListZonesOption,
     MissionArgument,
+    NodataOption,
     ObjectiveOption,
     PlaceOption,
     PlannerOption,
@@ -33,6 +36,7 @@ from gcsplan.cli.options import (
     UnitsOption,
     UnjudgedOption,
     WayHomeOption,
+    terrain_keys,
 )
 from gcsplan.errors import CheckFailed, InputError, NoMission, UsageError
 
@@ -40,6 +44,7 @@ if TYPE_CHECKING:
     from gcsplan.app.gate import GateTime
     from gcsplan.app.model import Plan
     from gcsplan.app.upload_job import JobResult, UploadJob, UploadOptions
+    from gcsplan.mission_file import MissionFile
     from gcsplan.units import Units
 
 SHOWN = 15
@@ -127,6 +132,9 @@ def plan(
     ignore_position: PlaceOption = False,
     atomic: AtomicOption = False,
     timeout: TimeoutOption = 60.0,
+    vertical_datum: DatumOption = None,
+    height_unit: HeightUnitOption = None,
+    nodata: NodataOption = None,
     list_zones: ListZonesOption = False,
     leave_out: LeaveOutOption = False,
     jobs: JobsOption = None,
@@ -158,8 +166,11 @@ def plan(
     each = _require_options(planner, objective, png, directory)
     if settle_outputs(directory):
         remark(f"an earlier run was cut off while it wrote to {directory}: the outputs before it were put back")
+    source: MissionFile | None = None
     try:
-        source = pipeline.load_mission(mission, departure=None if gate is None else gate.start, at=at)
+        read = terrain_keys(vertical_datum, height_unit, nodata)
+        depart = None if gate is None else gate.start
+        source = pipeline.load_mission(mission, departure=depart, at=at, terrain=read)
         targets: dict[str, str] = {}
         if upload or fence or fence_infinite:  # otherwise the upload modules need not be imported
             from gcsplan.app import fencing, uploads
@@ -191,7 +202,7 @@ def plan(
     except UsageError:
         raise  # a mistake on the command line does not invalidate an earlier mission
     except (InputError, NoMission, CheckFailed):
-        _retire(directory)
+        _retire(directory, None if as_json else source, system)
         raise
     _write(directory, files, {} if png is None else _pictures(planned, png, each))
     if not as_json:
@@ -261,9 +272,10 @@ def _require_options(planner: str | None, objective: str | None, png: Path | Non
     return each
 
 
-def _retire(directory: Path) -> None:
-    """Move the outputs of an earlier plan out of the way, since there is no mission now."""
-    from gcsplan.cli.console import remark
+def _retire(directory: Path, source: MissionFile | None, units: Units) -> None:
+    """Move the outputs of an earlier plan out of the way, since there is no mission now, and say how its world was
+    read: what was read amiss explains why."""
+    from gcsplan.cli.console import remark, say_world
     from gcsplan.export.outdir import retire_outputs
 
     try:
@@ -271,6 +283,8 @@ def _retire(directory: Path) -> None:
             remark(f"earlier outputs in {directory} were moved to {directory / 'previous'}")
     except InputError as error:  # the reason why there is no mission matters more
         remark(f"note: earlier outputs are still in {directory} and are of no use now: {error}")
+    if source is not None:
+        say_world(source, units)
 
 
 def _write(directory: Path, files: Mapping[str, str], pictures: dict[Path, bytes]) -> None:

@@ -2,8 +2,8 @@
 
 The surface lies on the post grid of the tile that holds the middle of the mission, so that inside this tile its heights
 are those that the autopilot interpolates. A neighbouring tile has posts of its own that fit no common grid: there, and
-in the cells on the border, a node is as high as the highest post near it. The surface is then above the terrain of the
-files by up to what the ground rises within two spacings, and never below it.
+in the cells on the border, the terrain of the files lies between a least and a greatest height (`dat_bounds`): on even
+ground, however steep, they are one.
 """
 
 from __future__ import annotations
@@ -20,19 +20,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.dem.cells import cells_in
+from gcsplan.dem.dat_bounds import bounds
 from gcsplan.dem.dat_file import DatFile, cell_of_file, is_dat, read_dat
 from gcsplan.errors import InputError
 from gcsplan.world.cell import Cell
 from gcsplan.world.datum import VerticalDatum
 from gcsplan.world.frame import Frame
+from gcsplan.world.height_unit import BY_FORMAT, HeightUnit
 from gcsplan.world.mosaic import FIT_ERROR_M, Window
 from gcsplan.world.raster import MAX_CELLS, require_file, sha256_of
 from gcsplan.world.surface import GridMap
-from gcsplan.world.terrain import Box, Terrain, TerrainSpec, place, terrain_of
+from gcsplan.world.terrain import NO_MORE_VOIDS, Box, Terrain, TerrainSpec, place, require_metres, terrain_of
 from gcsplan.world.terrain_grid import DEGREE_E7, METRES_OF_E7, STRIDE, TerrainGrid, cell_at, longitude_scale
 
-REACH = 2.1
-"""Spacings around a node within which a post of another tile decides its height: a cell beside it, and its far end."""
+WHOLE_METRES = HeightUnit("whole metres", 1.0, BY_FORMAT)
 
 NOTE = (
     "terrain of ArduPilot's .DAT files is in whole metres and may have been cut down to them: up to 1 m lower than its "
@@ -48,6 +49,7 @@ class DatTile:
     path: Path
     notes: tuple[str, ...]
     vertical: VerticalDatum | None = None
+    unit: HeightUnit = WHOLE_METRES
 
     @property
     def stored_bytes(self) -> int:
@@ -90,6 +92,10 @@ class DatTerrain:
         for key in ("crs", "height_unit"):
             if getattr(spec, key) is not None:
                 raise InputError("a .DAT file states it itself; remove the key", where=place(where, key))
+        if spec.nodata not in (None, NO_MORE_VOIDS):
+            words = "a .DAT file marks its voids itself: `none` alone may stand here, if zeros are ground or sea"
+            raise InputError(words, where=place(where, "nodata"))
+        require_metres(spec, "the heights of .DAT files are", where=place(where, "vertical_datum"))
 
     def covers(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
         """True where a place lies in a block that its file holds (which may still be unknown there)."""
@@ -213,21 +219,26 @@ class DatMosaic:
         grid = GridMap.fit(in_window, _around(frame, self.grid, anchor, wide, x, y))
         if not grid.error_m <= FIT_ERROR_M:
             raise InputError("the mission is too wide for the posts of one tile; plan a smaller one", where=self.where)
-        heights = self._heights(anchor, x, y)
+        heights, low = self._heights(anchor, x, y)
         unknown = int(np.count_nonzero(np.isnan(heights)))
         notes = [f"{unknown} of {heights.size} DEM nodes around the mission are unknown (no block)"] if unknown else []
-        (left, low), (right, high) = ([float(getattr(h, side)()) for h in held] for side in ("min", "max"))
-        goes_on = (first[0] > left, last[1] < high, last[0] < right, first[1] > low)
-        return Window(heights, grid, x, y, tuple(notes), goes_on)
+        (left, south), (right, top) = ([float(getattr(h, side)()) for h in held] for side in ("min", "max"))
+        goes_on = (first[0] > left, last[1] < top, last[0] < right, first[1] > south)
+        one = np.array_equal(low, heights, equal_nan=True)
+        return Window(heights, grid, x, y, tuple(notes), goes_on, None if one else low)
 
-    def _heights(self, anchor: Cell, x: Floats, y: Floats) -> Floats:
-        """(rows, cols) heights of the nodes with these numbers of columns and rows, rows going south."""
+    def _heights(self, anchor: Cell, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        """(rows, cols) greatest and least heights of nodes with these numbers of columns and rows, rows going south."""
         north, east = y[::-1], x
         inside, outside = self._sides(anchor, north, east)
-        heights = np.where(inside, self._posts(anchor, north, east), -np.inf)
-        if outside.any():
-            heights = np.maximum(heights, np.where(outside, self._raised(anchor, north, east), -np.inf))
-        return np.ascontiguousarray(heights[::-1])
+        own = self._posts(anchor, north, east)
+        there = self._bounds(anchor, north, east) if outside.any() else own
+        found = []
+        for sign, mine, others in zip((1.0, -1.0), own, there, strict=True):
+            heights = np.where(inside, sign * mine, -np.inf)
+            heights = np.maximum(heights, np.where(outside, sign * others, -np.inf))
+            found.append(np.ascontiguousarray(sign * heights[::-1]))
+        return found[0], found[1]
 
     def _sides(self, anchor: Cell, north: Floats, east: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Of each node: whether a cell beside it meets its own tile, and whether one meets another tile."""
@@ -240,13 +251,13 @@ class DatMosaic:
         inside = rows_in & (east > -1.0) & (east < wide.max(axis=0) + 1.0)
         return inside, rows_out | (east < 1.0) | (east > wide.min(axis=0) - 1.0)
 
-    def _posts(self, cell: Cell, north: Floats, east: Floats) -> Floats:
-        """Heights of a tile's posts; NaN where it has none. The higher one counts where two blocks hold a post.
+    def _posts(self, cell: Cell, north: Floats, east: Floats) -> tuple[Floats, Floats]:
+        """Greatest and least heights of a tile's posts, which differ where two blocks hold one; NaN where none does.
 
         The autopilot reads a point from the one block in whose stride it lies, up to and with the first post of the
         next one.
         """
-        out = np.full((len(north), len(east)), -np.inf)
+        high, low = (np.full((len(north), len(east)), end) for end in (-np.inf, np.inf))
         file = self._files.get(cell)
         for block, heights in ({} if file is None else file.blocks).items():
             r0, c0 = block.north * STRIDE[0] - int(north[0]), block.east * STRIDE[1] - int(east[0])
@@ -254,15 +265,16 @@ class DatMosaic:
             cols = slice(max(c0, 0), max(0, min(c0 + STRIDE[1] + 1, len(east))))
             if rows.start < rows.stop and cols.start < cols.stop:
                 part = heights[rows.start - r0 : rows.stop - r0, cols.start - c0 : cols.stop - c0]
-                out[rows, cols] = np.maximum(out[rows, cols], part)
-        return np.where(np.isinf(out), np.nan, out)
+                high[rows, cols] = np.maximum(high[rows, cols], part)
+                low[rows, cols] = np.minimum(low[rows, cols], part)
+        return np.where(np.isinf(high), np.nan, high), np.where(np.isinf(low), np.nan, low)
 
-    def _raised(self, anchor: Cell, north: Floats, east: Floats) -> Floats:
-        """The highest post of the other tiles around each node; NaN if one of them is unknown."""
+    def _bounds(self, anchor: Cell, north: Floats, east: Floats) -> tuple[Floats, Floats]:
+        """Greatest and least heights of nodes between which the ground of all other tiles lies; see `bounds`."""
         f = np.linspace(0.0, 1.0, 33)
         ends = [(a[0] - 3.0) + f * (a[-1] - a[0] + 6.0) for a in (north, east)]
         lat, lon = self.grid.post_e7(anchor, *np.meshgrid(*ends, indexing="ij"))
-        out = np.full((len(north), len(east)), -np.inf)
+        found: list[tuple[Floats, ...]] = []
         for cell in _cells_between(lat, lon):
             if cell == anchor:
                 continue
@@ -277,13 +289,13 @@ class DatMosaic:
                 continue
             # Of posts beyond the tile's eastern border the autopilot reads the first alone, of its row or the next.
             last = np.pad(np.ceil(wide), ((1, 1), (0, 0)), mode="edge")
-            most = np.maximum(np.maximum(last[:-2], last[1:-1]), last[2:])
-            posts = np.where(e <= most, self._posts(cell, n, e), -np.inf)
+            read = e <= np.maximum(np.maximum(last[:-2], last[1:-1]), last[2:])
             posts_at = self.grid.post_e7(cell, *np.meshgrid(n, e, indexing="ij"))
             north_m, east_m = self.grid.offset_m(anchor, *posts_at)
             row, col = north_m / self.grid.spacing_m - north[0], east_m / self.grid.spacing_m - east[0]
-            _scatter(out, row.ravel(), col.ravel(), posts.ravel())
-        return np.where(np.isinf(out), np.nan, out)
+            found.append(tuple(a[read] for a in (row, col, *self._posts(cell, n, e))))
+        row, col, high, low = (np.concatenate(a) for a in zip(*found, strict=True)) if found else (np.zeros(0),) * 4
+        return bounds((len(north), len(east)), row, col, high, low)
 
 
 def _each(known: Callable[[float, float], bool], lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
@@ -295,20 +307,6 @@ def _each(known: Callable[[float, float], bool], lat_deg: ArrayLike, lon_deg: Ar
 
 def _holds(file: DatFile, lat_deg: float, lon_deg: float) -> bool:
     return any(block in file.blocks for block in file.grid.blocks_over(lat_deg * 1e7, lon_deg * 1e7))
-
-
-def _scatter(out: Floats, row: Floats, col: Floats, heights: Floats) -> None:
-    """Raise every node of ``out`` to the heights within `REACH` of it; an unknown one makes it unknown."""
-    rows, cols = out.shape
-    near = (row > -3.0) & (row < rows + 2.0) & (col > -3.0) & (col < cols + 2.0)
-    row, col, heights = row[near], col[near], heights[near]
-    down, left = np.floor(row).astype(int), np.floor(col).astype(int)
-    for i in range(-2, 4):
-        for j in range(-2, 4):
-            r, c = down + i, left + j
-            within = (np.abs(r - row) <= REACH) & (np.abs(c - col) <= REACH)
-            within &= (r >= 0) & (r < rows) & (c >= 0) & (c < cols)
-            np.maximum.at(out, (r[within], c[within]), heights[within])
 
 
 def _cells_between(lat_e7: Floats, lon_e7: Floats) -> list[Cell]:

@@ -22,9 +22,20 @@ from gcsplan.errors import InputError
 from gcsplan.world.cell import Cell
 from gcsplan.world.datum import VerticalDatum, take_apart
 from gcsplan.world.frame import Frame
+from gcsplan.world.height_unit import METRE
 from gcsplan.world.mosaic import Mosaic
 from gcsplan.world.raster import Raster, open_raster, sha256_of
-from gcsplan.world.terrain import Box, OpenTerrain, Terrain, TerrainSpec, open_terrain, place, terrain_of
+from gcsplan.world.terrain import (
+    NO_MORE_VOIDS,
+    Box,
+    OpenTerrain,
+    Terrain,
+    TerrainSpec,
+    open_terrain,
+    place,
+    require_metres,
+    terrain_of,
+)
 
 ROWS = 3600
 """Rows of a tile of sea if no tile beside it says another number."""
@@ -43,9 +54,10 @@ def open_dem(spec: TerrainSpec, *, where: str) -> OpenTerrain:
         return DatTerrain(paths, spec, where=where) if paths else open_terrain(spec, where=where)
     if len(spec.dem) > 1:
         raise InputError(f"{named[0]} stands alone: no other tile beside it", where=place(where, "dem"))
-    for key in ("crs", "height_unit"):
+    for key in ("crs", "height_unit", "nodata"):
         if getattr(spec, key) is not None:
             raise InputError(f"{named[0]} states it itself; remove the key", where=place(where, key))
+    require_metres(spec, f"the heights of {named[0]} are", where=place(where, "vertical_datum"))
     return _SourceTerrain(SOURCES[named[0]], spec, where)
 
 
@@ -69,7 +81,8 @@ class _SourceTerrain:
             raise InputError(f"{_not_published(self._source, absent)}; give another DEM", where=at)
         sample = next(iter(tiles.values()), None)
         found = [tiles[c] if c in tiles else _sea(self._source, c, sample) for c in records if c in tiles or c in sea]
-        spec = replace(self._spec, dem=(self._source.name,))
+        # What these publish at 0 m is sea: their voids are filled or declared.
+        spec = replace(self._spec, dem=(self._source.name,), nodata=NO_MORE_VOIDS)
         info, notes = _told(self._source, records, sea, absent)
         return terrain_of(Mosaic(found, where=at), spec, where=self._where, info=info, notes=notes)
 
@@ -118,7 +131,8 @@ def _tile(cache: Cache, cell: Cell, record: Record, where: str) -> Raster:
     if sha256_of(path) != record.sha256:
         raise InputError.of([cache.missing((cell,), where, "damaged, unlike its checksum")])
     raster = open_raster(path, where=where)
-    return replace(raster, vertical=VerticalDatum(cache.source.vertical_datum), sha256=lambda: record.sha256)
+    datum, unit = VerticalDatum(cache.source.vertical_datum), replace(METRE, by=f"as {cache.source.name} has them")
+    return replace(raster, vertical=datum, sha256=lambda: record.sha256, unit=unit)
 
 
 def _sea(source: Source, cell: Cell, sample: Raster | None) -> Raster:
@@ -135,4 +149,5 @@ def _sea(source: Source, cell: Cell, sample: Raster | None) -> Raster:
         f"sea {cell.name}", take_apart("EPSG:4326", where=source.name), cell.lon_deg - 0.5 * dx,
         cell.lat_deg + 1.0 + 0.5 * dy, dx, dy, cols + more, rows + more, VerticalDatum(source.vertical_datum), read,
         (rows + more) * (cols + more), lambda: hashlib.sha256(f"sea {cell.name}".encode()).hexdigest(),
+        unit=replace(METRE, by=f"as {source.name} has them"),
     )  # fmt: skip

@@ -12,8 +12,8 @@ from gcsplan.figures import floored, raised
 ORDER: dict[str, tuple[str, ...]] = {
     "": ("name", "gcsplan", "planner", "objective", "seed", "inputs", "vehicles", "fleet"),
     "inputs": (
-        "dem_sha256", "vertical_datum", "resolution_m", "bare_dem", "dem_source", "dem_kind", "dem_tiles", "dem_notice",
-        "sea_tiles", "zones_sha256",
+        "dem_sha256", "vertical_datum", "heights_read", "resolution_m", "bare_dem", "dem_source", "dem_kind",
+        "dem_tiles", "dem_notice", "sea_tiles", "zones_sha256",
     ),
     "vehicles": (
         "name", "items", "length_m", "lower_bound_m", "gap_percent", "energy_j", "lower_bound_j",

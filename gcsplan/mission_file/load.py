@@ -82,6 +82,7 @@ def load_mission(
     around: Sequence[tuple[float, float]] = (),
     departure: datetime | None = None,
     at: str | Sequence[str] | None = None,
+    terrain: Mapping[str, object] | None = None,
 ) -> MissionFile:
     """Read and judge a mission; nothing is planned yet.
 
@@ -93,7 +94,8 @@ def load_mission(
 
     ``planner_names`` replaces the table of planners. ``around`` are places (latitude, longitude) in degrees, besides
     the mission's own, for which terrain is loaded too if it covers them. ``departure`` is when the mission begins, if
-    it does not say so itself (``at``). The argument ``at`` counts in place of that key.
+    it does not say so itself (``at``). The argument ``at`` counts in place of that key. ``terrain``: keys of its
+    section that count before the mission's own.
 
     Returns a `MissionFile`: vehicles, zones and terrain in metres. Raises InputError with every problem that was found,
     each with its place (file and key, such as ``vehicles[1].speed_m_s``; a mission without a file is called
@@ -110,7 +112,7 @@ def load_mission(
         >>> [request.vehicle.name for request in mission.vehicles]
         ['uav1']
     """
-    file, where, raw, written = read_content(source, text)
+    file, where, raw, written = read_content(source, text, terrain)
     if "version" in raw and (raw["version"] != 1 or isinstance(raw["version"], bool | float)):
         words = f"this gcsplan reads version 1, given {shown(raw['version'])}; write `version: 1`, or update gcsplan"
         raise InputError(words, where=f"{where}: version")

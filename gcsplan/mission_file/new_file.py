@@ -57,6 +57,8 @@ class Draft:
     goal: str
     dem: tuple[str, ...] = ()
     vertical_datum: str | None = None
+    height_unit: str | None = None
+    nodata: str | None = None
     flat_m: float | None = None
     autopilot: Autopilot = Autopilot.ARDUCOPTER
     sysid: int = 1
@@ -97,6 +99,9 @@ def _terrain(draft: Draft) -> Iterator[Row]:
         yield TerrainKeys, "dem", dem if len(draft.dem) == 1 else f"[{dem}]", True
         datum = draft.vertical_datum
         yield TerrainKeys, "vertical_datum", "EGM96" if datum is None else _word(datum), datum is not None
+        for key, value in (("height_unit", draft.height_unit), ("nodata", draft.nodata)):
+            if value is not None:
+                yield TerrainKeys, key, value, True
     else:
         yield TerrainKeys, "flat_m", f"{draft.flat_m:g}", True
     yield TerrainKeys, "obstacle_height_m", "0", True

@@ -108,7 +108,9 @@ class TerrainKeys(Keys):
     crs: Text | None = None
     """Coordinate system of a raster that does not state it, such as `EPSG:32617`."""
     height_unit: Literal["m", "ft", "us_ft"] | None = None
-    """Unit of heights in a raster that does not state it."""
+    """Unit of heights in a raster; it counts before the unit that the file or the datum states."""
+    nodata: Annotated[float, Field(allow_inf_nan=False)] | Literal["none"] | None = None
+    """A number of the raster that stands for no height, such as `0`; `none`: exact zeros are ground or sea."""
     flat_m: Metres | None = None
     """No raster: flat ground at this altitude; in a mission with a frame it counts above the frame's zero."""
     peaks: Annotated[list[PeakKeys], Field(min_length=1, max_length=1000)] | None = None

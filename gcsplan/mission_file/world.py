@@ -103,6 +103,7 @@ def make_spec(keys: TerrainKeys, folder: Path) -> TerrainSpec:
         geoid_grid=None if keys.geoid_grid is None else str(folder / keys.geoid_grid),
         crs=keys.crs,
         height_unit=keys.height_unit,
+        nodata=keys.nodata,
         flat_m=keys.flat_m,
         peaks=tuple(Peak(p.center[0], p.center[1], p.height_m, p.decay_m[0], p.decay_m[1]) for p in keys.peaks or ()),
         obstacle_height_m=keys.obstacle_height_m,

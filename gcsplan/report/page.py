@@ -262,7 +262,7 @@ def _profiles(
         parts.append(
             f"<details{shown}><summary>{esc(subject.name)}: {length} along the track"
             f"</summary>{tools(f'profile-{i}')}{profile_html(subject, line, found[i], i, page.world, page.units)}"
-            f"{profile_legend(subject, line, found[i], page.units)}</details>"
+            f"{profile_legend(subject, line, found[i], page.world, page.units)}</details>"
         )
     parts.append("</section>")
     return parts

@@ -42,7 +42,7 @@ def profile_html(
         title = f"no-fly zone {p.zone.name}: {zone_heights(p.zone, units)}"
         shapes.append(axes.area(_wide(run[part], axes), low, high, "zone", title))
     if not np.array_equal(line.top_m, line.ground_m, equal_nan=True):
-        shapes.append(axes.area(run, line.ground_m, line.top_m, "obstacles", "trees and buildings, as stated"))
+        shapes.append(axes.area(run, line.ground_m, line.top_m, "obstacles", f"{_standing(world)}, as stated"))
     shapes.append(axes.area(run, bottom, line.ground_m, "ground"))
     shapes.append(axes.line(run, line.amsl_m, "casing"))
     shapes.append(axes.line(run, line.amsl_m, f"track t{index % COLOURS}"))
@@ -55,20 +55,28 @@ def profile_html(
     return chart_html(f"profile-{index}", axes, shapes, marks, words, TALL)
 
 
-def profile_legend(subject: Subject, line: Line, found: list[Passage], units: Units) -> str:
+def profile_legend(subject: Subject, line: Line, found: list[Passage], world: World, units: Units) -> str:
     """The legend of a profile's colours."""
     limits = subject.vehicle.limits
     trees = not np.array_equal(line.top_m, line.ground_m, equal_nan=True)
     top = np.isfinite(line.ceiling_m).any()
     return (
         '<ul class="legend"><li><i class="swatch ground"></i>ground</li>'
-        + ('<li><i class="swatch obstacles"></i>trees and buildings</li>' if trees else "")
+        + (f'<li><i class="swatch obstacles"></i>{_standing(world)}</li>' if trees else "")
         + '<li><i class="swatch below"></i>too low: min AGL '
         + f"{stated(limits.min_agl_m, units.height)}, clearance and errors</li>"
         + ('<li><i class="swatch above"></i>too high for the limits</li>' if top else "")
         + ('<li><i class="swatch zone"></i>no-fly zone on the way</li>' if found else "")
         + "</ul>"
     )
+
+
+def _standing(world: World) -> str:
+    """What the band between the ground and its top is."""
+    differs, bare = world.airspace.surface.differs, bool(world.airspace.surface.info.get("bare_dem", True))
+    if not differs:
+        return "trees and buildings"
+    return "the ground's greatest height" if bare else "trees and buildings on the ground's greatest height"
 
 
 def _axes(line: Line, found: list[Passage], units: Units) -> Axes:

@@ -27,7 +27,7 @@ from gcsplan.report.plan_view import zone_heights
 from gcsplan.report.profile_view import passed
 from gcsplan.report.samples import Line, Passage
 from gcsplan.report.subject import Page, Subject
-from gcsplan.units import KILOJOULE, Unit, Units, duration
+from gcsplan.units import KILOJOULE, Unit, Units, duration, in_units
 from gcsplan.world.model_words import what_is_not_in
 
 CLOSE = 0.02
@@ -255,7 +255,8 @@ def _warnings(upload: Mapping[str, object]) -> Sequence[object]:
 def inputs_table(inputs: Mapping[str, object], facts: Sequence[tuple[str, str]], units: Units) -> str:
     """The inputs: terrain model, its datum and resolution, hashes; and what was requested."""
     names = {
-        "dem_sha256": "terrain model, SHA-256", "vertical_datum": "vertical datum", "resolution_m": "resolution",
+        "dem_sha256": "terrain model, SHA-256", "vertical_datum": "vertical datum", "heights_read": "heights",
+        "resolution_m": "resolution",
         "bare_dem": "terrain model", "zones_sha256": "zones, SHA-256",
         "dem_source": "terrain from", "dem_notice": "terrain data", "dem_tiles": "tiles",
         "sea_tiles": "tiles taken as sea, 0 m",
@@ -264,7 +265,7 @@ def inputs_table(inputs: Mapping[str, object], facts: Sequence[tuple[str, str]],
     for key, value in inputs.items():
         if value is None or key == "dem_kind":  # which stands in the words of bare_dem
             continue
-        words = esc(value)
+        words = esc(in_units(value, units) if isinstance(value, str) else value)
         if key == "bare_dem":
             words = esc(what_is_not_in(inputs).replace(" DEM: ", ": ", 1) or "obstacle heights were given")
         elif key == "resolution_m" and isinstance(value, int | float):

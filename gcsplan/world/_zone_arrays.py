@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -37,6 +38,23 @@ from gcsplan.world.zones import Circle, Level, Zone
 
 BOX = [WEST_E, SOUTH_N, EAST_E, NORTH_N]
 MOST_SQUARES = 128  # most squares of the lattice along one side
+
+
+def over_both_grounds(zones: Sequence[Zone], surface: Surface, field: Field, scale: float) -> tuple[Zone, ...]:
+    """``zones`` over a ground of two heights: their levels above ground count from the least one, so a ceiling is
+    higher by the largest difference under its zone. Such a zone holds the zone over any ground between the two."""
+    out = []
+    for zone in zones:
+        if surface.differs and zone.ceiling is not None and zone.ceiling.datum == "agl":
+            west, south, east, north = zone.bounds
+            more = 0.5 * (scale - 1.0) * max(east - west, north - south)  # a radius becomes metres of the plane
+            box = np.array([west - more, south - more, east + more, north + more])
+            i0, i1, j0, j1 = _cells(box, surface, field)
+            part = slice(max(j0, 0), max(j1 + 2, 0)), slice(max(i0, 0), max(i1 + 2, 0))
+            spread_m = surface.spread_m(*part)
+            zone = replace(zone, ceiling=replace(zone.ceiling, value_m=zone.ceiling.value_m + spread_m))
+        out.append(zone)
+    return tuple(out)
 
 
 def zones_as_arrays(zones: Sequence[Zone], surface: Surface, field: Field, scale: float) -> Zones:

@@ -46,7 +46,7 @@ from gcsplan.world._shared import (
     Demands,
 )
 from gcsplan.world._work_arrays import work_arrays
-from gcsplan.world._zone_arrays import zones_as_arrays
+from gcsplan.world._zone_arrays import over_both_grounds, zones_as_arrays
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
 from gcsplan.world.tube import ZONE_ROOM_M, Band, Reaches, Tube, make_tube
@@ -163,16 +163,17 @@ class Airspace:
     """A surface and its zones, with the functions that judge legs.
 
     ``scale`` >= 1: largest scale of the plane over the mission; real metres times it are at most metres of the plane,
-    so every horizontal clearance is multiplied by it.
+    so every horizontal clearance is multiplied by it. ``zones`` are those given, with higher ceilings above ground
+    where the ground has two heights (`over_both_grounds`).
     """
 
     def __init__(self, surface: Surface, zones: Sequence[Zone] = (), *, scale: float = 1.0) -> None:
         if not 1.0 <= scale < 2.0:
             raise ValueError(f"scale must be 1 or a little more, given {scale:g}")
         self.surface = surface
-        self.zones = tuple(zones)
         self.scale = scale
         self._field = Field.of(surface.grid)
+        self.zones = over_both_grounds(zones, surface, self._field, scale)
         self._zones = zones_as_arrays(self.zones, surface, self._field, scale)
         self._neighbourhoods: dict[tuple[bool, int, int], Neighbourhood] = {}
         ground, top = (np.ascontiguousarray(a, dtype=np.float64) for a in (surface.ground_m, surface.top_m))

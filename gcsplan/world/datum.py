@@ -8,7 +8,7 @@ systems: an ellipsoidal raster needs the grid's file, and the shift from the gri
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from pyproj.exceptions import ProjError
 
 from gcsplan.errors import InputError
 from gcsplan.world.frame import Frame
+from gcsplan.world.height_unit import BY_FILE, METRE, HeightUnit, unit_of_length
 
 WORST_SHIFT_M = 30.0
 """A horizontal datum shift less accurate than this, m, is refused: it would move hills by more than a DEM cell."""
@@ -29,6 +30,14 @@ _NATIONAL = {
     "AHD", "NZVD2009", "NZVD2016", "NN1954", "NN2000", "RH2000", "DVR90", "LN02", "LHN95", "IGN69", "GHA", "JGD2011",
     "TWVD2001", "KRONSTADT", "BALTIC1977", "N2000", "EH2000", "CASCAIS", "ALICANTE", "OSTEND", "MALINHEAD",
 }  # fmt: skip
+
+_NOT_THE_SEA = re.compile(
+    r"(?i)low[ _]water|high[ _]water|water[ _]level|chart|springs|caspian|wellbore|unknown|undefined"
+    r"|(?<!mean[ _-])(?<!zero[ _-])(?<!non[ _-])\btid(e|al)"
+)
+"""Zeros that are metres away from mean sea level: of tides, charts, inland seas, or of nothing that is known."""
+
+_NAMED_CRS = re.compile(r"(?i)(EPSG|ESRI):\d{4,6}(\+\d{4,6})?|urn:ogc:def:crs:\w+:[\w.]*:\d+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,38 +53,24 @@ class VerticalDatum:
 class RasterCRS:
     """A raster's coordinate system, in its parts.
 
-    ``horizontal`` is a 2D pyproj CRS; ``vertical`` is the datum that the raster itself states for its heights, or None;
-    ``vertical_unit_m`` is the length of its height unit in metres, or None.
+    ``horizontal`` is a 2D pyproj CRS, ``horizontal_unit`` the unit of its lengths (metres for degrees); ``vertical``
+    and ``vertical_unit`` are the datum and the unit that it states for heights, or None.
     """
 
     horizontal: Any
     geographic: bool
+    horizontal_unit: HeightUnit
     vertical: VerticalDatum | None
-    vertical_unit_m: float | None
+    vertical_unit: HeightUnit | None
 
 
 def take_apart(crs: str, *, where: str) -> RasterCRS:
     """Horizontal and vertical part of ``crs`` (WKT, PROJ string or ``EPSG:code``); raises InputError."""
     try:
         whole = CRS.from_user_input(crs)
-        parts = whole.sub_crs_list if whole.is_compound else [whole]
-        horizontal = parts[0]
-        vertical: VerticalDatum | None = None
-        unit_m: float | None = None
-        if len(parts) > 1:
-            axis = parts[1].axis_info[0] if parts[1].axis_info else None
-            if axis is not None and axis.direction.lower() != "up":
-                raise InputError(
-                    f"the raster counts {parts[1].name!r} {axis.direction}wards; heights must count upwards: "
-                    "convert it first",
-                    where=where,
-                )
-            vertical = _named_by_raster(parts[1].name)
-            unit_m = float(axis.unit_conversion_factor) if axis is not None else None
-        elif len(horizontal.axis_info) == 3 and horizontal.is_geographic:
-            vertical = VerticalDatum(f"{horizontal.name} ellipsoidal", ellipsoidal=True)
-            horizontal = horizontal.to_2d()
-        good = len(horizontal.axis_info) == 2 and (horizontal.is_geographic or horizontal.is_projected)
+        horizontal, vertical, unit = _parts(whole, BY_FILE, where)
+        good = horizontal is not None and (horizontal.is_geographic or horizontal.is_projected)
+        good = good and len(horizontal.axis_info) == 2
     except ProjError as why:
         raise InputError(
             f"the coordinate system is not understood ({_first_line(why)}); say what it is with `crs:`, "
@@ -88,7 +83,46 @@ def take_apart(crs: str, *, where: str) -> RasterCRS:
             "say what it is with `crs:`, for example `crs: EPSG:4326`",
             where=where,
         )
-    return RasterCRS(horizontal, bool(horizontal.is_geographic), vertical, unit_m)
+    geographic = bool(horizontal.is_geographic)
+    axis = horizontal.axis_info[0]
+    length = METRE if geographic else unit_of_length(float(axis.unit_conversion_factor), axis.unit_name)
+    return RasterCRS(horizontal, geographic, length, vertical, unit)
+
+
+def _parts(whole: Any, by: str, where: str) -> tuple[Any, VerticalDatum | None, HeightUnit | None]:
+    """Of a pyproj CRS: the horizontal part in 2D (None if there is none), the vertical datum, and the unit of heights.
+
+    Unit and direction are those of the vertical axis itself. ``by`` names the one who states the unit. Raises
+    InputError for what counts downwards, and for zeros that are not the sea's.
+    """
+    parts = whole.sub_crs_list if whole.is_compound else [whole]
+    horizontal = None if parts[0].is_vertical else parts[0]
+    if horizontal is not None and len(horizontal.axis_info) == 3:
+        axis = horizontal.axis_info[2]
+        datum = VerticalDatum(f"{horizontal.name} ellipsoidal", ellipsoidal=True)
+        unit = unit_of_length(float(axis.unit_conversion_factor), axis.unit_name)
+        return horizontal.to_2d(), datum, replace(unit, by=by)
+    vertical = [part for part in parts if part.is_vertical]
+    if not vertical:
+        return horizontal, None, None
+    name, axes = str(vertical[0].name), vertical[0].axis_info
+    if not axes or axes[0].direction.lower() != "up":
+        raise InputError(
+            f"{name!r} counts depths, downwards from its zero; only heights, which count upwards, are read: turn the "
+            "numbers around (gdal_calc.py --calc=-A), and say the datum of the heights (for MSL depth it is "
+            "EPSG:5714, for NAVD88 depth EPSG:5703)",
+            where=where,
+        )
+    zero = f"{name} {vertical[0].datum.name if vertical[0].datum is not None else ''}"
+    if _NOT_THE_SEA.search(zero):
+        raise InputError(
+            f"heights in {name!r} do not count from mean sea level, and their zero may be metres away from it: "
+            "convert them (gdalwarp -t_srs with the wanted vertical datum), and say that datum",
+            where=where,
+        )
+    ellipsoidal = "ellipsoid" in f"{name} {axes[0].name}".lower()
+    datum = VerticalDatum("WGS84 ellipsoidal", ellipsoidal=True) if ellipsoidal else _named_by_raster(name)
+    return horizontal, datum, replace(unit_of_length(float(axes[0].unit_conversion_factor), axes[0].unit_name), by=by)
 
 
 def vertical_datum(given: str | None, raster: VerticalDatum | None, *, where: str) -> VerticalDatum:
@@ -105,7 +139,7 @@ def vertical_datum(given: str | None, raster: VerticalDatum | None, *, where: st
                 where=where,
             )
         return raster
-    stated = _named_by_user(given, where=where)
+    stated, _ = stated_datum(given, where=where)
     if raster is None or raster.name == stated.name or (raster.ellipsoidal and stated.ellipsoidal):
         return stated
     if stated.name == "AMSL" and not raster.ellipsoidal:
@@ -161,25 +195,30 @@ def to_wgs84(horizontal: Any, *, where: str) -> Transformer:
         ) from None
 
 
-def _named_by_user(given: str, *, where: str) -> VerticalDatum:
-    if re.fullmatch(r"(?i)EPSG:\d{4,6}", given.strip()):
+def stated_datum(given: str, *, where: str) -> tuple[VerticalDatum, HeightUnit | None]:
+    """The datum that a key names, and the unit that it states with it: a coordinate system has one, a word has none.
+
+    ``given`` is a word (EGM96, NAVD88, WGS84, …), a code (EPSG:6360, also of a compound system), or the name of a
+    vertical system as PROJ has it (``NAVD88 height (ftUS)``). Raises InputError for everything else, and as `_parts`.
+    """
+    text = re.sub(r"\s+", " ", given).strip()
+    if _NAMED_CRS.fullmatch(text.replace(" ", "")):
+        code = text.replace(" ", "")
         try:
-            crs = CRS.from_user_input(given.strip().upper())
+            crs = CRS.from_user_input(code if code.lower().startswith("urn") else code.upper())
         except ProjError:
-            raise InputError(f"{given} is not in the EPSG register", where=where) from None
-        vertical = [c for c in ([crs, *crs.sub_crs_list]) if c.is_vertical and not c.is_compound]
-        if vertical:
-            return _named_by_raster(vertical[0].name)
-        if crs.is_geographic and len(crs.axis_info) == 3:
-            return VerticalDatum(f"{crs.name} ellipsoidal", ellipsoidal=True)
-        raise InputError(f"{given} ({crs.name}) says nothing about heights", where=where)
+            raise InputError(f"{text} is not in the register of coordinate systems", where=where) from None
+        return _said_by(crs, text, where)
     key = re.sub(r"[^A-Z0-9]", "", given.upper())
     if key in _GEOIDS:
-        return VerticalDatum(_GEOIDS[key])
+        return VerticalDatum(_GEOIDS[key]), None
     if key in _ELLIPSOIDAL or re.fullmatch(r"ITRF\d{2,4}", key):
-        return VerticalDatum("WGS84 ellipsoidal", ellipsoidal=True)
+        return VerticalDatum("WGS84 ellipsoidal", ellipsoidal=True), None
     if key in _NATIONAL:
-        return _national(key)
+        return _national(key), None
+    named_crs = _of_name(text)
+    if named_crs is not None:
+        return _said_by(named_crs, text, where)
     raise InputError(
         f"unknown vertical datum {given!r}; known are {', '.join(dict.fromkeys(_GEOIDS.values()))}, WGS84 "
         "(ellipsoidal), EPSG:code, and national ones such as NAVD88, DHHN2016 or AHD; AMSL stands for any other that "
@@ -188,10 +227,30 @@ def _named_by_user(given: str, *, where: str) -> VerticalDatum:
     )
 
 
+def _said_by(crs: Any, text: str, where: str) -> tuple[VerticalDatum, HeightUnit | None]:
+    _, datum, unit = _parts(crs, f"by vertical_datum {text}", where)
+    if datum is None:
+        raise InputError(f"{text} ({crs.name}) says nothing about heights", where=where)
+    return datum, unit
+
+
+def _of_name(text: str) -> Any | None:
+    """The coordinate system of exactly that name; PROJ itself takes names that are only like one."""
+    if re.search(r"[^\w .,()&/+-]", text) or text.startswith("+"):  # no PROJ string, no path, no WKT
+        return None
+    try:
+        crs = CRS.from_user_input(text)
+    except ProjError:
+        return None
+    return crs if _letters(crs.name) == _letters(text) else None
+
+
+def _letters(text: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", text.lower())
+
+
 def _named_by_raster(name: str) -> VerticalDatum:
-    if "ellips" in name.lower():
-        return VerticalDatum("WGS84 ellipsoidal", ellipsoidal=True)
-    short = re.sub(r"(?i)\s*(height|\(.*\))\s*", "", name).strip() or name
+    short = re.sub(r"(?i)[\s_]*(height|geoid|\(.*\))[\s_]*", "", name).strip() or name
     key = re.sub(r"[^A-Z0-9]", "", short.upper())
     return VerticalDatum(_GEOIDS[key]) if key in _GEOIDS else _national(short)
 

@@ -15,6 +15,7 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import InputError
 from gcsplan.world.datum import plane_to_raster, to_wgs84
 from gcsplan.world.frame import Frame
+from gcsplan.world.overlap import Placed, read_tiles
 from gcsplan.world.raster import MAX_CELLS, Raster
 from gcsplan.world.surface import NO_SIDES, GridMap, Sides
 
@@ -40,7 +41,8 @@ class Window:
     """A rectangle of nodes: ``heights_m`` (rows, cols), NaN unknown; ``grid`` maps the plane to them.
 
     ``x``, ``y``: coordinates of the columns and rows in the raster's own units. ``goes_on``: beyond which sides (first
-    column, first row, last column, last row) the tiles hold more.
+    column, first row, last column, last row) the tiles hold more. ``low_m``: where files differ ``heights_m`` are the
+    greatest heights and these the least; None if no files differ here.
     """
 
     heights_m: Floats
@@ -49,6 +51,7 @@ class Window:
     y: Floats
     notes: tuple[str, ...]
     goes_on: Sides = NO_SIDES
+    low_m: Floats | None = None
 
     @property
     def plane_box(self) -> Box:
@@ -62,30 +65,6 @@ class Window:
 
 
 @dataclass(frozen=True, slots=True)
-class _Placed:
-    """A tile with its first node in the common grid; each of its columns is ``step`` common ones wide."""
-
-    raster: Raster
-    col: int
-    row: int
-    step: int = 1
-
-    @property
-    def cols(self) -> int:
-        """Columns of the common grid from its first node to its last."""
-        return (self.raster.cols - 1) * self.step + 1
-
-    def overlap(self, col: int, row: int, cols: int, rows: int) -> tuple[int, int, int, int] | None:
-        """Column, row, columns, rows shared with a window of the common grid; None if they do not overlap.
-
-        A tile with wider columns is taken one of them farther to each side: nodes between two of them need both.
-        """
-        c0, c1 = max(col - self.step + 1, self.col), min(col + cols + self.step - 1, self.col + self.cols)
-        r0, r1 = max(row, self.row), min(row + rows, self.row + self.raster.rows)
-        return (c0, r0, c1 - c0, r1 - r0) if c0 < c1 and r0 < r1 else None
-
-
-@dataclass(frozen=True, slots=True)
 class _Layout:
     """The common grid and the tiles on it; its node (0, 0) is the first node of the first tile, at (x0, y0)."""
 
@@ -93,7 +72,7 @@ class _Layout:
     y0: float
     dx: float
     dy: float
-    tiles: tuple[_Placed, ...]
+    tiles: tuple[Placed, ...]
 
     def grid_of(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
         """Column and row of points in the raster's units."""
@@ -171,9 +150,9 @@ class Mosaic:
     def window(self, frame: Frame, box: Box, *, spare_m: float = 0.0, most_cells: int | None = None) -> Window:
         """The nodes that cover ``box`` (west, south, east, north, plane metres) and ``spare_m`` around it.
 
-        The window is clipped to the tiles; gaps between them are NaN, and where two tiles hold the same node the higher
-        height counts. Raises InputError if no tile meets the box, beyond ``most_cells`` (`MAX_CELLS`), and if the plane
-        cannot be fitted to `FIT_ERROR_M`.
+        The window is clipped to the tiles; gaps between them are NaN, and where two tiles hold the same node with two
+        heights both are kept (`Window.low_m`). Raises InputError if no tile meets the box, beyond ``most_cells``
+        (`MAX_CELLS`), and if the plane cannot be fitted to `FIT_ERROR_M`.
         """
         middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
         there, accuracy_m = plane_to_raster(frame, self.crs.horizontal, box, where=self.where)
@@ -236,7 +215,7 @@ class Mosaic:
                 "mission",
                 where=self.where,
             )
-        heights, notes = _read(parts, c0, r0, c1 - c0, r1 - r0)
+        heights, notes = read_tiles(parts, c0, r0, c1 - c0, r1 - r0)
         if accuracy_m < 0.0 or accuracy_m > 1.0:
             good = "unknown" if accuracy_m < 0.0 else f"{accuracy_m:g} m"
             notes.append(
@@ -244,7 +223,7 @@ class Mosaic:
                 "track_error_m should hold it"
             )
         goes_on = (c0 > first_col, r0 > first_row, c1 < last_col, r1 < last_row)
-        return Window(heights, grid, x, y, tuple(notes), goes_on)
+        return Window(heights.high_m, grid, x, y, tuple(notes), goes_on, heights.low_m)
 
     def extent(self, frame: Frame, box: Box) -> Box:
         """West, south, east, north of all tiles in the plane, as far as the plane reaches; ``box`` is the mission's."""
@@ -282,7 +261,7 @@ class Mosaic:
                 col = (raster.west + 0.5 * raster.dx + turn - x0) / dx
                 row = (y0 - (raster.north - 0.5 * raster.dy)) / first.dy
                 if max(abs(col - round(col)), abs(row - round(row))) <= ALIGNED_CELLS:
-                    tiles.append(_Placed(raster, round(col), round(row), round(ratio * parts)))
+                    tiles.append(Placed(raster, round(col), round(row), round(ratio * parts)))
                 elif turn == nearest:
                     raise InputError(
                         f"the tiles must lie on one grid: {raster.name} is off that of {first.name} by "
@@ -319,77 +298,3 @@ def _ratio(raster: Raster, first: Raster) -> Fraction:
     """The width of a raster's columns in columns of the first one, as a ratio of small numbers; 1 if it is none."""
     ratio = Fraction(raster.dx / first.dx).limit_denominator(WIDEST_COLUMNS)
     return ratio if 0 < ratio <= WIDEST_COLUMNS else Fraction(1)
-
-
-def _read(
-    parts: list[tuple[_Placed, tuple[int, int, int, int]]], c0: int, r0: int, cols: int, rows: int
-) -> tuple[Floats, list[str]]:
-    heights = np.full((rows, cols), np.nan)
-    differing = _Differing()
-    wide = [(tile, shared) for tile, shared in parts if tile.step > 1]
-    for tile, (col, row, width, height) in parts:
-        if tile.step == 1:
-            for first, new in tile.raster.read(col - tile.col, row - tile.row, width, height):
-                top = row - r0 + first
-                differing.put(heights[top : top + len(new), col - c0 : col - c0 + width], new)
-    # Tiles whose columns are the same nodes: between neighbours there is no gap.
-    for step, phase in sorted({(tile.step, tile.col % tile.step) for tile, _ in wide}):
-        some = [(tile, shared) for tile, shared in wide if (tile.step, tile.col % tile.step) == (step, phase)]
-        _put_wide(heights, some, c0, r0, phase, differing)
-    notes = []
-    if differing.nodes:
-        notes.append(
-            f"tiles differ where they overlap ({differing.nodes} nodes, {differing.worst_m:g} m at most); the higher "
-            "one counts"
-        )
-    unknown = int(np.count_nonzero(np.isnan(heights)))
-    if unknown:
-        notes.append(f"{unknown} of {heights.size} DEM nodes around the mission are unknown (void or no tile)")
-    return heights, notes
-
-
-@dataclass
-class _Differing:
-    """Puts heights into others and counts where both are known and differ."""
-
-    nodes: int = 0
-    worst_m: float = 0.0
-
-    def put(self, into: Floats, new: Floats) -> None:
-        """Keep the higher one of two known heights, or the known one."""
-        off = np.abs(into - new)
-        both = off > 0.0
-        if both.any():
-            self.nodes += int(np.count_nonzero(both))
-            self.worst_m = max(self.worst_m, float(off[both].max()))
-        np.fmax(into, new, out=into)
-
-
-def _put_wide(
-    heights: Floats,
-    parts: Sequence[tuple[_Placed, tuple[int, int, int, int]]],
-    c0: int,
-    r0: int,
-    phase: int,
-    differing: _Differing,
-) -> None:
-    """Put tiles whose columns are wider than the common ones into ``heights``, linear between their own nodes."""
-    cols = heights.shape[1]
-    step = parts[0][0].step
-    first, last = (c0 - phase) // step, -((phase - c0 - cols + 1) // step)  # own columns around the window
-    top, bottom = min(s[1] for _, s in parts) - r0, max(s[1] + s[3] for _, s in parts) - r0
-    own = np.full((bottom - top, last - first + 1), np.nan)
-    for tile, (col, row, width, height) in parts:
-        own_first = -((tile.col - col) // step)  # the tile's own first column in the window
-        count = (col + width - 1 - tile.col) // step - own_first + 1
-        at = (tile.col - phase) // step + own_first - first
-        if count < 1:
-            continue
-        for line, new in tile.raster.read(own_first, row - tile.row, count, height):
-            above = row - r0 - top + line
-            differing.put(own[above : above + len(new), at : at + count], new)
-    common = np.arange(c0, c0 + cols) - phase - first * step
-    k, part = common // step, (common % step) / step
-    on = part == 0.0  # a node of its own needs no neighbour
-    between = np.where(on, own[:, k], (1.0 - part) * own[:, k] + part * own[:, np.minimum(k + 1, last - first)])
-    differing.put(heights[top:bottom], between)

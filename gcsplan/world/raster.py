@@ -7,7 +7,6 @@ Heights belong to pixel centres, whatever AREA_OR_POINT says: GDAL's transform r
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import math
 import os
 import warnings
@@ -21,12 +20,11 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError, absent
-from gcsplan.units import FOOT
 from gcsplan.world.datum import RasterCRS, VerticalDatum, take_apart
+from gcsplan.world.height_unit import BY_FILE, BY_FORMAT, METRE, HeightUnit, unit_named, unit_that_counts
 
 Reader = Callable[[int, int, int, int], Iterator[tuple[int, Floats]]]
 
-SAMPLE = "sample:jacksboro"
 MAX_CELLS = 200_000_000
 """Most cells of one window: 1.6 GB as float64."""
 
@@ -39,17 +37,6 @@ largest coordinate, is lost in rounding."""
 
 LOWEST_M, HIGHEST_M = -500.0, 9000.0
 """Ground outside of this range is an undeclared void (-9999, -32768, 3.4e38): unknown."""
-
-UNITS_M = {
-    "": 1.0, "m": 1.0, "metre": 1.0, "meter": 1.0, "metres": 1.0, "meters": 1.0,
-    "ft": FOOT.size, "foot": FOOT.size, "feet": FOOT.size, "international foot": FOOT.size,
-    "ft (international)": FOOT.size,
-    "us-ft": 1200 / 3937, "us_ft": 1200 / 3937, "ftus": 1200 / 3937, "foot_us": 1200 / 3937,
-    "us survey foot": 1200 / 3937, "us survey feet": 1200 / 3937, "us foot": 1200 / 3937,
-    "dm": 0.1, "decimetre": 0.1, "decimeter": 0.1, "cm": 0.01, "centimetre": 0.01, "centimeter": 0.01,
-    "mm": 0.001, "millimetre": 0.001, "millimeter": 0.001, "km": 1000.0, "kilometre": 1000.0, "kilometer": 1000.0,
-}  # fmt: skip
-"""Metres in one unit of height, by the words that files use (lower case)."""
 
 CACHE_BYTES = MAX_BLOCK_BYTES
 """Unpacked blocks that GDAL caches, bytes; its default is a twentieth of the machine's memory."""
@@ -66,8 +53,8 @@ class Raster:
 
     ``read(col, row, cols, rows)`` yields strips (first row within the window, heights (n, cols)), NaN where unknown.
     ``west``, ``north`` are the outer corner in the raster's own units, ``dx``, ``dy`` > 0 the cell. ``read`` returns
-    metres, but above the raster's own vertical datum; ``vertical`` is the file's statement of that datum.
-    ``stored_bytes``: the size of the file.
+    metres, but above the raster's own vertical datum; ``vertical`` is the file's statement of that datum. ``unit`` is
+    the one in which the file counts. ``stored_bytes``: the size of the file.
     """
 
     name: str
@@ -83,31 +70,55 @@ class Raster:
     stored_bytes: int
     sha256: Callable[[], str]
     notes: tuple[str, ...] = ()
+    unit: HeightUnit = METRE
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What the user says of a file, and what counts before the file's own statements.
+
+    ``crs``: its coordinate system. ``height_unit``: a key of `OF_KEY`. ``datum_unit``: the unit that the vertical datum
+    states. ``nodata``: a number of the file that stands for no height.
+    """
+
+    crs: str | None = None
+    height_unit: str | None = None
+    datum_unit: HeightUnit | None = None
+    nodata: float | None = None
 
 
 _headers: dict[tuple[object, ...], tuple[Raster, tuple[float, float]]] = {}
 """Headers of files, with scale and offset that make metres of their numbers."""
 
 
-def open_raster(path: Path, *, where: str, crs: str | None = None, height_unit: str | None = None) -> Raster:
+def open_raster(
+    path: Path,
+    *,
+    where: str,
+    crs: str | None = None,
+    height_unit: str | None = None,
+    datum_unit: HeightUnit | None = None,
+    nodata: float | None = None,
+) -> Raster:
     """Header of the raster at ``path`` (GeoTIFF, SRTM .hgt or .hgt.zip, ESRI .asc).
 
-    ``crs`` overrides the file's; ``height_unit`` states the unit if the file does not. A file that has not changed
-    since this process opened it is not opened again: many missions use the same tiles. Raises InputError for anything
-    that is not a readable, georeferenced, north-up raster of real numbers.
+    The keywords are what the user says (`Said`).
+
+    A file that has not changed since this process opened it is not opened again: many missions use the same tiles.
+    Raises InputError for anything that is not a readable, georeferenced, north-up raster of real numbers.
     """
     require_file(path, where=where)
-    about = path.stat()
-    key = (path.absolute(), crs, height_unit, about.st_size, about.st_mtime_ns, about.st_ino)
+    about, said = path.stat(), Said(crs, height_unit, datum_unit, nodata)
+    key = (path.absolute(), said, about.st_size, about.st_mtime_ns, about.st_ino)
     try:
         if key not in _headers:
             with gdal(path) as dataset:
-                found = _header(dataset, path, where=where, crs=crs, height_unit=height_unit)
+                found = _header(dataset, path, said, where=where)
             if len(_headers) >= MOST_HEADERS:
                 _headers.clear()
             _headers[key] = found
         header, to_metres = _headers[key]
-        return replace(header, read=_reader(path, *to_metres, where=where))
+        return replace(header, read=_reader(path, *to_metres, said.nodata, where=where))
     except InputError:
         raise
     except Exception as why:
@@ -137,30 +148,6 @@ def sha256_of(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def sample_jacksboro() -> Raster:
-    """The real 3 arc-second SRTM tile around Jacksboro, Tennessee, that comes with matplotlib (EGM96).
-
-    Its xmin … ymax are the edges of the cells and row 0 is the north (the file's "ymin" is the northern edge).
-    """
-    # Only the file's location is needed: importing matplotlib would take longer than the rest.
-    found = importlib.util.find_spec("matplotlib")
-    if found is None or found.origin is None:
-        raise InputError(f"{SAMPLE} comes with matplotlib, which is not installed: pip install matplotlib")
-    path = Path(found.origin).parent / "mpl-data" / "sample_data" / "jacksboro_fault_dem.npz"
-    with np.load(path) as file:
-        heights = np.asarray(file["elevation"], float)
-        west, north, dx, dy = (float(file[k]) for k in ("xmin", "ymin", "dx", "dy"))
-    rows, cols = heights.shape
-
-    def read(col: int, row: int, width: int, height: int) -> Iterator[tuple[int, Floats]]:
-        yield 0, heights[row : row + height, col : col + width]
-
-    return Raster(
-        SAMPLE, take_apart("EPSG:4326", where=SAMPLE), west, north, dx, dy, cols, rows, VerticalDatum("EGM96"), read,
-        path.stat().st_size, lambda: sha256_of(path),
-    )  # fmt: skip
-
-
 @contextmanager
 def gdal(path: Path, other: str = "") -> Iterator[Any]:
     """The dataset at ``path``, whatever GDAL's environment variables say about pixel corners.
@@ -173,7 +160,10 @@ def gdal(path: Path, other: str = "") -> Iterator[Any]:
 
     with (
         warnings.catch_warnings(),
-        rasterio.Env(GTIFF_POINT_GEO_IGNORE=False, GDAL_PAM_ENABLED=True, GDAL_CACHEMAX=CACHE_BYTES),
+        # GDAL keeps the vertical part of older GeoTIFFs to itself unless it is asked for.
+        rasterio.Env(
+            GTIFF_POINT_GEO_IGNORE=False, GDAL_PAM_ENABLED=True, GDAL_CACHEMAX=CACHE_BYTES, GTIFF_REPORT_COMPD_CS=True
+        ),
     ):
         # Our own check of the georeference says more; the other warnings are between rasterio and its dependencies.
         for category in (NotGeoreferencedWarning, DeprecationWarning, PendingDeprecationWarning):
@@ -245,10 +235,8 @@ def require_numbers(dataset: Any, path: Path, *, where: str) -> None:
         )
 
 
-def _header(
-    dataset: Any, path: Path, *, where: str, crs: str | None, height_unit: str | None
-) -> tuple[Raster, tuple[float, float]]:
-    notes = []
+def _header(dataset: Any, path: Path, said: Said, *, where: str) -> tuple[Raster, tuple[float, float]]:
+    notes, crs = [], said.crs
     if dataset.count < 1:
         raise InputError(f"{path} holds no raster band", where=where)
     if dataset.count > 1:
@@ -281,7 +269,9 @@ def _header(
     system = take_apart(text, where=where)
     if system.geographic:
         _require_degrees(t, dataset, path, where=where)
-    factor = _metres_in_unit(dataset.units[0], height_unit, system.vertical_unit_m, path, where=where)
+    unit, unit_notes = _unit(dataset, system, said, path, where=where)
+    factor = unit.metres
+    notes += unit_notes
     scale, offset = float(dataset.scales[0]), float(dataset.offsets[0])
     if not (math.isfinite(scale) and math.isfinite(offset)) or scale == 0.0:
         raise InputError(f"{path} has a broken scale {scale} or offset {offset}", where=where)
@@ -289,16 +279,17 @@ def _header(
     to_metres = (scale * factor, offset * factor)
     header = Raster(
         path.name, system, t.c, t.f, t.a, -t.e, dataset.width, dataset.height, system.vertical,
-        _reader(path, *to_metres, where=where), path.stat().st_size, lambda: sha256_of(path), tuple(notes),
+        _reader(path, *to_metres, said.nodata, where=where), path.stat().st_size, lambda: sha256_of(path), tuple(notes),
+        unit,
     )  # fmt: skip
     return header, to_metres
 
 
-def _reader(path: Path, scale: float, offset: float, *, where: str) -> Reader:
+def _reader(path: Path, scale: float, offset: float, nodata: float | None, *, where: str) -> Reader:
     def read(col: int, row: int, cols: int, rows: int) -> Iterator[tuple[int, Floats]]:
         try:
             with gdal(path) as opened:
-                yield from _strips(opened, col, row, cols, rows, scale, offset)
+                yield from _strips(opened, (col, row, cols, rows), scale, offset, nodata)
         except Exception as why:
             raise InputError(_unreadable(path, why), where=where) from None
 
@@ -328,40 +319,33 @@ def _require_degrees(t: Any, dataset: Any, path: Path, *, where: str) -> None:
         )
 
 
-def _metres_in_unit(band: str | None, given: str | None, vertical_m: float | None, path: Path, *, where: str) -> float:
-    stated: float | None = None
+def _unit(dataset: Any, system: RasterCRS, said: Said, path: Path, *, where: str) -> tuple[HeightUnit, list[str]]:
+    """The unit of the heights, and notes. Raises InputError."""
+    stated = [unit for unit in (system.vertical_unit, said.datum_unit) if unit is not None]
+    band = str(dataset.units[0] or "").strip()
     if band:
-        stated = UNITS_M.get(band.strip().lower())
-        if stated is None:
+        unit = unit_named(band)
+        if unit is not None:
+            stated.append(replace(unit, by=BY_FORMAT if dataset.driver == "SRTMHGT" else BY_FILE))
+        elif said.height_unit is None and (system.vertical_unit is None or band != system.vertical_unit.name):
             raise InputError(
-                f"{path} gives heights in {band!r}, which is not known; set its unit (gdal_edit.py -units m)",
+                f"{path} gives heights in {band!r}, which is not known; say the unit with `height_unit: m` "
+                "(or ft, us_ft)",
                 where=where,
             )
-    if vertical_m is not None:
-        if stated is not None and not math.isclose(stated, vertical_m, rel_tol=1e-9):
-            raise InputError(
-                f"{path} contradicts itself: its band is in {band}, its vertical datum counts {vertical_m:g} m; "
-                "correct it with gdal_edit.py",
-                where=where,
-            )
-        stated = vertical_m
-    if given is None:
-        return 1.0 if stated is None else stated
-    wanted = UNITS_M[given]
-    if stated is not None and not math.isclose(stated, wanted, rel_tol=1e-9):
-        raise InputError(
-            f"`height_unit: {given}` contradicts {path}, whose unit of height is {stated:g} m; remove the key",
-            where=where,
-        )
-    return wanted
+    return unit_that_counts(stated, said.height_unit, system.horizontal_unit, path.name, where=where)
 
 
 def _strips(
-    dataset: Any, col: int, row: int, cols: int, rows: int, scale: float, offset: float
+    dataset: Any, window: tuple[int, int, int, int], scale: float, offset: float, nodata: float | None
 ) -> Iterator[tuple[int, Floats]]:
-    """Strips of ``raw * scale + offset``, metres; masked, non-finite and implausible cells are NaN."""
+    """Strips of ``raw * scale + offset``, metres; masked, non-finite and implausible cells are NaN.
+
+    ``window``: column, row, columns, rows. ``nodata``: what else stands for no height in the raw numbers.
+    """
     from rasterio.windows import Window
 
+    col, row, cols, rows = window
     if dataset.driver == "AAIGrid":
         # GDAL seeks a row after a missing one in a time that doubles with each; read in order it fails at once.
         for above in range(row + rows):
@@ -375,10 +359,18 @@ def _strips(
         for block in missing(dataset, 1, col, row + first, cols, n):
             part[block] = np.nan
         part[part == -32768.0] = np.nan  # the void of SRTM, declared or not, before a scale can hide it
+        if nodata is not None:
+            part[part == _as_stored(nodata, raw.data.dtype)] = np.nan
         with np.errstate(over="ignore", invalid="ignore"):
             part = part * scale + offset
             part[~((part >= LOWEST_M) & (part <= HIGHEST_M))] = np.nan
         yield first, part
+
+
+def _as_stored(number: float, dtype: Any) -> float:
+    """A number as a file of that type holds it: -3.4e38 in single precision is another one than in double."""
+    with np.errstate(over="ignore"):
+        return float(dtype.type(number)) if dtype.kind == "f" else number
 
 
 def missing(dataset: Any, band: int, col: int, row: int, cols: int, rows: int) -> Iterator[tuple[slice, slice]]:

@@ -117,11 +117,13 @@ class GridMap:
 class Surface:
     """Ground and what stands on it.
 
-    ``ground_m`` (rows, cols): height of each node, metres AMSL; NaN is unknown, never ground; bilinear between nodes.
-    ``top_m``: ground plus obstacles (trees, buildings), the same array if there are none; it counts for min AGL and
-    clearance, not for max AGL. ``grid`` maps the plane to nodes. ``info`` describes the source in the outputs
-    (``dem_sha256``, ``vertical_datum``, ``resolution_m``, ``bare_dem``). ``goes_on``: beyond which sides (first column,
-    first row, last column, last row) the terrain is known too, but not loaded here.
+    ``ground_m`` (rows, cols): least height of each node, metres AMSL; NaN is unknown, never ground; bilinear between
+    nodes. ``high_m``: greatest height of the ground, the same array unless sources differ somewhere; the true ground
+    lies between both. ``top_m``: greatest ground plus obstacles (trees, buildings), the array ``high_m`` if there are
+    none. ``top_m`` counts for min AGL and clearance, ``ground_m`` for max AGL and for zones' levels above ground.
+    ``grid`` maps the plane to nodes. ``info`` describes the source in the outputs (``dem_sha256``, ``vertical_datum``,
+    ``resolution_m``, ``bare_dem``). ``goes_on``: beyond which sides (first column, first row, last column, last row)
+    the terrain is known too, but not loaded here.
     """
 
     ground_m: Floats
@@ -129,19 +131,43 @@ class Surface:
     grid: GridMap
     info: dict[str, object] = field(default_factory=dict)
     goes_on: Sides = NO_SIDES
+    high_m: Floats | None = None
 
     def __post_init__(self) -> None:
-        for name in ("ground_m", "top_m"):
-            a = np.ascontiguousarray(getattr(self, name), dtype=np.float64)
+        same = self.high_m is None or self.high_m is self.ground_m
+        for name in ("ground_m", "top_m", "high_m"):
+            given = self.ground_m if name == "high_m" and same else getattr(self, name)
+            a = np.ascontiguousarray(given, dtype=np.float64)
             if a.ndim != 2 or min(a.shape) < 2:
                 raise ValueError(f"{name} must be (rows >= 2, cols >= 2), given {a.shape}")
             a.setflags(write=False)
             object.__setattr__(self, name, a)
-        if self.ground_m.shape != self.top_m.shape:
+        if not self.ground_m.shape == self.top_m.shape == self.high.shape:
             raise ValueError(f"ground {self.ground_m.shape} and top {self.top_m.shape} differ in shape")
 
+    @property
+    def high(self) -> Floats:
+        """``high_m``, which is never None once the surface is made."""
+        assert self.high_m is not None
+        return self.high_m
+
+    @property
+    def differs(self) -> bool:
+        """Whether the ground has two heights anywhere."""
+        return self.high_m is not self.ground_m
+
+    def high_at(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats:
+        """Greatest ground, metres AMSL, at points of the plane; NaN where unknown."""
+        return _bilinear(self.high, self.grid(east_m, north_m))
+
+    def spread_m(self, rows: slice, cols: slice) -> float:
+        """The largest difference between the two heights of a node of a part; 0 if none is known."""
+        if not self.differs:
+            return 0.0
+        return float(np.nanmax(self.high[rows, cols] - self.ground_m[rows, cols], initial=0.0))
+
     def ground_at(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats:
-        """Ground, metres AMSL, at points of the plane; NaN where unknown."""
+        """Least ground, metres AMSL, at points of the plane; NaN where unknown."""
         return _bilinear(self.ground_m, self.grid(east_m, north_m))
 
     def top_at(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats:

@@ -10,6 +10,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Literal, Protocol
 
@@ -18,18 +19,23 @@ from numpy.typing import ArrayLike
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.errors import InputError
-from gcsplan.world.datum import VerticalDatum, vertical_datum
+from gcsplan.world.datum import VerticalDatum, stated_datum, vertical_datum
 from gcsplan.world.frame import FARTHEST_M, Frame
 from gcsplan.world.geoid import GeoidGrid
+from gcsplan.world.height_unit import METRE
+from gcsplan.world.model_words import heights_read
 from gcsplan.world.mosaic import Mosaic, Window
 from gcsplan.world.obstacles import canopy_on
 from gcsplan.world.peaks import Peak, flat_grid, peaks_grid
-from gcsplan.world.raster import SAMPLE, Raster, open_raster, require_file, sample_jacksboro, sha256_of
+from gcsplan.world.raster import Raster, open_raster, require_file, sha256_of
+from gcsplan.world.sample import SAMPLE, sample_jacksboro
 from gcsplan.world.surface import Surface
 from gcsplan.world.tiles import Tile, hash_of, tiles_of
+from gcsplan.world.voids import take_out_zeros
 
 Box = tuple[float, float, float, float]
-HeightUnit = Literal["m", "ft", "us_ft"]
+HeightUnitKey = Literal["m", "ft", "us_ft"]
+NO_MORE_VOIDS: Literal["none"] = "none"
 
 RASTER_SPARE_M = 3000.0
 """Read around the requested box, m, so that the edge of the map lies beyond the box."""
@@ -43,7 +49,9 @@ class TerrainSpec:
     """The terrain as the user states it; paths are opened as they are (the mission file resolves relative ones).
 
     Either ``dem`` (paths of tiles, or ``sample:jacksboro`` alone), or ``flat_m`` with ``peaks`` on it (metres of a
-    local frame; heights above its ``up_m: 0``). ``crs`` and ``height_unit`` state what the rasters do not.
+    local frame; heights above its ``up_m: 0``). ``crs`` and ``height_unit`` count before what the rasters state.
+    ``nodata``: a number of the rasters that stands for no height, or "none": no other number than those that they
+    declare does, and exact zeros are ground or sea.
     ``obstacle_height_m`` stands everywhere; ``canopy`` is a raster of heights above ground, whose nodata cells are
     unknown unless ``canopy_nodata_m`` sets their height; if both are set the higher one counts. ``sea``: where a
     published source has no tile there is sea.
@@ -53,7 +61,8 @@ class TerrainSpec:
     vertical_datum: str | None = None
     geoid_grid: str | None = None
     crs: str | None = None
-    height_unit: HeightUnit | None = None
+    height_unit: HeightUnitKey | None = None
+    nodata: float | Literal["none"] | None = None
     flat_m: float | None = None
     peaks: tuple[Peak, ...] = ()
     obstacle_height_m: float = 0.0
@@ -195,14 +204,16 @@ class _RasterTerrain:
     def load(self, frame: Frame, box: Box, *, most_cells: int | None = None) -> Surface:
         spec, rasters = self._spec, self._mosaic.rasters
         window = self._mosaic.window(frame, box, spare_m=RASTER_SPARE_M, most_cells=most_cells)
-        ground = window.heights_m
-        if np.isnan(ground).all():
+        read_hash = hash_of(rasters, window)
+        notes = [n for r in rasters for n in r.notes] + list(window.notes)
+        if spec.nodata is None:
+            notes += take_out_zeros(window, partial(self._mosaic.node_degrees, window))
+        high = window.heights_m
+        if np.isnan(high).all():
             raise InputError(
                 "the DEM holds nothing but voids around the mission; give one with data here",
                 where=place(self._where, "dem"),
             )
-        read_hash = hash_of(rasters, window)
-        notes = [n for r in rasters for n in r.notes] + list(window.notes)
         datum = self._datum.name
         if self._datum.note:
             notes.append(self._datum.note)
@@ -211,23 +222,27 @@ class _RasterTerrain:
             _take_off_geoid(window, self._geoid, self._mosaic)
             datum = f"{datum}, made AMSL with {self._geoid.path.name}"
             info["geoid_sha256"] = sha256_of(self._geoid.path)
+        ground = high if window.low_m is None else window.low_m
         rows, cols = ground.shape
         size = window.grid.metres_per_cell(*(0.5 * np.add(window.plane_box[:2], window.plane_box[2:])))
         info |= {
             "dem_sha256": read_hash,
             "vertical_datum": datum,
+            "heights_read": heights_read(
+                (r.unit for r in rasters), datum, float(np.nanmin(ground)), float(np.nanmax(high))
+            ),
             "resolution_m": _rounded(float(size.max())),
             "bare_dem": spec.obstacle_height_m == 0.0 and spec.canopy is None,
             "source": ", ".join(r.name for r in rasters),
         }
-        top = ground
+        top = high
         if spec.obstacle_height_m > 0.0:
-            top = ground + spec.obstacle_height_m
+            top = high + spec.obstacle_height_m
         if self._canopy is not None and spec.canopy is not None:
             unknown_m = np.nan if spec.canopy_nodata_m is None else spec.canopy_nodata_m
             canopy = self._canopy.window(frame, window.plane_box)
             trees = canopy_on(window, canopy, unknown_m=unknown_m)
-            top = ground + np.maximum(trees, spec.obstacle_height_m)
+            top = high + np.maximum(trees, spec.obstacle_height_m)
             notes += [n for n in (*self._canopy.rasters[0].notes, *canopy.notes) if "DEM nodes" not in n]
             blind = int(np.count_nonzero(np.isnan(trees) & ~np.isnan(ground)))
             if blind:
@@ -237,7 +252,7 @@ class _RasterTerrain:
                 )
             info["canopy_sha256"] = self._canopy.rasters[0].sha256()
         info |= {**self._info, "notes": (*notes, *self._notes)}
-        return Surface(ground, top, window.grid, info, window.goes_on)
+        return Surface(ground, top, window.grid, info, window.goes_on, high)
 
 
 class _LocalTerrain:
@@ -245,12 +260,14 @@ class _LocalTerrain:
 
     def __init__(self, spec: TerrainSpec, where: str) -> None:
         self._spec = spec
-        for key in ("geoid_grid", "crs", "height_unit", "canopy", "canopy_nodata_m"):
+        for key in ("geoid_grid", "crs", "height_unit", "nodata", "canopy", "canopy_nodata_m"):
             if getattr(spec, key) is not None:
                 raise InputError(f"{key} belongs to a `dem`, not to flat ground and peaks", where=place(where, key))
-        self._datum = vertical_datum(spec.vertical_datum or "AMSL", None, where=place(where, "vertical_datum"))
+        at = place(where, "vertical_datum")
+        self._datum = vertical_datum(spec.vertical_datum or "AMSL", None, where=at)
+        require_metres(spec, "flat ground and peaks are", where=at)
         if self._datum.ellipsoidal:
-            raise InputError("flat ground and peaks are above mean sea level", where=place(where, "vertical_datum"))
+            raise InputError("flat ground and peaks are above mean sea level", where=at)
 
     def covers(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
         return np.ones(np.shape(lat_deg), np.bool_)
@@ -280,6 +297,7 @@ class _LocalTerrain:
         info: dict[str, object] = {
             "dem_sha256": hashlib.sha256(canonical.encode()).hexdigest(),
             "vertical_datum": self._datum.name,
+            "heights_read": heights_read((METRE,), self._datum.name, float(heights.min()), float(heights.max())),
             "resolution_m": _rounded(float(grid.metres_per_cell(0.0, 0.0).max())) if spec.peaks else 0,
             "bare_dem": spec.obstacle_height_m == 0.0,
             "source": f"{len(spec.peaks)} peaks" if spec.peaks else "flat",
@@ -293,18 +311,22 @@ class _LocalTerrain:
 
 def _rasters(spec: TerrainSpec, where: str) -> list[Raster]:
     if SAMPLE in spec.dem:
-        if len(spec.dem) > 1 or spec.crs or spec.height_unit:
-            raise InputError(f"{SAMPLE} stands alone: no other tile, no crs, no height_unit", where=where)
+        if len(spec.dem) > 1 or spec.crs or spec.height_unit or spec.nodata is not None:
+            raise InputError(f"{SAMPLE} stands alone: no other tile, no crs, height_unit or nodata", where=where)
         return [sample_jacksboro()]
     if any(d.startswith("sample:") for d in spec.dem):
         raise InputError(f"the only sample is {SAMPLE}, given {spec.dem[0]}", where=where)
     paths = tiles_of(spec.dem, where=where)
-    return [_open(path, spec, where, i, len(paths)) for i, path in enumerate(paths)]
-
-
-def _open(path: str, spec: TerrainSpec, where: str, index: int, count: int) -> Raster:
-    at = f"{where}[{index}]" if count > 1 else where
-    return open_raster(Path(path), where=at, crs=spec.crs, height_unit=spec.height_unit)
+    datum = place(where.removesuffix(".dem"), "vertical_datum")
+    unit = None if spec.vertical_datum is None else stated_datum(spec.vertical_datum, where=datum)[1]
+    nodata = None if spec.nodata == NO_MORE_VOIDS else spec.nodata
+    return [
+        open_raster(
+            Path(path), where=f"{where}[{i}]" if len(paths) > 1 else where, crs=spec.crs,
+            height_unit=spec.height_unit, datum_unit=unit, nodata=nodata,
+        )
+        for i, path in enumerate(paths)
+    ]  # fmt: skip
 
 
 def _geoid(spec: TerrainSpec, datum: VerticalDatum, where: str) -> GeoidGrid | None:
@@ -327,6 +349,16 @@ def _geoid(spec: TerrainSpec, datum: VerticalDatum, where: str) -> GeoidGrid | N
     return None
 
 
+def require_metres(spec: TerrainSpec, what: str, *, where: str) -> None:
+    """Raise InputError if the vertical datum that ``spec`` names states another unit than metres."""
+    unit = None if spec.vertical_datum is None else stated_datum(spec.vertical_datum, where=where)[1]
+    if unit is not None and not unit.is_same(METRE):
+        raise InputError(
+            f"{what} in metres, and {spec.vertical_datum} counts {unit.name}: name the datum of heights in metres",
+            where=where,
+        )
+
+
 def _take_off_geoid(window: Window, geoid: GeoidGrid, mosaic: Tiles) -> None:
     """Lower every node, in place, by the geoid's height above the ellipsoid there."""
     rows, cols = window.heights_m.shape
@@ -337,8 +369,10 @@ def _take_off_geoid(window: Window, geoid: GeoidGrid, mosaic: Tiles) -> None:
     along = np.stack([np.interp(np.arange(cols), c, line) for line in coarse])
     below = np.searchsorted(r, np.arange(rows), side="right").clip(1, len(r) - 1) - 1
     weight = (np.arange(rows) - r[below]) / (r[below + 1] - r[below])
-    for line, j, w in zip(window.heights_m, below, weight, strict=True):
-        line -= (1.0 - w) * along[j] + w * along[j + 1]
+    for heights in (window.heights_m, window.low_m):
+        if heights is not None:
+            for line, j, w in zip(heights, below, weight, strict=True):
+                line -= (1.0 - w) * along[j] + w * along[j + 1]
 
 
 def _sampled(count: int, step: int) -> Indices:

@@ -12,6 +12,7 @@ import numpy as np
 
 from gcsplan.errors import InputError
 from gcsplan.world.datum import VerticalDatum
+from gcsplan.world.height_unit import HeightUnit
 from gcsplan.world.mosaic import Window
 
 HASHED_BYTES = 256 * 2**20
@@ -42,6 +43,10 @@ class Tile(Protocol):
     @property
     def notes(self) -> tuple[str, ...]:
         """What a user should know of it."""
+
+    @property
+    def unit(self) -> HeightUnit:
+        """The unit in which it counts heights."""
 
     def sha256(self) -> str:
         """Its hash."""

@@ -28,11 +28,15 @@ Piece = tuple[float, float, Surface]
 
 def _ground_at(frame: Frame, surface: Surface, lat_deg: Floats, lon_deg: Floats) -> Floats:
     plane = frame.to_plane(lat_deg, lon_deg)
-    return surface.ground_at(plane[..., 0], plane[..., 1])
+    return surface.high_at(plane[..., 0], plane[..., 1])
 
 
 class VehicleTerrain:
-    """The vehicle's grid over ``surface``; unknown where the vehicle would not get all posts of a 4 × 4 part."""
+    """The vehicle's grid over ``surface``; unknown where the vehicle would not get all posts of a 4 × 4 part.
+
+    Where the ground has two heights the posts are of the greatest one, and `spread_at` tells how much lower those of a
+    vehicle may be whose terrain is another one of the sources.
+    """
 
     def __init__(self, frame: Frame, surface: Surface, spacing_m: int = SPACING_M) -> None:
         self._frame, self._surface = frame, surface
@@ -40,6 +44,7 @@ class VehicleTerrain:
         self.posts = PostHeights(TerrainGrid(spacing_m), partial(_ground_at, frame, surface))
         self._surfaces: dict[Cell, Surface | None] = {}
         self._range: tuple[Floats, Floats] | None = None
+        self._spread: Floats | None = None
 
     def amsl(self, lat_deg: float, lon_deg: float) -> float:
         """The height that the vehicle reads at a place, m AMSL; NaN where unknown."""
@@ -49,6 +54,25 @@ class VehicleTerrain:
         """The heights that it reads at points of the plane, m AMSL; NaN where unknown."""
         degrees = self._frame.to_degrees(*np.broadcast_arrays(np.asarray(east_m, float), np.asarray(north_m, float)))
         return self.posts.amsl(degrees[..., 0] * 1e7, degrees[..., 1] * 1e7)
+
+    def spread_at(self, east_m: Floats, north_m: Floats) -> Floats:
+        """How much lower the vehicle may read the ground at points of the plane (N,), m; 0 where sources agree.
+
+        It is the largest difference within two and a half posts: as far as the posts of a piece of a leg may lie.
+        """
+        surface = self._surface
+        if not surface.differs:
+            return np.zeros(np.shape(east_m))
+        if self._spread is None:
+            from scipy.ndimage import maximum_filter  # hardly any terrain has two heights
+
+            step = surface.grid.metres_per_cell(*surface.grid.centre)
+            size = [2 * math.ceil(2.5 * self.posts.grid.spacing_m / m) + 1 for m in step[::-1]]
+            off = np.nan_to_num(surface.high - surface.ground_m)
+            self._spread = maximum_filter(off, size, mode="nearest")
+        rows, cols = self._spread.shape
+        at = np.rint(surface.grid(east_m, north_m)).astype(int)
+        return np.asarray(self._spread[at[..., 1].clip(0, rows - 1), at[..., 0].clip(0, cols - 1)])
 
     def pieces(self, ends: Floats) -> list[Piece] | None:
         """A straight line of the plane (2, 2) in pieces over one surface each; None if it leads over no known posts.

@@ -25,8 +25,17 @@ class World:
     airspace: Airspace
     post_spacing_m: int = SPACING_M
 
+    def spread_m(self, lat_deg: float, lon_deg: float) -> float:
+        """How far the greatest ground at a place lies above the least one, m; 0 where they are one or unknown."""
+        surface = self.airspace.surface
+        if not surface.differs:
+            return 0.0
+        east, north = self.frame.to_plane(lat_deg, lon_deg)
+        spread = float(surface.high_at(east, north) - surface.ground_at(east, north))
+        return spread if spread > 0.0 else 0.0
+
     def ground_amsl(self, lat_deg: float, lon_deg: float) -> float:
-        """Ground at a place, metres AMSL; NaN where unknown."""
+        """Least ground at a place, metres AMSL; NaN where unknown."""
         place = lat_deg, lon_deg
         if place not in self._grounds:
             if len(self._grounds) >= KEPT:

@@ -285,13 +285,15 @@ def test_columns_of_no_simple_ratio_are_refused(tmp_path: Path, dx: float) -> No
     assert "one resolution" in str(refusal([degrees_tif(tmp_path / "a.tif"), odd]))
 
 
-def test_where_tiles_differ_the_higher_one_counts_and_is_told(tmp_path: Path) -> None:
+def test_where_tiles_differ_both_heights_are_kept_and_told(tmp_path: Path) -> None:
     heights = hills(100, 100)
     raised = heights.copy()
     raised[50, 50] += 7.0
     surface = load([degrees_tif(tmp_path / "a.tif", heights), degrees_tif(tmp_path / "b.tif", raised)])
     at = FRAME.to_plane(36.6 - 50.5 * 0.002, -84.6 + 50.5 * 0.002)
-    assert surface.ground_at(*at) == pytest.approx(raised[50, 50], abs=1e-3)
+    assert surface.high_at(*at) == surface.top_at(*at) == pytest.approx(raised[50, 50], abs=1e-3)
+    assert surface.ground_at(*at) == pytest.approx(heights[50, 50], abs=1e-3)
+    assert not load(degrees_tif(tmp_path / "c.tif", heights)).differs
     assert any("1 nodes, 7 m" in str(n) for n in surface.info["notes"])  # type: ignore[attr-defined]
 
 
@@ -432,7 +434,7 @@ def test_units_scale_and_offset_are_honoured(
 
 
 def test_a_unit_that_contradicts_or_is_unknown_is_refused(tmp_path: Path) -> None:
-    assert "contradicts" in str(refusal(degrees_tif(tmp_path / "a.tif", units=("ft",)), height_unit="m"))
+    assert "two units" in str(refusal(degrees_tif(tmp_path / "a.tif", units=("ft",)), vertical_datum="EPSG:5703"))
     assert "furlong" in str(refusal(degrees_tif(tmp_path / "b.tif", units=("furlong",))))
 
 

@@ -20,6 +20,7 @@ from gcsplan.check.battery import battery_home
 from gcsplan.check.commands import LAND_STARTS
 from gcsplan.check.corners import round_corners
 from gcsplan.check.flight import follow
+from gcsplan.check.home_height import why_unknown, with_error_of_home
 from gcsplan.check.judge import TERRAIN_ERROR_M
 from gcsplan.check.rtl.by_mission import return_by_mission
 from gcsplan.check.rtl.joins import LANDS, joins_of
@@ -76,14 +77,15 @@ def way_home(
     mission, rule = verdict.mission, RULES[vehicle.autopilot]
     stored = replace(mission, items=tuple(profile_of(mission.autopilot).stored(item) for item in mission.items))
     lat, lon = mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7
-    ground = world.ground_amsl(lat, lon)
+    ground, unsure = world.ground_amsl(lat, lon), why_unknown(mission.home, vehicle, world)
+    vehicle = with_error_of_home(vehicle, mission.home, world)
     judged_m = rule.default_rel_home_m if rtl_rel_home_m is None else rtl_rel_home_m
     flight = follow(stored, vehicle, world.ground_amsl, world.read_amsl, rtl_rel_home_m=judged_m)
     if verdict.legs:
         round_corners(flight, stored, vehicle, world.frame)
     trace = trace_of(flight, vehicle, world, terrain_error_m) if verdict.legs else None
-    if trace is None or math.isnan(ground):
-        why = "the mission could not be followed" if trace is None else "the ground at home is unknown"
+    if trace is None or math.isnan(ground) or unsure is not None:
+        why = unsure or ("the mission could not be followed" if trace is None else "the ground at home is unknown")
         return _not_judged(verdict, vehicle, judged_m, rtl_rel_home_m is None, (why,))
     if route == "mission":
         return _along_mission(verdict, vehicle, stored, flight, trace, judged_m)

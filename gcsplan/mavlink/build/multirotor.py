@@ -116,7 +116,8 @@ def _pad_cm(world: World, above: MissionItem, datum: float, vehicle: Vehicle) ->
     ArduCopter does not fly to this altitude, but since 4.7 it slows down for the landing at 10 m above it (before: 10 m
     above the terrain that it has, or above home).
     """
-    ground = world.ground_amsl(above.lat_deg, above.lon_deg)
+    # The greatest one: before ground that may be higher it slows down in time.
+    ground = world.ground_amsl(above.lat_deg, above.lon_deg) + world.spread_m(above.lat_deg, above.lon_deg)
     if vehicle.autopilot is not Autopilot.ARDUCOPTER or math.isnan(ground):
         return 0
     return round((ground - datum) * 100.0)

@@ -1,0 +1,44 @@
+"""Home where the ground has two heights: relative altitudes count from it, so all of them are uncertain together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from gcsplan.figures import raised
+from gcsplan.mavlink.mission.mission import Home
+from gcsplan.units import Quantity, UnitText
+from gcsplan.vehicle import Vehicle
+from gcsplan.world.world import World
+
+
+def spread_at_home_m(home: Home, world: World) -> float:
+    """How far the greatest ground at home lies above the least one, m; 0 where they are one or unknown."""
+    return world.spread_m(home.lat_e7 / 1e7, home.lon_e7 / 1e7)
+
+
+def why_unknown(home: Home, vehicle: Vehicle, world: World) -> str | None:
+    """Why altitudes above home cannot be judged: its ground is not one number within the altitude error; else None."""
+    spread_m, error_m = spread_at_home_m(home, world), vehicle.limits.altitude_error_m
+    if spread_m <= error_m:
+        return None
+    lat, lon = home.lat_e7 / 1e7, home.lon_e7 / 1e7
+    low_m = world.ground_amsl(lat, lon)
+    return UnitText(
+        "the ground at home ({:.7f}, {:.7f}) is not one number: by the terrain's own files it lies between {} and {}, "
+        "and altitudes count from it; judged would be a home away from where they differ, terrain of one file there, "
+        "or altitude_error_m of {} and more",
+        lat, lon, Quantity(low_m, "amsl", 1, "down"), Quantity(low_m + spread_m, "amsl", 1, "up"),
+        Quantity(raised(spread_m, 1), "height", 1),
+    )  # fmt: skip
+
+
+def with_error_of_home(vehicle: Vehicle, home: Home, world: World) -> Vehicle:
+    """The vehicle with an altitude error that holds the uncertainty of home's ground too.
+
+    Home is taken for its least height: from a higher one the whole mission is flown higher.
+    """
+    spread_m = spread_at_home_m(home, world)
+    if spread_m == 0.0:
+        return vehicle
+    limits = vehicle.limits
+    return replace(vehicle, limits=replace(limits, altitude_error_m=limits.altitude_error_m + spread_m))

@@ -1,0 +1,86 @@
+"""Voids that a terrain model holds as heights of exactly 0 without saying so.
+
+Programs fill what they do not know with 0, and such a hole on a crest looks like a valley. Sea and lakes at 0 have a
+shore: ground that rises from 0. A patch of exact zeros without any shore has cliffs all around, and counts as a void.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from gcsplan.arrays import Bools, Floats
+from gcsplan.figures import counted
+from gcsplan.world.mosaic import Window
+
+SHORE_M = 5.0
+"""Ground within this of 0, m, beside a patch of zeros is its shore."""
+
+
+class Patch(NamedTuple):
+    """A patch of exact zeros: its nodes, its first one, and how far from 0 the nearest ground beside it is, m."""
+
+    nodes: int
+    row: int
+    col: int
+    beside_m: float
+
+
+Degrees = Callable[[Sequence[int], Sequence[int]], tuple[Floats, Floats]]
+"""Latitudes and longitudes of columns and rows of nodes, as `Mosaic.node_degrees` gives them."""
+
+
+def take_out_zeros(window: Window, degrees: Degrees) -> list[str]:
+    """Make the patches of exact zeros that have no shore unknown, in place; returns a note that names them."""
+    surfaces = [z for z in (window.heights_m, window.low_m) if z is not None]
+    found = [zero_voids(z) for z in surfaces]
+    for void, _ in found:
+        for z in surfaces:
+            z[void] = np.nan
+    patches = next((patches for _, patches in found if patches), None)
+    if patches is None:
+        return []
+    lat, lon = (float(a[0, 0]) for a in degrees([patches[0].col], [patches[0].row]))
+    more = f" and {len(patches) - 1} more" if len(patches) > 1 else ""
+    return [
+        f"{counted(sum(patch.nodes for patch in patches), 'DEM node')} of exactly 0 m "
+        f"({counted(patches[0].nodes, 'node')} around {lat:.5f}, {lon:.5f}{more}) stand beside ground of "
+        f"{min(patch.beside_m for patch in patches):.0f} m and more without a shore: an undeclared void, whose ground "
+        "is unknown; if it is ground or sea, say `nodata: none`, and if every 0 is a void `nodata: 0`"
+    ]
+
+
+def zero_voids(heights_m: Floats) -> tuple[Bools, list[Patch]]:
+    """Where connected patches of exactly 0 have no shore, and these patches, the largest one first.
+
+    ``heights_m`` (rows, cols), NaN where unknown. Nodes are connected to all eight around them. A patch has a shore if
+    a known node beside it lies within `SHORE_M` of 0; one without any known node beside it has nothing to tell.
+    """
+    zero = heights_m == 0.0
+    nothing = np.zeros(zero.shape, np.bool_)
+    if not zero.any():
+        return nothing, []
+    from scipy.ndimage import label  # most terrain holds no zeros
+
+    patch, count = label(zero, np.ones((3, 3)))
+    nearest = np.full(count + 1, np.inf)
+    rows, cols = zero.shape
+    for down, right in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        upper, lower = slice(0, rows - down), slice(down, rows)
+        left, far = slice(max(0, -right), cols - max(0, right)), slice(max(0, right), cols - max(0, -right))
+        for at, beside in (((upper, left), (lower, far)), ((lower, far), (upper, left))):
+            shore = zero[at] & ~zero[beside] & ~np.isnan(heights_m[beside])
+            np.minimum.at(nearest, patch[at][shore], np.abs(heights_m[beside][shore]))
+    void = np.isfinite(nearest) & (nearest > SHORE_M)
+    if not void.any():
+        return nothing, []
+    sizes = np.bincount(patch.ravel(), minlength=count + 1)
+    first = np.full(count + 1, zero.size)
+    np.minimum.at(first, patch.ravel(), np.arange(zero.size))
+    found = [
+        Patch(int(sizes[k]), int(first[k]) // cols, int(first[k]) % cols, float(nearest[k]))
+        for k in np.flatnonzero(void)
+    ]
+    return np.asarray(void[patch]), sorted(found, key=lambda p: (-p.nodes, p.row, p.col))

@@ -1,0 +1,111 @@
+"""How heights are read, as keys and as options, in what `plan`, `check` and `new` say."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.world.test_terrain import degrees_tif
+
+MISSION = """version: 1
+terrain: {{dem: {dem}, {keys}}}
+limits: {{min_agl_m: 60, max_climb_deg: 20}}
+vehicles:
+  - {{name: uav1, sysid: 1, autopilot: arducopter, start: [36.5, -84.5], goal: [36.51, -84.49]}}
+"""
+FEET = np.full((100, 100), 1000.0)
+
+
+def mission(folder: Path, keys: str, dem: str = "a.tif") -> str:
+    (folder / "m.yaml").write_text(MISSION.format(dem=dem, keys=keys), encoding="utf-8")
+    return "m.yaml"
+
+
+@pytest.fixture
+def tiles(tmp_path: Path) -> Path:
+    degrees_tif(tmp_path / "a.tif", FEET, units=("ft",))
+    west, east = FEET.copy(), FEET + 60.0
+    degrees_tif(tmp_path / "b.tif", west)
+    degrees_tif(tmp_path / "c.tif", east)
+    return tmp_path
+
+
+def test_plan_check_and_report_say_it_in_one_line(run: Any, tiles: Path) -> None:
+    line = "heights: feet, from the file; EGM96; ground 304–305 m AMSL"
+    code, out, err = run("plan", mission(tiles, "vertical_datum: EGM96"), "-o", "o", "--report")
+    assert (code, out.count("heights: ")) == (0, 1)
+    assert line in out
+    assert "note: a.tif: heights are feet, from the file" in err
+    assert line.removeprefix("heights: ") in (tiles / "o" / "report.html").read_text(encoding="utf-8")
+    assert json.loads((tiles / "o" / "summary.json").read_text())["inputs"]["heights_read"] == line.removeprefix(
+        "heights: "
+    )
+    assert line in run("check", "m.yaml", "o/uav1.plan")[1]
+    options = ("--dem", "a.tif", "--vertical-datum", "EGM96", "--min-agl", "60")
+    assert line in run("check", "o/uav1.plan", *options)[1]
+    assert "1000 ft AMSL" in run("check", "o/uav1.plan", *options, "--units", "imperial")[1]
+    told = json.loads(run("check", "o/uav1.plan", *options, "--json")[1])
+    assert told["inputs"]["heights_read"] == line.removeprefix("heights: ")
+
+
+def test_the_options_count_before_the_mission_and_the_file(run: Any, tiles: Path) -> None:
+    plain = mission(tiles, "vertical_datum: EGM96")
+    code, out, err = run("plan", plain, "-o", "o", "--height-unit", "m", "--vertical-datum", "NAVD88")
+    assert code == 0
+    assert "heights: metres, by height_unit; NAVD88; ground 1000 m AMSL" in out
+    assert "in place of feet (from the file)" in err
+    assert run("check", plain, "o/uav1.plan", "--height-unit", "m")[0] == 0
+    assert "ground 304–305 m" in run("check", plain, "o/uav1.plan")[1]
+    code, out, _ = run(
+        "check", "o/uav1.plan", "--dem", "a.tif", "--vertical-datum", "EPSG:5773", "--min-agl", "60",
+        "--height-unit", "us_ft", "--nodata", "none",
+    )  # fmt: skip
+    assert "heights: US survey feet, by height_unit; EGM96" in out
+    for option, value, said in (("--height-unit", "yd", "m, ft or us_ft"), ("--nodata", "blue", "a number, or none")):
+        code, _, err = run("plan", plain, option, value)
+        assert code == 2
+        assert said in err
+
+
+def test_new_writes_them_into_the_mission(run: Any, tiles: Path) -> None:
+    places = ("--start", "36.5,-84.5", "--goal", "36.51,-84.49")
+    code, _, _ = run(
+        "new", *places, "--dem", "a.tif", "--vertical-datum", "EGM96", "--height-unit", "ft", "--nodata", "0"
+    )
+    assert code == 0
+    text = (tiles / "mission.yaml").read_text(encoding="utf-8")
+    assert "\n  height_unit: ft\n" in text
+    assert "\n  nodata: 0\n" in text
+
+
+def test_a_void_of_zeros_is_named_where_it_leaves_no_mission(run: Any, tiles: Path) -> None:
+    heights = FEET.copy()
+    heights[:, 58:60] = 0.0
+    degrees_tif(tiles / "a.tif", heights)
+    (tiles / "w.yaml").write_text(
+        MISSION.format(dem="a.tif", keys="vertical_datum: EGM96").replace("[36.51, -84.49]", "[36.5, -84.46]"),
+        encoding="utf-8",
+    )
+    code, _, err = run("plan", "w.yaml", "-o", "o")
+    assert code == 3
+    assert "exactly 0 m" in err
+    assert "`nodata: none`" in err
+    assert run("plan", "w.yaml", "-o", "o", "--nodata", "none")[0] in (0, 3)
+
+
+def test_a_home_over_tiles_that_differ_is_refused_and_not_judged(run: Any, tiles: Path) -> None:
+    assert run("plan", mission(tiles, "vertical_datum: EGM96", "b.tif"), "-o", "o")[0] == 0
+    code, _, err = run("plan", mission(tiles, "vertical_datum: EGM96", "[b.tif, c.tif]"), "-o", "both")
+    assert code == 2
+    assert "vehicles[0].start: the ground here is not one number" in err
+    assert "altitude_error_m: 60" in err
+    code, out, _ = run(
+        "check", "o/uav1.plan", "--dem", "b.tif", "--dem", "c.tif", "--vertical-datum", "EGM96", "--min-agl", "60"
+    )
+    assert code == 4
+    assert "the ground at home" in out
+    assert "--altitude-error" in out

@@ -1,0 +1,208 @@
+"""Units, directions and voids of heights, wherever a file or a key states them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from affine import Affine
+
+from gcsplan.errors import InputError
+from gcsplan.units import IMPERIAL, in_units
+from gcsplan.world.datum import stated_datum
+from gcsplan.world.height_unit import unit_named
+from gcsplan.world.surface import Surface
+from gcsplan.world.voids import zero_voids
+from tests.world.test_terrain import degrees_tif, hills, load, refusal, tif
+
+FOOT, US_FOOT = 0.3048, 1200 / 3937
+UPWARDS = {  # code: metres of its unit, name
+    5773: (1.0, "EGM96"), 3855: (1.0, "EGM2008"), 5703: (1.0, "NAVD88"), 6360: (US_FOOT, "NAVD88"),
+    8228: (FOOT, "NAVD88"), 5702: (US_FOOT, "NGVD29"), 7837: (1.0, "DHHN2016"), 5714: (1.0, "AMSL"),
+    8050: (FOOT, "AMSL"), 5798: (1.0, "EGM84"), 5711: (1.0, "AHD"), 5728: (1.0, "LN02"), 5621: (1.0, "EVRF2007"),
+    5754: (0.3048007491, "Poolbeg"),
+}  # fmt: skip
+DEPTHS, OTHER_ZEROS = (5715, 6358, 6357, 6359, 8051, 8053, 5861, 5866), (5868, 5872, 5874, 5829, 5611)
+
+
+def notes_of(surface: Surface) -> str:
+    return "\n".join(map(str, surface.info["notes"]))  # type: ignore[call-overload]
+
+
+def is_times(surface: Surface, heights: Any, metres: float) -> bool:
+    """Whether a surface holds a part of ``heights`` times ``metres``."""
+    rows, cols = surface.ground_m.shape
+    return any(
+        np.allclose(heights[r : r + rows, c : c + cols] * metres, surface.ground_m, rtol=1e-9, atol=1e-9)
+        for r in range(101 - rows)
+        for c in range(101 - cols)
+    )
+
+
+@pytest.mark.parametrize("code", UPWARDS)
+def test_a_vertical_code_has_its_unit_wherever_it_stands(tmp_path: Path, code: int) -> None:
+    metres, name = UPWARDS[code]
+    heights = np.round(hills(100, 100))
+    plain = degrees_tif(tmp_path / "a.tif", heights)
+    compound = degrees_tif(tmp_path / "b.tif", heights, crs=f"EPSG:4326+{code}")
+    for surface in (
+        load(plain, vertical_datum=f"EPSG:{code}"),
+        load(compound, vertical_datum=None),
+        load(plain, crs=f"EPSG:4326+{code}", vertical_datum=None),
+    ):
+        assert is_times(surface, heights, metres)
+        assert surface.info["vertical_datum"] == name
+        assert ("heights are" in notes_of(surface)) == (metres != 1.0)
+
+
+@pytest.mark.parametrize("code", [*DEPTHS, *OTHER_ZEROS])
+def test_what_counts_down_or_from_another_zero_is_refused_by_name(tmp_path: Path, code: int) -> None:
+    from pyproj import CRS
+
+    for keys, crs in (
+        ({"vertical_datum": f"EPSG:{code}"}, "EPSG:4326"),
+        ({"vertical_datum": None}, f"EPSG:4326+{code}"),
+    ):
+        error = refusal(degrees_tif(tmp_path / f"{crs[-4:]}.tif", crs=crs), **keys)
+        assert repr(CRS.from_epsg(code).name) in str(error)
+        assert ("downwards" if code in DEPTHS else "mean sea level") in str(error)
+
+
+def test_a_datum_is_known_by_its_exact_name_too() -> None:
+    datum, unit = stated_datum("NAVD88 height (ftUS)", where="m")
+    assert (datum.name, unit is not None and unit.metres) == ("NAVD88", pytest.approx(US_FOOT))
+    assert stated_datum("EPSG:4326+8228", where="m")[1].metres == FOOT  # type: ignore[union-attr]
+    for words in ("NAVD88 heigt", "+proj=longlat", "EPSG:4326", "Newlyn"):  # Newlyn is a datum that PROJ would take
+        with pytest.raises(InputError):
+            stated_datum(words, where="m")
+
+
+@pytest.mark.parametrize(
+    ("words", "metres"),
+    [("ft", FOOT), ("Feet", FOOT), ("foot (international)", FOOT), ("US survey foot", US_FOOT), ("ftUS", US_FOOT),
+     ("us-ft", US_FOOT), ("Foot_US", US_FOOT), ("US Survey Feet", US_FOOT), ("survey foot", US_FOOT), ("M", 1.0),
+     ("Metres", 1.0), ("decimeter", 0.1), ("cm", 0.01), ("km", 1000.0), ("fathom", None), ("degree", None)],
+)  # fmt: skip
+def test_the_words_of_units(words: str, metres: float | None) -> None:
+    unit = unit_named(words)
+    assert (None if unit is None else unit.metres) == metres
+
+
+def test_a_grid_in_feet_needs_the_unit_of_its_heights(tmp_path: Path) -> None:
+    heights = np.round(hills(400, 400))
+    # North Carolina's grid in US survey feet, around the frame's place.
+    path = tif(tmp_path / "a.tif", heights, Affine(300.0, 0.0, 880_000.0, 0.0, -300.0, 710_000.0), crs="EPSG:2264")
+    from gcsplan.world.frame import Frame
+
+    frame = Frame(35.6, -82.5)
+    error = refusal(path, frame=frame, box=(-500.0, -500.0, 500.0, 500.0), vertical_datum="NAVD88")
+    assert "US survey feet" in str(error)
+    assert "`height_unit: us_ft`" in str(error)
+    for keys in ({"height_unit": "m"}, {"vertical_datum": "EPSG:5703"}):
+        read = load(path, frame=frame, box=(-500.0, -500.0, 500.0, 500.0), **({"vertical_datum": "NAVD88"} | keys))
+        assert read.info["heights_read"].startswith("metres, by ")  # type: ignore[attr-defined]
+
+
+def test_the_key_counts_before_what_the_file_states_and_says_so(tmp_path: Path) -> None:
+    heights = np.round(hills(100, 100))
+    path = degrees_tif(tmp_path / "a.tif", heights, units=("ft",))
+    surface = load(path, height_unit="m")
+    assert is_times(surface, heights, 1.0)
+    assert "heights are metres by height_unit, in place of feet (from the file)" in notes_of(surface)
+    assert is_times(
+        load(degrees_tif(tmp_path / "b.tif", heights, units=("fathom",)), height_unit="us_ft"), heights, US_FOOT
+    )
+    error = refusal(path, vertical_datum="EPSG:6360")
+    assert "two units" in str(error)
+    assert "height_unit" in str(error)
+
+
+def test_one_line_says_how_heights_were_read(tmp_path: Path) -> None:
+    surface = load(degrees_tif(tmp_path / "a.tif", np.full((100, 100), 1000.0), units=("US survey foot",)))
+    line = surface.info["heights_read"]
+    assert line == "US survey feet, from the file; EGM96; ground 304–305 m AMSL"
+    assert "1000–1001 ft" in in_units(line, IMPERIAL)  # type: ignore[arg-type]
+    below = load(degrees_tif(tmp_path / "b.tif", np.linspace(-420.0, -400.0, 10000).reshape(100, 100)))
+    assert "ground -4" in str(below.info["heights_read"])
+    assert " to -4" in str(below.info["heights_read"])
+
+
+def test_older_geotiffs_keep_their_vertical_part(tmp_path: Path) -> None:
+    heights = np.round(hills(100, 100))
+    for version in ("1.0", "1.1"):
+        path = degrees_tif(tmp_path / f"{version}.tif", heights, crs="EPSG:4326+8228", GEOTIFF_VERSION=version)
+        assert load(path, vertical_datum=None).info["vertical_datum"] == "NAVD88"
+        assert "5715" not in str(refusal(degrees_tif(tmp_path / "d.tif", heights, crs="EPSG:4326+5715",
+                                                     GEOTIFF_VERSION=version)))  # fmt: skip
+
+
+# -- voids ------------------------------------------------------------------------------------------------------------
+
+
+def holed(value: float, beside: float = 0.0) -> Any:
+    """Hills with a patch of ``value`` in the middle, and one node of its edge at ``beside`` if that is not 0."""
+    heights = np.round(hills(100, 100)) + 200.0
+    heights[40:60, 40:60] = value
+    if beside:
+        heights[60, 50] = beside
+    return heights
+
+
+def test_a_patch_of_zeros_without_a_shore_is_a_void_and_named(tmp_path: Path) -> None:
+    path = degrees_tif(tmp_path / "a.tif", holed(0.0))
+    surface = load(path)
+    unknown = int(np.isnan(surface.ground_m).sum())
+    assert unknown > 100
+    assert f"{unknown} DEM nodes of exactly 0 m" in notes_of(surface)
+    assert "`nodata: none`" in notes_of(surface)
+    assert not np.isnan(load(path, nodata="none").ground_m).any()
+    assert np.isnan(load(path, nodata=0.0).ground_m).sum() == unknown
+    assert "undeclared" not in notes_of(load(path, nodata=0.0))
+
+
+def test_sea_and_lakes_with_a_shore_are_ground(tmp_path: Path) -> None:
+    for beside in (5.0, -5.0, 0.3):
+        assert not np.isnan(load(degrees_tif(tmp_path / "a.tif", holed(0.0, beside))).ground_m).any()
+    assert np.isnan(load(degrees_tif(tmp_path / "b.tif", holed(0.0, 5.5))).ground_m).any()
+    assert not np.isnan(load(degrees_tif(tmp_path / "c.tif", np.zeros((100, 100)))).ground_m).any()
+    assert not np.isnan(load(degrees_tif(tmp_path / "d.tif", holed(1.0))).ground_m).any()
+
+
+@pytest.mark.parametrize(
+    ("dtype", "value"), [("float32", -3.4e38), ("int16", -9999), ("float32", 77.7), ("uint8", 255)]
+)
+def test_another_void_is_declared_by_nodata(tmp_path: Path, dtype: str, value: float) -> None:
+    heights = np.round(hills(100, 100)) % 200 + 1.0
+    heights[40:60, 40:60] = value
+    path = degrees_tif(tmp_path / "a.tif", heights.astype(dtype))
+    assert np.isnan(load(path, nodata=value).ground_m).sum() > 100
+
+
+def test_patches_of_zeros_by_brute_force() -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(200):
+        z = rng.choice([0.0, 0.0, 0.0, 30.0, 4.0, -50.0, np.nan], (6, 7), p=[0.2, 0.2, 0.1, 0.25, 0.05, 0.15, 0.05])
+        wanted = np.zeros(z.shape, bool)
+        seen = np.zeros(z.shape, bool)
+        for at in zip(*np.nonzero(z == 0.0), strict=True):
+            if seen[at]:
+                continue
+            patch, queue, beside = [], [at], []
+            seen[at] = True
+            while queue:
+                i, j = queue.pop()
+                patch.append((i, j))
+                for a in range(max(i - 1, 0), min(i + 2, 6)):
+                    for b in range(max(j - 1, 0), min(j + 2, 7)):
+                        if z[a, b] != 0.0:
+                            beside.append(abs(z[a, b]))
+                        elif not seen[a, b]:
+                            seen[a, b] = True
+                            queue.append((a, b))
+            known = [x for x in beside if x == x]
+            if known and min(known) > 5.0:
+                for p in patch:
+                    wanted[p] = True
+        assert np.array_equal(zero_voids(z)[0], wanted)
