@@ -91,7 +91,7 @@ def judge(
     if mission.autopilot is Autopilot.PX4:
         radius_m = {seq: tuning.px4_accepts_m(i)[0] for seq, i in enumerate(stored.items, stored.first_seq)}
     seconds = np.full(len(flight.stretches), math.nan)
-    if times or flight.loop_seq is not None:  # how long the battery lasts in a round depends on them
+    if times or flight.loop_seq is not None or vehicle.energy.base_w:  # the battery depends on them
         seconds = seconds_of(flight.stretches, vehicle, world, home, radius_m)
     figures = _figures(flight, plane, report, vehicle, world, seconds)
     findings += _findings(flight.stretches, plane, report, vehicle.limits, world)
@@ -202,6 +202,7 @@ def _figures(
     for s, run_m, length_m, rise_m, climb_deg, ground_m, agl_m, low_deg, top_m, clear_m, zone, time_s in rows:
         hold_s = 0.0 if math.isinf(s.hold_s) else s.hold_s
         hold_j = _hold_w(vehicle, s) * hold_s
+        moving_j = energy.under_way_j(float(rise_m), float(run_m), time_s)
         figures.append(
             LegFigures(
                 seq=s.seq, kind=s.kind, start=s.start, end=s.end, column=s.column, on_path=s.on_path,
@@ -214,12 +215,14 @@ def _figures(
                 max_agl_m=top_m,
                 zone_clearance_m=clear_m,
                 nearest_zone=world.airspace.zones[zone].name if zone >= 0 else "",
-                energy_j=energy.vertical_j_per_m * float(rise_m) + energy.horizontal_j_per_m * float(run_m) + hold_j,
+                energy_j=moving_j + hold_j,
                 time_s=time_s + hold_s,
                 hold_s=s.hold_s,
                 hold_j=hold_j,
                 times=s.times,
                 jumped_from=s.jumped_from,
+                lead_j=_lead_j(vehicle, s, float(run_m), time_s),
+                speed_m_s=s.speed_m_s,
             )
         )  # fmt: skip
     return tuple(figures)
@@ -337,8 +340,20 @@ def _power_w(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> float | None
 def _hold_w(vehicle: Vehicle, s: Stretch) -> float:
     """The power, W, of the hold at the end of a stretch: of hovering, or of circling if that takes more."""
     circling = s.kind == "loiter" and s.reach_m > 0.0
-    around_w = vehicle.energy.horizontal_j_per_m * s.speed_m_s if circling else 0.0
-    return max(vehicle.energy.hover_w, around_w)
+    return vehicle.energy.hold_w(s.speed_m_s if circling else 0.0)
+
+
+def _lead_j(vehicle: Vehicle, s: Stretch, run_m: float, time_s: float) -> float:
+    """Joules of base power by which a stretch may be ahead of an even share of its energy.
+
+    From any place on it the rest takes at least the rest's metres at top speed. So by then no more time has passed than
+    the even share at top speed and the whole of what the stretch takes longer.
+    """
+    base_w = vehicle.energy.base_w
+    if not base_w or not s.speed_m_s > 0.0:
+        return 0.0
+    top_m_s = vehicle.fastest_over_ground_m_s(s.speed_m_s, max(s.start[2], s.end[2]))
+    return base_w * max(0.0, time_s - run_m / top_m_s)
 
 
 def _finding(seq: int, kind: str, message: str, value: float, limit: float, by: float, unit: str) -> Finding:

@@ -41,7 +41,9 @@ class LegFigures:
     ``min_agl_m`` counts from the ground and what stands on it, on the line itself; ``agl_end_m`` from bare ground.
     ``energy_j`` includes ``hold_j`` and ``time_s`` includes ``hold_s``, those of the hold at its end; ``hold_s`` may be
     infinite (a loiter without end takes no energy and no time here). The figures are those of one pass; ``times``: how
-    often it is flown, if a jump leads back. ``jumped_from``: the jump that leads to it.
+    often it is flown, if a jump leads back. ``jumped_from``: the jump that leads to it. ``lead_j``: of ``energy_j``,
+    what is at most spent ahead of an even share on the way: the base power while it is slower than its top speed.
+    ``speed_m_s``: commanded.
     """
 
     seq: int
@@ -65,6 +67,8 @@ class LegFigures:
     hold_j: float = 0.0
     times: int = 1
     jumped_from: int | None = None
+    lead_j: float = 0.0
+    speed_m_s: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
