@@ -101,6 +101,7 @@ def judge(
         findings += _unread(others, plane)
         report = steep_report(plane, world.airspace.examine(plane.legs, vehicle.limits), vehicle.limits)
         findings = _worst(findings, _findings(others, plane, report, vehicle.limits, world))
+    flight.notes += _unlike_fitted(flight.stretches, vehicle)
     if needs_straight(mission.items, mission.autopilot):
         flight.notes.append(STRAIGHT_NOTE)
     if any(s.terrain for s in flight.stretches):
@@ -110,6 +111,21 @@ def judge(
         )
     verdict = Verdict(mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near)
     return _with_battery(verdict, vehicle, flight)
+
+
+def _unlike_fitted(stretches: Sequence[Stretch], vehicle: Vehicle) -> list[str]:
+    """A note on cruise speeds for which the energy model is not fitted."""
+    energy = vehicle.energy
+    far = {s.speed_m_s: s.seq for s in reversed(stretches) if s.on_path and energy.unlike_fitted(s.speed_m_s)}
+    if not far or energy.fitted_m_s is None:
+        return []
+    slow, fast = energy.fitted_m_s
+    speed = max(far, key=lambda v: max(slow / max(v, 1e-9), v / fast))
+    at = f"{slow:g}" if slow == fast else f"{slow:g} to {fast:g}"
+    return [
+        f"the energy is fitted to flights at {at} m/s, and from item {far[speed]} on it flies at {speed:.3g} m/s: what "
+        f"it needs may be far off; fit-energy with flights at that speed too tells it"
+    ]
 
 
 def _refused(mission: Mission) -> list[Finding]:
