@@ -24,6 +24,7 @@ from gcsplan.check.plane_legs import PlaneLegs, legs_in_plane, steep_report
 from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.check.tuning import DEFAULTS, Tuning
 from gcsplan.check.verdict import Finding, LegFigures, Verdict
+from gcsplan.check.zone_heights import nearest_pass
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.firmware import STRAIGHT_NOTE, needs_straight
 from gcsplan.mavlink.mission.mission import Mission
@@ -39,6 +40,8 @@ TERRAIN_ERROR_M = 30.0
 
 NEAR_DEG = FARTHEST_M / 111_700.0
 """Degrees of latitude, or of longitude anywhere, that are surely no more than `FARTHEST_M`."""
+
+NO_CEILING = "max_agl_m is not set: nothing limits the height above ground, whose highest value is told"
 
 HIGHEST_M = 20_000.0
 """Above any aircraft that gcsplan plans for, m; keeps absurd numbers out of the exact check."""
@@ -95,6 +98,7 @@ def judge(
         seconds = seconds_of(flight.stretches, vehicle, world, home, radius_m)
     figures = _figures(flight, plane, report, vehicle, world, seconds)
     findings += _findings(flight.stretches, plane, report, vehicle.limits, world)
+    over = nearest_pass(flight.stretches, plane.legs, plane.owner, vehicle.limits, world) if times else None
     near = nearest_misses(flight.stretches, plane.legs, plane.owner, report, vehicle, world) if misses else ()
     if others := flight.others:  # they must be legal too; the figures stay those of the mission
         plane = legs_in_plane(others, vehicle.limits, world, terrain_error_m)
@@ -109,7 +113,12 @@ def judge(
             f"terrain-frame legs depend on the terrain data in the vehicle; judged as it reads this terrain, at posts "
             f"every {world.post_spacing_m} m, with {terrain_error_m:g} m of error"
         )
-    verdict = Verdict(mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near)
+    if vehicle.limits.max_agl_m is None:
+        flight.notes.append(NO_CEILING)
+    verdict = Verdict(
+        mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near, zone_pass=over,
+        energy_stated=vehicle.energy.stated,
+    )  # fmt: skip
     return _with_battery(verdict, vehicle, flight)
 
 

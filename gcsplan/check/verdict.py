@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from gcsplan.check.misses import Miss
 from gcsplan.check.stretch import Place, StretchKind
+from gcsplan.check.zone_heights import ZonePass
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.units import UnitText, joined
 
@@ -128,7 +129,8 @@ class Verdict:
     """The result of the check of ``mission`` (as sent); what is judged is what the autopilot stores of it.
 
     ``misses``: how near it comes to each limit, on request. ``until_reserve_s``: if the mission ends in a hold or a
-    round without end, seconds until the battery is down to its reserve.
+    round without end, seconds until the battery is down to its reserve. ``zone_pass``: the nearest zone that is passed
+    over or under. ``energy_stated``: the vehicle's energy was given; else energies say nothing and are not told.
     """
 
     mission: Mission
@@ -139,6 +141,12 @@ class Verdict:
     battery_used_percent: float | None = None
     misses: tuple[Miss, ...] = ()
     until_reserve_s: float | None = None
+    zone_pass: ZonePass | None = None
+    energy_stated: bool = True
+
+    def told_j(self, joules: float) -> float | None:
+        """An energy of this flight for people and files: None unless the vehicle's energy was given."""
+        return joules if self.energy_stated else None
 
     @property
     def safe(self) -> bool | None:
@@ -211,6 +219,12 @@ class Verdict:
         """The stretch that is lowest above ground, except columns; None if there is none."""
         legs = [leg for leg in self.legs if not leg.column and not math.isnan(leg.min_agl_m)]
         return min(legs, key=lambda leg: leg.min_agl_m, default=None)
+
+    @property
+    def highest(self) -> LegFigures | None:
+        """The stretch that is highest above ground, columns too; None if there is none."""
+        legs = [leg for leg in self.legs if not math.isnan(leg.max_agl_m)]
+        return max(legs, key=lambda leg: leg.max_agl_m, default=None)
 
     @property
     def nearest(self) -> LegFigures | None:

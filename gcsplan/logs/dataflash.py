@@ -102,7 +102,7 @@ def _take(
 
 
 def _volt_and_ampere(m: Any) -> tuple[float, float]:
-    """Voltage and current; whole numbers without a scale of their own are hundredths (`Log_Write_Current` until 3.3)."""
+    """Voltage and current; whole numbers without a scale of their own are hundredths (ArduCopter until 3.3)."""
     form = dict(zip(m.fmt.columns, m.fmt.format, strict=False))
     volt, ampere = (float(getattr(m, key)) * (0.01 if form.get(key) in WHOLE else 1.0) for key in ("Volt", "Curr"))
     return volt, ampere
