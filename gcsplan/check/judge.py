@@ -98,7 +98,7 @@ def judge(
         seconds = seconds_of(flight.stretches, vehicle, world, home, radius_m)
     figures = _figures(flight, plane, report, vehicle, world, seconds)
     findings += _findings(flight.stretches, plane, report, vehicle.limits, world)
-    over = nearest_pass(flight.stretches, plane.legs, plane.owner, vehicle.limits, world) if times else None
+    over = nearest_pass(flight.stretches, plane.legs, plane.owner, vehicle.limits, world)
     near = nearest_misses(flight.stretches, plane.legs, plane.owner, report, vehicle, world) if misses else ()
     if others := flight.others:  # they must be legal too; the figures stay those of the mission
         plane = legs_in_plane(others, vehicle.limits, world, terrain_error_m)

@@ -150,7 +150,12 @@ def _columns(title: str, rows: Sequence[Mapping[str, str]], each: int) -> list[T
 
 
 def _plan_row(
-    v: VehiclePlan, fleet: FleetPlan | None, home: WayHome | None, units: Units, *, lines: bool
+    v: VehiclePlan,
+    fleet: FleetPlan | None,
+    home: WayHome | None = None,
+    units: Units = METRIC,
+    *,
+    lines: bool = False,
 ) -> dict[str, str]:
     """The words of one vehicle by name; times have tenths in a fleet, whose order may hang on them."""
     verdict, energy = v.verdict, v.request.vehicle.energy

@@ -48,14 +48,15 @@ def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
                 least(low.min_agl_m if low else None, 1, units.height),
                 greatest(high.max_agl_m if high else None, 1, units.height),
                 f"{least(near.zone_clearance_m, 1, units.distance)} {esc(near.nearest_zone)}" if near else "–",
-                steepest(verdict.max_climb_deg), energy(verdict.told_j(verdict.energy_j), 0, s.vehicle.energy.battery_v),
+                steepest(verdict.max_climb_deg),
+                energy(verdict.told_j(verdict.energy_j), 0, s.vehicle.energy.battery_v),
                 num(verdict.battery_used_percent, 1, "%"),
                 duration(s.arrive_s, page.time_decimals), home,
             )
         )  # fmt: skip
         marks.append("bad" if verdict.safe is False else "close" if verdict.safe is None or s.homeless else "")
-    head = ("vehicle|", "verdict|", "path", "gap", "lowest AGL", "highest AGL", "nearest zone|", "steepest", "energy", "battery",
-            "arrives", "way home|")  # fmt: skip
+    head = ("vehicle|", "verdict|", "path", "gap", "lowest AGL", "highest AGL", "nearest zone|", "steepest", "energy",
+            "battery", "arrives", "way home|")  # fmt: skip
     return table("Key figures", head, rows, marks=marks, numbers=range(len(rows)))
 
 
