@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import TypeVar
 
+from gcsplan.arrays import Floats
+from gcsplan.world.atmosphere import true_per_indicated
 from gcsplan.world.limits import Limits
 
 DEFAULT_LEAN_DEG, LARGEST_LEAN_DEG = 30.0, 80.0
@@ -18,6 +21,12 @@ with 30° and near 15 m/s with 45°, whatever was commanded. An airframe with le
 
 PX4_VEL_MAX_M_S = 12.0
 """PX4's MPC_XY_VEL_MAX, default: it flies no faster, whatever is commanded, and says nothing."""
+
+FITS_WITHIN = 0.2
+"""A fitted energy model is taken to hold up to this part slower or faster than it was flown."""
+
+OWN_METRES = 1.0035
+"""Most metres over ground per metre of ArduPilot near home: it takes a degree as equally long everywhere."""
 
 PX4_RETURN_M_S = 5.0
 """PX4's MPC_XY_CRUISE, default: the speed of its return, whatever speed the mission has commanded."""
@@ -41,6 +50,9 @@ def lean_words(lean_deg: float) -> str:
     )
 
 
+Amount = TypeVar("Amount", float, Floats)
+
+
 class Autopilot(StrEnum):
     """The autopilot that a mission is written for."""
 
@@ -56,10 +68,16 @@ class Autopilot(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Energy:
-    """Energy model of the krill paper, Table 1: R1 joules per vertical metre, up or down, R2 per horizontal metre.
+    """What flying takes: E = ``base_w`` · seconds + R2 · horizontal metres through the air + R1 · vertical metres.
 
-    ``hover_w`` is the power for hovering. With ``battery_j`` None, the capacity is not judged. ``reserve`` is the part
-    of the battery that must be left at the end. ``battery_v`` is its nominal voltage, which only tells energies in mAh.
+    R1 (``vertical_j_per_m``, up or down), R2 and a base power of 0 are the model of the krill paper, Table 1. In a hold
+    the power is ``hover_w``, the whole of it, or what `hold_w` says if that is more. `under_way_j` and `hold_w` are the
+    model; everything that counts energy calls them.
+
+    With ``battery_j`` None, the capacity is not judged. ``reserve`` is the part of the battery that must be left at the
+    end. ``battery_v`` is its nominal voltage, which only tells energies in mAh. ``fitted_m_s``: slowest and fastest
+    airspeed of the flights that the numbers are fitted to, None if that is not known. ``stated``: the numbers were
+    given; else they are the paper's, which say nothing about this aircraft, and no output tells an energy.
     """
 
     vertical_j_per_m: float = 120.0
@@ -68,6 +86,28 @@ class Energy:
     battery_j: float | None = None
     reserve: float = 0.2
     battery_v: float | None = None
+    base_w: float = 0.0
+    fitted_m_s: tuple[float, float] | None = None
+    stated: bool = True
+
+    def under_way_j(self, vertical_m: Amount, air_m: Amount, seconds: Amount) -> Amount:
+        """Joules of moving for ``seconds``: ``vertical_m`` up and down, ``air_m`` horizontally through the air.
+
+        ``seconds`` do not count without a base power, and may then be NaN.
+        """
+        metres_j = self.vertical_j_per_m * vertical_m + self.horizontal_j_per_m * air_m
+        return metres_j + self.base_w * seconds if self.base_w else metres_j
+
+    def hold_w(self, airspeed_m_s: float = 0.0) -> float:
+        """Power of a hold, W: ``hover_w``, or that of flying at the airspeed of a circle or of the wind, if more."""
+        return max(self.hover_w, self.base_w + self.horizontal_j_per_m * airspeed_m_s)
+
+    def unlike_fitted(self, airspeed_m_s: float) -> bool:
+        """Whether an airspeed is so far from those that the numbers are fitted to that they may not hold."""
+        if self.fitted_m_s is None:
+            return False
+        slow, fast = self.fitted_m_s
+        return not (1.0 - FITS_WITHIN) * slow <= airspeed_m_s <= (1.0 + FITS_WITHIN) * fast
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +148,7 @@ class Vehicle:
     climb_m_s: float = 2.5
     descent_m_s: float = 1.5
     turn_radius_m: float = 0.0
-    energy: Energy = field(default_factory=Energy)
+    energy: Energy = field(default_factory=lambda: Energy(stated=False))
     link: str | None = None
     accel_m_s2: float = 1.5
     corner_accel_m_s2: float = 2.5
@@ -118,6 +158,12 @@ class Vehicle:
     lean_angle_deg: float | None = None
     vel_max_m_s: float | None = None
     climb_out: ClimbOut | None = None
+
+    def fastest_over_ground_m_s(self, speed_m_s: float, amsl_m: float) -> float:
+        """No faster than this over ground in still air, with a commanded speed, near home and up to an altitude."""
+        if self.keeps_airspeed:
+            return speed_m_s * float(true_per_indicated(amsl_m))
+        return speed_m_s * OWN_METRES if self.lays_curves else speed_m_s
 
     @property
     def lays_curves(self) -> bool:

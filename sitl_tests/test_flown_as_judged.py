@@ -13,7 +13,8 @@ from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.sim import sitl as flown
-from gcsplan.sim.outcome import Part, Terms
+from gcsplan.sim.outcome import Terms
+from gcsplan.sim.part import Part
 from gcsplan.sim.sitl_instances import sitl_instances
 from gcsplan.sim.trace import Trace
 from gcsplan.vehicle import Autopilot, Vehicle

@@ -50,9 +50,9 @@ def told_of(c: Checked, form: str, *, allow_unjudged: bool, units: Units) -> Tol
     lines = () if form == "whole" else tuple(finding_lines(c, allow_unjudged=allow_unjudged, units=units))
     text = ""
     if form == "whole":
-        text = json_of(verdict_of(str(c.file), c.verdict) | more_of(c), "verdicts")
+        text = json_of(verdict_of(str(c.file), c.verdict, c.way_home) | more_of(c), "verdicts")
     elif form == "row":
-        row = {"file": str(c.file), "code": code} | verdict_of(str(c.file), c.verdict)
+        row = {"file": str(c.file), "code": code} | verdict_of(str(c.file), c.verdict, c.way_home)
         home = {} if c.way_home is None else {"way_home": c.way_home.as_dict()}
         text = json_of(row | home, "verdicts", lines=False)
     return Told(str(c.file), code, dict(kinds), lines, None, text, failing)

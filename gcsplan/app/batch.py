@@ -33,7 +33,7 @@ __all__ = ["Batch", "BatchOptions", "Record", "exit_code", "missions_of"]
 FOLDER = "records"
 """The folder within the batch's directory that says what is done."""
 
-RULES = 2
+RULES = 3
 """Counts the changes of what lets a mission fly: records of earlier rules do not hold."""
 
 PIECE_S = 0.4
@@ -202,8 +202,8 @@ def record_of(options: BatchOptions, item: tuple[str, str]) -> Record:
 
 COLUMNS = (
     "mission", "vehicle", "code", "verdict", "reason", "message", "length_m", "gap_percent", "energy_j",
-    "flight_energy_j", "battery_used_percent", "min_agl_m", "min_zone_clearance_m", "max_climb_deg", "speed_m_s",
-    "depart_s", "arrive_s", "items", "stopped_by",
+    "flight_energy_j", "battery_used_percent", "min_agl_m", "max_agl_m", "min_zone_clearance_m", "min_zone_height_m",
+    "max_climb_deg", "speed_m_s", "depart_s", "arrive_s", "items", "stopped_by", "safe", "return_safe",
 )  # fmt: skip
 """The columns of the table of results."""
 
@@ -217,8 +217,8 @@ def _rows(name: str, summary: str) -> list[dict[str, Any]]:
     """One row for each vehicle, out of the summary's text, so that both have the same numbers."""
     rows = []
     for told in json.loads(summary)["vehicles"]:
-        verdict = {True: "safe", None: "not judged", False: "not safe"}[told["safe"]]
-        row = {"mission": name, "vehicle": told["name"], "code": 0, "verdict": verdict, "reason": "", "message": ""}
+        row = {"mission": name, "vehicle": told["name"], "code": 0, "reason": "", "message": ""}
+        row |= {"return_safe": told.get("way_home", {}).get("safe")}
         rows.append(row | {key: told[key] for key in COLUMNS if key in told})
     return rows
 

@@ -96,6 +96,6 @@ def gated(crews: Sequence[Crew], slots: Sequence[Slot]) -> list[tuple[Slot, int]
         opens_s = math.ceil(there_s + slot.hold_s + SLACK_S - 1e-6)
         hold_s = opens_s - there_s
         more_s = hold_s - slot.hold_s
-        energy_j = slot.energy_j + crew.vehicle.energy.hover_w * more_s
+        energy_j = slot.energy_j + crew.vehicle.energy.hold_w() * more_s
         out.append((replace(slot, hold_s=hold_s, arrive_s=slot.arrive_s + more_s, energy_j=energy_j), opens_s))
     return out

@@ -14,12 +14,14 @@ import numpy as np
 from gcsplan import __version__
 from gcsplan.app.model import FleetPlan, Plan, VehiclePlan
 from gcsplan.arrays import Floats
+from gcsplan.check.rtl.words import verdict_words
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.export.geojson import write_geojson
 from gcsplan.export.kml import write_kml
 from gcsplan.export.profile import write_profile
 from gcsplan.export.rows import ItemRow, Track, WayPoint
 from gcsplan.export.summary import write_summary
+from gcsplan.figures import floored, raised
 from gcsplan.fleet.arrival import Slot
 from gcsplan.mavlink.files.formats import write_plan, write_waypoints
 from gcsplan.mavlink.mission.commands import command_name
@@ -47,7 +49,7 @@ def outputs_of(
     to its fence items, for the `.plan`. With ``rally``, the `.plan` also contains the proposed rally points.
     """
     slots = {s.name: s for s in plan.fleet.slots} if plan.fleet is not None else {}
-    tracks = [_track(v, plan.source.geoid, slots.get(v.name)) for v in plan.vehicles]
+    tracks = [_track(v, plan.source.geoid, slots.get(v.name), homes.get(v.name)) for v in plan.vehicles]
     frame, zones = plan.world.frame, plan.world.airspace.zones
     files = {}
     for v in plan.vehicles:
@@ -114,11 +116,7 @@ def summary_of(plan: Plan, results: Sequence[JobResult] = (), homes: Homes = Map
         "objective": plan.objective,
         "seed": plan.seed,
         "inputs": dict(plan.source.inputs),
-        "vehicles": [
-            _vehicle(v, plan.fleet, uploads.get(v.name))
-            | ({"way_home": homes[v.name].as_dict()} if v.name in homes else {})
-            for v in plan.vehicles
-        ],
+        "vehicles": [_vehicle(v, plan.fleet, uploads.get(v.name), homes.get(v.name)) for v in plan.vehicles],
         "fleet": _fleet(plan),
         "left_out": [v.as_dict() for v in plan.left_out],
         "notes": list(dict.fromkeys(plan.notes)),
@@ -139,10 +137,12 @@ def _fleet(plan: Plan) -> dict[str, Any]:
     }
 
 
-def _vehicle(v: VehiclePlan, fleet: FleetPlan | None, result: JobResult | None) -> dict[str, Any]:
+def _vehicle(
+    v: VehiclePlan, fleet: FleetPlan | None, result: JobResult | None, home: WayHome | None
+) -> dict[str, Any]:  # fmt: skip
     slot = None if fleet is None else fleet.slot(v.name)
     verdict = v.verdict
-    lowest, nearest = verdict.lowest, verdict.nearest
+    lowest = verdict.lowest
     length = v.problem.objective == "length"
     bound = v.solution.lower_bound
     return {
@@ -151,15 +151,13 @@ def _vehicle(v: VehiclePlan, fleet: FleetPlan | None, result: JobResult | None) 
         "length_m": verdict.length_m,
         "lower_bound_m": bound if length else None,
         "gap_percent": v.gap_percent,
-        "energy_j": verdict.path_energy_j,
+        "energy_j": verdict.told_j(verdict.path_energy_j),
         "lower_bound_j": None if length else bound,
-        "flight_energy_j": verdict.energy_j,
+        "flight_energy_j": verdict.told_j(verdict.energy_j),
         "battery_used_percent": verdict.battery_used_percent,
         "min_agl_m": lowest.min_agl_m if lowest else None,
         "min_agl_at": {"leg": lowest.seq, "lat": lowest.min_agl_at[0], "lon": lowest.min_agl_at[1]} if lowest else None,
-        "min_zone_clearance_m": nearest.zone_clearance_m if nearest else None,
-        "nearest_zone": nearest.nearest_zone if nearest else None,
-        "max_climb_deg": verdict.max_climb_deg,
+        **_extremes(verdict),
         "speed_m_s": v.speed_m_s,
         "depart_s": slot.depart_s if slot else 0.0,
         "arrive_s": slot.arrive_s if slot else verdict.arrive_s,
@@ -172,7 +170,21 @@ def _vehicle(v: VehiclePlan, fleet: FleetPlan | None, result: JobResult | None) 
         "hold_s": slot.hold_s if slot else 0.0,
         "notes": list(dict.fromkeys((*v.notes, *v.solution.notes, *verdict.notes, *(slot.notes if slot else ())))),
         "upload": result.as_dict() if result else None,
-    } | _of_search(v)
+        "verdict": verdict_words(verdict.safe, home),
+    } | _of_search(v) | ({} if home is None else {"way_home": home.as_dict()})  # fmt: skip
+
+
+def _extremes(verdict: Verdict) -> dict[str, Any]:
+    """The greatest height above ground, the nearest zone beside, over or under, and the steepest angle."""
+    highest, nearest, passed = verdict.highest, verdict.nearest, verdict.zone_pass
+    return {
+        "max_agl_m": highest.max_agl_m if highest else None,
+        "min_zone_clearance_m": nearest.zone_clearance_m if nearest else None,
+        "nearest_zone": nearest.nearest_zone if nearest else None,
+        "min_zone_height_m": passed.height_m if passed else None,
+        "zone_passed": {"zone": passed.zone, "side": passed.side, "leg": passed.seq} if passed else None,
+        "max_climb_deg": verdict.max_climb_deg,
+    }
 
 
 def _of_search(v: VehiclePlan) -> dict[str, Any]:
@@ -187,22 +199,21 @@ def flat(figures: Any) -> dict[str, Any]:
     return {name: getattr(figures, name) for name in figures.__slots__}
 
 
-def verdict_of(name: str, verdict: Verdict) -> dict[str, Any]:
-    """A verdict as plain values, for ``check --json``."""
-    lowest, nearest = verdict.lowest, verdict.nearest
+def verdict_of(name: str, verdict: Verdict, home: WayHome | None = None) -> dict[str, Any]:
+    """A verdict as plain values, for ``check --json``; ``home``: the way home, if it was judged."""
+    lowest = verdict.lowest
     return {
         "file": name,
         "vehicle": verdict.mission.name,
         "safe": verdict.safe,
+        "verdict": verdict_words(verdict.safe, home),
         "items": len(verdict.mission.wire_items()),
         "length_m": verdict.length_m,
-        "energy_j": verdict.path_energy_j,
-        "flight_energy_j": verdict.energy_j,
+        "energy_j": verdict.told_j(verdict.path_energy_j),
+        "flight_energy_j": verdict.told_j(verdict.energy_j),
         "battery_used_percent": verdict.battery_used_percent,
         "min_agl_m": lowest.min_agl_m if lowest else None,
-        "min_zone_clearance_m": nearest.zone_clearance_m if nearest else None,
-        "nearest_zone": nearest.nearest_zone if nearest else None,
-        "max_climb_deg": verdict.max_climb_deg,
+        **_extremes(verdict),
         "violations": [flat(f) for f in verdict.findings],
         "not_judged": list(verdict.not_judged),
         "notes": list(verdict.notes),
@@ -238,13 +249,14 @@ def item_rows(vehicle: str, verdict: Verdict, slot: Slot | None = None) -> list[
         rows.append(
             ItemRow(
                 vehicle, seq, name, lat, lon, amsl, legs[-1].agl_end_m, min(low) if low else None,
-                math.fsum(leg.length_m for leg in legs), steep, energy_j, spent_j, until[seq],
+                math.fsum(leg.length_m for leg in legs), steep, verdict.told_j(energy_j),
+                verdict.told_j(spent_j), until[seq],
             )
         )  # fmt: skip
     return rows
 
 
-def _track(v: VehiclePlan, geoid: GeoidGrid | None, slot: Slot | None) -> Track:
+def _track(v: VehiclePlan, geoid: GeoidGrid | None, slot: Slot | None, returns: WayHome | None) -> Track:
     legs = v.verdict.legs
     places = np.array([legs[0].start, *(leg.end for leg in legs)])
     commands = {seq: command_name(item.command) for seq, item in enumerate(v.mission.wire_items())}
@@ -258,7 +270,19 @@ def _track(v: VehiclePlan, geoid: GeoidGrid | None, slot: Slot | None) -> Track:
         name = f"{leg.seq} {commands.get(leg.seq, '')}".strip()
         point = WayPoint(name, leg.seq, commands.get(leg.seq), leg.agl_end_m, above[i + 1], float(left[i + 1]))
         points.append(None if goes_on else point)
-    return Track(v.name, places[:, 0], places[:, 1], places[:, 2], tuple(points), reached, left)
+    words = _described(v.verdict, returns)
+    return Track(v.name, places[:, 0], places[:, 1], places[:, 2], tuple(points), reached, left, words)
+
+
+def _described(verdict: Verdict, home: WayHome | None) -> str:
+    """What a viewer says of a track: the verdict, and how low and how high above ground it is."""
+    lowest, highest = verdict.lowest, verdict.highest
+    words = [str(verdict_words(verdict.safe, home))]
+    if lowest is not None:
+        words.append(f"lowest {floored(lowest.min_agl_m, 1):.1f} m above ground")
+    if highest is not None:
+        words.append(f"highest {raised(highest.max_agl_m, 1):.1f} m above ground")
+    return ", ".join(words)
 
 
 def _times(verdict: Verdict, slot: Slot | None) -> tuple[Floats, Floats]:

@@ -21,6 +21,8 @@ from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import Airspace
+from gcsplan.world.atmosphere import TROPOPAUSE_M
+from gcsplan.world.frame import FARTHEST_M
 from gcsplan.world.limits import Limits
 from gcsplan.world.terrain_grid import NEAR_ENOUGH_M
 from gcsplan.world.world import World
@@ -28,6 +30,8 @@ from gcsplan.world.zones import Zone
 
 BYTES_PER_NODE = 64.0
 """Memory that a wider window takes for each of its nodes, terrain included: 58 bytes were measured."""
+FARTHEST_DEG = 2.0 * FARTHEST_M / 110_500.0
+"""Degrees of latitude from home that no mission leaves."""
 SPOT_M = 0.02
 """Metres by which two altitudes of one place are set apart; wire numbers are rounded to half a centimetre."""
 
@@ -178,7 +182,7 @@ def make_problem(
         via=via,
         objective="energy" if objective == "energy" else "length",
         vertical_j_per_m=vehicle.energy.vertical_j_per_m,
-        horizontal_j_per_m=vehicle.energy.horizontal_j_per_m,
+        horizontal_j_per_m=least_horizontal_j_per_m(vehicle, request.start_deg[0]),
         turn_radius_m=vehicle.turn_radius_m,
         seed=seed,
         gap_percent=settings.gap_percent,
@@ -194,6 +198,22 @@ def make_problem(
             "are cut and the landing place is overshot while braking: track_error_m must hold both"
         )
     return problem, tuple(notes)
+
+
+def least_horizontal_j_per_m(vehicle: Vehicle, home_lat_deg: float) -> float:
+    """The least that a horizontal metre takes in still air, J: what is minimised, and bounded from below.
+
+    With a base power a metre takes it for no less time than at the fastest speed over ground. Climbs, corners and stops
+    take longer, which counts in the flight's energy and not here.
+    """
+    energy, top_amsl_m = vehicle.energy, vehicle.limits.max_amsl_m
+    if not energy.base_w:
+        return energy.horizontal_j_per_m
+    fastest = vehicle.fastest_over_ground_m_s(vehicle.speed_max_m_s, TROPOPAUSE_M if top_amsl_m is None else top_amsl_m)
+    if vehicle.lays_curves:  # towards the equator ArduPilot's own metres of longitude are too long
+        near, far = (math.radians(max(abs(home_lat_deg) - part * FARTHEST_DEG, 0.0)) for part in (0.5, 1.0))
+        fastest *= math.cos(far) / math.cos(near)
+    return energy.horizontal_j_per_m + energy.base_w / fastest
 
 
 def _vias(

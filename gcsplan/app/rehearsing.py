@@ -21,7 +21,8 @@ from gcsplan.app.executor import Executor, Inline, executor
 from gcsplan.app.model import Plan, VehiclePlan
 from gcsplan.app.sites import Site, site_of
 from gcsplan.errors import UsageError
-from gcsplan.sim.outcome import Part, Rehearsal, Tally, Terms
+from gcsplan.sim.outcome import Rehearsal, Tally, Terms
+from gcsplan.sim.part import Part
 
 if TYPE_CHECKING:
     from gcsplan.sim.rehearsal import Block, Flights

@@ -1,10 +1,11 @@
 """The battery along a mission: what each leg uses, and whether the rest is enough for the return from every point.
 
-The model is R1/R2 (`gcsplan.vehicle.Energy`): a return costs R1 for its climb and its descent and R2 for the straight
-line home and for what the vehicle goes on before it turns home (`rtl.run_on`), and the power of hovering for the
-seconds over home. Along a straight leg the energy spent is linear, and the energy of the return is convex, because the
-distance to home and the climb to the return's altitude are. So their sum exceeds a limit at most on two parts of a leg,
-one at each end, and bisection finds where it crosses the limit, without sampling.
+The model is `gcsplan.vehicle.Energy`: a return costs R1 for its climb and its descent, R2 for the straight line home
+and for what the vehicle goes on before it turns home (`rtl.run_on`), the base power for no less than its time
+(`rtl.return_time`), and the power of hovering for the seconds over home. Along a straight leg the energy spent is at
+most linear (`LegFigures.lead_j`), and the energy of the return is convex, because the distance to home and the climb to
+the return's altitude are. So their sum exceeds a limit at most on two parts of a leg, one at each end, and bisection
+finds where it crosses the limit, without sampling.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any
 
 from gcsplan.check.geodesy import flat_m
 from gcsplan.check.rtl.model import RULES
+from gcsplan.check.rtl.return_time import return_s
 from gcsplan.check.rtl.run_on import more_m
 from gcsplan.check.stretch import Place
 from gcsplan.check.verdict import LegFigures, Verdict
@@ -104,12 +106,14 @@ def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m:
         return None
     usable = (1.0 - energy.reserve) * energy.battery_j
 
-    def back_j(at: Place, stands: bool) -> float:
+    def back_j(at: Place, speed_m_s: float, stands: bool) -> float:
         level = rule.level_amsl_m(return_amsl_m, at[2])
-        vertical = abs(level - at[2]) + max(level - home[2], 0.0)
+        down_m = max(level - home[2], 0.0)
         way_m = flat_m(at, home) + (0.0 if stands else more_m(vehicle, vehicle.speed_max_m_s, at[2]))
-        waits_j = energy.hover_w * vehicle.return_waits_s
-        return energy.vertical_j_per_m * vertical + energy.horizontal_j_per_m * way_m + waits_j
+        waits_j = energy.hold_w() * vehicle.return_waits_s
+        # The metres are the same with any base power; without one the time counts nothing.
+        seconds = return_s(vehicle, way_m, level - at[2], down_m, speed_m_s) if energy.base_w else math.nan
+        return energy.under_way_j(abs(level - at[2]) + down_m, way_m, seconds) + waits_j
 
     spent = along = most = 0.0
     most_at, most_m = verdict.legs[0].start, 0.0
@@ -122,13 +126,14 @@ def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m:
         spent += skipped_j
         along += skipped_m
         hold_j = leg.hold_j
-        way_j = leg.energy_j - hold_j
+        way_j = leg.energy_j - hold_j - leg.lead_j
+        ahead_j = spent + leg.lead_j
         stands = rule.climbs_first and leg.horizontal_m == 0.0
 
         def used(
-            part: float, leg: LegFigures = leg, way_j: float = way_j, spent: float = spent, stands: bool = stands
+            part: float, leg: LegFigures = leg, way_j: float = way_j, ahead_j: float = ahead_j, stands: bool = stands
         ) -> float:
-            return spent + part * way_j + back_j(_between(leg, part), stands)
+            return ahead_j + part * way_j + back_j(_between(leg, part), leg.speed_m_s, stands)
 
         ends = [(0.0, used(0.0)), (1.0, used(1.0) + hold_j)]
         for part, j in ends:
@@ -144,7 +149,7 @@ def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m:
                 short.append((low, high))
         spent += leg.energy_j
         along += leg.horizontal_m
-        back = back_j(leg.end, stands)
+        back = back_j(leg.end, leg.speed_m_s, stands)
         rows.append(
             LegBattery(
                 leg.seq, leg.kind, leg.energy_j, spent, back, 100.0 * spent / energy.battery_j,

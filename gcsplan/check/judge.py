@@ -25,6 +25,7 @@ from gcsplan.check.plane_legs import PlaneLegs, legs_in_plane, steep_report
 from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.check.tuning import DEFAULTS, Tuning
 from gcsplan.check.verdict import Finding, LegFigures, Verdict
+from gcsplan.check.zone_heights import nearest_pass
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.firmware import STRAIGHT_NOTE, needs_straight
 from gcsplan.mavlink.mission.mission import Mission
@@ -40,6 +41,8 @@ TERRAIN_ERROR_M = 30.0
 
 NEAR_DEG = FARTHEST_M / 111_700.0
 """Degrees of latitude, or of longitude anywhere, that are surely no more than `FARTHEST_M`."""
+
+NO_CEILING = "max_agl_m is not set: nothing limits the height above ground, whose highest value is told"
 
 HIGHEST_M = 20_000.0
 """Above any aircraft that gcsplan plans for, m; keeps absurd numbers out of the exact check."""
@@ -95,16 +98,18 @@ def judge(
     if mission.autopilot is Autopilot.PX4:
         radius_m = {seq: tuning.px4_accepts_m(i)[0] for seq, i in enumerate(stored.items, stored.first_seq)}
     seconds = np.full(len(flight.stretches), math.nan)
-    if times or flight.loop_seq is not None:  # how long the battery lasts in a round depends on them
+    if times or flight.loop_seq is not None or vehicle.energy.base_w:  # the battery depends on them
         seconds = seconds_of(flight.stretches, vehicle, world, home, radius_m)
     figures = _figures(flight, plane, report, vehicle, world, seconds)
     findings += _findings(flight.stretches, plane, report, vehicle.limits, world)
+    over = nearest_pass(flight.stretches, plane.legs, plane.owner, vehicle.limits, world)
     near = nearest_misses(flight.stretches, plane.legs, plane.owner, report, vehicle, world) if misses else ()
     if others := flight.others:  # they must be legal too; the figures stay those of the mission
         plane = legs_in_plane(others, vehicle.limits, world, terrain_error_m)
         findings += _unread(others, plane)
         report = steep_report(plane, world.airspace.examine(plane.legs, vehicle.limits), vehicle.limits)
         findings = _worst(findings, _findings(others, plane, report, vehicle.limits, world))
+    flight.notes += _unlike_fitted(flight.stretches, vehicle)
     if needs_straight(mission.items, mission.autopilot):
         flight.notes.append(STRAIGHT_NOTE)
     if any(s.terrain for s in flight.stretches):
@@ -112,8 +117,28 @@ def judge(
             f"terrain-frame legs depend on the terrain data in the vehicle; judged as it reads this terrain, at posts "
             f"every {world.post_spacing_m} m, with {terrain_error_m:g} m of error"
         )
-    verdict = Verdict(mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near)
+    if vehicle.limits.max_agl_m is None:
+        flight.notes.append(NO_CEILING)
+    verdict = Verdict(
+        mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near, zone_pass=over,
+        energy_stated=vehicle.energy.stated,
+    )  # fmt: skip
     return _with_battery(verdict, vehicle, flight)
+
+
+def _unlike_fitted(stretches: Sequence[Stretch], vehicle: Vehicle) -> list[str]:
+    """A note on cruise speeds for which the energy model is not fitted."""
+    energy = vehicle.energy
+    far = {s.speed_m_s: s.seq for s in reversed(stretches) if s.on_path and energy.unlike_fitted(s.speed_m_s)}
+    if not far or energy.fitted_m_s is None:
+        return []
+    slow, fast = energy.fitted_m_s
+    speed = max(far, key=lambda v: max(slow / max(v, 1e-9), v / fast))
+    at = f"{slow:g}" if slow == fast else f"{slow:g} to {fast:g}"
+    return [
+        f"the energy is fitted to flights at {at} m/s, and from item {far[speed]} on it flies at {speed:.3g} m/s: what "
+        f"it needs may be far off; fit-energy with flights at that speed too tells it"
+    ]
 
 
 def _refused(mission: Mission) -> list[Finding]:
@@ -206,6 +231,7 @@ def _figures(
     for s, run_m, length_m, rise_m, climb_deg, ground_m, agl_m, low_deg, top_m, clear_m, zone, time_s in rows:
         hold_s = 0.0 if math.isinf(s.hold_s) else s.hold_s
         hold_j = _hold_w(vehicle, s) * hold_s
+        moving_j = energy.under_way_j(float(rise_m), float(run_m), time_s)
         figures.append(
             LegFigures(
                 seq=s.seq, kind=s.kind, start=s.start, end=s.end, column=s.column, on_path=s.on_path,
@@ -218,12 +244,14 @@ def _figures(
                 max_agl_m=top_m,
                 zone_clearance_m=clear_m,
                 nearest_zone=world.airspace.zones[zone].name if zone >= 0 else "",
-                energy_j=energy.vertical_j_per_m * float(rise_m) + energy.horizontal_j_per_m * float(run_m) + hold_j,
+                energy_j=moving_j + hold_j,
                 time_s=time_s + hold_s,
                 hold_s=s.hold_s,
                 hold_j=hold_j,
                 times=s.times,
                 jumped_from=s.jumped_from,
+                lead_j=_lead_j(vehicle, s, float(run_m), time_s),
+                speed_m_s=s.speed_m_s,
             )
         )  # fmt: skip
     return tuple(figures)
@@ -341,8 +369,20 @@ def _power_w(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> float | None
 def _hold_w(vehicle: Vehicle, s: Stretch) -> float:
     """The power, W, of the hold at the end of a stretch: of hovering, or of circling if that takes more."""
     circling = s.kind == "loiter" and s.reach_m > 0.0
-    around_w = vehicle.energy.horizontal_j_per_m * s.speed_m_s if circling else 0.0
-    return max(vehicle.energy.hover_w, around_w)
+    return vehicle.energy.hold_w(s.speed_m_s if circling else 0.0)
+
+
+def _lead_j(vehicle: Vehicle, s: Stretch, run_m: float, time_s: float) -> float:
+    """Joules of base power by which a stretch may be ahead of an even share of its energy.
+
+    From any place on it the rest takes at least the rest's metres at top speed. So by then no more time has passed than
+    the even share at top speed and the whole of what the stretch takes longer.
+    """
+    base_w = vehicle.energy.base_w
+    if not base_w or not s.speed_m_s > 0.0:
+        return 0.0
+    top_m_s = vehicle.fastest_over_ground_m_s(s.speed_m_s, max(s.start[2], s.end[2]))
+    return base_w * max(0.0, time_s - run_m / top_m_s)
 
 
 def _finding(seq: int, kind: str, message: str, value: float, limit: float, by: float, unit: str) -> Finding:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from gcsplan.check.misses import Miss
 from gcsplan.check.stretch import Place, StretchKind
+from gcsplan.check.zone_heights import ZonePass
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.units import UnitText, joined
 
@@ -41,7 +42,9 @@ class LegFigures:
     ``min_agl_m`` counts from the ground and what stands on it, on the line itself; ``agl_end_m`` from bare ground.
     ``energy_j`` includes ``hold_j`` and ``time_s`` includes ``hold_s``, those of the hold at its end; ``hold_s`` may be
     infinite (a loiter without end takes no energy and no time here). The figures are those of one pass; ``times``: how
-    often it is flown, if a jump leads back. ``jumped_from``: the jump that leads to it.
+    often it is flown, if a jump leads back. ``jumped_from``: the jump that leads to it. ``lead_j``: of ``energy_j``,
+    what is at most spent ahead of an even share on the way: the base power while it is slower than its top speed.
+    ``speed_m_s``: commanded.
     """
 
     seq: int
@@ -65,6 +68,8 @@ class LegFigures:
     hold_j: float = 0.0
     times: int = 1
     jumped_from: int | None = None
+    lead_j: float = 0.0
+    speed_m_s: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +129,8 @@ class Verdict:
     """The result of the check of ``mission`` (as sent); what is judged is what the autopilot stores of it.
 
     ``misses``: how near it comes to each limit, on request. ``until_reserve_s``: if the mission ends in a hold or a
-    round without end, seconds until the battery is down to its reserve.
+    round without end, seconds until the battery is down to its reserve. ``zone_pass``: the nearest zone that is passed
+    over or under. ``energy_stated``: the vehicle's energy was given; else energies say nothing and are not told.
     """
 
     mission: Mission
@@ -135,6 +141,12 @@ class Verdict:
     battery_used_percent: float | None = None
     misses: tuple[Miss, ...] = ()
     until_reserve_s: float | None = None
+    zone_pass: ZonePass | None = None
+    energy_stated: bool = True
+
+    def told_j(self, joules: float) -> float | None:
+        """An energy of this flight for people and files: None unless the vehicle's energy was given."""
+        return joules if self.energy_stated else None
 
     @property
     def safe(self) -> bool | None:
@@ -207,6 +219,12 @@ class Verdict:
         """The stretch that is lowest above ground, except columns; None if there is none."""
         legs = [leg for leg in self.legs if not leg.column and not math.isnan(leg.min_agl_m)]
         return min(legs, key=lambda leg: leg.min_agl_m, default=None)
+
+    @property
+    def highest(self) -> LegFigures | None:
+        """The stretch that is highest above ground, columns too; None if there is none."""
+        legs = [leg for leg in self.legs if not math.isnan(leg.max_agl_m)]
+        return max(legs, key=lambda leg: leg.max_agl_m, default=None)
 
     @property
     def nearest(self) -> LegFigures | None:

@@ -279,8 +279,9 @@ def _home(text: str) -> Degrees:
 
 
 def _say_all(batch: Batch, units: Units) -> None:
-    from gcsplan.cli.console import say, say_heights, say_notes, verdict_table
+    from gcsplan.cli.console import say, say_heights, say_notes
     from gcsplan.cli.home_words import say_home, say_warnings
+    from gcsplan.cli.verdict_table import verdict_table
     from gcsplan.export.profile_text import profile_lines
     from gcsplan.units import in_units
 

@@ -11,9 +11,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from gcsplan.check.verdict import by_item
+from gcsplan.check.rtl.words import verdict_words
 from gcsplan.cli.screens import RESULTS, aside, console
-from gcsplan.figures import floored, steepened
+from gcsplan.figures import floored, raised, steepened
 from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Unit, Units, charge, duration, in_units
 from gcsplan.world.model_words import heights_line, what_is_not_in
 
@@ -22,10 +22,8 @@ if TYPE_CHECKING:
     from gcsplan.app.model import FleetPlan, Plan, VehiclePlan
     from gcsplan.app.upload_job import JobResult
     from gcsplan.check.rtl.verdict import WayHome
-    from gcsplan.check.verdict import Verdict
     from gcsplan.mavlink.protocol.machine import Progress as Transfer
     from gcsplan.mission_file import MissionFile
-    from gcsplan.vehicle import Energy
 
 WIDEST = 100_000
 MOST_WHOLE = 30
@@ -52,6 +50,13 @@ def least(value: float | None, decimals: int = 0, unit: Unit | None = None) -> s
     return number(floored(unit.of(value), unit.decimals(decimals)), unit.decimals(decimals))
 
 
+def greatest(value: float | None, decimals: int = 0, unit: Unit | None = None) -> str:
+    """A greatest value as in `number`, but rounded up, after it is converted."""
+    if value is None or unit is None:
+        return number(None if value is None else raised(value, decimals), decimals)
+    return number(raised(unit.of(value), unit.decimals(decimals)), unit.decimals(decimals))
+
+
 def steepest(degrees: float | None, decimals: int = 1) -> str:
     """A climb or descent as in `number`, but rounded away from level."""
     return number(None if degrees is None else steepened(degrees, decimals), decimals)
@@ -67,30 +72,34 @@ def new_table(title: str, columns: Sequence[tuple[str, bool]]) -> Table:
     return table
 
 
-def _width(table: Table) -> int:
+def table_width(table: Table) -> int:
     """Terminal columns that ``table`` needs if nothing is cut."""
     return console.measure(table, options=console.options.update(width=WIDEST)).maximum
 
 
 def print_table(table: Table) -> None:
     """Print the whole table, even if a narrow terminal breaks its lines: a verdict must not be cut off."""
-    width = _width(table)
+    width = table_width(table)
     wide = console if width <= console.width else Console(file=RESULTS, highlight=False, soft_wrap=True, width=width)
     wide.print(table)
 
 
-def verdict_word(safe: bool | None, home: WayHome | None = None) -> str:
-    """The coloured words safe, UNSAFE or not judged; a path without a safe return (``home``) is not simply safe."""
-    if safe is True and home is not None and home.safe is not True:
-        return "[yellow]path safe[/]"
-    return {True: "[green]safe[/]", False: "[bold red]UNSAFE[/]", None: "[yellow]not judged[/]"}[safe]
+def verdict_cell(safe: bool | None, home: WayHome | None, units: Units, *, lines: bool = False) -> str:
+    """The verdict's words, coloured: green if path and return are safe; ``lines``: the return below the path."""
+    words = in_units(verdict_words(safe, home), units)
+    if lines:
+        words = words.replace(", ", ",\n", 1).replace("; ", ";\n", 1).replace(" from ", "\nfrom ", 1)
+    return_safe = home is not None and home.safe is True
+    colour = "bold red" if safe is False else "green" if safe and return_safe else "yellow"
+    return f"[{colour}]{words}[/]"
 
 
 def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) -> None:
     """Print a plan: a column for each vehicle, values beside their limits; a row for each in a large fleet."""
-    rows = [_plan_row(v, plan.fleet, homes.get(v.name), units) for v in plan.vehicles]
-    if all(row["energy, mAh"] == "–" for row in rows):  # a mission without a battery's voltage has no charges
-        rows = [{name: words for name, words in row.items() if name != "energy, mAh"} for row in rows]
+    rows = [_plan_row(v, plan.fleet, homes.get(v.name), units, lines=len(plan.vehicles) > 1) for v in plan.vehicles]
+    for rare in ("energy, mAh", f"over or under a zone, {units.distance.symbol}"):  # mostly there is none
+        if all(row[rare] == "–" for row in rows):
+            rows = [{name: words for name, words in row.items() if name != rare} for row in rows]
     if len(rows) > MOST_WHOLE:
         rows = [{name: words for name, words in row.items() if name.startswith(BRIEF)} for row in rows]
     title = f"[bold]{escape(plan.source.name)}[/]  planner {plan.planner}, objective {plan.objective}"
@@ -156,14 +165,20 @@ def _columns(title: str, rows: Sequence[Mapping[str, str]], each: int) -> list[T
 
 
 def _plan_row(
-    v: VehiclePlan, fleet: FleetPlan | None, home: WayHome | None = None, units: Units = METRIC
+    v: VehiclePlan,
+    fleet: FleetPlan | None,
+    home: WayHome | None = None,
+    units: Units = METRIC,
+    *,
+    lines: bool = False,
 ) -> dict[str, str]:
     """The words of one vehicle by name; times have tenths in a fleet, whose order may hang on them."""
     verdict, energy = v.verdict, v.request.vehicle.energy
     slot = None if fleet is None else fleet.slot(v.name)
     tenths = 1 if fleet is not None and len(fleet.slots) > 1 else 0
     held = f" + {duration(slot.hold_s)} at the gate" if slot and slot.hold_s > 0 else ""
-    lowest, nearest = verdict.lowest, verdict.nearest
+    lowest, highest, nearest, passed = verdict.lowest, verdict.highest, verdict.nearest, verdict.zone_pass
+    joules = verdict.told_j(verdict.energy_j)
     limits = v.request.vehicle.limits
     climb = f" of {limits.max_climb_deg:g}" if limits.max_climb_deg < 90 else ""
     return {
@@ -171,68 +186,31 @@ def _plan_row(
         "items": str(len(v.mission.wire_items())),
         f"length, {units.path.symbol}": number(verdict.length_m, 0, units.path),
         "above the bound, %": number(v.gap_percent, 2),
-        "energy, kJ": number(verdict.energy_j, 0, KILOJOULE),
-        "energy, Wh": number(verdict.energy_j, 0, WATT_HOUR),
-        "energy, mAh": number(verdict.energy_j, 0, charge(energy.battery_v)) if energy.battery_v else "–",
+        "energy, kJ": number(joules, 0, KILOJOULE),
+        "energy, Wh": number(joules, 0, WATT_HOUR),
+        "energy, mAh": number(joules, 0, charge(energy.battery_v)) if energy.battery_v else "–",
         "battery, %": number(verdict.battery_used_percent),
         f"lowest AGL, {units.height.symbol}": (
             f"{least(lowest.min_agl_m, 1, units.height)} of {units.height.stated(limits.min_agl_m)}" if lowest else "–"
         ),
+        f"highest AGL, {units.height.symbol}": (
+            greatest(highest.max_agl_m, 1, units.height)
+            + (f" of {units.height.stated(limits.max_agl_m)}" if limits.max_agl_m is not None else "")
+            if highest
+            else "–"
+        ),
         f"nearest zone, {units.distance.symbol}": (
             f"{least(nearest.zone_clearance_m, 1, units.distance)} {escape(nearest.nearest_zone)}" if nearest else "–"
+        ),
+        f"over or under a zone, {units.distance.symbol}": (
+            f"{least(passed.height_m, 1, units.distance)} {passed.side} {escape(passed.zone)}" if passed else "–"
         ),
         "steepest, °": f"{steepest(verdict.max_climb_deg)}{climb}",
         f"speed, {units.speed.symbol}": number(v.speed_m_s, 2, units.speed),
         "departs": duration(slot.depart_s if slot else 0.0, tenths) + held,
         "arrives": duration(slot.arrive_s if slot else verdict.arrive_s, tenths),
-        "verdict": verdict_word(verdict.safe, home),
+        "verdict": verdict_cell(verdict.safe, home, units, lines=lines),
     }
-
-
-def verdict_table(
-    name: str, verdict: Verdict, home: WayHome | None = None, *, units: Units = METRIC, energy: Energy | None = None
-) -> None:
-    """Print what was found, then one row for each item that is flown, and for each time that a jump leads to it."""
-    title = f"[bold]{escape(name)}[/]  {verdict_word(verdict.safe, home)}"
-    if verdict.findings or verdict.not_judged:
-        console.print(title)
-        console.print(in_units(verdict.describe(), units), style="red" if verdict.findings else "yellow", markup=False)
-        title = ""
-    height, near = units.height, units.distance
-    columns = [("item", True), ("", False), (f"leg {units.leg.symbol}", True), (f"AMSL {height.symbol}", True),
-               (f"AGL {height.symbol}", True), (f"low AGL {height.symbol}", True), ("climb °", True),
-               (f"nearest zone {near.symbol}", True), ("energy kJ", True), ("time", True)]  # fmt: skip
-    bad = {f.seq for f in verdict.findings}
-    items = list(by_item(verdict.legs))
-    rows = [
-        (
-            str(item.seq), item.kind, number(item.length_m, 0, units.leg), number(item.end[2], 1, height),
-            least(item.agl_end_m, 1, height), least(item.min_agl_m, 1, height), steepest(item.climb_deg),
-            f"{least(item.zone_clearance_m, 0, near)} {escape(item.nearest_zone)}" if item.nearest_zone else "–",
-            number(item.energy_j, 1, KILOJOULE), duration(item.time_s),
-        )
-        for item in items
-    ]  # fmt: skip
-    for hidden in ((), (9,), (8, 9), (2, 8, 9)):  # too narrow: without time, energy, length; the limits matter more
-        shown = [i for i in range(len(columns)) if i not in hidden]
-        table = new_table(title, [columns[i] for i in shown])
-        for item, row in zip(items, rows, strict=True):
-            table.add_row(*(row[i] for i in shown), style="red" if item.seq in bad else None)
-        if _width(table) <= console.width:
-            break
-    print_table(table)
-    if verdict.legs:
-        used = "" if verdict.battery_used_percent is None else f", {verdict.battery_used_percent:.0f} % of the battery"
-        words = energy_words(verdict.energy_j, None if energy is None else energy.battery_v)
-        length = f"{number(verdict.length_m, 0, units.path)} {units.path.symbol}"
-        say(f"path {length}; whole flight {duration(verdict.time_s)}, {words}{used}")
-    say_notes(verdict.notes)
-
-
-def energy_words(joules: float, volts: float | None = None) -> str:
-    """An energy in every unit that it has: ``2 737 kJ, 760 Wh``, with a voltage ``34 245 mAh``, too."""
-    units = (KILOJOULE, WATT_HOUR, *([charge(volts)] if volts else []))
-    return ", ".join(f"{number(joules, 0, unit)} {unit.symbol}" for unit in units)
 
 
 def upload_table(results: Sequence[JobResult], title: str = "upload") -> None:
@@ -367,7 +345,7 @@ def rows_table(title: str, rows: Sequence[Mapping[str, str]], *, left: Sequence[
     table = new_table(title, [(name, name not in left) for name in rows[0]])
     for row in rows:
         table.add_row(*row.values())
-    if _width(table) <= console.width:
+    if table_width(table) <= console.width:
         print_table(table)
     else:
         _columns_table(title, rows)
@@ -375,6 +353,6 @@ def rows_table(title: str, rows: Sequence[Mapping[str, str]], *, left: Sequence[
 
 def _columns_table(title: str, rows: Sequence[Mapping[str, str]]) -> None:
     """Print a column for each of ``rows``, as many side by side as there is room for, up to four."""
-    each = next((n for n in (4, 3, 2) if all(_width(t) <= console.width for t in _columns(title, rows, n))), 1)
+    each = next((n for n in (4, 3, 2) if all(table_width(t) <= console.width for t in _columns(title, rows, n))), 1)
     for table in _columns(title, rows, each):
         print_table(table)

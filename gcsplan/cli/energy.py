@@ -29,11 +29,11 @@ def fit_energy(
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Fit the energy model to flight logs: joules per metre up or down and along, and watts of hovering.
+    """Fit the energy model to flight logs: joules per metre up or down and through the air, and watts.
 
-    Fly parts of it level, parts up and down, and hover for half a minute; the log must hold battery voltage and
-    current. Standard output is what to paste into a vehicle of the mission file. Exit code 4 means that the log does
-    not determine R1 or R2.
+    Fly parts of it level at two speeds, parts up and down, and hover for half a minute; the log must hold battery
+    voltage and current. Standard output is what to paste into a vehicle of the mission file. Exit code 4 means that
+    the log does not determine R1 or R2.
     """
     from gcsplan.cli.console import remark
     from gcsplan.logs.fit import fit_energy as fit
@@ -59,9 +59,13 @@ def fit_energy(
         )
         for note in found.notes:
             remark(f"note: {note}")
-        for c in (found.vertical, found.horizontal, found.hover):
+        for c in (found.vertical, found.horizontal, found.base, found.hover):
             if c.value is None:
                 remark(f"{c.name}: {c.why}")
+        if found.base.value is None and found.speed_m_s > 0.0:
+            remark(
+                f"note: this fit holds at {found.speed_m_s:.1f} m/s through the air, and says nothing of other speeds"
+            )
         put(found.yaml())
     raise typer.Exit(CheckFailed.exit_code if error else 0)
 

@@ -76,8 +76,9 @@ def upload(
     from gcsplan.app import check_sites, checking, fencing, pipeline, uploads
     from gcsplan.app import way_home as returns
     from gcsplan.app.upload_job import UploadOptions
-    from gcsplan.cli.console import say_notes, say_notes_of, transfer_progress, upload_table, verdict_table
+    from gcsplan.cli.console import say_notes, say_notes_of, transfer_progress, upload_table
     from gcsplan.cli.home_words import say_warnings
+    from gcsplan.cli.verdict_table import verdict_table
     from gcsplan.export.outdir import require_settled, steady
     from gcsplan.sim.loopback import loopback_fleet
     from gcsplan.units import units_of

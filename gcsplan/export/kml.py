@@ -137,7 +137,8 @@ def _track(track: Track, style: int, frame: Frame, start: datetime | None, *, li
     yield "<Folder>"
     yield f"<name>{name}</name>"
     yield from _look_at(_places(track), frame, along=True)
-    yield f"<Placemark><name>{name}</name><styleUrl>#track{style}</styleUrl>"
+    described = f"<description>{_text(track.description)}</description>" if track.description else ""
+    yield f"<Placemark><name>{name}</name>{described}<styleUrl>#track{style}</styleUrl>"
     yield f"<LineString>{'' if light else '<extrude>1</extrude>'}<altitudeMode>absolute</altitudeMode>"
     yield f"<coordinates>{_coordinates(track.lat_deg, track.lon_deg, track.amsl_m)}</coordinates>"
     yield "</LineString></Placemark>"

@@ -61,7 +61,7 @@ class Track:
 
     ``waypoints`` (N,) has the figures of the points that an item ends at, None for the others. ``reached_s``,
     ``left_s`` (N,): when the vehicle comes to each point and when it goes on, seconds from the common start; None if
-    that is not known.
+    that is not known. ``description``: what a viewer says of it.
     """
 
     vehicle: str
@@ -71,6 +71,7 @@ class Track:
     waypoints: tuple[WayPoint | None, ...] = field(default=())
     reached_s: Floats | None = None
     left_s: Floats | None = None
+    description: str = ""
 
     def __post_init__(self) -> None:
         columns = [np.asarray(getattr(self, name), float) for name in ("lat_deg", "lon_deg", "amsl_m")]

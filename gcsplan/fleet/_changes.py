@@ -220,7 +220,7 @@ class Chooser:
             for option in self._with_hold(base, hold):
                 if (found is None or option.cost < found.cost) and self.clear(option):
                     found = option
-            if found is not None and self.craft.vehicle.energy.hover_w > 0.0:
+            if found is not None and self.craft.vehicle.energy.hold_w() > 0.0:
                 break  # a longer hold costs more
         return found
 

@@ -91,14 +91,15 @@ class Craft:
         if hold == "ground":
             return 0.0
         if hold == "gate" and self.vehicle.can_hold:
-            return energy.hover_w
-        return max(energy.horizontal_j_per_m, 1.0) * self.slowest_m_s
+            return energy.hold_w()
+        return max(energy.horizontal_j_per_m, 1.0) * self.slowest_m_s + energy.base_w
 
     def fly(self, speed_m_s: float, depart_s: float = 0.0, hold_s: float = 0.0, notes: Sequence[str] = ()) -> Slot:
         """The slot of a flight with this speed (put into range), departure and hold."""
         speed = min(max(float(np.float32(speed_m_s)), self.slowest_m_s), self.fastest_m_s)
         arrive_s = depart_s + self.course.time_to_goal_s(speed, hold_s)
-        joules = self.crew.route.energy_j(self.vehicle, hold_s)
+        moving_s = self.course.moving_s(speed) if self.vehicle.energy.base_w else math.nan
+        joules = self.crew.route.energy_j(self.vehicle, hold_s, moving_s)
         said = (*notes, *_speed_notes(self.vehicle, speed))
         return Slot(self.name, depart_s, hold_s, speed, arrive_s, joules, self.crew.route, said)
 
@@ -124,12 +125,13 @@ class Craft:
     def _held(self, arrive_s: float, spare_s: float) -> Slot:
         """Hold whole seconds at the gate; the speed makes up for the fraction, or, if it cannot, the departure."""
         hold_s = math.ceil(spare_s - WITHIN_S)
-        joules = self.vehicle.energy.hover_w * hold_s
+        joules = self.vehicle.energy.hold_w() * hold_s
         if arrive_s - hold_s >= self.fast_s:
             note = f"holds {hold_s} s at the gate ({joules:.0f} J)"
             return self.fly(self._speed_for(arrive_s - hold_s), 0.0, float(hold_s), [note])
         hold_s = math.floor(spare_s)
-        note = f"holds {hold_s} s at the gate ({self.vehicle.energy.hover_w * hold_s:.0f} J); a hold is whole seconds: "
+        joules = self.vehicle.energy.hold_w() * hold_s
+        note = f"holds {hold_s} s at the gate ({joules:.0f} J); a hold is whole seconds: "
         note += f"the rest, {spare_s - hold_s:.2f} s, it waits on the ground"
         return self.fly(self.slowest_m_s, spare_s - hold_s, float(hold_s), [note])
 

@@ -95,22 +95,18 @@ class Route:
         """Length in space of the way-point legs, with corners not cut, m."""
         return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
 
-    def energy_j(self, vehicle: Vehicle, hold_s: float = 0.0) -> float:
-        """Energy of the flight, J (krill paper, Table 1: R1 per vertical metre, R2 per horizontal one).
+    def energy_j(self, vehicle: Vehicle, hold_s: float = 0.0, moving_s: float = math.nan) -> float:
+        """Energy of the flight, J, by `gcsplan.vehicle.Energy`.
 
-        Holds take ``hover_w``. Corners are not cut. ``hold_s`` is added to the route's own holds. Waiting on the ground
-        costs nothing.
+        Corners are not cut. ``hold_s`` is added to the route's own holds; ``moving_s``: seconds of flight without any
+        hold (`Course.moving_s`), needed with a base power alone. Waiting on the ground costs nothing.
         """
         corners = flown_corners(self)
         d = np.diff(corners, axis=0)
         held = hold_s + (0.0 if self.holds_s is None else float(self.holds_s.sum()))
         held += vehicle.return_waits_s if self.end == "rtl" else 0.0
-        energy = vehicle.energy
-        return (
-            energy.vertical_j_per_m * float(np.abs(d[:, 2]).sum())
-            + energy.horizontal_j_per_m * float(np.hypot(d[:, 0], d[:, 1]).sum())
-            + energy.hover_w * held
-        )
+        up_m, along_m = float(np.abs(d[:, 2]).sum()), float(np.hypot(d[:, 0], d[:, 1]).sum())
+        return vehicle.energy.under_way_j(up_m, along_m, moving_s) + vehicle.energy.hold_w() * held
 
 
 class Course:
@@ -152,6 +148,11 @@ class Course:
         """
         first = 0.0 if self.takeoff is None else self.takeoff.time_s(speed_m_s)
         return first + self.gate_s + hold_s + sum(s.time_s(speed_m_s) + held for s, held in self.to_goal)
+
+    def moving_s(self, speed_m_s: float) -> float:
+        """Seconds of the whole flight at a cruise speed, its end included and without holds."""
+        parts = [*([] if self.takeoff is None else [self.takeoff]), *(s for s, _ in self.to_goal), *self.after]
+        return math.fsum(part.time_s(speed_m_s) for part in parts)
 
     def fly(
         self, speed_m_s: float, depart_s: float = 0.0, hold_s: float = 0.0, error_m: float = POSITION_ERROR_M

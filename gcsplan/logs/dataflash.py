@@ -1,7 +1,8 @@
 """ArduPilot's onboard logs (.bin), read with pymavlink's DFReader.
 
-BAT holds Volt and Curr of each battery instance (AP_BattMonitor; CURR before 4.0). POS is the estimator's position; GPS
-is used if there is none. TimeUS is in microseconds since boot.
+BAT holds Volt and Curr of each battery instance (AP_BattMonitor; CURR before 4.0, whose whole numbers are hundredths
+until 3.3). POS is the estimator's position; GPS is used if there is none. XKF2 or NKF2 hold the wind that the estimator
+finds, which is 0 throughout if it looks for none. TimeUS is in microseconds since boot.
 """
 
 from __future__ import annotations
@@ -16,10 +17,12 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.errors import InputError
-from gcsplan.logs.flight_log import FlightLog, together
+from gcsplan.logs.flight_log import FlightLog, together, watts_of
 
 HEAD = b"\xa3\x95"
 FIX_3D = 3
+WHOLE = frozenset("bBhHiIqQ")
+"""Format characters of whole numbers that DFReader does not scale."""
 
 
 def read_dataflash(file: Path) -> FlightLog:
@@ -31,14 +34,15 @@ def read_dataflash(file: Path) -> FlightLog:
 
     places: list[tuple[float, float, float, float]] = []
     gps: list[tuple[float, float, float, float]] = []
-    batteries: dict[int, list[tuple[float, float]]] = {}
-    old: list[tuple[float, float]] = []
+    batteries: dict[int, list[tuple[float, float, float]]] = {}
+    wind: list[tuple[float, float, float]] = []
+    old: list[tuple[float, float, float]] = []
     log = None
     with _overheard() as said:
         try:
             log = DFReader.DFReader_binary(str(file))
-            while (m := log.recv_match(type=["BAT", "CURR", "POS", "GPS"])) is not None:
-                _take(m, places, gps, batteries, old)
+            while (m := log.recv_match(type=["BAT", "CURR", "POS", "GPS", "XKF2", "NKF2"])) is not None:
+                _take(m, places, gps, batteries, old, wind)
         except Exception as error:  # the reader has no error class for a damaged file
             raise InputError(
                 f"could not be read by pymavlink ({type(error).__name__}: {error}): it is damaged or not whole; "
@@ -56,8 +60,9 @@ def read_dataflash(file: Path) -> FlightLog:
         notes.append(f"{file.name}: no POS messages, so the GPS's own places were taken")
     if not batteries and old:
         batteries = {0: old}
-    _require(file, places, batteries)
-    return FlightLog.of(str(file), places, together(batteries), tuple(notes))
+    power = {which: watts_of(rows, str(file)) for which, rows in batteries.items()}
+    _require(file, places, power)
+    return FlightLog.of(str(file), places, together(power), tuple(notes), wind=wind)
 
 
 @contextmanager
@@ -77,8 +82,9 @@ def _overheard() -> Iterator[Callable[[], bool]]:
 
 
 def _take(
-    m: Any, places: list[Any], gps: list[Any], batteries: dict[int, list[tuple[float, float]]], old: list[Any]
-) -> None:
+    m: Any, places: list[Any], gps: list[Any], batteries: dict[int, list[tuple[float, float, float]]], old: list[Any],
+    wind: list[Any],
+) -> None:  # fmt: skip
     kind, time_s = m.get_type(), float(getattr(m, "TimeUS", math.nan)) * 1e-6
     if not math.isfinite(time_s):
         return
@@ -88,9 +94,18 @@ def _take(
         gps.append((time_s, float(m.Lat), float(m.Lng), float(m.Alt)))
     elif kind == "BAT":
         which = int(getattr(m, "Inst", getattr(m, "Instance", 0)))
-        batteries.setdefault(which, []).append((time_s, float(m.Volt) * float(m.Curr)))
+        batteries.setdefault(which, []).append((time_s, *_volt_and_ampere(m)))
     elif kind == "CURR" and hasattr(m, "Curr"):
-        old.append((time_s, float(m.Volt) * float(m.Curr)))
+        old.append((time_s, *_volt_and_ampere(m)))
+    elif kind in ("XKF2", "NKF2") and int(getattr(m, "C", 0)) == 0 and hasattr(m, "VWN"):
+        wind.append((time_s, float(m.VWE), float(m.VWN)))
+
+
+def _volt_and_ampere(m: Any) -> tuple[float, float]:
+    """Voltage and current; whole numbers without a scale of their own are hundredths (ArduCopter until 3.3)."""
+    form = dict(zip(m.fmt.columns, m.fmt.format, strict=False))
+    volt, ampere = (float(getattr(m, key)) * (0.01 if form.get(key) in WHOLE else 1.0) for key in ("Volt", "Curr"))
+    return volt, ampere
 
 
 def _require(file: Path, places: list[Any], batteries: dict[int, list[tuple[float, float]]]) -> None:

@@ -1,7 +1,9 @@
-"""Fit R1, R2 and hover power to flown energy: the cost of a vertical metre, a horizontal metre and a second of hover.
+"""Fit the energy model to flown energy: a vertical metre, a metre through the air, a second of flight, one of hovering.
 
 The model is that of `gcsplan.vehicle.Energy`, with which missions are planned: a step of the flight takes R1 times its
-vertical metres plus R2 times its horizontal ones, and hover power times its seconds of hovering. The fit is weighted
+vertical metres plus R2 times its horizontal metres through the air plus the base power times its seconds, or hover
+power times its seconds of hovering. Flights at one speed cannot tell the base power from R2: it is then left out, and
+the fit holds at that speed. Metres are through the air where the log tells the wind. The fit is weighted
 least squares over steps of a few seconds, robust by Huber's weights, with no coefficient below 0. A coefficient is
 reported only if the log determines it: enough of its motion was flown, the other columns do not explain its column, and
 its 95 % interval is narrow.
@@ -16,18 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from gcsplan.arrays import Bools, Floats
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
-from gcsplan.logs.flight_log import FlightLog
-
-STEP_S = 5.0
-"""Length of a step: long enough that height noise is small beside the climb, short enough to be of one kind."""
-
-STILL_M_S, STILL_RISE_M_S = 1.0, 0.3
-"""Horizontal and vertical speed below which the vehicle hovers."""
-
-UP_M, RUNNING = 2.0, 0.05
-"""In the air: this far above the lowest place, m, and with at least this part of the median power."""
+from gcsplan.logs.flight_log import FlightLog, require_power
+from gcsplan.logs.steps import STEP_S, STILL_M_S, STILL_RISE_M_S, steps_of
 
 LEAST = (20.0, 200.0, 20.0)
 """Least vertical metres, horizontal metres and seconds of hovering for a coefficient."""
@@ -41,15 +35,18 @@ UNIQUE = 0.03
 WIDEST = 0.25
 """Largest half of the 95 % interval, as a part of the value."""
 
-FASTEST_M_S = 150.0
-"""A higher speed is a damaged reading."""
-
 HUBER, ROUNDS = 1.345, 30
-GAP_S = 3.0
-"""Longest pause of positions or battery readings within a step that is used, s."""
+NAMES = ("vertical_j_per_m", "horizontal_j_per_m", "hover_w", "base_w")
+WORDS = ("vertical metres", "horizontal metres", "hovering", "time")
+BASE = 3
+"""The column of the seconds that are not hovering."""
 
-NAMES = ("vertical_j_per_m", "horizontal_j_per_m", "hover_w")
-WORDS = ("vertical metres", "horizontal metres", "hovering")
+APART = 1.2
+"""The fastest airspeed over the slowest that tells a base power."""
+
+ALIKE = 0.1
+"""Beside a base power: the part of the power to which what a metre adds must be known; it may be nothing."""
+
 AMOUNTS = ("m up and down", "m along", "s of hovering")
 
 
@@ -65,11 +62,16 @@ class Coefficient:
 
 @dataclass(frozen=True, slots=True)
 class EnergyFit:
-    """The fit to one or more logs. ``off_percent`` is the median error of the model in a step's energy."""
+    """The fit to one or more logs. ``off_percent`` is the median error of the model in a step's energy.
+
+    ``fitted_m_s``: slowest and fastest airspeed at which it holds, one number twice without a base power.
+    """
 
     vertical: Coefficient
     horizontal: Coefficient
     hover: Coefficient
+    base: Coefficient
+    fitted_m_s: tuple[float, float]
     steps: int
     energy_j: float
     speed_m_s: float
@@ -84,161 +86,157 @@ class EnergyFit:
     def yaml(self) -> str:
         """The lines to paste into a vehicle of a mission file."""
         lines = ["energy:"]
-        for c in (self.vertical, self.horizontal, self.hover):
+        for c in (self.vertical, self.horizontal, self.base, self.hover):
             if c.value is None:
                 lines.append(f"  # {c.name}: {c.why}")
             else:
                 lines.append(f"  {c.name}: {_three(c.value)}  # ± {_three(c.half_95 or 0.0)} (95 %)")
+        slow, fast = (_three(v) for v in self.fitted_m_s)
+        if self.speed_m_s > 0.0:
+            lines.append(f"  fitted_speed_m_s: {slow if slow == fast else f'[{slow}, {fast}]'}")
         return "\n".join(lines) + "\n"
 
     def as_dict(self) -> dict[str, Any]:
         """The fit as plain values."""
         return {
             c.name: {"value": c.value, "half_95": c.half_95, "why": c.why or None}
-            for c in (self.vertical, self.horizontal, self.hover)
+            for c in (self.vertical, self.horizontal, self.base, self.hover)
         } | {
             "steps": self.steps, "energy_j": self.energy_j, "speed_m_s": self.speed_m_s,
+            "fitted_speed_m_s": list(self.fitted_m_s),
             "off_percent": self.off_percent, "told": self.told, "notes": list(self.notes),
         }  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class Steps:
-    """N steps: ``design`` (N, 3) vertical metres, horizontal metres, hover seconds; ``energy_j``; signed ``rise_m``."""
-
-    design: Floats
-    energy_j: Floats
-    rise_m: Floats
 
 
 def fit_energy(logs: Sequence[FlightLog]) -> EnergyFit:
     """The model that fits all ``logs`` together. Raises InputError if they hold no flight."""
     parts = [steps_of(log) for log in logs]
+    where = ", ".join(log.name for log in logs)
     x = np.concatenate([p.design for p in parts])
     y = np.concatenate([p.energy_j for p in parts])
+    rise = np.concatenate([p.rise_m for p in parts])
     if len(y) < 6:
         raise InputError(
-            f"hold {len(y) * STEP_S:.0f} s of flight with battery readings, too little for a fit",
-            where=", ".join(log.name for log in logs),
+            f"hold {len(y) * STEP_S:.0f} s of flight with battery readings, too little for a fit", where=where
         )
-    rise = np.concatenate([p.rise_m for p in parts])
-    amount = x.sum(axis=0)
-    amount[0] = x[np.abs(rise) > STILL_RISE_M_S * STEP_S, 0].sum()  # smaller changes may be height noise
-    taking_part = [np.abs(rise) > STILL_RISE_M_S * STEP_S, x[:, 1] > 0.0, x[:, 2] > 0.0]
-    parts_of = np.array([t.sum() for t in taking_part])
-    has = (amount >= np.array(LEAST)) & (parts_of >= LEAST_STEPS)
-    columns = [k for k in range(3) if has[k]]
+    require_power(y / STEP_S, where)
+    reasons = _too_little(x, rise)
+    columns = [k for k in range(3) if not reasons[k]]
     kept = x[:, columns].sum(axis=1) > 0.0
     x, y, rise = x[kept], y[kept], rise[kept]
-    notes = [n for log in logs for n in log.notes]
-    reasons = ["", "", ""]
-    for k in range(3):
-        if not has[k]:
-            reasons[k] = (
-                f"{amount[k]:.0f} {AMOUNTS[k]} are too few: at least {LEAST[k]:.0f} are needed"
-                if amount[k] < LEAST[k]
-                else f"{parts_of[k] * STEP_S:.0f} s of it are too little: {LEAST_STEPS * STEP_S:.0f} s are needed"
-            )
     if not columns or len(y) < 2 * len(columns):
-        raise InputError(
-            "hold no flight: " + "; ".join(r for r in reasons if r), where=", ".join(log.name for log in logs)
-        )
-    beta, weight = _robust(x[:, columns], y)
-    unique = _unique(x[:, columns] * np.sqrt(weight)[:, None])
-    half = 1.96 * np.sqrt(np.maximum(np.diag(_covariance(x[:, columns], y, beta, weight)), 0.0))
-    made: list[Coefficient] = []
-    for k in range(3):
-        if reasons[k]:
-            made.append(Coefficient(NAMES[k], None, None, reasons[k]))
-            continue
-        j = columns.index(k)
-        why = ""
-        if unique[j] < UNIQUE:
-            why = _shadow(k, columns, x)
-        elif beta[j] <= 0.0:
-            why = f"the energy does not grow with {WORDS[k]} in this log"
-        elif half[j] > WIDEST * beta[j]:
-            about = f"{_three(float(beta[j]))} ± {_three(float(half[j]))}"
-            why = f"{about} is too uncertain: fly more of it, or in calmer air"
-        made.append(
-            Coefficient(NAMES[k], None, None, why) if why else Coefficient(NAMES[k], float(beta[j]), float(half[j]), "")
-        )
-    said = x[:, columns] @ beta
+        raise InputError("hold no flight: " + "; ".join(r for r in reasons if r), where=where)
     moving = x[:, 1] > STILL_M_S * STEP_S
-    notes += _up_and_down(x, y, rise, made)
+    speeds = x[moving, 1] / STEP_S if moving.any() else np.zeros(1)
+    slow, middle, fast = (float(v) for v in np.quantile(speeds, (0.05, 0.5, 0.95)))
+    based, why = _with_base(x, y, columns, (slow, fast)) if 1 in columns else (None, "nothing was flown along")
+    if based is not None:
+        made, base, columns = based.coefficients(reasons), based.base, [*columns, BASE]
+        fitted = slow, fast
+    else:
+        alone = _Model.of(x, y, columns)
+        made, base = alone.coefficients(reasons), Coefficient("base_w", None, None, why)
+        fitted = middle, middle
     return EnergyFit(
         vertical=made[0],
         horizontal=made[1],
         hover=made[2],
+        base=base,
+        fitted_m_s=fitted,
         steps=len(y),
         energy_j=float(y.sum()),
-        speed_m_s=float(np.median(x[moving, 1]) / STEP_S) if moving.any() else 0.0,
-        off_percent=float(100.0 * np.median(np.abs(y - said) / np.maximum(y, 1e-9))),
-        notes=tuple(notes),
+        speed_m_s=middle if moving.any() else 0.0,
+        off_percent=float(100.0 * np.median(np.abs(y - (based or alone).said) / np.maximum(y, 1e-9))),
+        notes=(*(n for log in logs for n in log.notes), *_of_wind(logs), *_up_and_down(x, y, rise, made, base)),
     )
 
 
-def steps_of(log: FlightLog) -> Steps:
-    """The log in steps of `STEP_S`, in the air, without pauses."""
-    begin = max(log.place_s[0], log.power_s[0])
-    end = min(log.place_s[-1], log.power_s[-1])
-    if end - begin < 2.0 * STEP_S:
-        raise InputError("positions and battery readings do not overlap in time", where=log.name)
-    second = np.arange(begin, end, 1.0)
-    east, north, amsl = (_smoothed(log.place_s, a, second) for a in (log.east_m, log.north_m, log.amsl_m))
-    spent = _energy_until(log.power_s, log.power_w, second)
-    per = int(STEP_S)
-    n = (len(second) - 1) // per
-    at = np.arange(n + 1) * per
-    run = np.hypot(np.diff(east), np.diff(north))[: n * per].reshape(n, per)
-    rise = np.diff(amsl)[: n * per].reshape(n, per)
-    along, up = run.sum(axis=1), rise.sum(axis=1)
-    energy = np.diff(spent[at])
-    chord = np.hypot(np.diff(east[at]), np.diff(north[at]))
-    slow = (run.max(axis=1) < STILL_M_S) & (chord < STILL_M_S * STEP_S)
-    level = np.abs(up) < STILL_RISE_M_S * STEP_S
-    still = slow & level
-    watts = energy / STEP_S
-    flying = (amsl[at[:-1]] > amsl.min() + UP_M) & (amsl[at[1:]] > amsl.min() + UP_M)
-    flying &= watts > RUNNING * np.median(watts[flying]) if flying.any() else flying
-    whole = ~_paused(log.place_s, second[at]) & ~_paused(log.power_s, second[at])
-    # A step that turns from climb to descent, or begins or ends in a hover, is of two kinds and is left out.
-    one_kind = np.abs(up) > 0.8 * np.abs(rise).sum(axis=1) - STILL_RISE_M_S * STEP_S
-    one_kind &= slow | (run.min(axis=1) >= STILL_M_S) | (along == 0.0)
-    columns = np.where(still, 0.0, np.abs(up)), np.where(slow, 0.0, along), np.where(still, STEP_S, 0.0)
-    design = np.stack(columns, axis=-1)
-    good = flying & whole & one_kind & (energy > 0.0) & (along + np.abs(up) < FASTEST_M_S * STEP_S)
-    return Steps(design[good], energy[good], up[good])
+def _too_little(x: Floats, rise: Floats) -> list[str]:
+    """Why too little of each motion was flown for its coefficient; empty: it is enough."""
+    amount = x[:, :3].sum(axis=0)
+    up = np.abs(rise) > STILL_RISE_M_S * STEP_S
+    amount[0] = x[up, 0].sum()  # smaller changes may be height noise
+    steps = np.array([t.sum() for t in (up, x[:, 1] > 0.0, x[:, 2] > 0.0)])
+    reasons = []
+    for k in range(3):
+        if amount[k] < LEAST[k]:
+            reasons.append(f"{amount[k]:.0f} {AMOUNTS[k]} are too few: at least {LEAST[k]:.0f} are needed")
+        elif steps[k] < LEAST_STEPS:
+            reasons.append(f"{steps[k] * STEP_S:.0f} s of it are too little: {LEAST_STEPS * STEP_S:.0f} s are needed")
+        else:
+            reasons.append("")
+    return reasons
 
 
-def _smoothed(t: Floats, a: Floats, at: Floats) -> Floats:
-    """The mean over a second around each of ``at`` if it has several readings; otherwise interpolated."""
-    total = np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(t))])
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """Coefficients of some columns, their halves of the 95 % interval, and the energy that they say of each step.
 
-    def until(x: Floats) -> Floats:
-        x = np.clip(x, t[0], t[-1])
-        k = np.clip(np.searchsorted(t, x, "right") - 1, 0, len(t) - 2)
-        value = np.interp(x, t, a)
-        return np.asarray(total[k] + 0.5 * (a[k] + value) * (x - t[k]))
+    ``alike_w``: the power of a step up to which a coefficient with a base power beside it need not be known; it may
+    then be 0. None without a base.
+    """
 
-    low, high = np.clip(at - 0.5, t[0], t[-1]), np.clip(at + 0.5, t[0], t[-1])
-    return np.asarray((until(high) - until(low)) / np.maximum(high - low, 1e-9))
+    x: Floats
+    columns: list[int]
+    beta: Floats
+    half: Floats
+    unique: Floats
+    said: Floats
+    alike_w: float | None = None
+
+    @classmethod
+    def of(cls, x: Floats, y: Floats, columns: list[int]) -> _Model:
+        some = x[:, columns]
+        beta, weight = _robust(some, y)
+        half = 1.96 * np.sqrt(np.maximum(np.diag(_covariance(some, y, beta, weight)), 0.0))
+        alike = ALIKE * float(np.median(y)) / STEP_S if BASE in columns else None
+        return cls(x, columns, beta, half, _unique(some * np.sqrt(weight)[:, None]), some @ beta, alike)
+
+    def coefficients(self, reasons: Sequence[str]) -> list[Coefficient]:
+        """R1, R2 and hover power; ``reasons``: why one of them has no column."""
+        return [self._one(k) if not reasons[k] else Coefficient(NAMES[k], None, None, reasons[k]) for k in range(3)]
+
+    @property
+    def base(self) -> Coefficient:
+        """The base power."""
+        return self._one(BASE)
+
+    def _one(self, k: int) -> Coefficient:
+        j = self.columns.index(k)
+        value, half, why = float(self.beta[j]), float(self.half[j]), ""
+        per_s = np.median(self.x[self.x[:, k] > 0.0, k]) / STEP_S
+        alike = self.alike_w is not None and k < 2 and half * per_s <= self.alike_w
+        if self.unique[j] < UNIQUE:
+            why = _shadow(k, self.columns, self.x)
+        elif value <= 0.0 and not alike:
+            why = f"the energy does not grow with {WORDS[k]} in this log"
+        elif half > WIDEST * value and not alike:
+            about = f"{_three(value)} ± {_three(half)}"
+            why = f"{about} is too uncertain: fly more of it, or in calmer air"
+        return Coefficient(NAMES[k], None, None, why) if why else Coefficient(NAMES[k], value, half, "")
 
 
-def _energy_until(t: Floats, watts: Floats, at: Floats) -> Floats:
-    """Joules from the first reading up to each of ``at``, with power linear between readings."""
-    total = np.concatenate([[0.0], np.cumsum(0.5 * (watts[1:] + watts[:-1]) * np.diff(t))])
-    k = np.clip(np.searchsorted(t, at, "right") - 1, 0, len(t) - 2)
-    return np.asarray(total[k] + 0.5 * (watts[k] + np.interp(at, t, watts)) * (at - t[k]))
+def _with_base(
+    x: Floats, y: Floats, columns: Sequence[int], speeds_m_s: tuple[float, float]
+) -> tuple[_Model | None, str]:
+    """The model with a base power, or why the flights do not tell one."""
+    slow, fast = speeds_m_s
+    if fast < APART * slow:
+        return None, f"flown at {_three(0.5 * (slow + fast))} m/s through the air alone: fly at two speeds or more"
+    model = _Model.of(x, y, [*columns, BASE])
+    if model.base.value is None:
+        return None, model.base.why
+    return model, ""
 
 
-def _paused(t: Floats, at: Floats) -> Bools:
-    """(N,) whether a pause of the readings reaches into each step between neighbours of ``at``."""
-    long = np.flatnonzero(np.diff(t) > GAP_S)
-    out = np.zeros(len(at) - 1, np.bool_)
-    for k in long.tolist():
-        out |= (at[1:] > t[k]) & (at[:-1] < t[k + 1])
-    return out
+def _of_wind(logs: Sequence[FlightLog]) -> list[str]:
+    """Whether metres are those through the air."""
+    told = [log for log in logs if len(log.wind)]
+    if not told:
+        return ["no log tells the wind: metres over ground are taken for those through the air"]
+    mean = [float(np.hypot(log.wind[:, 1], log.wind[:, 2]).mean()) for log in told]
+    words = f"metres are those through the air, in a wind of {max(mean):.1f} m/s as the log tells it"
+    return [words if len(told) == len(logs) else f"{words}; {len(logs) - len(told)} of {len(logs)} logs tell none"]
 
 
 def _robust(x: Floats, y: Floats) -> tuple[Floats, Floats]:
@@ -282,6 +280,8 @@ def _unique(x: Floats) -> Floats:
 
 def _shadow(k: int, columns: Sequence[int], x: Floats) -> str:
     others = " and ".join(WORDS[c] for c in columns if c != k and (x[:, c] > 0.0).any())
+    if k == BASE:
+        return f"cannot be told apart from {others}: the log has them always in the same proportion; fly at two speeds"
     if k < 2:
         return (
             f"cannot be told apart from {others}: the log has them always in the same proportion; fly some of it "
@@ -290,17 +290,17 @@ def _shadow(k: int, columns: Sequence[int], x: Floats) -> str:
     return f"cannot be told apart from {others}"
 
 
-def _up_and_down(x: Floats, y: Floats, rise: Floats, made: Sequence[Coefficient]) -> list[str]:
+def _up_and_down(x: Floats, y: Floats, rise: Floats, made: Sequence[Coefficient], base: Coefficient) -> list[str]:
     """A note on the separate costs of a metre up and a metre down, for which the model has one number."""
     if made[0].value is None or made[1].value is None:
         return []
     up, down = np.where(rise > 0.0, x[:, 0], 0.0), np.where(rise < 0.0, x[:, 0], 0.0)
-    rest = y - x[:, 1] * made[1].value - x[:, 2] * (made[2].value or 0.0)
+    rest = y - x[:, 1] * made[1].value - x[:, 2] * (made[2].value or 0.0) - x[:, BASE] * (base.value or 0.0)
     if up.sum() < LEAST[0] or down.sum() < LEAST[0]:
         flown = "climbs" if up.sum() >= down.sum() else "descents"
         return [f"the vertical metres are nearly all {flown}: R1 is theirs alone"]
     each = [float(side @ rest / (side @ side)) for side in (up, down)]
-    if abs(each[0] - each[1]) > 0.3 * made[0].value:
+    if abs(each[0] - each[1]) > 0.3 * max(made[0].value, 1.0):
         return [
             f"a metre up costs about {each[0]:.0f} J and a metre down {each[1]:.0f} J; R1 is one number for both, good "
             f"for missions that climb as much as they descend"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,16 +14,21 @@ from gcsplan.figures import counted
 
 EQUATOR_M, ECCENTRICITY_2 = 6_378_137.0, 6.694379990141e-3  # WGS84
 LEAST_POINTS = 20
+LEAST_V, MOST_V, LEAST_A, MOST_A, LEAST_W, MOST_W = 2.0, 1000.0, 0.02, 1000.0, 1.0, 100_000.0
+"""Between these lie voltage, current and power of the aircraft that gcsplan plans for, in the middle of a flight."""
+
+MOST_WIND_M_S = 60.0
 LONGEST_S, FARTHEST_DEG = 86_400.0, 3.0
 """Readings farther than this from the middle of a log, in time or place, are damaged, or from before the GPS fix."""
 
 
 @dataclass(frozen=True, eq=False)
 class FlightLog:
-    """Two series of one flight, each with its own clock readings (seconds, rising).
+    """The series of one flight, each with its own clock readings (seconds, rising).
 
-    ``place_s``, ``east_m``, ``north_m``, ``amsl_m`` are (P,), ``power_s``, ``power_w`` are (Q,). ``notes`` state which
-    data was used and which was skipped.
+    ``place_s``, ``east_m``, ``north_m``, ``amsl_m`` are (P,), ``power_s``, ``power_w`` are (Q,). ``wind`` (W, 3) are
+    seconds and the velocity of the air to the east and to the north, m/s; empty if the log does not tell it. ``notes``
+    state which data was used and which was skipped.
     """
 
     name: str
@@ -34,15 +39,17 @@ class FlightLog:
     power_s: Floats
     power_w: Floats
     notes: tuple[str, ...] = ()
+    wind: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     @classmethod
     def of(
         cls, name: str, places: list[tuple[float, float, float, float]], power: list[tuple[float, float]],
-        notes: tuple[str, ...] = (), *, degrees: bool = True,
+        notes: tuple[str, ...] = (), *, degrees: bool = True, wind: Sequence[tuple[float, float, float]] = (),
     ) -> FlightLog:  # fmt: skip
         """A log from (seconds, latitude, longitude, AMSL) and (seconds, watts), in any order, without rows with NaN.
 
-        Raises InputError if there is too little data.
+        ``wind``: (seconds, east, north) of the air; one that is 0 throughout is that of a vehicle that does not
+        estimate it. Raises InputError if there is too little data, or if its power is not that of an aircraft.
         """
         at, watts = _sorted(places), _sorted(power)
         if degrees and len(at):
@@ -54,8 +61,42 @@ class FlightLog:
                 raise InputError(
                     f"holds {counted(len(rows), what)}, and at least {LEAST_POINTS} are needed", where=name
                 )
+        require_power(watts[:, 1], name)
+        blows = _sorted(wind)
+        if len(blows) < LEAST_POINTS or not (blows[:, 1:] != 0.0).any() or np.abs(blows[:, 1:]).max() > MOST_WIND_M_S:
+            blows = np.zeros((0, 3))
         east, north = _in_metres(at[:, 1], at[:, 2]) if degrees else (at[:, 1], at[:, 2])
-        return cls(name, at[:, 0], east, north, at[:, 3], watts[:, 0], watts[:, 1], notes)
+        return cls(name, at[:, 0], east, north, at[:, 3], watts[:, 0], watts[:, 1], notes, blows)
+
+
+def require_power(watts: Floats, name: str) -> None:
+    """Raise InputError if the power of a flight is not that of an aircraft: then a unit is mistaken."""
+    flying = watts[watts > 0.0]
+    middle_w = float(np.median(flying)) if len(flying) else 0.0
+    if len(flying) and not LEAST_W <= middle_w <= MOST_W:
+        raise InputError(
+            f"tells a power of {middle_w:.3g} W, and {LEAST_W:g} to {MOST_W:g} W are an aircraft's: its power, its "
+            f"voltage (V) or its current (A) is in another unit, such as hundredths or thousandths; convert it",
+            where=name,
+        )
+
+
+def watts_of(readings: Sequence[tuple[float, float, float]], name: str) -> list[tuple[float, float]]:
+    """(seconds, watts) of readings of (seconds, volt, ampere).
+
+    Raises InputError if voltage or current is not that of an aircraft's battery: then a unit is mistaken.
+    """
+    rows = np.array(readings, dtype=np.float64).reshape(-1, 3)
+    for what, unit, column, least, most in (("voltage", "V", 1, LEAST_V, MOST_V), ("current", "A", 2, LEAST_A, MOST_A)):
+        values = rows[np.isfinite(rows).all(axis=1) & (rows[:, 2] > 0.0), column]
+        middle = float(np.median(values)) if len(values) else math.nan
+        if len(values) and not least <= middle <= most:
+            raise InputError(
+                f"tells a {what} of {middle:.3g} {unit}, and {least:g} to {most:g} {unit} are those of an aircraft's "
+                f"battery: it is in another unit, such as hundredths or thousandths; convert it",
+                where=name,
+            )
+    return [(float(t), float(v * a)) for t, v, a in rows]
 
 
 def _sorted(rows: Sequence[tuple[float, ...]]) -> Floats:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from gcsplan.errors import InputError
 from gcsplan.figures import counted
-from gcsplan.logs.flight_log import FlightLog
+from gcsplan.logs.flight_log import FlightLog, watts_of
 
 NAMES: dict[str, tuple[str, ...]] = {
     "time_s": ("time_s", "time", "t", "seconds", "timestamp_s"),
@@ -22,6 +22,8 @@ NAMES: dict[str, tuple[str, ...]] = {
     "power_w": ("power_w", "power", "watts", "w"),
     "volt": ("volt", "voltage", "voltage_v", "volts", "v"),
     "amp": ("amp", "current", "current_a", "amps", "a"),
+    "wind_east_m_s": ("wind_east_m_s", "wind_east"),
+    "wind_north_m_s": ("wind_north_m_s", "wind_north"),
 }
 """Accepted column names for each quantity, in any case of letters."""
 
@@ -56,12 +58,16 @@ def read_csv(file: Path, columns: Mapping[str, str]) -> FlightLog:
     keys = ("time_s", *(("east_m", "north_m") if flat else ("lat", "lon")), "amsl_m")
     places: list[tuple[float, float, float, float]] = []
     power: list[tuple[float, float]] = []
+    charge: list[tuple[float, float, float]] = []
+    wind: list[tuple[float, float, float]] = []
     bad: list[int] = []
     for number, line in enumerate(lines[1:], start=2):
         if not any(cell.strip() for cell in line):
             continue
         values = {key: _number(line, k) for key, k in at.items()}
         watts = values["power_w"] if "power_w" in at else values["volt"] * values["amp"]
+        if "wind_east_m_s" in at and math.isfinite(values["wind_east_m_s"] + values["wind_north_m_s"]):
+            wind.append((values["time_s"], values["wind_east_m_s"], values["wind_north_m_s"]))
         time_s = values["time_s"]
         good = False
         if all(math.isfinite(values[k]) for k in keys):  # position and power may be on separate lines
@@ -69,13 +75,15 @@ def read_csv(file: Path, columns: Mapping[str, str]) -> FlightLog:
             good = True
         if math.isfinite(time_s) and math.isfinite(watts):
             power.append((time_s, watts))
+            charge += [] if "power_w" in at else [(time_s, values["volt"], values["amp"])]
             good = True
         if not good:
             bad.append(number)
     if len(bad) > MOST_BAD * max(len(lines) - 1, 1):
         raise InputError(f"{counted(len(bad), 'line')} without numbers, the first is line {bad[0]}", where=str(file))
     notes = (f"{file.name}: passed over {counted(len(bad), 'line')} without numbers",) if bad else ()
-    return FlightLog.of(str(file), places, power, notes, degrees=not flat)
+    power = watts_of(charge, str(file)) if charge else power
+    return FlightLog.of(str(file), places, power, notes, degrees=not flat, wind=wind)
 
 
 def _places(names: list[str], columns: Mapping[str, str], where: str) -> dict[str, int]:
@@ -91,7 +99,7 @@ def _places(names: list[str], columns: Mapping[str, str], where: str) -> dict[st
             found = next((lower.index(n) for n in known if n in lower), None)
             if found is not None:
                 at[key] = found
-    for pair in (("lat", "lon"), ("east_m", "north_m"), ("volt", "amp")):
+    for pair in (("lat", "lon"), ("east_m", "north_m"), ("volt", "amp"), ("wind_east_m_s", "wind_north_m_s")):
         if len({*pair} & set(at)) == 1:
             at.pop(pair[0], None)
             at.pop(pair[1], None)

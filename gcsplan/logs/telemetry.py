@@ -1,6 +1,7 @@
 """MAVLink logs of a ground station (.tlog), read with pymavlink.
 
-GLOBAL_POSITION_INT has the position, BATTERY_STATUS the power (SYS_STATUS is used if there is none). Before each
+GLOBAL_POSITION_INT has the position, BATTERY_STATUS the power (SYS_STATUS is used if there is none), and WIND, which
+ArduPilot sends where it estimates one, the direction that the wind comes from and its speed. Before each
 message is the ground station's clock, in microseconds since 1970.
 """
 
@@ -16,7 +17,7 @@ from gcsplan.errors import InputError
 from gcsplan.logs.flight_log import FlightLog, together
 
 UNKNOWN_MV = 65535
-POSITION, BATTERY, STATUS = "GLOBAL_POSITION_INT", "BATTERY_STATUS", "SYS_STATUS"
+POSITION, BATTERY, STATUS, WIND = "GLOBAL_POSITION_INT", "BATTERY_STATUS", "SYS_STATUS", "WIND"
 
 
 def read_telemetry(file: Path, sysid: int | None) -> FlightLog:
@@ -27,14 +28,19 @@ def read_telemetry(file: Path, sysid: int | None) -> FlightLog:
     places: dict[int, list[tuple[float, float, float, float]]] = {}
     batteries: dict[int, dict[int, list[tuple[float, float]]]] = {}
     status: dict[int, list[tuple[float, float]]] = {}
+    winds: dict[int, list[tuple[float, float, float]]] = {}
     heard: Counter[int] = Counter()
     log = mavutil.mavlogfile(str(file))
     try:
-        while (m := log.recv_match(type=[POSITION, BATTERY, STATUS])) is not None:
+        while (m := log.recv_match(type=[POSITION, BATTERY, STATUS, WIND])) is not None:
             who, time_s = int(m.get_srcSystem()), float(m._timestamp)
             heard[who] += 1
             if m.get_type() == POSITION:
                 places.setdefault(who, []).append((time_s, m.lat / 1e7, m.lon / 1e7, m.alt / 1e3))
+            elif m.get_type() == WIND:
+                from_rad = math.radians(m.direction)
+                blown = -m.speed * math.sin(from_rad), -m.speed * math.cos(from_rad)
+                winds.setdefault(who, []).append((time_s, *blown))
             elif m.get_type() == BATTERY:
                 if math.isfinite(watts := _watts(m)):
                     batteries.setdefault(who, {}).setdefault(int(m.id), []).append((time_s, watts))
@@ -64,7 +70,7 @@ def read_telemetry(file: Path, sysid: int | None) -> FlightLog:
             "measure it, and the link must carry it (SR0_EXT_STAT)",
             where=str(file),
         )
-    return FlightLog.of(str(file), places[who], power, notes)
+    return FlightLog.of(str(file), places[who], power, notes, wind=winds.get(who, ()))
 
 
 def _watts(m: Any) -> float:

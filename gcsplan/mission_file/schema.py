@@ -187,9 +187,17 @@ class EnergyKeys(Keys):
     vertical_j_per_m: Annotated[float, Field(ge=0.0, le=1e9)] = 120.0
     """Energy per metre up or down."""
     horizontal_j_per_m: Annotated[float, Field(ge=0.0, le=1e9)] = 100.0
-    """Energy per horizontal metre."""
+    """Energy per horizontal metre through the air."""
+    base_w: Annotated[float, Field(ge=0.0, le=1e9)] = 0.0
+    """Power that flying takes beside that of its metres, however fast it is."""
     hover_w: Annotated[float, Field(ge=0.0, le=1e9)] = 0.0
-    """Power of hovering; counts during a hold."""
+    """The whole power of hovering, which counts during a hold; at least `base_w`."""
+    cruise_w: Annotated[float, Field(gt=0.0, le=1e9)] | None = None
+    """Power in cruise, instead of `base_w` and `horizontal_j_per_m`: read as `base_w`, with no energy per metre."""
+    endurance_s: Annotated[float, Field(ge=1.0, le=1e7)] | None = None
+    """How long a full battery lasts in flight, instead of `cruise_w`; mostly written `endurance_min`."""
+    fitted_speed_m_s: SpeedRange | None = None
+    """Airspeed of the flights that these numbers are fitted to, or slowest and fastest; for others there is a note."""
     battery_j: Annotated[float, Field(gt=0.0, le=1e15), AfterValidator(_no_trifle)] | None = None
     """Energy of the full battery; if absent, the battery is not judged."""
     battery_v: Annotated[float, Field(gt=0.0, le=MOST_VOLTS)] | None = None

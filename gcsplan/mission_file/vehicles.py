@@ -8,6 +8,7 @@ from dataclasses import fields, replace
 from typing import Any
 
 from gcsplan.errors import Problem
+from gcsplan.mission_file.energy import make_energy
 from gcsplan.mission_file.request import ArrivalRequest
 from gcsplan.mission_file.schema import ArrivalKeys, LimitKeys, VehicleKeys, nearest
 from gcsplan.vehicle import (
@@ -16,7 +17,6 @@ from gcsplan.vehicle import (
     PX4_VEL_MAX_M_S,
     Autopilot,
     ClimbOut,
-    Energy,
     Vehicle,
     fastest_at_m_s,
     lean_for_deg,
@@ -108,12 +108,13 @@ def make_vehicle(
     if limits is not None:
         _check_heights(keys, limits, where, problems, obstacle_m)
     climb_out = _climb_out(keys, limits, where, problems)
+    energy = make_energy(keys, where, problems, notes)
     if len(problems) > before or limits is None:
         return None
     return Vehicle(
         name=keys.name, sysid=keys.sysid, autopilot=Autopilot(keys.autopilot), limits=limits,
         speed_min_m_s=slow, speed_max_m_s=fast, turn_radius_m=keys.turn_radius_m,
-        energy=Energy(**keys.energy.model_dump()), link=keys.link, climb_out=climb_out,
+        energy=energy, link=keys.link, climb_out=climb_out,
         **(_wing_motion(keys, limits) if keys.turn_radius_m > 0.0 else _motion(keys, notes, local=local)),
     )  # fmt: skip
 

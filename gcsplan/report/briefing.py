@@ -105,8 +105,7 @@ def _facts(page: Page, s: Subject, units: Units) -> Iterator[tuple[str, str]]:
     verdict, limits, craft = s.verdict, s.vehicle.limits, s.vehicle
     yield "vehicle", f"{esc(str(verdict.mission.autopilot))}, system {craft.sysid}"
     if len(page.subjects) > 1:
-        good = "path safe" if s.homeless else "safe"
-        yield "verdict", {True: good, False: "NOT SAFE", None: "not judged"}[verdict.safe]
+        yield "verdict", esc(in_units(s.words, units))
     if verdict.legs:
         for name, at in (("starts at", verdict.legs[0].start), ("ends at", verdict.legs[-1].end)):
             yield name, f"{place(*at[:2])}<br>{num(at[2], 0, units.amsl)}"
@@ -119,12 +118,13 @@ def _facts(page: Page, s: Subject, units: Units) -> Iterator[tuple[str, str]]:
     peak = max((max(leg.start[2], leg.end[2]) for leg in verdict.legs), default=math.nan)
     most = f"; at most {stated(limits.max_amsl_m, units.height)}" if limits.max_amsl_m is not None else ""
     yield "highest", greatest(peak, 0, units.amsl) + most
-    if limits.max_agl_m is not None:
-        high = max((leg.max_agl_m for leg in verdict.legs if not math.isnan(leg.max_agl_m)), default=None)
-        most = stated(limits.max_agl_m, units.height)
-        yield "highest above ground", f"{greatest(high, 1, units.height)}; at most {most}"
+    high = verdict.highest
+    most = "no limit is set" if limits.max_agl_m is None else f"at most {stated(limits.max_agl_m, units.height)}"
+    yield "highest above ground", f"{greatest(high.max_agl_m if high else None, 1, units.height)}; {most}"
     zone = f"{least(near.zone_clearance_m, 1, units.distance)}, {esc(_name(near.nearest_zone))}" if near else "none"
     yield "nearest zone", f"{zone}; at least {stated(limits.horizontal_clearance_m, units.distance)}"
+    if (over := verdict.zone_pass) is not None:
+        yield "over or under a zone", f"{least(over.height_m, 1, units.distance)} {over.side} {esc(_name(over.zone))}"
     angle = f"; at most {num(limits.max_climb_deg, 0, '°')}" if limits.max_climb_deg < 90.0 else ""
     yield "steepest", steepest(verdict.max_climb_deg) + angle
     across, up = stated(limits.track_error_m, units.distance), stated(limits.altitude_error_m, units.height)
@@ -141,7 +141,7 @@ def _facts(page: Page, s: Subject, units: Units) -> Iterator[tuple[str, str]]:
 def _battery(s: Subject) -> str:
     used, battery = s.verdict.battery_used_percent, s.vehicle.energy
     if used is None:
-        return f"{energy(s.verdict.energy_j, 0, battery.battery_v)}; capacity not given"
+        return f"{energy(s.verdict.told_j(s.verdict.energy_j), 0, battery.battery_v)}; capacity not given"
     return f"{num(used, 1, '%')} used; {num(100.0 * battery.reserve, 0, '%')} must be left"
 
 

@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 from typing import Any
 
 from gcsplan.report.document import document
-from gcsplan.report.markup import THIN, energy, esc, least, num
+from gcsplan.report.markup import THIN, energy, esc, greatest, least, num
 from gcsplan.units import Units, duration
 
 Row = Mapping[str, Any]
@@ -89,7 +89,7 @@ def _turned(lon_deg: float, from_deg: float) -> float:
 def _table(rows: Sequence[Row], units: Units, page: str) -> str:
     head = (
         ("mission", ""), ("vehicle", ""), ("verdict", ""), ("length", "n"), ("gap", "n"), ("energy", "n"),
-        ("least AGL", "n"), ("arrives, T+", "n"),
+        ("lowest AGL", "n"), ("highest AGL", "n"), ("arrives, T+", "n"),
     )  # fmt: skip
     out = ['<div class="scroll"><table id="results"><caption>Every vehicle of every mission</caption><thead><tr>']
     out += [f'<th scope="col" class="{kind}">{name}</th>' for name, kind in head]
@@ -101,16 +101,22 @@ def _table(rows: Sequence[Row], units: Units, page: str) -> str:
         cells = [
             f'<th scope="row">{link}</th>',
             f"<td>{esc(row['vehicle'])}</td>",
-            f'<td class="{"good" if row["verdict"] == "safe" else "bad"}">{esc(row["verdict"])}</td>',
+            f'<td class="{_colour(row)}">{esc(row["verdict"])}</td>',
             f'<td class="n">{num(row.get("length_m"), 2, units.path)}</td>',
             f'<td class="n">{_percent(row.get("gap_percent"))}</td>',
             f'<td class="n">{energy(row.get("energy_j"))}</td>',
             f'<td class="n">{least(row.get("min_agl_m"), 1, units.height)}</td>',
+            f'<td class="n">{greatest(row.get("max_agl_m"), 1, units.height)}</td>',
             f'<td class="n">{_arrival(row.get("arrive_s"))}</td>',
         ]
         out.append(f'<tr data-row="{number}">{"".join(cells)}</tr>')
     out.append("</tbody></table></div>")
     return "".join(out)
+
+
+def _colour(row: Row) -> str:
+    """The class of a verdict: good if the path is safe and no return was found unsafe."""
+    return "good" if row.get("safe") is True and row.get("return_safe") is not False else "bad"
 
 
 def _percent(value: float | None) -> str:

@@ -20,7 +20,7 @@ from gcsplan.report.briefing import briefing_html
 from gcsplan.report.document import document
 from gcsplan.report.fleet_view import fleet_html, motions_of
 from gcsplan.report.home_view import home_html, home_lines
-from gcsplan.report.markup import data_block, energy, esc, least, num, place, stated, steepest, tools
+from gcsplan.report.markup import data_block, energy, esc, greatest, least, num, place, stated, steepest, tools
 from gcsplan.report.plan_view import COLOURS, map_html, map_marks
 from gcsplan.report.profile_view import profile_html, profile_legend
 from gcsplan.report.rehearsal_view import headline, rehearsal_html
@@ -128,7 +128,7 @@ PATH_ONLY = (
     "PATH SAFE",
     "Every metre of the path keeps every limit. A safe return from all of it is not shown.",
 )
-"""A path without a safe return is never shown as safe."""
+"""A path without a return that was judged safe is never shown as safe."""
 
 
 def verdict_of(safe: bool | None, *, homeless: bool) -> tuple[str, str, str, str]:
@@ -146,12 +146,13 @@ def _header(page: Page) -> str:
     wrong += [(s, f"not judged: {what}") for s in page.subjects for what in s.verdict.not_judged]
     several = len(page.subjects) > 1
     listed = "".join(f"<li>{f'<b>{esc(s.name)}</b>: ' if several else ''}{esc(text)}</li>" for s, text in wrong)
+    said = "" if several else "".join(f"<b>{esc(in_units(s.words, page.units))}.</b> " for s in page.subjects)
     absent = what_is_not_in(page.inputs)
     bare = f'<p class="bare"><b>{esc(absent)}</b></p>' if absent else ""
     return (
         f'<header><p class="brand">gcsplan mission report</p><h1>{esc(page.title)}</h1>'
         f'<div class="verdict {kind}"><span class="sign" aria-hidden="true">{sign}</span>'
-        f"<div><strong>{word}</strong><p>{words}</p></div></div>"
+        f"<div><strong>{word}</strong><p>{said}{words}</p></div></div>"
         + (f'<ul class="findings">{listed}</ul>' if listed else "")
         + left_out_html(page)
         + bare
@@ -162,8 +163,8 @@ def _header(page: Page) -> str:
 
 def _vehicles(page: Page) -> str:
     if len(page.subjects) > MOST_CARDS:
-        found = [verdict_of(s.verdict.safe, homeless=s.homeless) for s in page.subjects]
-        words = [f"{sign} {word.lower()}" for _, sign, word, _ in found]
+        signs = [verdict_of(s.verdict.safe, homeless=s.homeless)[1] for s in page.subjects]
+        words = [f"{sign} {esc(in_units(s.words, page.units))}" for s, sign in zip(page.subjects, signs, strict=True)]
         return f'<section id="vehicles">{FILTER}{tables.vehicles_table(page, words)}</section>'
     cards = "".join(_card(s, i, page) for i, s in enumerate(page.subjects))
     return f'<section class="cards" aria-label="Key figures">{cards}</section>'
@@ -172,7 +173,8 @@ def _vehicles(page: Page) -> str:
 def _card(subject: Subject, index: int, page: Page) -> str:
     units, in_fleet = page.units, bool(motions_of(page))
     verdict, limits, c = subject.verdict, subject.vehicle.limits, subject.certificate
-    kind, sign, word, _ = verdict_of(verdict.safe, homeless=subject.homeless)
+    kind, sign, _, _ = verdict_of(verdict.safe, homeless=subject.homeless)
+    word = esc(in_units(subject.words, units))
     low, near = verdict.lowest, verdict.nearest
     figures = [("path", num(verdict.length_m, 0, units.path), _bound_words(subject, units))]
     if low is not None:
@@ -181,15 +183,27 @@ def _card(subject: Subject, index: int, page: Page) -> str:
              f"min AGL {stated(limits.min_agl_m, units.height)}; on the leg to item {low.seq}, "
              f"{place(*low.min_agl_at)}")
         )  # fmt: skip
+    if (high := verdict.highest) is not None:
+        most = f"max AGL {stated(limits.max_agl_m, units.height)}" if limits.max_agl_m is not None else "no max AGL"
+        figures.append(
+            (
+                "highest above ground",
+                greatest(high.max_agl_m, 1, units.height),
+                f"{most}; on the leg to item {high.seq}",
+            )
+        )
     figures.append(
         ("nearest zone", least(near.zone_clearance_m, 1, units.distance),
          f"{esc(near.nearest_zone)}; clearance {stated(limits.horizontal_clearance_m, units.distance)}")
         if near is not None else ("nearest zone", "none", "no zone at the path's height")
     )  # fmt: skip
+    if (over := verdict.zone_pass) is not None:
+        where = f"{over.side} {esc(over.zone)}, on the leg to item {over.seq}"
+        figures.append(("over or under a zone", least(over.height_m, 1, units.distance), where))
     limit = f"limit {num(limits.max_climb_deg, 0, '°')}" if limits.max_climb_deg < 90 else "no limit"
     figures.append(("steepest", steepest(verdict.max_climb_deg), limit))
     battery = subject.vehicle.energy
-    used = energy(verdict.energy_j, 0, battery.battery_v)
+    used = energy(verdict.told_j(verdict.energy_j), 0, battery.battery_v)
     figures.append(
         ("battery", num(verdict.battery_used_percent, 1, "%"),
          f"{used}, of {energy(battery.battery_j, 0, battery.battery_v)}; "
@@ -213,7 +227,7 @@ def _card(subject: Subject, index: int, page: Page) -> str:
     cells = "".join(f"<div><dt>{name}</dt><dd>{value}<small>{more}</small></dd></div>" for name, value, more in figures)
     return (
         f'<article class="card t{index % COLOURS}"><h2><i class="swatch t{index % COLOURS}"></i>{esc(subject.name)}'
-        f'<span class="pill {kind}">{sign} {word.lower()}</span></h2><dl>{cells}</dl></article>'
+        f'<span class="pill {kind}">{sign} {word}</span></h2><dl>{cells}</dl></article>'
     )
 
 
@@ -336,7 +350,7 @@ def _line_data(index: int, subject: Subject, line: Line) -> dict[str, object]:
         "z": rounded(line.amsl_m), "g": rounded(line.ground_m),
         "o": rounded(line.top_m) if not np.array_equal(line.top_m, line.ground_m, equal_nan=True) else None,
         "f": rounded(line.floor_m), "c": rounded(line.ceiling_m), "t": rounded(line.time_s), "leg": line.leg.tolist(),
-        "j": [round(float(j) / 1000.0, 1) for j in line.used_j],
+        "j": [round(float(j) / 1000.0, 1) for j in line.used_j] if subject.verdict.energy_stated else None,
         "legs": [
             {"seq": leg.seq, "kind": leg.kind, "column": leg.column, "climb": steepened(leg.climb_deg, 1)}
             for leg in legs

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from gcsplan.check.rtl.verdict import WayHome
+from gcsplan.check.rtl.words import verdict_words
 from gcsplan.check.verdict import Verdict
 from gcsplan.fleet.arrival import Slot
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Separation
-from gcsplan.units import METRIC, Units
+from gcsplan.units import METRIC, Units, UnitText
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
 
@@ -62,8 +63,13 @@ class Subject:
 
     @property
     def homeless(self) -> bool:
-        """Whether the return was judged and is not safe, or not wholly judged."""
-        return self.home is not None and self.home.safe is not True
+        """Whether the return is not safe, or not judged."""
+        return self.home is None or self.home.safe is not True
+
+    @property
+    def words(self) -> UnitText:
+        """The verdict in a sentence."""
+        return verdict_words(self.verdict.safe, self.home)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +125,7 @@ class Page:
 
     @property
     def homeless(self) -> bool:
-        """Whether the return of any subject was judged and is not safe."""
+        """Whether the return of any subject is not safe, or not judged."""
         return any(s.homeless for s in self.subjects)
 
     @property

@@ -39,21 +39,24 @@ def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
     units, rows, marks = page.units, [], []
     for s, word in zip(page.subjects, verdicts, strict=True):
         verdict, low, near = s.verdict, s.verdict.lowest, s.verdict.nearest
+        high = verdict.highest
         bound = s.certificate.gap_percent if s.certificate is not None else None
         home = {True: "safe", False: "no safe return", None: "not judged"}[s.home.safe] if s.home is not None else "–"
         rows.append(
             (
                 esc(s.name), word, num(verdict.length_m, 0, units.path), num(bound, 2, "%"),
                 least(low.min_agl_m if low else None, 1, units.height),
+                greatest(high.max_agl_m if high else None, 1, units.height),
                 f"{least(near.zone_clearance_m, 1, units.distance)} {esc(near.nearest_zone)}" if near else "–",
-                steepest(verdict.max_climb_deg), energy(verdict.energy_j, 0, s.vehicle.energy.battery_v),
+                steepest(verdict.max_climb_deg),
+                energy(verdict.told_j(verdict.energy_j), 0, s.vehicle.energy.battery_v),
                 num(verdict.battery_used_percent, 1, "%"),
                 duration(s.arrive_s, page.time_decimals), home,
             )
         )  # fmt: skip
         marks.append("bad" if verdict.safe is False else "close" if verdict.safe is None or s.homeless else "")
-    head = ("vehicle|", "verdict|", "path", "gap", "lowest AGL", "nearest zone|", "steepest", "energy", "battery",
-            "arrives", "way home|")  # fmt: skip
+    head = ("vehicle|", "verdict|", "path", "gap", "lowest AGL", "highest AGL", "nearest zone|", "steepest", "energy",
+            "battery", "arrives", "way home|")  # fmt: skip
     return table("Key figures", head, rows, marks=marks, numbers=range(len(rows)))
 
 
@@ -74,7 +77,8 @@ def legs_table(subject: Subject, units: Units) -> str:
                 esc(name), num(item.length_m, 0, units.leg), num(item.end[2], 1, units.height),
                 least(item.agl_end_m, 1, units.height),
                 "column" if item.column else least(item.min_agl_m, 1, units.height),
-                greatest(item.max_agl_m, 1, units.height), steepest(item.climb_deg), near, energy(item.energy_j, 1),
+                greatest(item.max_agl_m, 1, units.height), steepest(item.climb_deg), near,
+                energy(subject.verdict.told_j(item.energy_j), 1),
                 num(100.0 * used / battery, 1, "%") if battery else "–", duration(item.time_s),
                 duration(clock[flown - 1]),
             )
@@ -120,9 +124,11 @@ def _limits(subject: Subject, line: Line | None, units: Units) -> list[Row]:
         at = f"item {low.seq}, {place(*low.min_agl_at)}"
         rows.append(("lowest above ground and what stands on it", words, least(low.min_agl_m, 2, height),
                      low.min_agl_m - needed_m, height, at, CLOSE * needed_m))  # fmt: skip
-    highs = [leg for leg in verdict.legs if not math.isnan(leg.max_agl_m)]
-    if limits.max_agl_m is not None and highs:
-        top = max(highs, key=lambda leg: leg.max_agl_m)
+    top = verdict.highest
+    if limits.max_agl_m is None and top is not None:
+        rows.append(("highest above ground", "no limit is set", greatest(top.max_agl_m, 2, height), None, height,
+                     f"item {top.seq}", None))  # fmt: skip
+    if limits.max_agl_m is not None and top is not None:
         rows.append(("highest above ground", f"{stated(limits.max_agl_m, height)} − {stated(error, height)} error",
                      greatest(top.max_agl_m, 2, height), limits.max_agl_m - error - top.max_agl_m, height,
                      f"item {top.seq}", CLOSE * limits.max_agl_m))  # fmt: skip
@@ -139,6 +145,10 @@ def _limits(subject: Subject, line: Line | None, units: Units) -> list[Row]:
                      f"{stated(limits.horizontal_clearance_m, distance)} + {stated(track, distance)} error",
                      least(near.zone_clearance_m, 2, distance), near.zone_clearance_m - needed_m, distance,
                      f"item {near.seq}, {esc(near.nearest_zone)}", max(CLOSE * needed_m, 1.0)))  # fmt: skip
+    if (over := verdict.zone_pass) is not None:
+        rows.append((f"height {over.side} a zone, less the error", f"{stated(error, distance)} error",
+                     least(over.height_m, 2, distance), over.height_m - error, distance,
+                     f"item {over.seq}, {esc(over.zone)}", max(CLOSE * error, 1.0)))  # fmt: skip
     if line is not None:
         rows += _height_left(subject, line, units)
     rows += _steepness(flown, limits.max_climb_deg, limits.max_descent_deg)

@@ -19,6 +19,7 @@ from gcsplan.sim.kinematics import AT_ONCE_M_S2
 from gcsplan.sim.trace import Trace
 from gcsplan.sim.track import PASSED, Track
 from gcsplan.sim.wind import Air, Weather
+from gcsplan.vehicle import Vehicle
 
 STEP_S = 0.1
 SAMPLE_STEPS = 2
@@ -40,6 +41,8 @@ class Flown:
     ``along_m`` (J, L): distance along its track; ``offset_m`` (J, L, 3): offset from it in east, north and up, None
     without weather. ``begin_s``, ``arrive_s``, ``end_s`` (L,): times of leaving the ground, of reaching the goal, and
     of touch-down (or reaching the last point); NaN if never. ``hold_s`` (L,): seconds of standing in the air.
+    ``air_m``, ``held_air_m`` (L,): horizontal metres through the air, while it moves and while it stands in the air;
+    ``cruise_m_s`` (L,): mean airspeed, except in columns.
     ``stops``: for each lane, (node, time reached, time left) of every stop.
     """
 
@@ -52,7 +55,26 @@ class Flown:
     arrive_s: Floats
     end_s: Floats
     hold_s: Floats
+    air_m: Floats
+    held_air_m: Floats
+    cruise_m_s: Floats
     stops: tuple[tuple[tuple[int, float, float], ...], ...]
+
+    def energy_j(self, lane: int, vehicle: Vehicle) -> float:
+        """Joules of a lane in the air that it flew through, up to where it came."""
+        track, held_s = self.track_of(lane), float(self.hold_s[lane])
+        s = np.concatenate([[0.0], np.cumsum(track.length_m)])
+        climbed_m = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(track.points[:, 2])))])
+        up_m = float(np.interp(self.along_m[-1, lane], s, climbed_m))
+        wind_m_s = float(self.held_air_m[lane]) / held_s if held_s > 0.0 else 0.0
+        moving_j = vehicle.energy.under_way_j(up_m, float(self.air_m[lane]), self.moved_s(lane))
+        return moving_j + vehicle.energy.hold_w(wind_m_s) * held_s
+
+    def moved_s(self, lane: int) -> float:
+        """Seconds of moving in the air, up to the end or, if it never came there, to the last sample."""
+        end_s = float(self.end_s[lane])
+        until_s = end_s if math.isfinite(end_s) else float(self.times_s[-1])
+        return max(until_s - float(self.begin_s[lane]) - float(self.hold_s[lane]), 0.0)
 
     def track_of(self, lane: int) -> Track:
         """Return the track of a lane."""
@@ -120,6 +142,7 @@ class _Ways:
         delta = np.concatenate([np.diff(t.points, axis=0)[:, :2] for t in tracks])
         run = np.hypot(delta[:, 0], delta[:, 1])
         self.course = delta / np.where(run > 0.0, run, 1.0)[:, None]
+        self.flat = run / np.maximum(self.end - self.begin, 1e-9)  # horizontal metres per metre
         self.stop_node = np.concatenate([_next_stop(t) for t in tracks])
         last = np.concatenate([first + _next_stop(t) - 1 for first, t in zip(self.first, tracks, strict=True)])
         self.stop_clock = self.clock[last] + took[last]
@@ -174,7 +197,9 @@ def fly(
         offset.append(air.offset)
     return Flown(
         tuple(tracks), runs, np.array(times), np.array(along), None if weather.calm else np.array(offset),
-        lanes.begin, lanes.arrive, lanes.ended, lanes.stood, tuple(tuple(one) for one in lanes.stops),
+        lanes.begin, lanes.arrive, lanes.ended, lanes.stood, lanes.air, lanes.held_air,
+        np.divide(lanes.cruised, lanes.cruised_s, out=np.zeros_like(lanes.cruised), where=lanes.cruised_s > 0.0),
+        tuple(tuple(one) for one in lanes.stops),
     )  # fmt: skip
 
 
@@ -195,6 +220,7 @@ class _Lanes:
         self.done = np.zeros(n, np.bool_)
         self.begin, self.arrive, self.ended = self.wait.copy(), np.full(n, np.nan), np.full(n, np.nan)
         self.stood = np.zeros(n)
+        self.air, self.held_air, self.cruised, self.cruised_s = (np.zeros(n) for _ in range(4))
         self.stops: list[list[tuple[int, float, float]]] = [[(0, 0.0, float(w))] for w in self.wait]
 
     def advance(self, to_s: float, wind: Floats | None) -> None:
@@ -202,6 +228,7 @@ class _Lanes:
         ways = self._ways
         b = to_s - self.clock
         waited = np.minimum(self.wait, b)
+        holds = np.where(self.s > 0.0, waited, 0.0)  # not on the ground, before it leaves
         self.wait -= waited
         b -= waited
         b[self.done] = 0.0
@@ -238,11 +265,24 @@ class _Lanes:
         self.s = np.where(stops, ways.stop_at[k], s + gone)
         self.v = np.where(stops, 0.0, np.where(b > 0.0, faster, v))
         self.clock[:] = to_s
+        came_m = self.s - s
         over_s = np.where(timed, (then - ways.stop_clock[k]) / np.maximum(pace, 1e-9), -1.0)
         for lane in np.flatnonzero(stops):
             left_s = float(b[lane] - over_s[lane]) if over_s[lane] >= 0.0 else None
             self._stop(int(lane), to_s - float(b[lane]), float(v[lane]), float(faster[lane]), float(left[lane]), left_s)
         self.piece = np.where(stops | self.done, self.piece, self._piece_at(k, self.s))
+        self._count(k, came_m, np.where(stops, b - (to_s - self.clock), b), holds, wind)
+
+    def _count(self, k: Indices, came_m: Floats, moved_s: Floats, held_s: Floats, wind: Floats | None) -> None:
+        """Add up a step in pieces ``k``: metres flown along them, seconds of moving and of standing."""
+        air = np.zeros((len(k), 2)) if wind is None else wind
+        over_ground = self._ways.course[k] * (came_m * self._ways.flat[k])[:, None]
+        air_m = np.hypot(*(over_ground - air * moved_s[:, None]).T)
+        cruises = ~self._ways.column[k]
+        self.air += air_m
+        self.cruised += np.where(cruises, air_m, 0.0)
+        self.cruised_s += np.where(cruises, moved_s, 0.0)
+        self.held_air += np.hypot(*air.T) * held_s
 
     def _by_clock(self, b: Floats, command: Floats, over_ground: Floats) -> tuple[Bools, Floats, Floats]:
         """Which lanes are in pieces that are flown by the clock; their time on it after ``b`` seconds; and its pace.

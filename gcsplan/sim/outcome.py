@@ -7,38 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
-from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed
 from gcsplan.figures import floored
-from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.sim.part import Part, lateness
 from gcsplan.sim.trace import Judged, Meeting, Trace, examine, meetings
 from gcsplan.units import METRIC, Units, UnitText, duration
-from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
 
 SHOWN = 8
 """Most violations that an error's message names."""
 MEETING_STEP_S = 0.2
-
-
-@dataclass(frozen=True, eq=False)
-class Part:
-    """One vehicle's part in a rehearsal: its mission with its verdict, and its planned departure and arrival.
-
-    ``depart_s``, ``arrive_s``: seconds since the fleet's common start; ``arrive_s`` is None if none is planned.
-    ``airborne``: it begins at the top of its take-off (missions from papers); ``leaves``: it is gone when it arrives.
-    """
-
-    vehicle: Vehicle
-    mission: Mission
-    verdict: Verdict
-    depart_s: float = 0.0
-    arrive_s: float | None = None
-    rtl_rel_home_m: float | None = None
-    airborne: bool = False
-    leaves: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,7 +212,7 @@ def _number(value: float | None) -> float | None:
 class Tally:
     """Accumulates the runs of a rehearsal; `result` returns the `Rehearsal`.
 
-    ``stood_s``: the longest that each vehicle stood in the air in a run. ``flown``: the traces of the first run.
+    ``most_j``: the most energy that each vehicle took in a run. ``flown``: the traces of the first run.
     """
 
     parts: Sequence[Part]
@@ -253,10 +231,10 @@ class Tally:
         self._arrive: list[list[float]] = [[] for _ in self.parts]
         self._end: list[list[float]] = [[] for _ in self.parts]
         self._lowest: list[Judged | None] = [None] * len(self.parts)
-        self.stood_s = [0.0] * len(self.parts)
+        self.most_j = [0.0] * len(self.parts)
 
-    def add(self, traces: Sequence[Trace], world: World, stood_s: Sequence[float] | None = None) -> None:
-        """Add one run; ``traces``, and ``stood_s`` in the air, are in the order of the parts."""
+    def add(self, traces: Sequence[Trace], world: World, spent_j: Sequence[float]) -> None:
+        """Add one run; ``traces``, and the energy that each flight took, J, are in the order of the parts."""
         self.runs += 1
         self.flown = self.flown or tuple(traces)
         self._seen = set()
@@ -269,8 +247,10 @@ class Tally:
                 self.breach("arrival", (trace.name,), f"{trace.name} never arrived at its goal{why}", math.inf)
             judged = examine(trace, part.vehicle, world)
             self._lower(i, judged)
-            if stood_s is not None:
-                self.stood_s[i] = max(self.stood_s[i], stood_s[i])
+            self.most_j[i] = max(self.most_j[i], spent_j[i])
+            self._battery(part, spent_j[i])
+            if (late := lateness(part, trace)) is not None:
+                self.breach("late", (trace.name,), *late)
             for f in judged.findings:
                 self.breach(f.kind, (trace.name,), f.message, f.by, f.zone)
         self._order(traces)
@@ -284,7 +264,7 @@ class Tally:
         for i, judged in enumerate(later._lowest):
             if judged is not None:
                 self._lower(i, judged)
-            self.stood_s[i] = max(self.stood_s[i], later.stood_s[i])
+            self.most_j[i] = max(self.most_j[i], later.most_j[i])
         for key, found in later._breaches.items():
             was = self._breaches.get(key)
             worst = found if was is None or found.by > was.by else was
@@ -318,6 +298,16 @@ class Tally:
             new = Breach(kind, vehicles, was.message, was.by, runs)
         self._breaches[key] = new
 
+    def _used_percent(self, part: Part, spent_j: float) -> float | None:
+        battery_j = part.vehicle.energy.battery_j
+        return None if battery_j is None else 100.0 * spent_j / battery_j
+
+    def _battery(self, part: Part, spent_j: float) -> None:
+        used, reserve = self._used_percent(part, spent_j), part.vehicle.energy.reserve
+        if used is not None and used > 100.0 * (1.0 - reserve) + 1e-9:
+            said = f"{part.vehicle.name} used {used:.0f} % of its battery, of which {100 * reserve:g} % must stay"
+            self.breach("battery", (part.vehicle.name,), said, used - 100.0 * (1.0 - reserve))
+
     def _order(self, traces: Sequence[Trace]) -> None:
         came = [t.name for t in sorted(traces, key=lambda t: math.inf if math.isnan(t.arrive_s) else t.arrive_s)]
         if self.runs == 1:
@@ -345,24 +335,17 @@ class Tally:
         self.separation_kept += not close
 
     def result(
-        self, simulator: str, seed: int, weather: dict[str, Any], energy_j: Sequence[float],
-        not_flown: Sequence[tuple[str, ...]],
-    ) -> Rehearsal:  # fmt: skip
-        """Return the rehearsal's result. ``energy_j``: of each vehicle's flight, J."""
+        self, simulator: str, seed: int, weather: dict[str, Any], not_flown: Sequence[tuple[str, ...]]
+    ) -> Rehearsal:
+        """Return the rehearsal's result."""
         performances = []
         for i, part in enumerate(self.parts):
             low = self._lowest[i]
-            energy = part.vehicle.energy
-            used = None if energy.battery_j is None else 100.0 * energy_j[i] / energy.battery_j
-            if used is not None and used > 100.0 * (1.0 - energy.reserve) + 1e-9:
-                stays = f"of which {100 * energy.reserve:g} % must stay"
-                said = f"{part.vehicle.name} used {used:.0f} % of its battery, {stays}"
-                self.breach("battery", (part.vehicle.name,), said, used - 100.0 * (1.0 - energy.reserve))
             performances.append(
                 Performance(
                     part.vehicle.name, part.depart_s, part.arrive_s, tuple(self._arrive[i]), tuple(self._end[i]),
                     math.nan if low is None else low.min_agl_m, (math.nan, math.nan) if low is None else low.min_agl_at,
-                    used, not_flown[i],
+                    self._used_percent(part, self.most_j[i]), not_flown[i],
                 )
             )  # fmt: skip
         breaches = sorted(self._breaches.values(), key=lambda b: (-b.runs, b.kind, b.vehicles))
@@ -370,14 +353,3 @@ class Tally:
             simulator, self.runs, seed, weather, tuple(performances), self.terms, self.order_flown, self.order_kept,
             self.separation_kept, self.closest, tuple(breaches), tuple(dict.fromkeys(self.notes)), self.flown,
         )  # fmt: skip
-
-
-def energy_of(points: np.ndarray[Any, np.dtype[np.float64]], hold_s: float, vehicle: Vehicle) -> float:
-    """Return the joules for a flown path (M, 3) and ``hold_s`` of hovering (krill paper, Table 1; wind is ignored)."""
-    delta = np.diff(points, axis=0)
-    energy = vehicle.energy
-    return float(
-        energy.vertical_j_per_m * np.abs(delta[:, 2]).sum()
-        + energy.horizontal_j_per_m * np.hypot(delta[:, 0], delta[:, 1]).sum()
-        + energy.hover_w * hold_s
-    )

@@ -16,8 +16,9 @@ from gcsplan.mavlink.link.link import Link
 from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.sim.kinematics import Kinematics
-from gcsplan.sim.mission_flight import fly
-from gcsplan.sim.outcome import Part, Rehearsal, Tally, Terms, energy_of
+from gcsplan.sim.mission_flight import Flown, fly
+from gcsplan.sim.outcome import Rehearsal, Tally, Terms
+from gcsplan.sim.part import Part, energy_of
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.track import Track, make_track
 from gcsplan.sim.vehicle import LoopbackVehicle
@@ -120,8 +121,25 @@ def flown(flights: Flights, world: World, block: Block) -> Tally:
     for r in range(count):
         lanes = range(r * len(parts), (r + 1) * len(parts))
         traces = [flight.trace(lane, leaves=part.leaves) for lane, part in zip(lanes, parts, strict=True)]
-        tally.add(traces, world, [float(flight.hold_s[lane]) for lane in lanes])
+        tally.add(traces, world, [_spent_j(flights, flight, lane) for lane in lanes])
+        for lane, part in zip(lanes, parts, strict=True):
+            if part.vehicle.energy.unlike_fitted(speed := float(flight.cruise_m_s[lane])) and not flights.weather.calm:
+                slow, fast = part.vehicle.energy.fitted_m_s or (0.0, 0.0)
+                tally.notes.append(
+                    f"{part.vehicle.name}: its energy is fitted to flights at {slow:g} to {fast:g} m/s through the "
+                    f"air, and it flew at {speed:.0f} m/s in this wind: what it used may be far off"
+                )
     return tally
+
+
+def _spent_j(flights: Flights, flight: Flown, lane: int) -> float:
+    """What a lane's flight took, J: in still air that of its track, else of the air that it flew through."""
+    k = lane % len(flights.parts)
+    vehicle = flights.parts[k].vehicle
+    if flights.weather.calm:
+        points, held_s = flights.tracks[k].points, float(flight.hold_s[lane])
+        return energy_of(points, held_s, vehicle, flight.moved_s(lane))
+    return flight.energy_j(lane, vehicle)
 
 
 def concluded(flights: Flights, runs: int, tallies: Sequence[Tally]) -> Rehearsal:
@@ -131,11 +149,8 @@ def concluded(flights: Flights, runs: int, tallies: Sequence[Tally]) -> Rehearsa
         tally.notes.append("without wind, gusts and noise every run is the same: one was flown")
     for one in tallies:
         tally.join(one)
-    energy = [
-        energy_of(t.points, s, p.vehicle) for t, s, p in zip(flights.tracks, tally.stood_s, flights.parts, strict=True)
-    ]
     not_flown = [t.not_flown for t in flights.tracks]
-    return tally.result("gcsplan", flights.seed, flights.weather.as_dict(), energy, not_flown)
+    return tally.result("gcsplan", flights.seed, flights.weather.as_dict(), not_flown)
 
 
 def on_board(parts: Sequence[Part]) -> list[Mission]:

@@ -31,9 +31,10 @@ from gcsplan.mavlink.link.url import parse_url
 from gcsplan.mavlink.link.watch import VehicleState, Watch
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.protocol.messages import Address
-from gcsplan.sim.outcome import Part, Rehearsal, Tally, Terms, energy_of
+from gcsplan.sim.outcome import Rehearsal, Tally, Terms
+from gcsplan.sim.part import Part, energy_of
 from gcsplan.sim.sitl_watch import FlightWatch
-from gcsplan.sim.sitl_wind import change_steps, wind_parameters
+from gcsplan.sim.sitl_wind import change_steps, wind_parameters, wind_vector
 from gcsplan.sim.sitl_wing import arrival_s, is_column, is_over
 from gcsplan.sim.trace import Trace
 from gcsplan.sim.wind import Weather
@@ -141,15 +142,28 @@ def rehearse_sitl(
         _all([PumpJob(c, change_steps(c, s, was)) for c, s, was in zip(channels, states, calm, strict=True)])
     tally = Tally(parts, terms)
     traces = [_trace(log, part, world) for log, part in zip(logs, parts, strict=True)]
-    tally.add(traces, world)
+    tally.add(traces, world, [_spent_j(t, p, weather, seed) for t, p in zip(traces, parts, strict=True)])
     tally.notes.append(f"every vehicle was released {LIFT_S:g} s before its departure, for its motors to spin up")
     tally.notes += [
         f"{t.name} left the ground {t.begin_s - p.depart_s:+.1f} s from its departure"
         for t, p in zip(traces, parts, strict=True)
         if abs(t.begin_s - p.depart_s) > _ODD_LIFT_S
     ]
-    energy = [energy_of(t.points, 0.0, p.vehicle) for t, p in zip(traces, parts, strict=True)]
-    return tally.result("sitl", seed if wind else 0, weather.as_dict() if wind else {}, energy, [()] * len(parts))
+    return tally.result("sitl", seed if wind else 0, weather.as_dict() if wind else {}, [()] * len(parts))
+
+
+def _spent_j(trace: Trace, part: Part, weather: Weather, seed: int) -> float:
+    """What a flight took, J: by its time, and the metres through the mean wind."""
+    held_s = math.fsum(leg.hold_s * leg.times for leg in part.verdict.legs if math.isfinite(leg.hold_s))
+    held_s = min(held_s, trace.end_s - trace.begin_s)
+    moved_s = trace.end_s - trace.begin_s - held_s
+    if not weather.wind_m_s:
+        return energy_of(trace.points, held_s, part.vehicle, moved_s)
+    blown = np.diff(trace.times_s)[:, None] * np.array(wind_vector(weather, seed))
+    air_m = float(np.hypot(*(np.diff(trace.points[:, :2], axis=0) - blown).T).sum())
+    # The metres of the holds are among them; they are those of the wind.
+    air_m = max(air_m - weather.wind_m_s * held_s, 0.0)
+    return energy_of(trace.points, held_s, part.vehicle, moved_s, air_m, weather.wind_m_s)
 
 
 def _all(jobs: list[PumpJob[Any]]) -> list[Any]:

@@ -10,7 +10,7 @@ import math
 from gcsplan.check.geodesy import offset_m
 from gcsplan.check.tuning import DEFAULTS
 from gcsplan.mavlink.mission import commands as cmd
-from gcsplan.sim.outcome import Part
+from gcsplan.sim.part import Part
 from gcsplan.vehicle import Autopilot
 
 MODELS = {Autopilot.ARDUCOPTER: "+", Autopilot.ARDUPLANE: "plane"}

@@ -18,7 +18,7 @@ from gcsplan.arrays import Floats
 from gcsplan.dem.dat_file import file_name, packed
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission.mission import TERRAIN
-from gcsplan.sim.outcome import Part
+from gcsplan.sim.part import Part
 from gcsplan.world.terrain_grid import SPACING_M, Block, PostHeights, TerrainGrid, known_parts
 from gcsplan.world.world import World
 

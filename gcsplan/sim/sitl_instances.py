@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gcsplan.errors import LinkError, UsageError
-from gcsplan.sim.outcome import Part
+from gcsplan.sim.part import Part
 from gcsplan.sim.sitl_frames import MODELS, heading_of, parameters_of
 from gcsplan.sim.sitl_ground import write_ground
 from gcsplan.sim.sockets import TcpTransport

@@ -30,10 +30,20 @@ def wind_parameters(weather: Weather, seed: int) -> dict[str, float]:
     """
     if not (weather.wind_m_s or weather.gusts_m_s):
         return {}
-    drawn_deg = math.degrees(np.random.default_rng((seed, 0)).uniform(0.0, 2.0 * math.pi))
-    from_deg = drawn_deg if weather.from_deg is None else weather.from_deg
+    from_deg = _from_deg(weather, seed)
     values = (weather.wind_m_s, (from_deg + 180.0) % 360.0 - 180.0, math.sqrt(2.0) * weather.gusts_m_s)
     return dict(zip(NAMES, (*values, _SAME_AT_EVERY_HEIGHT), strict=True))
+
+
+def _from_deg(weather: Weather, seed: int) -> float:
+    drawn_deg = math.degrees(np.random.default_rng((seed, 0)).uniform(0.0, 2.0 * math.pi))
+    return drawn_deg if weather.from_deg is None else weather.from_deg
+
+
+def wind_vector(weather: Weather, seed: int) -> tuple[float, float]:
+    """East and north of the mean wind that `wind_parameters` sets, m/s."""
+    come_from = math.radians(_from_deg(weather, seed))
+    return -weather.wind_m_s * math.sin(come_from), -weather.wind_m_s * math.cos(come_from)
 
 
 def change_steps(channel: Channel, state: VehicleState, values: Mapping[str, float]) -> Steps[dict[str, float]]:

@@ -13,7 +13,7 @@ from gcsplan.check.commands import flown_in_order
 from gcsplan.check.geodesy import flat_m
 from gcsplan.check.stretch import Place
 from gcsplan.mavlink.mission import commands as cmd
-from gcsplan.sim.outcome import Part
+from gcsplan.sim.part import Part
 
 WIDE = 1.5
 """A plane is at a circle within so many radii of its centre: it flew circles with 1.12 of the radius asked for."""

@@ -46,7 +46,7 @@ from gcsplan.world._shared import (
     Demands,
 )
 from gcsplan.world._work_arrays import work_arrays
-from gcsplan.world._zone_arrays import over_both_grounds, zones_as_arrays
+from gcsplan.world._zone_arrays import BOX, over_both_grounds, zones_as_arrays
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
 from gcsplan.world.tube import ZONE_ROOM_M, Band, Reaches, Tube, make_tube
@@ -193,8 +193,7 @@ class Airspace:
 
     def deepest(self, legs: Legs, limits: Limits, kind: Kind) -> float:
         """By how much the worst of ``legs`` breaks a limit of height, as in `examine`; 0 if none does."""
-        worst = self._examined(legs, limits)[1][:, _NUMBERS[kind], 0]
-        return float(worst[worst > 0.0].max(initial=0.0))
+        return float(np.fmax.reduce(self._examined(legs, limits)[1][:, _NUMBERS[kind], 0], initial=0.0))
 
     def _examined(self, legs: Legs, limits: Limits) -> tuple[Floats, Floats, Indices, Indices, Floats]:
         """What the kernel finds: figures (N, 4), the worst of each kind (N, 7, 2), the nearest zone (N,), and the zones
@@ -303,6 +302,11 @@ class Airspace:
                 work_arrays(self._zones.most_corners, len(self.zones)),
             )
         )  # fmt: skip
+
+    @property
+    def zone_boxes(self) -> Floats:
+        """(Z, 4) west, south, east and north of each zone's shape, metres of the plane."""
+        return self._zones.table[:, BOX]
 
     def beside_m(self, limits: Limits) -> float:
         """Horizontal distance to keep from zones on every side, metres of the plane: clearance plus track error."""

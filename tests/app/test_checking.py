@@ -244,7 +244,7 @@ def test_findings_stand_before_the_table(run: Any, folder: Path, world: list[str
     lines = out.splitlines()
     finding = next(k for k, line in enumerate(lines) if "inside no-fly zone" in line)
     head = next(k for k, line in enumerate(lines) if "leg m" in line)
-    assert lines[0].endswith("UNSAFE")
+    assert lines[0].endswith("path UNSAFE, return not judged")
     assert 0 < finding < head
     assert out.count("UNSAFE") == 1
 

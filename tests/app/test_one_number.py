@@ -18,8 +18,8 @@ from gcsplan.app.outputs import outputs_of, report_of, summary_of, verdict_of
 from gcsplan.app.rehearsing import rehearse
 from gcsplan.app.report_page import render_rehearsal
 from gcsplan.check.verdict import Verdict, by_item
-from gcsplan.cli import console
 from gcsplan.cli.console import _plan_row
+from gcsplan.cli.verdict_table import verdict_table
 from gcsplan.export.summary import write_summary
 from gcsplan.figures import floored, steepened
 from tests.support.plans import CASES, SLOW, cases, planned, text_rows
@@ -164,7 +164,7 @@ def test_the_check_of_the_written_file_finds_it(case: str, tmp_path: Path, capsy
         for key in ("energy_j", "flight_energy_j"):
             assert told[key] == pytest.approx(entry[key], abs=WIRE_J), key
         capsys.readouterr()
-        console.verdict_table(v.name, again.verdict)
+        verdict_table(v.name, again.verdict)
         said = capsys.readouterr().out
         shown_as(said.split("path ")[-1].split(" m;")[0], again.verdict.length_m, 0)
 

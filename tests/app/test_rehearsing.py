@@ -25,7 +25,8 @@ from gcsplan.errors import CheckFailed, LinkError, UsageError, VehicleRefused
 from gcsplan.mission_file import load_mission
 from gcsplan.sim import hub, sitl
 from gcsplan.sim.mission_flight import fly
-from gcsplan.sim.outcome import Part, Terms
+from gcsplan.sim.outcome import Terms
+from gcsplan.sim.part import Part
 from gcsplan.sim.rehearsal import _track
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.sitl import rehearse_sitl, require_here

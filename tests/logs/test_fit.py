@@ -341,7 +341,7 @@ def test_the_command_prints_what_is_to_be_pasted(tmp_path: Path) -> None:
     code, text = run(str(file), "--csv-columns", "power_w=P")
     assert code == 0
     numbers = yaml.safe_load(text)["energy"]
-    assert set(numbers) == {"vertical_j_per_m", "horizontal_j_per_m", "hover_w"}
+    assert set(numbers) == {"vertical_j_per_m", "horizontal_j_per_m", "hover_w", "fitted_speed_m_s"}
     assert numbers["vertical_j_per_m"] == pytest.approx(R1, rel=0.02)
     with pytest.raises(UsageError, match="time_s=Time"):
         run(str(file), "--csv-columns", "power")

@@ -20,8 +20,8 @@ from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.sim import hub, sitl_ground, sitl_instances
-from gcsplan.sim.outcome import Part
 from gcsplan.sim.parameters import REAL32, Parameter
+from gcsplan.sim.part import Part
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.sitl_frames import heading_of, parameters_of
 from gcsplan.sim.sitl_ground import write_ground

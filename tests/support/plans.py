@@ -18,7 +18,8 @@ from tests.support.paths import MISSIONS
 
 
 def _craft(name: str, sysid: int, **more: Any) -> dict[str, Any]:
-    return {"name": name, "sysid": sysid, "autopilot": "arducopter", "speed_m_s": [3, 10]} | more
+    energy = {"vertical_j_per_m": 120, "horizontal_j_per_m": 100}
+    return {"name": name, "sysid": sysid, "autopilot": "arducopter", "speed_m_s": [3, 10], "energy": energy} | more
 
 
 FLAT: dict[str, Any] = {

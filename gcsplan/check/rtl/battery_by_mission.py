@@ -29,7 +29,8 @@ def battery_by_mission(
     after = np.minimum(np.searchsorted(along, at + 0.01, "right"), len(along) - 1)
     run = np.maximum(along[after] - along[after - 1], 1e-9)
     share = np.clip((at - along[after - 1]) / run, 0.0, 1.0)
-    used = spent[after - 1] + share * (spent[after] - spent[after - 1]) + back_j
+    lead = _lead(legs, len(along))[after]
+    used = spent[after - 1] + lead + share * (spent[after] - spent[after - 1] - lead) + back_j
     begin = trace.points(parts.start)[:, 3]
     short: list[tuple[float, float]] = []
     over = np.flatnonzero(used > usable)
@@ -54,6 +55,14 @@ def battery_by_mission(
         None if first is None else float(begin[first]),
         None if first is None else int(trace.seq[parts.stretch[first]]), tuple(short), tuple(rows),
     )  # fmt: skip
+
+
+def _lead(legs: Sequence[LegFigures], count: int) -> Floats:
+    """(count,) `LegFigures.lead_j` of the leg that ends at each place of `_spent`; 0 where a group begins."""
+    out = []
+    for _, group in groupby(legs, key=lambda leg: leg.times):
+        out += [0.0, *(leg.lead_j for leg in group)]
+    return np.array([0.0, *out][:count])
 
 
 def _spent(legs: Sequence[LegFigures]) -> tuple[Floats, Floats, list[int]]:

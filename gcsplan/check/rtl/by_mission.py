@@ -26,6 +26,7 @@ from gcsplan.check.rtl.battery_by_mission import battery_by_mission
 from gcsplan.check.rtl.joins import Join, Joins
 from gcsplan.check.rtl.model import RULES, at_home_m
 from gcsplan.check.rtl.places import Target, places_of_returns
+from gcsplan.check.rtl.return_time import return_s
 from gcsplan.check.rtl.run_on import about_turn_m, more_m
 from gcsplan.check.rtl.stretches import without_doubles
 from gcsplan.check.rtl.trace import TINY_M, MissionTrace, TraceParts
@@ -139,13 +140,21 @@ class _Judge:
             for grade in (CLEAR, LEGAL):
                 good[grade, some] &= self._passes(ways, grade) & self.reached[k][grade]
             good[KNOWN, some] &= self._climbs(ways) & self.reached[k][KNOWN]
-            energy = self.vehicle.energy
-            more = more_m(self.vehicle, self.vehicle.speed_max_m_s, float(self.trace.amsl.max()))
-            way_j = (
-                energy.horizontal_j_per_m * (ways.away_m + ways.wide_m + more) + energy.vertical_j_per_m * ways.rise_m
-            )
-            back_j[some] = np.maximum(back_j[some], way_j + join.rest_j)
+            back_j[some] = np.maximum(back_j[some], self._way_j(parts.take(some), ways) + join.rest_j)
         return good, back_j
+
+    def _way_j(self, parts: TraceParts, ways: Ways) -> Floats:
+        """(N,) energy of the longest way from each part, J."""
+        vehicle, speed = self.vehicle, self.trace.speed_m_s[parts.stretch]
+        way_m = ways.away_m + ways.wide_m + more_m(vehicle, vehicle.speed_max_m_s, float(self.trace.amsl.max()))
+        rise_m, seconds = ways.rise_m, np.zeros(len(way_m))
+        if vehicle.energy.base_w:  # it climbs or descends: the slower of both
+            each = zip(way_m.tolist(), rise_m.tolist(), speed.tolist(), strict=True)
+            seconds[:] = [
+                max(return_s(vehicle, way, rise, 0.0, v), return_s(vehicle, way, -rise, 0.0, v))
+                for way, rise, v in each
+            ]
+        return vehicle.energy.under_way_j(rise_m, way_m, seconds)
 
     def _ways(self, parts: TraceParts, join: Join) -> Ways:
         """The ways from each part to ``join``."""

@@ -24,6 +24,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gcsplan.arrays import Floats
+from gcsplan.check.clock import seconds_of
 from gcsplan.check.commands import LAND_STARTS
 from gcsplan.check.geodesy import flat_m
 from gcsplan.check.stretch import Flight, Stretch
@@ -196,12 +197,13 @@ class _Finder:
         return None
 
     def _energy_j(self, stretches: Sequence[Stretch]) -> float:
-        energy = self.vehicle.energy
+        energy, times = self.vehicle.energy, [math.nan] * len(stretches)
+        if energy.base_w and stretches:
+            home = self.mission.home.lat_e7 / 1e7, self.mission.home.lon_e7 / 1e7
+            times = seconds_of(stretches, self.vehicle, self.world, home).tolist()
         return math.fsum(
-            energy.vertical_j_per_m * abs(s.end[2] - s.start[2])
-            + energy.horizontal_j_per_m * flat_m(s.start, s.end)
-            + energy.hover_w * s.hold_s
-            for s in stretches
+            energy.under_way_j(abs(s.end[2] - s.start[2]), flat_m(s.start, s.end), time_s) + energy.hold_w() * s.hold_s
+            for s, time_s in zip(stretches, times, strict=True)
         )
 
     def _place(self, item: MissionItem) -> Floats | None:

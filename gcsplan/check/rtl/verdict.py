@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from gcsplan.check.battery import BatteryHome
-from gcsplan.check.rtl.words import NO_RETURN, NOT_JUDGED, PATH, STILL_NO_RETURN, together_m
+from gcsplan.check.rtl.words import NO_RETURN, NOT_JUDGED, STILL_NO_RETURN, together_m, verdict_words
 from gcsplan.check.stretch import Place
 from gcsplan.figures import counted
 from gcsplan.mavlink.mission.return_altitude import setting, settings
@@ -165,6 +165,7 @@ class WayHome:
     ``route``: whether the returns were judged straight home, or to where they join the mission, behind the wire items
     ``starts``; ``along_path``: along a return path, else to a landing sequence. Altitudes say nothing then.
     ``path_back``: what a return path along the mission's own track would do, where no altitude is enough; mostly empty.
+    ``max_agl_m``: the limit on heights above ground, which a return at a greater altitude breaks over home at least.
     """
 
     vehicle: str
@@ -193,6 +194,7 @@ class WayHome:
     starts: tuple[int, ...] = ()
     along_path: bool = False
     path_back: str = ""
+    max_agl_m: float | None = None
 
     @property
     def safe(self) -> bool | None:
@@ -210,22 +212,21 @@ class WayHome:
     @property
     def headline(self) -> UnitText:
         """Both truths in one line: ``path safe; no safe return from 9.5 km of it``."""
-        return UnitText("{}; {}", PATH[self.path_safe], self._return())
+        return UnitText("{}{}", verdict_words(self.path_safe, self), self._more())
 
-    def _return(self) -> str:
+    def _more(self) -> str:
+        """What follows the verdict's words: why it was not judged, where, or for want of what."""
         if self.safe is True:
-            return "safe return from all of it"
+            return ""
         if self.safe is None:
-            return f"return not judged: {'; '.join(self.not_judged)}"
+            return f": {'; '.join(self.not_judged)}"
         short = self.battery.short if self.battery is not None else ()
         if self.no_return_m < 0.5:
             seq = self.unsafe[0].from_seq if self.unsafe else 0 if self.battery is None else self.battery.no_return_seq
-            return f"no safe return from a point of it, at item {seq}"
-        short_m = together_m(short)
-        battery: str = ""
-        if short:
-            battery = UnitText(" (battery: from {})", Reach(short_m)) if self.unsafe else " (battery)"
-        return UnitText("no safe return from {} of it{}", Reach(self.no_return_m), battery)
+            return f", at item {seq}"
+        if not short:
+            return ""
+        return UnitText(" (battery: from {})", Reach(together_m(short))) if self.unsafe else " (battery)"
 
     @property
     def advice(self) -> str:
@@ -244,18 +245,25 @@ class WayHome:
             return ""
         left = self.set_leaves_m or 0.0
         then: str = "safe return from all of it"
-        but = ""
+        but: list[str] = []
         if left:
             then = UnitText(
                 "no safe return from {} of it{}", Reach(left), "" if self.rally or self.left else " (battery)"
             )
         elif self.lowest_legal_rel_home_m is not None and self.set_rel_home_m >= self.lowest_legal_rel_home_m:
-            but += ", within all limits"
+            but.append(", within all limits")
+        if self.set_above_max_agl and self.max_agl_m is not None:
+            but.append(UnitText(", but above max_agl_m ({}) over home", Quantity(self.max_agl_m, "height", None)))
         if self.rally and self.battery is not None:
-            but += ", the battery not counted"
+            but.append(", the battery not counted")
         if self.not_judged:
-            but += ", as far as it was judged"
-        return UnitText("{}{}", then, but)
+            but.append(", as far as it was judged")
+        return UnitText("{}{}", then, joined("", but))
+
+    @property
+    def set_above_max_agl(self) -> bool:
+        """Whether a return at the altitude to set is higher above home than the mission may fly above ground."""
+        return None not in (self.max_agl_m, self.set_rel_home_m) and self.set_rel_home_m > self.max_agl_m  # type: ignore[operator]
 
     def as_dict(self, *, profile: bool = False) -> dict[str, Any]:
         """Plain values for ``summary.json``; the profile on request."""
@@ -272,6 +280,7 @@ class WayHome:
             "set_rel_home_m": self.set_rel_home_m,
             "set": [] if self.set_rel_home_m is None else settings(self.autopilot, self.set_rel_home_m),
             "set_leaves_m": self.set_leaves_m,
+            "set_above_max_agl": self.set_above_max_agl,
             "lowest_rel_home_m": self.lowest_rel_home_m,
             "highest_rel_home_m": self.highest_rel_home_m,
             "lowest_legal_rel_home_m": self.lowest_legal_rel_home_m,

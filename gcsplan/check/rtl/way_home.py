@@ -112,6 +112,7 @@ def way_home(
         vehicle=vehicle.name,
         autopilot=vehicle.autopilot,
         path_safe=verdict.safe,
+        max_agl_m=vehicle.limits.max_agl_m,
         parameter=rule.parameter,
         rtl_rel_home_m=judged_m,
         assumed=rtl_rel_home_m is None,

@@ -107,7 +107,7 @@ function sampleRows(k, i) {
   if (!leg.column && line.f[i] !== null) rows.push(['lowest allowed', num(line.f[i], 1, units.amsl)]);
   if (line.c[i] !== null) rows.push(['highest allowed', num(line.c[i], 1, units.amsl)]);
   rows.push(['climb', num(leg.climb, 1, '°')], ['since take-off', duration(line.t[i])]);
-  rows.push(['energy used', energy(line.j[i], 0, line.volts) + (line.battery ? ` · ${num((100 * line.j[i]) / line.battery, 1, '%')}` : '')]);
+  if (line.j) rows.push(['energy used', energy(line.j[i], 0, line.volts) + (line.battery ? ` · ${num((100 * line.j[i]) / line.battery, 1, '%')}` : '')]);
   rows.push(['at', placeWords(line.e[i], line.n[i])]);
   return rows;
 }

@@ -465,7 +465,7 @@ def test_the_headline_tells_path_and_return_and_counts_overlaps_once() -> None:
     broken = judged(w, mission(w, OVER), replace(v, limits=replace(v.limits, min_agl_m=45.0)), 50.0)
     assert broken.headline.startswith("path UNSAFE; no safe return from ")
     nothing = judged(w, replace(mission(w, OVER), items=()), rtl=60.0)
-    assert nothing.headline.endswith("; return not judged: the mission could not be followed")
+    assert nothing.headline.endswith(", return not judged: the mission could not be followed")
     assert nothing.advice == ""
 
 
