@@ -345,7 +345,7 @@ def test_a_vehicle_that_fits_draws_no_warning() -> None:
         ({"mav_autopilot": 0, "mav_type": 0, "system_status": UNINIT}, "could not be checked"),
         ({"mav_autopilot": 8, "mav_type": 2}, "calls itself"),
         ({"mav_type": 0}, "does not say whether"),
-        ({"lat_deg": None, "lon_deg": None, "amsl_m": None}, "reports no position"),
+        ({"mav_autopilot": 8, "lat_deg": None, "lon_deg": None, "amsl_m": None}, "reports no position"),
         ({"capabilities": None}, "capabilities"),
         ({"capabilities": 0}, "MISSION_ITEM_INT"),
         ({"system_status": CRITICAL}, "critical"),
