@@ -23,10 +23,12 @@ from gcsplan.mavlink.mission.return_altitude import return_on_board_m
 from gcsplan.vehicle import Vehicle, fastest_at_m_s
 
 if TYPE_CHECKING:
+    from gcsplan.app.model import VehiclePlan
     from gcsplan.app.upload_job import UploadJob
+    from gcsplan.check.rtl.verdict import WayHome
     from gcsplan.mavlink.link import session
 
-__all__ = ["judge_on_board", "settings_of"]
+__all__ = ["judge_on_board", "settings_of", "settings_of_plan"]
 
 SAME_S, SAME_PART = 1.0, 0.005
 """A flight that takes as long as told within this, s, or within this part of it, is the one that was told."""
@@ -38,8 +40,20 @@ def settings_of(job: UploadJob) -> tuple[Setting, ...]:
         return ()
     home = job.way_home
     returns = job.home_required and (home is None or home.route != "mission")
-    height_m = job.rtl_rel_home_m if home is None or home.route == "mission" else home.rtl_rel_home_m
-    return parameter_list(job.mission, job.vehicle, rtl_rel_home_m=height_m, returns=returns)
+    return _listed(job.mission, job.vehicle, job.rtl_rel_home_m, home, returns=returns)
+
+
+def settings_of_plan(v: VehiclePlan, home: WayHome | None) -> tuple[Setting, ...]:
+    """The list of parameters that a planned mission was judged with; ``home``: its way home, if that was judged."""
+    returns = home is not None and home.route != "mission"
+    return _listed(v.mission, v.request.vehicle, v.request.rtl_rel_home_m, home, returns=returns)
+
+
+def _listed(
+    mission: Mission, vehicle: Vehicle, rtl_rel_home_m: float | None, home: WayHome | None, *, returns: bool
+) -> tuple[Setting, ...]:
+    height_m = rtl_rel_home_m if home is None or home.route == "mission" else home.rtl_rel_home_m
+    return parameter_list(mission, vehicle, rtl_rel_home_m=height_m, returns=returns)
 
 
 def judge_on_board(

@@ -326,7 +326,7 @@ def require_file(file: Path) -> None:
 
 def verify_file(
     argument: str, url: str, sysid: int = 1, *, source: MissionFile | None = None, tolerance_m: float | None = None,
-    timeout_s: float = 60.0,
+    timeout_s: float = 60.0, allow_parameters: bool = False,
 ) -> JobResult:  # fmt: skip
     """Compare a file with the mission on board; nothing is written to the vehicle.
 
@@ -351,7 +351,7 @@ def verify_file(
             listen_s=LISTEN_S, timeout_s=timeout_s, rtl_rel_home_m=job.rtl_rel_home_m,
             read_parameters=checked is not None, settings=settings_of(job), vehicle=job.vehicle,
         )  # fmt: skip
-        judge = judge_on_board(job, allow_unjudged=False)
+        judge = judge_on_board(job, allow_unjudged=False, allow_parameters=allow_parameters)
         result = session.verify_mission(link, job.mission, options=options, judge=judge)
         result, shifted, cure = shifts.within(result, job.mission, tolerance_m)
         done = _result(job, result)

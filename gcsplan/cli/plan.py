@@ -23,6 +23,7 @@ from gcsplan.cli.options import (
     ListZonesOption,
     MissionArgument,
     ObjectiveOption,
+    ParametersOption,
     PlaceOption,
     PlannerOption,
     RequireWayHomeOption,
@@ -123,6 +124,7 @@ def plan(
     allow_unjudged: UnjudgedOption = False,
     allow_armed: ArmedOption = False,
     ignore_position: PlaceOption = False,
+    allow_parameters: ParametersOption = False,
     atomic: AtomicOption = False,
     timeout: TimeoutOption = 60.0,
     list_zones: ListZonesOption = False,
@@ -200,8 +202,9 @@ def plan(
     results: list[JobResult] = []
     if targets:
         options = UploadOptions(
-            allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout
-        )
+            allow_armed=allow_armed, ignore_position=ignore_position, allow_parameters=allow_parameters, atomic=atomic,
+            timeout_s=timeout,
+        )  # fmt: skip
         results = _upload(orders, options, gate)
         told = {"upload.json": lambda: outputs.upload_text(planned, results, homes)}
         if report:

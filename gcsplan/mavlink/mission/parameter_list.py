@@ -1,8 +1,8 @@
 """The parameters that a mission was judged with: one list for each vehicle, made from the plan alone.
 
 Each `Setting` says what the proof assumes of one parameter, what it may be, and why. A vehicle's parameters are held
-against it (`off`), the motion that they make is `vehicle_on_board`, and `param_file` is the list as ground stations
-load it. Nothing here is ever written to a vehicle.
+against it (`off`), and the motion that they make is `vehicle_on_board`. `parameter_file` is the list as ground
+stations load it. Nothing here is ever written to a vehicle.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from gcsplan.mavlink.mission.parameter_names import PARAMETERS, Name, Parameter
 from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, Autopilot, Vehicle
 from gcsplan.world.atmosphere import true_per_indicated
 
-__all__ = ["Off", "Setting", "commands_speed", "off", "param_file", "parameter_list", "vehicle_on_board"]
+__all__ = ["Off", "Setting", "commands_speed", "off", "parameter_list", "vehicle_on_board"]
 
 Rule = Literal["equal", "at least", "at most"]
 Matters = Literal["time", "turns", "return", "flight", "told"]
@@ -113,11 +113,9 @@ def parameter_list(
     """The settings that ``mission`` was judged with, for the autopilot of ``vehicle``.
 
     ``rtl_rel_home_m``: the return altitude above home that was judged. ``returns``: a return from anywhere is part of
-    what was judged; an RTL item always is. An ideal vehicle (of the papers' worlds) has no settings.
+    what was judged; an RTL item always is. What an ideal vehicle (of the papers' worlds) does not bound is not among
+    them.
     """
-    ideal = math.isinf(vehicle.accel_m_s2) and not vehicle.keeps_airspeed
-    if ideal:
-        return ()
     ends = any(item.command == RTL for item in mission.items)
     rows = {Autopilot.ARDUCOPTER: _copter, Autopilot.ARDUPLANE: _plane, Autopilot.PX4: _px4}
     return tuple(rows[vehicle.autopilot](mission, vehicle, rtl_rel_home_m, ends, returns or ends))
@@ -241,7 +239,7 @@ def _px4(mission: Mission, vehicle: Vehicle, rtl_rel_home_m: float | None, ends:
         Setting(known["land"], vehicle.land_m_s, "equal", "land_m_s, the landing's last metres", "time"),
         Setting(known["accel"], accel, "equal", "accel_m_s2, in all times and in how far a return runs on", "time"),
         Setting(known["jerk"], vehicle.leg_jerk_m_s3, "equal", "leg_jerk_m_s3, in all times", "time"),
-        Setting(known["corner"], vehicle.corner_accel_m_s2 / accel, "equal",
+        Setting(known["corner"], vehicle.corner_accel_m_s2 / accel if math.isfinite(accel) else math.inf, "equal",
                 "corner_accel_m_s2 over accel_m_s2, in corners", "time"),
         Setting(known["radius"], 10.0, "at most", "where items without a radius count as reached", "turns"),
         Setting(known["radius_height"], 0.8, "at most", "the height at which an item counts as reached", "turns"),
@@ -324,17 +322,3 @@ def vehicle_on_board(vehicle: Vehicle, mission: Mission, values: Mapping[str, fl
     # What divides by a rate needs one above 0.
     least = {key: max(value, 0.01) for key, value in changed.items() if value is not None and key != "return_wait_s"}
     return replace(vehicle, **(changed | least))  # type: ignore[arg-type]
-
-
-def param_file(name: str, settings: Sequence[Setting]) -> str:
-    """The list as a text that Mission Planner, MAVProxy and QGroundControl load: a NAME,VALUE line for each name.
-
-    A ground station passes over the names that the vehicle's version does not have. Rules and reasons are comments.
-    """
-    lines = [f"# {name}: the parameters that its mission was judged with. gcsplan writes none of them to a vehicle."]
-    for s in settings:
-        versions = " or ".join(f"{n.name}{' (' + n.versions + ')' if n.versions else ''}" for n in s.parameter.names)
-        rule = "" if s.rule == "equal" else f"{s.rule} this; "
-        lines.append(f"# {versions}: {rule}{s.why}")
-        lines += [f"{n.name},{n.value(s.value):.10g}" for n in s.parameter.names]
-    return "\n".join(lines) + "\n"
