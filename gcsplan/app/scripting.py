@@ -122,9 +122,9 @@ def write(
     """Write what ``gcsplan plan -o FOLDER`` writes, the same bytes, whole or not at all; returns the files' paths.
 
     The files are `.waypoints`, `.plan` and `.param` for each vehicle, `mission.kml`, `mission.geojson`, `profile.csv`
-    and `summary.json`; with ``report`` also `report.html`. ``way_home``, and ``report`` too, adds to the summary how each
-    vehicle returns from every point, which takes about a second for 20 km. ``units`` are those of the report; all other
-    files are in SI.
+    and `summary.json`; with ``report`` also `report.html`. ``way_home``, and ``report`` too, adds to the summary how
+    each vehicle returns from every point, which takes about a second for 20 km. ``units`` are those of the report; all
+    other files are in SI.
 
     Outputs of an earlier plan in ``folder`` are removed; any other file in the way is moved to its ``previous/``.
     Raises CheckFailed if a verdict does not pass (with ``allow_unjudged``, what could not be judged passes), or if the

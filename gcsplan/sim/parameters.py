@@ -176,7 +176,7 @@ class Parameters:
         # PX4 stores an integer's bytes in the float field, ArduPilot its value.
         self._bytewise = autopilot is Autopilot.PX4
         for name, value in (given or {}).items():
-            self.set_from_wire(name, value)
+            self._set(name, value)
         if firmware.has(NAMES_UNITS):
             self._table = dict(sorted(_in_4_7(self._table).items()))
 
@@ -206,6 +206,12 @@ class Parameters:
         value = wire
         if self._bytewise and parameter.kind != REAL32:
             value = float(struct.unpack("<i", struct.pack("<f", wire))[0])
+        return self._set(name, value)
+
+    def _set(self, name: str, value: float) -> bool:
+        parameter = self._table.get(name)
+        if parameter is None:
+            return False
         if not -3.5e38 < value < 3.5e38:  # NaN and infinities
             return False
         if parameter.kind != REAL32:
