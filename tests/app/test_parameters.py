@@ -225,7 +225,7 @@ def test_a_fleet_keeps_apart_as_its_parameters_make_it_fly() -> None:
                     speed_m_s=[10, 10], takeoff_agl_m=60)  # fmt: skip
     first = keys(name="a", rtl_rel_home_m=60, end="rtl", speed_m_s=[10, 10])
     done = planned(
-        first, crossing, arrival={"mode": "sequence", "separation_m": 30, "interval_s": 280, "order": ["a", "c"]}
+        first, crossing, arrival={"mode": "sequence", "separation_m": 30, "interval_s": 290, "order": ["a", "c"]}
     )
     fleet = done.fleet
     assert fleet is not None
