@@ -31,6 +31,17 @@ OWN_METRES = 1.0035
 PX4_RETURN_M_S = 5.0
 """PX4's MPC_XY_CRUISE, default: the speed of its return, whatever speed the mission has commanded."""
 
+COPTER_RETURN_M_S = 10.0
+"""The speed of ArduCopter's return, whatever the mission has commanded: RTL_SPEED, or, if that is 0 (the default),
+WPNAV_SPEED, whose default this is (mode_rtl.cpp, `climb_start`)."""
+
+COPTER_PEAK_ACCEL = 2.5 / 1.5
+"""ArduCopter's WPNAV_ACCEL (default 2.5) per ``accel_m_s2`` (1.5), which is that of the trapezoid that takes about as
+long."""
+
+COPTER_CORNER_ACCEL = 2.0
+"""ArduCopter's WPNAV_ACCEL_C (default: twice WPNAV_ACCEL) per ``corner_accel_m_s2`` (2.5)."""
+
 
 def lean_for_deg(speed_m_s: float) -> float:
     """The lean angle that an ArduCopter needs for a cruise speed, about."""
@@ -136,7 +147,8 @@ class Vehicle:
     a sharp corner at full speed. A climb or descent rate of ``inf`` means that the cruise speed is the speed in space,
     whatever the slope: the ideal vehicle of the papers. ``lean_angle_deg`` is an ArduCopter's largest lean angle, and
     ``vel_max_m_s`` a PX4's MPC_XY_VEL_MAX: they have bounded ``speed_max_m_s`` already; None: they bound nothing.
-    ``climb_out``: a fixed wing's, if it is known.
+    ``climb_out``: a fixed wing's, if it is known. ``return_m_s``, ``return_wait_s``: the speed of the autopilot's own
+    return and its wait over home, if they are not the defaults.
     """
 
     name: str
@@ -158,6 +170,8 @@ class Vehicle:
     lean_angle_deg: float | None = None
     vel_max_m_s: float | None = None
     climb_out: ClimbOut | None = None
+    return_m_s: float | None = None
+    return_wait_s: float | None = None
 
     def fastest_over_ground_m_s(self, speed_m_s: float, amsl_m: float) -> float:
         """No faster than this over ground in still air, with a commanded speed, near home and up to an altitude."""
@@ -183,12 +197,23 @@ class Vehicle:
 
     @property
     def return_speed_m_s(self) -> float | None:
-        """The speed of the autopilot's own return; None: that of the mission."""
-        return PX4_RETURN_M_S if self.autopilot is Autopilot.PX4 and math.isfinite(self.accel_m_s2) else None
+        """The speed of the autopilot's own return, whatever the mission has commanded; None: that of the mission.
+
+        A plane returns at the airspeed of AIRSPEED_CRUISE (navigation.cpp, `calc_airspeed_errors`).
+        """
+        if self.autopilot is Autopilot.ARDUPLANE:
+            return self.speed_max_m_s if self.keeps_airspeed or math.isfinite(self.accel_m_s2) else None
+        if math.isinf(self.accel_m_s2):
+            return None
+        if self.return_m_s is not None:
+            return self.return_m_s
+        return PX4_RETURN_M_S if self.autopilot is Autopilot.PX4 else COPTER_RETURN_M_S
 
     @property
     def return_waits_s(self) -> float:
         """How long it hovers over home at the end of the autopilot's own return, before it descends."""
+        if self.return_wait_s is not None:
+            return self.return_wait_s
         copter = self.autopilot is Autopilot.ARDUCOPTER and math.isfinite(self.accel_m_s2)
         return COPTER_RETURN_WAITS_S if copter else 0.0
 

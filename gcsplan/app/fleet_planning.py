@@ -36,7 +36,7 @@ LATER_S = 600.0
 SEPARATION_M = 30.0
 """Separation that is judged if the file has no `arrival`, m."""
 
-__all__ = ["crew_of", "fleet_of", "route_of", "without"]
+__all__ = ["conflict_words", "crew_of", "fleet_of", "motion_of", "route_of", "rules_of", "without"]
 
 
 def fleet_of(
@@ -64,15 +64,15 @@ def fleet_of(
         crews = [crew_of(v, world) for v in vehicles]
     flown, slots = _timed(vehicles, crews, plan, brief, gate, leaving)
     leaving.require_some(flown)
-    motions = [_motion(v, slot, world) for v, slot in zip(flown, slots, strict=True)]
+    motions = [motion_of(v, slot, world) for v, slot in zip(flown, slots, strict=True)]
     found = _separation(motions, flown, arrival)
     if found is not None and not found.safe and arrival is not None:
         # The missions as built are what is flown, so this check decides.
         if not leaving.allowed:
-            raise NoMission(_conflict_text(found.conflicts, world), reason="separation")
+            raise NoMission(conflict_words(found.conflicts, world), reason="separation")
         leave = least_to_leave(found.conflicts)
         for name, conflict in leave.items():
-            leaving.leave(name, NoMission(_conflict_text([conflict], world), reason="separation"))
+            leaving.leave(name, NoMission(conflict_words([conflict], world), reason="separation"))
         rows = [k for k, v in enumerate(flown) if v.name not in leave]
         flown, slots, motions = [flown[k] for k in rows], [slots[k] for k in rows], [motions[k] for k in rows]
         found = _separation(motions, flown, arrival)
@@ -81,7 +81,7 @@ def fleet_of(
         if not found.safe:
             notes.append(
                 f"the file asks for no `arrival`, so nothing keeps the vehicles apart; released together, "
-                f"{_conflict_text(found.conflicts, world)}"
+                f"{conflict_words(found.conflicts, world)}"
             )
     if gate is not None:
         notes.append(
@@ -264,7 +264,7 @@ def _kept_apart(
     return settled.schedule
 
 
-def _motion(v: VehiclePlan, slot: Slot, world: World) -> TimedPath:
+def motion_of(v: VehiclePlan, slot: Slot, world: World) -> TimedPath:
     """The motion of the mission as built. Its items contain the hold already, unless a time of day ends it."""
     course = Course(route_of(v, world), v.request.vehicle)
     return course.fly(slot.speed_m_s, slot.depart_s, slot.hold_s if v.order.gate_utc else 0.0)
@@ -276,7 +276,8 @@ def words_of(world: World, place: Place) -> str:
     return f"{lat:.6f}, {lon:.6f}, {place[2]:.0f} m AMSL"
 
 
-def _conflict_text(conflicts: Sequence[Conflict], world: World) -> str:
+def conflict_words(conflicts: Sequence[Conflict], world: World) -> str:
+    """Which vehicles come too near to each other, when and where."""
     lines = [f"  {c.describe(lambda place: words_of(world, place))}" for c in conflicts[:8]]
     more = f"\n  and {len(conflicts) - 8} more" if len(conflicts) > 8 else ""
     return "the vehicles come too near to each other:\n" + "\n".join(lines) + more

@@ -13,6 +13,7 @@ import numpy as np
 
 from gcsplan import __version__
 from gcsplan.app.model import FleetPlan, Plan, VehiclePlan
+from gcsplan.app.on_board import settings_of_plan
 from gcsplan.arrays import Floats
 from gcsplan.check.rtl.words import verdict_words
 from gcsplan.check.verdict import LegFigures, Verdict
@@ -26,6 +27,7 @@ from gcsplan.fleet.arrival import Slot
 from gcsplan.mavlink.files.formats import write_plan, write_waypoints
 from gcsplan.mavlink.mission.commands import command_name
 from gcsplan.mavlink.mission.mission import MissionItem
+from gcsplan.mavlink.mission.parameter_file import PARAM_ENDING, param_file
 from gcsplan.units import METRIC, Units
 
 if TYPE_CHECKING:
@@ -58,6 +60,10 @@ def outputs_of(
         files[f"{v.name}.plan"] = write_plan(
             v.mission, vehicle=v.request.vehicle, fence=fences.get(v.name, ()), rally=points
         )
+        if settings := settings_of_plan(v, homes.get(v.name)):
+            files[f"{v.name}.{PARAM_ENDING[v.mission.autopilot]}"] = param_file(
+                v.name, v.mission.autopilot, v.mission.sysid, settings
+            )
     start = None if plan.fleet is None else plan.fleet.start_utc
     files["mission.kml"] = write_kml(plan.source.name, tracks, zones, frame, start)
     files["mission.geojson"] = write_geojson(plan.source.name, tracks, zones, frame)
@@ -116,7 +122,11 @@ def summary_of(plan: Plan, results: Sequence[JobResult] = (), homes: Homes = Map
         "objective": plan.objective,
         "seed": plan.seed,
         "inputs": dict(plan.source.inputs),
-        "vehicles": [_vehicle(v, plan.fleet, uploads.get(v.name), homes.get(v.name)) for v in plan.vehicles],
+        "vehicles": [
+            _vehicle(v, plan.fleet, uploads.get(v.name), homes.get(v.name))
+            | {"parameters": [s.as_dict() for s in settings_of_plan(v, homes.get(v.name))]}
+            for v in plan.vehicles
+        ],
         "fleet": _fleet(plan),
         "left_out": [v.as_dict() for v in plan.left_out],
         "notes": list(dict.fromkeys(plan.notes)),

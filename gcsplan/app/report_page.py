@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from gcsplan.app.model import Plan
+from gcsplan.app.on_board import settings_of_plan
 from gcsplan.app.upload_job import JobResult
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.fleet.motion import TimedPath
@@ -56,6 +57,7 @@ def page_of_plan(
                 v.name, v.verdict, v.request.vehicle, certificate, tuple(dict.fromkeys(notes)),
                 None if fleet is None else fleet.motion(v.name), slot,
                 (homes or {}).get(v.name), uploads.get(v.name), leaves=v.request.end == "none",
+                settings=settings_of_plan(v, (homes or {}).get(v.name)),
             )
         )  # fmt: skip
     return Page(

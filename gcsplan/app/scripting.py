@@ -121,10 +121,10 @@ def write(
 ) -> list[Path]:
     """Write what ``gcsplan plan -o FOLDER`` writes, the same bytes, whole or not at all; returns the files' paths.
 
-    The files are `.waypoints` and `.plan` for each vehicle, `mission.kml`, `mission.geojson`, `profile.csv` and
-    `summary.json`; with ``report`` also `report.html`. ``way_home``, and ``report`` too, adds to the summary how each
-    vehicle returns from every point, which takes about a second for 20 km. ``units`` are those of the report; all other
-    files are in SI.
+    The files are `.waypoints`, `.plan` and `.param` for each vehicle, `mission.kml`, `mission.geojson`, `profile.csv`
+    and `summary.json`; with ``report`` also `report.html`. ``way_home``, and ``report`` too, adds to the summary how
+    each vehicle returns from every point, which takes about a second for 20 km. ``units`` are those of the report; all
+    other files are in SI.
 
     Outputs of an earlier plan in ``folder`` are removed; any other file in the way is moved to its ``previous/``.
     Raises CheckFailed if a verdict does not pass (with ``allow_unjudged``, what could not be judged passes), or if the
@@ -145,7 +145,7 @@ def write(
         ... })
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     [file.name for file in write(planned, folder)]
-        ['uav1.waypoints', 'uav1.plan', 'mission.kml', 'mission.geojson', 'profile.csv', 'summary.json']
+        ['uav1.waypoints', 'uav1.plan', 'uav1.param', 'mission.kml', 'mission.geojson', 'profile.csv', 'summary.json']
     """
     system = units_of(units)
     settle_outputs(folder)
@@ -203,6 +203,7 @@ def upload(
     allow_unjudged: bool = False,
     allow_armed: bool = False,
     ignore_position: bool = False,
+    allow_parameters: bool = False,
     timeout_s: float = 60.0,
     progress: ProgressCall | None = None,
 ) -> list[JobResult]:
@@ -211,7 +212,9 @@ def upload(
     ``to`` is a URL for all vehicles (distinguished by system id), ``"link"`` (the mission file's links), ``"sim"`` (a
     simulated vehicle for each), ``"NAME=URL"``, a list of these, or a mapping from name to URL. Vehicles without a
     target are left out. With ``atomic``, if one upload fails, the missions that the others took are cleared again.
-    ``timeout_s`` is the longest time without progress. ``progress(name, progress)`` is called during the uploads.
+    ``timeout_s`` is the longest time without progress. With ``allow_parameters`` a vehicle whose parameters are outside
+    of the mission's list is judged with them instead of refused. ``progress(name, progress)`` is called during the
+    uploads.
 
     Returns one `JobResult` per vehicle, in the plan's order: ``verified`` is True only if the mission was read back and
     equals what was sent; ``message`` says what went wrong. A failure of one vehicle does not affect the others and
@@ -228,8 +231,9 @@ def upload(
     from gcsplan.sim.loopback import loopback_fleet
 
     options = UploadOptions(
-        allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout_s
-    )
+        allow_armed=allow_armed, ignore_position=ignore_position, allow_parameters=allow_parameters, atomic=atomic,
+        timeout_s=timeout_s,
+    )  # fmt: skip
     return uploads.run_jobs(
         uploads.jobs_of(planned, targets, homes, bool(homes)), options, progress, simulator=loopback_fleet
     )

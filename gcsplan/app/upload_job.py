@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from gcsplan.app.fleet_on_board import FleetOnBoard
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.build.fence import Fence
@@ -23,13 +24,15 @@ ProgressCall = Callable[[str, Progress], None]
 
 @dataclass(frozen=True, slots=True)
 class UploadOptions:
-    """The user's permissions. ``atomic``: if one upload fails, the missions that others took are cleared again.
+    """The user's permissions. ``allow_parameters``: parameters on board that are outside of the list are judged as they
+    are. ``atomic``: if one upload fails, the missions that others took are cleared again.
 
     ``timeout_s``: the longest time without progress, see `gcsplan.mavlink.protocol.patience`.
     """
 
     allow_armed: bool = False
     ignore_position: bool = False
+    allow_parameters: bool = False
     unchecked: bool = False
     atomic: bool = False
     timeout_s: float = 60.0
@@ -41,7 +44,8 @@ class UploadJob:
 
     ``way_home`` is None unless it was judged. ``home_required``: a vehicle that returns at another altitude is refused.
     ``ground`` is what a vehicle that flies the terrain frame is sent. ``hours``: those of the flight from its departure
-    on, if a zone was left out for them.
+    on, if a zone was left out for them. ``fleet``: the other vehicles' motions, from which this one keeps apart as its
+    parameters make it fly.
     """
 
     name: str
@@ -57,6 +61,7 @@ class UploadJob:
     home_required: bool = False
     ground: Ground | None = None
     hours: Hours | None = None
+    fleet: FleetOnBoard | None = None
 
 
 @dataclass(frozen=True, eq=False)

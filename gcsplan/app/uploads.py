@@ -21,12 +21,14 @@ from typing import TYPE_CHECKING, Any
 from gcsplan.app.check_sites import Checked, split_name
 from gcsplan.app.checking import check_files
 from gcsplan.app.fencing import not_fenced, upload_fences
+from gcsplan.app.fleet_on_board import FleetOnBoard
 from gcsplan.app.flight_hours import hours_left
 from gcsplan.app.ground import MissionGround
 from gcsplan.app.model import Plan
+from gcsplan.app.on_board import judge_on_board, settings_of
 from gcsplan.app.rollback import rolled_back
 from gcsplan.app.upload_job import LINK, SIM, JobResult, ProgressCall, UploadJob, UploadOptions
-from gcsplan.app.upload_orders import judge_on_board, order_of, report_end
+from gcsplan.app.upload_orders import order_of, report_end
 from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, UsageError, VehicleRefused
 from gcsplan.export.outdir import write_whole
 from gcsplan.figures import counted
@@ -109,12 +111,12 @@ def jobs_of(
     ``homes``: ways home that were judged; ``home_required``: they must be safe.
     """
     source = plan.source
-    ground = MissionGround(source)
+    ground, fleet = MissionGround(source), FleetOnBoard(plan)
     return [
         UploadJob(
             v.name, where[v.name], v.mission, v.verdict, v.request.vehicle, plan.world, v.request.rtl_rel_home_m,
             source.terrain_error_m, way_home=homes.get(v.name), home_required=home_required, ground=ground,
-            hours=hours_left(source, v, plan.fleet),
+            hours=hours_left(source, v, plan.fleet), fleet=fleet,
         )
         for v in plan.vehicles if v.name in where
     ]  # fmt: skip
@@ -325,7 +327,7 @@ def require_file(file: Path) -> None:
 
 def verify_file(
     argument: str, url: str, sysid: int = 1, *, source: MissionFile | None = None, tolerance_m: float | None = None,
-    timeout_s: float = 60.0,
+    timeout_s: float = 60.0, allow_parameters: bool = False,
 ) -> JobResult:  # fmt: skip
     """Compare a file with the mission on board; nothing is written to the vehicle.
 
@@ -349,9 +351,9 @@ def verify_file(
             notes = (*read.notes, *([read.unread_fence] if read.unread_fence else []))
         options = session.SessionOptions(
             listen_s=LISTEN_S, timeout_s=timeout_s, rtl_rel_home_m=job.rtl_rel_home_m,
-            read_parameters=checked is not None,
+            read_parameters=checked is not None, settings=settings_of(job), vehicle=job.vehicle,
         )  # fmt: skip
-        judge = judge_on_board(job, allow_unjudged=False)
+        judge = judge_on_board(job, allow_unjudged=False, allow_parameters=allow_parameters)
         result = session.verify_mission(link, job.mission, options=options, judge=judge)
         result, shifted, cure = shifts.within(result, job.mission, tolerance_m)
         done = _result(job, result)

@@ -65,7 +65,7 @@ def l1_off_m(radius_m: float, turn_rad: float, speed_m_s: float, tuning: Tuning 
     cos, sin = math.cos(turn_rad), math.sin(turn_rad)
     x, y, heading, bank, worst = -tangent, 0.0, 0.0, 0.0, 0.0  # the corner is the origin, the first leg the x axis
     steps = math.ceil((2.0 * tangent / speed_m_s + CALM_S * tuning.l1_slower) / STEP_S)
-    most = math.radians(MOST_BANK_DEG)
+    most = math.radians(min(tuning.roll_deg, MOST_BANK_DEG))
     for _ in range(steps):
         aside = cos * y - sin * x  # left of the new leg
         closing = math.asin(min(max(-aside / ahead, -CAPTURE_SINE), CAPTURE_SINE))

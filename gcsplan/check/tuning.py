@@ -25,6 +25,7 @@ class Tuning:
     plane_radius_m: float = 90.0  # ArduPlane WP_RADIUS
     l1_period_s: float = 17.0  # ArduPlane NAVL1_PERIOD
     l1_damping: float = 0.75  # ArduPlane NAVL1_DAMPING
+    roll_deg: float = 45.0  # ArduPlane ROLL_LIMIT_DEG (LIM_ROLL_CD before 4.5)
     read: frozenset[str] = frozenset()
 
     @classmethod
@@ -37,7 +38,8 @@ class Tuning:
             "WPNAV_RADIUS": ("copter_radius_m", 0.01), "WP_RADIUS_M": ("copter_radius_m", 1.0),
             "NAV_ACC_RAD": ("px4_radius_m", 1.0), "NAV_MC_ALT_RAD": ("px4_height_m", 1.0),
             "WP_RADIUS": ("plane_radius_m", 1.0), "NAVL1_PERIOD": ("l1_period_s", 1.0),
-            "NAVL1_DAMPING": ("l1_damping", 1.0),
+            "NAVL1_DAMPING": ("l1_damping", 1.0), "ROLL_LIMIT_DEG": ("roll_deg", 1.0),
+            "LIM_ROLL_CD": ("roll_deg", 0.01),
         }  # fmt: skip
         usable = {name: v for name, v in values.items() if name in known and math.isfinite(v) and v > 0.0}
         fields = {known[name][0]: value * known[name][1] for name, value in usable.items()}

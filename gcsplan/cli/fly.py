@@ -30,7 +30,9 @@ def sim(
     Ctrl-C ends it.
     """
     from gcsplan.cli.console import remark
+    from gcsplan.mavlink.mission.mission import Home
     from gcsplan.sim.firmware import firmwares
+    from gcsplan.sim.loopback import set_up
     from gcsplan.sim.misbehaviour import Misbehaviour
     from gcsplan.sim.server import SimServer, serve
     from gcsplan.sim.vehicle import LoopbackVehicle
@@ -43,12 +45,18 @@ def sim(
         from gcsplan.app.pipeline import load_mission
 
         stands = [
-            (r.vehicle.sysid, r.vehicle.autopilot, r.start_deg, r.start[2], r.vehicle.lean_angle_deg)
+            (
+                r.vehicle.sysid,
+                r.vehicle.autopilot,
+                r.start_deg,
+                r.start[2],
+                set_up(r.vehicle, Home.at(*r.start_deg, r.start[2])),
+            )
             for r in load_mission(mission).vehicles
         ]
     elif autopilot is None or autopilot in list(Autopilot):
         kind = Autopilot(autopilot or Autopilot.ARDUCOPTER)
-        stands = [(sysid or 1, kind, (36.6, -84.38), 471.0, None)]  # a valley of the sample terrain
+        stands = [(sysid or 1, kind, (36.6, -84.38), 471.0, {})]  # a valley of the sample terrain
     else:
         raise UsageError(f"--autopilot {autopilot}: one of {', '.join(Autopilot)} is wanted")
     versions = firmwares([stand[1] for stand in stands], firmware)
@@ -60,10 +68,10 @@ def sim(
             lon_deg=place[1],
             amsl_m=amsl_m,
             misbehave=trouble,
-            parameters={} if lean_deg is None else {"ANGLE_MAX": 100.0 * lean_deg},
+            parameters=own,
             firmware=version,
         )
-        for (number, kind, place, amsl_m, lean_deg), version in zip(stands, versions, strict=True)
+        for (number, kind, place, amsl_m, own), version in zip(stands, versions, strict=True)
     ]
 
     def ready(server: SimServer) -> None:

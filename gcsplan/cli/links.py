@@ -18,6 +18,7 @@ from gcsplan.cli.options import (
     FenceOption,
     FilesArgument,
     JsonOption,
+    ParametersOption,
     PlaceOption,
     RequireWayHomeOption,
     SysidOption,
@@ -62,6 +63,7 @@ def upload(
     allow_unjudged: UnjudgedOption = False,
     allow_armed: ArmedOption = False,
     ignore_position: PlaceOption = False,
+    allow_parameters: ParametersOption = False,
     atomic: AtomicOption = False,
     fence: FenceOption = False,
     fence_infinite: FenceInfiniteOption = False,
@@ -93,7 +95,7 @@ def upload(
         raise UsageError("the way home is judged in the world of a mission file: give --mission FILE, not --unchecked")
     options = UploadOptions(
         allow_armed=allow_armed, ignore_position=ignore_position, unchecked=unchecked, atomic=atomic,
-        timeout_s=timeout,
+        timeout_s=timeout, allow_parameters=allow_parameters,
     )  # fmt: skip
     if mission is not None:
         if sysid is not None:
@@ -161,6 +163,7 @@ def verify(
     ] = None,
     at: AtOption = None,
     sysid: UnlessMissionSysidOption = None,
+    allow_parameters: ParametersOption = False,
     timeout: TimeoutOption = 60.0,
     as_json: JsonOption = False,
 ) -> None:
@@ -179,7 +182,10 @@ def verify(
     shifts.require_tolerance(tolerance_m, judged=mission is not None)
     require_settled([check_sites.split_name(file)[1]])
     source = None if mission is None else pipeline.load_mission(mission, at=at)
-    done = uploads.verify_file(file, to, sysid or 1, source=source, tolerance_m=tolerance_m, timeout_s=timeout)
+    done = uploads.verify_file(
+        file, to, sysid or 1, source=source, tolerance_m=tolerance_m, timeout_s=timeout,
+        allow_parameters=allow_parameters,
+    )  # fmt: skip
     if as_json:
         emit(done.as_dict(), uploads.failure([done]))
     else:

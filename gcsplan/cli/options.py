@@ -163,6 +163,10 @@ TimeoutOption = Annotated[
     ),
 ]  # fmt: skip
 PlaceOption = Annotated[bool, typer.Option("--ignore-position", help="Send wherever the vehicle stands.")]
+ParametersOption = Annotated[
+    bool,
+    typer.Option("--allow-parameters", help="Judge with the parameters on board, also outside of the mission's list."),
+]
 
 UncheckedSysidOption = Annotated[
     int | None,

@@ -27,6 +27,7 @@ from gcsplan.cli.options import (
     MissionArgument,
     NodataOption,
     ObjectiveOption,
+    ParametersOption,
     PlaceOption,
     PlannerOption,
     RequireWayHomeOption,
@@ -130,6 +131,7 @@ def plan(
     allow_unjudged: UnjudgedOption = False,
     allow_armed: ArmedOption = False,
     ignore_position: PlaceOption = False,
+    allow_parameters: ParametersOption = False,
     atomic: AtomicOption = False,
     timeout: TimeoutOption = 60.0,
     vertical_datum: DatumOption = None,
@@ -213,8 +215,9 @@ def plan(
     results: list[JobResult] = []
     if targets:
         options = UploadOptions(
-            allow_armed=allow_armed, ignore_position=ignore_position, atomic=atomic, timeout_s=timeout
-        )
+            allow_armed=allow_armed, ignore_position=ignore_position, allow_parameters=allow_parameters, atomic=atomic,
+            timeout_s=timeout,
+        )  # fmt: skip
         results = _upload(orders, options, gate)
         told = {"upload.json": lambda: outputs.upload_text(planned, results, homes)}
         if report:

@@ -13,6 +13,7 @@ from typing import Literal
 
 import numpy as np
 
+from gcsplan.fleet.lean import lean_needed_deg
 from gcsplan.fleet.order import WITHIN_S
 from gcsplan.fleet.timing import Course, Route, speed_for
 from gcsplan.vehicle import DEFAULT_LEAN_DEG, LARGEST_LEAN_DEG, Autopilot, Vehicle, lean_for_deg, lean_words
@@ -167,14 +168,24 @@ def _float32_range(low: float, high: float) -> tuple[float, float]:
 
 
 def _speed_notes(vehicle: Vehicle, speed_m_s: float) -> list[str]:
+    """What an ArduCopter must be able to lean: for the speed in still air, and as far as forecasts in wind count."""
     if vehicle.autopilot is not Autopilot.ARDUCOPTER:
         return []
-    lean_deg = math.ceil(lean_for_deg(speed_m_s) - WITHIN_LEAN_DEG)
-    if lean_deg <= DEFAULT_LEAN_DEG:
-        return []
+    lean_deg = max(math.ceil(lean_for_deg(speed_m_s) - WITHIN_LEAN_DEG), round(lean_needed_deg(speed_m_s)))
+    counts_deg = vehicle.lean_angle_deg or 0.0
+    notes = []
     if lean_deg > LARGEST_LEAN_DEG:
         return [
             f"{speed_m_s:.2f} m/s needs a lean of more than {LARGEST_LEAN_DEG:g}°, which is ArduCopter's largest: a "
             f"vehicle that flies this mission arrives late"
         ]
-    return [f"{speed_m_s:.2f} m/s needs a lean of about {lean_deg}°: set {lean_words(lean_deg)} before it flies"]
+    if lean_deg > DEFAULT_LEAN_DEG:
+        notes.append(
+            f"{speed_m_s:.2f} m/s needs a lean of about {lean_deg}°: set {lean_words(lean_deg)} before it flies"
+        )
+    if counts_deg > max(lean_deg, DEFAULT_LEAN_DEG):
+        notes.append(
+            f"times, and forecasts in wind, count with lean_angle_deg: {counts_deg:g}: they hold with "
+            f"{lean_words(counts_deg)}"
+        )
+    return notes

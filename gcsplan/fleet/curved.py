@@ -20,19 +20,15 @@ from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.fleet.lean import leaning_m_s
 from gcsplan.fleet.scurve import Begun, Curves, along_slope, curves
 from gcsplan.fleet.speeds import POSITION_ERROR_M, bounds
-from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, Autopilot, Vehicle
 
 __all__ = ["CORNER_M", "Curved", "curved"]
 
 CORNER_M = 2.0
 """WPNAV_RADIUS, default: the middle of a turn lies this near to its way point."""
 
-FULL_ACCEL = 2.5 / 1.5
-"""A curve's peak acceleration (WPNAV_ACCEL, default 2.5) per `Vehicle.accel_m_s2` (1.5), which is that of the
-trapezoid that takes about as long."""
-
-CORNER_ACCEL = 2.0
-"""WPNAV_ACCEL_C (default: twice WPNAV_ACCEL) per `Vehicle.corner_accel_m_s2` (2.5)."""
+FULL_ACCEL, CORNER_ACCEL = COPTER_PEAK_ACCEL, COPTER_CORNER_ACCEL
+"""A curve's peak acceleration and the one across a turn, per `Vehicle.accel_m_s2` and `Vehicle.corner_accel_m_s2`."""
 
 LAG_S, LAG_FROM, REST_M_S = 0.36, 0.6, 0.96
 """Speeding up by a factor f costs LAG_S·(ln f - LAG_FROM) seconds more than its curve, if that is above 0; a standstill

@@ -11,14 +11,18 @@ from __future__ import annotations
 import numpy as np
 
 from gcsplan.arrays import Floats
+from gcsplan.vehicle import LARGEST_LEAN_DEG
 from gcsplan.world.atmosphere import density_ratio
 
-__all__ = ["leaning_m_s"]
+__all__ = ["lean_needed_deg", "leaning_m_s"]
 
 BODY, ROTORS = 0.003627, 0.02532
 """Drag at sea level per weight, of the body at 1 m/s, and of the rotors at 1 m/s with a thrust of one weight."""
 
 _ROUNDS = 30
+
+MEASURED_AMSL_M, SPARE = 593.0, 1.007
+"""Where the drag was measured, and what a speed should be below the fastest where the altitude is not known."""
 
 
 def leaning_m_s(lean_deg: float, slope_rad: Floats, amsl_m: Floats) -> Floats:
@@ -33,3 +37,15 @@ def leaning_m_s(lean_deg: float, slope_rad: Floats, amsl_m: Floats) -> Floats:
         across = along * np.tan(tilt)
         thrust = np.maximum(np.cos(lean) + BODY * thin * across * np.abs(across) + rotors * across, 0.01)
     return np.asarray(along / np.cos(tilt))
+
+
+def lean_needed_deg(speed_m_s: float, amsl_m: float | None = None) -> float:
+    """The lean, in whole degrees, that level flight at a speed needs at an altitude, at most `LARGEST_LEAN_DEG` + 1.
+
+    Without an altitude: with a little to spare, where the drag was measured.
+    """
+    wanted = SPARE * speed_m_s if amsl_m is None else speed_m_s * (1.0 - 1e-3)
+    leans = np.arange(1.0, LARGEST_LEAN_DEG + 1.0)
+    height = np.full(1, MEASURED_AMSL_M if amsl_m is None else amsl_m)
+    enough = (lean for lean in leans.tolist() if leaning_m_s(lean, np.zeros(1), height)[0] >= wanted)
+    return next(enough, LARGEST_LEAN_DEG + 1.0)

@@ -49,11 +49,11 @@ class Route:
     ``points`` (N, 3), N >= 2, are east_m, north_m, amsl_m from the top of take-off to the approach point. Grounds are
     amsl. Without ``start_ground_amsl_m`` the flight begins in the air at the first point (as in the papers); without
     ``goal_ground_amsl_m`` there is no landing. ``end`` is as in a mission file: ``rtl`` climbs to ``rtl_amsl_m`` if it
-    is lower, flies straight home at cruise speed, and lands; ``none`` is gone on arrival. ``holds_s`` (N,) are seconds
-    of holding at each point; the first is the gate. ``items`` (N + 1,) are the caller's numbers of the take-off, of
-    each way point but the first, and of the end of the flight; legs with the same number are parts of one leg. ``pace``
-    (N,) is the speed over ground that results from a commanded speed of 1 on each leg, and last on the straight line
-    home.
+    is lower, flies straight home at `Vehicle.return_speed_m_s`, and lands; ``none`` is gone on arrival. ``holds_s``
+    (N,) are seconds of holding at each point; the first is the gate. ``items`` (N + 1,) are the caller's numbers of the
+    take-off, of each way point but the first, and of the end of the flight; legs with the same number are parts of one
+    leg. ``pace`` (N,) is the speed over ground that results from a commanded speed of 1 on each leg, and last on the
+    straight line home.
 
     A fixed wing has no columns: ``climb_out`` (K, 3) leads from the ground to the first point, ``glide`` (K, 3) from
     the last point down to the ground if it lands. After a return it circles over home and stays in the air.
@@ -285,6 +285,8 @@ def _after(route: Route, vehicle: Vehicle) -> list[Motion]:
         d = np.diff(slanted, axis=0)
         level = np.linalg.norm(d, axis=1) / np.hypot(d[:, 0], d[:, 1]) if route.end == "rtl" else None
         down = legs(slanted, vehicle, np.full(len(d), number, dtype=np.intp), pace=level)
+        if down is not None and route.end == "rtl" and vehicle.return_speed_m_s is not None:
+            down = at_own_speed(down, vehicle.return_speed_m_s)
         return [] if down is None else [down]
     if route.end == "land" and route.goal_ground_amsl_m is not None:
         home_m = route.start_ground_amsl_m

@@ -8,6 +8,7 @@ from dataclasses import fields, replace
 from typing import Any
 
 from gcsplan.errors import Problem
+from gcsplan.fleet.lean import lean_needed_deg
 from gcsplan.mission_file.energy import make_energy
 from gcsplan.mission_file.request import ArrivalRequest
 from gcsplan.mission_file.schema import ArrivalKeys, LimitKeys, VehicleKeys, nearest
@@ -135,7 +136,7 @@ def within_lean(
     leans_deg = DEFAULT_LEAN_DEG if lean_deg is None else lean_deg
     most, wanted = fastest_at_m_s(leans_deg), vehicle.speed_max_m_s
     if wanted > most:
-        needs_deg = math.ceil(lean_for_deg(wanted) - 1e-6)
+        needs_deg = max(math.ceil(lean_for_deg(wanted) - 1e-6), round(lean_needed_deg(wanted)))
         angle = f"a lean of {leans_deg:g}°" + (", ArduCopter's default," if lean_deg is None else " (lean_angle_deg)")
         cure = "" if needs_deg > LARGEST_LEAN_DEG else (
             f"; for {wanted:g} m/s write lean_angle_deg: {needs_deg}, and set {lean_words(needs_deg)}"

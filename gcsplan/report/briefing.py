@@ -28,6 +28,8 @@ NAME, MESSAGE = 28, 105
 MAP_MM, SMALL_MAP_MM, WIDE_MM = 56.0, 24.0, 180.0
 """Height of the map, height where problems take the room, and greatest width."""
 PX_PER_MM = 96.0 / 25.4
+MAIN_PARAMETERS = ("speed", "return_speed", "lean", "roll")
+"""The parameters that stand on the briefing, by their newest names; the report's tables have all."""
 KINDS = ("start", "goal", "rally", "name")
 """The marks of the map that are on the briefing's, too."""
 NOT_IN_IT = "Wind, emergency landing sites and moving obstacles are not in the model."
@@ -136,6 +138,10 @@ def _facts(page: Page, s: Subject, units: Units) -> Iterator[tuple[str, str]]:
         end = duration(s.motion.end_s)
         yield "on the ground", "stays in the air" if s.motion.ends_in_air else "flies on" if s.leaves else end
     yield from _way_home(s, units)
+    main = [t.parameter.names[-1].name + f" {t.parameter.names[-1].value(t.value):.6g}" for t in s.settings
+            if t.parameter.key in MAIN_PARAMETERS]  # fmt: skip
+    if main:
+        yield "parameters", f"{esc(', '.join(main))}; all: see its limits"
 
 
 def _battery(s: Subject) -> str:

@@ -293,7 +293,7 @@ def _details(
         parts.append(tables.limits_table(subject, line, page.units))
         if line is not None:
             parts.append(tables.zones_table(page, subject, line, found[i]))
-        parts.append(tables.legs_table(subject, page.units) + "</details>")
+        parts.append(tables.legs_table(subject, page.units) + tables.parameters_table(subject) + "</details>")
     parts.append("</section>")
     return parts
 

@@ -12,6 +12,7 @@ from gcsplan.check.verdict import Verdict
 from gcsplan.fleet.arrival import Slot
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Separation
+from gcsplan.mavlink.mission.parameter_list import Setting
 from gcsplan.units import METRIC, Units, UnitText
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
@@ -36,7 +37,7 @@ class Subject:
     ``slot`` is its part of the time table, None for a checked file, and so is ``motion``, the whole flight over time.
     ``flown`` is what it flew in a rehearsal, from that track alone. ``leaves``: it is gone where its motion ends.
     ``home`` is the way home from every point, if it was judged. ``upload`` holds the keys of ``upload.json``, None if
-    nothing was sent.
+    nothing was sent. ``settings``: the parameters that its mission was judged with.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Subject:
     upload: Mapping[str, object] | None = None
     flown: TimedPath | None = None
     leaves: bool = False
+    settings: tuple[Setting, ...] = ()
 
     @property
     def depart_s(self) -> float:

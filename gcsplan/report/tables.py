@@ -232,6 +232,21 @@ def certificate_table(page: Page) -> str:
     return table("Certificate: how far the path can be from the best there is", head, rows)
 
 
+def parameters_table(subject: Subject) -> str:
+    """The parameters that a mission was judged with; empty if there are none."""
+    if not subject.settings:
+        return ""
+    rows = [
+        (
+            "<br>".join(esc(n.name) for n in s.parameter.names),
+            "<br>".join(f"{n.value(s.value):.6g}" for n in s.parameter.names),
+            "" if s.rule == "equal" else esc(s.rule), esc(s.why),
+        )
+        for s in subject.settings
+    ]  # fmt: skip
+    return table("Parameters of the vehicle that this was judged with", ("parameter|", "value", "rule|", "why|"), rows)
+
+
 def upload_table(page: Page) -> str:
     """The result of each upload; a note if nothing was sent."""
     rows, marks = [], []

@@ -6,10 +6,17 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mavlink.mission.mission import Home, Mission
+from gcsplan.mavlink.mission.parameter_list import parameter_list
 from gcsplan.sim.server import SimServer
 from gcsplan.sim.vehicle import LoopbackVehicle
-from gcsplan.vehicle import DEFAULT_LEAN_DEG, LARGEST_LEAN_DEG, Autopilot, lean_for_deg
+from gcsplan.vehicle import DEFAULT_LEAN_DEG, LARGEST_LEAN_DEG, Autopilot, Vehicle, lean_for_deg
+
+
+def set_up(vehicle: Vehicle, home: Home) -> dict[str, float]:
+    """The parameters of a simulated vehicle that is set up as its mission file says, by their first names."""
+    listed = parameter_list(Mission(vehicle.autopilot, home, ()), vehicle)
+    return {s.parameter.names[0].name: s.parameter.names[0].value(s.value) for s in listed}
 
 
 def _set_up(mission: Mission) -> dict[str, float]:

@@ -38,6 +38,7 @@ class Misbehaviour:
     link that sends wrong answers before every right one. ``stale_type``: another mission type of which wrong answers
     come likewise. ``answer_sysid``: system id of the answers instead of the vehicle's. ``refuse``: seq of an item that
     is answered with the ACK ``refuse_code``. ``no_space``: every upload gets NO_SPACE. ``armed``: the vehicle is armed.
+    ``mute``: a parameter that it does not answer for, the first ``mute_times`` times (None: never).
     """
 
     drop: float = 0.0
@@ -59,6 +60,8 @@ class Misbehaviour:
     refuse_code: int = 5
     no_space: bool = False
     armed: bool = False
+    mute: str = ""
+    mute_times: int | None = None
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -69,7 +72,7 @@ class Misbehaviour:
         for name in ("delay_s", "reboot_s"):
             if not 0.0 <= getattr(self, name) <= 3600.0:
                 problems.append(Problem(name, f"wants seconds 0 … 3600, given {getattr(self, name)}"))
-        for name in ("corrupt", "edit", "refuse", "silent_after", "reboot_at"):
+        for name in ("corrupt", "edit", "refuse", "silent_after", "reboot_at", "mute_times"):
             if (value := getattr(self, name)) is not None and not 0 <= value <= 65535:
                 problems.append(Problem(name, f"wants a whole number 0 … 65535, given {value}"))
         for name in ("stray_sysid", "answer_sysid"):

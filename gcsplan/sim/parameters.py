@@ -67,8 +67,14 @@ _TABLES: dict[Autopilot, dict[str, Parameter]] = {
         "RTL_ALT": _i(1500),
         "RTL_ALT_FINAL": _i(0),
         "RTL_ALT_TYPE": _i(0, INT8),
+        "RTL_CLIMB_MIN": _i(0, INT16),
+        "RTL_CONE_SLOPE": _r(3.0),
         "RTL_LOIT_TIME": _i(5000),
         "RTL_SPEED": _i(0),
+        "WPNAV_ACCEL": _r(250.0),
+        "WPNAV_ACCEL_C": _r(0.0),
+        "WPNAV_ACCEL_Z": _r(100.0),
+        "WPNAV_JERK": _r(1.0),
         "WPNAV_RADIUS": _r(200.0),
         "WPNAV_SPEED": _r(1000.0),
         "WPNAV_SPEED_DN": _r(150.0),
@@ -84,6 +90,7 @@ _TABLES: dict[Autopilot, dict[str, Parameter]] = {
         "FS_GCS_ENABL": _i(0, INT8),
         "FS_LONG_ACTN": _i(0, INT8),
         "Q_ENABLE": _i(0, INT8),
+        "ROLL_LIMIT_DEG": _r(45.0),
         "RTL_ALTITUDE": _r(100.0),
         "RTL_AUTOLAND": _i(0, INT8),
         "RTL_RADIUS": _i(0, INT16),
@@ -131,9 +138,11 @@ _TABLES: dict[Autopilot, dict[str, Parameter]] = {
 
 _RENAMED = {
     "ANGLE_MAX": ("ATC_ANGLE_MAX", 0.01), "LAND_SPEED": ("LAND_SPD_MS", 0.01), "RTL_ALT": ("RTL_ALT_M", 0.01),
-    "RTL_ALT_FINAL": ("RTL_ALT_FINAL_M", 0.01), "RTL_SPEED": ("RTL_SPEED_MS", 0.01),
-    "WPNAV_RADIUS": ("WP_RADIUS_M", 0.01), "WPNAV_SPEED": ("WP_SPD", 0.01), "WPNAV_SPEED_DN": ("WP_SPD_DN", 0.01),
-    "WPNAV_SPEED_UP": ("WP_SPD_UP", 0.01), "SYSID_THISMAV": ("MAV_SYSID", 1.0), "SYSID_MYGCS": ("MAV_GCS_SYSID", 1.0),
+    "RTL_ALT_FINAL": ("RTL_ALT_FINAL_M", 0.01), "RTL_CLIMB_MIN": ("RTL_CLIMB_MIN_M", 0.01),
+    "RTL_SPEED": ("RTL_SPEED_MS", 0.01), "WPNAV_ACCEL": ("WP_ACC", 0.01), "WPNAV_ACCEL_C": ("WP_ACC_CNR", 0.01),
+    "WPNAV_ACCEL_Z": ("WP_ACC_Z", 0.01), "WPNAV_JERK": ("WP_JERK", 1.0), "WPNAV_RADIUS": ("WP_RADIUS_M", 0.01),
+    "WPNAV_SPEED": ("WP_SPD", 0.01), "WPNAV_SPEED_DN": ("WP_SPD_DN", 0.01), "WPNAV_SPEED_UP": ("WP_SPD_UP", 0.01),
+    "SYSID_THISMAV": ("MAV_SYSID", 1.0), "SYSID_MYGCS": ("MAV_GCS_SYSID", 1.0),
 }  # fmt: skip
 """Names of 4.6 with the name in 4.7 and the factor of the value; those in another unit are floats in 4.7."""
 
@@ -167,7 +176,7 @@ class Parameters:
         # PX4 stores an integer's bytes in the float field, ArduPilot its value.
         self._bytewise = autopilot is Autopilot.PX4
         for name, value in (given or {}).items():
-            self.set_from_wire(name, value)
+            self._set(name, value)
         if firmware.has(NAMES_UNITS):
             self._table = dict(sorted(_in_4_7(self._table).items()))
 
@@ -197,6 +206,12 @@ class Parameters:
         value = wire
         if self._bytewise and parameter.kind != REAL32:
             value = float(struct.unpack("<i", struct.pack("<f", wire))[0])
+        return self._set(name, value)
+
+    def _set(self, name: str, value: float) -> bool:
+        parameter = self._table.get(name)
+        if parameter is None:
+            return False
         if not -3.5e38 < value < 3.5e38:  # NaN and infinities
             return False
         if parameter.kind != REAL32:

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 
 from gcsplan.check.geodesy import offset_m
-from gcsplan.check.tuning import DEFAULTS
 from gcsplan.mavlink.mission import commands as cmd
+from gcsplan.mavlink.mission.parameter_list import parameter_list
 from gcsplan.sim.part import Part
 from gcsplan.vehicle import Autopilot
 
@@ -40,47 +40,16 @@ PLANE: dict[str, float] = _EITHER | {
 }  # fmt: skip
 """Parameters of SITL's plane: its limits, and controllers tuned for it."""
 
-FAST_M_S, FAST_LEAN_DEG = 9.0, 45.0
-"""Cruise speed (m/s) above which the largest lean is raised to this (degrees): 30° was measured to limit the speed to
-about 10 m/s."""
-
 
 def parameters_of(part: Part) -> dict[str, float]:
-    """Return an instance's parameters: those of its airframe and the vehicle's own, so that it can fly the plan."""
-    return _plane(part) if part.vehicle.autopilot is Autopilot.ARDUPLANE else _copter(part)
-
-
-def _copter(part: Part) -> dict[str, float]:
-    v = part.vehicle
-    speeds = {
-        ("WPNAV_SPEED", "WP_SPD"): v.speed_max_m_s, ("WPNAV_SPEED_UP", "WP_SPD_UP"): v.climb_m_s,
-        ("WPNAV_SPEED_DN", "WP_SPD_DN"): v.descent_m_s, ("LAND_SPEED", "LAND_SPD_MS"): v.land_m_s,
-    }  # fmt: skip
-    if part.rtl_rel_home_m is not None:
-        speeds["RTL_ALT", "RTL_ALT_M"] = part.rtl_rel_home_m
-    if v.lean_angle_deg is not None:  # the planned times count with it
-        speeds["ANGLE_MAX", "ATC_ANGLE_MAX"] = v.lean_angle_deg
-    elif v.speed_max_m_s > FAST_M_S:
-        speeds["ANGLE_MAX", "ATC_ANGLE_MAX"] = FAST_LEAN_DEG
-    given = dict(COPTER)
-    for (in_hundredths, today), value in speeds.items():
-        given |= {in_hundredths: 100.0 * value, today: value}
-    return given
-
-
-def _plane(part: Part) -> dict[str, float]:
-    v = part.vehicle
-    given = PLANE | {
-        "AIRSPEED_CRUISE": v.speed_max_m_s, "WP_RADIUS": DEFAULTS.plane_radius_m, "NAVL1_PERIOD": DEFAULTS.l1_period_s,
-        "NAVL1_DAMPING": DEFAULTS.l1_damping, "TECS_CLMB_MAX": v.climb_m_s, "TECS_SINK_MAX": v.descent_m_s,
-    }  # fmt: skip
-    if v.speed_max_m_s > given["AIRSPEED_MAX"]:
-        given["AIRSPEED_MAX"] = v.speed_max_m_s
-    given["AIRSPEED_MIN"] = min(given["AIRSPEED_MIN"], v.speed_min_m_s)
-    if v.turn_radius_m > 0.0:
-        given["WP_LOITER_RAD"] = v.turn_radius_m
-    if part.rtl_rel_home_m is not None:
-        given["RTL_ALTITUDE"] = part.rtl_rel_home_m
+    """Return an instance's parameters: those of its airframe, and the list of its plan as a pilot sets it."""
+    given = dict(PLANE if part.vehicle.autopilot is Autopilot.ARDUPLANE else COPTER)
+    for s in parameter_list(part.mission, part.vehicle, rtl_rel_home_m=part.rtl_rel_home_m):
+        for name in s.parameter.names:
+            listed = name.value(s.value)
+            own = given.get(name.name, listed)
+            kept = (s.rule == "at least" and own >= listed) or (s.rule == "at most" and own <= listed)
+            given[name.name] = own if kept else listed
     return given
 
 

@@ -45,6 +45,7 @@ class Telemetry:
         self.parameters = Parameters(vehicle.autopilot, vehicle.sysid, vehicle.firmware, vehicle.parameters)
         vehicle.mode = _FIRST_MODE[vehicle.autopilot]
         self._began: float | None = None
+        self._muted = 0
         self._terrain: TerrainMemory | None = None
         self._tells_terrain = False
         self._by_id: dict[int, Callable[[float], Message]] = {
@@ -290,6 +291,10 @@ class Telemetry:
             wanted = names[message.param_index : message.param_index + 1]
         else:
             wanted = [name for name in names if name == _text(message.param_id)]
+            order = self._vehicle.misbehave
+            if order.mute in wanted and (order.mute_times is None or self._muted < order.mute_times):
+                self._muted += 1
+                return []
         return list(self._param_values(wanted))
 
     def _param_set(self, message: Message, now: float) -> list[Message]:

@@ -152,10 +152,11 @@ def test_a_vehicle_that_leans_less_than_the_plan_needs_is_refused_and_gets_nothi
 def test_simulated_vehicles_lean_as_far_as_their_missions_need() -> None:
     [result] = upload(planned(lean_angle_deg=45), "sim")
     assert result.verified
-    vehicle = planned(lean_angle_deg=60).vehicles[0].request.vehicle
-    assert parameters_of(SimpleNamespace(vehicle=vehicle, rtl_rel_home_m=None))["ANGLE_MAX"] == 6000.0  # type: ignore[arg-type]
+    [flown] = planned(lean_angle_deg=60).vehicles
+    vehicle, mission = flown.request.vehicle, flown.mission
+    assert parameters_of(SimpleNamespace(vehicle=vehicle, mission=mission, rtl_rel_home_m=None))["ANGLE_MAX"] == 6000.0  # type: ignore[arg-type]
     leans = replace(vehicle, lean_angle_deg=30.0)  # no more than it was planned with
-    assert parameters_of(SimpleNamespace(vehicle=leans, rtl_rel_home_m=None))["ANGLE_MAX"] == 3000.0  # type: ignore[arg-type]
+    assert parameters_of(SimpleNamespace(vehicle=leans, mission=mission, rtl_rel_home_m=None))["ANGLE_MAX"] == 3000.0  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

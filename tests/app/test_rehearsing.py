@@ -153,12 +153,12 @@ def test_links_that_may_lead_to_a_real_aircraft_are_refused(url: str) -> None:
 def test_an_instance_is_given_the_vehicles_own_speeds(planned: Plan) -> None:
     part = parts_of(planned)[0]
     given = parameters_of(part)
-    assert (given["WPNAV_SPEED"], given["WPNAV_SPEED_UP"], given["WPNAV_SPEED_DN"]) == (1000.0, 250.0, 150.0)
+    assert given["WPNAV_SPEED"] == pytest.approx(100.0 * part.mission.commanded_m_s, abs=0.01)
+    assert (given["RTL_SPEED"], given["WPNAV_SPEED_UP"], given["WPNAV_SPEED_DN"]) == (1000.0, 250.0, 150.0)
     assert given["ANGLE_MAX"] == 3000  # as far as it was planned with
     free = replace(part, vehicle=replace(part.vehicle, lean_angle_deg=None))
-    assert parameters_of(free)["ANGLE_MAX"] == 4500
+    assert "ANGLE_MAX" not in parameters_of(free)  # no more than a pilot is told to set
     slow = replace(free, vehicle=replace(free.vehicle, speed_max_m_s=8.0), rtl_rel_home_m=80.0)
-    assert "ANGLE_MAX" not in parameters_of(slow)
     assert parameters_of(slow)["RTL_ALT"] == 8000.0
 
 

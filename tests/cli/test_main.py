@@ -20,7 +20,7 @@ from gcsplan.vehicle import Autopilot
 from tests.support.paths import DATA
 
 CROSSING = DATA / "crossing.yaml"
-OUTPUTS = {"uav1.waypoints", "uav1.plan", "mission.kml", "mission.geojson", "profile.csv", "summary.json"}
+OUTPUTS = {"uav1.waypoints", "uav1.plan", "uav1.param", "mission.kml", "mission.geojson", "profile.csv", "summary.json"}
 
 
 def changed(tmp_path: Path, old: str, new: str) -> Path:

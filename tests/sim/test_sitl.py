@@ -75,7 +75,9 @@ def test_a_copter_gets_each_speed_by_its_name_before_and_since_4_7() -> None:
     assert (given["ARMING_CHECK"], given["ARMING_SKIPCHK"]) == (0, -1)
     assert "ANGLE_MAX" not in given
     fast = parameters_of(replace(part, vehicle=replace(part.vehicle, speed_max_m_s=15.0)))
-    assert (fast["ANGLE_MAX"], fast["ATC_ANGLE_MAX"]) == (4500.0, 45.0)
+    assert "ANGLE_MAX" not in fast  # nobody is told to set what the plan does not count with
+    leans = parameters_of(replace(part, vehicle=replace(part.vehicle, lean_angle_deg=45.0)))
+    assert (leans["ANGLE_MAX"], leans["ATC_ANGLE_MAX"]) == (4500.0, 45.0)
 
 
 def test_a_plane_gets_its_circle_its_speeds_and_the_direction_of_its_take_off() -> None:

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from gcsplan.check.circles import circle_growth
 from gcsplan.check.tracking import GRAVITY_M_S2
 from gcsplan.check.tuning import DEFAULTS
-from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, Autopilot, Vehicle
 
 CORNER_M_S2, CORNER_M = 5.0, 2.0
 """ArduCopter: acceleration in a corner, twice WPNAV_ACCEL; how far the arc stays from the corner, WPNAV_RADIUS."""
@@ -59,22 +59,36 @@ BRAKES = {
 
 def run_on_m(vehicle: Vehicle, speed_m_s: float) -> float:
     """How far a multicopter at a speed runs on, straight ahead, before it turns home, m; 0 for a plane."""
+    brakes = brakes_of(vehicle)
+    return 0.0 if brakes is None else brakes.length_m(speed_m_s)
+
+
+def brakes_of(vehicle: Vehicle) -> Brakes | None:
+    """A multicopter's brakes: no harder than by default, and less hard if it accelerates less; None for a plane."""
     brakes = BRAKES.get(vehicle.autopilot)
     if brakes is None or math.isinf(vehicle.accel_m_s2):
-        return 0.0
-    return brakes.length_m(speed_m_s)
+        return None
+    if vehicle.autopilot is Autopilot.ARDUCOPTER:
+        accel = COPTER_PEAK_ACCEL * vehicle.accel_m_s2
+        return brakes if accel >= brakes.accel_m_s2 else Brakes(accel, brakes.lag_m, brakes.lag_s)
+    if not vehicle.smooths:
+        return brakes
+    accel, lag_s = vehicle.accel_m_s2, 0.5 * vehicle.accel_m_s2 / vehicle.leg_jerk_m_s3
+    return Brakes(min(accel, brakes.accel_m_s2), brakes.lag_m, max(lag_s, brakes.lag_s))
 
 
 def run_past_m(vehicle: Vehicle, speed_m_s: float, turn_rad: float | None) -> float:
     """How far past the end of a leg a multicopter runs, m; ``turn_rad``: the corner there, None: a stop."""
-    brakes = BRAKES.get(vehicle.autopilot)
-    if brakes is None or math.isinf(vehicle.accel_m_s2):
+    brakes = brakes_of(vehicle)
+    if brakes is None:
         return 0.0
     if turn_rad is None:
         return brakes.lag_m
     half = 0.5 * min(turn_rad, math.pi - 1e-3)
     radius_m = CORNER_M / max(1.0 / math.cos(half) - 1.0, 1e-9)
-    return brakes.length_m(min(speed_m_s, math.sqrt(CORNER_M_S2 * radius_m)))
+    across = COPTER_CORNER_ACCEL * vehicle.corner_accel_m_s2
+    corner_m_s2 = max(across, CORNER_M_S2) if math.isfinite(across) else CORNER_M_S2
+    return brakes.length_m(min(speed_m_s, math.sqrt(corner_m_s2 * radius_m)))
 
 
 def levels_off_m(vehicle: Vehicle) -> tuple[float, float]:

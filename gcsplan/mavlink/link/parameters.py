@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,42 +16,38 @@ from gcsplan.mavlink.link.preflight import distance_m
 from gcsplan.mavlink.mission.autopilots import PX4, profile_of
 from gcsplan.mavlink.mission.commands import RTL, TAKEOFF
 from gcsplan.mavlink.mission.mission import GLOBAL, RELATIVE, Mission
-from gcsplan.mavlink.mission.return_altitude import RETURN_PARAMETERS, on_board, returns_otherwise
+from gcsplan.mavlink.mission.parameter_list import Setting, off
+from gcsplan.mavlink.mission.parameter_names import PARAMETERS
+from gcsplan.mavlink.mission.return_altitude import on_board, returns_otherwise
 from gcsplan.mavlink.mission.return_route import Route, takes_another_route
 from gcsplan.vehicle import COPTER_RETURN_WAITS_S, DEFAULT_LEAN_DEG, Autopilot, fastest_at_m_s, lean_for_deg
 
 Values = Mapping[str, float]
 
-_RETURN = {autopilot: tuple(p.name for p in known) for autopilot, known in RETURN_PARAMETERS.items()}
 _COPTER = (
-    _RETURN[Autopilot.ARDUCOPTER],
     ("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ALT_MAX",), ("FENCE_RADIUS",),
     ("FS_THR_ENABLE",), ("FS_GCS_ENABLE",), ("BATT_FS_LOW_ACT",), ("BATT_FS_CRT_ACT",),
-    ("RTL_LOIT_TIME",),
-    ("RTL_ALT_FINAL", "RTL_ALT_FINAL_M"),  # cm; renamed and in metres since 4.7
-    ("WPNAV_RADIUS", "WP_RADIUS_M"),  # cm; renamed and in metres since 4.7
-    ("ANGLE_MAX", "ATC_ANGLE_MAX"),  # hundredths of a degree; renamed and in degrees since 4.7
 )  # fmt: skip
 _PLANE = (
-    _RETURN[Autopilot.ARDUPLANE],
     ("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ALT_MAX",),
     ("RTL_AUTOLAND",), ("THR_FAILSAFE",), ("FS_LONG_ACTN",), ("FS_GCS_ENABL",), ("BATT_FS_LOW_ACT",),
-    ("WP_RADIUS",), ("NAVL1_PERIOD",), ("NAVL1_DAMPING",), ("TECS_PITCH_MAX",),
 )  # fmt: skip
 _PX4 = (
-    _RETURN[Autopilot.PX4], ("GF_ACTION",), ("GF_MAX_VER_DIST",), ("GF_MAX_HOR_DIST",),
-    ("NAV_RCL_ACT",), ("NAV_DLL_ACT",), ("COM_LOW_BAT_ACT",), ("NAV_ACC_RAD",), ("NAV_MC_ALT_RAD",),
-    ("RTL_TYPE",), ("RTL_CONE_ANG",), ("MPC_XY_VEL_MAX",), ("MPC_XY_CRUISE",), ("MPC_ACC_HOR",), ("MPC_JERK_AUTO",),
-    ("MPC_XY_TRAJ_P",), ("MPC_Z_V_AUTO_UP",), ("MPC_Z_V_AUTO_DN",),
+    ("GF_ACTION",), ("GF_MAX_VER_DIST",), ("GF_MAX_HOR_DIST",),
+    ("NAV_RCL_ACT",), ("NAV_DLL_ACT",), ("COM_LOW_BAT_ACT",),
 )  # fmt: skip
 GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
-    Autopilot.ARDUCOPTER: _COPTER, Autopilot.ARDUPLANE: _PLANE, Autopilot.PX4: _PX4,
+    autopilot: tuple(parameter.group() for parameter in PARAMETERS[autopilot].values()) + others
+    for autopilot, others in (
+        (Autopilot.ARDUCOPTER, _COPTER), (Autopilot.ARDUPLANE, _PLANE), (Autopilot.PX4, _PX4)
+    )
 }  # fmt: skip
 """Parameters that are read before a mission is sent. Names in one group are one parameter in different versions."""
 
+_FENCE = tuple((f"FENCE_{what}",) for what in ("ENABLE", "TYPE", "ACTION", "RADIUS", "ALT_MAX", "ALT_MIN"))
 FENCE_GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
-    Autopilot.ARDUCOPTER: (("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ACTION",)),
-    Autopilot.ARDUPLANE: (("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ACTION",)),
+    Autopilot.ARDUCOPTER: _FENCE,
+    Autopilot.ARDUPLANE: _FENCE,
     Autopilot.PX4: (("GF_ACTION",),),
 }
 """Parameters that are read before a fence is sent."""
@@ -66,8 +62,14 @@ _FAILSAFES = {
     "FS_GCS_ENABL": "loss of the ground station", "NAV_DLL_ACT": "loss of the ground station",
     "BATT_FS_LOW_ACT": "a low battery", "COM_LOW_BAT_ACT": "a low battery",
 }  # fmt: skip
-_ALTITUDE_FENCE, _CIRCLE_FENCE, _POLYGON_FENCE = 1, 2, 4  # bits of FENCE_TYPE; the circle is the one around home
+_ALTITUDE_FENCE, _CIRCLE_FENCE, _POLYGON_FENCE, _FLOOR_FENCE = (
+    1,
+    2,
+    4,
+    8,
+)  # bits of FENCE_TYPE; the circle is the one around home
 _SAME_M, _SAME_S = 0.5, 0.5
+_TOLD_ELSEWHERE = {"return_altitude", "return_waits", "return_end", "return_type", "pitch", "radius", "radius_height"}
 
 
 def decode_value(message: Any, mav_autopilot: int) -> float:
@@ -166,13 +168,38 @@ def judge_fence_parameters(values: Values) -> list[str]:
         return ["no parameters could be read: whether the fence is enforced is not known"]
     values, found = _numbers(values)
     if values.get("FENCE_ENABLE") == 0:
-        found.append("FENCE_ENABLE is 0 on board: the fence is kept and not enforced until it is enabled")
+        others = _other_fences(values)
+        too = f"; enabling it also puts into force {', and '.join(others)}" if others else ""
+        found.append(f"FENCE_ENABLE is 0 on board: the fence is kept and not enforced until it is enabled{too}")
     kinds = values.get("FENCE_TYPE")
     if kinds is not None and not _bits(kinds) & _POLYGON_FENCE:
         found.append(f"FENCE_TYPE is {kinds:g} on board: polygons and circles (4) are not among the fences in force")
     if values.get("FENCE_ACTION") == 0 or values.get("GF_ACTION") == 0:
         found.append("the fence's action on board is none: a breach is only reported")
     return found
+
+
+def _other_fences(values: Values) -> list[str]:
+    """The fences that FENCE_ENABLE also enables, in words: those of FENCE_TYPE that are no polygons and circles."""
+    kinds = values.get("FENCE_TYPE")
+    if kinds is None:
+        return ["what FENCE_TYPE says, which could not be read (a circle around home, a highest altitude)"]
+    known = [
+        (_CIRCLE_FENCE, "FENCE_RADIUS", "the circle of {} around home"),
+        (_ALTITUDE_FENCE, "FENCE_ALT_MAX", "the ceiling at {} above home"),
+        (_FLOOR_FENCE, "FENCE_ALT_MIN", "the floor at {} above home"),
+    ]
+    return [
+        what.format(f"{values[name]:g} m" if name in values else "a height or radius that could not be read")
+        + f" ({name}; FENCE_TYPE {kinds:g})"
+        for bit, name, what in known
+        if _bits(kinds) & bit
+    ]
+
+
+def settings_words(settings: Sequence[Setting], values: Values, autopilot: Autopilot) -> list[str]:
+    """Which parameters on board are outside of what the mission was judged with; others tell of some of them."""
+    return [o.describe() for o in off(settings, values, autopilot) if o.setting.parameter.key not in _TOLD_ELSEWHERE]
 
 
 def _numbers(values: Values) -> tuple[Values, list[str]]:

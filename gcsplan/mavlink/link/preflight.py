@@ -179,7 +179,11 @@ def _straightness(state: VehicleState, against: Reasons, warnings: list[str], *,
 
 def _position(state: VehicleState, start: Home, ground_m: float, against: Reasons, warnings: list[str]) -> None:
     if state.lat_deg is None or state.lon_deg is None or state.amsl_m is None:
-        warnings.append("the vehicle reports no position: whether it stands at the start could not be checked")
+        words = "the vehicle reports no position: whether it stands at the start could not be checked"
+        if is_generic(state.mav_autopilot):
+            warnings.append(words)
+        else:
+            against.append(("no_position", f"{words}: wait until it has a position, or --ignore-position"))
         return
     away_m = distance_m(state.lat_deg, state.lon_deg, start.lat_e7 / 1e7, start.lon_e7 / 1e7)
     if state.just_at is not None and away_m <= NEAR_START_M:

@@ -16,14 +16,11 @@ from typing import Protocol, TypeVar
 
 from gcsplan.errors import CheckFailed, GcsplanError, InputError
 from gcsplan.mavlink.link.link import Channel, Link, PumpJob, Steps, pump, run
+from gcsplan.mavlink.link.options import Judge, ProgressCall, SessionOptions, Task
 from gcsplan.mavlink.link.parameters import GROUPS
 from gcsplan.mavlink.link.results import UploadResult
-from gcsplan.mavlink.link.steps import discover_steps, parameter_steps
+from gcsplan.mavlink.link.steps import SLOW_ANSWER_S, discover_steps, parameter_steps
 from gcsplan.mavlink.link.tasks import (
-    Judge,
-    ProgressCall,
-    SessionOptions,
-    Task,
     clearing,
     looking_at,
     reading,
@@ -117,7 +114,10 @@ def read_vehicle(
         autopilot = autopilot_of(state.mav_autopilot, state.mav_type)
         values: dict[str, float] = {}
         if autopilot is not None:
-            values = yield from parameter_steps(channel, state, GROUPS[autopilot], recheck.watch, recheck)
+            groups = GROUPS[autopilot]
+            values = yield from parameter_steps(
+                channel, state, groups, recheck.watch, recheck, needed=groups, most_s=SLOW_ANSWER_S
+            )
         return state, autopilot, values
 
     return _run(link, sysid, steps)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
+
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.errors import LinkError
@@ -10,14 +12,18 @@ from gcsplan.mavlink.link.parameters import decode_value, parameter_name
 from gcsplan.mavlink.link.recheck import Recheck, request_message
 from gcsplan.mavlink.link.watch import STANDBY, UNINIT, VehicleState, Watch
 from gcsplan.mavlink.mission.autopilots import is_generic
+from gcsplan.mavlink.mission.parameter_names import OnBoard
 from gcsplan.mavlink.protocol.messages import Address
 
 _AUTOPILOT_VERSION, _GLOBAL_POSITION_INT, _HOME_POSITION = 148, 33, 242
 _DOES_NOT_EXIST = 1  # MAV_PARAM_ERROR
 _ASK_AGAIN_S = 0.5
 _ASKED_TIMES, _GENERIC_ASKED_TIMES = 4, 2  # a vehicle that reports a generic autopilot may never report a position
+_ASK_AGAIN_MOST_S, _SLOWER = 4.0, 1.5
 _PARAMETER_S = 2.0
 _NO_PARAMETERS_S = 1.0
+SLOW_ANSWER_S = 6.0
+"""Patience with parameters that are told and do not decide: several round trips of a slow link."""
 
 
 def discover_steps(
@@ -61,29 +67,41 @@ def parameter_steps(
     groups: tuple[tuple[str, ...], ...],
     watch: Watch,
     recheck: Recheck | None = None,
-) -> Steps[dict[str, float]]:
-    """Return the values of those parameters that the vehicle has; takes at most 2 s, or 1 s if none arrives.
+    *,
+    needed: Collection[tuple[str, ...]] = (),
+    most_s: float = 0.0,
+) -> Steps[OnBoard]:
+    """Return the values of those parameters that the vehicle has, and the names that it says it does not have.
 
-    A value that is not a number is NaN.
+    A value that is not a number is NaN. Of each of ``groups`` it has one name. It takes at most 2 s after the last
+    answer, or 1 s if none arrives; but the groups that are ``needed`` are asked for until ``most_s``, unless the
+    vehicle does not say what it is. What is then still without an answer is in neither: `parameter_names.unanswered`.
     """
     clock = channel.link.clock
-    values: dict[str, float] = {}
+    generic = is_generic(state.mav_autopilot)
+    values = OnBoard(generic=generic)
     unknown: set[str] = set()  # names that the vehicle reported as missing
-    started, ask_at = clock(), clock()
+    started = ask_at = answered_at = clock()
+    again_s = _ASK_AGAIN_S
 
-    def missing() -> list[str]:
-        left = [name for group in groups if not any(n in values for n in group) for name in group]
+    def missing(of: Iterable[tuple[str, ...]]) -> list[str]:
+        left = [name for group in of if not any(n in values for n in group) for name in group]
         return [name for name in left if name not in unknown]
 
-    while missing():
+    def until() -> float:
+        patience_s = _PARAMETER_S if values or unknown else _NO_PARAMETERS_S
+        return max(answered_at + patience_s, started + most_s if missing(needed) and not generic else started)
+
+    while missing(groups):
         now = clock()
-        if now >= started + (_PARAMETER_S if values else _NO_PARAMETERS_S):
+        if now >= until():
             break
         if now >= ask_at:
-            for name in missing():
+            late = now >= answered_at + _PARAMETER_S
+            for name in missing(needed if late and missing(needed) else groups):
                 _ask_parameter(channel, state.address, name)
-            ask_at = now + _ASK_AGAIN_S
-        yield ask_at
+            ask_at, again_s = now + again_s, min(_ASK_AGAIN_MOST_S, (_SLOWER if late else 1.0) * again_s)
+        yield min(ask_at, until())
         for heard in channel.take():
             (recheck or watch).note(heard, clock())
             ours = not heard.late and heard.source == state.address and channel.peer in (None, heard.peer)
@@ -91,9 +109,13 @@ def parameter_steps(
             if kind == "PARAM_VALUE":
                 name = parameter_name(heard.message)
                 if any(name in group for group in groups):
+                    answered_at = answered_at if name in values else clock()
                     values[name] = decode_value(heard.message, state.mav_autopilot)
             elif kind == "PARAM_ERROR" and heard.message.error == _DOES_NOT_EXIST:
-                unknown.add(parameter_name(heard.message))
+                name = parameter_name(heard.message)
+                answered_at = answered_at if name in unknown else clock()
+                unknown.add(name)
+    values.absent = frozenset(unknown)
     return values
 
 

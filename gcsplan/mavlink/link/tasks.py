@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
-from types import MappingProxyType
 from typing import Any
 
 from gcsplan.errors import LinkError, VehicleRefused
 from gcsplan.mavlink.link.drive import drive
 from gcsplan.mavlink.link.link import Channel, Steps
-from gcsplan.mavlink.link.parameters import FENCE_GROUPS, GROUPS, judge_fence_parameters, judge_parameters
+from gcsplan.mavlink.link.on_board import judging, reading_parameters
+from gcsplan.mavlink.link.options import SessionOptions, Task
 from gcsplan.mavlink.link.preflight import (
     NEAR_START_M,
     Reasons,
@@ -22,101 +21,31 @@ from gcsplan.mavlink.link.preflight import (
     preflight,
     rivals_words,
 )
-from gcsplan.mavlink.link.px4_motion import slower_words
 from gcsplan.mavlink.link.recheck import Judge as JudgeState
 from gcsplan.mavlink.link.recheck import Recheck
 from gcsplan.mavlink.link.results import UploadResult, outcome_word
-from gcsplan.mavlink.link.steps import discover_steps, parameter_steps
-from gcsplan.mavlink.link.terrain import TERRAIN_GROUPS, flies_terrain, terrain_steps
+from gcsplan.mavlink.link.steps import discover_steps
+from gcsplan.mavlink.link.terrain import terrain_steps
 from gcsplan.mavlink.link.watch import VehicleState, Watch
 from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA, max_items
 from gcsplan.mavlink.mission.autopilots import PX4 as MAV_PX4
 from gcsplan.mavlink.mission.compare import compare, faults
-from gcsplan.mavlink.mission.mission import FENCE, MISSION, Mission, MissionItem
-from gcsplan.mavlink.mission.return_route import Route
-from gcsplan.mavlink.protocol.patience import TIMEOUT_S, Patience, checked_timeout_s
+from gcsplan.mavlink.mission.mission import MISSION, Mission
+from gcsplan.mavlink.mission.parameter_names import OnBoard
+from gcsplan.mavlink.protocol.patience import Patience
 from gcsplan.mavlink.protocol.transfer import (
     Accepted,
     Changed,
     Clear,
     Download,
-    Progress,
     Refused,
     Settled,
-    Timers,
     VerifiedUpload,
 )
-from gcsplan.vehicle import Autopilot, Vehicle
-from gcsplan.world.terrain_grid import Ground
-
-ProgressCall = Callable[[str, Progress], None]
-Judge = Callable[[Mission, Mapping[str, float]], str | None]
-"""Repeats the caller's check with the parameters that were read: None if it passes, else the reason."""
 
 # Longest list that is read. ArduPilot: 64 KB of missions on an SD card (BRD_SD_MISSION) at 15 bytes per item.
 _MOST_HELD = {ARDUPILOTMEGA: 4369, MAV_PX4: 2000}
 _MOST_HELD_BY_ANY = 4369
-
-
-@dataclass(frozen=True, slots=True)
-class SessionOptions:
-    """Options of a session. ``unchecked``: send without a verdict. ``simulated``: only copied to the result.
-
-    ``discover_s``: seconds to wait for a first heartbeat; ``listen_s``: to listen for rivals after it; ``standby_s``:
-    to wait for a vehicle that is booting. ``ground_amsl_m``: DEM altitude at the start, by default the altitude of the
-    mission's home. ``timeout_s``: longest time without progress of a transfer (see `Patience`); it also limits
-    ``discover_s`` and ``standby_s``. The parameters on board are compared with ``rtl_rel_home_m`` (the return altitude
-    that was checked), ``route`` (of the return that was checked), ``advised_rel_home_m`` (the one to set, if another is
-    better) and ``expected_parameters``, and a PX4's motion with ``vehicle``. ``terrain``: the ground for a mission in
-    the terrain frame, which is then served and compared (`link.terrain`).
-    """
-
-    unchecked: bool = False
-    allow_armed: bool = False
-    ignore_position: bool = False
-    ground_amsl_m: float | None = None
-    rtl_rel_home_m: float | None = None
-    route: Route | None = None
-    advised_rel_home_m: float | None = None
-    expected_parameters: Mapping[str, float] = field(default_factory=dict)
-    terrain: Ground | None = None
-    read_parameters: bool = True
-    discover_s: float = 10.0
-    listen_s: float = 1.5
-    standby_s: float = 30.0
-    timeout_s: float = TIMEOUT_S
-    attempts: int = 4
-    timers: Timers = field(default_factory=Timers)
-    simulated: bool = False
-    vehicle: Vehicle | None = None
-
-    def __post_init__(self) -> None:
-        checked_timeout_s(self.timeout_s)
-
-
-@dataclass(frozen=True)
-class Task:
-    """One list in wire order for one vehicle; ``mission``: set for a mission, None for a fence or rally points."""
-
-    name: str
-    sysid: int
-    autopilot: Autopilot
-    items: tuple[MissionItem, ...]
-    mission_type: int
-    options: SessionOptions
-    mission: Mission | None = None
-    judge: Judge | None = None
-    progress: ProgressCall | None = None
-
-    @classmethod
-    def of(
-        cls, mission: Mission, options: SessionOptions, judge: Judge | None, progress: ProgressCall | None = None
-    ) -> Task:
-        """Return the task of sending ``mission``."""
-        return cls(
-            mission.name, mission.sysid, mission.autopilot, mission.wire_items(), MISSION, options, mission, judge,
-            progress,
-        )  # fmt: skip
 
 
 def finding(channel: Channel, watch: Watch, options: SessionOptions) -> Steps[VehicleState]:
@@ -136,11 +65,14 @@ def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
     recheck = _holding(channel, watch, state, options, lambda now: objections(
         now, task.items, task.autopilot, **_terms(task)
     ))  # fmt: skip
-    against, values = yield from _parameters(channel, task, state, watch, recheck)
+    against, values = yield from reading_parameters(channel, task, state, watch, recheck)
     warnings += against
     noted, off = yield from terrain_steps(channel, state.address, task.items, values, options.terrain, recheck.note)
-    warnings, values = warnings + noted, values | off
-    failed = task.judge(task.mission, values) if task.mission and task.judge and options.read_parameters else None
+    warnings += noted
+    values.update(off)
+    failed = None
+    if task.mission and options.read_parameters:
+        failed = yield from judging(channel, task, task.mission, values, recheck)
     if failed is not None:
         raise VehicleRefused(
             f"with this vehicle's parameters the mission cannot be flown as it was judged, and it was not sent; plan "
@@ -179,7 +111,10 @@ def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
     after = watch.state(clock())
     if after and after.armed and not state.armed:
         warnings.append("the vehicle was armed by somebody during the upload")
-    result = result_of(task, channel, settled, clock() - started, warnings, watch.texts_since(said_before), values)
+    ended_s = clock() - started
+    result = yield from result_of(
+        task, channel, settled, ended_s, warnings, watch.texts_since(said_before), values, recheck
+    )
     result = replace(result, state=state)
     return replace(result, changed=changed.reason, change=changed.why) if changed else result
 
@@ -202,27 +137,6 @@ def _holding(
     channel: Channel, watch: Watch, state: VehicleState, options: SessionOptions, judge: JudgeState
 ) -> Recheck:
     return Recheck(channel, watch, state, judge, may_move=options.ignore_position, standby_s=options.standby_s)
-
-
-def _parameters(
-    channel: Channel, task: Task, state: VehicleState, watch: Watch, recheck: Recheck
-) -> Steps[tuple[list[str], dict[str, float]]]:
-    """Read the parameters on board; return warnings about those that do not fit the list, and the values read."""
-    options, mission = task.options, task.mission
-    warnings: list[str] = []
-    values: dict[str, float] = {}
-    if mission and options.read_parameters:
-        groups = GROUPS[task.autopilot] + (TERRAIN_GROUPS if flies_terrain(task.items) else ())
-        values = yield from parameter_steps(channel, state, groups, watch, recheck)
-        warnings += judge_parameters(
-            values, mission, rtl_rel_home_m=options.rtl_rel_home_m, advised_rel_home_m=options.advised_rel_home_m,
-            expected=options.expected_parameters, route=options.route,
-        )  # fmt: skip
-        warnings += slower_words(values, options.vehicle) if options.vehicle else []
-    if task.mission_type == FENCE and options.read_parameters:
-        values = yield from parameter_steps(channel, state, FENCE_GROUPS[task.autopilot], watch, recheck)
-        warnings += judge_fence_parameters(values)
-    return warnings, values
 
 
 def reading(
@@ -263,19 +177,21 @@ def verifying(channel: Channel, task: Task) -> Steps[UploadResult]:
     """
     state, recheck = yield from looking_at(channel, task.options)
     warnings = _of_link(channel)
-    values: dict[str, float] = {}
+    values = OnBoard()
     if task.judge is not None:
         against: Reasons = []
         identity(state, task.autopilot, against, warnings)
         if against:
             raise VehicleRefused(f"not compared: {against[0][1]}", where=f"vehicle {task.sysid}", reason=against[0][0])
-        noted, values = yield from _parameters(channel, task, state, recheck.watch, recheck)
+        noted, values = yield from reading_parameters(channel, task, state, recheck.watch, recheck)
         warnings += noted
     started = channel.link.clock()
     read = yield from reading(channel, state, task.mission_type, task.options, recheck)
     differences = tuple(compare(task.items, read.items, task.autopilot, task.mission_type))
     settled = Settled(Accepted(read.opaque_id), not faults(differences), differences, read.items, "", 1, read.retries)
-    return result_of(task, channel, settled, channel.link.clock() - started, warnings, recheck.texts, values)
+    ended_s = channel.link.clock() - started
+    result = yield from result_of(task, channel, settled, ended_s, warnings, recheck.texts, values, recheck)
+    return result
 
 
 def clearing(
@@ -357,8 +273,9 @@ def result_of(
     seconds: float,
     warnings: list[str],
     texts: tuple[str, ...],
-    values: Mapping[str, float] = MappingProxyType({}),
-) -> UploadResult:
+    values: OnBoard,
+    recheck: Recheck,
+) -> Steps[UploadResult]:
     """Return the result of ``task``; the caller's check is repeated on the read-back with the parameters read."""
     mission: Mission | None = None
     failed: str | None = None
@@ -366,7 +283,7 @@ def result_of(
         mission = Mission.from_wire(
             task.autopilot, settled.read_back, home=task.mission.home, name=task.name, sysid=task.sysid
         )
-        failed = task.judge(mission, values) if task.judge else None
+        failed = yield from judging(channel, task, mission, values, recheck)
         warnings = warnings + other_home(task.mission, settled.read_back)
     return UploadResult(
         task.name,

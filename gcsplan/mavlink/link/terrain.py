@@ -18,7 +18,7 @@ import numpy as np
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.arrays import Floats
-from gcsplan.errors import GcsplanError
+from gcsplan.errors import GcsplanError, VehicleRefused
 from gcsplan.mavlink.link.link import Channel, Heard, Steps
 from gcsplan.mavlink.mission.mission import TERRAIN, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
@@ -316,6 +316,17 @@ def terrain_error_m(values: Mapping[str, float], judged_m: float) -> float:
     return max(judged_m, shift_m) if math.isnan(off_m) else shift_m + off_m
 
 
+def odd_spacing(values: Mapping[str, float]) -> str:
+    """Why the spacing of the terrain posts on board is none that is judged, in words; empty if it is, or not read."""
+    spacing = values.get("TERRAIN_SPACING", float(SPACING_M))
+    if LEAST_SPACING_M <= spacing <= MOST_SPACING_M:
+        return ""
+    return (
+        f"TERRAIN_SPACING is {spacing:g} on board, and {LEAST_SPACING_M} to {MOST_SPACING_M} m are judged: set "
+        f"TERRAIN_SPACING {SPACING_M}"
+    )
+
+
 def places_along(items: Sequence[MissionItem], count: int = PLACES) -> list[tuple[int, int]]:
     """Places, 1e-7°, on the legs to the items in the terrain frame, evenly on each."""
     placed = [item for item in items if item.x or item.y]
@@ -349,9 +360,9 @@ def terrain_steps(
         return [], {}
     if values.get("TERRAIN_ENABLE") == 0.0:
         return ["TERRAIN_ENABLE is 0 on board: it knows no terrain and does not fly the terrain frame"], {}
+    if odd := odd_spacing(values):
+        raise VehicleRefused(f"not sent: {odd}", where=f"vehicle {to.sysid}", reason="parameters")
     spacing = values.get("TERRAIN_SPACING", float(SPACING_M))
-    if not LEAST_SPACING_M <= spacing <= MOST_SPACING_M:
-        return [f"TERRAIN_SPACING is {spacing:g} on board: the terrain that it reads was not compared"], {}
     service = TerrainService(ground)
     channel.link.serve(channel.sysid, service.steps)
     compared = yield from compare_steps(

@@ -14,6 +14,7 @@ from typing import Literal
 
 from gcsplan.mavlink.mission.commands import DO_LAND_START, DO_RETURN_PATH_START
 from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mavlink.mission.parameter_names import unanswered
 from gcsplan.vehicle import Autopilot
 
 Route = Literal["straight", "mission"]
@@ -36,6 +37,14 @@ def starts(mission: Mission) -> tuple[str, ...]:
     return tuple(name for command, name in names.items() if command in held)
 
 
+def deciding(mission: Mission) -> tuple[tuple[str, ...], ...]:
+    """The parameters that decide whether a return joins ``mission``, each a group of one name; none without starts."""
+    if not starts(mission) or mission.autopilot is Autopilot.PX4:
+        return ()
+    names = ("RTL_AUTOLAND",) if mission.autopilot is Autopilot.ARDUPLANE else tuple(COPTER_RETURNS)
+    return tuple((name,) for name in names)
+
+
 def route_setting(autopilot: Autopilot, *, path: bool) -> str:
     """What to set for returns along the mission; ``path``: along a return path, else to a landing sequence."""
     if autopilot is Autopilot.ARDUPLANE:
@@ -54,6 +63,9 @@ def takes_another_route(values: Mapping[str, float], mission: Mission, route: Ro
     path = "DO_RETURN_PATH_START" in held
     if mission.autopilot is Autopilot.ARDUPLANE:
         return _plane(values.get("RTL_AUTOLAND"), held, path, route)
+    silent = [group[0] for group in unanswered(values, deciding(mission))]
+    if silent and len(silent) < len(COPTER_RETURNS):
+        return f"{', '.join(silent)} could not be read: whether the return joins the mission is not known"
     if route != "mission":
         on = [name for name in COPTER_RETURNS if values.get(name) == AUTO_RTL]
         if not on:
@@ -63,9 +75,8 @@ def takes_another_route(values: Mapping[str, float], mission: Mission, route: Ro
             f"straight home: set 1 or 2 (RTL), or judge it with return_route: mission"
         )
     other = [f"{name} {values[name]:g}" for name, wrong in COPTER_RETURNS.items() if values.get(name) in wrong]
-    unread = [name for name in COPTER_RETURNS if name not in values]
-    if unread and len(unread) == len(COPTER_RETURNS):
-        return f"none of {', '.join(unread)} could be read: whether the return joins the mission is not known"
+    if len(silent) == len(COPTER_RETURNS):
+        return f"none of {', '.join(silent)} could be read: whether the return joins the mission is not known"
     if not other:
         return ""
     return (

@@ -17,7 +17,7 @@ from gcsplan.errors import CheckFailed, GcsplanError, InputError, LinkError, Rea
 from gcsplan.mavlink.link import steps
 from gcsplan.mavlink.link.frames import SigningKey
 from gcsplan.mavlink.link.link import Heard, Link
-from gcsplan.mavlink.link.parameters import judge_parameters
+from gcsplan.mavlink.link.parameters import judge_fence_parameters, judge_parameters
 from gcsplan.mavlink.link.preflight import preflight
 from gcsplan.mavlink.link.session import (
     SessionOptions,
@@ -339,13 +339,38 @@ def test_a_vehicle_that_fits_draws_no_warning() -> None:
     assert warnings_of(READY) == ""
 
 
+def test_an_autopilot_without_a_position_is_refused_unless_that_is_ignored() -> None:
+    lost = replace(READY, lat_deg=None, lon_deg=None, amsl_m=None)
+    with pytest.raises(VehicleRefused, match="reports no position") as refused:
+        warnings_of(lost)
+    assert refused.value.reason == "no_position"
+    assert warnings_of(lost, ignore_position=True) == ""
+
+
+def test_what_else_a_fence_puts_into_force_is_told() -> None:
+    values = {
+        "FENCE_ENABLE": 0.0,
+        "FENCE_TYPE": 7.0,
+        "FENCE_RADIUS": 150.0,
+        "FENCE_ALT_MAX": 100.0,
+        "FENCE_ACTION": 1.0,
+    }
+    [told] = judge_fence_parameters(values)
+    assert "also puts into force the circle of 150 m around home (FENCE_RADIUS; FENCE_TYPE 7)" in told
+    assert "the ceiling at 100 m above home (FENCE_ALT_MAX; FENCE_TYPE 7)" in told
+    [alone] = judge_fence_parameters(values | {"FENCE_TYPE": 4.0})
+    assert "puts into force" not in alone
+    [unread] = judge_fence_parameters({"FENCE_ENABLE": 0.0})
+    assert "could not be read" in unread
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
         ({"mav_autopilot": 0, "mav_type": 0, "system_status": UNINIT}, "could not be checked"),
         ({"mav_autopilot": 8, "mav_type": 2}, "calls itself"),
         ({"mav_type": 0}, "does not say whether"),
-        ({"lat_deg": None, "lon_deg": None, "amsl_m": None}, "reports no position"),
+        ({"mav_autopilot": 8, "lat_deg": None, "lon_deg": None, "amsl_m": None}, "reports no position"),
         ({"capabilities": None}, "capabilities"),
         ({"capabilities": 0}, "MISSION_ITEM_INT"),
         ({"system_status": CRITICAL}, "critical"),

@@ -12,6 +12,7 @@ from gcsplan.mavlink.link.link import Channel, Heard, Link, Steps
 from gcsplan.mavlink.link.steps import discover_steps, parameter_steps
 from gcsplan.mavlink.link.watch import STANDBY, UNINIT, VehicleState, Watch
 from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA, GENERIC
+from gcsplan.mavlink.mission.parameter_names import OnBoard, unanswered
 from gcsplan.mavlink.protocol.messages import Address
 
 T = TypeVar("T")
@@ -157,3 +158,45 @@ def test_what_another_component_says_of_parameters_does_not_count() -> None:
     air.say(value("FENCE_TYPE", 9.0), Address(1, 154))
     assert air.run(parameter_steps(air.channel, STATE, GROUPS, Watch(1))) == {}
     assert [name_of(m) for m in air.sent].count("FENCE_ENABLE") == 2
+
+
+def late(after_s: float, answers: Callable[[str], Sequence[Any]], **more: Any) -> tuple[Any, float]:
+    """What is read over a link whose answers come so much later, and the seconds that it took."""
+    waiting: list[tuple[float, Any]] = []
+
+    def asked(message: Any) -> Sequence[Any]:
+        waiting.extend((air.now + after_s, answer) for answer in answers(name_of(message)))
+        return []
+
+    air = Air(asked, ARDUPILOTMEGA)
+    steps = parameter_steps(air.channel, STATE, GROUPS, Watch(1), **more)
+    try:
+        until = next(steps)
+        for _ in range(2000):
+            due = min([until, *(at for at, _ in waiting)])
+            air.now = max(air.now, due)
+            for at, answer in [w for w in waiting if w[0] <= air.now]:
+                waiting.remove((at, answer))
+                air.say(answer)
+            until = next(steps)
+    except StopIteration as stop:
+        return stop.value, air.now - 100.0
+    raise AssertionError("it goes on and on")
+
+
+def test_needed_parameters_are_read_over_a_slow_link() -> None:
+    for round_trip_s in (1.0, 1.5, 4.0):
+        values, took_s = late(round_trip_s, lambda name: [value(name, 7.0)], needed=GROUPS, most_s=20.0)
+        assert {"FENCE_ENABLE", "FENCE_TYPE"} <= set(values)
+        assert took_s == pytest.approx(round_trip_s, abs=0.01)
+
+
+def test_needed_parameters_are_asked_for_until_the_timeout_and_silence_is_no_absence() -> None:
+    def answers(name: str) -> list[Any]:
+        return [error(name, 1)] if name == "FENCE_TYPE" else [] if name == "FENCE_ENABLE" else [value(name, 1.0)]
+
+    values, took_s = late(0.1, answers, needed=(("FENCE_ENABLE",), ("FENCE_TYPE",)), most_s=20.0)
+    assert took_s == pytest.approx(20.0)
+    assert values.absent == {"FENCE_TYPE"}
+    assert unanswered(values, GROUPS) == [("FENCE_ENABLE",)]
+    assert unanswered(OnBoard({"FENCE_ENABLE": float("nan")}), GROUPS[1:2]) == [("FENCE_ENABLE",)]

@@ -11,7 +11,7 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 import pytest
 
 from gcsplan.arrays import Floats
-from gcsplan.errors import InputError
+from gcsplan.errors import InputError, VehicleRefused
 from gcsplan.mavlink.link.frames import FrameWriter, Signing
 from gcsplan.mavlink.link.link import Link, PumpJob, Steps, pump
 from gcsplan.mavlink.link.results import UploadResult
@@ -241,6 +241,12 @@ def test_a_vehicle_without_terrain_is_told() -> None:
     result, values = uploaded(air, hills)
     assert any("TERRAIN_ENABLE is 0" in warning for warning in result.warnings)
     assert OFF not in values
+
+
+@pytest.mark.parametrize("spacing", [2, 4, 1001])
+def test_posts_that_are_not_judged_are_refused_at_once(spacing: int) -> None:
+    with pytest.raises(VehicleRefused, match=f"TERRAIN_SPACING is {spacing} on board, and 5 to 1000 m are judged"):
+        uploaded(air_with_vehicle(spacing_m=spacing), hills)
 
 
 def test_the_error_is_what_the_vehicle_may_shift_and_what_it_reads_amiss() -> None:

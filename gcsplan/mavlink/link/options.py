@@ -1,0 +1,81 @@
+"""What a session is told to do: its options, and the task of one list for one vehicle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from gcsplan.mavlink.mission.mission import MISSION, Mission, MissionItem
+from gcsplan.mavlink.mission.parameter_list import Setting
+from gcsplan.mavlink.mission.return_route import Route
+from gcsplan.mavlink.protocol.patience import TIMEOUT_S, checked_timeout_s
+from gcsplan.mavlink.protocol.transfer import Progress, Timers
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.terrain_grid import Ground
+
+ProgressCall = Callable[[str, Progress], None]
+Judge = Callable[[Mission, Mapping[str, float]], str | None]
+"""Repeats the caller's check with the parameters that were read: None if it passes, else the reason."""
+
+
+@dataclass(frozen=True, slots=True)
+class SessionOptions:
+    """Options of a session. ``unchecked``: send without a verdict. ``simulated``: only copied to the result.
+
+    ``discover_s``: seconds to wait for a first heartbeat; ``listen_s``: to listen for rivals after it; ``standby_s``:
+    to wait for a vehicle that is booting. ``ground_amsl_m``: DEM altitude at the start, by default the altitude of the
+    mission's home. ``timeout_s``: longest time without progress of a transfer (see `Patience`); it also limits
+    ``discover_s`` and ``standby_s``. The parameters on board are compared with ``rtl_rel_home_m`` (the return altitude
+    that was checked), ``route`` (of the return that was checked), ``advised_rel_home_m`` (the one to set, if another is
+    better), ``settings`` (what the mission was judged with) and ``expected_parameters``, and a PX4's motion with
+    ``vehicle``. ``terrain``: the ground for a mission in
+    the terrain frame, which is then served and compared (`link.terrain`).
+    """
+
+    unchecked: bool = False
+    allow_armed: bool = False
+    ignore_position: bool = False
+    ground_amsl_m: float | None = None
+    rtl_rel_home_m: float | None = None
+    route: Route | None = None
+    advised_rel_home_m: float | None = None
+    expected_parameters: Mapping[str, float] = field(default_factory=dict)
+    terrain: Ground | None = None
+    read_parameters: bool = True
+    discover_s: float = 10.0
+    listen_s: float = 1.5
+    standby_s: float = 30.0
+    timeout_s: float = TIMEOUT_S
+    attempts: int = 4
+    timers: Timers = field(default_factory=Timers)
+    simulated: bool = False
+    vehicle: Vehicle | None = None
+    settings: tuple[Setting, ...] = ()
+
+    def __post_init__(self) -> None:
+        checked_timeout_s(self.timeout_s)
+
+
+@dataclass(frozen=True)
+class Task:
+    """One list in wire order for one vehicle; ``mission``: set for a mission, None for a fence or rally points."""
+
+    name: str
+    sysid: int
+    autopilot: Autopilot
+    items: tuple[MissionItem, ...]
+    mission_type: int
+    options: SessionOptions
+    mission: Mission | None = None
+    judge: Judge | None = None
+    progress: ProgressCall | None = None
+
+    @classmethod
+    def of(
+        cls, mission: Mission, options: SessionOptions, judge: Judge | None, progress: ProgressCall | None = None
+    ) -> Task:
+        """Return the task of sending ``mission``."""
+        return cls(
+            mission.name, mission.sysid, mission.autopilot, mission.wire_items(), MISSION, options, mission, judge,
+            progress,
+        )  # fmt: skip

@@ -1,0 +1,324 @@
+"""The parameters that a mission was judged with: one list for each vehicle, made from the plan alone.
+
+Each `Setting` says what the proof assumes of one parameter, what it may be, and why. A vehicle's parameters are held
+against it (`off`), and the motion that they make is `vehicle_on_board`. `parameter_file` is the list as ground
+stations load it. Nothing here is ever written to a vehicle.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+from gcsplan.mavlink.mission.commands import (
+    DO_CHANGE_SPEED,
+    LOITER_TIME,
+    LOITER_TO_ALT,
+    LOITER_TURNS,
+    LOITER_UNLIM,
+    RTL,
+)
+from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mavlink.mission.parameter_names import PARAMETERS, Name, Parameter
+from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, Autopilot, Vehicle
+from gcsplan.world.atmosphere import true_per_indicated
+
+__all__ = ["Off", "Setting", "commands_speed", "off", "parameter_list", "vehicle_on_board"]
+
+Rule = Literal["equal", "at least", "at most"]
+Matters = Literal["time", "turns", "return", "flight", "told"]
+
+SAME = 0.01
+"""Part by which a value may differ and still count as the same."""
+
+GRAVITY_M_S2 = 9.80665
+CIRCLE_M = 60.0
+"""WP_LOITER_RAD, default: what circles without a radius of their own, and the circle over home, are judged with."""
+
+RETURN_ROLL_DEG = 45.0
+"""ROLL_LIMIT_DEG, default: the bank with which a plane's turn about is judged."""
+
+ROLL_SPARE = 1.1
+"""A plane needs more bank than an even turn takes: on its way into it, and to come back from beside it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """What the proof assumes of a parameter. ``value`` is in the parameter's unit.
+
+    ``matters``: to the ``time`` (another value is judged again, with the separation), to where it ``turns`` (judged
+    again by `check.tuning`, but for the return from anywhere), to the ``return`` or to the ``flight`` itself (another
+    value is not what was judged), or is only ``told``. ``off_at_zero``: 0 switches it off, which is within the rule.
+    """
+
+    parameter: Parameter
+    value: float
+    rule: Rule
+    why: str
+    matters: Matters
+    off_at_zero: bool = False
+
+    @property
+    def needed(self) -> bool:
+        """Whether the proof hangs on it, so that silence is no answer."""
+        return self.matters != "told"
+
+    def allows(self, amount: float) -> bool:
+        """Whether an amount on board is within the rule."""
+        spare = SAME * abs(self.value) + 1e-6
+        if self.off_at_zero and amount == 0.0:
+            return True
+        if self.rule == "equal":
+            return abs(amount - self.value) <= spare
+        return amount >= self.value - spare if self.rule == "at least" else amount <= self.value + spare
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for JSON: one entry for each name."""
+        names = [
+            {"parameter": n.name, "value": n.value(self.value), "versions": n.versions or "all"}
+            for n in self.parameter.names
+        ]
+        return {"names": names, "value": self.value, "unit": self.parameter.unit, "rule": self.rule, "why": self.why}
+
+
+@dataclass(frozen=True, slots=True)
+class Off:
+    """A parameter on board that is outside of its rule. ``amount`` is in the parameter's unit."""
+
+    setting: Setting
+    name: Name
+    amount: float
+    raw: float
+
+    def describe(self) -> str:
+        """What it is, what was assumed and why, and what to set."""
+        wanted, rule = self.name.value(self.setting.value), self.setting.rule
+        least = "" if rule == "equal" else f"{rule} "
+        return (
+            f"{self.name.name} is {self.raw:.6g} on board, and {least}{wanted:.6g} is assumed ({self.setting.why}): "
+            f"set {self.name.name} {wanted:.10g}"
+        )
+
+
+def commands_speed(mission: Mission) -> bool:
+    """Whether a mission sets its own cruise speed."""
+    return any(item.command == DO_CHANGE_SPEED for item in mission.items)
+
+
+def parameter_list(
+    mission: Mission, vehicle: Vehicle, *, rtl_rel_home_m: float | None = None, returns: bool = False
+) -> tuple[Setting, ...]:
+    """The settings that ``mission`` was judged with, for the autopilot of ``vehicle``.
+
+    ``rtl_rel_home_m``: the return altitude above home that was judged. ``returns``: a return from anywhere is part of
+    what was judged; an RTL item always is. What an ideal vehicle (of the papers' worlds) does not bound is not among
+    them.
+    """
+    ends = any(item.command == RTL for item in mission.items)
+    rows = {Autopilot.ARDUCOPTER: _copter, Autopilot.ARDUPLANE: _plane, Autopilot.PX4: _px4}
+    return tuple(rows[vehicle.autopilot](mission, vehicle, rtl_rel_home_m, ends, returns or ends))
+
+
+def _speed_m_s(mission: Mission, vehicle: Vehicle) -> float:
+    return mission.commanded_m_s or vehicle.speed_max_m_s
+
+
+def _copter(
+    mission: Mission, vehicle: Vehicle, rtl_rel_home_m: float | None, ends: bool, returns: bool
+) -> list[Setting]:
+    known = PARAMETERS[Autopilot.ARDUCOPTER]
+    own: Matters = "told" if commands_speed(mission) else "time"
+    back: Matters = "return" if returns else "told"
+    home = vehicle.return_speed_m_s or vehicle.speed_max_m_s
+    rows = [
+        Setting(known["speed"], _speed_m_s(mission, vehicle), "equal",
+                "the mission's speed: one that was interrupted goes on at this parameter's", own),
+        Setting(known["return_speed"], home, "equal", "the speed of the return", "time" if ends else "told"),
+        Setting(known["climb"], vehicle.climb_m_s, "equal", "climb_m_s, in all times", "time"),
+        Setting(known["descent"], vehicle.descent_m_s, "equal", "descent_m_s, in all times", "time"),
+        Setting(known["land"], vehicle.land_m_s, "equal", "land_m_s, the landing's last 10 m", "time"),
+        Setting(known["accel"], COPTER_PEAK_ACCEL * vehicle.accel_m_s2, "equal",
+                "accel_m_s2, in all times and in how far a return runs on", "time"),
+        Setting(known["vertical_accel"], vehicle.vertical_accel_m_s2, "equal", "vertical_accel_m_s2", "time"),
+        Setting(known["corner_accel"], COPTER_CORNER_ACCEL * vehicle.corner_accel_m_s2, "equal",
+                "corner_accel_m_s2, in corners; 0 is twice the acceleration", "time"),
+        Setting(known["jerk"], vehicle.leg_jerk_m_s3, "equal", "leg_jerk_m_s3, in all times", "time"),
+        Setting(known["radius"], 2.0, "at most", "where corners begin", "turns"),
+        Setting(known["return_altitude_type"], 0.0, "equal", "returns are judged above home, not above terrain", back),
+        Setting(known["cone"], 3.0, "at least", "how low a return may be near home", back, off_at_zero=True),
+        Setting(known["return_climb"], 0.0, "at most", "a return is no higher than was judged", back),
+        Setting(known["return_end"], 0.0, "at most", "a return lands", "told"),
+        Setting(known["return_waits"], vehicle.return_waits_s, "equal", "how long a return waits over home",
+                "time" if ends else "told"),
+    ]  # fmt: skip
+    if vehicle.lean_angle_deg is not None:
+        why = f"lean_angle_deg: {_speed_m_s(mission, vehicle):.3g} m/s, and forecasts in wind"
+        rows.append(Setting(known["lean"], vehicle.lean_angle_deg, "at least", why, "time"))
+    return _finite(rows + _altitude(known, rtl_rel_home_m, returns))
+
+
+def _altitude(known: Mapping[str, Parameter], rtl_rel_home_m: float | None, returns: bool) -> list[Setting]:
+    if rtl_rel_home_m is None:
+        return []
+    why = "the return altitude, above home" + (", as judged" if returns else "")
+    return [Setting(known["return_altitude"], rtl_rel_home_m, "equal", why, "told")]
+
+
+def _plane(
+    mission: Mission, vehicle: Vehicle, rtl_rel_home_m: float | None, ends: bool, returns: bool
+) -> list[Setting]:
+    known = PARAMETERS[Autopilot.ARDUPLANE]
+    fastest = max(mission.commanded_m_s, vehicle.speed_max_m_s)
+    slowest = _slowest_m_s(mission) or fastest
+    back: Matters = "return" if returns else "told"
+    circles = [CIRCLE_M, *([vehicle.turn_radius_m] if not returns else [])]
+    uses_default = returns or any(_without_radius(item.command, item.params) for item in mission.items)
+    rows = [
+        Setting(known["speed"], vehicle.speed_max_m_s, "equal",
+                "the airspeed of the climb-out, of a return, and of a mission that was interrupted", "time"),
+        Setting(known["speed_most"], fastest, "at least", "the fastest speed of the plan", "flight"),
+        Setting(known["speed_least"], slowest, "at most", "the slowest speed of the plan", "flight"),
+        Setting(known["circle"], max(circles), "at most", "the radius of circles that say none, and over home",
+                "flight" if uses_default else "told"),
+        Setting(known["return_circle"], CIRCLE_M, "at most", "the radius of the circle over home", back),
+        Setting(known["radius"], 90.0, "at most", "how early turns begin at way points that say no radius", "turns"),
+        Setting(known["l1_period"], 17.0, "equal", "how fast it settles on a leg", "turns"),
+        Setting(known["l1_damping"], 0.75, "equal", "how it settles on a leg", "turns"),
+        Setting(known["pitch"], 15.0, "at most", "how far a climb-out rises too high", "told"),
+    ]  # fmt: skip
+    roll_deg = RETURN_ROLL_DEG if returns else _roll_deg(mission, vehicle, fastest, uses_default)
+    if roll_deg > 0.0:
+        why = "turns of the return" if returns else f"the bank of its turns at {fastest:.3g} m/s, and a tenth to steer"
+        rows.append(Setting(known["roll"], roll_deg, "at least", why, "flight"))
+    if vehicle.turn_radius_m > 0.0:
+        rows.append(Setting(known["climb_most"], vehicle.climb_m_s, "at least", "climb_m_s", "told"))
+        rows.append(Setting(known["descent_most"], vehicle.descent_m_s, "at least", "descent_m_s", "told"))
+    return _finite(rows + _altitude(known, rtl_rel_home_m, returns))
+
+
+def _slowest_m_s(mission: Mission) -> float:
+    speeds = [i.params[1] for i in mission.items if i.command == DO_CHANGE_SPEED and i.params[0] == 0.0]
+    return min((v for v in speeds if 0.0 < v < math.inf), default=0.0)
+
+
+def _without_radius(command: int, params: Sequence[float]) -> bool:
+    """Whether an item makes a plane circle with WP_LOITER_RAD (check.flight)."""
+    if command == LOITER_TIME:
+        return True
+    number = {LOITER_UNLIM: 2, LOITER_TURNS: 2, LOITER_TO_ALT: 1}.get(command)
+    return number is not None and not abs(params[number]) > 1.0
+
+
+def _roll_deg(mission: Mission, vehicle: Vehicle, fastest_m_s: float, uses_default: bool) -> float:
+    """The bank of the plan's tightest turn at its highest place, with some to spare; 0 without a turn radius.
+
+    Circles are as wide as the turn radius at least.
+    """
+    if vehicle.turn_radius_m <= 0.0:
+        return 0.0
+    highest_m = max((item.z for item in mission.items if math.isfinite(item.z)), default=0.0) + mission.home.amsl_m
+    true_m_s = fastest_m_s * float(true_per_indicated(min(highest_m, 10_000.0)))
+    bank_deg = math.degrees(math.atan(true_m_s**2 / (GRAVITY_M_S2 * vehicle.turn_radius_m)))
+    return min(ROLL_SPARE * bank_deg, RETURN_ROLL_DEG)
+
+
+def _px4(mission: Mission, vehicle: Vehicle, rtl_rel_home_m: float | None, ends: bool, returns: bool) -> list[Setting]:
+    known = PARAMETERS[Autopilot.PX4]
+    back: Matters = "return" if returns else "told"
+    home = vehicle.return_speed_m_s or vehicle.speed_max_m_s
+    plain = commands_speed(mission)
+    accel = vehicle.accel_m_s2
+    rows = [
+        Setting(known["speed_most"], _speed_m_s(mission, vehicle), "at least", "the mission's speed", "flight"),
+        Setting(known["return_speed"], home, "equal", "the speed of the return, whatever the mission's is",
+                "time" if ends or not plain else "told"),
+        Setting(known["climb"], vehicle.climb_m_s, "equal", "climb_m_s, in all times", "time"),
+        Setting(known["descent"], vehicle.descent_m_s, "equal", "descent_m_s, in all times", "time"),
+        Setting(known["land"], vehicle.land_m_s, "equal", "land_m_s, the landing's last metres", "time"),
+        Setting(known["accel"], accel, "equal", "accel_m_s2, in all times and in how far a return runs on", "time"),
+        Setting(known["jerk"], vehicle.leg_jerk_m_s3, "equal", "leg_jerk_m_s3, in all times", "time"),
+        Setting(known["corner"], vehicle.corner_accel_m_s2 / accel if math.isfinite(accel) else math.inf, "equal",
+                "corner_accel_m_s2 over accel_m_s2, in corners", "time"),
+        Setting(known["radius"], 10.0, "at most", "where items without a radius count as reached", "turns"),
+        Setting(known["radius_height"], 0.8, "at most", "the height at which an item counts as reached", "turns"),
+        Setting(known["return_type"], 0.0, "equal", "returns are judged straight home", back),
+        Setting(known["cone"], 45.0, "at most", "how low a return may be near home", back),
+        Setting(known["return_waits"], vehicle.return_waits_s, "equal", "how long a return waits over home",
+                "time" if ends else "told"),
+    ]  # fmt: skip
+    return _finite(rows + _altitude(known, rtl_rel_home_m, returns))
+
+
+def _finite(rows: Sequence[Setting]) -> list[Setting]:
+    """The rows that say a number: an ideal motion key bounds nothing."""
+    return [row for row in rows if math.isfinite(row.value)]
+
+
+def _amount(parameter: Parameter, values: Mapping[str, float], autopilot: Autopilot) -> float | None:
+    """The amount that is flown: zeros that stand for another parameter are read as that one."""
+    amount, known = parameter.read(values), PARAMETERS[autopilot]
+    if amount is None or autopilot is Autopilot.PX4:
+        return amount
+    if parameter.key == "return_speed" and amount <= 0.0:
+        return known["speed"].read(values)
+    if parameter.key == "corner_accel" and amount <= 0.0:
+        accel = known["accel"].read(values)
+        return None if accel is None else 2.0 * accel
+    return abs(amount) if parameter.key in ("circle", "return_circle") else amount
+
+
+def off(settings: Sequence[Setting], values: Mapping[str, float], autopilot: Autopilot) -> list[Off]:
+    """The parameters among ``values`` that are outside of their rules, in the order of ``settings``."""
+    found = []
+    for setting in settings:
+        name = setting.parameter.on_board(values)
+        amount = _amount(setting.parameter, values, autopilot)
+        if name is not None and amount is not None and not setting.allows(amount):
+            found.append(Off(setting, name, amount, values[name.name]))
+    return found
+
+
+def vehicle_on_board(vehicle: Vehicle, mission: Mission, values: Mapping[str, float]) -> Vehicle:
+    """``vehicle`` as its parameters on board make it fly ``mission``; what was not read, or is the same, stays.
+
+    Where the mission sets no speed, the parameter's is its speed.
+    """
+    if math.isinf(vehicle.accel_m_s2) and not vehicle.keeps_airspeed:
+        return vehicle
+    known, autopilot = PARAMETERS[vehicle.autopilot], vehicle.autopilot
+
+    def read(key: str, own: float | None, per: float = 1.0) -> float | None:
+        amount = _amount(known[key], values, autopilot) if key in known else None
+        if amount is None or not amount >= 0.0 or own is None or math.isinf(own):
+            return own
+        amount *= per
+        return own if abs(amount - own) <= SAME * abs(own) else amount
+
+    if autopilot is Autopilot.ARDUPLANE:
+        return replace(vehicle, speed_max_m_s=max(read("speed", vehicle.speed_max_m_s) or 0.0, 1.0))
+    px4 = autopilot is Autopilot.PX4
+    accel = read("accel", vehicle.accel_m_s2, 1.0 if px4 else 1.0 / COPTER_PEAK_ACCEL)
+    changed: dict[str, float | None] = {
+        "climb_m_s": read("climb", vehicle.climb_m_s),
+        "descent_m_s": read("descent", vehicle.descent_m_s),
+        "land_m_s": read("land", vehicle.land_m_s),
+        "accel_m_s2": accel,
+        "vertical_accel_m_s2": read("vertical_accel", vehicle.vertical_accel_m_s2),
+        "corner_accel_m_s2": read("corner", vehicle.corner_accel_m_s2, accel or 1.0) if px4 else read(
+            "corner_accel", vehicle.corner_accel_m_s2, 1.0 / COPTER_CORNER_ACCEL
+        ),
+        "leg_jerk_m_s3": read("jerk", vehicle.leg_jerk_m_s3),
+        "lean_angle_deg": read("lean", vehicle.lean_angle_deg),
+    }  # fmt: skip
+    if vehicle.return_speed_m_s is not None:
+        speed = read("return_speed", vehicle.return_speed_m_s)
+        changed["return_m_s"] = vehicle.return_m_s if speed == vehicle.return_speed_m_s else speed
+        waits = read("return_waits", vehicle.return_waits_s)
+        changed["return_wait_s"] = vehicle.return_wait_s if waits == vehicle.return_waits_s else waits
+    if not commands_speed(mission):
+        changed["speed_max_m_s"] = read("return_speed" if px4 else "speed", vehicle.speed_max_m_s)
+    # What divides by a rate needs one above 0.
+    least = {key: max(value, 0.01) for key, value in changed.items() if value is not None and key != "return_wait_s"}
+    return replace(vehicle, **(changed | least))  # type: ignore[arg-type]
