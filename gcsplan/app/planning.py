@@ -72,7 +72,7 @@ def plan_vehicle(
             )
             mission, verdict = built(over, request, solution, order)
             if not verdict.findings:
-                solution = of_all(tried, problem, tried[0].lower_bound)
+                solution = of_all(tried, problem)
                 return VehiclePlan(
                     request, problem, solution, mission, verdict, vehicle.speed_max_m_s, notes, order, over
                 )

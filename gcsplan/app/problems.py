@@ -18,6 +18,7 @@ from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest
+from gcsplan.planners.cures import FILLED
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import Airspace
@@ -124,7 +125,8 @@ def make_problem(
     progress: Callable[[Progress], None] | None = None,
     options: Mapping[str, object] | None = None,
 ) -> tuple[Problem, tuple[str, ...]]:
-    """The planner's problem for one vehicle, with the wire's margins in its limits, and notes for the user.
+    """The planner's problem for one vehicle, with the wire's margins in the limits of its paths, those of the check for
+    its bounds, and notes for the user.
 
     The altitudes of start and goal are whole centimetres above home. If ``takeoff_agl_m`` meets min AGL plus altitude
     error but not the ground's slope within the track error, it is raised, with a note; a lower value is bad input.
@@ -132,7 +134,10 @@ def make_problem(
     vehicle = request.vehicle
     given, margins = margins, replace(margins, bow_m=min(margins.bow_m, _largest_bow_m(world)))
     margins = replace(margins, track_m=margins.track_m + corner_m(vehicle))
-    limits = _with_margins(vehicle.limits, margins, terrain=source.altitude_frame == "terrain", source=source)
+    checked = vehicle.limits
+    if source.altitude_frame == "terrain":
+        checked = replace(checked, altitude_error_m=checked.altitude_error_m + source.terrain_error_m)
+    limits = _with_margins(checked, margins, terrain=source.altitude_frame == "terrain")
     air = world.airspace
     datum = request.start[2]
     notes: list[str] = []
@@ -148,9 +153,10 @@ def make_problem(
                 where=f"{source.path}: vehicles.{vehicle.name}.{key}",
             )
         if math.isinf(low):
-            raise NoMission(
-                f"{vehicle.name}: the ground within reach of the {what} is unknown to the terrain model",
-                reason="infeasible",
+            shut = math.isinf(lowest_amsl(air, east, north, checked))
+            words = f"the ground within reach of the {what} is unknown to the terrain model: {FILLED}"
+            raise in_degrees(
+                Refusal(words, reason="infeasible" if shut else "not_found", place=(east, north)), vehicle, world
             )
         amsl = max(low, ground + (wanted_agl_m or 0.0))
         amsl = datum + math.ceil((amsl - datum) * 100.0 - 1e-6) / 100.0
@@ -171,6 +177,8 @@ def make_problem(
     problem = Problem(
         airspace=air,
         limits=limits,
+        checked=checked,
+        rounding_m=margins.rounding_m,
         start=(request.start[0], request.start[1], start_amsl),
         goal=(request.goal[0], request.goal[1], goal_amsl),
         via=via,
@@ -247,8 +255,8 @@ def _largest_bow_m(world: World) -> float:
     return float(world.frame.bow_m(ends[0], ends[1])[0]) + 1e-3
 
 
-def _with_margins(limits: Limits, margins: Margins, *, terrain: bool, source: MissionFile) -> Limits:
-    """The limits for the planner: the vehicle's, reduced by what the wire's rounding and the bow may take.
+def _with_margins(limits: Limits, margins: Margins, *, terrain: bool) -> Limits:
+    """The limits of the planner's paths: those of the check, reduced by what the wire's rounding and the bow may take.
 
     In the terrain frame, too, by what a vehicle may read amiss and still be taken: an upload judges with it.
     """
@@ -259,9 +267,7 @@ def _with_margins(limits: Limits, margins: Margins, *, terrain: bool, source: Mi
     return replace(
         limits,
         track_error_m=limits.track_error_m + margins.track_m + margins.bow_m,
-        altitude_error_m=limits.altitude_error_m
-        + margins.altitude_m
-        + (source.terrain_error_m + NEAR_ENOUGH_M if terrain else 0.0),
+        altitude_error_m=limits.altitude_error_m + margins.altitude_m + (NEAR_ENOUGH_M if terrain else 0.0),
         max_climb_deg=limits.max_climb_deg if limits.max_climb_deg >= 90 else less(limits.max_climb_deg),
         max_descent_deg=limits.max_descent_deg if limits.max_descent_deg >= 90 else less(limits.max_descent_deg),
     )

@@ -20,12 +20,17 @@ LONGEST_LEG_M = 5000.0
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """Margins that a planner keeps for the wire: rounding of altitudes, rounding and bow of tracks, slope for both."""
+    """Margins that a planner keeps for the wire: rounding of altitudes, rounding and bow of tracks, slope for both.
+
+    They make paths longer, never bounds. ``rounding_m``: how far a mission's place may lie beside the one that was
+    meant, in the plane and in altitude; bounds hold for all missions whose ends lie that near to the plan's.
+    """
 
     altitude_m: float = 0.02
     track_m: float = 0.03
     bow_m: float = BOW_M
     slope: float = 0.002
+    rounding_m: tuple[float, float] = (0.011, 0.01)
 
 
 MARGINS = Margins()
