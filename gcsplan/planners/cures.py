@@ -22,7 +22,7 @@ from gcsplan.world.zones import Circle, Zone
 
 Place = tuple[float, float]
 
-FILLED = "give a terrain model that knows it (`gcsplan dem fetch` gets one), or one whose voids (its nodata value) are filled"
+FILLED = "give a terrain model that knows it (`gcsplan dem fetch` gets one), or fill its voids (nodata)"
 """What fills unknown ground."""
 NAMES, SINGLES = 5, 8
 """Most no-fly zones that are named in a message, and that are removed one at a time."""

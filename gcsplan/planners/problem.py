@@ -51,8 +51,8 @@ class Problem:
     """Find a path from ``start`` to ``goal`` (east_m, north_m, amsl_m) that passes every ``via`` in order.
 
     ``limits`` are what paths keep: they already include the planner's margins (wire rounding, bow, corners that are
-    cut), so a path that passes `Airspace.examine` under them passes the final check too. ``checked`` are the same limits
-    as the check applies them, without any margin (None: ``limits``): bounds and proofs assume those alone, by
+    cut), so a path that passes `Airspace.examine` under them passes the final check too. ``checked`` are the same
+    limits as the check applies them, without any margin (None: ``limits``): bounds and proofs assume those alone, by
     `bound_limits` and `for_bounds`. ``rounding_m``: how far ends and vias of the paths that a bound speaks of may lie
     beside the problem's own, in the plane and in altitude. See docs/concepts/certificates.md.
 
@@ -109,8 +109,8 @@ class Problem:
 
     @property
     def connectors(self) -> float:
-        """The most that connectors to the problem's own ends and vias add to the cost of a path: one at each end, two at
-        each via. A bound of paths between the exact ends, less this, is one of all paths."""
+        """The most that connectors to the problem's own ends and vias add to the cost of a path: one at each end, two
+        at each via. A bound of paths between the exact ends, less this, is one of all paths."""
         flat, rise = self.rounding_m
         each = math.hypot(flat, rise)
         if self.objective == "energy":

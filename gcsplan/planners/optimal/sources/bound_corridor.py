@@ -199,7 +199,8 @@ def _past(
     high: Floats,
 ) -> Floats | None:  # fmt: skip
     """`_along` past the stretches that are shut; ``low``, ``high`` (N,): what is free at the places."""
-    stretches = _stretches(low - high)
+    # An infinite floor is shut (unknown ground), or given (an end), whatever is free below the cap.
+    stretches = _stretches(np.subtract(low, high, out=low.copy(), where=np.isfinite(low)))
     if len(stretches) > MOST:
         return None
     cuts = sorted({0, len(s) - 1, *(k for stretch in stretches for k in stretch)})
@@ -260,7 +261,7 @@ def _point(place: Floats) -> Point:
 
 def _stretches(over: Floats) -> list[tuple[int, int]]:
     """First and last index of each stretch with less than `OPEN_M` of free altitudes, and somewhere none; ``over``: the
-    lowest minus the highest free altitude (N,)."""
+    lowest minus the highest free altitude (N,), inf over unknown ground."""
     runs = [run for run in _runs(over > -OPEN_M) if (over[run[0] : run[1] + 1] > 0.0).any()]
     return [(max(first - 1, 0), min(last + 1, len(over) - 1)) for first, last in runs]
 
