@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mavlink.build.multirotor import build_mission, corner_m
-from gcsplan.mavlink.build.order import LONGEST_LEG_M, MARGINS, Margins, Order
+from gcsplan.mavlink.build.order import BOW_M, LONGEST_LEG_M, MARGINS, Margins, Order
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import Mission
@@ -29,6 +30,8 @@ from gcsplan.world.zones import Zone
 
 BYTES_PER_NODE = 64.0
 """Memory that a wider window takes for each of its nodes, terrain included: 58 bytes were measured."""
+LEAST_BOW_M = 0.01
+"""Metres; legs of some 700 m have no larger bow."""
 SPOT_M = 0.02
 """Metres by which two altitudes of one place are set apart; wire numbers are rounded to half a centimetre."""
 
@@ -132,7 +135,7 @@ def make_problem(
     error but not the ground's slope within the track error, it is raised, with a note; a lower value is bad input.
     """
     vehicle = request.vehicle
-    given, margins = margins, replace(margins, bow_m=min(margins.bow_m, _largest_bow_m(world)))
+    given, margins = margins, replace(margins, bow_m=bow_margin_m(request, world, margins))
     margins = replace(margins, track_m=margins.track_m + corner_m(vehicle))
     checked = vehicle.limits
     if source.altitude_frame == "terrain":
@@ -244,13 +247,25 @@ def lowest_amsl(air: Airspace, east_m: float, north_m: float, limits: Limits) ->
     return low
 
 
-def _largest_bow_m(world: World) -> float:
+def bow_margin_m(request: VehicleRequest, world: World, margins: Margins = MARGINS) -> float:
+    """The bow that a mission's legs may have, m: that of a straight one between its terminals, `LEAST_BOW_M` at least,
+    so that legs need not be cut; as many times as large as ``margins`` ask for more than `MARGINS`."""
+    places = [request.start[:2], *(v[:2] for v in request.via), request.goal[:2]]
+    longest_m = max(math.dist(a, b) for a, b in pairwise(places))
+    own_m = LEAST_BOW_M
+    if request.vehicle.turn_radius_m > 0.0:
+        own_m = BOW_M  # arcs, climb-outs and approaches have legs of their own
+    own_m = min(max(own_m, _largest_bow_m(world, longest_m)), BOW_M)
+    return min(own_m * margins.bow_m / BOW_M, _largest_bow_m(world))
+
+
+def _largest_bow_m(world: World, longest_m: float = LONGEST_LEG_M) -> float:
     """Bow of the longest leg that may be flown in this world, m (small in the papers' 100 m worlds)."""
     surface = world.airspace.surface
     rows, cols = surface.ground_m.shape
     corners = surface.grid.to_plane([0, cols - 1, 0, cols - 1], [0, 0, rows - 1, rows - 1])
     north_m = float(corners[:, 1].max())
-    half_m = 0.5 * min(LONGEST_LEG_M, float(np.linalg.norm(np.ptp(corners, axis=0))))
+    half_m = 0.5 * min(LONGEST_LEG_M, longest_m, float(np.linalg.norm(np.ptp(corners, axis=0))))
     ends = world.frame.to_degrees([-half_m, half_m], [north_m, north_m])
     return float(world.frame.bow_m(ends[0], ends[1])[0]) + 1e-3
 
