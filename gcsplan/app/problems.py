@@ -142,37 +142,13 @@ def make_problem(
         checked = replace(checked, altitude_error_m=checked.altitude_error_m + source.terrain_error_m)
     limits = _with_margins(checked, margins, terrain=source.altitude_frame == "terrain")
     air = world.airspace
-    datum = request.start[2]
     notes: list[str] = []
-
-    def end_point(what: str, place: tuple[float, float, float], key: str, wanted_agl_m: float | None) -> float:
-        east, north, ground = place
-        low = lowest_amsl(air, east, north, limits)
-        needed = limits.min_agl_m + vehicle.limits.altitude_error_m
-        if wanted_agl_m is not None and wanted_agl_m < needed - 1e-6:
-            raise InputError(
-                f"must be at least min_agl_m + altitude_error_m = {needed:g}, given {wanted_agl_m:g}: "
-                f"the path begins and ends there",
-                where=f"{source.path}: vehicles.{vehicle.name}.{key}",
-            )
-        if math.isinf(low):
-            shut = math.isinf(lowest_amsl(air, east, north, checked))
-            words = f"the ground within reach of the {what} is unknown to the terrain model: {FILLED}"
-            raise in_degrees(
-                Refusal(words, reason="infeasible" if shut else "not_found", place=(east, north)), vehicle, world
-            )
-        amsl = max(low, ground + (wanted_agl_m or 0.0))
-        amsl = datum + math.ceil((amsl - datum) * 100.0 - 1e-6) / 100.0
-        if wanted_agl_m is not None and amsl - ground > wanted_agl_m + 0.011:
-            notes.append(
-                f"{key} {wanted_agl_m:g} raised to {amsl - ground:.2f}: so far the ground rises within the track error"
-            )
-        return amsl
 
     start_agl_m = _wanted_agl_m(request.takeoff_agl_m, request.start_amsl_m, request.start[2])
     goal_agl_m = _wanted_agl_m(request.approach_agl_m, request.goal_amsl_m, request.goal[2])
-    start_amsl = end_point("start", request.start, "takeoff_agl_m", start_agl_m)
-    goal_amsl = end_point("goal", request.goal, "approach_agl_m", goal_agl_m)
+    ends = _Ends(source, request, world, limits, checked, notes)
+    start_amsl = ends.amsl_m("start", request.start, "takeoff_agl_m", start_agl_m)
+    goal_amsl = ends.amsl_m("goal", request.goal, "approach_agl_m", goal_agl_m)
     via = _vias(air, request, (start_amsl, goal_amsl), notes)
     settings = source.planner
     own = world.airspace.zones[len(source.zones) :]
@@ -203,6 +179,44 @@ def make_problem(
             "are cut and the landing place is overshot while braking: track_error_m must hold both"
         )
     return problem, tuple(notes)
+
+
+@dataclass(frozen=True)
+class _Ends:
+    """The altitudes of a path's ends: whole centimetres above home, legal under ``limits``, which paths keep."""
+
+    source: MissionFile
+    request: VehicleRequest
+    world: World
+    limits: Limits
+    checked: Limits
+    notes: list[str]
+
+    def amsl_m(self, what: str, place: tuple[float, float, float], key: str, wanted_agl_m: float | None) -> float:
+        """The altitude AMSL of one end, as ``wanted_agl_m`` above ground or raised, with a note. Raises InputError,
+        NoMission."""
+        east, north, ground = place
+        vehicle, air, datum = self.request.vehicle, self.world.airspace, self.request.start[2]
+        low = lowest_amsl(air, east, north, self.limits)
+        needed = self.limits.min_agl_m + vehicle.limits.altitude_error_m
+        if wanted_agl_m is not None and wanted_agl_m < needed - 1e-6:
+            raise InputError(
+                f"must be at least min_agl_m + altitude_error_m = {needed:g}, given {wanted_agl_m:g}: "
+                f"the path begins and ends there",
+                where=f"{self.source.path}: vehicles.{vehicle.name}.{key}",
+            )
+        if math.isinf(low):
+            shut = math.isinf(lowest_amsl(air, east, north, self.checked))
+            words = f"the ground within reach of the {what} is unknown to the terrain model: {FILLED}"
+            refusal = Refusal(words, reason="infeasible" if shut else "not_found", place=(east, north))
+            raise in_degrees(refusal, vehicle, self.world)
+        amsl = max(low, ground + (wanted_agl_m or 0.0))
+        amsl = datum + math.ceil((amsl - datum) * 100.0 - 1e-6) / 100.0
+        if wanted_agl_m is not None and amsl - ground > wanted_agl_m + 0.011:
+            self.notes.append(
+                f"{key} {wanted_agl_m:g} raised to {amsl - ground:.2f}: so far the ground rises within the track error"
+            )
+        return amsl
 
 
 def _vias(

@@ -136,12 +136,7 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
                 forms.append(_half_planes(part, grow, inner=sign < 0.0))
                 bounds[k] = np.concatenate([part.min(axis=0) - grow, part.max(axis=0) + grow])
         for k, (a, b) in enumerate(pairs, len(found)):
-            # Where two zones cross, an altitude that is free of one may lie in the other.
-            rows[k] = rows[a]
-            rows[k, [RADIUS, PAIR, ONE, OTHER]] = -1.0, 1.0, a, b
-            rows[k, [LOOKS, RISE]] = rows[[a, b]][:, [LOOKS, RISE]].max(axis=0)
-            rows[k, BOTTOM_2 : TOP_2_AGL + 1] = rows[b, BOTTOM : TOP_AGL + 1]
-            rows[k, UNDER_2] = rows[b, UNDER]
+            _cross(rows, k, a, b)
             forms.append(np.vstack([forms[a], forms[b]]))
             bounds[k, :2] = np.maximum(bounds[a, :2], bounds[b, :2])
             bounds[k, 2:] = np.minimum(bounds[a, 2:], bounds[b, 2:])
@@ -153,6 +148,15 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
     numbers = [number for number, *_ in found]
     owner = np.array([(n, n) for n in numbers] + [(numbers[a], numbers[b]) for a, b in pairs], np.intp).reshape(-1, 2)
     return Shapes(both[0], both[1], boxes, owner, int(size.sum()), int(size[both[0][0][:, LOOKS] > 0.0].sum()))
+
+
+def _cross(rows: Floats, k: int, a: int, b: int) -> None:
+    """Fill row ``k`` for the crossing of two parts: an altitude that is free of ``a`` may lie in ``b``."""
+    rows[k] = rows[a]
+    rows[k, [RADIUS, PAIR, ONE, OTHER]] = -1.0, 1.0, a, b
+    rows[k, [LOOKS, RISE]] = rows[[a, b]][:, [LOOKS, RISE]].max(axis=0)
+    rows[k, BOTTOM_2 : TOP_2_AGL + 1] = rows[b, BOTTOM : TOP_AGL + 1]
+    rows[k, UNDER_2] = rows[b, UNDER]
 
 
 def _rise(problem: Problem, zone: Zone, reach: float, box: tuple[float, float, float, float]) -> float:
