@@ -5,10 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from gcsplan.planners.budget import FIRST, FIRST_S, Budget
 from gcsplan.planners.problem import Problem, Solution
 
-__all__ = ["of_all", "within_budget"]
+SAME_M = 1e-6
+"""Metres within which two paths end at the same place."""
+
+__all__ = ["of_all", "same_ends", "with_bound", "within_budget"]
 
 
 def within_budget(problem: Problem, tried: Sequence[Solution], begun_s: float) -> Problem:
@@ -22,31 +27,39 @@ def within_budget(problem: Problem, tried: Sequence[Solution], begun_s: float) -
     return replace(problem, budget_s=problem.budget_s * 0.5 ** len(tried), budget=budget)
 
 
-def of_all(tried: Sequence[Solution], problem: Problem, bound: float | None) -> Solution:
-    """The last of some solutions, with a lower ``bound`` under the limits of the first: those of the later ones are
-    tighter than the mission's own, and so are their bounds.
+def of_all(tried: Sequence[Solution], problem: Problem) -> Solution:
+    """The last of some solutions, with the best lower bound of those that have its ends: all of them hold under the
+    limits of the check, whatever margins the paths keep.
 
     ``problem``: that of the last one. Times and searches are those of all.
     """
     first, last = tried[0], tried[-1]
     if first is last:
         return last
-    stopped_by = last.stopped_by
-    if "time" in (s.stopped_by for s in tried):
-        stopped_by = "time"
-    elif stopped_by == "gap" and (
-        bound is None or problem.cost(last.path) > bound * (1.0 + problem.gap_percent / 100.0)
-    ):
-        stopped_by = "exhausted"
+    alike = [s.lower_bound for s in tried if s.lower_bound is not None and same_ends(s, last)]
+    last = with_bound(last, max(alike, default=None), problem)
+    stopped_by = "time" if "time" in (s.stopped_by for s in tried) else last.stopped_by
     note = f"planned {len(tried)} times, each time with larger margins: the first mission breaks a limit as it is flown"
-    if bound is not None:
-        note += "; the lower bound is one under the limits of the first plan"
     return replace(
         last,
-        lower_bound=bound,
         stopped_by=stopped_by,
         planning_s=sum(s.planning_s for s in tried),
         first_path_s=first.first_path_s,
         search=tuple(step for s in tried for step in s.search),
         notes=(*last.notes, note),
     )
+
+
+def with_bound(solution: Solution, bound: float | None, problem: Problem) -> Solution:
+    """A solution of ``problem`` with another lower bound; where it is not within the wanted gap, ``gap`` did not end
+    the search."""
+    near = bound is not None and problem.cost(solution.path) <= bound * (1.0 + problem.gap_percent / 100.0)
+    stopped_by = "exhausted" if solution.stopped_by == "gap" and not near else solution.stopped_by
+    return replace(solution, lower_bound=bound, stopped_by=stopped_by)
+
+
+def same_ends(one: Solution, other: Solution) -> bool:
+    """Whether the paths of two solutions for the same vias begin and end at the same places and altitudes: then the
+    lower bound of either is one of both."""
+    a, b = (s.path.points[[0, -1]] for s in (one, other))
+    return bool(np.abs(a - b).max() < SAME_M)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gcsplan.app.attempts import same_ends, with_bound
 from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.planning import plan_vehicle
 from gcsplan.errors import InputError, NoMission
@@ -132,7 +133,10 @@ class Detours:
             plan = plan_vehicle(self._brief, request, limits=limits, searched=searched)
         except (NoMission, InputError):
             return None
-        plan = replace(plan, request=self._plans[name].request)
+        own = self._plans[name]
+        # Other limits, zones or vias than the vehicle's own: only the bound of its own plan says something of it.
+        bound = own.solution.lower_bound if same_ends(plan.solution, own.solution) else None
+        plan = replace(plan, request=own.request, solution=with_bound(plan.solution, bound, plan.problem))
         route = self._route_of(plan)
         self._found.append((route, plan))
         return route

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from gcsplan.check.verdict import Finding, Verdict
 from gcsplan.mavlink.build.order import Margins
@@ -37,9 +38,10 @@ def larger(margins: Margins, findings: Sequence[Finding], corner_m: float = math
     steep = max((f.by / f.limit for f in findings if f.kind in ("climb", "descent")), default=0.0)
     if math.isfinite(corner_m):
         low_m = max(low_m, near_m)
-    return Margins(
-        margins.altitude_m + 0.02 + 1.05 * low_m,
-        margins.track_m + 0.03 + 1.05 * near_m,
-        3.0 * margins.bow_m,
-        min(margins.slope + (0.001 + 1.5 * steep if steep else 0.0), MOST_SLOPE),
+    return replace(
+        margins,
+        altitude_m=margins.altitude_m + 0.02 + 1.05 * low_m,
+        track_m=margins.track_m + 0.03 + 1.05 * near_m,
+        bow_m=3.0 * margins.bow_m,
+        slope=min(margins.slope + (0.001 + 1.5 * steep if steep else 0.0), MOST_SLOPE),
     )

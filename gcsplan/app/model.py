@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from gcsplan.app.leaving_out import LeftOut
 from gcsplan.check.verdict import Verdict
+from gcsplan.errors import GcsplanError
 from gcsplan.fleet.arrival import Slot
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.mavlink.build.order import Order
@@ -19,6 +20,10 @@ from gcsplan.world.world import World
 
 if TYPE_CHECKING:
     from gcsplan.fleet.separation import Encounter, Separation
+
+
+TOUCH_M, TOUCH = 1e-3, 1e-7
+"""Metres, and part of the bound, by which rounding may put the cost of a plan below its bound."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +56,18 @@ class VehiclePlan:
     order: Order = field(default_factory=Order)
     brief: Brief | None = None
 
+    def __post_init__(self) -> None:
+        """Raise GcsplanError where a mission that passes costs less than its lower bound: then one of both is wrong."""
+        bound = self.solution.lower_bound
+        if bound is None or self.verdict.findings:
+            return
+        per_m = max(1.0, self.problem.horizontal_j_per_m) if self.problem.objective == "energy" else 1.0
+        if self.cost < bound - TOUCH_M * per_m - TOUCH * bound:
+            raise GcsplanError(
+                f"{self.name}: a bug of gcsplan: the plan costs {self.cost:.3f}, less than its own lower bound of "
+                f"{bound:.3f}; nothing is written"
+            )
+
     @property
     def name(self) -> str:
         """The vehicle's name."""
@@ -65,7 +82,7 @@ class VehiclePlan:
     def gap_percent(self) -> float | None:
         """How far the flown path may be above the best one, in percent of the lower bound; None without a bound."""
         bound = self.solution.lower_bound
-        return None if not bound else max(0.0, 100.0 * (self.cost / bound - 1.0))
+        return None if not bound else max(0.0, 100.0 * (self.cost / bound - 1.0))  # below by rounding alone, see above
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,17 +7,21 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from gcsplan.app.attempts import of_all, within_budget
+from gcsplan.app.corners import cut, sharpened
 from gcsplan.app.leaving_out import LeavingOut
 from gcsplan.app.margins import larger, on_path
 from gcsplan.app.model import Brief, VehiclePlan
-from gcsplan.app.problems import built, looked_over, make_problem, run_planner, unsafe
+from gcsplan.app.problems import bow_margin_m, built, looked_over, make_problem, run_planner, unsafe
+from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
-from gcsplan.mavlink.build.multirotor import acceptance_radius_m
+from gcsplan.mavlink.build.multirotor import acceptance_radius_m, corner_m, spaced_out
 from gcsplan.mavlink.build.order import MARGINS, Order
+from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import VehicleRequest
-from gcsplan.planners.problem import Progress, Solution
+from gcsplan.planners.problem import Problem, Progress, Solution, passes_vias
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.limits import Limits
+from gcsplan.world.path import Path
 from gcsplan.world.world import World
 
 __all__ = ["over_one_terrain", "plan_vehicle", "rebuilt"]
@@ -66,16 +70,14 @@ def plan_vehicle(
             break  # there is no path with margins this large: report what the last mission broke
         tried.append(solution)
         over = looked_over(brief, solution)
-        for spaced in (True, False):  # first without way points nearer than the acceptance radii, where that is legal
-            order = Order(
-                request.end, source.altitude_frame, spaced=spaced, return_path=request.return_route == "mission"
-            )
-            mission, verdict = built(over, request, solution, order)
-            if not verdict.findings:
-                solution = of_all(tried, problem, tried[0].lower_bound)
-                return VehiclePlan(
-                    request, problem, solution, mission, verdict, vehicle.speed_max_m_s, notes, order, over
-                )
+        order = Order(
+            request.end, source.altitude_frame, return_path=request.return_route == "mission",
+            bow_m=bow_margin_m(limited, world),
+        )  # fmt: skip
+        solution, order, mission, verdict = _built(over, request, problem, solution, order)
+        if not verdict.findings:
+            solution = of_all([*tried[:-1], solution], problem)
+            return VehiclePlan(request, problem, solution, mission, verdict, vehicle.speed_max_m_s, notes, order, over)
         failed = verdict
         findings = on_path(mission, verdict)
         if not findings:
@@ -83,6 +85,28 @@ def plan_vehicle(
         margins = larger(margins, findings, acceptance_radius_m(vehicle))
     assert failed is not None
     raise unsafe(failed, vehicle)
+
+
+def _built(
+    over: Brief, request: VehicleRequest, problem: Problem, solution: Solution, order: Order
+) -> tuple[Solution, Order, Mission, Verdict]:
+    """The mission of a solution, its verdict, and both as they were built: without way points nearer than the
+    acceptance radii, if that is legal; else with all; else with another one behind each corner that is cut too near."""
+    vehicle, points = request.vehicle, solution.path.points
+    if passes_vias(problem, spaced_out(points, vehicle)):
+        mission, verdict = built(over, request, solution, order)
+        if not verdict.findings:
+            return solution, order, mission, verdict
+    order = replace(order, spaced=False)
+    corners: set[int] = set()
+    while True:
+        mission, verdict = built(over, request, solution, order)
+        copter = vehicle.autopilot is Autopilot.ARDUCOPTER and corner_m(vehicle) > 0.0
+        more = cut(mission, on_path(mission, verdict), points, over.world) - corners if copter else set[int]()
+        if not more:
+            return solution, order, mission, verdict
+        corners |= more
+        solution = replace(solution, path=Path(sharpened(points, corners)))
 
 
 def _both_ways(request: VehicleRequest, altitude_frame: str) -> VehicleRequest:

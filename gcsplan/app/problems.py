@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,11 +14,12 @@ from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mavlink.build.multirotor import build_mission, corner_m
-from gcsplan.mavlink.build.order import LONGEST_LEG_M, MARGINS, Margins, Order
+from gcsplan.mavlink.build.order import BOW_M, LONGEST_LEG_M, MARGINS, Margins, Order
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest
+from gcsplan.planners.cures import FILLED
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import Airspace
@@ -32,6 +34,8 @@ BYTES_PER_NODE = 64.0
 """Memory that a wider window takes for each of its nodes, terrain included: 58 bytes were measured."""
 FARTHEST_DEG = 2.0 * FARTHEST_M / 110_500.0
 """Degrees of latitude from home that no mission leaves."""
+LEAST_BOW_M = 0.01
+"""Metres; legs of some 700 m have no larger bow."""
 SPOT_M = 0.02
 """Metres by which two altitudes of one place are set apart; wire numbers are rounded to half a centimetre."""
 
@@ -128,48 +132,29 @@ def make_problem(
     progress: Callable[[Progress], None] | None = None,
     options: Mapping[str, object] | None = None,
 ) -> tuple[Problem, tuple[str, ...]]:
-    """The planner's problem for one vehicle, with the wire's margins in its limits, and notes for the user.
+    """The planner's problem for one vehicle, with the wire's margins in the limits of its paths, those of the check for
+    its bounds, and notes for the user.
 
     The altitudes of start and goal are whole centimetres above home. If ``takeoff_agl_m`` meets min AGL plus altitude
     error but not the ground's slope within the track error, it is raised, with a note; a lower value is bad input.
     """
     vehicle = request.vehicle
-    given, margins = margins, replace(margins, bow_m=min(margins.bow_m, _largest_bow_m(world)))
+    given, margins = margins, replace(margins, bow_m=bow_margin_m(request, world, margins))
     margins = replace(margins, track_m=margins.track_m + corner_m(vehicle))
-    limits = _with_margins(vehicle.limits, margins, terrain=source.altitude_frame == "terrain", source=source)
+    checked = vehicle.limits
     spread_m = world.spread_m(*request.start_deg)  # of home's ground, from which altitudes count
-    limits = replace(limits, altitude_error_m=limits.altitude_error_m + spread_m)
+    checked = replace(checked, altitude_error_m=checked.altitude_error_m + spread_m)
+    if source.altitude_frame == "terrain":
+        checked = replace(checked, altitude_error_m=checked.altitude_error_m + source.terrain_error_m)
+    limits = _with_margins(checked, margins, terrain=source.altitude_frame == "terrain")
     air = world.airspace
-    datum = request.start[2]
     notes: list[str] = []
-
-    def end_point(what: str, place: tuple[float, float, float], key: str, wanted_agl_m: float | None) -> float:
-        east, north, ground = place
-        low = lowest_amsl(air, east, north, limits)
-        needed = limits.min_agl_m + vehicle.limits.altitude_error_m
-        if wanted_agl_m is not None and wanted_agl_m < needed - 1e-6:
-            raise InputError(
-                f"must be at least min_agl_m + altitude_error_m = {needed:g}, given {wanted_agl_m:g}: "
-                f"the path begins and ends there",
-                where=f"{source.path}: vehicles.{vehicle.name}.{key}",
-            )
-        if math.isinf(low):
-            raise NoMission(
-                f"{vehicle.name}: the ground within reach of the {what} is unknown to the terrain model",
-                reason="infeasible",
-            )
-        amsl = max(low, ground + (wanted_agl_m or 0.0))
-        amsl = datum + math.ceil((amsl - datum) * 100.0 - 1e-6) / 100.0
-        if wanted_agl_m is not None and amsl - ground > wanted_agl_m + 0.011:
-            notes.append(
-                f"{key} {wanted_agl_m:g} raised to {amsl - ground:.2f}: so far the ground rises within the track error"
-            )
-        return amsl
 
     start_agl_m = _wanted_agl_m(request.takeoff_agl_m, request.start_amsl_m, request.start[2])
     goal_agl_m = _wanted_agl_m(request.approach_agl_m, request.goal_amsl_m, request.goal[2])
-    start_amsl = end_point("start", request.start, "takeoff_agl_m", start_agl_m)
-    goal_amsl = end_point("goal", request.goal, "approach_agl_m", goal_agl_m)
+    ends = _Ends(source, request, world, limits, checked, notes)
+    start_amsl = ends.amsl_m("start", request.start, "takeoff_agl_m", start_agl_m)
+    goal_amsl = ends.amsl_m("goal", request.goal, "approach_agl_m", goal_agl_m)
     via = _vias(air, request, (start_amsl, goal_amsl), notes)
     settings = source.planner
     own = world.airspace.zones[len(source.zones) :]
@@ -177,6 +162,8 @@ def make_problem(
     problem = Problem(
         airspace=air,
         limits=limits,
+        checked=checked,
+        rounding_m=margins.rounding_m,
         start=(request.start[0], request.start[1], start_amsl),
         goal=(request.goal[0], request.goal[1], goal_amsl),
         via=via,
@@ -214,6 +201,44 @@ def least_horizontal_j_per_m(vehicle: Vehicle, home_lat_deg: float) -> float:
         near, far = (math.radians(max(abs(home_lat_deg) - part * FARTHEST_DEG, 0.0)) for part in (0.5, 1.0))
         fastest *= math.cos(far) / math.cos(near)
     return energy.horizontal_j_per_m + energy.base_w / fastest
+
+
+@dataclass(frozen=True)
+class _Ends:
+    """The altitudes of a path's ends: whole centimetres above home, legal under ``limits``, which paths keep."""
+
+    source: MissionFile
+    request: VehicleRequest
+    world: World
+    limits: Limits
+    checked: Limits
+    notes: list[str]
+
+    def amsl_m(self, what: str, place: tuple[float, float, float], key: str, wanted_agl_m: float | None) -> float:
+        """The altitude AMSL of one end, as ``wanted_agl_m`` above ground or raised, with a note. Raises InputError,
+        NoMission."""
+        east, north, ground = place
+        vehicle, air, datum = self.request.vehicle, self.world.airspace, self.request.start[2]
+        low = lowest_amsl(air, east, north, self.limits)
+        needed = self.limits.min_agl_m + vehicle.limits.altitude_error_m
+        if wanted_agl_m is not None and wanted_agl_m < needed - 1e-6:
+            raise InputError(
+                f"must be at least min_agl_m + altitude_error_m = {needed:g}, given {wanted_agl_m:g}: "
+                f"the path begins and ends there",
+                where=f"{self.source.path}: vehicles.{vehicle.name}.{key}",
+            )
+        if math.isinf(low):
+            shut = math.isinf(lowest_amsl(air, east, north, self.checked))
+            words = f"the ground within reach of the {what} is unknown to the terrain model: {FILLED}"
+            refusal = Refusal(words, reason="infeasible" if shut else "not_found", place=(east, north))
+            raise in_degrees(refusal, vehicle, self.world)
+        amsl = max(low, ground + (wanted_agl_m or 0.0))
+        amsl = datum + math.ceil((amsl - datum) * 100.0 - 1e-6) / 100.0
+        if wanted_agl_m is not None and amsl - ground > wanted_agl_m + 0.011:
+            self.notes.append(
+                f"{key} {wanted_agl_m:g} raised to {amsl - ground:.2f}: so far the ground rises within the track error"
+            )
+        return amsl
 
 
 def _vias(
@@ -258,19 +283,31 @@ def lowest_amsl(air: Airspace, east_m: float, north_m: float, limits: Limits) ->
     return low
 
 
-def _largest_bow_m(world: World) -> float:
+def bow_margin_m(request: VehicleRequest, world: World, margins: Margins = MARGINS) -> float:
+    """The bow that a mission's legs may have, m: that of a straight one between its terminals, `LEAST_BOW_M` at least,
+    so that legs need not be cut; as many times as large as ``margins`` ask for more than `MARGINS`."""
+    places = [request.start[:2], *(v[:2] for v in request.via), request.goal[:2]]
+    longest_m = max(math.dist(a, b) for a, b in pairwise(places))
+    own_m = LEAST_BOW_M
+    if request.vehicle.turn_radius_m > 0.0:
+        own_m = BOW_M  # arcs, climb-outs and approaches have legs of their own
+    own_m = min(max(own_m, _largest_bow_m(world, longest_m)), BOW_M)
+    return min(own_m * margins.bow_m / BOW_M, _largest_bow_m(world))
+
+
+def _largest_bow_m(world: World, longest_m: float = LONGEST_LEG_M) -> float:
     """Bow of the longest leg that may be flown in this world, m (small in the papers' 100 m worlds)."""
     surface = world.airspace.surface
     rows, cols = surface.ground_m.shape
     corners = surface.grid.to_plane([0, cols - 1, 0, cols - 1], [0, 0, rows - 1, rows - 1])
     north_m = float(corners[:, 1].max())
-    half_m = 0.5 * min(LONGEST_LEG_M, float(np.linalg.norm(np.ptp(corners, axis=0))))
+    half_m = 0.5 * min(LONGEST_LEG_M, longest_m, float(np.linalg.norm(np.ptp(corners, axis=0))))
     ends = world.frame.to_degrees([-half_m, half_m], [north_m, north_m])
     return float(world.frame.bow_m(ends[0], ends[1])[0]) + 1e-3
 
 
-def _with_margins(limits: Limits, margins: Margins, *, terrain: bool, source: MissionFile) -> Limits:
-    """The limits for the planner: the vehicle's, reduced by what the wire's rounding and the bow may take.
+def _with_margins(limits: Limits, margins: Margins, *, terrain: bool) -> Limits:
+    """The limits of the planner's paths: those of the check, reduced by what the wire's rounding and the bow may take.
 
     In the terrain frame, too, by what a vehicle may read amiss and still be taken: an upload judges with it.
     """
@@ -281,9 +318,7 @@ def _with_margins(limits: Limits, margins: Margins, *, terrain: bool, source: Mi
     return replace(
         limits,
         track_error_m=limits.track_error_m + margins.track_m + margins.bow_m,
-        altitude_error_m=limits.altitude_error_m
-        + margins.altitude_m
-        + (source.terrain_error_m + NEAR_ENOUGH_M if terrain else 0.0),
+        altitude_error_m=limits.altitude_error_m + margins.altitude_m + (NEAR_ENOUGH_M if terrain else 0.0),
         max_climb_deg=limits.max_climb_deg if limits.max_climb_deg >= 90 else less(limits.max_climb_deg),
         max_descent_deg=limits.max_descent_deg if limits.max_descent_deg >= 90 else less(limits.max_descent_deg),
     )

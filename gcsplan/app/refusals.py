@@ -63,4 +63,4 @@ def _explained(
         brief.source, request, brief.world, brief.objective, brief.seed, progress=progress, options=options
     )
     # The limits as the user wrote them: planning a change of them adds the margins for the wire again.
-    return with_cures(replace(problem, limits=vehicle.limits), bare, plan)
+    return with_cures(replace(problem, limits=vehicle.limits, checked=None), bare, plan)

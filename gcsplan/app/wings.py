@@ -17,7 +17,7 @@ from itertools import count, islice
 
 import numpy as np
 
-from gcsplan.app.attempts import of_all, within_budget
+from gcsplan.app.attempts import of_all, with_bound, within_budget
 from gcsplan.app.margins import larger, on_path
 from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.problems import built, looked_over, make_problem, run_planner, unsafe
@@ -29,9 +29,9 @@ from gcsplan.errors import NoMission
 from gcsplan.mavlink.build.fixed_wing import flown_m, tangents_m, thinned
 from gcsplan.mavlink.build.order import MARGINS, Order, Wing
 from gcsplan.mission_file import VehicleRequest
-from gcsplan.planners.problem import Problem, Progress, Solution
+from gcsplan.planners.cures import FILLED
+from gcsplan.planners.problem import Problem, Progress, Solution, straight_bound
 from gcsplan.vehicle import Vehicle
-from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
 
@@ -74,7 +74,6 @@ def plan_wing(
     margins = replace(MARGINS, track_m=MARGINS.track_m + ACCEPTED_M + CHORDS_M)
     sharp: Floats | None = None
     failed: VehiclePlan | None = None
-    first: Limits | None = None
     tried: list[Solution] = []
     begun_s = time.perf_counter()
     for _ in range(ATTEMPTS):
@@ -84,15 +83,14 @@ def plan_wing(
             if sharp is None:
                 straight = replace(problem, turn_radius_m=0.0, progress=None)
                 sharp = run_planner(brief.run, straight, vehicle, world).path.points
-            plan = _joined(brief, request, limited, problem, sharp, world, first)
-            first = first or problem.limits
+            plan = _joined(brief, request, limited, problem, sharp, world)
         except NoMission:
             if failed is None:
                 raise
             break  # there is no path with margins this large: report what the last mission broke
         tried.append(plan.solution)
         if not plan.verdict.findings:
-            solution = of_all(tried, problem, plan.solution.lower_bound)
+            solution = of_all(tried, problem)
             return replace(plan, solution=solution, notes=(*notes, *plan.notes))
         failed = plan
         findings = on_path(plan.mission, plan.verdict)
@@ -104,13 +102,10 @@ def plan_wing(
 
 
 def _joined(
-    brief: Brief, request: VehicleRequest, limited: VehicleRequest, problem: Problem, sharp: Floats, world: World,
-    first: Limits | None,
+    brief: Brief, request: VehicleRequest, limited: VehicleRequest, problem: Problem, sharp: Floats, world: World
 ) -> VehiclePlan:  # fmt: skip
-    """The mission with the first pair of ends that a path can be joined to; it may still break limits.
-
-    ``first``: the limits of the first attempt, None in that attempt: bounds hold for those.
-    """
+    """The mission with the first pair of ends that a path can be joined to; it may still break limits, and has no bound
+    then."""
     vehicle = request.vehicle
     refused: list[NoMission] = []
     why = ""
@@ -139,9 +134,9 @@ def _joined(
         if crowded:
             why = f"{APART}\n  {crowded[0]}"
             continue
-        if first is not None and not verdict.findings:
-            bound = _bound_under(first, brief, inner, vehicle, world)
-            solution = _whole(problem, replace(found, lower_bound=bound), start, goal)
+        if not verdict.findings and found.lower_bound is not None:
+            bound = _bound_between(brief, inner, solution.path.points, start, goal, vehicle, world)
+            solution = with_bound(solution, bound, problem)
         speed = vehicle.speed_max_m_s
         return VehiclePlan(request, inner, solution, mission, verdict, speed, tuple(_words(start, goal)), order, over)
     if refused and not why:
@@ -178,8 +173,9 @@ def _with_goal_circle(problem: Problem, request: VehicleRequest) -> Problem:
     low = float(problem.airspace.floor_amsl(east, north, wide))
     if math.isinf(low):
         raise NoMission(
-            f"{request.vehicle.name}: the ground within {reach_m:.0f} m of the goal is unknown to the terrain model",
-            reason="infeasible",
+            f"{request.vehicle.name}: the ground within {reach_m:.0f} m of the goal is unknown to the terrain model: "
+            f"{FILLED}",
+            reason="not_found",
         )
     datum = request.start[2]
     raised = max(amsl, datum + math.ceil((low - datum) * 100.0 - 1e-6) / 100.0)
@@ -197,33 +193,47 @@ def _inner(problem: Problem, start: FlightEnd, goal: FlightEnd | None) -> Proble
 
 
 def _whole(problem: Problem, solution: Solution, start: FlightEnd, goal: FlightEnd | None) -> Solution:
-    """The solution with both ends added. Its lower bound holds for missions with exactly these ends."""
+    """The solution with both ends added, yet without a lower bound."""
     inner = solution.path.points
     before = np.vstack([start.leaves, start.chain[:-1]])
     behind = np.empty((0, 3)) if goal is None else np.vstack([goal.chain[-2::-1], goal.top])
     points = thinned(np.vstack([before[1:], inner, behind]), problem.turn_radius_m)
     points = _slowed(points, start.leaves, problem)
-    everything = np.vstack([before, inner, behind])
-    # An end counts by the length of its straight pieces, less what its turns, those at the joints too, may cut off.
-    radius = problem.turn_radius_m
-    run = np.hypot(*np.diff(everything[:, :2], axis=0).T)
-    spare = 2.0 * tangents_m(everything, radius) - 2.0 * radius * np.arctan(tangents_m(everything, radius) / radius)
-    n, k = len(before), len(behind)
-    ends_m = float(run[:n].sum() - spare[: n + 1].sum())
-    ends_m += float(run[len(run) - k :].sum() - spare[len(spare) - k - 1 :].sum()) if k else 0.0
-    per_m = problem.horizontal_j_per_m if problem.objective == "energy" else 1.0
-    bound = None if solution.lower_bound is None else solution.lower_bound + max(ends_m, 0.0) * per_m
     note = "the lower bound is that of missions with this climb-out" + (" and this approach" if goal else "")
-    return replace(solution, path=Path(points), flown=None, lower_bound=bound, notes=(*solution.notes, note))
+    notes = (*solution.notes, note) if solution.lower_bound is not None else solution.notes
+    return replace(solution, path=Path(points), flown=None, lower_bound=None, notes=notes)
 
 
-def _bound_under(limits: Limits, brief: Brief, inner: Problem, vehicle: Vehicle, world: World) -> float | None:
-    """A lower bound of the planner's part under other ``limits`` than its own; None if the planner has none."""
-    loose = replace(inner, limits=limits, turn_radius_m=0.0, progress=None, widen=None)
+def _bound_between(
+    brief: Brief, inner: Problem, points: Floats, start: FlightEnd, goal: FlightEnd | None, vehicle: Vehicle,
+    world: World,
+) -> float:  # fmt: skip
+    """A lower bound of all paths from the end of the climb-out to the approach, under the limits of the check.
+
+    Neither the turns that this plan makes there nor its turn radius count. What its arcs cut off at both joints, where
+    it does not pass the ends themselves, is subtracted: its ``points`` (N, 3) begin behind the first joint.
+    """
+    first, last = start.leaves, np.array(inner.goal) if goal is None else goal.top
+    outer = replace(
+        inner, start=_three(first), goal=_three(last), limits=inner.checked or inner.limits, checked=None,
+        turn_radius_m=0.0, progress=None, widen=None, budget_s=0.5 * inner.budget_s,
+    )  # fmt: skip
     try:
-        return run_planner(brief.run, loose, vehicle, world).lower_bound
-    except NoMission:
-        return None
+        bound = run_planner(brief.run, outer, vehicle, world).lower_bound
+    except NoMission:  # an end of a climb-out may lie lower than paths may
+        bound = None
+    if bound is None:
+        bound = max(straight_bound(outer) - outer.connectors, 0.0)
+    whole = np.vstack([start.ground, first, points, *([] if goal is None else [goal.ground])])
+    tangent = tangents_m(whole, vehicle.turn_radius_m)
+    cut_m = 2.0 * (tangent - vehicle.turn_radius_m * np.arctan(tangent / vehicle.turn_radius_m))
+    ends_m = float(cut_m[1] + cut_m[-2]) + abs(start.circle_m)
+    return max(bound - ends_m * (inner.horizontal_j_per_m if inner.objective == "energy" else 1.0), 0.0)
+
+
+def _three(point: Floats) -> tuple[float, float, float]:
+    east, north, amsl = point.tolist()
+    return east, north, amsl
 
 
 def _slowed(points: Floats, leaves: Floats, problem: Problem) -> Floats:

@@ -194,7 +194,7 @@ def prepare(name: str, text: str) -> Set:
 
     source = load_mission(f"{name}.yaml", text=text)
     world = world_of(source)
-    bare = Margins(0.0, 0.0, 0.0, 0.0)
+    bare = Margins(0.0, 0.0, 0.0, 0.0, (0.0, 0.0))
     objective = source.planner.objective
     problems = tuple(make_problem(source, r, world, objective, source.planner.seed, bare)[0] for r in source.vehicles)
     return Set(source, world, problems)

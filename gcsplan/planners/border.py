@@ -36,7 +36,7 @@ def goes_on(problem: Problem) -> bool:
     surface = problem.airspace.surface
     if not any(surface.goes_on):
         return False
-    if surface.ground_m.size > 4 or np.ptp(surface.ground_m) != 0.0 or np.ptp(surface.top_m) != 0.0:
+    if surface.ground_m.size > 4 or surface.level_m is None:
         return True
     reach = _reach_m(problem.airspace, problem.limits)
     corners = surface.grid.to_plane([0, surface.ground_m.shape[1] - 1], [surface.ground_m.shape[0] - 1, 0])
@@ -105,7 +105,7 @@ def border(problem: Problem) -> tuple[Floats, float]:
     metres the true, curved border may bow away from them."""
     surface = problem.airspace.surface
     rows, cols = surface.ground_m.shape
-    keep = np.full(2, _reach_m(problem.airspace, problem.limits)) / _least_step_m(surface)
+    keep = np.full(2, _reach_m(problem.airspace, problem.bound_limits)) / _least_step_m(surface)
     if surface.ground_m.size > 4:  # cells, not flat ground
         keep += INSET_CELLS
     c0, r0 = np.minimum(keep, 0.49 * np.array([cols - 1, rows - 1])).tolist()
@@ -134,7 +134,7 @@ def _by_ground(problem: Problem) -> bool:
     a corner is unknown. Cells that touch at a corner are joined. Also true if a terminal lies in a shut cell."""
     from scipy.ndimage import label
 
-    surface, limits = problem.airspace.surface, problem.limits
+    surface, limits = problem.airspace.surface, problem.bound_limits
     top = surface.top_m
     lowest = np.minimum(np.minimum(top[:-1, :-1], top[:-1, 1:]), np.minimum(top[1:, :-1], top[1:, 1:]))
     lowest[np.isnan(top[:-1, :-1] + top[:-1, 1:] + top[1:, :-1] + top[1:, 1:])] = np.nan
@@ -159,9 +159,9 @@ def _by_zones(problem: Problem) -> bool:
     """`enclosed` by zones alone, over ground of any height."""
     import shapely  # needed only where no path was found
 
-    air, limits = problem.airspace, problem.limits
+    air, limits = problem.airspace, problem.bound_limits
     top = math.inf if limits.max_amsl_m is None else limits.max_amsl_m - limits.altitude_error_m
-    reach = limits.horizontal_clearance_m + limits.track_error_m - TOUCH_M
+    reach = limits.horizontal_clearance_m + limits.track_error_m - TOUCH_M - problem.bound_spare_m
     walls = [_shape(z, reach) for z in air.zones if _is_wall(z, top)]
     if not walls:
         return False

@@ -22,6 +22,8 @@ from gcsplan.world.zones import Circle, Zone
 
 Place = tuple[float, float]
 
+FILLED = "give a terrain model that knows it (`gcsplan dem fetch` gets one), or fill its voids (nodata)"
+"""What fills unknown ground."""
 NAMES, SINGLES = 5, 8
 """Most no-fly zones that are named in a message, and that are removed one at a time."""
 STEEPEST_DEG, STEEPEST_TURNING_DEG = 90.0, 45.0
@@ -212,6 +214,38 @@ def _fewer_zones(trials: Trials, path: Floats) -> Cure:
     return Cure(f"without the no-fly zones {words} together there is a path", *at)
 
 
+def _known(problem: Problem) -> Problem:
+    """The problem with unknown ground filled: each unknown node is as high as the nearest known one."""
+    air, surface = problem.airspace, problem.airspace.surface
+    ground = _filled(surface.ground_m)
+    top = ground if surface.top_m is surface.ground_m else _filled(surface.top_m)
+    return replace(problem, airspace=Airspace(replace(surface, ground_m=ground, top_m=top), air.zones, scale=air.scale))
+
+
+def _filled(z: Floats) -> Floats:
+    from scipy.ndimage import distance_transform_edt  # only where no path was found over ground with voids
+
+    unknown = np.isnan(z)
+    if unknown.all() or not unknown.any():
+        return z
+    nearest = distance_transform_edt(unknown, return_distances=False, return_indices=True)
+    return np.asarray(z[tuple(nearest)])
+
+
+def _over_unknown(trials: Trials, path: Floats) -> Cure:
+    """Name the unknown ground that a path leads over which was found with that ground filled."""
+    problem = trials.problem
+    found = problem.airspace.examine(Legs.of_path(path, problem.limits), problem.limits).violations
+    void = min((v for v in found if v.kind == "coverage"), key=lambda v: (v.leg, v.fraction), default=None)
+    if void is None:  # the path that was found avoids it: another search may find it without help
+        return Cure("with the unknown ground of the terrain model filled there is a path")
+    return Cure(
+        f"unknown ground is in the way: with it as high as the ground around it there is a path over it. {FILLED}",
+        (void.east_m, void.north_m),
+        "that ground",
+    )
+
+
 def _together(trials: Trials, lifts: Sequence[Lift]) -> Cure:
     """Find which limits must be lifted together where lifting any one of them alone does not help."""
     names = _list([lift.name for lift in lifts], "or")
@@ -240,6 +274,7 @@ def _together(trials: Trials, lifts: Sequence[Lift]) -> Cure:
 
 
 LIFTS = (
+    Lift("unknown ground", lambda p: p.airspace.surface.has_unknown, _known, _over_unknown),
     Lift("max_amsl_m", lambda p: p.limits.max_amsl_m is not None, lambda p: _limited(p, max_amsl_m=None), _ceiling),
     Lift("the no-fly zones", lambda p: len(p.airspace.zones) > 0, lambda p: _zoned(p, ()), _fewer_zones),
     Lift("max_agl_m", lambda p: p.limits.max_agl_m is not None, lambda p: _limited(p, max_agl_m=None), _above_ground),

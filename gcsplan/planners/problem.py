@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Literal
@@ -50,8 +50,13 @@ class Progress:
 class Problem:
     """Find a path from ``start`` to ``goal`` (east_m, north_m, amsl_m) that passes every ``via`` in order.
 
-    ``limits`` already include the margins for wire rounding, so a path that passes `Airspace.examine` under them passes
-    the final check too. Metres only: a planner never sees a degree. ``options`` are keys that only some planners know:
+    ``limits`` are what paths keep: they already include the planner's margins (wire rounding, bow, corners that are
+    cut), so a path that passes `Airspace.examine` under them passes the final check too. ``checked`` are the same
+    limits as the check applies them, without any margin (None: ``limits``): bounds and proofs assume those alone, by
+    `bound_limits` and `for_bounds`. ``rounding_m``: how far ends and vias of the paths that a bound speaks of may lie
+    beside the problem's own, in the plane and in altitude. See docs/concepts/certificates.md.
+
+    Metres only: a planner never sees a degree. ``options`` are keys that only some planners know:
     the swarms' ``encoding``, ``cost``, ``points``, ``population``, ``iterations``, ``evaluations``, ``parameters``.
 
     ``widen(margin_m, budget_mb)``: the same problem over more terrain, at least ``margin_m`` around all terminals (inf:
@@ -78,6 +83,39 @@ class Problem:
     options: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
     widen: Callable[[float, float], Problem | None] | None = None
     leaving: float = math.inf
+    checked: Limits | None = None
+    rounding_m: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def bound_limits(self) -> Limits:
+        """The limits that bounds and proofs assume: those of the check, with less track error by the rounding of ends.
+
+        So a path that begins a little beside the start is one from the start itself, with a connector that is legal.
+        """
+        checked = self.limits if self.checked is None else self.checked
+        return replace(checked, track_error_m=max(checked.track_error_m - self.rounding_m[0], 0.0))
+
+    @property
+    def bound_spare_m(self) -> float:
+        """Metres by which bounds assume zones to be smaller and floors lower, because the track error is less than the
+        rounding of ends."""
+        checked = self.limits if self.checked is None else self.checked
+        return max(self.rounding_m[0] - checked.track_error_m, 0.0)
+
+    @property
+    def for_bounds(self) -> Problem:
+        """The same problem with the limits that bounds and proofs assume, for searches that serve them alone."""
+        return replace(self, limits=self.bound_limits, checked=None, rounding_m=(0.0, 0.0))
+
+    @property
+    def connectors(self) -> float:
+        """The most that connectors to the problem's own ends and vias add to the cost of a path: one at each end, two
+        at each via. A bound of paths between the exact ends, less this, is one of all paths."""
+        flat, rise = self.rounding_m
+        each = math.hypot(flat, rise)
+        if self.objective == "energy":
+            each = self.horizontal_j_per_m * flat + self.vertical_j_per_m * rise
+        return (2 + 2 * len(self.via)) * each
 
     def leg_costs(self, start: Floats, end: Floats) -> Floats:
         """(...) costs of straight legs between points (..., 3); `cost` of a path is their sum."""
@@ -218,5 +256,5 @@ def straight_bound(problem: Problem) -> float:
 
 def _run(problem: Problem, a: tuple[float, float], b: tuple[float, float]) -> float:
     """Least metres of track that the climb or descent from ``a`` to ``b`` (metres along, altitude) needs."""
-    limits, rise = problem.limits, b[1] - a[1]
-    return max(rise / limits.max_climb_slope, -rise / limits.max_descent_slope)
+    limits, rise = problem.bound_limits, abs(b[1] - a[1]) - 2.0 * problem.rounding_m[1]
+    return max(rise, 0.0) / (limits.max_climb_slope if b[1] > a[1] else limits.max_descent_slope)

@@ -7,17 +7,24 @@ out what would help.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from gcsplan.planners.border import enclosed, goes_on, within_m
-from gcsplan.planners.cures import floor_words, rounded_up
+from gcsplan.planners.cures import FILLED, floor_words, rounded_up
 from gcsplan.planners.lattice.lattice import levels_of, near_zone
 from gcsplan.planners.problem import Problem, Refusal, terminals_of
 from gcsplan.world.airspace import Airspace, Legs, Violation
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Zone
+
+TOUCH_M, CLIFF_M = 1e-6, 1.0
+"""Metres by which a terminal must break a limit for that to be proved: rounding; and what ground may rise within the
+rounding of its place."""
+FAR_M = 20_000.0
+"""Metres above and below the ground at which all limits of height are broken."""
 
 
 class NoPath(Refusal):
@@ -35,7 +42,8 @@ def explain(problem: Problem, *, proved: bool | None = None) -> Refusal:
         proved = enclosed(problem)
         words = f"a path is not found within {within_m(problem) / 1000.0:.1f} km of the straight track"
     if proved:
-        words = "there is no path within the limits, which is proved"
+        over = " over ground that the terrain model knows" if problem.airspace.surface.has_unknown else ""
+        words = f"there is no path within the limits{over}, which is proved"
     return NoPath(f"no mission: {words}", reason="infeasible" if proved else "not_found", untried=True)
 
 
@@ -67,6 +75,19 @@ def check_ends(problem: Problem) -> None:
 
 
 def _check_end(problem: Problem, name: str, place: tuple[float, float], amsl: float | None) -> None:
+    try:
+        _require_legal(problem, name, place, amsl)
+    except Refusal as wrong:
+        if _proved(problem, place, amsl):
+            raise
+        raise Refusal(
+            f"{wrong.message}; only with the planner's own margins is that certain", reason="not_found", place=place,
+            place_of=name, untried=wrong.untried,
+        ) from None  # fmt: skip
+
+
+def _require_legal(problem: Problem, name: str, place: tuple[float, float], amsl: float | None) -> None:
+    """Raise Refusal if a terminal breaks a limit that paths keep; proved or not, see `_proved`."""
     air, limits = problem.airspace, problem.limits
     low = float(air.floor_amsl(*place, limits))
     high = float(air.ceiling_amsl(*place, limits))
@@ -75,7 +96,7 @@ def _check_end(problem: Problem, name: str, place: tuple[float, float], amsl: fl
         return Refusal(f"no mission: {words}", reason="infeasible", place=place, place_of=name, untried=untried)
 
     if not math.isfinite(low):
-        raise refuse(f"the ground at {name}, or within reach of it, is unknown to the terrain model")
+        raise refuse(f"the ground at {name}, or within reach of it, is unknown to the terrain model: {FILLED}")
     lowest, highest = f"{rounded_up(low):.1f} m", f"{-rounded_up(-high):.1f} m"
     if low > high + 1e-6:
         raise refuse(
@@ -104,6 +125,27 @@ def _check_end(problem: Problem, name: str, place: tuple[float, float], amsl: fl
             f"{name} lies in no-fly zone {shut[0].name!r} or within {reach:.1f} m of it "
             f"(horizontal_clearance_m + track_error_m): move {name}, or shrink the zone"
         )
+
+
+def _proved(problem: Problem, place: tuple[float, float], amsl: float | None) -> bool:
+    """Whether a terminal is illegal as the check applies the limits, with all that it may lie beside its place."""
+    off_m = problem.rounding_m[1]
+    bare = problem.for_bounds
+    bare = replace(bare, limits=replace(bare.limits, altitude_error_m=max(bare.limits.altitude_error_m - off_m, 0.0)))
+    # The errors, less that rounding, hold all places that the terminal may be at; where they are smaller, a cliff may
+    # begin within the rounding.
+    hold = problem.bound_spare_m == 0.0 and problem.limits.altitude_error_m >= off_m
+    least_m = TOUCH_M if hold else CLIFF_M
+    if amsl is not None:
+        return any(v.by > least_m for v in _broken(bare, (*place, amsl)))
+    ground = bare.airspace.surface.ground_at(*place)
+    middle = float(ground) if np.isfinite(ground) else 0.0
+    below, above = (_broken(bare, (*place, middle + off)) for off in (-FAR_M, FAR_M))
+    if any(v.kind == "coverage" and v.by > least_m for v in below):
+        return True
+    low = middle - FAR_M + max((v.by for v in below if v.kind in ("min_agl", "terrain_clearance")), default=0.0)
+    high = middle + FAR_M - max((v.by for v in above if v.kind in ("max_agl", "max_amsl")), default=-math.inf)
+    return low > high + least_m or bool(_shut_by(bare, place, low + least_m, high - least_m))
 
 
 def _broken(problem: Problem, place: tuple[float, float, float]) -> tuple[Violation, ...]:

@@ -166,6 +166,21 @@ class Surface:
             return 0.0
         return float(np.nanmax(self.high[rows, cols] - self.ground_m[rows, cols], initial=0.0))
 
+    @property
+    def level_m(self) -> float | None:
+        """Altitude AMSL of the ground if it is level, and so is what stands on it; None if it is not.
+
+        A surface with an unknown node is not level, for a void may be anything; nor is one with two heights.
+        """
+        level = all(float(z.min()) == float(z.max()) for z in (self.ground_m, self.top_m))  # NaN is not equal to NaN
+        level = level and not self.differs
+        return float(self.ground_m[0, 0]) if level else None
+
+    @property
+    def has_unknown(self) -> bool:
+        """Whether some node of ground or top is unknown."""
+        return bool(np.isnan(self.ground_m.sum() + self.top_m.sum()))
+
     def ground_at(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats:
         """Least ground, metres AMSL, at points of the plane; NaN where unknown."""
         return _bilinear(self.ground_m, self.grid(east_m, north_m))

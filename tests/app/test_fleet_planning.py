@@ -226,6 +226,7 @@ def test_where_nobody_may_wait_a_longer_path_makes_up_for_the_time() -> None:
     assert south["length_m"] > 1300
     assert any("m more, to arrive so late" in note for note in south["notes"])
     assert done.vehicles[1].verdict.safe is True
+    assert south["lower_bound_m"] == pytest.approx(1000.0, abs=0.1)  # of its own request, not of the zigzag's vias
 
 
 # -- routes, outputs, papers --------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from gcsplan.app.fleet_planning import route_of
 from gcsplan.app.model import Plan
 from gcsplan.app.outputs import outputs_of
 from gcsplan.app.pipeline import plan
-from gcsplan.app.wing_ends import starts
+from gcsplan.app.wing_ends import FlightEnd, starts
 from gcsplan.arrays import Floats
 from gcsplan.check.arcs import REMAINS, SAG_M, SETTLES_S, bend
 from gcsplan.check.climb_out import above_slant, over_m, slant_shortage
@@ -47,7 +47,6 @@ from gcsplan.sim.mission_flight import fly
 from gcsplan.sim.track import make_track
 from gcsplan.vehicle import Autopilot, ClimbOut, Vehicle
 from gcsplan.world.atmosphere import true_per_indicated
-from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Zone
@@ -898,23 +897,24 @@ def test_where_no_climb_out_is_legal_on_the_wanted_heading_the_refusal_names_it(
     assert caught.value.reason == "infeasible"
 
 
-def test_a_wing_that_is_planned_again_has_a_bound_under_the_first_limits(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of its last ends; the limits of the last plan are tighter, and its bound may be higher than a safe mission."""
-    real, asked = wings._bound_under, list[tuple[Limits, Problem, float | None]]()
+def test_the_bound_of_a_wing_holds_from_the_end_of_its_climb_out_under_the_limits_of_the_check(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Not from behind the turns that this plan makes there, and not under the larger margins of a later attempt."""
+    real, asked = wings._bound_between, list[tuple[Problem, FlightEnd, float]]()
 
-    def bound_under(limits: Limits, brief: Any, inner: Problem, *more: Any) -> float | None:
-        asked.append((limits, inner, real(limits, brief, inner, *more)))
+    def bound_between(brief: Any, inner: Problem, points: Floats, start: FlightEnd, *more: Any) -> float:
+        asked.append((inner, start, real(brief, inner, points, start, *more)))
         return asked[-1][2]
 
-    monkeypatch.setattr(wings, "_bound_under", bound_under)
+    monkeypatch.setattr(wings, "_bound_between", bound_between)
     (v,) = plan(load_mission(MISSIONS / "m.yaml", text=text_of())).vehicles
-    ((limits, inner, bound),) = asked
-    assert inner.limits.altitude_error_m > limits.altitude_error_m
-    assert bound is not None
-    assert v.solution.lower_bound is not None
-    assert bound <= v.solution.lower_bound <= v.verdict.length_m
-    tight = real(inner.limits, v.brief, inner, v.request.vehicle, v.brief.world)  # type: ignore[arg-type,union-attr]
-    assert tight is not None
-    assert bound <= tight * (1.0 + 1e-3)
+    ((inner, start, bound),) = asked
+    assert v.solution.lower_bound == bound <= v.verdict.length_m
+    assert inner.checked == v.request.vehicle.limits
+    assert inner.limits.altitude_error_m > inner.checked.altitude_error_m + 0.02
+    direct = math.dist(start.leaves, inner.goal)
+    assert direct < math.dist(start.leaves, start.chain[-1]) + math.dist(start.chain[-1], inner.goal)
+    assert bound >= direct - 1.0
     assert any("this climb-out" in note for note in v.solution.notes)
     assert any("planned 2 times" in note for note in v.solution.notes)

@@ -1,8 +1,8 @@
 """Conversion of a path in metres to a `Mission`.
 
 Altitudes are sent in whole centimetres, degrees in whole 1e-7; the planner kept margins for both (`MARGINS`). Legs are
-split until the line straight in the plane and the line straight in degrees lie within `BOW_M` of each other, so that it
-does not matter which of the two an autopilot flies.
+split until the line straight in the plane and the line straight in degrees lie within `Order.bow_m` of each other, so
+that it does not matter which of the two an autopilot flies.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ from gcsplan.world.path import Path
 from gcsplan.world.world import World
 
 COPTER_ACCEPTANCE_M = 2.0  # ArduCopter WPNAV_RADIUS, default
+SHORT_LEG_M, ROUNDED_M = 0.1, 0.02
+"""Length of the leg that is put behind a corner which must not be cut, metres, and what rounding may add to it."""
 
 
 def acceptance_radius_m(vehicle: Vehicle) -> float:
@@ -35,11 +37,16 @@ def acceptance_radius_m(vehicle: Vehicle) -> float:
 
 
 def corner_m(vehicle: Vehicle) -> float:
-    """Return the planner's margin for corners that are cut by more than ``track_error_m``; mostly 0."""
+    """Return the planner's margin for corners that are cut by more than ``track_error_m``; mostly 0.
+
+    ArduCopter cuts what is left of a corner behind which a short leg begins; the others turn as far before it.
+    """
     if vehicle.turn_radius_m > 0.0 or math.isinf(vehicle.corner_accel_m_s2):
         return 0.0
     radius_m = acceptance_radius_m(vehicle)
-    return radius_m if radius_m > vehicle.limits.track_error_m else 0.0
+    if radius_m <= vehicle.limits.track_error_m:
+        return 0.0
+    return 0.5 * (SHORT_LEG_M + ROUNDED_M) if vehicle.autopilot is Autopilot.ARDUCOPTER else radius_m
 
 
 def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[float, float], order: Order) -> Mission:
@@ -51,7 +58,7 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
         return build_wing(path, world, vehicle, home_deg, order)
     datum = world.ground_amsl(*(m.degrees_e7(x) / 1e7 for x in home_deg))
     home = Home.at(*home_deg, round(datum, 2))
-    points = _spaced(path.points, 2.0 * acceptance_radius_m(vehicle) if order.spaced else 0.0)
+    points = spaced_out(path.points, vehicle) if order.spaced else path.points
     terrain = order.altitude_frame == "terrain"
     if terrain:  # split legs in height above ground, because the autopilot interpolates that height along a leg
         ground = world.vehicle_terrain.ground_at(points[:, 0], points[:, 1])
@@ -62,7 +69,7 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
                 "a larger DEM, or another altitude_frame"
             )
         points = np.column_stack([points[:, :2], points[:, 2] - ground])
-    points = split_legs(points, world)
+    points = split_legs(points, world, order.bow_m)
     places = world.frame.to_degrees(points[:, 0], points[:, 1])
     lat_e7 = np.rint(places[:, 0] * 1e7).astype(int)
     lon_e7 = np.rint(places[:, 1] * 1e7).astype(int)
@@ -132,8 +139,9 @@ def _gate(order: Order, vehicle: Vehicle) -> MissionItem:
     return MissionItem(cmd.DELAY, m.NO_POSITION, (-1.0, float(hour), float(minute), float(second)))
 
 
-def _spaced(points: Floats, apart_m: float) -> Floats:
-    """Drop inner points nearer than ``apart_m`` to the previous kept point or to the last point; keep the ends."""
+def spaced_out(points: Floats, vehicle: Vehicle) -> Floats:
+    """Drop inner points nearer than two acceptance radii to the previous kept point or to the last point."""
+    apart_m = 2.0 * acceptance_radius_m(vehicle)
     kept = [points[0]]
     for p in points[1:-1]:
         if np.linalg.norm(p - kept[-1]) >= apart_m and np.linalg.norm(p - points[-1]) >= apart_m:

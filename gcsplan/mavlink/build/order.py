@@ -20,12 +20,17 @@ LONGEST_LEG_M = 5000.0
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """Margins that a planner keeps for the wire: rounding of altitudes, rounding and bow of tracks, slope for both."""
+    """Margins that a planner keeps for the wire: rounding of altitudes, rounding and bow of tracks, slope for both.
+
+    They make paths longer, never bounds. ``rounding_m``: how far a mission's place may lie beside the one that was
+    meant, in the plane and in altitude; bounds hold for all missions whose ends lie that near to the plan's.
+    """
 
     altitude_m: float = 0.02
-    track_m: float = 0.03
+    track_m: float = 0.012
     bow_m: float = BOW_M
     slope: float = 0.002
+    rounding_m: tuple[float, float] = (0.011, 0.01)
 
 
 MARGINS = Margins()
@@ -58,7 +63,8 @@ class Order:
     """The requested mission around a path; ``speed_m_s`` None means the fastest cruise.
 
     ``spaced``: drop way points nearer to their neighbours than two acceptance radii. ``hold_s``: seconds to wait in the
-    air above the start (the gate) before departure; only multicopters can (`Vehicle.can_hold`). ``gate_utc``: wait
+    air above the start (the gate) before departure; only multicopters can (`Vehicle.can_hold`). ``bow_m``: legs are cut
+    until each is that straight in the plane and in degrees at once. ``gate_utc``: wait
     there until this hour, minute and second of the day, UTC, instead; only ArduCopter can. ``wing``: the ends of a
     fixed wing's mission, None for aircraft that can hover. ``return_path``: behind the end, add a return path back
     along the track to a landing at home, to which ArduCopter returns by Auto RTL.
@@ -72,14 +78,15 @@ class Order:
     gate_utc: tuple[int, int, int] | None = None
     wing: Wing | None = None
     return_path: bool = False
+    bow_m: float = BOW_M
 
 
-def split_legs(points: Floats, world: World) -> Floats:
-    """(N, 3) points with legs cut to at most `LONGEST_LEG_M` and until the bow of each is at most `BOW_M`."""
+def split_legs(points: Floats, world: World, most_bow_m: float = BOW_M) -> Floats:
+    """(N, 3) points with legs cut to at most `LONGEST_LEG_M` and until the bow of each is at most ``most_bow_m``."""
     places = world.frame.to_degrees(points[:, 0], points[:, 1])
     bow = world.frame.bow_m(places[:-1], places[1:])
     run = np.hypot(*np.diff(points[:, :2], axis=0).T)
-    parts = np.maximum(np.ceil(run / LONGEST_LEG_M), np.ceil(np.sqrt(bow / BOW_M)))  # n parts: bow / n²
+    parts = np.maximum(np.ceil(run / LONGEST_LEG_M), np.ceil(np.sqrt(bow / most_bow_m)))  # n parts: bow / n²
     cut = [points[:1]]
     for a, b, n in zip(points[:-1], points[1:], np.maximum(parts, 1).astype(int), strict=True):
         cut.append(a + (b - a) * (np.arange(1, n + 1) / n)[:, None])

@@ -30,12 +30,13 @@ class End:
         """(east_m, north_m)."""
         return self.east_m, self.north_m
 
-    def cone(self, slope: float, spare_m: float) -> list[Cone]:
+    def cone(self, slope: float, spare_m: float, off_m: float = 0.0) -> list[Cone]:
         """The cone of the altitudes that paths with ``spare_m`` metres to spare can reach near here, climbing or
-        descending by ``slope``; none if the altitude is free or the slope is not limited."""
+        descending by ``slope``, if they begin or end up to ``off_m`` higher; none if the altitude is free or the slope
+        is not limited."""
         if self.amsl_m is None or not math.isfinite(slope):
             return []
-        return [(self.east_m, self.north_m, self.amsl_m + slope * spare_m, slope)]
+        return [(self.east_m, self.north_m, self.amsl_m + slope * spare_m + off_m, slope)]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

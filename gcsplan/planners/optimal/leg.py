@@ -46,7 +46,7 @@ raise the bound for another to follow."""
 
 
 class Leg:
-    """One leg of a problem, from terminal to terminal, under caps of at most ``top_m`` AMSL."""
+    """One leg of a problem, from terminal to terminal, under caps of at most ``top_m`` AMSL, the highest of bounds."""
 
     def __init__(self, problem: Problem, start: End, goal: End, top_m: float) -> None:
         self.problem, self.start, self.goal, self.top_m = problem, start, goal, top_m
@@ -224,7 +224,7 @@ class Leg:
         self, cap_m: float, within: Corridor | None, limit: float, climbs: bool, suffices: Callable[[float], bool],
         closely: bool,
     ) -> float:  # fmt: skip
-        limits = self.problem.limits
+        limits, off_m = self.problem.bound_limits, self.problem.rounding_m[1]
         climb, descent = (limits.max_climb_slope, limits.max_descent_slope) if climbs else (math.inf, math.inf)
         # Not `lower_m`, which counts laps: near the ends, a path that flew laps has climbed for as many metres.
         known = self.length_m
@@ -234,7 +234,7 @@ class Leg:
             return known
         for k in range(RAISED):
             spare = max(limit - known, 0.0)
-            cones = self.start.cone(climb, spare) + self.goal.cone(descent, spare)
+            cones = self.start.cone(climb, spare, off_m) + self.goal.cone(descent, spare, off_m)
             if k == 0:
                 clearance.hold(cones)
             elif not clearance.obstructs(cones, self.last_track):
@@ -309,7 +309,7 @@ class Leg:
         limit = min(limit_m, self.reach_m)
         close = self._closer(limit)
         if self._reached is None or self._reached[0] is not close:
-            mesh, a, b = close.left.mesh, self.start, self.goal
+            mesh, a, b, off_m = close.left.mesh, self.start, self.goal, self.problem.rounding_m[1]
             count, low, high = intervals(mesh, close.cell, close.low_m, close.high_m, SPARE_M)
             k, nth = np.nonzero(np.arange(MOST) < count[:, None])
             every = AltitudeIntervals(
@@ -321,10 +321,10 @@ class Leg:
                 close.left_m[k],
                 np.column_stack([close.away_m[k], close.away_most_m[k]]),
                 np.column_stack([close.left_m[k], close.left_most_m[k]]),
-                Terminal(mesh.cells_at(a.place), a.amsl_m),
-                Terminal(mesh.cells_at(b.place), b.amsl_m),
+                Terminal(mesh.cells_at(a.place), a.amsl_m, off_m),
+                Terminal(mesh.cells_at(b.place), b.amsl_m, off_m),
             )
-            self._reached = close, Reached(every, self.problem.limits, close.limit_m)
+            self._reached = close, Reached(every, self.problem.bound_limits, close.limit_m)
         found = self._reached[1].within(limit, close.away.cells_between(close.left, limit))
         self.problem.budget.spend("interval", self._reached[1].looked_at)
         return found

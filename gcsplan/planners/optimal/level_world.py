@@ -26,7 +26,7 @@ def in_window(incumbent: Incumbent) -> Problem:
     problem = incumbent.problem
     surface = problem.airspace.surface
     ground, top = surface.ground_m, surface.top_m
-    if ground.size > FEW or not (np.ptp(ground) == 0.0 and np.ptp(top) == 0.0):
+    if ground.size > FEW or surface.level_m is None:
         return problem
     rows, cols = ground.shape
     corners = surface.grid.to_plane([0.0, cols - 1.0], [rows - 1.0, 0.0])

@@ -44,11 +44,15 @@ class PlaneSearch:
     def __init__(self, incumbent: Incumbent, problem: Problem | None = None) -> None:
         self.incumbent = incumbent
         self.problem = problem = incumbent.problem if problem is None else problem
-        limits = problem.limits
-        top_m = limits.max_amsl_m
-        top_m = above_all(problem) if top_m is None else top_m - limits.altitude_error_m
-        self.top_m = incumbent.highest(top_m)
-        """Highest altitude AMSL of the paths that are searched: the ceiling, or what better paths can climb to."""
+        most_m = above_all(problem)
+        paths_m, bounds_m = (
+            most_m if limits.max_amsl_m is None else limits.max_amsl_m - limits.altitude_error_m
+            for limits in (problem.limits, problem.bound_limits)
+        )
+        self.top_m = incumbent.highest(bounds_m)
+        """Highest altitude AMSL that bounds assume: the ceiling, or what better paths can climb to."""
+        self.path_top_m = min(self.top_m, paths_m)
+        """Highest altitude AMSL of the paths that are searched."""
         places = terminals_of(problem)
         heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
         ends = [End(*place, z) for place, z in zip(places, heights, strict=True)]
@@ -89,7 +93,7 @@ class PlaneSearch:
             self.raise_tracks()
             # Tracks that only the finer lattice shows are nearly the shortest; in the last round nothing else is left.
             patient = slack in (slacks[0], slacks[-1])
-            if self.try_below(self.top_m, fine=False) or (patient and self.try_below(self.top_m, fine=True)):
+            if self.try_below(self.path_top_m, fine=False) or (patient and self.try_below(self.path_top_m, fine=True)):
                 return
             if self.past(PAST, fine=False, first=True):
                 return
@@ -151,7 +155,7 @@ class PlaneSearch:
         """Look for a path on the finer lattice; return whether it is the best so far."""
         # With a track error, that lattice keeps metres from the terrain that the exact check leaves open.
         near = self.incumbent.sharp and self.problem.limits.track_error_m > 0.0
-        return (near and self.narrow_passage()) or self.try_below(self.top_m, fine=True)
+        return (near and self.narrow_passage()) or self.try_below(self.path_top_m, fine=True)
 
     def narrow_passage(self) -> bool:
         """Look for a path over nodes that are only as high as in the exact check: through slits that are shut in the
@@ -159,7 +163,7 @@ class PlaneSearch:
         whether the path is the best so far."""
         narrow, before_m = Narrow(), math.nan
         for more_m in DARED_M:
-            if self.try_below(self.top_m, fine=True, narrow=narrow):
+            if self.try_below(self.path_top_m, fine=True, narrow=narrow):
                 return True
             lacks = self.incumbent.unsettled
             # Where the last change did not matter, the next one will not.
@@ -192,7 +196,7 @@ class PlaneSearch:
         incumbent = self.incumbent
         laps = incumbent.climbs and (incumbent.best is None or (incumbent.sharp and cap_m is None))
         spare_m = self.longest() - sum(leg.length_m for leg in self.legs) if laps else 0.0
-        below_m = self.top_m if cap_m is None else cap_m
+        below_m = self.path_top_m if cap_m is None else cap_m
         search = DetourSearch(incumbent, lambda choice: self.terminals(choice, below_m, fine), fine)
         roots = [self.choice]
         if cap_m is None:

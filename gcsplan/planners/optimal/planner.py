@@ -37,6 +37,7 @@ from gcsplan.planners.optimal.window import plan_over
 from gcsplan.planners.problem import Problem, Refusal, Solution, terminals_of
 from gcsplan.planners.profile.climb_laps import on_the_spot
 from gcsplan.planners.refusal import check_ends, explain
+from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 
 TURNS_NOTE = "the lower bound is that of paths with sharp corners: it ignores turn_radius_m"
@@ -54,7 +55,10 @@ def plan(problem: Problem) -> Solution:
     names the binding constraint and says whether it is proved that there is no path.
     """
     problem = replace(problem, budget=problem.budget.anew(problem.budget_s, problem.budget_mb))
-    return plan_over(problem, _within)
+    found = plan_over(problem, _within)
+    # The searches bound paths between the exact ends; those of the mission may lie beside them.
+    bound = None if found.lower_bound is None else max(found.lower_bound - problem.connectors, 0.0)
+    return replace(found, lower_bound=bound)
 
 
 def _within(problem: Problem) -> Solution:
@@ -92,12 +96,16 @@ def _sharp(problem: Problem, sharp: bool = True) -> Solution:
 
 def _under_one_ceiling(problem: Problem) -> Problem:
     """The same problem with a maximum altitude AMSL instead of AGL, if the ground is level: more searches apply."""
-    limits, surface = problem.limits, problem.airspace.surface
-    if limits.max_agl_m is None or np.ptp(surface.ground_m) > 0.0 or np.ptp(surface.top_m) > 0.0:
+    if problem.limits.max_agl_m is None or (level_m := problem.airspace.surface.level_m) is None:
         return problem
-    most_m = float(surface.ground_m[0, 0]) + limits.max_agl_m
-    most_m = most_m if limits.max_amsl_m is None else min(most_m, limits.max_amsl_m)
-    return replace(problem, limits=replace(limits, max_agl_m=None, max_amsl_m=most_m))
+
+    def amsl(limits: Limits) -> Limits:
+        most = [level_m + m for m in (limits.max_agl_m,) if m is not None]
+        most += [m for m in (limits.max_amsl_m,) if m is not None]
+        return replace(limits, max_agl_m=None, max_amsl_m=min(most, default=None))
+
+    checked = None if problem.checked is None else amsl(problem.checked)
+    return replace(problem, limits=amsl(problem.limits), checked=checked)
 
 
 def _turning(problem: Problem) -> Solution:

@@ -200,7 +200,7 @@ class Searches:
     def _look_at_outlines(self) -> None:
         from gcsplan.planners.optimal.sources.outline_tracks import OutlineTracks  # shapely: many missions need none
 
-        limits = self.problem.limits
+        limits = self.problem.bound_limits
         highest_m = float(np.nanmax(self.problem.airspace.surface.ground_m))
         most_m = [*([] if limits.max_amsl_m is None else [limits.max_amsl_m]),
                   *([] if limits.max_agl_m is None else [highest_m + limits.max_agl_m])]  # fmt: skip

@@ -91,7 +91,10 @@ def widened(now: Problem, cost: float) -> Problem | None:
     if wide is None:
         return None
     ends = [_end(old, new) for old, new in ((now.start, wide.start), (now.goal, wide.goal))]
-    wide = replace(now, airspace=wide.airspace, limits=wide.limits, start=ends[0], goal=ends[1], widen=wide.widen)
+    wide = replace(
+        now, airspace=wide.airspace, limits=wide.limits, checked=wide.checked, start=ends[0], goal=ends[1],
+        widen=wide.widen,
+    )  # fmt: skip
     try:
         check_ends(wide)
     except Refusal:  # an end that is barely legal here may not be legal there

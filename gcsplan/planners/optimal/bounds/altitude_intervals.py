@@ -30,10 +30,12 @@ ROUNDS, WORTHWHILE = 4, 0.01
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Terminal:
-    """Where a track begins or ends: the cells that the place may lie in, and its altitude; None if that is free."""
+    """Where a track begins or ends: the cells that the place may lie in, and its altitude, known to ``off_m`` metres;
+    None if that is free."""
 
     cells: Int64s
     amsl_m: float | None
+    off_m: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -114,6 +116,7 @@ class AltitudeIntervals:
         room = np.empty(n), np.empty(n, np.int32), np.empty(n, np.int64)
         low, high, away = self.low_m, self.high_m, self.away_m.copy()
         latest, z, shut = limit_m - self.left_m, self.start.amsl_m, np.zeros(n - 1, np.bool_)
+        off_m = self.start.off_m + SPARE_M
 
         def least(own: Floats, most: Floats, begin: float) -> Floats:
             nonlocal shut
@@ -129,11 +132,11 @@ class AltitudeIntervals:
         away = np.maximum(away, least(away + near, latest + far, -math.inf) - far)
         falls = rises = None
         if math.isfinite(up):
-            begin = -math.inf if z is None else -z - SPARE_M
+            begin = -math.inf if z is None else -z - off_m
             falls = -least(up * away - high, up * latest - low, begin)
             away, high = np.maximum(away, (low - falls) / up), np.minimum(high, falls + up * latest)
         if math.isfinite(down):
-            begin = -math.inf if z is None else z - SPARE_M
+            begin = -math.inf if z is None else z - off_m
             rises = least(low + down * away, high + down * latest, begin)
             away, low = np.maximum(away, (rises - high) / down), np.maximum(low, rises - down * latest)
         if falls is not None and rises is not None:

@@ -21,8 +21,8 @@ from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.navmesh.crossing import Climb, Crossing, crossing
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.sources.outline_tracks import OutlineTracks
+from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import distances
-from gcsplan.world.limits import Limits
 
 MOST_CASES = 48
 """Most cases that are looked at."""
@@ -59,10 +59,11 @@ class _Stretch:
         """The least length of paths over such tracks."""
         return math.hypot(sum(self.lengths_m), self.to_m - self.from_m)
 
-    def climbs(self, leg: int, top_m: float, limits: Limits) -> tuple[Climb, Climb]:
+    def climbs(self, leg: int, top_m: float, problem: Problem) -> tuple[Climb, Climb]:
         """The climb to an altitude on one of the legs, and the descent from it."""
-        rises_m = (max(top_m - z, 0.0) for z in (self.from_m, self.to_m))
+        rises_m = (max(top_m - z - problem.rounding_m[1], 0.0) for z in (self.from_m, self.to_m))
         beyond_m = sum(self.lengths_m[: leg - self.first]), sum(self.lengths_m[leg - self.first + 1 :])
+        limits = problem.bound_limits
         slopes = limits.max_climb_slope, limits.max_descent_slope
         up, down = (
             Climb(rise, rise * math.hypot(1.0, 1.0 / slope) if rise > 0.0 else 0.0, more)
@@ -184,7 +185,7 @@ class Overflight:
         choices = []
         for stretch in stretches:
             for leg in range(stretch.first, stretch.last):
-                up, down = stretch.climbs(leg, top_m, self.problem.limits)
+                up, down = stretch.climbs(leg, top_m, self.problem)
                 away_m, left_m = shapely.distance(shape, shapely.points(self.outlines.legs[leg][:2]))
                 least_m = max(float(up.length_m(away_m) + down.length_m(left_m)), stretch.least_m)
                 choices.append((all_m - stretch.least_m + least_m, leg, stretch))
@@ -193,7 +194,7 @@ class Overflight:
             if least >= best[0]:
                 break
             others_m = all_m - stretch.least_m
-            found = self._crossing(k, leg, shut, stretch.climbs(leg, top_m, self.problem.limits), best[0] - others_m)
+            found = self._crossing(k, leg, shut, stretch.climbs(leg, top_m, self.problem), best[0] - others_m)
             if found is None:
                 best = least, around
             elif others_m + found.length_m < best[0]:

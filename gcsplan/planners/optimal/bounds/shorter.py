@@ -178,6 +178,7 @@ def bound_by_caps(plane: PlaneSearch) -> None:
         return sum(leg.bound(cap, cells, limit, care > 0) for leg, cells, limit in looked_at)
 
     def try_at(cap: float) -> None:
+        cap = min(cap, plane.path_top_m)
         if round(cap, 1) not in tried:
             tried.add(round(cap, 1))
             if plane.try_below(cap, fine=False):

@@ -72,7 +72,8 @@ class ClearanceGrid:
         whole: bool = False,
         exact_m: float | None = None,
     ) -> None:
-        limits, scale = plane.problem.limits, plane.problem.airspace.scale
+        problem = plane.problem
+        limits, scale = problem.bound_limits if low else problem.limits, problem.airspace.scale
         whole = whole or wanted is None
         wanted = plane.inside if wanted is None else wanted
         self.plane, self.fineness, self.cap_m, self.low = plane, fineness, cap_m, low
@@ -139,8 +140,9 @@ class ClearanceGrid:
 
         For bounds, a border beyond which there is more terrain has none.
         """
-        plane, limits = self.plane, self.plane.problem.limits
-        surface = plane.problem.airspace.surface
+        plane, problem = self.plane, self.plane.problem
+        limits = problem.bound_limits if self.low else problem.limits
+        surface = problem.airspace.surface
         rows, cols = surface.ground_m.shape
         corners = [(plane.x[j, i], plane.y[j, i]) for j in (0, -1) for i in (0, -1)]
         cell_m = np.array([surface.grid.metres_per_cell(*at) for at in corners])
@@ -149,7 +151,7 @@ class ClearanceGrid:
             reach_m = limits.horizontal_clearance_m + limits.track_error_m - hair_m
             east_m, north_m = 1.01 * cell_m.max(axis=0)
         else:
-            reach_m = plane.problem.airspace.beside_m(limits) + hair_m
+            reach_m = problem.airspace.beside_m(limits) + hair_m
             east_m, north_m = 0.99 * cell_m.min(axis=0)
         step = plane.stride / (plane.parts * self.fineness)  # all that follows is in cells of the terrain model
         col = plane.col0 + step * (self.col * self.fineness + np.arange(self.shape[1]))
@@ -303,7 +305,7 @@ class ClearanceGrid:
 
     def _lay(self) -> None:
         """Give the cells the walls of the zones."""
-        reach_m, near_m = self.plane.reach_m()
+        reach_m, near_m = self.plane.reach_m(self.low)
         spend, read = self.plane.problem.budget.spend, np.zeros(1, np.int64)
         count = stamp_zones(
             self._around, self._span, self._excess, self._floor, self._ground, *self._coarse, self._steep,

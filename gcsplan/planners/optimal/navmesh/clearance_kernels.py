@@ -135,6 +135,12 @@ def _on_border(z: Floats, over: Int64s, j: int, i: int) -> float:
     return float(z[over[3] - min(j, over[3] - over[1]), over[0] + min(i, over[2] - over[0])])
 
 
+@device
+def _or_lowest(height: float) -> float:
+    """A height; if it is unknown, one below all ground."""
+    return -1e9 if math.isnan(height) else height
+
+
 @kernel("f8[,] i8[] i8 f8[,] f8[,]")
 def pool(z: Floats, over: Int64s, stride: int, low: Floats, high: Floats) -> None:
     """Heights of every ``stride``-th node of a terrain model, rows going north, lowered (``low``) and raised (``high``)
@@ -148,14 +154,17 @@ def pool(z: Floats, over: Int64s, stride: int, low: Floats, high: Floats) -> Non
     for j in range(rows):
         for i in range(cols):
             h = _on_border(z, over, j * stride, i * stride)
-            low[j, i] = -1e9 if math.isnan(h) else h
+            low[j, i] = _or_lowest(h)
             high[j, i] = math.inf if math.isnan(h) else h
     for j in range(rows - 1):
         for i in range(cols - 1):
             a, b = _on_border(z, over, j * stride, i * stride), _on_border(z, over, j * stride, (i + 1) * stride)
             c = _on_border(z, over, (j + 1) * stride, (i + 1) * stride)
             d = _on_border(z, over, (j + 1) * stride, i * stride)
-            most = least = 0.0
+            most = 0.0
+            least = -math.inf if math.isnan(a + b + c + d) else 0.0
+            # The patch is as low as can be at an unknown corner, but on the side between two known ones it is not.
+            a, b, c, d = _or_lowest(a), _or_lowest(b), _or_lowest(c), _or_lowest(d)
             for q in range(stride + 1):
                 v = q / stride
                 for p in range(stride + 1):

@@ -17,7 +17,7 @@ def ranges(mesh: Mesh, top_m: float, cells: Int64s) -> tuple[Floats, Floats]:
     lowest above highest where there is none. ``mesh`` must be for bounds and as fine as its plane."""
     plane, (rows, cols) = mesh.plane, mesh.excess.shape
     low, high = mesh.lowest(cells), np.full(len(cells), top_m)
-    limits = plane.problem.limits
+    limits = plane.problem.bound_limits
     if limits.max_agl_m is not None:
         ground = plane.grounds[1][mesh.row : mesh.row + rows, mesh.col : mesh.col + cols]
         pairs = np.maximum(ground[:-1], ground[1:])
@@ -52,4 +52,4 @@ def _laid(mesh: Mesh) -> tuple[Floats, Floats, Floats, Floats, Floats, Int32s, b
     plane, (rows, cols) = mesh.plane, mesh.excess.shape
     ground = np.ascontiguousarray(plane.grounds[0][mesh.row : mesh.row + rows, mesh.col : mesh.col + cols])
     boxes = plane.boxes(mesh.row, mesh.col, 1, rows, cols)
-    return ground, *mesh.places(), *plane.shapes.low, boxes, plane.stride == 1, *plane.reach_m()
+    return ground, *mesh.places(), *plane.shapes.low, boxes, plane.stride == 1, *plane.reach_m(True)

@@ -12,7 +12,7 @@ that nothing moves by more than a few centimetres, or millimetres; the margins o
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -72,9 +72,11 @@ class Plane:
             zones[~over[other] & (zones[:, PAIR] > 0.0), TOP_2] = np.inf
         return zones, edges
 
-    def reach_m(self) -> tuple[float, float]:
-        """Metres by which zones are grown, and a little less: between nodes that are within that reach for certain."""
-        reach_m = self.problem.airspace.beside_m(self.problem.limits)
+    def reach_m(self, low: bool) -> tuple[float, float]:
+        """Metres by which zones are grown, for bounds (``low``) or for paths, and a little less: between nodes that are
+        within that reach for certain."""
+        problem = self.problem
+        reach_m = problem.airspace.beside_m(problem.bound_limits if low else problem.limits)
         return reach_m, reach_m - 2.0 * self.fit.bent_m - TOUCH_M
 
     def boxes(self, row: int, col: int, fineness: int, rows: int, cols: int) -> Int32s:
@@ -178,6 +180,7 @@ def lattice(
 ) -> Plane:
     """Make the lattice over an `extent`; the other arguments are those of `make_plane`."""
     surface = problem.airspace.surface
+    fit = replace(fit, spare_m=fit.spare_m + problem.bound_spare_m)
     col0, _, _, row1 = over
     grounds = nodes(surface.ground_m, over, parts, stride, whole)
     tops = grounds

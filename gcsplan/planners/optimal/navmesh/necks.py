@@ -74,12 +74,13 @@ class LegNecks:
         if plane.stride > 1 or necks is None or clearance.cap_m > self.top_m:
             return clearance.mesh().track(self.start, self.goal, limit_m, guide)
         self._necks[parts] = necks
-        step_m = max(LOOK_M, self.problem.limits.track_error_m)
+        bare = self.problem.for_bounds
+        step_m = max(LOOK_M, bare.limits.track_error_m)
         for _ in range(LOOKS):
             way = necks.mesh(clearance).track(self.start, self.goal, limit_m, guide)
             if way is None or not closely or not self.problem.budget.goes_on():
                 break
-            shut = shut_places(self.problem, way.points, self.top_m, step_m)
+            shut = shut_places(bare, way.points, self.top_m, step_m)
             if not len(shut) or not necks.look(plane, shut):
                 break
         return way

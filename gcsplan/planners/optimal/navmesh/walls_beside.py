@@ -24,7 +24,7 @@ def walls_beside(clearance: ClearanceGrid) -> Iterator[tuple[Indices, Floats]]:
     away as the track error reaches, in several directions; see `ClearanceGrid.add_walls`."""
     from scipy.ndimage import maximum_filter  # most missions have no necks
 
-    plane, limits = clearance.plane, clearance.plane.problem.limits
+    plane, limits = clearance.plane, clearance.plane.problem.bound_limits
     reach_m = SPARE * limits.track_error_m - 2.0 * plane.fit.bent_m
     if reach_m <= 0.0:
         return

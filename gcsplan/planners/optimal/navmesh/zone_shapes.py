@@ -80,8 +80,8 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
     such a zone is laid down twice: as it is, and grown by the reach with its levels moved by that rise. For bounds, the
     rise is the most anywhere at the zone; for paths, what it is around each node (`BESIDE`), as far as that is known.
     """
-    air, limits = problem.airspace, problem.limits
-    reach = air.beside_m(limits)
+    air = problem.airspace
+    reach = air.beside_m(problem.limits)  # no less than what bounds assume
     there = reach <= min(math.dist((x[0, 0], y[0, 0]), place) for place in ((x[0, 1], y[0, 1]), (x[1, 0], y[1, 0])))
     box = float(x.min()), float(y.min()), float(x.max()), float(y.max())
     found: list[tuple[int, Zone, Floats | None]] = []
@@ -101,11 +101,13 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
     pairs = _crossing(found, reach + max(fit.spare_m, fit.hair_m))
     both: list[tuple[Floats, Floats]] = []
     bounds = np.zeros((len(found) + len(pairs), 4))
-    for sign, off_m in ((-1.0, fit.spare_m), (1.0, fit.hair_m)):
+    sides = (-1.0, fit.spare_m, problem.bound_limits), (1.0, fit.hair_m, problem.limits)
+    for sign, off_m, limits in sides:
+        beside = air.beside_m(limits)
         rows = np.zeros((len(found) + len(pairs), NUMBERS))
         forms: list[Floats] = []
         for k, (row, (_, zone, part)) in enumerate(zip(rows, found, strict=False)):
-            grow = (0.0 if moved[k] == 0.0 and zone.follows_ground else reach) + sign * off_m
+            grow = (0.0 if moved[k] == 0.0 and zone.follows_ground else beside) + sign * off_m
             row[[BOTTOM, TOP, OWN_BOTTOM, OWN_TOP]] = -np.inf, np.inf, -np.inf, np.inf
             row[LOOKS] = sign < 0.0 and moved[k] > 0.0
             row[THIN] = 2.0 * (limits.altitude_error_m - off_m) if sign < 0.0 else -np.inf
@@ -134,12 +136,7 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
                 forms.append(_half_planes(part, grow, inner=sign < 0.0))
                 bounds[k] = np.concatenate([part.min(axis=0) - grow, part.max(axis=0) + grow])
         for k, (a, b) in enumerate(pairs, len(found)):
-            # Where two zones cross, an altitude that is free of one may lie in the other.
-            rows[k] = rows[a]
-            rows[k, [RADIUS, PAIR, ONE, OTHER]] = -1.0, 1.0, a, b
-            rows[k, [LOOKS, RISE]] = rows[[a, b]][:, [LOOKS, RISE]].max(axis=0)
-            rows[k, BOTTOM_2 : TOP_2_AGL + 1] = rows[b, BOTTOM : TOP_AGL + 1]
-            rows[k, UNDER_2] = rows[b, UNDER]
+            _cross(rows, k, a, b)
             forms.append(np.vstack([forms[a], forms[b]]))
             bounds[k, :2] = np.maximum(bounds[a, :2], bounds[b, :2])
             bounds[k, 2:] = np.minimum(bounds[a, 2:], bounds[b, 2:])
@@ -151,6 +148,15 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
     numbers = [number for number, *_ in found]
     owner = np.array([(n, n) for n in numbers] + [(numbers[a], numbers[b]) for a, b in pairs], np.intp).reshape(-1, 2)
     return Shapes(both[0], both[1], boxes, owner, int(size.sum()), int(size[both[0][0][:, LOOKS] > 0.0].sum()))
+
+
+def _cross(rows: Floats, k: int, a: int, b: int) -> None:
+    """Fill row ``k`` for the crossing of two parts: an altitude that is free of ``a`` may lie in ``b``."""
+    rows[k] = rows[a]
+    rows[k, [RADIUS, PAIR, ONE, OTHER]] = -1.0, 1.0, a, b
+    rows[k, [LOOKS, RISE]] = rows[[a, b]][:, [LOOKS, RISE]].max(axis=0)
+    rows[k, BOTTOM_2 : TOP_2_AGL + 1] = rows[b, BOTTOM : TOP_AGL + 1]
+    rows[k, UNDER_2] = rows[b, UNDER]
 
 
 def _rise(problem: Problem, zone: Zone, reach: float, box: tuple[float, float, float, float]) -> float:

@@ -114,7 +114,7 @@ def _end(plane: PlaneSearch, leg: Leg, along_m: float, whole_m: float) -> Floats
     if end.amsl_m is not None:
         return np.array([*end.place, end.amsl_m])
     low_m = float(plane.problem.floors(*np.array([end.place]).T)[0])
-    return np.array([*end.place, _height(plane, leg, along_m, whole_m - along_m, low_m, plane.top_m)])
+    return np.array([*end.place, _height(plane, leg, along_m, whole_m - along_m, low_m, plane.path_top_m)])
 
 
 def _sampled(way: Floats) -> tuple[Floats, Floats, Floats]:
@@ -181,9 +181,9 @@ def _along(
     that terrain and zones shut are tried before those that terrain shuts.
     """
     floor = plane.problem.floors(*places.T)
-    free = [(places, floor, np.full_like(floor, plane.top_m))]
+    free = [(places, floor, np.full_like(floor, plane.path_top_m))]
     moved, low, high = _freer(plane, places)
-    if (moved != places).any() or ((low > high) & (floor <= plane.top_m)).any():
+    if (moved != places).any() or ((low > high) & (floor <= plane.path_top_m)).any():
         free.insert(0, (moved, low, high))
     for at, lowest, highest in free:
         found = _past(plane, leg, ends, at, s, whole_m, lowest, highest)
@@ -199,7 +199,8 @@ def _past(
     high: Floats,
 ) -> Floats | None:  # fmt: skip
     """`_along` past the stretches that are shut; ``low``, ``high`` (N,): what is free at the places."""
-    stretches = _stretches(low - high)
+    # An infinite floor is shut (unknown ground), or given (an end), whatever is free below the cap.
+    stretches = _stretches(np.subtract(low, high, out=low.copy(), where=np.isfinite(low)))
     if len(stretches) > MOST:
         return None
     cuts = sorted({0, len(s) - 1, *(k for stretch in stretches for k in stretch)})
@@ -220,7 +221,9 @@ def _past(
             for _ in found.first_looks(SLACKS):
                 pass
         if sub.best is None and not sub.proved_infeasible and found.legs:
-            lowest = over_pass(plane.problem, plane.top_m, np.vstack([start[:2], places[first + 1 : last], goal[:2]]))
+            lowest = over_pass(
+                plane.problem, plane.path_top_m, np.vstack([start[:2], places[first + 1 : last], goal[:2]])
+            )
             if not sub.take_along(joined([lowest], [])):
                 found.narrow_passage()
         if sub.best is None or not plane.incumbent.budget.goes_on():
@@ -258,7 +261,7 @@ def _point(place: Floats) -> Point:
 
 def _stretches(over: Floats) -> list[tuple[int, int]]:
     """First and last index of each stretch with less than `OPEN_M` of free altitudes, and somewhere none; ``over``: the
-    lowest minus the highest free altitude (N,)."""
+    lowest minus the highest free altitude (N,), inf over unknown ground."""
     runs = [run for run in _runs(over > -OPEN_M) if (over[run[0] : run[1] + 1] > 0.0).any()]
     return [(max(first - 1, 0), min(last + 1, len(over) - 1)) for first, last in runs]
 
@@ -270,7 +273,7 @@ def _freer(plane: PlaneSearch, places: Floats) -> tuple[Floats, Floats, Floats]:
     ahead = np.gradient(places, axis=0)
     aside = np.stack([-ahead[:, 1], ahead[:, 0]], axis=-1) / np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
     tried = [places + off * aside for off in (0.0, ASIDE_M, -ASIDE_M)]
-    free = [free_below(plane.problem, at, plane.top_m, OPEN_M) for at in tried]
+    free = [free_below(plane.problem, at, plane.path_top_m, OPEN_M) for at in tried]
     shut = [low > high for low, high in free]
     side = np.where(shut[1] & ~shut[2], 2, np.where(shut[2] & ~shut[1], 1, 0))
     side[[0, -1]] = 0

@@ -99,9 +99,10 @@ class OutlineTracks:
         """The shortest track of each leg past the zones ``which`` (zones,); None if a leg has none. ``outer``: outlines
         for paths instead of bounds. Raises Exhausted."""
         if outer not in self._solids:
-            air, limits = self.problem.airspace, self.problem.limits
+            air, limits = self.problem.airspace, self.problem.limits if outer else self.problem.bound_limits
             reach_m, wider_m = air.beside_m(limits), air.beside_over_ground_m(limits) if outer else 0.0
-            hair_m = [HAIR_M if air.surface.grid.error_m == 0.0 else HAIR_BENT_M] * len(air.zones)
+            hair = HAIR_M if air.surface.grid.error_m == 0.0 else HAIR_BENT_M
+            hair_m = [hair if outer else hair + self.problem.bound_spare_m] * len(air.zones)
             hair_m = [
                 h + max(wider_m - reach_m, 0.0) * z.follows_ground for h, z in zip(hair_m, air.zones, strict=True)
             ]
@@ -126,7 +127,7 @@ def _length_m(tracks: list[Floats]) -> float:
 def _sides(problem: Problem) -> tuple[Bools, Floats]:
     """(zones,) which zones can perhaps be passed under at some place, and the least altitude AMSL over each, inf over
     those without a top."""
-    limits, surface, zones = problem.limits, problem.airspace.surface, problem.airspace.zones
+    limits, surface, zones = problem.bound_limits, problem.airspace.surface, problem.airspace.zones
     high = float(np.nanmax(surface.ground_m)) if any(z.follows_ground for z in zones) else 0.0
     low = float(np.nanmin(surface.ground_m))
     lowest = limits.min_agl_m + limits.altitude_error_m

@@ -1,0 +1,57 @@
+"""Corners of a copter's path that are cut too near: one way point more behind each, so that the turn is a small one.
+
+ArduCopter blends two legs within WPNAV_RADIUS, and not in the first half of either (`check.corners`). A leg of some
+centimetres behind a corner, in the direction of the next leg, leaves the line as it is, and hardly room to cut it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from gcsplan.arrays import Floats
+from gcsplan.check.verdict import Finding
+from gcsplan.mavlink.build.multirotor import SHORT_LEG_M
+from gcsplan.mavlink.mission import commands as cmd
+from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.world.world import World
+
+__all__ = ["cut", "sharpened"]
+
+NEAR_M = 0.05
+"""Metres within which an item is at a point of the path: rounding, and more."""
+SLIGHT = 1e-3
+"""A turn, rad, that is none."""
+
+
+def cut(mission: Mission, findings: Sequence[Finding], points: Floats, world: World) -> set[int]:
+    """The corners of a path (N, 3) at which the legs with ``findings`` begin and end, by index."""
+    way = points[:, :2]
+    a, b = np.diff(way[:-1], axis=0), np.diff(way[1:], axis=0)
+    turns = np.abs(np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)))
+    long = np.hypot(*np.diff(way, axis=0).T)
+    found: set[int] = set()
+    for seq in {s for f in findings for s in (f.seq - 1, f.seq)}:
+        index = seq - mission.first_seq
+        if not 0 <= index < len(mission.items):
+            continue
+        item = mission.items[index]
+        if item.command not in (cmd.WAYPOINT, cmd.LOITER_UNLIM):
+            continue
+        place = np.array(world.frame.to_plane(item.x / 1e7, item.y / 1e7), dtype=float)
+        for k in (np.flatnonzero(np.hypot(*(way[1:-1] - place).T) < NEAR_M) + 1).tolist():
+            if turns[k - 1] > SLIGHT and long[k] > 2.0 * SHORT_LEG_M:
+                found.add(k)
+    return found
+
+
+def sharpened(points: Floats, corners: Collection[int]) -> Floats:
+    """The path with another point `SHORT_LEG_M` behind each of ``corners``, on the leg that begins there."""
+    out = []
+    for k, p in enumerate(points):
+        out.append(p)
+        if k in corners:
+            leg = points[k + 1] - p
+            out.append(p + SHORT_LEG_M / float(np.hypot(*leg[:2])) * leg)
+    return np.array(out)
