@@ -22,8 +22,9 @@ from gcsplan.errors import InputError
 from gcsplan.world.cell import Cell
 from gcsplan.world.datum import VerticalDatum, take_apart
 from gcsplan.world.frame import Frame
+from gcsplan.world.input_files import sha256_of, sha256_of_all
 from gcsplan.world.mosaic import Mosaic
-from gcsplan.world.raster import Raster, open_raster, sha256_of
+from gcsplan.world.raster import Raster, open_raster
 from gcsplan.world.terrain import Box, OpenTerrain, Terrain, TerrainSpec, open_terrain, place, terrain_of
 
 ROWS = 3600
@@ -118,7 +119,10 @@ def _tile(cache: Cache, cell: Cell, record: Record, where: str) -> Raster:
     if sha256_of(path) != record.sha256:
         raise InputError.of([cache.missing((cell,), where, "damaged, unlike its checksum")])
     raster = open_raster(path, where=where)
-    return replace(raster, vertical=VerticalDatum(cache.source.vertical_datum), sha256=lambda: record.sha256)
+    return replace(
+        raster, vertical=VerticalDatum(cache.source.vertical_datum),
+        sha256=lambda: sha256_of_all(raster.files, record.sha256),
+    )  # fmt: skip
 
 
 def _sea(source: Source, cell: Cell, sample: Raster | None) -> Raster:

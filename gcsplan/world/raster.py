@@ -6,7 +6,6 @@ Heights belong to pixel centres, whatever AREA_OR_POINT says: GDAL's transform r
 
 from __future__ import annotations
 
-import hashlib
 import importlib.util
 import math
 import os
@@ -23,6 +22,7 @@ from gcsplan.arrays import Floats
 from gcsplan.errors import InputError, absent
 from gcsplan.units import FOOT
 from gcsplan.world.datum import RasterCRS, VerticalDatum, take_apart
+from gcsplan.world.input_files import files_of, neighbours, sha256_of, sha256_of_all, tell_file, tell_raster
 
 Reader = Callable[[int, int, int, int], Iterator[tuple[int, Floats]]]
 
@@ -67,7 +67,8 @@ class Raster:
     ``read(col, row, cols, rows)`` yields strips (first row within the window, heights (n, cols)), NaN where unknown.
     ``west``, ``north`` are the outer corner in the raster's own units, ``dx``, ``dy`` > 0 the cell. ``read`` returns
     metres, but above the raster's own vertical datum; ``vertical`` is the file's statement of that datum.
-    ``stored_bytes``: the size of the file.
+    ``stored_bytes``: the size of the file. ``files`` are those that it is read from: itself, and its sidecars, masks
+    and overviews.
     """
 
     name: str
@@ -83,6 +84,7 @@ class Raster:
     stored_bytes: int
     sha256: Callable[[], str]
     notes: tuple[str, ...] = ()
+    files: tuple[Path, ...] = ()
 
 
 _headers: dict[tuple[object, ...], tuple[Raster, tuple[float, float]]] = {}
@@ -92,13 +94,13 @@ _headers: dict[tuple[object, ...], tuple[Raster, tuple[float, float]]] = {}
 def open_raster(path: Path, *, where: str, crs: str | None = None, height_unit: str | None = None) -> Raster:
     """Header of the raster at ``path`` (GeoTIFF, SRTM .hgt or .hgt.zip, ESRI .asc).
 
-    ``crs`` overrides the file's; ``height_unit`` states the unit if the file does not. A file that has not changed
-    since this process opened it is not opened again: many missions use the same tiles. Raises InputError for anything
-    that is not a readable, georeferenced, north-up raster of real numbers.
+    ``crs`` overrides the file's; ``height_unit`` states the unit if the file does not. If neither the file nor one
+    beside it has changed since this process opened it, it is not opened again: many missions use the same tiles. Raises
+    InputError for anything that is not a readable, georeferenced, north-up raster of real numbers.
     """
+    tell_raster(path)
     require_file(path, where=where)
-    about = path.stat()
-    key = (path.absolute(), crs, height_unit, about.st_size, about.st_mtime_ns, about.st_ino)
+    key = (path.absolute(), crs, height_unit, neighbours(path))
     try:
         if key not in _headers:
             with gdal(path) as dataset:
@@ -107,6 +109,8 @@ def open_raster(path: Path, *, where: str, crs: str | None = None, height_unit: 
                 _headers.clear()
             _headers[key] = found
         header, to_metres = _headers[key]
+        for file in header.files:
+            tell_file(file)
         return replace(header, read=_reader(path, *to_metres, where=where))
     except InputError:
         raise
@@ -117,6 +121,7 @@ def open_raster(path: Path, *, where: str, crs: str | None = None, height_unit: 
 
 def require_file(path: Path, *, where: str) -> None:
     """Raise InputError unless ``path`` is a file that can be read and is not empty."""
+    tell_file(path)
     try:
         if path.is_dir():
             raise InputError(f"{path} is a folder without .DAT files; give a file", where=where)
@@ -131,12 +136,6 @@ def require_file(path: Path, *, where: str) -> None:
         raise InputError(f"{path} cannot be read: {why}", where=where) from None
 
 
-def sha256_of(path: Path) -> str:
-    """SHA-256 of a file's bytes, read in pieces."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
 def sample_jacksboro() -> Raster:
     """The real 3 arc-second SRTM tile around Jacksboro, Tennessee, that comes with matplotlib (EGM96).
 
@@ -147,6 +146,7 @@ def sample_jacksboro() -> Raster:
     if found is None or found.origin is None:
         raise InputError(f"{SAMPLE} comes with matplotlib, which is not installed: pip install matplotlib")
     path = Path(found.origin).parent / "mpl-data" / "sample_data" / "jacksboro_fault_dem.npz"
+    tell_file(path)
     with np.load(path) as file:
         heights = np.asarray(file["elevation"], float)
         west, north, dx, dy = (float(file[k]) for k in ("xmin", "ymin", "dx", "dy"))
@@ -286,10 +286,11 @@ def _header(
     if not (math.isfinite(scale) and math.isfinite(offset)) or scale == 0.0:
         raise InputError(f"{path} has a broken scale {scale} or offset {offset}", where=where)
 
+    files = files_of(dataset, path)
     to_metres = (scale * factor, offset * factor)
     header = Raster(
         path.name, system, t.c, t.f, t.a, -t.e, dataset.width, dataset.height, system.vertical,
-        _reader(path, *to_metres, where=where), path.stat().st_size, lambda: sha256_of(path), tuple(notes),
+        _reader(path, *to_metres, where=where), path.stat().st_size, lambda: sha256_of_all(files), tuple(notes), files,
     )  # fmt: skip
     return header, to_metres
 
