@@ -20,6 +20,7 @@ from gcsplan.cli.options import (
     UnjudgedOption,
 )  # fmt: skip
 from gcsplan.errors import InputError
+from gcsplan.figures import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -68,6 +69,7 @@ def batch(
             done.append(record)
             display.done(len(done), f", {sum(r.code != 0 for r in done)} without a plan")
 
+        pages = [] if report else [page for k in todo if (page := out / work.missions[k][0] / "report.html").is_file()]
         try:
             if todo:
                 with executor(jobs, cluster, pieces=len(todo), piece_s=PIECE_S) as workers:
@@ -76,6 +78,9 @@ def batch(
         finally:
             order = {name: k for k, (name, _) in enumerate(work.missions)}
             done.sort(key=lambda r: order[r.mission])
+            gone = sum(not page.is_file() for page in pages)
+            if gone:
+                remark(f"{counted(gone, 'report')} of earlier plans are gone; --report writes them anew")
             written = _tables(out, done, units, "report.html" if report else "summary.json") if done else []
     if as_json:
         emit({"missions": len(work.missions), "rows": [dict(row) for r in done for row in r.rows]})

@@ -35,6 +35,7 @@ __all__ = [
     "can_hold",
     "has_outputs",
     "is_output",
+    "outputs_in",
     "require_settled",
     "retire_outputs",
     "settle_outputs",
@@ -145,6 +146,15 @@ def steady(files: Iterable[str | os.PathLike[str]]) -> Iterator[None]:
         if _mark(folder) != mark:
             raise InputError("another gcsplan wrote its outputs here while they were read; run this again",
                              where=str(folder))  # fmt: skip
+
+
+def outputs_in(directory: str | os.PathLike[str]) -> list[str]:
+    """The names of gcsplan's outputs in ``directory``; none if it cannot be read."""
+    root = Path(directory)
+    try:
+        return sorted(name for name in _manifest(root) if os.path.lexists(root / name))
+    except OSError:
+        return []
 
 
 def has_outputs(directory: str | os.PathLike[str], digests: Mapping[str, str]) -> bool:
