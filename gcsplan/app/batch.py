@@ -1,7 +1,7 @@
 """Plan many mission files: each is a piece of work of its own, and a bad one never stops the others.
 
-What is done is kept: a file whose content, terrain, zones and options are unchanged is not planned again. Only this
-process writes; workers send the files' texts.
+What is done is kept (`gcsplan.app.records`): a mission is not planned again if no file that it reads, no option and no
+output of it has changed. Only this process writes; workers send the files' texts.
 """
 
 from __future__ import annotations
@@ -9,8 +9,9 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,15 +24,14 @@ from gcsplan.app.flying import flyable
 from gcsplan.app.model import Plan
 from gcsplan.app.named_files import named_files
 from gcsplan.app.pipeline import plan
+from gcsplan.app.records import Record, fault_of_name, kept_record, write_record
 from gcsplan.errors import GcsplanError, InputError, NoMission, UsageError, worst_of
-from gcsplan.export.outdir import retire_outputs, settle_outputs, write_outputs, write_whole
-from gcsplan.mission_file.read_files import files_of
+from gcsplan.export.durable import locked
+from gcsplan.export.outdir import retire_outputs, settle_outputs, write_outputs
 from gcsplan.mission_file.samples import file_of, is_sample
+from gcsplan.world.input_files import Reading, reading
 
 __all__ = ["Batch", "BatchOptions", "Record", "exit_code", "missions_of"]
-
-FOLDER = "records"
-"""The folder within the batch's directory that says what is done."""
 
 RULES = 3
 """Counts the changes of what lets a mission fly: records of earlier rules do not hold."""
@@ -55,23 +55,6 @@ class BatchOptions:
     report: bool = False
     allow_unjudged: bool = False
     at: str | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Record:
-    """The result of one mission: a row for each vehicle (one without a vehicle if there is no mission), and tracks.
-
-    ``code`` is the exit code that `plan` would end with; ``files`` are the outputs, name to text, empty if they are on
-    disk already. ``tracks`` are lists of [latitude, longitude], one for each of the first rows; the vehicles of the
-    other rows are left out.
-    """
-
-    mission: str
-    key: str
-    code: int
-    rows: tuple[Mapping[str, Any], ...]
-    tracks: tuple[Sequence[Sequence[float]], ...] = ()
-    files: Mapping[str, str] | None = None
 
 
 def missions_of(given: Sequence[str]) -> list[tuple[str, Path]]:
@@ -110,94 +93,109 @@ class Batch:
     directory: Path
     options: BatchOptions
 
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Make the directory, and keep other batches out of it meanwhile. Raises InputError if one is at work there."""
+        try:
+            self.directory.mkdir(parents=True, exist_ok=True)
+        except OSError as why:
+            raise InputError(f"cannot be made: {why.strerror or why}", where=str(self.directory)) from why
+        with locked(self.directory):
+            yield
+
     def run(self, workers: Executor, todo: Sequence[int], told: Callable[[Record], None]) -> None:
         """Plan the missions with the numbers ``todo``; each is written, then ``told``, as it is done."""
-        items = [(self.missions[k][0], str(self.missions[k][1])) for k in todo]
+        names = {name.casefold() for name, _ in self.missions}
+        good = []
+        for number in todo:
+            name, _ = self.missions[number]
+            fault = fault_of_name(name, names)
+            if fault:
+                told(_failed(name, "", InputError(fault)))
+            else:
+                good.append(number)
+        items = [(self.missions[k][0], str(self.missions[k][1])) for k in good]
 
         def lost(item: tuple[str, str], why: GcsplanError) -> Record:
-            row = _refusal(item[0], why.exit_code, why.reason, str(why))
-            return Record(item[0], key_of(Path(item[1]), self.options), why.exit_code, (row,))
+            return _failed(item[0], asked_of(item[1], self.options), why)
 
-        for number, record in workers.each(record_of, self.options, items, lost=lost):
-            told(self._written(record, todo[number]))
+        for _, record in workers.each(record_of, self.options, items, lost=lost):
+            told(self._written(record))
 
     def known(self) -> tuple[list[Record], list[int]]:
         """The records that still hold, and the numbers of the missions that must be planned."""
         kept: list[Record] = []
         todo: list[int] = []
         for number, (name, path) in enumerate(self.missions):
-            record = self._kept(name)
-            if record is not None and record.key == key_of(path, self.options):
+            record = kept_record(self.directory, name, asked_of(path, self.options))
+            if record is not None:
                 kept.append(record)
             else:
                 todo.append(number)
         return kept, todo
 
-    def _kept(self, name: str) -> Record | None:
-        """The record of an earlier run; None if there is none, or if its outputs are gone."""
-        try:
-            given = json.loads(self._record_file(name).read_text(encoding="utf-8"))
-            record = Record(name, given["key"], given["code"], tuple(given["rows"]), tuple(given["tracks"]))
-        except (OSError, ValueError, KeyError, TypeError):
-            return None
-        if record.tracks and not (self.directory / name / "summary.json").is_file():
-            return None
-        return record
+    def _written(self, record: Record) -> Record:
+        """Write a mission's record, and then its outputs, or move earlier ones out of the way.
 
-    def _record_file(self, name: str) -> Path:
-        return self.directory / FOLDER / f"{name}.json"
-
-    def _written(self, record: Record, number: int) -> Record:
-        """Write a mission's outputs, or move earlier ones out of the way, and then its record."""
-        out = self.directory / self.missions[number][0]
+        What cannot be written is that mission's failure, and its earlier outputs leave if they can.
+        """
+        out = self.directory / record.mission
+        changed = Reading.changed(record.inputs or {})
+        if changed:
+            words = (
+                f"{changed} is not what was read here: it changed while the mission was planned, or a worker of the "
+                "cluster sees another file there; run the same command again"
+            )
+            record = _failed(record.mission, record.asked, InputError(words))
         try:
             settle_outputs(out)
+            write_record(self.directory, record)
             if record.files:
                 write_outputs(out, record.files)
             else:
                 retire_outputs(out)
-            file = self._record_file(record.mission)
-            file.parent.mkdir(parents=True, exist_ok=True)
-            kept = {"key": record.key, "code": record.code, "rows": record.rows, "tracks": record.tracks}
-            write_whole(file, json.dumps(kept, indent=1, default=dict))
-        except (OSError, GcsplanError) as why:
-            raise InputError(f"cannot be written: {why}", where=str(out)) from why
-        return Record(record.mission, record.key, record.code, record.rows, record.tracks)
+        except (OSError, ValueError, GcsplanError) as why:
+            with suppress(OSError, GcsplanError):
+                retire_outputs(out)
+            record = _failed(record.mission, record.asked, InputError(f"cannot be written: {why}", where=str(out)))
+        return replace(record, files=None)
 
 
-def key_of(path: Path, options: BatchOptions) -> str:
-    """A digest of all that a result depends on: the file, the files that it names (size and time), options, version."""
-    digest = hashlib.sha256(repr((__version__, RULES, options)).encode())
-    try:
-        digest.update(path.read_bytes())
-        for file in files_of(path):
-            about = file.stat()
-            digest.update(repr((str(file), about.st_size, about.st_mtime_ns)).encode())
-    except (OSError, GcsplanError) as why:
-        digest.update(repr(why).encode())
-    return digest.hexdigest()
+def asked_of(path: str | Path, options: BatchOptions) -> str:
+    """A digest of what is asked beside the content of files: which mission, the options, the version."""
+    asked = repr((__version__, RULES, options, os.path.abspath(path)))
+    return hashlib.sha256(asked.encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def record_of(options: BatchOptions, item: tuple[str, str]) -> Record:
     """Plan one mission, in whatever process; every failure becomes a row."""
     name, file = item
-    key = key_of(Path(file), options)  # of what is planned now: since `known` read it, the file may have changed
-    try:
-        planned = plan(
-            file, planner=options.planner, objective=options.objective, seed=options.seed, at=options.at,
-        )  # fmt: skip
-        planned, homes = flyable(planned, allow_unjudged=options.allow_unjudged, asked=options.report)
-        files = outputs.outputs_of(planned, homes)
-        if options.report:
-            files["report.html"] = outputs.report_of(planned, (), homes)
-    except GcsplanError as why:
-        return Record(name, key, why.exit_code, (_refusal(name, why.exit_code, why.reason, str(why)),))
-    except Exception as why:  # a bug of ours in one mission must not cost the others
-        words = f"internal error, a bug in gcsplan: {type(why).__name__}: {why}"
-        return Record(name, key, 70, (_refusal(name, 70, "internal", words),))
+    asked = asked_of(file, options)
+    with reading() as read:
+        try:
+            planned = plan(
+                file, planner=options.planner, objective=options.objective, seed=options.seed, at=options.at,
+            )  # fmt: skip
+            planned, homes = flyable(planned, allow_unjudged=options.allow_unjudged, asked=options.report)
+            files = outputs.outputs_of(planned, homes)
+            if options.report:
+                files["report.html"] = outputs.report_of(planned, (), homes)
+        except GcsplanError as why:
+            return _failed(name, asked, why, read)
+        except Exception as why:  # a bug of ours in one mission must not cost the others
+            words = f"internal error, a bug in gcsplan: {type(why).__name__}: {why}"
+            row = _refusal(name, 70, "internal", words)
+            return Record(name, asked, 70, (row,), inputs=read.marks)
     out = [_refusal(name, NoMission.exit_code, v.reason, v.message, v.name) for v in planned.left_out]
     code = NoMission.exit_code if out else 0
-    return Record(name, key, code, (*_rows(name, files["summary.json"]), *out), tuple(_tracks(planned)), files)
+    rows = (*_rows(name, files["summary.json"]), *out)
+    return Record(name, asked, code, rows, tuple(_tracks(planned)), files, read.marks)
+
+
+def _failed(name: str, asked: str, why: GcsplanError, read: Reading | None = None) -> Record:
+    """The record of a mission without a plan; without ``read`` it is tried again next time."""
+    row = _refusal(name, why.exit_code, why.reason, str(why))
+    return Record(name, asked, why.exit_code, (row,), inputs=None if read is None else read.marks)
 
 
 COLUMNS = (

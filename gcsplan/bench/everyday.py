@@ -7,8 +7,6 @@ killed without affecting the others.
 from __future__ import annotations
 
 import contextlib
-import csv
-import io
 import json
 import math
 import multiprocessing as mp
@@ -26,6 +24,7 @@ from gcsplan.bench.everyday_missions import KINDS, Everyday, draw
 from gcsplan.bench.everyday_oracle import Plane, Unreachable
 from gcsplan.bench.terrain_measure import Memory, passes, percentile
 from gcsplan.errors import InputError, NoMission
+from gcsplan.export.table import csv_of
 from gcsplan.mission_file import load_mission
 from gcsplan.planners.optimal.searches import require_names
 from gcsplan.planners.problem import Problem, Solution
@@ -198,11 +197,7 @@ def line(o: Outcome) -> str:
 
 def as_csv(outcomes: Sequence[Outcome]) -> str:
     """CSV with one row per mission."""
-    out = io.StringIO()
-    rows = csv.DictWriter(out, [f.name for f in fields(Outcome)])
-    rows.writeheader()
-    rows.writerows(asdict(o) for o in outcomes)
-    return out.getvalue()
+    return csv_of([[f.name for f in fields(Outcome)], *(asdict(o).values() for o in outcomes)], end="\r\n")
 
 
 def report(outcomes: Sequence[Outcome]) -> str:

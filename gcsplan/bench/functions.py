@@ -10,7 +10,6 @@ Every algorithm starts from the same population in the same run, so runs are com
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -24,6 +23,7 @@ from gcsplan.arrays import Floats
 from gcsplan.bench.functions_printed import PRINTED, RUNS, WOLVES, Printed
 from gcsplan.errors import InputError
 from gcsplan.export.outdir import write_whole
+from gcsplan.export.table import csv_of
 from gcsplan.optimisers.driver import minimise
 from gcsplan.optimisers.functions import FUNCTIONS
 from gcsplan.optimisers.registry import get
@@ -164,17 +164,15 @@ def write(result: dict[str, Any], out: Path) -> list[Path]:
     Each file is written whole or not at all. Raises InputError if one cannot be written.
     """
     ready(out)
-    table, runs = io.StringIO(newline=""), io.StringIO(newline="")
-    lines = csv.DictWriter(table, list(result["rows"][0]))
-    lines.writeheader()
-    lines.writerows(result["rows"])
-    rows = csv.writer(runs)
-    rows.writerow(["function", "algorithm", "setting", "run", "cost"])
-    for key, values in result["costs"].items():
-        rows.writerows([*key.split("/"), k, repr(value)] for k, value in enumerate(values))
+    names = list(result["rows"][0])
+    lines = [names, *([row.get(name) for name in names] for row in result["rows"])]
+    runs = [
+        ["function", "algorithm", "setting", "run", "cost"],
+        *([*key.split("/"), k, repr(v)] for key, values in result["costs"].items() for k, v in enumerate(values)),
+    ]
     files = {
-        out / "functions.csv": table.getvalue(),
-        out / "functions-runs.csv": runs.getvalue(),
+        out / "functions.csv": csv_of(lines, end="\r\n"),
+        out / "functions-runs.csv": csv_of(runs, end="\r\n"),
         out / "functions.md": "\n".join(_markdown(result)) + "\n",
     }
     for path, content in files.items():

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +13,7 @@ from gcsplan.arrays import Floats
 from gcsplan.bench.metabox import THEIRS
 from gcsplan.bench.papers_statistics import compare, holm
 from gcsplan.export.outdir import write_whole
+from gcsplan.export.table import csv_of
 
 COLUMNS = ("optimiser", "of", "place, %", "p", "over the best, %", "clear", "remarks")
 
@@ -62,14 +61,12 @@ def write(result: dict[str, Any], out: Path) -> list[Path]:
 
     Raises InputError if one cannot be written.
     """
-    page = io.StringIO(newline="")
-    table = csv.DictWriter(page, list(result["runs"][0]))
-    table.writeheader()
-    table.writerows(result["runs"])
+    names = list(result["runs"][0])
+    table = [names, *([run.get(name) for name in names] for run in result["runs"])]
     files = {
         out / "metabox.json": json.dumps(result | {"rows": rows(result)}, indent=1) + "\n",
         out / "metabox.md": report(result),
-        out / "metabox-runs.csv": page.getvalue(),
+        out / "metabox-runs.csv": csv_of(table, end="\r\n"),
     }
     for path, content in files.items():
         write_whole(path, content)

@@ -6,7 +6,6 @@ All but the files of times are the same to the byte whenever the same runs are m
 from __future__ import annotations
 
 import base64
-import csv
 import html
 import io
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -19,6 +18,7 @@ from gcsplan.bench.papers_printed import Number, Row
 from gcsplan.bench.papers_remarks import legend, remarks, schedules
 from gcsplan.bench.papers_tables import Table, significant
 from gcsplan.export.outdir import write_whole
+from gcsplan.export.table import csv_of
 
 IMPOSSIBLE, UNREACHED = "†", "‡"
 LEGEND = (
@@ -242,12 +242,8 @@ def _flat(summary: Summary, row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _csv(rows: Sequence[dict[str, Any]]) -> str:
-    text = io.StringIO(newline="")
-    if rows:
-        writer = csv.DictWriter(text, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-    return text.getvalue()
+    names = list(rows[0]) if rows else []
+    return csv_of([names, *([row.get(name) for name in names] for row in rows)], end="\r\n") if rows else ""
 
 
 def _about(result: dict[str, Any]) -> str:

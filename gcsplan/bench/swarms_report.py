@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import platform
 import statistics
 from collections.abc import Sequence
@@ -15,6 +13,7 @@ from typing import Literal
 from rich.table import Table
 
 from gcsplan.bench.terrain_measure import percentile
+from gcsplan.export.table import csv_of
 
 COLUMNS = (
     "method", "encoding", "cost", "raw legal", "repaired", "refused", "solved %", "after restarts %", "over p50 %",
@@ -147,12 +146,8 @@ class Result:
 
     def csv(self) -> str:
         """One row for each attempt."""
-        out = io.StringIO()
-        writer = csv.writer(out, lineterminator="\n")
         rows = [self._row(a) for a in self.attempts]
-        writer.writerow(list(rows[0]) if rows else [])
-        writer.writerows(["" if v is None else v for v in row.values()] for row in rows)
-        return out.getvalue()
+        return csv_of([list(rows[0]) if rows else [], *(row.values() for row in rows)])
 
     def _row(self, attempt: Attempt) -> dict[str, object]:
         row = asdict(attempt)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
@@ -10,6 +9,7 @@ from dataclasses import asdict, dataclass, fields
 from rich.table import Table
 
 from gcsplan.bench.terrain_measure import OURS, OURS_LONG, Outcome, beyond, percentile
+from gcsplan.export.table import csv_of
 
 LEAST_GAP = 1e-3
 """Percent at which smaller gaps are drawn."""
@@ -155,15 +155,13 @@ def _failed(o: Outcome) -> bool:
 def as_csv(outcomes: Sequence[Outcome]) -> str:
     """CSV with one row per outcome, without the paths."""
     names = [f.name for f in fields(Outcome) if f.name != "points"]
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
     bounds = best_bounds(outcomes)
-    writer.writerow([*names, "gap_percent"])
+    rows: list[list[object]] = [[*names, "gap_percent"]]
     for o in outcomes:
         row = asdict(o)
         gap = o.gap_percent if o.bound else beyond(o.cost, bounds.get(o.key))
-        writer.writerow(["" if row[n] is None else row[n] for n in names] + ["" if gap is None else gap])
-    return out.getvalue()
+        rows.append([*(row[n] for n in names), gap])
+    return csv_of(rows)
 
 
 def figure(outcomes: Sequence[Outcome]) -> bytes:

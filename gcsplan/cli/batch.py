@@ -21,11 +21,12 @@ from gcsplan.cli.options import (
     UnjudgedOption,
 )  # fmt: skip
 from gcsplan.errors import InputError
+from gcsplan.figures import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from gcsplan.app.batch import Record
+    from gcsplan.app.records import Record
 
 SHOWN = 20
 """Missions without a plan that are printed at most; the table has all of them."""
@@ -60,24 +61,29 @@ def batch(
 
     options = BatchOptions(planner, objective, seed, report, allow_unjudged, at)
     work = Batch(missions_of(missions), out, options)
-    done, todo = work.known()
-    if done:
-        remark(f"{len(done)} of {len(work.missions)} missions are done and unchanged")
     display = WorkDisplay(len(work.missions), "missions")
+    with work.alone():
+        done, todo = work.known()
+        if done:
+            remark(f"{len(done)} of {len(work.missions)} missions are done and unchanged")
 
-    def told(record: Record) -> None:
-        done.append(record)
-        display.done(len(done), f", {sum(r.code != 0 for r in done)} without a plan")
+        def told(record: Record) -> None:
+            done.append(record)
+            display.done(len(done), f", {sum(r.code != 0 for r in done)} without a plan")
 
-    try:
-        if todo:
-            with executor(jobs, cluster, pieces=len(todo), piece_s=PIECE_S) as workers:
-                display.workers(workers)
-                work.run(workers, todo, told)
-    finally:
-        order = {name: k for k, (name, _) in enumerate(work.missions)}
-        done.sort(key=lambda r: order[r.mission])
-        written = _tables(out, done, units, "report.html" if report else "summary.json") if done else []
+        pages = [] if report else [page for k in todo if (page := out / work.missions[k][0] / "report.html").is_file()]
+        try:
+            if todo:
+                with executor(jobs, cluster, pieces=len(todo), piece_s=PIECE_S) as workers:
+                    display.workers(workers)
+                    work.run(workers, todo, told)
+        finally:
+            order = {name: k for k, (name, _) in enumerate(work.missions)}
+            done.sort(key=lambda r: order[r.mission])
+            gone = sum(not page.is_file() for page in pages)
+            if gone:
+                remark(f"{counted(gone, 'report')} of earlier plans are gone; --report writes them anew")
+            written = _tables(out, done, units, "report.html" if report else "summary.json") if done else []
     if as_json:
         emit({"missions": len(work.missions), "rows": [dict(row) for r in done for row in r.rows]})
     else:

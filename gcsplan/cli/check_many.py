@@ -181,8 +181,6 @@ def tell(
             elif told.failing is not None:
                 more += 1
             progress(f"{summary.files} of {count} files, {summary.files - summary.codes[0]} do not pass")
-    except BrokenPipeError:
-        raise
     except (KeyboardInterrupt, Exception) as why:
         if isinstance(printer, Lines):
             printer.end(header, summary, None)

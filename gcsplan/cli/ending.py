@@ -6,6 +6,7 @@ import io
 import json
 import os
 import signal
+import stat
 import sys
 import threading
 import traceback
@@ -77,17 +78,48 @@ def emit(document: dict[str, Any], error: dict[str, Any] | None = None) -> None:
 
 
 def put(text: str) -> None:
-    """Write to standard output and flush, so that a failure is reported. Raises InputError (or BrokenPipeError)."""
+    """Write to standard output and flush, so that a failure is reported. Raises InputError."""
     try:
         sys.stdout.write(text)
         sys.stdout.flush()
-    except BrokenPipeError:
-        raise
     except (OSError, AttributeError) as error:  # a full disk, or a closed standard output, which is None
         with suppress(OSError, AttributeError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         words = getattr(error, "strerror", None) or "it is closed"
         raise InputError(f"cannot be written: {words}", where="standard output") from error
+
+
+class _Pipe(io.FileIO):
+    """A pipe whose reader may go away: the rest is then written nowhere, and the command goes on to its own end."""
+
+    def write(self, data: Any, /) -> int:
+        try:
+            return super().write(data) or 0
+        except BrokenPipeError:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self.fileno())
+            os.close(nowhere)
+            return len(memoryview(data).cast("B"))
+
+
+def outlive_readers() -> None:
+    """Let ``gcsplan … | head -1`` do what it does without ``head``: same files, same exit code, no complaint."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        try:
+            piped = not stat.S_ISREG(os.fstat(stream.fileno()).st_mode) and not stream.isatty()
+        except (AttributeError, OSError, ValueError):  # closed, or no file of the system
+            continue
+        if piped and stream is getattr(sys, f"__{name}__"):
+            stream.flush()
+            whole = io.BufferedWriter(_Pipe(stream.fileno(), "wb", closefd=False))
+            setattr(
+                sys, name,
+                io.TextIOWrapper(
+                    whole, encoding=stream.encoding, errors=stream.errors, line_buffering=stream.line_buffering,
+                    write_through=name == "stderr",
+                ),
+            )  # fmt: skip
 
 
 @contextmanager
@@ -144,6 +176,6 @@ def fail(error: GcsplanError, as_json: bool, debug: bool) -> NoReturn:
         traceback.print_exc()
     complain(error)
     if as_json:
-        with suppress(InputError, BrokenPipeError):
+        with suppress(InputError):
             put(json.dumps({"error": error.as_dict()}) + "\n")
     sys.exit(error.exit_code)

@@ -14,7 +14,16 @@ import typer
 from gcsplan.cli import batch, check, energy, fly, links, new, plan, rehearse, schema
 from gcsplan.cli.bench import bench_app
 from gcsplan.cli.dem import dem_app
-from gcsplan.cli.ending import Interrupted, end_in_good_order, explained, fail, interrupted, put, speak_plainly
+from gcsplan.cli.ending import (
+    Interrupted,
+    end_in_good_order,
+    explained,
+    fail,
+    interrupted,
+    outlive_readers,
+    put,
+    speak_plainly,
+)
 from gcsplan.cli.memory import settle_memory
 from gcsplan.cli.terrain import terrain_app
 from gcsplan.errors import GcsplanError, InputError
@@ -86,6 +95,7 @@ def main() -> NoReturn:
     debug = "--debug" in sys.argv
     arguments = [a for a in sys.argv[1:] if a != "--debug"]
     as_json = "--json" in arguments
+    outlive_readers()
     speak_plainly()
     settle_memory()
     # gcsplan uses no plug-ins of pydantic; a search for them reads the lists of all installed packages
@@ -102,9 +112,6 @@ def main() -> NoReturn:
         fail(error, as_json, debug)
     except (KeyboardInterrupt, typer.Abort):
         fail(interrupted(), as_json, debug)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(1)
     except MemoryError:
         words = "not enough memory for this: give a smaller area, coarser terrain, fewer zones or items"
         fail(InputError(words, reason="memory"), as_json, debug)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -206,7 +206,8 @@ def plan(
     except (InputError, NoMission, CheckFailed):
         _retire(directory, None if as_json else source, system)
         raise
-    _write(directory, files, {} if png is None else _pictures(planned, png, each))
+    pictures = {} if png is None else _pictures(planned, png, each)
+    _write(directory, files, pictures, later=["upload.json"] if targets else [])
     if not as_json:
         plan_table(planned, homes, system)
         say_homes(homes, system)
@@ -290,15 +291,24 @@ def _retire(directory: Path, source: MissionFile | None, units: Units) -> None:
         say_world(source, units)
 
 
-def _write(directory: Path, files: Mapping[str, str], pictures: dict[Path, bytes]) -> None:
-    """Write the outputs and the pictures; those inside the directory are written and removed with its outputs."""
+def _write(directory: Path, files: Mapping[str, str], pictures: dict[Path, bytes], later: Sequence[str]) -> None:
+    """Write the outputs and the pictures; those inside the directory are written and removed with its outputs.
+
+    ``later``: outputs that are written afterwards.
+    """
     from gcsplan.cli.console import remark
-    from gcsplan.export.outdir import can_hold, write_outputs, write_whole
+    from gcsplan.export.outdir import can_hold, outputs_in, write_outputs, write_whole
 
     beside = [file for file in pictures if can_hold(directory, file)]
+    earlier = outputs_in(directory)
     in_the_way = write_outputs(directory, {**files, **{file.name: pictures.pop(file) for file in beside}})
+    gone = [name for name in earlier if name not in later and not os.path.lexists(directory / name)]
     for file, content in pictures.items():
         write_whole(file, content)
+    if gone:
+        shown = ", ".join([*gone[:SHOWN], *([f"{len(gone) - SHOWN} more"] if len(gone) > SHOWN else [])])
+        cure = "; --report writes one of this plan" if "report.html" in gone else ""
+        remark(f"note: gone from {directory}, because this plan has no such output: {shown}{cure}")
     if in_the_way:
         remark(f"{', '.join(in_the_way)} in {directory} were not gcsplan's, and were moved to {directory / 'previous'}")
 

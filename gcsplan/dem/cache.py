@@ -18,6 +18,7 @@ from gcsplan.dem.cells import names_of
 from gcsplan.dem.sources import Source
 from gcsplan.errors import InputError, Problem
 from gcsplan.world.cell import Cell
+from gcsplan.world.input_files import tell_file, tell_setting
 
 CACHE_VARIABLE = "GCSPLAN_DEM_CACHE"
 State = Literal["tile", "sea", "absent"]
@@ -58,9 +59,12 @@ class Record:
 
 def cache_folder() -> Path:
     """``$GCSPLAN_DEM_CACHE``, else ``$XDG_CACHE_HOME/gcsplan/dem``, else the platform's folder for caches."""
+    tell_setting(CACHE_VARIABLE)
     own = os.environ.get(CACHE_VARIABLE, "")
     if own:
         return Path(os.path.expanduser(own)).absolute()
+    for name in ("XDG_CACHE_HOME", "LOCALAPPDATA", "HOME"):
+        tell_setting(name)
     xdg = os.environ.get("XDG_CACHE_HOME", "")
     if xdg and Path(xdg).is_absolute():  # its specification says to ignore others
         return Path(xdg) / "gcsplan" / "dem"
@@ -90,6 +94,8 @@ class Cache:
 
     def find(self, cell: Cell) -> Record | None:
         """What the cache holds of a tile; None if nothing, or nothing that can be relied on."""
+        tell_file(self.record_path(cell))
+        tell_file(self.tile_path(cell))
         record = _read(self.record_path(cell))
         if record is None or (record.tile, record.source) != (cell.name, self.source.name):
             return None

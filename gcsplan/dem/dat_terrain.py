@@ -27,8 +27,9 @@ from gcsplan.world.cell import Cell
 from gcsplan.world.datum import VerticalDatum
 from gcsplan.world.frame import Frame
 from gcsplan.world.height_unit import BY_FORMAT, HeightUnit
+from gcsplan.world.input_files import sha256_of, tell_folder
 from gcsplan.world.mosaic import FIT_ERROR_M, Window
-from gcsplan.world.raster import MAX_CELLS, require_file, sha256_of
+from gcsplan.world.raster import MAX_CELLS, require_file
 from gcsplan.world.surface import GridMap
 from gcsplan.world.terrain import NO_MORE_VOIDS, Box, Terrain, TerrainSpec, place, require_metres, terrain_of
 from gcsplan.world.terrain_grid import DEGREE_E7, METRES_OF_E7, STRIDE, TerrainGrid, cell_at, longitude_scale
@@ -67,6 +68,7 @@ def dat_files(paths: Sequence[str], *, where: str) -> list[Path]:
     others = []
     for text in paths:
         path = Path(text)
+        tell_folder(path, (".dat",))
         inside = sorted(p for p in path.iterdir() if is_dat(p)) if os.path.isdir(path) else []
         if is_dat(path) or inside:
             found += inside or [path]

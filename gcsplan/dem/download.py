@@ -30,6 +30,7 @@ Report = Callable[[int, int | None], None]
 BLOCK_BYTES = 65_536
 LONGEST_PAUSE_S = 30.0
 MOST_SIDE_BYTES = 4096
+MOST_ETAG = 200
 
 PART_MB = (5, 8, 10, 15, 16, 20, 25, 32, 50, 64, 100, 128)
 """Sizes of the parts, MiB, in which programs upload to S3: the ETag is then a checksum of the parts' checksums."""
@@ -110,13 +111,23 @@ class _Redirects(urllib.request.HTTPRedirectHandler):
 
     max_redirections = 5
 
+    def http_error_302(self, req: urllib.request.Request, fp: IO[bytes], code: int, msg: str, headers: Message) -> Any:
+        """Follow a redirect; an address that cannot be read leaves no connection open."""
+        try:
+            return super().http_error_302(req, fp, code, msg, headers)  # type: ignore[arg-type]
+        except (ValueError, LookupError, ArithmeticError):
+            fp.close()
+            raise
+
+    http_error_301 = http_error_303 = http_error_307 = http_error_308 = http_error_302
+
     def redirect_request(
         self, req: urllib.request.Request, fp: IO[bytes], code: int, msg: str, headers: Message, newurl: str
     ) -> urllib.request.Request | None:
         secure = req.full_url.startswith("https:")
         if not newurl.startswith("https:" if secure else ("http:", "https:")):
             fp.close()
-            raise LinkError(f"redirected to {newurl[:200]}, which is not followed", where=req.full_url)
+            raise LinkError(f"redirected to {_words(newurl)}, which is not followed", where=req.full_url)
         return super().redirect_request(req, fp, code, msg, headers, newurl)  # type: ignore[arg-type]
 
 
@@ -180,6 +191,9 @@ def _try(part: _Part, most_bytes: int, patience: Patience, until: float, report:
         raise _Again(f"no answer: {_words(why.reason)}") from why
     except (http.client.HTTPException, TimeoutError, ConnectionError, ssl.SSLError) as why:
         raise _Again(f"the connection broke: {_words(why)}") from why
+    except (ValueError, LookupError, ArithmeticError) as why:
+        # The library raises these for addresses in redirects and for headers that nobody can read.
+        raise LinkError(f"the server's answer cannot be read: {_words(why)}", where=part.url) from why
     if length is not None and part.have != length:
         raise _Again(f"the connection ended after {part.have} of {length} bytes")
     return part.have
@@ -202,8 +216,9 @@ def _begin(part: _Part, answer: Any, most_bytes: int) -> int | None:
     if answer.headers.get("Content-Encoding", "identity").lower() != "identity":
         raise LinkError("the server packs what it sends, though it was asked not to", where=part.url)
     etag = answer.headers.get("ETag", "")
+    etag = etag if len(etag) <= MOST_ETAG else ""
     if answer.status == 206:
-        span = re.fullmatch(r"bytes (\d+)-(\d+)/(\d+)", answer.headers.get("Content-Range", ""))
+        span = re.fullmatch(r"bytes ([0-9]{1,15})-([0-9]{1,15})/([0-9]{1,15})", answer.headers.get("Content-Range", ""))
         if span is None or int(span[1]) != part.have or (etag and etag != part.etag):
             part.drop()
             raise _Again("the server continued another part than was asked for")
@@ -211,11 +226,11 @@ def _begin(part: _Part, answer: Any, most_bytes: int) -> int | None:
     elif answer.status == 200:
         part.begin(etag)
         said = answer.headers.get("Content-Length", "")
-        length = int(said) if said.isdigit() else None
+        length = int(said) if re.fullmatch("[0-9]{1,15}", said) else None
         if length is None and answer.headers.get("Transfer-Encoding", "").lower() != "chunked":
             raise LinkError("the server does not say how long it is, so that nobody could see a loss", where=part.url)
     else:
-        raise LinkError(f"the server answers {answer.status} {answer.reason}", where=part.url)
+        raise LinkError(f"the server answers {answer.status} {_words(answer.reason)}", where=part.url)
     if length is not None and length > most_bytes:
         raise LinkError(f"it is {length} bytes long, more than the {most_bytes} that it may be", where=part.url)
     return length
@@ -223,7 +238,7 @@ def _begin(part: _Part, answer: Any, most_bytes: int) -> int | None:
 
 def _take(part: _Part, answer: Any, length: int | None, most_bytes: int, until: float, report: Report | None) -> None:
     with part.file.open("ab") as into:
-        while block := answer.read1(BLOCK_BYTES):
+        while block := _block(answer):
             part.have += len(block)
             if part.have > most_bytes:
                 part.drop()
@@ -235,15 +250,23 @@ def _take(part: _Part, answer: Any, length: int | None, most_bytes: int, until: 
                 raise _Again(f"slow: {part.have} of {length if length is not None else 'unknown'} bytes came")
 
 
+def _block(answer: Any) -> bytes:
+    """What comes next; the network's trouble, told from the disk's."""
+    try:
+        return bytes(answer.read1(BLOCK_BYTES))
+    except OSError as why:
+        raise _Again(f"the connection broke: {_words(why)}") from why
+
+
 def _refused(part: _Part, why: urllib.error.HTTPError) -> None:
     """Turn an HTTP error into one of ours."""
     with why:
         if why.code in _PASSING:
-            raise _Again(f"the server answers {why.code} {why.reason}")
+            raise _Again(f"the server answers {why.code} {_words(why.reason)}")
         if why.code == 416:  # what is kept is longer than the object is now
             part.drop()
             raise _Again("what was kept of it is of another version")
-        raise LinkError(f"the server answers {why.code} {why.reason}", where=part.url, reason="download")
+        raise LinkError(f"the server answers {why.code} {_words(why.reason)}", where=part.url, reason="download")
 
 
 def _checked(part: _Part, length: int) -> Arrived:
@@ -287,4 +310,6 @@ def _agree(file: Path, wanted: str, parts: int) -> bool:
 
 
 def _words(why: object) -> str:
-    return (str(why).strip() or type(why).__name__).splitlines()[0][:200]
+    """The first line of what somebody else says, without what a terminal would obey."""
+    line = (str(why).strip() or type(why).__name__).splitlines()[0][:200]
+    return "".join(c if c.isprintable() else "\ufffd" for c in line)

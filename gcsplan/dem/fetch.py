@@ -21,7 +21,8 @@ from gcsplan.dem.download import Patience, Unreachable, download, is_address
 from gcsplan.dem.sources import MOST_LIST_BYTES, WITNESS, Source
 from gcsplan.errors import GcsplanError, InputError, LinkError
 from gcsplan.world.cell import Cell
-from gcsplan.world.raster import Raster, open_raster, sha256_of
+from gcsplan.world.input_files import sha256_of
+from gcsplan.world.raster import Raster, open_raster
 
 try:
     import fcntl

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from gcsplan.world.cell import Cell
+from gcsplan.world.input_files import tell_file
 
 Kind = Literal["surface", "bare"]
 
@@ -128,5 +129,6 @@ def source_or_path(name: str, folder: Path) -> str:
     """The name of a source, or the path of a file in ``folder``; a file that has a source's name is that file."""
     path = folder / name
     if name in SOURCES:
+        tell_file(path)
         return str(path.absolute()) if path.exists() else name
     return str(path)

@@ -23,8 +23,9 @@ from gcsplan.world.cell import Cell
 from gcsplan.world.datum import VerticalDatum, take_apart
 from gcsplan.world.frame import Frame
 from gcsplan.world.height_unit import METRE
+from gcsplan.world.input_files import sha256_of, sha256_of_all
 from gcsplan.world.mosaic import Mosaic
-from gcsplan.world.raster import Raster, open_raster, sha256_of
+from gcsplan.world.raster import Raster, open_raster
 from gcsplan.world.terrain import (
     NO_MORE_VOIDS,
     Box,
@@ -131,8 +132,11 @@ def _tile(cache: Cache, cell: Cell, record: Record, where: str) -> Raster:
     if sha256_of(path) != record.sha256:
         raise InputError.of([cache.missing((cell,), where, "damaged, unlike its checksum")])
     raster = open_raster(path, where=where)
-    datum, unit = VerticalDatum(cache.source.vertical_datum), replace(METRE, by=f"as {cache.source.name} has them")
-    return replace(raster, vertical=datum, sha256=lambda: record.sha256, unit=unit)
+    return replace(
+        raster, vertical=VerticalDatum(cache.source.vertical_datum),
+        unit=replace(METRE, by=f"as {cache.source.name} has them"),
+        sha256=lambda: sha256_of_all(raster.files, record.sha256),
+    )  # fmt: skip
 
 
 def _sea(source: Source, cell: Cell, sample: Raster | None) -> Raster:

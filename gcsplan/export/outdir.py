@@ -33,6 +33,9 @@ __all__ = [
     "PREVIOUS",
     "add_output",
     "can_hold",
+    "has_outputs",
+    "is_output",
+    "outputs_in",
     "require_settled",
     "retire_outputs",
     "settle_outputs",
@@ -143,6 +146,35 @@ def steady(files: Iterable[str | os.PathLike[str]]) -> Iterator[None]:
         if _mark(folder) != mark:
             raise InputError("another gcsplan wrote its outputs here while they were read; run this again",
                              where=str(folder))  # fmt: skip
+
+
+def outputs_in(directory: str | os.PathLike[str]) -> list[str]:
+    """The names of gcsplan's outputs in ``directory``; none if it cannot be read."""
+    root = Path(directory)
+    try:
+        return sorted(name for name in _manifest(root) if os.path.lexists(root / name))
+    except OSError:
+        return []
+
+
+def has_outputs(directory: str | os.PathLike[str], digests: Mapping[str, str]) -> bool:
+    """Whether these outputs (name to SHA-256) are in ``directory``, whole and unedited; if none, that it has none."""
+    root = Path(directory)
+    try:
+        if not root.is_dir():
+            return not digests
+        if is_caught(root):
+            return False
+        if not digests:
+            return not any(os.path.lexists(root / name) for name in _manifest(root))
+        return all(_is_name(name) and _is_ours(root / name, digest) for name, digest in digests.items())
+    except OSError:
+        return False
+
+
+def is_output(name: str) -> bool:
+    """Whether gcsplan may write a file, or the folder of earlier files, of this name (in lower case) among outputs."""
+    return _OURS.fullmatch(name) is not None or name in (PREVIOUS, MANIFEST)
 
 
 def can_hold(directory: str | os.PathLike[str], file: str | os.PathLike[str]) -> bool:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Callable, Iterable
 
 from gcsplan.export.rows import ItemRow
+from gcsplan.export.table import csv_of
 from gcsplan.figures import floored, steepened
 
 COLUMNS: tuple[tuple[str, str, int], ...] = (
@@ -30,13 +29,11 @@ ROUNDED = {"agl_m": floored, "min_agl_on_leg_m": floored, "climb_deg": steepened
 
 def write_profile(rows: Iterable[ItemRow]) -> str:
     """The CSV text: a header and one line per row, with LF and a decimal point; unknown values are empty."""
-    out = io.StringIO()
-    table = csv.writer(out, lineterminator="\n")
-    table.writerow(["vehicle", "seq", "command", *(name for name, _, _ in COLUMNS)])
+    lines: list[list[object]] = [["vehicle", "seq", "command", *(name for name, _, _ in COLUMNS)]]
     for row in rows:
         numbers = [_cell(getattr(row, key), decimals, ROUNDED.get(key, round)) for _, key, decimals in COLUMNS]
-        table.writerow([row.vehicle, row.seq, row.command, *numbers])
-    return out.getvalue()
+        lines.append([row.vehicle, row.seq, row.command, *numbers])
+    return csv_of(lines)
 
 
 def _cell(value: float | None, decimals: int, rounded: Callable[[float, int], float]) -> str:

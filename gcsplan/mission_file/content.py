@@ -13,6 +13,7 @@ from gcsplan.mission_file import samples
 from gcsplan.mission_file.schema import shown
 from gcsplan.mission_file.strict_yaml import MAX_BYTES, MAX_DEPTH, MAX_NODES, read_yaml
 from gcsplan.mission_file.yaml_slips import missing_space
+from gcsplan.world.input_files import tell_file
 
 UNNAMED = Path("mission.yaml")
 """Path of a mission that has no file; files that the mission names are then found from the current folder."""
@@ -58,6 +59,7 @@ def read_content(
 
 
 def _text(file: Path, where: str) -> str:
+    tell_file(file)
     try:
         if file.is_dir():
             raise InputError("this is a folder; give a mission file (.yaml)", where=where)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from gcsplan.errors import InputError
 from gcsplan.mission_file.schema import nearest
+from gcsplan.world.input_files import tell_file
 
 PREFIX = "sample:"
 FOLDERS = (Path(__file__).parents[1] / "missions", Path(__file__).parents[2] / "missions")
@@ -25,7 +26,10 @@ def names() -> list[str]:
 
 def is_sample(source: str | os.PathLike[str]) -> bool:
     """Whether ``source`` names a sample; a file that is really called so keeps its meaning."""
-    return os.fspath(source).startswith(PREFIX) and not os.path.exists(source)
+    if not os.fspath(source).startswith(PREFIX):
+        return False
+    tell_file(source)
+    return not os.path.exists(source)
 
 
 def file_of(source: str | os.PathLike[str]) -> Path:

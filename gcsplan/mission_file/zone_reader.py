@@ -14,6 +14,7 @@ from gcsplan.mission_file.zone_geojson import read_geojson
 from gcsplan.mission_file.zone_json import load_json
 from gcsplan.mission_file.zone_kml import read_kml
 from gcsplan.mission_file.zone_zip import unpack
+from gcsplan.world.input_files import tell_file
 
 MAX_BYTES = 20_000_000
 """Most bytes of a file, and of what is unpacked from one."""
@@ -73,6 +74,7 @@ def _read(path: Path, kind: str, data: bytes, layer: str | None) -> ZoneFile:
 
 
 def _bytes(path: Path, where: str) -> bytes:
+    tell_file(path)
     try:
         if not path.is_file():
             raise InputError(absent(path), where=where)

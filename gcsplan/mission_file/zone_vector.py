@@ -18,6 +18,7 @@ from gcsplan.mission_file.zone_draft import MAX_VERTICES, SIZES
 from gcsplan.mission_file.zone_file import MAX_ZONES, Drawn, ZoneFile
 from gcsplan.mission_file.zone_geojson import ALTITUDES
 from gcsplan.mission_file.zone_zip import unpack
+from gcsplan.world.input_files import tell_file
 from gcsplan.world.reprojection import ToDegrees
 
 if TYPE_CHECKING:
@@ -74,6 +75,8 @@ def _on_disk(path: Path, data: bytes, most_bytes: int) -> Iterator[Path]:
     else:
         parts = {kind: data, **(_beside(path, most_bytes - len(data)) if kind == ".shp" else {})}
     unsaved = path.with_name(path.name + "-wal")
+    if kind == ".gpkg":
+        tell_file(unsaved)
     if kind == ".gpkg" and unsaved.is_file() and unsaved.stat().st_size:
         words = f"{unsaved.name} beside it holds changes that are not in it yet; close the program that has it open"
         raise InputError(words, where=str(path))
@@ -93,7 +96,10 @@ def _beside(path: Path, most_bytes: int) -> dict[str, bytes]:
     """The companions of a Shapefile, by their suffixes."""
     beside: dict[str, bytes] = {}
     for suffix in COMPANIONS:
-        file = next((f for f in (path.with_suffix(suffix), path.with_suffix(suffix.upper())) if f.is_file()), None)
+        names = (path.with_suffix(suffix), path.with_suffix(suffix.upper()))
+        for name in names:
+            tell_file(name)
+        file = next((f for f in names if f.is_file()), None)
         if file is None:
             continue
         most_bytes -= file.stat().st_size

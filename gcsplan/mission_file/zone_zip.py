@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import io
+import lzma
+import struct
 import zipfile
 import zlib
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
 from gcsplan.errors import InputError
+
+DAMAGED = (
+    zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, OSError, RuntimeError, ValueError,
+    LookupError, ArithmeticError,
+)  # fmt: skip
+"""What the library raises for damaged archives."""
 
 
 def unpack(
@@ -22,7 +30,9 @@ def unpack(
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             # Programs of Apple add files ._NAME below __MACOSX, which are none of the user's.
-            names = [PurePosixPath(n) for n in archive.namelist() if not PurePosixPath(n).name.startswith("._")]
+            # A member's own name may be ./doc.kml or a//doc.kml, and one that ends with a slash is a folder.
+            members = {PurePosixPath(m.filename): m for m in archive.infolist() if not m.is_dir()}
+            names = [name for name in members if not name.name.startswith("._")]
             found = [n for n in names if n.suffix.lower() in kinds]
             if len(found) != 1:
                 inside = ", ".join(str(n)[:60] for n in (found or names)[:6]) or "nothing"
@@ -33,14 +43,14 @@ def unpack(
             companions = [n for n in names if n.with_suffix("") == main.with_suffix("") and n.suffix.lower() in beside]
             unpacked: dict[str, bytes] = {}
             for name in dict.fromkeys([main, *companions]):
-                with archive.open(str(name)) as member:
+                with archive.open(members[name]) as member:
                     unpacked[name.suffix.lower()] = member.read(most_bytes + 1)
                 # What the archive says of sizes may be a lie, so that the bytes themselves are counted.
                 if sum(len(content) for content in unpacked.values()) > most_bytes:
                     words = f"unpacks to more than {most_bytes} bytes; simplify or split it"
                     raise InputError(words, where=f"{path}: {name}")
             return unpacked
-    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError, ValueError, NotImplementedError) as why:
+    except DAMAGED as why:
         if isinstance(why, InputError):
             raise
         words = f"this is not a sound zip archive ({str(why)[:100]}); unpack it, and name the file in it"

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
+from gcsplan.world.input_files import files_of, sha256_of_all, tell_file, tell_raster
 from gcsplan.world.raster import gdal, missing, require_numbers
 
 WORST_GEOID_M = 120.0
@@ -31,9 +32,15 @@ class GeoidGrid:
     def __init__(self, path: Path, *, where: str) -> None:
         self.path = path
         self.where = where
+        self._files: tuple[Path, ...] = (path,)
+        tell_raster(path)
         if not path.is_file():
             raise InputError(f"the geoid grid {path} is not there; give the path of a .gtx or .tif grid", where=where)
         self._read(None, None)
+
+    def sha256(self) -> str:
+        """The hash of the grid, and of the files that belong to it."""
+        return sha256_of_all(self._files)
 
     def height_m(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Floats:
         """Geoid above the ellipsoid at points (any equal shapes), metres; AMSL = ellipsoidal height - this.
@@ -66,6 +73,9 @@ class GeoidGrid:
         try:
             with gdal(self.path, "GTX") as dataset:
                 require_numbers(dataset, self.path, where=self.where)
+                self._files = files_of(dataset, self.path)
+                for file in self._files:
+                    tell_file(file)
                 return _heights(dataset, lat, lon)
         except InputError:
             raise

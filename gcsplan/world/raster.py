@@ -6,7 +6,6 @@ Heights belong to pixel centres, whatever AREA_OR_POINT says: GDAL's transform r
 
 from __future__ import annotations
 
-import hashlib
 import math
 import os
 import warnings
@@ -22,6 +21,7 @@ from gcsplan.arrays import Floats
 from gcsplan.errors import InputError, absent
 from gcsplan.world.datum import RasterCRS, VerticalDatum, take_apart
 from gcsplan.world.height_unit import BY_FILE, BY_FORMAT, METRE, HeightUnit, unit_named, unit_that_counts
+from gcsplan.world.input_files import files_of, neighbours, sha256_of_all, tell_file, tell_raster
 
 Reader = Callable[[int, int, int, int], Iterator[tuple[int, Floats]]]
 
@@ -54,7 +54,8 @@ class Raster:
     ``read(col, row, cols, rows)`` yields strips (first row within the window, heights (n, cols)), NaN where unknown.
     ``west``, ``north`` are the outer corner in the raster's own units, ``dx``, ``dy`` > 0 the cell. ``read`` returns
     metres, but above the raster's own vertical datum; ``vertical`` is the file's statement of that datum. ``unit`` is
-    the one in which the file counts. ``stored_bytes``: the size of the file.
+    the one in which the file counts. ``stored_bytes``: the size of the file. ``files`` are those that it is read from:
+    itself, and its sidecars, masks and overviews.
     """
 
     name: str
@@ -71,6 +72,7 @@ class Raster:
     sha256: Callable[[], str]
     notes: tuple[str, ...] = ()
     unit: HeightUnit = METRE
+    files: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,12 +106,14 @@ def open_raster(
 
     The keywords are what the user says (`Said`).
 
-    A file that has not changed since this process opened it is not opened again: many missions use the same tiles.
-    Raises InputError for anything that is not a readable, georeferenced, north-up raster of real numbers.
+    If neither the file nor one beside it has changed since this process opened it, it is not opened again: many
+    missions use the same tiles. Raises InputError for anything that is not a readable, georeferenced, north-up raster
+    of real numbers.
     """
+    tell_raster(path)
     require_file(path, where=where)
-    about, said = path.stat(), Said(crs, height_unit, datum_unit, nodata)
-    key = (path.absolute(), said, about.st_size, about.st_mtime_ns, about.st_ino)
+    said = Said(crs, height_unit, datum_unit, nodata)
+    key = (path.absolute(), said, neighbours(path))
     try:
         if key not in _headers:
             with gdal(path) as dataset:
@@ -118,6 +122,8 @@ def open_raster(
                 _headers.clear()
             _headers[key] = found
         header, to_metres = _headers[key]
+        for file in header.files:
+            tell_file(file)
         return replace(header, read=_reader(path, *to_metres, said.nodata, where=where))
     except InputError:
         raise
@@ -128,6 +134,7 @@ def open_raster(
 
 def require_file(path: Path, *, where: str) -> None:
     """Raise InputError unless ``path`` is a file that can be read and is not empty."""
+    tell_file(path)
     try:
         if path.is_dir():
             raise InputError(f"{path} is a folder without .DAT files; give a file", where=where)
@@ -140,12 +147,6 @@ def require_file(path: Path, *, where: str) -> None:
         raise
     except (OSError, ValueError) as why:
         raise InputError(f"{path} cannot be read: {why}", where=where) from None
-
-
-def sha256_of(path: Path) -> str:
-    """SHA-256 of a file's bytes, read in pieces."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 @contextmanager
@@ -276,11 +277,12 @@ def _header(dataset: Any, path: Path, said: Said, *, where: str) -> tuple[Raster
     if not (math.isfinite(scale) and math.isfinite(offset)) or scale == 0.0:
         raise InputError(f"{path} has a broken scale {scale} or offset {offset}", where=where)
 
+    files = files_of(dataset, path)
     to_metres = (scale * factor, offset * factor)
     header = Raster(
         path.name, system, t.c, t.f, t.a, -t.e, dataset.width, dataset.height, system.vertical,
-        _reader(path, *to_metres, said.nodata, where=where), path.stat().st_size, lambda: sha256_of(path), tuple(notes),
-        unit,
+        _reader(path, *to_metres, said.nodata, where=where), path.stat().st_size, lambda: sha256_of_all(files),
+        tuple(notes), unit, files,
     )  # fmt: skip
     return header, to_metres
 

@@ -13,7 +13,8 @@ from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.world.datum import VerticalDatum, take_apart
 from gcsplan.world.height_unit import METRE
-from gcsplan.world.raster import Raster, sha256_of
+from gcsplan.world.input_files import sha256_of, tell_file
+from gcsplan.world.raster import Raster
 
 SAMPLE = "sample:jacksboro"
 
@@ -28,6 +29,7 @@ def sample_jacksboro() -> Raster:
     if found is None or found.origin is None:
         raise InputError(f"{SAMPLE} comes with matplotlib, which is not installed: pip install matplotlib")
     path = Path(found.origin).parent / "mpl-data" / "sample_data" / "jacksboro_fault_dem.npz"
+    tell_file(path)
     with np.load(path) as file:
         heights = np.asarray(file["elevation"], float)
         west, north, dx, dy = (float(file[k]) for k in ("xmin", "ymin", "dx", "dy"))

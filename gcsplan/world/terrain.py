@@ -27,7 +27,7 @@ from gcsplan.world.model_words import heights_read
 from gcsplan.world.mosaic import Mosaic, Window
 from gcsplan.world.obstacles import canopy_on
 from gcsplan.world.peaks import Peak, flat_grid, peaks_grid
-from gcsplan.world.raster import Raster, open_raster, require_file, sha256_of
+from gcsplan.world.raster import Raster, open_raster, require_file
 from gcsplan.world.sample import SAMPLE, sample_jacksboro
 from gcsplan.world.surface import Surface
 from gcsplan.world.tiles import Tile, hash_of, tiles_of
@@ -221,7 +221,7 @@ class _RasterTerrain:
         if self._geoid is not None:
             _take_off_geoid(window, self._geoid, self._mosaic)
             datum = f"{datum}, made AMSL with {self._geoid.path.name}"
-            info["geoid_sha256"] = sha256_of(self._geoid.path)
+            info["geoid_sha256"] = self._geoid.sha256()
         ground = high if window.low_m is None else window.low_m
         rows, cols = ground.shape
         size = window.grid.metres_per_cell(*(0.5 * np.add(window.plane_box[:2], window.plane_box[2:])))

@@ -13,6 +13,7 @@ import numpy as np
 from gcsplan.errors import InputError
 from gcsplan.world.datum import VerticalDatum
 from gcsplan.world.height_unit import HeightUnit
+from gcsplan.world.input_files import tell_folder
 from gcsplan.world.mosaic import Window
 
 HASHED_BYTES = 256 * 2**20
@@ -77,6 +78,7 @@ def tiles_of(paths: Sequence[str], *, where: str) -> list[str]:
 
 def _in_folder(path: str, where: str) -> list[str]:
     """The rasters in a folder, or the file itself."""
+    tell_folder(path, RASTERS)
     if not os.path.isdir(path):  # not pathlib's, which raises for a name that no disk can hold
         return [path]
     try:

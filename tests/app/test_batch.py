@@ -13,12 +13,12 @@ import yaml
 from typer import testing as runner
 
 from gcsplan.app import batch as module
-from gcsplan.app.batch import Batch, BatchOptions, Record, exit_code, key_of, missions_of
+from gcsplan.app.batch import Batch, BatchOptions, exit_code, missions_of
 from gcsplan.app.executor import Dask, Inline, executor
+from gcsplan.app.records import Record
 from gcsplan.cli.main import app
 from gcsplan.errors import GcsplanError, UsageError
 from gcsplan.export.table import csv_text, parquet_bytes
-from gcsplan.mission_file.read_files import files_of
 from gcsplan.report.index_page import render_index
 from gcsplan.units import METRIC
 
@@ -111,28 +111,6 @@ def test_a_bug_in_one_mission_costs_only_that_mission(
     assert {n: r.code for n, r in records.items()} == {"good": 0, "north/good": 70, "north/broken": 70, "shut": 2}
     assert exit_code(list(records.values())) == 70
     assert "a bug in gcsplan: ZeroDivisionError: made" in records["north/good"].rows[0]["message"]
-
-
-def test_the_key_is_of_all_files_that_a_mission_names(tmp_path: Path) -> None:
-    zones, tiles = tmp_path / "zones.geojson", tmp_path / "tiles"
-    zones.write_text("{}")
-    (tiles / "deep").mkdir(parents=True)
-    (tiles / "deep" / "a.tif").write_text("a")
-    file = tmp_path / "m.yaml"
-    file.write_text(mission(terrain={"dem": "tiles"}, no_fly=[{"file": "zones.geojson"}]))
-    assert files_of(file) == (tiles / "deep" / "a.tif", zones)
-    seen = {key_of(file, BatchOptions())}
-    for change in (
-        lambda: zones.write_text('{"a": 1}'),
-        lambda: (tiles / "b.tif").write_text("b"),
-        lambda: (tiles / "b.tif").write_text("longer"),
-        lambda: file.write_text(file.read_text() + "\n"),
-    ):
-        change()
-        key = key_of(file, BatchOptions())
-        assert key not in seen
-        seen.add(key)
-    assert key_of(file, BatchOptions(seed=2)) not in seen
 
 
 def test_names_are_paths_from_the_common_folder(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -285,9 +286,32 @@ def test_what_is_piped_is_the_table_and_a_reader_that_goes_away_is_no_bug(run: A
     assert "lowest AGL, m" in text
     assert re.search(r"verdict +safe", text)
     assert "\x1b" not in text
+    whole = {p.name: p.read_bytes() for p in (tmp_path / "out").iterdir()}
+    shutil.rmtree(tmp_path / "out")
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         process.stdout.close()
         err = process.stderr.read()
-        assert process.wait(timeout=120) == 1
-    assert "Traceback" not in err
-    assert "internal" not in err
+        assert process.wait(timeout=120) == 0
+    assert not re.search("Traceback|internal|pipe", err, re.IGNORECASE)
+    assert {p.name: p.read_bytes() for p in (tmp_path / "out").iterdir()} == whole
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"), [("--help", 0), ("planners", 0), ("plan sample:nope", 2), ("plan sample:nope --json", 2)]
+)
+def test_a_command_ends_alike_whoever_reads_it(arguments: str, code: int) -> None:
+    command = [sys.executable, "-m", "gcsplan", *arguments.split()]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as process:
+        process.stdout.close()  # `2>&1 | true`
+        assert process.wait(timeout=120) == code
+
+
+def test_a_plan_says_which_outputs_of_the_earlier_one_are_gone(run: Any, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert run("plan", str(CROSSING), "-o", str(out), "--report")[0] == 0
+    code, _, err = run("plan", str(CROSSING), "-o", str(out))
+    assert code == 0
+    assert not (out / "report.html").exists()
+    assert "gone from" in err
+    assert "report.html; --report writes one of this plan" in err
+    assert "gone from" not in run("plan", str(CROSSING), "-o", str(out))[2]

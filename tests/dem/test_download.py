@@ -274,3 +274,40 @@ def test_a_redirect_is_followed_but_not_to_a_file(served: Served, tmp_path: Path
 )  # fmt: skip
 def test_an_address_is_http_of_a_host(text: str, good: bool) -> None:
     assert is_address(text) is good
+
+
+HOSTILE: list[tuple[int, dict[str, str]]] = [
+    (302, {"Location": location})
+    for location in (
+        "http://[", "http://[::1", "http://" + "a" * 300 + "/", "http://a..b/", "http://127.0.0.1:99999/x",
+        "http://127.0.0.1:x/", "//[/", "http://\x01/", "http://" + "é" * 70 + ".example/", "http:///", "?" * 5000,
+        "http://127.0.0.1:1/%zz", "javascript:1", "http://user:pw@[/",
+    )
+] + [
+    (200, {"Content-Length": length})
+    for length in ("\u00b2", "9" * 5000, "-1", "1e5", " ", "0x10", "\u00b3" * 400, "+5", "1_000")
+] + [
+    (206, {"Content-Length": "5", "Content-Range": f"bytes {span}"})
+    for span in ("0-4/" + "9" * 5000, "0-\u00b2/5", "x", "-/-")
+] + [
+    (200, {"Content-Length": "5", "ETag": "x" * 60_000}), (200, {"Content-Length": "5", "Content-Encoding": "br"}),
+    (304, {}), (999, {"Content-Length": "0"}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("answer", range(len(HOSTILE)))
+def test_an_answer_that_nobody_can_read_is_that_object_s_failure(served: Served, tmp_path: Path, answer: int) -> None:
+    code, headers = HOSTILE[answer]
+
+    def trouble(request: BaseHTTPRequestHandler, path: str, number: int) -> bool:
+        if path != PATH:
+            return False
+        lines = [f"HTTP/1.0 {code} x\x1b[31m", *(f"{name}: {value}" for name, value in headers.items()), "", "12345"]
+        request.wfile.write("\r\n".join(lines).encode("latin-1"))
+        return True
+
+    served.trouble = trouble
+    if "ETag" in headers:
+        assert bring(served, tmp_path).etag == ""  # a record holds no tag of any length
+    else:
+        assert "\x1b" not in str(refusal(served, tmp_path))

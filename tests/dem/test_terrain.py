@@ -19,7 +19,7 @@ from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.from_options import OpenWorld, WorldOptions
 from gcsplan.world.cell import Cell
 from gcsplan.world.frame import Frame
-from gcsplan.world.raster import sha256_of
+from gcsplan.world.input_files import sha256_of
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import TerrainSpec
 from tests.support.tiles import ROWS, height_at, heights_of, tile

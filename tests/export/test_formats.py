@@ -24,12 +24,14 @@ from gcsplan.export.kml import DRAWN_TOP_M, write_kml
 from gcsplan.export.profile import write_profile
 from gcsplan.export.rows import ItemRow, Track, WayPoint, outline_deg
 from gcsplan.export.summary import ORDER, write_summary
+from gcsplan.export.table import csv_of
 from gcsplan.mission_file.zone_draft import place_zones
 from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.support.effort import draws
+from tests.support.paths import REPOSITORY
 
 FRAME = Frame(36.6, -84.3)
 TRACK = Track(
@@ -459,3 +461,23 @@ def test_the_same_input_gives_the_same_bytes() -> None:
     for write in (write_kml, write_geojson):
         assert write("m", [TRACK], ZONES, FRAME) == write("m", [TRACK], ZONES, Frame(36.6, -84.3))
     assert write_summary(summary()) == write_summary(dict(reversed(summary().items())))
+
+
+@pytest.mark.parametrize(
+    ("value", "cell"),
+    [
+        ("=1+1", "'=1+1"), ("+cmd", "'+cmd"), ("-uav", "'-uav"), ("@sum", "'@sum"), ("\tx", "'\tx"), ("\rx", '"\'\rx"'),
+        ("-5.25", "-5.25"), ("+1e-3", "+1e-3"), (-5.25, "-5.25"), ("uav=1", "uav=1"), ("", ""), (None, ""),
+        ("=1,2", '"\'=1,2"'), ("-1+2", "'-1+2"), ("-.5", "-.5"),
+    ],
+)  # fmt: skip
+def test_no_text_of_a_csv_is_a_formula(value: object, cell: str) -> None:
+    assert csv_of([["a", value]]) == f"a,{cell}\n"
+
+
+def test_every_csv_is_written_in_one_place() -> None:
+    writers = [
+        path.name for path in (REPOSITORY / "gcsplan").rglob("*.py")
+        if re.search(r"csv\.(Dict)?[wW]riter", path.read_text(encoding="utf-8"))
+    ]  # fmt: skip
+    assert writers == ["table.py"]

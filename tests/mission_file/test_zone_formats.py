@@ -473,3 +473,17 @@ def test_names_of_archives_lead_nowhere(tmp_path: Path) -> None:
     (tmp_path / "z.zip").write_bytes(buffer.getvalue())
     assert len(placed(read(tmp_path / "z.zip"))) == 1
     assert [p.name for p in tmp_path.iterdir()] == ["z.zip"]
+
+
+@pytest.mark.parametrize("name", ["./doc.kml", "a//doc.kml", "a/./doc.kml", "/doc.kml", "a/../doc.kml"])
+def test_a_kmz_member_goes_by_its_own_name(tmp_path: Path, name: str) -> None:
+    with zipfile.ZipFile(tmp_path / "z.kmz", "w") as archive:
+        archive.writestr(name, KML)
+        archive.writestr("folder.kml/", "")
+    assert len(placed(read(tmp_path / "z.kmz"))) == 1
+
+
+def test_a_kmz_of_a_folder_alone_is_refused(tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "z.kmz", "w") as archive:
+        archive.writestr("doc.kml/", "")
+    assert "must hold one .kml file" in message(tmp_path / "z.kmz")
