@@ -20,6 +20,7 @@ from gcsplan.mission_file.zone_draft import MAX_VERTICES, Bounds, Remark, ZoneDr
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_levels import EXAMPLES, LevelError, Limit, read_level
 from gcsplan.world.degree_shapes import LARGEST_RADIUS_M, outline_of, unwrapped
+from gcsplan.world.outlines import MOST_CROSSINGS, MOST_PAIRS, crossings, overlapping_pairs
 from gcsplan.world.zones import Level
 
 Corner = tuple[float, float]
@@ -182,7 +183,11 @@ class AirspaceFile:
         if not why:
             self._add(zone, part, where, tuple(outline), None, limits, [])
             return
-        parts = enclosed(outline) if len(set(outline)) > 2 else []
+        at = np.asarray(outline, float)
+        tangled = overlapping_pairs(at) > MOST_PAIRS or crossings(at) > MOST_CROSSINGS
+        if tangled:
+            why = f"its outline of {len(outline)} corners is too tangled to tell what it encloses"
+        parts = enclosed(outline) if len(set(outline)) > 2 and not tangled else []
         if not parts:
             if ring:
                 self._add(zone, part, where, around(ring), None, limits, [Problem(where, f"{why}; {CURE}")])
