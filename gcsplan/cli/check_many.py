@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any, Protocol
 
-from gcsplan.cli.ending import complain, explained, interrupted, printable, put
+from gcsplan.cli.ending import closers, complain, explained, interrupted, printable, put
 from gcsplan.errors import GcsplanError, InputError
 
 if TYPE_CHECKING:
@@ -172,6 +172,7 @@ def tell(
     failing: list[Failing] = []
     broken: GcsplanError | None = None
     printer.begin(header)
+    closers.append(lambda error: printer.end(header, summary, error.as_dict()))
     try:
         for told in results:
             summary.add(told)
@@ -186,6 +187,8 @@ def tell(
             printer.end(header, summary, None)
             raise
         broken = interrupted() if isinstance(why, KeyboardInterrupt) else explained(why)
+    finally:
+        closers.pop()
     printer.end(header, summary, failure(failing, more) if broken is None else broken.as_dict())
     if broken is not None:  # not raised, for a second document must not follow
         complain(broken)

@@ -10,10 +10,11 @@ import stat
 import sys
 import threading
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any, ClassVar, NoReturn
 
+from gcsplan.cli.signals import Watch
 from gcsplan.errors import GcsplanError, InputError, UsageError
 
 
@@ -43,25 +44,51 @@ _ENDINGS: dict[int, type[Interrupted]] = {
 }
 _received: list[int] = []
 
+closers: list[Callable[[GcsplanError], None]] = []
+"""The last one closes the document that standard output holds a part of, with an error in it."""
 
-def end_in_good_order() -> None:
+
+def end_in_good_order(*, as_json: bool = False) -> None:
     """Make SIGTERM and SIGHUP end this process as Ctrl-C does: links are closed, unfinished work is undone.
 
-    A process that was started to ignore one of them (nohup) continues to ignore it.
+    A process that was started to ignore one of them (nohup) continues to ignore it. While a library computes, the
+    process ends at once, with the same message (`signals.Watch`).
     """
-    owner = os.getpid()
+    if threading.current_thread() is not threading.main_thread():  # Python sets handlers in the main thread only
+        return
+    owner, watch = os.getpid(), Watch(lambda number: _end_at_once(number, as_json))
 
     def stop(number: int, _: object) -> None:
-        if os.getpid() != owner:  # a forked child dies by the signal's default
-            signal.signal(number, signal.SIG_DFL)
-            os.kill(os.getpid(), number)
-        _received.append(number)
+        watch.heard()
+        if number in _ENDINGS:
+            if os.getpid() != owner:  # a forked child dies by the signal's default
+                signal.signal(number, signal.SIG_DFL)
+                os.kill(os.getpid(), number)
+            _received.append(number)
         raise KeyboardInterrupt
 
-    here = threading.current_thread() is threading.main_thread()  # Python sets handlers in the main thread only
-    for number in _ENDINGS if here else ():
-        if signal.getsignal(number) is signal.SIG_DFL:
+    defaults = dict.fromkeys(_ENDINGS, signal.SIG_DFL) | {signal.SIGINT: signal.default_int_handler}
+    for number, default in defaults.items():
+        if signal.getsignal(number) is default:
             signal.signal(number, stop)
+
+
+def _end_at_once(number: int, as_json: bool) -> NoReturn:
+    """End the process from a thread beside one that computes; nothing else of this process runs any more."""
+    if number in _ENDINGS:
+        _received.append(number)
+    error = interrupted()
+    with suppress(Exception):
+        if sys.stderr.isatty():
+            sys.stderr.write("\r\x1b[K\x1b[?25h")  # a progress bar hides the cursor
+        complain(error)
+        sys.stderr.flush()
+        if closers:
+            closers[-1](error)
+        elif as_json:
+            put(json.dumps({"error": error.as_dict()}) + "\n")
+        sys.stdout.flush()
+    os._exit(error.exit_code)
 
 
 def interrupted(words: str = "") -> Interrupted:

@@ -101,7 +101,7 @@ def main() -> NoReturn:
     # gcsplan uses no plug-ins of pydantic; a search for them reads the lists of all installed packages
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
-        end_in_good_order()
+        end_in_good_order(as_json=as_json)
         # With standalone_mode=False click returns the code of typer.Exit instead of exiting.
         code = _commands(arguments[0] if arguments else "")(args=arguments, prog_name="gcsplan", standalone_mode=False)
         if code == Interrupted.exit_code:  # typer's code for Ctrl-C

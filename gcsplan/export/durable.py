@@ -31,6 +31,9 @@ PART = ".gcsplan-part-"
 LOCK_WAIT_S = 10.0
 """Seconds that a run waits for another one that is writing to the same directory."""
 
+in_progress = 0
+"""How many writes are in progress, which a signal must not cut off."""
+
 _PART_NAME = re.compile(re.escape(PART) + r"[0-9a-f]{16}")
 _CANNOT_SYNC = {errno.EINVAL, errno.ENOTSUP, errno.EBADF, errno.EACCES, errno.EPERM}
 _CANNOT_LOCK = {errno.EINVAL, errno.ENOTSUP, errno.EBADF, errno.ENOLCK, errno.ENOSYS}
@@ -45,6 +48,21 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
     """
     target = Path(path)
     data = content.encode("utf-8") if isinstance(content, str) else content
+    with _uncut():
+        _replace(target, data)
+
+
+@contextmanager
+def _uncut() -> Iterator[None]:
+    global in_progress
+    in_progress += 1
+    try:
+        yield
+    finally:
+        in_progress -= 1
+
+
+def _replace(target: Path, data: bytes) -> None:
     try:
         _sweep(target.parent)
         handle, part = _new_part(target.parent)
@@ -60,7 +78,9 @@ def write_whole(path: str | os.PathLike[str], content: str | bytes) -> None:
             raise
         sync_directory(target.parent)
     except (OSError, ValueError) as error:
-        raise InputError(f"cannot be written: {getattr(error, 'strerror', None) or error}", where=str(path)) from error
+        raise InputError(
+            f"cannot be written: {getattr(error, 'strerror', None) or error}", where=str(target)
+        ) from error
 
 
 def write_new(path: Path, data: bytes) -> None:
@@ -110,7 +130,8 @@ def locked(directory: Path) -> Iterator[None]:
     The lock ends with the process, however that ends. Raises InputError if another process holds it for `LOCK_WAIT_S`.
     """
     if not POSIX:
-        yield
+        with _uncut():
+            yield
         return
     until = time.monotonic() + LOCK_WAIT_S
     while True:
@@ -118,7 +139,8 @@ def locked(directory: Path) -> Iterator[None]:
         try:
             free = _take_lock(handle)
             if free and os.path.samestat(os.fstat(handle), os.stat(directory)):  # otherwise it was replaced meanwhile
-                yield
+                with _uncut():
+                    yield
                 return
         finally:
             os.close(handle)

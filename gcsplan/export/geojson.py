@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.export.rows import HEIGHT_DECIMALS, Track, WayPoint, outline_deg
+from gcsplan.export.rows import HEIGHT_DECIMALS, Track, WayPoint, outlines_deg
 from gcsplan.figures import floored
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Level, Zone
@@ -46,9 +46,9 @@ def write_geojson(name: str, tracks: Sequence[Track], zones: Sequence[Zone], fra
                 place = _position(track.lon_deg[index], track.lat_deg[index], track.amsl_m[index])
                 about = {"kind": "waypoint", "vehicle": track.vehicle, **_figures(point, float(track.amsl_m[index]))}
                 features.append(_feature({"type": "Point", "coordinates": place}, about))
-    for zone in zones:
+    for zone, ring in zip(zones, outlines_deg(zones, frame), strict=True):
         about = {"kind": "no_fly", "name": zone.name, **_levels(zone)}
-        features.append(_feature(_area(outline_deg(zone, frame)), about))
+        features.append(_feature(_area(ring), about))
     document = {
         "type": "FeatureCollection",
         "name": name,

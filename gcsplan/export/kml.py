@@ -15,7 +15,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.export.rows import HEIGHT_DECIMALS, Track, WayPoint, extent_words, outline_deg
+from gcsplan.export.rows import HEIGHT_DECIMALS, Track, WayPoint, extent_words, outlines_deg
 from gcsplan.figures import floored
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Level, Zone
@@ -54,7 +54,7 @@ def write_kml(
     time of day from which the tracks' times count, if there is one.
     """
     top_m = max((float(t.amsl_m.max()) for t in tracks), default=0.0) + DRAWN_TOP_M
-    outlines = [outline_deg(zone, frame) for zone in zones]
+    outlines = outlines_deg(zones, frame)
     lines = [
         '<?xml version="1.0" encoding="UTF-8"?>',
         '<kml xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2">',

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -86,17 +87,25 @@ class Track:
             object.__setattr__(self, name, column)
 
 
-def outline_deg(zone: Zone, frame: Frame) -> Floats:
-    """(N, 2) latitude, longitude of the corners of ``zone``, counter-clockwise, not closed.
+def outlines_deg(zones: Sequence[Zone], frame: Frame) -> list[Floats]:
+    """For each of the zones (N, 2) latitude, longitude of its corners, counter-clockwise, not closed.
 
     A circle becomes a polygon of `CIRCLE_CORNERS` corners that contains all of it.
     """
-    shape = zone.shape
-    if isinstance(shape, Circle):
-        turn = 2.0 * np.pi * np.arange(CIRCLE_CORNERS) / CIRCLE_CORNERS
-        reach = (shape.radius_m + OUTLINE_MARGIN_M) / math.cos(math.pi / CIRCLE_CORNERS)
-        return frame.to_degrees(shape.east_m + reach * np.cos(turn), shape.north_m + reach * np.sin(turn))
-    return frame.to_degrees(shape.vertices[:, 0], shape.vertices[:, 1])
+    turn = 2.0 * np.pi * np.arange(CIRCLE_CORNERS) / CIRCLE_CORNERS
+    east, north = np.cos(turn), np.sin(turn)
+    rings = []
+    for zone in zones:
+        shape = zone.shape
+        if isinstance(shape, Circle):
+            reach = (shape.radius_m + OUTLINE_MARGIN_M) / math.cos(math.pi / CIRCLE_CORNERS)
+            rings.append(np.stack([shape.east_m + reach * east, shape.north_m + reach * north], axis=-1))
+        else:
+            rings.append(shape.vertices)
+    if not rings:
+        return []
+    corners = np.concatenate(rings)  # one call for all: each has a cost of its own
+    return np.split(frame.to_degrees(corners[:, 0], corners[:, 1]), np.cumsum([len(r) for r in rings])[:-1])
 
 
 def extent_words(zone: Zone) -> str:

@@ -24,6 +24,7 @@ from gcsplan.world.degree_shapes import (
     wide_fault,
 )
 from gcsplan.world.frame import Frame
+from gcsplan.world.outlines import fewer_corners
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 
 SIZES = ("radius_m", "buffer_m")
@@ -31,6 +32,17 @@ SIZES = ("radius_m", "buffer_m")
 
 MAX_VERTICES = 100_000
 """Most vertices of one polygon."""
+
+MOST_CORNERS = 20_000
+"""Most corners of one polygon near the mission; more are drawn wider, by at most `WIDEST_M`, with fewer."""
+
+WIDEST_M, MUCH_WIDER_M = 0.5, (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+"""How much wider an outline is drawn without being asked, m, and tolerances that are tried for a cure."""
+
+WIDER = (
+    f"an outline of more than {MOST_CORNERS} corners is drawn wider with fewer, by at most {WIDEST_M:g} m, and so are "
+    "these zones"
+)
 
 MAX_LINE_POINTS = 20_000
 """Most points of one line: its corridor takes a second for some thousand points."""
@@ -227,6 +239,7 @@ def place_zones(drafts: Sequence[ZoneDraft], frame: Frame) -> tuple[list[tuple[Z
         shapes = _shapes(draft, frame)
         if not shapes:
             far.append(draft)
+        draft, shapes = _with_fewer_corners(draft, shapes)
         for i, shape in enumerate(shapes):
             name = draft.name if len(shapes) == 1 else f"{draft.name}/{i + 1}"
             placed.append((draft, Zone(name, shape, draft.floor, draft.ceiling)))
@@ -235,6 +248,43 @@ def place_zones(drafts: Sequence[ZoneDraft], frame: Frame) -> tuple[list[tuple[Z
             other = replace(draft, points=draft.doubt, faults=(fault,), remarks=())
             placed += [(other, Zone(draft.name, shape)) for shape in near_polygons(other.points, frame)]
     return placed, far
+
+
+def _with_fewer_corners(
+    draft: ZoneDraft, shapes: Sequence[Circle | Polygon]
+) -> tuple[ZoneDraft, Sequence[Circle | Polygon]]:
+    """The shapes, those with too many corners drawn wider with fewer, and what is said of that.
+
+    If that does not help, the zone has a fault: it refuses a mission nearby.
+    """
+    found: list[Circle | Polygon] = []
+    for shape in shapes:
+        if isinstance(shape, Circle) or len(shape.vertices) <= MOST_CORNERS:
+            found.append(shape)
+            continue
+        count, drawn = len(shape.vertices), _wider(shape)
+        if drawn is not None:
+            draft = replace(draft, remarks=(*draft.remarks, (WIDER, f"{len(drawn.vertices)} for {count}")))
+            found.append(drawn)
+            continue
+        cure = next((f"drawn up to {more_m:g} m wider it has {len(ring)}" for more_m in MUCH_WIDER_M
+                     if (ring := fewer_corners(shape.vertices, more_m)) is not None and len(ring) <= MOST_CORNERS),
+                    "draw a simpler one around it")  # fmt: skip
+        words = (
+            f"zone {draft.name[:60]!r}: its outline has {count} corners, more than {MOST_CORNERS}; simplify it: {cure}"
+        )
+        draft = replace(draft, faults=(*draft.faults, Problem(draft.where, words)))
+        found.append(shape)
+    return draft, found
+
+
+def _wider(shape: Polygon) -> Polygon | None:
+    """The polygon drawn wider by at most `WIDEST_M` with few enough corners; None if that fails."""
+    for more_m in (0.1 * WIDEST_M, WIDEST_M):
+        ring = fewer_corners(shape.vertices, more_m)
+        if ring is not None and len(ring) <= MOST_CORNERS:
+            return Polygon(np.ascontiguousarray(ring))
+    return None
 
 
 def zone_notes(placed: Sequence[tuple[ZoneDraft, object]]) -> list[str]:

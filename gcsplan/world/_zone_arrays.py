@@ -126,12 +126,12 @@ def _lattice(box: Floats) -> tuple[Floats, Int64s, Int64s]:
     corner = np.floor((box - (west, south, west, south)) / side).astype(np.int64)
     corner[:, 0::2] = corner[:, 0::2].clip(0, cols - 1)
     corner[:, 1::2] = corner[:, 1::2].clip(0, rows - 1)
-    members: list[list[int]] = [[] for _ in range(cols * rows)]
-    for k, (i0, j0, i1, j1) in enumerate(corner):
-        for j in range(j0, j1 + 1):
-            for i in range(i0, i1 + 1):
-                members[j * cols + i].append(k)
+    wide, tall = (corner[:, 2] - corner[:, 0] + 1), (corner[:, 3] - corner[:, 1] + 1)
+    count = wide * tall
+    zone = np.repeat(np.arange(len(box)), count)
+    place = np.arange(len(zone)) - np.repeat(np.cumsum(count) - count, count)
+    square = (corner[zone, 1] + place // wide[zone]) * cols + corner[zone, 0] + place % wide[zone]
+    near = np.ascontiguousarray(zone[np.argsort(square, kind="stable")], np.int64)
     bucket = np.zeros(cols * rows + 1, np.int64)
-    bucket[1:] = np.cumsum([len(m) for m in members])
-    near = np.array([k for m in members for k in m], np.int64)
+    bucket[1:] = np.cumsum(np.bincount(square, minlength=cols * rows))
     return np.array([west, south, 1.0 / side, cols, rows]), bucket, near

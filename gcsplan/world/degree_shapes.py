@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.world.frame import FARTHEST_M, Frame
+from gcsplan.world.outlines import MOST_PAIRS, crossings, overlapping_pairs
 from gcsplan.world.zones import Circle, Polygon
 
 if TYPE_CHECKING:
@@ -50,6 +51,10 @@ METRES_OF_DEGREE = 111_700.0
 
 MOST_POINTS = 1000
 """A longer line becomes several corridors, since the time for one grows faster than its points."""
+
+UNTANGLED, MOST_OF_POINT = 32, 4
+"""A line of more points than the first that crosses itself more often than this for each point becomes several
+corridors at once: what it surrounds would be found, at great length, and then cut into parts of its own."""
 
 FAR_M = 1.6 * FARTHEST_M
 """No mission goes farther than this from the frame's origin, m."""
@@ -124,7 +129,9 @@ def _rings_around(points: Floats, buffer_m: float) -> list[Floats]:
     import shapely
 
     half = len(points) // 2
-    if len(points) > MOST_POINTS:
+    most = MOST_OF_POINT * len(points)
+    tangled = UNTANGLED < len(points) <= MOST_POINTS and crossings(points, most, closed=False) > most
+    if len(points) > MOST_POINTS or tangled:
         return _rings_around(points[: half + 1], buffer_m) + _rings_around(points[half:], buffer_m)
     line, begin = shapely.LineString(points), shapely.Point(points[0])
     shapely.prepare(line)  # distances from all corners to all legs would take minutes
@@ -191,7 +198,13 @@ def outline_of(points: Sequence[Corner], *, local: bool = False) -> tuple[list[C
     import shapely  # many missions have no polygons
 
     shape = shapely.Polygon(np.asarray(ring, float) if local else np.asarray(ring, float)[:, ::-1])
-    return ring, "" if shape.is_valid and shape.area > 0.0 else _why_invalid(shape, local)
+    if overlapping_pairs(shapely.get_coordinates(shape)[:-1]) > MOST_PAIRS:
+        return ring, (
+            f"the outline has {len(ring)} corners, and its edges lie beside each other in such numbers that it would "
+            "take minutes to examine; simplify it, or draw what is around it"
+        )
+    # The function, not the method: it lets other threads run, which hear signals.
+    return ring, "" if shapely.is_valid(shape) and shape.area > 0.0 else _why_invalid(shape, local)
 
 
 def wide_fault(points: Sequence[Corner], holes: int = 0, *, closed: bool = True) -> str:

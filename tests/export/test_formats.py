@@ -22,7 +22,7 @@ from pyproj import Geod
 from gcsplan.export.geojson import write_geojson
 from gcsplan.export.kml import DRAWN_TOP_M, write_kml
 from gcsplan.export.profile import write_profile
-from gcsplan.export.rows import ItemRow, Track, WayPoint, outline_deg
+from gcsplan.export.rows import ItemRow, Track, WayPoint, outlines_deg
 from gcsplan.export.summary import ORDER, write_summary
 from gcsplan.export.table import csv_of
 from gcsplan.mission_file.zone_draft import place_zones
@@ -98,7 +98,7 @@ def test_a_track_that_is_none_is_refused(lat: list[float], lon: list[float], way
 @settings(max_examples=draws(60))
 @given(st.floats(-40_000, 40_000), st.floats(-40_000, 40_000), st.floats(1.0, 20_000.0))
 def test_the_outline_of_a_circle_holds_the_circle_even_after_rounding(east: float, north: float, radius: float) -> None:
-    corners = np.round(outline_deg(Zone("z", Circle(east, north, radius)), FRAME), 7)
+    corners = np.round(outlines_deg([Zone("z", Circle(east, north, radius))], FRAME)[0], 7)
     ring = FRAME.to_plane(corners[:, 0], corners[:, 1])
     ahead = np.roll(ring, -1, axis=0)
     edge = ahead - ring
@@ -384,7 +384,7 @@ def test_a_zone_across_the_antimeridian_becomes_two_polygons_of_the_same_area() 
             assert len({math.copysign(1.0, p[0]) for p in ring}) == 1
             assert all(abs(p[0]) <= 180.0 for p in ring)
             total += WGS84.polygon_area_perimeter([p[0] for p in ring], [p[1] for p in ring])[0]
-        corners = frame.to_plane(*outline_deg(zone, frame).T)
+        corners = frame.to_plane(*outlines_deg([zone], frame)[0].T)
         e, n = corners.T
         shoelace = 0.5 * float(np.sum(e * np.roll(n, -1) - n * np.roll(e, -1)))
         assert total == pytest.approx(shoelace, rel=1e-4)

@@ -67,11 +67,16 @@ class Arc:
         start, end = math.atan2(e0, n0), math.atan2(e1, n1)
         return cls(centre, start, _sweep(start, end, clockwise), (radii[0], radii[1]), (first, last))
 
+    @property
+    def pieces(self) -> int:
+        """How many straight pieces the arc is drawn with; it has up to four corners more."""
+        step = min(WIDEST_STEP, 2.0 * math.acos(1.0 - min(SAGITTA_M / max(self.radii_m), 0.5)))
+        return max(1, math.ceil(abs(self.sweep) / step))
+
     def corners(self, outward: bool | None) -> list[Corner]:
         """The arc's corners: around the circle if it bulges ``outward``, inside it if not, on it if that is unknown."""
         least, most = min(self.radii_m), max(self.radii_m)
-        step = min(WIDEST_STEP, 2.0 * math.acos(1.0 - min(SAGITTA_M / most, 0.5)))
-        count = max(1, math.ceil(abs(self.sweep) / step))
+        count = self.pieces
         part = self.sweep / count
         if outward:  # tangents: their corners lie over the middle of each piece
             most *= 1.0 + 0.2 * (most / EARTH_RADIUS_M) ** 2  # the plane stretches distances by (r/R)²/6 at most
@@ -86,6 +91,11 @@ class Arc:
         centre_lon = self.centre[1]  # beyond the antimeridian, if that is where the circle goes
         corners = [(float(lat), centre_lon + ((float(lon) - centre_lon + 180.0) % 360.0 - 180.0)) for lat, lon in at]
         return corners if self.ends is None else [self.ends[0], *corners, self.ends[1]]
+
+
+def corners_of(pieces: Sequence[Corner | Arc]) -> int:
+    """How many corners the outline of points and arcs has, before it is drawn; no more than it has."""
+    return sum(p.pieces if isinstance(p, Arc) else 1 for p in pieces)
 
 
 def outline(pieces: Sequence[Corner | Arc]) -> list[Corner]:

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from gcsplan.errors import Problem
 from gcsplan.figures import counted
-from gcsplan.mission_file.airspace.arcs import Arc, ArcError, Corner, outline
+from gcsplan.mission_file.airspace.arcs import Arc, ArcError, Corner, corners_of, outline
 from gcsplan.mission_file.airspace.policy import UNREAD_TIMES, Policy, Published
 from gcsplan.mission_file.airspace.times import Period, TimeError, read_end, read_instant
 from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
@@ -267,6 +267,10 @@ class _Reading:
         if block.lost and not file.judge.reason(zone):  # it may reach farther than what is understood of it
             for number, words in block.lost[:MOST_MISTAKES]:
                 file.fault(f"{file.path}: line {number}", f"zone {name[:60]!r}: {words}")
+            return
+        if (count := corners_of(block.pieces)) > MAX_VERTICES:
+            words = f"its outline has {len(block.pieces)} points and arcs, drawn with {count} corners, more than"
+            file.fault(where, f"zone {name[:60]!r}: {words} {MAX_VERTICES}; simplify it")
             return
         ring = outline(block.pieces)
         shapes = len(block.circles) + bool(ring)

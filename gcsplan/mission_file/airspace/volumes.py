@@ -20,6 +20,7 @@ from gcsplan.mission_file.zone_draft import ACROSS, MAX_VERTICES, Bounds, Remark
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_levels import EXAMPLES, LevelError, Limit, read_level
 from gcsplan.world.degree_shapes import HALF_TURN_DEG, LARGEST_RADIUS_M, across, outline_of, unwrapped, wide_fault
+from gcsplan.world.outlines import MOST_CROSSINGS, MOST_PAIRS, crossings, overlapping_pairs
 from gcsplan.world.zones import Level
 
 Corner = tuple[float, float]
@@ -191,7 +192,11 @@ class AirspaceFile:
         if not why:
             self._add(zone, part, where, tuple(outline), None, limits, [], doubt)
             return
-        parts = enclosed(outline) if len(set(outline)) > 2 else []
+        at = np.asarray(outline, float)
+        tangled = overlapping_pairs(at) > MOST_PAIRS or crossings(at) > MOST_CROSSINGS
+        if tangled:
+            why = f"its outline of {len(outline)} corners is too tangled to tell what it encloses"
+        parts = enclosed(outline) if len(set(outline)) > 2 and not tangled else []
         if not parts:
             if ring:
                 self._add(zone, part, where, self._around(ring), None, limits, [Problem(where, f"{why}; {CURE}")])

@@ -1,0 +1,309 @@
+"""Inputs of a given size, one kind for each amount that a user's file decides: corners, arcs, zones, items, cells, …
+
+``write(kind, count, seed)`` writes the files of one input into the current folder and returns the arguments of
+``gcsplan``. All inputs lie around one place on flat ground, so that the amount alone makes the work.
+
+    python -m tests.campaigns.sizes KIND COUNT [SEED]     # writes one input here, and prints its command
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import random
+import shlex
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import rasterio
+import yaml
+from rasterio.transform import Affine
+
+LAT, LON = 46.0, 14.5
+NORTH_M, EAST_M = 111_160.0, 77_300.0
+"""Metres of a degree at this place, roughly."""
+
+Places = Sequence[tuple[float, float]]
+"""(east, north), metres from the place."""
+
+
+def degrees(places: Places) -> list[list[float]]:
+    """[latitude, longitude] of each place."""
+    return [[LAT + n / NORTH_M, LON + e / EAST_M] for e, n in places]
+
+
+def spiky(count: int, rng: random.Random, middle: tuple[float, float] = (2000.0, 0.0), outer: float = 900.0) -> Places:
+    """A ring whose every corner is a spike."""
+    turn = [2.0 * math.pi * k / count for k in range(count)]
+    radii = [outer * rng.uniform(0.66, 1.0) for _ in range(count)]
+    return [(middle[0] + r * math.cos(a), middle[1] + r * math.sin(a)) for a, r in zip(turn, radii, strict=True)]
+
+
+def smooth(count: int, rng: random.Random) -> Places:
+    """A coast: a ring whose corners lie on a soft curve, as surveyors measure it."""
+    turn = np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)
+    radius = 700.0 + sum(120.0 / k * np.sin(k * turn + rng.uniform(0.0, 6.0)) for k in range(2, 9))
+    return list(zip((2000.0 + radius * np.cos(turn)).tolist(), (radius * np.sin(turn)).tolist(), strict=True))
+
+
+def mission(
+    no_fly: list[dict[str, object]] | None = None, goal: tuple[float, float] = (4000.0, 100.0), **keys: object
+) -> list[str]:
+    """Write ``m.yaml``: one copter over flat ground; ``keys`` replace those of the file, or of its vehicle."""
+    start, end = degrees([(0.0, 0.0), goal])
+    vehicle: dict[str, object] = {
+        "name": "u", "sysid": 1, "autopilot": "arducopter", "start": start, "goal": end, "speed_m_s": [3, 10],
+    }  # fmt: skip
+    vehicle |= {
+        k: keys.pop(k) for k in ("via", "turn_radius_m", "autopilot", "takeoff_heading_deg", "end") if k in keys
+    }
+    document: dict[str, object] = {
+        "version": 1, "terrain": {"flat_m": 100}, "limits": {"min_agl_m": 30}, "no_fly": no_fly or [],
+        "vehicles": [vehicle], "planner": {"budget_s": 5},
+    }  # fmt: skip
+    Path("m.yaml").write_text(yaml.safe_dump(document | keys, default_flow_style=None))
+    return ["m.yaml"]
+
+
+def waypoints(places: Places, command: int = 16, more: Sequence[Sequence[float]] = ()) -> None:
+    """Write ``u.waypoints``: a take-off, the places 50 m above home, and further rows behind them."""
+    rows = [[0, 16, 0, 0, 0, 0, LAT, LON, 100.0], [3, 22, 0, 0, 0, 0, 0, 0, 50.0]]
+    rows += [[3, command, 0, 0, 0, 0, lat, lon, 50.0] for lat, lon in degrees(places)]
+    rows += [list(r) for r in more]
+    text = ["QGC WPL 110"]
+    for seq, (frame, what, *params) in enumerate(rows):
+        text.append("\t".join([str(seq), str(int(seq == 0)), str(int(frame)), str(int(what)), *map(repr, params), "1"]))
+    Path("u.waypoints").write_text("\n".join(text) + "\n")
+
+
+def ring_file(ring: Places) -> None:
+    """Write ``zones.geojson`` with one polygon."""
+    points = [[lon, lat] for lat, lon in degrees([*ring, ring[0]])]
+    shape = {"type": "Polygon", "coordinates": [points]}
+    feature = {"type": "Feature", "properties": {"name": "z"}, "geometry": shape}
+    Path("zones.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
+
+
+def snake(count: int) -> Places:
+    """A line that runs to and fro over a field, as a survey does, around the spiky ring."""
+    return [(40.0 * (k // 2), 1500.0 + 400.0 * ((k // 2 + k) % 2)) for k in range(count)]
+
+
+# -- kinds -------------------------------------------------------------------------------------------------------------
+
+
+def corners(count: int, rng: random.Random) -> list[str]:
+    ring_file(spiky(count, rng))
+    return ["plan", *mission([{"file": "zones.geojson"}]), "-o", "out", "--json"]
+
+
+def coast(count: int, rng: random.Random) -> list[str]:
+    ring_file(smooth(count, rng))
+    return ["plan", *mission([{"file": "zones.geojson"}]), "-o", "out", "--json"]
+
+
+def corners_checked(count: int, rng: random.Random) -> list[str]:
+    ring_file(spiky(count, rng))
+    waypoints([(300.0 + 10.0 * k, 950.0) for k in range(300)])
+    return ["check", *mission([{"file": "zones.geojson"}]), "u.waypoints", "--json"]
+
+
+def corners_at_home(count: int, rng: random.Random) -> list[str]:
+    return [*corners(count, rng), "--way-home"]
+
+
+def corners_fenced(count: int, rng: random.Random) -> list[str]:
+    return [*corners(count, rng), "--fence"]
+
+
+def corners_drawn(count: int, rng: random.Random) -> list[str]:
+    return [*corners(count, rng), "--report"]
+
+
+def crossing(count: int, rng: random.Random) -> list[str]:
+    """An ED-269 ring that crosses itself everywhere."""
+    points = degrees([(rng.uniform(-2000.0, 2000.0), rng.uniform(500.0, 4500.0)) for _ in range(count)])
+    ring = [[lon, lat] for lat, lon in [*points, points[0]]]
+    geometry = {
+        "uomDimensions": "M", "lowerLimit": 0, "lowerVerticalReference": "AGL", "upperLimit": 120,
+        "upperVerticalReference": "AGL", "horizontalProjection": {"type": "Polygon", "coordinates": [ring]},
+    }  # fmt: skip
+    zone = {
+        "identifier": "Z1", "country": "SVN", "name": "crossing", "type": "COMMON", "restriction": "PROHIBITED",
+        "reason": ["OTHER"], "applicability": [{"permanent": "YES"}], "zoneAuthority": [{"name": "a"}],
+        "geometry": [geometry],
+    }  # fmt: skip
+    Path("zones.json").write_text(json.dumps({"title": "t", "description": "d", "features": [zone]}))
+    return ["plan", *mission([{"file": "zones.json"}], at="2026-11-24T10:00Z"), "-o", "out", "--json"]
+
+
+def arcs(count: int, rng: random.Random) -> list[str]:
+    """An OpenAir zone of many whole circles' arcs around one centre."""
+    lines = ["AC R", "AN arcs", "AL GND", "AH 1000 ft", f"V X={_dms(LAT)} N {_dms(LON)} E"]
+    lines += [
+        f"DA {rng.uniform(3.0, 4.0):.3f},{rng.uniform(0, 360):.1f},{rng.uniform(0, 360):.1f}" for _ in range(count)
+    ]
+    Path("zones.txt").write_text("\n".join(lines) + "\n")
+    return ["plan", *mission([{"file": "zones.txt"}]), "-o", "out", "--json"]
+
+
+def cylinders(count: int, rng: random.Random) -> list[str]:
+    features = []
+    for k in range(count):
+        [[lat, lon]] = degrees([(rng.uniform(-9000.0, 9000.0), rng.uniform(600.0, 9000.0))])
+        point = {"type": "Point", "coordinates": [lon, lat]}
+        features.append({"type": "Feature", "properties": {"name": f"z{k}", "radius_m": 40}, "geometry": point})
+    Path("zones.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    return ["plan", *mission([{"file": "zones.geojson"}]), "-o", "out", "--json"]
+
+
+def forest(count: int, rng: random.Random) -> list[str]:
+    """Many circles in the way, between start and goal."""
+    arguments = cylinders(count, rng)
+    data = json.loads(Path("zones.geojson").read_text())
+    for feature in data["features"]:
+        [[lat, lon]] = degrees([(rng.uniform(300.0, 3700.0), rng.uniform(-3000.0, 3000.0))])
+        feature["geometry"]["coordinates"] = [lon, lat]
+        feature["properties"]["radius_m"] = 5
+    Path("zones.geojson").write_text(json.dumps(data))
+    return arguments
+
+
+def corridor(count: int, rng: random.Random) -> list[str]:
+    """A corridor around a line of random points."""
+    line = degrees([(rng.uniform(-2000.0, 2000.0), rng.uniform(500.0, 4500.0)) for _ in range(count)])
+    return ["plan", *mission([{"name": "c", "line": line, "buffer_m": 50}]), "-o", "out", "--json"]
+
+
+def river(count: int, rng: random.Random) -> list[str]:
+    """A corridor around a winding line, as power lines and rivers are."""
+    line = [(8.0 * k - 4.0 * count, 800.0 + 300.0 * math.sin(0.01 * k) + rng.uniform(-3.0, 3.0)) for k in range(count)]
+    return ["plan", *mission([{"name": "c", "line": degrees(line), "buffer_m": 50}]), "-o", "out", "--json"]
+
+
+def items(count: int, rng: random.Random) -> list[str]:
+    ring_file(spiky(100, rng))
+    waypoints(snake(count - 2))
+    return ["check", *mission([{"file": "zones.geojson"}]), "u.waypoints", "--json"]
+
+
+def items_at_home(count: int, rng: random.Random) -> list[str]:
+    return [*items(count, rng), "--way-home"]
+
+
+def items_drawn(count: int, rng: random.Random) -> list[str]:
+    return [*items(count, rng), "--report", "r.html"]
+
+
+def splines(count: int, rng: random.Random) -> list[str]:
+    waypoints(snake(count - 2), command=82)
+    return ["check", *mission(), "u.waypoints", "--json"]
+
+
+def jumps(count: int, rng: random.Random) -> list[str]:
+    """Fifteen jumps, each of which repeats all items before it many times."""
+    more = [[3, 177, 2 + k, 30000, 0, 0, 0, 0, 0] for k in range(15)]
+    waypoints(snake(count - 2), more=more)
+    return ["check", *mission(), "u.waypoints", "--json"]
+
+
+def vias(count: int, rng: random.Random) -> list[str]:
+    places = degrees([(4000.0 * k / (count + 1), rng.uniform(-500.0, 500.0)) for k in range(1, count + 1)])
+    return ["plan", *mission(via=places), "-o", "out", "--json"]
+
+
+def cells(count: int, rng: random.Random) -> list[str]:
+    """A raster with ``count`` million cells."""
+    side = round(1000.0 * math.sqrt(count))
+    step = 0.2 / side
+    rows = np.random.default_rng(rng.randrange(10**9)).uniform(100.0, 130.0, (1, side)).astype(np.float32)
+    with rasterio.open(
+        "dem.tif", "w", driver="GTiff", width=side, height=side, count=1, dtype="float32", crs="EPSG:4326",
+        transform=Affine(step, 0, LON - 0.1, 0, -step, LAT + 0.1), tiled=True, compress="deflate",
+    ) as file:  # fmt: skip
+        block = np.repeat(rows, 256, axis=0)
+        for row in range(0, side, 256):
+            height = min(256, side - row)
+            file.write(block[:height], 1, window=((row, row + height), (0, side)))
+    terrain = {"dem": "dem.tif", "vertical_datum": "EGM96"}
+    return ["plan", *mission(terrain=terrain), "-o", "out", "--json"]
+
+
+def tiles(count: int, rng: random.Random) -> list[str]:
+    """Terrain in ``count`` tiles."""
+    side = math.ceil(math.sqrt(count))
+    step = 0.2 / (side * 20)
+    names = []
+    for k in range(count):
+        r, c = divmod(k, side)
+        names.append(f"t{k}.tif")
+        corner = Affine(step, 0, LON - 0.1 + c * 20 * step, 0, -step, LAT + 0.1 - r * 20 * step)
+        with rasterio.open(
+            names[-1], "w", driver="GTiff", width=20, height=20, count=1, dtype="float32", crs="EPSG:4326",
+            transform=corner,
+        ) as file:  # fmt: skip
+            file.write(np.full((20, 20), 100.0 + rng.random(), np.float32), 1)
+    return ["plan", *mission(terrain={"dem": names, "vertical_datum": "EGM96"}), "-o", "out", "--json"]
+
+
+def fleet(count: int, rng: random.Random) -> list[str]:
+    """Vehicles side by side that fly to the other side."""
+    fliers = []
+    for k in range(count):
+        start, goal = degrees(
+            [(60.0 * (k % 100), -60.0 * (k // 100)), (60.0 * ((k + 7) % 100), 2000.0 + 60.0 * (k // 100))]
+        )
+        fliers.append({"name": f"u{k}", "sysid": k % 250 + 1, "autopilot": "arducopter", "start": start, "goal": goal,
+                       "speed_m_s": [3, 10]})  # fmt: skip
+    arrival = {"mode": "none", "separation_m": 20}
+    return ["plan", *mission(vehicles=fliers, arrival=arrival), "-o", "out", "--json"]
+
+
+def long_wing(count: int, rng: random.Random) -> list[str]:
+    """A fixed wing's flight of ``count`` kilometres."""
+    keys = {"autopilot": "arduplane", "turn_radius_m": 100, "takeoff_heading_deg": 90, "end": "loiter"}
+    return ["plan", *mission(goal=(1000.0 * count, 100.0), **keys), "-o", "out", "--report", "--json"]
+
+
+def runs(count: int, rng: random.Random) -> list[str]:
+    return ["rehearse", *mission(), "--runs", str(count), "--gusts", "1", "--json"]
+
+
+def log(count: int, rng: random.Random) -> list[str]:
+    """A flight log of that many lines."""
+    lines = ["time_s,lat,lon,alt_m,power_w"]
+    for k in range(count):
+        lat, lon = LAT + 0.00005 * (k % 500), LON
+        lines.append(
+            f"{0.1 * k:.1f},{lat:.7f},{lon:.7f},{100.0 + 0.1 * (k % 300):.1f},{300.0 + rng.uniform(-20, 20):.1f}"
+        )
+    Path("log.csv").write_text("\n".join(lines) + "\n")
+    return ["fit-energy", "log.csv"]
+
+
+def _dms(value: float) -> str:
+    minutes = 60.0 * (value - int(value))
+    return f"{int(value)}:{int(minutes):02d}:{60.0 * (minutes - int(minutes)):04.1f}"
+
+
+Kind = Callable[[int, random.Random], list[str]]
+
+KINDS: dict[str, Kind] = {
+    f.__name__: f
+    for f in (
+        corners, coast, corners_checked, corners_at_home, corners_fenced, corners_drawn, crossing, arcs, cylinders,
+        forest, corridor, river, items, items_at_home, items_drawn, splines, jumps, vias, cells, tiles, fleet,
+        long_wing, runs, log,
+    )
+}  # fmt: skip
+
+
+def write(kind: str, count: int, seed: int = 1) -> list[str]:
+    """Write one input into the current folder; return the arguments of ``gcsplan``."""
+    return KINDS[kind](count, random.Random(seed))
+
+
+if __name__ == "__main__":
+    print("gcsplan", shlex.join(write(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]) if len(sys.argv) > 3 else 1)))

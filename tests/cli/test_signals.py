@@ -1,0 +1,58 @@
+"""A signal ends a command within a second, also while a library computes for many seconds."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from tests.export.test_generation import heed_signals
+from tests.support.paths import REPOSITORY
+
+BUSY = """
+import os, random, sys
+import numpy as np, shapely
+sys.argv = ["gcsplan", "plan", "m.yaml", "--json"]
+from gcsplan.cli import main as cli
+from gcsplan.export import durable
+
+def command(**_):
+    rng = np.random.default_rng(1)
+    turn = np.linspace(0.0, 2.0 * np.pi, 60_000, endpoint=False)
+    ring = shapely.Polygon((rng.uniform(600.0, 900.0, (60_000, 1)) * np.stack([np.cos(turn), np.sin(turn)], axis=-1)))
+    print("begins", file=sys.stderr, flush=True)
+    shapely.is_valid(np.array([ring] * 9))  # half a minute
+    print("ended", file=sys.stderr, flush=True)
+
+cli._commands = lambda called: command
+cli.main()
+"""
+
+
+@pytest.mark.first_quick
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize(("number", "code"), [("SIGTERM", 143), ("SIGINT", 130), ("SIGHUP", 129)])
+def test_a_signal_ends_a_command_in_the_middle_of_a_library(number: str, code: int) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", BUSY], cwd=REPOSITORY, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=heed_signals,
+    )  # fmt: skip
+    try:
+        assert process.stderr is not None
+        assert process.stderr.readline() == "begins\n"
+        time.sleep(0.2)
+        begun = time.monotonic()
+        process.send_signal(getattr(signal, number))
+        out, err = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert time.monotonic() - begun < 5.0  # half a second, on a machine that is not busy
+    assert process.returncode == code
+    assert json.loads(out)["error"]["code"] == code
+    assert err.startswith("gcsplan: ")
+    assert err.count("\n") == 1
