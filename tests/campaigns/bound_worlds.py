@@ -337,7 +337,7 @@ def climbs(rng: np.random.Generator) -> Case:
 def mountains(rng: np.random.Generator) -> Case:
     """Hills with a ceiling at times, zones, errors or none; short missions whose ends weigh much, and long ones."""
     cell = float(rng.choice([15.0, 30.0, 60.0]))
-    t = hills(rng, int(rng.integers(20, 60)), cell, float(rng.uniform(0.5, 6.0)) * cell)
+    t = hills(rng, int(rng.integers(10, 34)), cell, float(rng.uniform(0.5, 6.0)) * cell)
     a, b = ends_on(rng, t, float(rng.choice([0.1, 0.45])))
     limits = {"min_agl_m": float(rng.choice([10.0, 30.0])), **errors(rng)}
     low, high = float(t.heights.min()), float(t.heights.max())
@@ -379,7 +379,7 @@ def _some_zones(rng: np.random.Generator, t: Terrain, ends: list[Floats], high: 
 def holes(rng: np.random.Generator) -> Case:
     """Ground with voids of every size and place, level ground too, with ceilings above ground and above the sea."""
     cell = float(rng.choice([20.0, 40.0]))
-    t = hills(rng, int(rng.integers(18, 50)), cell, float(rng.uniform(0.3, 3.0)) * cell, flat=bool(rng.random() < 0.35))
+    t = hills(rng, int(rng.integers(12, 36)), cell, float(rng.uniform(0.3, 3.0)) * cell, flat=bool(rng.random() < 0.35))
     a, b = ends_on(rng, t, 0.4)
     limits = {"min_agl_m": 20.0, **errors(rng)}
     if limits["horizontal_clearance_m"] > 10.0:
@@ -419,7 +419,7 @@ def fleets(rng: np.random.Generator) -> Case:
         start, goal = np.array([0.0, 120.0 * k]), np.array([far, 120.0 * k + float(rng.uniform(-20, 20))])
         if rng.random() < 0.3:
             goal = np.array([far, 120.0 * (count - 1 - k)])
-        vehicles.append(craft(rng, start, goal, "arducopter", name=f"u{k}", sysid=k + 1, speed_m_s=[6, 8]))
+        vehicles.append(craft(rng, start, goal, "arducopter", name=f"u{k}", sysid=k + 1, speed_m_s=[7, 8]))
     limits = {"min_agl_m": 30.0, **errors(rng)}
     limits["horizontal_clearance_m"] = min(limits["horizontal_clearance_m"], 10.0)
     found = []
