@@ -238,7 +238,7 @@ def _leg(
 def ground_track(
     air: Air, a: Floats, b: Floats, barriers: Sequence[Barrier], fine: int, floors_too: bool = True
 ) -> Floats | None:
-    """A track over known ground that no ceiling shuts, outside the ``barriers``, by steps between nodes, pulled taut."""
+    """A track over known ground that no ceiling shuts, outside ``barriers``, by steps between nodes, pulled taut."""
     t = air.ground.t
     if t is None:
         return None
@@ -293,10 +293,10 @@ def _by_steps(free: Bools, start: tuple[int, int], goal: tuple[int, int]) -> lis
             continue
         for i, j, length in steps:
             k = r + i, c + j
-            if 0 <= k[0] < free.shape[0] and 0 <= k[1] < free.shape[1] and (free[k] or k == goal):
-                if so_far + length < cost[k] - 1e-12:
-                    cost[k], before[k] = so_far + length, (r, c)
-                    heapq.heappush(queue, (so_far + length, k))
+            inside = 0 <= k[0] < free.shape[0] and 0 <= k[1] < free.shape[1]
+            if inside and (free[k] or k == goal) and so_far + length < cost[k] - 1e-12:
+                cost[k], before[k] = so_far + length, (r, c)
+                heapq.heappush(queue, (so_far + length, k))
     return None
 
 

@@ -60,8 +60,8 @@ class Route:
     """The way points between the fixed ends of a plan, and the judge of others in their place.
 
     ``points`` (N, 3) are the plan's own, ends included: east, north, and z in the items' frame. ``fixed``: those that
-    may not move (ends and vias). ``base_m``: AMSL of z = 0; NaN in the terrain frame. ``source``: judge there and not in
-    the plan's world, for a plan that is of another world and only gives its ends.
+    may not move (ends and vias). ``base_m``: AMSL of z = 0; NaN in the terrain frame. ``source``: judge there and not
+    in the plan's world, for a plan that is of another world and only gives its ends.
     """
 
     case: Case
@@ -420,8 +420,8 @@ def draw(route: Route, rng: np.random.Generator) -> None:
     if route.wing:
         return
     for name, ways, track in route.tracks(rng):
-        if route.budget.spent:
-            return
+        if route.budget.spent or (route.source is not None and route.best is not None):
+            return  # one safe mission refutes a proof
         points = route.along(track, ways, name)
         if points is None or route.source is not None or len(points) > 25 or "other" in name:
             continue

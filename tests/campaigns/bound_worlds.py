@@ -23,6 +23,8 @@ LAT, LON, EPSG = 46.6, 9.0, "EPSG:32632"
 UTM_SCALE = 0.9996
 UTM_NORTH_M = float(Transformer.from_crs("EPSG:4326", EPSG, always_xy=True).transform(LON, LAT)[1])
 BUDGET_S = 4.0
+LONG_M, LONG_PART = (700.0, 2500.0, 30_000.0), (0.45, 0.45, 0.1)
+"""Half lengths of long walls; the longest ones are seldom drawn, because a way around takes seconds to judge."""
 
 
 @dataclass(eq=False)
@@ -281,7 +283,7 @@ def walls(rng: np.random.Generator) -> Case:
 
 def slits(rng: np.random.Generator) -> Case:
     """A long wall with a slit that is wider than the check asks by centimetres or metres."""
-    far, half = float(rng.uniform(300.0, 1500.0)), float(rng.choice([600.0, 4000.0, 20_000.0]))
+    far, half = float(rng.uniform(300.0, 1500.0)), float(rng.choice(LONG_M, p=LONG_PART))
     asked = errors(rng)
     room = float(rng.choice([0.08, 0.15, 0.3, 1.0, 3.0]))
     wide = 2.0 * (asked["horizontal_clearance_m"] + asked["track_error_m"]) + room
@@ -301,7 +303,7 @@ def slits(rng: np.random.Generator) -> Case:
 
 def over(rng: np.random.Generator) -> Case:
     """A long wall to pass over below the ceiling, or under, with centimetres to spare, or just none."""
-    far, half = float(rng.uniform(300.0, 1500.0)), float(rng.choice([1500.0, 8000.0, 30_000.0]))
+    far, half = float(rng.uniform(300.0, 1500.0)), float(rng.choice(LONG_M, p=LONG_PART))
     asked = errors(rng)
     room, low = float(rng.choice([0.02, 0.04, 0.1, 0.5, 3.0])), 30.0
     b = Barrier(wall(0.5 * far, -half, half, float(rng.choice([4.0, 40.0]))))
@@ -426,7 +428,8 @@ def fleets(rng: np.random.Generator) -> Case:
     if rng.random() < 0.4:
         found.append(Barrier(wall(0.5 * far, -float(rng.uniform(20, 200)), float(rng.uniform(20, 150)), 10.0)))
     arrival: dict[str, object] = {
-        "mode": "sequence", "interval_s": float(rng.uniform(5, 40)), "hold": str(rng.choice(["none", "none", "ground"])),
+        "mode": "sequence", "interval_s": float(rng.uniform(5, 40)),
+        "hold": str(rng.choice(["none", "none", "ground"])),
         "separation_m": 25.0,
     }  # fmt: skip
     if rng.random() < 0.3:

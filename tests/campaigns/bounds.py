@@ -259,7 +259,8 @@ def run(
     stopped: Callable[[], bool] = lambda: False,
     most: int = WITNESSES,
 ) -> Tally:
-    """Attack for ``seconds``, at most ``worlds`` seeds or until ``witnesses`` are drawn; every family on one seed first."""
+    """Attack for ``seconds``, ``worlds`` seeds or until ``witnesses`` are drawn; every family on one seed, then on the
+    next."""
     tally, begun, number = Tally(), time.monotonic(), seed
     while worlds is None or number - seed < worlds:
         for family in families:

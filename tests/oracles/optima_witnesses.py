@@ -42,8 +42,8 @@ def kept() -> Mapping[tuple[str, int], Floats]:
 def known(family: str, seed: int, case: Case) -> Floats | None:
     """The path stored for a mission if it is legal there, else None.
 
-    With voids in the ground, it is the path stored for the mission without them, if the exact check passes it there too:
-    such a witness comes from nothing that has ever seen a void.
+    With voids in the ground, it is the path stored for the mission without them, if the exact check passes it there
+    too: such a witness comes from nothing that has ever seen a void.
     """
     points = kept().get((family.removesuffix(VOIDS), seed))
     return points if points is not None and is_feasible(case.problem, points) else None

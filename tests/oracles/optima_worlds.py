@@ -475,8 +475,8 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case | None]] = {
 
 VOIDS = "+voids"
 HOLED = tuple(family + VOIDS for family in FAMILIES)
-"""Each family once more, on ground that is unknown in places: the same missions, so a path of one that keeps clear of the
-voids is a path of the other."""
+"""Each family once more, on ground that is unknown in places: the same missions, so a path of one that keeps clear of
+the voids is a path of the other."""
 
 
 def make(family: str, seed: int) -> Case:
