@@ -25,7 +25,7 @@ from tests.oracles.optima import shortest_past_discs
 from tests.oracles.optima_polish import PATIENT, QUICK, Effort, cost_of, polish
 from tests.oracles.optima_search import best_path
 from tests.oracles.optima_witnesses import known
-from tests.oracles.optima_worlds import FAMILIES, Case, make
+from tests.oracles.optima_worlds import FAMILIES, HOLED, Case, make
 
 SURE_M = 2e-3
 """Brute-force breaches (m) beyond this count: the fitted map of a raster in degrees may be off by that much."""
@@ -212,7 +212,7 @@ def summary(verdicts: list[Verdict]) -> str:
 
 def table(verdicts: list[Verdict]) -> str:
     """Figures by family and of all together. Three numbers in a cell are p50, p90 and maximum."""
-    lines = [f"{'family':12}" + "".join(f"{head:>{width}}" for head, width in COLUMNS)]
+    lines = [f"{'family':18}" + "".join(f"{head:>{width}}" for head, width in COLUMNS)]
     for family in [*dict.fromkeys(v.family for v in verdicts), "all"]:
         of = [v for v in verdicts if family in (v.family, "all")]
         solved = [v for v in of if math.isfinite(v.cost)]
@@ -228,7 +228,7 @@ def table(verdicts: list[Verdict]) -> str:
             f"{sum(v.judging_s for v in of):.0f}",
         ]
         row = "".join(f"{cell:>{width}}" for cell, (_, width) in zip(cells, COLUMNS, strict=True))
-        lines.append(f"{family:12}{row}")
+        lines.append(f"{family:18}{row}")
     return "\n".join(lines)
 
 
@@ -242,7 +242,7 @@ def main() -> None:
     """Run a campaign from the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, nargs=2, default=(0, 100), metavar=("FIRST", "LAST"))
-    parser.add_argument("--families", nargs="+", default=list(FAMILIES), choices=list(FAMILIES))
+    parser.add_argument("--families", nargs="+", default=[*FAMILIES, *HOLED], choices=[*FAMILIES, *HOLED])
     parser.add_argument("--effort", choices=("quick", "patient"), default="quick")
     parser.add_argument("--missed", action="store_true", help="print missed missions too")
     parser.add_argument(

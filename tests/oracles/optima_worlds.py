@@ -2,7 +2,7 @@
 
 Each family has one difficulty: discs whose optimum is known exactly; cylinders to pass over, under or around; ground
 whose pass is exactly as high as the ceiling; climb limits; a maximum AGL; clearances and errors; rasters that are
-turned, in degrees, or have holes; via points.
+turned, in degrees, or have holes; via points. Each of them joins once more with voids in its ground (`with_voids`).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import minimum_spanning_tree
 
@@ -472,13 +473,70 @@ FAMILIES: dict[str, Callable[[np.random.Generator], Case | None]] = {
 }  # fmt: skip
 
 
+VOIDS = "+voids"
+HOLED = tuple(family + VOIDS for family in FAMILIES)
+"""Each family once more, on ground that is unknown in places: the same missions, so a path of one that keeps clear of
+the voids is a path of the other."""
+
+
 def make(family: str, seed: int) -> Case:
     """Mission number ``seed`` of a family; few missions are solved by straight legs."""
+    if family.endswith(VOIDS):
+        return with_voids(make(family.removesuffix(VOIDS), seed), np.random.default_rng([*family.encode(), seed]))
     rng = np.random.default_rng([*family.encode(), seed])
     while True:
         case = FAMILIES[family](rng)
         if case is not None and (rng.random() < 0.03 or not _open(case.problem)):
             return case
+
+
+def with_voids(case: Case, rng: np.random.Generator) -> Case:
+    """The same mission over ground with voids of any size and place that leave its terminals legal."""
+    p, surface = case.problem, case.problem.airspace.surface
+    air = p.airspace
+    for _ in range(60):
+        unknown = _void(rng, surface.ground_m.shape)
+        ground = without_pinches(np.where(unknown, np.nan, surface.ground_m))
+        top = np.where(np.isnan(ground), np.nan, surface.top_m)
+        holed = Airspace(replace(surface, ground_m=ground, top_m=top), air.zones, scale=air.scale)
+        stops = [p.start, *((v.east_m, v.north_m, v.amsl_m) for v in p.via), p.goal]
+        if all(_is_legal(holed, p.limits, stop) for stop in stops):
+            return replace(
+                case, name=case.name + VOIDS, problem=replace(p, airspace=holed), discs=None,
+                ground=replace(case.ground, heights=ground),
+            )  # fmt: skip
+    return case
+
+
+def _void(rng: np.random.Generator, shape: tuple[int, int]) -> NDArray[np.bool_]:
+    """Unknown nodes: one, a corner, a block, a quadrant, a band from edge to edge, or many single ones."""
+    rows, cols = shape
+    unknown = np.zeros(shape, bool)
+    kind = int(rng.integers(0, 6))
+    r, c = int(rng.integers(rows)), int(rng.integers(cols))
+    if kind == 0:
+        unknown[r, c] = True
+    elif kind == 1:
+        unknown[0 if r % 2 else -1, 0 if c % 2 else -1] = True
+    elif kind == 2:
+        unknown[r : r + int(rng.integers(1, max(2, rows // 2))), c : c + int(rng.integers(1, max(2, cols // 2)))] = True
+    elif kind == 3:
+        unknown[slice(0, rows // 2) if r % 2 else slice(rows // 2, rows),
+                slice(0, cols // 2) if c % 2 else slice(cols // 2, cols)] = True  # fmt: skip
+    elif kind == 4:
+        unknown[:, c] = True
+        unknown[r : r + int(rng.integers(0, max(1, rows // 3)))] = False
+    else:
+        unknown |= rng.random(shape) < 0.02
+    return unknown
+
+
+def _is_legal(air: Airspace, limits: Limits, stop: tuple[float, float, float | None]) -> bool:
+    low, high = float(air.floor_amsl(*stop[:2], limits)), float(air.ceiling_amsl(*stop[:2], limits))
+    if not low <= high:
+        return False
+    here = np.array([[*stop[:2], low if stop[2] is None else stop[2]]])
+    return bool(air.clear(Legs.between(here, here, limits), limits)[0])
 
 
 def _open(p: Problem) -> bool:

@@ -1,0 +1,104 @@
+"""Tests that the campaign `bounds` finds planted faults: a bound raised by 0.01 %, a false proof, a silent refusal."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gcsplan import load_mission, plan
+from gcsplan.app.model import Plan
+from gcsplan.errors import NoMission
+from tests.campaigns.bound_paths import Ground, shortest_track, taut
+from tests.campaigns.bound_worlds import Barrier, Case, Terrain, make, wall
+from tests.campaigns.bounds import run
+
+FOREVER_S = 1e9
+
+
+def raised(part: float) -> object:
+    def planner(file: Path) -> Plan:
+        planned = plan(load_mission(file))
+        return replace(planned, vehicles=tuple(
+            replace(v, solution=replace(v.solution, lower_bound=(v.solution.lower_bound or 0.0) * (1.0 + part)))
+            for v in planned.vehicles
+        ))  # fmt: skip
+
+    return planner
+
+
+def refused(words: str) -> object:
+    def planner(file: Path) -> Plan:
+        if file.stem == "mission":
+            raise NoMission(words, reason="infeasible")
+        return plan(load_mission(file))
+
+    return planner
+
+
+def kinds(planner: object, family: str, seed: int, most: int) -> set[str]:
+    tally = run(FOREVER_S, seed, (family,), worlds=1, planner=planner, most=most)  # type: ignore[arg-type]
+    return {f.kind for f in tally.faults}
+
+
+def test_a_bound_that_is_raised_by_a_ten_thousandth_is_found() -> None:
+    assert kinds(raised(1e-4), "walls", 1, 40) & {"own cost", "undercut"}
+
+
+def test_a_false_proof_is_found_by_a_way_past_the_walls() -> None:
+    assert "proved" in kinds(refused("there is no path within the limits, which is proved"), "walls", 1, 60)
+
+
+def test_a_refusal_that_does_not_name_unknown_ground_is_found() -> None:
+    seed = 2
+    words = "there is no path within the limits, which is proved"
+    assert "silent" in kinds(refused(words), "holes", seed, 1)
+    assert "silent" not in kinds(refused(f"{words}; the ground is unknown to the terrain model"), "holes", seed, 1)
+
+
+# -- the second implementation ---------------------------------------------------------------------------------------
+
+
+def test_the_shortest_track_follows_the_rounded_corners_of_a_grown_wall() -> None:
+    barrier = Barrier(wall(100.0, -50.0, 50.0, 20.0))
+    track = shortest_track([np.array([0.0, 0.0]), np.array([200.0, 0.0])], [barrier], 30.0, fine=64)
+    assert track is not None
+    # Tangents from the ends to circles of 30 m around the wall's corners, arcs, and the side between.
+    far = np.hypot(90.0, 50.0)
+    turn = np.pi / 2.0 + np.arctan2(50.0, 90.0) - np.arccos(30.0 / far)
+    exact = 2.0 * (np.sqrt(far**2 - 30.0**2) + 30.0 * turn) + 20.0
+    found = float(np.hypot(*np.diff(track, axis=0).T).sum())
+    assert exact - 1e-6 <= found <= exact * (1.0 + 1e-4)
+
+
+def test_a_taut_profile_touches_what_is_in_its_way_and_keeps_to_the_slope() -> None:
+    s = np.linspace(0.0, 100.0, 101)
+    low = np.where(np.abs(s - 50.0) < 5.5, 30.0, 0.0)
+    high = np.full(101, 60.0)
+    low[[0, -1]] = high[[0, -1]] = 10.0
+    profile = taut(s, low, high, (np.inf, np.inf))
+    assert profile is not None
+    assert profile == pytest.approx(np.array([[0, 10], [45, 30], [55, 30], [100, 10]]))
+    assert taut(s, low, high, (0.3, 0.3)) is None
+    gentle = taut(s, low, high, (0.5, 0.5))
+    assert gentle is not None
+    assert np.abs(np.diff(gentle[:, 1]) / np.diff(gentle[:, 0])).max() <= 0.5 + 1e-9
+
+
+def test_unknown_ground_is_unknown_in_the_second_implementation_too() -> None:
+    z = np.full((4, 4), 7.0)
+    z[0, 0] = np.nan
+    case = Case("holes", 0, [], {}, terrain=Terrain(z, 0.0, 30.0, 10.0))
+    heights = Ground(case).at(np.array([5.0, 15.0, 31.0]), np.array([25.0, 15.0, 15.0]))
+    assert np.isnan(heights).tolist() == [True, False, True]
+
+
+def test_the_worlds_of_a_seed_are_the_same_again_and_load() -> None:
+    with tempfile.TemporaryDirectory() as name:
+        for family in ("slits", "over", "holes", "wings", "returns"):
+            case, again = make(family, 5), make(family, 5)
+            assert case.document() == again.document()
+            load_mission(case.write(Path(name)))
