@@ -130,7 +130,7 @@ def range_fault(lat_deg: float, lon_deg: float, *, most_lon_deg: float = 180.0) 
     if abs(lat_deg) > 90.0:
         return f"latitude must be within ±90°, given {lat_deg:g}"
     turned = (lon_deg + 180.0) % 360.0 - 180.0
-    cure = f": write {turned:.10g}" if abs(lon_deg) <= 360.0 else ""
+    cure = f": write {turned:.10g}" if abs(lon_deg) <= 720.0 else ""
     return f"longitude must be within ±{most_lon_deg:g}°, given {lon_deg:.10g}{cure}"
 
 

@@ -64,7 +64,7 @@ _SEEMS_A_LIMIT = re.compile(
 _SEEMS_A_TIME = re.compile(
     r"(?:valid|effective|activ\w*?|start|begin|end|expir\w*?|permanent)"
     r"(?:from|to|until|till|on|at|date|time|datetime|day|days|hour|hours|times|period|span|stamp|utc|local)*"
-    r"|timespan|timestamp|\w*schedule|\w*applicability|(?:operating|opening|operational)?hours(?:ofoperation)?|weekdays?"
+    r"|timespan|timestamp|\w*schedule|\w*applicability|(?:operating|opening|operational)?hours(?:ofoperation)?|weekdays?|times?ofuse|wkhr\w*"
 )
 """The name of an attribute that says when a zone applies, in lower case, letters alone."""
 

@@ -33,6 +33,9 @@ Corner = tuple[float, float, float]
 
 READ = "the ceiling is the height to which the zone is drawn; one over the ground follows it point by point"
 NOT_READ = "the drawn altitudes are not read as limits"
+_PICTURES = ("PhotoOverlay", "ScreenOverlay", "Tour")
+"""What shows the map and limits nothing."""
+
 _READ_SHAPES = ("Polygon", "Point", "LineString")
 _SHAPES = (*_READ_SHAPES, "LinearRing", "Model", "Track", "MultiTrack")
 
@@ -48,15 +51,20 @@ def read_kml(path: Path, data: bytes) -> ZoneFile:
         raise InputError(f"this is not KML: {str(why)[:200]}", where=str(path)) from None
     placemarks = 0
     loose: Counter[str] = Counter()
-    for element in _walk(root, path, leaves=("Placemark",)):
+    pictures: Counter[str] = Counter()
+    for element in _walk(root, path, leaves=("Placemark", *_PICTURES, *_SHAPES)):
         kind = _kind(element)
         if kind in _SHAPES:
             loose[kind] += 1
+        elif kind in _PICTURES:
+            pictures[kind] += 1
         if kind == "Placemark":
             placemarks += 1
             _placemark(found, element, placemarks)
         elif kind in ("NetworkLink", "NetworkLinkControl", "GroundOverlay"):
             found.problems.append(Problem(f"{path}: {kind}", f"a {kind} cannot be read as a zone; remove it"))
+    if pictures:
+        found.said.append(f"not used: {', '.join(counted(count, kind) for kind, count in pictures.items())}")
     for kind, count in loose.items():
         words = f"{counted(count, kind)} outside of a Placemark cannot be read as a zone; put each into a Placemark"
         found.problems.append(Problem(f"{path}: {kind}", words))

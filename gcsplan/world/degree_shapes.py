@@ -314,7 +314,7 @@ def _great_circles(begins: Floats, ends: Floats) -> Floats | None:
             found.append(begin[None])
             continue
         any_bent = True
-        part = np.arange(n := min(MOST_PIECES, math.ceil(4.0 * math.sqrt(bow_m / EDGE_BOW_M)))) / n
+        part = np.arange(n := min(MOST_PIECES, math.ceil(2.0 * math.sqrt(bow_m / EDGE_BOW_M)))) / n
         along = begin + part[:, None] * (end - begin)
         along[:, 1] += _off_straight(begin, end, part)
         found.append(along)

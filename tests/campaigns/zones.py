@@ -170,6 +170,7 @@ def attack(seed: int, folder: Path) -> tuple[str, str, list[str]]:
         form = "nad83"
     if form == "mercator":  # other edges are no straight lines in degrees
         parts = [[_level(p[0])] for p in parts]
+        kind = kind.removeprefix("written ")  # in metres it is as wide as it is drawn
     named = f"{kind}, {form}"
     try:
         found = read_zones(WRITERS[form](folder, parts), where="zones")

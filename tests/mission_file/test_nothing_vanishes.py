@@ -84,6 +84,7 @@ def test_kml_beside_placemarks_is_refused(tmp_path: Path) -> None:
         ("<Polygon><outerBoundaryIs/></Polygon>", "1 Polygon outside of a Placemark"),
         ("<Folder><Track/><Track/></Folder>", "2 Tracks outside of a Placemark"),
         ("<NetworkLinkControl/>", "a NetworkLinkControl cannot be read as a zone"),
+        ("<ScreenOverlay/><PhotoOverlay><Point/></PhotoOverlay>", "not used: 1 ScreenOverlay, 1 PhotoOverlay"),
         ("<GroundOverlay/>", "a GroundOverlay cannot be read as a zone"),
     ):
         assert words in told(tmp_path / "z.kml", zone.replace("</kml>", f"{other}</kml>"))

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from pyproj import Geod
 
 from gcsplan.mission_file.airspace.arcs import Arc, outline
+from gcsplan.mission_file.airspace.times import Hours
 from gcsplan.mission_file.zone_draft import ZoneDraft
 from tests.mission_file.airspace.made import limits, read, remarks, said
 from tests.support.effort import draws
@@ -289,3 +290,10 @@ RECORDS = st.sampled_from(
 @settings(max_examples=draws(150), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_no_text_ends_in_a_traceback(tmp_path: Path, lines: list[str]) -> None:
     said(tmp_path, "\n".join(lines).encode("utf-8", "surrogatepass"), "a.txt")
+
+
+def test_a_day_alone_as_the_end_of_an_activation_is_all_of_it(tmp_path: Path) -> None:
+    text = "AC R\nAN a\nAA 2026-11-24T10:00Z/2026-11-24\nV X=47:00:00 N 008:00:00 E\nDC 1\n"
+    for at, unused in (("2026-11-24T23:00Z", False), ("2026-11-25T00:01Z", True)):
+        (zone,) = read(tmp_path, text, "a.openair", hours=Hours.read(at)).zones
+        assert bool(zone.unused) is unused

@@ -38,6 +38,15 @@ def applies(minute: datetime, period: dict[str, Any]) -> bool:
     return "schedule" not in period
 
 
+def can_apply(period: dict[str, Any]) -> bool:
+    """Whether a period that says when it begins and ends applies in one of its quarters of an hour."""
+    if not {"startDateTime", "endDateTime", "schedule"} <= period.keys():
+        return True
+    first, last = (datetime.fromisoformat(period[k]) for k in ("startDateTime", "endDateTime"))
+    return any(applies(first + timedelta(minutes=15 * i), period) for i in range((last - first) // QUARTER + 1))
+
+
+QUARTER = timedelta(minutes=15)
 CLOCK = st.builds(lambda h, m: f"{h:02}:{m:02}Z", st.integers(0, 23), st.sampled_from([0, 15, 30]))
 LINE = st.fixed_dictionaries(
     {"day": st.lists(st.sampled_from([*WEEK, "ANY"]), min_size=1, max_size=2), "startTime": CLOCK, "endTime": CLOCK}
@@ -58,6 +67,10 @@ def test_periods_against_every_minute(given_: list[Any], first: int, quarters: i
     if any(p.get("startDateTime", "") > p.get("endDateTime", "~") for p in given_):
         assert "before it begins" in unread
         return
+    if not all(can_apply(p) for p in given_):
+        assert "its schedule has no time" in unread
+        assert apply_in(periods, hours)
+        return
     assert not unread
     assert apply_in(periods, hours) == any(applies(m, p) for m in minutes for p in given_)
 
@@ -71,7 +84,11 @@ def test_periods_against_every_minute(given_: list[Any], first: int, quarters: i
         [{"schedule": [{"day": ["ANY"], "startEvent": "SR", "endEvent": "SS"}]}],  # sunrise to sunset
         [{"schedule": [{"day": ["MON"], "startTime": "06:00"}]}], [{"schedule": [{"startTime": "06:00Z"}]}],
         [{"startDateTime": "2026-11-25T00:00Z", "endDateTime": "2026-11-20T00:00Z"}],
-        [{"schedule": [{"day": ["XMAS"]}]}], [{"endDateTime": "2020-01-01T00:00Z", "holidays": True}],
+        [{"schedule": [{"day": ["XMAS"]}]}],
+        [{"schedule": [{"day": ["MON"], "startTime": "23:00-10:00", "endTime": "01:00+14:00"}]}],
+        [{"schedule": [{"day": ["MON"], "startTime": "10:00-10:00", "endTime": "12:00+10:00"}]}],
+        [{"startDateTime": "2026-11-23", "endDateTime": "2026-11-23", "schedule": [{"day": ["THU"]}]}],
+        [{"endDateTime": "2020-01-01T00:00Z", "holidays": True}],
     ],
 )  # fmt: skip
 def test_what_is_not_understood_applies_always(given_: Any) -> None:
@@ -85,6 +102,29 @@ def test_offsets_and_the_end_of_a_day() -> None:
     assert not apply_in(periods, Hours.read(["2026-11-23T20:00Z", "2026-11-23T22:29Z"]))
     assert apply_in(periods, Hours.read(["2026-11-23T20:00Z", "2026-11-23T22:30Z"]))
     assert read_instant("2026-11-23T24:00Z") == read_instant("2026-11-24") == MONDAY + timedelta(days=1)
+
+
+def test_a_day_alone_as_an_end_is_all_of_it() -> None:
+    for given_ in (
+        [{"endDateTime": "2026-11-24"}],
+        [{"startDateTime": "2026-11-24T10:00Z", "endDateTime": "2026-11-24"}],
+    ):
+        periods, unread = read_periods(given_)
+        assert not unread
+        assert apply_in(periods, Hours.read("2026-11-24T22:30Z"))
+        assert not apply_in(periods, Hours.read("2026-11-25T00:01Z"))
+
+
+def test_a_schedule_without_a_beginning_begins_at_local_midnight() -> None:
+    until, _ = read_periods([{"schedule": [{"day": ["TUE"], "endTime": "06:00-10:00"}]}])
+    assert not apply_in(until, Hours.read(["2026-11-24T00:00Z", "2026-11-24T09:59Z"]))
+    assert apply_in(until, Hours.read(["2026-11-24T10:00Z", "2026-11-24T10:01Z"]))
+    assert apply_in(until, Hours.read(["2026-11-24T15:59Z", "2026-11-24T16:00Z"]))
+    since, _ = read_periods([{"schedule": [{"day": ["TUE"], "startTime": "22:00+02:00"}]}])
+    assert apply_in(since, Hours.read(["2026-11-24T21:59Z", "2026-11-24T22:00Z"]))
+    assert not apply_in(since, Hours.read(["2026-11-24T22:01Z", "2026-11-24T23:00Z"]))
+    east, _ = read_periods([{"schedule": [{"day": ["TUE"], "endTime": "06:00+02:00"}]}])
+    assert apply_in(east, Hours.read(["2026-11-23T22:00Z", "2026-11-23T22:01Z"]))
 
 
 def test_a_night_belongs_to_the_day_on_which_it_begins_and_ends_count() -> None:
