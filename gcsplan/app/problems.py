@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gcsplan.app.model import Brief
+from gcsplan.check.home_height import why_unknown
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
@@ -16,7 +17,7 @@ from gcsplan.mavlink.build.multirotor import build_mission, corner_m
 from gcsplan.mavlink.build.order import LONGEST_LEG_M, MARGINS, Margins, Order
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.autopilots import profile_of
-from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mavlink.mission.mission import Home, Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -130,6 +131,9 @@ def make_problem(
     error but not the ground's slope within the track error, it is raised, with a note; a lower value is bad input.
     """
     vehicle = request.vehicle
+    unsure = why_unknown(Home.at(*request.start_deg, request.start[2]), vehicle, world)
+    if unsure is not None:
+        raise InputError(unsure, where=f"{source.path}: vehicles.{vehicle.name}.start")
     given, margins = margins, replace(margins, bow_m=min(margins.bow_m, _largest_bow_m(world)))
     margins = replace(margins, track_m=margins.track_m + corner_m(vehicle))
     limits = _with_margins(vehicle.limits, margins, terrain=source.altitude_frame == "terrain", source=source)

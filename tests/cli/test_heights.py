@@ -101,8 +101,12 @@ def test_a_home_over_tiles_that_differ_is_refused_and_not_judged(run: Any, tiles
     assert run("plan", mission(tiles, "vertical_datum: EGM96", "b.tif"), "-o", "o")[0] == 0
     code, _, err = run("plan", mission(tiles, "vertical_datum: EGM96", "[b.tif, c.tif]"), "-o", "both")
     assert code == 2
-    assert "vehicles[0].start: the ground here is not one number" in err
-    assert "altitude_error_m: 60" in err
+    assert "vehicles.uav1.start: the ground at home (36.5000000, -84.5000000) is not one number" in err
+    assert "between 1000.0 m AMSL and 1060.0 m AMSL" in err
+    assert "altitude_error_m of 60.0 m" in err
+    code, out, _ = run("check", "m.yaml", "o/uav1.plan")
+    assert code == 4
+    assert "the ground at home" in out
     code, out, _ = run(
         "check", "o/uav1.plan", "--dem", "b.tif", "--dem", "c.tif", "--vertical-datum", "EGM96", "--min-agl", "60"
     )
