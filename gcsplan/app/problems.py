@@ -131,14 +131,11 @@ def make_problem(
     error but not the ground's slope within the track error, it is raised, with a note; a lower value is bad input.
     """
     vehicle = request.vehicle
-    unsure = why_unknown(Home.at(*request.start_deg, request.start[2]), vehicle, world)
-    if unsure is not None:
-        raise InputError(unsure, where=f"{source.path}: vehicles.{vehicle.name}.start")
+    _require_one_height(source, request, world)
     given, margins = margins, replace(margins, bow_m=min(margins.bow_m, _largest_bow_m(world)))
     margins = replace(margins, track_m=margins.track_m + corner_m(vehicle))
-    limits = _with_margins(vehicle.limits, margins, terrain=source.altitude_frame == "terrain", source=source)
-    spread_m = world.spread_m(*request.start_deg)  # of home's ground, from which altitudes count
-    limits = replace(limits, altitude_error_m=limits.altitude_error_m + spread_m)
+    home_m = world.spread_m(*request.start_deg)
+    limits = _with_margins(vehicle.limits, margins, home_m, terrain=source.altitude_frame == "terrain", source=source)
     air = world.airspace
     datum = request.start[2]
     notes: list[str] = []
@@ -200,6 +197,13 @@ def make_problem(
     return problem, tuple(notes)
 
 
+def _require_one_height(source: MissionFile, request: VehicleRequest, world: World) -> None:
+    """Raise InputError where home's ground is not one number: altitudes count from it."""
+    unsure = why_unknown(Home.at(*request.start_deg, request.start[2]), request.vehicle, world)
+    if unsure is not None:
+        raise InputError(unsure, where=f"{source.path}: vehicles.{request.vehicle.name}.start")
+
+
 def _vias(
     air: Airspace, request: VehicleRequest, ends_amsl_m: tuple[float, float], notes: list[str]
 ) -> tuple[Via, ...]:
@@ -253,8 +257,9 @@ def _largest_bow_m(world: World) -> float:
     return float(world.frame.bow_m(ends[0], ends[1])[0]) + 1e-3
 
 
-def _with_margins(limits: Limits, margins: Margins, *, terrain: bool, source: MissionFile) -> Limits:
-    """The limits for the planner: the vehicle's, reduced by what the wire's rounding and the bow may take.
+def _with_margins(limits: Limits, margins: Margins, home_m: float, *, terrain: bool, source: MissionFile) -> Limits:
+    """The limits for the planner: the vehicle's, reduced by what the wire's rounding and the bow may take, and by the
+    difference ``home_m`` of home's two heights.
 
     In the terrain frame, too, by what a vehicle may read amiss and still be taken: an upload judges with it.
     """
@@ -267,6 +272,7 @@ def _with_margins(limits: Limits, margins: Margins, *, terrain: bool, source: Mi
         track_error_m=limits.track_error_m + margins.track_m + margins.bow_m,
         altitude_error_m=limits.altitude_error_m
         + margins.altitude_m
+        + home_m
         + (source.terrain_error_m + NEAR_ENOUGH_M if terrain else 0.0),
         max_climb_deg=limits.max_climb_deg if limits.max_climb_deg >= 90 else less(limits.max_climb_deg),
         max_descent_deg=limits.max_descent_deg if limits.max_descent_deg >= 90 else less(limits.max_descent_deg),
