@@ -110,9 +110,9 @@ def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) 
 
 
 def say_heights(inputs: Mapping[str, object], units: Units) -> None:
-    """Print how the terrain's heights were read, in one line beside the notes."""
+    """Print how the terrain's heights were read, as one note."""
     if (line := heights_line(inputs)) is not None:
-        remark(in_units(line, units))
+        say_notes([in_units(line, units)])
 
 
 def say_world(source: MissionFile, units: Units) -> None:
