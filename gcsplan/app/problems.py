@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.app.model import Brief
+from gcsplan.check.home_height import why_unknown
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
@@ -17,7 +18,7 @@ from gcsplan.mavlink.build.multirotor import build_mission, corner_m
 from gcsplan.mavlink.build.order import BOW_M, LONGEST_LEG_M, MARGINS, Margins, Order
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.autopilots import profile_of
-from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mavlink.mission.mission import Home, Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.planners.cures import FILLED
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
@@ -139,6 +140,7 @@ def make_problem(
     error but not the ground's slope within the track error, it is raised, with a note; a lower value is bad input.
     """
     vehicle = request.vehicle
+    _require_one_height(source, request, world)
     given, margins = margins, replace(margins, bow_m=bow_margin_m(request, world, margins))
     margins = replace(margins, track_m=margins.track_m + corner_m(vehicle))
     checked = vehicle.limits
@@ -239,6 +241,13 @@ class _Ends:
                 f"{key} {wanted_agl_m:g} raised to {amsl - ground:.2f}: so far the ground rises within the track error"
             )
         return amsl
+
+
+def _require_one_height(source: MissionFile, request: VehicleRequest, world: World) -> None:
+    """Raise InputError where home's ground is not one number: altitudes count from it."""
+    unsure = why_unknown(Home.at(*request.start_deg, request.start[2]), request.vehicle, world)
+    if unsure is not None:
+        raise InputError(unsure, where=f"{source.path}: vehicles.{request.vehicle.name}.start")
 
 
 def _vias(

@@ -25,7 +25,7 @@ def why_unknown(home: Home, vehicle: Vehicle, world: World) -> str | None:
     low_m = world.ground_amsl(lat, lon)
     return UnitText(
         "the ground at home ({:.7f}, {:.7f}) is not one number: by the terrain's own files it lies between {} and {}, "
-        "and altitudes count from it; judged would be a home away from where they differ, terrain of one file there, "
+        "and altitudes count from it; what helps is a home away from where they differ, terrain of one file there, "
         "or altitude_error_m of {} and more",
         lat, lon, Quantity(low_m, "amsl", 1, "down"), Quantity(low_m + spread_m, "amsl", 1, "up"),
         Quantity(raised(spread_m, 1), "height", 1),

@@ -119,16 +119,15 @@ def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) 
 
 
 def say_heights(inputs: Mapping[str, object], units: Units) -> None:
-    """Print how the terrain's heights were read, in one line."""
+    """Print how the terrain's heights were read, as one note."""
     if (line := heights_line(inputs)) is not None:
-        say(in_units(line, units))
+        say_notes([in_units(line, units)])
 
 
 def say_world(source: MissionFile, units: Units) -> None:
     """Print how a mission's world was read, on standard error: there is no result."""
     say_notes(source.notes)
-    if (line := heights_line(source.inputs)) is not None:
-        remark(in_units(line, units))
+    say_heights(source.inputs, units)
 
 
 def _say_fleet(plan: Plan, units: Units) -> None:

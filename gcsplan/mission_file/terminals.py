@@ -63,8 +63,6 @@ def make_request(
         start = _end("start", terminals.start, frame, surface, zones, keys.takeoff_agl_m, problems)
     if terminals.goal in good and terminals.goal is not None:
         goal = _end("goal", terminals.goal, frame, surface, zones, keys.approach_agl_m, problems)
-    if start is not None and terminals.vehicle is not None and terminals.start is not None:
-        _require_one_height(terminals.start, start.at, surface, terminals.vehicle.limits.altitude_error_m, problems)
     via = [_via(p, frame, surface, zones, problems) for p in terminals.via if p is not None and p in good]
     if len(problems) > before or terminals.vehicle is None or terminals.start is None or terminals.goal is None:
         return None
@@ -97,22 +95,6 @@ def _ground(place: Place, frame: Frame, surface: Surface, problems: list[Problem
         problems.append(Problem(place.where, words))
         return None
     return east, north, ground_m
-
-
-def _require_one_height(
-    place: Place, at: tuple[float, float, float], surface: Surface, error_m: float, problems: list[Problem]
-) -> None:
-    """A problem where home's ground is not one number within the altitude error: altitudes count from it."""
-    low_m, high_m = at[2], float(surface.high_at(*at[:2]))
-    if surface.differs and high_m - low_m > error_m:
-        problems.append(
-            Problem(
-                place.where,
-                f"the ground here is not one number: by the terrain's own files it lies between {low_m:.1f} and "
-                f"{high_m:.1f} m AMSL, and altitudes count from it; start away from where they differ, give terrain of "
-                f"one file here, or altitude_error_m: {math.ceil((high_m - low_m) * 10.0) / 10.0:g}",
-            )
-        )
 
 
 def _end(

@@ -3,10 +3,10 @@
     python -m tests.campaigns.heights --seconds 600 --seed 1
 
 Each case is one mission's terrain: GeoTIFF, ESRI .asc, SRTM .hgt or ArduPilot's .DAT, with a vertical datum, a unit
-and a void stated by keys, by the file, or by nobody, and often by several of them. What must be read is worked out here,
-from tables written by hand: refused for one of the given reasons, or heights, bilinear between nodes. A fault is a case
-that is read where it must be refused, refused where it must be read, refused for another reason, or read with other
-heights.
+and a void stated by keys, by the file, or by nobody, and often by several of them. What must be read is worked out
+here, from tables written by hand: refused for one of the given reasons, or heights, bilinear between nodes. A fault is
+a case that is read where it must be refused, refused where it must be read, refused for another reason, or read with
+other heights.
 """
 
 from __future__ import annotations

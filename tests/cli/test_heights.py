@@ -36,35 +36,34 @@ def tiles(tmp_path: Path) -> Path:
 
 def test_plan_check_and_report_say_it_in_one_line(run: Any, tiles: Path) -> None:
     line = "heights: feet, from the file; EGM96; ground 304–305 m AMSL"
-    code, out, err = run("plan", mission(tiles, "vertical_datum: EGM96"), "-o", "o", "--report")
-    assert (code, out.count("heights: ")) == (0, 1)
-    assert line in out
+    code, _, err = run("plan", mission(tiles, "vertical_datum: EGM96"), "-o", "o", "--report")
+    assert (code, err.count(line)) == (0, 1)
     assert "note: a.tif: heights are feet, from the file" in err
     assert line.removeprefix("heights: ") in (tiles / "o" / "report.html").read_text(encoding="utf-8")
     assert json.loads((tiles / "o" / "summary.json").read_text())["inputs"]["heights_read"] == line.removeprefix(
         "heights: "
     )
-    assert line in run("check", "m.yaml", "o/uav1.plan")[1]
+    assert line in run("check", "m.yaml", "o/uav1.plan")[2]
     options = ("--dem", "a.tif", "--vertical-datum", "EGM96", "--min-agl", "60")
-    assert line in run("check", "o/uav1.plan", *options)[1]
-    assert "1000 ft AMSL" in run("check", "o/uav1.plan", *options, "--units", "imperial")[1]
+    assert line in run("check", "o/uav1.plan", *options)[2]
+    assert "1000 ft AMSL" in run("check", "o/uav1.plan", *options, "--units", "imperial")[2]
     told = json.loads(run("check", "o/uav1.plan", *options, "--json")[1])
     assert told["inputs"]["heights_read"] == line.removeprefix("heights: ")
 
 
 def test_the_options_count_before_the_mission_and_the_file(run: Any, tiles: Path) -> None:
     plain = mission(tiles, "vertical_datum: EGM96")
-    code, out, err = run("plan", plain, "-o", "o", "--height-unit", "m", "--vertical-datum", "NAVD88")
+    code, _, err = run("plan", plain, "-o", "o", "--height-unit", "m", "--vertical-datum", "NAVD88")
     assert code == 0
-    assert "heights: metres, by height_unit; NAVD88; ground 1000 m AMSL" in out
+    assert "heights: metres, by height_unit; NAVD88; ground 1000 m AMSL" in err
     assert "in place of feet (from the file)" in err
     assert run("check", plain, "o/uav1.plan", "--height-unit", "m")[0] == 0
-    assert "ground 304–305 m" in run("check", plain, "o/uav1.plan")[1]
-    code, out, _ = run(
+    assert "ground 304–305 m" in run("check", plain, "o/uav1.plan")[2]
+    _, _, err = run(
         "check", "o/uav1.plan", "--dem", "a.tif", "--vertical-datum", "EPSG:5773", "--min-agl", "60",
         "--height-unit", "us_ft", "--nodata", "none",
     )  # fmt: skip
-    assert "heights: US survey feet, by height_unit; EGM96" in out
+    assert "heights: US survey feet, by height_unit; EGM96" in err
     for option, value, said in (("--height-unit", "yd", "m, ft or us_ft"), ("--nodata", "blue", "a number, or none")):
         code, _, err = run("plan", plain, option, value)
         assert code == 2
@@ -101,8 +100,12 @@ def test_a_home_over_tiles_that_differ_is_refused_and_not_judged(run: Any, tiles
     assert run("plan", mission(tiles, "vertical_datum: EGM96", "b.tif"), "-o", "o")[0] == 0
     code, _, err = run("plan", mission(tiles, "vertical_datum: EGM96", "[b.tif, c.tif]"), "-o", "both")
     assert code == 2
-    assert "vehicles[0].start: the ground here is not one number" in err
-    assert "altitude_error_m: 60" in err
+    assert "vehicles.uav1.start: the ground at home (36.5000000, -84.5000000) is not one number" in err
+    assert "between 1000.0 m AMSL and 1060.0 m AMSL" in err
+    assert "altitude_error_m of 60.0 m" in err
+    code, out, _ = run("check", "m.yaml", "o/uav1.plan")
+    assert code == 4
+    assert "the ground at home" in out
     code, out, _ = run(
         "check", "o/uav1.plan", "--dem", "b.tif", "--dem", "c.tif", "--vertical-datum", "EGM96", "--min-agl", "60"
     )
