@@ -12,15 +12,21 @@ Errors are those of `gcsplan.errors`.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from gcsplan.app.executor import Executor, Inline, executor
 from gcsplan.app.model import Plan, VehiclePlan
 from gcsplan.app.sites import Site, site_of
 from gcsplan.errors import UsageError
+from gcsplan.mavlink.mission.parameter_file import read_param_file
+from gcsplan.mavlink.mission.parameter_list import vehicle_on_board
+from gcsplan.mavlink.mission.return_altitude import return_on_board_m
 from gcsplan.sim.outcome import Rehearsal, Tally, Terms
 from gcsplan.sim.part import Part
 
@@ -28,7 +34,17 @@ if TYPE_CHECKING:
     from gcsplan.sim.rehearsal import Block, Flights
     from gcsplan.sim.wind import Weather
 
-__all__ = ["Part", "Rehearsal", "Terms", "parts_of", "rehearse", "rehearse_in_sitl", "seats_of", "terms_of"]
+__all__ = [
+    "Part",
+    "Rehearsal",
+    "Terms",
+    "parameters_of",
+    "parts_of",
+    "rehearse",
+    "rehearse_in_sitl",
+    "seats_of",
+    "terms_of",
+]
 
 
 def parts_of(planned: Plan) -> list[Part]:
@@ -67,6 +83,7 @@ def rehearse(
     runs: int = 1,
     seed: int = 1,
     airspeed_m_s: float | None = None,
+    parameters: Mapping[str, Mapping[str, float]] = MappingProxyType({}),
     progress: Callable[[int, int], None] | None = None,
     jobs: int | None = 1,
     cluster: Any = None,
@@ -75,13 +92,14 @@ def rehearse(
     """Upload to one simulated vehicle per UAV, fly all of them in simulated time, and judge; see `sim.rehearsal`.
 
     ``jobs`` processes or the workers of ``cluster`` share the runs (`executor`); a few runs are flown in this process.
-    The result does not depend on it. ``watch`` is called with the executor before the work begins.
+    The result does not depend on it. ``parameters``: by vehicle, those that it flies with in place of what the plan
+    assumes; what is planned stays. ``watch`` is called with the executor before the work begins.
     """
     from gcsplan.sim.rehearsal import concluded, different, flown, prepared
 
     flights = prepared(
-        parts_of(planned), planned.world, terms_of(planned), weather=weather, runs=runs, seed=seed,
-        airspeed_m_s=airspeed_m_s,
+        [_set_up(part, parameters.get(part.vehicle.name, {})) for part in parts_of(planned)], planned.world,
+        terms_of(planned), weather=weather, runs=runs, seed=seed, airspeed_m_s=airspeed_m_s,
     )  # fmt: skip
     count = different(flights, runs)
     tallies: dict[int, Tally] = {}
@@ -100,6 +118,42 @@ def rehearse(
             if progress is not None:
                 progress(sum(blocks[k][1] for k in tallies), runs)
     return concluded(flights, runs, [tallies[k] for k in range(len(blocks))])
+
+
+def _set_up(part: Part, values: Mapping[str, float]) -> Part:
+    """``part``, flown as these parameters make the vehicle fly."""
+    if not values:
+        return part
+    returns_m = return_on_board_m(values)
+    return replace(
+        part, vehicle=vehicle_on_board(part.vehicle, part.mission, values),
+        rtl_rel_home_m=part.rtl_rel_home_m if returns_m is None or part.rtl_rel_home_m is None else returns_m,
+    )  # fmt: skip
+
+
+def parameters_of(words: Sequence[str], planned: Plan) -> dict[str, dict[str, float]]:
+    """Parameters by vehicle from the ``--params`` words: a file or a vehicle's URL, for all, or NAME= it for one.
+
+    From a URL each vehicle is read by its system id. Raises InputError, UsageError, LinkError.
+    """
+    from gcsplan.app.uploads import open_link
+    from gcsplan.mavlink.link.session import read_vehicle
+
+    sysids = {v.name: v.request.vehicle.sysid for v in planned.vehicles}
+    found: dict[str, dict[str, float]] = {}
+    for word in words:
+        name, equals, where = word.partition("=")
+        if equals and name not in sysids:
+            known = ", ".join(sysids)
+            raise UsageError(f"--params {word}: the mission file has no vehicle {name!r}; it has {known}")
+        source = where if equals else word
+        for one in [name] if equals else sysids:
+            if re.match(r"(udp|tcp|/dev/|COM\d)", source) and not Path(source).is_file():
+                with open_link(source) as link:
+                    found[one] = dict(read_vehicle(link, sysids[one])[2])
+            else:
+                found[one] = read_param_file(Path(source))
+    return found
 
 
 def block_of(shared: tuple[Site, Flights], block: Block) -> Tally:

@@ -66,6 +66,13 @@ def rehearse(
             "arducopter and arduplane.",
         ),
     ] = None,
+    params: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[NAME=]FILE|URL",
+            help="Fly with these parameters in place of what the plan assumes: a .param file, or a vehicle to read.",
+        ),
+    ] = None,
     jobs: JobsOption = None,
     cluster: ClusterOption = None,
     speedup: Annotated[
@@ -112,6 +119,8 @@ def rehearse(
         raise UsageError("--noise-m, --airspeed and --runs are the built-in simulator's, not --sitl's")
     if speedup is not None and sitl_binary is None:
         raise UsageError("--speedup goes with --sitl-binary")
+    if in_sitl and params:
+        raise UsageError("--params is the built-in simulator's: an SITL has parameters of its own")
     source = pipeline.load_mission(mission, at=at)
     names = [r.vehicle.name for r in source.vehicles]
     addresses = rehearsing.seats_of(sitl or [], names)
@@ -130,7 +139,8 @@ def rehearse(
         display = WorkDisplay(runs, "runs")
         result = rehearsing.rehearse(
             planned, weather=weather, runs=runs, seed=seed, airspeed_m_s=airspeed, jobs=jobs, cluster=cluster,
-            watch=display.workers, progress=lambda done, _: display.done(done),
+            parameters=rehearsing.parameters_of(params or [], planned), watch=display.workers,
+            progress=lambda done, _: display.done(done),
         )  # fmt: skip
     error: GcsplanError | None = result.error(allow_unjudged=allow_unjudged)
     if planned.left_out:

@@ -25,11 +25,13 @@ from gcsplan.check.geodesy import offset_m
 from gcsplan.errors import GcsplanError, LinkError, UsageError, VehicleRefused
 from gcsplan.mavlink.link.frames import signing_key
 from gcsplan.mavlink.link.link import Channel, Link, PumpJob, Steps, pump
+from gcsplan.mavlink.link.parameters import settings_words
 from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet
 from gcsplan.mavlink.link.steps import discover_steps, parameter_steps
 from gcsplan.mavlink.link.url import parse_url
 from gcsplan.mavlink.link.watch import VehicleState, Watch
 from gcsplan.mavlink.mission import commands as cmd
+from gcsplan.mavlink.mission.parameter_list import parameter_list
 from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.sim.outcome import Rehearsal, Tally, Terms
 from gcsplan.sim.part import Part, energy_of
@@ -119,7 +121,8 @@ def rehearse_sitl(
         urls = list(dict.fromkeys(seats[p.vehicle.name] for p in parts))
         links = {url: stack.enter_context(Link(url, key=signing_key())) for url in urls}
         channels = [links[seats[p.vehicle.name]].channel(p.vehicle.sysid) for p in parts]
-        states = _all([PumpJob(c, _ready(c, p, said, i_know=i_know)) for c, p in zip(channels, parts, strict=True)])
+        found = _all([PumpJob(c, _ready(c, p, said, i_know=i_know)) for c, p in zip(channels, parts, strict=True)])
+        states: list[VehicleState] = [state for state, _ in found]
         for result in upload_fleet(
             [
                 UploadOrder(
@@ -143,6 +146,7 @@ def rehearse_sitl(
     tally = Tally(parts, terms)
     traces = [_trace(log, part, world) for log, part in zip(logs, parts, strict=True)]
     tally.add(traces, world, [_spent_j(t, p, weather, seed) for t, p in zip(traces, parts, strict=True)])
+    tally.notes += [words for _, unlike in found for words in unlike]
     tally.notes.append(f"every vehicle was released {LIFT_S:g} s before its departure, for its motors to spin up")
     tally.notes += [
         f"{t.name} left the ground {t.begin_s - p.depart_s:+.1f} s from its departure"
@@ -178,8 +182,13 @@ def _all(jobs: list[PumpJob[Any]]) -> list[Any]:
 # -- one vehicle ----------------------------------------------------------------------------------------------------
 
 
-def _ready(channel: Channel, part: Part, report: Callable[[str, str], None], *, i_know: bool) -> Steps[VehicleState]:
-    """Wait until the vehicle has a position and a home, and make sure that it is a simulator and not armed."""
+def _ready(
+    channel: Channel, part: Part, report: Callable[[str, str], None], *, i_know: bool
+) -> Steps[tuple[VehicleState, list[str]]]:
+    """Wait until the vehicle has a position and a home, and make sure that it is a simulator and not armed.
+
+    Return its state, and which of its parameters are not those that the mission was judged with.
+    """
     clock, name = channel.link.clock, part.vehicle.name
     end = clock() + _READY_S
     report(name, "waits for its position")
@@ -190,15 +199,17 @@ def _ready(channel: Channel, part: Part, report: Callable[[str, str], None], *, 
             break
         if clock() > end:
             raise VehicleRefused(f"{name}: it has no position after {_READY_S:g} s", where=channel.link.url)
-    values = yield from parameter_steps(channel, state, (("SIM_SPEEDUP",),), watch)
-    if not values and not i_know:
+    settings = parameter_list(part.mission, part.vehicle, rtl_rel_home_m=part.rtl_rel_home_m)
+    groups = (("SIM_SPEEDUP",), *(s.parameter.group() for s in settings))
+    values = yield from parameter_steps(channel, state, groups, watch)
+    if "SIM_SPEEDUP" not in values and not i_know:
         raise VehicleRefused(
             f"{name}: what answers at {channel.link.url} has no parameter SIM_SPEEDUP, so it is no simulator: a "
             f"rehearsal would arm it and start its mission. Nothing was sent to it (--i-know insists)"
         )
     if state.armed:
         raise VehicleRefused(f"{name}: it is armed already: let it land, or start it anew", where=channel.link.url)
-    return state
+    return state, [f"{name}: {words}" for words in settings_words(settings, values, part.vehicle.autopilot)]
 
 
 def _fly(

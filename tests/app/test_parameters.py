@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,12 @@ from gcsplan.app.fleet_on_board import FleetOnBoard
 from gcsplan.app.model import Plan
 from gcsplan.app.outputs import outputs_of, report_of
 from gcsplan.app.pipeline import plan
-from gcsplan.app.rehearsing import parts_of, terms_of
+from gcsplan.app.rehearsing import parameters_of, parts_of, terms_of
+from gcsplan.app.rehearsing import rehearse as fly_plan
 from gcsplan.app.upload_job import JobResult
 from gcsplan.app.uploads import verify_file
 from gcsplan.check.judge import judge
+from gcsplan.errors import InputError, UsageError
 from gcsplan.fleet.lean import lean_needed_deg
 from gcsplan.mission_file import load_mission
 from gcsplan.sim.misbehaviour import Misbehaviour
@@ -283,3 +286,23 @@ def test_the_lean_that_a_speed_needs_has_something_to_spare() -> None:
     notes = " ".join(planned(keys(speed_m_s=[14, 14], lean_angle_deg=50)).fleet.slots[0].notes)  # type: ignore[union-attr]
     assert "needs a lean of about 43°" in notes
     assert "count with lean_angle_deg: 50" in notes
+
+
+# -- a rehearsal with the vehicle's own --------------------------------------------------------------------------------
+
+
+def test_a_rehearsal_flies_with_the_parameters_of_a_file_or_a_vehicle(tmp_path: Path) -> None:
+    done = planned(keys(**RTL))
+    file = tmp_path / "board.param"
+    file.write_text("# of today\nRTL_SPEED,500\nWPNAV_SPEED_UP 250\n1\t1\tRTL_ALT\t6000\t6\n", encoding="utf-8")
+    [slow] = fly_plan(done, parameters=parameters_of([str(file)], done)).vehicles
+    [told] = fly_plan(done).vehicles
+    assert slow.as_dict()["end_s"] - told.as_dict()["end_s"] == pytest.approx(2224.0 / 5.0 - 2224.0 / 10.0, abs=8.0)
+    with SimServer([board(RTL_SPEED=500)], "udpin:127.0.0.1:0") as server:
+        read = parameters_of([f"uav1={server.url_for_gcs}"], done)
+    assert read["uav1"]["RTL_SPEED"] == 500.0
+    with pytest.raises(UsageError, match="no vehicle 'b'"):
+        parameters_of([f"b={file}"], done)
+    file.write_text("RTL_SPEED;500\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"board\.param:1: NAME,VALUE"):
+        parameters_of([str(file)], done)

@@ -1,0 +1,242 @@
+"""Random parameter sets on board, asked of the judge that uploads ask, and flown in the built-in simulator.
+
+    python -m tests.campaigns.parameters --sets 500 --seed 1
+    python -m tests.campaigns.parameters --seconds 600
+
+A flight that is accepted must take the time that was told (1 s or 0.5 %, and what the simulator itself is off by), run
+on no farther before a return than was judged, return at the judged height and by the judged rule, and have the bank for
+its turns. What keeps all of that with room to spare must not be refused. The oracle reads the raw parameters by itself:
+it shares neither the table of names nor the judge's motion with the code that it tests.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import random
+import time
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import yaml
+
+from gcsplan.app import way_home as returns
+from gcsplan.app.model import Plan
+from gcsplan.app.on_board import judge_on_board
+from gcsplan.app.pipeline import plan
+from gcsplan.app.rehearsing import parts_of
+from gcsplan.app.upload_job import UploadJob
+from gcsplan.app.uploads import jobs_of
+from gcsplan.check.rtl.run_on import run_on_m
+from gcsplan.mavlink.mission.parameter_names import OnBoard
+from gcsplan.mission_file import load_mission
+from gcsplan.sim.firmware import firmware_of
+from gcsplan.sim.kinematics import Kinematics
+from gcsplan.sim.mission_flight import fly
+from gcsplan.sim.parameters import Parameters
+from gcsplan.sim.track import make_track
+from gcsplan.vehicle import Autopilot, Vehicle
+
+LAT, LON = 46.5, 8.0
+KINDS = ("copter", "copter-rtl", "copter-required", "fast", "px4", "px4-rtl", "wing", "wing-required")
+SPARE_S, SPARE_PART = 0.5, 0.004
+"""How much the simulator's own motion may differ from the told one beyond the tolerance."""
+
+G_M_S2 = 9.80665
+
+Values = Mapping[str, float]
+
+
+def mission_text(kind: str) -> str:
+    own: dict[str, dict[str, Any]] = {
+        "copter": {}, "copter-rtl": {"end": "rtl"}, "copter-required": {},
+        "fast": {"speed_m_s": [14, 14], "lean_angle_deg": 50}, "px4": {"autopilot": "px4"},
+        "px4-rtl": {"autopilot": "px4", "end": "rtl"},
+        "wing": {"autopilot": "arduplane", "turn_radius_m": 120, "speed_m_s": [20, 20], "end": "loiter"},
+        "wing-required": {"autopilot": "arduplane", "turn_radius_m": 120, "speed_m_s": [20, 20], "end": "loiter"},
+    }  # fmt: skip
+    vehicle = {
+        "name": "uav1", "sysid": 1, "autopilot": "arducopter", "start": [LAT, LON], "goal": [LAT + 0.02, LON + 0.004],
+        "via": [[LAT + 0.008, LON + 0.004]], "speed_m_s": [9, 9], "takeoff_agl_m": 80, "rtl_rel_home_m": 120,
+    } | own[kind]  # fmt: skip
+    required = {"way_home": "required"} if kind.endswith("required") else {}
+    return yaml.safe_dump({
+        "version": 1, "terrain": {"flat_m": 100}, "vehicles": [vehicle],
+        "limits": {"min_agl_m": 40, "track_error_m": 15, "altitude_error_m": 8},
+    } | required)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Case:
+    """A plan with its upload job; ``base``: the parameters of a vehicle that is set up for it."""
+
+    plan: Plan
+    job: UploadJob
+    base: dict[str, float]
+    told_s: float
+
+
+@cache
+def case_of(kind: str) -> Case:
+    done = plan(load_mission("m.yaml", text=mission_text(kind)))
+    homes = returns.judged(done, asked=False)
+    [job] = jobs_of(done, {"uav1": "udpout:127.0.0.1:9"}, homes, bool(homes))
+    vehicle = done.vehicles[0].request.vehicle
+    base = {
+        Autopilot.ARDUCOPTER: {"RTL_ALT": 12_000.0, "ANGLE_MAX": 5000.0 if kind == "fast" else 3000.0},
+        Autopilot.PX4: {"RTL_RETURN_ALT": 120.0, "NAV_ACC_RAD": 10.0},
+        Autopilot.ARDUPLANE: {"AIRSPEED_CRUISE": 20.0, "RTL_ALTITUDE": 120.0},
+    }[vehicle.autopilot]
+    return Case(done, job, base, flown_s(done, vehicle, {}))
+
+
+def board_of(case: Case, changed: Values) -> OnBoard:
+    """What the vehicle answers, as the simulated vehicle of today's version has it."""
+    autopilot = case.job.mission.autopilot
+    table = Parameters(autopilot, 1, firmware_of(autopilot), case.base | changed)
+    return OnBoard({name: table.value(name) for name in table.names()})
+
+
+# -- the oracle: raw parameters by their oldest names ------------------------------------------------------------------
+
+
+def kinematics(vehicle: Vehicle, raw: Values) -> tuple[Kinematics, Vehicle]:
+    """The simulator's motion with raw parameters; what is not among them is the plan's."""
+    own = Kinematics.of(vehicle)
+    if vehicle.autopilot is Autopilot.ARDUPLANE:
+        cruise = raw.get("AIRSPEED_CRUISE", vehicle.speed_max_m_s)
+        other = replace(vehicle, speed_max_m_s=cruise)
+        return Kinematics.of(other), other
+    if vehicle.autopilot is Autopilot.PX4:
+        moved = replace(
+            own, climb_m_s=raw.get("MPC_Z_V_AUTO_UP", own.climb_m_s),
+            descent_m_s=raw.get("MPC_Z_V_AUTO_DN", own.descent_m_s), land_m_s=raw.get("MPC_LAND_SPEED", own.land_m_s),
+            accel_m_s2=0.65 * raw.get("MPC_ACC_HOR", 3.0),
+            corner_accel_m_s2=raw.get("MPC_XY_TRAJ_P", 0.5) * raw.get("MPC_ACC_HOR", 3.0),
+        )  # fmt: skip
+        return moved, replace(vehicle, return_m_s=raw.get("MPC_XY_CRUISE", 5.0))
+    accel = raw.get("WPNAV_ACCEL", 250.0) / 100.0
+    moved = replace(
+        own, climb_m_s=raw.get("WPNAV_SPEED_UP", 250.0) / 100.0, descent_m_s=raw.get("WPNAV_SPEED_DN", 150.0) / 100.0,
+        land_m_s=raw.get("LAND_SPEED", 50.0) / 100.0, leg_accel_m_s2=accel,
+        vertical_accel_m_s2=raw.get("WPNAV_ACCEL_Z", 100.0) / 100.0, leg_jerk_m_s3=raw.get("WPNAV_JERK", 1.0),
+        lean_deg=raw.get("ANGLE_MAX", 100.0 * own.lean_deg) / 100.0,
+    )  # fmt: skip
+    back = raw.get("RTL_SPEED", 0.0) / 100.0 or raw.get("WPNAV_SPEED", 1000.0) / 100.0
+    return moved, replace(vehicle, return_m_s=back, return_wait_s=raw.get("RTL_LOIT_TIME", 5000.0) / 1000.0)
+
+
+def flown_s(done: Plan, vehicle: Vehicle, raw: Values) -> float:
+    """Seconds of the flight in the built-in simulator, on the motion of raw parameters."""
+    [part] = parts_of(done)
+    moved, other = kinematics(vehicle, raw)
+    track = make_track(part.mission, other, done.world, moved, rtl_rel_home_m=part.rtl_rel_home_m)
+    trace = fly([track], [0.0]).trace(0, leaves=False)
+    return trace.arrive_s if trace.stays else trace.end_s
+
+
+def faults(kind: str, case: Case, raw: Values, spare: float) -> list[str]:
+    """What an accepted flight with these parameters would break; ``spare``: part of each tolerance that counts."""
+    vehicle = case.job.vehicle
+    assert vehicle is not None
+    found = []
+    took_s = flown_s(case.plan, vehicle, raw)
+    off_s = abs(took_s - case.told_s)
+    if off_s > spare * max(1.0, 0.005 * case.told_s) + (SPARE_S + SPARE_PART * case.told_s if spare == 1.0 else 0.0):
+        found.append(f"time {took_s - case.told_s:+.1f} s of {case.told_s:.1f}")
+    returns_too = kind.endswith(("rtl", "required"))
+    if returns_too and vehicle.autopilot is Autopilot.ARDUCOPTER:
+        if raw.get("RTL_ALT_TYPE", 0.0) != 0.0:
+            found.append("above terrain")
+        if raw.get("RTL_CLIMB_MIN", 0.0) > 0.5:
+            found.append("climbs more")
+        if 0.0 < raw.get("RTL_CONE_SLOPE", 3.0) < 2.95:
+            found.append("lower in the cone")
+    if kind == "copter-required":
+        accel = raw.get("WPNAV_ACCEL", 250.0) / 100.0
+        told_m, speed = run_on_m(vehicle, 9.0), 9.0
+        runs_m = speed**2 / (2.0 * accel) + accel / 2.0  # get_stopping_point_NE_m
+        if runs_m > told_m * 1.03 + 0.1:
+            found.append(f"runs on {runs_m:.0f} m of {told_m:.0f}")
+    if returns_too and vehicle.autopilot is Autopilot.PX4 and raw.get("RTL_TYPE", 0.0) != 0.0:
+        found.append("another return")
+    if vehicle.autopilot is Autopilot.ARDUPLANE:
+        bank_deg = math.degrees(math.atan(20.0**2 / (G_M_S2 * vehicle.turn_radius_m)))
+        if raw.get("ROLL_LIMIT_DEG", 45.0) < (44.0 if kind == "wing-required" else bank_deg):
+            found.append("roll")
+        if raw.get("AIRSPEED_MAX", 22.0) < 19.7:
+            found.append("too slow")
+    return found
+
+
+# -- sets ----------------------------------------------------------------------------------------------------
+
+
+def random_set(kind: str, rng: random.Random) -> dict[str, float]:
+    """A few parameters away from what the vehicle was set up with, a little or much."""
+
+    def near(value: float, least: float) -> float:
+        factor = rng.choice([rng.uniform(0.995, 1.005), rng.uniform(0.85, 1.2), rng.uniform(0.2, 3.0)])
+        return max(value * factor, least)
+
+    copter = {
+        "WPNAV_SPEED": near(1000, 100), "RTL_SPEED": rng.choice([0.0, near(1000, 100)]),
+        "WPNAV_SPEED_UP": near(250, 20), "WPNAV_SPEED_DN": near(150, 20), "LAND_SPEED": round(near(50, 20)),
+        "WPNAV_ACCEL": near(250, 50), "WPNAV_ACCEL_Z": near(100, 20), "WPNAV_JERK": near(1.0, 0.5),
+        "ANGLE_MAX": round(near(5000 if kind == "fast" else 3000, 1000)), "RTL_LOIT_TIME": round(near(5000, 0)),
+        "RTL_ALT_TYPE": rng.choice([0, 0, 1]), "RTL_CLIMB_MIN": rng.choice([0, 0, 1000]),
+        "RTL_CONE_SLOPE": rng.choice([0.0, 3.0, 1.0, 5.0]),
+    }  # fmt: skip
+    px4 = {
+        "MPC_XY_CRUISE": near(5, 1), "MPC_Z_V_AUTO_UP": near(3, 0.5), "MPC_Z_V_AUTO_DN": near(1.5, 0.5),
+        "MPC_LAND_SPEED": near(0.7, 0.3), "MPC_ACC_HOR": near(3, 1), "MPC_XY_TRAJ_P": near(0.5, 0.1),
+        "RTL_TYPE": rng.choice([0, 0, 1]),
+    }  # fmt: skip
+    wing = {
+        "ROLL_LIMIT_DEG": rng.uniform(10, 60), "AIRSPEED_MAX": round(near(22, 10)), "AIRSPEED_CRUISE": near(20, 12),
+    }  # fmt: skip
+    table = wing if kind.startswith("wing") else px4 if kind.startswith("px4") else copter
+    names = rng.sample(sorted(table), min(len(table), rng.randint(1, 3)))
+    return {name: float(table[name]) for name in names}
+
+
+def one(seed: int) -> tuple[str, str]:
+    """How one set ends: accepted, refused, or a fault; and the words."""
+    rng = random.Random(seed)
+    kind = KINDS[seed % len(KINDS)]
+    case = case_of(kind)
+    changed = random_set(kind, rng)
+    judge = judge_on_board(case.job, allow_unjudged=case.job.verdict is not None and case.job.verdict.safe is None)
+    assert judge is not None
+    refused = judge(case.job.mission, board_of(case, changed))
+    raw = case.base | changed
+    if refused is None:
+        broken = faults(kind, case, raw, 1.0)
+        return ("fault" if broken else "accepted", f"{kind} {changed}: {'; '.join(broken)}")
+    needless = not faults(kind, case, raw, 0.4)
+    return ("needless" if needless else "refused", f"{kind} {changed}: {refused.splitlines()[-1]}")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sets", type=int, default=500)
+    parser.add_argument("--seconds", type=float, default=math.inf)
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args()
+    count: Counter[str] = Counter()
+    until, seed = time.monotonic() + given.seconds, given.seed
+    while time.monotonic() < until and (seed < given.seed + given.sets or given.seconds < math.inf):
+        end, words = one(seed)
+        count[end] += 1
+        if end in ("fault", "needless"):
+            print(f"{seed}: {end}: {words}", flush=True)
+        seed += 1
+    print(f"{seed - given.seed} sets: {dict(count)}")
+    return 1 if count["fault"] else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
