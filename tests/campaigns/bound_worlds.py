@@ -477,4 +477,15 @@ def make(family: str, seed: int) -> Case:
     """World number ``seed`` of a family."""
     case = FAMILIES[family](np.random.default_rng([seed, *family.encode()]))
     case.seed = seed
+    if case.terrain is None and np.random.default_rng([seed, 7, *family.encode()]).random() < 0.3:
+        _turn(case)  # long walls from west to east: there the plane is larger than the ground
     return case
+
+
+def _turn(case: Case) -> None:
+    """Exchange east and north."""
+    for b in case.barriers:
+        b.ring = b.ring[:, ::-1].copy()
+    for v in case.vehicles:
+        for p in (v["start"], v["goal"], *v.get("via", [])):  # type: ignore[attr-defined, misc]
+            p["east_m"], p["north_m"] = p["north_m"], p["east_m"]
