@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import Geod
 
-from gcsplan.world import degree_shapes
 from gcsplan.errors import InputError
+from gcsplan.world import degree_shapes
 from gcsplan.world.degree_shapes import near_corridors, near_polygons
 from gcsplan.world.frame import Frame
 from tests.support.effort import draws
