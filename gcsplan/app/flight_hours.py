@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import datetime, timedelta
 
 from gcsplan.app.model import FleetPlan, VehiclePlan
@@ -18,7 +19,10 @@ FAR_S = 1e8
 LANDINGS = ("land", "rtl")
 
 WRITE = "write at: [from, to] with all of the flight in it"
-ENDLESS = "it ends in the air, and when it lands is not known: end it with a landing or an RTL, or leave `at` out"
+ENDLESS = (
+    "it ends in the air, and when it lands is not known: end it with a landing (a multicopter also with an RTL), or "
+    "leave `at` out, so that all zones count"
+)
 
 
 def landing_of(verdict: Verdict, departure: datetime) -> datetime | None:
@@ -39,25 +43,36 @@ def beyond_hours(verdict: Verdict, hours: Hours | None) -> str:
     if end is not None and end <= hours.end:
         return ""
     lasts = ENDLESS if end is None else f"it lasts to {_shown(end)}; {WRITE}"
-    return (
-        f"the hours of zones: those that do not apply from {hours} were left out, and the flight from then on: {lasts}"
-    )
+    return _beyond(hours, lasts)
 
 
-def require_within_hours(source: MissionFile, flown: Sequence[VehiclePlan], fleet: FleetPlan) -> None:
-    """Raise InputError if a flight lasts beyond the hours for which zones were left out."""
+def _beyond(hours: Hours, lasts: str) -> str:
+    left_out = f"the hours of zones: those that do not apply from {hours} were left out, and the flight from then on"
+    return f"{left_out}: {lasts}"
+
+
+def within_hours(source: MissionFile, flown: Sequence[VehiclePlan], fleet: FleetPlan) -> tuple[VehiclePlan, ...]:
+    """The vehicles of a plan; a flight without an end is not judged, if zones were left out for the hours.
+
+    Raises InputError if a flight lasts beyond them.
+    """
     hours = source.hours
     if hours is None:
-        return
+        return tuple(flown)
     start = fleet.start_utc or hours.start
+    judged = []
     for v in flown:
         end = landing_of(v.verdict, start + timedelta(seconds=waits_s(v, fleet)))
-        if end is not None and hours.start <= start and end <= hours.end:
-            continue
-        lasts = f"flies from {_shown(start)} to {_shown(end)}; {WRITE}" if end is not None else f"{ENDLESS[3:]}"
-        raise InputError(
-            f"zones were left out that do not apply from {hours}, but {v.name} {lasts}", where=f"{source.path}: at"
-        )
+        if start < hours.start or (end is not None and end > hours.end):
+            lasts = "without end" if end is None else f"to {_shown(end)}"
+            raise InputError(
+                f"zones were left out that do not apply from {hours}, but {v.name} flies from {_shown(start)} {lasts}; "
+                f"{WRITE}",
+                where=f"{source.path}: at",
+            )
+        words = () if end is not None else (_beyond(hours, ENDLESS),)
+        judged.append(replace(v, verdict=replace(v.verdict, not_judged=(*v.verdict.not_judged, *words))))
+    return tuple(judged)
 
 
 def hours_left(source: MissionFile, v: VehiclePlan, fleet: FleetPlan | None) -> Hours | None:

@@ -15,7 +15,7 @@ from typing import Any
 from gcsplan.app.executor import Inline, executor
 from gcsplan.app.fleet_jobs import PIECE_S, planned_by
 from gcsplan.app.fleet_planning import fleet_of
-from gcsplan.app.flight_hours import require_within_hours
+from gcsplan.app.flight_hours import within_hours
 from gcsplan.app.gate import GateTime
 from gcsplan.app.leaving_out import LeavingOut
 from gcsplan.app.model import Brief, Plan, VehiclePlan
@@ -104,7 +104,7 @@ def plan(
     leaving.require_some(vehicles)
     source = brief.source
     flown, fleet = fleet_of(vehicles, brief, None if gate_utc is None else GateTime(gate_utc), leaving)
-    require_within_hours(source, flown, fleet)
+    flown = within_hours(source, flown, fleet)
     notes = list(source.notes)
     if len(flown) > 1 and source.arrival is None:
         notes.append("the file asks for no `arrival`: the separation between vehicles is not judged")

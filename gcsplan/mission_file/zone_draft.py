@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gcsplan.errors import Problem
+from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.places import range_fault
 from gcsplan.world.degree_shapes import (
     LARGEST_BUFFER_M,
@@ -236,7 +236,10 @@ def place_zones(drafts: Sequence[ZoneDraft], frame: Frame) -> tuple[list[tuple[Z
     placed: list[tuple[ZoneDraft, Zone]] = []
     far: list[ZoneDraft] = []
     for draft in drafts:
-        shapes = _shapes(draft, frame)
+        try:
+            shapes = _shapes(draft, frame)
+        except InputError as why:
+            raise InputError(f"zone {draft.name[:60]!r}: {why.message}", where=draft.where) from None
         if not shapes:
             far.append(draft)
         draft, shapes = _with_fewer_corners(draft, shapes)

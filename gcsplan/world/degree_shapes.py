@@ -72,8 +72,8 @@ height: a mask of the world that leaves out a strip along the antimeridian is ta
 GREAT_CIRCLE_M = 1.0
 """An edge that lies nearer to its great circle is not told from it, m."""
 
-MOST_PIECES = 20_000
-"""Most pieces of one great circle."""
+MOST_PIECES, MOST_PIECES_OF_ALL = 20_000, 400_000
+"""Most pieces of one great circle, and of all of one zone."""
 
 
 def near_circle(centre: Corner, radius_m: float, frame: Frame, *, local: bool = False) -> Circle | None:
@@ -306,7 +306,7 @@ def _great_circles(begins: Floats, ends: Floats) -> Floats | None:
     if not long.any():
         return None
     found: list[Floats] = []
-    any_bent = False
+    any_bent, count = False, 0
     for begin, end, is_long in zip(begins, ends, long.tolist(), strict=True):
         off_m = METRES_OF_DEGREE * _off_straight(begin, end, np.arange(1, 64) / 64.0) if is_long else np.zeros(1)
         bow_m = float(np.abs(off_m).max())
@@ -315,6 +315,8 @@ def _great_circles(begins: Floats, ends: Floats) -> Floats | None:
             continue
         any_bent = True
         part = np.arange(n := min(MOST_PIECES, math.ceil(2.0 * math.sqrt(bow_m / EDGE_BOW_M)))) / n
+        if (count := count + n) > MOST_PIECES_OF_ALL:
+            raise InputError(f"a zone of {len(begins)} corners has too many long edges for great circles; simplify it")
         along = begin + part[:, None] * (end - begin)
         along[:, 1] += _off_straight(begin, end, part)
         found.append(along)

@@ -154,5 +154,8 @@ def test_plan_batch_and_rehearse_take_the_option(call: Run) -> None:
     endless = MISSION.replace("goal: [47.01, 8.0]", "goal: [47.01, 8.0], end: loiter")
     Path("m.yaml").write_text(endless)
     code, said = call("plan", "m.yaml", "-o", "out", "--at", TUESDAY)
-    assert code == 2
-    assert "uav1 ends in the air, and when it lands is not known" in said
+    assert code == 4
+    assert "it ends in the air, and when it lands is not known" in said
+    assert call("plan", "m.yaml", "-o", "out", "--at", TUESDAY, "--allow-unjudged")[0] == 0
+    code, said = call("plan", "m.yaml", "-o", "out", "--at", f"{TUESDAY}/2026-11-24T10:01Z")
+    assert code == 4

@@ -12,8 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import Geod
 
+from gcsplan.errors import InputError
 from gcsplan.world import degree_shapes
-from gcsplan.world.degree_shapes import near_corridors
+from gcsplan.world.degree_shapes import near_corridors, near_polygons
 from gcsplan.world.frame import Frame
 from tests.support.effort import draws
 
@@ -103,3 +104,9 @@ def test_a_line_of_many_points_becomes_several_corridors_that_hold_all_of_it() -
     corridors = [shapely.Polygon(p.vertices) for p in near_corridors(points.tolist(), 50.0, FRAME, local=True)]
     assert 4 < len(corridors) < 12
     assert shapely.union_all(corridors).buffer(1e-6).contains(shapely.LineString(points).buffer(50.0))
+
+
+def test_great_circles_of_one_zone_are_bounded() -> None:
+    zigzag = [(50.0 + 0.01 * i, 0.0 if i % 2 else 120.0) for i in range(60)]
+    with pytest.raises(InputError, match="too many long edges for great circles"):
+        near_polygons(zigzag, FRAME, great_circles=True)
