@@ -79,6 +79,10 @@ def judge_on_board(
         planned_m_s = min(planned_m_s, fastest_at_m_s(vehicle.lean_angle_deg))
 
     def again(read_back: Mission, values: Mapping[str, float]) -> str | None:
+        if job.home_required and job.way_home is not None and not simulated:
+            against = against_on_board(job.way_home, values, job.mission)
+            if against is not None:
+                return against
         if silent := _silent(settings, values):
             return silent
         if vehicle.lean_angle_deg is not None and (short := lean_shortage(values, planned_m_s)):
@@ -87,10 +91,6 @@ def judge_on_board(
             return short
         if flies_terrain(read_back.wire_items()) and (odd := odd_spacing(values)):
             return odd
-        if job.home_required and job.way_home is not None and not simulated:
-            against = against_on_board(job.way_home, values, job.mission)
-            if against is not None:
-                return against
         found = off(settings, values, vehicle.autopilot)
         decide = ("flight", "return", "turns") if straight else ("flight", "return")
         if unlike := [o for o in found if o.setting.matters in decide]:

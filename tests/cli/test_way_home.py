@@ -213,10 +213,13 @@ def test_a_vehicle_that_does_not_tell_its_return_altitude_gets_no_mission_that_r
     table = {name: parameters._r(value) for name, value in told.items()}
     monkeypatch.setitem(parameters._TABLES, Autopilot.ARDUCOPTER, table)
     with SimServer([board()], "udpin:127.0.0.1:0", speedup=10.0) as server:
-        code, text, _ = run("plan", mission, "--upload", server.url_for_gcs)
+        code, text, _ = run("plan", mission, "--upload", server.url_for_gcs, "--timeout", "2")
         assert (code, server.vehicles[0].items()) == (5, ()), text
         assert "the return altitude on board could not be read" in text
-        assert run("plan", write(tmp_path, rtl_rel_home_m=200.0), "--upload", server.url_for_gcs)[0] == 0
+        mission = write(tmp_path, rtl_rel_home_m=200.0)  # nor does it tell what the path hangs on
+        code, text, _ = run("plan", mission, "--upload", server.url_for_gcs, "--timeout", "2")
+        assert (code, server.vehicles[0].items()) == (5, ()), text
+        assert "WPNAV_RADIUS or WP_RADIUS_M" in text
 
 
 def test_an_rtl_item_is_judged_at_the_altitude_of_the_vehicle_before_it_is_sent(
