@@ -231,9 +231,13 @@ class UnitText(str):
 
     def exchanged(self, old: str, new: str) -> UnitText:
         """The text with some of its words exchanged."""
-        parts = (p.exchanged(old, new) if isinstance(p, UnitText) else p.replace(old, new) if isinstance(p, str) else p
+        return self.changed(lambda words: words.replace(old, new))
+
+    def changed(self, change: Callable[[str], str]) -> UnitText:
+        """The text with ``change`` applied to each piece of its words."""
+        parts = (p.changed(change) if isinstance(p, UnitText) else change(p) if isinstance(p, str) else p
                  for p in self.parts)  # fmt: skip
-        return UnitText(self.template.replace(old, new), *parts)
+        return UnitText(change(self.template), *parts)
 
 
 Part = Quantity | Symbol | Reach | Seconds | Joules

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import os
 import re
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -225,7 +226,9 @@ def match(source: MissionFile, argument: str) -> tuple[VehicleRequest, Path]:
         return by_name[file.stem], file
     if len(by_name) == 1:
         return next(iter(by_name.values())), file
-    raise UsageError(f"{argument}: which vehicle is it for? Write NAME={file} with one of {', '.join(by_name)}")
+    raise UsageError(
+        f"{argument}: which vehicle is it for? Write NAME={shlex.quote(str(file))} with one of {', '.join(by_name)}"
+    )
 
 
 def at_start(read: MissionFileRead, start: Home, vehicle: Vehicle) -> MissionFileRead:

@@ -127,12 +127,17 @@ def finding_lines(c: Checked, *, allow_unjudged: bool = False, units: Units = ME
     """
     lines = [f"{c.file}:{f.seq}: {f.kind}: {_without_item(in_units(f.message, units))}" for f in c.verdict.findings]
     if not allow_unjudged:
-        lines += [f"{c.file}:{_item_in(w)}: not_judged: {_without_item(w)}" for w in c.verdict.not_judged]
-    return lines + [in_units(line, units) for line in home_lines(c)]
+        lines += [
+            f"{c.file}:{_item_in(w)}: not_judged: {_without_item(in_units(w, units))}" for w in c.verdict.not_judged
+        ]
+    return lines + home_lines(c, units)
 
 
-def home_lines(c: Checked) -> list[str]:
-    """The lines of `finding_lines` on a way home that is not safe; none if it is, or was not judged at all."""
+def home_lines(c: Checked, units: Units | None = None) -> list[str]:
+    """The lines of `finding_lines` on a way home that is not safe; none if it is, or was not judged at all.
+
+    They are in ``units``; None: as files have them, in SI.
+    """
     home = c.way_home
     if home is None or home.safe is True:
         return []
@@ -141,7 +146,7 @@ def home_lines(c: Checked) -> list[str]:
     if not home.unsafe and battery is not None and battery.no_return_seq is not None:
         first = battery.no_return_seq
     if lets_fly(home, required=c.home_required):
-        return [UnitText("{}:{}: warning: way_home: {}", c.file, first, home.headline)]
+        return [_said(UnitText("{}:{}: warning: way_home: {}", c.file, first, home.headline), units)]
     advice = UnitText("; {}", home.advice) if home.advice else ""
     lines: list[str] = [UnitText("{}:{}: way_home: {}{}", c.file, first, home.headline, advice)]
     lines += [
@@ -149,8 +154,14 @@ def home_lines(c: Checked) -> list[str]:
     ]  # fmt: skip
     if battery is not None and battery.short:
         lines.append(UnitText("{}:{}: way_home: {}", c.file, battery.no_return_seq or 0, battery.describe()))
-    lines += [f"{c.file}:{_item_in(w)}: not_judged: the way home: {_without_item(w)}" for w in home.not_judged]
-    return lines
+    lines += [
+        f"{c.file}:{_item_in(w)}: not_judged: the way home: {_without_item(_said(w, units))}" for w in home.not_judged
+    ]
+    return [_said(line, units) for line in lines]
+
+
+def _said(words: str, units: Units | None) -> str:
+    return str(words) if units is None else in_units(words, units)
 
 
 def _item_in(words: str) -> int:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from gcsplan.check.rtl.verdict import UnsafeStretch, WayHome
 from gcsplan.check.verdict import Verdict
 from gcsplan.mission_file.from_options import OPTIONS
+from gcsplan.units import UnitText
 
 _KEY = re.compile(r"\b({})\b".format("|".join(key for key in OPTIONS if "_" in key)))
 """Keys that are no English words."""
@@ -16,7 +17,11 @@ _KEY = re.compile(r"\b({})\b".format("|".join(key for key in OPTIONS if "_" in k
 
 def in_options(words: str) -> str:
     """``words`` with ``--rtl-altitude`` in place of ``rtl_rel_home_m``, and so on."""
-    return _KEY.sub(lambda found: OPTIONS[found[1]], words)
+
+    def named(piece: str) -> str:
+        return _KEY.sub(lambda found: OPTIONS[found[1]], piece)
+
+    return words.changed(named) if isinstance(words, UnitText) else named(words)
 
 
 def all_in_options(lines: Iterable[str]) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from datetime import datetime
 from os import PathLike
 from typing import Any
 
+from gcsplan.app.arguments import require
 from gcsplan.app.executor import Inline, executor
 from gcsplan.app.fleet_jobs import PIECE_S, planned_by
 from gcsplan.app.fleet_planning import fleet_of
@@ -67,7 +68,8 @@ def plan(
     path, (N, 3) float64: east_m and north_m in the mission's plane, and amsl_m. ``mission`` holds the items as they are
     sent, and ``verdict`` is the exact check of those items.
 
-    Raises InputError for a bad mission, NoMission if no safe path exists or none was found (``reason`` states which).
+    Raises InputError for a bad mission, UsageError for an argument of another type, NoMission if no safe path exists or
+    none was found (``reason`` states which).
 
     Examples:
         >>> planned = plan({
@@ -81,6 +83,10 @@ def plan(
         >>> uav1.verdict.safe, round(uav1.verdict.length_m), uav1.solution.path.points.shape
         (True, 900, (2, 3))
     """
+    require(
+        "plan", planner=planner, objective=objective, seed=seed, options=options, gate_utc=gate_utc, progress=progress,
+        jobs=jobs, leave_out=leave_out,
+    )  # fmt: skip
     if not isinstance(source, MissionFile):
         source = load_mission(source, departure=gate_utc, at=at)
     elif at is not None:

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 
 from gcsplan.app import outputs, uploads
 from gcsplan.app import way_home as returns
+from gcsplan.app.arguments import require
 from gcsplan.app.checking import check_files, check_mission
 from gcsplan.app.flying import flyable
 from gcsplan.app.model import Plan
@@ -86,6 +87,7 @@ def check(
         >>> check(planned.vehicles[0].mission, mission).safe
         True
     """
+    require("check", vehicle=vehicle, **({} if isinstance(what, Plan | Mission) else {"what": what}))
     if isinstance(what, Plan):
         if within is not None or vehicle is not None:
             raise UsageError("a plan is judged whole, in its own world: give nothing else to check")
@@ -147,6 +149,7 @@ def write(
         ...     [file.name for file in write(planned, folder)]
         ['uav1.waypoints', 'uav1.plan', 'uav1.param', 'mission.kml', 'mission.geojson', 'profile.csv', 'summary.json']
     """
+    require("write", planned=planned, folder=folder)
     system = units_of(units)
     settle_outputs(folder)
     try:
@@ -188,6 +191,7 @@ def report(
         >>> report(planned, way_home=False).startswith("<!DOCTYPE html>")
         True
     """
+    require("report", planned=planned, file=file)
     system = units_of(units)
     text = outputs.report_of(planned, results, returns.homes_of(planned) if way_home else {}, system)
     if file is not None:
@@ -221,6 +225,7 @@ def upload(
     raises nothing; `gcsplan.app.uploads.exit_code` sums them up. Raises UsageError for bad targets, and, before
     anything is sent, CheckFailed if a verdict does not pass, or a return with ``way_home: required``.
     """
+    require("upload", planned=planned, to=to, timeout_s=timeout_s, progress=progress)
     if isinstance(to, Mapping):
         words = [f"{name}={url}" for name, url in to.items()]
     else:
@@ -263,6 +268,10 @@ def rehearse(
     from gcsplan.app import rehearsing
     from gcsplan.sim.wind import Weather
 
+    require(
+        "rehearse", planned=planned, wind_m_s=wind_m_s, from_deg=from_deg, gusts_m_s=gusts_m_s, noise_m=noise_m,
+        runs=runs, seed=seed, progress=progress, jobs=jobs,
+    )  # fmt: skip
     returns.judged(planned, asked=False)
     weather = Weather(wind_m_s, from_deg, gusts_m_s, noise_m)
     return rehearsing.rehearse(

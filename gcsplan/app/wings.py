@@ -23,8 +23,8 @@ from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.problems import built, looked_over, make_problem, run_planner, unsafe
 from gcsplan.app.wing_ends import FlightEnd, circle_m, goals, starts
 from gcsplan.arrays import Floats, Indices
-from gcsplan.check.arcs import UNFITTING
 from gcsplan.check.circles import circle_growth
+from gcsplan.check.turn_words import UNFITTING
 from gcsplan.errors import NoMission
 from gcsplan.mavlink.build.fixed_wing import flown_m, tangents_m, thinned
 from gcsplan.mavlink.build.order import MARGINS, Order, Wing

@@ -32,12 +32,13 @@ from gcsplan.check.geodesy import flat_m
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.check.tracking import tracking_m, true_m_s
 from gcsplan.check.tuning import DEFAULTS, Tuning
+from gcsplan.check.turn_words import too_banked, too_tight, turns_late, unread_arcs
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.frame import Frame
 
-__all__ = ["SAG_M", "UNFITTING", "bend", "tangent_m"]
+__all__ = ["SAG_M", "bend", "tangent_m"]
 
 
 SAG_M = 0.2
@@ -45,8 +46,6 @@ SAG_M = 0.2
 
 FIT_M = 0.25
 """Arcs of neighbouring corners may overlap by this, m: rounding on the wire moves arcs that just touch."""
-
-UNFITTING = "what is flown there is not judged"
 
 LEAST_TURN = math.radians(0.02)
 ABOUT = math.radians(170.0)
@@ -80,10 +79,7 @@ def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tunin
     """
     radius = vehicle.turn_radius_m
     if mission.autopilot is not Autopilot.ARDUPLANE:
-        flight.not_judged.append(
-            f"the arcs of {radius:g} m that {vehicle.name} flies at its corners are not judged: {mission.autopilot} "
-            f"begins a turn by parameters that the mission does not hold"
-        )
+        flight.not_judged.append(unread_arcs(radius, vehicle.name, mission.autopilot))
         return
     least_s, most_s = L1_PERIODS_S
     if not least_s <= tuning.l1_period_s <= most_s:
@@ -95,14 +91,11 @@ def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tunin
     fastest = max((s.speed_m_s for s in flight.stretches), default=0.0)
     bank_deg = math.degrees(math.atan(fastest**2 / (GRAVITY_M_S2 * radius)))
     if bank_deg > MOST_BANK_DEG:
-        flight.not_judged.append(
-            f"turns of {radius:g} m at {fastest:g} m/s need a bank of {bank_deg:.0f}°, and ArduPlane's ROLL_LIMIT_DEG "
-            f"is {MOST_BANK_DEG:g}°: the arcs that it flies are wider, and not judged"
-        )
+        flight.not_judged.append(too_banked(radius, fastest, bank_deg, MOST_BANK_DEG))
     bent, other = [], list(flight.instead)
     new: list[Stretch] = []
     flight.not_judged += [
-        f"item {k}: flies {item.params[2]:.0f} m past its way point before it turns (param3): that is not judged"
+        turns_late(k, float(item.params[2]))
         for k, item in enumerate(mission.items, mission.first_seq)
         if item.command == cmd.WAYPOINT and item.params[2] >= 1.0
     ]
@@ -202,14 +195,8 @@ class _Run:
             if max(a.tangent + b.tangent, b.begins_m) <= self.long_m[k] + FIT_M:
                 continue
             seqs = ", ".join(dict.fromkeys(str(x.seq) for x in self.run[max(k - 1, 0) : k + 1]))
-            takes = (
-                f"arcs of {self.radius:g} m take {a.tangent + b.tangent:.0f} m"
-                if a.tangent + b.tangent > self.long_m[k] + FIT_M
-                else f"the turn begins {b.begins_m:.0f} m before the end"
-            )
-            flight.not_judged.append(
-                f"item {seqs}: {takes} of the leg to item {s.seq}, which is {self.long_m[k]:.0f} m long: {UNFITTING}"
-            )
+            leg = (s.seq, self.long_m[k], FIT_M)
+            flight.not_judged.append(too_tight(seqs, self.radius, a.tangent + b.tangent, b.begins_m, leg))
             # Left sharp, so that the rest can be judged.
             found[k], found[k + 1] = _Corner(off_m=a.off_m), _Corner(off_m=b.off_m)
         for k in range(len(self.run) - 1):  # on a leg too short to settle, the offset remains at the next turn

@@ -33,6 +33,7 @@ from gcsplan.check.circles import circle_growth
 from gcsplan.check.geodesy import flat_m, offset_m
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.check.tuning import DEFAULTS, Tuning
+from gcsplan.check.turn_words import turns_late
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -44,7 +45,6 @@ PARTS = (0.0, 0.0625, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
 """Places along a leg where it is cut into parts; each part is widened by what its beginning needs."""
 
 SAME_M = 0.02
-UNJUDGED = "that is not judged"
 
 
 def round_corners(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tuning: Tuning = DEFAULTS) -> None:
@@ -173,9 +173,7 @@ class _Cutter:
         if item.command != cmd.WAYPOINT:
             return 0.0
         if item.params[2] >= 1.0:
-            words = (
-                f"item {s.seq}: flies {item.params[2]:.0f} m past its way point before it turns (param3): {UNJUDGED}"
-            )
+            words = turns_late(s.seq, float(item.params[2]))
             if words not in self.not_judged:
                 self.not_judged.append(words)
         if item.params[1] > 0.0:

@@ -41,6 +41,7 @@ from gcsplan.check.rtl.model import RULES, return_pieces
 from gcsplan.check.rtl.run_on import about_turn_m
 from gcsplan.check.spline import NO_DIRECTION, chords, slowed, towards
 from gcsplan.check.stretch import Flight, Place, StretchKind
+from gcsplan.check.turn_words import takes_off_elsewhere
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
@@ -163,9 +164,7 @@ class _Pilot(Aboard):
         if self.autopilot is Autopilot.PX4 and self.has_place(item):
             away_m = flat_m((lat, lon, 0.0), (item.lat_deg, item.lon_deg, 0.0))
             if away_m > 1.0:
-                self.flight.not_judged.append(
-                    f"item {seq}: take-off lies {away_m:.0f} m from home: what PX4 does between is not judged"
-                )
+                self.flight.not_judged.append(takes_off_elsewhere(seq, away_m))
         elif self.autopilot is Autopilot.ARDUCOPTER and self.has_place(item):
             away_m = flat_m((lat, lon, 0.0), (item.lat_deg, item.lon_deg, 0.0))
             if away_m > TAKE_OFF_ELSEWHERE_M:

@@ -7,12 +7,12 @@ that of a climb-out (`climb_out`).
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 
 from gcsplan.check.aboard import Aboard
 from gcsplan.check.geodesy import flat_m
 from gcsplan.check.stretch import Place
+from gcsplan.check.turn_words import glides_to
 from gcsplan.mavlink.mission.mission import MissionItem
 
 FLARE_S, FLARE_MOST_M, LAND_SINK_M_S = 2.0, 6.0, 0.25
@@ -29,12 +29,7 @@ def glide(pilot: Aboard, seq: int, item: MissionItem) -> None:
     ground = pilot.ground(*target[:2])
     off_m = target[2] - ground
     if not abs(off_m) <= max(1.0, pilot.vehicle.limits.altitude_error_m):
-        words = (
-            "is unknown" if math.isnan(ground) else f"lies {abs(off_m):.1f} m {'below' if off_m > 0 else 'above'} it"
-        )
-        pilot.flight.not_judged.append(
-            f"item {seq}: the glide leads to the item's altitude, and the ground there {words}: it is not judged"
-        )
+        pilot.flight.not_judged.append(glides_to(seq, off_m))
         return
     end = (*target[:2], ground)
     pilot.note(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -133,7 +134,7 @@ def new(
         return
     say_notes(notes)
     say(f"written: {', '.join(map(str, files))}")
-    say(f"plan it: gcsplan plan {out}")
+    say(f"plan it: gcsplan plan {shlex.quote(str(out))}")
 
 
 def _on_a_terminal() -> bool:

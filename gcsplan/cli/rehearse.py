@@ -191,7 +191,7 @@ def _ending(result: Rehearsal, units: Units) -> list[str]:
     if result.runs > 1 and result.p95_s is not None:
         lines.append(f"95 % of all arrivals lie within {result.p95_s:.2f} s of the plan")
     lines += [f"violation: {in_units(b.describe(result.runs), units)}" for b in result.breaches]
-    lines += [f"not flown: {what}" for what in result.not_judged]
+    lines += [f"not flown: {in_units(what, units)}" for what in result.not_judged]
     lines.append(
         {True: "flown as planned", False: "VIOLATIONS were found", None: "not everything was flown"}[result.safe]
     )

@@ -10,6 +10,7 @@ from typing import Any
 
 from gcsplan.errors import InputError
 from gcsplan.mission_file import samples
+from gcsplan.mission_file.other_files import what_else
 from gcsplan.mission_file.schema import shown
 from gcsplan.mission_file.strict_yaml import MAX_BYTES, MAX_DEPTH, MAX_NODES, read_yaml
 from gcsplan.mission_file.yaml_slips import missing_space
@@ -41,8 +42,9 @@ def read_content(
         file, where = Path(source), str(source)
         if text is None:
             file = samples.file_of(source)
-            text = _text(file, where)
-        raw = read_yaml(text, where=where)
+            text, raw = _read(file, where)
+        else:
+            raw = read_yaml(text, where=where)
     elif source is None and text is not None:
         file, where, raw = UNNAMED, "mission", read_yaml(text, where="mission")
     else:
@@ -56,6 +58,22 @@ def read_content(
     if terrain and isinstance(raw.get("terrain"), dict):
         raw = {**raw, "terrain": {**raw["terrain"], **terrain}}
     return file, where, raw, text
+
+
+def _read(file: Path, where: str) -> tuple[str, Any]:
+    """The text of a file and what it says. Raises InputError; of a file of another kind one that says what takes it."""
+    try:
+        text = _text(file, where)
+        raw = read_yaml(text, where=where)
+    except InputError:
+        other = what_else(file)
+        if other:
+            raise InputError(other, where=where) from None
+        raise
+    other = what_else(file, raw)
+    if other:
+        raise InputError(other, where=where)
+    return text, raw
 
 
 def _text(file: Path, where: str) -> str:

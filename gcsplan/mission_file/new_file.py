@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from gcsplan.mission_file.schema import (
     VehicleKeys,
 )  # fmt: skip
 from gcsplan.mission_file.units import UNITS, unit_end
+from gcsplan.mission_file.zone_draft import one_line
 from gcsplan.vehicle import PX4_VEL_MAX_M_S, Autopilot
 
 WIDTH = 100
@@ -77,7 +79,9 @@ def place_text(text: str) -> str:
 
 def text_of(draft: Draft, file: str, name: str) -> str:
     """The commented mission file of ``draft``; ``file`` is the name that it will have."""
-    parts = [_HEAD.format(modeline=MODELINE, file=file, name=json.dumps(name, ensure_ascii=False))]
+    parts = [
+        _HEAD.format(modeline=MODELINE, file=one_line(shlex.quote(file)), name=json.dumps(name, ensure_ascii=False))
+    ]
     parts += _section("terrain", _terrain(draft))
     parts += _section("limits", _limits(draft))
     parts.append(_ZONES.format(said=describe(MissionKeys, "no_fly")))

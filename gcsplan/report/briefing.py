@@ -68,7 +68,9 @@ def _problems(page: Page) -> str:
     found = [f"{s.name}: {in_units(f.message, page.units)}" for s in page.subjects for f in s.verdict.findings]
     found += [f"{name}: no mission, left out: {why}" for name, why in page.left_out]
     found += [in_units(text, page.units) for text in page.rehearsed.violations] if page.rehearsed is not None else []
-    unjudged = [f"{s.name}: not judged: {what}" for s in page.subjects for what in s.verdict.not_judged]
+    unjudged = [
+        f"{s.name}: not judged: {in_units(what, page.units)}" for s in page.subjects for what in s.verdict.not_judged
+    ]
     out = [*found[:MOST_FINDINGS], *unjudged[:MOST_NOTES]]
     rest = len(found) + len(unjudged) - len(out)
     listed = "".join(f"<li>{esc(_short(text, MESSAGE))}</li>" for text in out)

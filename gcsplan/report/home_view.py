@@ -69,7 +69,7 @@ def _one(
     if line is not None and home.profile:
         name = f"home-{index}"
         chart = tools(name) + _chart(name, subject, home, line, index, charts, units) + _legend(home)
-    listed = "".join(f"<li>{esc(n)}</li>" for n in (*home.not_judged, *home.notes))
+    listed = "".join(f"<li>{esc(n)}</li>" for n in (*(in_units(w, units) for w in home.not_judged), *home.notes))
     headline = esc(in_units(home.headline, units))
     return (
         f"<details{' open' if open_ else ''}><summary>{esc(subject.name)}: {headline}</summary>"

@@ -143,7 +143,7 @@ def _verdict(page: Page) -> tuple[str, str, str, str]:
 def _header(page: Page) -> str:
     kind, sign, word, words = _verdict(page)
     wrong = [(s, in_units(f.message, page.units)) for s in page.subjects for f in s.verdict.findings]
-    wrong += [(s, f"not judged: {what}") for s in page.subjects for what in s.verdict.not_judged]
+    wrong += [(s, f"not judged: {in_units(what, page.units)}") for s in page.subjects for what in s.verdict.not_judged]
     several = len(page.subjects) > 1
     listed = "".join(f"<li>{f'<b>{esc(s.name)}</b>: ' if several else ''}{esc(text)}</li>" for s, text in wrong)
     said = "" if several else "".join(f"<b>{esc(in_units(s.words, page.units))}.</b> " for s in page.subjects)
@@ -304,7 +304,7 @@ def _end(page: Page) -> str:
     listed = "".join(
         f"<li>{f'<b>{esc(who)}</b>: ' if who and several else ''}{esc(n)}</li>" for n, who in dict.fromkeys(notes)
     )
-    unjudged = [(s.name, what) for s in page.subjects for what in s.verdict.not_judged]
+    unjudged = [(s.name, in_units(what, page.units)) for s in page.subjects for what in s.verdict.not_judged]
     missing = "".join(f"<li><b>{esc(who)}</b>: {esc(what)}</li>" for who, what in unjudged)
     inputs = tables.inputs_table(page.inputs, page.facts, page.units)
     return (

@@ -35,7 +35,7 @@ class Frame:
     def __init__(self, lat_deg: float, lon_deg: float, amsl_m: float = 0.0) -> None:
         if not (abs(lat_deg) <= 85.0 and abs(lon_deg) <= 180.0):
             raise InputError(
-                f"the origin of the frame must lie within ±85° latitude and ±180° longitude, given "
+                f"missions are planned between 85° south and 85° north, at longitudes within ±180°; given "
                 f"{lat_deg:g}, {lon_deg:g}"
             )
         self.lat_deg = float(lat_deg)

@@ -315,3 +315,64 @@ def test_a_plan_says_which_outputs_of_the_earlier_one_are_gone(run: Any, tmp_pat
     assert "gone from" in err
     assert "report.html; --report writes one of this plan" in err
     assert "gone from" not in run("plan", str(CROSSING), "-o", str(out))[2]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("uav1.plan", '{"fileType": "Plan", "version": 1}', "use check (gcsplan check MISSION.yaml 'a b/uav1.plan')"),
+        ("uav1.waypoints", "QGC WPL 110\n0\t1\t0\n", "use check"), ("m.txt", "QGC WPL 110\n", "use check"),
+        ("z.kml", "<?xml version='1.0'?><kml/>", "this is a file of zones"),
+        ("z.geojson", '{"type": "FeatureCollection", "features": []}', "gcsplan check 'a b/z.geojson' --list-zones"),
+        ("d.tif", "II*\0\0\0\0\0", "this is a file of terrain"), ("log.bin", "\u00a3\0", "use fit-energy"),
+    ],
+)  # fmt: skip
+def test_a_file_of_another_kind_is_told_where_it_belongs(
+    run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, content: str, words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a b").mkdir()
+    (tmp_path / "a b" / name).write_text(content)
+    code, _, err = run("plan", f"a b/{name}")
+    assert code == 2
+    assert words in err
+    assert len(err.splitlines()) == 1
+
+
+def test_a_mission_file_among_files_to_check_is_told_what_makes_them(run: Any, tmp_path: Path) -> None:
+    file = tmp_path / "Flug \u00dcbung.yaml"
+    file.write_text(CROSSING.read_text())
+    code, _, err = run("check", str(CROSSING), str(file))
+    assert code == 2
+    assert f"gcsplan plan '{file}' makes such a file" in err
+
+
+def test_advised_commands_are_quoted(run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    place = ("--start", "47.0,8.0", "--goal", "47.0,8.02", "--flat", "100")
+    code, out, _ = run("new", *place, "-o", "Flug \u00dcbung.yaml")
+    assert code == 0
+    assert "plan it: gcsplan plan 'Flug \u00dcbung.yaml'" in out
+    assert "gcsplan plan 'Flug \u00dcbung.yaml'" in (tmp_path / "Flug \u00dcbung.yaml").read_text(encoding="utf-8")
+
+
+def test_the_pole_is_refused_without_an_origin_that_nobody_gave(run: Any, tmp_path: Path) -> None:
+    code, _, err = run("new", "--start", "89,8", "--goal", "89,8.02", "--flat", "100", "-o", str(tmp_path / "p.yaml"))
+    assert code == 2
+    assert "between 85° south and 85° north" in err
+    assert "origin" not in err
+
+
+def test_check_with_options_alone_tells_findings_and_way_home_in_the_units_asked(run: Any, tmp_path: Path) -> None:
+    """The words of options once took the quantities out of findings."""
+    steps = [(36.6, -84.35, 60, 22), (36.6, -84.30, 150, 16), (36.62, -84.25, 350, 16), (36.62, -84.25, 0, 21)]
+    rows = ["QGC WPL 110", "0\t1\t0\t16\t0\t0\t0\t0\t36.6\t-84.35\t300\t1"]
+    rows += [f"{k}\t0\t3\t{c}\t0\t0\t0\t0\t{y}\t{x}\t{z}\t1" for k, (y, x, z, c) in enumerate(steps, start=1)]
+    file = tmp_path / "m.waypoints"
+    file.write_text("\n".join(rows) + "\n")
+    world = ("--dem", "sample:jacksboro", "--min-agl", "120", "--max-agl", "130", "--units", "aviation", "--way-home")
+    code, out, err = run("check", str(file), *world, "-q")
+    assert code == 4
+    lines = [line for line in (out + err).splitlines() if not line.startswith(("note: ", "warning: "))]
+    assert any("ft, limit" in line for line in lines)
+    assert not [line for line in lines if re.search(r"\d ?(m|km|m/s)\b", line)]

@@ -154,3 +154,10 @@ def test_another_autopilot_than_the_mission_files_is_refused(run: Any) -> None:
         code, said = run("verify", "out/uav1.waypoints", "--to", server.url_for_gcs, "--mission", CROSSING)
     assert code == 5
     assert "the mission is written for ArduCopter, and the vehicle is PX4" in said
+
+
+def test_an_empty_board_was_sent_nothing(run: Any, url: str) -> None:
+    code, text = run("verify", "out/uav1.plan", "--to", url)
+    assert code == 7
+    assert "on board is 0" in text
+    assert "sent" not in text

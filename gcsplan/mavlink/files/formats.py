@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import stat
 from dataclasses import replace
 from os import PathLike
@@ -54,9 +55,20 @@ def read_mission_file(
             read = replace(read, notes=(*read.notes, words))
     else:
         raise InputError(
-            "neither a .waypoints file (first line 'QGC WPL 110') nor a .plan file (a JSON object)", where=where
+            f"neither a .waypoints file (first line 'QGC WPL 110') nor a .plan file (a JSON object){_instead(file)}",
+            where=where,
         )
     return replace(read, mission=replace(read.mission, name=file.stem))
+
+
+def _instead(file: Path) -> str:
+    """What a file of another kind, by its name, is for."""
+    name, end = shlex.quote(str(file)), file.suffix.lower()
+    if end in (".yaml", ".yml"):
+        return f"; a mission file comes first (gcsplan check {name} FILE), and gcsplan plan {name} makes such a file"
+    if end in (".kml", ".kmz", ".geojson", ".gpkg", ".shp", ".fgb"):
+        return f"; zones are given with --zones {name}, or in a mission file"
+    return f"; terrain is given with --dem {name}, or in a mission file" if end in (".tif", ".tiff", ".hgt") else ""
 
 
 def _text(file: Path, where: str) -> str:
@@ -76,4 +88,5 @@ def _text(file: Path, where: str) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError(f"not a text file in UTF-8 (byte {error.start})", where=where) from None
+        words = f"not a text file in UTF-8 (byte {error.start}){_instead(file)}"
+        raise InputError(words, where=where) from None

@@ -106,7 +106,8 @@ class UploadResult:
             shown = "; ".join(str(d) for d in self.faults[:_SHOWN])
             rest = len(self.faults) - _SHOWN
             more = f"; and {rest} more" if rest > 0 else ""
-            return ReadBackDiffers(f"what is on board is not what was sent: {shown}{more}{tail}", where=where)
+            asked = "the file has" if self.faults[0].unsent else "was sent"
+            return ReadBackDiffers(f"what is on board is not what {asked}: {shown}{more}{tail}", where=where)
         if self.failed_check is not None:
             return CheckFailed(f"the mission as read back fails the check: {self.failed_check}{tail}", where=where)
         return LinkError(f"the outcome is {self.reason}{tail}", where=where)

@@ -187,7 +187,8 @@ def verifying(channel: Channel, task: Task) -> Steps[UploadResult]:
         warnings += noted
     started = channel.link.clock()
     read = yield from reading(channel, state, task.mission_type, task.options, recheck)
-    differences = tuple(compare(task.items, read.items, task.autopilot, task.mission_type))
+    found = compare(task.items, read.items, task.autopilot, task.mission_type)
+    differences = tuple(replace(d, unsent=True) for d in found)
     settled = Settled(Accepted(read.opaque_id), not faults(differences), differences, read.items, "", 1, read.retries)
     ended_s = channel.link.clock() - started
     result = yield from result_of(task, channel, settled, ended_s, warnings, recheck.texts, values, recheck)

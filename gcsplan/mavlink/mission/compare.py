@@ -25,7 +25,8 @@ YAW_TOLERANCE_DEG = 1e-3
 class Difference:
     """One number that differs from the expected one; ``seq`` is -1 for the list as a whole.
 
-    ``excused``: harmless and reported nevertheless (the vehicle's own home, a position within a tolerance).
+    ``excused``: harmless and reported nevertheless (the vehicle's own home, a position within a tolerance). ``unsent``:
+    nothing was sent, and ``sent`` is what the file has.
     """
 
     seq: int
@@ -35,6 +36,7 @@ class Difference:
     read: str
     what: str = ""
     excused: bool = False
+    unsent: bool = False
 
     def __str__(self) -> str:
         place = f"item {self.seq} ({self.what})" if self.seq >= 0 else "the list"
@@ -42,6 +44,8 @@ class Difference:
             return f"{place}: {self.field} is the vehicle's own, {self.read}; planned {self.sent}"
         kept = "" if self.expected == self.sent else f" (kept as {self.expected})"
         within = ", within the tolerance" if self.excused else ""
+        if self.unsent:
+            return f"{place}: {self.field}: the file has {self.sent}{kept}, on board is {self.read}{within}"
         return f"{place}: {self.field}: sent {self.sent}{kept}, read back {self.read}{within}"
 
 
