@@ -19,6 +19,7 @@ from gcsplan.cli.console import plan_table
 from gcsplan.export.table import csv_text
 from gcsplan.mission_file import load_mission
 from gcsplan.report.index_page import render_index
+from gcsplan.units import METRIC
 from tests.check.test_energy import ENERGY, mission
 from tests.support.paths import DATA
 
@@ -66,7 +67,7 @@ def test_a_batch_tells_in_index_and_csv_what_its_pages_tell(tmp_path: Path) -> N
         assert row["verdict"].endswith(ends)
         assert (row["safe"], row["return_safe"]) == (True, False if report else None)
         assert row["verdict"] in csv_text(COLUMNS, [row])
-        assert row["verdict"] in render_index("b", records[0].rows, {})
+        assert row["verdict"] in render_index("b", records[0].rows, {}, METRIC, "report.html")
         if report:
             assert row["verdict"] in (out / "crossing" / "report.html").read_text(encoding="utf-8")
         assert row["max_agl_m"] > row["min_agl_m"]
