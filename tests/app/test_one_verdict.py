@@ -83,7 +83,13 @@ def test_without_an_energy_key_no_output_tells_an_energy(capsys: pytest.CaptureF
         assert (vehicle["energy_j"] is not None, vehicle["flight_energy_j"] is not None) == (told, told)
         last = outputs_of(done)["profile.csv"].splitlines()[-1].split(",")
         assert (last[10] != "", last[11] != "") == (told, told)
-        assert ("Wh" in report_of(done)) is told
+        assert ("<dt>energy</dt><dd>–" in report_of(done)) is not told
+
+
+def test_the_papers_energy_is_told_where_it_is_what_is_minimised() -> None:
+    done = plan(load_mission(mission(None)), objective="energy")
+    assert summary_of(done)["vehicles"][0]["energy_j"] > 0.0
+    assert any("the paper's energy" in n for n in done.notes)
 
 
 def test_an_advised_return_altitude_above_max_agl_is_told() -> None:
