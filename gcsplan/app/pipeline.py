@@ -115,6 +115,9 @@ def plan(
     if len(flown) > 1 and source.arrival is None:
         notes.append("the file asks for no `arrival`: the separation between vehicles is not judged")
     notes += fleet.notes
+    if goal == "energy" and any(not v.verdict.energy_stated for v in flown):
+        flown = tuple(replace(v, verdict=replace(v.verdict, energy_stated=True)) for v in flown)
+        notes.append("what is minimised is the paper's energy, for no `energy:` of a vehicle is given")
     return Plan(source, brief.world, name, goal, number, flown, tuple(notes), fleet, tuple(leaving.found), leave_out)
 
 

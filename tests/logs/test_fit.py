@@ -7,6 +7,7 @@ import math
 import os
 import struct
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -357,3 +358,93 @@ def test_the_command_ends_with_4_where_the_log_cannot_tell(tmp_path: Path) -> No
     assert "vertical_j_per_m" in told["error"]["message"]
     assert told["fit"]["vertical_j_per_m"]["value"] is None
     assert told["fit"]["horizontal_j_per_m"]["value"] == pytest.approx(R2, rel=0.02)
+
+
+# -- time, speeds and wind --------------------------------------------------------------------------------------------
+
+BASE, PER_M, UP = 300.0, 5.0, 40.0
+TWO_SPEEDS: tuple[Leg, ...] = (
+    (0, 0, 60, 30), (0, 0, 0, 40), (500, 0, 0, 100), (0, 500, 0, 100), (1400, 0, 0, 100), (0, -1400, 0, 100),
+    (0, 0, -40, 25), (0, 0, 40, 20), (0, 0, 0, 40), (0, 0, -50, 30),
+)  # fmt: skip
+
+
+def timed(legs: Sequence[Leg], seed: int, wind: tuple[float, float] = (0.0, 0.0)) -> FlightLog:
+    """A flight with a base power, in a wind that blows to the east and to the north."""
+    t, place, _ = flown(legs, seed=seed)
+    at = np.concatenate([[0.0], np.cumsum([leg[3] for leg in legs])])
+    leg = np.minimum(np.searchsorted(at, t, side="right") - 1, len(legs) - 1)
+    watts = np.array(
+        [
+            450.0 if not (e or n or u) else BASE + UP * abs(u) / s
+            + PER_M * (math.hypot(e / s - wind[0], n / s - wind[1]) if e or n else 0.0)
+            for e, n, u, s in legs
+        ]
+    )[leg]  # fmt: skip
+    watts *= 1.0 + 0.03 * np.random.default_rng(seed).standard_normal(len(t))
+    blows = np.column_stack([t, np.full(len(t), wind[0]), np.full(len(t), wind[1])]) if any(wind) else np.zeros((0, 3))
+    return replace(log_of(t, place, watts), wind=blows)
+
+
+@pytest.mark.parametrize("wind", [(0.0, 0.0), (3.0, -2.0)])
+def test_two_speeds_tell_the_base_power_and_one_does_not(wind: tuple[float, float]) -> None:
+    found = fit_energy([timed(TWO_SPEEDS, 21, wind)])
+    assert found.base.value == pytest.approx(BASE, rel=0.05)
+    assert found.horizontal.value == pytest.approx(PER_M, abs=1.0)
+    assert found.vertical.value == pytest.approx(UP, rel=0.2)
+    assert found.hover.value == pytest.approx(450.0, rel=0.02)
+    slow, fast = found.fitted_m_s
+    assert slow < 7.0
+    assert fast > 12.0
+    assert any("through the air" in n for n in found.notes) is True
+
+
+def test_a_fit_at_one_speed_predicts_that_speed_alone_and_says_so() -> None:
+    legs: tuple[Leg, ...] = ((0, 0, 60, 30), (2800, 0, 0, 200), (0, 0, -40, 25), (0, 0, 40, 20), (0, 0, 0, 40))
+    found = fit_energy([timed(legs, 22)])
+    assert found.base.value is None
+    assert found.fitted_m_s == pytest.approx((14.0, 14.0), rel=0.02)
+    assert yaml.safe_load(found.yaml())["energy"]["fitted_speed_m_s"] == pytest.approx(14.0, rel=0.02)
+    both = fit_energy([timed(legs, 22), timed(TWO_SPEEDS, 23)])
+    slow_w = (both.base.value or 0.0) + 5.0 * (both.horizontal.value or 0.0)
+    assert slow_w == pytest.approx(BASE + 5.0 * PER_M, rel=0.05)
+
+
+def test_a_power_that_does_not_grow_with_speed_is_a_base_power_alone() -> None:
+    t, place, _ = flown(TWO_SPEEDS, seed=24)
+    watts = 320.0 * (1.0 + 0.03 * np.random.default_rng(24).standard_normal(len(t)))
+    found = fit_energy([log_of(t, place, watts)])
+    assert found.told
+    assert found.base.value == pytest.approx(320.0, rel=0.05)
+    assert found.horizontal.value == pytest.approx(0.0, abs=2.0)
+
+
+@pytest.mark.parametrize(
+    ("volt", "ampere", "what"), [(100.0, 100.0, "voltage"), (1000.0, 1.0, "voltage"), (1.0, 1000.0, "current")]
+)
+def test_readings_in_another_unit_are_refused(tmp_path: Path, volt: float, ampere: float, what: str) -> None:
+    t, place, watts = flown(seed=25)
+    file = csv_of(tmp_path / "a.csv", "time_s,x,y,z,volt,amp", [t, *place.T, np.full(len(t), 22.2 * volt),
+                  watts / 22.2 * ampere])  # fmt: skip
+    with pytest.raises(InputError, match=f"tells a {what} of .*another unit"):
+        read_log(file)
+    milli = csv_of(tmp_path / "b.csv", "time_s,x,y,z,power", [t, *place.T, 1000.0 * watts])
+    with pytest.raises(InputError, match="tells a power of"):
+        read_log(milli)
+
+
+def test_an_old_log_s_hundredths_are_read_by_its_own_format(tmp_path: Path) -> None:
+    t, place, watts = flown(seed=26)
+    lat, lon = degrees(place)
+    old = {"CURR": (131, "Qhhh", "TimeUS,Throttle,Volt,Curr", "<Qhhh")}
+    FORMATS.update(old)
+    try:
+        rows: list[tuple[str, tuple[float, ...]]] = []
+        for i, s in enumerate(t):
+            us = int(s * 1e6) + 1
+            rows.append(("POS", (us, round(lat[i] * 1e7), round(lon[i] * 1e7), 300 + place[i, 2], place[i, 2])))
+            rows.append(("CURR", (us, 500, 2200, min(round(watts[i] / 22.0 * 100), 32767))))
+        found = fit_energy([read_log(dataflash(tmp_path / "old.bin", rows))])
+    finally:
+        FORMATS.pop("CURR")
+    assert within(found), found.yaml()

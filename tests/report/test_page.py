@@ -613,8 +613,8 @@ def test_the_key_figures_of_a_large_fleet_stand_in_one_table() -> None:
     read = Reader(render_page(replace(page, subjects=(*many, bad))))
     assert "Key figures" in read.text
     assert not [a for t, a in read.elements if t == "article"]
-    assert read.text.count("✓ safe") == 7
-    assert read.text.count("✕ not safe") == 1
+    assert read.text.count("! path safe, return not judged") == 7
+    assert read.text.count("✕ path UNSAFE, return not judged") == 1
     assert "NOT SAFE" in read.text
 
 

@@ -79,7 +79,8 @@ CASES: dict[str, Any] = {
     "one leg": {
         "version": 1, "name": "one leg", "terrain": {"flat_m": 300}, "limits": {"min_agl_m": 30},
         "vehicles": [
-            {"name": "uav1", "sysid": 1, "autopilot": "arducopter", "start": [47.0, 8.0], "goal": [47.002, 8.0]},
+            {"name": "uav1", "sysid": 1, "autopilot": "arducopter", "start": [47.0, 8.0], "goal": [47.002, 8.0],
+             "energy": {"vertical_j_per_m": 120}},
         ],
     },
     "below 120 m": FLAT | {

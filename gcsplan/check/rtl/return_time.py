@@ -36,6 +36,7 @@ def return_s(vehicle: Vehicle, way_m: float, rise_m: float, down_m: float, speed
     if math.isfinite(vehicle.vertical_accel_m_s2):
         seconds += (climb + 2.0 * descent) / vehicle.vertical_accel_m_s2
     if math.isfinite(vehicle.accel_m_s2):
-        jerks_s = 2.0 * vehicle.accel_m_s2 / vehicle.leg_jerk_m_s3  # 0 without a bound of the jerk
+        # PX4 brakes by 2 a/j seconds at the speed earlier (`fleet.smoothed`); without a bound of the jerk this is 0.
+        jerks_s = (4.0 if vehicle.smooths else 2.0) * vehicle.accel_m_s2 / vehicle.leg_jerk_m_s3
         seconds += CHANGES * (speed / vehicle.accel_m_s2 + jerks_s)
     return seconds

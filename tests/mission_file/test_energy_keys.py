@@ -1,0 +1,49 @@
+"""Power in cruise and endurance as keys of ``energy:``: read as a base power, refused where they contradict others."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from gcsplan.errors import InputError
+from gcsplan.mission_file import load_mission
+from tests.check.test_energy import mission
+
+
+def energy_of(keys: dict[str, Any]) -> tuple[Any, tuple[str, ...]]:
+    source = load_mission(mission(keys))
+    return source.vehicles[0].vehicle.energy, source.notes
+
+
+def test_power_in_cruise_and_endurance_become_a_base_power_with_a_note() -> None:
+    energy, notes = energy_of({"cruise_w": 320})
+    assert (energy.base_w, energy.horizontal_j_per_m, energy.hold_w()) == (320.0, 0.0, 320.0)
+    assert any("cruise_w 320 is read as base_w 320" in n and "120 J" in n for n in notes)
+    energy, notes = energy_of({"battery_wh": 100, "endurance_min": 30, "vertical_j_per_m": 40})
+    assert energy.base_w == pytest.approx(200.0)
+    assert any("endurance_min: 30 min" in n for n in notes)
+    assert not any("as in the paper" in n for n in notes)
+
+
+@pytest.mark.parametrize(
+    ("keys", "where", "cure"),
+    [
+        ({"cruise_w": 300, "horizontal_j_per_m": 50}, "energy.cruise_w", "keep one"),
+        ({"cruise_w": 300, "endurance_min": 20, "battery_wh": 90}, "energy.endurance_min", "keep one"),
+        ({"base_w": 300, "endurance_min": 20, "battery_wh": 90}, "energy.endurance_min", "keep one"),
+        ({"endurance_min": 20}, "energy.endurance_min", "give battery_wh"),
+        ({"fitted_speed_m_s": [9, 5]}, "energy.fitted_speed_m_s", "slowest"),
+    ],
+)
+def test_keys_that_contradict_each_other_are_refused_with_a_cure(keys: dict[str, Any], where: str, cure: str) -> None:
+    with pytest.raises(InputError) as refused:
+        energy_of(keys)
+    [problem] = refused.value.problems
+    assert problem.where.endswith(where)
+    assert cure in problem.message
+
+
+def test_without_a_key_the_energy_is_not_stated() -> None:
+    assert energy_of({})[0].stated is False
+    assert energy_of({"hover_w": 100})[0].stated is True
