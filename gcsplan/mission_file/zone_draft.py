@@ -36,6 +36,9 @@ MAX_VERTICES = 100_000
 MOST_CORNERS = 20_000
 """Most corners of one polygon near the mission; more are drawn wider, by at most `WIDEST_M`, with fewer."""
 
+MOST_ALL_CORNERS = 400_000
+"""Most corners of all polygons near enough to matter, corridors' polygons included; more refuse a mission near them."""
+
 WIDEST_M, MUCH_WIDER_M = 0.5, (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 """How much wider an outline is drawn without being asked, m, and tolerances that are tried for a cure."""
 
@@ -235,6 +238,7 @@ def place_zones(drafts: Sequence[ZoneDraft], frame: Frame) -> tuple[list[tuple[Z
     """
     placed: list[tuple[ZoneDraft, Zone]] = []
     far: list[ZoneDraft] = []
+    corners = 0
     for draft in drafts:
         try:
             shapes = _shapes(draft, frame)
@@ -243,6 +247,13 @@ def place_zones(drafts: Sequence[ZoneDraft], frame: Frame) -> tuple[list[tuple[Z
         if not shapes:
             far.append(draft)
         draft, shapes = _with_fewer_corners(draft, shapes)
+        corners += sum(len(shape.vertices) for shape in shapes if isinstance(shape, Polygon))
+        if corners > MOST_ALL_CORNERS and draft.radius_m is None:
+            words = (
+                f"with this one the zones have {corners} corners, more than {MOST_ALL_CORNERS} together; simplify them"
+            )
+            fault = Problem(draft.where, f"zone {draft.name[:60]!r}: {words}")
+            draft = replace(draft, faults=(*draft.faults, fault))
         for i, shape in enumerate(shapes):
             name = draft.name if len(shapes) == 1 else f"{draft.name}/{i + 1}"
             placed.append((draft, Zone(name, shape, draft.floor, draft.ceiling)))

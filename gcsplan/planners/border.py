@@ -16,6 +16,7 @@ from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
+from gcsplan.world.outlines import few_corners
 from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Circle, Zone
 
@@ -23,6 +24,8 @@ PIECES = 8
 """Straight pieces that approximate one side of a window; in the plane a side is curved."""
 INSET_CELLS = 1.0
 """Cells along the border that count as beyond it, in addition to the distance that paths keep from unknown ground."""
+MOST_CORNERS = 2000
+"""Corners of one polygon in that test; of a polygon with more, a smaller one inside it counts."""
 TOUCH_M = 0.01
 """Metres by which zones are shrunk in the test whether they enclose a place."""
 
@@ -195,7 +198,12 @@ def _shape(zone: Zone, reach_m: float) -> Any:
 
     if isinstance(zone.shape, Circle):
         return shapely.Point(zone.shape.east_m, zone.shape.north_m).buffer(zone.shape.radius_m + reach_m, quad_segs=64)
-    shape = shapely.make_valid(shapely.Polygon(zone.shape.vertices))
+    few = few_corners(zone.shape.vertices, MOST_CORNERS, outward=False)
+    if few is None:
+        return shapely.Polygon()
+    shape = shapely.Polygon(few)
+    if not shapely.is_valid(shape):  # to make a valid one valid takes minutes where edges lie close to each other
+        shape = shapely.make_valid(shape)
     return shape.buffer(reach_m, quad_segs=16) if reach_m > 0.0 else shape
 
 

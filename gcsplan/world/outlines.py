@@ -27,6 +27,9 @@ FEW = 2000
 SAMPLED, AT_ONCE = 64, 32
 """Edges from which pairs are estimated, and most edges whose crossings are counted at once."""
 
+WIDER_M = (0.05, 0.2, 1.0, 5.0, 20.0, 100.0)
+"""Tolerances that `few_corners` tries, m."""
+
 ROUNDS = 200
 """Rounds of steps at most; each takes a fifth of what can be left out, or more."""
 
@@ -81,6 +84,20 @@ def fewer_corners(vertices: Floats, tolerance_m: float, *, outward: bool = True)
     shape = shapely.Polygon(ring)
     fine = len(ring) >= 3 and overlapping_pairs(ring) <= MOST_PAIRS and bool(shapely.is_valid(shape))
     return ring if fine and shape.area > 0.0 else None
+
+
+def few_corners(vertices: Floats, most: int, *, outward: bool) -> Floats | None:
+    """An outline (N, 2) with at most ``most`` corners around a polygon (``outward``) or inside it; or None.
+
+    It is the polygon's own if that has so few, else with the least of the tolerances `WIDER_M` that is enough.
+    """
+    if len(vertices) <= most:
+        return vertices
+    for tolerance_m in WIDER_M:
+        ring = fewer_corners(vertices, tolerance_m, outward=outward)
+        if ring is not None and len(ring) <= most:
+            return ring
+    return None
 
 
 def _round(ring: Floats, error: Floats, tolerance_m: float, side: float) -> tuple[Floats, Floats, bool]:

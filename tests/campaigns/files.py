@@ -1,6 +1,6 @@
 """Hostile files: randomly corrupted mission files, zones, other programs' missions and terrain, by the command line.
 
-    python -m tests.campaigns.files --seconds 120 [--seed 1] [--inputs N] [--keep DIR]
+    python -m tests.campaigns.files --seconds 120 [--seed 1] [--inputs N] [--keep DIR] [--sizes]
 
 Each input is one run of ``gcsplan check --json`` with one or more files corrupted as people, programs and attackers
 do. The run must end with one of the exit codes in `CODES`, print one JSON document, no traceback and no warning, write
@@ -29,6 +29,7 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.cli import main as cli
+from tests.campaigns import sizes
 from tests.campaigns.disk import workshop
 from tests.campaigns.hostile import KINDS, write_clean
 from tests.support.paths import REPOSITORY
@@ -197,10 +198,13 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--inputs", type=int, default=10**9, help="at most this many inputs")
     parser.add_argument("--keep", metavar="DIR", help="work in DIR, and leave the files of the last input")
+    parser.add_argument("--sizes", action="store_true", help="large inputs, not spoilt ones (tests.campaigns.sizes)")
     parser.add_argument("--work", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.work:
         work(given.seed)
+    if given.sizes:
+        return sizes.campaign(sizes.FILES, given.seconds, given.seed, given.inputs)
     return campaign(given.seconds, given.seed, given.inputs, given.keep)
 
 

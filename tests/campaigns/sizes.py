@@ -4,15 +4,23 @@
 ``gcsplan``. All inputs lie around one place on flat ground, so that the amount alone makes the work.
 
     python -m tests.campaigns.sizes KIND COUNT [SEED]     # writes one input here, and prints its command
+
+`campaign` runs inputs at the limits that docs/safety.md states, below and beyond them. Each must end with an exit code
+of the contract within its stated time and memory; beyond a limit it may be refused by name (exit 2) instead.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
+import os
 import random
 import shlex
+import subprocess
 import sys
+import tempfile
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -20,6 +28,8 @@ import numpy as np
 import rasterio
 import yaml
 from rasterio.transform import Affine
+
+from tests.support.paths import REPOSITORY
 
 LAT, LON = 46.0, 14.5
 NORTH_M, EAST_M = 111_160.0, 77_300.0
@@ -298,6 +308,80 @@ KINDS: dict[str, Kind] = {
         long_wing, runs, log,
     )
 }  # fmt: skip
+
+
+FILES = {
+    "corners_checked": 20_000, "crossing": 250, "arcs": 500, "items": 10_000, "items_at_home": 650, "splines": 650,
+    "jumps": 650, "log": 500_000,
+}  # fmt: skip
+"""Kinds that are read and checked, without a planner, with the largest amount that docs/safety.md states."""
+
+WORLDS = {
+    "corners": 20_000, "coast": 100_000, "corners_fenced": 20_000, "corners_drawn": 20_000, "corridor": 5000,
+    "river": 20_000, "cylinders": 20_000, "forest": 20_000, "vias": 500, "cells": 60, "tiles": 2000, "fleet": 100,
+    "long_wing": 150, "runs": 1000,
+}  # fmt: skip
+"""Kinds that are planned, the same."""
+
+BEYOND = 3
+"""Inputs have up to so many times the stated amount."""
+
+PATIENCE_S, MEMORY_MB = 60.0, 1000.0
+"""Most processor seconds and megabytes of one input."""
+
+CODES = {0, 2, 3, 4}
+
+
+def run(kind: str, count: int, seed: int) -> tuple[int, float, float, str]:
+    """Exit code, processor seconds, megabytes and last words of one input; written into the current folder."""
+    command = [sys.executable, "-m", "gcsplan.cli.main", *write(kind, count, seed)]
+    environment = os.environ | {"PYTHONPATH": str(REPOSITORY)}
+    with tempfile.TemporaryFile("w+") as err:
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=err, env=environment)
+        until = time.monotonic() + 10.0 * PATIENCE_S  # busy machines
+        while not (ended := os.wait4(process.pid, os.WNOHANG))[0]:
+            if time.monotonic() > until:
+                process.kill()
+                ended = os.wait4(process.pid, 0)
+                break
+            time.sleep(0.02)
+        process.returncode = os.waitstatus_to_exitcode(ended[1])
+        err.seek(0)
+        words = err.read()[-300:]
+    used = ended[2]
+    return process.returncode, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0, words
+
+
+def faults(code: int, took_s: float, held_mb: float, words: str) -> list[str]:
+    """What is wrong with how an input ended."""
+    found = [] if code in CODES else [f"ended with {code}: {words}"]
+    found += [f"took {took_s:.1f} s of the processor"] if took_s > PATIENCE_S else []
+    found += [f"held {held_mb:.0f} MB"] if held_mb > MEMORY_MB else []
+    found += [f"a traceback: {words}"] if "Traceback" in words else []
+    return found
+
+
+def campaign(kinds: dict[str, int], seconds: float, seed: int, inputs: int = 10**9) -> int:
+    """Run inputs of random kinds and amounts, half of them at the limit; print faults and figures by kind."""
+    until, done = time.monotonic() + seconds, 0
+    figures: dict[str, list[float]] = {kind: [0, 0, 0, 0.0, 0.0] for kind in kinds}
+    while done < inputs and time.monotonic() < until:
+        rng = random.Random(seed)
+        kind = rng.choice(list(kinds))
+        count = kinds[kind] if rng.random() < 0.5 else max(4, int(BEYOND ** rng.uniform(-3.0, 1.0) * kinds[kind]))
+        with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+            code, took_s, held_mb, words = run(kind, count, seed)
+        wrong = faults(code, took_s, held_mb, words)
+        for what in wrong:
+            print(f"seed {seed} ({kind} of {count}): {what}", flush=True)
+        row = figures[kind]
+        row[0], row[1], row[2] = row[0] + 1, row[1] + (code == 2), row[2] + bool(wrong)
+        row[3], row[4] = max(row[3], took_s), max(row[4], held_mb)
+        seed, done = seed + 1, done + 1
+    for kind, (ran, refused, wrong_, took_s, held_mb) in figures.items():
+        about = f"{ran:.0f} inputs, {refused:.0f} refused, {wrong_:.0f} faults"
+        print(f"{kind:16} {about}, {took_s:.1f} s and {held_mb:.0f} MB at most")
+    return 1 if any(row[2] for row in figures.values()) else 0
 
 
 def write(kind: str, count: int, seed: int = 1) -> list[str]:

@@ -36,6 +36,7 @@ from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Progress, Solution
 from gcsplan.world.frame import Frame, centre_of
 from gcsplan.world.path import Path as Track
+from tests.campaigns import sizes
 
 CAP_M, HIGH_M, LOW_M = 300.0, 600.0, 100.0
 """AMSL (m) of the ceiling, of the ridges, and of the ground beside them."""
@@ -434,7 +435,10 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--families", nargs="+", default=list(FAMILIES), choices=list(FAMILIES))
     parser.add_argument("--all", action="store_true", help="print every mission")
+    parser.add_argument("--sizes", action="store_true", help="large worlds instead (tests.campaigns.sizes)")
     given = parser.parse_args()
+    if given.sizes:
+        raise SystemExit(sizes.campaign(sizes.WORLDS, given.seconds, given.seed))
     resource.setrlimit(resource.RLIMIT_AS, (MOST_BYTES, MOST_BYTES))
     outcomes: list[Outcome] = []
     begun, seed = time.monotonic(), given.seed

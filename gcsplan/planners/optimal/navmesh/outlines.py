@@ -21,7 +21,7 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.navmesh.mesh_kernels import sort_portals
 from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundTrack, Place, Portals
-from gcsplan.world.outlines import fewer_corners
+from gcsplan.world.outlines import few_corners
 from gcsplan.world.zones import Circle, Zone
 
 COARSE = 4
@@ -38,8 +38,6 @@ MOST_CORNERS = 12_000
 """Corners of all outlines of one mesh, at most: with more, the triangulation takes seconds."""
 MOST_GROWN = 1000
 """Corners of one polygon that is grown, at most: its edges are grown one by one, a thousand in half a second."""
-PLAINER_M = (0.05, 0.2, 1.0, 5.0, 20.0, 100.0)
-"""Tolerances with which a polygon with more corners is drawn with fewer, m, until they are few enough."""
 BEYOND_M = 1.0
 """Metres that the mesh reaches beyond the outlines and the places."""
 MOST_OPENED = 1_000_000
@@ -124,8 +122,10 @@ class Outline:
         if reach <= 0.0:
             return bare.buffer(reach, join_style="mitre")
         angle = self._angles(reach, range(4 * COARSE) if self.fine else ())
-        vertices = _plain(vertices, outer=self.outer)
-        bare = shapely.Polygon(vertices)
+        few = few_corners(vertices, MOST_GROWN, outward=self.outer)
+        if few is None:
+            raise Exhausted(0.0)
+        vertices, bare = few, shapely.Polygon(few)
         following = np.roll(vertices, -1, axis=0)
         turn = np.arctan2(*(following - vertices).T[::-1])
         # An edge with half a circle around each of its ends is convex: the hull of the two circles' corners.
@@ -135,17 +135,6 @@ class Outline:
             for corners in (_around(np.sort((angle + first) % (2.0 * math.pi)), reach, outer=self.outer),)
         ]
         return shapely.union_all([bare, *shapely.convex_hull(shapely.multipoints(np.array(parts)))])
-
-
-def _plain(vertices: Floats, *, outer: bool) -> Floats:
-    """A polygon's corners, or fewer of a polygon around it (``outer``) or inside it. Raises Exhausted."""
-    if len(vertices) <= MOST_GROWN:
-        return vertices
-    for tolerance_m in PLAINER_M:
-        plain = fewer_corners(vertices, tolerance_m, outward=outer)
-        if plain is not None and len(plain) <= MOST_GROWN:
-            return plain
-    raise Exhausted(0.0)
 
 
 WIDTH = 0.5 * math.pi / COARSE

@@ -1,0 +1,74 @@
+"""Zones as large as their files allow: read and placed in bounded time, or refused by name before the work is done."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from gcsplan.errors import InputError
+from gcsplan.mission_file import load_mission
+from gcsplan.mission_file.zone_draft import MOST_CORNERS
+from gcsplan.world.zones import Polygon
+from tests.campaigns import sizes
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def within_s() -> Iterator[list[float]]:
+    """The most seconds of the processor that the test may take, to be put in."""
+    most: list[float] = []
+    begun = time.process_time()
+    yield most
+    assert time.process_time() - begun < most[0]
+
+
+def said(kind: str, count: int) -> str:
+    """What the refusal of a mission with zones of that kind says; its notes if it is not refused."""
+    sizes.write(kind, count)
+    try:
+        return "\n".join(load_mission("m.yaml").notes)
+    except InputError as refusal:
+        return "\n".join(str(p) for p in refusal.problems)
+
+
+def test_an_outline_of_99_000_spikes_is_refused_by_its_name(within_s: list[float]) -> None:
+    within_s.append(8.0)  # minutes before
+    assert "features[0].geometry.coordinates: the outline has 99000 corners" in said("corners", 99_000)
+
+
+def test_a_coast_of_90_000_corners_is_drawn_wider_with_a_note(within_s: list[float]) -> None:
+    within_s.append(8.0)
+    sizes.write("coast", 90_000)
+    mission = load_mission("m.yaml")
+    (zone,) = mission.zones
+    assert isinstance(zone.shape, Polygon)
+    assert len(zone.shape.vertices) <= MOST_CORNERS
+    assert any("drawn wider with fewer, by at most 0.5 m" in note for note in mission.notes)
+
+
+def test_a_ring_of_3_000_random_corners_is_not_untangled(within_s: list[float]) -> None:
+    within_s.append(5.0)  # 150 s and 4 GB before
+    assert "its outline of 3000 corners is too tangled to tell what it encloses" in said("crossing", 3000)
+
+
+def test_a_ring_that_crosses_itself_a_hundred_times_is_untangled() -> None:
+    assert "too tangled" not in said("crossing", 30)
+
+
+def test_ten_thousand_arcs_are_counted_before_they_are_drawn(within_s: list[float]) -> None:
+    within_s.append(5.0)  # 49 s and 1.1 GB before
+    assert "its outline has 10000 points and arcs, drawn with" in said("arcs", 10_000)
+
+
+@pytest.mark.slow
+def test_a_corridor_of_4_000_random_points_is_placed_in_seconds(within_s: list[float]) -> None:
+    within_s.append(10.0)  # 36 s before
+    sizes.write("corridor", 4000)
+    assert len(load_mission("m.yaml").zones) > 1000
