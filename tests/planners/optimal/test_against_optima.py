@@ -27,7 +27,7 @@ from tests.oracles.optima import profile_by_programme, shortest_past_discs
 from tests.oracles.optima_campaign import TOUCH_M, exact_past_discs, judge, reverse, summary
 from tests.oracles.optima_polish import PATIENT, Effort, cost_of, is_feasible
 from tests.oracles.optima_search import best_path
-from tests.oracles.optima_worlds import FAMILIES, hills, make, pass_height, plane_ground
+from tests.oracles.optima_worlds import FAMILIES, HOLED, hills, make, pass_height, plane_ground
 
 pytestmark = pytest.mark.slow
 
@@ -35,6 +35,8 @@ pytestmark = pytest.mark.slow
 WORLDS = dict.fromkeys(FAMILIES, 12) | {"clearances": 6, "passes": 6, "stops": 6, "pockets": 4}
 """Missions of each family that a run judges. `tests.oracles.optima_campaign` judges more: for up to 46 of each family
 a path is stored, for all others it searches for one."""
+HOLED_WORLDS = 4
+"""Missions of each family with voids in its ground; `bands+voids` 2 was called infeasible although a path is known."""
 BACKWARDS = 2
 """Missions of each of some families that are planned forwards and backwards."""
 BRIEF = Effort(300, 3, 1, 1, 1, 0.04)
@@ -140,6 +142,13 @@ def test_bound_is_never_over_and_path_never_under_what_is_known(family: str) -> 
     assert not wrong, "\n".join([*wrong, summary(verdicts)])
     missed = [str(v) for v in verdicts if v.missed]
     assert len(missed) <= MOST_MISSED.get(family, 0.1) * len(verdicts), "\n".join(missed)
+
+
+@pytest.mark.parametrize("family", HOLED)
+def test_no_void_makes_a_bound_or_a_proof_wrong(family: str) -> None:
+    verdicts = [judge(family, seed, BRIEF) for seed in range(HOLED_WORLDS)]
+    wrong = [str(v) for v in verdicts if v.wrong]
+    assert not wrong, "\n".join([*wrong, summary(verdicts)])
 
 
 @pytest.mark.parametrize("family", ["cylinders", "mountains", "climbs", "clearances", "borders"])
