@@ -124,10 +124,13 @@ def say_heights(inputs: Mapping[str, object], units: Units) -> None:
         say_notes([in_units(line, units)])
 
 
-def say_world(source: MissionFile, units: Units) -> None:
-    """Print how a mission's world was read, on standard error: there is no result."""
-    say_notes(source.notes)
-    say_heights(source.inputs, units)
+def say_terrain(source: MissionFile, units: Units) -> None:
+    """Print what a mission's terrain has to note, if anything, and how its heights were read: it may explain why there
+    is no mission."""
+    notes = source.surface.info.get("notes", ())
+    if isinstance(notes, tuple) and notes:
+        say_notes([str(note) for note in notes])
+        say_heights(source.inputs, units)
 
 
 def _say_fleet(plan: Plan, units: Units) -> None:

@@ -277,9 +277,9 @@ def _require_options(planner: str | None, objective: str | None, png: Path | Non
 
 
 def _retire(directory: Path, source: MissionFile | None, units: Units) -> None:
-    """Move the outputs of an earlier plan out of the way, since there is no mission now, and say how its world was
-    read: what was read amiss explains why."""
-    from gcsplan.cli.console import remark, say_world
+    """Move the outputs of an earlier plan out of the way, since there is no mission now, and say what its
+    terrain has to note."""
+    from gcsplan.cli.console import remark, say_terrain
     from gcsplan.export.outdir import retire_outputs
 
     try:
@@ -288,7 +288,7 @@ def _retire(directory: Path, source: MissionFile | None, units: Units) -> None:
     except InputError as error:  # the reason why there is no mission matters more
         remark(f"note: earlier outputs are still in {directory} and are of no use now: {error}")
     if source is not None:
-        say_world(source, units)
+        say_terrain(source, units)
 
 
 def _write(directory: Path, files: Mapping[str, str], pictures: dict[Path, bytes], later: Sequence[str]) -> None:
