@@ -281,13 +281,12 @@ def _with_fewer_corners(
             draft = replace(draft, remarks=(*draft.remarks, (WIDER, f"{len(drawn.vertices)} for {count}")))
             found.append(drawn)
             continue
-        cure = next((f"drawn up to {more_m:g} m wider it has {len(ring)}" for more_m in MUCH_WIDER_M
-                     if (ring := fewer_corners(shape.vertices, more_m)) is not None and len(ring) <= MOST_CORNERS),
-                    "draw a simpler one around it")  # fmt: skip
-        words = (
-            f"zone {draft.name[:60]!r}: its outline has {count} corners, more than {MOST_CORNERS}; simplify it: {cure}"
-        )
-        draft = replace(draft, faults=(*draft.faults, Problem(draft.where, words)))
+        tried = ((more_m, fewer_corners(shape.vertices, more_m, most=MOST_CORNERS)) for more_m in MUCH_WIDER_M)
+        cures = (f"drawn up to {more_m:g} m wider it has {len(ring)}" for more_m, ring in tried if ring is not None)
+        words = f"its outline has {count} corners, more than {MOST_CORNERS}; simplify it: "
+        words += next(cures, "draw a simpler one around it")
+        fault = Problem(draft.where, f"zone {draft.name[:60]!r}: {words}")
+        draft = replace(draft, faults=(*draft.faults, fault))
         found.append(shape)
     return draft, found
 
@@ -295,8 +294,8 @@ def _with_fewer_corners(
 def _wider(shape: Polygon) -> Polygon | None:
     """The polygon drawn wider by at most `WIDEST_M` with few enough corners; None if that fails."""
     for more_m in (0.1 * WIDEST_M, WIDEST_M):
-        ring = fewer_corners(shape.vertices, more_m)
-        if ring is not None and len(ring) <= MOST_CORNERS:
+        ring = fewer_corners(shape.vertices, more_m, most=MOST_CORNERS)
+        if ring is not None:
             return Polygon(np.ascontiguousarray(ring))
     return None
 

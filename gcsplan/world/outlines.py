@@ -65,8 +65,11 @@ def crossings(ring: Floats, most: int = MOST_CROSSINGS, *, closed: bool = True) 
     return count
 
 
-def fewer_corners(vertices: Floats, tolerance_m: float, *, outward: bool = True) -> Floats | None:
-    """An outline (N, 2), counter-clockwise and simple, with fewer corners; None if that crosses itself.
+def fewer_corners(
+    vertices: Floats, tolerance_m: float, *, outward: bool = True, most: int | None = None
+) -> Floats | None:
+    """An outline (N, 2), counter-clockwise and simple, with fewer corners; None if that crosses itself, or has more
+    than ``most``.
 
     ``outward``: it holds the polygon, and every point of it lies within ``tolerance_m`` of the polygon; else the
     polygon holds it, and every point that it lacks lies within ``tolerance_m`` of the outside.
@@ -81,6 +84,8 @@ def fewer_corners(vertices: Floats, tolerance_m: float, *, outward: bool = True)
         ring, error, done = _round(ring, error, tolerance_m, 1.0 if outward else -1.0)
         if not done:
             break
+    if most is not None and len(ring) > most:
+        return None
     shape = shapely.Polygon(ring)
     fine = len(ring) >= 3 and overlapping_pairs(ring) <= MOST_PAIRS and bool(shapely.is_valid(shape))
     return ring if fine and shape.area > 0.0 else None
@@ -94,8 +99,8 @@ def few_corners(vertices: Floats, most: int, *, outward: bool) -> Floats | None:
     if len(vertices) <= most:
         return vertices
     for tolerance_m in WIDER_M:
-        ring = fewer_corners(vertices, tolerance_m, outward=outward)
-        if ring is not None and len(ring) <= most:
+        ring = fewer_corners(vertices, tolerance_m, outward=outward, most=most)
+        if ring is not None:
             return ring
     return None
 

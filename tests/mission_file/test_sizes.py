@@ -68,6 +68,14 @@ def test_ten_thousand_arcs_are_counted_before_they_are_drawn(within_s: list[floa
 
 
 @pytest.mark.slow
+def test_where_half_a_metre_does_not_help_the_message_says_what_would(within_s: list[float]) -> None:
+    within_s.append(20.0)
+    assert "its outline has 28000 corners, more than 20000; simplify it: drawn up to 1 m wider it has" in said(
+        "corners", 28_000
+    )
+
+
+@pytest.mark.slow
 def test_a_corridor_of_4_000_random_points_is_placed_in_seconds(within_s: list[float]) -> None:
     within_s.append(10.0)  # 36 s before
     sizes.write("corridor", 4000)
