@@ -43,6 +43,8 @@ _ENDINGS: dict[int, type[Interrupted]] = {
     getattr(signal, name): kind for name, kind in (("SIGTERM", Terminated), ("SIGHUP", HungUp)) if hasattr(signal, name)
 }
 _received: list[int] = []
+_watch: list[Watch] = []
+_as_json: list[bool] = []
 
 closers: list[Callable[[GcsplanError], None]] = []
 """The last one closes the document that standard output holds a part of, with an error in it."""
@@ -56,7 +58,10 @@ def end_in_good_order(*, as_json: bool = False) -> None:
     """
     if threading.current_thread() is not threading.main_thread():  # Python sets handlers in the main thread only
         return
-    owner, watch = os.getpid(), Watch(lambda number: _end_at_once(number, as_json))
+    if not _watch:  # one for a process, which may run several commands
+        _watch.append(Watch(_end_at_once))
+    _as_json[:] = [as_json]
+    owner, watch = os.getpid(), _watch[0]
 
     def stop(number: int, _: object) -> None:
         watch.heard()
@@ -73,7 +78,7 @@ def end_in_good_order(*, as_json: bool = False) -> None:
             signal.signal(number, stop)
 
 
-def _end_at_once(number: int, as_json: bool) -> NoReturn:
+def _end_at_once(number: int) -> NoReturn:
     """End the process from a thread beside one that computes; nothing else of this process runs any more."""
     if number in _ENDINGS:
         _received.append(number)
@@ -85,7 +90,7 @@ def _end_at_once(number: int, as_json: bool) -> NoReturn:
         sys.stderr.flush()
         if closers:
             closers[-1](error)
-        elif as_json:
+        elif any(_as_json):
             put(json.dumps({"error": error.as_dict()}) + "\n")
         sys.stdout.flush()
     os._exit(error.exit_code)

@@ -56,3 +56,19 @@ def test_a_signal_ends_a_command_in_the_middle_of_a_library(number: str, code: i
     assert json.loads(out)["error"]["code"] == code
     assert err.startswith("gcsplan: ")
     assert err.count("\n") == 1
+
+
+def test_a_process_that_runs_many_commands_listens_once() -> None:
+    many = """
+import os, sys, threading
+sys.argv = ["gcsplan", "--version"]
+from gcsplan.cli import main as cli
+for _ in range(20):
+    try:
+        cli.main()
+    except SystemExit:
+        pass
+print(threading.active_count())
+"""
+    ended = subprocess.run([sys.executable, "-c", many], cwd=REPOSITORY, capture_output=True, text=True, timeout=60)
+    assert ended.stdout.splitlines()[-1] == "2"
