@@ -175,7 +175,7 @@ def check(
     form: Form = "whole" if as_json else "row" if json_lines else "lines"
     shown = Shown(form, allow_unjudged, units_of(units), len(arguments) > 1)
     archive = _archive(mission, arguments, given, asked, shown, at)
-    printer = Document() if as_json else Rows() if json_lines else Lines(shown.units, summed=not quiet)
+    printer = Document() if as_json else Rows() if json_lines else Lines(summed=not quiet)
     reading = steady(check_sites.split_name(file)[1] for file in arguments)
     if report is None and (rows or quiet or len(arguments) > TABLES):
         raise typer.Exit(tell_archive(archive, printer, jobs, cluster, reading))
@@ -286,7 +286,7 @@ def _say_all(batch: Batch, units: Units) -> None:
     from gcsplan.units import in_units
 
     say_notes(batch.notes)
-    say_heights(batch.inputs, units)
+    say_heights(batch.inputs)
     for c in batch.checked:
         say_notes(c.notes)
         name = f"{c.file} as {c.vehicle.name} ({c.vehicle.autopilot})"

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from gcsplan.app.archive import Archive
     from gcsplan.app.archive_words import Summary, Told
     from gcsplan.app.checking import Failing
-    from gcsplan.units import Units
 
 LINE_S = 5.0
 """Seconds between two lines of progress."""
@@ -42,8 +41,8 @@ class Printer(Protocol):
 class Lines:
     """The findings, a line for each; ``summed``: with notes before them, and the summary after them."""
 
-    def __init__(self, units: Units, *, summed: bool) -> None:
-        self.units, self.summed = units, summed
+    def __init__(self, *, summed: bool) -> None:
+        self.summed = summed
 
     def begin(self, header: Header) -> None:
         """See `Printer`."""
@@ -51,7 +50,7 @@ class Lines:
 
         if self.summed:
             say_notes(header[2])
-            say_heights(header[1], self.units)
+            say_heights(header[1])
 
     def tell(self, told: Told) -> None:
         """See `Printer`."""

@@ -113,24 +113,24 @@ def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) 
     if plan.fleet is not None:
         notes = [(slot.name, note) for slot in plan.fleet.slots for note in slot.notes]
         say_notes_of([(name, note.removeprefix(f"{name} ")) for name, note in notes])
-    say_heights(plan.source.inputs, units)
+    say_heights(plan.source.inputs)
     if words := what_is_not_in(plan.source.inputs):
         console.print(words, style="yellow", markup=False)
 
 
-def say_heights(inputs: Mapping[str, object], units: Units) -> None:
-    """Print how the terrain's heights were read, as one note."""
+def say_heights(inputs: Mapping[str, object]) -> None:
+    """Print how the terrain's heights were read, as one note; like all notes in SI."""
     if (line := heights_line(inputs)) is not None:
-        say_notes([in_units(line, units)])
+        say_notes([line])
 
 
-def say_terrain(source: MissionFile, units: Units) -> None:
+def say_terrain(source: MissionFile) -> None:
     """Print what a mission's terrain has to note, if anything, and how its heights were read: it may explain why there
     is no mission."""
     notes = source.surface.info.get("notes", ())
     if isinstance(notes, tuple) and notes:
         say_notes([str(note) for note in notes])
-        say_heights(source.inputs, units)
+        say_heights(source.inputs)
 
 
 def _say_fleet(plan: Plan, units: Units) -> None:

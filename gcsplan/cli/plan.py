@@ -204,7 +204,7 @@ def plan(
     except UsageError:
         raise  # a mistake on the command line does not invalidate an earlier mission
     except (InputError, NoMission, CheckFailed):
-        _retire(directory, None if as_json else source, system)
+        _retire(directory, None if as_json else source)
         raise
     pictures = {} if png is None else _pictures(planned, png, each)
     _write(directory, files, pictures, later=["upload.json"] if targets else [])
@@ -276,7 +276,7 @@ def _require_options(planner: str | None, objective: str | None, png: Path | Non
     return each
 
 
-def _retire(directory: Path, source: MissionFile | None, units: Units) -> None:
+def _retire(directory: Path, source: MissionFile | None) -> None:
     """Move the outputs of an earlier plan out of the way, since there is no mission now, and say what its
     terrain has to note."""
     from gcsplan.cli.console import remark, say_terrain
@@ -288,7 +288,7 @@ def _retire(directory: Path, source: MissionFile | None, units: Units) -> None:
     except InputError as error:  # the reason why there is no mission matters more
         remark(f"note: earlier outputs are still in {directory} and are of no use now: {error}")
     if source is not None:
-        say_terrain(source, units)
+        say_terrain(source)
 
 
 def _write(directory: Path, files: Mapping[str, str], pictures: dict[Path, bytes], later: Sequence[str]) -> None:

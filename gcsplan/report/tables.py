@@ -27,7 +27,7 @@ from gcsplan.report.plan_view import zone_heights
 from gcsplan.report.profile_view import passed
 from gcsplan.report.samples import Line, Passage
 from gcsplan.report.subject import Page, Subject
-from gcsplan.units import KILOJOULE, Unit, Units, duration, in_units
+from gcsplan.units import KILOJOULE, Unit, Units, duration
 from gcsplan.world.model_words import what_is_not_in
 
 CLOSE = 0.02
@@ -290,7 +290,7 @@ def inputs_table(inputs: Mapping[str, object], facts: Sequence[tuple[str, str]],
     for key, value in inputs.items():
         if value is None or key == "dem_kind":  # which stands in the words of bare_dem
             continue
-        words = esc(in_units(value, units) if isinstance(value, str) else value)
+        words = esc(value)  # a text as files have it
         if key == "bare_dem":
             words = esc(what_is_not_in(inputs).replace(" DEM: ", ": ", 1) or "obstacle heights were given")
         elif key == "resolution_m" and isinstance(value, int | float):

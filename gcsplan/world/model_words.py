@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 
-from gcsplan.units import Quantity, UnitText
+from gcsplan.figures import floored, raised
 from gcsplan.world.height_unit import HeightUnit
 
 BARE_DEM = "bare DEM: trees, masts and wires are not in it"
@@ -19,20 +18,18 @@ def what_is_not_in(inputs: Mapping[str, object]) -> str:
     return BARE_DEM if inputs.get("bare_dem", True) else ""
 
 
-def heights_read(units: Iterable[HeightUnit], datum: str, low_m: float, high_m: float) -> UnitText:
+def heights_read(units: Iterable[HeightUnit], datum: str, low_m: float, high_m: float) -> str:
     """How heights were read: ``US survey feet, from the file; NAVD88; ground 160–440 m``.
 
     ``units`` are those of all files, ``low_m`` and ``high_m`` the lowest and the highest ground that was loaded.
     """
     told = " and ".join(dict.fromkeys(unit.told() for unit in units))
-    low, high = Quantity(low_m, "amsl", 0, "down"), Quantity(high_m, "amsl", 0, "up")
-    if low.text(None) == high.text(None):
-        return UnitText("{}; {}; ground {}", told, datum, high)
-    ends = "{} to {}" if low_m < 0.0 else "{}–{}"
-    return UnitText(f"{{}}; {{}}; ground {ends}", told, datum, replace(low, bare=True), high)
+    low, high = floored(low_m, 0), raised(high_m, 0)
+    ends = f"{high:.0f}" if low == high else f"{low:.0f}{' to ' if low < 0.0 else '–'}{high:.0f}"
+    return f"{told}; {datum}; ground {ends} m AMSL"
 
 
-def heights_line(inputs: Mapping[str, object]) -> UnitText | None:
+def heights_line(inputs: Mapping[str, object]) -> str | None:
     """The line of a surface's ``info`` or a report's inputs: ``heights: …``; None if they do not say it."""
     read = inputs.get("heights_read")
-    return UnitText("heights: {}", read) if isinstance(read, str) else None
+    return f"heights: {read}" if isinstance(read, str) else None

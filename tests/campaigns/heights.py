@@ -175,8 +175,8 @@ class Said:
             reasons.add("two datums")
         if key_name == "ellipsoid":
             reasons.add("ellipsoid")
-        if rng.random() < 0.03:
-            key, key_unit = None, None
+        if rng.random() < 0.03 and not reasons:  # what a key forbids is not forgotten with it
+            key, key_unit, key_name = None, None, None
             if own_code is None:
                 reasons.add("no datum")
         height_unit = str(rng.choice(list(KEY_UNITS))) if rng.random() < 0.25 else None

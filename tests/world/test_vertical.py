@@ -10,7 +10,6 @@ import pytest
 from affine import Affine
 
 from gcsplan.errors import InputError
-from gcsplan.units import IMPERIAL, in_units
 from gcsplan.world.datum import stated_datum
 from gcsplan.world.height_unit import unit_named
 from gcsplan.world.surface import Surface
@@ -123,7 +122,6 @@ def test_one_line_says_how_heights_were_read(tmp_path: Path) -> None:
     surface = load(degrees_tif(tmp_path / "a.tif", np.full((100, 100), 1000.0), units=("US survey foot",)))
     line = surface.info["heights_read"]
     assert line == "US survey feet, from the file; EGM96; ground 304–305 m AMSL"
-    assert "1000–1001 ft" in in_units(line, IMPERIAL)  # type: ignore[arg-type]
     below = load(degrees_tif(tmp_path / "b.tif", np.linspace(-420.0, -400.0, 10000).reshape(100, 100)))
     assert "ground -4" in str(below.info["heights_read"])
     assert " to -4" in str(below.info["heights_read"])
