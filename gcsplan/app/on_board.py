@@ -15,6 +15,7 @@ from gcsplan.app.fencing import against_fence
 from gcsplan.app.flight_hours import beyond_hours
 from gcsplan.app.way_home import against_on_board
 from gcsplan.check.judge import judge
+from gcsplan.check.rtl.run_on import run_on_m, run_past_m
 from gcsplan.check.tuning import Tuning
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.mission.mission import Mission
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = ["judge_on_board", "settings_of", "settings_of_plan"]
 
+RIGHT_ANGLE_RAD = 0.5 * math.pi
 SAME_S, SAME_PART = 1.0, 0.005
 """A flight that takes as long as told within this, s, or within this part of it, is the one that was told."""
 
@@ -141,8 +143,8 @@ def _against_motion(
     """Why a vehicle that moves otherwise than planned is refused: its return, its times, or its separation."""
     timed = [o for o in found if o.setting.matters == "time"]
     if job.home_required and job.way_home is not None and job.way_home.route != "mission":
-        if not allow_parameters and (braking := [o for o in timed if o.setting.parameter.key in ("accel", "jerk")]):
-            return _lines("a safe return is required, and it runs on farther, or otherwise, than was judged", braking)
+        if not allow_parameters and job.vehicle is not None and _runs_farther(job.vehicle, flies, job.mission):
+            return _lines("a safe return is required, and it runs on farther than was judged", timed)
         if allow_parameters and (against := _against_return(job, flies, verdict)):
             return against
     if job.verdict is not None and not allow_parameters:
@@ -154,6 +156,13 @@ def _against_motion(
     if job.fleet is not None and (near := job.fleet.against(job.name, flies, verdict)):
         return _lines(f"with these parameters {near}", timed)
     return None
+
+
+def _runs_farther(judged: Vehicle, flies: Vehicle, mission: Mission) -> bool:
+    """Whether a return runs on farther than was judged, from a leg or from a corner."""
+    speed_m_s, more = max(mission.commanded_m_s, judged.speed_max_m_s), 1.0 + SAME_PART
+    past_m = [run_past_m(v, speed_m_s, RIGHT_ANGLE_RAD) for v in (judged, flies)]
+    return run_on_m(flies, speed_m_s) > more * run_on_m(judged, speed_m_s) or past_m[1] > more * past_m[0]
 
 
 def _against_return(job: UploadJob, flies: Vehicle, verdict: Verdict) -> str:

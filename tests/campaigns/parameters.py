@@ -117,7 +117,8 @@ def kinematics(vehicle: Vehicle, raw: Values) -> tuple[Kinematics, Vehicle]:
             accel_m_s2=0.65 * raw.get("MPC_ACC_HOR", 3.0),
             corner_accel_m_s2=raw.get("MPC_XY_TRAJ_P", 0.5) * raw.get("MPC_ACC_HOR", 3.0),
         )  # fmt: skip
-        return moved, replace(vehicle, return_m_s=raw.get("MPC_XY_CRUISE", 5.0))
+        rates = {"climb_m_s": moved.climb_m_s, "descent_m_s": moved.descent_m_s}  # a mission's stretches have them, too
+        return moved, replace(vehicle, return_m_s=raw.get("MPC_XY_CRUISE", 5.0), **rates)
     accel = raw.get("WPNAV_ACCEL", 250.0) / 100.0
     moved = replace(
         own, climb_m_s=raw.get("WPNAV_SPEED_UP", 250.0) / 100.0, descent_m_s=raw.get("WPNAV_SPEED_DN", 150.0) / 100.0,
@@ -126,7 +127,9 @@ def kinematics(vehicle: Vehicle, raw: Values) -> tuple[Kinematics, Vehicle]:
         lean_deg=raw.get("ANGLE_MAX", 100.0 * own.lean_deg) / 100.0,
     )  # fmt: skip
     back = raw.get("RTL_SPEED", 0.0) / 100.0 or raw.get("WPNAV_SPEED", 1000.0) / 100.0
-    return moved, replace(vehicle, return_m_s=back, return_wait_s=raw.get("RTL_LOIT_TIME", 5000.0) / 1000.0)
+    waits_s = raw.get("RTL_LOIT_TIME", 5000.0) / 1000.0
+    rates = {"climb_m_s": moved.climb_m_s, "descent_m_s": moved.descent_m_s}
+    return moved, replace(vehicle, return_m_s=back, return_wait_s=waits_s, **rates)
 
 
 def flown_s(done: Plan, vehicle: Vehicle, raw: Values) -> float:
