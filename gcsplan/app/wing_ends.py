@@ -90,7 +90,7 @@ def starts(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator
             f"{request.vehicle.name}: no climb-out {which} clears the ground, the zones and the ceiling at "
             f"{pitch_deg(request.vehicle)}° (max_climb_deg, whole degrees) and leads to where min AGL is met, straight "
             f"or in circles: another {other} or a steeper climb may",
-            reason="infeasible",
+            reason="not_found",
         )
 
 
@@ -110,7 +110,7 @@ def goals(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[
         raise NoMission(
             f"{request.vehicle.name}: no straight approach to the goal, on any heading, clears the ground and the "
             f"zones at max_descent_deg {request.vehicle.limits.max_descent_deg:g}: use end: loiter, or another goal",
-            reason="infeasible",
+            reason="not_found",
         )
 
 

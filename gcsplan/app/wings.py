@@ -114,7 +114,7 @@ def _joined(
             break
         inner = _inner(problem, start, goal)
         try:
-            found = run_planner(brief.run, inner, vehicle, world)
+            found = _between(brief, inner, vehicle, world)
         except NoMission as refusal:
             refused.append(refusal)
             if refusal.reason != "not_found" or len(refused) == MOST_REFUSED:
@@ -204,6 +204,17 @@ def _whole(problem: Problem, solution: Solution, start: FlightEnd, goal: FlightE
     return replace(solution, path=Path(points), flown=None, lower_bound=None, notes=notes)
 
 
+def _between(brief: Brief, inner: Problem, vehicle: Vehicle, world: World) -> Solution:
+    """The planner's part. Its bound only ends the search, and assumes the margins, which are metres here: against one
+    without them the gap would stay open whatever is tried. A refusal is that of the limits of the check."""
+    try:
+        return run_planner(brief.run, replace(inner, checked=None, rounding_m=(0.0, 0.0)), vehicle, world)
+    except NoMission as refusal:
+        if refusal.reason != "infeasible" or inner.checked is None:
+            raise
+    return run_planner(brief.run, inner, vehicle, world)
+
+
 def _bound_between(
     brief: Brief, inner: Problem, points: Floats, start: FlightEnd, goal: FlightEnd | None, vehicle: Vehicle,
     world: World,
@@ -223,7 +234,7 @@ def _bound_between(
     except NoMission:  # an end of a climb-out may lie lower than paths may
         bound = None
     if bound is None:
-        bound = max(straight_bound(outer) - outer.connectors, 0.0)
+        bound = straight_bound(outer, outer.rounding_m)
     whole = np.vstack([start.ground, first, points, *([] if goal is None else [goal.ground])])
     tangent = tangents_m(whole, vehicle.turn_radius_m)
     cut_m = 2.0 * (tangent - vehicle.turn_radius_m * np.arctan(tangent / vehicle.turn_radius_m))

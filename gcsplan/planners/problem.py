@@ -88,19 +88,33 @@ class Problem:
 
     @property
     def bound_limits(self) -> Limits:
-        """The limits that bounds and proofs assume: those of the check, with less track error by the rounding of ends.
+        """The limits that bounds and proofs assume: those of the check, with less track error by `_aside_m`.
 
         So a path that begins a little beside the start is one from the start itself, with a connector that is legal.
         """
-        checked = self.limits if self.checked is None else self.checked
-        return replace(checked, track_error_m=max(checked.track_error_m - self.rounding_m[0], 0.0))
+        checked = self._checked
+        return replace(checked, track_error_m=max(checked.track_error_m - self._aside_m, 0.0))
 
     @property
     def bound_spare_m(self) -> float:
-        """Metres by which bounds assume zones to be smaller and floors lower, because the track error is less than the
-        rounding of ends."""
-        checked = self.limits if self.checked is None else self.checked
-        return max(self.rounding_m[0] - checked.track_error_m, 0.0)
+        """Metres by which bounds assume zones to be smaller and floors lower, because the track error is less than
+        `_aside_m`."""
+        return max(self._aside_m - self._checked.track_error_m, 0.0)
+
+    @property
+    def _checked(self) -> Limits:
+        return self.limits if self.checked is None else self.checked
+
+    @property
+    def _aside_m(self) -> float:
+        """By how much bounds assume less track error, so that connectors are legal: the rounding; 0 if the ends alone
+        are rounded and keep it themselves, under `limits`. A path may pass a via where the planner's own cannot."""
+        checked, (flat_m, rise_m) = self._checked, self.rounding_m
+        keep = (
+            self.limits.track_error_m >= checked.track_error_m + flat_m
+            and self.limits.altitude_error_m >= checked.altitude_error_m + rise_m
+        )
+        return 0.0 if keep and not self.via else flat_m
 
     @property
     def for_bounds(self) -> Problem:
@@ -116,6 +130,12 @@ class Problem:
         if self.objective == "energy":
             each = self.horizontal_j_per_m * flat + self.vertical_j_per_m * rise
         return (2 + 2 * len(self.via)) * each
+
+    def rounded_bound(self, bound: float) -> float:
+        """A lower bound of all paths, whose ends and vias may lie beside the exact ones, from one of paths between
+        those: less the connectors, or the straight line between places that lie as near to each other as they may."""
+        straight = straight_bound(self, self.rounding_m) * (1.0 - 1e-12)
+        return max(bound - self.connectors, min(straight, bound))
 
     def leg_costs(self, start: Floats, end: Floats) -> Floats:
         """(...) costs of straight legs between points (..., 3); `cost` of a path is their sum."""
@@ -234,24 +254,25 @@ def straight_way_m(problem: Problem) -> float:
     return sum(math.dist(a, b) for a, b in pairwise(terminals_of(problem)))
 
 
-def straight_bound(problem: Problem) -> float:
-    """A lower bound of the cost: the straight line from terminal to terminal, free altitudes left free."""
+def straight_bound(problem: Problem, rounding_m: tuple[float, float] = (0.0, 0.0)) -> float:
+    """A lower bound of the cost: the straight line from terminal to terminal, free altitudes left free.
+
+    ``rounding_m``: how far each terminal may lie beside its place, in the plane and in altitude.
+    """
+    flat, rise = (2.0 * m for m in rounding_m)  # two terminals, nearer to each other
     known: list[tuple[float, float]] = [(0.0, problem.start[2])]  # (metres along the track, altitude)
     way, last = 0.0, problem.start[:2]
     for v in problem.via:
-        way += math.dist(last, (v.east_m, v.north_m))
+        way += max(math.dist(last, (v.east_m, v.north_m)) - flat, 0.0)
         last = (v.east_m, v.north_m)
         if v.amsl_m is not None:
             known.append((way, v.amsl_m))
-    way += math.dist(last, problem.goal[:2])
+    way += max(math.dist(last, problem.goal[:2]) - flat, 0.0)
     known.append((way, problem.goal[2]))
+    legs = [(max(b[0] - a[0], _run(problem, a, b)), max(abs(b[1] - a[1]) - rise, 0.0)) for a, b in pairwise(known)]
     if problem.objective == "energy":
-        return sum(
-            problem.vertical_j_per_m * abs(b[1] - a[1])
-            + problem.horizontal_j_per_m * max(b[0] - a[0], _run(problem, a, b))
-            for a, b in pairwise(known)
-        )
-    return sum(math.hypot(max(b[0] - a[0], _run(problem, a, b)), b[1] - a[1]) for a, b in pairwise(known))
+        return sum(problem.vertical_j_per_m * up_m + problem.horizontal_j_per_m * run_m for run_m, up_m in legs)
+    return sum(math.hypot(*leg) for leg in legs)
 
 
 def _run(problem: Problem, a: tuple[float, float], b: tuple[float, float]) -> float:

@@ -129,12 +129,17 @@ def _require_legal(problem: Problem, name: str, place: tuple[float, float], amsl
 
 def _proved(problem: Problem, place: tuple[float, float], amsl: float | None) -> bool:
     """Whether a terminal is illegal as the check applies the limits, with all that it may lie beside its place."""
-    off_m = problem.rounding_m[1]
-    bare = problem.for_bounds
-    bare = replace(bare, limits=replace(bare.limits, altitude_error_m=max(bare.limits.altitude_error_m - off_m, 0.0)))
+    aside_m, off_m = problem.rounding_m
+    checked = problem.limits if problem.checked is None else problem.checked
+    limits = replace(
+        checked,
+        track_error_m=max(checked.track_error_m - aside_m, 0.0),
+        altitude_error_m=max(checked.altitude_error_m - off_m, 0.0),
+    )
+    bare = replace(problem, limits=limits, checked=None, rounding_m=(0.0, 0.0))
     # The errors, less that rounding, hold all places that the terminal may be at; where they are smaller, a cliff may
     # begin within the rounding.
-    hold = problem.bound_spare_m == 0.0 and problem.limits.altitude_error_m >= off_m
+    hold = checked.track_error_m >= aside_m and problem.limits.altitude_error_m >= off_m
     least_m = TOUCH_M if hold else CLIFF_M
     if amsl is not None:
         return any(v.by > least_m for v in _broken(bare, (*place, amsl)))

@@ -170,3 +170,20 @@ def test_a_plan_below_its_own_bound_is_a_bug_and_not_a_gap_of_0() -> None:
     with pytest.raises(GcsplanError, match="less than its own lower bound") as caught:
         replace(v, solution=replace(v.solution, lower_bound=v.cost + 0.01))
     assert caught.value.exit_code == 70
+
+
+def test_a_short_level_leg_may_be_shorter_by_the_rounding_of_its_ends_in_the_plane_alone() -> None:
+    v = planned(ERRORS, goal_m=30.0)
+    assert v.solution.lower_bound == pytest.approx(30.0 - 0.022, abs=1e-6)
+
+
+def test_only_vias_take_track_error_from_bounds_for_the_ends_keep_the_rounding_themselves() -> None:
+    v = planned(ERRORS, DISC)
+    assert v.problem.checked is not None
+    assert v.problem.bound_limits == v.problem.checked
+    past = planned(ERRORS, DISC, via=[{"east_m": 500, "north_m": 300}]).problem
+    assert past.bound_limits.track_error_m == pytest.approx(ERRORS["track_error_m"] - 0.011)
+    bare = replace(v.problem, limits=v.problem.checked, checked=None)  # ends that keep nothing beyond the check
+    assert bare.bound_limits.track_error_m == pytest.approx(ERRORS["track_error_m"] - 0.011)
+    nothing = replace(bare, limits=replace(bare.limits, track_error_m=0.0))
+    assert (nothing.bound_limits.track_error_m, nothing.bound_spare_m) == (0.0, 0.011)

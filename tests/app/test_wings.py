@@ -894,7 +894,7 @@ def test_where_no_climb_out_is_legal_on_the_wanted_heading_the_refusal_names_it(
     source = load_mission(MISSIONS / "m.yaml", text=text_of(takeoff_heading_deg="210"))
     with pytest.raises(NoMission, match="no climb-out on takeoff_heading_deg 210") as caught:
         plan(source)
-    assert caught.value.reason == "infeasible"
+    assert caught.value.reason == "not_found"  # searched in steps, with margins: not a proof
 
 
 def test_the_bound_of_a_wing_holds_from_the_end_of_its_climb_out_under_the_limits_of_the_check(
@@ -918,3 +918,19 @@ def test_the_bound_of_a_wing_holds_from_the_end_of_its_climb_out_under_the_limit
     assert bound >= direct - 1.0
     assert any("this climb-out" in note for note in v.solution.notes)
     assert any("planned 2 times" in note for note in v.solution.notes)
+
+
+def test_that_margins_shut_the_way_between_a_wings_ends_is_no_proof(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With margins the search is refused as proved: the answer is that of the limits of the check."""
+    (v,) = plan(load_mission(MISSIONS / "m.yaml", text=text_of())).vehicles
+    asked: list[Problem] = []
+
+    def shut(_: object, problem: Problem, *__: object) -> None:
+        asked.append(problem)
+        raise NoMission("shut", reason="infeasible" if problem.checked is None else "not_found")
+
+    monkeypatch.setattr(wings, "run_planner", shut)
+    with pytest.raises(NoMission) as caught:
+        wings._between(v.brief, v.problem, v.request.vehicle, v.brief.world)
+    assert caught.value.reason == "not_found"
+    assert [p.checked for p in asked] == [None, v.problem.checked]
