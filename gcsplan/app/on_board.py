@@ -19,7 +19,14 @@ from gcsplan.check.rtl.run_on import run_on_m, run_past_m
 from gcsplan.check.tuning import Tuning
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.mavlink.mission.parameter_list import Off, Setting, off, parameter_list, vehicle_on_board
+from gcsplan.mavlink.mission.parameter_list import (
+    Off,
+    Setting,
+    corners_as_it_leans,
+    off,
+    parameter_list,
+    vehicle_on_board,
+)
 from gcsplan.mavlink.mission.parameter_names import OnBoard, unanswered
 from gcsplan.mavlink.mission.return_altitude import return_on_board_m
 from gcsplan.vehicle import Vehicle, fastest_at_m_s
@@ -33,6 +40,7 @@ if TYPE_CHECKING:
 __all__ = ["judge_on_board", "settings_of", "settings_of_plan"]
 
 RIGHT_ANGLE_RAD = 0.5 * math.pi
+LEANS = ", for ArduCopter before 4.5 takes corners with all that its lean allows"
 SAME_S, SAME_PART = 1.0, 0.005
 """A flight that takes as long as told within this, s, or within this part of it, is the one that was told."""
 
@@ -72,7 +80,7 @@ def judge_on_board(
         return None
     from gcsplan.mavlink.link.parameters import lean_shortage
     from gcsplan.mavlink.link.px4_motion import speed_shortage
-    from gcsplan.mavlink.link.terrain import flies_terrain, odd_spacing, terrain_error_m
+    from gcsplan.mavlink.link.terrain import TERRAIN_DECIDES, flies_terrain, odd_spacing, terrain_error_m
 
     world, vehicle, settings = job.world, job.vehicle, () if simulated else settings_of(job)
     straight = job.home_required and job.way_home is not None and job.way_home.route != "mission"
@@ -85,7 +93,8 @@ def judge_on_board(
             against = against_on_board(job.way_home, values, job.mission)
             if against is not None:
                 return against
-        if silent := _silent(settings, values):
+        terrain = TERRAIN_DECIDES if not simulated and flies_terrain(read_back.wire_items()) else ()
+        if silent := _silent(settings, values, terrain):
             return silent
         if vehicle.lean_angle_deg is not None and (short := lean_shortage(values, planned_m_s)):
             return short
@@ -111,7 +120,7 @@ def judge_on_board(
         if not allow_unjudged and (beyond := beyond_hours(verdict, job.hours)):
             return f"not judged: {beyond}"
         if flies != vehicle:
-            against = _against_motion(job, flies, verdict, found, allow_parameters=allow_parameters)
+            against = _against_motion(job, flies, verdict, found, values, allow_parameters=allow_parameters)
             if against is not None:
                 return against
         return against_fence(job, flown, rtl_rel_home_m, tuning)
@@ -119,15 +128,15 @@ def judge_on_board(
     return again
 
 
-def _silent(settings: Sequence[Setting], values: Mapping[str, float]) -> str:
-    """Which parameters that the proof hangs on gave no answer, in words; empty if all did.
+def _silent(settings: Sequence[Setting], values: Mapping[str, float], others: tuple[tuple[str, ...], ...] = ()) -> str:
+    """Which parameters that the proof hangs on, or ``others``, gave no answer, in words; empty if all did.
 
     A peer that does not say what autopilot it is has no known parameters, and values that no vehicle was asked for say
     nothing of the others.
     """
     if not isinstance(values, OnBoard) or values.generic:
         return ""
-    silent = unanswered(values, [s.parameter.group() for s in settings if s.needed])
+    silent = unanswered(values, [*(s.parameter.group() for s in settings if s.needed), *others])
     if not silent:
         return ""
     names = ", ".join(" or ".join(group) for group in silent)
@@ -138,21 +147,33 @@ def _silent(settings: Sequence[Setting], values: Mapping[str, float]) -> str:
 
 
 def _against_motion(
-    job: UploadJob, flies: Vehicle, verdict: Verdict, found: Sequence[Off], *, allow_parameters: bool
+    job: UploadJob,
+    flies: Vehicle,
+    verdict: Verdict,
+    found: Sequence[Off],
+    values: Mapping[str, float],
+    *,
+    allow_parameters: bool,
 ) -> str | None:
-    """Why a vehicle that moves otherwise than planned is refused: its return, its times, or its separation."""
+    """Why a vehicle that moves otherwise than planned is refused: its return, its times, or its separation.
+
+    A return that runs on farther from corners because the firmware has no other rule is judged with that.
+    """
+    leans = corners_as_it_leans(values)
     timed = [o for o in found if o.setting.matters == "time"]
     if job.home_required and job.way_home is not None and job.way_home.route != "mission":
-        if not allow_parameters and job.vehicle is not None and _runs_farther(job.vehicle, flies, job.mission):
-            return _lines("a safe return is required, and it runs on farther than was judged", timed)
-        if allow_parameters and (against := _against_return(job, flies, verdict)):
+        if not allow_parameters and job.vehicle is not None:
+            turning = replace(flies, corner_accel_m_s2=job.vehicle.corner_accel_m_s2) if leans else flies
+            if _runs_farther(job.vehicle, turning, job.mission):
+                return _lines("a safe return is required, and it runs on farther than was judged", timed)
+        if (allow_parameters or leans) and (against := _against_return(job, flies, verdict)):
             return against
     if job.verdict is not None and not allow_parameters:
         told_s, takes_s = job.verdict.time_s, verdict.time_s
         late_s = takes_s - told_s
         if math.isfinite(late_s) and abs(late_s) > max(SAME_S, SAME_PART * told_s):
             words = f"the flight takes {takes_s:.1f} s instead of {told_s:.1f} s ({late_s:+.1f} s)"
-            return _lines(f"{words}; --allow-parameters takes that", timed)
+            return _lines(f"{words}{LEANS if leans else ''}; --allow-parameters takes that", timed)
     if job.fleet is not None and (near := job.fleet.against(job.name, flies, verdict)):
         return _lines(f"with these parameters {near}", timed)
     return None

@@ -12,6 +12,7 @@ from gcsplan.mavlink.link.parameters import decode_value, parameter_name
 from gcsplan.mavlink.link.recheck import Recheck, request_message
 from gcsplan.mavlink.link.watch import STANDBY, UNINIT, VehicleState, Watch
 from gcsplan.mavlink.mission.autopilots import is_generic
+from gcsplan.mavlink.mission.firmware import version_of
 from gcsplan.mavlink.mission.parameter_names import OnBoard
 from gcsplan.mavlink.protocol.messages import Address
 
@@ -79,13 +80,18 @@ def parameter_steps(
     """
     clock = channel.link.clock
     generic = is_generic(state.mav_autopilot)
-    values = OnBoard(generic=generic)
+    values = OnBoard(generic=generic, version=version_of(state.flight_sw_version))
     unknown: set[str] = set()  # names that the vehicle reported as missing
     started = ask_at = answered_at = clock()
     again_s = _ASK_AGAIN_S
 
     def missing(of: Iterable[tuple[str, ...]]) -> list[str]:
-        left = [name for group in of if not any(n in values for n in group) for name in group]
+        left = [
+            name
+            for group in of
+            if not any(n in values for n in group) and not values.too_old_for(group)
+            for name in group
+        ]
         return [name for name in left if name not in unknown]
 
     def until() -> float:

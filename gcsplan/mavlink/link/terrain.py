@@ -292,6 +292,9 @@ OFF = "terrain_off_m"
 TERRAIN_GROUPS = (("TERRAIN_ENABLE",), ("TERRAIN_SPACING",), ("TERRAIN_OFS_MAX",))
 """Parameters that are read, too, before a mission in the terrain frame is sent."""
 
+TERRAIN_DECIDES = (("TERRAIN_SPACING",), ("TERRAIN_OFS_MAX",))
+"""Those of them that such a mission is judged with: no answer is not their default."""
+
 PLACES = 40
 """Places that are compared before a mission is sent."""
 _UPLOAD_PATIENCE_S, _UPLOAD_MOST_S = 10.0, 45.0

@@ -14,7 +14,7 @@ from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, NO_POSITION, MissionItem
 from gcsplan.vehicle import Autopilot
 
-__all__ = ["STRAIGHT_NOTE", "STRAIGHT_UNTIL", "flies_straight", "needs_straight", "version_words"]
+__all__ = ["STRAIGHT_NOTE", "STRAIGHT_UNTIL", "flies_straight", "needs_straight", "version_of", "version_words"]
 
 STRAIGHT_UNTIL = (1, 17)
 """The last version (major, minor) of PX4 that is known to fly straight legs."""
@@ -42,6 +42,14 @@ def version_words(flight_sw_version: int | None) -> str:
         return "of a version that it does not tell"
     major, minor, patch, kind = flight_sw_version.to_bytes(4, "big")
     return f"{major}.{minor}.{patch}" + next(words for least, words in _KINDS if kind >= least)
+
+
+def version_of(flight_sw_version: int | None) -> tuple[int, int] | None:
+    """The version (major, minor) in AUTOPILOT_VERSION's number; None if it is not told."""
+    if not flight_sw_version:
+        return None
+    major, minor, _, _ = flight_sw_version.to_bytes(4, "big")
+    return (major, minor)
 
 
 def flies_straight(flight_sw_version: int | None) -> bool:

@@ -21,11 +21,11 @@ from gcsplan.mavlink.mission.commands import (
     RTL,
 )
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.mavlink.mission.parameter_names import PARAMETERS, Name, Parameter
+from gcsplan.mavlink.mission.parameter_names import PARAMETERS, Name, OnBoard, Parameter
 from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, Autopilot, Vehicle
 from gcsplan.world.atmosphere import true_per_indicated
 
-__all__ = ["Off", "Setting", "commands_speed", "off", "parameter_list", "vehicle_on_board"]
+__all__ = ["Off", "Setting", "commands_speed", "corners_as_it_leans", "off", "parameter_list", "vehicle_on_board"]
 
 Rule = Literal["equal", "at least", "at most"]
 Matters = Literal["time", "turns", "return", "flight", "told"]
@@ -259,6 +259,9 @@ def _finite(rows: Sequence[Setting]) -> list[Setting]:
 def _amount(parameter: Parameter, values: Mapping[str, float], autopilot: Autopilot) -> float | None:
     """The amount that is flown: zeros that stand for another parameter are read as that one."""
     amount, known = parameter.read(values), PARAMETERS[autopilot]
+    if parameter.key == "corner_accel" and corners_as_it_leans(values):
+        leans_deg = known["lean"].read(values)
+        return None if leans_deg is None else GRAVITY_M_S2 * math.tan(math.radians(min(max(leans_deg, 0.0), 80.0)))
     if amount is None or autopilot is Autopilot.PX4:
         return amount
     if parameter.key == "return_speed" and amount <= 0.0:
@@ -267,6 +270,16 @@ def _amount(parameter: Parameter, values: Mapping[str, float], autopilot: Autopi
         accel = known["accel"].read(values)
         return None if accel is None else 2.0 * accel
     return abs(amount) if parameter.key in ("circle", "return_circle") else amount
+
+
+def corners_as_it_leans(values: Mapping[str, float]) -> bool:
+    """Whether ArduCopter without WPNAV_ACCEL_C, or with 0, takes corners with all that its lean allows.
+
+    Before 4.4 there is no such parameter, in 4.4 this is what its 0 means; since 4.5 it is twice WPNAV_ACCEL.
+    """
+    if not isinstance(values, OnBoard) or values.version is None or values.version >= (4, 5):
+        return False
+    return "ANGLE_MAX" in values and not PARAMETERS[Autopilot.ARDUCOPTER]["corner_accel"].read(values)
 
 
 def off(settings: Sequence[Setting], values: Mapping[str, float], autopilot: Autopilot) -> list[Off]:

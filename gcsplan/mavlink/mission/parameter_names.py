@@ -2,7 +2,8 @@
 
 ArduCopter 4.7 renamed most of them and changed their units (ArduPilot's list of renamed parameters; AC_WPNav.cpp,
 mode_rtl.cpp, Parameters.cpp); ArduPlane 4.5 renamed those of roll and airspeed. A vehicle answers to one of the names
-of a parameter.
+of a parameter. ArduPilot before 4.7 says nothing to a name that it does not have, so a parameter that is newer than the
+oldest firmware says its first version (ArduPilot's parameter lists of Copter and Plane 4.1 to 4.8).
 """
 
 from __future__ import annotations
@@ -31,12 +32,16 @@ class Name:
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A parameter under all its names, with its default in ``unit``; ``key`` is what gcsplan calls it."""
+    """A parameter under all its names, with its default in ``unit``; ``key`` is what gcsplan calls it.
+
+    ``since``: the first firmware (major, minor) that has it under any name.
+    """
 
     key: str
     names: tuple[Name, ...]
     default: float
     unit: str
+    since: tuple[int, int] = (0, 0)
 
     def group(self) -> tuple[str, ...]:
         """The names, of which a vehicle answers to one."""
@@ -61,34 +66,55 @@ class Parameter:
 class OnBoard(dict[str, float]):
     """Parameters that were read, by name. ``absent``: names that the vehicle says it does not have.
 
-    ``generic``: it does not say what autopilot it is, so nothing is known of its parameters.
+    ``generic``: it does not say what autopilot it is, so nothing is known of its parameters. ``version``: that of its
+    firmware (major, minor), None if it does not tell it.
     """
 
     def __init__(
-        self, values: Mapping[str, float] | None = None, absent: Collection[str] = (), *, generic: bool = False
+        self,
+        values: Mapping[str, float] | None = None,
+        absent: Collection[str] = (),
+        *,
+        generic: bool = False,
+        version: tuple[int, int] | None = None,
     ) -> None:
         super().__init__(values or {})
-        self.absent, self.generic = frozenset(absent), generic
+        self.absent, self.generic, self.version = frozenset(absent), generic, version
+
+    def too_old_for(self, group: tuple[str, ...]) -> bool:
+        """Whether the firmware on board is older than the parameter of these names."""
+        return self.version is not None and self.version < _SINCE.get(group, (0, 0))
 
 
 def unanswered(values: Mapping[str, float], groups: Iterable[tuple[str, ...]]) -> list[tuple[str, ...]]:
     """Those ``groups`` of names of which none was read as a number, and not all are known to be absent.
 
-    "Does not exist" is an answer; silence is none, and does not count as a default.
+    "Does not exist" is an answer, and so is a firmware that is too old for it; silence is none, and does not count as a
+    default.
     """
-    absent: frozenset[str] = values.absent if isinstance(values, OnBoard) else frozenset()
+    board = values if isinstance(values, OnBoard) else OnBoard(values)
     return [
         group
         for group in groups
-        if not any(math.isfinite(values.get(n, math.nan)) for n in group) and not all(n in absent for n in group)
+        if not any(math.isfinite(board.get(n, math.nan)) for n in group)
+        and not all(n in board.absent for n in group)
+        and not board.too_old_for(group)
     ]
 
 
-_BEFORE, _SINCE = "before ArduPilot 4.7", "since ArduPilot 4.7"
+_BEFORE, _RENAMED = "before ArduPilot 4.7", "since ArduPilot 4.7"
 
 
-def _copter(key: str, old: str, new: str, default: float, unit: str, per_unit: float = 100.0) -> Parameter:
-    return Parameter(key, (Name(old, per_unit, _BEFORE), Name(new, 1.0, _SINCE)), default, unit)
+def _copter(
+    key: str,
+    old: str,
+    new: str,
+    default: float,
+    unit: str,
+    per_unit: float = 100.0,
+    since: tuple[int, int] = (0, 0),
+) -> Parameter:
+    return Parameter(key, (Name(old, per_unit, _BEFORE), Name(new, 1.0, _RENAMED)), default, unit, since)
 
 
 def _one(key: str, name: str, default: float, unit: str = "", per_unit: float = 1.0) -> Parameter:
@@ -108,7 +134,7 @@ PARAMETERS: dict[Autopilot, dict[str, Parameter]] = {
         _copter("land", "LAND_SPEED", "LAND_SPD_MS", 0.5, "m/s"),
         _copter("accel", "WPNAV_ACCEL", "WP_ACC", 2.5, "m/s²"),
         _copter("vertical_accel", "WPNAV_ACCEL_Z", "WP_ACC_Z", 1.0, "m/s²"),
-        _copter("corner_accel", "WPNAV_ACCEL_C", "WP_ACC_CNR", 0.0, "m/s²"),
+        _copter("corner_accel", "WPNAV_ACCEL_C", "WP_ACC_CNR", 0.0, "m/s²", since=(4, 4)),
         _copter("jerk", "WPNAV_JERK", "WP_JERK", 1.0, "m/s³", 1.0),
         _copter("radius", "WPNAV_RADIUS", "WP_RADIUS_M", 2.0, "m"),
         _copter("lean", "ANGLE_MAX", "ATC_ANGLE_MAX", 30.0, "°"),
@@ -167,3 +193,5 @@ PARAMETERS: dict[Autopilot, dict[str, Parameter]] = {
     ),
 }  # fmt: skip
 """By autopilot and key."""
+
+_SINCE = {p.group(): p.since for known in PARAMETERS.values() for p in known.values()} | {("TERRAIN_OFS_MAX",): (4, 2)}
