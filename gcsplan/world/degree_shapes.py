@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.world.frame import FARTHEST_M, Frame
-from gcsplan.world.outlines import MOST_PAIRS, crossings, overlapping_pairs
+from gcsplan.world.outlines import MOST_CROSSINGS, MOST_PAIRS, crossings, overlapping_pairs
 from gcsplan.world.zones import Circle, Polygon
 
 if TYPE_CHECKING:
@@ -62,6 +62,9 @@ FAR_M = 1.6 * FARTHEST_M
 MOST_LON_DEG = 360.0
 """Longitudes of zones lie within this, so that both conventions and zones across the antimeridian can be written."""
 
+TURNS_DEG = (0.0, -360.0, 360.0)
+"""Whole turns by which a zone may lie beside the mission's longitudes."""
+
 HALF_TURN_DEG = 180.0
 """From this longitude difference on nobody can tell on which side of the globe an edge runs."""
 
@@ -74,6 +77,9 @@ GREAT_CIRCLE_M = 1.0
 
 MOST_PIECES, MOST_PIECES_OF_ALL = 20_000, 400_000
 """Most pieces of one great circle, and of all of one zone."""
+
+FEW_EDGES = 64
+"""So few edges cross too seldom to be counted: great circles meet straight ones three times at most."""
 
 
 def near_circle(centre: Corner, radius_m: float, frame: Frame, *, local: bool = False) -> Circle | None:
@@ -94,7 +100,8 @@ def near_polygons(ring: Sequence[Corner], frame: Frame, *, great_circles: bool =
     that is straight in degrees, and all that either encloses belongs to the polygon.
     """
     rings = _turned(ring, frame.lon_deg)
-    parts = [p for one in (_with_great_circles(rings) if great_circles else [rings]) for p in _near_parts(one, frame)]
+    wholes = _with_great_circles(rings, frame) if great_circles else [rings]
+    parts = [p for one in wholes for p in _near_parts(one, frame)]
     cut = [_cut_edges(part, np.roll(part, -1, axis=0), frame) for part in parts]
     return [counter_clockwise(frame.to_plane(points[:, 1], points[:, 0])) for points in cut]
 
@@ -112,7 +119,7 @@ def near_corridors(
         parts = [np.asarray(line, float)]
     else:
         whole = unwrapped(line, frame.lon_deg)
-        bent = _great_circles(whole[:-1], whole[1:]) if great_circles else None
+        bent = _great_circles(whole[:-1], whole[1:], _window(frame, buffer_m)) if great_circles else None
         lines = [whole] if bent is None else [whole, np.concatenate([bent, whole[-1:]])]
         near = [p for one in lines for p in _near_parts(one, frame, spare_m=buffer_m, is_line=True)]
         cut = [np.concatenate([_cut_edges(part[:-1], part[1:], frame), part[-1:]]) for part in near]
@@ -155,19 +162,16 @@ def _rings_around(points: Floats, buffer_m: float) -> list[Floats]:
 
 def _near_parts(points: Floats, frame: Frame, *, spare_m: float = 0.0, is_line: bool = False) -> list[Floats]:
     """The parts of a polygon or line (N, 2) longitude, latitude within `FAR_M` and ``spare_m``, not closed."""
-    tall = math.degrees((FAR_M + spare_m) / 6_350_000.0)
-    wide = min(tall / math.cos(math.radians(min(abs(frame.lat_deg) + tall, 89.0))), 80.0)
-    south, north = frame.lat_deg - tall, frame.lat_deg + tall
-    window = (frame.lon_deg - wide, south, frame.lon_deg + wide, north)
+    window = _window(frame, spare_m)
     found: list[Floats] = []
     (west_most, south_most), (east_most, north_most) = points.min(axis=0), points.max(axis=0)
-    for turn in (0.0, -360.0, 360.0):
+    for turn in TURNS_DEG:
         low, high = (west_most + turn, south_most), (east_most + turn, north_most)
-        if low[0] >= window[2] or high[0] <= window[0] or low[1] >= north or high[1] <= south:
+        if low[0] >= window[2] or high[0] <= window[0] or low[1] >= window[3] or high[1] <= window[1]:
             continue
         turned = points + np.array([turn, 0.0])
         parts: list[Floats] = [turned]
-        if low[0] < window[0] or high[0] > window[2] or low[1] < south or high[1] > north:
+        if low[0] < window[0] or high[0] > window[2] or low[1] < window[1] or high[1] > window[3]:
             import shapely
 
             whole = (shapely.LineString if is_line else shapely.Polygon)(turned)
@@ -176,6 +180,13 @@ def _near_parts(points: Floats, frame: Frame, *, spare_m: float = 0.0, is_line: 
             parts = [np.asarray(p.coords) if is_line else np.asarray(p.exterior.coords)[:-1] for p in near]
         found += parts
     return found
+
+
+def _window(frame: Frame, spare_m: float = 0.0) -> tuple[float, float, float, float]:
+    """West, south, east, north (degrees) of all within `FAR_M` and ``spare_m``."""
+    tall = math.degrees((FAR_M + spare_m) / 6_350_000.0)
+    wide = min(tall / math.cos(math.radians(min(abs(frame.lat_deg) + tall, 89.0))), 80.0)
+    return frame.lon_deg - wide, frame.lat_deg - tall, frame.lon_deg + wide, frame.lat_deg + tall
 
 
 def counter_clockwise(vertices: Floats) -> Polygon:
@@ -282,27 +293,36 @@ def _turned(points: Sequence[Corner], near_lon_deg: float) -> Floats:
     return np.stack([p[:, 1] + 360.0 * np.round((near_lon_deg - p[0, 1]) / 360.0), p[:, 0]], axis=-1)
 
 
-def _with_great_circles(ring: Floats) -> list[Floats]:
-    """The outlines of all that a ring (N, 2) longitude, latitude encloses by either kind of edges."""
-    bent = _great_circles(ring, np.roll(ring, -1, axis=0))
+def _with_great_circles(ring: Floats, frame: Frame) -> list[Floats]:
+    """The outlines near a place of all that a ring (N, 2) longitude, latitude encloses by either kind of edges."""
+    bent = _great_circles(ring, np.roll(ring, -1, axis=0), _window(frame))
     if bent is None:
         return [ring]
     import shapely
 
+    both = np.concatenate([ring, bent])  # one line along both, for they begin at the same corner
+    most = MOST_CROSSINGS + 8 * len(ring)  # at a corner two edges touch two others, which counts for each
+    if len(ring) > FEW_EDGES and (overlapping_pairs(both) > MOST_PAIRS or crossings(both, most) > most):
+        raise InputError(
+            f"of its outline of {len(ring)} corners so many long edges lie beside each other that it would take "
+            "minutes to tell what they enclose along great circles; simplify it"
+        )
     whole = shapely.union_all([shapely.Polygon(ring), shapely.make_valid(shapely.Polygon(bent))])
     parts = [p for p in shapely.get_parts(whole) if p.geom_type == "Polygon"]
     return [np.asarray(p.exterior.coords)[:-1] for p in parts]
 
 
-def _great_circles(begins: Floats, ends: Floats) -> Floats | None:
-    """The edges (N, 2) longitude, latitude along great circles, without the last end; None if all are as good as
-    straight.
+def _great_circles(begins: Floats, ends: Floats, window: tuple[float, float, float, float]) -> Floats | None:
+    """The edges (N, 2) longitude, latitude along great circles, without the last end; None if straight ones will do.
 
     On the sphere of geodetic latitudes; edges are shorter than half a turn, and those that end at a pole are meridians.
+    Edges over other longitudes than the ``window``'s stay straight: those across a place's meridian tell what holds it.
     """
     span, high = ends[:, 0] - begins[:, 0], np.maximum(np.abs(begins[:, 1]), np.abs(ends[:, 1]))
     rough_m = np.tan(np.radians(np.minimum(high, 89.9))) * (METRES_OF_DEGREE * span) ** 2 / (7.0 * 6.3e6)
     long = (rough_m > GREAT_CIRCLE_M) & (high < 89.999) & (np.abs(span) < HALF_TURN_DEG)
+    west, east = np.minimum(begins[:, 0], ends[:, 0]), np.maximum(begins[:, 0], ends[:, 0])
+    long &= np.any([(east >= window[0] + turn) & (west <= window[2] + turn) for turn in TURNS_DEG], axis=0)
     if not long.any():
         return None
     found: list[Floats] = []

@@ -56,7 +56,7 @@ def crossings(ring: Floats, most: int = MOST_CROSSINGS, *, closed: bool = True) 
 
     edges = shapely.linestrings(np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)[: None if closed else -1])
     tree, count = shapely.STRtree(edges), 0
-    at_once = max(1, min(AT_ONCE, 100_000 // len(edges)))  # the boxes of one edge may overlap those of all others
+    at_once = max(8, min(AT_ONCE, 1_000_000 // len(edges)))  # the boxes of one edge may overlap those of all others
     for k in range(0, len(edges), at_once):
         some = edges[k : k + at_once]
         count += int(tree.query(some, predicate="intersects").shape[1]) - 3 * len(some)  # itself and its two neighbours

@@ -110,3 +110,16 @@ def test_great_circles_of_one_zone_are_bounded() -> None:
     zigzag = [(50.0 + 0.01 * i, 0.0 if i % 2 else 120.0) for i in range(60)]
     with pytest.raises(InputError, match="too many long edges for great circles"):
         near_polygons(zigzag, FRAME, great_circles=True)
+
+
+def test_long_edges_beside_each_other_are_counted_before_great_circles_are_joined() -> None:
+    teeth = [(46.5 + 1e-6 * (k // 2 + 1), 8.0 + 0.5 * (-1) ** ((k + 1) // 2)) for k in range(400)]
+    comb = [*teeth, (47.0, 8.7), (46.4, 8.7)]  # 0.1 m apart: each great circle crosses hundreds of straight edges
+    assert shapely.Polygon(comb).is_valid
+    with pytest.raises(InputError, match="of its outline of 402 corners so many long edges lie beside each other"):
+        near_polygons(comb, FRAME, great_circles=True)
+
+
+def test_edges_over_other_longitudes_need_no_great_circles() -> None:
+    zigzag = [(50.0 + 0.01 * i, 60.0 if i % 2 else 120.0) for i in range(60)]  # too many, if they were near
+    assert near_polygons([*zigzag, (52.0, 20.0), (49.0, 20.0)], FRAME, great_circles=True) == []
