@@ -1095,7 +1095,7 @@ def test_many_tiles_are_read_by_windows(tmp_path: Path) -> None:
     assert len(tiles) == 36
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("gcsplan.world.tiles.HASHED_BYTES", 0)
-        patch.setattr("gcsplan.world.raster.sha256_of", lambda path: pytest.fail(f"{path} is read whole"))
+        patch.setattr("gcsplan.world.raster.sha256_of_all", lambda path: pytest.fail(f"{path} is read whole"))
         read = load().info["dem_sha256"]
         assert read == load().info["dem_sha256"] != first.info["dem_sha256"]
         tile_of(tmp_path, 0, 0, written=True)  # far away, but of another size
