@@ -16,7 +16,7 @@ import numpy as np
 from gcsplan.app.problems import lowest_amsl
 from gcsplan.arrays import Floats
 from gcsplan.check.circles import circle_growth
-from gcsplan.check.climb_out import REACHED_M, above_slant, circle_missing_m, over_m, slant_shortage
+from gcsplan.check.climb_out import REACHED_M, above_slant, beside_strip, circle_missing_m, over_m, slant_shortage
 from gcsplan.check.glide import flared
 from gcsplan.errors import NoMission
 from gcsplan.mavlink.build.fixed_wing import pitch_deg
@@ -89,7 +89,7 @@ def starts(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator
         raise NoMission(
             f"{request.vehicle.name}: no climb-out {which} clears the ground, the zones and the ceiling at "
             f"{pitch_deg(request.vehicle)}° (max_climb_deg, whole degrees) and leads to where min AGL is met, straight "
-            f"or in circles: another {other} or a steeper climb may",
+            f"or in circles: another {other} or a steeper climb may{beside_strip(problem.airspace)}",
             reason="not_found",
         )
 
@@ -109,7 +109,8 @@ def goals(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[
     if not found:
         raise NoMission(
             f"{request.vehicle.name}: no straight approach to the goal, on any heading, clears the ground and the "
-            f"zones at max_descent_deg {request.vehicle.limits.max_descent_deg:g}: use end: loiter, or another goal",
+            f"zones at max_descent_deg {request.vehicle.limits.max_descent_deg:g}: use end: loiter, or another goal"
+            f"{beside_strip(problem.airspace)}",
             reason="not_found",
         )
 

@@ -277,12 +277,24 @@ def bare(air: Airspace) -> Airspace:
     return Airspace(Surface(surface.ground_m, surface.high, surface.grid, high_m=surface.high), (), scale=air.scale)
 
 
+def beside_strip(air: Airspace) -> str:
+    """What a refused climb-out or glide has to do with obstacles, and what to do; empty over bare ground."""
+    if air.surface.top_m is air.surface.high_m:
+        return ""
+    return (
+        "; from twice altitude_error_m above the strip on trees and buildings count too, and obstacle_height_m "
+        "puts them everywhere: above altitude_error_m no way over level ground clears them. Where the way is open, "
+        "give `canopy`, a raster with 0 there, in place of obstacle_height_m"
+    )
+
+
 def _low(s: Stretch, east: float, north: float, amsl: float, by: float, world: World) -> Finding:
     lat, lon = (float(x) for x in world.frame.to_degrees(east, north))
     way = "climb-out" if s.kind == "takeoff" else "glide"
     message = UnitText(
-        "item {} ({}): the {} comes too near to the ground, by {}, at {:.6f}, {:.6f}, {}",
+        "item {} ({}): the {} comes too near to the ground, by {}, at {:.6f}, {:.6f}, {}{}",
         s.seq, s.kind, way, Quantity(by, "height", 2), lat, lon, Quantity(amsl, "amsl", 1),
+        beside_strip(world.airspace),
     )  # fmt: skip
     return Finding(s.seq, "min_agl", message, lat, lon, amsl, -by, 0.0, by, "m")
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
+from gcsplan.world.height_unit import METRE, unit_named
 from gcsplan.world.input_files import files_of, sha256_of_all, tell_file, tell_raster
 from gcsplan.world.raster import gdal, missing, require_numbers
 
@@ -97,10 +98,10 @@ def _heights(dataset: Any, lat: Floats | None, lon: Floats | None) -> Floats:
         or min(cols, rows) < 2
     ):
         raise ValueError("it must be north-up, in degrees, and of two posts a side at least")
+    band = _band(dataset)
+    _unit_m(dataset, band)
     if lat is None or lon is None:
         return np.empty(0)
-    names = [name or "" for name in dataset.descriptions]
-    band = names.index(_UNDULATION) + 1 if _UNDULATION in names else 1
     row = (t.f - lat) / -t.e - 0.5
     around = cols * t.a >= 360.0 - 1e-6  # around the globe: the first column follows the last
     col = ((lon - t.c) % 360.0) / t.a - 0.5
@@ -111,6 +112,22 @@ def _heights(dataset: Any, lat: Floats | None, lon: Floats | None) -> Floats:
     if inside.any():
         height[inside] = _between(dataset, band, row[inside], col[inside], cols if around else 0)
     return height
+
+
+def _band(dataset: Any) -> int:
+    names = [name or "" for name in dataset.descriptions]
+    return names.index(_UNDULATION) + 1 if _UNDULATION in names else 1
+
+
+def _unit_m(dataset: Any, band: int) -> float:
+    """Metres of one unit of the grid; metres where it states none. Raises ValueError if nobody knows the unit."""
+    stated = str(dataset.units[band - 1] or "").strip()
+    unit = unit_named(stated) if stated else METRE
+    if unit is None:
+        raise ValueError(
+            f"its unit {stated!r} is not known; write metre or ft with gdal_edit.py -units, or give another"
+        )
+    return unit.metres
 
 
 def _kept(at: Floats, last: int) -> tuple[Floats, Floats]:
@@ -135,7 +152,7 @@ def _between(dataset: Any, band: int, row: Floats, col: Floats, around: int) -> 
     for block in missing(dataset, band, left, top, right - left, bottom - top):
         posts[block] = np.nan
     with np.errstate(over="ignore", invalid="ignore"):
-        posts = posts * float(dataset.scales[band - 1]) + float(dataset.offsets[band - 1])
+        posts = (posts * float(dataset.scales[band - 1]) + float(dataset.offsets[band - 1])) * _unit_m(dataset, band)
         c1 = (c0 + 1) % around if around else c0 + 1
         u, v = col - c0, row - r0
         upper = (1.0 - u) * posts[r0 - top, c0 - left] + u * posts[r0 - top, c1 - left]

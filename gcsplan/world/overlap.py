@@ -91,8 +91,9 @@ def read_tiles(
         _put_wide(heights, some, c0, r0, phase)
     notes = []
     if heights.nodes:
+        worst_m = max(heights.worst_m, 0.001)  # what single precision makes of one height in two units is less
         notes.append(
-            f"tiles differ where they overlap ({heights.nodes} nodes, {heights.worst_m:g} m at most); each limit "
+            f"tiles differ where they overlap ({heights.nodes} nodes, {worst_m:g} m at most); each limit "
             "counts the unfavourable height"
         )
     unknown = int(np.count_nonzero(np.isnan(heights.high_m)))

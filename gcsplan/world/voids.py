@@ -44,9 +44,11 @@ def take_out_zeros(window: Window, degrees: Degrees) -> list[str]:
         return []
     lat, lon = (float(a[0, 0]) for a in degrees([patches[0].col], [patches[0].row]))
     more = f" and {len(patches) - 1} more" if len(patches) > 1 else ""
+    nodes = sum(patch.nodes for patch in patches)
+    verb = "stands" if nodes == 1 else "stand"
     return [
-        f"{counted(sum(patch.nodes for patch in patches), 'DEM node')} of exactly 0 m "
-        f"({counted(patches[0].nodes, 'node')} around {lat:.5f}, {lon:.5f}{more}) stand beside ground of "
+        f"{counted(nodes, 'DEM node')} of exactly 0 m "
+        f"({counted(patches[0].nodes, 'node')} around {lat:.5f}, {lon:.5f}{more}) {verb} beside ground of "
         f"{min(patch.beside_m for patch in patches):.0f} m and more without a shore: an undeclared void, whose ground "
         "is unknown; if it is ground or sea, say `nodata: none`, and if every 0 is a void `nodata: 0`"
     ]

@@ -897,6 +897,12 @@ def test_where_no_climb_out_is_legal_on_the_wanted_heading_the_refusal_names_it(
     assert caught.value.reason == "not_found"  # searched in steps, with margins: not a proof
 
 
+def test_a_climb_out_that_obstacles_close_says_so_and_what_to_do() -> None:
+    forested = text_of().replace("obstacle_height_m: 0", "obstacle_height_m: 12")  # altitude_error_m is 8
+    with pytest.raises(NoMission, match=r"obstacle_height_m puts them everywhere.*give `canopy`"):
+        plan(load_mission(MISSIONS / "m.yaml", text=forested))
+
+
 def test_the_bound_of_a_wing_holds_from_the_end_of_its_climb_out_under_the_limits_of_the_check(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -556,6 +556,22 @@ def test_a_geoid_is_what_proj_makes_of_the_same_grid(tmp_path: Path, kind: str) 
     np.testing.assert_allclose(ours, theirs, atol=1e-5)
 
 
+@pytest.mark.parametrize(("unit", "metres"), [("ft", 0.3048), ("US survey foot", 1200 / 3937), ("metre", 1.0)])
+def test_a_geoid_grid_counts_in_its_own_unit(tmp_path: Path, unit: str, metres: float) -> None:
+    path = Path(geoid_tif(tmp_path / "g.tif", np.full((3, 3), -98.0), -85.0, 37.0, 0.5))
+    with rasterio.open(path, "r+") as file:
+        file.units = (unit,)
+    assert GeoidGrid(path, where="m").height_m(36.5, -84.5) == pytest.approx(-98.0 * metres, abs=1e-9)
+
+
+def test_a_geoid_grid_in_a_unit_that_nobody_knows_is_refused(tmp_path: Path) -> None:
+    path = Path(geoid_tif(tmp_path / "g.tif", np.full((3, 3), -30.0), -85.0, 37.0, 0.5))
+    with rasterio.open(path, "r+") as file:
+        file.units = ("ell",)
+    with pytest.raises(InputError, match="unit 'ell' is not known"):
+        GeoidGrid(path, where="m")
+
+
 def test_a_geoid_grid_knows_its_band_and_its_voids(tmp_path: Path) -> None:
     posts = np.stack([np.full((3, 3), 7.0), np.full((3, 3), -30.0)])
     posts[1, 0, 0] = -9999.0
@@ -1079,7 +1095,7 @@ def test_many_tiles_are_read_by_windows(tmp_path: Path) -> None:
     assert len(tiles) == 36
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("gcsplan.world.tiles.HASHED_BYTES", 0)
-        patch.setattr("gcsplan.world.raster.sha256_of", lambda path: pytest.fail(f"{path} is read whole"))
+        patch.setattr("gcsplan.world.raster.sha256_of_all", lambda path: pytest.fail(f"{path} is read whole"))
         read = load().info["dem_sha256"]
         assert read == load().info["dem_sha256"] != first.info["dem_sha256"]
         tile_of(tmp_path, 0, 0, written=True)  # far away, but of another size
