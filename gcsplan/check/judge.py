@@ -42,7 +42,7 @@ TERRAIN_ERROR_M = 30.0
 NEAR_DEG = FARTHEST_M / 111_700.0
 """Degrees of latitude, or of longitude anywhere, that are surely no more than `FARTHEST_M`."""
 
-NO_CEILING = "max_agl_m is not set: nothing limits the height above ground, whose highest value is told"
+NO_CEILING = "max_agl_m is not set: nothing limits the height above ground"
 
 HIGHEST_M = 20_000.0
 """Above any aircraft that gcsplan plans for, m; keeps absurd numbers out of the exact check."""

@@ -140,10 +140,12 @@ def _facts(page: Page, s: Subject, units: Units) -> Iterator[tuple[str, str]]:
         end = duration(s.motion.end_s)
         yield "on the ground", "stays in the air" if s.motion.ends_in_air else "flies on" if s.leaves else end
     yield from _way_home(s, units)
-    main = [t.parameter.names[-1].name + f" {t.parameter.names[-1].value(t.value):.6g}" for t in s.settings
-            if t.parameter.key in MAIN_PARAMETERS]  # fmt: skip
+    main = [(t.parameter.names[-1], t.value) for t in s.settings if t.parameter.key in MAIN_PARAMETERS]
     if main:
-        yield "parameters", f"{esc(', '.join(main))}; all: see its limits"
+        values = ", ".join(f"{name.name} {name.value(value):.6g}" for name, value in main)
+        versions = " and ".join(sorted({name.versions for name, _ in main if name.versions}))
+        named = f" (so named {versions})" if versions else ""
+        yield "parameters", esc(f"{values}{named}; its limits have the whole list")
 
 
 def _battery(s: Subject) -> str:
