@@ -130,8 +130,7 @@ def locked(directory: Path) -> Iterator[None]:
     The lock ends with the process, however that ends. Raises InputError if another process holds it for `LOCK_WAIT_S`.
     """
     if not POSIX:
-        with _uncut():
-            yield
+        yield
         return
     until = time.monotonic() + LOCK_WAIT_S
     while True:
@@ -139,8 +138,7 @@ def locked(directory: Path) -> Iterator[None]:
         try:
             free = _take_lock(handle)
             if free and os.path.samestat(os.fstat(handle), os.stat(directory)):  # otherwise it was replaced meanwhile
-                with _uncut():
-                    yield
+                yield
                 return
         finally:
             os.close(handle)
@@ -151,6 +149,13 @@ def locked(directory: Path) -> Iterator[None]:
                 where=str(directory),
             )
         time.sleep(0.02)
+
+
+@contextmanager
+def writing(directory: Path) -> Iterator[None]:
+    """As `locked`, for a body that does nothing but write: no signal cuts it off."""
+    with locked(directory), _uncut():
+        yield
 
 
 def is_mine(path: Path | str) -> bool:

@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from gcsplan.errors import InputError
-from gcsplan.export.durable import locked, sync_directory, write_whole
+from gcsplan.export.durable import sync_directory, write_whole, writing
 from gcsplan.export.generation import (
     MANIFEST,
     NAME,
@@ -49,7 +49,9 @@ MAX_OUTPUT_BYTES = 1_000_000_000
 """No output is this large; a larger file is not gcsplan's, and is not read to find out."""
 
 # Names of gcsplan's outputs, for a directory whose manifest is damaged.
-_OURS = re.compile(r".+\.(waypoints|plan)|mission\.(kml|geojson)|profile\.csv|(summary|upload)\.json|report\.html")
+_OURS = re.compile(
+    r".+\.(waypoints|plan|param)|mission\.(kml|geojson)|profile\.csv|(summary|upload)\.json|report\.html"
+)
 
 
 def write_outputs(directory: str | os.PathLike[str], files: Mapping[str, str | bytes]) -> list[str]:
@@ -77,7 +79,7 @@ def retire_outputs(directory: str | os.PathLike[str]) -> list[str]:
     with _reported(root):
         if not root.is_dir():
             return []
-        with locked(root):
+        with writing(root):
             settle(root)
             ours = _manifest(root)
             names = sorted(name for name in ours if os.path.lexists(root / name))
@@ -113,7 +115,7 @@ def settle_outputs(directory: str | os.PathLike[str]) -> bool:
     with _reported(root):
         if not root.is_dir() or not is_caught(root):
             return False
-        with locked(root):
+        with writing(root):
             return settle(root)
 
 
@@ -187,7 +189,7 @@ def _write(root: Path, files: Mapping[str, str | bytes], *, keep: bool) -> list[
     _check_names(files)
     contents = {name: c.encode("utf-8") if isinstance(c, str) else bytes(c) for name, c in files.items()}
     in_the_way = []
-    with _reported(root), _made(root), locked(root):
+    with _reported(root), _made(root), writing(root):
         settle(root)
         ours = _manifest(root)
         with Generation(root) as next_one:

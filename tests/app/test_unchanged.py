@@ -258,6 +258,7 @@ def test_a_second_batch_in_one_folder_is_refused(two: Batch, monkeypatch: pytest
 def test_names_of_the_batch_s_own_files_are_no_missions(tmp_path: Path) -> None:
     given, out = tmp_path / "missions", tmp_path / "out"
     names = ["results.csv", "index.html", "Records", "records/deep", "a", "a/summary.json", "a/previous/b", "a.json/b"]
+    names.append("a/uav1.param")
     for name in names:
         (given / name).parent.mkdir(parents=True, exist_ok=True)
         (given / f"{name}.yaml").write_text(mission())

@@ -288,7 +288,7 @@ def judge(site: Site, touched: set[str], *, killed: bool) -> list[str]:
         if (records[name].code, [dict(row) for row in records[name].rows]) != (code, rows):
             wrong.append(f"{name} ends with {records[name].code}, {records[name].rows}, afresh with {code}, {rows}")
         # A file of others may lie beside a plan; a file that looks like an output may not.
-        more = {n for n in found if n.endswith((".plan", ".waypoints", ".kml", ".geojson"))} - set(files)
+        more = {n for n in found if n.endswith((".plan", ".waypoints", ".param", ".kml", ".geojson"))} - set(files)
         other = sorted(more | {n for n in files if found.get(n) != files[n]})
         if other:
             wrong.append(f"{name} is not what planning it now gives: {', '.join(other)}")

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -15,8 +16,10 @@ from tests.export.test_generation import heed_signals
 from tests.support.paths import REPOSITORY
 
 BUSY = """
-import os, random, sys
+import os, sys
+from pathlib import Path
 import numpy as np, shapely
+folder = Path(sys.argv[1])
 sys.argv = ["gcsplan", "plan", "m.yaml", "--json"]
 from gcsplan.cli import main as cli
 from gcsplan.export import durable
@@ -26,7 +29,8 @@ def command(**_):
     turn = np.linspace(0.0, 2.0 * np.pi, 60_000, endpoint=False)
     ring = shapely.Polygon((rng.uniform(600.0, 900.0, (60_000, 1)) * np.stack([np.cos(turn), np.sin(turn)], axis=-1)))
     print("begins", file=sys.stderr, flush=True)
-    shapely.is_valid(np.array([ring] * 9))  # half a minute
+    with durable.locked(folder):  # as a batch has its folder
+        shapely.is_valid(np.array([ring] * 9))  # half a minute
     print("ended", file=sys.stderr, flush=True)
 
 cli._commands = lambda called: command
@@ -37,10 +41,10 @@ cli.main()
 @pytest.mark.first_quick
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 @pytest.mark.parametrize(("number", "code"), [("SIGTERM", 143), ("SIGINT", 130), ("SIGHUP", 129)])
-def test_a_signal_ends_a_command_in_the_middle_of_a_library(number: str, code: int) -> None:
+def test_a_signal_ends_a_command_in_the_middle_of_a_library(number: str, code: int, tmp_path: Path) -> None:
     process = subprocess.Popen(
-        [sys.executable, "-c", BUSY], cwd=REPOSITORY, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        preexec_fn=heed_signals,
+        [sys.executable, "-c", BUSY, str(tmp_path)], cwd=REPOSITORY, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True, preexec_fn=heed_signals,
     )  # fmt: skip
     try:
         assert process.stderr is not None
@@ -72,3 +76,29 @@ print(threading.active_count())
 """
     ended = subprocess.run([sys.executable, "-c", many], cwd=REPOSITORY, capture_output=True, text=True, timeout=60)
     assert ended.stdout.splitlines()[-1] == "2"
+
+
+def test_what_python_can_undo_is_undone_also_after_code_that_stops_all_threads() -> None:
+    """Between the two calls of the list Python has no turn; the second keeps the listener from looking."""
+    busy = """
+import hashlib, operator, os, signal, sys, threading
+from functools import partial
+sys.argv = ["gcsplan", "plan", "m.yaml"]
+from gcsplan.cli import main as cli
+from gcsplan.export import durable
+
+def command(**_):
+    threading.Timer(0.02, os.kill, (os.getpid(), signal.SIGTERM)).start()
+    try:
+        list(map(operator.call, [
+            partial(hashlib.pbkdf2_hmac, "sha256", b"", b"", 200_000),
+            partial(sum, range(50_000_000)),
+        ]))
+    finally:
+        print("undone", flush=True)
+
+cli._commands = lambda called: command
+cli.main()
+"""
+    ended = subprocess.run([sys.executable, "-c", busy], cwd=REPOSITORY, capture_output=True, text=True, timeout=60)
+    assert (ended.returncode, ended.stdout) == (143, "undone\n")

@@ -148,11 +148,12 @@ def test_nothing_to_retire_changes_nothing(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("damage", [b"", b"{", b"[]", b'{"outputs": 3}', b"\xff", b"[" * 100_000])
 def test_with_a_damaged_manifest_outputs_are_told_by_their_names_and_kept(tmp_path: Path, damage: bytes) -> None:
-    write_outputs(tmp_path, FIRST)
+    first = FIRST | {"uav1.param": "RTL_ALT 6000\n"}
+    write_outputs(tmp_path, first)
     (tmp_path / "notes.txt").write_text("mine")
     (tmp_path / MANIFEST).write_bytes(damage)
-    assert retire_outputs(tmp_path) == sorted(FIRST)
-    assert set(files(tmp_path)) == {"notes.txt", *(f"{PREVIOUS}/{name}" for name in FIRST)}
+    assert retire_outputs(tmp_path) == sorted(first)
+    assert set(files(tmp_path)) == {"notes.txt", *(f"{PREVIOUS}/{name}" for name in first)}
     write_outputs(tmp_path, SECOND)
     (tmp_path / MANIFEST).write_bytes(damage)
     write_outputs(tmp_path, FIRST)
