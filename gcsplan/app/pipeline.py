@@ -118,7 +118,7 @@ def plan(
     notes += fleet.notes
     if goal == "energy" and any(not v.verdict.energy_stated for v in flown):
         flown = tuple(replace(v, verdict=replace(v.verdict, energy_stated=True)) for v in flown)
-        notes.append("what is minimised is the paper's energy, for no `energy:` of a vehicle is given")
+        notes.append("the energy that is minimised is the paper's: a vehicle has no `energy:`")
     return Plan(source, brief.world, name, goal, number, flown, tuple(notes), fleet, tuple(leaving.found), leave_out)
 
 

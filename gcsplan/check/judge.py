@@ -137,7 +137,7 @@ def _unlike_fitted(stretches: Sequence[Stretch], vehicle: Vehicle) -> list[str]:
     at = f"{slow:g}" if slow == fast else f"{slow:g} to {fast:g}"
     return [
         f"the energy is fitted to flights at {at} m/s, and from item {far[speed]} on it flies at {speed:.3g} m/s: what "
-        f"it needs may be far off; fit-energy with flights at that speed too tells it"
+        f"it needs may be far off; fit the energy to flights at that speed, too"
     ]
 
 

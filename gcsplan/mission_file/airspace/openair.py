@@ -226,7 +226,7 @@ class _Reading:
         if not block.has_centre and self.zones:
             if code == "DC":
                 raise _RecordError(
-                    "has no centre of its own, V X=… in this zone, and that of the zone before is not its"
+                    "has no centre of its own (V X=… in this zone); the centre of the zone before does not count"
                 )
             block.remarks.append((CARRIED, f"line {self.number}: {code} {value[:40]}"))
         if code == "DC":
