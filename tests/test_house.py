@@ -67,7 +67,7 @@ PROJECTION = {"world/frame.py", "world/datum.py", "world/grids.py", "world/repro
 SOCKETS = {"dem/download.py", "mavlink/link/link.py", "mavlink/link/transport.py", "sim/server.py", "sim/sockets.py"}
 NETWORK = {"socket", "socketserver", "select", "selectors", "asyncio", "ssl", "http", "urllib", "serial"}
 DEGREES = ("lat_deg", "lon_deg", "lat_e7", "lon_e7")
-MOST_LINES = 400  # of a module
+MOST_LINES = 600  # of a module
 MOST_LINES_OF_FUNCTION = 80
 
 TABLES = {

@@ -92,17 +92,9 @@ def plan(
         source = load_mission(source, departure=gate_utc, at=at)
     elif at is not None:
         raise InputError("the mission is read already: give `at` to load_mission", where="at")
-    settings = source.planner
-    name = planner or settings.name
-    entry = get_planner(name)
-    goal = objective or settings.objective
-    if goal not in ("length", "energy"):
-        raise InputError(f"objective must be length or energy, given {goal!r}")
-    number = settings.seed if seed is None else seed
-    merged = _options(source, name) | dict(options or {})
-    by_priority = bool(entry.optimiser) and (merged.get("cost") or entry.defaults.get("cost")) == "msfoa"
-    _require_warm_start(source, name, merged)
-    brief = Brief(source, world_of(source), entry.plan, goal, number, merged, by_priority and len(source.vehicles) > 1)
+    name = planner or source.planner.name
+    brief = _brief_of(source, name, objective, seed, options or {})
+    goal = brief.objective
     if leave_out is None:
         leave_out = source.arrival is not None and source.arrival.leave_out
     leaving = LeavingOut(allowed=leave_out)
@@ -119,7 +111,24 @@ def plan(
     if goal == "energy" and any(not v.verdict.energy_stated for v in flown):
         flown = tuple(replace(v, verdict=replace(v.verdict, energy_stated=True)) for v in flown)
         notes.append("the energy that is minimised is the paper's: a vehicle has no `energy:`")
-    return Plan(source, brief.world, name, goal, number, flown, tuple(notes), fleet, tuple(leaving.found), leave_out)
+    return Plan(
+        source, brief.world, name, goal, brief.seed, flown, tuple(notes), fleet, tuple(leaving.found), leave_out
+    )  # fmt: skip
+
+
+def _brief_of(
+    source: MissionFile, name: str, objective: str | None, seed: int | None, options: Mapping[str, object]
+) -> Brief:
+    """What all vehicles of a mission are planned with; what is given overrides the file's."""
+    entry = get_planner(name)
+    goal = objective or source.planner.objective
+    if goal not in ("length", "energy"):
+        raise InputError(f"objective must be length or energy, given {goal!r}")
+    merged = _options(source, name) | dict(options)
+    by_priority = bool(entry.optimiser) and (merged.get("cost") or entry.defaults.get("cost")) == "msfoa"
+    _require_warm_start(source, name, merged)
+    number = source.planner.seed if seed is None else seed
+    return Brief(source, world_of(source), entry.plan, goal, number, merged, by_priority and len(source.vehicles) > 1)
 
 
 def _planned(

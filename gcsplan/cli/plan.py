@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from gcsplan.app.gate import GateTime
     from gcsplan.app.model import Plan
     from gcsplan.app.upload_job import JobResult, UploadJob, UploadOptions
+    from gcsplan.check.rtl.verdict import WayHome
     from gcsplan.mission_file import MissionFile
     from gcsplan.units import Units
 
@@ -220,10 +221,7 @@ def plan(
             timeout_s=timeout,
         )  # fmt: skip
         results = _upload(orders, options, gate)
-        told = {"upload.json": lambda: outputs.upload_text(planned, results, homes)}
-        if report:
-            told["report.html"] = lambda: outputs.report_of(planned, results, homes, system)
-        _add(directory, told)
+        _add_results(directory, planned, results, homes, system if report else None)
         if not as_json:
             upload_table(results)
             release_table(planned, results, gate)
@@ -232,6 +230,18 @@ def plan(
     if as_json:
         emit(outputs.summary_of(planned, results, homes), failure)
     raise typer.Exit(failure["code"] if failure is not None else 0)
+
+
+def _add_results(
+    directory: Path, planned: Plan, results: list[JobResult], homes: Mapping[str, WayHome], report: Units | None
+) -> None:
+    """Add what an upload came to; ``report``: the units of a report that tells it too, None without one."""
+    from gcsplan.app import outputs
+
+    told = {"upload.json": lambda: outputs.upload_text(planned, results, homes)}
+    if report is not None:
+        told["report.html"] = lambda: outputs.report_of(planned, results, homes, report)
+    _add(directory, told)
 
 
 def _left_out(planned: Plan, mission: Path) -> dict[str, Any] | None:
