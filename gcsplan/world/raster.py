@@ -332,7 +332,7 @@ def _unit(dataset: Any, system: RasterCRS, said: Said, path: Path, *, where: str
         elif said.height_unit is None and (system.vertical_unit is None or band != system.vertical_unit.name):
             raise InputError(
                 f"{path} gives heights in {band!r}, which is not known; say the unit with `height_unit: m` "
-                "(or ft, us_ft)",
+                "(or ft, us_ft; a canopy says its own: gdal_edit.py -units metre)",
                 where=where,
             )
     return unit_that_counts(stated, said.height_unit, system.horizontal_unit, path.name, where=where)
