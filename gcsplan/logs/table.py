@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import difflib
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from gcsplan.errors import InputError
@@ -34,6 +34,9 @@ WANTED = (
 MOST_BAD = 0.1
 """Part of the lines that may be unreadable before the file is refused."""
 
+MOST_BYTES, MOST_LINES = 256_000_000, 2_000_000
+"""Most bytes and lines of a file that is read: 11 h at 50 Hz."""
+
 
 def read_csv(file: Path, columns: Mapping[str, str]) -> FlightLog:
     """The flight in a CSV file; ``columns`` maps a key of `NAMES` to the file's own name. Raises InputError."""
@@ -43,16 +46,20 @@ def read_csv(file: Path, columns: Mapping[str, str]) -> FlightLog:
             hint = f"; did you mean {near[0]}?" if near else ""
             raise InputError(f"--csv-columns knows {', '.join(NAMES)}, given {key!r}{hint}", where=str(file))
     try:
-        text = file.read_text(encoding="utf-8-sig")
+        bytes_ = file.stat().st_size
+        text = "" if bytes_ > MOST_BYTES else file.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"is no readable text: {error}", where=str(file)) from None
+    if bytes_ > MOST_BYTES or text.count("\n") > MOST_LINES:
+        raise InputError(
+            f"has more than {MOST_BYTES // 10**6} MB or {MOST_LINES} lines; cut it to the flight, "
+            f"to the columns {WANTED}, or to every tenth line",
+            where=str(file),
+        )
     head = text.split("\n", 1)[0]
     mark = max(",;\t", key=head.count)
-    try:
-        lines = list(csv.reader(text.splitlines(), delimiter=mark))
-    except csv.Error as error:
-        raise InputError(f"is no CSV: {error}", where=str(file)) from None
-    names = [n.strip() for n in lines[0]] if lines else []
+    lines = _lines(text, mark, str(file))
+    names = [n.strip() for n in next(lines, [])]
     at = _places(names, columns, str(file))
     flat = "east_m" in at
     keys = ("time_s", *(("east_m", "north_m") if flat else ("lat", "lon")), "amsl_m")
@@ -61,7 +68,8 @@ def read_csv(file: Path, columns: Mapping[str, str]) -> FlightLog:
     charge: list[tuple[float, float, float]] = []
     wind: list[tuple[float, float, float]] = []
     bad: list[int] = []
-    for number, line in enumerate(lines[1:], start=2):
+    number = 1
+    for number, line in enumerate(lines, start=2):
         if not any(cell.strip() for cell in line):
             continue
         values = {key: _number(line, k) for key, k in at.items()}
@@ -79,11 +87,19 @@ def read_csv(file: Path, columns: Mapping[str, str]) -> FlightLog:
             good = True
         if not good:
             bad.append(number)
-    if len(bad) > MOST_BAD * max(len(lines) - 1, 1):
+    if len(bad) > MOST_BAD * max(number - 1, 1):
         raise InputError(f"{counted(len(bad), 'line')} without numbers, the first is line {bad[0]}", where=str(file))
     notes = (f"{file.name}: passed over {counted(len(bad), 'line')} without numbers",) if bad else ()
     power = watts_of(charge, str(file)) if charge else power
     return FlightLog.of(str(file), places, power, notes, degrees=not flat, wind=wind)
+
+
+def _lines(text: str, mark: str, where: str) -> Iterator[list[str]]:
+    """The cells of one line after the other."""
+    try:
+        yield from csv.reader(text.splitlines(), delimiter=mark)
+    except csv.Error as error:
+        raise InputError(f"is no CSV: {error}", where=where) from None
 
 
 def _places(names: list[str], columns: Mapping[str, str], where: str) -> dict[str, int]:

@@ -80,3 +80,19 @@ def test_a_corridor_of_4_000_random_points_is_placed_in_seconds(within_s: list[f
     within_s.append(10.0)  # 36 s before
     sizes.write("corridor", 4000)
     assert len(load_mission("m.yaml").zones) > 1000
+
+
+@pytest.mark.parametrize(("amount", "what"), [(500, ""), (501, "at most 500")])
+def test_via_points_are_counted(amount: int, what: str) -> None:
+    assert what in said("vias", amount)
+
+
+def test_vehicles_are_counted() -> None:
+    assert "must be a list of 1 to 2000 vehicles, given" in said("fleet", 2001)
+
+
+def test_terrain_files_are_counted() -> None:
+    sizes.mission(terrain={"dem": [f"t{k}.tif" for k in range(2001)], "vertical_datum": "EGM96"})
+    with pytest.raises(InputError) as refusal:
+        load_mission("m.yaml")
+    assert "2000" in str(refusal.value.problems)
