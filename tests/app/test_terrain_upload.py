@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from gcsplan.app.on_board import settings_of
 from gcsplan.app.pipeline import load_mission, plan
 from gcsplan.app.upload_orders import judge_on_board
 from gcsplan.app.uploads import jobs_of
 from gcsplan.mavlink.link.terrain import OFF
+from gcsplan.mavlink.mission.parameter_names import OnBoard
 
 MISSION = {
     "version": 1, "terrain": {"flat_m": 300}, "altitude_frame": "terrain", "terrain_error_m": 5,
@@ -42,3 +44,19 @@ def test_other_posts_are_judged_as_such(spacing: float) -> None:
     again = judge_on_board(job, allow_unjudged=False)
     assert again is not None
     assert again(job.mission, {"TERRAIN_SPACING": spacing, "TERRAIN_OFS_MAX": 5.0, OFF: 0.0}) is None
+
+
+def test_posts_of_which_nothing_is_known_are_not_the_default_ones() -> None:
+    planned = plan(load_mission(MISSION))
+    [job] = jobs_of(planned, {"uav1": "udpout:127.0.0.1:9"})
+    again, settings = judge_on_board(job, allow_unjudged=False), settings_of(job)
+    assert again is not None
+    read = {n.name: n.value(s.value) for s in settings for n in s.parameter.names[:1]} | {
+        "TERRAIN_ENABLE": 1.0,
+        OFF: 0.0,
+    }
+    for silent in ("TERRAIN_SPACING", "TERRAIN_OFS_MAX"):
+        answered = {"TERRAIN_SPACING": 100.0, "TERRAIN_OFS_MAX": 5.0} | read
+        assert again(job.mission, OnBoard(answered)) is None
+        answered.pop(silent)
+        assert f"{silent} could not be read" in str(again(job.mission, OnBoard(answered)))
