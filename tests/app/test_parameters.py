@@ -102,7 +102,7 @@ def test_what_was_not_answered_is_no_default(
     assert (never.outcome, never.code, never.reason) == ("refused", 5, "parameters")
     assert f"{name} " in never.message
     assert "could not be read from the vehicle" in never.message
-    lost = sent(done, board(autopilot, Misbehaviour(mute=name, mute_times=4), **parameters), timeout_s=20.0)
+    lost = sent(done, board(autopilot, Misbehaviour(mute=name, mute_times=2), **parameters), timeout_s=20.0)
     assert (lost.outcome, lost.code) == ("refused", 5)  # read in the end
     assert "could not be read" not in lost.message
     assert ("inside no-fly zone" if name == "WPNAV_RADIUS" else f"{name} is {parameters[name]:g} on") in lost.message
@@ -110,7 +110,7 @@ def test_what_was_not_answered_is_no_default(
 
 def test_a_value_that_comes_late_is_as_good(tmp_path: Any) -> None:
     done = planned()
-    assert sent(done, board(misbehave=Misbehaviour(mute="WPNAV_ACCEL", mute_times=4)), timeout_s=20.0).verified
+    assert sent(done, board(misbehave=Misbehaviour(mute="WPNAV_ACCEL", mute_times=2)), timeout_s=20.0).verified
 
 
 def test_verify_does_not_take_silence_for_a_default(tmp_path: Any) -> None:
@@ -203,6 +203,7 @@ def test_a_required_return_that_runs_on_farther_is_judged_so_where_that_is_allow
 # -- returns at the autopilot's own speed ----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_return_is_timed_at_the_speed_that_arducopter_flies() -> None:
     for speed in (5, 15):
         done = planned(keys(speed_m_s=[speed, speed], lean_angle_deg=55, **RTL))
@@ -290,6 +291,7 @@ def test_the_lean_that_a_speed_needs_has_something_to_spare() -> None:
 # -- a rehearsal with the vehicle's own --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_rehearsal_flies_with_the_parameters_of_a_file_or_a_vehicle(tmp_path: Path) -> None:
     done = planned(keys(**RTL))
     file = tmp_path / "board.param"
