@@ -103,10 +103,10 @@ def test_rtl_climbs_returns_straight_and_lands_at_home() -> None:
     assert down.end == (36.6, -84.3, GROUND_M)
 
 
-def test_px4_returns_at_its_own_cruise_speed_and_others_at_the_missions() -> None:
+def test_every_autopilot_returns_at_a_speed_of_its_own_not_the_missions() -> None:
     items = TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), MissionItem(cmd.RTL, 2)
     assert fly(*items, rtl_rel_home_m=120, autopilot=Autopilot.PX4).stretches[-2].speed_m_s == 5.0
-    assert fly(*items, rtl_rel_home_m=120).stretches[-2].speed_m_s == 15.0
+    assert fly(*items, rtl_rel_home_m=120).stretches[-2].speed_m_s == 10.0  # WPNAV_SPEED, as RTL_SPEED is 0
 
 
 @pytest.mark.parametrize(("above_m", "told"), [(4.0, False), (30.0, True), (-30.0, False)])
