@@ -28,9 +28,10 @@ PATH, LANDING = cmd.DO_RETURN_PATH_START, cmd.DO_LAND_START
         (AUTO | {"FS_GCS_ENABLE": 1.0}, "mission", "FS_GCS_ENABLE 1 on board: such a return does not join"),
         (AUTO | {"BATT_FS_CRT_ACT": 2.0}, "mission", "set 6 (Auto RTL)"),
         ({}, "mission", "could be read"),
-        ({"FS_GCS_ENABLE": 1.0}, None, ""),
+        (dict.fromkeys(AUTO, 1.0), None, ""),
+        ({"FS_GCS_ENABLE": 1.0}, None, "BATT_FS_CRT_ACT could not be read"),  # silence is no default
         ({}, "straight", ""),
-        ({"FS_GCS_ENABLE": 6.0}, None, "was judged straight home"),
+        (dict.fromkeys(AUTO, 1.0) | {"FS_GCS_ENABLE": 6.0}, None, "was judged straight home"),
     ],
 )
 def test_arducopters_failsafes_choose_one_by_one(values: dict[str, float], route: Route | None, words: str) -> None:
