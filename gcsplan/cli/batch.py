@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from os.path import isfile  # a name that no disk can hold is no file, rather than an error
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -71,7 +72,7 @@ def batch(
             done.append(record)
             display.done(len(done), f", {sum(r.code != 0 for r in done)} without a plan")
 
-        pages = [] if report else [page for k in todo if (page := out / work.missions[k][0] / "report.html").is_file()]
+        pages = [] if report else [page for k in todo if isfile(page := out / work.missions[k][0] / "report.html")]
         try:
             if todo:
                 with executor(jobs, cluster, pieces=len(todo), piece_s=PIECE_S) as workers:

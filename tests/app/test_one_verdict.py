@@ -89,7 +89,7 @@ def test_without_an_energy_key_no_output_tells_an_energy(capsys: pytest.CaptureF
 def test_the_papers_energy_is_told_where_it_is_what_is_minimised() -> None:
     done = plan(load_mission(mission(None)), objective="energy")
     assert summary_of(done)["vehicles"][0]["energy_j"] > 0.0
-    assert any("the paper's energy" in n for n in done.notes)
+    assert any("the energy that is minimised is the paper's" in n for n in done.notes)
 
 
 def test_an_advised_return_altitude_above_max_agl_is_told() -> None:
