@@ -129,14 +129,15 @@ def test_check_with_options_takes_it_too(call: Run) -> None:
 
 
 def test_upload_and_verify_refuse_a_flight_beyond_the_hours(call: Run, url: str) -> None:
+    as_it_flies = ("--allow-parameters",)  # the file commands no speed, and WPNAV_SPEED is not the mission's
     code, said = call("upload", "waits.waypoints", "--to", url, "--mission", "dated.yaml")
     assert code == 4
     assert "the hours of zones" in said
-    code, said = call("upload", "short.waypoints", "--to", url, "--mission", "m.yaml", "--at", TUESDAY)
+    code, said = call("upload", "short.waypoints", "--to", url, "--mission", "m.yaml", "--at", TUESDAY, *as_it_flies)
     assert code == 0, said
-    assert call("verify", "short.waypoints", "--to", url, "--mission", "dated.yaml")[0] == 0
+    assert call("verify", "short.waypoints", "--to", url, "--mission", "dated.yaml", *as_it_flies)[0] == 0
     minutes = f"{TUESDAY}/2026-11-24T10:01Z"
-    code, said = call("verify", "short.waypoints", "--to", url, "--mission", "m.yaml", "--at", minutes)
+    code, said = call("verify", "short.waypoints", "--to", url, "--mission", "m.yaml", "--at", minutes, *as_it_flies)
     assert code == 4
     assert "the hours of zones" in said
     assert call("upload", "short.waypoints", "--to", url, "--unchecked", "--at", TUESDAY)[0] == 2
