@@ -36,7 +36,8 @@ def truth(v: VehiclePlan, done: Plan) -> dict[str, Any]:
     verdict, low, near = v.verdict, v.verdict.lowest, v.verdict.nearest
     assert done.fleet is not None
     return {
-        "length_m": verdict.length_m, "energy_j": verdict.energy_j, "battery_percent": verdict.battery_used_percent,
+        "length_m": verdict.length_m, "energy_j": verdict.energy_j if verdict.energy_stated else None,
+        "battery_percent": verdict.battery_used_percent,
         "min_agl_m": None if low is None else low.min_agl_m,
         "zone_m": None if near is None else near.zone_clearance_m, "zone": None if near is None else near.nearest_zone,
         "climb_deg": verdict.max_climb_deg, "speed_m_s": v.speed_m_s,
@@ -62,8 +63,11 @@ def test_the_table_shows_it(case: str) -> None:
         row, true = _plan_row(v, done.fleet), truth(v, done)
         assert row["items"] == str(true["items"])
         shown_as(row["length, m"], true["length_m"], 0)
-        shown_as(row["energy, kJ"], true["energy_j"] / 1e3, 0)
-        shown_as(row["energy, Wh"], true["energy_j"] / 3600.0, 0)
+        if true["energy_j"] is None:  # nobody stated what a metre takes
+            assert (row["energy, kJ"], row["energy, Wh"]) == ("–", "–")
+        else:
+            shown_as(row["energy, kJ"], true["energy_j"] / 1e3, 0)
+            shown_as(row["energy, Wh"], true["energy_j"] / 3600.0, 0)
         if true["battery_percent"] is not None:
             shown_as(row["battery, %"], true["battery_percent"], 0)
         if true["min_agl_m"] is not None:
@@ -89,14 +93,17 @@ def test_json_and_csv_hold_it(case: str) -> None:
             ("max_climb_deg", "climb_deg"), ("speed_m_s", "speed_m_s"), ("arrive_s", "arrive_s"), ("items", "items"),
         ):  # fmt: skip
             assert entry[key] == true[name], key
-        assert entry["energy_j"] == verdict.path_energy_j
+        assert entry["energy_j"] == (None if true["energy_j"] is None else verdict.path_energy_j)
         mine = [r for r in rows if r["vehicle"] == v.name]
 
         def column(name: str, mine: list[dict[str, str]] = mine) -> list[float]:
             return [float(r[name]) for r in mine if r[name]]
 
-        assert column("cumulative_energy_j")[-1] == pytest.approx(true["energy_j"], abs=0.051 * len(mine))
-        assert math.fsum(column("energy_j")) == pytest.approx(true["energy_j"], abs=0.051 * len(mine))
+        if true["energy_j"] is None:
+            assert column("cumulative_energy_j") == column("energy_j") == []
+        else:
+            assert column("cumulative_energy_j")[-1] == pytest.approx(true["energy_j"], abs=0.051 * len(mine))
+            assert math.fsum(column("energy_j")) == pytest.approx(true["energy_j"], abs=0.051 * len(mine))
         assert math.fsum(column("leg_m")) == pytest.approx(
             math.fsum(leg.length_m * leg.times for leg in verdict.legs), abs=0.00051 * len(mine)
         )
@@ -124,8 +131,9 @@ def test_the_report_shows_it(case: str) -> None:
             shown_as(quantity(cells["nearest zone"]), true["zone_m"], 1, least=True)
             assert html.unescape(notes["nearest zone"]).startswith(true["zone"])
         shown_as(quantity(cells["steepest"]), true["climb_deg"], 1, steepest=True)
-        used = cells["energy"] if "energy" in cells else notes["battery"]
-        shown_as(quantity(used.split("kJ")[0]), true["energy_j"] / 1e3, 0)
+        if true["energy_j"] is not None:
+            used = cells["energy"] if "energy" in cells else notes["battery"]
+            shown_as(quantity(used.split("kJ")[0]), true["energy_j"] / 1e3, 0)
         if true["battery_percent"] is not None:
             shown_as(quantity(cells["battery"]), true["battery_percent"], 1)
         legs, items = text_rows(page, f"Legs of {v.name},"), list(by_item(v.verdict.legs))
