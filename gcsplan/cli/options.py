@@ -18,7 +18,7 @@ LINKS = "udpout:HOST:PORT sends (,LOCAL: from that port), udpin:HOST:PORT listen
 MISBEHAVIOURS = (
     "drop, duplicate, reorder, delay (probabilities), delay_s, corrupt (an item), corrupt_field, silent_after "
     "(messages), reboot_at (an item), reboot_s, reboot_loses, edit (an item), stray_sysid, stale_type, answer_sysid, "
-    "refuse (an item), refuse_code, no_space, armed, seed"
+    "refuse (an item), refuse_code, no_space, mute (a parameter), mute_times, armed, seed"
 )
 
 

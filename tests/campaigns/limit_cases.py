@@ -33,6 +33,8 @@ POSTS_M = 20
 """Spacing of the vehicle's terrain, m: the worlds are too small for one of 100 m."""
 
 WING_RADIUS_M, WING_SPEED_M_S = 40.0, 14.0
+STRIP_M = 1000.0
+"""Around home, m: nothing stands there in the worlds of fixed wings."""
 
 
 @dataclass(frozen=True)
@@ -126,6 +128,8 @@ def make_case(rng: np.random.Generator, family: str) -> Case | None:
         energy=Energy(120.0, 100.0, hover_w=300.0, battery_j=1e9),
     )  # fmt: skip
     mission = make_mission(rng, family, autopilot, ground, surface, frame)
+    if family == "wing":
+        surface = with_strip(surface, frame, mission)
     case = Case(family, ground, surface, (), frame, craft, mission)
     if case.verdict().safe is not True:
         return None
@@ -145,6 +149,15 @@ def corner_zones(rng: np.random.Generator, case: Case) -> list[Zone]:
         inside = b + off * (ways[0] + ways[1])
         found.append(Zone(f"corner {len(found)}", Circle(float(inside[0]), float(inside[1]), 0.1 * off)))
     return found[:2]
+
+
+def with_strip(surface: Surface, frame: Frame, mission: Mission) -> Surface:
+    """The surface without its canopy within `STRIP_M` of home, where a fixed wing climbs out from the ground."""
+    rows, cols = np.indices(surface.ground_m.shape)
+    nodes = surface.grid.to_plane(cols.ravel(), rows.ravel()).reshape(*rows.shape, 2)
+    home = frame.to_plane(mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7)
+    near = np.hypot(*(nodes - home).transpose(2, 0, 1)) <= STRIP_M
+    return Surface(surface.ground_m, np.where(near, surface.ground_m, surface.top_m), surface.grid)
 
 
 # -- missions ------------------------------------------------------------------------------------------------------
