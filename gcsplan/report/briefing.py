@@ -25,7 +25,7 @@ MOST_VEHICLES = 4
 MOST_FINDINGS, MOST_RALLY, MOST_NOTES = 2, 4, 1
 NAME, MESSAGE = 28, 105
 """Most letters of a name in the table, and of a message."""
-MAP_MM, SMALL_MAP_MM, WIDE_MM = 56.0, 24.0, 180.0
+MAP_MM, SMALL_MAP_MM, WIDE_MM = 44.0, 16.0, 180.0
 """Height of the map, height where problems take the room, and greatest width."""
 PX_PER_MM = 96.0 / 25.4
 MAIN_PARAMETERS = ("speed", "return_speed", "lean", "roll")
@@ -126,9 +126,9 @@ def _facts(page: Page, s: Subject, units: Units) -> Iterator[tuple[str, str]]:
     most = "no limit is set" if limits.max_agl_m is None else f"at most {stated(limits.max_agl_m, units.height)}"
     yield "highest above ground", f"{greatest(high.max_agl_m if high else None, 1, units.height)}; {most}"
     zone = f"{least(near.zone_clearance_m, 1, units.distance)}, {esc(_name(near.nearest_zone))}" if near else "none"
-    yield "nearest zone", f"{zone}; at least {stated(limits.horizontal_clearance_m, units.distance)}"
     if (over := verdict.zone_pass) is not None:
-        yield "over or under a zone", f"{least(over.height_m, 1, units.distance)} {over.side} {esc(_name(over.zone))}"
+        zone += f"; {least(over.height_m, 1, units.distance)} {over.side} {esc(_name(over.zone))}"
+    yield "nearest zone", f"{zone}; at least {stated(limits.horizontal_clearance_m, units.distance)}"
     angle = f"; at most {num(limits.max_climb_deg, 0, '°')}" if limits.max_climb_deg < 90.0 else ""
     yield "steepest", steepest(verdict.max_climb_deg) + angle
     across, up = stated(limits.track_error_m, units.distance), stated(limits.altitude_error_m, units.height)
@@ -145,7 +145,7 @@ def _facts(page: Page, s: Subject, units: Units) -> Iterator[tuple[str, str]]:
         values = ", ".join(f"{name.name} {name.value(value):.6g}" for name, value in main)
         versions = " and ".join(sorted({name.versions for name, _ in main if name.versions}))
         named = f" (so named {versions})" if versions else ""
-        yield "parameters", esc(f"{values}{named}; its limits have the whole list")
+        yield "parameters", esc(f"{values}{named}")
 
 
 def _battery(s: Subject) -> str:
