@@ -150,7 +150,8 @@ def test_what_is_reported_to_help_does(name: str) -> None:
 def test_a_mission_file_with_the_reported_value_has_a_mission(
     tmp_path: FilePath, file: str, key: str, given: str
 ) -> None:
-    text = (MISSIONS / file).read_text(encoding="utf-8")
+    # The value is tried for a path; whether the battery lasts for its laps is judged when the mission is planned.
+    text = re.sub(r"battery_\w+: [\d.e]+,? ?", "", (MISSIONS / file).read_text(encoding="utf-8"))
     mission = tmp_path / "mission.yaml"
     mission.write_text(re.sub(rf"{key}: [\d.]+", f"{key}: {given}", text), encoding="utf-8")
     with pytest.raises(NoMission) as caught:
