@@ -25,8 +25,11 @@ MEASURED_AMSL_M, SPARE = 593.0, 1.007
 """Where the drag was measured, and what a speed should be below the fastest where the altitude is not known."""
 
 
-def leaning_m_s(lean_deg: float, slope_rad: Floats, amsl_m: Floats) -> Floats:
-    """(N,) the fastest speeds in space along slopes (N,), climbs positive, at altitudes (N,), in still air."""
+def leaning_m_s(lean_deg: float | Floats, slope_rad: Floats, amsl_m: Floats) -> Floats:
+    """(N,) the fastest speeds in space along slopes (N,), climbs positive, at altitudes (N,), in still air.
+
+    ``lean_deg``: one for all, or (N,).
+    """
     thin = density_ratio(amsl_m)
     lean = np.radians(lean_deg)
     tilt = np.clip(lean + slope_rad, None, np.radians(80.0))
@@ -46,6 +49,6 @@ def lean_needed_deg(speed_m_s: float, amsl_m: float | None = None) -> float:
     """
     wanted = SPARE * speed_m_s if amsl_m is None else speed_m_s * (1.0 - 1e-3)
     leans = np.arange(1.0, LARGEST_LEAN_DEG + 1.0)
-    height = np.full(1, MEASURED_AMSL_M if amsl_m is None else amsl_m)
-    enough = (lean for lean in leans.tolist() if leaning_m_s(lean, np.zeros(1), height)[0] >= wanted)
-    return next(enough, LARGEST_LEAN_DEG + 1.0)
+    height = np.full(len(leans), MEASURED_AMSL_M if amsl_m is None else amsl_m)
+    enough = np.flatnonzero(leaning_m_s(leans, np.zeros(len(leans)), height) >= wanted)
+    return float(leans[enough[0]]) if len(enough) else LARGEST_LEAN_DEG + 1.0
