@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -16,13 +17,18 @@ from tests.support.paths import MISSIONS
 
 SLOW = {"fleet-100", "fleet-4", "jacksboro-high", "jacksboro-wing"}
 
+planned_once = cache(lambda file: plan(load_mission(file)))
+
 
 @pytest.mark.parametrize(
     "file",
-    [pytest.param(f, id=f.stem, marks=[pytest.mark.slow] if f.stem in SLOW else []) for f in MISSIONS.glob("*.yaml")],
+    [
+        pytest.param(f, id=f.stem, marks=[pytest.mark.xdist_group(f.stem), *[pytest.mark.slow] * (f.stem in SLOW)])
+        for f in MISSIONS.glob("*.yaml")
+    ],
 )
 def test_a_mission_of_the_gallery_is_safe_and_its_files_are_what_was_judged(file: Path, tmp_path: Path) -> None:
-    planned = plan(load_mission(file))
+    planned = planned_once(file)
     files = outputs_of(planned)
     assert {v.verdict.safe for v in planned.vehicles} == {True}
     if planned.fleet is not None and planned.fleet.separation is not None:
@@ -36,9 +42,11 @@ def test_a_mission_of_the_gallery_is_safe_and_its_files_are_what_was_judged(file
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("file", [pytest.param(f, id=f.stem) for f in MISSIONS.glob("*.yaml")])
+@pytest.mark.parametrize(
+    "file", [pytest.param(f, id=f.stem, marks=pytest.mark.xdist_group(f.stem)) for f in MISSIONS.glob("*.yaml")]
+)
 def test_every_mission_of_the_gallery_has_a_safe_return_from_all_of_its_paths(file: Path) -> None:
-    homes = homes_of(plan(load_mission(file)))
+    homes = homes_of(planned_once(file))
     for name, home in homes.items():
         if file.stem == "fleet-100" and home.unsafe:  # as the mission says
             assert sum(s.to_m - s.from_m for s in home.unsafe) <= 75.0, name

@@ -103,6 +103,7 @@ def test_results_do_not_depend_on_who_works_nor_on_what_is_kept(
     assert [told_without_error(t) for t in again] == [told_without_error(t) for t in alone]
 
 
+@pytest.mark.slow
 def test_the_world_of_a_mission_is_the_same_everywhere(
     folder: Path, options: WorldOptions, files: list[str], tmp_path: Path
 ) -> None:

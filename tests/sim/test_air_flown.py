@@ -44,6 +44,7 @@ def test_a_head_wind_costs_time_and_metres_and_a_late_flight_is_not_as_planned()
     assert used > 1.2 * told
 
 
+@pytest.mark.slow
 def test_the_worst_run_counts_and_a_reserve_that_is_used_is_no_flight_as_planned() -> None:
     gusty = Weather(6.0, None, 1.5)
     result = flown(gusty, runs=4)
