@@ -18,9 +18,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import InputError
 from gcsplan.world.frame import FARTHEST_M, Frame
 from gcsplan.world.outlines import MOST_CROSSINGS, MOST_PAIRS, crossings, overlapping_pairs
@@ -104,6 +104,31 @@ def near_polygons(ring: Sequence[Corner], frame: Frame, *, great_circles: bool =
     parts = [p for one in wholes for p in _near_parts(one, frame)]
     cut = [_cut_edges(part, np.roll(part, -1, axis=0), frame) for part in parts]
     return [counter_clockwise(frame.to_plane(points[:, 1], points[:, 0])) for points in cut]
+
+
+def plain_polygons(rings: Sequence[Sequence[Corner]], frame: Frame, *, great_circles: bool) -> list[Polygon | None]:
+    """What `near_polygons` makes of each ring, computed for all of them together; None of one that it must look at.
+
+    A country's zones are many, and most are like this: near as a whole, with edges too short to bow.
+    """
+    if not rings:
+        return []
+    at = np.array([corner for ring in rings for corner in ring])[:, ::-1]
+    count = np.array([len(ring) for ring in rings])
+    first = np.cumsum(count) - count
+    at[:, 0] += np.repeat(_turns(at[first, 0], frame.lon_deg), count)
+    after = np.arange(1, len(at) + 1)
+    after[first + count - 1] = first
+    ends = at[after]
+    cut = _may_bow(at, ends)
+    if great_circles:
+        cut |= _may_follow_great_circle(at, ends)
+    west, south, east, north = _window(frame)
+    cut |= ((at <= (west, south)) | (at >= (east, north))).any(axis=1)
+    plain = ~np.logical_or.reduceat(cut, first)
+    plane = frame.to_plane(at[:, 1], at[:, 0])
+    parts = np.split(plane, first[1:])
+    return [counter_clockwise(part) if good else None for part, good in zip(parts, plain.tolist(), strict=True)]
 
 
 def near_corridors(
@@ -191,8 +216,8 @@ def _window(frame: Frame, spare_m: float = 0.0) -> tuple[float, float, float, fl
 
 def counter_clockwise(vertices: Floats) -> Polygon:
     """The counter-clockwise polygon of ``vertices`` (N, 2) east_m, north_m, listed in either direction."""
-    x, y = vertices[:, 0], vertices[:, 1]
-    area = float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+    x, y = (vertices[1:] - vertices[0]).T
+    area = float(x[:-1] @ y[1:] - x[1:] @ y[:-1])
     return Polygon(np.ascontiguousarray(vertices if area > 0.0 else vertices[::-1]))
 
 
@@ -223,9 +248,9 @@ def wide_fault(points: Sequence[Corner], holes: int = 0, *, closed: bool = True)
 
     An edge along a pole is a point, however far it goes in longitude.
     """
-    at = np.asarray(points, float)
-    if len(at) < 2 or not (width := float(np.ptp(at[:, 1]))) >= HALF_TURN_DEG:
+    if not (width := _width_deg(points)) >= HALF_TURN_DEG:
         return ""
+    at = np.asarray(points, float)
     if holes:
         return (
             f"the polygon is {width:g}° of longitude wide and has a hole: it is a keep-in area, outside of which "
@@ -260,9 +285,9 @@ def across(points: Sequence[Corner], holes: int = 0) -> tuple[Sequence[Corner], 
     The second is a rectangle from which its surroundings are left out. It is empty, and the points are unchanged, if
     they do not cross the antimeridian as `ACROSS_DEG` says, or if there are ``holes``.
     """
-    at = np.asarray(points, float)
-    if holes or len(at) < 3 or not np.ptp(at[:, 1]) >= 360.0 - ACROSS_DEG:
+    if holes or len(points) < 3 or not _width_deg(points) >= 360.0 - ACROSS_DEG:
         return points, ()
+    at = np.asarray(points, float)
     step = np.diff(at[:, 1], append=at[0, 1])
     short = (step + 180.0) % 360.0 - 180.0
     long = np.abs(step) >= HALF_TURN_DEG
@@ -279,6 +304,12 @@ def across(points: Sequence[Corner], holes: int = 0) -> tuple[Sequence[Corner], 
     return ring, other if low < high else ()
 
 
+def _width_deg(points: Sequence[Corner]) -> float:
+    """The range of longitudes as they are written; plain Python, as most outlines have few corners and are narrow."""
+    lons = [lon for _, lon in points]
+    return max(lons, default=0.0) - min(lons, default=0.0)
+
+
 def _beyond(lon0: float, lon1: float) -> str:
     """Which longitude to write instead so that an edge runs the short way."""
     west, east = min(lon0, lon1), max(lon0, lon1)
@@ -290,7 +321,12 @@ def _beyond(lon0: float, lon1: float) -> str:
 def _turned(points: Sequence[Corner], near_lon_deg: float) -> Floats:
     """(N, 2) longitude, latitude, all turned by the same whole turns so that the first is near ``near_lon_deg``."""
     p = np.asarray(points, float)
-    return np.stack([p[:, 1] + 360.0 * np.round((near_lon_deg - p[0, 1]) / 360.0), p[:, 0]], axis=-1)
+    return np.stack([p[:, 1] + _turns(p[0, 1], near_lon_deg), p[:, 0]], axis=-1)
+
+
+def _turns(lon_deg: ArrayLike, near_lon_deg: float) -> Floats:
+    """The whole turns, degrees, that bring longitudes near ``near_lon_deg``."""
+    return np.asarray(360.0 * np.round((near_lon_deg - np.asarray(lon_deg)) / 360.0))
 
 
 def _with_great_circles(ring: Floats, frame: Frame) -> list[Floats]:
@@ -318,9 +354,7 @@ def _great_circles(begins: Floats, ends: Floats, window: tuple[float, float, flo
     On the sphere of geodetic latitudes; edges are shorter than half a turn, and those that end at a pole are meridians.
     Edges over other longitudes than the ``window``'s stay straight: those across a place's meridian tell what holds it.
     """
-    span, high = ends[:, 0] - begins[:, 0], np.maximum(np.abs(begins[:, 1]), np.abs(ends[:, 1]))
-    rough_m = np.tan(np.radians(np.minimum(high, 89.9))) * (METRES_OF_DEGREE * span) ** 2 / (7.0 * 6.3e6)
-    long = (rough_m > GREAT_CIRCLE_M) & (high < 89.999) & (np.abs(span) < HALF_TURN_DEG)
+    long = _may_follow_great_circle(begins, ends)
     west, east = np.minimum(begins[:, 0], ends[:, 0]), np.maximum(begins[:, 0], ends[:, 0])
     long &= np.any([(east >= window[0] + turn) & (west <= window[2] + turn) for turn in TURNS_DEG], axis=0)
     if not long.any():
@@ -341,6 +375,13 @@ def _great_circles(begins: Floats, ends: Floats, window: tuple[float, float, flo
         along[:, 1] += _off_straight(begin, end, part)
         found.append(along)
     return np.concatenate(found) if any_bent else None
+
+
+def _may_follow_great_circle(begins: Floats, ends: Floats) -> Bools:
+    """(N,) whether edges, (N, 2) longitude, latitude, may lie farther than `GREAT_CIRCLE_M` from great circles."""
+    span, high = ends[:, 0] - begins[:, 0], np.maximum(np.abs(begins[:, 1]), np.abs(ends[:, 1]))
+    rough_m = np.tan(np.radians(np.minimum(high, 89.9))) * (METRES_OF_DEGREE * span) ** 2 / (7.0 * 6.3e6)
+    return np.asarray((rough_m > GREAT_CIRCLE_M) & (high < 89.999) & (np.abs(span) < HALF_TURN_DEG))
 
 
 def _off_straight(begin: Floats, end: Floats, part: Floats) -> Floats:
@@ -376,7 +417,7 @@ def _cut_edges(begins: Floats, ends: Floats, frame: Frame) -> Floats:
     return np.asarray(begins[edge] + (ends - begins)[edge] * part[:, None])
 
 
-def _may_bow(start: Floats, end: Floats) -> NDArray[np.bool_]:
+def _may_bow(start: Floats, end: Floats) -> Bools:
     """(N,) whether edges, (N, 2) longitude, latitude, may lie farther than `EDGE_BOW_M` from their chords in the plane.
 
     An edge of length s at latitude f bows by at most (0.18 tan f + 0.02) s²/R, a fifth of what is compared here.

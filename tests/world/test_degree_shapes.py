@@ -14,7 +14,7 @@ from pyproj import Geod
 
 from gcsplan.errors import InputError
 from gcsplan.world import degree_shapes
-from gcsplan.world.degree_shapes import near_corridors, near_polygons
+from gcsplan.world.degree_shapes import near_corridors, near_polygons, plain_polygons
 from gcsplan.world.frame import Frame
 from tests.support.effort import draws
 
@@ -96,6 +96,24 @@ def test_the_cuts_are_those_of_edges_that_are_all_measured() -> None:
             pieces = np.maximum(1, np.ceil(np.sqrt(bow / degree_shapes.EDGE_BOW_M))).astype(int)
             whole = [a + (b - a) * (np.arange(n) / n)[:, None] for a, b, n in zip(ring, following, pieces, strict=True)]
             assert np.array_equal(degree_shapes._cut_edges(ring, following, frame), np.concatenate(whole))
+
+
+@pytest.mark.parametrize("great_circles", [False, True])
+def test_polygons_that_are_projected_together_are_those_that_are_looked_at_one_by_one(great_circles: bool) -> None:
+    rng = np.random.default_rng(5)
+    rings = []
+    for _ in range(300):  # small and large, near and far, either way around, in both conventions of longitudes
+        lat, lon, size = rng.uniform(-84, 84), rng.uniform(-180, 180), 10.0 ** rng.uniform(-4, 1)
+        lat, lon = (lat, lon) if rng.random() < 0.2 else (46.5 + rng.uniform(-3, 3), 8.0 + rng.uniform(-4, 4))
+        turns = np.sort(rng.uniform(0, 2 * np.pi, rng.integers(3, 40)))[:: rng.choice([-1, 1])]
+        lats, lons = lat + size * np.sin(turns), lon + size * np.cos(turns) + rng.choice([-360, 0, 360])
+        rings.append([(float(a), float(o)) for a, o in zip(lats.clip(-90, 90), lons, strict=True)])
+    found = plain_polygons(rings, FRAME, great_circles=great_circles)
+    assert 40 < sum(one is not None for one in found) < 260
+    for ring, one in zip(rings, found, strict=True):
+        if one is not None:
+            (alone,) = near_polygons(ring, FRAME, great_circles=great_circles)
+            assert np.array_equal(one.vertices, alone.vertices)
 
 
 def test_a_line_of_many_points_becomes_several_corridors_that_hold_all_of_it() -> None:
