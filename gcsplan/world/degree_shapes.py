@@ -72,6 +72,9 @@ ACROSS_DEG, ACROSS_PART = 2.0, 0.5
 """Edges of a whole turn less the first may cross the antimeridian, if the polygon then is wide by this part of its
 height: a mask of the world that leaves out a strip along the antimeridian is tall there, and narrow."""
 
+POLE_DEG = 89.999
+"""A corner at a latitude from here on is the pole."""
+
 GREAT_CIRCLE_M = 1.0
 """An edge that lies nearer to its great circle is not told from it, m."""
 
@@ -351,19 +354,25 @@ def _with_great_circles(ring: Floats, frame: Frame) -> list[Floats]:
 def _great_circles(begins: Floats, ends: Floats, window: tuple[float, float, float, float]) -> Floats | None:
     """The edges (N, 2) longitude, latitude along great circles, without the last end; None if straight ones will do.
 
-    On the sphere of geodetic latitudes; edges are shorter than half a turn, and those that end at a pole are meridians.
-    Edges over other longitudes than the ``window``'s stay straight: those across a place's meridian tell what holds it.
+    On the sphere of geodetic latitudes; edges are shorter than half a turn. One that ends at a pole goes along the
+    other end's meridian. Edges over other longitudes than the ``window``'s, and those that lie north or south of it
+    either way, stay straight: on which side of a place they cross its meridian tells what holds it.
     """
     long = _may_follow_great_circle(begins, ends)
     west, east = np.minimum(begins[:, 0], ends[:, 0]), np.maximum(begins[:, 0], ends[:, 0])
     long &= np.any([(east >= window[0] + turn) & (west <= window[2] + turn) for turn in TURNS_DEG], axis=0)
+    south, north = latitudes_between(begins[:, ::-1], ends[:, ::-1])
+    long &= (north >= window[1]) & (south <= window[3])
     if not long.any():
         return None
     found: list[Floats] = []
     any_bent, count = False, 0
     for begin, end, is_long in zip(begins, ends, long.tolist(), strict=True):
-        off_m = METRES_OF_DEGREE * _off_straight(begin, end, np.arange(1, 64) / 64.0) if is_long else np.zeros(1)
-        bow_m = float(np.abs(off_m).max())
+        if is_long and max(abs(begin[1]), abs(end[1])) >= POLE_DEG:
+            found.append(np.array([begin, (end[0], begin[1]) if abs(begin[1]) >= POLE_DEG else (begin[0], end[1])]))
+            any_bent = True
+            continue
+        bow_m = _bow_m(begin, end) if is_long else 0.0
         if bow_m <= GREAT_CIRCLE_M:
             found.append(begin[None])
             continue
@@ -371,27 +380,54 @@ def _great_circles(begins: Floats, ends: Floats, window: tuple[float, float, flo
         part = np.arange(n := min(MOST_PIECES, math.ceil(2.0 * math.sqrt(bow_m / EDGE_BOW_M)))) / n
         if (count := count + n) > MOST_PIECES_OF_ALL:
             raise InputError(f"a zone of {len(begins)} corners has too many long edges for great circles; simplify it")
-        along = begin + part[:, None] * (end - begin)
-        along[:, 1] += _off_straight(begin, end, part)
+        along = _along_great_circle(begin, end, part)
+        along[0] = begin
         found.append(along)
     return np.concatenate(found) if any_bent else None
 
 
 def _may_follow_great_circle(begins: Floats, ends: Floats) -> Bools:
     """(N,) whether edges, (N, 2) longitude, latitude, may lie farther than `GREAT_CIRCLE_M` from great circles."""
-    span, high = ends[:, 0] - begins[:, 0], np.maximum(np.abs(begins[:, 1]), np.abs(ends[:, 1]))
-    rough_m = np.tan(np.radians(np.minimum(high, 89.9))) * (METRES_OF_DEGREE * span) ** 2 / (7.0 * 6.3e6)
-    return np.asarray((rough_m > GREAT_CIRCLE_M) & (high < 89.999) & (np.abs(span) < HALF_TURN_DEG))
+    (span, rise), high = np.abs(ends - begins).T, np.maximum(np.abs(begins[:, 1]), np.abs(ends[:, 1]))
+    steep = np.tan(np.radians(np.minimum(high, 89.9)))
+    # A geodesic turns by sin f cos f l² and by 2 sin f l b, over b and l of latitude and longitude.
+    rough_m = steep * METRES_OF_DEGREE**2 * span * (span + 2.0 * rise) / (7.0 * 6.3e6)
+    rough_m[span > 90.0] = np.inf
+    level = (high >= POLE_DEG) & (begins[:, 1] == ends[:, 1])  # along the pole
+    return np.asarray((rough_m > GREAT_CIRCLE_M) & ~level & (span < HALF_TURN_DEG))
 
 
-def _off_straight(begin: Floats, end: Floats, part: Floats) -> Floats:
-    """By how many degrees of latitude the great circle lies north of the line straight in degrees, at parts of it."""
-    (lon0, lat0), (lon1, lat1) = begin, end
-    turn = math.radians(lon1 - lon0)
-    rise = math.tan(math.radians(lat0)) * np.sin((1.0 - part) * turn) + math.tan(math.radians(lat1)) * np.sin(
-        part * turn
-    )
-    return np.asarray(np.degrees(np.arctan(rise / math.sin(turn))) - (lat0 + part * (lat1 - lat0)))
+def latitudes_between(begins: ArrayLike, ends: ArrayLike) -> tuple[Floats, Floats]:
+    """(N,) least and greatest latitudes of edges (N, 2) latitude, longitude, as straight lines or great circles.
+
+    With x from one end and D the longitudes between them, the tangent of a great circle's latitude is that of its
+    ends, weighted by sin(D - x)/sin(D) and sin(x)/sin(D), whose sum is from 1 to 1/cos(D/2). The shorter way counts.
+    """
+    a, b = np.asarray(begins, float), np.asarray(ends, float)
+    span = np.abs((b[:, 1] - a[:, 1] + 180.0) % 360.0 - 180.0)
+    most = 1.0 / np.maximum(np.cos(np.radians(0.5 * span)), 1e-9)
+    low, high = np.minimum(a[:, 0], b[:, 0]), np.maximum(a[:, 0], b[:, 0])
+    bent = [np.degrees(np.arctan(most * np.tan(np.radians(lat)))) for lat in (low, high)]
+    return np.where(low < 0.0, bent[0], low), np.where(high > 0.0, bent[1], high)
+
+
+def _bow_m(begin: Floats, end: Floats) -> float:
+    """How far an edge's great circle lies from the line that is straight in degrees at most, m; at 63 places of it."""
+    span, rise = end - begin
+    arc = _along_great_circle(begin, end, np.arange(1, 64) / 64.0)
+    north = np.abs(arc[:, 1] - begin[1] - (arc[:, 0] - begin[0]) * (rise / span))
+    wide = abs(span) * math.cos(math.radians(min(abs(begin[1]), abs(end[1])))) if begin[1] * end[1] > 0.0 else abs(span)
+    return float(METRES_OF_DEGREE * north.max() * wide / math.hypot(wide, rise))
+
+
+def _along_great_circle(begin: Floats, end: Floats, part: Floats) -> Floats:
+    """(N, 2) longitude, latitude of places on an edge's great circle, at parts of its length."""
+    lon, lat = np.radians([begin[0], end[0]]), np.radians([begin[1], end[1]])
+    a, b = np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], axis=-1)
+    angle = 2.0 * math.atan2(float(np.linalg.norm(a - b)), float(np.linalg.norm(a + b)))
+    x, y, z = (np.sin((1.0 - part) * angle)[:, None] * a + np.sin(part * angle)[:, None] * b).T
+    turned = (np.degrees(np.arctan2(y, x)) - begin[0] + 180.0) % 360.0 - 180.0
+    return np.stack([begin[0] + turned, np.degrees(np.arctan2(z, np.hypot(x, y)))], axis=-1)
 
 
 def unwrapped(points: Sequence[Corner] | Floats, near_lon_deg: float) -> Floats:

@@ -19,7 +19,15 @@ from gcsplan.mission_file.zone_attributes import OVER_PRESSURE, UNDER_PRESSURE
 from gcsplan.mission_file.zone_draft import ACROSS, MAX_VERTICES, Bounds, Remark, ZoneDraft, check_degrees
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_levels import EXAMPLES, LevelError, Limit, read_level
-from gcsplan.world.degree_shapes import HALF_TURN_DEG, LARGEST_RADIUS_M, across, outline_of, unwrapped, wide_fault
+from gcsplan.world.degree_shapes import (
+    HALF_TURN_DEG,
+    LARGEST_RADIUS_M,
+    across,
+    latitudes_between,
+    outline_of,
+    unwrapped,
+    wide_fault,
+)
 from gcsplan.world.outlines import MOST_CROSSINGS, MOST_PAIRS, crossings, overlapping_pairs
 from gcsplan.world.zones import Level
 
@@ -212,15 +220,18 @@ class AirspaceFile:
         """A rectangle with all points well inside, to tell whether a zone without an outline lies near.
 
         A zone that is half a turn wide may lie on either side of its corners: then the rectangle goes around the globe,
-        and to the poles where they may be in it, or great circles come near them.
+        as far north and south as great circles reach, and to the poles where they may be in it.
         """
         at = np.asarray(points, float)
         (south, west), (north, east) = at.min(axis=0) - AROUND_DEG, at.max(axis=0) + AROUND_DEG
         if east - west >= HALF_TURN_DEG:
             west, east = -HALF_TURN_DEG, HALF_TURN_DEG
             short = unwrapped([*points, points[0]], points[0][1])[:, 0]
-            if self.great_circles or abs(short[-1] - short[0]) > 1.0:
+            if abs(short[-1] - short[0]) > 1.0:
                 south, north = -90.0, 90.0
+            elif self.great_circles:
+                lows, highs = latitudes_between(at, np.roll(at, -1, axis=0))
+                south, north = min(south, lows.min() - AROUND_DEG), max(north, highs.max() + AROUND_DEG)
         south, north = max(south, -90.0), min(north, 90.0)
         corners = ((south, west), (south, east), (north, east), (north, west))
         return tuple((float(lat), float(lon)) for lat, lon in corners)
