@@ -427,9 +427,17 @@ def dat_case(rng: np.random.Generator, folder: Path) -> tuple[Case, Path]:
         said.reasons.add("own voids")
     lat = float(rng.integers(-60, 60) + rng.choice([0.003, 0.5, 0.997]))
     lon = float(rng.integers(-170, 170) + rng.choice([0.003, 0.5, 0.997]))
-    path = write_dat(folder / "terrain", lat, lon, reach_deg=0.06)
+    (north, east), waves_m = rng.uniform(-0.6, 0.6, 2), float(rng.choice([0.0, 5.0, 40.0]))
+    wide = math.cos(math.radians(lat))
+
+    def ground(lat_deg: Floats, lon_deg: Floats) -> Floats:
+        away = (lon_deg - lon + 180.0) % 360.0 - 180.0
+        waves = waves_m * np.sin(lat_deg * 2000.0) * np.cos(away * 2000.0)
+        return np.asarray(3500.0 + 111_000.0 * (north * (lat_deg - lat) + east * wide * away) + waves)
+
+    path = write_dat(folder / "terrain", lat, lon, reach_deg=0.06, ground=ground)
     spec = said.spec(dem=(str(path),), nodata=key_nodata)
-    return Case(spec, Frame(lat, lon), said.reasons), path
+    return Case(spec, Frame(lat, lon), said.reasons, spare_m=2.1 if waves_m == 0.0 else math.inf), path
 
 
 # -- the judgement ----------------------------------------------------------------------------------------------------
@@ -477,6 +485,8 @@ def attempt(seed: int, tally: Tally, reader: Load = load) -> None:
     if dat is not None:
         if not (got[0] <= wanted[0] + 0.03).all() or not (got[1] >= wanted[0] - 0.03).all():
             fault("what the autopilot reads lies outside of both heights")
+        if (got[1] - got[0]).max() > case.spare_m:
+            fault(f"a plane has two heights {(got[1] - got[0]).max():.1f} m apart")
         return
     near = _beside_voids(case, at)
     for name, a, b in zip(("least", "greatest"), got, wanted, strict=True):
