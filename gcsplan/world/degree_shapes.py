@@ -386,6 +386,16 @@ def _great_circles(begins: Floats, ends: Floats, window: tuple[float, float, flo
     return np.concatenate(found) if any_bent else None
 
 
+def along_great_circles(ring: Sequence[Corner]) -> list[Corner] | None:
+    """The corners of an outline (latitude, longitude) along great circles; None if straight edges will do.
+
+    Raises InputError beyond `MOST_PIECES_OF_ALL`.
+    """
+    at = np.asarray(ring, float)[:, ::-1]
+    bent = _great_circles(at, np.roll(at, -1, axis=0), (-720.0, -90.0, 720.0, 90.0))
+    return None if bent is None else [(float(lat), float(lon)) for lon, lat in bent]
+
+
 def _may_follow_great_circle(begins: Floats, ends: Floats) -> Bools:
     """(N,) whether edges, (N, 2) longitude, latitude, may lie farther than `GREAT_CIRCLE_M` from great circles."""
     (span, rise), high = np.abs(ends - begins).T, np.maximum(np.abs(begins[:, 1]), np.abs(ends[:, 1]))

@@ -175,10 +175,13 @@ def between_edges(ring: Ring, lon: float, lat: float, form: str) -> bool:
 
 def certain(parts: Sequence[Part], lon: float, lat: float, form: str) -> bool | None:
     """Whether the format has the place inside a part; None near a border, and where edges of both kinds may hold it."""
-    off = NEAR_BORDER_M / 111_000.0
+    wide, off = math.cos(math.radians(lat)), NEAR_BORDER_M / 111_000.0
+    corners = [((x - lon + 180.0) % 360.0 - 180.0, y - lat) for p in parts for x, y in p[0]]
+    if any(math.hypot(wide * x, y) < off for x, y in corners):  # a tip may be narrower than the places looked at
+        return None
     answers = {
-        any(held(p[0], lon + dx * off / math.cos(math.radians(lat)), lat + dy * off, form) for p in parts)
-        for dx in (-1.0, 0.0, 1.0) for dy in (-1.0, 0.0, 1.0)
+        any(held(p[0], lon + dx * size / wide, lat + dy * size, form) for p in parts)
+        for dx in (-1.0, 0.0, 1.0) for dy in (-1.0, 0.0, 1.0) for size in (off, 0.1 * off)
     }  # fmt: skip
     answer = answers.pop() if len(answers) == 1 else None
     return None if answer is False and any(between_edges(p[0], lon, lat, form) for p in parts) else answer

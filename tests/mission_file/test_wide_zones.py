@@ -150,6 +150,14 @@ def test_great_circles_to_a_pole_are_meridians(tmp_path: Path, form: str, sign: 
 
 
 @pytest.mark.parametrize("form", ["openair", "ed269"])
+def test_an_outline_that_crosses_itself_encloses_what_its_great_circles_do(tmp_path: Path, form: str) -> None:
+    """Its crossing along great circles is elsewhere: the long edge passes 94.39° E at 45.29° S, not at 45.24° S."""
+    ring = [(97.74168, -45.46888), (95.50235, -45.3459), (91.69018, -44.53826), (91.98307, -45.07078)]
+    assert verdict(tmp_path, form, 94.392409, -45.259130, ring) == "inside"
+    assert verdict(tmp_path, form, 94.392409, -45.32, ring) == "free"
+
+
+@pytest.mark.parametrize("form", ["openair", "ed269"])
 def test_an_authority_s_edge_of_half_a_turn_refuses_no_mission_far_from_it(tmp_path: Path, form: str) -> None:
     """Great circles between its corners, 20° apart by the shorter way, reach 30.4° N."""
     ring = band(-170.0, 170.0, 20.0, 30.0)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gcsplan.errors import Problem
+from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.airspace.policy import Judge, Policy, Published
 from gcsplan.mission_file.zone_attributes import OVER_PRESSURE, UNDER_PRESSURE
 from gcsplan.mission_file.zone_draft import ACROSS, MAX_VERTICES, Bounds, Remark, ZoneDraft, check_degrees
@@ -23,6 +23,7 @@ from gcsplan.world.degree_shapes import (
     HALF_TURN_DEG,
     LARGEST_RADIUS_M,
     across,
+    along_great_circles,
     latitudes_between,
     outline_of,
     unwrapped,
@@ -211,6 +212,13 @@ class AirspaceFile:
             else:
                 self.fault(where, "the polygon has no points")
             return
+        if self.great_circles:  # whose crossings lie elsewhere
+            try:
+                bent = along_great_circles(outline)
+            except InputError as too_many:
+                self._add(zone, part, where, self._around(ring), None, limits, [Problem(where, too_many.message)])
+                return
+            parts = parts if bent is None else enclosed(outline, bent)
         limits = Limits(limits.bounds, [*limits.remarks, (CROSSES, "")], limits.faults)
         for i, piece in enumerate(parts):
             name = part if len(parts) == 1 else f"{part}/{i + 1}"
@@ -255,12 +263,12 @@ class AirspaceFile:
         self.found.add(draft, remarks)
 
 
-def enclosed(outline: Sequence[Corner]) -> list[list[Corner]]:
-    """The outlines of all that a line which crosses itself encloses, whichever way it runs around it."""
+def enclosed(*outlines: Sequence[Corner]) -> list[list[Corner]]:
+    """The outlines of all that lines which cross themselves and each other enclose, whichever way they run."""
     import shapely
 
-    line = np.asarray([*outline, outline[0]], float)[:, ::-1]
-    faces = shapely.get_parts(shapely.polygonize([shapely.union_all(shapely.LineString(line))]))
+    lines = [shapely.LineString(np.asarray([*outline, outline[0]], float)[:, ::-1]) for outline in outlines]
+    faces = shapely.get_parts(shapely.polygonize([shapely.union_all(lines)]))
     whole = shapely.union_all(faces)
     outer = [shapely.Polygon(p.exterior) for p in shapely.get_parts(whole) if p.geom_type == "Polygon"]
     rings = []
