@@ -143,8 +143,11 @@ def _job(c: Checked, url: str) -> UploadJob:
     )  # fmt: skip
 
 
-def unchecked_job(argument: str, url: str, sysid: int) -> UploadJob:
-    """The job of a file for ``--unchecked``; the vehicle is asked for its autopilot if the file does not name one."""
+def unchecked_job(argument: str, url: str, sysid: int) -> tuple[UploadJob, list[str]]:
+    """The job of a file for ``--unchecked``, and what of the file is not sent with it or was not read.
+
+    The vehicle is asked for its autopilot if the file does not name one.
+    """
     name, file = split_name(argument)
     endpoint = parse_url(url)
     require_file(file)
@@ -153,7 +156,8 @@ def unchecked_job(argument: str, url: str, sysid: int) -> UploadJob:
         with open_link(url) as link:
             autopilot = _autopilot_of(link, sysid)
     read = read_mission_file(file, autopilot=autopilot)
-    return UploadJob(name or file.stem, endpoint.url, replace(read.mission, name=name or file.stem, sysid=sysid))
+    job = UploadJob(name or file.stem, endpoint.url, replace(read.mission, name=name or file.stem, sysid=sysid))
+    return job, [*read.notes, *([read.unread_fence] if read.unread_fence else [])]
 
 
 def open_link(url: str) -> Link:

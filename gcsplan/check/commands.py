@@ -97,12 +97,12 @@ def flown_otherwise(item: MissionItem, mission: Mission) -> str:
     first, second = item.params[:2]
     if mission.autopilot is Autopilot.PX4:
         if item.command == cmd.LAND and second >= 1.0:
-            return "a precision landing (param2) looks for its beacon, and where is not known"
+            return "a precision landing (param2) looks for its beacon, and where is not known (0 lands without it)"
         if item.command in (cmd.WAYPOINT, cmd.LOITER_TIME, cmd.DELAY) and not math.isfinite(first):
-            return f"a hold of {first} s (param1) has no end that is known"
+            return f"a hold of {first} s (param1) has no end that is known (give its seconds)"
     if mission.autopilot is Autopilot.ARDUPLANE:
         if item.command == cmd.VTOL_LAND and first == FW_DESCENT:
-            return "a descent as a fixed wing (param1) is flown as the autopilot likes"
+            return "a descent as a fixed wing (param1) is flown as the autopilot likes (0 lands as a multicopter)"
         if item.command == cmd.RTL and any(i.command in LAND_STARTS for i in mission.items):
-            return "a return leads on to DO_LAND_START, by RTL_AUTOLAND"
+            return "a return leads on to DO_LAND_START, by RTL_AUTOLAND (end with the landing itself)"
     return ""

@@ -99,7 +99,7 @@ class _Pilot(Aboard):
 
     def _fly(self, seq: int, item: MissionItem) -> None:
         if self.landed:
-            self.flight.not_judged.append(f"item {seq} comes after the landing: what it does is not judged")
+            self.flight.not_judged.append(f"item {seq} comes after the landing: what it does is not judged; remove it")
             return
         command = item.command
         if self.autopilot is Autopilot.PX4 and self.off_africa(item):
@@ -153,7 +153,7 @@ class _Pilot(Aboard):
                 return
             self.flight.not_judged.append(
                 f"item {seq}: a runway take-off (NAV_TAKEOFF on ArduPlane) leaves straight ahead on a heading that "
-                f"the mission does not hold"
+                f"the mission does not hold; a fixed wing with turn_radius_m is judged from its launch on"
             )
             self.airborne, self.known = True, False
             return
@@ -196,7 +196,7 @@ class _Pilot(Aboard):
             if not self.airborne:
                 self.flight.not_judged.append(
                     f"item {seq} is the first to fly to and there is no take-off before it: the way from home to it "
-                    f"is not judged"
+                    f"is not judged; put a take-off before it"
                 )
             self.airborne = self.known = True
             self.at = target
@@ -322,14 +322,19 @@ class _Pilot(Aboard):
             if is_wing(self.vehicle):
                 glide(self, seq, item)
                 return
-            self.flight.not_judged.append(f"item {seq}: a runway landing's glide (NAV_LAND on ArduPlane) is not judged")
+            self.flight.not_judged.append(
+                f"item {seq}: a runway landing's glide (NAV_LAND on ArduPlane) is not judged; "
+                "that of a fixed wing with turn_radius_m is"
+            )
             self.landed = True
             return
         if self.has_place(item):
             self._fly_to_landing(seq, item)
         ground = self.ground(self.at[0], self.at[1])
         if math.isnan(ground):
-            self.flight.not_judged.append(f"item {seq}: the ground at the landing place is unknown")
+            self.flight.not_judged.append(
+                f"item {seq}: the ground at the landing place is unknown; give terrain that knows it"
+            )
         else:
             down = (self.at[0], self.at[1], ground)
             self.lands_fast(seq, ground)
@@ -378,13 +383,15 @@ class _Pilot(Aboard):
         if 0 < item.params[0] < math.inf:
             self.add(seq, "loiter", self.at, self.at, hold_s=item.params[0], column=not self.airborne)
         else:
-            self.flight.not_judged.append(f"item {seq}: a wait until a time of day costs what is not known beforehand")
+            self.flight.not_judged.append(
+                f"item {seq}: a wait until a time of day costs what is not known beforehand; give its seconds (param1)"
+            )
 
     def _lose(self, seq: int, item: MissionItem) -> None:
         self.direction = None
         self.flight.not_judged.append(
             f"item {seq}: what {self.autopilot} flies for command {item.command} is not judged: "
-            f"{why_lost(item, self.mission)}"
+            f"{why_lost(item, self.mission)}; leave it out to have the rest judged"
         )
         target = self.target(item) if self.has_place(item) else None
         if target is not None and cmd.is_nav(item.command):

@@ -24,7 +24,9 @@ def glide(pilot: Aboard, seq: int, item: MissionItem) -> None:
     target = pilot.target(item) if pilot.has_place(item) else None
     pilot.landed = True
     if target is None:
-        pilot.flight.not_judged.append(f"item {seq}: a landing of a fixed wing without a place is not judged")
+        pilot.flight.not_judged.append(
+            f"item {seq}: a landing of a fixed wing without a place is not judged; give it one"
+        )
         return
     ground = pilot.ground(*target[:2])
     off_m = target[2] - ground

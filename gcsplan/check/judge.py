@@ -82,7 +82,7 @@ def judge(
         )  # fmt: skip
     findings += _refused(mission) + _unreached(flight)
     if not flight.stretches:
-        flight.not_judged.append("the mission flies nowhere: it has no item that moves the vehicle")
+        flight.not_judged.append("the mission flies nowhere: it has no item that moves the vehicle; add one")
         return Verdict(mission, (), tuple(findings), tuple(flight.not_judged), tuple(flight.notes))
     far = [_too_far(s) for s in (*flight.stretches, *flight.others) if _is_too_far(s, world)]
     if far:  # beyond the projected plane and any terrain model that could be loaded

@@ -94,7 +94,7 @@ def fly_all(mission: Mission, make_pilot: Callable[[], Pilot]) -> Flight:
     if start is not None:
         flight.not_judged.append(
             f"items {mission.first_seq + start} to {mission.first_seq + len(mission.items) - 1}: a jump leads back "
-            f"from what only a return leads to: what follows is not judged"
+            f"from what only a return leads to: what follows is not judged; end what a return leads to with a landing"
         )
     return flight
 
@@ -108,13 +108,16 @@ def fly_in_order(mission: Mission, pilot: Pilot, start: int = 0) -> bool:
     flight, first, items = pilot.flight, mission.first_seq, mission.items
     if mission.autopilot.is_ardupilot and len(jumps) > MOST_JUMPS:
         flight.not_judged.append(
-            f"the mission has {len(jumps)} jumps, and ArduPilot counts {MOST_JUMPS} on small boards and passes the rest"
+            f"the mission has {len(jumps)} jumps, and ArduPilot counts {MOST_JUMPS} on small boards and passes the "
+            "rest; write some rounds out"
         )
     index, steps = start, 0
     while index < len(items):
         steps += 1
         if steps > MOST_STEPS:
-            flight.not_judged.append(f"the jumps lead through more than {MOST_STEPS} items: the rest is not judged")
+            flight.not_judged.append(
+                f"the jumps lead through more than {MOST_STEPS} items: the rest is not judged; give them fewer rounds"
+            )
             return False
         if pilot.over and mission.autopilot.is_ardupilot and items[index].command in LAND_STARTS:
             flight.apart_from = index
@@ -128,7 +131,7 @@ def fly_in_order(mission: Mission, pilot: Pilot, start: int = 0) -> bool:
                 return False
             continue
         if jump.target is None:
-            flight.not_judged.append(f"item {seq} jumps to an item that the mission has not")
+            flight.not_judged.append(f"item {seq} jumps to an item that the mission has not; correct its number")
             return False
         if jump.rounds is not None and jump.done >= jump.rounds:
             _pass(mission, flight, seq, jump)
@@ -179,7 +182,8 @@ def _pass(mission: Mission, flight: Flight, seq: int, jump: _Jump) -> None:
     if jump.passed == 2 and jump.rounds and mission.autopilot.is_ardupilot:
         flight.not_judged.append(
             f"item {seq} is reached again after its {jump.rounds} jumps: ArduPilot before 4.7 skips it then, and 4.7 "
-            f"begins its count anew (MIS_OPTIONS bit 3 stops that), so how long it flies depends on the version"
+            f"begins its count anew (MIS_OPTIONS bit 3 stops that), so how long it flies depends on the version; "
+            "write the outer rounds out"
         )
 
 
@@ -211,7 +215,9 @@ def _never(mission: Mission, flight: Flight, seq: int, index: int, *, loop: bool
 
 def _without_end(flight: Flight, seq: int, target: int, last: int, was: tuple[Hashable, int, int]) -> None:
     if len(flight.stretches) == was[1]:
-        flight.not_judged.append(f"item {seq} jumps to item {target} for ever and nothing is flown between them")
+        flight.not_judged.append(
+            f"item {seq} jumps to item {target} for ever and nothing is flown between them; remove it"
+        )
         return
     flight.loop_seq = seq
     never = "" if seq == last else f"; the items after it, {seq + 1} to {last}, are never flown"

@@ -125,7 +125,9 @@ def upload(
         if len(files) > 1:
             raise UsageError("--unchecked takes one FILE, for the vehicle --sysid; send the others one by one")
         require_settled([check_sites.split_name(files[0])[1]])
-        jobs = [uploads.unchecked_job(files[0], to, sysid or 1)]
+        job, notes = uploads.unchecked_job(files[0], to, sysid or 1)
+        jobs = [job]
+        say_notes(notes)
     names = [job.name for job in jobs]
     with talking(names), transfer_progress(names) as moved_on:
         results = uploads.run_jobs(jobs, options, moved_on, simulator=loopback_fleet)

@@ -3,6 +3,7 @@
 In each cell of the grid a plane is fitted to the posts within a spacing of it. Whatever is bilinear between these posts
 lies between that plane less the lowest of their distances from it and that plane plus the highest one. A node takes the
 outermost value of the four cells around it, so that between nodes the bounds hold too. Over a plane they are the plane.
+A cell whose posts lie in one row holds no ground between posts, and counts for no node.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ REACH = 1.1
 """Spacings around a cell within which a post counts: one, and what the scales of two tiles differ by."""
 
 FLATTEST = 1e-6
-"""Posts whose places spread less than this, in squares of spacings, give no slope: the plane is level."""
+"""Posts whose places spread less than this, in squares of spacings, lie in one row or are one."""
 
 
 def bounds(shape: tuple[int, int], row: Floats, col: Floats, high: Floats, low: Floats) -> tuple[Floats, Floats]:
@@ -36,14 +37,13 @@ def bounds(shape: tuple[int, int], row: Floats, col: Floats, high: Floats, low: 
         for total, value in zip(sums, (None, x, y, x * x, x * y, y * y, h, x * h, y * h), strict=True):
             total += np.bincount(at, value, count)
     n, x, y, xx, xy, yy, h, xh, yh = sums
-    some = n > 0.0
-    n = np.where(some, n, 1.0)
+    n = np.where(n > 0.0, n, 1.0)
     x, y, h = x / n, y / n, h / n
     xx, xy, yy, xh, yh = xx / n - x * x, xy / n - x * y, yy / n - y * y, xh / n - x * h, yh / n - y * h
     spread = xx * yy - xy * xy
-    steep = spread > FLATTEST
-    spread = np.where(steep, spread, 1.0)
-    along, across = (np.where(steep, a / spread, 0.0) for a in (xh * yy - yh * xy, yh * xx - xh * xy))
+    some = spread > FLATTEST
+    spread = np.where(some, spread, 1.0)
+    along, across = (np.where(some, a / spread, 0.0) for a in (xh * yy - yh * xy, yh * xx - xh * xy))
     above, below = np.full(count, -np.inf), np.full(count, np.inf)
     for at, k, dy, dx in _posts_of_cells(row, col, rows, cols):
         plane = h[at] + along[at] * (dx - x[at]) + across[at] * (dy - y[at])

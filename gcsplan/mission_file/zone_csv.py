@@ -13,6 +13,7 @@ from gcsplan.mission_file.places import read_place
 from gcsplan.mission_file.zone_attributes import Attribute, as_figure, read_attributes
 from gcsplan.mission_file.zone_draft import SIZES
 from gcsplan.mission_file.zone_file import ZoneFile
+from gcsplan.mission_file.zone_text import decoded
 
 LAT = ("lat", "latitude", "latdeg", "latitudedeg", "latdec", "latdd", "latwgs84")
 LON = ("lon", "lng", "long", "longitude", "londeg", "longitudedeg", "londec", "longdec", "londd", "longdd", "lonwgs84")
@@ -28,6 +29,9 @@ _HEIGHT = re.compile(
 """The height of what stands there, whose top is the zone's ceiling above ground. Without a unit it is not read."""
 
 _SIZE = re.compile(r"(radius|buffer)(?:m|metres|meters)")
+_SEPARATOR = re.compile(r'"?sep=([,;\t|])"?[,;\t|]*', re.IGNORECASE)
+"""The first line in which Excel says what parts the columns."""
+
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
 
 
@@ -44,13 +48,15 @@ class _Columns:
 def read_csv(path: Path, data: bytes) -> ZoneFile:
     """The zones of a table. Raises InputError if it is none, or if it has no columns for a place."""
     try:
-        text = data.decode("utf-8-sig")
+        text = decoded(data)
     except UnicodeDecodeError as why:
         words = f"the file must be UTF-8 text, byte {why.start} is not; save it as `CSV UTF-8`"
         raise InputError(words, where=str(path)) from None
     lines = text.splitlines()
-    header = next((line for line in lines if line.strip()), "")
-    delimiter = max(DELIMITERS, key=header.count)
+    filled = [line.strip() for line in lines[:20] if line.strip()]
+    said = _SEPARATOR.fullmatch(filled[0]) if filled else None
+    header = filled[0] if filled else ""
+    delimiter = said[1] if said is not None else max(DELIMITERS, key=header.count)
     # A cell longer than csv's limit, 128 KiB, or a zero byte is an error of csv.
     rows = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, skipinitialspace=True)
     found = ZoneFile(path)
@@ -58,6 +64,8 @@ def read_csv(path: Path, data: bytes) -> ZoneFile:
     try:
         for row in rows:
             if not any(cell.strip() for cell in row):
+                continue
+            if said is not None and columns is None and row[0].strip().lower().startswith("sep="):
                 continue
             if columns is None:
                 columns = _header(path, row, delimiter)

@@ -21,6 +21,7 @@ from gcsplan.world.degree_shapes import (
     near_corridors,
     near_polygons,
     outline_of,
+    plain_polygons,
     wide_fault,
 )
 from gcsplan.world.frame import Frame
@@ -239,9 +240,10 @@ def place_zones(drafts: Sequence[ZoneDraft], frame: Frame) -> tuple[list[tuple[Z
     placed: list[tuple[ZoneDraft, Zone]] = []
     far: list[ZoneDraft] = []
     corners = 0
+    plain = _plain(drafts, frame)
     for draft in drafts:
         try:
-            shapes = _shapes(draft, frame)
+            shapes = [plain[id(draft)]] if id(draft) in plain else _shapes(draft, frame)
         except InputError as why:
             raise InputError(f"zone {draft.name[:60]!r}: {why.message}", where=draft.where) from None
         if not shapes:
@@ -334,6 +336,20 @@ def zones_sha256(drafts: Sequence[ZoneDraft]) -> str:
         for d in drafts
     ]
     return hashlib.sha256(json.dumps(plain).encode()).hexdigest()
+
+
+def _plain(drafts: Sequence[ZoneDraft], frame: Frame) -> dict[int, Polygon]:
+    """The shapes, by the identity of their drafts, of polygons that need no more than to be projected."""
+    found: dict[int, Polygon] = {}
+    for great_circles in (False, True):
+        some = [
+            d
+            for d in drafts
+            if not (d.local or d.radius_m is not None or d.buffer_m is not None) and d.great_circles is great_circles
+        ]
+        shapes = plain_polygons([d.points for d in some], frame, great_circles=great_circles)
+        found |= {id(d): shape for d, shape in zip(some, shapes, strict=True) if shape is not None}
+    return found
 
 
 def _shapes(draft: ZoneDraft, frame: Frame) -> Sequence[Circle | Polygon]:

@@ -21,6 +21,11 @@ def read_geojson(path: Path, whole: Any) -> ZoneFile:
     found = ZoneFile(path)
     if not isinstance(whole, dict):
         raise InputError("a GeoJSON file holds one object, for example a FeatureCollection", where=str(path))
+    if str(whole.get("geometryType", "")).startswith("esri") or "rings" in whole:
+        raise InputError(
+            "this is Esri's JSON, not GeoJSON: ask the server for f=geojson, or convert it (ogr2ogr a.geojson FILE)",
+            where=str(path),
+        )
     _require_wgs84(whole, path)
     _require_whole(found, whole)
     features = whole.get("features") if whole.get("type") == "FeatureCollection" else [whole]

@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.errors import InputError
+from gcsplan.mission_file.zone_text import decoded
 
 
 def load_json(path: Path, data: bytes) -> Any:
     """The value that the text holds. Raises InputError."""
     try:
-        return json.loads(
-            data.decode("utf-8-sig"), object_pairs_hook=_unique, parse_constant=_no_constant, parse_int=_bounded_int
-        )
+        return json.loads(decoded(data), object_pairs_hook=_unique, parse_constant=_no_constant, parse_int=_bounded_int)
     except RecursionError:
         raise InputError("the file is nested too deeply to be GeoJSON", where=str(path)) from None
     except ValueError as why:  # bad UTF-8, bad JSON, and the refusals below

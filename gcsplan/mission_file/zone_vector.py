@@ -178,7 +178,13 @@ def _feature(found: ZoneFile, geometry: shapely.Geometry | None, said: Said, whe
         outline = shape.exterior if shape.geom_type == "Polygon" else shape
         drawn = _unread(outline)
         xy = np.asarray(outline.coords)[:, :2]
-        corners = [(float(lat), float(lon)) for lat, lon in to_degrees.line(xy, MAX_VERTICES)]
+        try:
+            is_keep_in = shape.geom_type == "Polygon" and bool(shape.interiors)  # if it is wide, and then by that name
+            drawn_deg = to_degrees.line(xy, MAX_VERTICES, any_width=is_keep_in)
+            corners = [(float(lat), float(lon)) for lat, lon in drawn_deg]
+        except InputError as why:
+            found.problems.append(Problem(where, f"zone {said.name[:60]!r}: {why.message}"))
+            continue
         if shape.geom_type == "Polygon":
             found.add_ring(said, part, where, corners, "", drawn, len(shape.interiors))
         elif shape.geom_type == "Point":

@@ -59,31 +59,36 @@ def over_both_grounds(zones: Sequence[Zone], surface: Surface, field: Field, sca
 
 def zones_as_arrays(zones: Sequence[Zone], surface: Surface, field: Field, scale: float) -> Zones:
     """Arrays of ``zones``; radii become metres of the plane, levels over ground get bounds over the zone's ground."""
-    table = np.zeros((len(zones), ZONE_NUMBERS))
+    rows: list[list[float]] = []  # lists, because numpy takes longer to fill a row of a few numbers
     vertices: list[Floats] = []
     corners = 0
-    for row, zone in zip(table, zones, strict=True):
+    for zone in zones:
+        row = [0.0] * ZONE_NUMBERS
         shape = zone.shape
         row[FIRST] = row[LAST] = corners
         if isinstance(shape, Circle):
-            radius = shape.radius_m * scale
-            row[[EAST, NORTH, RADIUS]] = shape.east_m, shape.north_m, radius
-            row[BOX] = shape.east_m - radius, shape.north_m - radius, shape.east_m + radius, shape.north_m + radius
+            row[EAST], row[NORTH], row[RADIUS] = shape.east_m, shape.north_m, (radius := shape.radius_m * scale)
+            box = shape.east_m - radius, shape.north_m - radius, shape.east_m + radius, shape.north_m + radius
         else:
             v = np.asarray(shape.vertices, dtype=np.float64)
             vertices.append(v)
             corners += len(v)
-            row[[EAST, NORTH, RADIUS, LAST]] = *v[0], -1.0, corners
-            row[BOX] = *v.min(axis=0), *v.max(axis=0)
+            row[EAST], row[NORTH], row[RADIUS], row[LAST] = float(v[0, 0]), float(v[0, 1]), -1.0, corners
+            box = shape.bounds
+        for number, value in zip(BOX, box, strict=True):
+            row[number] = value
         floor, ceiling = zone.floor or Level(-math.inf, "amsl"), zone.ceiling or Level(math.inf, "amsl")
-        row[[FLOOR, CEILING]] = row[[BAND_LOW, BAND_HIGH]] = floor.value_m, ceiling.value_m
-        row[[FLOOR_AGL, CEILING_AGL]] = floor.datum == "agl", ceiling.datum == "agl"
-        if row[FLOOR_AGL] or row[CEILING_AGL]:
-            cell = _cells(row[BOX], surface, field)
+        row[FLOOR] = row[BAND_LOW] = floor.value_m
+        row[CEILING] = row[BAND_HIGH] = ceiling.value_m
+        row[FLOOR_AGL], row[CEILING_AGL] = floor.datum == "agl", ceiling.datum == "agl"
+        if zone.follows_ground:
+            cell = _cells(np.array(box), surface, field)
             low, high = _ground_range(cell, surface.ground_m)
-            row[[COL0, COL1, ROW0, ROW1]] = cell
+            row[COL0], row[COL1], row[ROW0], row[ROW1] = cell
             row[BAND_LOW] += low if row[FLOOR_AGL] else 0.0
             row[BAND_HIGH] += high if row[CEILING_AGL] else 0.0
+        rows.append(row)
+    table = np.array(rows, np.float64).reshape(len(zones), ZONE_NUMBERS)
     most = max((len(v) for v in vertices), default=0)
     return Zones(table, np.concatenate(vertices) if vertices else np.zeros((0, 2)), *_lattice(table[:, BOX]), most)
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from pyproj import CRS, Transformer
+from pyproj.crs.datum import Datum  # type: ignore[attr-defined]
 from pyproj.exceptions import ProjError
 
 from gcsplan.errors import InputError
@@ -33,9 +34,26 @@ _NATIONAL = {
 
 _NOT_THE_SEA = re.compile(
     r"(?i)low[ _]water|high[ _]water|water[ _]level|chart|springs|caspian|wellbore|unknown|undefined"
+    r"|wiener[ _]null|vienna|\baioc|\bkoc\b|\bkoc_|poolbeg|kiunga|kumul"
     r"|(?<!mean[ _-])(?<!zero[ _-])(?<!non[ _-])\btid(e|al)"
 )
-"""Zeros that are metres away from mean sea level: of tides, charts, inland seas, or of nothing that is known."""
+"""Zeros that are metres away from mean sea level: of tides, charts, inland seas and towns, or of nothing that is known.
+
+The register has Vienna's zero 157 m above that of the country, AIOC's at the Caspian Sea, and Poolbeg's 2.7 m below
+Malin Head's; Kumul and Kiunga are 3 m off.
+"""
+
+_GEOCENTRIC = re.compile(
+    r"(?i)WGS_?(19)?84|ETRS|ETRF|ITRF|IG[Sb]\d|NAD_?(19)?83|North_American_1983|GDA|NZGD|JGD|SIRGAS|POSGAR|RGF_?(19)?93"
+    r"|SWEREF|EUREF|DREF91|CGCS|China_Geodetic|GRS80|ellipsoid"
+)
+"""Beginnings of names of ellipsoidal heights whose ellipsoid lies where that of WGS 84 does, within a metre or two."""
+
+ELLIPSOID_M, MOST_OFF_M, MOST_OFF_FLATTENING = 6_378_137.0, 1.5, 0.01
+"""The semi-major axis of WGS 84, m, and how far that of another ellipsoid, and the inverse of its flattening, may be
+off: on Bessel's ellipsoid heights are tens of metres off."""
+
+_SHIFT = re.compile(r'(?i)"Vertical_Shift"\s*,\s*([-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?)')
 
 _NAMED_CRS = re.compile(r"(?i)(EPSG|ESRI):\d{4,6}(\+\d{4,6})?|urn:ogc:def:crs:\w+:[\w.]*:\d+")
 
@@ -66,6 +84,7 @@ class RasterCRS:
 
 def take_apart(crs: str, *, where: str) -> RasterCRS:
     """Horizontal and vertical part of ``crs`` (WKT, PROJ string or ``EPSG:code``); raises InputError."""
+    require_unshifted(crs, where=where)
     try:
         whole = CRS.from_user_input(crs)
         horizontal, vertical, unit = _parts(whole, BY_FILE, where)
@@ -89,6 +108,17 @@ def take_apart(crs: str, *, where: str) -> RasterCRS:
     return RasterCRS(horizontal, geographic, length, vertical, unit)
 
 
+def require_unshifted(text: str, *, where: str) -> None:
+    """Raise InputError for Esri's text of a vertical system that shifts its heights; libraries read it without that."""
+    shift = _SHIFT.search(text)
+    if shift is not None and float(shift[1]) != 0.0:
+        raise InputError(
+            f"the raster's vertical system is shifted by {shift[1]} (Vertical_Shift), which is not read: convert the "
+            "heights, and write the system without it",
+            where=where,
+        )
+
+
 def _parts(whole: Any, by: str, where: str) -> tuple[Any, VerticalDatum | None, HeightUnit | None]:
     """Of a pyproj CRS: the horizontal part in 2D (None if there is none), the vertical datum, and the unit of heights.
 
@@ -99,6 +129,9 @@ def _parts(whole: Any, by: str, where: str) -> tuple[Any, VerticalDatum | None, 
     horizontal = None if parts[0].is_vertical else parts[0]
     if horizontal is not None and len(horizontal.axis_info) == 3:
         axis = horizontal.axis_info[2]
+        if axis.direction.lower() != "up" or not (horizontal.is_geographic or horizontal.is_projected):
+            raise InputError(f"{horizontal.name!r} has no axis of heights; name the vertical system", where=where)
+        _require_geocentric(horizontal, where)
         datum = VerticalDatum(f"{horizontal.name} ellipsoidal", ellipsoidal=True)
         unit = unit_of_length(float(axis.unit_conversion_factor), axis.unit_name)
         return horizontal.to_2d(), datum, replace(unit, by=by)
@@ -121,8 +154,61 @@ def _parts(whole: Any, by: str, where: str) -> tuple[Any, VerticalDatum | None, 
             where=where,
         )
     ellipsoidal = "ellipsoid" in f"{name} {axes[0].name}".lower()
+    if ellipsoidal and not _GEOCENTRIC.match(name):
+        raise _not_geocentric(name, where)
+    if not ellipsoidal:
+        _require_registered(vertical[0], where)
     datum = VerticalDatum("WGS84 ellipsoidal", ellipsoidal=True) if ellipsoidal else _named_by_raster(name)
     return horizontal, datum, replace(unit_of_length(float(axes[0].unit_conversion_factor), axes[0].unit_name), by=by)
+
+
+def _require_registered(vertical: Any, where: str) -> None:
+    """Raise InputError for a vertical system whose zero no register knows, or that shifts another one's."""
+    name = str(vertical.name)
+    if vertical.source_crs is not None:
+        raise InputError(
+            f"heights in {name!r} are shifted from those in {str(vertical.source_crs.name)!r}: convert them (gdalwarp "
+            "-t_srs with that system)",
+            where=where,
+        )
+    datum = "" if vertical.datum is None else str(vertical.datum.name)
+    if vertical.to_authority() is None and not _is_known(name) and not _is_known(datum):
+        raise InputError(
+            f"the raster has heights in {name!r}, which no register knows; say `vertical_datum:` (AMSL if it follows "
+            "mean sea level) and, in place of the raster's own system, `crs:` (its horizontal part, such as EPSG:4326)",
+            where=where,
+        )
+
+
+def _is_known(name: str) -> bool:
+    """Whether a name is, or begins with, that of a vertical system or datum that we or PROJ's registers know."""
+    key = re.sub(r"[^A-Z0-9]", "", name.upper())
+    if any(key.startswith(known) for known in (*_GEOIDS, *_NATIONAL)) or _of_name(name) is not None:
+        return True
+    try:
+        found = str(Datum.from_name(name).name)
+    except ProjError:
+        return False
+    return _letters(found) == _letters(name)
+
+
+def _require_geocentric(crs: Any, where: str) -> None:
+    """Raise InputError if the ellipsoid of a 3D system is not about that of WGS 84."""
+    of = crs.ellipsoid
+    off = (
+        abs(of.semi_major_metre - ELLIPSOID_M) > MOST_OFF_M
+        or abs(of.inverse_flattening - 298.257) > MOST_OFF_FLATTENING
+    )
+    if off or re.match(r"(?i)WGS 72", crs.name):
+        raise _not_geocentric(str(crs.name), where)
+
+
+def _not_geocentric(name: str, where: str) -> InputError:
+    return InputError(
+        f"ellipsoidal heights in {name!r} count from another ellipsoid than that of WGS 84, which may be tens of "
+        "metres away: convert them (gdalwarp -t_srs EPSG:4979, or to a datum at mean sea level), and say that datum",
+        where=where,
+    )
 
 
 def vertical_datum(given: str | None, raster: VerticalDatum | None, *, where: str) -> VerticalDatum:

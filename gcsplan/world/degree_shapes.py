@@ -18,9 +18,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import InputError
 from gcsplan.world.frame import FARTHEST_M, Frame
 from gcsplan.world.outlines import MOST_CROSSINGS, MOST_PAIRS, crossings, overlapping_pairs
@@ -72,6 +72,9 @@ ACROSS_DEG, ACROSS_PART = 2.0, 0.5
 """Edges of a whole turn less the first may cross the antimeridian, if the polygon then is wide by this part of its
 height: a mask of the world that leaves out a strip along the antimeridian is tall there, and narrow."""
 
+POLE_DEG = 89.999
+"""A corner at a latitude from here on is the pole."""
+
 GREAT_CIRCLE_M = 1.0
 """An edge that lies nearer to its great circle is not told from it, m."""
 
@@ -104,6 +107,31 @@ def near_polygons(ring: Sequence[Corner], frame: Frame, *, great_circles: bool =
     parts = [p for one in wholes for p in _near_parts(one, frame)]
     cut = [_cut_edges(part, np.roll(part, -1, axis=0), frame) for part in parts]
     return [counter_clockwise(frame.to_plane(points[:, 1], points[:, 0])) for points in cut]
+
+
+def plain_polygons(rings: Sequence[Sequence[Corner]], frame: Frame, *, great_circles: bool) -> list[Polygon | None]:
+    """What `near_polygons` makes of each ring, computed for all of them together; None of one that it must look at.
+
+    A country's zones are many, and most are like this: near as a whole, with edges too short to bow.
+    """
+    if not rings:
+        return []
+    at = np.array([corner for ring in rings for corner in ring])[:, ::-1]
+    count = np.array([len(ring) for ring in rings])
+    first = np.cumsum(count) - count
+    at[:, 0] += np.repeat(_turns(at[first, 0], frame.lon_deg), count)
+    after = np.arange(1, len(at) + 1)
+    after[first + count - 1] = first
+    ends = at[after]
+    cut = _may_bow(at, ends)
+    if great_circles:
+        cut |= _may_follow_great_circle(at, ends)
+    west, south, east, north = _window(frame)
+    cut |= ((at <= (west, south)) | (at >= (east, north))).any(axis=1)
+    plain = ~np.logical_or.reduceat(cut, first)
+    plane = frame.to_plane(at[:, 1], at[:, 0])
+    parts = np.split(plane, first[1:])
+    return [counter_clockwise(part) if good else None for part, good in zip(parts, plain.tolist(), strict=True)]
 
 
 def near_corridors(
@@ -191,8 +219,8 @@ def _window(frame: Frame, spare_m: float = 0.0) -> tuple[float, float, float, fl
 
 def counter_clockwise(vertices: Floats) -> Polygon:
     """The counter-clockwise polygon of ``vertices`` (N, 2) east_m, north_m, listed in either direction."""
-    x, y = vertices[:, 0], vertices[:, 1]
-    area = float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
+    x, y = (vertices[1:] - vertices[0]).T
+    area = float(x[:-1] @ y[1:] - x[1:] @ y[:-1])
     return Polygon(np.ascontiguousarray(vertices if area > 0.0 else vertices[::-1]))
 
 
@@ -223,9 +251,9 @@ def wide_fault(points: Sequence[Corner], holes: int = 0, *, closed: bool = True)
 
     An edge along a pole is a point, however far it goes in longitude.
     """
-    at = np.asarray(points, float)
-    if len(at) < 2 or not (width := float(np.ptp(at[:, 1]))) >= HALF_TURN_DEG:
+    if not (width := _width_deg(points)) >= HALF_TURN_DEG:
         return ""
+    at = np.asarray(points, float)
     if holes:
         return (
             f"the polygon is {width:g}° of longitude wide and has a hole: it is a keep-in area, outside of which "
@@ -260,9 +288,9 @@ def across(points: Sequence[Corner], holes: int = 0) -> tuple[Sequence[Corner], 
     The second is a rectangle from which its surroundings are left out. It is empty, and the points are unchanged, if
     they do not cross the antimeridian as `ACROSS_DEG` says, or if there are ``holes``.
     """
-    at = np.asarray(points, float)
-    if holes or len(at) < 3 or not np.ptp(at[:, 1]) >= 360.0 - ACROSS_DEG:
+    if holes or len(points) < 3 or not _width_deg(points) >= 360.0 - ACROSS_DEG:
         return points, ()
+    at = np.asarray(points, float)
     step = np.diff(at[:, 1], append=at[0, 1])
     short = (step + 180.0) % 360.0 - 180.0
     long = np.abs(step) >= HALF_TURN_DEG
@@ -279,6 +307,12 @@ def across(points: Sequence[Corner], holes: int = 0) -> tuple[Sequence[Corner], 
     return ring, other if low < high else ()
 
 
+def _width_deg(points: Sequence[Corner]) -> float:
+    """The range of longitudes as they are written; plain Python, as most outlines have few corners and are narrow."""
+    lons = [lon for _, lon in points]
+    return max(lons, default=0.0) - min(lons, default=0.0)
+
+
 def _beyond(lon0: float, lon1: float) -> str:
     """Which longitude to write instead so that an edge runs the short way."""
     west, east = min(lon0, lon1), max(lon0, lon1)
@@ -290,7 +324,12 @@ def _beyond(lon0: float, lon1: float) -> str:
 def _turned(points: Sequence[Corner], near_lon_deg: float) -> Floats:
     """(N, 2) longitude, latitude, all turned by the same whole turns so that the first is near ``near_lon_deg``."""
     p = np.asarray(points, float)
-    return np.stack([p[:, 1] + 360.0 * np.round((near_lon_deg - p[0, 1]) / 360.0), p[:, 0]], axis=-1)
+    return np.stack([p[:, 1] + _turns(p[0, 1], near_lon_deg), p[:, 0]], axis=-1)
+
+
+def _turns(lon_deg: ArrayLike, near_lon_deg: float) -> Floats:
+    """The whole turns, degrees, that bring longitudes near ``near_lon_deg``."""
+    return np.asarray(360.0 * np.round((near_lon_deg - np.asarray(lon_deg)) / 360.0))
 
 
 def _with_great_circles(ring: Floats, frame: Frame) -> list[Floats]:
@@ -315,21 +354,25 @@ def _with_great_circles(ring: Floats, frame: Frame) -> list[Floats]:
 def _great_circles(begins: Floats, ends: Floats, window: tuple[float, float, float, float]) -> Floats | None:
     """The edges (N, 2) longitude, latitude along great circles, without the last end; None if straight ones will do.
 
-    On the sphere of geodetic latitudes; edges are shorter than half a turn, and those that end at a pole are meridians.
-    Edges over other longitudes than the ``window``'s stay straight: those across a place's meridian tell what holds it.
+    On the sphere of geodetic latitudes; edges are shorter than half a turn. One that ends at a pole goes along the
+    other end's meridian. Edges over other longitudes than the ``window``'s, and those that lie north or south of it
+    either way, stay straight: on which side of a place they cross its meridian tells what holds it.
     """
-    span, high = ends[:, 0] - begins[:, 0], np.maximum(np.abs(begins[:, 1]), np.abs(ends[:, 1]))
-    rough_m = np.tan(np.radians(np.minimum(high, 89.9))) * (METRES_OF_DEGREE * span) ** 2 / (7.0 * 6.3e6)
-    long = (rough_m > GREAT_CIRCLE_M) & (high < 89.999) & (np.abs(span) < HALF_TURN_DEG)
+    long = _may_follow_great_circle(begins, ends)
     west, east = np.minimum(begins[:, 0], ends[:, 0]), np.maximum(begins[:, 0], ends[:, 0])
     long &= np.any([(east >= window[0] + turn) & (west <= window[2] + turn) for turn in TURNS_DEG], axis=0)
+    south, north = latitudes_between(begins[:, ::-1], ends[:, ::-1])
+    long &= (north >= window[1]) & (south <= window[3])
     if not long.any():
         return None
     found: list[Floats] = []
     any_bent, count = False, 0
     for begin, end, is_long in zip(begins, ends, long.tolist(), strict=True):
-        off_m = METRES_OF_DEGREE * _off_straight(begin, end, np.arange(1, 64) / 64.0) if is_long else np.zeros(1)
-        bow_m = float(np.abs(off_m).max())
+        if is_long and max(abs(begin[1]), abs(end[1])) >= POLE_DEG:
+            found.append(np.array([begin, (end[0], begin[1]) if abs(begin[1]) >= POLE_DEG else (begin[0], end[1])]))
+            any_bent = True
+            continue
+        bow_m = _bow_m(begin, end) if is_long else 0.0
         if bow_m <= GREAT_CIRCLE_M:
             found.append(begin[None])
             continue
@@ -337,20 +380,64 @@ def _great_circles(begins: Floats, ends: Floats, window: tuple[float, float, flo
         part = np.arange(n := min(MOST_PIECES, math.ceil(2.0 * math.sqrt(bow_m / EDGE_BOW_M)))) / n
         if (count := count + n) > MOST_PIECES_OF_ALL:
             raise InputError(f"a zone of {len(begins)} corners has too many long edges for great circles; simplify it")
-        along = begin + part[:, None] * (end - begin)
-        along[:, 1] += _off_straight(begin, end, part)
+        along = _along_great_circle(begin, end, part)
+        along[0] = begin
         found.append(along)
     return np.concatenate(found) if any_bent else None
 
 
-def _off_straight(begin: Floats, end: Floats, part: Floats) -> Floats:
-    """By how many degrees of latitude the great circle lies north of the line straight in degrees, at parts of it."""
-    (lon0, lat0), (lon1, lat1) = begin, end
-    turn = math.radians(lon1 - lon0)
-    rise = math.tan(math.radians(lat0)) * np.sin((1.0 - part) * turn) + math.tan(math.radians(lat1)) * np.sin(
-        part * turn
-    )
-    return np.asarray(np.degrees(np.arctan(rise / math.sin(turn))) - (lat0 + part * (lat1 - lat0)))
+def along_great_circles(ring: Sequence[Corner]) -> list[Corner] | None:
+    """The corners of an outline (latitude, longitude) along great circles; None if straight edges will do.
+
+    Raises InputError beyond `MOST_PIECES_OF_ALL`.
+    """
+    at = np.asarray(ring, float)[:, ::-1]
+    bent = _great_circles(at, np.roll(at, -1, axis=0), (-720.0, -90.0, 720.0, 90.0))
+    return None if bent is None else [(float(lat), float(lon)) for lon, lat in bent]
+
+
+def _may_follow_great_circle(begins: Floats, ends: Floats) -> Bools:
+    """(N,) whether edges, (N, 2) longitude, latitude, may lie farther than `GREAT_CIRCLE_M` from great circles."""
+    (span, rise), high = np.abs(ends - begins).T, np.maximum(np.abs(begins[:, 1]), np.abs(ends[:, 1]))
+    steep = np.tan(np.radians(np.minimum(high, 89.9)))
+    # A geodesic turns by sin f cos f l² and by 2 sin f l b, over b and l of latitude and longitude.
+    rough_m = steep * METRES_OF_DEGREE**2 * span * (span + 2.0 * rise) / (7.0 * 6.3e6)
+    rough_m[span > 90.0] = np.inf
+    level = (high >= POLE_DEG) & (begins[:, 1] == ends[:, 1])  # along the pole
+    return np.asarray((rough_m > GREAT_CIRCLE_M) & ~level & (span < HALF_TURN_DEG))
+
+
+def latitudes_between(begins: ArrayLike, ends: ArrayLike) -> tuple[Floats, Floats]:
+    """(N,) least and greatest latitudes of edges (N, 2) latitude, longitude, as straight lines or great circles.
+
+    With x from one end and D the longitudes between them, the tangent of a great circle's latitude is that of its
+    ends, weighted by sin(D - x)/sin(D) and sin(x)/sin(D), whose sum is from 1 to 1/cos(D/2). The shorter way counts.
+    """
+    a, b = np.asarray(begins, float), np.asarray(ends, float)
+    span = np.abs((b[:, 1] - a[:, 1] + 180.0) % 360.0 - 180.0)
+    most = 1.0 / np.maximum(np.cos(np.radians(0.5 * span)), 1e-9)
+    low, high = np.minimum(a[:, 0], b[:, 0]), np.maximum(a[:, 0], b[:, 0])
+    bent = [np.degrees(np.arctan(most * np.tan(np.radians(lat)))) for lat in (low, high)]
+    return np.where(low < 0.0, bent[0], low), np.where(high > 0.0, bent[1], high)
+
+
+def _bow_m(begin: Floats, end: Floats) -> float:
+    """How far an edge's great circle lies from the line that is straight in degrees at most, m; at 63 places of it."""
+    span, rise = end - begin
+    arc = _along_great_circle(begin, end, np.arange(1, 64) / 64.0)
+    north = np.abs(arc[:, 1] - begin[1] - (arc[:, 0] - begin[0]) * (rise / span))
+    wide = abs(span) * math.cos(math.radians(min(abs(begin[1]), abs(end[1])))) if begin[1] * end[1] > 0.0 else abs(span)
+    return float(METRES_OF_DEGREE * north.max() * wide / math.hypot(wide, rise))
+
+
+def _along_great_circle(begin: Floats, end: Floats, part: Floats) -> Floats:
+    """(N, 2) longitude, latitude of places on an edge's great circle, at parts of its length."""
+    lon, lat = np.radians([begin[0], end[0]]), np.radians([begin[1], end[1]])
+    a, b = np.stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)], axis=-1)
+    angle = 2.0 * math.atan2(float(np.linalg.norm(a - b)), float(np.linalg.norm(a + b)))
+    x, y, z = (np.sin((1.0 - part) * angle)[:, None] * a + np.sin(part * angle)[:, None] * b).T
+    turned = (np.degrees(np.arctan2(y, x)) - begin[0] + 180.0) % 360.0 - 180.0
+    return np.stack([begin[0] + turned, np.degrees(np.arctan2(z, np.hypot(x, y)))], axis=-1)
 
 
 def unwrapped(points: Sequence[Corner] | Floats, near_lon_deg: float) -> Floats:
@@ -376,7 +463,7 @@ def _cut_edges(begins: Floats, ends: Floats, frame: Frame) -> Floats:
     return np.asarray(begins[edge] + (ends - begins)[edge] * part[:, None])
 
 
-def _may_bow(start: Floats, end: Floats) -> NDArray[np.bool_]:
+def _may_bow(start: Floats, end: Floats) -> Bools:
     """(N,) whether edges, (N, 2) longitude, latitude, may lie farther than `EDGE_BOW_M` from their chords in the plane.
 
     An edge of length s at latitude f bows by at most (0.18 tan f + 0.02) s²/R, a fifth of what is compared here.

@@ -62,7 +62,9 @@ _SPELLED = {
 
 
 def unit_named(words: str) -> HeightUnit | None:
-    """The unit that a file calls ``words``; None if nobody knows it."""
+    """The unit that a file calls ``words``; None if nobody knows it, or if they count with it (``m/10``)."""
+    if re.search(r"[0-9/*^%]", words):
+        return None
     return _SPELLED.get(re.sub(r"[^a-z]", "", words.lower()))
 
 

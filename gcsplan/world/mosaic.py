@@ -15,6 +15,7 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import InputError
 from gcsplan.world.datum import plane_to_raster, to_wgs84
 from gcsplan.world.frame import Frame
+from gcsplan.world.height_unit import BY_NOBODY, METRE, OF_KEY
 from gcsplan.world.overlap import Placed, read_tiles
 from gcsplan.world.raster import MAX_CELLS, Raster
 from gcsplan.world.surface import NO_SIDES, GridMap, Sides
@@ -110,9 +111,10 @@ class Mosaic:
             if other.vertical != first.vertical:
                 raise InputError(
                     f"the tiles must share one vertical datum: {first.name} says {_datum(first)}, {other.name} "
-                    f"{_datum(other)}",
+                    f"{_datum(other)}; correct the one that is wrong (gdal_edit.py -a_srs)",
                     where=where,
                 )
+        _require_known_units(self.rasters, where)
         self._degrees = to_wgs84(first.crs.horizontal, where=where)
         self._layout(0.0)  # finds tiles off the common grid before anything is read
 
@@ -269,6 +271,20 @@ class Mosaic:
                         where=self.where,
                     )
         return _Layout(x0, y0, dx, first.dy, tuple(tiles))
+
+
+def _require_known_units(rasters: Sequence[Raster], where: str) -> None:
+    """Raise InputError if a tile's heights are in another unit than metres, and another's in one that nobody states."""
+    silent = next((r for r in rasters if r.unit.by == BY_NOBODY), None)
+    other = next((r for r in rasters if not r.unit.is_same(METRE)), None)
+    if silent is not None and other is not None:
+        likely = next((key for key, unit in OF_KEY.items() if unit.is_same(other.unit)), "m")
+        raise InputError(
+            f"the heights of {other.name} are {other.unit.told()}, and nothing says the unit of those of {silent.name} "
+            f"beside it; if all tiles have one, say it with `height_unit: {likely}`, else write it into the file "
+            "(gdal_edit.py -units metre)",
+            where=where,
+        )
 
 
 def _datum(raster: Raster) -> str:

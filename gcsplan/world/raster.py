@@ -19,7 +19,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError, absent
-from gcsplan.world.datum import RasterCRS, VerticalDatum, take_apart
+from gcsplan.world.datum import RasterCRS, VerticalDatum, require_unshifted, take_apart
 from gcsplan.world.height_unit import BY_FILE, BY_FORMAT, METRE, HeightUnit, unit_named, unit_that_counts
 from gcsplan.world.input_files import files_of, neighbours, sha256_of_all, tell_file, tell_raster
 
@@ -37,6 +37,12 @@ largest coordinate, is lost in rounding."""
 
 LOWEST_M, HIGHEST_M = -500.0, 9000.0
 """Ground outside of this range is an undeclared void (-9999, -32768, 3.4e38): unknown."""
+
+MARKS = (-9999.0, -32767.0, -32768.0, -99999.0)
+"""Raw numbers that stand for no height, declared or not: in centimetres or with an offset they may look like ground.
+So do the largest and the smallest number of an integer of two bytes and more."""
+
+MOST_OF_PRJ = 65_536
 
 CACHE_BYTES = MAX_BLOCK_BYTES
 """Unpacked blocks that GDAL caches, bytes; its default is a twentieth of the machine's memory."""
@@ -267,6 +273,8 @@ def _header(dataset: Any, path: Path, said: Said, *, where: str) -> tuple[Raster
         )
     if crs is not None and dataset.crs:
         notes.append(f"{path.name}: `crs: {crs}` is used instead of the file's own coordinate system")
+    if crs is None and dataset.driver == "AAIGrid":
+        require_unshifted(_prj_beside(path), where=where)
     system = take_apart(text, where=where)
     if system.geographic:
         _require_degrees(t, dataset, path, where=where)
@@ -296,6 +304,15 @@ def _reader(path: Path, scale: float, offset: float, nodata: float | None, *, wh
             raise InputError(_unreadable(path, why), where=where) from None
 
     return read
+
+
+def _prj_beside(path: Path) -> str:
+    """The text of the .prj beside an .asc, as far as a coordinate system is long."""
+    for beside in (path.with_suffix(".prj"), path.with_suffix(".PRJ")):
+        if beside.is_file():
+            with beside.open("rb") as file:
+                return file.read(MOST_OF_PRJ).decode("utf-8", "replace")
+    return ""
 
 
 def _require_grid(t: Any, dataset: Any, path: Path, *, where: str) -> None:
@@ -360,13 +377,22 @@ def _strips(
         part[np.ma.getmaskarray(raw)] = np.nan
         for block in missing(dataset, 1, col, row + first, cols, n):
             part[block] = np.nan
-        part[part == -32768.0] = np.nan  # the void of SRTM, declared or not, before a scale can hide it
+        for mark in (*MARKS, *_ends(raw.data.dtype)):  # before a scale or a unit can hide them
+            part[part == mark] = np.nan
         if nodata is not None:
             part[part == _as_stored(nodata, raw.data.dtype)] = np.nan
         with np.errstate(over="ignore", invalid="ignore"):
             part = part * scale + offset
             part[~((part >= LOWEST_M) & (part <= HIGHEST_M))] = np.nan
         yield first, part
+
+
+def _ends(dtype: Any) -> tuple[float, ...]:
+    """The numbers at both ends of an integer type of two bytes and more; 0 is no end."""
+    if dtype.kind not in "iu" or dtype.itemsize < 2:
+        return ()
+    info = np.iinfo(dtype)
+    return (float(info.max), float(info.min)) if info.min else (float(info.max),)
 
 
 def _as_stored(number: float, dtype: Any) -> float:

@@ -12,10 +12,10 @@ import numpy as np
 from pyproj import CRS, Transformer
 from pyproj.exceptions import ProjError
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.errors import InputError
 from gcsplan.world.datum import WORST_SHIFT_M
-from gcsplan.world.degree_shapes import EDGE_BOW_M, unwrapped
+from gcsplan.world.degree_shapes import EDGE_BOW_M, HALF_TURN_DEG, unwrapped
 
 WGS84 = "WGS 84"
 METRES_OF_DEGREE = 111_700.0
@@ -74,10 +74,12 @@ class ToDegrees:
             raise self._refused(f"{x:g}, {y:g} lies where {self.name!r} is not defined")
         return found
 
-    def line(self, xy: Floats, most: int) -> Floats:
+    def line(self, xy: Floats, most: int, *, any_width: bool = False) -> Floats:
         """(M, 2) latitude, longitude of a line (N, 2) x, y, cut until it is straight in degrees from point to point.
 
-        No more than ``most`` points are added.
+        No more than ``most`` points are added. Raises InputError if that are too few, and unless ``any_width`` for an
+        edge of half a turn and more: a zone across the antimeridian that somebody converted to Mercator is one around
+        the rest of the globe.
         """
         ends = self.points(xy)
         if self._operation is None or len(xy) < 2:
@@ -95,7 +97,27 @@ class ToDegrees:
             raise self._refused("its edges are too long to be straight in degrees")
         cut = [b + s * (np.arange(n) / n)[:, None] for b, s, n in zip(begin, step, pieces, strict=True)]
         found = self.points(np.concatenate([*cut, xy[-1:]]))
-        return found if self._degrees is not None else np.ascontiguousarray(unwrapped(found, found[0, 1])[:, ::-1])
+        if self._degrees is not None:
+            return found
+        lon, lat = unwrapped(found, found[0, 1]).T
+        if not any_width:
+            self._require_narrow(xy, lon, np.append(0, np.cumsum(pieces)))
+        return np.stack([lat, lon], axis=-1)
+
+    def _require_narrow(self, xy: Floats, lon_deg: Floats, corner: Indices) -> None:
+        """Raise InputError for an edge of half a turn and more; ``corner`` are the places of ``xy`` in ``lon_deg``."""
+        wide_deg = np.abs(np.diff(lon_deg[corner]))
+        k = int(wide_deg.argmax())
+        if wide_deg[k] >= HALF_TURN_DEG:
+            a, b = (f"{x:.7g}, {y:.7g}" for x, y in xy[k : k + 2])
+            raise InputError(
+                f"the edge from {a} to {b} spans {wide_deg[k]:.6g}° of longitude, and from {HALF_TURN_DEG:g}° on it "
+                "may run on either side of the globe: cut the zone in two at the 180° meridian if it crosses it, else "
+                "put a corner between",
+                where=self._where,
+            )
+        if np.array_equal(xy[0], xy[-1]) and abs(lon_deg[-1] - lon_deg[0]) > HALF_TURN_DEG:
+            raise InputError("the outline goes around a pole: cut the zone there in two", where=self._where)
 
     def _refused(self, words: str) -> InputError:
         return InputError(f"{words}; convert it with ogr2ogr -t_srs EPSG:4326", where=self._where)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -39,6 +39,9 @@ NO_MORE_VOIDS: Literal["none"] = "none"
 
 RASTER_SPARE_M = 3000.0
 """Read around the requested box, m, so that the edge of the map lies beyond the box."""
+
+WIDER_M, WIDER_CELLS = (4000.0, 8000.0, 16_000.0, 32_000.0, 64_000.0, 120_000.0), 30_000_000
+"""How far around the box, m, and over how many cells zeros are followed that fill the window to its border."""
 
 GEOID_STEP_M = 100.0
 """Spacing at which the geoid is looked up, linear between, m: it bends by less than a millimetre over that."""
@@ -207,7 +210,8 @@ class _RasterTerrain:
         read_hash = hash_of(rasters, window)
         notes = [n for r in rasters for n in r.notes] + list(window.notes)
         if spec.nodata is None:
-            notes += take_out_zeros(window, partial(self._mosaic.node_degrees, window))
+            wider = self._wider(frame, box) if any(window.goes_on) else ()
+            notes += take_out_zeros(window, partial(self._mosaic.node_degrees, window), wider)
         high = window.heights_m
         if np.isnan(high).all():
             raise InputError(
@@ -253,6 +257,19 @@ class _RasterTerrain:
             info["canopy_sha256"] = self._canopy.rasters[0].sha256()
         info |= {**self._info, "notes": (*notes, *self._notes)}
         return Surface(ground, top, window.grid, info, window.goes_on, high)
+
+    def _wider(self, frame: Frame, box: Box) -> Iterator[Window]:
+        """Windows around ``box`` that grow until the tiles end, or what may be read for them."""
+        west, south, east, north = box
+        for more_m in WIDER_M:
+            larger = west - more_m, south - more_m, east + more_m, north + more_m
+            try:
+                window = self._mosaic.window(frame, larger, most_cells=WIDER_CELLS)
+            except InputError:
+                return
+            yield window
+            if not any(window.goes_on):
+                return
 
 
 class _LocalTerrain:

@@ -6,7 +6,7 @@ shore: ground that rises from 0. A patch of exact zeros without any shore has cl
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -32,30 +32,73 @@ Degrees = Callable[[Sequence[int], Sequence[int]], tuple[Floats, Floats]]
 """Latitudes and longitudes of columns and rows of nodes, as `Mosaic.node_degrees` gives them."""
 
 
-def take_out_zeros(window: Window, degrees: Degrees) -> list[str]:
-    """Make the patches of exact zeros that have no shore unknown, in place; returns a note that names them."""
+def take_out_zeros(window: Window, degrees: Degrees, wider: Iterable[Window] = ()) -> list[str]:
+    """Make the patches of exact zeros that have no shore unknown, in place; returns a note that names them.
+
+    ``wider``: larger windows of the same files, from small to large, that are looked at where a patch fills the window
+    to its border.
+    """
     surfaces = [z for z in (window.heights_m, window.low_m) if z is not None]
     found = [zero_voids(z) for z in surfaces]
-    for void, _ in found:
+    blind = found[0].blind
+    notes: list[str] = []
+    if blind.any():
+        beyond, notes = _looked_beyond(window, blind, wider)
+        found += beyond
+    for void in found:
         for z in surfaces:
-            z[void] = np.nan
-    patches = next((patches for _, patches in found if patches), None)
+            z[void.nodes] = np.nan
+    patches = next((void.patches for void in found if void.patches), None)
     if patches is None:
-        return []
+        return notes
     lat, lon = (float(a[0, 0]) for a in degrees([patches[0].col], [patches[0].row]))
     more = f" and {len(patches) - 1} more" if len(patches) > 1 else ""
     nodes = sum(patch.nodes for patch in patches)
     verb = "stands" if nodes == 1 else "stand"
     return [
+        *notes,
         f"{counted(nodes, 'DEM node')} of exactly 0 m "
         f"({counted(patches[0].nodes, 'node')} around {lat:.5f}, {lon:.5f}{more}) {verb} beside ground of "
         f"{min(patch.beside_m for patch in patches):.0f} m and more without a shore: an undeclared void, whose ground "
-        "is unknown; if it is ground or sea, say `nodata: none`, and if every 0 is a void `nodata: 0`"
+        "is unknown; if it is ground or sea, say `nodata: none`, and if every 0 is a void `nodata: 0`",
     ]
 
 
-def zero_voids(heights_m: Floats) -> tuple[Bools, list[Patch]]:
-    """Where connected patches of exactly 0 have no shore, and these patches, the largest one first.
+def _looked_beyond(window: Window, blind: Bools, wider: Iterable[Window]) -> tuple[list[Voids], list[str]]:
+    """The nodes of ``blind`` patches, which fill the window to its border, that larger windows show to be voids."""
+    rows, cols = blind.shape
+    for large in wider:
+        left = round((window.x[0] - large.x[0]) / (window.x[1] - window.x[0]))
+        top = round((window.y[0] - large.y[0]) / (window.y[1] - window.y[0]))
+        here = slice(top, top + rows), slice(left, left + cols)
+        seen = zero_voids(large.heights_m)
+        still = blind & seen.blind[here]
+        if still.any():
+            continue
+        void = blind & seen.nodes[here]
+        if not void.any():
+            return [], []
+        row, col = (int(k[0]) for k in np.nonzero(void))
+        nodes = int(np.count_nonzero(void))
+        patch = Patch(nodes, row, col, min(p.beside_m for p in seen.patches))
+        return [Voids(void, [patch], np.zeros_like(void))], []
+    return [], [
+        f"{counted(int(np.count_nonzero(blind)), 'DEM node')} of exactly 0 m, around which nothing else is known, "
+        "count as sea or ground; if they are voids, say `nodata: 0`"
+    ]
+
+
+class Voids(NamedTuple):
+    """Which nodes lie in patches of zeros without a shore, these patches, the largest one first, and which nodes lie
+    in patches without any known node beside them."""
+
+    nodes: Bools
+    patches: list[Patch]
+    blind: Bools
+
+
+def zero_voids(heights_m: Floats) -> Voids:
+    """The connected patches of exactly 0 that have no shore.
 
     ``heights_m`` (rows, cols), NaN where unknown. Nodes are connected to all eight around them. A patch has a shore if
     a known node beside it lies within `SHORE_M` of 0; one without any known node beside it has nothing to tell.
@@ -63,7 +106,7 @@ def zero_voids(heights_m: Floats) -> tuple[Bools, list[Patch]]:
     zero = heights_m == 0.0
     nothing = np.zeros(zero.shape, np.bool_)
     if not zero.any():
-        return nothing, []
+        return Voids(nothing, [], nothing)
     from scipy.ndimage import label  # most terrain holds no zeros
 
     patch, count = label(zero, np.ones((3, 3)))
@@ -75,9 +118,12 @@ def zero_voids(heights_m: Floats) -> tuple[Bools, list[Patch]]:
         for at, beside in (((upper, left), (lower, far)), ((lower, far), (upper, left))):
             shore = zero[at] & ~zero[beside] & ~np.isnan(heights_m[beside])
             np.minimum.at(nearest, patch[at][shore], np.abs(heights_m[beside][shore]))
+    alone = np.isinf(nearest)
+    alone[0] = False  # what is no zero
+    blind = np.asarray(alone[patch]) if alone.any() else nothing
     void = np.isfinite(nearest) & (nearest > SHORE_M)
     if not void.any():
-        return nothing, []
+        return Voids(nothing, [], blind)
     sizes = np.bincount(patch.ravel(), minlength=count + 1)
     first = np.full(count + 1, zero.size)
     np.minimum.at(first, patch.ravel(), np.arange(zero.size))
@@ -85,4 +131,4 @@ def zero_voids(heights_m: Floats) -> tuple[Bools, list[Patch]]:
         Patch(int(sizes[k]), int(first[k]) // cols, int(first[k]) % cols, float(nearest[k]))
         for k in np.flatnonzero(void)
     ]
-    return np.asarray(void[patch]), sorted(found, key=lambda p: (-p.nodes, p.row, p.col))
+    return Voids(np.asarray(void[patch]), sorted(found, key=lambda p: (-p.nodes, p.row, p.col)), blind)

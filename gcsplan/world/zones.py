@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 from gcsplan.arrays import Floats
@@ -37,6 +38,12 @@ class Polygon:
 
     vertices: Floats
 
+    @cached_property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """West, south, east, north, metres."""
+        (west, south), (east, north) = self.vertices.min(axis=0).tolist(), self.vertices.max(axis=0).tolist()
+        return west, south, east, north
+
 
 @dataclass(frozen=True, eq=False)
 class Zone:
@@ -61,5 +68,4 @@ class Zone:
         s = self.shape
         if isinstance(s, Circle):
             return (s.east_m - s.radius_m, s.north_m - s.radius_m, s.east_m + s.radius_m, s.north_m + s.radius_m)
-        low, high = s.vertices.min(axis=0), s.vertices.max(axis=0)
-        return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+        return s.bounds

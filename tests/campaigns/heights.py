@@ -45,10 +45,14 @@ HEIGHT_CODES = {  # EPSG code: metres of a unit, name
     6360: (US_FOOT, "NAVD88"), 8228: (FOOT, "NAVD88"), 5702: (US_FOOT, "NGVD29"), 7837: (1.0, "DHHN2016"),
     5714: (1.0, "AMSL"), 8050: (FOOT, "AMSL"), 8052: (US_FOOT, "AMSL"), 5701: (1.0, "ODN"), 5711: (1.0, "AHD"),
     5728: (1.0, "LN02"), 5941: (1.0, "NN2000"), 5709: (1.0, "NAP"), 5621: (1.0, "EVRF2007"), 5613: (1.0, "RH2000"),
-    6647: (1.0, "CGVD2013(CGG2013)"), 5720: (1.0, "NGF-IGN69"),
+    6647: (1.0, "CGVD2013(CGG2013)"), 5720: (1.0, "NGF-IGN69"), 5783: (1.0, "DHHN92"), 5710: (1.0, "Ostend"),
+    6130: (FOOT, "GCVD54"),
 }  # fmt: skip
+COMPOUND_CODES = {7405: (1.0, "ODN"), 5498: (1.0, "NAVD88"), 9518: (1.0, "EGM2008"), 5554: (1.0, "DHHN92")}
+ELLIPSOIDAL_CODES = {4979: "ellipsoid", 4937: "ellipsoid", 9267: "other ellipsoid", 4985: "other ellipsoid",
+                     4978: "no heights"}  # fmt: skip
 DEPTH_CODES = (5715, 6357, 6358, 6359, 8051, 8053, 5861, 5866, 5336)
-OTHER_ZERO_CODES = (5868, 5869, 5872, 5874, 5829, 5611)
+OTHER_ZERO_CODES = (5868, 5869, 5872, 5874, 5829, 5611, 8881, 5797, 5754, 7979)
 WORDS = {"EGM96": "EGM96", "egm 2008": "EGM2008", "NAVD88": "NAVD88", "msl": "AMSL", "AMSL": "AMSL",
          "DHHN2016": "DHHN2016", "navd 88": "NAVD88"}  # fmt: skip
 UNIT_WORDS = {
@@ -61,8 +65,11 @@ REASONS = {
     "no datum": "does not say what its heights are measured from", "two datums": "the raster itself says",
     "two units": "two units of height", "unknown unit": "which is not known", "no unit": "nothing says the unit",
     "own unit": "states it itself", "in metres": "are in metres", "own voids": "marks its voids itself",
-    "ellipsoid": "must be converted to mean sea level",
+    "ellipsoid": "must be converted to mean sea level", "other ellipsoid": "count from another ellipsoid",
+    "no heights": "has no axis of heights", "silent tile": "nothing says the unit of those of",
 }  # fmt: skip
+MARKS = (-9999.0, -32767.0, -32768.0)
+"""Raw numbers that are voids wherever they stand."""
 BOX = (-1200.0, -1200.0, 1200.0, 1200.0)
 POINTS = 60
 SHORE_M = 5.0
@@ -160,7 +167,15 @@ class Said:
         if way < 0.35 or (own_code is None and way < 0.5):
             number = own_code if own_code is not None and rng.random() < 0.7 else code()
             key = f"{rng.choice(['EPSG:', 'epsg:', 'EPSG:4326+'])}{number}"
-            key_unit, key_name = unit_of(number)
+            if (odd := rng.random()) < 0.06:
+                number = int(rng.choice([*COMPOUND_CODES]))
+                key, (key_unit, key_name) = f"EPSG:{number}", COMPOUND_CODES[number]
+            elif odd < 0.1:
+                number = int(rng.choice([*ELLIPSOIDAL_CODES]))
+                key, key_unit, key_name = f"EPSG:{number}", 1.0, "ellipsoid"
+                reasons.add(ELLIPSOIDAL_CODES[number])
+            else:
+                key_unit, key_name = unit_of(number)
         elif way < 0.6 or own_code is None:
             key = str(rng.choice(list(WORDS)))
             key_name = WORDS[key]
@@ -173,7 +188,7 @@ class Said:
             reasons.add("no datum")
         if key_name is not None and own_name is not None and key_name not in (own_name, "AMSL"):
             reasons.add("two datums")
-        if key_name == "ellipsoid":
+        if key == "WGS84":
             reasons.add("ellipsoid")
         if rng.random() < 0.03 and not reasons:  # what a key forbids is not forgotten with it
             key, key_unit, key_name = None, None, None
@@ -245,7 +260,7 @@ def raster_case(rng: np.random.Generator, folder: Path, kind: str) -> Case:
     """A GeoTIFF or an .asc of 120 × 120 nodes, at times two that overlap."""
     feet_grid = kind == "tif" and rng.random() < 0.2
     said = Said.draw(rng, own=True)
-    band = str(rng.choice([*UNIT_WORDS, "fathoms"])) if rng.random() < 0.3 else None
+    band = str(rng.choice([*UNIT_WORDS, "fathoms", "m/10", "0.1 ft"])) if rng.random() < 0.3 else None
     metres = said.metres(band, feet_grid=feet_grid)
     n = 120
     low, high = (40.0, 400.0) if rng.random() < 0.8 else (-430.0, -300.0)  # the Dead Sea
@@ -266,9 +281,18 @@ def raster_case(rng: np.random.Generator, folder: Path, kind: str) -> Case:
         if rng.random() < 0.5:
             second[:, : n // 2] = raw[:, : n // 2]
     surfaces = [raw] if second is None else [raw, second]
+    bands = [band, band]
+    if second is not None and band in UNIT_WORDS and rng.random() < 0.3:  # the second tile is silent
+        bands[1] = None
+        own_unit = None if said.own_code is None else HEIGHT_CODES.get(said.own_code, (None, ""))[0]
+        if said.height_unit is None and said.key_unit is None and own_unit is None:
+            said.reasons |= ({"silent tile"} if UNIT_WORDS[band] != 1.0 else set()) | (
+                {"no unit"} if feet_grid else set()
+            )
     read = []
     for z in surfaces:
-        m = np.where(z == nodata, np.nan, z) if nodata is not None else z.copy()
+        m = np.where(np.isin(z, MARKS), np.nan, z)
+        m = np.where(z == nodata, np.nan, m) if nodata is not None else m
         m = np.where(z == key_nodata, np.nan, m) if isinstance(key_nodata, float) else m
         m = (m * scale + offset) * metres
         read.append(np.where((m >= -500.0) & (m <= 9000.0), m, np.nan))
@@ -291,16 +315,18 @@ def raster_case(rng: np.random.Generator, folder: Path, kind: str) -> Case:
                 ) as file:  # fmt: skip
                     file.write(z.astype(dtype), 1)
                     file.scales, file.offsets = (scale,), (offset,)
-                    if band is not None:
-                        file.units = (band,)
+                    if bands[k] is not None:
+                        file.units = (bands[k],)
         else:
             head = f"ncols {n}\nnrows {n}\nxllcorner {transform.c!r}\nyllcorner {transform.f - n * transform.a!r}\n"
             head += f"cellsize {transform.a!r}\n" + (f"NODATA_value {nodata:g}\n" if nodata is not None else "")
             path.write_text(head + "\n".join(" ".join(f"{x:.10g}" for x in line) for line in z))
             if not by_key:
                 (folder / f"{k}.prj").write_text(CRS(own).to_wkt("WKT1_ESRI"))
-            if band is not None:
-                xml = f'<PAMDataset><PAMRasterBand band="1"><UnitType>{band}</UnitType></PAMRasterBand></PAMDataset>'
+            if bands[k] is not None:
+                xml = (
+                    f'<PAMDataset><PAMRasterBand band="1"><UnitType>{bands[k]}</UnitType></PAMRasterBand></PAMDataset>'
+                )
                 (folder / f"{k}.asc.aux.xml").write_text(xml)
         paths.append(str(path))
     spec = said.spec(tuple(paths), key_nodata, own if by_key else None)
@@ -310,7 +336,9 @@ def raster_case(rng: np.random.Generator, folder: Path, kind: str) -> Case:
 def _voids(rng: np.random.Generator, raw: Floats, metres: float) -> tuple[float | None, Any]:
     """Put a void into raw heights; returns the file's nodata and the key's."""
     way = str(
-        rng.choice(["none", "none", "declared", "undeclared", "zero", "lake", "key", "zeros are ground", "all sea"])
+        rng.choice(
+            ["none", "none", "declared", "undeclared", "mark", "zero", "lake", "key", "zeros are ground", "all sea"]
+        )
     )
     r, c = rng.integers(50, 64, 2)
     hole = slice(r, r + int(rng.integers(1, 9))), slice(c, c + int(rng.integers(1, 9)))
@@ -319,6 +347,8 @@ def _voids(rng: np.random.Generator, raw: Floats, metres: float) -> tuple[float 
         return -9999.0, None
     if way == "undeclared":
         raw[hole] = -32768.0
+    elif way == "mark":
+        raw[hole] = rng.choice(MARKS)
     elif way in ("zero", "lake", "zeros are ground"):
         raw[hole] = 0.0
         if way == "lake":
@@ -397,9 +427,17 @@ def dat_case(rng: np.random.Generator, folder: Path) -> tuple[Case, Path]:
         said.reasons.add("own voids")
     lat = float(rng.integers(-60, 60) + rng.choice([0.003, 0.5, 0.997]))
     lon = float(rng.integers(-170, 170) + rng.choice([0.003, 0.5, 0.997]))
-    path = write_dat(folder / "terrain", lat, lon, reach_deg=0.06)
+    (north, east), waves_m = rng.uniform(-0.6, 0.6, 2), float(rng.choice([0.0, 5.0, 40.0]))
+    wide = math.cos(math.radians(lat))
+
+    def ground(lat_deg: Floats, lon_deg: Floats) -> Floats:
+        away = (lon_deg - lon + 180.0) % 360.0 - 180.0
+        waves = waves_m * np.sin(lat_deg * 2000.0) * np.cos(away * 2000.0)
+        return np.asarray(3500.0 + 111_000.0 * (north * (lat_deg - lat) + east * wide * away) + waves)
+
+    path = write_dat(folder / "terrain", lat, lon, reach_deg=0.06, ground=ground)
     spec = said.spec(dem=(str(path),), nodata=key_nodata)
-    return Case(spec, Frame(lat, lon), said.reasons), path
+    return Case(spec, Frame(lat, lon), said.reasons, spare_m=2.1 if waves_m == 0.0 else math.inf), path
 
 
 # -- the judgement ----------------------------------------------------------------------------------------------------
@@ -447,6 +485,8 @@ def attempt(seed: int, tally: Tally, reader: Load = load) -> None:
     if dat is not None:
         if not (got[0] <= wanted[0] + 0.03).all() or not (got[1] >= wanted[0] - 0.03).all():
             fault("what the autopilot reads lies outside of both heights")
+        if (got[1] - got[0]).max() > case.spare_m:
+            fault(f"a plane has two heights {(got[1] - got[0]).max():.1f} m apart")
         return
     near = _beside_voids(case, at)
     for name, a, b in zip(("least", "greatest"), got, wanted, strict=True):

@@ -6,7 +6,8 @@ An input is one or two random polygons: narrow or up to a turn wide, in either c
 antimeridian, at a pole, with a hole, split. It is written in one format and read by `read_zones`; then places inside
 and outside it are looked up. The answer that is right is computed here, without the code under test: longitudes count
 as they are written, edges are straight in degrees, and in formats that do not say so great circles as well, whose
-latitude at a longitude comes from the plane through the centre of the Earth.
+latitude at a longitude comes from the plane through the centre of the Earth. Each fourth input is a circle, a corridor
+or a polygon in another coordinate system (`zone_shapes`).
 
 A fault is a place that the format has inside the zone (its holes too, since they count as no-fly) and that gcsplan
 neither refuses nor has in a zone; or one that is well outside and in a zone. Exits with 1 and prints the seed if there
@@ -34,6 +35,7 @@ from gcsplan.mission_file.zone_draft import place_zones
 from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Polygon
+from tests.campaigns import zone_shapes
 from tests.support.zone_files import EITHER_EDGE, WRITERS, Part, Ring
 
 NEAR_BORDER_M = 4.0
@@ -46,10 +48,20 @@ MAX_FOUND = 20
 def polygon(rng: random.Random) -> tuple[str, list[Part]]:
     """A kind of polygon and its parts."""
     kind = rng.choice(["narrow", "wide", "world", "many corners", "across", "written across", "split", "pole", "hole",
-                       "hole in world", "360", "long edge"])  # fmt: skip
+                       "hole in world", "360", "long edge", "tip at the pole", "steep"])  # fmt: skip
     lat, lon = rng.uniform(-70.0, 70.0), rng.uniform(-180.0, 180.0)
     if kind == "narrow":
         return kind, [[_star(rng, lon, lat, rng.uniform(0.05, 15.0), 0.0)]]
+    if kind == "tip at the pole":
+        sign, wide = rng.choice([-1.0, 1.0]), rng.uniform(1.0, 80.0)
+        base = [(lon - wide, sign * rng.uniform(40.0, 70.0)), (lon + wide, sign * rng.uniform(40.0, 70.0))]
+        tip = [(lon + rng.uniform(-wide, wide), sign * 90.0)] if rng.random() < 0.5 else [
+            (lon + wide, sign * 90.0), (lon - wide, sign * 90.0)
+        ]  # fmt: skip
+        return kind, [[base + tip if rng.random() < 0.5 else (base + tip)[::-1]]]
+    if kind == "steep":  # long edges that run nearly north
+        tall, wide = rng.uniform(1.0, 14.0), 10.0 ** rng.uniform(-3.0, 0.0)
+        return kind, [[[(lon, lat - tall), (lon + wide, lat + tall), (lon - wide * rng.uniform(0.5, 9.0), lat + tall)]]]
     if kind == "360":
         return kind, [[_star(rng, rng.uniform(0.0, 350.0), lat, rng.uniform(0.05, 9.0), 0.0)]]
     if kind in ("wide", "world", "many corners", "long edge"):
@@ -117,8 +129,10 @@ def _crossings(ring: Ring, lon: float, lat: float, great_circles: bool) -> int:
 
 def latitude_at(x0: float, y0: float, x1: float, y1: float, lon: float, *, great_circles: bool) -> float:
     """The latitude of an edge at a longitude that it passes."""
-    if not great_circles or max(abs(y0), abs(y1)) > 89.99:
+    if not great_circles or y0 == y1 == math.copysign(90.0, y0):
         return y0 + (y1 - y0) * (lon - x0) / (x1 - x0)
+    if 90.0 in (abs(y0), abs(y1)):  # along the pole, and then along a meridian
+        return y0 if abs(y0) == 90.0 else y1
     (ax, ay, az), (bx, by, bz) = _on_sphere(x0, y0), _on_sphere(x1, y1)
     east, north, up = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     along = east * math.cos(math.radians(lon)) + north * math.sin(math.radians(lon))
@@ -133,17 +147,44 @@ def _on_sphere(lon: float, lat: float) -> tuple[float, float, float]:
 def held(ring: Ring, lon: float, lat: float, form: str) -> bool:
     """Whether the format has the place inside the ring."""
     straight = inside(ring, lon, lat, great_circles=False)
-    return straight or (form in EITHER_EDGE and inside(ring, lon, lat, great_circles=True))
+    short = shorter(ring) if form in EITHER_EDGE else None
+    return straight or (short is not None and inside(short, lon, lat, great_circles=True))
+
+
+def shorter(ring: Ring) -> Ring | None:
+    """A ring with edges the shorter way, which great circles go; None if it then does not close."""
+    found = [ring[0]]
+    for lon, lat in [*ring[1:], ring[0]]:
+        found.append((found[-1][0] + (lon - found[-1][0] + 180.0) % 360.0 - 180.0, lat))
+    return found[:-1] if abs(found[-1][0] - ring[0][0]) < 1.0 else None
+
+
+def between_edges(ring: Ring, lon: float, lat: float, form: str) -> bool:
+    """Whether a place lies between a straight edge and its great circle: mixed, they may enclose it."""
+    if form not in EITHER_EDGE:
+        return False
+    for turn in (-720.0, -360.0, 0.0, 360.0, 720.0):
+        x = lon + turn
+        for (x0, y0), (x1, y1) in zip(ring, [*ring[1:], ring[0]], strict=True):
+            if (x0 > x) != (x1 > x):
+                north = {latitude_at(x0, y0, x1, y1, x, great_circles=bent) > lat for bent in (False, True)}
+                if len(north) == 2:
+                    return True
+    return False
 
 
 def certain(parts: Sequence[Part], lon: float, lat: float, form: str) -> bool | None:
-    """Whether the format has the place inside a part; None near a border."""
-    off = NEAR_BORDER_M / 111_000.0
+    """Whether the format has the place inside a part; None near a border, and where edges of both kinds may hold it."""
+    wide, off = math.cos(math.radians(lat)), NEAR_BORDER_M / 111_000.0
+    corners = [((x - lon + 180.0) % 360.0 - 180.0, y - lat) for p in parts for x, y in p[0]]
+    if any(math.hypot(wide * x, y) < off for x, y in corners):  # a tip may be narrower than the places looked at
+        return None
     answers = {
-        any(held(p[0], lon + dx * off / math.cos(math.radians(lat)), lat + dy * off, form) for p in parts)
-        for dx in (-1.0, 0.0, 1.0) for dy in (-1.0, 0.0, 1.0)
+        any(held(p[0], lon + dx * size / wide, lat + dy * size, form) for p in parts)
+        for dx in (-1.0, 0.0, 1.0) for dy in (-1.0, 0.0, 1.0) for size in (off, 0.1 * off)
     }  # fmt: skip
-    return answers.pop() if len(answers) == 1 else None
+    answer = answers.pop() if len(answers) == 1 else None
+    return None if answer is False and any(between_edges(p[0], lon, lat, form) for p in parts) else answer
 
 
 def places(rng: random.Random, parts: Sequence[Part]) -> list[tuple[float, float]]:
@@ -254,13 +295,14 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--inputs", type=int, default=10**9)
     args = parser.parse_args()
-    until, seed, found = time.monotonic() + args.seconds, args.seed, []
+    until, seed = time.monotonic() + args.seconds, args.seed
+    found: list[str] = []
     ended: Counter[str] = Counter()
     kinds: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder:
         while seed - args.seed < args.inputs and time.monotonic() < until and len(found) < MAX_FOUND:
-            named, how, faults = attack(seed, Path(folder))
-            ended[how] += 1
+            named, how, faults = (zone_shapes.attack if seed % 4 == 0 else attack)(seed, Path(folder))
+            ended[reason(how) if how.startswith("refused:") else how] += 1
             kinds[f"{named.split(',')[0]}: {how.split(':')[0]}"] += 1
             found += faults
             seed += 1

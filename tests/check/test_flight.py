@@ -406,7 +406,8 @@ def test_a_command_that_is_not_judged_is_named_with_the_reason() -> None:
         (cmd.DO_AUX_FUNCTION, "auxiliary function: a switch may change the flight mode"),
     ):
         flight = fly(TAKEOFF, MissionItem(command, 3, (1.0, 0.0, 0.0, 0.0), TAKEOFF.x + 9000, TAKEOFF.y, 80.0))
-        assert flight.not_judged == [f"item 2: what arducopter flies for command {command} is not judged: {words}"]
+        said = f"item 2: what arducopter flies for command {command} is not judged: {words}"
+        assert flight.not_judged == [f"{said}; leave it out to have the rest judged"]
 
 
 def test_a_copter_flies_the_vtol_commands_as_its_own() -> None:

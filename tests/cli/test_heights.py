@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.dem.test_dat_terrain import write as write_dat
 from tests.world.test_terrain import degrees_tif
 
 MISSION = """version: 1
@@ -111,3 +112,58 @@ def test_a_home_over_tiles_that_differ_is_refused_and_not_judged(run: Any, tiles
     assert code == 4
     assert "the ground at home" in out
     assert "--altitude-error" in out
+
+
+DAT_MISSION = """version: 1
+terrain: {{dem: {dem}, vertical_datum: EGM96}}
+limits: {{min_agl_m: 60, altitude_error_m: 3, track_error_m: 3}}
+vehicles:
+  - {{name: uav1, sysid: 1, autopilot: arducopter, start: [{lat}, -84.5], goal: [{lat}, -84.49]}}
+"""
+
+
+def slope(lat_deg: Any, lon_deg: Any) -> Any:
+    """27° of slope, whose height at 36° N is 1500 m."""
+    return 1500.0 + 0.5095 * 110_960.0 * (np.asarray(lat_deg) - 36.0) + 0.0 * np.asarray(lon_deg)
+
+
+def rough(lat_deg: Any, lon_deg: Any) -> Any:
+    """The slope with waves of 45 m in every 280 m."""
+    return slope(lat_deg, lon_deg) + 45.0 * np.sin(np.asarray(lat_deg) * 2500.0) * np.cos(np.asarray(lon_deg) * 2500.0)
+
+
+def dat_mission(folder: Path, dem: str, lat: float) -> str:
+    (folder / f"{dem}.yaml").write_text(DAT_MISSION.format(dem=dem, lat=lat), encoding="utf-8")
+    return f"{dem}.yaml"
+
+
+@pytest.mark.parametrize("lat", [35.9998, 36.0002])
+def test_dat_files_across_a_degree_line_on_a_slope_put_home_where_it_is(run: Any, tmp_path: Path, lat: float) -> None:
+    """Both sides of the line have posts of their own, and the vehicle's items count from home's ground."""
+    write_dat(tmp_path / "plain", lat, -84.5, reach_deg=0.06, ground=slope)
+    assert run("plan", dat_mission(tmp_path, "plain", lat), "-o", "o")[0] == 0
+    home, *items = [row.split("\t") for row in (tmp_path / "o" / "uav1.waypoints").read_text().splitlines()[1:]]
+    true_m = float(slope(lat, -84.5))
+    assert abs(float(home[10]) - true_m) < 1.5  # posts are whole metres, upwards
+    flown = [row for row in items if row[3] == "16"]
+    assert flown
+    for row in flown:
+        assert true_m + float(row[10]) - float(slope(float(row[8]), float(row[9]))) > 60.0
+    assert run("check", "plain.yaml", "o/uav1.waypoints")[0] == 0
+
+
+def test_dat_files_without_one_height_at_home_are_refused_and_not_judged(run: Any, tmp_path: Path) -> None:
+    lat = 35.9998
+    for name, ground in (("plain", slope), ("rough", rough)):
+        write_dat(tmp_path / name, lat, -84.5, reach_deg=0.06, ground=ground)
+    assert run("plan", dat_mission(tmp_path, "plain", lat), "-o", "o")[0] == 0
+    code, _, err = run("plan", dat_mission(tmp_path, "rough", lat), "-o", "r")
+    assert code == 2
+    assert "vehicles.uav1.start: the ground at home (35.9998000, -84.5000000) is not one number" in err
+    assert not (tmp_path / "r").exists()
+    code, out, _ = run("check", "rough.yaml", "o/uav1.waypoints")
+    assert code == 4
+    assert "not judged: the ground at home" in out
+    assert "what helps is a home away from where they differ" in out
+    away = lat - 0.01
+    assert run("plan", dat_mission(tmp_path, "rough", away), "-o", "r")[0] == 0

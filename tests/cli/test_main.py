@@ -170,6 +170,12 @@ def test_an_unsafe_file_is_not_sent_unless_unchecked(run: Any, tmp_path: Path) -
         assert server.vehicles[0].items()[1:] == ()
         assert run("upload", "out/uav1.waypoints", "--to", server.url_for_gcs, "--unchecked")[0] == 0
         assert len(server.vehicles[0].items()) > 5
+        plan = json.loads((tmp_path / "out" / "uav1.plan").read_text())
+        plan["geoFence"] = {"polygon": [[36.0, -84.0], [36.1, -84.0], [36.1, -84.1]], "version": 1}
+        (tmp_path / "fenced.plan").write_text(json.dumps(plan))
+        code, _, err = run("upload", "fenced.plan", "--to", server.url_for_gcs, "--unchecked")
+        assert code == 0
+        assert "note: the file's geoFence of version 1 (polygon) is not read" in err
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from gcsplan.world.cell import Cell
 from gcsplan.world.frame import Frame
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import Box, TerrainSpec
-from gcsplan.world.terrain_grid import PostHeights, TerrainGrid
+from gcsplan.world.terrain_grid import Ground, PostHeights, TerrainGrid
 from tests.oracles import terrain_grid as oracle
 
 BOX = (-2500.0, -2500.0, 2500.0, 2500.0)
@@ -27,10 +27,13 @@ def hills(lat_deg: Floats, lon_deg: Floats) -> Floats:
     return np.asarray(400.0 + 60.0 * np.sin(lat_deg * 300.0) * np.cos(lon_deg * 200.0))
 
 
-def write(folder: Path, lat: float, lon: float, *, reach_deg: float = 0.08, grid: TerrainGrid | None = None) -> Path:
+def write(
+    folder: Path, lat: float, lon: float, *, reach_deg: float = 0.08, grid: TerrainGrid | None = None,
+    ground: Ground = hills,
+) -> Path:  # fmt: skip
     """Files with the blocks around a place."""
     grid = grid or TerrainGrid()
-    posts = PostHeights(grid, hills)
+    posts = PostHeights(grid, ground)
     south, west, north, east = (x * 1e7 for x in (lat - reach_deg, lon - reach_deg, lat + reach_deg, lon + reach_deg))
     blocks = list(grid.blocks_within(south, west, north, east))
     folder.mkdir(exist_ok=True)
@@ -215,3 +218,21 @@ def test_covers_asks_the_blocks(tmp_path: Path) -> None:
     assert terrain.covers(36.55, -84.40)
     assert not terrain.covers(36.9, -84.40)
     assert not terrain.covers(38.0, -84.40)
+
+
+@pytest.mark.parametrize(("lat", "lon"), [(35.9998, -84.5), (36.5, -84.0002), (46.9998, 8.5), (36.0002, -84.0002)])
+@pytest.mark.parametrize("rise", [(0.5, 0.0), (0.0, 0.5), (-0.4, 0.4)], ids=["north", "east", "aslant"])
+def test_a_plane_over_a_degree_line_has_one_height(
+    tmp_path: Path, lat: float, lon: float, rise: tuple[float, float]
+) -> None:
+    """But for posts in whole metres, upwards; one row of posts beyond the line says nothing of the slope across it."""
+    wide = math.cos(math.radians(lat))
+
+    def plane(lat_deg: Floats, lon_deg: Floats) -> Floats:
+        return np.asarray(2500.0 + 111_000.0 * (rise[0] * (lat_deg - lat) + rise[1] * wide * (lon_deg - lon)))
+
+    folder = write(tmp_path / "t", lat, lon, reach_deg=0.05, ground=plane)
+    _, surface = surface_of(folder, lat, lon, (-500.0, -500.0, 500.0, 500.0))
+    east, north = (a.ravel() for a in np.meshgrid(np.linspace(-400.0, 400.0, 41), np.linspace(-400.0, 400.0, 41)))
+    spread = surface.high_at(east, north) - surface.ground_at(east, north)
+    assert float(spread.max()) < 2.1

@@ -161,6 +161,31 @@ def test_a_plans_fence_that_is_not_read_is_told(fence: Any, words: str) -> None:
     assert read.unread_fence.startswith(f"the file's {words}") if words else read.unread_fence == ""
 
 
+CORNERS = [[46.0, 14.0], [46.1, 14.0], [46.1, 14.1]]
+
+
+@pytest.mark.parametrize(
+    ("fence", "words"),
+    [
+        ({"polygons": [{"inclusion": False, "polygon": CORNERS, "version": 1}]}, ""),
+        (
+            {"polygons": [{"inclusion": False, "polygon": CORNERS, "maxAltitude": 50}]},
+            "geoFence.polygons[0].maxAltitude",
+        ),
+        ({"polygons": [{"inclusion": False, "polygon": CORNERS, "version": 2}]}, "geoFence.polygons[0] of version 2"),
+        (
+            {"circles": [{"inclusion": True, "circle": {"center": [46.0, 14.0], "radius": 50}, "floor": 10}]},
+            "geoFence.circles[0].floor",
+        ),
+    ],
+)
+def test_what_a_shape_of_a_plans_fence_has_besides_is_told(fence: Any, words: str) -> None:
+    whole = {"circles": [], "polygons": [], "version": 2} | fence
+    read = parse_plan(json.dumps(PLAN | {"geoFence": whole}), autopilot=None, where="a.plan")
+    assert read.fence
+    assert read.unread_fence.startswith(f"the file's {words}") if words else read.unread_fence == ""
+
+
 def test_a_plans_other_keys_and_rally_points_are_told() -> None:
     rally = {"points": [[46.0, 14.0, 50]], "version": 1}
     read = parse_plan(json.dumps(PLAN | {"rallyPoints": rally, "corridor": [1]}), autopilot=None, where="a.plan")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from gcsplan.errors import InputError
@@ -54,11 +55,8 @@ def verdict(folder: Path, form: str, lon: float, lat: float, *rings: Ring) -> st
 @pytest.mark.parametrize("ring", [band(-170.0, 170.0, 30.0, 60.0), band(-95.0, 95.0, 30.0, 60.0)], ids=["340", "190"])
 def test_an_edge_of_half_a_turn_is_refused_and_says_what_to_write(tmp_path: Path, form: str, ring: Ring) -> None:
     said = verdict(tmp_path, form, 14.49, 46.03, ring)
-    if form == "mercator":  # its edges are straight in metres, so that nobody can take them for the other side
-        assert said == "inside"
-        return
     assert "of longitude, and from 180° on it may run on either side of the globe" in said
-    assert f"write {ring[0][0] + 360.0:g} for {ring[0][0]:g}" in said
+    assert form == "mercator" or f"write {ring[0][0] + 360.0:g} for {ring[0][0]:g}" in said
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -138,6 +136,51 @@ def test_formats_without_straight_edges_hold_great_circles_too(tmp_path: Path, f
     assert verdict(tmp_path, form, 10.0, 48.1, ring) == "inside"  # straight: its southern edge bends, too
     assert verdict(tmp_path, form, 10.0, 50.5, ring) == "free"
     assert verdict(tmp_path, "geojson", 10.0, 50.4, ring) == "free"
+
+
+@pytest.mark.parametrize("form", ["kml", "openair", "ed269"])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_great_circles_to_a_pole_are_meridians(tmp_path: Path, form: str, sign: float) -> None:
+    """A sector of 80° whose tip is at the pole, with one corner there: along meridians it is as wide everywhere."""
+    sector = [(-40.0, sign * 60.0), (40.0, sign * 60.0), (0.0, sign * 90.0)]
+    assert [verdict(tmp_path, form, lon, sign * 80.0, sector) for lon in (0.0, 35.0, 41.0)] == [
+        "inside", "inside", "free"
+    ]  # fmt: skip
+    assert verdict(tmp_path, "geojson", 35.0, sign * 80.0, sector) == "free"
+
+
+@pytest.mark.parametrize("form", ["openair", "ed269"])
+def test_an_outline_that_crosses_itself_encloses_what_its_great_circles_do(tmp_path: Path, form: str) -> None:
+    """Its crossing along great circles is elsewhere: the long edge passes 94.39° E at 45.29° S, not at 45.24° S."""
+    ring = [(97.74168, -45.46888), (95.50235, -45.3459), (91.69018, -44.53826), (91.98307, -45.07078)]
+    assert verdict(tmp_path, form, 94.392409, -45.259130, ring) == "inside"
+    assert verdict(tmp_path, form, 94.392409, -45.32, ring) == "free"
+
+
+@pytest.mark.parametrize("form", ["openair", "ed269"])
+def test_an_authority_s_edge_of_half_a_turn_refuses_no_mission_far_from_it(tmp_path: Path, form: str) -> None:
+    """Great circles between its corners, 20° apart by the shorter way, reach 30.4° N."""
+    ring = band(-170.0, 170.0, 20.0, 30.0)
+    assert "spans 340° of longitude" in verdict(tmp_path, form, 14.49, 30.3, ring)
+    assert verdict(tmp_path, form, 14.49, 46.03, ring) == "free"
+    assert verdict(tmp_path, form, 14.49, 10.0, ring) == "free"
+
+
+@pytest.mark.parametrize("crs", ["EPSG:3413", "EPSG:3995", "EPSG:3031", "EPSG:32661"])
+def test_a_polygon_around_a_pole_in_a_polar_system_is_refused_by_name(tmp_path: Path, crs: str) -> None:
+    import pyogrio
+    import shapely
+    from pyproj import Transformer
+
+    pole = -90.0 if crs == "EPSG:3031" else 90.0
+    x, y = Transformer.from_crs("EPSG:4326", crs, always_xy=True).transform(0.0, pole)
+    square = shapely.box(x - 1e6, y - 1e6, x + 1e6, y + 1e6)
+    pyogrio.raw.write(
+        tmp_path / "z.gpkg", shapely.to_wkb(np.array([square], dtype=object)), [np.array(["cap"], dtype=object)],
+        ["name"], geometry_type="Polygon", crs=crs,
+    )  # fmt: skip
+    (problem,) = read_zones(tmp_path / "z.gpkg", where="zones").problems
+    assert problem.message == "zone 'cap': the outline goes around a pole: cut the zone there in two"
 
 
 def test_a_line_has_no_edge_of_half_a_turn_either(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from pyproj import Geod
 
 from gcsplan.errors import InputError
 from gcsplan.world import degree_shapes
-from gcsplan.world.degree_shapes import near_corridors, near_polygons
+from gcsplan.world.degree_shapes import near_corridors, near_polygons, plain_polygons
 from gcsplan.world.frame import Frame
 from tests.support.effort import draws
 
@@ -98,6 +98,24 @@ def test_the_cuts_are_those_of_edges_that_are_all_measured() -> None:
             assert np.array_equal(degree_shapes._cut_edges(ring, following, frame), np.concatenate(whole))
 
 
+@pytest.mark.parametrize("great_circles", [False, True])
+def test_polygons_that_are_projected_together_are_those_that_are_looked_at_one_by_one(great_circles: bool) -> None:
+    rng = np.random.default_rng(5)
+    rings = []
+    for _ in range(300):  # small and large, near and far, either way around, in both conventions of longitudes
+        lat, lon, size = rng.uniform(-84, 84), rng.uniform(-180, 180), 10.0 ** rng.uniform(-4, 1)
+        lat, lon = (lat, lon) if rng.random() < 0.2 else (46.5 + rng.uniform(-3, 3), 8.0 + rng.uniform(-4, 4))
+        turns = np.sort(rng.uniform(0, 2 * np.pi, rng.integers(3, 40)))[:: rng.choice([-1, 1])]
+        lats, lons = lat + size * np.sin(turns), lon + size * np.cos(turns) + rng.choice([-360, 0, 360])
+        rings.append([(float(a), float(o)) for a, o in zip(lats.clip(-90, 90), lons, strict=True)])
+    found = plain_polygons(rings, FRAME, great_circles=great_circles)
+    assert 40 < sum(one is not None for one in found) < 260
+    for ring, one in zip(rings, found, strict=True):
+        if one is not None:
+            (alone,) = near_polygons(ring, FRAME, great_circles=great_circles)
+            assert np.array_equal(one.vertices, alone.vertices)
+
+
 def test_a_line_of_many_points_becomes_several_corridors_that_hold_all_of_it() -> None:
     along = np.linspace(0.0, 100_000.0, 5001)
     points = np.stack([along, 300.0 * np.sin(along / 500.0)], axis=-1)
@@ -107,7 +125,7 @@ def test_a_line_of_many_points_becomes_several_corridors_that_hold_all_of_it() -
 
 
 def test_great_circles_of_one_zone_are_bounded() -> None:
-    zigzag = [(50.0 + 0.01 * i, 0.0 if i % 2 else 120.0) for i in range(60)]
+    zigzag = [(44.0 + 0.01 * i, 0.0 if i % 2 else 120.0) for i in range(60)]
     with pytest.raises(InputError, match="too many long edges for great circles"):
         near_polygons(zigzag, FRAME, great_circles=True)
 
@@ -120,6 +138,32 @@ def test_long_edges_beside_each_other_are_counted_before_great_circles_are_joine
         near_polygons(comb, FRAME, great_circles=True)
 
 
+def test_edges_on_other_latitudes_need_no_great_circles() -> None:
+    """They would be too many, and enclose the same of what is near."""
+    zigzag = [(20.0 + 0.01 * i, 0.0 if i % 2 else 40.0) for i in range(60)]
+    north = [(60.0, 0.0), (60.0, 41.0), (10.0, 41.0)]
+    (near,) = near_polygons([*zigzag, *north], FRAME, great_circles=True)
+    (straight,) = near_polygons([*zigzag, *north], FRAME)
+    assert np.array_equal(near.vertices, straight.vertices)
+
+
+@settings(max_examples=draws(300))
+@given(*(st.floats(-89.0, 89.0) for _ in range(2)), st.floats(0.0, 179.0), st.floats(0.0, 1.0))
+def test_the_latitudes_of_an_edge_are_those_of_the_line_and_the_great_circle(
+    lat0: float, lat1: float, span: float, part: float
+) -> None:
+    low, high = degree_shapes.latitudes_between([(lat0, 170.0)], [(lat1, 170.0 + span)])
+    a, b = (
+        np.array([math.cos(math.radians(lat)) * math.cos(x), math.cos(math.radians(lat)) * math.sin(x),
+                  math.sin(math.radians(lat))])
+        for lat, x in ((lat0, 0.0), (lat1, math.radians(span)))
+    )  # fmt: skip
+    chord = (1.0 - part) * a + part * b  # its direction lies on the great circle
+    on_circle = math.degrees(math.atan2(chord[2], math.hypot(chord[0], chord[1])))
+    for lat in (lat0, lat1, on_circle, lat0 + part * (lat1 - lat0)):
+        assert low[0] - 1e-6 <= lat <= high[0] + 1e-6
+
+
 def test_edges_over_other_longitudes_need_no_great_circles() -> None:
-    zigzag = [(50.0 + 0.01 * i, 60.0 if i % 2 else 120.0) for i in range(60)]  # too many, if they were near
+    zigzag = [(44.0 + 0.01 * i, 60.0 if i % 2 else 120.0) for i in range(60)]  # too many, if they were near
     assert near_polygons([*zigzag, (52.0, 20.0), (49.0, 20.0)], FRAME, great_circles=True) == []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,20 +11,23 @@ import pytest
 from affine import Affine
 
 from gcsplan.errors import InputError
-from gcsplan.world.datum import stated_datum
+from gcsplan.world.datum import stated_datum, take_apart
 from gcsplan.world.height_unit import unit_named
 from gcsplan.world.surface import Surface
 from gcsplan.world.voids import zero_voids
-from tests.world.test_terrain import degrees_tif, hills, load, refusal, tif
+from tests.world.test_terrain import FRAME, degrees_tif, hills, load, refusal, tif
 
 FOOT, US_FOOT = 0.3048, 1200 / 3937
 UPWARDS = {  # code: metres of its unit, name
     5773: (1.0, "EGM96"), 3855: (1.0, "EGM2008"), 5703: (1.0, "NAVD88"), 6360: (US_FOOT, "NAVD88"),
     8228: (FOOT, "NAVD88"), 5702: (US_FOOT, "NGVD29"), 7837: (1.0, "DHHN2016"), 5714: (1.0, "AMSL"),
     8050: (FOOT, "AMSL"), 5798: (1.0, "EGM84"), 5711: (1.0, "AHD"), 5728: (1.0, "LN02"), 5621: (1.0, "EVRF2007"),
-    5754: (0.3048007491, "Poolbeg"),
+    6130: (FOOT, "GCVD54"),
 }  # fmt: skip
-DEPTHS, OTHER_ZEROS = (5715, 6358, 6357, 6359, 8051, 8053, 5861, 5866), (5868, 5872, 5874, 5829, 5611)
+DEPTHS, OTHER_ZEROS = (
+    (5715, 6358, 6357, 6359, 8051, 8053, 5861, 5866),
+    (5868, 5872, 5874, 5829, 5611, 8881, 5797, 5754, 7979, 7652),
+)
 
 
 def notes_of(surface: Surface) -> str:
@@ -82,11 +86,91 @@ def test_a_datum_is_known_by_its_exact_name_too() -> None:
     ("words", "metres"),
     [("ft", FOOT), ("Feet", FOOT), ("foot (international)", FOOT), ("US survey foot", US_FOOT), ("ftUS", US_FOOT),
      ("us-ft", US_FOOT), ("Foot_US", US_FOOT), ("US Survey Feet", US_FOOT), ("survey foot", US_FOOT), ("M", 1.0),
-     ("Metres", 1.0), ("decimeter", 0.1), ("cm", 0.01), ("km", 1000.0), ("fathom", None), ("degree", None)],
+     ("Metres", 1.0), ("decimeter", 0.1), ("cm", 0.01), ("km", 1000.0), ("fathom", None), ("degree", None),
+     ("m/10", None), ("10 m", None), ("0.1 ft", None), ("m*100", None), ("m/s", None)],
 )  # fmt: skip
 def test_the_words_of_units(words: str, metres: float | None) -> None:
     unit = unit_named(words)
     assert (None if unit is None else unit.metres) == metres
+
+
+@pytest.mark.parametrize("code", ["EPSG:9267", "EPSG:4985", "ESRI:115921", "ESRI:115908", "ESRI:115875"])
+def test_ellipsoidal_heights_on_another_ellipsoid_are_refused_by_name(code: str) -> None:
+    """MGI and CH1903+ are on Bessel's, tens of metres away; WGS 72 some metres."""
+    with pytest.raises(InputError, match="count from another ellipsoid than that of WGS 84"):
+        stated_datum(code, where="m")
+
+
+@pytest.mark.parametrize("code", ["EPSG:4979", "EPSG:4937", "ESRI:115700", "ESRI:115702", "EPSG:9701"])
+def test_ellipsoidal_heights_of_datums_like_wgs84_are_known(code: str) -> None:
+    assert stated_datum(code, where="m")[0].ellipsoidal
+
+
+def test_a_geocentric_system_has_no_heights() -> None:
+    with pytest.raises(InputError, match="has no axis of heights"):
+        stated_datum("EPSG:4978", where="m")
+
+
+WGS84_WKT = (
+    'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],PRIMEM["Greenwich",0],'
+    'UNIT["degree",0.0174532925199433]]'
+)
+NAVD88_SHIFTED = (
+    'VERTCRS["Site",BASEVERTCRS["NAVD88 height",VDATUM["North American Vertical Datum 1988"]],'
+    'DERIVINGCONVERSION["offset",METHOD["Vertical Offset"],PARAMETER["Vertical Offset",-100,LENGTHUNIT["metre",1]]],'
+    'CS[vertical,1],AXIS["up",up],LENGTHUNIT["metre",1]]'
+)
+
+
+@pytest.mark.parametrize(
+    ("vertical", "words"),
+    [
+        ('VERT_CS["Site 7",VERT_DATUM["Site 7",2005],UNIT["metre",1],AXIS["Up",UP]]', "'Site 7', which no register"),
+        ('VERT_CS["unnamed",VERT_DATUM["unnamed",2005],UNIT["metre",1],AXIS["Up",UP]]', "which no register knows"),
+        (NAVD88_SHIFTED, "'Site' are shifted from those in 'NAVD88 height'"),
+    ],
+)
+def test_a_vertical_system_of_a_file_s_own_is_refused_by_name(vertical: str, words: str) -> None:
+    if vertical.startswith("VERTCRS"):
+        from pyproj import CRS
+
+        whole = f'COMPOUNDCRS["x",{CRS.from_epsg(4326).to_wkt()},{vertical}]'
+    else:
+        whole = f'COMPD_CS["x",{WGS84_WKT},{vertical}]'
+    with pytest.raises(InputError, match=re.escape(words)):
+        take_apart(whole, where="dem")
+
+
+def test_esri_s_shift_of_heights_is_not_forgotten(tmp_path: Path) -> None:
+    """Libraries read the system of an .asc without the parameter."""
+    esri = (
+        'GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",6378137.0,298.257223563]],'
+        'PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],VERTCS["EGM96_Geoid",VDATUM["EGM96_Geoid"],'
+        'PARAMETER["Vertical_Shift",{}],PARAMETER["Direction",1.0],UNIT["Meter",1.0]]'
+    )
+    lat, lon = FRAME.lat_deg, FRAME.lon_deg
+    head = f"ncols 100\nnrows 100\nxllcorner {lon - 0.05!r}\nyllcorner {lat - 0.05!r}\ncellsize 0.001\n"
+    path = tmp_path / "a.asc"
+    path.write_text(head + "\n".join(" ".join(["700"] * 100) for _ in range(100)))
+    (tmp_path / "a.prj").write_text(esri.format("0.0"))
+    assert load(path, vertical_datum=None).info["vertical_datum"] == "EGM96"
+    (tmp_path / "a.prj").write_text(esri.format("100.0"))
+    assert "is shifted by 100.0 (Vertical_Shift)" in str(refusal(path, vertical_datum=None))
+
+
+def test_tiles_in_feet_do_not_lend_their_unit_to_one_that_states_none(tmp_path: Path) -> None:
+    heights = np.round(hills(100, 100)) + 300.0
+    a = degrees_tif(tmp_path / "a.tif", heights, units=("ft",))
+    b = degrees_tif(tmp_path / "b.tif", heights)
+    for order in ((a, b), (b, a)):
+        said = str(refusal(order))
+        assert "heights of a.tif are feet, from the file, and nothing says the unit of those of b.tif" in said
+        assert "`height_unit: ft`" in said
+        assert is_times(load(order, height_unit="ft"), heights, FOOT)
+    c = degrees_tif(tmp_path / "c.tif", heights, units=("m",))
+    assert "metres, from the file and metres, no unit is stated" in str(load((c, b)).info["heights_read"])
+    both = load((a, c))  # each says its own
+    assert both.differs
 
 
 def test_a_grid_in_feet_needs_the_unit_of_its_heights(tmp_path: Path) -> None:
@@ -166,6 +250,42 @@ def test_sea_and_lakes_with_a_shore_are_ground(tmp_path: Path) -> None:
     assert np.isnan(load(degrees_tif(tmp_path / "b.tif", holed(0.0, 5.5))).ground_m).any()
     assert not np.isnan(load(degrees_tif(tmp_path / "c.tif", np.zeros((100, 100)))).ground_m).any()
     assert not np.isnan(load(degrees_tif(tmp_path / "d.tif", holed(1.0))).ground_m).any()
+
+
+@pytest.mark.parametrize(("beside", "unknown"), [(0.0, True), (3.0, False)])
+def test_zeros_that_fill_the_window_are_followed_beyond_it(tmp_path: Path, beside: float, unknown: bool) -> None:
+    """A void of 18 km; the mission sees nothing but zeros."""
+    heights = np.round(hills(400, 400)) + 300.0
+    heights[100:300, 100:300] = 0.0
+    heights[300, 150] = beside or 300.0
+    lat, lon = FRAME.lat_deg, FRAME.lon_deg
+    path = tif(tmp_path / "a.tif", heights, Affine(0.001, 0.0, lon - 0.2, 0.0, -0.001, lat + 0.2), crs="EPSG:4326")
+    box = (-500.0, -500.0, 500.0, 500.0)
+    if unknown:
+        assert "nothing but voids" in str(refusal(path, box=box))
+        assert not np.isnan(load(path, box=box, nodata="none").ground_m).any()
+    else:
+        surface = load(path, box=box)
+        assert not surface.ground_m.any()
+        assert "exactly 0" not in notes_of(surface)
+
+
+def test_zeros_without_an_end_are_named(tmp_path: Path) -> None:
+    sea = load(degrees_tif(tmp_path / "c.tif", np.zeros((100, 100))))
+    assert "of exactly 0 m, around which nothing else is known, count as sea or ground" in notes_of(sea)
+
+
+@pytest.mark.parametrize(
+    ("dtype", "value", "unit"),
+    [("int32", -9999, "cm"), ("int16", 32767, "cm"), ("int16", -32767, "cm"), ("uint16", 65535, "cm"),
+     ("float32", -9999.0, "cm"), ("int16", -32768, "cm")],
+)  # fmt: skip
+def test_marks_of_voids_are_voids_in_any_unit(tmp_path: Path, dtype: str, value: float, unit: str) -> None:
+    heights = np.round(hills(100, 100) % 100.0 * 100.0 + 500.0)
+    heights[40:60, 40:60] = value
+    surface = load(degrees_tif(tmp_path / "a.tif", heights.astype(dtype), units=(unit,)))
+    assert np.isnan(surface.ground_m).sum() > 100
+    assert np.nanmin(surface.ground_m) >= 5.0
 
 
 @pytest.mark.parametrize(

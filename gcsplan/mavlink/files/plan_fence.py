@@ -21,6 +21,9 @@ MAX_PROBLEMS = 20
 FENCE_VERSION = RALLY_VERSION = 2
 FENCE_KEYS = frozenset({"circles", "polygons", "breachReturn"})
 RALLY_KEYS = frozenset({"points"})
+SHAPE_KEYS = {"circles": frozenset({"circle", "inclusion", "version"}),
+              "polygons": frozenset({"polygon", "inclusion", "version"})}  # fmt: skip
+SHAPE_VERSION = 1
 RESAVE = "open the file in QGroundControl and save it again"
 
 
@@ -111,6 +114,13 @@ def unread_keys(section: object, known: Collection[str], version: int, where: st
     if given != version:
         return f"{where} of version {str(given)[:20]} ({', '.join(k[:40] for k in keys[:8])})" if keys else ""
     others = [f"{where}.{key[:40]}" for key in keys if key not in known]
+    for kind, own in SHAPE_KEYS.items():
+        entries = section.get(kind)
+        for i, entry in enumerate(entries if kind in known and isinstance(entries, list) else []):
+            inner = entry if isinstance(entry, dict) else {}
+            others += [f"{where}.{kind}[{i}].{key[:40]}" for key in inner if key not in own]
+            if inner.get("version", SHAPE_VERSION) != SHAPE_VERSION:
+                others.append(f"{where}.{kind}[{i}] of version {str(inner['version'])[:20]}")
     return ", ".join(others[:8])
 
 

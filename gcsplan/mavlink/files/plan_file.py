@@ -50,6 +50,7 @@ from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, RELATIVE, TE
 from gcsplan.vehicle import Autopilot, Vehicle
 
 FIXED_WING, QUADROTOR = 1, 2  # MAV_TYPE
+CALCULATED_ABOVE_TERRAIN = 3  # QGroundControl's AltMode: sent above sea level
 ALTITUDE_MODE = {RELATIVE: 1, GLOBAL: 2, TERRAIN: 4}  # QGroundControl's AltMode; 0 is "mixed"
 MAX_PROBLEMS = 20
 KEYS = frozenset({"fileType", "geoFence", "groundStation", "mission", "rallyPoints", "version"})
@@ -316,7 +317,9 @@ class _Items:
         params = [json_float(p) for p in values] if isinstance(values, list) and len(values) == 7 else []
         command, frame = json_float(entry.get("command")), json_float(entry.get("frame"))
         goes_on = entry.get("autoContinue")
-        if len(params) != 7 or None in params:
+        if not params and isinstance(values, list) and entry.get("coordinate") is not None:
+            self._bad(f"{key}.params", f"must be seven numbers, and the place stands in `coordinate`: {RESAVE}")
+        elif len(params) != 7 or None in params:
             self._bad(f"{key}.params", "must be seven numbers (null where none is given)")
         elif command is None or frame is None:
             self._bad(key, "command and frame must be numbers")
@@ -325,6 +328,7 @@ class _Items:
         else:
             p1, p2, p3, p4, x, y, z = (math.nan if p is None else p for p in params)
             x, y = self._unset(command, frame, x, y, key)
+            self._compare_altitude(entry, z, key)
             item = read_item(
                 RawItem(command, frame, (p1, p2, p3, p4), x, y, z, goes_on), self.problems, f"{self.where}: {key}"
             )
@@ -333,6 +337,14 @@ class _Items:
                 self.items.append(item)
         if len(self.problems) >= MAX_PROBLEMS:
             self._raise()
+
+    def _compare_altitude(self, entry: dict[str, Any], z: float, key: str) -> None:
+        """Note an altitude that QGroundControl shows and that is not the one which is sent, its last param."""
+        mode, shown = entry.get("AltitudeMode"), json_float(entry.get("Altitude"))
+        if mode == CALCULATED_ABOVE_TERRAIN:
+            shown = json_float(entry.get("AMSLAltAboveTerrain"))
+        if mode in (*ALTITUDE_MODE.values(), CALCULATED_ABOVE_TERRAIN) and shown is not None and abs(shown - z) > 0.05:
+            self.notes.append(f"{key}: its Altitude of {shown:g} m is not the one that is sent, params[6] {z:g} m")
 
     def _number(self, jump_id: object) -> None:
         number = whole(json_float(jump_id) or math.nan, 1, 2**31) if jump_id is not None else None

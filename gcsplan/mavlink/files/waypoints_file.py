@@ -29,12 +29,21 @@ from gcsplan.mavlink.files.file_items import (
     read_item,
     whole,
 )
-from gcsplan.mavlink.mission.commands import WAYPOINT
+from gcsplan.mavlink.mission.commands import (
+    CIRCLE_IN,
+    CIRCLE_OUT,
+    FENCE_RETURN_POINT,
+    POLYGON_IN,
+    POLYGON_OUT,
+    RALLY_POINT,
+    WAYPOINT,
+)
 from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot
 
 HEADER = "QGC WPL 110"
 COLUMNS = ("seq", "current", "frame", "command", "param1", "param2", "param3", "param4", "x", "y", "z", "autocontinue")
+FENCE_AND_RALLY = frozenset({FENCE_RETURN_POINT, POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT, RALLY_POINT})
 MAX_LINE = 1000
 MAX_NUMBER = 64
 MAX_PROBLEMS = 20
@@ -185,6 +194,13 @@ def _mission(rows: list[_Row], has_home: bool, autopilot: Autopilot, where: str,
     elif hint is not None:
         notes.append("the file has no home row: the mission's own home was taken")
         home = hint
+    if home is None and not has_home:
+        raise InputError(
+            f"of a file that begins with 'QGC WPL 120' no row is home; write 'QGC WPL 110' there, '{HOME_ROW}' (TABs "
+            "between) as its first row if that is not home already, and count the other rows from 1 (check takes "
+            "--home)",
+            where=where,
+        )
     if home is None:
         raise InputError(
             f"the file has no home row, and a file without one silently loses its first real item; put '{HOME_ROW}' "
@@ -201,6 +217,14 @@ def _mission(rows: list[_Row], has_home: bool, autopilot: Autopilot, where: str,
             break
     if problems:
         raise InputError.of(problems, headline=f"{where} is damaged" if len(problems) > 1 else "")
+    lists = {item.command in FENCE_AND_RALLY for item in items}
+    if lists == {True}:
+        what = "rally points" if items[0].command == RALLY_POINT else "a fence"
+        raise InputError(
+            f"the file holds {what} ({len(items)} items), as Mission Planner saves them, and no mission: give the "
+            "mission's own file; no-fly zones are read from GeoJSON, KML and others",
+            where=where,
+        )
     first_seq = 1 if autopilot.is_ardupilot else 0
     index_of = {row.seq: index for index, row in enumerate(rows)}
     items_tuple = jumps_from_file(items, index_of, first_seq, where)

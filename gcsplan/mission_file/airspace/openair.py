@@ -20,6 +20,7 @@ from gcsplan.mission_file.airspace.times import Period, TimeError, read_end, rea
 from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
 from gcsplan.mission_file.zone_draft import MAX_VERTICES, Remark
 from gcsplan.mission_file.zone_file import ZoneFile
+from gcsplan.mission_file.zone_text import decoded
 from gcsplan.world.degree_shapes import MOST_LON_DEG
 
 SUFFIXES = (".openair", ".air", ".txt")
@@ -56,6 +57,10 @@ _PLACE = re.compile(
     r"(\d{1,3}(?:\.\d{1,20})?)(?:\s*:\s*(\d{1,2}(?:\.\d{1,20})?))?(?:\s*:\s*(\d{1,2}(?:\.\d{1,20})?))?\s*([EW])",
     re.ASCII | re.IGNORECASE,
 )
+_PART = r"(\d{1,3}(?:\.\d{1,20})?(?:\s*:\s*\d{1,2}(?:\.\d{1,20})?){0,2})"
+_LETTERS_FIRST = re.compile(rf"([NS])\s*{_PART}[\s,]*([EW])\s*{_PART}", re.ASCII | re.IGNORECASE)
+_COMPACT = re.compile(r"(?<![\d:.])(\d{2,3})([0-5]\d)([0-5]\d(?:\.\d{1,20})?)(?![\d:.])", re.ASCII)
+"""Degrees, minutes and seconds in one number, such as 460500.00N 0143000.00E."""
 _LONGEST_LINE = 2000
 
 MOST_MISTAKES = 5
@@ -97,7 +102,7 @@ def read_openair(path: Path, data: bytes, policy: Policy) -> ZoneFile:
 
 def _text(data: bytes) -> str:
     try:
-        return data.decode("utf-8-sig")
+        return decoded(data)
     except UnicodeDecodeError:
         return data.decode("latin-1")  # names alone have other letters, and older programs write them so
 
@@ -324,6 +329,9 @@ def _places(text: str, count: int) -> tuple[list[Corner], str]:
     """The first places of a text, and what follows them, which is no place."""
     places: list[Corner] = []
     at = 0
+    text = _COMPACT.sub(r"\1:\2:\3", text)
+    if text[:1].upper() in ("N", "S"):
+        text = _LETTERS_FIRST.sub(r"\2 \1 \4 \3", text)
     for match in _matches(text):
         if len(places) == count:
             raise _RecordError(f"it has more than {counted(count, 'place')}; write a line for each")

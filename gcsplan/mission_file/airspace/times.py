@@ -25,6 +25,9 @@ _DAY = timedelta(days=1)
 _DATE = re.compile(r"\d{4}-\d{2}-\d{2}", re.ASCII)
 _MOST_CHARACTERS = 40
 
+_OF_PERIOD = ("permanent", "startDateTime", "endDateTime", "schedule")
+_OF_LINE = ("day", "startTime", "endTime", "startEvent", "endEvent")
+
 WEEK = ("MON", "TUE", "WED", "THU", "FRI", "SAT", "SUN")
 OUT_OF_HOURS = "they do not apply in the hours of the mission"
 """Why such zones are not used."""
@@ -179,9 +182,7 @@ def _period(given: Any) -> Period:
         raise TimeError(f"permanent {str(permanent)[:20]!r} is neither YES nor NO")
     if permanent == "YES":
         return ALWAYS
-    unknown = sorted(str(k)[:40] for k in given if k not in ("permanent", "startDateTime", "endDateTime", "schedule"))
-    if unknown:
-        raise TimeError(f"{unknown[0]!r} of a period is not known")
+    _require_known(given, _OF_PERIOD, "a period")
     start, end = _moment(given.get("startDateTime")), _moment(given.get("endDateTime"), read_end)
     schedule = given.get("schedule")
     if schedule is None or schedule == []:
@@ -190,6 +191,13 @@ def _period(given: Any) -> Period:
         raise TimeError("the schedule is no list")
     daily = [_daily(one) for one in schedule]
     return Period(start, end, () if None in daily else tuple(d for d in daily if d is not None))
+
+
+def _require_known(given: dict[str, Any], known: Sequence[str], what: str) -> None:
+    """Raise TimeError for a member that the standard does not have: it may say that the zone applies at other times."""
+    unknown = sorted(str(key)[:40] for key in given if key not in known)
+    if unknown:
+        raise TimeError(f"{unknown[0]!r} of {what} is not known")
 
 
 def _moment(given: Any, read: Callable[[str], datetime] = read_instant) -> datetime | None:
@@ -206,6 +214,7 @@ def _daily(given: Any) -> Daily | None:
     listed = [said] if isinstance(said, str) else said
     if not isinstance(listed, list) or not listed:
         raise TimeError("a line of a schedule has no days")
+    _require_known(given, _OF_LINE, "a line of a schedule")
     if any(given.get(key) not in (None, "") for key in ("startEvent", "endEvent")):
         return None
     days: set[int] = set()

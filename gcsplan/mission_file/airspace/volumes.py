@@ -13,13 +13,22 @@ from pathlib import Path
 
 import numpy as np
 
-from gcsplan.errors import Problem
+from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.airspace.policy import Judge, Policy, Published
 from gcsplan.mission_file.zone_attributes import OVER_PRESSURE, UNDER_PRESSURE
 from gcsplan.mission_file.zone_draft import ACROSS, MAX_VERTICES, Bounds, Remark, ZoneDraft, check_degrees
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_levels import EXAMPLES, LevelError, Limit, read_level
-from gcsplan.world.degree_shapes import HALF_TURN_DEG, LARGEST_RADIUS_M, across, outline_of, unwrapped, wide_fault
+from gcsplan.world.degree_shapes import (
+    HALF_TURN_DEG,
+    LARGEST_RADIUS_M,
+    across,
+    along_great_circles,
+    latitudes_between,
+    outline_of,
+    unwrapped,
+    wide_fault,
+)
 from gcsplan.world.outlines import MOST_CROSSINGS, MOST_PAIRS, crossings, overlapping_pairs
 from gcsplan.world.zones import Level
 
@@ -203,6 +212,13 @@ class AirspaceFile:
             else:
                 self.fault(where, "the polygon has no points")
             return
+        if self.great_circles:  # whose crossings lie elsewhere
+            try:
+                bent = along_great_circles(outline)
+            except InputError as too_many:
+                self._add(zone, part, where, self._around(ring), None, limits, [Problem(where, too_many.message)])
+                return
+            parts = parts if bent is None else enclosed(outline, bent)
         limits = Limits(limits.bounds, [*limits.remarks, (CROSSES, "")], limits.faults)
         for i, piece in enumerate(parts):
             name = part if len(parts) == 1 else f"{part}/{i + 1}"
@@ -212,15 +228,18 @@ class AirspaceFile:
         """A rectangle with all points well inside, to tell whether a zone without an outline lies near.
 
         A zone that is half a turn wide may lie on either side of its corners: then the rectangle goes around the globe,
-        and to the poles where they may be in it, or great circles come near them.
+        as far north and south as great circles reach, and to the poles where they may be in it.
         """
         at = np.asarray(points, float)
         (south, west), (north, east) = at.min(axis=0) - AROUND_DEG, at.max(axis=0) + AROUND_DEG
         if east - west >= HALF_TURN_DEG:
             west, east = -HALF_TURN_DEG, HALF_TURN_DEG
             short = unwrapped([*points, points[0]], points[0][1])[:, 0]
-            if self.great_circles or abs(short[-1] - short[0]) > 1.0:
+            if abs(short[-1] - short[0]) > 1.0:
                 south, north = -90.0, 90.0
+            elif self.great_circles:
+                lows, highs = latitudes_between(at, np.roll(at, -1, axis=0))
+                south, north = min(south, lows.min() - AROUND_DEG), max(north, highs.max() + AROUND_DEG)
         south, north = max(south, -90.0), min(north, 90.0)
         corners = ((south, west), (south, east), (north, east), (north, west))
         return tuple((float(lat), float(lon)) for lat, lon in corners)
@@ -244,12 +263,12 @@ class AirspaceFile:
         self.found.add(draft, remarks)
 
 
-def enclosed(outline: Sequence[Corner]) -> list[list[Corner]]:
-    """The outlines of all that a line which crosses itself encloses, whichever way it runs around it."""
+def enclosed(*outlines: Sequence[Corner]) -> list[list[Corner]]:
+    """The outlines of all that lines which cross themselves and each other enclose, whichever way they run."""
     import shapely
 
-    line = np.asarray([*outline, outline[0]], float)[:, ::-1]
-    faces = shapely.get_parts(shapely.polygonize([shapely.union_all(shapely.LineString(line))]))
+    lines = [shapely.LineString(np.asarray([*outline, outline[0]], float)[:, ::-1]) for outline in outlines]
+    faces = shapely.get_parts(shapely.polygonize([shapely.union_all(lines)]))
     whole = shapely.union_all(faces)
     outer = [shapely.Polygon(p.exterior) for p in shapely.get_parts(whole) if p.geom_type == "Polygon"]
     rings = []

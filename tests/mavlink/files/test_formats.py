@@ -251,7 +251,7 @@ def test_a_plans_jump_ids_need_not_be_in_order() -> None:
 def test_header_120_has_no_home_row_and_counts_jumps_from_its_first_item() -> None:
     jump = "2\t0\t2\t177\t1\t3\t0\t0\t0\t0\t0\t1\n"
     text = "QGC WPL 120\n" + POINT.replace("1\t", "0\t", 1) + POINT + jump
-    with pytest.raises(InputError, match="silently loses its first real item"):
+    with pytest.raises(InputError, match=r"no row is home; write .QGC WPL 110. there"):
         read_waypoints(text, autopilot=COPTER, where="f")
     for autopilot, target in ((COPTER, 2.0), (PX4, 1.0)):
         read = parse_waypoints(text, autopilot=autopilot, where="f", home_hint=HOME)

@@ -188,11 +188,11 @@ def test_flight_levels_limit_nothing_unless_the_mission_says_how_far_they_lie_of
 
 
 def test_an_outline_that_crosses_itself_is_no_fly_with_all_that_it_encloses(tmp_path: Path) -> None:
-    bow = "DP 47:00:00 N 008:00:00 E\nDP 47:06:00 N 008:06:00 E\nDP 47:06:00 N 008:00:00 E\nDP 47:00:00 N 008:06:00 E\n"
+    bow = "DP 47:00:00 N 008:00:00 E\nDP 47:00:36 N 008:00:36 E\nDP 47:00:36 N 008:00:00 E\nDP 47:00:00 N 008:00:36 E\n"
     found = read(tmp_path, f"AC R\nAN bow\n{bow}", "a.txt")
     area = sum(shapely.Polygon(z.points).area for z in found.zones)
     assert [z.name for z in found.zones] == ["bow/1", "bow/2"]
-    assert area == pytest.approx(0.005)
+    assert area == pytest.approx(0.00005)
     assert "cross or touch themselves" in remarks(found)
 
 

@@ -87,6 +87,7 @@ def test_periods_against_every_minute(given_: list[Any], first: int, quarters: i
         [{"schedule": [{"day": ["MON"], "startTime": "10:00-10:00", "endTime": "12:00+10:00"}]}],
         [{"startDateTime": "2026-11-23", "endDateTime": "2026-11-23", "schedule": [{"day": ["THU"]}]}],
         [{"endDateTime": "2020-01-01T00:00Z", "holidays": True}],
+        [{"schedule": [{"day": ["MON"], "endDay": ["FRI"], "startTime": "06:00Z", "endTime": "18:00Z"}]}],
     ],
 )  # fmt: skip
 def test_what_is_not_understood_applies_always(given_: Any) -> None:
