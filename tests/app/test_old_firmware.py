@@ -91,6 +91,6 @@ def test_an_ordinary_vehicle_of_each_version_is_accepted(
 
 def test_what_the_firmware_has_and_does_not_answer_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     vehicle = board_of(monkeypatch, Autopilot.ARDUCOPTER, (4, 4), mute="WPNAV_ACCEL_C")
-    result = sent(planned(keys()), vehicle, timeout_s=1.0)
+    result = sent(planned(keys()), vehicle, timeout_s=0.6)
     assert (result.outcome, result.reason) == ("refused", "parameters")
     assert "WPNAV_ACCEL_C or WP_ACC_CNR could not be read" in result.message

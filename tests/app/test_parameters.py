@@ -98,7 +98,7 @@ def test_what_was_not_answered_is_no_default(
 ) -> None:
     done = planned(keys(rtl_rel_home_m=60, **vehicle), way_home=way_home, no_fly=ZONE)
     autopilot = vehicle.get("autopilot", "arducopter")
-    never = sent(done, board(autopilot, Misbehaviour(mute=name), **parameters), timeout_s=1.5)
+    never = sent(done, board(autopilot, Misbehaviour(mute=name), **parameters), timeout_s=0.6)
     assert (never.outcome, never.code, never.reason) == ("refused", 5, "parameters")
     assert f"{name} " in never.message
     assert "could not be read from the vehicle" in never.message
@@ -121,7 +121,7 @@ def test_verify_does_not_take_silence_for_a_default(tmp_path: Any) -> None:
     vehicle.load(done.vehicles[0].mission.wire_items())
     with SimServer([vehicle], "udpin:127.0.0.1:0") as server:
         source = load_mission(tmp_path / "m.yaml")
-        found = verify_file(str(tmp_path / "uav1.plan"), server.url_for_gcs, source=source, timeout_s=1.5)
+        found = verify_file(str(tmp_path / "uav1.plan"), server.url_for_gcs, source=source, timeout_s=0.6)
     assert found.code == 4
     assert "WPNAV_RADIUS or WP_RADIUS_M could not be read" in found.message
 
