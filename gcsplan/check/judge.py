@@ -18,6 +18,7 @@ from gcsplan.check.climb_out import slant_findings
 from gcsplan.check.clock import seconds_of
 from gcsplan.check.corners import round_corners
 from gcsplan.check.enough import enough
+from gcsplan.check.extent import extent_of
 from gcsplan.check.flight import follow
 from gcsplan.check.home_height import why_unknown, with_error_of_home
 from gcsplan.check.misses import nearest_misses
@@ -70,7 +71,8 @@ def judge(
     flight = follow(stored, vehicle, world.ground_amsl, world.read_amsl, rtl_rel_home_m=rtl_rel_home_m)
     if (unsure := why_unknown(mission.home, vehicle, world)) is not None:
         return Verdict(mission, (), (), (unsure, *flight.not_judged), tuple(flight.notes))
-    vehicle = with_error_of_home(vehicle, mission.home, world)
+    limits, vehicle = vehicle.limits, with_error_of_home(vehicle, mission.home, world)
+    home_error_m = vehicle.limits.altitude_error_m - limits.altitude_error_m
     findings: list[Finding] = []
     count = len(mission.wire_items())
     if table.max_items is not None and count > table.max_items:
@@ -104,8 +106,10 @@ def judge(
     findings += _findings(flight.stretches, plane, report, vehicle.limits, world)
     over = nearest_pass(flight.stretches, plane.legs, plane.owner, vehicle.limits, world)
     near = nearest_misses(flight.stretches, plane.legs, plane.owner, report, vehicle, world) if misses else ()
+    flown = [plane.legs]
     if others := flight.others:  # they must be legal too; the figures stay those of the mission
         plane = legs_in_plane(others, vehicle.limits, world, terrain_error_m)
+        flown.append(plane.legs)
         findings += _unread(others, plane)
         report = steep_report(plane, world.airspace.examine(plane.legs, vehicle.limits), vehicle.limits)
         findings = _worst(findings, _findings(others, plane, report, vehicle.limits, world))
@@ -122,6 +126,7 @@ def judge(
     verdict = Verdict(
         mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near, zone_pass=over,
         energy_stated=vehicle.energy.stated,
+        extent=extent_of([*flight.stretches, *others], flown, mission.home, limits, home_error_m),
     )  # fmt: skip
     return _with_battery(verdict, vehicle, flight)
 

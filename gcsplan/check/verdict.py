@@ -12,6 +12,7 @@ from gcsplan.check.misses import Miss
 from gcsplan.check.stretch import Place, StretchKind
 from gcsplan.check.zone_heights import ZonePass
 from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mavlink.mission.parameter_safety import Extent
 from gcsplan.units import UnitText, joined
 
 if TYPE_CHECKING:
@@ -131,6 +132,7 @@ class Verdict:
     ``misses``: how near it comes to each limit, on request. ``until_reserve_s``: if the mission ends in a hold or a
     round without end, seconds until the battery is down to its reserve. ``zone_pass``: the nearest zone that is passed
     over or under. ``energy_stated``: the vehicle's energy was given; else energies say nothing and are not told.
+    ``extent``: how far all that is flown comes from home, errors counted; None where nothing was judged.
     """
 
     mission: Mission
@@ -143,6 +145,7 @@ class Verdict:
     until_reserve_s: float | None = None
     zone_pass: ZonePass | None = None
     energy_stated: bool = True
+    extent: Extent | None = None
 
     def told_j(self, joules: float) -> float | None:
         """An energy of this flight for people and files: None unless the vehicle's energy was given."""

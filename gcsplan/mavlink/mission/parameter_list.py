@@ -20,6 +20,7 @@ from gcsplan.mavlink.mission.commands import (
     LOITER_UNLIM,
     RTL,
 )
+from gcsplan.mavlink.mission.fences import acts, fences_in_force, is_fence
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.parameter_names import PARAMETERS, Name, OnBoard, Parameter
 from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, Autopilot, Vehicle
@@ -50,7 +51,8 @@ class Setting:
 
     ``matters``: to the ``time`` (another value is judged again, with the separation), to where it ``turns`` (judged
     again by `check.tuning`, but for the return from anywhere), to the ``return`` or to the ``flight`` itself (another
-    value is not what was judged), or is only ``told``. ``off_at_zero``: 0 switches it off, which is within the rule.
+    value is not what was judged), or is only ``told``. ``also``: other values that are within the rule, like a 0 that
+    switches it off.
     """
 
     parameter: Parameter
@@ -58,7 +60,7 @@ class Setting:
     rule: Rule
     why: str
     matters: Matters
-    off_at_zero: bool = False
+    also: tuple[float, ...] = ()
 
     @property
     def needed(self) -> bool:
@@ -68,7 +70,7 @@ class Setting:
     def allows(self, amount: float) -> bool:
         """Whether an amount on board is within the rule."""
         spare = SAME * abs(self.value) + 1e-6
-        if self.off_at_zero and amount == 0.0:
+        if amount in self.also:
             return True
         if self.rule == "equal":
             return abs(amount - self.value) <= spare
@@ -80,7 +82,16 @@ class Setting:
             {"parameter": n.name, "value": n.value(self.value), "versions": n.versions or "all"}
             for n in self.parameter.names
         ]
-        return {"names": names, "value": self.value, "unit": self.parameter.unit, "rule": self.rule, "why": self.why}
+        return {
+            "names": names, "value": self.value, "unit": self.parameter.unit, "rule": self.rule, "also": [*self.also],
+            "why": self.why,
+        }  # fmt: skip
+
+    def rule_words(self) -> str:
+        """``at least``, with the other values that are within the rule; empty for one value alone."""
+        rule = "" if self.rule == "equal" else self.rule
+        others = " or ".join(f"{amount:g}" for amount in self.also)
+        return f"{rule}, or {others}" if rule and others else f"or {others}" if others else rule
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,8 +107,9 @@ class Off:
         """What it is, what was assumed and why, and what to set."""
         wanted, rule = self.name.value(self.setting.value), self.setting.rule
         least = "" if rule == "equal" else f"{rule} "
+        assumed = f"{least}{wanted:.6g}" + "".join(f" or {self.name.value(amount):g}" for amount in self.setting.also)
         return (
-            f"{self.name.name} is {self.raw:.6g} on board, and {least}{wanted:.6g} is assumed ({self.setting.why}): "
+            f"{self.name.name} is {self.raw:.6g} on board, and {assumed} is assumed ({self.setting.why}): "
             f"set {self.name.name} {wanted:.10g}"
         )
 
@@ -147,7 +159,7 @@ def _copter(
         Setting(known["jerk"], vehicle.leg_jerk_m_s3, "equal", "leg_jerk_m_s3, in all times", "time"),
         Setting(known["radius"], 2.0, "at most", "where corners begin", "turns"),
         Setting(known["return_altitude_type"], 0.0, "equal", "returns are judged above home, not above terrain", back),
-        Setting(known["cone"], 3.0, "at least", "how low a return may be near home", back, off_at_zero=True),
+        Setting(known["cone"], 3.0, "at least", "how low a return may be near home", back, also=(0.0,)),
         Setting(known["return_climb"], 0.0, "at most", "a return is no higher than was judged", back),
         Setting(known["return_end"], 0.0, "at most", "a return lands", "told"),
         Setting(known["return_waits"], vehicle.return_waits_s, "equal", "how long a return waits over home",
@@ -283,9 +295,18 @@ def corners_as_it_leans(values: Mapping[str, float]) -> bool:
 
 
 def off(settings: Sequence[Setting], values: Mapping[str, float], autopilot: Autopilot) -> list[Off]:
-    """The parameters among ``values`` that are outside of their rules, in the order of ``settings``."""
+    """The parameters among ``values`` that are outside of their rules, in the order of ``settings``.
+
+    A fence counts where it is in force. One that only tells of a breach does not change the flight, but lowers
+    ArduCopter's return.
+    """
     found = []
+    on = fences_in_force(values, autopilot)
+    if not acts(values, autopilot):
+        on = frozenset(s.parameter.key for s in settings if s.parameter.key in on and s.matters in ("return", "told"))
     for setting in settings:
+        if is_fence(setting.parameter.key) and setting.parameter.key not in on:
+            continue
         name = setting.parameter.on_board(values)
         amount = _amount(setting.parameter, values, autopilot)
         if name is not None and amount is not None and not setting.allows(amount):

@@ -85,6 +85,15 @@ class OnBoard(dict[str, float]):
         """Whether the firmware on board is older than the parameter of these names."""
         return self.version is not None and self.version < _SINCE.get(group, (0, 0))
 
+    def lacks(self, group: tuple[str, ...]) -> bool:
+        """Whether a firmware is known to be without the parameter: too old for it, or built without fences.
+
+        That is one that answers for other parameters, and for no fence's.
+        """
+        family = next((f for f in _FENCE_FAMILIES if group[0].startswith(f)), None)
+        unfenced = family is not None and bool(self) and not any(n.startswith(family) for n in (*self, *self.absent))
+        return unfenced or self.too_old_for(group)
+
 
 def unanswered(values: Mapping[str, float], groups: Iterable[tuple[str, ...]]) -> list[tuple[str, ...]]:
     """Those ``groups`` of names of which none was read as a number, and not all are known to be absent.
@@ -98,10 +107,11 @@ def unanswered(values: Mapping[str, float], groups: Iterable[tuple[str, ...]]) -
         for group in groups
         if not any(math.isfinite(board.get(n, math.nan)) for n in group)
         and not all(n in board.absent for n in group)
-        and not board.too_old_for(group)
+        and not board.lacks(group)
     ]
 
 
+_FENCE_FAMILIES = ("FENCE_", "GF_")
 _BEFORE, _RENAMED = "before ArduPilot 4.7", "since ArduPilot 4.7"
 
 
@@ -194,4 +204,6 @@ PARAMETERS: dict[Autopilot, dict[str, Parameter]] = {
 }  # fmt: skip
 """By autopilot and key."""
 
-_SINCE = {p.group(): p.since for known in PARAMETERS.values() for p in known.values()} | {("TERRAIN_OFS_MAX",): (4, 2)}
+_SINCE = {p.group(): p.since for known in PARAMETERS.values() for p in known.values()} | {
+    ("TERRAIN_OFS_MAX",): (4, 2), ("FENCE_AUTOENABLE",): (4, 6),  # of Copter; Plane has it since 4.1
+}  # fmt: skip
