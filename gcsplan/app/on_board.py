@@ -116,9 +116,12 @@ def judge_on_board(
         if flies_terrain(read_back.wire_items()) and (odd := odd_spacing(values)):
             return odd
         found = off(settings, values, vehicle.autopilot)
-        decide = ("flight", "return", "turns") if straight else ("flight", "return")
+        decide = {"flight", "return"} | ({"turns"} if straight else set())
+        if not allow_parameters or (job.fleet is not None and job.fleet.keeps_apart):
+            decide.add("pace")
         if unlike := [o for o in found if o.setting.matters in decide]:
-            return _lines("this is not what was judged, and cannot be judged", unlike)
+            allowed = "; --allow-parameters takes that" if {o.setting.matters for o in unlike} == {"pace"} else ""
+            return _lines(f"this is not what was judged, and cannot be judged{allowed}", unlike)
         # Home on board is where the vehicle is now, but the altitudes count from the planned start.
         flown, tuning = replace(read_back, home=job.mission.home), Tuning.of(values)
         flies = vehicle if simulated else vehicle_on_board(vehicle, flown, values)

@@ -65,7 +65,9 @@ _TABLES: dict[Autopilot, dict[str, Parameter]] = {
         "FS_EKF_ACTION": _i(1, INT8),
         "FS_GCS_ENABLE": _i(0, INT8),
         "FS_THR_ENABLE": _i(1, INT8),
+        "LAND_ALT_LOW": _i(1000, INT16),
         "LAND_SPEED": _i(50, INT16),
+        "LAND_SPEED_HIGH": _i(0, INT16),
         "RTL_ALT": _i(1500),
         "RTL_ALT_FINAL": _i(0),
         "RTL_ALT_TYPE": _i(0, INT8),
@@ -117,7 +119,10 @@ _TABLES: dict[Autopilot, dict[str, Parameter]] = {
         "MIS_YAW_TMT": _r(-1.0),
         "MPC_ACC_HOR": _r(3.0),
         "MPC_JERK_AUTO": _r(4.0),
+        "MPC_LAND_ALT1": _r(10.0),
+        "MPC_LAND_ALT2": _r(5.0),
         "MPC_LAND_SPEED": _r(0.7),
+        "MPC_TKO_SPEED": _r(1.5),
         "MPC_XY_CRUISE": _r(5.0),
         "MPC_XY_TRAJ_P": _r(0.5),
         "MPC_XY_VEL_MAX": _r(12.0),
@@ -140,7 +145,8 @@ _TABLES: dict[Autopilot, dict[str, Parameter]] = {
 
 
 _RENAMED = {
-    "ANGLE_MAX": ("ATC_ANGLE_MAX", 0.01), "LAND_SPEED": ("LAND_SPD_MS", 0.01), "RTL_ALT": ("RTL_ALT_M", 0.01),
+    "ANGLE_MAX": ("ATC_ANGLE_MAX", 0.01), "LAND_ALT_LOW": ("LAND_ALT_LOW_M", 0.01),
+    "LAND_SPEED": ("LAND_SPD_MS", 0.01), "LAND_SPEED_HIGH": ("LAND_SPD_HIGH_MS", 0.01), "RTL_ALT": ("RTL_ALT_M", 0.01),
     "RTL_ALT_FINAL": ("RTL_ALT_FINAL_M", 0.01), "RTL_CLIMB_MIN": ("RTL_CLIMB_MIN_M", 0.01),
     "RTL_SPEED": ("RTL_SPEED_MS", 0.01), "WPNAV_ACCEL": ("WP_ACC", 0.01), "WPNAV_ACCEL_C": ("WP_ACC_CNR", 0.01),
     "WPNAV_ACCEL_Z": ("WP_ACC_Z", 0.01), "WPNAV_JERK": ("WP_JERK", 1.0), "WPNAV_RADIUS": ("WP_RADIUS_M", 0.01),

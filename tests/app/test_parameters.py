@@ -157,6 +157,39 @@ def test_a_flight_that_takes_another_time_is_refused_or_allowed(
     assert allowed.verified
 
 
+@pytest.mark.parametrize(
+    ("vehicle", "parameters", "words"),
+    [
+        ({}, {"LAND_SPEED_HIGH": 50}, "LAND_SPEED_HIGH is 50 on board, and 0 or 150 is assumed"),
+        ({}, {"LAND_ALT_LOW": 5000}, "LAND_ALT_LOW is 5000 on board, and 1000 is assumed"),
+        ({"autopilot": "px4"}, {"MPC_TKO_SPEED": 5}, "MPC_TKO_SPEED is 5 on board, and 1.5 is assumed"),
+        ({"autopilot": "px4"}, {"MPC_LAND_ALT2": 40}, "MPC_LAND_ALT2 is 40 on board"),
+    ],
+)
+def test_a_pace_that_cannot_be_counted_is_refused_or_allowed(
+    vehicle: dict[str, Any], parameters: Mapping[str, float], words: str
+) -> None:
+    done, autopilot = planned(keys(**vehicle)), vehicle.get("autopilot", "arducopter")
+    refused = sent(done, board(autopilot, **parameters))
+    assert (refused.outcome, refused.reason) == ("refused", "parameters")
+    assert words in refused.message
+    assert "--allow-parameters" in refused.message
+    allowed = sent(done, board(autopilot, **parameters), allow_parameters=True)
+    assert allowed.verified
+    assert any(words in line for line in allowed.warnings)
+
+
+@pytest.mark.parametrize("parameters", [{"WPNAV_SPEED_UP": -250}, {"WPNAV_ACCEL": 0}])
+def test_a_number_that_no_vehicle_flies_is_not_passed_over(parameters: Mapping[str, float]) -> None:
+    refused = sent(planned(), board(**parameters))
+    assert (refused.outcome, refused.reason) == ("refused", "parameters")
+
+
+def test_a_px4_that_does_not_land_after_its_return_is_told() -> None:
+    result = sent(planned(keys(autopilot="px4", **RTL)), board("px4", RTL_RETURN_ALT=60, RTL_LAND_DELAY=-1))
+    assert any("RTL_LAND_DELAY is -1 on board: a return ends in a hover" in line for line in result.warnings)
+
+
 def test_a_speed_that_an_interrupted_mission_goes_on_at_is_told() -> None:
     result = sent(planned(keys(speed_m_s=[5, 5])), board())
     assert result.verified

@@ -233,6 +233,12 @@ def _over_home(values: Values, mission: Mission, route: Route | None) -> list[st
             f"RTL_LOIT_TIME is {1000.0 * waits_s:g} on board: a return waits {waits_s:g} s over home before it "
             f"descends, and times and battery count {COPTER_RETURN_WAITS_S:g} s"
         )
+    if values.get("RTL_LAND_DELAY", 0.0) < 0.0:
+        found.append(
+            f"RTL_LAND_DELAY is {values['RTL_LAND_DELAY']:g} on board: a return ends in a hover at RTL_DESCEND_ALT, "
+            f"until the battery is empty or it is landed by hand; it was judged as a landing, which RTL_LAND_DELAY 0 "
+            f"makes"
+        )
     for name, metre in _RETURN_ENDS.items():
         if values.get(name, 0.0) > 0.0:
             found.append(

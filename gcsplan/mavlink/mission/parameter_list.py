@@ -14,11 +14,13 @@ from typing import Any, Literal
 
 from gcsplan.mavlink.mission.commands import (
     DO_CHANGE_SPEED,
+    LAND,
     LOITER_TIME,
     LOITER_TO_ALT,
     LOITER_TURNS,
     LOITER_UNLIM,
     RTL,
+    TAKEOFF,
 )
 from gcsplan.mavlink.mission.fences import acts, fences_in_force, is_fence
 from gcsplan.mavlink.mission.mission import Mission
@@ -29,7 +31,7 @@ from gcsplan.world.atmosphere import true_per_indicated
 __all__ = ["Off", "Setting", "commands_speed", "corners_as_it_leans", "off", "parameter_list", "vehicle_on_board"]
 
 Rule = Literal["equal", "at least", "at most"]
-Matters = Literal["time", "turns", "return", "flight", "told"]
+Matters = Literal["time", "pace", "turns", "return", "flight", "told"]
 
 SAME = 0.01
 """Part by which a value may differ and still count as the same."""
@@ -49,7 +51,8 @@ ROLL_SPARE = 1.1
 class Setting:
     """What the proof assumes of a parameter. ``value`` is in the parameter's unit.
 
-    ``matters``: to the ``time`` (another value is judged again, with the separation), to where it ``turns`` (judged
+    ``matters``: to the ``time`` (another value is judged again, with the separation), to the ``pace`` (to the time,
+    which no other value can be counted for), to where it ``turns`` (judged
     again by `check.tuning`, but for the return from anywhere), to the ``return`` or to the ``flight`` itself (another
     value is not what was judged), or is only ``told``. ``also``: other values that are within the rule, like a 0 that
     switches it off.
@@ -144,6 +147,7 @@ def _copter(
     own: Matters = "told" if commands_speed(mission) else "time"
     back: Matters = "return" if returns else "told"
     home = vehicle.return_speed_m_s or vehicle.speed_max_m_s
+    lands = _pace(mission, vehicle, LAND, RTL)
     rows = [
         Setting(known["speed"], _speed_m_s(mission, vehicle), "equal",
                 "the mission's speed: one that was interrupted goes on at this parameter's", own),
@@ -151,6 +155,9 @@ def _copter(
         Setting(known["climb"], vehicle.climb_m_s, "equal", "climb_m_s, in all times", "time"),
         Setting(known["descent"], vehicle.descent_m_s, "equal", "descent_m_s, in all times", "time"),
         Setting(known["land"], vehicle.land_m_s, "equal", "land_m_s, the landing's last 10 m", "time"),
+        Setting(known["land_high"], 0.0, "equal", "a landing's speed higher up: 0 is descent_m_s", lands,
+                (vehicle.descent_m_s,)),
+        Setting(known["land_low"], 10.0, "equal", "from where on a landing is slow", lands),
         Setting(known["accel"], COPTER_PEAK_ACCEL * vehicle.accel_m_s2, "equal",
                 "accel_m_s2, in all times and in how far a return runs on", "time"),
         Setting(known["vertical_accel"], vehicle.vertical_accel_m_s2, "equal", "vertical_accel_m_s2", "time"),
@@ -169,6 +176,12 @@ def _copter(
         why = f"lean_angle_deg: {_speed_m_s(mission, vehicle):.3g} m/s, and forecasts in wind"
         rows.append(Setting(known["lean"], vehicle.lean_angle_deg, "at least", why, "time"))
     return _finite(rows + _altitude(known, rtl_rel_home_m, returns))
+
+
+def _pace(mission: Mission, vehicle: Vehicle, *commands: int) -> Matters:
+    """Whether a parameter of these items decides the time; an ideal vehicle has none."""
+    flown = any(item.command in commands for item in mission.items) and math.isfinite(vehicle.accel_m_s2)
+    return "pace" if flown else "told"
 
 
 def _altitude(known: Mapping[str, Parameter], rtl_rel_home_m: float | None, returns: bool) -> list[Setting]:
@@ -241,7 +254,7 @@ def _px4(mission: Mission, vehicle: Vehicle, rtl_rel_home_m: float | None, ends:
     back: Matters = "return" if returns else "told"
     home = vehicle.return_speed_m_s or vehicle.speed_max_m_s
     plain = commands_speed(mission)
-    accel = vehicle.accel_m_s2
+    accel, lands = vehicle.accel_m_s2, _pace(mission, vehicle, LAND, RTL)
     rows = [
         Setting(known["speed_most"], _speed_m_s(mission, vehicle), "at least", "the mission's speed", "flight"),
         Setting(known["return_speed"], home, "equal", "the speed of the return, whatever the mission's is",
@@ -249,6 +262,10 @@ def _px4(mission: Mission, vehicle: Vehicle, rtl_rel_home_m: float | None, ends:
         Setting(known["climb"], vehicle.climb_m_s, "equal", "climb_m_s, in all times", "time"),
         Setting(known["descent"], vehicle.descent_m_s, "equal", "descent_m_s, in all times", "time"),
         Setting(known["land"], vehicle.land_m_s, "equal", "land_m_s, the landing's last metres", "time"),
+        Setting(known["land_high"], 10.0, "equal", "from where on a landing is slower", lands),
+        Setting(known["land_low"], 5.0, "equal", "from where on a landing is slow", lands),
+        Setting(known["takeoff"], 1.5, "equal", "the speed of a take-off's first metres",
+                _pace(mission, vehicle, TAKEOFF)),
         Setting(known["accel"], accel, "equal", "accel_m_s2, in all times and in how far a return runs on", "time"),
         Setting(known["jerk"], vehicle.leg_jerk_m_s3, "equal", "leg_jerk_m_s3, in all times", "time"),
         Setting(known["corner"], vehicle.corner_accel_m_s2 / accel if math.isfinite(accel) else math.inf, "equal",
@@ -325,9 +342,9 @@ def vehicle_on_board(vehicle: Vehicle, mission: Mission, values: Mapping[str, fl
 
     def read(key: str, own: float | None, per: float = 1.0) -> float | None:
         amount = _amount(known[key], values, autopilot) if key in known else None
-        if amount is None or not amount >= 0.0 or own is None or math.isinf(own):
+        if amount is None or own is None or math.isinf(own):
             return own
-        amount *= per
+        amount = per * max(amount, 0.0)
         return own if abs(amount - own) <= SAME * abs(own) else amount
 
     if autopilot is Autopilot.ARDUPLANE:
