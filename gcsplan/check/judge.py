@@ -25,7 +25,7 @@ from gcsplan.check.misses import nearest_misses
 from gcsplan.check.plane_legs import PlaneLegs, legs_in_plane, steep_report
 from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.check.tuning import DEFAULTS, Tuning
-from gcsplan.check.verdict import Finding, LegFigures, Verdict
+from gcsplan.check.verdict import PAPER_NOTE, Finding, LegFigures, Verdict
 from gcsplan.check.zone_heights import nearest_pass
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.firmware import STRAIGHT_NOTE, needs_straight
@@ -121,11 +121,11 @@ def judge(
             f"terrain-frame legs depend on the terrain data in the vehicle; judged as it reads this terrain, at posts "
             f"every {world.post_spacing_m} m, with {terrain_error_m:g} m of error"
         )
-    if vehicle.limits.max_agl_m is None:
-        flight.notes.append(NO_CEILING)
+    flight.notes += [PAPER_NOTE] if vehicle.energy.papers else []
+    flight.notes += [NO_CEILING] if vehicle.limits.max_agl_m is None else []
     verdict = Verdict(
         mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near, zone_pass=over,
-        energy_stated=vehicle.energy.stated,
+        energy_stated=vehicle.energy.stated, paper_energy=vehicle.energy.papers,
         extent=extent_of([*flight.stretches, *others], flown, mission.home, limits, home_error_m),
     )  # fmt: skip
     return _with_battery(verdict, vehicle, flight)
