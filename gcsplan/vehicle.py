@@ -88,7 +88,9 @@ class Energy:
     With ``battery_j`` None, the capacity is not judged. ``reserve`` is the part of the battery that must be left at the
     end. ``battery_v`` is its nominal voltage, which only tells energies in mAh. ``fitted_m_s``: slowest and fastest
     airspeed of the flights that the numbers are fitted to, None if that is not known. ``stated``: the numbers were
-    given; else they are the paper's, which say nothing about this aircraft, and no output tells an energy.
+    given; else they are the paper's, which say nothing about this aircraft, and no output tells an energy. ``papers``:
+    a battery or a hover was given and nothing of what flying takes, so the paper's numbers count, marked in every
+    output.
     """
 
     vertical_j_per_m: float = 120.0
@@ -100,6 +102,7 @@ class Energy:
     base_w: float = 0.0
     fitted_m_s: tuple[float, float] | None = None
     stated: bool = True
+    papers: bool = False
 
     def under_way_j(self, vertical_m: Amount, air_m: Amount, seconds: Amount) -> Amount:
         """Joules of moving for ``seconds``: ``vertical_m`` up and down, ``air_m`` horizontally through the air.

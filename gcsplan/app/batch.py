@@ -200,7 +200,8 @@ def _failed(name: str, asked: str, why: GcsplanError, read: Reading | None = Non
 
 COLUMNS = (
     "mission", "vehicle", "code", "verdict", "reason", "message", "length_m", "gap_percent", "energy_j",
-    "flight_energy_j", "battery_used_percent", "min_agl_m", "max_agl_m", "min_zone_clearance_m", "min_zone_height_m",
+    "flight_energy_j", "energy_figures", "battery_used_percent", "min_agl_m", "max_agl_m", "min_zone_clearance_m",
+    "min_zone_height_m",
     "max_climb_deg", "speed_m_s", "depart_s", "arrive_s", "items", "stopped_by", "safe", "return_safe",
 )  # fmt: skip
 """The columns of the table of results."""

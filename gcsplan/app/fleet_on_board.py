@@ -23,13 +23,18 @@ class FleetOnBoard:
         self._motions = {} if plan.fleet is None else {m.name: m for m in plan.fleet.motions}
         self._lock = threading.Lock()
 
+    @property
+    def keeps_apart(self) -> bool:
+        """Whether there are others to keep apart from, and the file asks for it."""
+        return self._plan.fleet is not None and self._plan.source.arrival is not None and len(self._motions) > 1
+
     def against(self, name: str, vehicle: Vehicle, verdict: Verdict) -> str:
         """Why the others do not keep apart from ``name``, flown as ``vehicle`` with ``verdict``; empty if they do.
 
         Nothing is asked of a fleet whose file says no ``arrival``, nor of a single vehicle.
         """
         plan = self._plan
-        if plan.fleet is None or plan.source.arrival is None or len(self._motions) < 2:
+        if not self.keeps_apart or plan.fleet is None or plan.source.arrival is None:
             return ""
         from gcsplan.app.fleet_planning import conflict_words, motion_of, rules_of
         from gcsplan.fleet.separation import separation

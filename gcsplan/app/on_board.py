@@ -18,6 +18,7 @@ from gcsplan.check.judge import judge
 from gcsplan.check.rtl.run_on import run_on_m, run_past_m
 from gcsplan.check.tuning import Tuning
 from gcsplan.check.verdict import Verdict
+from gcsplan.mavlink.mission.commands import RTL
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.parameter_list import (
     Off,
@@ -28,8 +29,9 @@ from gcsplan.mavlink.mission.parameter_list import (
     vehicle_on_board,
 )
 from gcsplan.mavlink.mission.parameter_names import OnBoard, unanswered
+from gcsplan.mavlink.mission.parameter_safety import needed_groups, safety_list
 from gcsplan.mavlink.mission.return_altitude import return_on_board_m
-from gcsplan.vehicle import Vehicle, fastest_at_m_s
+from gcsplan.vehicle import Autopilot, Vehicle, fastest_at_m_s
 
 if TYPE_CHECKING:
     from gcsplan.app.model import VehiclePlan
@@ -51,20 +53,31 @@ def settings_of(job: UploadJob) -> tuple[Setting, ...]:
         return ()
     home = job.way_home
     returns = job.home_required and (home is None or home.route != "mission")
-    return _listed(job.mission, job.vehicle, job.rtl_rel_home_m, home, returns=returns)
+    return _listed(job.mission, job.vehicle, job.rtl_rel_home_m, home, job.verdict, returns=returns)
 
 
 def settings_of_plan(v: VehiclePlan, home: WayHome | None) -> tuple[Setting, ...]:
     """The list of parameters that a planned mission was judged with; ``home``: its way home, if that was judged."""
     returns = home is not None and home.route != "mission"
-    return _listed(v.mission, v.request.vehicle, v.request.rtl_rel_home_m, home, returns=returns)
+    return _listed(v.mission, v.request.vehicle, v.request.rtl_rel_home_m, home, v.verdict, returns=returns)
 
 
 def _listed(
-    mission: Mission, vehicle: Vehicle, rtl_rel_home_m: float | None, home: WayHome | None, *, returns: bool
+    mission: Mission,
+    vehicle: Vehicle,
+    rtl_rel_home_m: float | None,
+    home: WayHome | None,
+    verdict: Verdict | None,
+    *,
+    returns: bool,
 ) -> tuple[Setting, ...]:
-    height_m = rtl_rel_home_m if home is None or home.route == "mission" else home.rtl_rel_home_m
-    return parameter_list(mission, vehicle, rtl_rel_home_m=height_m, returns=returns)
+    by_mission = home is not None and home.route == "mission"
+    height_m = rtl_rel_home_m if home is None or by_mission else home.rtl_rel_home_m
+    rows = parameter_list(mission, vehicle, rtl_rel_home_m=height_m, returns=returns)
+    if verdict is None or verdict.extent is None:
+        return rows
+    straight_m = height_m if returns or any(item.command == RTL for item in mission.items) else None
+    return rows + safety_list(vehicle.autopilot, verdict.extent, rtl_rel_home_m=straight_m, by_mission=by_mission)
 
 
 def judge_on_board(
@@ -94,7 +107,7 @@ def judge_on_board(
             if against is not None:
                 return against
         terrain = TERRAIN_DECIDES if not simulated and flies_terrain(read_back.wire_items()) else ()
-        if silent := _silent(settings, values, terrain):
+        if silent := _silent(settings, values, vehicle.autopilot, terrain):
             return silent
         if vehicle.lean_angle_deg is not None and (short := lean_shortage(values, planned_m_s)):
             return short
@@ -103,9 +116,12 @@ def judge_on_board(
         if flies_terrain(read_back.wire_items()) and (odd := odd_spacing(values)):
             return odd
         found = off(settings, values, vehicle.autopilot)
-        decide = ("flight", "return", "turns") if straight else ("flight", "return")
+        decide = {"flight", "return"} | ({"turns"} if straight else set())
+        if not allow_parameters or (job.fleet is not None and job.fleet.keeps_apart):
+            decide.add("pace")
         if unlike := [o for o in found if o.setting.matters in decide]:
-            return _lines("this is not what was judged, and cannot be judged", unlike)
+            allowed = "; --allow-parameters takes that" if {o.setting.matters for o in unlike} == {"pace"} else ""
+            return _lines(f"this is not what was judged, and cannot be judged{allowed}", unlike)
         # Home on board is where the vehicle is now, but the altitudes count from the planned start.
         flown, tuning = replace(read_back, home=job.mission.home), Tuning.of(values)
         flies = vehicle if simulated else vehicle_on_board(vehicle, flown, values)
@@ -128,7 +144,9 @@ def judge_on_board(
     return again
 
 
-def _silent(settings: Sequence[Setting], values: Mapping[str, float], others: tuple[tuple[str, ...], ...] = ()) -> str:
+def _silent(
+    settings: Sequence[Setting], values: Mapping[str, float], autopilot: Autopilot, others: tuple[tuple[str, ...], ...]
+) -> str:
     """Which parameters that the proof hangs on, or ``others``, gave no answer, in words; empty if all did.
 
     A peer that does not say what autopilot it is has no known parameters, and values that no vehicle was asked for say
@@ -136,7 +154,7 @@ def _silent(settings: Sequence[Setting], values: Mapping[str, float], others: tu
     """
     if not isinstance(values, OnBoard) or values.generic:
         return ""
-    silent = unanswered(values, [*(s.parameter.group() for s in settings if s.needed), *others])
+    silent = unanswered(values, [*needed_groups(settings, autopilot, values), *others])
     if not silent:
         return ""
     names = ", ".join(" or ".join(group) for group in silent)

@@ -109,7 +109,7 @@ def plan(
         notes.append("the file asks for no `arrival`: the separation between vehicles is not judged")
     notes += fleet.notes
     if goal == "energy" and any(not v.verdict.energy_stated for v in flown):
-        flown = tuple(replace(v, verdict=replace(v.verdict, energy_stated=True)) for v in flown)
+        flown = tuple(replace(v, verdict=replace(v.verdict, energy_stated=True, paper_energy=True)) for v in flown)
         notes.append("the energy that is minimised is the paper's: a vehicle has no `energy:`")
     return Plan(
         source, brief.world, name, goal, brief.seed, flown, tuple(notes), fleet, tuple(leaving.found), leave_out

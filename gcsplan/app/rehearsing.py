@@ -22,10 +22,11 @@ from typing import TYPE_CHECKING, Any
 
 from gcsplan.app.executor import Executor, Inline, executor
 from gcsplan.app.model import Plan, VehiclePlan
+from gcsplan.app.on_board import settings_of_plan
 from gcsplan.app.sites import Site, site_of
 from gcsplan.errors import UsageError
 from gcsplan.mavlink.mission.parameter_file import read_param_file
-from gcsplan.mavlink.mission.parameter_list import vehicle_on_board
+from gcsplan.mavlink.mission.parameter_list import off, vehicle_on_board
 from gcsplan.mavlink.mission.return_altitude import return_on_board_m
 from gcsplan.sim.outcome import Rehearsal, Tally, Terms
 from gcsplan.sim.part import Part
@@ -117,7 +118,18 @@ def rehearse(
             tallies[number] = tally
             if progress is not None:
                 progress(sum(blocks[k][1] for k in tallies), runs)
-    return concluded(flights, runs, [tallies[k] for k in range(len(blocks))])
+    return _outside(planned, parameters, concluded(flights, runs, [tallies[k] for k in range(len(blocks))]))
+
+
+def _outside(planned: Plan, parameters: Mapping[str, Mapping[str, float]], result: Rehearsal) -> Rehearsal:
+    """``result``, where parameters that no simulated flight shows, or that end it, are parts not flown."""
+    vehicles, notes = [], list(result.notes)
+    for v, flown in zip(planned.vehicles, result.vehicles, strict=True):
+        found = off(settings_of_plan(v, None), parameters.get(v.name, {}), v.mission.autopilot)
+        notes += [f"{v.name}: {o.describe()}" for o in found if o.setting.matters in ("time", "told")]
+        words = tuple(o.describe() for o in found if o.setting.matters not in ("time", "told"))
+        vehicles.append(replace(flown, not_flown=(*flown.not_flown, *words)) if words else flown)
+    return replace(result, vehicles=tuple(vehicles), notes=tuple(notes))
 
 
 def _set_up(part: Part, values: Mapping[str, float]) -> Part:
@@ -131,7 +143,7 @@ def _set_up(part: Part, values: Mapping[str, float]) -> Part:
     )  # fmt: skip
 
 
-def parameters_of(words: Sequence[str], planned: Plan) -> dict[str, dict[str, float]]:
+def parameters_of(words: Sequence[str], planned: Plan) -> dict[str, Mapping[str, float]]:
     """Parameters by vehicle from the ``--params`` words: a file or a vehicle's URL, for all, or NAME= it for one.
 
     From a URL each vehicle is read by its system id. Raises InputError, UsageError, LinkError.
@@ -140,7 +152,7 @@ def parameters_of(words: Sequence[str], planned: Plan) -> dict[str, dict[str, fl
     from gcsplan.mavlink.link.session import read_vehicle
 
     sysids = {v.name: v.request.vehicle.sysid for v in planned.vehicles}
-    found: dict[str, dict[str, float]] = {}
+    found: dict[str, Mapping[str, float]] = {}
     for word in words:
         name, equals, where = word.partition("=")
         if equals and name not in sysids:
@@ -150,7 +162,7 @@ def parameters_of(words: Sequence[str], planned: Plan) -> dict[str, dict[str, fl
         for one in [name] if equals else sysids:
             if re.match(r"(udp|tcp|/dev/|COM\d)", source) and not Path(source).is_file():
                 with open_link(source) as link:
-                    found[one] = dict(read_vehicle(link, sysids[one])[2])
+                    found[one] = read_vehicle(link, sysids[one])[2]
             else:
                 found[one] = read_param_file(Path(source))
     return found

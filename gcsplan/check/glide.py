@@ -7,16 +7,21 @@ that of a climb-out (`climb_out`).
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 
 from gcsplan.check.aboard import Aboard
-from gcsplan.check.geodesy import flat_m
+from gcsplan.check.geodesy import flat_m, offset_m
 from gcsplan.check.stretch import Place
 from gcsplan.check.turn_words import glides_to
 from gcsplan.mavlink.mission.mission import MissionItem
 
 FLARE_S, FLARE_MOST_M, LAND_SINK_M_S = 2.0, 6.0, 0.25
 """Defaults of LAND_FLARE_SEC, of twice LAND_FLARE_ALT, and of TECS_LAND_SINK."""
+
+BEFORE_M, STEP_M = 200.0, 10.0
+DOWNHILL, DOWNHILL_M = 0.02, 2.0
+"""How far before its place the ground of a landing is looked at, and from which slope and height on it is told."""
 
 
 def glide(pilot: Aboard, seq: int, item: MissionItem) -> None:
@@ -38,10 +43,40 @@ def glide(pilot: Aboard, seq: int, item: MissionItem) -> None:
         f"item {seq}: the landing is judged as a straight glide from the way point before it, and as ArduPlane's "
         f"defaults (LAND_FLARE_SEC, LAND_FLARE_ALT) flare it"
     )
+    if words := _downhill(pilot, seq, end):
+        pilot.note(words)
     pilot.add(seq, "land", pilot.at, end, column=True)
     for a, b in pairwise(flared(pilot.at, end, flat_m(pilot.at, end), pilot.pace.speed_m_s)):
         pilot.instead(seq, "land", a, b, column=True)
     pilot.at = end
+
+
+def _downhill(pilot: Aboard, seq: int, end: Place) -> str:
+    """That a landing leads down a slope, where the aircraft meets the ground before its place; empty if not."""
+    top, run_m = pilot.at, flat_m(pilot.at, end)
+    if run_m < STEP_M:
+        return ""
+    steepest, early_m = (0.0, 0.0), 0.0
+    for k in range(1, int(min(BEFORE_M, run_m) / STEP_M) + 1):
+        away_m = k * STEP_M
+        part = away_m / run_m
+        lat, lon = (end[i] + part * (top[i] - end[i]) for i in (0, 1))
+        higher_m = pilot.ground(lat, lon) - end[2]
+        if higher_m >= max(DOWNHILL * away_m, DOWNHILL_M) and higher_m / away_m > steepest[0]:
+            steepest = higher_m / away_m, away_m
+        if part * (top[2] - end[2]) - pilot.vehicle.limits.altitude_error_m <= higher_m:
+            early_m = away_m
+    slope, away_m = steepest
+    if slope == 0.0:
+        return ""
+    east_m, north_m = offset_m(top, end)
+    uphill_deg = (math.degrees(math.atan2(east_m, north_m)) + 180.0) % 360.0
+    return (
+        f"item {seq}: it lands downhill: {away_m:.0f} m before its place the ground is {slope * away_m:.0f} m higher "
+        f"({100.0 * slope:.0f} %): within the altitude error it touches down up to {early_m:.0f} m before its "
+        f"place, and elsewhere with a wind along the runway: land on a heading of {uphill_deg:.0f}°, uphill, or "
+        f"give another goal"
+    )
 
 
 def flared(top: Place, ground: Place, run_m: float, speed_m_s: float) -> list[Place]:

@@ -18,13 +18,14 @@ from gcsplan.check.climb_out import slant_findings
 from gcsplan.check.clock import seconds_of
 from gcsplan.check.corners import round_corners
 from gcsplan.check.enough import enough
+from gcsplan.check.extent import extent_of
 from gcsplan.check.flight import follow
 from gcsplan.check.home_height import why_unknown, with_error_of_home
 from gcsplan.check.misses import nearest_misses
 from gcsplan.check.plane_legs import PlaneLegs, legs_in_plane, steep_report
 from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.check.tuning import DEFAULTS, Tuning
-from gcsplan.check.verdict import Finding, LegFigures, Verdict
+from gcsplan.check.verdict import PAPER_NOTE, Finding, LegFigures, Verdict
 from gcsplan.check.zone_heights import nearest_pass
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.firmware import STRAIGHT_NOTE, needs_straight
@@ -70,7 +71,8 @@ def judge(
     flight = follow(stored, vehicle, world.ground_amsl, world.read_amsl, rtl_rel_home_m=rtl_rel_home_m)
     if (unsure := why_unknown(mission.home, vehicle, world)) is not None:
         return Verdict(mission, (), (), (unsure, *flight.not_judged), tuple(flight.notes))
-    vehicle = with_error_of_home(vehicle, mission.home, world)
+    limits, vehicle = vehicle.limits, with_error_of_home(vehicle, mission.home, world)
+    home_error_m = vehicle.limits.altitude_error_m - limits.altitude_error_m
     findings: list[Finding] = []
     count = len(mission.wire_items())
     if table.max_items is not None and count > table.max_items:
@@ -104,8 +106,10 @@ def judge(
     findings += _findings(flight.stretches, plane, report, vehicle.limits, world)
     over = nearest_pass(flight.stretches, plane.legs, plane.owner, vehicle.limits, world)
     near = nearest_misses(flight.stretches, plane.legs, plane.owner, report, vehicle, world) if misses else ()
+    flown = [plane.legs]
     if others := flight.others:  # they must be legal too; the figures stay those of the mission
         plane = legs_in_plane(others, vehicle.limits, world, terrain_error_m)
+        flown.append(plane.legs)
         findings += _unread(others, plane)
         report = steep_report(plane, world.airspace.examine(plane.legs, vehicle.limits), vehicle.limits)
         findings = _worst(findings, _findings(others, plane, report, vehicle.limits, world))
@@ -117,11 +121,12 @@ def judge(
             f"terrain-frame legs depend on the terrain data in the vehicle; judged as it reads this terrain, at posts "
             f"every {world.post_spacing_m} m, with {terrain_error_m:g} m of error"
         )
-    if vehicle.limits.max_agl_m is None:
-        flight.notes.append(NO_CEILING)
+    flight.notes += [PAPER_NOTE] if vehicle.energy.papers else []
+    flight.notes += [NO_CEILING] if vehicle.limits.max_agl_m is None else []
     verdict = Verdict(
         mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near, zone_pass=over,
-        energy_stated=vehicle.energy.stated,
+        energy_stated=vehicle.energy.stated, paper_energy=vehicle.energy.papers,
+        extent=extent_of([*flight.stretches, *others], flown, mission.home, limits, home_error_m),
     )  # fmt: skip
     return _with_battery(verdict, vehicle, flight)
 

@@ -12,10 +12,18 @@ from gcsplan.check.misses import Miss
 from gcsplan.check.stretch import Place, StretchKind
 from gcsplan.check.zone_heights import ZonePass
 from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mavlink.mission.parameter_safety import Extent
 from gcsplan.units import UnitText, joined
 
 if TYPE_CHECKING:
     from gcsplan.fleet.arrival import Slot
+
+
+PAPER_MARK = " (paper's figures)"
+PAPER_NOTE = (
+    "energy and battery count the paper's 120 J for a metre up or down and 100 J for one along, which say nothing "
+    "about this aircraft: give what flying takes under energy: (cruise_w, endurance_min, or what fit-energy finds)"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +139,8 @@ class Verdict:
     ``misses``: how near it comes to each limit, on request. ``until_reserve_s``: if the mission ends in a hold or a
     round without end, seconds until the battery is down to its reserve. ``zone_pass``: the nearest zone that is passed
     over or under. ``energy_stated``: the vehicle's energy was given; else energies say nothing and are not told.
+    ``paper_energy``: energies count the paper's numbers, for the vehicle's own were not given. ``extent``: how far all
+    that is flown comes from home, errors counted; None where nothing was judged.
     """
 
     mission: Mission
@@ -143,10 +153,22 @@ class Verdict:
     until_reserve_s: float | None = None
     zone_pass: ZonePass | None = None
     energy_stated: bool = True
+    paper_energy: bool = False
+    extent: Extent | None = None
 
     def told_j(self, joules: float) -> float | None:
         """An energy of this flight for people and files: None unless the vehicle's energy was given."""
         return joules if self.energy_stated else None
+
+    @property
+    def energy_figures(self) -> str | None:
+        """Whose numbers the energies count: ``own`` or ``paper``; None if no energy is told."""
+        return ("paper" if self.paper_energy else "own") if self.energy_stated else None
+
+    @property
+    def energy_mark(self) -> str:
+        """What stands behind an energy or a part of the battery for people."""
+        return PAPER_MARK if self.paper_energy else ""
 
     @property
     def safe(self) -> bool | None:

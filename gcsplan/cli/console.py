@@ -181,17 +181,17 @@ def _plan_row(
     held = f" + {duration(slot.hold_s)} at the gate" if slot and slot.hold_s > 0 else ""
     lowest, highest, nearest, passed = verdict.lowest, verdict.highest, verdict.nearest, verdict.zone_pass
     joules = verdict.told_j(verdict.energy_j)
-    limits = v.request.vehicle.limits
+    limits, mark = v.request.vehicle.limits, verdict.energy_mark
     climb = f" of {limits.max_climb_deg:g}" if limits.max_climb_deg < 90 else ""
     return {
         "vehicle": v.name,
         "items": str(len(v.mission.wire_items())),
         f"length, {units.path.symbol}": number(verdict.length_m, 0, units.path),
         "above the bound, %": number(v.gap_percent, 2),
-        "energy, kJ": number(joules, 0, KILOJOULE),
-        "energy, Wh": number(joules, 0, WATT_HOUR),
-        "energy, mAh": number(joules, 0, charge(energy.battery_v)) if energy.battery_v else "–",
-        "battery, %": number(verdict.battery_used_percent),
+        "energy, kJ": number(joules, 0, KILOJOULE) + mark,
+        "energy, Wh": number(joules, 0, WATT_HOUR) + mark,
+        "energy, mAh": number(joules, 0, charge(energy.battery_v)) + mark if energy.battery_v else "–",
+        "battery, %": number(verdict.battery_used_percent) + (mark if verdict.battery_used_percent is not None else ""),
         f"lowest AGL, {units.height.symbol}": (
             f"{least(lowest.min_agl_m, 1, units.height)} of {units.height.stated(limits.min_agl_m)}" if lowest else "–"
         ),

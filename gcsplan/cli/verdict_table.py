@@ -68,7 +68,7 @@ def verdict_table(
         joules = verdict.told_j(verdict.energy_j)
         words = "" if joules is None else f", {energy_words(joules, None if energy is None else energy.battery_v)}"
         length = f"{number(verdict.length_m, 0, units.path)} {units.path.symbol}"
-        say(f"path {length}; whole flight {duration(verdict.time_s)}{words}{used}")
+        say(f"path {length}; whole flight {duration(verdict.time_s)}{words}{used}{verdict.energy_mark}")
         say_heights(verdict, units)
     say_notes(verdict.notes)
 

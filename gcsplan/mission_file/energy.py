@@ -15,7 +15,7 @@ WAYS = (("base_w", "horizontal_j_per_m"), ("cruise_w",), ("endurance_s",))
 def make_energy(keys: VehicleKeys, where: str, problems: list[Problem], notes: list[str]) -> Energy:
     """The energy model of a vehicle; ``problems`` if its keys contradict each other.
 
-    Without any key under ``energy:`` it is the paper's, marked as not stated.
+    Without any key under ``energy:`` it is the paper's, marked as not stated; with a battery alone, as the paper's.
     """
     given = keys.energy
     used = [[key for key in way if key in given.model_fields_set and getattr(given, key) is not None] for way in WAYS]
@@ -40,6 +40,7 @@ def make_energy(keys: VehicleKeys, where: str, problems: list[Problem], notes: l
         words = f"the slowest speed must not be above the fastest, given [{speeds[0]:g}, {speeds[1]:g}]"
         problems.append(Problem(f"{where}.energy.fitted_speed_m_s", words))
     base_w, along = given.base_w, given.horizontal_j_per_m
+    papers = bool(given.model_fields_set) and not said and "vertical_j_per_m" not in given.model_fields_set
     if (cruise_w := _cruise_w(given)) is not None:
         base_w, along = cruise_w, 0.0
         key = "cruise_w" if given.cruise_w is not None else "endurance_s"
@@ -47,11 +48,25 @@ def make_energy(keys: VehicleKeys, where: str, problems: list[Problem], notes: l
             f"{keys.name}: {key} {getattr(given, key):g} is read as base_w {base_w:.4g}, the power for as long as it "
             f"flies, and horizontal_j_per_m 0" + _paper(given)
         )
+    elif given.model_fields_set and not papers and (unsaid := _unsaid(given)):
+        words = " and ".join(f"{key} {getattr(given, key):g}" for key in unsaid)
+        notes.append(f"{keys.name}: {words} are the paper's, not this aircraft's, for `energy:` says nothing of them")
+    if given.hover_w and given.hover_w < base_w:
+        notes.append(
+            f"{keys.name}: hover_w {given.hover_w:g} is less than base_w {base_w:.4g}, the power of flying at any "
+            f"speed: a hold counts {base_w:.4g} W"
+        )
     return Energy(
         vertical_j_per_m=given.vertical_j_per_m, horizontal_j_per_m=along, hover_w=given.hover_w,
         battery_j=given.battery_j, reserve=given.reserve, battery_v=given.battery_v, base_w=base_w,
         fitted_m_s=None if speeds is None else (speeds[0], speeds[1]), stated=bool(given.model_fields_set),
+        papers=papers,
     )  # fmt: skip
+
+
+def _unsaid(given: EnergyKeys) -> list[str]:
+    """What counts as in the paper, because it is not given."""
+    return [key for key in ("vertical_j_per_m", "horizontal_j_per_m") if key not in given.model_fields_set]
 
 
 def _cruise_w(given: EnergyKeys) -> float | None:

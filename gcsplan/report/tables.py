@@ -49,7 +49,7 @@ def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
                 greatest(high.max_agl_m if high else None, 1, units.height),
                 f"{least(near.zone_clearance_m, 1, units.distance)} {esc(near.nearest_zone)}" if near else "–",
                 steepest(verdict.max_climb_deg),
-                energy(verdict.told_j(verdict.energy_j), 0, s.vehicle.energy.battery_v),
+                energy(verdict.told_j(verdict.energy_j), 0, s.vehicle.energy.battery_v) + esc(verdict.energy_mark),
                 num(verdict.battery_used_percent, 1, "%"),
                 duration(s.arrive_s, page.time_decimals), home,
             )
@@ -156,8 +156,8 @@ def _limits(subject: Subject, line: Line | None, units: Units) -> list[Row]:
     if battery.battery_j and verdict.battery_used_percent is not None:
         may = 100.0 * (1.0 - battery.reserve)
         rows.append(("battery", f"{num(may, 1)} ({num(100 * battery.reserve, 0)} kept)",
-                     num(verdict.battery_used_percent, 1, "%"), may - verdict.battery_used_percent, "%", "whole flight",
-                     5.0))  # fmt: skip
+                     num(verdict.battery_used_percent, 1, "%") + esc(verdict.energy_mark),
+                     may - verdict.battery_used_percent, "%", "whole flight", 5.0))  # fmt: skip
     items, most = len(verdict.mission.wire_items()), profile_of(verdict.mission.autopilot).max_items
     if most is not None:
         rows.append(
@@ -240,7 +240,7 @@ def parameters_table(subject: Subject) -> str:
         (
             "<br>".join(esc(n.name) for n in s.parameter.names),
             "<br>".join(f"{n.value(s.value):.6g}" for n in s.parameter.names),
-            "" if s.rule == "equal" else esc(s.rule), esc(s.why),
+            esc(s.rule_words()), esc(s.why),
         )
         for s in subject.settings
     ]  # fmt: skip

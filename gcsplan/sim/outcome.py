@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from gcsplan.check.verdict import PAPER_MARK
 from gcsplan.errors import CheckFailed
 from gcsplan.figures import floored
 from gcsplan.sim.part import Part, lateness
@@ -66,6 +67,7 @@ class Performance:
     min_agl_at: tuple[float, float]
     battery_used_percent: float | None
     not_flown: tuple[str, ...] = ()
+    paper_energy: bool = False
 
     @property
     def errors_s(self) -> tuple[float, ...]:
@@ -89,7 +91,9 @@ class Performance:
             "p95_error_s": _number(self.p95_s), "worst_error_s": _number(worst),
             "end_s": _number(_median(self.end_s)), "min_agl_m": _number(self.min_agl_m),
             "min_agl_at": {"lat": _number(self.min_agl_at[0]), "lon": _number(self.min_agl_at[1])},
-            "battery_used_percent": self.battery_used_percent, "not_flown": list(self.not_flown),
+            "battery_used_percent": self.battery_used_percent,
+            "energy_figures": None if self.battery_used_percent is None else "paper" if self.paper_energy else "own",
+            "not_flown": list(self.not_flown),
         }  # fmt: skip
 
 
@@ -191,7 +195,8 @@ def _row(v: Performance, runs: int, units: Units = METRIC, decimals: int = 0) ->
     height = units.height
     lowest = floored(height.of(v.min_agl_m), height.decimals(1))
     row[f"lowest AGL, {height.symbol}"] = "–" if math.isnan(v.min_agl_m) else f"{lowest:.{height.decimals(1)}f}"
-    row["battery, %"] = "–" if v.battery_used_percent is None else f"{v.battery_used_percent:.0f}"
+    mark = PAPER_MARK if v.paper_energy else ""
+    row["battery, %"] = "–" if v.battery_used_percent is None else f"{v.battery_used_percent:.0f}{mark}"
     return row
 
 
@@ -305,7 +310,8 @@ class Tally:
     def _battery(self, part: Part, spent_j: float) -> None:
         used, reserve = self._used_percent(part, spent_j), part.vehicle.energy.reserve
         if used is not None and used > 100.0 * (1.0 - reserve) + 1e-9:
-            said = f"{part.vehicle.name} used {used:.0f} % of its battery, of which {100 * reserve:g} % must stay"
+            mark = PAPER_MARK if part.vehicle.energy.papers else ""
+            said = f"{part.vehicle.name} used {used:.0f} % of its battery{mark}, of which {100 * reserve:g} % must stay"
             self.breach("battery", (part.vehicle.name,), said, used - 100.0 * (1.0 - reserve))
 
     def _order(self, traces: Sequence[Trace]) -> None:
@@ -345,7 +351,7 @@ class Tally:
                 Performance(
                     part.vehicle.name, part.depart_s, part.arrive_s, tuple(self._arrive[i]), tuple(self._end[i]),
                     math.nan if low is None else low.min_agl_m, (math.nan, math.nan) if low is None else low.min_agl_at,
-                    self._used_percent(part, self.most_j[i]), not_flown[i],
+                    self._used_percent(part, self.most_j[i]), not_flown[i], part.vehicle.energy.papers,
                 )
             )  # fmt: skip
         breaches = sorted(self._breaches.values(), key=lambda b: (-b.runs, b.kind, b.vehicles))

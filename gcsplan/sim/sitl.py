@@ -31,7 +31,9 @@ from gcsplan.mavlink.link.steps import discover_steps, parameter_steps
 from gcsplan.mavlink.link.url import parse_url
 from gcsplan.mavlink.link.watch import VehicleState, Watch
 from gcsplan.mavlink.mission import commands as cmd
+from gcsplan.mavlink.mission.fences import FENCE_DECIDES
 from gcsplan.mavlink.mission.parameter_list import parameter_list
+from gcsplan.mavlink.mission.parameter_safety import safety_list
 from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.sim.outcome import Rehearsal, Tally, Terms
 from gcsplan.sim.part import Part, energy_of
@@ -200,7 +202,11 @@ def _ready(
         if clock() > end:
             raise VehicleRefused(f"{name}: it has no position after {_READY_S:g} s", where=channel.link.url)
     settings = parameter_list(part.mission, part.vehicle, rtl_rel_home_m=part.rtl_rel_home_m)
-    groups = (("SIM_SPEEDUP",), *(s.parameter.group() for s in settings))
+    decide: tuple[tuple[str, ...], ...] = ()
+    if part.verdict.extent is not None:
+        settings += safety_list(part.vehicle.autopilot, part.verdict.extent)
+        decide = FENCE_DECIDES[part.vehicle.autopilot]
+    groups = (("SIM_SPEEDUP",), *dict.fromkeys((*(s.parameter.group() for s in settings), *decide)))
     values = yield from parameter_steps(channel, state, groups, watch)
     if "SIM_SPEEDUP" not in values and not i_know:
         raise VehicleRefused(

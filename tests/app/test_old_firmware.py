@@ -18,13 +18,15 @@ from tests.support.impatient import be_impatient
 
 OLD_COPTER = """
     WPNAV_SPEED WPNAV_SPEED_UP WPNAV_SPEED_DN WPNAV_ACCEL WPNAV_ACCEL_Z WPNAV_JERK WPNAV_RADIUS ANGLE_MAX LAND_SPEED
+    LAND_SPEED_HIGH LAND_ALT_LOW
     RTL_SPEED RTL_ALT RTL_ALT_TYPE RTL_ALT_FINAL RTL_CLIMB_MIN RTL_CONE_SLOPE RTL_LOIT_TIME
     TERRAIN_ENABLE TERRAIN_SPACING TERRAIN_OFS_MAX
 """
 PLANE = "WP_RADIUS WP_LOITER_RAD RTL_RADIUS NAVL1_PERIOD NAVL1_DAMPING TECS_CLMB_MAX TECS_SINK_MAX TECS_PITCH_MAX "
 MULTICOPTER = """
     MPC_XY_VEL_MAX MPC_XY_CRUISE MPC_Z_V_AUTO_UP MPC_Z_V_AUTO_DN MPC_LAND_SPEED MPC_ACC_HOR MPC_JERK_AUTO MPC_XY_TRAJ_P
-    NAV_ACC_RAD NAV_MC_ALT_RAD RTL_RETURN_ALT RTL_TYPE RTL_CONE_ANG RTL_LAND_DELAY
+    MPC_LAND_ALT1 MPC_LAND_ALT2 MPC_TKO_SPEED NAV_ACC_RAD NAV_MC_ALT_RAD RTL_RETURN_ALT
+    RTL_TYPE RTL_CONE_ANG RTL_LAND_DELAY
 """
 RENAMED = {
     "AIRSPEED_CRUISE": ("TRIM_ARSPD_CM", 100.0), "AIRSPEED_MAX": ("ARSPD_FBW_MAX", 1.0),
@@ -91,6 +93,6 @@ def test_an_ordinary_vehicle_of_each_version_is_accepted(
 
 def test_what_the_firmware_has_and_does_not_answer_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     vehicle = board_of(monkeypatch, Autopilot.ARDUCOPTER, (4, 4), mute="WPNAV_ACCEL_C")
-    result = sent(planned(keys()), vehicle, timeout_s=1.0)
+    result = sent(planned(keys()), vehicle, timeout_s=0.6)
     assert (result.outcome, result.reason) == ("refused", "parameters")
     assert "WPNAV_ACCEL_C or WP_ACC_CNR could not be read" in result.message

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from html import unescape
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,9 +14,11 @@ from gcsplan.app.batch import COLUMNS, Batch, BatchOptions
 from gcsplan.app.executor import Inline
 from gcsplan.app.outputs import outputs_of, report_of, summary_of
 from gcsplan.app.pipeline import plan
+from gcsplan.app.rehearsing import rehearse
 from gcsplan.app.way_home import homes_of
 from gcsplan.check.rtl.words import verdict_words
 from gcsplan.cli.console import plan_table
+from gcsplan.cli.verdict_table import verdict_table
 from gcsplan.export.table import csv_text
 from gcsplan.mission_file import load_mission
 from gcsplan.report.index_page import render_index
@@ -84,6 +87,28 @@ def test_without_an_energy_key_no_output_tells_an_energy(capsys: pytest.CaptureF
         last = outputs_of(done)["profile.csv"].splitlines()[-1].split(",")
         assert (last[10] != "", last[11] != "") == (told, told)
         assert ("<dt>energy</dt><dd>–" in report_of(done)) is not told
+
+
+def test_a_battery_without_energy_is_judged_by_the_papers_numbers_and_says_so(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    done = plan(load_mission(mission({"battery_wh": 900})))
+    [v] = done.vehicles
+    mark = "(paper's figures)"
+    assert any("which say nothing about this aircraft" in note for note in v.verdict.notes)
+    plan_table(done, {})
+    assert capsys.readouterr().out.count(mark) >= 2
+    verdict_table("uav1", v.verdict, energy=v.request.vehicle.energy)
+    assert mark in capsys.readouterr().out
+    [vehicle] = summary_of(done)["vehicles"]
+    assert (vehicle["energy_figures"], vehicle["battery_used_percent"] > 0.0) == ("paper", True)
+    page = unescape(report_of(done))
+    assert page.count(mark) >= 3  # figures, what is left, the briefing
+    [flown] = rehearse(done).vehicles
+    assert flown.as_dict()["energy_figures"] == "paper"
+    own = plan(load_mission(mission(ENERGY)))
+    assert summary_of(own)["vehicles"][0]["energy_figures"] == "own"
+    assert mark not in unescape(report_of(own))
 
 
 def test_the_papers_energy_is_told_where_it_is_what_is_minimised() -> None:

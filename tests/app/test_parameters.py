@@ -98,7 +98,7 @@ def test_what_was_not_answered_is_no_default(
 ) -> None:
     done = planned(keys(rtl_rel_home_m=60, **vehicle), way_home=way_home, no_fly=ZONE)
     autopilot = vehicle.get("autopilot", "arducopter")
-    never = sent(done, board(autopilot, Misbehaviour(mute=name), **parameters), timeout_s=1.5)
+    never = sent(done, board(autopilot, Misbehaviour(mute=name), **parameters), timeout_s=0.6)
     assert (never.outcome, never.code, never.reason) == ("refused", 5, "parameters")
     assert f"{name} " in never.message
     assert "could not be read from the vehicle" in never.message
@@ -121,7 +121,7 @@ def test_verify_does_not_take_silence_for_a_default(tmp_path: Any) -> None:
     vehicle.load(done.vehicles[0].mission.wire_items())
     with SimServer([vehicle], "udpin:127.0.0.1:0") as server:
         source = load_mission(tmp_path / "m.yaml")
-        found = verify_file(str(tmp_path / "uav1.plan"), server.url_for_gcs, source=source, timeout_s=1.5)
+        found = verify_file(str(tmp_path / "uav1.plan"), server.url_for_gcs, source=source, timeout_s=0.6)
     assert found.code == 4
     assert "WPNAV_RADIUS or WP_RADIUS_M could not be read" in found.message
 
@@ -155,6 +155,39 @@ def test_a_flight_that_takes_another_time_is_refused_or_allowed(
     assert "the flight takes" in refused.message
     allowed = sent(done, board(autopilot, **(own | parameters)), allow_parameters=True)
     assert allowed.verified
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "parameters", "words"),
+    [
+        ({}, {"LAND_SPEED_HIGH": 50}, "LAND_SPEED_HIGH is 50 on board, and 0 or 150 is assumed"),
+        ({}, {"LAND_ALT_LOW": 5000}, "LAND_ALT_LOW is 5000 on board, and 1000 is assumed"),
+        ({"autopilot": "px4"}, {"MPC_TKO_SPEED": 5}, "MPC_TKO_SPEED is 5 on board, and 1.5 is assumed"),
+        ({"autopilot": "px4"}, {"MPC_LAND_ALT2": 40}, "MPC_LAND_ALT2 is 40 on board"),
+    ],
+)
+def test_a_pace_that_cannot_be_counted_is_refused_or_allowed(
+    vehicle: dict[str, Any], parameters: Mapping[str, float], words: str
+) -> None:
+    done, autopilot = planned(keys(**vehicle)), vehicle.get("autopilot", "arducopter")
+    refused = sent(done, board(autopilot, **parameters))
+    assert (refused.outcome, refused.reason) == ("refused", "parameters")
+    assert words in refused.message
+    assert "--allow-parameters" in refused.message
+    allowed = sent(done, board(autopilot, **parameters), allow_parameters=True)
+    assert allowed.verified
+    assert any(words in line for line in allowed.warnings)
+
+
+@pytest.mark.parametrize("parameters", [{"WPNAV_SPEED_UP": -250}, {"WPNAV_ACCEL": 0}])
+def test_a_number_that_no_vehicle_flies_is_not_passed_over(parameters: Mapping[str, float]) -> None:
+    refused = sent(planned(), board(**parameters))
+    assert (refused.outcome, refused.reason) == ("refused", "parameters")
+
+
+def test_a_px4_that_does_not_land_after_its_return_is_told() -> None:
+    result = sent(planned(keys(autopilot="px4", **RTL)), board("px4", RTL_RETURN_ALT=60, RTL_LAND_DELAY=-1))
+    assert any("RTL_LAND_DELAY is -1 on board: a return ends in a hover" in line for line in result.warnings)
 
 
 def test_a_speed_that_an_interrupted_mission_goes_on_at_is_told() -> None:

@@ -53,6 +53,8 @@ def test_posts_of_which_nothing_is_known_are_not_the_default_ones() -> None:
     assert again is not None
     read = {n.name: n.value(s.value) for s in settings for n in s.parameter.names[:1]} | {
         "TERRAIN_ENABLE": 1.0,
+        "FENCE_ENABLE": 0.0,
+        "FENCE_AUTOENABLE": 0.0,
         OFF: 0.0,
     }
     for silent in ("TERRAIN_SPACING", "TERRAIN_OFS_MAX"):

@@ -789,7 +789,7 @@ def test_the_example_plans_to_a_safe_mission_near_its_bound(circling: Plan) -> N
     assert v.gap_percent < 1.0
     assert v.mission.items[0].command == cmd.TAKEOFF
     assert v.mission.items[-1].command == cmd.LOITER_UNLIM
-    assert any("launch it on a heading of" in n for n in v.notes)
+    assert any("launch it on a heading of" in n and "it climbs straight ahead for" in n for n in v.notes)
     assert not any("QuadPlane" in n for n in v.notes)
 
 

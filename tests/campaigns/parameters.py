@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
+import numpy as np
 import yaml
 
 from gcsplan.app import way_home as returns
@@ -31,14 +32,19 @@ from gcsplan.app.rehearsing import parts_of
 from gcsplan.app.upload_job import UploadJob
 from gcsplan.app.uploads import jobs_of
 from gcsplan.check.rtl.run_on import run_on_m
+from gcsplan.mavlink.mission import commands as cmd
+from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.parameter_names import OnBoard
 from gcsplan.mission_file import load_mission
 from gcsplan.sim.firmware import firmware_of
 from gcsplan.sim.kinematics import Kinematics
 from gcsplan.sim.mission_flight import fly
 from gcsplan.sim.parameters import Parameters
+from gcsplan.sim.part import Part
+from gcsplan.sim.trace import Trace
 from gcsplan.sim.track import make_track
 from gcsplan.vehicle import Autopilot, Vehicle
+from tests.oracles.px4_smoothing import fly as smoothing
 
 LAT, LON = 46.5, 8.0
 KINDS = ("copter", "copter-rtl", "copter-required", "fast", "px4", "px4-rtl", "wing", "wing-required")
@@ -46,6 +52,8 @@ SPARE_S, SPARE_PART = 0.5, 0.004
 """How much the simulator's own motion may differ from the told one beyond the tolerance."""
 
 G_M_S2 = 9.80665
+TOP_M = 40.0
+"""From where on the missions land, at least."""
 
 Values = Mapping[str, float]
 
@@ -133,12 +141,88 @@ def kinematics(vehicle: Vehicle, raw: Values) -> tuple[Kinematics, Vehicle]:
 
 
 def flown_s(done: Plan, vehicle: Vehicle, raw: Values) -> float:
-    """Seconds of the flight in the built-in simulator, on the motion of raw parameters."""
+    """Seconds of the flight in the built-in simulator, on the motion of raw parameters.
+
+    A PX4's legs, which the simulator flies with one even acceleration, are flown step by step instead, by the rules of
+    PX4: the simulator's flight with the plan's accelerations, and what the legs take more or less than with those.
+    """
     [part] = parts_of(done)
     moved, other = kinematics(vehicle, raw)
-    track = make_track(part.mission, other, done.world, moved, rtl_rel_home_m=part.rtl_rel_home_m)
-    trace = fly([track], [0.0]).trace(0, leaves=False)
+    if vehicle.autopilot is Autopilot.PX4:
+        own = Kinematics.of(vehicle)
+        moved = replace(moved, accel_m_s2=own.accel_m_s2, corner_accel_m_s2=own.corner_accel_m_s2)
+        steps_s = px4_legs_s(part.mission, vehicle, raw) - px4_legs_s(
+            part.mission, vehicle, {"MPC_XY_CRUISE": raw.get("MPC_XY_CRUISE", 5.0)}
+        )
+        return simulated_s(done, part, moved, other) + steps_s
+    high_m_s, down_m_s = raw.get("LAND_SPEED_HIGH", 0.0) / 100.0, moved.descent_m_s
+    slower_s = (TOP_M - 10.0) * (1.0 / high_m_s - 1.0 / down_m_s) if high_m_s > 0.0 else 0.0
+    return simulated_s(done, part, moved, other) + slower_s
+
+
+def px4_legs_s(mission: Mission, vehicle: Vehicle, raw: Values) -> float:
+    """Seconds of a PX4's legs, and of its return if the mission ends with one, flown step by step."""
+    home = (mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7)
+    east_m = 111_320.0 * math.cos(math.radians(home[0]))
+    places = [(i.lat_deg, i.lon_deg) for i in mission.items if i.command == cmd.WAYPOINT]
+    points = np.array([((lon - home[1]) * east_m, (lat - home[0]) * 111_320.0) for lat, lon in [home, *places]])
+    points = points[np.append(True, np.hypot(*np.diff(points, axis=0).T) > 1.0)]
+    motion = {
+        "accel": raw.get("MPC_ACC_HOR", 3.0), "gain": raw.get("MPC_XY_TRAJ_P", 0.5),
+        "jerk": raw.get("MPC_JERK_AUTO", 4.0),
+    }  # fmt: skip
+    took_s = smoothing(points, mission.commanded_m_s, vehicle.acceptance_m, **motion)[0]
+    if any(i.command == cmd.RTL for i in mission.items):
+        back = np.array([points[-1], points[0]])
+        took_s += smoothing(back, raw.get("MPC_XY_CRUISE", 5.0), vehicle.acceptance_m, **motion)[0]
+    return took_s
+
+
+def simulated_s(done: Plan, part: Part, moved: Kinematics, other: Vehicle) -> float:
+    """Seconds of a flight in the built-in simulator."""
+    trace = trace_of(done, part, moved, other)
     return trace.arrive_s if trace.stays else trace.end_s
+
+
+def trace_of(done: Plan, part: Part, moved: Kinematics, other: Vehicle) -> Trace:
+    """A flight in the built-in simulator."""
+    track = make_track(part.mission, other, done.world, moved, rtl_rel_home_m=part.rtl_rel_home_m)
+    return fly([track], [0.0]).trace(0, leaves=False)
+
+
+@cache
+def flown_extent_m(kind: str) -> tuple[float, float]:
+    """How far from home, and how high above it, the simulator's flight with the plan's parameters comes."""
+    done = case_of(kind).plan
+    [part] = parts_of(done)
+    vehicle = done.vehicles[0].request.vehicle
+    trace = trace_of(done, part, Kinematics.of(vehicle), vehicle)
+    home = part.mission.home
+    east, north = done.world.frame.to_plane(home.lat_e7 / 1e7, home.lon_e7 / 1e7)
+    away = np.hypot(trace.points[:, 0] - float(east), trace.points[:, 1] - float(north))
+    return float(away.max()), float(trace.points[:, 2].max()) - home.amsl_m
+
+
+def breaches(kind: str, raw: Values, spare: float) -> list[str]:
+    """The fences that a flight would leave; with a ``spare`` below 1 also those that it nearly leaves."""
+    away_m, high_m = flown_extent_m(kind)
+    room = 0.0 if spare == 1.0 else 40.0
+    if kind.startswith("px4"):
+        acts = raw.get("GF_ACTION", 2.0) >= 2.0
+        out = acts and 0.0 < raw.get("GF_MAX_HOR_DIST", 0.0) < away_m + room
+        return ["leaves its fence"] if out or (acts and 0.0 < raw.get("GF_MAX_VER_DIST", 0.0) < high_m + room) else []
+    on = raw.get("FENCE_ENABLE", 0.0) == 1.0 or raw.get("FENCE_AUTOENABLE", 0.0) in (1.0, 2.0, 3.0)
+    kinds = int(raw.get("FENCE_TYPE", 4.0 if kind.startswith("wing") else 7.0)) if on else 0
+    acts = raw.get("FENCE_ACTION", 1.0) != 0.0
+    ceiling_m = raw.get("FENCE_ALT_MAX", 100.0)
+    found = []
+    if (kinds % 4 >= 2 and acts and raw.get("FENCE_RADIUS", 300.0) < away_m + room) or (
+        kinds % 2 == 1 and acts and ceiling_m < high_m + room
+    ):
+        found.append("leaves its fence")
+    if kinds % 2 == 1 and kind in ("copter-rtl", "copter-required") and ceiling_m - 2.0 < 120.0 + room:
+        found.append("returns lower")
+    return found
 
 
 def faults(kind: str, case: Case, raw: Values, spare: float) -> list[str]:
@@ -150,6 +234,7 @@ def faults(kind: str, case: Case, raw: Values, spare: float) -> list[str]:
     off_s = abs(took_s - case.told_s)
     if off_s > spare * max(1.0, 0.005 * case.told_s) + (SPARE_S + SPARE_PART * case.told_s if spare == 1.0 else 0.0):
         found.append(f"time {took_s - case.told_s:+.1f} s of {case.told_s:.1f}")
+    found += breaches(kind, raw, spare)
     returns_too = kind.endswith(("rtl", "required"))
     if returns_too and vehicle.autopilot is Autopilot.ARDUCOPTER:
         if raw.get("RTL_ALT_TYPE", 0.0) != 0.0:
@@ -192,10 +277,19 @@ def random_set(kind: str, rng: random.Random) -> dict[str, float]:
         "ANGLE_MAX": round(near(5000 if kind == "fast" else 3000, 1000)), "RTL_LOIT_TIME": round(near(5000, 0)),
         "RTL_ALT_TYPE": rng.choice([0, 0, 1]), "RTL_CLIMB_MIN": rng.choice([0, 0, 1000]),
         "RTL_CONE_SLOPE": rng.choice([0.0, 3.0, 1.0, 5.0]),
+        "LAND_SPEED_HIGH": rng.choice([0, 150, round(near(150, 20))]),
+    }  # fmt: skip
+    fence = {
+        "FENCE_ENABLE": rng.choice([0, 1]), "FENCE_AUTOENABLE": rng.choice([0, 0, 3]),
+        "FENCE_TYPE": rng.randrange(8), "FENCE_ACTION": rng.choice([0, 1, 1]),
+        "FENCE_RADIUS": rng.choice([300, rng.uniform(2000, 3500)]),
+        "FENCE_ALT_MAX": rng.choice([100, rng.uniform(60, 200)]),
     }  # fmt: skip
     px4 = {
         "MPC_XY_CRUISE": near(5, 1), "MPC_Z_V_AUTO_UP": near(3, 0.5), "MPC_Z_V_AUTO_DN": near(1.5, 0.5),
         "MPC_LAND_SPEED": near(0.7, 0.3), "MPC_ACC_HOR": near(3, 1), "MPC_XY_TRAJ_P": near(0.5, 0.1),
+        "MPC_JERK_AUTO": near(4, 1), "GF_MAX_HOR_DIST": rng.choice([0, rng.uniform(1500, 3000)]),
+        "GF_MAX_VER_DIST": rng.choice([0, rng.uniform(50, 200)]), "GF_ACTION": rng.randrange(4),
         "RTL_TYPE": rng.choice([0, 0, 1]),
     }  # fmt: skip
     wing = {
@@ -203,7 +297,8 @@ def random_set(kind: str, rng: random.Random) -> dict[str, float]:
     }  # fmt: skip
     table = wing if kind.startswith("wing") else px4 if kind.startswith("px4") else copter
     names = rng.sample(sorted(table), min(len(table), rng.randint(1, 3)))
-    return {name: float(table[name]) for name in names}
+    fenced = fence if not kind.startswith("px4") and rng.random() < 0.3 else {}
+    return {name: float(table[name]) for name in names} | {name: float(value) for name, value in fenced.items()}
 
 
 def one(seed: int) -> tuple[str, str]:

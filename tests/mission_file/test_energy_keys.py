@@ -47,3 +47,29 @@ def test_keys_that_contradict_each_other_are_refused_with_a_cure(keys: dict[str,
 def test_without_a_key_the_energy_is_not_stated() -> None:
     assert energy_of({})[0].stated is False
     assert energy_of({"hover_w": 100})[0].stated is True
+
+
+def test_a_hover_that_takes_less_than_flying_is_told() -> None:
+    energy, notes = energy_of({"base_w": 300, "horizontal_j_per_m": 10, "vertical_j_per_m": 40, "hover_w": 200})
+    assert energy.hold_w() == 300.0
+    assert [n for n in notes if "hover_w 200 is less than base_w 300" in n and "a hold counts 300 W" in n]
+    assert not any("hover_w" in n for n in energy_of({"base_w": 300, "hover_w": 350})[1])
+    assert not any("hover_w" in n for n in energy_of({"base_w": 300})[1])
+
+
+@pytest.mark.parametrize(
+    ("keys", "papers", "noted"),
+    [
+        ({"battery_wh": 90}, True, ""),
+        ({"battery_wh": 90, "hover_w": 300, "reserve": 0.3}, True, ""),
+        ({"battery_wh": 90, "horizontal_j_per_m": 50}, False, "vertical_j_per_m 120 are the paper's"),
+        ({"base_w": 200}, False, "vertical_j_per_m 120 and horizontal_j_per_m 100 are the paper's"),
+        ({"cruise_w": 200}, False, ""),
+        ({"horizontal_j_per_m": 50, "vertical_j_per_m": 40}, False, ""),
+    ],
+)
+def test_what_counts_as_in_the_paper_is_marked(keys: dict[str, Any], papers: bool, noted: str) -> None:
+    energy, notes = energy_of(keys)
+    assert energy.papers is papers
+    assert any("are the paper's, not this aircraft's" in n for n in notes) is bool(noted)
+    assert not noted or any(noted in n for n in notes)

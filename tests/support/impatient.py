@@ -7,13 +7,18 @@ from functools import partial
 import pytest
 
 from gcsplan.app import uploads
-from gcsplan.mavlink.link import session
+from gcsplan.mavlink.link import session, steps
 from gcsplan.mavlink.protocol.transfer import Timers
 
 _OPTIONS = session.SessionOptions
 
 
 def be_impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Listen only 0.1 s for a second vehicle with the same system id, and wait 0.3 s for each response."""
+    """Listen only 0.1 s for a second vehicle with the same system id, and wait 0.3 s for each response.
+
+    Parameters are asked for again after 0.1 s, and those that nothing hangs on given up after 0.3 s.
+    """
+    for name, seconds in (("_ASK_AGAIN_S", 0.1), ("_PARAMETER_S", 0.3), ("_NO_PARAMETERS_S", 0.3)):
+        monkeypatch.setattr(steps, name, seconds)
     monkeypatch.setattr(uploads, "LISTEN_S", 0.1)
     monkeypatch.setattr(session, "SessionOptions", partial(_OPTIONS, timers=Timers(response_s=0.3)))

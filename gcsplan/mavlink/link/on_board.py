@@ -22,6 +22,7 @@ from gcsplan.mavlink.link.terrain import TERRAIN_GROUPS, flies_terrain
 from gcsplan.mavlink.link.watch import VehicleState, Watch
 from gcsplan.mavlink.mission.mission import FENCE, Mission
 from gcsplan.mavlink.mission.parameter_names import OnBoard
+from gcsplan.mavlink.mission.parameter_safety import needed_groups
 from gcsplan.mavlink.mission.return_route import deciding
 
 __all__ = ["judging", "reading_parameters"]
@@ -41,7 +42,7 @@ def reading_parameters(
     values = OnBoard()
     if mission and options.read_parameters:
         terrain = TERRAIN_GROUPS if flies_terrain(task.items) else ()
-        needed = (*(s.parameter.group() for s in options.settings if s.needed), *terrain, *deciding(mission))
+        needed = (*needed_groups(options.settings, task.autopilot), *terrain, *deciding(mission))
         values = yield from parameter_steps(
             channel, state, GROUPS[task.autopilot] + terrain, watch, recheck,
             needed=needed if task.judge is not None else (), most_s=options.timeout_s,
@@ -49,6 +50,7 @@ def reading_parameters(
         warnings += judge_parameters(
             values, mission, rtl_rel_home_m=options.rtl_rel_home_m, advised_rel_home_m=options.advised_rel_home_m,
             expected=options.expected_parameters, route=options.route,
+            settings=options.settings,
         )  # fmt: skip
         warnings += settings_words(options.settings, values, task.autopilot)
         warnings += slower_words(values, options.vehicle) if options.vehicle else []

@@ -15,6 +15,7 @@ from gcsplan.mavlink.link.numbers import finite, whole
 from gcsplan.mavlink.link.preflight import distance_m
 from gcsplan.mavlink.mission.autopilots import PX4, profile_of
 from gcsplan.mavlink.mission.commands import RTL, TAKEOFF
+from gcsplan.mavlink.mission.fences import CIRCLE, FENCE_DECIDES, FLOOR, POLYGON, SAFETY, TOP, fences_in_force
 from gcsplan.mavlink.mission.mission import GLOBAL, RELATIVE, Mission
 from gcsplan.mavlink.mission.parameter_list import Setting, off
 from gcsplan.mavlink.mission.parameter_names import PARAMETERS
@@ -24,32 +25,20 @@ from gcsplan.vehicle import COPTER_RETURN_WAITS_S, DEFAULT_LEAN_DEG, Autopilot, 
 
 Values = Mapping[str, float]
 
-_COPTER = (
-    ("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ALT_MAX",), ("FENCE_RADIUS",),
-    ("FS_THR_ENABLE",), ("FS_GCS_ENABLE",), ("BATT_FS_LOW_ACT",), ("BATT_FS_CRT_ACT",),
-)  # fmt: skip
-_PLANE = (
-    ("FENCE_ENABLE",), ("FENCE_TYPE",), ("FENCE_ALT_MAX",),
-    ("RTL_AUTOLAND",), ("THR_FAILSAFE",), ("FS_LONG_ACTN",), ("FS_GCS_ENABL",), ("BATT_FS_LOW_ACT",),
-)  # fmt: skip
-_PX4 = (
-    ("GF_ACTION",), ("GF_MAX_VER_DIST",), ("GF_MAX_HOR_DIST",),
-    ("NAV_RCL_ACT",), ("NAV_DLL_ACT",), ("COM_LOW_BAT_ACT",),
-)  # fmt: skip
 GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
-    autopilot: tuple(parameter.group() for parameter in PARAMETERS[autopilot].values()) + others
-    for autopilot, others in (
-        (Autopilot.ARDUCOPTER, _COPTER), (Autopilot.ARDUPLANE, _PLANE), (Autopilot.PX4, _PX4)
+    autopilot: (
+        *(parameter.group() for parameter in (*PARAMETERS[autopilot].values(), *SAFETY[autopilot].values())),
+        *(group for group in FENCE_DECIDES[autopilot] if group not in {p.group() for p in SAFETY[autopilot].values()}),
+        *((("RTL_AUTOLAND",),) if autopilot is Autopilot.ARDUPLANE else ()),
     )
-}  # fmt: skip
+    for autopilot in Autopilot
+}
 """Parameters that are read before a mission is sent. Names in one group are one parameter in different versions."""
 
-_FENCE = tuple((f"FENCE_{what}",) for what in ("ENABLE", "TYPE", "ACTION", "RADIUS", "ALT_MAX", "ALT_MIN"))
 FENCE_GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
-    Autopilot.ARDUCOPTER: _FENCE,
-    Autopilot.ARDUPLANE: _FENCE,
-    Autopilot.PX4: (("GF_ACTION",),),
-}
+    autopilot: (*FENCE_DECIDES[autopilot], ("FENCE_RADIUS",), ("FENCE_ALT_MAX",), ("FENCE_ALT_MIN",))
+    for autopilot in (Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE)
+} | {Autopilot.PX4: FENCE_DECIDES[Autopilot.PX4]}
 """Parameters that are read before a fence is sent."""
 
 _LEAN_ANGLE = {"ANGLE_MAX": 0.01, "ATC_ANGLE_MAX": 1.0}
@@ -62,13 +51,8 @@ _FAILSAFES = {
     "FS_GCS_ENABL": "loss of the ground station", "NAV_DLL_ACT": "loss of the ground station",
     "BATT_FS_LOW_ACT": "a low battery", "COM_LOW_BAT_ACT": "a low battery",
 }  # fmt: skip
-_ALTITUDE_FENCE, _CIRCLE_FENCE, _POLYGON_FENCE, _FLOOR_FENCE = (
-    1,
-    2,
-    4,
-    8,
-)  # bits of FENCE_TYPE; the circle is the one around home
 _SAME_M, _SAME_S = 0.5, 0.5
+_ENABLED = {1.0: "the take-off", 2.0: "the take-off", 3.0: "arming"}  # FENCE_AUTOENABLE
 _TOLD_ELSEWHERE = {"return_altitude", "return_waits", "return_end", "return_type", "pitch", "radius", "radius_height"}
 
 
@@ -130,12 +114,14 @@ def judge_parameters(
     advised_rel_home_m: float | None = None,
     expected: Values | None = None,
     route: Route | None = None,
+    settings: Sequence[Setting] = (),
 ) -> list[str]:
     """Return in words which ``values`` do not fit ``mission``; nothing is changed on board.
 
     ``rtl_rel_home_m``: the return altitude that the mission was checked with, m above home; ``advised_rel_home_m``: the
     one to set, if that check found it better. ``expected``: the values that the user expects, by name. ``route``: the
-    one that the return was judged by.
+    one that the return was judged by. ``settings``: the list that it was judged with, whose fences `settings_words`
+    tells.
     """
     label = profile_of(mission.autopilot).label
     if not values:
@@ -153,7 +139,8 @@ def judge_parameters(
     found += [words] if (words := takes_another_route(values, mission, route)) else []
     found += [words] if (words := returns_otherwise(values)) else []
     found += _over_home(values, mission, route)
-    found += _fences(values, _extent(mission))
+    if not settings:
+        found += _fences(values, mission.autopilot, _extent(mission))
     found += _lean(values, mission)
     found += _climb_out(values, mission)
     off = [f"{_FAILSAFES[name]} ({name})" for name in _FAILSAFES if values.get(name) == 0]
@@ -170,9 +157,13 @@ def judge_fence_parameters(values: Values) -> list[str]:
     if values.get("FENCE_ENABLE") == 0:
         others = _other_fences(values)
         too = f"; enabling it also puts into force {', and '.join(others)}" if others else ""
-        found.append(f"FENCE_ENABLE is 0 on board: the fence is kept and not enforced until it is enabled{too}")
+        itself = values.get("FENCE_AUTOENABLE", 0.0)
+        words = "FENCE_ENABLE is 0 on board: the fence is kept and not enforced until it is enabled"
+        if itself in _ENABLED:
+            words = f"FENCE_AUTOENABLE is {itself:g} on board: the fence is enforced from {_ENABLED[itself]} on"
+        found.append(words + too)
     kinds = values.get("FENCE_TYPE")
-    if kinds is not None and not _bits(kinds) & _POLYGON_FENCE:
+    if kinds is not None and not _bits(kinds) & POLYGON:
         found.append(f"FENCE_TYPE is {kinds:g} on board: polygons and circles (4) are not among the fences in force")
     if values.get("FENCE_ACTION") == 0 or values.get("GF_ACTION") == 0:
         found.append("the fence's action on board is none: a breach is only reported")
@@ -185,9 +176,9 @@ def _other_fences(values: Values) -> list[str]:
     if kinds is None:
         return ["what FENCE_TYPE says, which could not be read (a circle around home, a highest altitude)"]
     known = [
-        (_CIRCLE_FENCE, "FENCE_RADIUS", "the circle of {} around home"),
-        (_ALTITUDE_FENCE, "FENCE_ALT_MAX", "the ceiling at {} above home"),
-        (_FLOOR_FENCE, "FENCE_ALT_MIN", "the floor at {} above home"),
+        (CIRCLE, "FENCE_RADIUS", "the circle of {} around home"),
+        (TOP, "FENCE_ALT_MAX", "the ceiling at {} above home"),
+        (FLOOR, "FENCE_ALT_MIN", "the floor at {} above home"),
     ]
     return [
         what.format(f"{values[name]:g} m" if name in values else "a height or radius that could not be read")
@@ -242,6 +233,12 @@ def _over_home(values: Values, mission: Mission, route: Route | None) -> list[st
             f"RTL_LOIT_TIME is {1000.0 * waits_s:g} on board: a return waits {waits_s:g} s over home before it "
             f"descends, and times and battery count {COPTER_RETURN_WAITS_S:g} s"
         )
+    if values.get("RTL_LAND_DELAY", 0.0) < 0.0:
+        found.append(
+            f"RTL_LAND_DELAY is {values['RTL_LAND_DELAY']:g} on board: a return ends in a hover at RTL_DESCEND_ALT, "
+            f"until the battery is empty or it is landed by hand; it was judged as a landing, which RTL_LAND_DELAY 0 "
+            f"makes"
+        )
     for name, metre in _RETURN_ENDS.items():
         if values.get(name, 0.0) > 0.0:
             found.append(
@@ -276,19 +273,16 @@ def _lean(values: Values, mission: Mission) -> list[str]:
     return [short] if short else []
 
 
-def _fences(values: Values, extent: _Extent) -> list[str]:
-    kinds = _bits(values.get("FENCE_TYPE", 0.0)) if values.get("FENCE_ENABLE", 0) else 0
-    px4 = bool(values.get("GF_ACTION", 0))
-    limits = [
-        ("FENCE_ALT_MAX", bool(kinds & _ALTITUDE_FENCE), "high", extent.top_rel_home_m),
-        ("FENCE_RADIUS", bool(kinds & _CIRCLE_FENCE), "far", extent.reach_m),
-        ("GF_MAX_VER_DIST", px4 and values.get("GF_MAX_VER_DIST", 0) > 0, "high", extent.top_rel_home_m),
-        ("GF_MAX_HOR_DIST", px4 and values.get("GF_MAX_HOR_DIST", 0) > 0, "far", extent.reach_m),
-    ]
+def _fences(values: Values, autopilot: Autopilot, extent: _Extent) -> list[str]:
+    """The fences in force that the items leave: what is told of a mission that was not judged in its world."""
+    known, on = SAFETY[autopilot], fences_in_force(values, autopilot)
+    limits = [("fence_top", "high", extent.top_rel_home_m), ("fence_radius", "far", extent.reach_m)]
     return [
-        f"the mission goes {raised(reach, 0):.0f} m {way} and the fence on board ends at {values[name]:g} m ({name})"
-        for name, on, way, reach in limits
-        if on and name in values and reach > values[name]
+        f"the mission goes {raised(reach, 0):.0f} m {way} and the fence on board ends at {ends:g} m ({name})"
+        for key, way, reach in limits
+        if key in on
+        for name in known[key].group()
+        if (ends := values.get(name)) is not None and reach > ends
     ]
 
 

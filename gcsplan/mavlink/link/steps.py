@@ -94,17 +94,22 @@ def parameter_steps(
         ]
         return [name for name in left if name not in unknown]
 
+    def waited_for() -> list[str]:
+        return missing(group for group in needed if not values.lacks(group))
+
     def until() -> float:
         patience_s = _PARAMETER_S if values or unknown else _NO_PARAMETERS_S
-        return max(answered_at + patience_s, started + most_s if missing(needed) and not generic else started)
+        return max(answered_at + patience_s, started + most_s if waited_for() and not generic else started)
 
+    for name in (name for group in groups if values.too_old_for(group) for name in group):
+        _ask_parameter(channel, state.address, name)  # once: an early version may have it
     while missing(groups):
         now = clock()
         if now >= until():
             break
         if now >= ask_at:
             late = now >= answered_at + _PARAMETER_S
-            for name in missing(needed if late and missing(needed) else groups):
+            for name in (late and waited_for()) or missing(groups):
                 _ask_parameter(channel, state.address, name)
             ask_at, again_s = now + again_s, min(_ASK_AGAIN_MOST_S, (_SLOWER if late else 1.0) * again_s)
         yield min(ask_at, until())
@@ -121,7 +126,7 @@ def parameter_steps(
                 name = parameter_name(heard.message)
                 answered_at = answered_at if name in unknown else clock()
                 unknown.add(name)
-    values.absent = frozenset(unknown)
+                values.absent = frozenset(unknown)
     return values
 
 

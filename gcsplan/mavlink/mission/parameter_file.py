@@ -21,7 +21,7 @@ __all__ = ["PARAM_ENDING", "param_file", "read_param_file"]
 PARAM_ENDING = {Autopilot.ARDUCOPTER: "param", Autopilot.ARDUPLANE: "param", Autopilot.PX4: "params"}
 """Mission Planner looks for .param, QGroundControl for .params."""
 
-_WHOLE = {"RTL_TYPE", "RTL_CONE_ANG"}
+_WHOLE = {"RTL_TYPE", "RTL_CONE_ANG", "GF_ACTION", "NAV_RCL_ACT", "NAV_DLL_ACT", "COM_LOW_BAT_ACT"}
 _INT32, _REAL32 = 6, 9  # MAV_PARAM_TYPE
 _MOST_BYTES, _MOST_LETTERS = 4_000_000, 16
 """Largest file that is read, and the longest name that MAVLink has."""
@@ -36,6 +36,8 @@ def param_file(name: str, autopilot: Autopilot, sysid: int, settings: Sequence[S
     for s in settings:
         versions = " or ".join(f"{n.name}{f' ({n.versions})' if n.versions else ''}" for n in s.parameter.names)
         rule = "" if s.rule == "equal" else f"{s.rule} this; "
+        if s.also:
+            rule += f"{' and '.join(f'{amount:g}' for amount in s.also)} too; "
         lines.append(f"# {versions}: {rule}{s.why}")
         for n in s.parameter.names:
             value = f"{n.value(s.value):.10g}"

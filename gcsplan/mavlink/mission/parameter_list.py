@@ -14,12 +14,15 @@ from typing import Any, Literal
 
 from gcsplan.mavlink.mission.commands import (
     DO_CHANGE_SPEED,
+    LAND,
     LOITER_TIME,
     LOITER_TO_ALT,
     LOITER_TURNS,
     LOITER_UNLIM,
     RTL,
+    TAKEOFF,
 )
+from gcsplan.mavlink.mission.fences import acts, fences_in_force, is_fence
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.parameter_names import PARAMETERS, Name, OnBoard, Parameter
 from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, Autopilot, Vehicle
@@ -28,7 +31,7 @@ from gcsplan.world.atmosphere import true_per_indicated
 __all__ = ["Off", "Setting", "commands_speed", "corners_as_it_leans", "off", "parameter_list", "vehicle_on_board"]
 
 Rule = Literal["equal", "at least", "at most"]
-Matters = Literal["time", "turns", "return", "flight", "told"]
+Matters = Literal["time", "pace", "turns", "return", "flight", "told"]
 
 SAME = 0.01
 """Part by which a value may differ and still count as the same."""
@@ -48,9 +51,11 @@ ROLL_SPARE = 1.1
 class Setting:
     """What the proof assumes of a parameter. ``value`` is in the parameter's unit.
 
-    ``matters``: to the ``time`` (another value is judged again, with the separation), to where it ``turns`` (judged
+    ``matters``: to the ``time`` (another value is judged again, with the separation), to the ``pace`` (to the time,
+    which no other value can be counted for), to where it ``turns`` (judged
     again by `check.tuning`, but for the return from anywhere), to the ``return`` or to the ``flight`` itself (another
-    value is not what was judged), or is only ``told``. ``off_at_zero``: 0 switches it off, which is within the rule.
+    value is not what was judged), or is only ``told``. ``also``: other values that are within the rule, like a 0 that
+    switches it off.
     """
 
     parameter: Parameter
@@ -58,7 +63,7 @@ class Setting:
     rule: Rule
     why: str
     matters: Matters
-    off_at_zero: bool = False
+    also: tuple[float, ...] = ()
 
     @property
     def needed(self) -> bool:
@@ -68,7 +73,7 @@ class Setting:
     def allows(self, amount: float) -> bool:
         """Whether an amount on board is within the rule."""
         spare = SAME * abs(self.value) + 1e-6
-        if self.off_at_zero and amount == 0.0:
+        if amount in self.also:
             return True
         if self.rule == "equal":
             return abs(amount - self.value) <= spare
@@ -80,7 +85,16 @@ class Setting:
             {"parameter": n.name, "value": n.value(self.value), "versions": n.versions or "all"}
             for n in self.parameter.names
         ]
-        return {"names": names, "value": self.value, "unit": self.parameter.unit, "rule": self.rule, "why": self.why}
+        return {
+            "names": names, "value": self.value, "unit": self.parameter.unit, "rule": self.rule, "also": [*self.also],
+            "why": self.why,
+        }  # fmt: skip
+
+    def rule_words(self) -> str:
+        """``at least``, with the other values that are within the rule; empty for one value alone."""
+        rule = "" if self.rule == "equal" else self.rule
+        others = " or ".join(f"{amount:g}" for amount in self.also)
+        return f"{rule}, or {others}" if rule and others else f"or {others}" if others else rule
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,8 +110,9 @@ class Off:
         """What it is, what was assumed and why, and what to set."""
         wanted, rule = self.name.value(self.setting.value), self.setting.rule
         least = "" if rule == "equal" else f"{rule} "
+        assumed = f"{least}{wanted:.6g}" + "".join(f" or {self.name.value(amount):g}" for amount in self.setting.also)
         return (
-            f"{self.name.name} is {self.raw:.6g} on board, and {least}{wanted:.6g} is assumed ({self.setting.why}): "
+            f"{self.name.name} is {self.raw:.6g} on board, and {assumed} is assumed ({self.setting.why}): "
             f"set {self.name.name} {wanted:.10g}"
         )
 
@@ -132,6 +147,7 @@ def _copter(
     own: Matters = "told" if commands_speed(mission) else "time"
     back: Matters = "return" if returns else "told"
     home = vehicle.return_speed_m_s or vehicle.speed_max_m_s
+    lands = _pace(mission, vehicle, LAND, RTL)
     rows = [
         Setting(known["speed"], _speed_m_s(mission, vehicle), "equal",
                 "the mission's speed: one that was interrupted goes on at this parameter's", own),
@@ -139,6 +155,9 @@ def _copter(
         Setting(known["climb"], vehicle.climb_m_s, "equal", "climb_m_s, in all times", "time"),
         Setting(known["descent"], vehicle.descent_m_s, "equal", "descent_m_s, in all times", "time"),
         Setting(known["land"], vehicle.land_m_s, "equal", "land_m_s, the landing's last 10 m", "time"),
+        Setting(known["land_high"], 0.0, "equal", "a landing's speed higher up: 0 is descent_m_s", lands,
+                (vehicle.descent_m_s,)),
+        Setting(known["land_low"], 10.0, "equal", "from where on a landing is slow", lands),
         Setting(known["accel"], COPTER_PEAK_ACCEL * vehicle.accel_m_s2, "equal",
                 "accel_m_s2, in all times and in how far a return runs on", "time"),
         Setting(known["vertical_accel"], vehicle.vertical_accel_m_s2, "equal", "vertical_accel_m_s2", "time"),
@@ -147,7 +166,7 @@ def _copter(
         Setting(known["jerk"], vehicle.leg_jerk_m_s3, "equal", "leg_jerk_m_s3, in all times", "time"),
         Setting(known["radius"], 2.0, "at most", "where corners begin", "turns"),
         Setting(known["return_altitude_type"], 0.0, "equal", "returns are judged above home, not above terrain", back),
-        Setting(known["cone"], 3.0, "at least", "how low a return may be near home", back, off_at_zero=True),
+        Setting(known["cone"], 3.0, "at least", "how low a return may be near home", back, also=(0.0,)),
         Setting(known["return_climb"], 0.0, "at most", "a return is no higher than was judged", back),
         Setting(known["return_end"], 0.0, "at most", "a return lands", "told"),
         Setting(known["return_waits"], vehicle.return_waits_s, "equal", "how long a return waits over home",
@@ -157,6 +176,12 @@ def _copter(
         why = f"lean_angle_deg: {_speed_m_s(mission, vehicle):.3g} m/s, and forecasts in wind"
         rows.append(Setting(known["lean"], vehicle.lean_angle_deg, "at least", why, "time"))
     return _finite(rows + _altitude(known, rtl_rel_home_m, returns))
+
+
+def _pace(mission: Mission, vehicle: Vehicle, *commands: int) -> Matters:
+    """Whether a parameter of these items decides the time; an ideal vehicle has none."""
+    flown = any(item.command in commands for item in mission.items) and math.isfinite(vehicle.accel_m_s2)
+    return "pace" if flown else "told"
 
 
 def _altitude(known: Mapping[str, Parameter], rtl_rel_home_m: float | None, returns: bool) -> list[Setting]:
@@ -229,7 +254,7 @@ def _px4(mission: Mission, vehicle: Vehicle, rtl_rel_home_m: float | None, ends:
     back: Matters = "return" if returns else "told"
     home = vehicle.return_speed_m_s or vehicle.speed_max_m_s
     plain = commands_speed(mission)
-    accel = vehicle.accel_m_s2
+    accel, lands = vehicle.accel_m_s2, _pace(mission, vehicle, LAND, RTL)
     rows = [
         Setting(known["speed_most"], _speed_m_s(mission, vehicle), "at least", "the mission's speed", "flight"),
         Setting(known["return_speed"], home, "equal", "the speed of the return, whatever the mission's is",
@@ -237,6 +262,10 @@ def _px4(mission: Mission, vehicle: Vehicle, rtl_rel_home_m: float | None, ends:
         Setting(known["climb"], vehicle.climb_m_s, "equal", "climb_m_s, in all times", "time"),
         Setting(known["descent"], vehicle.descent_m_s, "equal", "descent_m_s, in all times", "time"),
         Setting(known["land"], vehicle.land_m_s, "equal", "land_m_s, the landing's last metres", "time"),
+        Setting(known["land_high"], 10.0, "equal", "from where on a landing is slower", lands),
+        Setting(known["land_low"], 5.0, "equal", "from where on a landing is slow", lands),
+        Setting(known["takeoff"], 1.5, "equal", "the speed of a take-off's first metres",
+                _pace(mission, vehicle, TAKEOFF)),
         Setting(known["accel"], accel, "equal", "accel_m_s2, in all times and in how far a return runs on", "time"),
         Setting(known["jerk"], vehicle.leg_jerk_m_s3, "equal", "leg_jerk_m_s3, in all times", "time"),
         Setting(known["corner"], vehicle.corner_accel_m_s2 / accel if math.isfinite(accel) else math.inf, "equal",
@@ -283,9 +312,18 @@ def corners_as_it_leans(values: Mapping[str, float]) -> bool:
 
 
 def off(settings: Sequence[Setting], values: Mapping[str, float], autopilot: Autopilot) -> list[Off]:
-    """The parameters among ``values`` that are outside of their rules, in the order of ``settings``."""
+    """The parameters among ``values`` that are outside of their rules, in the order of ``settings``.
+
+    A fence counts where it is in force. One that only tells of a breach does not change the flight, but lowers
+    ArduCopter's return.
+    """
     found = []
+    on = fences_in_force(values, autopilot)
+    if not acts(values, autopilot):
+        on = frozenset(s.parameter.key for s in settings if s.parameter.key in on and s.matters in ("return", "told"))
     for setting in settings:
+        if is_fence(setting.parameter.key) and setting.parameter.key not in on:
+            continue
         name = setting.parameter.on_board(values)
         amount = _amount(setting.parameter, values, autopilot)
         if name is not None and amount is not None and not setting.allows(amount):
@@ -304,9 +342,9 @@ def vehicle_on_board(vehicle: Vehicle, mission: Mission, values: Mapping[str, fl
 
     def read(key: str, own: float | None, per: float = 1.0) -> float | None:
         amount = _amount(known[key], values, autopilot) if key in known else None
-        if amount is None or not amount >= 0.0 or own is None or math.isinf(own):
+        if amount is None or own is None or math.isinf(own):
             return own
-        amount *= per
+        amount = per * max(amount, 0.0)
         return own if abs(amount - own) <= SAME * abs(own) else amount
 
     if autopilot is Autopilot.ARDUPLANE:

@@ -1,7 +1,8 @@
 """Parameters of the autopilots that decide how a mission is flown: every name, its unit, and its default.
 
 ArduCopter 4.7 renamed most of them and changed their units (ArduPilot's list of renamed parameters; AC_WPNav.cpp,
-mode_rtl.cpp, Parameters.cpp); ArduPlane 4.5 renamed those of roll and airspeed. A vehicle answers to one of the names
+mode_rtl.cpp, Parameters.cpp); ArduPlane 4.5 renamed those of roll and airspeed. Those of PX4 are the same in its
+sources of 2023 (1.14) and of 2026. A vehicle answers to one of the names
 of a parameter. ArduPilot before 4.7 says nothing to a name that it does not have, so a parameter that is newer than the
 oldest firmware says its first version (ArduPilot's parameter lists of Copter and Plane 4.1 to 4.8).
 """
@@ -85,6 +86,15 @@ class OnBoard(dict[str, float]):
         """Whether the firmware on board is older than the parameter of these names."""
         return self.version is not None and self.version < _SINCE.get(group, (0, 0))
 
+    def lacks(self, group: tuple[str, ...]) -> bool:
+        """Whether a firmware is known to be without the parameter: too old for it, or built without fences.
+
+        That is one that answers for other parameters, and for no fence's.
+        """
+        family = next((f for f in _FENCE_FAMILIES if group[0].startswith(f)), None)
+        unfenced = family is not None and bool(self) and not any(n.startswith(family) for n in (*self, *self.absent))
+        return unfenced or self.too_old_for(group)
+
 
 def unanswered(values: Mapping[str, float], groups: Iterable[tuple[str, ...]]) -> list[tuple[str, ...]]:
     """Those ``groups`` of names of which none was read as a number, and not all are known to be absent.
@@ -98,10 +108,11 @@ def unanswered(values: Mapping[str, float], groups: Iterable[tuple[str, ...]]) -
         for group in groups
         if not any(math.isfinite(board.get(n, math.nan)) for n in group)
         and not all(n in board.absent for n in group)
-        and not board.too_old_for(group)
+        and not board.lacks(group)
     ]
 
 
+_FENCE_FAMILIES = ("FENCE_", "GF_")
 _BEFORE, _RENAMED = "before ArduPilot 4.7", "since ArduPilot 4.7"
 
 
@@ -132,6 +143,8 @@ PARAMETERS: dict[Autopilot, dict[str, Parameter]] = {
         _copter("climb", "WPNAV_SPEED_UP", "WP_SPD_UP", 2.5, "m/s"),
         _copter("descent", "WPNAV_SPEED_DN", "WP_SPD_DN", 1.5, "m/s"),
         _copter("land", "LAND_SPEED", "LAND_SPD_MS", 0.5, "m/s"),
+        _copter("land_high", "LAND_SPEED_HIGH", "LAND_SPD_HIGH_MS", 0.0, "m/s"),
+        _copter("land_low", "LAND_ALT_LOW", "LAND_ALT_LOW_M", 10.0, "m"),
         _copter("accel", "WPNAV_ACCEL", "WP_ACC", 2.5, "m/s²"),
         _copter("vertical_accel", "WPNAV_ACCEL_Z", "WP_ACC_Z", 1.0, "m/s²"),
         _copter("corner_accel", "WPNAV_ACCEL_C", "WP_ACC_CNR", 0.0, "m/s²", since=(4, 4)),
@@ -181,6 +194,9 @@ PARAMETERS: dict[Autopilot, dict[str, Parameter]] = {
         _one("climb", "MPC_Z_V_AUTO_UP", 3.0, "m/s"),
         _one("descent", "MPC_Z_V_AUTO_DN", 1.5, "m/s"),
         _one("land", "MPC_LAND_SPEED", 0.7, "m/s"),
+        _one("land_high", "MPC_LAND_ALT1", 10.0, "m"),
+        _one("land_low", "MPC_LAND_ALT2", 5.0, "m"),
+        _one("takeoff", "MPC_TKO_SPEED", 1.5, "m/s"),
         _one("accel", "MPC_ACC_HOR", 3.0, "m/s²"),
         _one("jerk", "MPC_JERK_AUTO", 4.0, "m/s³"),
         _one("corner", "MPC_XY_TRAJ_P", 0.5),
@@ -194,4 +210,6 @@ PARAMETERS: dict[Autopilot, dict[str, Parameter]] = {
 }  # fmt: skip
 """By autopilot and key."""
 
-_SINCE = {p.group(): p.since for known in PARAMETERS.values() for p in known.values()} | {("TERRAIN_OFS_MAX",): (4, 2)}
+_SINCE = {p.group(): p.since for known in PARAMETERS.values() for p in known.values()} | {
+    ("TERRAIN_OFS_MAX",): (4, 2), ("FENCE_AUTOENABLE",): (4, 6),  # of Copter; Plane has it since 4.1
+}  # fmt: skip

@@ -511,7 +511,8 @@ def test_a_return_along_the_mission_does_not_wait_over_home() -> None:
     ],
 )
 def test_parameters_that_do_not_fit_are_told_in_words(values: dict[str, float], words: str) -> None:
-    assert words in " / ".join(judge_parameters(values, mission(), rtl_rel_home_m=60.0))
+    autopilot = Autopilot.PX4 if "RTL_RETURN_ALT" in values else Autopilot.ARDUCOPTER
+    assert words in " / ".join(judge_parameters(values, mission(autopilot), rtl_rel_home_m=60.0))
 
 
 def test_a_plane_that_climbs_out_more_steeply_than_was_judged_is_told() -> None:
