@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from gcsplan.app.fleet_planning import without
 from gcsplan.app.leaving_out import LeavingOut
 from gcsplan.app.model import Plan
-from gcsplan.app.pipeline import require_passing
 from gcsplan.app.way_home import homes_of, is_required, judged, require
+from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed
 
 if TYPE_CHECKING:
     from gcsplan.check.rtl.verdict import WayHome
 
-__all__ = ["flyable"]
+__all__ = ["flyable", "require_passing"]
 
 
 def flyable(
@@ -49,3 +50,15 @@ def flyable(
     fleet = None if plan.fleet is None else without(plan.fleet, vehicles, plan.source.arrival)
     homes = {name: home for name, home in homes.items() if name not in gone}
     return replace(plan, vehicles=vehicles, fleet=fleet, left_out=tuple(leaving.found)), homes
+
+
+def require_passing(verdicts: Mapping[str, Verdict], *, allow_unjudged: bool = False) -> None:
+    """Raise CheckFailed unless every verdict is safe (or not judged, if that is allowed)."""
+    bad = {name: v for name, v in verdicts.items() if v.safe is False or (v.safe is None and not allow_unjudged)}
+    if bad:
+        broken = any(v.safe is False for v in bad.values())
+        lines = "\n".join(f"{name}:\n  " + v.describe().replace("\n", "\n  ") for name, v in bad.items())
+        raise CheckFailed(
+            f"{'limits are broken' if broken else 'not everything could be judged'}\n{lines}",
+            reason="violation" if broken else "not_judged",
+        )

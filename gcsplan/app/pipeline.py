@@ -8,24 +8,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from datetime import datetime
 from os import PathLike
 from typing import Any
 
 from gcsplan.app.arguments import require
 from gcsplan.app.executor import Inline, executor
+from gcsplan.app.finishing import finished
 from gcsplan.app.fleet_jobs import PIECE_S, planned_by
-from gcsplan.app.fleet_planning import fleet_of
-from gcsplan.app.flight_hours import within_hours
 from gcsplan.app.gate import GateTime
 from gcsplan.app.leaving_out import LeavingOut
 from gcsplan.app.model import Brief, Plan, VehiclePlan
-from gcsplan.app.planning import over_one_terrain
 from gcsplan.app.refusals import plan_or_explain
 from gcsplan.app.sites import world_of
-from gcsplan.check.verdict import Verdict
-from gcsplan.errors import CheckFailed, InputError, NoMission, unknown_name
+from gcsplan.errors import InputError, NoMission, unknown_name
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.planners.problem import Progress
 from gcsplan.planners.registry import VOLUME_KEYS
@@ -94,26 +90,11 @@ def plan(
         raise InputError("the mission is read already: give `at` to load_mission", where="at")
     name = planner or source.planner.name
     brief = _brief_of(source, name, objective, seed, options or {})
-    goal = brief.objective
     if leave_out is None:
         leave_out = source.arrival is not None and source.arrival.leave_out
     leaving = LeavingOut(allowed=leave_out)
     vehicles = _planned(brief, name, progress, jobs, cluster, leaving)
-    brief, vehicles = over_one_terrain(brief, vehicles, progress, leaving)
-    leaving.require_some(vehicles)
-    source = brief.source
-    flown, fleet = fleet_of(vehicles, brief, None if gate_utc is None else GateTime(gate_utc), leaving)
-    flown = within_hours(source, flown, fleet)
-    notes = list(source.notes)
-    if len(flown) > 1 and source.arrival is None:
-        notes.append("the file asks for no `arrival`: the separation between vehicles is not judged")
-    notes += fleet.notes
-    if goal == "energy" and any(not v.verdict.energy_stated for v in flown):
-        flown = tuple(replace(v, verdict=replace(v.verdict, energy_stated=True, paper_energy=True)) for v in flown)
-        notes.append("the energy that is minimised is the paper's: a vehicle has no `energy:`")
-    return Plan(
-        source, brief.world, name, goal, brief.seed, flown, tuple(notes), fleet, tuple(leaving.found), leave_out
-    )  # fmt: skip
+    return finished(brief, vehicles, name, progress, leaving, None if gate_utc is None else GateTime(gate_utc))
 
 
 def _brief_of(
@@ -203,15 +184,3 @@ def _options(source: MissionFile, planner: str) -> dict[str, object]:
     if planner != source.planner.name and isinstance(own, Mapping):
         extras["parameters"] = {k: v for k, v in own.items() if k in VOLUME_KEYS}
     return extras
-
-
-def require_passing(verdicts: Mapping[str, Verdict], *, allow_unjudged: bool = False) -> None:
-    """Raise CheckFailed unless every verdict is safe (or not judged, if that is allowed)."""
-    bad = {name: v for name, v in verdicts.items() if v.safe is False or (v.safe is None and not allow_unjudged)}
-    if bad:
-        broken = any(v.safe is False for v in bad.values())
-        lines = "\n".join(f"{name}:\n  " + v.describe().replace("\n", "\n  ") for name, v in bad.items())
-        raise CheckFailed(
-            f"{'limits are broken' if broken else 'not everything could be judged'}\n{lines}",
-            reason="violation" if broken else "not_judged",
-        )

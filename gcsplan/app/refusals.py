@@ -2,7 +2,8 @@
 
 A change is reported as a help only if a whole mission was planned with it. It is tried with the limits and zones of the
 mission file, through the same steps as any plan: with the margins for the wire, the climb-out and glide of a fixed
-wing, and the verdict on the mission as stored.
+wing, and the verdict on the mission as stored, battery included. A value is reported to do only if `plan` would write
+its mission: arrival, hours and a required return count, too, but for what other vehicles of a fleet do.
 """
 
 from __future__ import annotations
@@ -10,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+from gcsplan.app.finishing import finished
+from gcsplan.app.flying import flyable
 from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.planning import plan_vehicle
 from gcsplan.app.problems import in_degrees, make_problem
@@ -49,7 +52,7 @@ def _explained(
 ) -> Refusal:
     vehicle = request.vehicle
 
-    def plan(changed: Problem) -> Solution:
+    def planned(changed: Problem) -> tuple[Brief, VehiclePlan]:
         planner = replace(brief.source.planner, gap_percent=changed.gap_percent, budget_s=changed.budget_s)
         tried = replace(
             brief,
@@ -57,10 +60,17 @@ def _explained(
             world=World(brief.world.frame, changed.airspace),
         )
         limited = replace(request, vehicle=replace(vehicle, limits=changed.limits))
-        return plan_vehicle(tried, limited, changed.progress, options=options).solution
+        return tried, plan_vehicle(tried, limited, changed.progress, options=options)
+
+    def whole(changed: Problem) -> Solution:
+        tried, found = planned(changed)
+        flyable(finished(tried, [found], brief.source.planner.name))
+        return found.solution
 
     problem, _ = make_problem(
         brief.source, request, brief.world, brief.objective, brief.seed, progress=progress, options=options
     )
     # The limits as the user wrote them: planning a change of them adds the margins for the wire again.
-    return with_cures(replace(problem, limits=vehicle.limits, checked=None), bare, plan)
+    problem = replace(problem, limits=vehicle.limits, checked=None)
+    alone = "that is tried without the other vehicles" if len(brief.source.vehicles) > 1 else ""
+    return with_cures(problem, bare, lambda changed: planned(changed)[1].solution, whole, alone)

@@ -25,9 +25,8 @@ from gcsplan.app import outputs, uploads
 from gcsplan.app import way_home as returns
 from gcsplan.app.arguments import require
 from gcsplan.app.checking import check_files, check_mission
-from gcsplan.app.flying import flyable
+from gcsplan.app.flying import flyable, require_passing
 from gcsplan.app.model import Plan
-from gcsplan.app.pipeline import require_passing
 from gcsplan.app.upload_job import LINK, JobResult, ProgressCall, UploadOptions
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict

@@ -19,7 +19,8 @@ import numpy as np
 import yaml
 
 from gcsplan.app import outputs, uploads
-from gcsplan.app.pipeline import plan, require_passing
+from gcsplan.app.flying import require_passing
+from gcsplan.app.pipeline import plan
 from gcsplan.app.upload_job import SIM, UploadOptions
 from gcsplan.app.way_home import homes_of
 from gcsplan.bench.fleet_missions import fleet_document

@@ -77,6 +77,7 @@ def upload(
     """
     from gcsplan.app import check_sites, checking, fencing, pipeline, uploads
     from gcsplan.app import way_home as returns
+    from gcsplan.app.flying import require_passing
     from gcsplan.app.upload_job import UploadOptions
     from gcsplan.cli.console import say_notes, say_notes_of, transfer_progress, upload_table
     from gcsplan.cli.home_words import say_warnings
@@ -112,7 +113,7 @@ def upload(
                 name = f"{c.file} as {c.vehicle.name}"
                 verdict_table(name, c.verdict, c.way_home, units=units_of(units), energy=c.vehicle.energy)
         verdicts = {c.vehicle.name: c.verdict for c in checked}
-        pipeline.require_passing(verdicts, allow_unjudged=allow_unjudged)
+        require_passing(verdicts, allow_unjudged=allow_unjudged)
         homes = {c.vehicle.name: c.way_home for c in checked}
         returns.require(homes, required=returns.is_required(source, require_way_home))
         if not as_json:

@@ -222,6 +222,8 @@ def _refusal(
             said.append("order: best finds an order that works")
     if hold != "ground" and not late:
         said.append("hold: ground lets it leave later")
+    if interval is not None or earliest is not None:
+        said.append("only times are compared here, neither batteries nor separation")
     return NoSchedule(f"{why}; {'; '.join(said)}", vehicle=one.name, interval_s=interval, arrive_s=earliest)
 
 

@@ -1,6 +1,8 @@
 """What would help where there is no path: change one limit at a time and plan the changed problem.
 
-A limit's value is reported only if the planner found a path with it. `Trials` bounds the number and time of the plans.
+A limit's value is reported to do only if a whole plan with it has a mission: with the budget and the wanted gap of the
+problem, and with all that refuses a plan, such as the battery. Elsewhere a path that was found quickly is enough to say
+that there is one. `Trials` bounds the number and time of the plans.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ from gcsplan.arrays import Floats
 from gcsplan.planners.lattice.routes import Level, Router
 from gcsplan.planners.problem import Problem, Refusal
 from gcsplan.planners.profile.track import denser
-from gcsplan.planners.trials import DEGREES, LEAST_DEG, Least, Plan, Trials, metres_from, two_digits
+from gcsplan.planners.trials import DEGREES, LEAST_DEG, Plan, Trials, metres_from, two_digits
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Zone
@@ -34,15 +36,16 @@ LEVEL = Level(math.inf, 40_000)
 """Lattice on which the altitude of the lowest pass is estimated."""
 
 
-def with_cures(problem: Problem, bare: Refusal, plan: Plan) -> Refusal:
+def with_cures(problem: Problem, bare: Refusal, plan: Plan, whole: Plan | None = None, but: str = "") -> Refusal:
     """The refusal ``bare`` of ``problem``, extended by what would help; every cure is planned before it is reported.
 
-    ``plan`` returns a solution of a changed problem or raises NoMission. The clock is read between two plans and
+    ``plan`` returns a solution of a changed problem or raises NoMission; ``whole`` (None: the same) also refuses
+    whatever else refuses a plan, and ``but`` says what that leaves out. The clock is read between two plans and
     whenever a plan reports progress, so the whole stays short if the planner keeps ``budget_s``.
     """
     if not bare.untried:
         return bare
-    trials = Trials(problem, plan)
+    trials = Trials(problem, plan, whole)
     # The searches in the plane can prove that ceilings and zones shut every path; they know little of climb limits.
     order = LIFTS if bare.reason == "infeasible" else LIFTS[::-1]
     lifts = [lift for lift in order if lift.binds(problem)]
@@ -57,7 +60,7 @@ def with_cures(problem: Problem, bare: Refusal, plan: Plan) -> Refusal:
         elif not trials.stopped:
             in_vain.append(lift)
     untried = lifts[len(cures) + len(in_vain) :]
-    words = [bare.message, *(cure.words for cure in cures)]
+    words = [bare.message, *(cure.words for cure in cures), *([but] if but and any(c.whole for c in cures) else [])]
     if not cures and not untried:
         cures = [_together(trials, lifts)]
         words.append(cures[0].words)
@@ -81,11 +84,12 @@ def with_cures(problem: Problem, bare: Refusal, plan: Plan) -> Refusal:
 
 @dataclass(frozen=True, slots=True)
 class Cure:
-    """A change that helps, in words for the message, and the place that it concerns."""
+    """A change that helps, in words for the message, and its place; ``whole``: a whole plan was made with it."""
 
     words: str
     place: Place | None = None
     place_of: str = ""
+    whole: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,13 +120,14 @@ def _ceiling(trials: Trials, path: Floats) -> Cure:
     values = metres_from(_lowest_pass(problem, enough))
     found = trials.least("max_amsl_m", lambda m: _limited(problem, max_amsl_m=m), given, enough, values)
     if found.path is None:
-        return Cure(f"without max_amsl_m there is a path{_no_value(found)}")
+        return Cure(f"without max_amsl_m there is a path{found.no_value}")
     amsl_m, place = _over_highest_ground(problem, found.path)
     return Cure(
         f"max_amsl_m {found.value:g} would do {found.words(f'{given:g} is given')}: the path crosses its highest "
         f"ground at {amsl_m:.1f} m AMSL ({floor_words(limits)})",
         place,
         "that ground",
+        whole=True,
     )
 
 
@@ -153,11 +158,11 @@ def _climbing(trials: Trials, path: Floats) -> Cure:
     enough = min(two_digits(max(steep, 1.1 * given, LEAST_DEG)), values.most)
     found = trials.least("max_climb_deg", at, given, enough, values)
     if found.path is None:
-        return Cure(f"without max_climb_deg and max_descent_deg there is a path{_no_value(found)}")
+        return Cure(f"without max_climb_deg and max_descent_deg there is a path{found.no_value}")
     raised = [(key, was) for key, was in (("max_climb_deg", up), ("max_descent_deg", down)) if was < found.value]
     would = " and ".join(f"{key} {found.value:g}" for key, _ in raised)
     was = " and ".join(f"{was:g}" for was in dict.fromkeys(was for _, was in raised))
-    return Cure(f"{would} would do {found.words(f'{was} is given')}")
+    return Cure(f"{would} would do {found.words(f'{was} is given')}", whole=True)
 
 
 def _steepest_deg(problem: Problem) -> float:
@@ -169,10 +174,6 @@ def _metres_over(given: float, needed_m: float) -> float:
     return float(max(math.ceil(needed_m + ROUNDED_M), math.floor(given) + 1))
 
 
-def _no_value(found: Least) -> str:
-    return "" if math.isnan(found.in_vain) else f", but with {found.in_vain:g} none is found"
-
-
 def _above_ground(trials: Trials, path: Floats) -> Cure:
     problem, limits = trials.problem, trials.problem.limits
     given = limits.max_agl_m
@@ -182,8 +183,8 @@ def _above_ground(trials: Trials, path: Floats) -> Cure:
     values = metres_from(0.0)
     found = trials.least("max_agl_m", lambda m: _limited(problem, max_agl_m=m), given, enough, values)
     if found.path is None:
-        return Cure(f"without max_agl_m there is a path{_no_value(found)}")
-    return Cure(f"max_agl_m {found.value:g} would do {found.words(f'{given:g} is given')}")
+        return Cure(f"without max_agl_m there is a path{found.no_value}")
+    return Cure(f"max_agl_m {found.value:g} would do {found.words(f'{given:g} is given')}", whole=True)
 
 
 def _fewer_zones(trials: Trials, path: Floats) -> Cure:

@@ -10,9 +10,10 @@ import pytest
 import yaml
 
 from gcsplan.app import planning
+from gcsplan.app.flying import require_passing
 from gcsplan.app.model import Plan
 from gcsplan.app.outputs import outputs_of, summary_of
-from gcsplan.app.pipeline import plan, require_passing
+from gcsplan.app.pipeline import plan
 from gcsplan.check.verdict import Finding, Verdict
 from gcsplan.errors import CheckFailed, InputError, NoMission
 from gcsplan.mavlink.files.formats import read_plan, read_waypoints

@@ -220,7 +220,7 @@ def test_a_plan_keeps_what_its_corners_take_beyond_the_track_error(autopilot: Au
     assert planned.verdict.safe is True
     # A copter's corners are mended where they are cut; PX4's take their radius everywhere.
     kept_m = corner_m(planned.request.vehicle)
-    assert kept_m == pytest.approx(0.06 if autopilot is COPTER else 1.0)
+    assert kept_m == pytest.approx(0.035 if autopilot is COPTER else 1.0)
     nearest = planned.verdict.nearest
     assert nearest is None or nearest.zone_clearance_m >= 30.0 + 0.5 + (0.0 if autopilot is COPTER else kept_m)
 

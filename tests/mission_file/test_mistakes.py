@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from gcsplan.app import pipeline
+from gcsplan.app.flying import require_passing
 from gcsplan.cli.main import main
 
 FOLDER = Path(__file__).parents[1] / "data" / "mistakes"
@@ -101,4 +102,4 @@ def test_what_the_message_tells_leads_to_a_plan(file: Path, folder: Path) -> Non
     assert mistake.mended != mistake.mission
     (folder / "mission.yaml").write_text(mistake.mended, encoding="utf-8")
     planned = pipeline.plan(pipeline.load_mission(Path("mission.yaml")))
-    pipeline.require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=False)
+    require_passing({v.name: v.verdict for v in planned.vehicles}, allow_unjudged=False)

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from gcsplan.app import pipeline
-from gcsplan.errors import NoMission
+from gcsplan.errors import CheckFailed, NoMission
 from gcsplan.planners.cures import with_cures
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
-from gcsplan.planners.trials import GRACE_S, LEAST_S, SHARE, TRIES
+from gcsplan.planners.trials import GRACE_S, LEAST_S, SHARE, TRIES, WHOLE, WHOLE_SHARE
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
@@ -150,8 +150,7 @@ def test_what_is_reported_to_help_does(name: str) -> None:
 def test_a_mission_file_with_the_reported_value_has_a_mission(
     tmp_path: FilePath, file: str, key: str, given: str
 ) -> None:
-    # The value is tried for a path; whether the battery lasts for its laps is judged when the mission is planned.
-    text = re.sub(r"battery_\w+: [\d.e]+,? ?", "", (MISSIONS / file).read_text(encoding="utf-8"))
+    text = (MISSIONS / file).read_text(encoding="utf-8")
     mission = tmp_path / "mission.yaml"
     mission.write_text(re.sub(rf"{key}: [\d.]+", f"{key}: {given}", text), encoding="utf-8")
     with pytest.raises(NoMission) as caught:
@@ -234,7 +233,7 @@ def test_a_plan_that_runs_on_is_stopped_when_it_reports_progress(monkeypatch: py
 def test_so_many_plans_and_no_more(opens: Callable[[Problem], bool], monkeypatch: pytest.MonkeyPatch) -> None:
     slow = SlowPlan(0.0, opens)
     cures_of(many_limits(), slow, monkeypatch)
-    assert 4 <= slow.asked <= TRIES
+    assert 4 <= slow.asked <= TRIES + 3 * WHOLE  # three limits have values
 
 
 def test_a_value_that_was_tried_in_vain_is_not_reported_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -242,6 +241,58 @@ def test_a_value_that_was_tried_in_vain_is_not_reported_to_do(monkeypatch: pytes
     message = cures_of(many_limits(), slow, monkeypatch).message
     assert "without max_amsl_m there is a path, but with" in message
     assert "would do" not in message
+
+
+@pytest.mark.parametrize(
+    ("refused", "words"),
+    [
+        (NoMission("battery: 9 J", reason="battery"), "the battery is too small"),
+        (CheckFailed("a safe return is required, and there is none\nuav1: 3 m"), "and there is none"),
+    ],
+)
+def test_a_value_whose_whole_plan_is_refused_does_not_do(
+    refused: NoMission | CheckFailed, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    problem = replace(many_limits(), airspace=Airspace(ground(0.0)))
+    problem = replace(problem, limits=Limits(10.0, 50.0))
+
+    def opens(p: Problem) -> bool:
+        return p.limits.max_agl_m is None or p.limits.max_agl_m >= 70.0
+
+    def whole(p: Problem) -> Solution:
+        asked.append(p.limits.max_agl_m)
+        assert (p.gap_percent, p.budget_s) == (problem.gap_percent, problem.budget_s)
+        if p.limits.max_agl_m is None or p.limits.max_agl_m < least_m:
+            raise refused
+        return slow(p)
+
+    monkeypatch.setattr("gcsplan.planners.trials.time.perf_counter", lambda: 0.0)
+    found, slow = {}, SlowPlan(0.0, opens)
+    for least_m in (0.0, 90.0, 1e9):
+        asked = list[float | None]()
+        found[least_m] = with_cures(problem, BARE, slow, whole, "others aside").message
+        assert 1 <= len(asked) <= WHOLE
+    assert "max_agl_m 71 would do (50 is given, with 69 none is found); others aside" in found[0.0]
+    assert "max_agl_m 71 would do" not in found[90.0] + found[1e9]
+    assert re.search(rf"max_agl_m \d+ would do \(50 is given, with \d+ .*{words}\)", found[90.0])
+    assert re.search(rf"without max_agl_m there is a path, but with \d+ .*{words}", found[1e9])
+    assert "others" not in found[1e9]
+
+
+def test_a_whole_plan_that_runs_on_is_stopped_and_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = replace(many_limits(), airspace=Airspace(ground(0.0)), limits=Limits(10.0, 50.0))
+    slow = SlowPlan(0.0, lambda p: p.limits.max_agl_m is None or p.limits.max_agl_m >= 70.0)
+
+    def endless(p: Problem) -> Solution:
+        assert p.progress is not None
+        while True:
+            slow.now_s += 0.25
+            p.progress(Progress(slow.now_s, None, None, "search"))
+
+    monkeypatch.setattr("gcsplan.planners.trials.time.perf_counter", lambda: slow.now_s)
+    message = with_cures(problem, BARE, slow, endless).message
+    assert "there is a path, but with 69 none is found, and with 71, whose whole mission was not tried in " in message
+    assert slow.now_s <= (WHOLE_SHARE + 1.0) * problem.budget_s + 0.25
 
 
 def test_what_helps_only_together_is_said_so(monkeypatch: pytest.MonkeyPatch) -> None:

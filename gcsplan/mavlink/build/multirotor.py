@@ -25,7 +25,7 @@ from gcsplan.world.path import Path
 from gcsplan.world.world import World
 
 COPTER_ACCEPTANCE_M = 2.0  # ArduCopter WPNAV_RADIUS, default
-SHORT_LEG_M, ROUNDED_M = 0.1, 0.02
+SHORT_LEG_M, ROUNDED_M = 0.05, 0.02
 """Length of the leg that is put behind a corner which must not be cut, metres, and what rounding may add to it."""
 
 

@@ -192,8 +192,9 @@ class Incumbent:
         return (self.cost - self.bound) / max(self.bound, 1e-9)
 
     def done(self) -> bool:
-        """Whether the gap is as small as wanted."""
-        return self.gap <= self.wanted
+        """Whether the gap to the bound that is reported, of paths whose ends may lie beside the exact ones, is as small
+        as wanted."""
+        return self.cost <= self.problem.rounded_bound(self.bound) * (1.0 + self.wanted)
 
     def goes_on(self) -> bool:
         """Whether the gap is larger than wanted, more bound is of use, and budget is left."""

@@ -19,6 +19,7 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.corridor import joined
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.navmesh.crossing import Climb, Crossing, crossing
+from gcsplan.planners.optimal.navmesh.outlines import Outline
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.sources.outline_tracks import OutlineTracks
 from gcsplan.planners.problem import Problem
@@ -28,6 +29,8 @@ MOST_CASES = 48
 """Most cases that are looked at."""
 ROUNDS = 6
 """Most times that one crossing is computed again, with arcs drawn more finely or more zones beside it."""
+DEARER = 10.0
+"""What each metre of track that is too short for its climb costs a path, m: then it is made longer without laps."""
 LOWER_M = 0.01
 """A way is too low over a zone if it is more than this below its top, m."""
 
@@ -59,14 +62,17 @@ class _Stretch:
         """The least length of paths over such tracks."""
         return math.hypot(sum(self.lengths_m), self.to_m - self.from_m)
 
-    def climbs(self, leg: int, top_m: float, problem: Problem) -> tuple[Climb, Climb]:
-        """The climb to an altitude on one of the legs, and the descent from it."""
-        rises_m = (max(top_m - z - problem.rounding_m[1], 0.0) for z in (self.from_m, self.to_m))
+    def climbs(self, leg: int, top_m: float, problem: Problem, *, outer: bool) -> tuple[Climb, Climb]:
+        """The climb to an altitude on one of the legs, and the descent from it; ``outer``: for paths, without laps."""
+        limits, off_m = problem.bound_limits, -problem.rounding_m[1]
+        if outer:
+            off_m = problem.limits.altitude_error_m - limits.altitude_error_m + LOWER_M
+            limits = problem.limits
+        rises_m = (max(top_m - z + off_m, 0.0) for z in (self.from_m, self.to_m))
         beyond_m = sum(self.lengths_m[: leg - self.first]), sum(self.lengths_m[leg - self.first + 1 :])
-        limits = problem.bound_limits
         slopes = limits.max_climb_slope, limits.max_descent_slope
         up, down = (
-            Climb(rise, rise * math.hypot(1.0, 1.0 / slope) if rise > 0.0 else 0.0, more)
+            Climb(rise, rise * math.hypot(1.0, 1.0 / slope) if rise > 0.0 else 0.0, more, DEARER * outer)
             for rise, slope, more in zip(rises_m, slopes, beyond_m, strict=True)
         )
         return up, down
@@ -93,18 +99,18 @@ class _Stretch:
 
 
 class Overflight:
-    """The bound of one problem with the outlines of its zones."""
+    """The bound of one problem with the outlines of its zones; ``outer``: the same for paths."""
 
-    def __init__(self, incumbent: Incumbent, outlines: OutlineTracks) -> None:
-        self.incumbent, self.problem, self.outlines = incumbent, incumbent.problem, outlines
+    def __init__(self, incumbent: Incumbent, outlines: OutlineTracks, outer: bool = False) -> None:
+        self.incumbent, self.problem, self.outlines, self.outer = incumbent, incumbent.problem, outlines, outer
         self._ends_m = [self.problem.start[2], *(z for _, _, z in outlines.legs)]
         self._number = count()
         self._crossings: dict[tuple[object, ...], tuple[Crossing, float]] = {}
         """Crossings by leg, shapes and climbs, with the limit they were computed for."""
 
     def look(self) -> None:
-        """Raise the bound to the least cost of a path that is better than the best; then look for a path along the way
-        of that bound, if it leads over a zone. Raises Exhausted."""
+        """Raise the bound to the least cost of a path that is better than the best; then look for a path past the same
+        zones as the way of that bound, if it leads over one. Raises Exhausted."""
         incumbent, outlines = self.incumbent, self.outlines
         around = self._cases(outlines.walls() | (outlines.over & ~outlines.under), frozenset())
         if around and around[0].least <= incumbent.bound:
@@ -112,7 +118,9 @@ class Overflight:
         case = self._lowest()
         incumbent.raise_bound(incumbent.cost if case is None else case.least)
         if case is not None and case.over:
-            incumbent.take_along(joined([w[:, :2] for w in case.ways], [z for _, _, z in self.outlines.legs[:-1]]))
+            paths = Overflight(incumbent, outlines, outer=True)._cases(case.shut, case.over)
+            for ways in [case.ways, *(found.ways for found in paths)]:
+                incumbent.take_along(joined([w[:, :2] for w in ways], [z for _, _, z in outlines.legs[:-1]]))
 
     def _lowest(self) -> _Case | None:
         """The case whose paths cost least; None if no path is better than the best. Raises Exhausted."""
@@ -139,7 +147,7 @@ class Overflight:
         line, along_m = shapely.LineString(way[:, :2]), distances(way[:, :2])
         deepest_m, found = LOWER_M, None
         for k in np.flatnonzero(outlines.over & ~outlines.under & ~case.shut).tolist():
-            inside = line.intersection(outlines.outline(k).shape) if k not in case.over else shapely.LineString()
+            inside = line.intersection(self._outline(k).shape) if k not in case.over else shapely.LineString()
             if shapely.length(inside) > 0.0:
                 at_m = shapely.line_locate_point(line, shapely.points(shapely.get_coordinates(inside)))
                 lacks_m = float(outlines.tops_m[k] - np.interp(at_m, along_m, way[:, 2]).min())
@@ -149,7 +157,7 @@ class Overflight:
 
     def _cases(self, shut: Bools, over: frozenset[int]) -> list[_Case]:
         """The case with such zones; nothing if no path of it is better than the best."""
-        tracks = self.outlines.tracks(shut)
+        tracks = self.outlines.tracks(shut, outer=self.outer)
         if tracks is None:
             return []
         p, incumbent = self.problem, self.incumbent
@@ -179,28 +187,34 @@ class Overflight:
     def _over(self, k: int, shut: Bools, stretches: list[_Stretch], tracks: list[Floats]) -> tuple[float, list[Floats]]:
         """The least length of paths over a zone and around the zones ``shut``, at most that of the best path, and ways
         that are as long, as far as they are known. ``tracks``: the shortest ones of all legs."""
-        top_m, shape = float(self.outlines.tops_m[k]), self.outlines.outline(k).shape
+        top_m, shape = float(self.outlines.tops_m[k]), self._outline(k).shape
         around = [way for s in stretches for way in s.ways(tracks)]
         all_m = sum(s.least_m for s in stretches)
         choices = []
         for stretch in stretches:
             for leg in range(stretch.first, stretch.last):
-                up, down = stretch.climbs(leg, top_m, self.problem)
+                up, down = self._climbs(stretch, leg, top_m)
                 away_m, left_m = shapely.distance(shape, shapely.points(self.outlines.legs[leg][:2]))
-                least_m = max(float(up.length_m(away_m) + down.length_m(left_m)), stretch.least_m)
+                least_m = max(float(up.least_m(away_m) + down.least_m(left_m)), stretch.least_m)
                 choices.append((all_m - stretch.least_m + least_m, leg, stretch))
         best = self.incumbent.cost, around
         for least, leg, stretch in sorted(choices, key=lambda choice: choice[:2]):
             if least >= best[0]:
                 break
             others_m = all_m - stretch.least_m
-            found = self._crossing(k, leg, shut, stretch.climbs(leg, top_m, self.problem), best[0] - others_m)
+            found = self._crossing(k, leg, shut, self._climbs(stretch, leg, top_m), best[0] - others_m)
             if found is None:
                 best = least, around
             elif others_m + found.length_m < best[0]:
                 over = stretch.ways(tracks, (leg, found, top_m)) if len(found.before) else stretch.ways(tracks)
                 best = others_m + found.length_m, [*around[: stretch.first], *over, *around[stretch.last :]]
         return best
+
+    def _outline(self, k: int) -> Outline:
+        return self.outlines.outline(k, outer=self.outer)
+
+    def _climbs(self, stretch: _Stretch, leg: int, top_m: float) -> tuple[Climb, Climb]:
+        return stretch.climbs(leg, top_m, self.problem, outer=self.outer)
 
     def _crossing(self, k: int, leg: int, shut: Bools, climbs: tuple[Climb, Climb], limit_m: float) -> Crossing | None:
         """The crossing of a leg over a zone and around those of the zones ``shut`` that its way meets; None if nothing
@@ -210,7 +224,7 @@ class Overflight:
         beside: set[int] = set()
         found = None
         for _ in range(ROUNDS):
-            known = [outlines.outline(j) for j in (k, *sorted(beside))]
+            known = [self._outline(j) for j in (k, *sorted(beside))]
             shapes = tuple(o.shape for o in known)
             if shapely.intersects_xy(shapes, *np.transpose([a, b])[:, :, None]).any():
                 break
@@ -229,7 +243,7 @@ class Overflight:
             met = {
                 j for j in np.flatnonzero(shut).tolist()
                 if j != k and j not in beside
-                and any(shapely.relate_pattern(outlines.outline(j).shape, way, "T********") for way in ways)
+                and any(shapely.relate_pattern(self._outline(j).shape, way, "T********") for way in ways)
             }  # fmt: skip
             beside |= met
             if not any(finer) and not met:

@@ -28,9 +28,11 @@ TOUCHING_M = 1e-6
 """Metres within which two shapes count as touching; much less than `SHRUNK_M`."""
 MOST_CORNERS = 256
 """Most corners of all outlines around which the ways lead: the work grows with their square."""
-PART, OFF_PART = 1e-5, 2e-4
+PART, OFF_PARTS = 1e-5, (5e-5, 2e-4)
 """Parts of the length by which the bound may be too low, and by which arcs may be drawn too small: a way that turns
-along an arc gets shorter by a third of that for each radian."""
+along an arc gets shorter by a third of that for each radian. The second is for outlines with many corners."""
+MANY_CORNERS = 200
+"""Corners of all outlines, from which on they are drawn with fewer."""
 HALVINGS, MOST_PAIRS = 40, 200_000
 """Most times that pieces of edges are halved, and most pairs of pieces at once."""
 
@@ -38,20 +40,29 @@ HALVINGS, MOST_PAIRS = 40, 200_000
 @dataclass(frozen=True, slots=True)
 class Climb:
     """What an end of a leg lacks to a zone's top: ``rise_m``, which takes at least ``slant_m`` metres of flight.
-    ``more_m``: the track beyond the end, on which the climb may begin."""
+    ``more_m``: the track beyond the end, on which the climb may begin. ``dearer``: what each metre costs more by which
+    a track is too short for that."""
 
     rise_m: float
     slant_m: float
     more_m: float = 0.0
+    dearer: float = 0.0
+
+    def least_m(self, track_m: Floats) -> Floats:
+        """The least length with this climb over tracks that are at least ``track_m`` (N,) long from the end of the
+        leg."""
+        return np.maximum(np.hypot(track_m + self.more_m, self.rise_m), self.slant_m)
 
     def length_m(self, track_m: Floats) -> Floats:
-        """The least length with this climb over tracks that are ``track_m`` (N,) long from the end of the leg."""
-        return np.maximum(np.hypot(track_m + self.more_m, self.rise_m), self.slant_m)
+        """The same over tracks that are just so long, with what is dearer."""
+        lacks_m = math.sqrt(max(self.slant_m**2 - self.rise_m**2, 0.0)) - (track_m + self.more_m)
+        return self.least_m(track_m) + self.dearer * np.maximum(lacks_m, 0.0)
 
     def growth(self, track_m: Floats) -> Floats:
         """By how much that length grows with each metre of the track."""
-        length = np.hypot(track_m + self.more_m, self.rise_m)
-        return np.where(length < self.slant_m, 0.0, (track_m + self.more_m) / np.maximum(length, 1e-12))
+        track_m = track_m + self.more_m
+        length = np.hypot(track_m, self.rise_m)
+        return np.where(length < self.slant_m, -self.dearer, track_m / np.maximum(length, 1e-12))
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +84,12 @@ def crossing(
 
     Neither place may lie within a polygon. Raises Exhausted if the polygons have too many corners.
     """
-    zone, *others = (_coarser(shape, OFF_PART * limit_m) for shape in (zone, *others))
-    views = _Views(a, b, [zone, *others], budget)
+    for part in OFF_PARTS:
+        shapes = [_coarser(shape, part * limit_m) for shape in (zone, *others)]
+        if sum(map(shapely.get_num_coordinates, shapes)) <= MANY_CORNERS:
+            break
+    zone = shapes[0]
+    views = _Views(a, b, shapes, budget)
     edges = _edges(zone)
     before = _Pieces(views, views.onto(edges, 0, (up, down), limit_m))
     after = _Pieces(views, views.onto(edges, 1, (down, up), limit_m))
@@ -218,7 +233,7 @@ class _Views:
         share = ((to * (b - a)).sum(axis=2) / np.maximum(long_m**2, 1e-12)).clip(0.0, 1.0)
         straight_m = np.hypot(*np.moveaxis(to - share[..., None] * (b - a), 2, 0))
         least_m = away_m[:, None] + straight_m
-        whole_m = climbs[0].length_m(least_m) + climbs[1].length_m(straight_m[1 - end])
+        whole_m = climbs[0].least_m(least_m) + climbs[1].least_m(straight_m[1 - end])
         c, e = np.nonzero(np.isfinite(least_m) & (least_m <= most_m + TOUCHING_M) & (whole_m < limit_m))
         return np.concatenate([away_m[c, None], self.corners[c], edges[e]], axis=1)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import zip_longest
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from gcsplan.planners.optimal.navmesh.zone_kernels import (
     UNDER_2,
 )
 from gcsplan.planners.problem import Problem
+from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Zone
 
 
@@ -52,6 +54,22 @@ TOUCH_M = 1e-6
 
 LOOSE, CLOSE = Fit(0.03, 0.05, 0.07), Fit(0.003, 0.01, 0.07)
 """`LOOSE` lets long rows of cells be one piece; `CLOSE` is for where slits a few centimetres wide count."""
+
+
+OVERLAP = 0.2
+"""Part of the spare by which parts of one zone overlap at least, in a zone that is made smaller."""
+
+NOTHING = np.array([[-1.0, 0.0, 0.0, 0.0]])
+"""The form of a part that holds no place."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Part:
+    """A convex part of a zone, ``sides``: for bounds and for paths (None: none), of which it need not be the same one;
+    a disc has none. ``inset_m``: that for bounds is of a zone that is already so much smaller."""
+
+    sides: tuple[Floats | None, Floats | None] = (None, None)
+    inset_m: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -84,70 +102,81 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
     reach = air.beside_m(problem.limits)  # no less than what bounds assume
     there = reach <= min(math.dist((x[0, 0], y[0, 0]), place) for place in ((x[0, 1], y[0, 1]), (x[1, 0], y[1, 0])))
     box = float(x.min()), float(y.min()), float(x.max()), float(y.max())
-    found: list[tuple[int, Zone, Floats | None]] = []
+    found: list[tuple[int, Zone, _Part]] = []
     moved: list[float] = []
     """Metres by which each part's levels over ground are moved; 0: they are not, and a part with such is not grown."""
+
+    def growth(zone: Zone, more: float, sign: float, off_m: float, limits: Limits) -> float:
+        return (0.0 if more == 0.0 and zone.follows_ground else air.beside_m(limits)) + sign * off_m
+
+    sides = (-1.0, fit.spare_m, problem.bound_limits), (1.0, fit.hair_m, problem.limits)
     for number, zone in enumerate(air.zones):
         west, south, east, north = zone.bounds
         if west - reach > box[2] or east + reach < box[0] or south - reach > box[3] or north + reach < box[1]:
             continue
-        parts: list[Floats | None] = [None]
-        if not isinstance(zone.shape, Circle):
-            parts = [*convex_parts(zone.shape.vertices)]
         rise = _rise(problem, zone, reach, box)
         for more in (0.0, rise) if rise > 0.0 else (0.0,):
+            parts = _parts(zone, growth(zone, more, *sides[0]), OVERLAP * fit.spare_m)
             found.extend((number, zone, part) for part in parts)
             moved.extend(more for _ in parts)
     pairs = _crossing(found, reach + max(fit.spare_m, fit.hair_m))
     both: list[tuple[Floats, Floats]] = []
-    bounds = np.zeros((len(found) + len(pairs), 4))
-    sides = (-1.0, fit.spare_m, problem.bound_limits), (1.0, fit.hair_m, problem.limits)
-    for sign, off_m, limits in sides:
-        beside = air.beside_m(limits)
+    bounds = np.tile([np.inf, np.inf, -np.inf, -np.inf], (len(found) + len(pairs), 1))
+    for side, (sign, off_m, limits) in enumerate(sides):
         rows = np.zeros((len(found) + len(pairs), NUMBERS))
         forms: list[Floats] = []
         for k, (row, (_, zone, part)) in enumerate(zip(rows, found, strict=False)):
-            grow = (0.0 if moved[k] == 0.0 and zone.follows_ground else beside) + sign * off_m
-            row[[BOTTOM, TOP, OWN_BOTTOM, OWN_TOP]] = -np.inf, np.inf, -np.inf, np.inf
-            row[LOOKS] = sign < 0.0 and moved[k] > 0.0
-            row[THIN] = 2.0 * (limits.altitude_error_m - off_m) if sign < 0.0 else -np.inf
-            for level, at, more in ((zone.floor, BOTTOM, -1.0), (zone.ceiling, TOP, 1.0)):
-                if level is not None:
-                    over_ground = level.datum == "agl"
-                    # For paths, AMSL levels get no margin for rounding: a zone may be exactly as high as the ceiling.
-                    off = sign * off_m if over_ground or sign < 0.0 else -TOUCH_M
-                    row[at] = level.value_m + more * (limits.altitude_error_m + off)
-                    row[at + 2] = over_ground
-                    row[OWN_BOTTOM if at == BOTTOM else OWN_TOP] = row[at]
-                    if over_ground and moved[k] > 0.0 and sign > 0.0:
-                        row[at + 2] = BESIDE
-                    elif over_ground:
-                        row[at] -= more * moved[k]
+            grow = growth(zone, moved[k], sign, off_m, limits)
+            _set_levels(row, zone, moved[k], sign, off_m, limits)
             row[UNDER], row[RISE] = zone.floor is not None, 0.0 if there else moved[k]
             row[RADIUS] = -1.0
-            if part is None:
-                assert isinstance(zone.shape, Circle)
+            corners: Floats | None
+            if isinstance(zone.shape, Circle):
                 radius = max(zone.shape.radius_m * air.scale + grow, 0.0)
                 row[[EAST, NORTH, RADIUS]] = zone.shape.east_m, zone.shape.north_m, radius
                 forms.append(np.array([[radius, zone.shape.east_m, zone.shape.north_m, 1.0]]))
-                middle = np.array([zone.shape.east_m, zone.shape.north_m])
-                bounds[k] = np.concatenate([middle - radius, middle + radius])
+                corners, grow = np.array([[zone.shape.east_m, zone.shape.north_m]]), radius
+            elif (corners := part.sides[side]) is None:
+                forms.append(NOTHING)
+                continue
             else:
-                forms.append(_half_planes(part, grow, inner=sign < 0.0))
-                bounds[k] = np.concatenate([part.min(axis=0) - grow, part.max(axis=0) + grow])
+                grow += part.inset_m * (sign < 0.0)
+                forms.append(_half_planes(corners, grow, inner=sign < 0.0))
+            bounds[k, :2] = np.minimum(bounds[k, :2], corners.min(axis=0) - grow)
+            bounds[k, 2:] = np.maximum(bounds[k, 2:], corners.max(axis=0) + grow)
         for k, (a, b) in enumerate(pairs, len(found)):
             _cross(rows, k, a, b)
             forms.append(np.vstack([forms[a], forms[b]]))
-            bounds[k, :2] = np.maximum(bounds[a, :2], bounds[b, :2])
-            bounds[k, 2:] = np.minimum(bounds[a, 2:], bounds[b, 2:])
         lengths = np.cumsum([0] + [len(f) for f in forms])
         rows[:, FIRST], rows[:, LAST] = lengths[:-1], lengths[1:]
         both.append((rows, np.ascontiguousarray(np.concatenate(forms)) if forms else np.zeros((0, 4))))
+    for k, (a, b) in enumerate(pairs, len(found)):
+        bounds[k, :2] = np.maximum(bounds[a, :2], bounds[b, :2])
+        bounds[k, 2:] = np.minimum(bounds[a, 2:], bounds[b, 2:])
     boxes = _cells(bounds, x, y)
     size = (boxes[:, 1] - boxes[:, 0] + 1).clip(0) * (boxes[:, 3] - boxes[:, 2] + 1).clip(0)
     numbers = [number for number, *_ in found]
     owner = np.array([(n, n) for n in numbers] + [(numbers[a], numbers[b]) for a, b in pairs], np.intp).reshape(-1, 2)
     return Shapes(both[0], both[1], boxes, owner, int(size.sum()), int(size[both[0][0][:, LOOKS] > 0.0].sum()))
+
+
+def _set_levels(row: Floats, zone: Zone, moved_m: float, sign: float, off_m: float, limits: Limits) -> None:
+    """Fill in the levels of a part, for bounds (``sign`` -1) or for paths (1), off by a margin ``off_m``."""
+    row[[BOTTOM, TOP, OWN_BOTTOM, OWN_TOP]] = -np.inf, np.inf, -np.inf, np.inf
+    row[LOOKS] = sign < 0.0 and moved_m > 0.0
+    row[THIN] = 2.0 * (limits.altitude_error_m - off_m) if sign < 0.0 else -np.inf
+    for level, at, more in ((zone.floor, BOTTOM, -1.0), (zone.ceiling, TOP, 1.0)):
+        if level is not None:
+            over_ground = level.datum == "agl"
+            # For paths, AMSL levels get no margin for rounding: a zone may be exactly as high as the ceiling.
+            off = sign * off_m if over_ground or sign < 0.0 else -TOUCH_M
+            row[at] = level.value_m + more * (limits.altitude_error_m + off)
+            row[at + 2] = over_ground
+            row[OWN_BOTTOM if at == BOTTOM else OWN_TOP] = row[at]
+            if over_ground and moved_m > 0.0 and sign > 0.0:
+                row[at + 2] = BESIDE
+            elif over_ground:
+                row[at] -= more * moved_m
 
 
 def _cross(rows: Floats, k: int, a: int, b: int) -> None:
@@ -178,7 +207,7 @@ def _rise(problem: Problem, zone: Zone, reach: float, box: tuple[float, float, f
     return max(1.01 * reach * steep, 1e-9) if math.isfinite(steep) else math.inf
 
 
-def _crossing(found: list[tuple[int, Zone, Floats | None]], reach: float) -> list[tuple[int, int]]:
+def _crossing(found: list[tuple[int, Zone, _Part]], reach: float) -> list[tuple[int, int]]:
     """Pairs of parts that may cross, of two zones each of which, by itself, may be passed above or below."""
     some = [k for k, (_, zone, _) in enumerate(found) if zone.floor is not None or zone.ceiling is not None]
     out = []
@@ -194,6 +223,24 @@ def _crossing(found: list[tuple[int, Zone, Floats | None]], reach: float) -> lis
             if u[0] - v[2] < apart and v[0] - u[2] < apart and u[1] - v[3] < apart and v[1] - u[3] < apart:
                 out.append((a, b))
     return out
+
+
+def _parts(zone: Zone, grow_m: float, overlap_m: float) -> list[_Part]:
+    """The convex parts of a zone that is grown by ``grow_m`` for bounds. Parts that are made smaller one by one would
+    leave slits between them, so the zone is made smaller first, and its parts grown until they overlap."""
+    if isinstance(zone.shape, Circle):
+        return [_Part()]
+    whole = convex_parts(zone.shape.vertices)
+    if len(whole) == 1 or grow_m >= overlap_m:
+        return [_Part((part, part)) for part in whole]
+    import shapely
+
+    inset_m = overlap_m - grow_m
+    small = shapely.Polygon(zone.shape.vertices).buffer(-inset_m, join_style="mitre", mitre_limit=100.0)
+    rings = [p.exterior for p in shapely.get_parts(small) if not p.is_empty]
+    ccw = [shapely.get_coordinates(ring if ring.is_ccw else ring.reverse())[:-1] for ring in rings]
+    low = [part for vertices in ccw for part in convex_parts(vertices)]
+    return [_Part(sides, inset_m) for sides in zip_longest(low, whole)]
 
 
 def _half_planes(part: Floats, reach: float, *, inner: bool) -> Floats:

@@ -52,7 +52,7 @@ class OutlineTracks:
         """The shortest track past the zones that a choice shuts; None if there is none or it takes too much work."""
         which = ~((choice.under & self.under) | (choice.over & self.over))
         try:
-            tracks = self._tracks(which, outer=True)
+            tracks = self.tracks(which, outer=True)
         except Exhausted:
             return None
         if tracks is None:
@@ -64,7 +64,7 @@ class OutlineTracks:
         that there is none; then look for paths."""
         incumbent = self.incumbent
         try:
-            tracks = self._tracks(~(self.under | self.over), outer=False)
+            tracks = self.tracks(~(self.under | self.over), outer=False)
         except Exhausted:
             tracks = []
         if tracks is None:
@@ -86,16 +86,11 @@ class OutlineTracks:
         too_high = self.over & (self.tops_m > self.incumbent.highest(math.inf) + HARDLY_M)
         return (too_high & ~self.under) | ~(self.under | self.over)
 
-    def tracks(self, which: Bools) -> list[Floats] | None:
-        """The shortest track of each leg around the zones ``which`` (zones,), for bounds; None if a leg has none.
-        Raises Exhausted."""
-        return self._tracks(which, outer=False)
+    def outline(self, zone: int, *, outer: bool) -> Outline:
+        """A zone's outline for paths (``outer``) or for bounds, once `tracks` was asked for such."""
+        return self._solids[outer].outlines[zone]
 
-    def outline(self, zone: int) -> Outline:
-        """A zone's outline for bounds."""
-        return self._solids[False].outlines[zone]
-
-    def _tracks(self, which: Bools, *, outer: bool) -> list[Floats] | None:
+    def tracks(self, which: Bools, *, outer: bool) -> list[Floats] | None:
         """The shortest track of each leg past the zones ``which`` (zones,); None if a leg has none. ``outer``: outlines
         for paths instead of bounds. Raises Exhausted."""
         if outer not in self._solids:

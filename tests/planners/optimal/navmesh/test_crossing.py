@@ -72,6 +72,15 @@ def test_a_climb_that_takes_longer_than_the_way_to_the_zone_ends_beyond_it() -> 
     assert before.length_m == pytest.approx(math.hypot(700.0, 60.0) + 500.0, abs=0.06)
 
 
+def test_tracks_that_are_too_short_for_their_climb_can_be_made_dearer() -> None:
+    gentle = Climb(60.0, 60.0 * math.hypot(1.0, 6.0), dearer=10.0)  # 360 m of track; the zone's middle is 300 m away
+    found = over(shapely.box(-100.0, -250.0, 100.0, 250.0), up=gentle, down=climb(0.0))
+    assert np.hypot(*np.diff(found.before, axis=0).T).sum() >= 360.0 - 0.05
+    assert (
+        found.length_m > over(shapely.box(-100.0, -250.0, 100.0, 250.0), up=climb(60.0, 1 / 6), down=climb(0)).length_m
+    )
+
+
 def test_no_place_of_the_outline_in_reach_is_the_limit() -> None:
     found = over(shapely.box(-100.0, 900.0, 100.0, 1000.0), up=climb(60.0), down=climb(60.0), limit_m=900.0)
     assert found.length_m == 900.0
