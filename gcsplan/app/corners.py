@@ -6,13 +6,14 @@ centimetres behind a corner, in the direction of the next leg, leaves the line a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 
 import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Finding
-from gcsplan.mavlink.build.multirotor import SHORT_LEG_M
+from gcsplan.mavlink.build.multirotor import ROUNDED_M, SHORT_LEG_M
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.world.world import World
@@ -27,10 +28,10 @@ SLIGHT = 1e-3
 
 def cut(mission: Mission, findings: Sequence[Finding], points: Floats, world: World) -> set[int]:
     """The corners of a path (N, 3) at which the legs with ``findings`` begin and end, by index."""
-    way = points[:, :2]
-    a, b = np.diff(way[:-1], axis=0), np.diff(way[1:], axis=0)
-    turns = np.abs(np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(axis=1)))
-    long = np.hypot(*np.diff(way, axis=0).T)
+    way, legs = points[:, :2], np.diff(points, axis=0)
+    long = np.hypot(*legs[:, :2].T)
+    ways = legs / np.maximum(np.linalg.norm(legs, axis=1), 1e-9)[:, None]
+    turns = np.linalg.norm(np.diff(ways, axis=0), axis=1)  # in height, too
     found: set[int] = set()
     for seq in {s for f in findings for s in (f.seq - 1, f.seq)}:
         index = seq - mission.first_seq
@@ -47,11 +48,15 @@ def cut(mission: Mission, findings: Sequence[Finding], points: Floats, world: Wo
 
 
 def sharpened(points: Floats, corners: Collection[int]) -> Floats:
-    """The path with another point `SHORT_LEG_M` behind each of ``corners``, on the leg that begins there."""
+    """The path with another point `SHORT_LEG_M` behind each of ``corners``, on the leg that begins there, or so near
+    above or below it that rounding makes the way there no steeper than the leg."""
     out = []
     for k, p in enumerate(points):
         out.append(p)
         if k in corners:
             leg = points[k + 1] - p
-            out.append(p + SHORT_LEG_M / float(np.hypot(*leg[:2])) * leg)
+            behind = p + SHORT_LEG_M / float(np.hypot(*leg[:2])) * leg
+            rise_m = float(behind[2] - p[2])
+            behind[2] -= math.copysign(min(abs(rise_m), ROUNDED_M), rise_m)
+            out.append(behind)
     return np.array(out)

@@ -14,7 +14,7 @@ from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.problems import bow_margin_m, built, looked_over, make_problem, run_planner, unsafe
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
-from gcsplan.mavlink.build.multirotor import acceptance_radius_m, corner_m, spaced_out
+from gcsplan.mavlink.build.multirotor import acceptance_radius_m, cuts_corners, spaced_out
 from gcsplan.mavlink.build.order import MARGINS, Order
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import VehicleRequest
@@ -101,8 +101,9 @@ def _built(
     corners: set[int] = set()
     while True:
         mission, verdict = built(over, request, solution, order)
-        copter = vehicle.autopilot is Autopilot.ARDUCOPTER and corner_m(vehicle) > 0.0
-        more = cut(mission, on_path(mission, verdict), points, over.world) - corners if copter else set[int]()
+        more: set[int] = set()
+        if cuts_corners(vehicle) and vehicle.autopilot is Autopilot.ARDUCOPTER:
+            more = cut(mission, on_path(mission, verdict), points, over.world) - corners
         if not more:
             return solution, order, mission, verdict
         corners |= more

@@ -19,6 +19,9 @@ leg at the leg's beginning and 0 at its end, and no more than R·sin(A)·cos(A) 
 ``track_error_m`` and ``altitude_error_m`` include corners by definition, so offsets within them widen nothing. Offsets
 beyond them widen the legs, and the widened legs are added as flown in place of the straight ones. A vehicle whose
 ``corner_accel_m_s2`` is not bounded turns on the spot by definition.
+
+While an ArduCopter turns, it is where it would be on the one leg, moved by what it has flown, or will fly, of the
+other, which is half of the shorter leg at most. In height that is at most what both climb over so many metres.
 """
 
 from __future__ import annotations
@@ -134,9 +137,13 @@ class _Cutter:
         if radius_m <= 0.0:
             return _Off()
         if self.copter:
-            shorter_m = 0.5 * min(long_m, flat_m(after.start, after.end))
-            rise_m = 0.5 * max(rise_m, abs(after.end[2] - after.start[2]))
-            return _Off(min(radius_m, shorter_m * sine), min(radius_m, rise_m))
+            next_m, next_rise_m = flat_m(after.start, after.end), abs(after.end[2] - after.start[2])
+            shorter_m = 0.5 * min(long_m, next_m)
+            height_m = min(radius_m, 0.5 * max(rise_m, next_rise_m))
+            if shorter_m > 0.0 and not (s.terrain or after.terrain):
+                half_m = 0.5 * min(math.hypot(long_m, rise_m), math.hypot(next_m, next_rise_m))
+                height_m = min(height_m, half_m * (rise_m / long_m + next_rise_m / next_m))
+            return _Off(min(radius_m, shorter_m * sine), height_m)
         if radius_m >= long_m:  # it turns at once, wherever it is
             aside_m, sag_m = min(radius_m, long_m + off.aside_m), rise_m + off.height_m
         else:

@@ -15,6 +15,7 @@ from gcsplan.arrays import Floats
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import GcsplanError, NoMission
+from gcsplan.mavlink.build.multirotor import SHORT_LEG_M
 from gcsplan.mavlink.mission import commands as cmd
 
 ERRORS = {"min_agl_m": 30, "horizontal_clearance_m": 20, "track_error_m": 3, "altitude_error_m": 5}
@@ -151,7 +152,7 @@ def test_corners_without_errors_are_mended_where_they_are_cut() -> None:
     assert v.gap_percent is not None
     assert v.gap_percent < 0.06
     legs_m = np.hypot(*np.diff(v.solution.path.points[:, :2], axis=0).T)
-    assert legs_m.min() == pytest.approx(0.1, abs=0.01)
+    assert legs_m.min() == pytest.approx(SHORT_LEG_M, abs=0.01)
     assert v.problem.limits.track_error_m < 0.2
 
 

@@ -468,9 +468,63 @@ def returns(rng: np.random.Generator) -> Case:
     return case
 
 
+def frames(rng: np.random.Generator) -> Case:
+    """ArduCopters in the terrain altitude frame: their legs follow the ground, within the error of its heights. The
+    vehicle's own grid has parts of some kilometres, all of which must be known."""
+    t = hills(rng, 150, 80.0, float(rng.uniform(20.0, 250.0)))
+    a, b = ends_on(rng, t, float(rng.choice([0.02, 0.12])), inner=0.25)
+    limits = {"min_agl_m": float(rng.choice([10.0, 40.0])), **errors(rng)}
+    low, high = float(t.heights.min()), float(t.heights.max())
+    if rng.random() < 0.4:
+        limits["max_amsl_m"] = low + limits["min_agl_m"] + 110.0 + float(rng.uniform(0.5, 1.2)) * (high - low)
+    elif rng.random() < 0.5:
+        limits["max_agl_m"] = limits["min_agl_m"] + float(rng.uniform(100.0, 200.0))
+    if rng.random() < 0.3:
+        limits |= {"max_climb_deg": float(rng.uniform(12, 35)), "max_descent_deg": float(rng.uniform(12, 35))}
+    found = []
+    for _ in range(int(rng.integers(0, 4))):
+        at = a + float(rng.uniform(0.2, 0.8)) * (b - a) + rng.uniform(-0.1, 0.1, 2) * math.dist(a, b)
+        r = float(rng.uniform(0.03, 0.2)) * math.dist(a, b)
+        if min(math.dist(at, a), math.dist(at, b)) > r + 45.0:
+            found.append(Barrier(at[None, :], r, ceiling=(float(rng.uniform(60, 200)), "agl")
+                                 if rng.random() < 0.4 else None))  # fmt: skip
+    terrain = {"altitude_frame": "terrain", "objective": objective(rng)}
+    return Case("frames", 0, [craft(rng, a, b, "arducopter")], limits, found, t, **terrain)
+
+
+def bends(rng: np.random.Generator) -> Case:
+    """Zones that are not convex, mostly without errors: thin walls around yards open to one side, and stars."""
+    case = mountains(rng) if rng.random() < 0.6 else climbs(rng)
+    if rng.random() < 0.7:
+        case.limits |= {"horizontal_clearance_m": 0.0, "track_error_m": 0.0}
+    v = case.vehicles[0]
+    ends = [np.array([v[k]["east_m"], v[k]["north_m"]]) for k in ("start", "goal")]  # type: ignore[index]
+    far = math.dist(*ends)
+    case.barriers = []
+    for _ in range(int(rng.integers(1, 4))):
+        turn = np.linspace(0.0, 2.0 * np.pi, 11)[:-1] + float(rng.uniform(0.0, 6.3))
+        at = ends[0] + float(rng.uniform(0.1, 1.0)) * (ends[1] - ends[0]) + rng.uniform(-0.15, 0.15, 2) * far
+        size, way = float(rng.uniform(0.1, 0.35)) * far, np.column_stack([np.cos(turn), np.sin(turn)])
+        ring = at + size * np.vstack([way[:-2], (1.0 - float(rng.choice([0.03, 0.1]))) * way[-3::-1]])
+        if rng.random() < 0.3:
+            ring = at + 0.5 * size * way * rng.uniform(0.3, 1.0, (10, 1))
+        if min(math.dist(p, end) for p in denser(ring) for end in ends) > 45.0:
+            case.barriers.append(Barrier(ring, ceiling=level(rng, 60.0, 200.0, 0.0) if rng.random() < 0.3 else None))
+    case.family = "bends"
+    return case
+
+
+def denser(ring: Floats) -> Floats:
+    """Points along the edges of a ring (N, 2)."""
+    part = np.linspace(0.0, 1.0, 20)[:, None, None]
+    return np.asarray((ring + part * (np.roll(ring, -1, axis=0) - ring)).reshape(-1, 2))
+
+
 FAMILIES: dict[str, Callable[[np.random.Generator], Case]] = {
-    f.__name__: f for f in (walls, slits, over, climbs, mountains, holes, stops, fleets, wings, returns)
-}
+    f.__name__: f for f in (
+        walls, slits, over, climbs, mountains, holes, stops, fleets, wings, returns, frames, bends,
+    )
+}  # fmt: skip
 
 
 def make(family: str, seed: int) -> Case:

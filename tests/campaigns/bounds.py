@@ -1,8 +1,9 @@
 """Attack lower bounds, gaps and proofs: missions at the check's limit that must not be below a bound.
 
 Random worlds (walls, slits with centimetres of room, zones to pass over or under, climbs, hills, ground with voids,
-vias, fleets, fixed wings, return paths) are planned through the public functions alone. Then a second implementation
-draws missions from the plan's own take-off top to its approach, each judged by the check. A fault is
+vias, fleets, fixed wings, return paths, the terrain frame, zones that are not convex) are planned through the public
+functions alone. Then a second implementation draws missions from the plan's own take-off top to its approach, each
+judged by the check. A fault is
 
 - undercut: a safe mission costs less than the bound, by more than 1 mm + 1e-7 of it (or the joules of that);
 - proved: a mission is safe where the plan was refused as proved;

@@ -11,6 +11,8 @@ import pytest
 import yaml
 
 from gcsplan.app.pipeline import plan
+from gcsplan.check.corners import round_corners
+from gcsplan.check.flight import follow
 from gcsplan.check.judge import judge
 from gcsplan.check.tuning import Tuning
 from gcsplan.check.verdict import Verdict
@@ -258,3 +260,47 @@ def test_a_wing_with_a_slower_l1_controller_than_usual_is_judged_wider() -> None
         odd = verdict(flown, beside, craft, Tuning.of({"NAVL1_PERIOD": period_s}))
         assert odd.safe is None
         assert any(f"NAVL1_PERIOD is {period_s:g} s" in words for words in odd.not_judged)
+
+
+def test_a_copters_blended_corners_lie_within_the_widened_legs() -> None:
+    """Second implementation: while it turns, the copter is moved by what both legs add, half of the shorter at most."""
+    craft = vehicle(COPTER, horizontal_clearance_m=0.0, track_error_m=0.0, altitude_error_m=0.0)
+    s = np.linspace(0.0, 1.0, 41)[:, None]
+    for seed in range(150):
+        rng = np.random.default_rng(seed)
+        long = rng.choice([0.05, 0.3, 3.0, 40.0, 300.0], 2) * rng.uniform(0.7, 1.3, 2)
+        course = np.cumsum(rng.uniform(-3.1, 3.1, 2))
+        steps = np.column_stack([np.sin(course), np.cos(course), rng.uniform(-1.2, 1.2, 2)]) * long[:, None]
+        a, b, c = np.cumsum([[300.0, 200.0, 200.0], *steps], axis=0)
+        flown = mission(COPTER, *(at(cmd.WAYPOINT, *p) for p in (a, b, c)))
+        flight = follow(flown, craft, FLAT.ground_amsl)
+        round_corners(flight, flown, craft, FLAT.frame)
+        legs = [x for x in (*flight.stretches, *flight.instead) if x.seq in (flown.first_seq + 2, flown.first_seq + 3)]
+        ends = np.array([[[*FLAT.frame.to_plane(*p[:2]), p[2]] for p in (x.start, x.end)] for x in legs])
+        first = next(x for x in ends if abs(x[1, 2] - 300.0 - b[2]) < 0.01)
+        b = first[1]
+        u, v = (w / np.linalg.norm(w) for w in (b - first[0], steps[1]))
+        lengths = np.linalg.norm(first[1] - first[0]), np.linalg.norm(steps[1])
+        d = min(0.5 * min(lengths), 4.0 * 2.0 / max(float(np.linalg.norm(v - u)), 1e-6))
+        for p in b - d * (1.0 - s) ** 2 * u + d * s**2 * v:
+            inside = []
+            for x, (one, two) in zip(legs, ends, strict=True):
+                run = (two - one)[:2]
+                t = np.clip((p - one)[:2] @ run / max(float(run @ run), 1e-12), 0.0, 1.0)
+                off = np.abs(one + t * (two - one) - p)
+                inside.append(math.hypot(*off[:2]) <= x.reach_m + 0.02 and off[2] <= x.band_m + 0.03)
+            assert any(inside), (seed, long, p, b)
+
+
+def test_a_peak_with_a_short_leg_behind_it_is_hardly_cut() -> None:
+    craft = vehicle(COPTER, horizontal_clearance_m=0.0, track_error_m=0.0, altitude_error_m=0.0)
+
+    def lowest_m(*places: tuple[float, float, float]) -> float:
+        flown = mission(COPTER, *(at(cmd.WAYPOINT, *p) for p in places))
+        flight = follow(flown, craft, FLAT.ground_amsl)
+        round_corners(flight, flown, craft, FLAT.frame)
+        return max((x.band_m for x in flight.instead if abs(x.end[2] - 500.0) < 0.01), default=0.0)
+
+    before, peak, behind = (300.0, 0.0, 150.0), (600.0, 0.0, 200.0), (900.0, 0.0, 150.0)
+    assert lowest_m(before, peak, behind) == pytest.approx(2.0)
+    assert lowest_m(before, peak, (600.05, 0.0, 200.0), behind) < 0.01

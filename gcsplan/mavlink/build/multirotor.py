@@ -36,6 +36,13 @@ def acceptance_radius_m(vehicle: Vehicle) -> float:
     return vehicle.acceptance_m
 
 
+def cuts_corners(vehicle: Vehicle) -> bool:
+    """Return whether a vehicle that can hover cuts corners by more than its errors may include."""
+    errors_m = min(vehicle.limits.track_error_m, vehicle.limits.altitude_error_m)
+    bounded = vehicle.turn_radius_m <= 0.0 and math.isfinite(vehicle.corner_accel_m_s2)
+    return bounded and acceptance_radius_m(vehicle) > errors_m
+
+
 def corner_m(vehicle: Vehicle) -> float:
     """Return the planner's margin for corners that are cut by more than ``track_error_m``; mostly 0.
 

@@ -38,6 +38,9 @@ MOST_CORNERS = 12_000
 """Corners of all outlines of one mesh, at most: with more, the triangulation takes seconds."""
 MOST_GROWN = 1000
 """Corners of one polygon that is grown, at most: its edges are grown one by one, a thousand in half a second."""
+APART_M = 1e-5
+"""Metres that corners of a mesh are apart at least: where outlines meet, rounding may make two of one, and a track that
+turns there would be missed. Outlines keep a hair that is much more."""
 BEYOND_M = 1.0
 """Metres that the mesh reaches beyond the outlines and the places."""
 MOST_OPENED = 1_000_000
@@ -198,7 +201,7 @@ def _shortest(a: Place, b: Place, shapes: Sequence[shapely.Polygon]) -> GroundTr
     places = np.array([a, b])
     bounds = np.array([*(s.bounds for s in shapes), (*places.min(axis=0), *places.max(axis=0))])
     box = shapely.box(*(bounds[:, :2].min(axis=0) - BEYOND_M), *(bounds[:, 2:].max(axis=0) + BEYOND_M))
-    free = box.difference(shapely.union_all(shapes)) if shapes else box
+    free = shapely.set_precision(box.difference(shapely.union_all(shapes)), APART_M) if shapes else box
     if shapely.get_num_coordinates(free) > MOST_CORNERS:
         raise Exhausted(0.0)
     parts = [p for p in shapely.get_parts(free) if shapely.dwithin(p, shapely.points(places), 1e-6).all()]

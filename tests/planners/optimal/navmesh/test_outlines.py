@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -95,6 +96,16 @@ def test_any_number_of_triangles_may_meet_at_a_corner(seed: int) -> None:
         track = Solids(zones, 0.0, 1.0, [2e-3] * 2, Budget.endless(), outer=outer).shortest(*places, np.ones(2, bool))
         assert track is not None
         assert track.length_m == pytest.approx(oracle, rel=3e-4, abs=0.05)
+
+
+def test_a_track_turns_where_rounding_has_made_two_corners_of_one() -> None:
+    # Two zones' outlines that meet: their union has corners 1e-14 m apart, and the way south turns at them.
+    corners = [(73.5, -61.25), (43.11033185386742, -26.057106177671713), (43.11033185386742, -26.05710617767171),
+               (124.5, 106.75)]  # fmt: skip
+    a, b, south = (0.0, 0.0), (183.7, 14.35), [(0.0, 0.0), (73.5, -61.25), (183.7, 14.35)]
+    found = outlines._shortest(a, b, [shapely.Polygon(corners)])
+    assert found is not None
+    assert found.length_m == pytest.approx(sum(math.dist(*leg) for leg in itertools.pairwise(south)), abs=1e-3)
 
 
 @pytest.mark.first_quick
