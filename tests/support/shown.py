@@ -25,8 +25,8 @@ def seconds(text: str) -> float:
 
 
 def number(text: str) -> float:
-    """A number as it is shown, ``1 234.5``."""
-    return float(re.sub(f"[{SPACES}]", "", text))
+    """A number as it is shown, ``1 234.5``, or ``137 (paper's figures)``."""
+    return float(re.sub(f"[{SPACES}]", "", text.removesuffix(" (paper's figures)")))
 
 
 NUMBER = r"-?\d{1,3}(?:[\u2009\u202f]\d{3})+(?:\.\d+)?|-?\d+(?:\.\d+)?"
