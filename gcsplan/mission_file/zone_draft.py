@@ -330,12 +330,12 @@ def one_line(text: str) -> str:
 
 def zones_sha256(drafts: Sequence[ZoneDraft]) -> str:
     """Hash of the zones' contents, independent of where and in what layout they were written."""
-    plain = [
-        [d.name, d.points, d.local, d.radius_m, d.floor and str(d.floor), d.ceiling and str(d.ceiling)]
-        + ([d.buffer_m] if d.buffer_m is not None else [])
-        for d in drafts
-    ]
-    return hashlib.sha256(json.dumps(plain).encode()).hexdigest()
+    found = hashlib.sha256()
+    for d in drafts:
+        plain = [d.name, len(d.points), d.local, d.radius_m, d.buffer_m, d.floor and str(d.floor)]
+        found.update(json.dumps([*plain, d.ceiling and str(d.ceiling)]).encode())
+        found.update(np.array(d.points, "<f8").tobytes())
+    return found.hexdigest()
 
 
 def _plain(drafts: Sequence[ZoneDraft], frame: Frame) -> dict[int, Polygon]:

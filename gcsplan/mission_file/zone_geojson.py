@@ -12,6 +12,7 @@ from gcsplan.figures import counted
 from gcsplan.mission_file.zone_attributes import Attribute, Said, is_number, read_attributes, shown
 from gcsplan.mission_file.zone_draft import SIZES
 from gcsplan.mission_file.zone_file import Drawn, ZoneFile
+from gcsplan.world.degree_shapes import beyond_outline
 
 ALTITUDES = "the altitudes of corners are not read as limits"
 
@@ -158,7 +159,10 @@ def _rings(found: ZoneFile, rings: Any, said: Said, part: str, where: str, at: s
         found.problems.append(Problem(at, f"a polygon is a list of rings, given {shown(rings)}"))
         return
     outline = _positions(found, rings[0], f"{at}[0]")
-    if outline is not None:
+    holes = [_positions(found, ring, f"{at}[{k}]") for k, ring in enumerate(rings[1:], 1) if isinstance(ring, list)]
+    if outline is not None and (odd := beyond_outline(outline, [hole for hole in holes if hole])):
+        found.problems.append(Problem(at, f"zone {part[:60]!r}: {odd}"))
+    elif outline is not None:
         found.add_ring(said, part, where, outline, at.removeprefix(where).removeprefix("."), _unread(rings[0]),
                        holes=len(rings) - 1)  # fmt: skip
 

@@ -22,6 +22,7 @@ from gcsplan.mission_file.zone_attributes import Attribute, Said, as_figure, rea
 from gcsplan.mission_file.zone_draft import SIZES
 from gcsplan.mission_file.zone_file import NOT_DRAWN, Drawn, ZoneFile
 from gcsplan.mission_file.zone_levels import LARGEST_M
+from gcsplan.world.degree_shapes import beyond_outline
 from gcsplan.world.zones import Level
 
 MAX_DEPTH = 60
@@ -126,14 +127,18 @@ def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
 
 def _polygon(found: ZoneFile, shape: Any, said: Said, part: str, where: str) -> None:
     outer = [e for e in _walk(shape, found.path) if _kind(e) == "outerBoundaryIs"]
-    holes = sum(_kind(e) == "innerBoundaryIs" for e in _walk(shape, found.path))
     if len(outer) != 1:
         found.problems.append(Problem(where, f"a Polygon has one outerBoundaryIs, given {len(outer)}"))
         return
     points = _coordinates(found, outer[0], where)
-    if points is not None:
+    inner = [e for e in _walk(shape, found.path) if _kind(e) == "innerBoundaryIs"]
+    rings = [_coordinates(found, e, where) for e in inner]
+    odd = beyond_outline([p[:2] for p in points or []], [[p[:2] for p in ring] for ring in rings if ring])
+    if odd:
+        found.problems.append(Problem(where, odd))
+    elif points is not None:
         drawn = _unread(points) if said.of_levels else _drawn(shape, points)
-        found.add_ring(said, part, where, [p[:2] for p in points], "", drawn, holes)
+        found.add_ring(said, part, where, [p[:2] for p in points], "", drawn, len(inner))
 
 
 def _drawn(shape: Any, points: list[Corner]) -> Drawn:

@@ -18,6 +18,7 @@ from gcsplan.mission_file.zone_draft import MAX_VERTICES, SIZES
 from gcsplan.mission_file.zone_file import MAX_ZONES, Drawn, ZoneFile
 from gcsplan.mission_file.zone_geojson import ALTITUDES
 from gcsplan.mission_file.zone_zip import unpack
+from gcsplan.world.degree_shapes import beyond_outline
 from gcsplan.world.input_files import tell_file
 from gcsplan.world.reprojection import ToDegrees
 
@@ -185,7 +186,10 @@ def _feature(found: ZoneFile, geometry: shapely.Geometry | None, said: Said, whe
         except InputError as why:
             found.problems.append(Problem(where, f"zone {said.name[:60]!r}: {why.message}"))
             continue
-        if shape.geom_type == "Polygon":
+        rings = [np.asarray(ring.coords)[:, :2] for ring in getattr(shape, "interiors", ())]
+        if odd := beyond_outline(xy.tolist(), [ring.tolist() for ring in rings], metres=True):
+            found.problems.append(Problem(where, f"zone {said.name[:60]!r}: {odd}"))
+        elif shape.geom_type == "Polygon":
             found.add_ring(said, part, where, corners, "", drawn, len(shape.interiors))
         elif shape.geom_type == "Point":
             found.add_circle(said, part, where, corners[0], drawn.remarks)

@@ -95,7 +95,7 @@ def zones_as_arrays(zones: Sequence[Zone], surface: Surface, field: Field, scale
 
 def _cells(box: Floats, surface: Surface, field: Field) -> tuple[int, int, int, int]:
     """First and last column and row of the cells that a box of the plane may touch; beyond the DEM too."""
-    f = np.linspace(0.0, 1.0, 9)
+    f = np.linspace(0.0, 1.0, 2 if field.affine else 9)
     if not field.affine:  # beyond the fitted square the map is not valid, and no leg is judged there
         middle = np.array(surface.grid.centre * 2)
         box = np.clip(box, middle - 1.05 * surface.grid.scale_m, middle + 1.05 * surface.grid.scale_m)

@@ -72,6 +72,9 @@ ACROSS_DEG, ACROSS_PART = 2.0, 0.5
 """Edges of a whole turn less the first may cross the antimeridian, if the polygon then is wide by this part of its
 height: a mask of the world that leaves out a strip along the antimeridian is tall there, and narrow."""
 
+SAME_PLACE_DEG = 1e-6
+"""Corners of a hole may lie so far beyond its outline's: rounding, a decimetre."""
+
 POLE_DEG = 89.999
 """A corner at a latitude from here on is the pole."""
 
@@ -244,6 +247,28 @@ def outline_of(points: Sequence[Corner], *, local: bool = False) -> tuple[list[C
         )
     # The function, not the method: it lets other threads run, which hear signals.
     return ring, "" if shapely.is_valid(shape) and shape.area > 0.0 else _why_invalid(shape, local)
+
+
+def beyond_outline(outline: Sequence[Corner], holes: Sequence[Sequence[Corner]], *, metres: bool = False) -> str:
+    """Why holes of an outline, (latitude, longitude) each, are none; empty if they are within its rectangle.
+
+    Only the outline becomes a zone. Rings in the wrong order would make it as small as a hole. Longitudes of a hole may
+    be whole turns off, unless coordinates are ``metres``.
+    """
+    if not holes or not outline:
+        return ""
+    at = np.asarray(outline, float)
+    low, high = at.min(axis=0) - SAME_PLACE_DEG, at.max(axis=0) + SAME_PLACE_DEG
+    for k, hole in enumerate(holes, start=2):
+        inner = np.array(hole, float).reshape(-1, 2)
+        if not metres:
+            inner[:, 1] += _turns(inner[:, 1], 0.5 * (low[1] + high[1]))
+        if (inner < low).any() or (inner > high).any():
+            return (
+                f"ring {k} reaches beyond ring 1, which is the outline: put the outline first and holes after it, and "
+                "draw what is no hole as a polygon of its own"
+            )
+    return ""
 
 
 def wide_fault(points: Sequence[Corner], holes: int = 0, *, closed: bool = True) -> str:

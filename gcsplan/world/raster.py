@@ -223,7 +223,7 @@ def _unreadable(path: Path, why: Exception) -> str:
     reason = (str(cause).strip() or type(cause).__name__).splitlines()[0].replace(str(path.absolute()), path.name)[:200]
     return (
         f"{path} cannot be read as a GeoTIFF, an SRTM .hgt or an ESRI .asc grid ({reason}){hint}; "
-        "gdal_translate makes a GeoTIFF of other formats"
+        "`rio convert FILE a.tif`, which is installed with gcsplan, makes a GeoTIFF of other formats"
     )
 
 

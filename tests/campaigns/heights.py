@@ -403,6 +403,8 @@ def hgt_case(rng: np.random.Generator, folder: Path) -> Case:
         raw[r : r + 5, c : c + 5] = 0.0
         key_nodata = "none" if rng.random() < 0.3 else None
     (folder / "N36W085.hgt").write_bytes(raw.astype(">i2").tobytes())
+    if rng.random() < 0.3:
+        return _neighbours(rng, folder, said, raw, metres)
     z = np.where(raw == -32768.0, np.nan, raw) * metres
     if key_nodata is None:
         z[500:700, 500:700] = np.where(shoreless(z[500:700, 500:700]), np.nan, z[500:700, 500:700])
@@ -412,6 +414,28 @@ def hgt_case(rng: np.random.Generator, folder: Path) -> Case:
         return (lon + 85.0) * 1200.0, (37.0 - lat) * 1200.0
 
     return Case(spec, Frame(36.5, -84.5), said.reasons, z, z, at, 0.02)
+
+
+def _neighbours(rng: np.random.Generator, folder: Path, said: Said, west: Floats, metres: float) -> Case:
+    """Two tiles whose common column of posts differs; the mission lies over it."""
+    east = np.round(slopes(rng, 1201, 1201, 40.0, 400.0) / (metres if said.height_unit else 1.0))
+    off = np.round(rng.uniform(-40.0, 40.0, 1201) * (rng.random(1201) < 0.7))
+    east[:, 0] = west[:, -1] + off
+    if rng.random() < 0.5:
+        east[590:600, 0:2] = -32768.0  # a void at the border of one tile is known from the other
+    (folder / "N36W084.hgt").write_bytes(east.astype(">i2").tobytes())
+    left, right = (np.where(z == -32768.0, np.nan, z) * metres for z in (west, east))
+    low, high = (np.concatenate([left[:, :-1], end(left[:, -1:], right[:, :1]), right[:, 1:]], axis=1)
+                 for end in (np.fmin, np.fmax))  # fmt: skip
+    for z in (low, high):
+        part = z[500:700, 1100:1300]
+        part[shoreless(part)] = np.nan
+    paths = (str(folder / "N36W085.hgt"), str(folder / "N36W084.hgt"))
+
+    def at(lat: Floats, lon: Floats) -> tuple[Floats, Floats]:
+        return (lon + 85.0) * 1200.0, (37.0 - lat) * 1200.0
+
+    return Case(said.spec(paths, None), Frame(36.5, -84.0), said.reasons, low, high, at, 0.02)
 
 
 def dat_case(rng: np.random.Generator, folder: Path) -> tuple[Case, Path]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -181,6 +182,31 @@ def test_a_polygon_around_a_pole_in_a_polar_system_is_refused_by_name(tmp_path: 
     )  # fmt: skip
     (problem,) = read_zones(tmp_path / "z.gpkg", where="zones").problems
     assert problem.message == "zone 'cap': the outline goes around a pole: cut the zone there in two"
+
+
+@pytest.mark.parametrize("form", [form for form in WRITERS if form != "openair"])
+def test_rings_in_the_wrong_order_are_no_small_zone(tmp_path: Path, form: str) -> None:
+    """A hole before its outline: read as it stands, the zone would be as small as the hole."""
+    outline, hole = band(14.0, 15.0, 45.5, 46.5), band(14.4, 14.6, 45.9, 46.1)
+    assert verdict_of(tmp_path, form, [outline, hole], 14.2, 46.0) == "inside"
+    swapped = verdict_of(tmp_path, form, [hole, outline], 14.2, 46.0)
+    assert "put the outline first and holes after it" in swapped or (form, swapped) == ("shp", "inside")  # GDAL sorts
+    west = [[(x - 194.5, y) for x, y in ring] for ring in (outline, hole)]  # across the 180° meridian
+    turned = [west[0], [(x + 360.0, y) for x, y in west[1]]]
+    if form not in ("mercator", "nad83", "gpkg", "shp"):
+        assert verdict_of(tmp_path, form, turned, 179.8, 46.0) == "inside"
+
+
+def verdict_of(folder: Path, form: str, part: Sequence[Ring], lon: float, lat: float) -> str:
+    """As `verdict`, of one polygon with its rings."""
+    try:
+        found = read_zones(WRITERS[form](folder, [part]), where="zones")
+    except InputError as why:
+        return str(why)
+    if found.problems:
+        return found.problems[0].message
+    answer = answered(used(found.zones), Frame(lat, lon), lon, lat)
+    return "refused" if answer is None else "inside" if answer else "free"
 
 
 def test_a_line_has_no_edge_of_half_a_turn_either(tmp_path: Path) -> None:

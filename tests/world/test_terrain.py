@@ -710,7 +710,7 @@ def test_only_files_are_opened_never_an_address(path: str) -> None:
 def test_other_formats_are_refused_with_the_cure(tmp_path: Path) -> None:
     vrt = tmp_path / "a.vrt"
     vrt.write_text('<VRTDataset rasterXSize="9" rasterYSize="9"></VRTDataset>')
-    assert "gdal_translate" in str(refusal(vrt))
+    assert "`rio convert FILE a.tif`" in str(refusal(vrt))
 
 
 def test_a_window_that_would_not_fit_into_memory_is_refused_before_it_is_read(

@@ -12,6 +12,7 @@ from gcsplan.mission_file.airspace.volumes import AirspaceFile, Corner, Limits
 from gcsplan.mission_file.zone_attributes import MOST_SHOWN, NOT_READ, is_number, meaning_of, shown
 from gcsplan.mission_file.zone_draft import Remark
 from gcsplan.mission_file.zone_file import ZoneFile
+from gcsplan.world.degree_shapes import beyond_outline
 
 _NUMBER = re.compile(r"[-+]?\d{1,9}(\.\d{1,9})?", re.ASCII)
 
@@ -69,7 +70,10 @@ def outer_ring(given: Any) -> tuple[list[Corner], int]:
     """The outline of a polygon's rings, and the number of its holes. Raises MemberError."""
     if not isinstance(given, list) or not given or not isinstance(given[0], list):
         raise MemberError(f"a polygon is a list of rings, given {shown(given)}")
-    return _many(given[0]) or [position(p) for p in given[0]], len(given) - 1
+    outline, *holes = (_many(ring) or [position(p) for p in ring] for ring in given if isinstance(ring, list))
+    if odd := beyond_outline(outline, holes):
+        raise MemberError(odd)
+    return outline, len(given) - 1
 
 
 def _many(given: list[Any]) -> list[Corner]:
