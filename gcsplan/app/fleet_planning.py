@@ -183,6 +183,7 @@ def route_of(v: VehiclePlan, world: World) -> Route:
         climb_out_m_s=climb_out_m_s(v),
         glide=glide,
         pace=pace,
+        follows=v.order.altitude_frame == "terrain",
     )  # fmt: skip
 
 

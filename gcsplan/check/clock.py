@@ -85,7 +85,7 @@ def _legs_s(
     stretch = legs(
         points, vehicle, owner, np.array([s.seq for s in run], dtype=np.intp)[owner],
         pace=speed, rates_m_s=np.array([s.rates_m_s or own for s in run])[owner],
-        radius_m=np.array([radius_m.get(s.seq, vehicle.acceptance_m) for s in run])[owner],
+        radius_m=np.array([radius_m.get(s.seq, vehicle.acceptance_m) for s in run])[owner], follows=follows[owner],
     )  # fmt: skip
     return np.zeros(len(run)) if stretch is None else stretch.shares_s(1.0, len(run))
 

@@ -22,8 +22,7 @@ def extent_of(
     """The extent of ``stretches``, at least one, with the errors of ``limits`` and what widens each of them.
 
     ``legs``: the same in the plane, where those of the terrain frame follow the ground; their errors of height count,
-    but for ``home_error_m``, which moves home and all heights above it alike. The ends of columns may stand on the
-    ground, where there is no error of height downwards.
+    but for ``home_error_m``, which moves home and all heights above it alike. The ground at home is part of it.
     """
     ends = np.array([(*s.start, *s.end) for s in stretches])
     lat, lon = ends[:, [0, 3]], ends[:, [1, 4]]
@@ -32,10 +31,9 @@ def extent_of(
     east_m = degree_m(float(np.abs(np.append(lat, home_lat)).min()))[0]  # the longest of the flight's degrees
     away_m = np.hypot(east_m * ((lon - home_lon + 180.0) % 360.0 - 180.0), north_m * (lat - home_lat)).max(axis=1)
     reach_m = float((away_m + np.array([s.reach_m for s in stretches])).max()) + limits.track_error_m
-    top_m, bottom_m = -np.inf, home.amsl_m
+    top_m, bottom_m = -np.inf, home.amsl_m - limits.altitude_error_m
     for part in legs:
         error_m = part.altitude_error_m - home_error_m
         top_m = max(top_m, float((np.maximum(part.start[:, 2], part.end[:, 2]) + error_m).max()))
-        low_m = np.minimum(part.start[:, 2], part.end[:, 2]) - np.where(part.column, 0.0, error_m)
-        bottom_m = min(bottom_m, float(low_m.min()))
+        bottom_m = min(bottom_m, float((np.minimum(part.start[:, 2], part.end[:, 2]) - error_m).min()))
     return Extent(top_m - home.amsl_m, bottom_m - home.amsl_m, reach_m)

@@ -11,6 +11,7 @@ speed: `LAG_S` is what that was measured to cost.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -20,6 +21,7 @@ from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.fleet.lean import leaning_m_s
 from gcsplan.fleet.scurve import Begun, Curves, along_slope, curves
 from gcsplan.fleet.speeds import POSITION_ERROR_M, bounds
+from gcsplan.fleet.trailing import trailing_s
 from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, Autopilot, Vehicle
 
 __all__ = ["CORNER_M", "Curved", "curved"]
@@ -50,7 +52,8 @@ class Curved:
     part of the leg. ``way`` (L, 3) are the legs as the autopilot counts them, in metres: a leg that follows the ground
     is level. ``begins``, ``ends`` (L, 3) are the directions in which each leg begins and ends; of a curve they differ.
     ``part_m`` (P,) are the parts' lengths so counted. The speed along a part is at most ``most_m_s`` (P,) and
-    at most the cruise speed times ``per_cruise`` (P,). ``owner`` (P,) is the caller's number of each part.
+    at most the cruise speed times ``per_cruise`` (P,). ``owner`` (P,) is the caller's number of each part. Parts that
+    ``follows`` (P,) follow the ground, with ``rates_m_s`` (P, 2) of climb and descent (`trailing`).
     """
 
     knots: Floats
@@ -63,6 +66,8 @@ class Curved:
     per_cruise: Floats
     owner: Indices
     vehicle: Vehicle
+    follows: Bools
+    rates_m_s: Floats
 
     @property
     def start(self) -> Floats:
@@ -117,7 +122,13 @@ class Curved:
 
     def _part_s(self, cruise_m_s: float) -> Floats:
         """(P,) seconds of each part at its highest speed."""
-        return np.asarray(self.part_m / np.minimum(self.most_m_s, cruise_m_s * self.per_cruise))
+        speed = np.minimum(self.most_m_s, cruise_m_s * self.per_cruise)
+        if not self.follows.any():
+            return np.asarray(self.part_m / speed)
+        return trailing_s(
+            self.part_m, np.diff(self.knots[:, 2]), self.rates_m_s, speed, self.follows,
+            FULL_ACCEL * self.vehicle.accel_m_s2, self.vehicle.vertical_accel_m_s2,
+        )  # fmt: skip
 
     def _legs(self, cruise_m_s: float) -> tuple[Curves, Floats, Floats]:
         """The legs' curves at a cruise speed; the seconds (L - 1,) for which each overlaps with the next; and the
@@ -170,6 +181,7 @@ class Curved:
 
 def curved(
     points: Floats, vehicle: Vehicle, owner: Indices, leg: Indices, pace: Floats | None, rates_m_s: Floats | None,
+    follows: Bools | None = None,
 ) -> Curved | None:  # fmt: skip
     """The stretch through ``points`` (N, 3) without a stop; None if nothing moves.
 
@@ -187,7 +199,12 @@ def curved(
     last = np.append(first[1:], len(d))
     run, length = np.hypot(d[:, 0], d[:, 1]), np.linalg.norm(d, axis=1)
     rates = np.array([[vehicle.climb_m_s, vehicle.descent_m_s]]) if rates_m_s is None else rates_m_s[keep[1:]]
-    most, per_cruise = bounds(length, run, d[:, 2], np.broadcast_to(rates, (len(d), 2)))
+    rates = np.broadcast_to(rates, (len(d), 2))
+    most, per_cruise = bounds(length, run, d[:, 2], rates)
+    trails = np.zeros(len(d), dtype=np.bool_)
+    if follows is not None:
+        trails = follows[keep[1:]] & (last - first > 1)[number] & (run > 0.0)
+        most = np.where(trails, math.inf, most)  # `trailing` keeps the rates
     if vehicle.autopilot is Autopilot.ARDUCOPTER and vehicle.lean_angle_deg is not None:
         slope = np.arctan2(d[:, 2], np.maximum(run, 1e-12))
         lean = leaning_m_s(vehicle.lean_angle_deg, slope, 0.5 * (p[1:, 2] + p[:-1, 2]))
@@ -195,8 +212,8 @@ def curved(
     if pace is not None:
         per_cruise = per_cruise * pace[keep[1:]]
     way = p[last] - p[first]
-    follows = (last - first > 1)[number] & (run > 0.0)  # parts of a leg that follows the ground
-    level = np.where(follows, run / length, 1.0)
+    cut = (last - first > 1)[number] & (run > 0.0)  # parts of a leg that follows the ground
+    level = np.where(cut, run / length, 1.0)
     several = last - first > 1
     way[several, 2] = 0.0
     part_m = length * level
@@ -208,7 +225,7 @@ def curved(
     done = np.cumsum(part_m) - np.concatenate([[0.0], np.cumsum(whole)])[number]
     at = np.append(0.0, number + np.minimum(done / whole[number], 1.0))
     at[last] = number[last - 1] + 1.0
-    return Curved(p, at, way, begins, ends, part_m, most * level, per_cruise * level, owner, vehicle)
+    return Curved(p, at, way, begins, ends, part_m, most * level, per_cruise * level, owner, vehicle, trails, rates)
 
 
 def _unit(way: Floats, instead: Floats) -> Floats:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gcsplan.arrays import Floats, Indices
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.fleet.curved import Curved, curved
 from gcsplan.fleet.smoothed import Smoothed, smoothed
 from gcsplan.fleet.speeds import Stretch, rounded
@@ -22,14 +22,15 @@ Motion = Stretch | Curved | Smoothed
 
 def legs(
     points: Floats, vehicle: Vehicle, owner: Indices, leg: Indices | None = None, pace: Floats | None = None,
-    rates_m_s: Floats | None = None, radius_m: Floats | None = None,
+    rates_m_s: Floats | None = None, radius_m: Floats | None = None, follows: Bools | None = None,
 ) -> Motion | None:  # fmt: skip
     """The stretch through ``points`` (N, 3) without a stop; None if nothing moves.
 
     ``owner`` (N - 1,) are the caller's numbers of the parts between them. Parts with the same number of ``leg`` (N -
     1,) are one leg, cut to follow the ground or a curve; None: each part is a leg. ``pace`` (N - 1,) is the speed that
     results from a cruise speed of 1, if that is not 1. ``rates_m_s`` (N - 1, 2) are the rates of climb and descent on
-    each part, ``radius_m`` (N - 1,) PX4's acceptance radius at its end, if they are not the vehicle's own.
+    each part, ``radius_m`` (N - 1,) PX4's acceptance radius at its end, if they are not the vehicle's own; ``follows``
+    (N - 1,) those that follow the ground.
 
     ArduPilot flies S-curves (`curved`) and PX4 smooths (`smoothed`) unless a motion key of the vehicle is not
     bounded; every other vehicle rounds its corners (`speeds`). A fixed wing keeps the airspeed that it indicates,
@@ -39,7 +40,7 @@ def legs(
         pace, rates_m_s = _in_air(points, vehicle, pace, rates_m_s)
     if vehicle.lays_curves and math.isfinite(vehicle.corner_accel_m_s2):
         numbers = np.arange(len(owner), dtype=np.intp) if leg is None else leg
-        return curved(points, vehicle, owner, numbers, pace, rates_m_s)
+        return curved(points, vehicle, owner, numbers, pace, rates_m_s, follows)
     if vehicle.smooths:
         return smoothed(points, vehicle, owner, pace, rates_m_s, radius_m)
     return rounded(points, vehicle, owner, pace, rates_m_s)

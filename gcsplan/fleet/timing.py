@@ -53,7 +53,7 @@ class Route:
     (N,) are seconds of holding at each point; the first is the gate. ``items`` (N + 1,) are the caller's numbers of the
     take-off, of each way point but the first, and of the end of the flight; legs with the same number are parts of one
     leg. ``pace`` (N,) is the speed over ground that results from a commanded speed of 1 on each leg, and last on the
-    straight line home.
+    straight line home. ``follows``: its legs follow the ground.
 
     A fixed wing has no columns: ``climb_out`` (K, 3) leads from the ground to the first point, ``glide`` (K, 3) from
     the last point down to the ground if it lands. After a return it circles over home and stays in the air.
@@ -72,6 +72,7 @@ class Route:
     climb_out_m_s: Floats | None = None
     glide: Floats | None = None
     pace: Floats | None = None
+    follows: bool = False
 
     def __post_init__(self) -> None:
         p = self.points
@@ -128,7 +129,9 @@ class Course:
         for i, j in pairwise(stops):
             owner = np.arange(i + 1, j + 1, dtype=np.intp)
             pace = None if route.pace is None else route.pace[i:j]
-            stretch = legs(route.points[i : j + 1], vehicle, owner, None if leg is None else leg[i:j], pace)
+            follows = np.full(j - i, route.follows)
+            numbers = None if leg is None else leg[i:j]
+            stretch = legs(route.points[i : j + 1], vehicle, owner, numbers, pace, follows=follows)
             held = float(holds[j]) if j < stops[-1] else 0.0
             if stretch is not None:
                 self.to_goal.append((stretch, held))

@@ -49,10 +49,10 @@ NAMES_UNITS = Change(
     ARDUPILOT, (4, 7), "names of parameters",
     "ANGLE_MAX, ARMING_CHECK, LAND_ALT_LOW, LAND_SPEED, LAND_SPEED_HIGH, RTL_ALT, RTL_ALT_FINAL, RTL_CLIMB_MIN, "
     "RTL_SPEED, SYSID_MYGCS, SYSID_THISMAV, WPNAV_ACCEL, WPNAV_ACCEL_C, WPNAV_ACCEL_Z, WPNAV_JERK, WPNAV_RADIUS, "
-    "WPNAV_SPEED, WPNAV_SPEED_DN, WPNAV_SPEED_UP: centimetres and hundredths of a degree",
+    "WPNAV_SPEED, WPNAV_SPEED_DN, WPNAV_SPEED_UP, WPNAV_TER_MARGIN: centimetres and hundredths of a degree",
     "ATC_ANGLE_MAX, ARMING_SKIPCHK, LAND_ALT_LOW_M, LAND_SPD_MS, LAND_SPD_HIGH_MS, RTL_ALT_M, RTL_ALT_FINAL_M, "
     "RTL_CLIMB_MIN_M, RTL_SPEED_MS, MAV_GCS_SYSID, MAV_SYSID, WP_ACC, WP_ACC_CNR, WP_ACC_Z, WP_JERK, WP_RADIUS_M, "
-    "WP_SPD, WP_SPD_DN, WP_SPD_UP: metres and degrees",
+    "WP_SPD, WP_SPD_DN, WP_SPD_UP, WP_TER_MARGIN: metres and degrees",
 )  # fmt: skip
 TAKES_ARCS = Change(
     ARDUPILOT, (4, 7), "NAV_ARC_WAYPOINT in a copter's mission", "refused: ACK 3", "stored as sent, and flown",

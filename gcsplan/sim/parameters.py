@@ -83,6 +83,7 @@ _TABLES: dict[Autopilot, dict[str, Parameter]] = {
         "WPNAV_SPEED": _r(1000.0),
         "WPNAV_SPEED_DN": _r(150.0),
         "WPNAV_SPEED_UP": _r(250.0),
+        "WPNAV_TER_MARGIN": _r(10.0),
         "WP_NAVALT_MIN": _r(0.0),
     },
     Autopilot.ARDUPLANE: {
@@ -151,6 +152,7 @@ _RENAMED = {
     "RTL_SPEED": ("RTL_SPEED_MS", 0.01), "WPNAV_ACCEL": ("WP_ACC", 0.01), "WPNAV_ACCEL_C": ("WP_ACC_CNR", 0.01),
     "WPNAV_ACCEL_Z": ("WP_ACC_Z", 0.01), "WPNAV_JERK": ("WP_JERK", 1.0), "WPNAV_RADIUS": ("WP_RADIUS_M", 0.01),
     "WPNAV_SPEED": ("WP_SPD", 0.01), "WPNAV_SPEED_DN": ("WP_SPD_DN", 0.01), "WPNAV_SPEED_UP": ("WP_SPD_UP", 0.01),
+    "WPNAV_TER_MARGIN": ("WP_TER_MARGIN", 1.0),
     "SYSID_THISMAV": ("MAV_SYSID", 1.0), "SYSID_MYGCS": ("MAV_GCS_SYSID", 1.0),
 }  # fmt: skip
 """Names of 4.6 with the name in 4.7 and the factor of the value; those in another unit are floats in 4.7."""

@@ -22,6 +22,8 @@ __all__ = ["leg_limits", "step_legs"]
 
 STEP_S = 0.01
 """Time step of the curves and of the look at the next leg."""
+TRAIL_STEP_S, TERRAIN_MARGIN_M = 0.05, 10.0
+"""Time step over ground that is followed; WPNAV_TER_MARGIN, default."""
 SAMPLE_S = 0.25
 """Time between places while a leg speeds up or slows down."""
 LAG_S, LAG_FROM, REST_M_S = 0.36, 0.6, 0.96
@@ -116,19 +118,49 @@ def step_legs(
 def leg_limits(parts: Floats, way: Floats, stretch: Stretch, kinematics: Kinematics) -> tuple[float, float]:
     """The highest speed and acceleration along a leg ``way`` (3,) that leads through the places ``parts`` (P, 3)."""
     climb, descent = stretch.rates_m_s or (kinematics.climb_m_s, kinematics.descent_m_s)
-    took_s = 0.0
+    took_s, free_m_s = 0.0, []
     for part, amsl_m in zip(np.diff(parts, axis=0), 0.5 * (parts[1:, 2] + parts[:-1, 2]), strict=True):
         length, rise = float(np.linalg.norm(part)), float(part[2])
         most = stretch.speed_m_s * length / max(math.hypot(part[0], part[1]), 1e-9)
+        level = math.hypot(part[0], part[1]) / length
+        free_m_s.append(level * kinematics.leaning_m_s(rise / length, float(amsl_m), most))
         if math.isinf(climb if rise > 0 else descent):  # the commanded speed is the speed in space
             most = stretch.speed_m_s
         elif rise:
             most = min(most, (climb if rise > 0 else descent) * length / abs(rise))
         took_s += length / kinematics.leaning_m_s(rise / length, float(amsl_m), most)
     length, run, rise = float(np.linalg.norm(way)), math.hypot(way[0], way[1]), abs(float(way[2]))
+    if stretch.terrain and math.isfinite(climb) and math.isfinite(descent):
+        took_s = _trailing_s(parts, free_m_s, climb, descent, kinematics)
     level, upright = kinematics.leg_accel_m_s2, kinematics.vertical_accel_m_s2
     accel = min(level * length / max(run, 1e-9), upright * length / max(rise, 1e-9))
     return length / took_s, accel
+
+
+def _trailing_s(parts: Floats, free_m_s: list[float], climb: float, descent: float, kinematics: Kinematics) -> float:
+    """Seconds along the ends ``parts`` (N + 1, 3) of pieces over the ground, step by step.
+
+    ArduCopter's height follows the ground's with its rates, and it flies the slower the more it is off: at full speed
+    within half of WPNAV_TER_MARGIN, not at all at the whole (AC_PosControl.cpp, `pos_offset_z_scaler`).
+    """
+    along = np.append(0.0, np.cumsum(np.hypot(*np.diff(parts[:, :2], axis=0).T)))
+    gone_m, height_m, upward, speed, now_s = 0.0, float(parts[0, 2]), 0.0, free_m_s[0], 0.0
+    up_m_s2, level_m_s2, k, last = kinematics.vertical_accel_m_s2, kinematics.leg_accel_m_s2, 0, len(free_m_s) - 1
+    ends, heights = along.tolist(), parts[:, 2].tolist()
+    while gone_m < ends[-1]:
+        while k < last and gone_m >= ends[k + 1]:
+            k += 1
+        share = (gone_m - ends[k]) / max(ends[k + 1] - ends[k], 1e-9)
+        short_m = heights[k] + share * (heights[k + 1] - heights[k]) - height_m
+        stops = math.copysign(math.sqrt(2.0 * up_m_s2 * abs(short_m)), short_m)
+        upward += min(max(min(max(stops, -descent), climb) - upward, -up_m_s2 * TRAIL_STEP_S), up_m_s2 * TRAIL_STEP_S)
+        height_m += upward * TRAIL_STEP_S
+        pace = min(max((TERRAIN_MARGIN_M - abs(short_m)) / (0.5 * TERRAIN_MARGIN_M), 0.01), 1.0) * free_m_s[k]
+        change = level_m_s2 * TRAIL_STEP_S
+        speed = max(speed + min(max(pace - speed, -change), change), 0.01 * free_m_s[k])
+        gone_m += speed * TRAIL_STEP_S
+        now_s += TRAIL_STEP_S
+    return float(now_s - (gone_m - ends[-1]) / speed)
 
 
 def _sample_times(legs: list[_Leg], begin: list[float], turned: list[float]) -> Floats:

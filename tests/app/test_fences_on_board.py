@@ -37,7 +37,7 @@ def quickly(monkeypatch: pytest.MonkeyPatch) -> None:
         ({"FENCE_ENABLE": 1}, "FENCE_RADIUS is 300 on board, and at least 2227 is assumed (the farthest place"),
         ({"FENCE_AUTOENABLE": 3}, "FENCE_RADIUS is 300 on board"),
         (ON | {"FENCE_ALT_MAX": 64}, "FENCE_ALT_MAX is 64 on board, and at least 65 is assumed"),
-        (ON | {"FENCE_TYPE": 8, "FENCE_ALT_MIN": 1}, "FENCE_ALT_MIN is 1 on board, and at most 0 is assumed"),
+        (ON | {"FENCE_TYPE": 8, "FENCE_ALT_MIN": 1}, "FENCE_ALT_MIN is 1 on board, and at most -5 is assumed"),
         (ON | {"FENCE_TYPE": 15}, ""),
         (ON, ""),
         ({"FENCE_ENABLE": 1, "FENCE_TYPE": 4}, ""),
@@ -156,7 +156,7 @@ def test_a_failsafe_that_ends_elsewhere_is_told(autopilot: str, parameters: dict
 
 def test_the_list_has_fences_and_failsafes() -> None:
     for autopilot, wanted in (
-        ("arducopter", {"FENCE_ALT_MAX": 65, "FENCE_RADIUS": 2227, "FENCE_ALT_MIN": 0, "FENCE_ACTION": 1,
+        ("arducopter", {"FENCE_ALT_MAX": 65, "FENCE_RADIUS": 2227, "FENCE_ALT_MIN": -5, "FENCE_ACTION": 1,
                         "FS_THR_ENABLE": 1, "FS_GCS_ENABLE": 1, "BATT_FS_LOW_ACT": 2, "BATT_FS_CRT_ACT": 2,
                         "FS_EKF_ACTION": 1}),
         ("px4", {"GF_MAX_VER_DIST": 65, "GF_MAX_HOR_DIST": 2227, "GF_ACTION": 3, "NAV_RCL_ACT": 2, "NAV_DLL_ACT": 2,

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from fractions import Fraction
 
+from gcsplan.check.verdict import PAPER_MARK
+
 FOOT, MILE = Fraction(3048, 10000), Fraction(5280 * 3048, 10000)
 EXACT = {
     "m": Fraction(1), "km": Fraction(1000), "ft": FOOT, "mi": MILE, "NM": Fraction(1852), "m/s": Fraction(1),
@@ -25,8 +27,8 @@ def seconds(text: str) -> float:
 
 
 def number(text: str) -> float:
-    """A number as it is shown, ``1 234.5``, or ``137 (paper's figures)``."""
-    return float(re.sub(f"[{SPACES}]", "", text.removesuffix(" (paper's figures)")))
+    """A number as it is shown, ``1 234.5``, with or without whose figures it counts."""
+    return float(re.sub(f"[{SPACES}]", "", text.removesuffix(PAPER_MARK)))
 
 
 NUMBER = r"-?\d{1,3}(?:[\u2009\u202f]\d{3})+(?:\.\d+)?|-?\d+(?:\.\d+)?"

@@ -21,9 +21,10 @@ from gcsplan.mavlink.mission.commands import (
     LOITER_UNLIM,
     RTL,
     TAKEOFF,
+    WAYPOINT,
 )
 from gcsplan.mavlink.mission.fences import acts, fences_in_force, is_fence
-from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, TERRAIN, Mission
 from gcsplan.mavlink.mission.parameter_names import PARAMETERS, Name, OnBoard, Parameter
 from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, Autopilot, Vehicle
 from gcsplan.world.atmosphere import true_per_indicated
@@ -172,6 +173,9 @@ def _copter(
         Setting(known["return_waits"], vehicle.return_waits_s, "equal", "how long a return waits over home",
                 "time" if ends else "told"),
     ]  # fmt: skip
+    if any(FRAME_SYNONYMS.get(item.frame, item.frame) == TERRAIN for item in mission.items):
+        why = "how far off its height above ground it slows down"
+        rows.append(Setting(known["terrain_margin"], 10.0, "equal", why, _pace(mission, vehicle, WAYPOINT)))
     if vehicle.lean_angle_deg is not None:
         why = f"lean_angle_deg: {_speed_m_s(mission, vehicle):.3g} m/s, and forecasts in wind"
         rows.append(Setting(known["lean"], vehicle.lean_angle_deg, "at least", why, "time"))

@@ -150,6 +150,7 @@ PARAMETERS: dict[Autopilot, dict[str, Parameter]] = {
         _copter("corner_accel", "WPNAV_ACCEL_C", "WP_ACC_CNR", 0.0, "m/s²", since=(4, 4)),
         _copter("jerk", "WPNAV_JERK", "WP_JERK", 1.0, "m/s³", 1.0),
         _copter("radius", "WPNAV_RADIUS", "WP_RADIUS_M", 2.0, "m"),
+        _copter("terrain_margin", "WPNAV_TER_MARGIN", "WP_TER_MARGIN", 10.0, "m", 1.0, since=(4, 2)),
         _copter("lean", "ANGLE_MAX", "ATC_ANGLE_MAX", 30.0, "°"),
         _copter("return_altitude", "RTL_ALT", "RTL_ALT_M", 15.0, "m"),
         _copter("return_climb", "RTL_CLIMB_MIN", "RTL_CLIMB_MIN_M", 0.0, "m"),
