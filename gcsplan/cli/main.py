@@ -15,9 +15,11 @@ if _hears and _before is signal.default_int_handler:
 
 import os  # noqa: E402
 import sys  # noqa: E402
+from contextlib import suppress  # noqa: E402
 from typing import Any, NoReturn  # noqa: E402
 
 from gcsplan.cli.ending import (  # noqa: E402
+    ENDED,
     Interrupted,
     end_in_good_order,
     explained,
@@ -79,13 +81,28 @@ def entry() -> NoReturn:
         code = ended.code
     except KeyboardInterrupt:  # it came before the command began, or while another end was told
         code = interrupted().exit_code
+    if code in ENDED:
+        _end_now(code)
     for number in ENDING:
         if signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, signal.SIG_DFL)
-    # Python ends as if by Ctrl-C, whatever the exit code, if a KeyboardInterrupt ever passed through a text that was
-    # executed, as dataclasses are made; the next text that is executed makes it forget (run_eval_code_obj).
-    exec("")
     sys.exit(code)
+
+
+def _end_now(code: int) -> NoReturn:
+    """End a process that was interrupted, and has undone what it began.
+
+    What libraries do at exit is left out: it may wait for seconds for workers that compute, and Python ends as if by
+    Ctrl-C, whatever the exit code, if a KeyboardInterrupt passed through a text that it executed (as it does to make
+    dataclasses; run_eval_code_obj).
+    """
+    executor = sys.modules.get("gcsplan.app.executor")
+    if executor is not None:
+        executor.end_processes()
+    with suppress(OSError, ValueError, AttributeError):
+        sys.stdout.flush()
+        sys.stderr.flush()
+    os._exit(code)
 
 
 if __name__ == "__main__":
