@@ -153,7 +153,7 @@ def commands() -> list[tuple[str, Any]]:
     """Every command with its full name, groups before what is in them."""
     import typer.main
 
-    from gcsplan.cli.main import app
+    from gcsplan.cli.commands import app
 
     found: list[tuple[str, Any]] = []
 

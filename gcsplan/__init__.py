@@ -15,11 +15,10 @@ Every function blocks until it is done. Errors are those of `gcsplan.errors`.
 
 from __future__ import annotations
 
-import importlib
 import sys
 from types import ModuleType
-from typing import TYPE_CHECKING
 
+TYPE_CHECKING = False  # as typing has it, whose import takes as long as all else before a command hears signals
 if TYPE_CHECKING:
     from gcsplan.app.pipeline import load_mission, plan
     from gcsplan.app.scripting import check, rehearse, report, upload, write
@@ -41,6 +40,8 @@ _MODULE_OF = {
 
 def __getattr__(name: str) -> object:
     if name in _MODULE_OF:
+        import importlib
+
         return getattr(importlib.import_module(_MODULE_OF[name]), name)
     raise AttributeError(f"module 'gcsplan' has no attribute {name!r}")
 

@@ -1,6 +1,6 @@
 """``python -m gcsplan`` does the same as the command ``gcsplan``; use it where scripts are not on the PATH."""
 
-from gcsplan.cli.main import main
+from gcsplan.cli.main import entry
 
 if __name__ == "__main__":
-    main()
+    entry()

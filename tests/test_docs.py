@@ -85,7 +85,7 @@ def test_units_and_defaults_are_those_of_the_code(made: ModuleType) -> None:
 def test_the_command_line_s_reference_names_every_command_and_option(made: ModuleType) -> None:
     import typer.main
 
-    from gcsplan.cli.main import app
+    from gcsplan.cli.commands import app
 
     text = made.command_line()
     parts = {part.split("`")[1]: part for part in re.split(r"^## ", text, flags=re.MULTILINE)[1:]}

@@ -7,6 +7,7 @@ The results are the same wherever it is done. Work is a function that can be imp
 from __future__ import annotations
 
 import math
+import multiprocessing
 import os
 import queue
 import signal
@@ -372,12 +373,32 @@ def _processes(count: int) -> Iterator[Any]:
             )
             raise GcsplanError(f"{words} ({error})") from error
         with local, distributed.Client(local, set_as_default=False) as client:
-            yield client
+            try:
+                yield client
+            except BaseException:
+                for nanny in local.workers.values():
+                    nanny.auto_restart = False
+                end_processes()
+                raise
+
+
+def end_processes() -> None:
+    """End the processes that this one has started in the middle of their work, for which dask would wait."""
+    for process in multiprocessing.active_children():
+        process.kill()
 
 
 @contextmanager
 def _deaf() -> Iterator[None]:
     """Processes that are started here do not hear Ctrl-C: this process ends them, without a traceback from each."""
+    if hasattr(signal, "pthread_sigmask"):
+        # This thread, those that it starts and their processes; others of this process still hear it.
+        blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+        return
     if threading.current_thread() is not threading.main_thread():
         yield
         return

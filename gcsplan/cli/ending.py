@@ -42,6 +42,9 @@ class HungUp(Interrupted):
 _ENDINGS: dict[int, type[Interrupted]] = {
     getattr(signal, name): kind for name, kind in (("SIGTERM", Terminated), ("SIGHUP", HungUp)) if hasattr(signal, name)
 }
+ENDED = {Interrupted.exit_code} | {kind.exit_code for kind in _ENDINGS.values()}
+"""Exit codes of a command that was interrupted."""
+
 _received: list[int] = []
 _watch: list[Watch] = []
 _as_json: list[bool] = []

@@ -40,7 +40,7 @@ def fit_energy(
     from gcsplan.logs.reader import read_log
 
     columns = _columns(csv_columns)
-    found = fit([read_log(file, columns=columns, sysid=sysid) for file in logs])
+    found = fit(read_log(file, columns=columns, sysid=sysid) for file in logs)
     error = None
     if not found.told:
         why = [f"{c.name}: {c.why}" for c in (found.vertical, found.horizontal) if c.value is None]

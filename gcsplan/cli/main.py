@@ -1,20 +1,25 @@
-"""The command line: parse, one call, print, exit code. Slow packages are imported by the commands that need them."""
+"""The command line: parse, one call, print, exit code.
+
+The commands are imported only once signals are heard: their imports take a tenth of a second and more.
+"""
 
 from __future__ import annotations
 
-import copy
-import os
-import sys
-from collections.abc import Callable
-from functools import cache
-from typing import Annotated, NoReturn
+import signal
+import threading
 
-import typer
+_hears = threading.current_thread() is threading.main_thread()
+_before = signal.getsignal(signal.SIGINT)
+if _hears and _before is signal.default_int_handler:
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C while modules are imported ends without a traceback
 
-from gcsplan.cli import batch, check, energy, fly, links, new, plan, rehearse, schema
-from gcsplan.cli.bench import bench_app
-from gcsplan.cli.dem import dem_app
-from gcsplan.cli.ending import (
+import os  # noqa: E402
+import sys  # noqa: E402
+from contextlib import suppress  # noqa: E402
+from typing import Any, NoReturn  # noqa: E402
+
+from gcsplan.cli.ending import (  # noqa: E402
+    ENDED,
     Interrupted,
     end_in_good_order,
     explained,
@@ -24,70 +29,18 @@ from gcsplan.cli.ending import (
     put,
     speak_plainly,
 )
-from gcsplan.cli.memory import settle_memory
-from gcsplan.cli.terrain import terrain_app
-from gcsplan.errors import GcsplanError, InputError
+from gcsplan.cli.memory import settle_memory  # noqa: E402
+from gcsplan.cli.signals import ENDING  # noqa: E402
+from gcsplan.errors import GcsplanError, InputError  # noqa: E402
 
-app = typer.Typer(
-    name="gcsplan",
-    help="Plans MAVLink missions over real terrain, proves every metre of them, uploads and verifies them.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
-    epilog="Exit codes: 0 done, 2 bad input, 3 no mission, 4 violation, 5 refused, 6 unknown or dead link, "
-    "7 read-back differs, 70 a bug of ours, 129, 130, 143 interrupted (SIGHUP, Ctrl-C, SIGTERM).",
-)
-app.add_typer(dem_app, name="dem")
-app.add_typer(terrain_app, name="terrain")
-app.add_typer(bench_app, name="bench")
-app.command(short_help="Write a commented mission file.")(new.new)
-app.command(short_help="Plan a mission file; upload and verify on request.")(plan.plan)
-app.command(short_help="Plan many mission files: a table, a map.")(batch.batch)
-app.command(short_help="Plan, fly it all in a simulator, judge.")(rehearse.rehearse)
-app.command(short_help="Does a file fly safely in a mission's world?")(check.check)
-app.command(short_help="Check files, upload them, read them back, compare.")(links.upload)
-app.command(short_help="Is exactly this file on board?")(links.verify)
-app.command()(links.download)
-app.command(short_help="Remove the mission, fence or rally points.")(links.clear)
-app.command(short_help="Loopback vehicles that take missions.")(fly.sim)
-app.command("fit-energy", short_help="The energy model out of flight logs.")(energy.fit_energy)
-app.command()(plan.planners)
-app.command(short_help="The JSON Schema of a mission file, for editors.")(schema.schema)
+if _hears:
+    signal.signal(signal.SIGINT, _before)
 
 
-def _print_version(asked: bool) -> None:
-    if asked:
-        from gcsplan import __version__
+def _commands(called: str) -> Any:
+    from gcsplan.cli.commands import commands
 
-        put(f"{__version__}\n")
-        raise typer.Exit
-
-
-@app.callback(invoke_without_command=True)
-def root(
-    # eager: it is printed before typer imports what it reads other options with
-    version: Annotated[
-        bool, typer.Option("--version", help="Print the version.", is_eager=True, callback=_print_version)
-    ] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="Show a traceback with an error.")] = False,
-) -> None:
-    """Options of all commands."""
-
-
-@cache
-def _commands(called: str) -> Callable[..., object]:
-    """The command ``called`` with its options, made once; all commands if there is none of that name.
-
-    typer makes the options of every command that it knows, which takes longer than anything else before a command runs.
-    """
-    own = [c for c in app.registered_commands if called == (c.name or (c.callback and c.callback.__name__))]
-    groups = [g for g in app.registered_groups if g.name == called]
-    if not own and not groups:
-        return typer.main.get_command(app)
-    one = copy.copy(app)
-    one.registered_commands, one.registered_groups = own, groups
-    return typer.main.get_command(one)
+    return commands(called)
 
 
 def main() -> NoReturn:
@@ -95,13 +48,13 @@ def main() -> NoReturn:
     debug = "--debug" in sys.argv
     arguments = [a for a in sys.argv[1:] if a != "--debug"]
     as_json = "--json" in arguments
-    outlive_readers()
-    speak_plainly()
-    settle_memory()
-    # gcsplan uses no plug-ins of pydantic; a search for them reads the lists of all installed packages
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
         end_in_good_order(as_json=as_json)
+        outlive_readers()
+        speak_plainly()
+        settle_memory()
+        # gcsplan uses no plug-ins of pydantic; a search for them reads the lists of all installed packages
+        os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
         # With standalone_mode=False click returns the code of typer.Exit instead of exiting.
         code = _commands(arguments[0] if arguments else "")(args=arguments, prog_name="gcsplan", standalone_mode=False)
         if code == Interrupted.exit_code:  # typer's code for Ctrl-C
@@ -110,14 +63,47 @@ def main() -> NoReturn:
         sys.exit(code if isinstance(code, int) else 0)
     except GcsplanError as error:
         fail(error, as_json, debug)
-    except (KeyboardInterrupt, typer.Abort):
+    except KeyboardInterrupt:
         fail(interrupted(), as_json, debug)
     except MemoryError:
         words = "not enough memory for this: give a smaller area, coarser terrain, fewer zones or items"
         fail(InputError(words, reason="memory"), as_json, debug)
     except Exception as error:  # the only place where a bug of gcsplan becomes an exit code
-        fail(explained(error), as_json, debug)
+        fail(interrupted() if type(error).__name__ == "Abort" else explained(error), as_json, debug)
+
+
+def entry() -> NoReturn:
+    """`main` as the only work of a process: a signal at any moment ends it, without a traceback."""
+    code: Any = Interrupted.exit_code
+    try:
+        main()
+    except SystemExit as ended:
+        code = ended.code
+    except KeyboardInterrupt:  # it came before the command began, or while another end was told
+        code = interrupted().exit_code
+    if code in ENDED:
+        _end_now(code)
+    for number in ENDING:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.SIG_DFL)
+    sys.exit(code)
+
+
+def _end_now(code: int) -> NoReturn:
+    """End a process that was interrupted, and has undone what it began.
+
+    What libraries do at exit is left out: it may wait for seconds for workers that compute, and Python ends as if by
+    Ctrl-C, whatever the exit code, if a KeyboardInterrupt passed through a text that it executed (as it does to make
+    dataclasses; run_eval_code_obj).
+    """
+    executor = sys.modules.get("gcsplan.app.executor")
+    if executor is not None:
+        executor.end_processes()
+    with suppress(OSError, ValueError, AttributeError):
+        sys.stdout.flush()
+        sys.stderr.flush()
+    os._exit(code)
 
 
 if __name__ == "__main__":
-    main()
+    entry()

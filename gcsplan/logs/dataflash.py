@@ -10,17 +10,20 @@ from __future__ import annotations
 import io
 import math
 import os
-import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
 from typing import Any
 
+from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
-from gcsplan.logs.flight_log import FlightLog, together, watts_of
+from gcsplan.logs.flight_log import MOST_READINGS, FlightLog, Readings, together, too_long, watts_of
 
 HEAD = b"\xa3\x95"
 FIX_3D = 3
+KINDS = ["BAT", "CURR", "POS", "GPS", "XKF2", "NKF2"]
+MOST_BATTERIES = 16  # AP_BATT_MONITOR_MAX_INSTANCES of ArduPilot 4.6
+MOST_COMPLAINTS = 10_000  # of pymavlink, which makes one for each byte that it cannot read
 WHOLE = frozenset("bBhHiIqQ")
 """Format characters of whole numbers that DFReader does not scale."""
 
@@ -32,17 +35,21 @@ def read_dataflash(file: Path) -> FlightLog:
             raise InputError("is no ArduPilot log: it does not begin with A3 95", where=str(file))
     from pymavlink import DFReader
 
-    places: list[tuple[float, float, float, float]] = []
-    gps: list[tuple[float, float, float, float]] = []
-    batteries: dict[int, list[tuple[float, float, float]]] = {}
-    wind: list[tuple[float, float, float]] = []
-    old: list[tuple[float, float, float]] = []
-    log = None
+    own = {f"battery {k}": 3 for k in range(MOST_BATTERIES)}
+    read = Readings(str(file), places=4, gps=4, wind=3, old=3, **own)
+    # the reader's own clock is found by reading up to a GPS message, and is not used
+    reader: Any = type("Reader", (DFReader.DFReader_binary,), {"init_clock": DFReader.DFReader_binary.init_clock_usec})
+    log: Any = object.__new__(reader)  # there, and closed, also if it cannot be made
     with _overheard() as said:
         try:
-            log = DFReader.DFReader_binary(str(file))
-            while (m := log.recv_match(type=["BAT", "CURR", "POS", "GPS", "XKF2", "NKF2"])) is not None:
-                _take(m, places, gps, batteries, old, wind)
+            log.__init__(str(file))
+            wanted = {log.name_to_id.get(kind) for kind in KINDS} - {None}
+            if sum(log.counts[k] for k in wanted) > MOST_READINGS:
+                raise too_long(str(file))
+            while (m := log.recv_match(type=KINDS)) is not None:
+                _take(m, read)
+        except InputError:
+            raise
         except Exception as error:  # the reader has no error class for a damaged file
             raise InputError(
                 f"could not be read by pymavlink ({type(error).__name__}: {error}): it is damaged or not whole; "
@@ -50,55 +57,75 @@ def read_dataflash(file: Path) -> FlightLog:
                 where=str(file),
             ) from None
         finally:
-            if log is not None:
+            with suppress(AttributeError):
                 log.close()
     notes = []
     if said():
         notes.append(f"{file.name} is damaged in places, which were passed over")
-    if not places and gps:
-        places = gps
+    places = read["places"]
+    if not len(places) and len(read["gps"]):
+        places = read["gps"]
         notes.append(f"{file.name}: no POS messages, so the GPS's own places were taken")
-    if not batteries and old:
-        batteries = {0: old}
+    batteries = {k: read[kind] for k, kind in enumerate(own) if len(read[kind])}
+    if not batteries and len(read["old"]):
+        batteries = {0: read["old"]}
     power = {which: watts_of(rows, str(file)) for which, rows in batteries.items()}
     _require(file, places, power)
-    return FlightLog.of(str(file), places, together(power), tuple(notes), wind=wind)
+    return FlightLog.of(str(file), places, together(power), tuple(notes), wind=read["wind"])
 
 
 @contextmanager
 def _overheard() -> Iterator[Callable[[], bool]]:
     """Keep pymavlink's messages about damage, from Python and C, off the console; yields whether there were any."""
-    words = io.StringIO()
-    length = 0
-    with tempfile.TemporaryFile() as kept, redirect_stderr(words), redirect_stdout(words):
-        before = os.dup(2)
-        os.dup2(kept.fileno(), 2)
-        try:
-            yield lambda: bool(length or words.getvalue().strip())
-        finally:
-            os.dup2(before, 2)
-            os.close(before)
-            length = kept.seek(0, os.SEEK_END)
+    words = _Complaints()
+    # a full pipe takes no more; a file would grow by 30 bytes for each damaged one
+    reading, writing = os.pipe()
+    with suppress(OSError, AttributeError):
+        os.set_blocking(reading, False)
+        os.set_blocking(writing, False)
+    first = b""
+    before = os.dup(2)
+    try:
+        os.dup2(writing, 2)
+        with redirect_stderr(words), redirect_stdout(words):
+            yield lambda: bool(first or words.count)
+    finally:
+        os.dup2(before, 2)
+        with suppress(BlockingIOError):
+            first = os.read(reading, 1)
+        for end in (before, reading, writing):
+            os.close(end)
 
 
-def _take(
-    m: Any, places: list[Any], gps: list[Any], batteries: dict[int, list[tuple[float, float, float]]], old: list[Any],
-    wind: list[Any],
-) -> None:  # fmt: skip
+class _Complaints(io.TextIOBase):
+    """Counts what is written, and keeps none of it; raises ValueError once there are too many complaints."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def write(self, text: str, /) -> int:
+        self.count += bool(text.strip())
+        if self.count > MOST_COMPLAINTS:
+            raise ValueError(f"{MOST_COMPLAINTS} places are damaged")
+        return len(text)
+
+
+def _take(m: Any, read: Readings) -> None:
     kind, time_s = m.get_type(), float(getattr(m, "TimeUS", math.nan)) * 1e-6
     if not math.isfinite(time_s):
         return
     if kind == "POS":
-        places.append((time_s, float(m.Lat), float(m.Lng), float(m.Alt)))
+        read.add("places", time_s, float(m.Lat), float(m.Lng), float(m.Alt))
     elif kind == "GPS" and getattr(m, "I", 0) == 0 and getattr(m, "Status", FIX_3D) >= FIX_3D:
-        gps.append((time_s, float(m.Lat), float(m.Lng), float(m.Alt)))
+        read.add("gps", time_s, float(m.Lat), float(m.Lng), float(m.Alt))
     elif kind == "BAT":
         which = int(getattr(m, "Inst", getattr(m, "Instance", 0)))
-        batteries.setdefault(which, []).append((time_s, *_volt_and_ampere(m)))
+        if 0 <= which < MOST_BATTERIES:
+            read.add(f"battery {which}", time_s, *_volt_and_ampere(m))
     elif kind == "CURR" and hasattr(m, "Curr"):
-        old.append((time_s, *_volt_and_ampere(m)))
+        read.add("old", time_s, *_volt_and_ampere(m))
     elif kind in ("XKF2", "NKF2") and int(getattr(m, "C", 0)) == 0 and hasattr(m, "VWN"):
-        wind.append((time_s, float(m.VWE), float(m.VWN)))
+        read.add("wind", time_s, float(m.VWE), float(m.VWN))
 
 
 def _volt_and_ampere(m: Any) -> tuple[float, float]:
@@ -108,10 +135,10 @@ def _volt_and_ampere(m: Any) -> tuple[float, float]:
     return volt, ampere
 
 
-def _require(file: Path, places: list[Any], batteries: dict[int, list[tuple[float, float]]]) -> None:
-    if not places:
+def _require(file: Path, places: Floats, batteries: Mapping[int, Floats]) -> None:
+    if not len(places):
         raise InputError("holds no places (POS or GPS): was there a fix?", where=str(file))
-    if not any(w > 0.0 for rows in batteries.values() for _, w in rows):
+    if not any((rows[:, 1] > 0.0).any() for rows in batteries.values()):
         raise InputError(
             "holds no battery current (BAT with Volt and Curr): a power module must measure it (BATT_MONITOR 4), and "
             "LOG_BITMASK must hold the battery",

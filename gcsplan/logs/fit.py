@@ -12,7 +12,7 @@ its 95 % interval is narrow.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -108,10 +108,17 @@ class EnergyFit:
         }  # fmt: skip
 
 
-def fit_energy(logs: Sequence[FlightLog]) -> EnergyFit:
-    """The model that fits all ``logs`` together. Raises InputError if they hold no flight."""
-    parts = [steps_of(log) for log in logs]
-    where = ", ".join(log.name for log in logs)
+def fit_energy(logs: Iterable[FlightLog]) -> EnergyFit:
+    """The model that fits all ``logs`` together, of which one is held at a time. Raises InputError if they hold no
+    flight."""
+    parts, names, winds = [], [], []
+    log_notes: list[str] = []
+    for log in logs:
+        parts.append(steps_of(log))
+        names.append(log.name)
+        log_notes += log.notes
+        winds.append(float(np.hypot(log.wind[:, 1], log.wind[:, 2]).mean()) if len(log.wind) else None)
+    where = ", ".join(names)
     x = np.concatenate([p.design for p in parts])
     y = np.concatenate([p.energy_j for p in parts])
     rise = np.concatenate([p.rise_m for p in parts])
@@ -147,7 +154,7 @@ def fit_energy(logs: Sequence[FlightLog]) -> EnergyFit:
         energy_j=float(y.sum()),
         speed_m_s=middle if moving.any() else 0.0,
         off_percent=float(100.0 * np.median(np.abs(y - (based or alone).said) / np.maximum(y, 1e-9))),
-        notes=(*(n for log in logs for n in log.notes), *_of_wind(logs), *_up_and_down(x, y, rise, made, base)),
+        notes=(*log_notes, *_of_wind(winds), *_up_and_down(x, y, rise, made, base)),
     )
 
 
@@ -229,14 +236,14 @@ def _with_base(
     return model, ""
 
 
-def _of_wind(logs: Sequence[FlightLog]) -> list[str]:
-    """Whether metres are those through the air."""
-    told = [log for log in logs if len(log.wind)]
+def _of_wind(winds_m_s: Sequence[float | None]) -> list[str]:
+    """Whether metres are those through the air; ``winds_m_s``: the mean wind of each log, None if it tells none."""
+    told = [wind for wind in winds_m_s if wind is not None]
     if not told:
         return ["no log tells the wind: metres over ground are taken for those through the air"]
-    mean = [float(np.hypot(log.wind[:, 1], log.wind[:, 2]).mean()) for log in told]
-    words = f"metres are those through the air, in a wind of {max(mean):.1f} m/s as the log tells it"
-    return [words if len(told) == len(logs) else f"{words}; {len(logs) - len(told)} of {len(logs)} logs tell none"]
+    words = f"metres are those through the air, in a wind of {max(told):.1f} m/s as the log tells it"
+    none, every = len(winds_m_s) - len(told), len(winds_m_s)
+    return [f"{words}; {none} of {every} logs tell none" if none else words]
 
 
 def _robust(x: Floats, y: Floats) -> tuple[Floats, Floats]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from array import array
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,8 +19,46 @@ LEAST_V, MOST_V, LEAST_A, MOST_A, LEAST_W, MOST_W = 2.0, 1000.0, 0.02, 1000.0, 1
 """Between these lie voltage, current and power of the aircraft that gcsplan plans for, in the middle of a flight."""
 
 MOST_WIND_M_S = 60.0
+MOST_READINGS = 2_000_000
+"""Most readings of one log, of all kinds together: 5 h of place and battery at 50 Hz."""
+
+Rows = Floats | Sequence[tuple[float, ...]]
+"""Rows of equally many numbers."""
+
 LONGEST_S, FARTHEST_DEG = 86_400.0, 3.0
 """Readings farther than this from the middle of a log, in time or place, are damaged, or from before the GPS fix."""
+
+
+class Readings:
+    """The rows of one log by their kind, 8 bytes a number; refuses more than `MOST_READINGS`.
+
+    ``widths``: the kinds, and how many numbers a row of each has.
+    """
+
+    def __init__(self, name: str, **widths: int) -> None:
+        self.name, self.widths = name, widths
+        self.count = 0
+        self._numbers = {kind: array("d") for kind in widths}
+
+    def add(self, kind: str, *row: float) -> None:
+        """Add a row. Raises InputError if there are too many."""
+        self.count += 1
+        if self.count > MOST_READINGS:
+            raise too_long(self.name)
+        self._numbers[kind].extend(row)
+
+    def __getitem__(self, kind: str) -> Floats:
+        """(N, width) the rows of a kind, in the order in which they came."""
+        return np.frombuffer(self._numbers[kind], dtype=np.float64).reshape(-1, self.widths[kind])
+
+
+def too_long(name: str) -> InputError:
+    """The refusal of a log that holds more than is read."""
+    return InputError(
+        f"holds more than {MOST_READINGS} readings of place, battery and wind; cut it to the flight, or give its parts "
+        f"as several logs",
+        where=name,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +82,8 @@ class FlightLog:
 
     @classmethod
     def of(
-        cls, name: str, places: list[tuple[float, float, float, float]], power: list[tuple[float, float]],
-        notes: tuple[str, ...] = (), *, degrees: bool = True, wind: Sequence[tuple[float, float, float]] = (),
+        cls, name: str, places: Rows, power: Rows, notes: tuple[str, ...] = (), *, degrees: bool = True,
+        wind: Rows = (),
     ) -> FlightLog:  # fmt: skip
         """A log from (seconds, latitude, longitude, AMSL) and (seconds, watts), in any order, without rows with NaN.
 
@@ -81,8 +120,8 @@ def require_power(watts: Floats, name: str) -> None:
         )
 
 
-def watts_of(readings: Sequence[tuple[float, float, float]], name: str) -> list[tuple[float, float]]:
-    """(seconds, watts) of readings of (seconds, volt, ampere).
+def watts_of(readings: Rows, name: str) -> Floats:
+    """(N, 2) seconds and watts of readings of (seconds, volt, ampere).
 
     Raises InputError if voltage or current is not that of an aircraft's battery: then a unit is mistaken.
     """
@@ -96,12 +135,12 @@ def watts_of(readings: Sequence[tuple[float, float, float]], name: str) -> list[
                 f"battery: it is in another unit, such as hundredths or thousandths; convert it",
                 where=name,
             )
-    return [(float(t), float(v * a)) for t, v, a in rows]
+    return np.column_stack([rows[:, 0], rows[:, 1] * rows[:, 2]])
 
 
-def _sorted(rows: Sequence[tuple[float, ...]]) -> Floats:
+def _sorted(rows: Rows) -> Floats:
     """The rows sorted by time, one row per clock reading."""
-    if not rows:
+    if not len(rows):
         return np.zeros((0, 4))
     a = np.array(rows, dtype=np.float64)
     a = a[np.isfinite(a).all(axis=1)]
@@ -119,13 +158,12 @@ def _in_metres(lat_deg: Floats, lon_deg: Floats) -> tuple[Floats, Floats]:
     return EQUATOR_M / math.sqrt(w) * math.cos(lat) * np.radians(turned), north
 
 
-def together(batteries: dict[int, list[tuple[float, float]]]) -> list[tuple[float, float]]:
+def together(batteries: Mapping[int, Rows]) -> Floats:
     """The sum of the power of all batteries, at the times of the one with the most readings."""
     series = sorted(batteries.values(), key=len, reverse=True)
     if len(series) == 1:
-        return series[0]
-    base = np.array(sorted(series[0]))
-    for other in series[1:]:
-        rows = np.array(sorted(other))
+        return np.array(series[0], dtype=np.float64)
+    base, *others = (rows[np.lexsort(rows.T[::-1])] for rows in (np.array(s, dtype=np.float64) for s in series))
+    for rows in others:
         base[:, 1] += np.interp(base[:, 0], rows[:, 0], rows[:, 1])
-    return [(float(t), float(w)) for t, w in base]
+    return base

@@ -11,6 +11,9 @@ from gcsplan.logs.flight_log import FlightLog
 from gcsplan.logs.table import read_csv
 from gcsplan.logs.telemetry import read_telemetry
 
+MOST_BYTES = 256_000_000
+"""Most bytes of a log, whatever its kind."""
+
 
 def read_log(file: Path, *, columns: Mapping[str, str] | None = None, sysid: int | None = None) -> FlightLog:
     """The flight in ``file``: ArduPilot's .bin (or .BIN; .log is refused), a .tlog, or CSV, by its ending.
@@ -24,6 +27,11 @@ def read_log(file: Path, *, columns: Mapping[str, str] | None = None, sysid: int
         raise InputError("is a folder; give one log, or several", where=str(file))
     if file.stat().st_size == 0:
         raise InputError("is empty: the log was not closed, or not copied whole", where=str(file))
+    if file.stat().st_size > MOST_BYTES:
+        raise InputError(
+            f"has more than {MOST_BYTES // 10**6} MB; cut it to the flight, or give its parts as several logs",
+            where=str(file),
+        )
     kind = file.suffix.lower()
     if columns and kind != ".csv":
         raise InputError("--csv-columns is for CSV files", where=str(file))

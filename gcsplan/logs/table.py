@@ -6,11 +6,13 @@ import csv
 import difflib
 import math
 from collections.abc import Iterator, Mapping
+from itertools import chain
 from pathlib import Path
+from typing import TextIO
 
 from gcsplan.errors import InputError
 from gcsplan.figures import counted
-from gcsplan.logs.flight_log import FlightLog, watts_of
+from gcsplan.logs.flight_log import FlightLog, Readings, watts_of
 
 NAMES: dict[str, tuple[str, ...]] = {
     "time_s": ("time_s", "time", "t", "seconds", "timestamp_s"),
@@ -34,8 +36,8 @@ WANTED = (
 MOST_BAD = 0.1
 """Part of the lines that may be unreadable before the file is refused."""
 
-MOST_BYTES, MOST_LINES = 256_000_000, 2_000_000
-"""Most bytes and lines of a file that is read: 11 h at 50 Hz."""
+MOST_LINES, MOST_CHARS = 1_000_000, 100_000
+"""Most lines of a file (5 h at 50 Hz), and most characters of one."""
 
 
 def read_csv(file: Path, columns: Mapping[str, str]) -> FlightLog:
@@ -45,29 +47,13 @@ def read_csv(file: Path, columns: Mapping[str, str]) -> FlightLog:
             near = difflib.get_close_matches(key, NAMES, 1)
             hint = f"; did you mean {near[0]}?" if near else ""
             raise InputError(f"--csv-columns knows {', '.join(NAMES)}, given {key!r}{hint}", where=str(file))
-    try:
-        bytes_ = file.stat().st_size
-        text = "" if bytes_ > MOST_BYTES else file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"is no readable text: {error}", where=str(file)) from None
-    if bytes_ > MOST_BYTES or text.count("\n") > MOST_LINES:
-        raise InputError(
-            f"has more than {MOST_BYTES // 10**6} MB or {MOST_LINES} lines; cut it to the flight, "
-            f"to the columns {WANTED}, or to every tenth line",
-            where=str(file),
-        )
-    head = text.split("\n", 1)[0]
-    mark = max(",;\t", key=head.count)
-    lines = _lines(text, mark, str(file))
+    lines = _lines(file)
     names = [n.strip() for n in next(lines, [])]
     at = _places(names, columns, str(file))
     flat = "east_m" in at
     keys = ("time_s", *(("east_m", "north_m") if flat else ("lat", "lon")), "amsl_m")
-    places: list[tuple[float, float, float, float]] = []
-    power: list[tuple[float, float]] = []
-    charge: list[tuple[float, float, float]] = []
-    wind: list[tuple[float, float, float]] = []
-    bad: list[int] = []
+    read = Readings(str(file), places=4, power=2, charge=3, wind=3)
+    bad = first_bad = 0
     number = 1
     for number, line in enumerate(lines, start=2):
         if not any(cell.strip() for cell in line):
@@ -75,31 +61,53 @@ def read_csv(file: Path, columns: Mapping[str, str]) -> FlightLog:
         values = {key: _number(line, k) for key, k in at.items()}
         watts = values["power_w"] if "power_w" in at else values["volt"] * values["amp"]
         if "wind_east_m_s" in at and math.isfinite(values["wind_east_m_s"] + values["wind_north_m_s"]):
-            wind.append((values["time_s"], values["wind_east_m_s"], values["wind_north_m_s"]))
+            read.add("wind", values["time_s"], values["wind_east_m_s"], values["wind_north_m_s"])
         time_s = values["time_s"]
         good = False
         if all(math.isfinite(values[k]) for k in keys):  # position and power may be on separate lines
-            places.append((time_s, values[keys[1]], values[keys[2]], values["amsl_m"]))
+            read.add("places", time_s, values[keys[1]], values[keys[2]], values["amsl_m"])
             good = True
         if math.isfinite(time_s) and math.isfinite(watts):
-            power.append((time_s, watts))
-            charge += [] if "power_w" in at else [(time_s, values["volt"], values["amp"])]
+            if "power_w" in at:
+                read.add("power", time_s, watts)
+            else:
+                read.add("charge", time_s, values["volt"], values["amp"])
             good = True
         if not good:
-            bad.append(number)
-    if len(bad) > MOST_BAD * max(number - 1, 1):
-        raise InputError(f"{counted(len(bad), 'line')} without numbers, the first is line {bad[0]}", where=str(file))
-    notes = (f"{file.name}: passed over {counted(len(bad), 'line')} without numbers",) if bad else ()
-    power = watts_of(charge, str(file)) if charge else power
-    return FlightLog.of(str(file), places, power, notes, degrees=not flat, wind=wind)
+            bad += 1
+            first_bad = first_bad or number
+    if bad > MOST_BAD * max(number - 1, 1):
+        raise InputError(f"{counted(bad, 'line')} without numbers, the first is line {first_bad}", where=str(file))
+    notes = (f"{file.name}: passed over {counted(bad, 'line')} without numbers",) if bad else ()
+    power = read["power"] if "power_w" in at else watts_of(read["charge"], str(file))
+    return FlightLog.of(str(file), read["places"], power, notes, degrees=not flat, wind=read["wind"])
 
 
-def _lines(text: str, mark: str, where: str) -> Iterator[list[str]]:
-    """The cells of one line after the other."""
+def _lines(file: Path) -> Iterator[list[str]]:
+    """The cells of one line after the other. Raises InputError."""
     try:
-        yield from csv.reader(text.splitlines(), delimiter=mark)
+        with file.open(encoding="utf-8-sig", newline=None) as opened:
+            lines = _counted(opened, file)
+            head = next(lines, "")
+            yield from csv.reader(chain([head], lines), delimiter=max(",;\t", key=head.count))
     except csv.Error as error:
-        raise InputError(f"is no CSV: {error}", where=where) from None
+        raise InputError(f"is no CSV: {error}", where=str(file)) from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"is no readable text: {error}", where=str(file)) from None
+
+
+def _counted(opened: TextIO, file: Path) -> Iterator[str]:
+    """One line after the other. Raises InputError where there are too many, or one is too long."""
+    number = 0
+    while line := opened.readline(MOST_CHARS + 1):
+        number += 1
+        if len(line) > MOST_CHARS:
+            raise InputError(f"line {number} has more than {MOST_CHARS} characters: no log in CSV", where=str(file))
+        if number > MOST_LINES:
+            raise InputError(
+                f"has more than {MOST_LINES} lines; cut it to the flight, or to every tenth line", where=str(file)
+            )
+        yield line
 
 
 def _places(names: list[str], columns: Mapping[str, str], where: str) -> dict[str, int]:

@@ -9,14 +9,21 @@ from __future__ import annotations
 
 import math
 import os
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gcsplan.errors import InputError
-from gcsplan.logs.flight_log import FlightLog, together
+from gcsplan.logs.flight_log import FlightLog, Readings, together
 
 UNKNOWN_MV = 65535
+MOST_MESSAGES = 2_000_000
+"""Most messages of a file, of any kind: 11 h at 50 Hz."""
+
+READS = 4
+"""Reads of a file for a message: its clock, its head, the rest. Damaged parts are read byte by byte."""
+
 POSITION, BATTERY, STATUS, WIND = "GLOBAL_POSITION_INT", "BATTERY_STATUS", "SYS_STATUS", "WIND"
 
 
@@ -25,27 +32,14 @@ def read_telemetry(file: Path, sysid: int | None) -> FlightLog:
     os.environ.setdefault("MAVLINK20", "1")
     from pymavlink import mavutil
 
-    places: dict[int, list[tuple[float, float, float, float]]] = {}
-    batteries: dict[int, dict[int, list[tuple[float, float]]]] = {}
-    status: dict[int, list[tuple[float, float]]] = {}
-    winds: dict[int, list[tuple[float, float, float]]] = {}
-    heard: Counter[int] = Counter()
+    read: dict[int, Readings] = {}
     log = mavutil.mavlogfile(str(file))
     try:
-        while (m := log.recv_match(type=[POSITION, BATTERY, STATUS, WIND])) is not None:
-            who, time_s = int(m.get_srcSystem()), float(m._timestamp)
-            heard[who] += 1
-            if m.get_type() == POSITION:
-                places.setdefault(who, []).append((time_s, m.lat / 1e7, m.lon / 1e7, m.alt / 1e3))
-            elif m.get_type() == WIND:
-                from_rad = math.radians(m.direction)
-                blown = -m.speed * math.sin(from_rad), -m.speed * math.cos(from_rad)
-                winds.setdefault(who, []).append((time_s, *blown))
-            elif m.get_type() == BATTERY:
-                if math.isfinite(watts := _watts(m)):
-                    batteries.setdefault(who, {}).setdefault(int(m.id), []).append((time_s, watts))
-            elif m.current_battery >= 0 and 0 < m.voltage_battery < UNKNOWN_MV:
-                status.setdefault(who, []).append((time_s, m.voltage_battery * 1e-3 * m.current_battery * 1e-2))
+        log.f = _Counted(log.f, str(file))
+        while (m := log.recv_msg()) is not None:
+            _take(m, read, str(file))
+    except InputError:
+        raise
     except Exception as error:  # the reader has no error class for a damaged file
         raise InputError(
             f"could not be read by pymavlink ({type(error).__name__}: {error}): it is damaged or no .tlog",
@@ -53,24 +47,64 @@ def read_telemetry(file: Path, sysid: int | None) -> FlightLog:
         ) from None
     finally:
         log.close()
-    flew = sorted(places)
+    flew = sorted(who for who, own in read.items() if len(own[POSITION]))
     if sysid is None and len(flew) > 1:
         raise InputError(
             f"holds the flights of the systems {', '.join(map(str, flew))}: say which with --sysid N", where=str(file)
         )
     who = sysid if sysid is not None else flew[0] if flew else 0
-    if who not in places:
+    if who not in flew:
         words = f"of system {who}; it holds {', '.join(map(str, flew)) or 'none'}" if sysid is not None else ""
         raise InputError(f"holds no places (GLOBAL_POSITION_INT) {words}".rstrip(), where=str(file))
-    power = together(batteries[who]) if who in batteries else status.get(who, [])
-    notes = () if who in batteries else (f"{file.name}: no BATTERY_STATUS, so SYS_STATUS was taken",)
-    if not any(w > 0.0 for _, w in power):
+    own = read[who]
+    batteries = {k: own[BATTERY][own[BATTERY][:, 0] == k, 1:] for k in np.unique(own[BATTERY][:, 0]).tolist()}
+    power = together(batteries) if batteries else own[STATUS]
+    notes = () if batteries else (f"{file.name}: no BATTERY_STATUS, so SYS_STATUS was taken",)
+    if not (power[:, 1] > 0.0).any():
         raise InputError(
             "holds no battery current (BATTERY_STATUS or SYS_STATUS with voltage and current): a power module must "
             "measure it, and the link must carry it (SR0_EXT_STAT)",
             where=str(file),
         )
-    return FlightLog.of(str(file), places[who], power, notes, wind=winds.get(who, ()))
+    return FlightLog.of(str(file), own[POSITION], power, notes, wind=own[WIND])
+
+
+class _Counted:
+    """A file that is read no more often than a log of `MOST_MESSAGES` needs."""
+
+    def __init__(self, file: Any, name: str) -> None:
+        self._file, self._name, self._left = file, name, READS * MOST_MESSAGES
+        self.tell, self.close = file.tell, file.close
+
+    def read(self, size: int) -> bytes:
+        """The next ``size`` bytes. Raises InputError after too many calls."""
+        self._left -= 1
+        if self._left < 0:
+            raise InputError(
+                f"holds more than {MOST_MESSAGES} messages, or is damaged; cut it to the flight "
+                f"(mavlogdump.py --output), or give its parts as several logs",
+                where=self._name,
+            )
+        return bytes(self._file.read(size))
+
+
+def _take(m: Any, read: dict[int, Readings], name: str) -> None:
+    """Add what a message tells of its vehicle."""
+    kind = m.get_type()
+    if kind not in (POSITION, BATTERY, STATUS, WIND):
+        return
+    who, time_s = int(m.get_srcSystem()), float(m._timestamp)
+    own = read.setdefault(who, Readings(name, **{POSITION: 4, BATTERY: 3, STATUS: 2, WIND: 3}))
+    if kind == POSITION:
+        own.add(kind, time_s, m.lat / 1e7, m.lon / 1e7, m.alt / 1e3)
+    elif kind == WIND:
+        from_rad = math.radians(m.direction)
+        own.add(kind, time_s, -m.speed * math.sin(from_rad), -m.speed * math.cos(from_rad))
+    elif kind == BATTERY:
+        if math.isfinite(watts := _watts(m)):
+            own.add(kind, int(m.id), time_s, watts)
+    elif m.current_battery >= 0 and 0 < m.voltage_battery < UNKNOWN_MV:
+        own.add(kind, time_s, m.voltage_battery * 1e-3 * m.current_battery * 1e-2)
 
 
 def _watts(m: Any) -> float:

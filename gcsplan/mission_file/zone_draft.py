@@ -38,7 +38,8 @@ MOST_CORNERS = 20_000
 """Most corners of one polygon near the mission; more are drawn wider, by at most `WIDEST_M`, with fewer."""
 
 MOST_ALL_CORNERS = 400_000
-"""Most corners of all polygons near enough to matter, corridors' polygons included; more refuse a mission near them."""
+"""Most corners of all polygons near enough to matter, corridors' polygons included; more refuse a mission near them,
+and twice as many each mission: they are not even drawn."""
 
 WIDEST_M, MUCH_WIDER_M = 0.5, (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 """How much wider an outline is drawn without being asked, m, and tolerances that are tried for a cure."""
@@ -255,6 +256,11 @@ def place_zones(drafts: Sequence[ZoneDraft], frame: Frame) -> tuple[list[tuple[Z
                 f"with this one the zones have {corners} corners, more than {MOST_ALL_CORNERS} together; simplify them"
             )
             fault = Problem(draft.where, f"zone {draft.name[:60]!r}: {words}")
+            if corners > 2 * MOST_ALL_CORNERS:
+                raise InputError(
+                    f"{fault.message}, or give a file of those around the mission alone (ogr2ogr -spat)",
+                    where=draft.where,
+                )
             draft = replace(draft, faults=(*draft.faults, fault))
         for i, shape in enumerate(shapes):
             name = draft.name if len(shapes) == 1 else f"{draft.name}/{i + 1}"

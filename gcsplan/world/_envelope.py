@@ -55,7 +55,7 @@ def lift_beside(
 
     The segment's ends are given in the plane, then in the grid.
     """
-    if extrema.slope[j, i] == math.inf:
+    if extrema.slope[j, i] == math.inf or extrema.slope[j, i] == 0.0:
         return math.nan
     if extrema.slope[j, i] < 0.0:
         d, _ = unknown_near(m, z, extrema.cols, extrema.rows, ea, na, eb, nb, reach, i, j)
@@ -219,7 +219,7 @@ def around(
             continue
         i, j = min(max(int(math.floor(c)), 0), cols - 2), min(max(int(math.floor(r)), 0), rows - 2)
         slope = extrema.slope[j, i]
-        if slope == math.inf:
+        if slope == math.inf or slope == 0.0:
             continue
         u, v = min(max(c - i, 0.0), 1.0), min(max(r - j, 0.0), 1.0)
         za = sign * z[j, i]

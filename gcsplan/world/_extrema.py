@@ -8,6 +8,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats, Int64s, Singles
 from gcsplan.world._compiled import device, kernel
+from gcsplan.world._shared import LEAST_SLOPE
 
 SLOPE, HIGH, LOW, LOST = range(4)
 
@@ -127,7 +128,7 @@ def _put(line: Singles, any_lost: bool, slope: Singles, high: Singles, low: Sing
         low[j] = -of_low[j]
     if not any_lost:
         for j in range(width):
-            slope[j] = of_slope[j]
+            slope[j] = of_slope[j] if of_slope[j] > LEAST_SLOPE else LEAST_SLOPE
         return
     for j in range(width):
         if slope[j] != 0.0:
@@ -135,4 +136,4 @@ def _put(line: Singles, any_lost: bool, slope: Singles, high: Singles, low: Sing
         elif near[j] != 0.0:
             slope[j] = -of_slope[j] - np.float32(1e-9)
         else:
-            slope[j] = of_slope[j]
+            slope[j] = of_slope[j] if of_slope[j] > LEAST_SLOPE else LEAST_SLOPE

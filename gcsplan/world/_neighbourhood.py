@@ -73,7 +73,7 @@ class Neighbourhood:
         self._seen = np.ones((0, 0), np.bool_)
         rows, cols = heights.shape[0] - 1, heights.shape[1] - 1
         if rows * cols > LARGE:
-            self.extrema = _not_looked_at(field, heights, reach_m)
+            self.extrema = _empty(field, heights, reach_m)
             self._seen = np.zeros((-(-rows // TILE), -(-cols // TILE)), np.bool_)
         else:
             self.extrema = extrema_around(field, heights, reach_m)
@@ -97,17 +97,16 @@ class Neighbourhood:
 
 def extrema_around(field: Field, heights: Floats, reach_m: float) -> LocalExtrema:
     """The local extrema of a surface, examined everywhere."""
-    extrema = _not_looked_at(field, heights, reach_m)
+    extrema = _empty(field, heights, reach_m)
     _look_at(field, heights, extrema, slice(0, extrema.slope.shape[0]), slice(0, extrema.slope.shape[1]))
     return extrema
 
 
-def _not_looked_at(field: Field, heights: Floats, reach_m: float) -> LocalExtrema:
-    """Local extrema that are unknown everywhere."""
+def _empty(field: Field, heights: Floats, reach_m: float) -> LocalExtrema:
+    """Local extrema that are unknown everywhere; zeros take no memory until they are written over."""
     shape = heights.shape[0] - 1, heights.shape[1] - 1
     cols, rows = (math.ceil(reach_m / step) for step in (field.step_x, field.step_y))
-    slope, high, low = (np.empty(shape, np.float32) for _ in range(3))
-    slope.fill(np.inf)
+    slope, high, low = (np.zeros(shape, np.float32) for _ in range(3))
     return LocalExtrema(slope, high, low, cols, rows)
 
 

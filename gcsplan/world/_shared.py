@@ -56,12 +56,16 @@ class Zones(NamedTuple):
     most_corners: int
 
 
+LEAST_SLOPE = 1e-37
+"""The slope of level ground in `LocalExtrema`: no height that is added to one of metres."""
+
+
 class LocalExtrema(NamedTuple):
     """Bounds over the known cells within ``cols`` and ``rows`` of each cell, (rows - 1, cols - 1) float32.
 
-    ``slope`` (rise over run) is ``inf`` in a cell that is itself unknown, and negative (its magnitude is the slope) if
-    an unknown cell, or the border, lies within reach. ``high`` and ``low`` are metres AMSL; all three are rounded
-    outward.
+    ``slope`` (rise over run) is ``inf`` in a cell that is itself unknown, 0 in one that was not examined, which counts
+    as unknown too, and negative (its magnitude is the slope) if an unknown cell, or the border, lies within reach;
+    level ground has `LEAST_SLOPE`. ``high`` and ``low`` are metres AMSL; all three are rounded outward.
     """
 
     slope: Singles

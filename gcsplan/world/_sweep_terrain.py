@@ -99,7 +99,7 @@ def glance(
             turn = dc * dr * (tb - t) * (tb - t)
             # The line dips below its lower end by at most a quarter of the bulge.
             least = min(agl, after) + min(0.25 * sign * kd * turn, 0.0)
-            if not (0.0 <= slope < math.inf and least - r * slope >= need):
+            if not (0.0 < slope < math.inf and least - r * slope >= need):
                 if not full:
                     return -1 if need - min(agl, after) > TOUCH_M else 0
                 sure = 0
@@ -199,7 +199,7 @@ def sweep(
                 kd = z[j + 1, i + 1] - za - kb - kc
                 slope = slopes[j, i]
                 failing = False
-                if slope == math.inf:
+                if slope == math.inf or slope == 0.0:
                     agl = math.nan
                     if tb > t or end == t:
                         out[UNKNOWN], out[UNKNOWN_AT], out[STEEPEST] = 0.0, first + 0.5 * (t + tb) * share, math.inf

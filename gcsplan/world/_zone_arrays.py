@@ -38,6 +38,7 @@ from gcsplan.world.zones import Circle, Level, Zone
 
 BOX = [WEST_E, SOUTH_N, EAST_E, NORTH_N]
 MOST_SQUARES = 128  # most squares of the lattice along one side
+MOST_LISTED = 2_000_000  # most zones in all squares together, 8 bytes each: large zones lie in every square
 
 
 def over_both_grounds(zones: Sequence[Zone], surface: Surface, field: Field, scale: float) -> tuple[Zone, ...]:
@@ -125,14 +126,17 @@ def _lattice(box: Floats) -> tuple[Floats, Int64s, Int64s]:
         return np.array([0.0, 0.0, 1.0, 1.0, 1.0]), np.zeros(2, np.int64), np.zeros(0, np.int64)
     west, south = box[:, 0].min(), box[:, 1].min()
     wide, tall = box[:, 2].max() - west, box[:, 3].max() - south
-    side = max(wide, tall) / min(MOST_SQUARES, 2.0 * math.sqrt(len(box)) + 1.0)
-    side = max(side, 1.0)
-    cols, rows = int(wide / side) + 1, int(tall / side) + 1
-    corner = np.floor((box - (west, south, west, south)) / side).astype(np.int64)
-    corner[:, 0::2] = corner[:, 0::2].clip(0, cols - 1)
-    corner[:, 1::2] = corner[:, 1::2].clip(0, rows - 1)
-    wide, tall = (corner[:, 2] - corner[:, 0] + 1), (corner[:, 3] - corner[:, 1] + 1)
-    count = wide * tall
+    side = max(max(wide, tall) / min(MOST_SQUARES, 2.0 * math.sqrt(len(box)) + 1.0), 1.0)
+    while True:
+        cols, rows = int(wide / side) + 1, int(tall / side) + 1
+        corner = np.floor((box - (west, south, west, south)) / side).astype(np.int64)
+        corner[:, 0::2] = corner[:, 0::2].clip(0, cols - 1)
+        corner[:, 1::2] = corner[:, 1::2].clip(0, rows - 1)
+        count = (corner[:, 2] - corner[:, 0] + 1) * (corner[:, 3] - corner[:, 1] + 1)
+        if count.sum() <= MOST_LISTED or cols * rows == 1:
+            break
+        side *= 2.0
+    wide = corner[:, 2] - corner[:, 0] + 1
     zone = np.repeat(np.arange(len(box)), count)
     place = np.arange(len(zone)) - np.repeat(np.cumsum(count) - count, count)
     square = (corner[zone, 1] + place // wide[zone]) * cols + corner[zone, 0] + place % wide[zone]

@@ -33,27 +33,50 @@ def to_points(regions: Floats, points: Floats) -> Floats:
     return best
 
 
-def to_polygon(regions: Floats, corners: Floats) -> Floats:
-    """(M,) distance of each region (M, K, 2) from a polygon (V, 2) with its inside; `MEETS` where they overlap."""
+def to_polygon(regions: Floats, corners: Floats, within: Floats | float = math.inf) -> Floats:
+    """(M,) distance of each region (M, K, 2) from a polygon (V, 2) with its inside; `MEETS` where they overlap.
+
+    A region that is farther away than ``within`` (each its own, or one for all) may count as still farther.
+    """
     at_once = max(AT_ONCE // (len(corners) * max(math.comb(regions.shape[1], 3), 1)), 1)
-    parts = [_to_polygon(regions[i : i + at_once], corners) for i in range(0, len(regions), at_once)]
+    within = np.broadcast_to(within, len(regions))
+    parts = [
+        _to_polygon(regions[i : i + at_once], corners, float(within[i : i + at_once].max()))
+        for i in range(0, len(regions), at_once)
+    ]
     return np.concatenate(parts) if parts else np.zeros(0)
 
 
-def _to_polygon(regions: Floats, corners: Floats) -> Floats:
+def _to_polygon(regions: Floats, corners: Floats, within: float) -> Floats:
     after = np.roll(corners, -1, axis=0)
+    meets = _inside(regions, corners).any(axis=1)
+    near = _near(regions.reshape(-1, 2), corners, after, within)
+    corners, after = corners[near], after[near]
     # Distances of the region's points from the polygon's edges, and of the polygon's corners from the region's pairs.
     away = regions[:, :, None] - corners
-    best = _to_segment(away, after - corners).min(axis=(1, 2))
-    meets = _inside(regions, corners).any(axis=1)
+    best = _to_segment(away, after - corners).min(axis=(1, 2), initial=np.inf)
     meets |= _holds(regions, np.broadcast_to(corners, (len(regions), *corners.shape))).any(axis=1)
     for a, b in _pairs(regions):
         a, b = a[:, None], b[:, None]
-        best = np.minimum(best, _to_segment(corners - a, b - a).min(axis=1))
+        best = np.minimum(best, _to_segment(corners - a, b - a).min(axis=1, initial=np.inf))
         sides = _cross(b - a, corners - a), _cross(b - a, after - a)
         ends = _cross(after - corners, a - corners), _cross(after - corners, b - corners)
         meets |= ((sides[0] * sides[1] < 0.0) & (ends[0] * ends[1] < 0.0)).any(axis=1)
     return np.where(meets, MEETS, best)
+
+
+def _near(points: Floats, first: Floats, last: Floats, within: float) -> Bools:
+    """(V,) which segments are not certainly farther than ``within`` from the hull of ``points``."""
+    away = points - points[0]
+    length = np.hypot(*away.T)
+    along = away[length.argmax()] / max(float(length.max()), 1e-30)
+    near = np.ones(len(first), np.bool_)
+    # Where the shadows of both on a line are that far apart, so are they: of long regions, the line across.
+    for axis in ((1.0, 0.0), (0.0, 1.0), along, along[::-1] * (-1.0, 1.0)):
+        shadow, a, b = points @ axis, first @ axis, last @ axis
+        spare = within + 1e-6 * (1.0 + np.abs(shadow).max())
+        near &= (np.minimum(a, b) <= shadow.max() + spare) & (np.maximum(a, b) >= shadow.min() - spare)
+    return near
 
 
 def _pairs(regions: Floats) -> list[tuple[Floats, Floats]]:

@@ -90,11 +90,11 @@ class Swept:
         """
         spared = 0.0 if self.inner is None else spared_m
         found, begins = (
-            _apart(self.regions[met, :count], row, vertex) < demanded - spared - TOUCH_M for count in (None, self.begin)
+            _nearer(self.regions[met, :count], row, vertex, demanded - spared - TOUCH_M) for count in (None, self.begin)
         )
         if self.inner is not None:
-            found |= _apart(self.inner[met], row, vertex) < demanded - TOUCH_M
-            begins |= _apart(self.inner[met, :2], row, vertex) < demanded - TOUCH_M
+            found |= _nearer(self.inner[met], row, vertex, demanded - TOUCH_M)
+            begins |= _nearer(self.inner[met, :2], row, vertex, demanded - TOUCH_M)
         return found, begins
 
 
@@ -265,11 +265,12 @@ def _crossings(
     return Crossings(line, zone, s0, s1, bottom - error_m, top + error_m, np.concatenate(begins))
 
 
-def _apart(regions: Floats, row: Floats, vertex: Floats) -> Floats:
-    """How far regions lie from a zone, m; negative where they overlap."""
+def _nearer(regions: Floats, row: Floats, vertex: Floats, limit: Floats) -> Bools:
+    """Which regions (M, K, 2) are nearer to a zone than their own ``limit`` (M,), m; one that overlaps is at -1 m."""
     if row[RADIUS] >= 0.0:
-        return hulls.to_point(regions, row[[EAST, NORTH]]) - float(row[RADIUS])
-    return hulls.to_polygon(regions, vertex[int(row[FIRST]) : int(row[LAST])])
+        return np.asarray(hulls.to_point(regions, row[[EAST, NORTH]]) - float(row[RADIUS]) < limit)
+    corners = vertex[int(row[FIRST]) : int(row[LAST])]
+    return np.asarray(hulls.to_polygon(regions, corners, np.maximum(limit, 0.0)) < limit)
 
 
 def _in_circle(away: Floats, unit: Floats, radius: float, length: Floats) -> tuple[Floats, Floats]:
@@ -283,6 +284,11 @@ def _in_circle(away: Floats, unit: Floats, radius: float, length: Floats) -> tup
 
 def _in_polygon(corners: Floats, starts: Floats, unit: Floats, reach: float, length: Floats) -> tuple[Floats, Floats]:
     """The same for a polygon grown by ``reach``: the hull of all parts."""
+    at_once = max(hulls.AT_ONCE // len(corners), 1)
+    if len(starts) > at_once:
+        parts = [slice(k, k + at_once) for k in range(0, len(starts), at_once)]
+        found = [_in_polygon(corners, starts[s], unit[s], reach, length[s]) for s in parts]
+        return np.concatenate([f[0] for f in found]), np.concatenate([f[1] for f in found])
     away = corners[None] - starts[:, None]
     along = (away * unit[:, None]).sum(axis=-1)
     aside = away[..., 1] * unit[:, None, 0] - away[..., 0] * unit[:, None, 1]

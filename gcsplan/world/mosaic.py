@@ -217,7 +217,7 @@ class Mosaic:
                 "mission",
                 where=self.where,
             )
-        heights, notes = read_tiles(parts, c0, r0, c1 - c0, r1 - r0)
+        heights, notes = read_tiles(parts, c0, r0, c1 - c0, r1 - r0, self.where)
         if accuracy_m < 0.0 or accuracy_m > 1.0:
             good = "unknown" if accuracy_m < 0.0 else f"{accuracy_m:g} m"
             notes.append(

@@ -20,10 +20,12 @@ def canopy_on(ground: Window, canopy: Window, *, unknown_m: float = np.nan) -> F
 
     A canopy value holds for its whole pixel. Each DEM cell gets the greatest value of the pixels that it meets, each
     node the greatest of its four cells, so the bilinear surface over the nodes is nowhere below ground plus canopy.
+    The canopy's heights are changed in place.
     ``unknown_m`` is the height of nodata pixels and of everything outside the canopy raster.
     """
-    heights = np.where((canopy.heights_m >= -1.0) & (canopy.heights_m <= TALLEST_M), canopy.heights_m, unknown_m)
-    heights = np.maximum(heights, 0.0)  # NaN stays NaN
+    heights = canopy.heights_m
+    heights[~((heights >= -1.0) & (heights <= TALLEST_M))] = unknown_m
+    np.maximum(heights, 0.0, out=heights)  # NaN stays NaN
     rows, cols = ground.heights_m.shape
     to_ground = _grid_to_grid(canopy, ground)
     cells = np.zeros((rows - 1, cols - 1))

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.world.raster import Raster
+from gcsplan.errors import InputError
+from gcsplan.world.raster import MAX_CELLS, Raster
 
 Shared = tuple[int, int, int, int]
 """Column, row, columns, rows of the common grid that a tile and a window share."""
@@ -45,17 +46,21 @@ class Placed:
 class Heights:
     """Greatest heights (rows, cols), NaN where unknown, and the least ones as soon as two differ.
 
-    ``nodes`` counts the heights that differ, ``worst_m`` is the largest difference.
+    ``nodes`` counts the heights that differ, ``worst_m`` is the largest difference. ``where`` names the files.
     """
 
-    def __init__(self, rows: int, cols: int) -> None:
+    def __init__(self, rows: int, cols: int, where: str = "") -> None:
+        self._where = where
         self.high_m = np.full((rows, cols), np.nan)
         self.low_m: Floats | None = None
         self.nodes = 0
         self.worst_m = 0.0
 
     def put(self, part: tuple[slice, slice], high_m: Floats, low_m: Floats | None = None) -> None:
-        """Put heights into a part: unknown ones change nothing, and of two that are known both count."""
+        """Put heights into a part: unknown ones change nothing, and of two that are known both count.
+
+        Raises InputError if two heights of each node do not fit into memory.
+        """
         into = self.high_m[part]
         off = np.abs(into - high_m)
         both = off > 0.0
@@ -63,6 +68,13 @@ class Heights:
             self.nodes += int(np.count_nonzero(both))
             self.worst_m = max(self.worst_m, float(off[both].max()))
         if self.low_m is None and (low_m is not None or both.any()):
+            if self.high_m.size > MAX_CELLS // 2:
+                raise InputError(
+                    f"tiles differ where they overlap, and two heights of {self.high_m.size / 1e6:.3g} million cells "
+                    f"are more than {MAX_CELLS // 2 / 1e6:.3g} million: make one file of them (gdal_merge.py), or use "
+                    f"a coarser DEM (gdalwarp -tr) or a smaller mission",
+                    where=self._where,
+                )
             self.low_m = self.high_m.copy()
         if self.low_m is not None:
             low = self.low_m[part]
@@ -75,10 +87,13 @@ class Heights:
 
 
 def read_tiles(
-    parts: Sequence[tuple[Placed, Shared]], c0: int, r0: int, cols: int, rows: int
+    parts: Sequence[tuple[Placed, Shared]], c0: int, r0: int, cols: int, rows: int, where: str = ""
 ) -> tuple[Heights, list[str]]:
-    """The heights of a window that begins at column ``c0`` and row ``r0``, and notes on what differs or is unknown."""
-    heights = Heights(rows, cols)
+    """The heights of a window that begins at column ``c0`` and row ``r0``, and notes on what differs or is unknown.
+
+    ``where`` names the files in messages. Raises InputError.
+    """
+    heights = Heights(rows, cols, where)
     for tile, (col, row, width, height) in parts:
         if tile.step == 1:
             for first, new in tile.raster.read(col - tile.col, row - tile.row, width, height):

@@ -25,8 +25,8 @@ from gcsplan.world.input_files import files_of, neighbours, sha256_of_all, tell_
 
 Reader = Callable[[int, int, int, int], Iterator[tuple[int, Floats]]]
 
-MAX_CELLS = 200_000_000
-"""Most cells of one window: 1.6 GB as float64."""
+MAX_CELLS = 50_000_000
+"""Most cells of one window with one height each: 400 MB as float64, with which a command stays below 1 GB."""
 
 MAX_BLOCK_BYTES = 64 * 2**20
 """Most bytes of one block of a file. GDAL unpacks a whole block to read one cell; its cache holds no more than this."""

@@ -27,7 +27,7 @@ from gcsplan.world.model_words import heights_read
 from gcsplan.world.mosaic import Mosaic, Window
 from gcsplan.world.obstacles import canopy_on
 from gcsplan.world.peaks import Peak, flat_grid, peaks_grid
-from gcsplan.world.raster import Raster, open_raster, require_file
+from gcsplan.world.raster import MAX_CELLS, Raster, open_raster, require_file
 from gcsplan.world.sample import SAMPLE, sample_jacksboro
 from gcsplan.world.surface import Surface
 from gcsplan.world.tiles import Tile, hash_of, tiles_of
@@ -42,6 +42,9 @@ RASTER_SPARE_M = 3000.0
 
 WIDER_M, WIDER_CELLS = (4000.0, 8000.0, 16_000.0, 32_000.0, 64_000.0, 120_000.0), 30_000_000
 """How far around the box, m, and over how many cells zeros are followed that fill the window to its border."""
+
+STANDING, CANOPY = 2, 4
+"""Arrays of a window that are held at once where obstacles of one height stand, and with a canopy."""
 
 GEOID_STEP_M = 100.0
 """Spacing at which the geoid is looked up, linear between, m: it bends by less than a millimetre over that."""
@@ -206,12 +209,15 @@ class _RasterTerrain:
 
     def load(self, frame: Frame, box: Box, *, most_cells: int | None = None) -> Surface:
         spec, rasters = self._spec, self._mosaic.rasters
+        held = CANOPY if self._canopy is not None else STANDING if spec.obstacle_height_m > 0.0 else 1
+        most_cells = min(MAX_CELLS // held, MAX_CELLS if most_cells is None else most_cells)
         window = self._mosaic.window(frame, box, spare_m=RASTER_SPARE_M, most_cells=most_cells)
         read_hash = hash_of(rasters, window)
         notes = [n for r in rasters for n in r.notes] + list(window.notes)
         if spec.nodata is None:
             wider = self._wider(frame, box) if any(window.goes_on) else ()
-            notes += take_out_zeros(window, partial(self._mosaic.node_degrees, window), wider)
+            degrees = partial(self._mosaic.node_degrees, window)
+            notes += take_out_zeros(window, degrees, wider, where=place(self._where, "dem"))
         high = window.heights_m
         if np.isnan(high).all():
             raise InputError(
@@ -244,9 +250,8 @@ class _RasterTerrain:
             top = high + spec.obstacle_height_m
         if self._canopy is not None and spec.canopy is not None:
             unknown_m = np.nan if spec.canopy_nodata_m is None else spec.canopy_nodata_m
-            canopy = self._canopy.window(frame, window.plane_box)
+            canopy = self._canopy.window(frame, window.plane_box, most_cells=MAX_CELLS // CANOPY)
             trees = canopy_on(window, canopy, unknown_m=unknown_m)
-            top = high + np.maximum(trees, spec.obstacle_height_m)
             notes += [n for n in (*self._canopy.rasters[0].notes, *canopy.notes) if "DEM nodes" not in n]
             blind = int(np.count_nonzero(np.isnan(trees) & ~np.isnan(ground)))
             if blind:
@@ -254,6 +259,8 @@ class _RasterTerrain:
                     f"the canopy is unknown at {blind} of {rows * cols} DEM nodes, which cannot be flown over; "
                     "canopy_nodata_m gives them a height"
                 )
+            top = np.maximum(trees, spec.obstacle_height_m, out=trees)  # in place: these are the largest arrays
+            top += high
             info["canopy_sha256"] = self._canopy.rasters[0].sha256()
         info |= {**self._info, "notes": (*notes, *self._notes)}
         return Surface(ground, top, window.grid, info, window.goes_on, high)

@@ -12,8 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats
+from gcsplan.errors import InputError
 from gcsplan.figures import counted
 from gcsplan.world.mosaic import Window
+from gcsplan.world.raster import MAX_CELLS
 
 SHORE_M = 5.0
 """Ground within this of 0, m, beside a patch of zeros is its shore."""
@@ -32,13 +34,23 @@ Degrees = Callable[[Sequence[int], Sequence[int]], tuple[Floats, Floats]]
 """Latitudes and longitudes of columns and rows of nodes, as `Mosaic.node_degrees` gives them."""
 
 
-def take_out_zeros(window: Window, degrees: Degrees, wider: Iterable[Window] = ()) -> list[str]:
+def take_out_zeros(window: Window, degrees: Degrees, wider: Iterable[Window] = (), *, where: str = "") -> list[str]:
     """Make the patches of exact zeros that have no shore unknown, in place; returns a note that names them.
 
     ``wider``: larger windows of the same files, from small to large, that are looked at where a patch fills the window
-    to its border.
+    to its border. ``where`` names the files in messages. Raises InputError if the patches of so large a window do not
+    fit into memory.
     """
     surfaces = [z for z in (window.heights_m, window.low_m) if z is not None]
+    cells = sum(z.size for z in surfaces)
+    if cells > MAX_CELLS // 2 and any((z == 0.0).any() for z in surfaces):
+        raise InputError(
+            f"the DEM has heights of exactly 0 m, which may hide voids, and is too large around the mission to look "
+            f"at their shores: {cells / 1e6:.3g} million cells, more than {MAX_CELLS // 2 / 1e6:.3g} million. If each "
+            f"0 is ground or sea, say `nodata: none`, and if each is a void `nodata: 0`; or use a coarser DEM "
+            f"(gdalwarp -tr)",
+            where=where,
+        )
     found = [zero_voids(z) for z in surfaces]
     blind = found[0].blind
     notes: list[str] = []
@@ -104,11 +116,11 @@ def zero_voids(heights_m: Floats) -> Voids:
     a known node beside it lies within `SHORE_M` of 0; one without any known node beside it has nothing to tell.
     """
     zero = heights_m == 0.0
-    nothing = np.zeros(zero.shape, np.bool_)
     if not zero.any():
-        return Voids(nothing, [], nothing)
+        return Voids(zero, [], zero)
     from scipy.ndimage import label  # most terrain holds no zeros
 
+    nothing = np.zeros(zero.shape, np.bool_)
     patch, count = label(zero, np.ones((3, 3)))
     nearest = np.full(count + 1, np.inf)
     rows, cols = zero.shape
@@ -124,11 +136,13 @@ def zero_voids(heights_m: Floats) -> Voids:
     void = np.isfinite(nearest) & (nearest > SHORE_M)
     if not void.any():
         return Voids(nothing, [], blind)
-    sizes = np.bincount(patch.ravel(), minlength=count + 1)
+    taken = void[patch]
+    at_node = np.flatnonzero(taken)
+    sizes = np.bincount(patch.ravel()[at_node], minlength=count + 1)
     first = np.full(count + 1, zero.size)
-    np.minimum.at(first, patch.ravel(), np.arange(zero.size))
+    np.minimum.at(first, patch.ravel()[at_node], at_node)
     found = [
         Patch(int(sizes[k]), int(first[k]) // cols, int(first[k]) % cols, float(nearest[k]))
         for k in np.flatnonzero(void)
     ]
-    return Voids(np.asarray(void[patch]), sorted(found, key=lambda p: (-p.nodes, p.row, p.col)), blind)
+    return Voids(np.asarray(taken), sorted(found, key=lambda p: (-p.nodes, p.row, p.col)), blind)

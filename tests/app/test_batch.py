@@ -16,7 +16,7 @@ from gcsplan.app import batch as module
 from gcsplan.app.batch import Batch, BatchOptions, exit_code, missions_of
 from gcsplan.app.executor import Dask, Inline, executor
 from gcsplan.app.records import Record
-from gcsplan.cli.main import app
+from gcsplan.cli.commands import app
 from gcsplan.errors import GcsplanError, UsageError
 from gcsplan.export.table import csv_text, parquet_bytes
 from gcsplan.report.index_page import render_index

@@ -23,7 +23,7 @@ from gcsplan.app import pipeline, scripting, uploads
 from gcsplan.app.model import Plan
 from gcsplan.app.pipeline import plan
 from gcsplan.app.scripting import rehearse, upload, write
-from gcsplan.cli.main import app
+from gcsplan.cli.commands import app
 from gcsplan.errors import CheckFailed, InputError, UsageError
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.mission_file import load, load_mission

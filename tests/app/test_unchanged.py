@@ -17,7 +17,7 @@ from gcsplan import load_mission
 from gcsplan.app.batch import Batch, BatchOptions, missions_of
 from gcsplan.app.executor import Inline
 from gcsplan.app.records import Record
-from gcsplan.cli.main import app
+from gcsplan.cli.commands import app
 from gcsplan.errors import InputError
 from gcsplan.export.durable import locked
 from gcsplan.export.outdir import write_outputs

@@ -23,6 +23,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import rasterio
@@ -224,9 +225,9 @@ def vias(count: int, rng: random.Random) -> list[str]:
     return ["plan", *mission(via=places), "-o", "out", "--json"]
 
 
-def cells(count: int, rng: random.Random) -> list[str]:
-    """A raster with ``count`` million cells."""
-    side = round(1000.0 * math.sqrt(count))
+def cells(count: float, rng: random.Random) -> list[str]:
+    """A raster with ``count`` million cells around the mission, six tenths of the whole."""
+    side = round(1000.0 * math.sqrt(count / 0.607))
     step = 0.2 / side
     rows = np.random.default_rng(rng.randrange(10**9)).uniform(100.0, 130.0, (1, side)).astype(np.float32)
     with rasterio.open(
@@ -273,7 +274,7 @@ def fleet(count: int, rng: random.Random) -> list[str]:
 
 def long_wing(count: int, rng: random.Random) -> list[str]:
     """A fixed wing's flight of ``count`` kilometres."""
-    keys = {"autopilot": "arduplane", "turn_radius_m": 100, "takeoff_heading_deg": 90, "end": "loiter"}
+    keys: dict[str, Any] = {"autopilot": "arduplane", "turn_radius_m": 100, "takeoff_heading_deg": 90, "end": "loiter"}
     return ["plan", *mission(goal=(1000.0 * count, 100.0), **keys), "-o", "out", "--report", "--json"]
 
 
@@ -298,7 +299,7 @@ def _dms(value: float) -> str:
     return f"{int(value)}:{int(minutes):02d}:{60.0 * (minutes - int(minutes)):04.1f}"
 
 
-Kind = Callable[[int, random.Random], list[str]]
+Kind = Callable[[Any, random.Random], list[str]]
 
 KINDS: dict[str, Kind] = {
     f.__name__: f
@@ -384,7 +385,7 @@ def campaign(kinds: dict[str, int], seconds: float, seed: int, inputs: int = 10*
     return 1 if any(row[2] for row in figures.values()) else 0
 
 
-def write(kind: str, count: int, seed: int = 1) -> list[str]:
+def write(kind: str, count: float, seed: int = 1) -> list[str]:
     """Write one input into the current folder; return the arguments of ``gcsplan``."""
     return KINDS[kind](count, random.Random(seed))
 

@@ -102,3 +102,59 @@ cli.main()
 """
     ended = subprocess.run([sys.executable, "-c", busy], cwd=REPOSITORY, capture_output=True, text=True, timeout=60)
     assert (ended.returncode, ended.stdout) == (143, "undone\n")
+
+
+def ended_by(words: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """What a process of `entry` does; ``words`` are executed first, and may use ``send()``, a signal to itself."""
+    begin = """
+import os, signal, sys, types
+def send(number=signal.SIGINT):
+    os.kill(os.getpid(), number)
+class Sends:
+    def __init__(self, name): self.name = name
+    def find_spec(self, name, *_):
+        if name == self.name:
+            send()
+"""
+    return subprocess.run(
+        [sys.executable, "-c", begin + words, *arguments], cwd=REPOSITORY, capture_output=True, text=True, timeout=60,
+        preexec_fn=heed_signals,
+    )  # fmt: skip
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize("module", ["gcsplan.cli.ending", "gcsplan.cli.commands", "typer", "gcsplan.cli.dem"])
+def test_ctrl_c_while_modules_are_imported_is_quiet(module: str) -> None:
+    words = f"sys.meta_path.insert(0, Sends({module!r}))\nfrom gcsplan.cli.main import entry\nentry()"
+    ended = ended_by(words, "planners")
+    assert ended.returncode in (130, -signal.SIGINT)  # 130 for a shell, both
+    assert ended.stderr in ("", "gcsplan: interrupted\n")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_the_exit_code_is_the_signal_s_though_python_executes_a_text() -> None:
+    """As dataclasses are made while modules are imported: Python would then end as if by Ctrl-C."""
+    words = """
+from gcsplan.cli import main as cli
+cli._commands = lambda called: lambda **_: exec("send(signal.SIGTERM)\\nfor k in range(10**9): pass")
+cli.entry()
+"""
+    assert ended_by(words, "plan").returncode == 143
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_a_signal_while_another_end_is_told_shows_no_traceback() -> None:
+    words = """
+from gcsplan.cli import ending, main as cli
+from gcsplan.errors import InputError
+def command(**_):
+    raise InputError("wrong")
+def told(error):
+    print("gcsplan:", error, file=sys.stderr)
+    send()
+    for k in range(10**9): pass
+cli._commands, ending.complain = lambda called: command, told
+cli.entry()
+"""
+    ended = ended_by(words, "plan")
+    assert (ended.returncode, ended.stderr) == (130, "gcsplan: wrong\n")
