@@ -509,7 +509,8 @@ def bends(rng: np.random.Generator) -> Case:
         if rng.random() < 0.3:
             ring = at + 0.5 * size * way * rng.uniform(0.3, 1.0, (10, 1))
         if min(math.dist(p, end) for p in denser(ring) for end in ends) > 45.0:
-            case.barriers.append(Barrier(ring, ceiling=level(rng, 60.0, 200.0, 0.0) if rng.random() < 0.3 else None))
+            ceiling = (float(rng.uniform(60.0, 200.0)), "agl") if rng.random() < 0.3 else None
+            case.barriers.append(Barrier(ring, ceiling=ceiling))
     case.family = "bends"
     return case
 
