@@ -256,7 +256,8 @@ def place_zones(drafts: Sequence[ZoneDraft], frame: Frame) -> tuple[list[tuple[Z
             fault = Problem(draft.where, f"zone {draft.name[:60]!r}: {words}")
             if corners > 2 * MOST_ALL_CORNERS:
                 raise InputError(
-                    f"{fault.message}, or give a file of those around the mission alone (ogr2ogr -spat)", where=draft.where
+                    f"{fault.message}, or give a file of those around the mission alone (ogr2ogr -spat)",
+                    where=draft.where,
                 )
             draft = replace(draft, faults=(*draft.faults, fault))
         for i, shape in enumerate(shapes):
