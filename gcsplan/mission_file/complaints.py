@@ -23,6 +23,8 @@ Section = TypeVar("Section", bound=Keys)
 UNKNOWN = "unknown key"
 SWAPPED = "latitude and longitude look swapped"
 MOST_SWAPPED = 6
+MOST_TOLD = 100
+"""Most mistakes of one section that are told, and ten times as many of a mission."""
 
 SHORT = {TerrainKeys: "dem", PlannerKeys: "name", ZoneKeys: "file"}
 """The key for which a text may be meant that stands where a whole section is wanted."""
@@ -52,7 +54,7 @@ def read_section(kind: type[Section], value: Any, where: str, problems: list[Pro
         return kind.model_validate(value)
     except ValidationError as why:
         errors = why.errors(include_url=False)
-        problems += [_problem(kind, e, where) for e in errors]
+        problems += few([_problem(kind, e, where) for e in errors[:MOST_TOLD]], where, MOST_TOLD, len(errors))
         unknown = {e["loc"][0] for e in errors if e["type"] == "extra_forbidden" and len(e["loc"]) == 1}
         if len(unknown) < len(errors):
             return None
@@ -65,6 +67,15 @@ def with_lines(problems: Sequence[Problem], text: str, where: str) -> list[Probl
     lines = lines_of(text, [p.where.removeprefix(where) if p.where.startswith(where) else "" for p in problems])
     return [p if n is None else replace(p, message=f"{p.message} (line {n})")
             for p, n in zip(problems, lines, strict=True)]  # fmt: skip
+
+
+def few(problems: Sequence[Problem], where: str, most: int, count: int | None = None) -> list[Problem]:
+    """The first ``most`` problems, and how many of ``count`` (None: of these) are left out."""
+    more = (len(problems) if count is None else count) - most
+    return [
+        *problems[:most],
+        *([Problem(where, f"has {more} more mistakes, which are not listed")] if more > 0 else []),
+    ]
 
 
 def told_once(problems: Iterable[Problem]) -> list[Problem]:
@@ -115,7 +126,9 @@ def unknown_keys(given: Iterable[str], known: Iterable[str], where: str) -> list
     """One problem for each unknown key, with the nearest known one."""
     names = list(known)
     prefix = where if where.endswith(": ") else where + "."
-    return [Problem(f"{prefix}{key[:80]}", _unknown(key, names)) for key in given if key not in names]
+    wrong = [key for key in given if key not in names]
+    told = [Problem(f"{prefix}{key[:80]}", _unknown(key, names)) for key in wrong[:MOST_TOLD]]
+    return few(told, where.removesuffix(": "), MOST_TOLD, len(wrong))
 
 
 def key_path(where: str, loc: Iterable[int | str]) -> str:

@@ -18,7 +18,7 @@ from gcsplan.errors import InputError, Problem
 from gcsplan.figures import counted
 from gcsplan.mission_file.airspace.left_out import faults_near, left_out_by_hours, unused_notes, used
 from gcsplan.mission_file.airspace.times import Hours, hours_of, texts_of
-from gcsplan.mission_file.complaints import read_section, told_once, unknown_keys, with_lines
+from gcsplan.mission_file.complaints import MOST_TOLD, few, read_section, told_once, unknown_keys, with_lines
 from gcsplan.mission_file.content import read_content
 from gcsplan.mission_file.ground import Ground, Site, known_in_plane, opened
 from gcsplan.mission_file.request import (
@@ -219,7 +219,8 @@ class _Reading:
 
     def _refusal(self, problems: list[Problem]) -> InputError:
         """All problems as the user wrote the keys, with their lines if the mission was a text."""
-        told = [self.units.as_written(p) for p in told_once(problems)]
+        told = told_once(few(problems, self.where.removesuffix(": "), 10 * MOST_TOLD))
+        told = [self.units.as_written(p) for p in told]
         return InputError.of(told if self.text is None else with_lines(told, self.text, self.where))
 
     # -- the plain keys ------------------------------------------------------------------------------------------

@@ -83,14 +83,18 @@ def lines_of(text: str, paths: Iterable[str]) -> list[int | None]:
     That of the nearest section around it if the key is not there; None if not even its first key is.
     """
     root = yaml.compose(text, Loader=_Loader)
-    return [_line_of(root, path) for path in paths]
+    known: dict[int, dict[str, tuple[yaml.Node, yaml.Node]]] = {}
+    return [_line_of(root, path, known) for path in paths]
 
 
-def _line_of(node: yaml.Node | None, path: str) -> int | None:
+def _line_of(node: yaml.Node | None, path: str, known: dict[int, dict[str, tuple[yaml.Node, yaml.Node]]]) -> int | None:
+    """``known``: the keys of the mappings that were looked into, by their ids."""
     line = None
     for key, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", path):
         if isinstance(node, yaml.MappingNode) and key:
-            inner = next(((k, v) for k, v in node.value if isinstance(k, yaml.ScalarNode) and k.value == key), None)
+            if id(node) not in known:
+                known[id(node)] = {k.value: (k, v) for k, v in reversed(node.value) if isinstance(k, yaml.ScalarNode)}
+            inner = known[id(node)].get(key)
             if inner is None:
                 return line
             line, node = inner[0].start_mark.line + 1, inner[1]

@@ -12,15 +12,18 @@ of the contract within its stated time and memory; beyond a limit it may be refu
 from __future__ import annotations
 
 import contextlib
+import importlib
 import json
 import math
 import os
 import random
+import re
 import shlex
-import subprocess
+import signal
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -30,7 +33,7 @@ import rasterio
 import yaml
 from rasterio.transform import Affine
 
-from tests.support.paths import REPOSITORY
+from gcsplan.cli import main
 
 LAT, LON = 46.0, 14.5
 NORTH_M, EAST_M = 111_160.0, 77_300.0
@@ -170,6 +173,35 @@ def cylinders(count: int, rng: random.Random) -> list[str]:
     return ["plan", *mission([{"file": "zones.geojson"}]), "-o", "out", "--json"]
 
 
+def wide_cylinders(count: int, rng: random.Random) -> list[str]:
+    """Circles of 60 km that all lie over each other."""
+    arguments = cylinders(count, rng)
+    data = json.loads(Path("zones.geojson").read_text())
+    for feature in data["features"]:
+        [[lat, lon]] = degrees([(rng.uniform(92_000.0, 108_000.0), rng.uniform(-20_000.0, 20_000.0))])
+        feature["geometry"]["coordinates"] = [lon, lat]
+        feature["properties"]["radius_m"] = 60_000
+    Path("zones.geojson").write_text(json.dumps(data))
+    return arguments
+
+
+def great_circles(count: int, rng: random.Random) -> list[str]:
+    """Polygons of KML around the mission with edges of three degrees, each of which is drawn as a great circle too."""
+    marks = []
+    for k in range(count):
+        lat, lon = LAT + 0.5 + rng.uniform(-0.1, 0.1), LON + rng.uniform(-0.2, 0.2)
+        turn = [math.pi * n / 4.0 for n in range(9)]
+        ring = " ".join(f"{lon + 3.0 * math.cos(t):.6f},{lat + 0.3 * math.sin(t):.6f},0" for t in turn)
+        marks.append(
+            f"<Placemark><name>z{k}</name><Polygon><outerBoundaryIs><LinearRing><coordinates>{ring}</coordinates>"
+            f"</LinearRing></outerBoundaryIs></Polygon></Placemark>"
+        )
+    Path("zones.kml").write_text(
+        f'<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{"".join(marks)}</Document></kml>'
+    )
+    return ["plan", *mission([{"file": "zones.kml"}]), "-o", "out", "--json"]
+
+
 def forest(count: int, rng: random.Random) -> list[str]:
     """Many circles in the way, between start and goal."""
     arguments = cylinders(count, rng)
@@ -243,7 +275,10 @@ def cells(count: float, rng: random.Random) -> list[str]:
 
 
 def tiles(count: int, rng: random.Random) -> list[str]:
-    """Terrain in ``count`` tiles."""
+    """Terrain in ``count`` tiles, of which more than are taken are only named."""
+    if count > REFUSED["tiles"]:
+        names = [f"t{k}.tif" for k in range(count)]
+        return ["plan", *mission(terrain={"dem": names, "vertical_datum": "EGM96"}), "-o", "out", "--json"]
     side = math.ceil(math.sqrt(count))
     step = 0.2 / (side * 20)
     names = []
@@ -305,8 +340,8 @@ KINDS: dict[str, Kind] = {
     f.__name__: f
     for f in (
         corners, coast, corners_checked, corners_at_home, corners_fenced, corners_drawn, crossing, arcs, cylinders,
-        forest, corridor, river, items, items_at_home, items_drawn, splines, jumps, vias, cells, tiles, fleet,
-        long_wing, runs, log,
+        wide_cylinders, great_circles, forest, corridor, river, items, items_at_home, items_drawn, splines, jumps,
+        vias, cells, tiles, fleet, long_wing, runs, log,
     )
 }  # fmt: skip
 
@@ -315,17 +350,25 @@ FILES = {
     "corners_checked": 20_000, "crossing": 250, "arcs": 500, "items": 10_000, "items_at_home": 650, "splines": 650,
     "jumps": 650, "log": 500_000,
 }  # fmt: skip
-"""Kinds that are read and checked, without a planner, with the largest amount that docs/safety.md states."""
+"""Kinds that are read and checked, without a planner, with an amount whose time docs/safety.md states."""
 
 WORLDS = {
-    "corners": 20_000, "coast": 100_000, "corners_fenced": 20_000, "corners_drawn": 20_000, "corridor": 5000,
-    "river": 20_000, "cylinders": 20_000, "forest": 20_000, "vias": 500, "cells": 60, "tiles": 2000, "fleet": 100,
-    "long_wing": 150, "runs": 1000,
+    "corners": 20_000, "coast": 90_000, "corners_fenced": 20_000, "corners_drawn": 20_000, "corridor": 4000,
+    "river": 20_000, "cylinders": 20_000, "wide_cylinders": 20_000, "forest": 20_000, "vias": 300, "cells": 49,
+    "tiles": 1000, "fleet": 100, "long_wing": 150, "runs": 100, "great_circles": 800,
 }  # fmt: skip
 """Kinds that are planned, the same."""
 
-BEYOND = 3
-"""Inputs have up to so many times the stated amount."""
+REFUSED = {
+    "crossing": 2000, "arcs": 5000, "items": 10_000, "log": 1_000_000, "coast": 100_000, "corners": 100_000,
+    "corners_checked": 100_000, "corridor": 20_000, "river": 20_000, "cylinders": 20_000, "forest": 20_000, "vias": 500,
+    "cells": 51, "tiles": 2000, "fleet": 2000, "runs": 10_000,
+}  # fmt: skip
+"""Amounts beyond which an input of that kind must be refused by name."""
+
+BEYOND, AT_LIMIT, OFTEN = 3, 0.03, 8
+"""Inputs beyond a limit have up to so many times its amount; part of the inputs that are no larger than
+FILES and WORLDS say; how much more often kinds that are refused at once are drawn than others."""
 
 PATIENCE_S, MEMORY_MB = 60.0, 1000.0
 """Most processor seconds and megabytes of one input."""
@@ -333,24 +376,38 @@ PATIENCE_S, MEMORY_MB = 60.0, 1000.0
 CODES = {0, 2, 3, 4}
 
 
-def run(kind: str, count: int, seed: int) -> tuple[int, float, float, str]:
-    """Exit code, processor seconds, megabytes and last words of one input; written into the current folder."""
-    command = [sys.executable, "-m", "gcsplan.cli.main", *write(kind, count, seed)]
-    environment = os.environ | {"PYTHONPATH": str(REPOSITORY)}
+def run(kind: str, count: float, seed: int) -> tuple[int, float, float, str]:
+    """Exit code, processor seconds, megabytes and last words of one input; written into the current folder.
+
+    It runs in a fork of this process, which has imported the commands already: that is most of the time of an input
+    that is refused.
+    """
+    arguments = write(kind, count, seed)
     with tempfile.TemporaryFile("w+") as err:
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=err, env=environment)
+        process = os.fork()
+        if process == 0:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+            os.dup2(err.fileno(), 2)
+            sys.argv = ["gcsplan", *arguments]
+            try:
+                main.entry()
+            except SystemExit as end:
+                sys.stdout.flush()
+                sys.stderr.flush()
+                os._exit(end.code if isinstance(end.code, int) else 70)
+            finally:
+                os._exit(70)
         until = time.monotonic() + 10.0 * PATIENCE_S  # busy machines
-        while not (ended := os.wait4(process.pid, os.WNOHANG))[0]:
+        while not (ended := os.wait4(process, os.WNOHANG))[0]:
             if time.monotonic() > until:
-                process.kill()
-                ended = os.wait4(process.pid, 0)
+                os.kill(process, signal.SIGKILL)
+                ended = os.wait4(process, 0)
                 break
-            time.sleep(0.02)
-        process.returncode = os.waitstatus_to_exitcode(ended[1])
+            time.sleep(0.01)
         err.seek(0)
         words = err.read()[-300:]
     used = ended[2]
-    return process.returncode, used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0, words
+    return os.waitstatus_to_exitcode(ended[1]), used.ru_utime + used.ru_stime, used.ru_maxrss / 1024.0, words
 
 
 def faults(code: int, took_s: float, held_mb: float, words: str) -> list[str]:
@@ -363,16 +420,31 @@ def faults(code: int, took_s: float, held_mb: float, words: str) -> list[str]:
 
 
 def campaign(kinds: dict[str, int], seconds: float, seed: int, inputs: int = 10**9) -> int:
-    """Run inputs of random kinds and amounts, half of them at the limit; print faults and figures by kind."""
+    """Run inputs of random kinds and amounts, most of them beyond a limit; print faults and figures by kind.
+
+    Faults are also inputs beyond a limit that are not refused; why they are is counted, without numbers and names.
+    """
     until, done = time.monotonic() + seconds, 0
+    importlib.import_module("gcsplan.cli.commands")
+    importlib.import_module("gcsplan.app.outputs")
+    reasons: Counter[str] = Counter()
     figures: dict[str, list[float]] = {kind: [0, 0, 0, 0.0, 0.0] for kind in kinds}
     while done < inputs and time.monotonic() < until:
         rng = random.Random(seed)
-        kind = rng.choice(list(kinds))
-        count = kinds[kind] if rng.random() < 0.5 else max(4, int(BEYOND ** rng.uniform(-3.0, 1.0) * kinds[kind]))
+        kind = rng.choices(list(kinds), [OFTEN if k in REFUSED else 1 for k in kinds])[0]
+        beyond = kind in REFUSED and rng.random() > AT_LIMIT
+        if beyond:
+            count = int(BEYOND ** rng.uniform(0.0, 1.0) ** 3 * REFUSED[kind]) + 1
+        elif rng.random() > 3.0 * AT_LIMIT and kind not in REFUSED:  # those that are never refused cost their time
+            count = max(4, int(BEYOND ** rng.uniform(-5.0, -2.0) * kinds[kind]))
+        else:
+            count = kinds[kind] if rng.random() < 0.5 else max(4, int(BEYOND ** rng.uniform(-3.0, 0.0) * kinds[kind]))
         with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
             code, took_s, held_mb, words = run(kind, count, seed)
         wrong = faults(code, took_s, held_mb, words)
+        wrong += [f"was not refused: {code}"] if beyond and code != 2 else []
+        if code == 2:
+            reasons[re.sub(r"[^ :]*[\d'][^ :]*", "#", words.strip().split("\n")[-1])[-150:]] += 1
         for what in wrong:
             print(f"seed {seed} ({kind} of {count}): {what}", flush=True)
         row = figures[kind]
@@ -382,6 +454,9 @@ def campaign(kinds: dict[str, int], seconds: float, seed: int, inputs: int = 10*
     for kind, (ran, refused, wrong_, took_s, held_mb) in figures.items():
         about = f"{ran:.0f} inputs, {refused:.0f} refused, {wrong_:.0f} faults"
         print(f"{kind:16} {about}, {took_s:.1f} s and {held_mb:.0f} MB at most")
+    for why, many in reasons.most_common():
+        print(f"{many:6} refused: {why}")
+    print(f"{done} inputs, the next seed is {seed}")
     return 1 if any(row[2] for row in figures.values()) else 0
 
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from gcsplan.logs.table import MOST_BYTES
 from tests.campaigns import sizes
 
 
@@ -32,14 +30,6 @@ def test_runs_of_a_rehearsal_are_counted(run: Any) -> None:
     code, _, err = run(*sizes.write("runs", 10_001))
     assert code == 2
     assert "10000" in err
-
-
-def test_a_log_is_refused_by_its_size_before_it_is_read(run: Any) -> None:
-    with Path("log.csv").open("wb") as file:
-        file.truncate(MOST_BYTES + 1)
-    code, _, err = run("fit-energy", "log.csv")
-    assert code == 2
-    assert "log.csv: has more than 256 MB or 2000000 lines; cut it to the flight" in err
 
 
 @pytest.mark.slow

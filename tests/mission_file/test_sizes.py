@@ -6,11 +6,13 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from gcsplan.errors import InputError
-from gcsplan.mission_file import load_mission
+from gcsplan.mission_file import load_mission, zone_draft
 from gcsplan.mission_file.zone_draft import MOST_CORNERS
+from gcsplan.world._zone_arrays import MOST_LISTED, _lattice
 from gcsplan.world.zones import Polygon
 from tests.campaigns import sizes
 
@@ -43,9 +45,9 @@ def test_an_outline_of_99_000_spikes_is_refused_by_its_name(within_s: list[float
     assert "features[0].geometry.coordinates: the outline has 99000 corners" in said("corners", 99_000)
 
 
-def test_a_coast_of_90_000_corners_is_drawn_wider_with_a_note(within_s: list[float]) -> None:
+def test_a_coast_of_30_000_corners_is_drawn_wider_with_a_note(within_s: list[float]) -> None:
     within_s.append(8.0)
-    sizes.write("coast", 90_000)
+    sizes.write("coast", 30_000)
     mission = load_mission("m.yaml")
     (zone,) = mission.zones
     assert isinstance(zone.shape, Polygon)
@@ -88,7 +90,10 @@ def test_via_points_are_counted(amount: int, what: str) -> None:
 
 
 def test_vehicles_are_counted() -> None:
-    assert "must be a list of 1 to 2000 vehicles, given" in said("fleet", 2001)
+    sizes.mission(vehicles=[0] * 2001)
+    with pytest.raises(InputError) as refusal:
+        load_mission("m.yaml")
+    assert "must be a list of 1 to 2000 vehicles, given" in str(refusal.value.problems)
 
 
 def test_terrain_files_are_counted() -> None:
@@ -96,3 +101,32 @@ def test_terrain_files_are_counted() -> None:
     with pytest.raises(InputError) as refusal:
         load_mission("m.yaml")
     assert "2000" in str(refusal.value.problems)
+
+
+def test_mistakes_are_counted(within_s: list[float]) -> None:
+    within_s.append(6.0)  # 10,000 lines: 30 s before, and 25 minutes for a file of 5 MB
+    sizes.mission()
+    text = Path("m.yaml").read_text() + "".join(f"k{k}: 1\n" for k in range(10_000))
+    Path("m.yaml").write_text(text)
+    with pytest.raises(InputError) as refusal:
+        load_mission("m.yaml")
+    assert len(refusal.value.problems) == 101
+    assert "has 9900 more mistakes, which are not listed" in str(refusal.value.problems[-1])
+
+
+def test_zones_that_all_lie_over_each_other_take_little_memory() -> None:
+    box = np.array([[-6e4, -6e4, 6e4, 6e4]]) + np.random.default_rng(1).uniform(-1e4, 1e4, (20_000, 1))
+    lattice, bucket, near = _lattice(box)
+    assert len(near) <= MOST_LISTED  # 300 million before
+    assert bucket[-1] == len(near)
+    at = ((box[7, :2] - lattice[:2]) * lattice[2]).astype(int)
+    square = int(at[1] * lattice[3] + at[0])
+    assert 7 in near[bucket[square] : bucket[square + 1]]
+
+
+def test_great_circles_of_many_zones_are_counted_together(
+    within_s: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    within_s.append(5.0)
+    monkeypatch.setattr(zone_draft, "MOST_ALL_CORNERS", 20_000)
+    assert "more than 20000 together; simplify them, or give a file of those around" in said("great_circles", 1000)
