@@ -118,9 +118,10 @@ def test_mistakes_are_counted(within_s: list[float]) -> None:
     ("name", "text", "words"),
     [
         ("z.geojson", '{"type": "FeatureCollection", "features": [' + "1," * 100_000 + "1]}", "features[999]"),
+        ("z.txt", "AC R\n" * 50_000, "z.txt: line 10"),
         ("z.kml", "<kml>" + "<a>" * 2_000_001, "the KML has more than 2000000 tags"),
     ],
-    ids=["geojson", "kml"],
+    ids=["geojson", "openair", "kml"],
 )
 def test_what_is_no_zone_is_counted_too(name: str, text: str, words: str, within_s: list[float]) -> None:
     within_s.append(2.0)
