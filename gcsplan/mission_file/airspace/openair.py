@@ -59,7 +59,7 @@ _PLACE = re.compile(
 _LONGEST_LINE = 2000
 
 MOST_MISTAKES, MOST_FAULTS = 5, 1000
-"""Mistakes of one zone, or before the first, that are reported; and mistakes of a file after which it is not read on."""
+"""Mistakes of one zone, or before the first, that are reported; and those of a file after which it is not read on."""
 
 
 class _RecordError(ValueError):
