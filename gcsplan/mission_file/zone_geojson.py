@@ -17,6 +17,10 @@ from gcsplan.world.degree_shapes import beyond_outline
 ALTITUDES = "the altitudes of corners are not read as limits"
 
 
+MOST_MISTAKES = 1000
+"""Most mistakes of a file that are looked for."""
+
+
 def read_geojson(path: Path, whole: Any) -> ZoneFile:
     """The zones of GeoJSON, as `zone_json.load_json` returns it. Raises InputError if it is not GeoJSON."""
     found = ZoneFile(path)
@@ -34,6 +38,8 @@ def read_geojson(path: Path, whole: Any) -> ZoneFile:
         raise InputError("a FeatureCollection needs a list `features` that is not empty", where=str(path))
     flown = [_is_flown(whole, feature) for feature in features]
     for i, feature in enumerate(features):
+        if len(found.problems) > MOST_MISTAKES:
+            break  # they refuse the file
         where = f"{path}: features[{i}]" if whole.get("type") == "FeatureCollection" else f"{path}: feature"
         if not flown[i]:
             _feature(found, feature, where, f"{path.stem}[{i}]")

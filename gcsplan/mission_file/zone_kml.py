@@ -26,6 +26,9 @@ from gcsplan.world.degree_shapes import beyond_outline
 from gcsplan.world.zones import Level
 
 MAX_DEPTH = 60
+MOST_TAGS = 2_000_000
+"""Most beginnings and ends of elements, each of which takes some 300 bytes of memory; 20 MB of zones have a third."""
+
 MODES: dict[str, Literal["agl", "amsl"]] = {"relativeToGround": "agl", "absolute": "amsl"}
 """What altitudes are counted from, by the altitudeModes in which they count at all."""
 
@@ -44,6 +47,10 @@ _SHAPES = (*_READ_SHAPES, "LinearRing", "Model", "Track", "MultiTrack")
 def read_kml(path: Path, data: bytes) -> ZoneFile:
     """The zones of KML text. Raises InputError if it is not KML."""
     found = ZoneFile(path, great_circles=True)  # as Google Earth draws them
+    if data.count(b"<") > MOST_TAGS:
+        raise InputError(
+            f"the KML has more than {MOST_TAGS} tags; leave out what is far from the mission", where=str(path)
+        )
     try:
         root = defusedxml.ElementTree.fromstring(data, forbid_dtd=True)
     except DefusedXmlException:

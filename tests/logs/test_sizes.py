@@ -64,7 +64,9 @@ def test_lines_of_a_csv_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert "has more than 99 lines; cut it to the flight, or to every tenth line" in refused(file)
 
 
-@pytest.mark.parametrize("text", ["," * 200_000, HEADER + "1" * 200_000, HEADER + ('"' + "1\n" * 200_000)])
+@pytest.mark.parametrize(
+    "text", ["," * 200_000, HEADER + "1" * 200_000, HEADER + ('"' + "1\n" * 200_000)], ids=["head", "row", "quote"]
+)
 def test_a_line_without_an_end_is_refused(text: str, tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(text)
     said = refused(tmp_path / "log.csv")

@@ -114,6 +114,25 @@ def test_mistakes_are_counted(within_s: list[float]) -> None:
     assert "has 9900 more mistakes, which are not listed" in str(refusal.value.problems[-1])
 
 
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("z.geojson", '{"type": "FeatureCollection", "features": [' + "1," * 100_000 + "1]}", "features[999]"),
+        ("z.txt", "AC R\n" * 50_000, "z.txt: line 10"),
+        ("z.kml", "<kml>" + "<a>" * 2_000_001, "the KML has more than 2000000 tags"),
+    ],
+    ids=["geojson", "openair", "kml"],
+)
+def test_what_is_no_zone_is_counted_too(name: str, text: str, words: str, within_s: list[float]) -> None:
+    within_s.append(2.0)
+    Path(name).write_text(text)
+    sizes.mission([{"file": name}])
+    with pytest.raises(InputError) as refusal:
+        load_mission("m.yaml")
+    assert len(refusal.value.problems) <= 1001
+    assert words in str(refusal.value)
+
+
 def test_zones_that_all_lie_over_each_other_take_little_memory() -> None:
     box = np.array([[-6e4, -6e4, 6e4, 6e4]]) + np.random.default_rng(1).uniform(-1e4, 1e4, (20_000, 1))
     lattice, bucket, near = _lattice(box)

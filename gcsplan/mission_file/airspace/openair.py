@@ -63,8 +63,8 @@ _COMPACT = re.compile(r"(?<![\d:.])(\d{2,3})([0-5]\d)([0-5]\d(?:\.\d{1,20})?)(?!
 """Degrees, minutes and seconds in one number, such as 460500.00N 0143000.00E."""
 _LONGEST_LINE = 2000
 
-MOST_MISTAKES = 5
-"""Mistakes of one zone, or before the first, that are reported."""
+MOST_MISTAKES, MOST_FAULTS = 5, 1000
+"""Mistakes of one zone, or before the first, that are reported; and those of a file after which it is not read on."""
 
 
 class _RecordError(ValueError):
@@ -130,6 +130,8 @@ class _Reading:
                 continue
             if not self.zones and self.block is None and len(self.file.found.problems) >= MOST_MISTAKES:
                 break  # it is another format
+            if len(self.file.found.problems) > MOST_FAULTS:
+                break  # they refuse the file
             match = None if len(record) > _LONGEST_LINE else _RECORD.fullmatch(record)
             if match is None:
                 self._odd(number, record)
