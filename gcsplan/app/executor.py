@@ -7,10 +7,10 @@ The results are the same wherever it is done. Work is a function that can be imp
 from __future__ import annotations
 
 import math
-import multiprocessing
 import os
 import queue
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -384,7 +384,8 @@ def _processes(count: int) -> Iterator[Any]:
 
 def end_processes() -> None:
     """End the processes that this one has started in the middle of their work, for which dask would wait."""
-    for process in multiprocessing.active_children():
+    started = sys.modules.get("multiprocessing")  # who has not imported it has started none
+    for process in started.active_children() if started else ():
         process.kill()
 
 

@@ -64,11 +64,17 @@ def verdict_table(
             break
     print_table(table)
     if verdict.legs:
-        used = "" if verdict.battery_used_percent is None else f", {verdict.battery_used_percent:.0f} % of the battery"
-        joules = verdict.told_j(verdict.energy_j)
-        words = "" if joules is None else f", {energy_words(joules, None if energy is None else energy.battery_v)}"
+        joules, mark = verdict.told_j(verdict.energy_j), verdict.energy_mark
+        used = [] if joules is None else [energy_words(joules, None if energy is None else energy.battery_v)]
+        if verdict.battery_used_percent is not None:
+            used.append(f"{verdict.battery_used_percent:.0f} % of the battery")
         length = f"{number(verdict.length_m, 0, units.path)} {units.path.symbol}"
-        say(f"path {length}; whole flight {duration(verdict.time_s)}{words}{used}{verdict.energy_mark}")
+        flight = f"path {length}; whole flight {duration(verdict.time_s)}"
+        if mark and used:  # one line would be wider than 80 columns
+            say(flight)
+            say(f"energy{mark}: {', '.join(used)}")
+        else:
+            say(", ".join([flight, *used]))
         say_heights(verdict, units)
     say_notes(verdict.notes)
 
