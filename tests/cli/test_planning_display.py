@@ -13,7 +13,7 @@ import pytest
 from rich.console import Console
 
 from gcsplan.cli import console as words
-from gcsplan.cli import main as cli
+from gcsplan.cli import commands
 from gcsplan.cli import planning_display as display
 from gcsplan.cli.planning_display import PlanningBoard, planning_display
 from gcsplan.planners.problem import Progress
@@ -152,7 +152,7 @@ def test_lines_go_to_standard_error_and_the_document_to_standard_output(
     monkeypatch.setattr(PlanningBoard, "line", kept)
     monkeypatch.setattr(PlanningBoard, "report", report_and_wait)
     arguments = ["plan", str(MISSIONS / "fleet-4.yaml"), "-o", str(tmp_path / "out"), "--json"]
-    assert cli.app(args=arguments, standalone_mode=False) == 0
+    assert commands.app(args=arguments, standalone_mode=False) == 0
     out, err = capsys.readouterr()
     assert json.loads(out)["planner"] == "optimal"
     assert {f"uav{k} ({k} of 4)" for k in (1, 4)} <= {
