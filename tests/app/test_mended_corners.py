@@ -15,13 +15,12 @@ from gcsplan.mavlink.build.multirotor import SHORT_LEG_M
 from gcsplan.mission_file import load_mission
 
 
-@pytest.mark.parametrize(("number", "most_m"), [(64, 5425.0), pytest.param(38, 705.0, marks=pytest.mark.slow)])
-def test_a_mission_over_hills_without_errors_is_planned_once(number: int, most_m: float) -> None:
-    # Planned again with the margins of its short legs' climbs, 64 took 5,501 m and 38 took 889.
-    one = draw(11, number)
+def test_a_mission_over_hills_without_errors_is_planned_once() -> None:
+    # Planned again with the margins of its short legs' climbs, it took 5,501 m.
+    one = draw(11, 64)
     (found,) = plan(load_mission(Path(f"{one.kind}.yaml"), text=yaml.safe_dump(one.document))).vehicles
     assert found.verdict.safe is True
-    assert found.cost < most_m
+    assert found.cost < 5425.0
     assert not any("planned 2 times" in note for note in found.solution.notes)
 
 
