@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from gcsplan.cli import console as words
 from gcsplan.cli import commands
+from gcsplan.cli import console as words
 from gcsplan.cli import planning_display as display
 from gcsplan.cli.planning_display import PlanningBoard, planning_display
 from gcsplan.planners.problem import Progress

@@ -205,6 +205,7 @@ def test_a_vehicle_that_returns_at_another_altitude_than_the_required_one_is_ref
         )
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("told", [{}, {"RTL_ALT": math.nan}], ids=["nothing", "no number"])
 def test_a_vehicle_that_does_not_tell_its_return_altitude_gets_no_mission_that_requires_one(
     run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: dict[str, float]

@@ -66,6 +66,7 @@ def test_groups_that_meet_after_all_are_joined(monkeypatch: pytest.MonkeyPatch) 
     assert set(found.done) == set(plan.order)
 
 
+@pytest.mark.slow
 def test_one_that_is_stuck_is_left_out_of_its_group_alone() -> None:
     # The goal of the last lies beside that of the first of its cluster, where the first has landed.
     crews = clusters(3)

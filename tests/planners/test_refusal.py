@@ -120,6 +120,7 @@ def test_goal_fenced_in_names_the_zones() -> None:
     assert e.east_m is not None
 
 
+@pytest.mark.slow
 def test_one_zone_across_the_map_is_named_alone() -> None:
     bar = Zone("border", Circle(1000.0, 1000.0, 1200.0), Level(0.0, "amsl"), Level(4000.0, "amsl"))
     dot = Zone("dot", Circle(300.0, 300.0, 50.0))

@@ -73,6 +73,7 @@ def test_an_outline_that_would_take_minutes_is_refused_at_once() -> None:
     assert overlapping_pairs(ring_of("smooth", 99_000, 1)) < MOST_PAIRS
 
 
+@pytest.mark.slow
 def test_the_corridor_of_a_tangled_line_holds_it_and_is_found_in_time() -> None:
     line = np.random.default_rng(1).uniform(0.0, 4000.0, (500, 2))
     begun = time.process_time()

@@ -108,6 +108,7 @@ def test_the_best_cost_never_rises_and_the_budget_is_exact() -> None:
     assert again.curve.tobytes() == found.curve.tobytes()
 
 
+@pytest.mark.slow
 def test_no_ant_through_a_closed_wall_is_a_refusal() -> None:
     wall = tuple(Zone(f"w{i}", Circle(1000.0, float(n), 80.0)) for i, n in enumerate(range(-900, 3000, 100)))
     problem = mission(iterations=3, points=3)

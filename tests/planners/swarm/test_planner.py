@@ -96,6 +96,7 @@ def test_a_cost_that_sees_nothing_cannot_pass_a_path_through_a_zone(monkeypatch:
     assert faults(problem, solution.path) == []
 
 
+@pytest.mark.slow
 def test_a_curve_that_cannot_be_mended_is_refused_by_name() -> None:
     wall = [Zone(f"wall {i}", Circle(1000.0, float(n), 60.0)) for i, n in enumerate(range(-50, 2100, 90))]
     problem = toy(encoding="sections", iterations=5)
