@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -43,6 +44,9 @@ BOX_LOW, BOX_HIGH = [WEST_E, SOUTH_N], [EAST_E, NORTH_N]
 WIDER = 1.6
 UNUSED = -1e9
 """A reach for which the kernel need not look for anything."""
+MOST_ROWS = 200_000
+"""Most pieces of the lines that are looked at together: the kernel's rows take 11 MB, which a cache holds, so returns
+of 240 km are judged in two thirds of the time that all at once take."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,19 +133,24 @@ def over(
     starts, ends = (np.ascontiguousarray(a, dtype=np.float64) for a in (starts, ends))
     reach = Reaches.of(limits, air._field, air.scale)
     near, far = reach.near_m + wide_m, reach.far_m + wide_m
-    line, s0, rows = _pieces(
-        air, starts, ends, (near if limits.max_agl_m is not None else UNUSED, near, far), of_top=True
-    )
     error = limits.altitude_error_m
     margin = reach.near_margin_m if wide_m == 0.0 else MARGIN_M
-    high = rows[:, 3:5].max(axis=1) + (error + margin)
-    legal = high + limits.min_agl_m
-    if limits.horizontal_clearance_m > 0.0:
-        beside = rows[:, 5:7].max(axis=1) + (error + max(reach.far_margin_m, margin))
-        high, legal = np.maximum(high, beside), np.maximum(legal, beside)
-    unknown = np.isnan(high) | np.isnan(legal)
-    high, legal = np.where(unknown, np.inf, high), np.where(unknown, np.inf, legal)
-    low = np.where(unknown, -np.inf, rows[:, 1:3].min(axis=1) - (error + margin))
+    found: list[tuple[Indices, Floats, Floats, Floats, Floats]] = []
+    for first, last in pairwise(_batches(air, starts, ends)):
+        line, s0, rows = _pieces(
+            air, starts[first:last], ends[first:last],
+            (near if limits.max_agl_m is not None else UNUSED, near, far), of_top=True,
+        )  # fmt: skip
+        high = rows[:, 3:5].max(axis=1) + (error + margin)
+        legal = high + limits.min_agl_m
+        if limits.horizontal_clearance_m > 0.0:
+            beside = rows[:, 5:7].max(axis=1) + (error + max(reach.far_margin_m, margin))
+            high, legal = np.maximum(high, beside), np.maximum(legal, beside)
+        unknown = np.isnan(high) | np.isnan(legal)
+        high, legal = np.where(unknown, np.inf, high), np.where(unknown, np.inf, legal)
+        low = np.where(unknown, -np.inf, rows[:, 1:3].min(axis=1) - (error + margin))
+        found.append((line + first, s0, high, legal, low))
+    line, s0, high, legal, low = (np.concatenate(parts) for parts in zip(*found, strict=True))
     n = len(starts)
     clear_m, legal_m, ceiling_m = np.full(n, -np.inf), np.full(n, -np.inf), np.full(n, np.inf)
     np.maximum.at(clear_m, line, high)
@@ -149,8 +158,18 @@ def over(
     if limits.max_agl_m is not None:
         np.minimum.at(ceiling_m, line, low + limits.max_agl_m)
     clearance_m = limits.horizontal_clearance_m * air.scale
-    found = _crossings(air, starts, ends, reach, wide_m, error, swept, clearance_m)
-    return LevelLines(clear_m, legal_m, ceiling_m, found, line, s0, high, legal)
+    crossings = _crossings(air, starts, ends, reach, wide_m, error, swept, clearance_m)
+    return LevelLines(clear_m, legal_m, ceiling_m, crossings, line, s0, high, legal)
+
+
+def _batches(air: Airspace, starts: Floats, ends: Floats) -> list[int]:
+    """The first line of each batch of some `MOST_ROWS` pieces, and the number of lines.
+
+    Batches begin with an even line: `_pieces` follows every other one backwards.
+    """
+    cells = 16.0 + 3.0 * np.hypot(*(ends - starts).T) / min(air._field.step_x, air._field.step_y)
+    batch = np.floor(np.cumsum(cells) / MOST_ROWS)[::2]
+    return [0, *(2 * (1 + np.flatnonzero(np.diff(batch)))).tolist(), len(starts)]
 
 
 def _pieces(
