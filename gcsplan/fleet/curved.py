@@ -201,9 +201,11 @@ def curved(
     rates = np.array([[vehicle.climb_m_s, vehicle.descent_m_s]]) if rates_m_s is None else rates_m_s[keep[1:]]
     rates = np.broadcast_to(rates, (len(d), 2))
     most, per_cruise = bounds(length, run, d[:, 2], rates)
+    several = last - first > 1
+    cut = several[number] & (run > 0.0)  # parts of a leg that follows the ground or a curve
     trails = np.zeros(len(d), dtype=np.bool_)
     if follows is not None:
-        trails = follows[keep[1:]] & (last - first > 1)[number] & (run > 0.0)
+        trails = follows[keep[1:]] & cut
         most = np.where(trails, math.inf, most)  # `trailing` keeps the rates
     if vehicle.autopilot is Autopilot.ARDUCOPTER and vehicle.lean_angle_deg is not None:
         slope = np.arctan2(d[:, 2], np.maximum(run, 1e-12))
@@ -212,9 +214,7 @@ def curved(
     if pace is not None:
         per_cruise = per_cruise * pace[keep[1:]]
     way = p[last] - p[first]
-    cut = (last - first > 1)[number] & (run > 0.0)  # parts of a leg that follows the ground
     level = np.where(cut, run / length, 1.0)
-    several = last - first > 1
     way[several, 2] = 0.0
     part_m = length * level
     whole = np.bincount(number, weights=part_m)
