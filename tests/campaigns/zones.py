@@ -3,7 +3,7 @@
     python -m tests.campaigns.zones --seconds 120 [--seed 1] [--inputs N]
 
 An input is one or two random polygons: narrow or up to a turn wide, in either convention of longitudes, across the
-antimeridian, at a pole, with a hole, split. It is written in one format and read by `read_zones`; then places inside
+antimeridian, at a pole, with a hole, split, of several parts with several holes. It is written in one format and read by `read_zones`; then places inside
 and outside it are looked up. The answer that is right is computed here, without the code under test: longitudes count
 as they are written, edges are straight in degrees, and in formats that do not say so great circles as well, whose
 latitude at a longitude comes from the plane through the centre of the Earth. Each fourth input is a circle, a corridor
@@ -48,7 +48,7 @@ MAX_FOUND = 20
 def polygon(rng: random.Random) -> tuple[str, list[Part]]:
     """A kind of polygon and its parts."""
     kind = rng.choice(["narrow", "wide", "world", "many corners", "across", "written across", "split", "pole", "hole",
-                       "hole in world", "360", "long edge", "tip at the pole", "steep"])  # fmt: skip
+                       "hole in world", "360", "long edge", "tip at the pole", "steep", "islands"])  # fmt: skip
     lat, lon = rng.uniform(-70.0, 70.0), rng.uniform(-180.0, 180.0)
     if kind == "narrow":
         return kind, [[_star(rng, lon, lat, rng.uniform(0.05, 15.0), 0.0)]]
@@ -90,6 +90,8 @@ def polygon(rng: random.Random) -> tuple[str, list[Part]]:
     if kind == "hole":
         ring = _star(rng, lon, lat, rng.uniform(1.0, 9.0), 0.0)
         return kind, [[ring, [(lon, lat), (lon + 0.02, lat), (lon, lat + 0.02)]]]
+    if kind == "islands":  # of one zone, each with lakes
+        return kind, [_island(rng, lon + 25.0 * k, 0.8 * lat) for k in range(rng.randint(2, 5))]
     hole = [(lon * 0.8, lat * 0.8), (lon * 0.8 + 3.0, lat * 0.8), (lon * 0.8, lat * 0.8 + 2.0)]
     return kind, [[_band(rng, -179.9, 179.9, -80.0, 80.0, rng.choice([1, 4])), hole]]
 
@@ -100,6 +102,15 @@ def _star(rng: random.Random, lon: float, lat: float, size: float, turn: float) 
     size = min(size, 84.0 - abs(lat))
     return [
         (lon + turn + 1.2 * (r := size * rng.uniform(0.4, 1.0)) * math.cos(b), lat + r * math.sin(b)) for b in bearings
+    ]
+
+
+def _island(rng: random.Random, lon: float, lat: float) -> Part:
+    size = 10.0 ** rng.uniform(-2.0, 0.8)
+    lakes = [(lon + 0.15 * size * (k - 1), lat) for k in range(rng.randint(0, 3))]
+    return [
+        _star(rng, lon, lat, size, 0.0),
+        *([(x, y), (x + 0.1 * size, y), (x, y + 0.1 * size)] for x, y in lakes),
     ]
 
 
