@@ -19,6 +19,7 @@ import gcsplan
 from gcsplan import errors
 from gcsplan.cli import ending
 from gcsplan.mission_file import json_schema, schema, units
+from gcsplan.notes.catalogue import TEXTS
 from gcsplan.planners import registry
 from gcsplan.sim.firmware import CHANGES
 
@@ -342,6 +343,22 @@ def all_messages() -> str:
     return "\n".join(lines)
 
 
+def all_notes() -> str:
+    """The table of notes: the code that ``--json`` has, and the sentence."""
+    rows = [f"| `{code}` | {_cell(_shown_text(text))} |" for code, text in sorted(TEXTS.items())]
+    return "\n".join(["| code | sentence |", "| --- | --- |", *rows])
+
+
+def _shown_text(text: str) -> str:
+    """A sentence of the catalogue with ``‹name›`` for its data, and both words where a number decides."""
+
+    def shown(field: re.Match[str]) -> str:
+        name, _, form = field[1].partition(":")
+        return form if name == "key" else form.replace("|", "/") if "|" in form else f"‹{name}›"
+
+    return re.sub(r"\{(.*?)\}", shown, text)
+
+
 # -- the rest ---------------------------------------------------------------------------------------------------------
 
 
@@ -373,6 +390,7 @@ PARTS: Mapping[str, Callable[[], str]] = {
     "command-line": command_line,
     "exit-codes": exit_codes,
     "messages": all_messages,
+    "notes": all_notes,
     "planners": planners,
     "firmware-changes": firmware_changes,
     "changelog": lambda: from_top("CHANGELOG.md"),

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Protocol, Self
 
 from gcsplan.errors import UsageError
 from gcsplan.figures import floored, raised
@@ -243,12 +243,21 @@ class UnitText(str):
 Part = Quantity | Symbol | Reach | Seconds | Joules
 
 
-def in_units(text: str, units: Units) -> str:
+class Readable(Protocol):
+    """What makes its own sentence, such as a note."""
+
+    def in_units(self, units: Units) -> str:
+        """The sentence with its quantities in ``units``."""
+
+
+def in_units(text: str | Readable, units: Units) -> str:
     """A text for people: its quantities in ``units``. A plain text is itself."""
+    if not isinstance(text, str):
+        return text.in_units(units)
     return _filled(text.template, text.parts, units) if isinstance(text, UnitText) else text
 
 
-def joined(between: str, texts: Sequence[str]) -> UnitText:
+def joined(between: str, texts: Sequence[str | Readable]) -> UnitText:
     """Texts joined by the words ``between``, which have no braces."""
     return UnitText(between.join("{}" for _ in texts), *texts)
 
@@ -258,7 +267,7 @@ def _filled(template: str, parts: Sequence[object], units: Units | None) -> str:
     for part in parts:
         if isinstance(part, Part):
             texts.append(part.text(units))
-        elif isinstance(part, UnitText):
+        elif isinstance(part, UnitText) or hasattr(part, "in_units"):
             texts.append(str(part) if units is None else in_units(part, units))
         else:
             texts.append(part)

@@ -328,7 +328,7 @@ def judged(
     more = [words for words in (read.unread_fence, beyond_hours(verdict, hours)) if words]
     verdict = replace(verdict, not_judged=(*verdict.not_judged, *more))
     notes += fence_notes
-    if verdict.legs and verdict.legs[-1].kind == "cruise" and not any("without end" in n for n in verdict.notes):
+    if verdict.legs and verdict.legs[-1].kind == "cruise" and not any("without end" in str(n) for n in verdict.notes):
         notes.append("the mission ends in the air: what becomes of the vehicle after its last item is not in it")
     home: WayHome | None = None
     if asks_home:

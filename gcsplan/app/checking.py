@@ -128,7 +128,8 @@ def finding_lines(c: Checked, *, allow_unjudged: bool = False, units: Units = ME
     lines = [f"{c.file}:{f.seq}: {f.kind}: {_without_item(in_units(f.message, units))}" for f in c.verdict.findings]
     if not allow_unjudged:
         lines += [
-            f"{c.file}:{_item_in(w)}: not_judged: {_without_item(in_units(w, units))}" for w in c.verdict.not_judged
+            f"{c.file}:{_item_in(str(w))}: not_judged: {_without_item(in_units(w, units))}"
+            for w in c.verdict.not_judged
         ]
     return lines + home_lines(c, units)
 

@@ -9,22 +9,23 @@ from dataclasses import replace
 from gcsplan.check.rtl.verdict import UnsafeStretch, WayHome
 from gcsplan.check.verdict import Verdict
 from gcsplan.mission_file.from_options import OPTIONS
+from gcsplan.notes.note import Said
 from gcsplan.units import UnitText
 
 _KEY = re.compile(r"\b({})\b".format("|".join(key for key in OPTIONS if "_" in key)))
 """Keys that are no English words."""
 
 
-def in_options(words: str) -> str:
+def in_options(words: Said) -> str:
     """``words`` with ``--rtl-altitude`` in place of ``rtl_rel_home_m``, and so on."""
 
     def named(piece: str) -> str:
         return _KEY.sub(lambda found: OPTIONS[found[1]], piece)
 
-    return words.changed(named) if isinstance(words, UnitText) else named(words)
+    return words.changed(named) if isinstance(words, UnitText) else named(str(words))
 
 
-def all_in_options(lines: Iterable[str]) -> tuple[str, ...]:
+def all_in_options(lines: Iterable[Said]) -> tuple[str, ...]:
     """Each of ``lines`` in the words of the options."""
     return tuple(in_options(words) for words in lines)
 

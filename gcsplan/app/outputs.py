@@ -155,6 +155,7 @@ def _vehicle(
     lowest = verdict.lowest
     length = v.problem.objective == "length"
     bound = v.solution.lower_bound
+    notes = (*v.notes, *v.solution.notes, *map(str, verdict.notes), *(slot.notes if slot else ()))
     return {
         "name": v.name,
         "items": len(v.mission.wire_items()),
@@ -177,9 +178,9 @@ def _vehicle(
         "stopped_by": v.solution.stopped_by,
         "search": [asdict(step) for step in v.solution.search],
         "safe": verdict.safe,
-        "not_judged": list(verdict.not_judged),
+        "not_judged": [str(note) for note in verdict.not_judged],
         "hold_s": slot.hold_s if slot else 0.0,
-        "notes": list(dict.fromkeys((*v.notes, *v.solution.notes, *verdict.notes, *(slot.notes if slot else ())))),
+        "notes": list(dict.fromkeys(notes)),
         "upload": result.as_dict() if result else None,
         "verdict": verdict_words(verdict.safe, home),
     } | _of_search(v) | ({} if home is None else {"way_home": home.as_dict()})  # fmt: skip
@@ -227,8 +228,8 @@ def verdict_of(name: str, verdict: Verdict, home: WayHome | None = None) -> dict
         "min_agl_m": lowest.min_agl_m if lowest else None,
         **_extremes(verdict),
         "violations": [flat(f) for f in verdict.findings],
-        "not_judged": list(verdict.not_judged),
-        "notes": list(verdict.notes),
+        "not_judged": [str(note) for note in verdict.not_judged],
+        "notes": [str(note) for note in verdict.notes],
     }
 
 

@@ -51,7 +51,7 @@ def page_of_plan(
             v.cost, v.solution.lower_bound, v.gap_percent, v.solution.stopped_by,
         )  # fmt: skip
         slot = None if fleet is None else fleet.slot(v.name)
-        notes = (*v.notes, *v.solution.notes, *v.verdict.notes, *(slot.notes if slot is not None else ()))
+        notes = (*v.notes, *v.solution.notes, *map(str, v.verdict.notes), *(slot.notes if slot is not None else ()))
         subjects.append(
             Subject(
                 v.name, v.verdict, v.request.vehicle, certificate, tuple(dict.fromkeys(notes)),

@@ -130,7 +130,7 @@ def _joined(
             continue
         over = looked_over(brief, solution)
         mission, verdict = built(over, request, solution, order)
-        crowded = [words for words in verdict.not_judged if words.endswith(UNFITTING)]
+        crowded = [str(words) for words in verdict.not_judged if str(words).endswith(UNFITTING)]
         if crowded:
             why = f"{APART}\n  {crowded[0]}"
             continue

@@ -45,6 +45,7 @@ from gcsplan.check.turn_words import takes_off_elsewhere
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 
 COPTER_CIRCLE_RADIUS_M = 10.0  # ArduCopter CIRCLE_RADIUS, default
@@ -135,10 +136,7 @@ class _Pilot(Aboard):
         if self.airborne and not self.landed and self.autopilot is Autopilot.ARDUPLANE:
             last = self.flight.stretches[-1] if self.flight.stretches else None
             if last is not None and (last.kind != "loiter" or last.hold_s < math.inf):
-                self.flight.not_judged.append(
-                    "after the last item ArduPlane returns home by itself (RTL): that return is not judged; "
-                    "end the mission with a landing, a loiter or an RTL"
-                )
+                self.flight.not_judged.append(Note("returns_by_itself"))
 
     # -- pieces ----------------------------------------------------------------------------------------------
 

@@ -25,11 +25,12 @@ from gcsplan.check.misses import nearest_misses
 from gcsplan.check.plane_legs import PlaneLegs, legs_in_plane, steep_report
 from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.check.tuning import DEFAULTS, Tuning
-from gcsplan.check.verdict import PAPER_NOTE, Finding, LegFigures, Verdict
+from gcsplan.check.verdict import Finding, LegFigures, Verdict
 from gcsplan.check.zone_heights import nearest_pass
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.firmware import STRAIGHT_NOTE, needs_straight
 from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.notes.note import Note
 from gcsplan.units import Joules, Quantity, UnitText, measured
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import LegReport, Violation
@@ -121,7 +122,7 @@ def judge(
             f"terrain-frame legs depend on the terrain data in the vehicle; judged as it reads this terrain, at posts "
             f"every {world.post_spacing_m} m, with {terrain_error_m:g} m of error"
         )
-    flight.notes += [PAPER_NOTE] if vehicle.energy.papers else []
+    flight.notes += [Note("paper_energy")] if vehicle.energy.papers else []
     flight.notes += [NO_CEILING] if vehicle.limits.max_agl_m is None else []
     verdict = Verdict(
         mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near, zone_pass=over,
@@ -131,7 +132,7 @@ def judge(
     return _with_battery(verdict, vehicle, flight)
 
 
-def _unlike_fitted(stretches: Sequence[Stretch], vehicle: Vehicle) -> list[str]:
+def _unlike_fitted(stretches: Sequence[Stretch], vehicle: Vehicle) -> list[Note]:
     """A note on cruise speeds for which the energy model is not fitted."""
     energy = vehicle.energy
     far = {s.speed_m_s: s.seq for s in reversed(stretches) if s.on_path and energy.unlike_fitted(s.speed_m_s)}
@@ -140,10 +141,7 @@ def _unlike_fitted(stretches: Sequence[Stretch], vehicle: Vehicle) -> list[str]:
     slow, fast = energy.fitted_m_s
     speed = max(far, key=lambda v: max(slow / max(v, 1e-9), v / fast))
     at = f"{slow:g}" if slow == fast else f"{slow:g} to {fast:g}"
-    return [
-        f"the energy is fitted to flights at {at} m/s, and from item {far[speed]} on it flies at {speed:.3g} m/s: what "
-        f"it needs may be far off; fit the energy to flights at that speed, too"
-    ]
+    return [Note("energy_fitted_elsewhere", far[speed], fitted=at, speed_m_s=speed)]
 
 
 def _refused(mission: Mission) -> list[Finding]:
@@ -350,12 +348,10 @@ def _with_battery(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> Verdict
     if power_w is None:
         return verdict
     if power_w <= 0.0:
-        words = f"item {last.seq}: how long the battery lasts there is not known, for hover_w is 0"
-        return replace(verdict, notes=(*verdict.notes, words))
+        return replace(verdict, notes=(*verdict.notes, Note("battery_lasts_unknown", last.seq)))
     left_s = (usable - used) / power_w
-    what = "its round" if flight.loop_seq is not None else "its hold"
-    words = f"item {last.seq}: {what} has no end: the battery comes to its reserve after {left_s:.0f} s of it"
-    return replace(verdict, notes=(*verdict.notes, words), until_reserve_s=left_s)
+    note = Note("battery_until_reserve", last.seq, loop=flight.loop_seq is not None, left_s=left_s)
+    return replace(verdict, notes=(*verdict.notes, note), until_reserve_s=left_s)
 
 
 def _power_w(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> float | None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from gcsplan.notes.note import Said
+
 StretchKind = Literal["takeoff", "cruise", "land", "loiter", "rtl"]
 Place = tuple[float, float, float]
 """Latitude, longitude in degrees, altitude AMSL in metres."""
@@ -67,8 +69,8 @@ class Flight:
 
     stretches: list[Stretch] = field(default_factory=list)
     instead: list[Stretch] = field(default_factory=list)
-    not_judged: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    not_judged: list[Said] = field(default_factory=list)
+    notes: list[Said] = field(default_factory=list)
     unreached: list[Unreached] = field(default_factory=list)
     loop_seq: int | None = None
     apart_from: int | None = None

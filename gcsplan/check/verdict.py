@@ -13,6 +13,7 @@ from gcsplan.check.stretch import Place, StretchKind
 from gcsplan.check.zone_heights import ZonePass
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.parameter_safety import Extent
+from gcsplan.notes.note import Said
 from gcsplan.units import UnitText, joined
 
 if TYPE_CHECKING:
@@ -20,10 +21,6 @@ if TYPE_CHECKING:
 
 
 PAPER_MARK = " (paper's figures)"
-PAPER_NOTE = (
-    "energy and battery count the paper's 120 J for a metre up or down and 100 J for one along, which say nothing "
-    "about this aircraft: give what flying takes under energy: (cruise_w, endurance_min, or what fit-energy finds)"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,8 +143,8 @@ class Verdict:
     mission: Mission
     legs: tuple[LegFigures, ...]
     findings: tuple[Finding, ...]
-    not_judged: tuple[str, ...]
-    notes: tuple[str, ...] = ()
+    not_judged: tuple[Said, ...]
+    notes: tuple[Said, ...] = ()
     battery_used_percent: float | None = None
     misses: tuple[Miss, ...] = ()
     until_reserve_s: float | None = None

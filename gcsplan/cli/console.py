@@ -112,7 +112,9 @@ def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) 
     if plan.fleet is not None:
         notes = [(slot.name, note) for slot in plan.fleet.slots for note in slot.notes]
         say_notes_of([(name, note.removeprefix(f"{name} ")) for name, note in notes])
-    say_notes_of([(v.name, n) for v in plan.vehicles for n in (*v.notes, *v.solution.notes, *v.verdict.notes)])
+    say_notes_of(
+        [(v.name, n) for v in plan.vehicles for n in (*v.notes, *v.solution.notes, *map(str, v.verdict.notes))]
+    )
     say_heights(plan.source.inputs)
     if words := what_is_not_in(plan.source.inputs):
         console.print(words, style="yellow", markup=False)

@@ -76,7 +76,7 @@ def verdict_table(
         else:
             say(", ".join([flight, *used]))
         say_heights(verdict, units)
-    say_notes(verdict.notes)
+    say_notes([str(note) for note in verdict.notes])
 
 
 def say_heights(verdict: Verdict, units: Units) -> None:

@@ -168,7 +168,7 @@ def page_of_check(
     subjects = tuple(
         Subject(
             c.vehicle.name if names.count(c.vehicle.name) == 1 else str(c.file),
-            c.verdict, c.vehicle, None, tuple(dict.fromkeys((*c.notes, *c.verdict.notes))),
+            c.verdict, c.vehicle, None, tuple(dict.fromkeys((*c.notes, *map(str, c.verdict.notes)))),
             home=homes[i] if i < len(homes) else None,
         )
         for i, c in enumerate(checked)

@@ -225,7 +225,7 @@ def _track(vehicle: Vehicle, line: _Line, goal: int, flight: Flight, kinematics:
         np.array(accel), np.array(column, dtype=np.bool_), np.array(seq, dtype=np.intp), goal,
         not (last.column and last.end[2] < last.start[2]), kinematics.slowing_m_s2,
         _airspeeds(points, kinematics),
-        (*flight.not_judged, *_left_out(flight), *turns), vehicle.keeps_airspeed,
+        (*map(str, flight.not_judged), *_left_out(flight), *turns), vehicle.keeps_airspeed,
     )  # fmt: skip
 
 

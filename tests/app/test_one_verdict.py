@@ -21,6 +21,7 @@ from gcsplan.cli.console import plan_table
 from gcsplan.cli.verdict_table import verdict_table
 from gcsplan.export.table import csv_text
 from gcsplan.mission_file import load_mission
+from gcsplan.notes.note import Note
 from gcsplan.report.index_page import render_index
 from gcsplan.units import METRIC
 from tests.check.test_energy import ENERGY, mission
@@ -95,7 +96,7 @@ def test_a_battery_without_energy_is_judged_by_the_papers_numbers_and_says_so(
     done = plan(load_mission(mission({"battery_wh": 900})))
     [v] = done.vehicles
     mark = "(paper's figures)"
-    assert any("which say nothing about this aircraft" in note for note in v.verdict.notes)
+    assert Note("paper_energy") in v.verdict.notes
     plan_table(done, {})
     assert capsys.readouterr().out.count(mark) >= 2
     verdict_table("uav1", v.verdict, energy=v.request.vehicle.energy)

@@ -3,11 +3,11 @@
     python -m tests.campaigns.zones --seconds 120 [--seed 1] [--inputs N]
 
 An input is one or two random polygons: narrow or up to a turn wide, in either convention of longitudes, across the
-antimeridian, at a pole, with a hole, split, of several parts with several holes. It is written in one format and read by `read_zones`; then places inside
-and outside it are looked up. The answer that is right is computed here, without the code under test: longitudes count
-as they are written, edges are straight in degrees, and in formats that do not say so great circles as well, whose
-latitude at a longitude comes from the plane through the centre of the Earth. Each fourth input is a circle, a corridor
-or a polygon in another coordinate system (`zone_shapes`).
+antimeridian, at a pole, with a hole, split, of several parts with several holes. It is written in one format and read
+by `read_zones`; then places inside and outside it are looked up. The answer that is right is computed here, without the
+code under test: longitudes count as they are written, edges are straight in degrees, and in formats that do not say so
+great circles as well, whose latitude at a longitude comes from the plane through the centre of the Earth. Each fourth
+input is a circle, a corridor or a polygon in another coordinate system (`zone_shapes`).
 
 A fault is a place that the format has inside the zone (its holes too, since they count as no-fly) and that gcsplan
 neither refuses nor has in a zone; or one that is well outside and in a zone. Exits with 1 and prints the seed if there

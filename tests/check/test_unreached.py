@@ -12,6 +12,7 @@ from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from tests.support.worlds import vehicle, world
 
@@ -60,11 +61,11 @@ def test_a_hold_without_end_that_ends_the_mission_is_none() -> None:
     assert verdict.safe is True, verdict.describe()
     used = 120.0 * 100 + 100.0 * 1500
     assert verdict.until_reserve_s == pytest.approx((0.8e6 - used) / 400.0, rel=1e-3)
-    assert any("the battery comes to its reserve after" in n for n in verdict.notes)
+    assert Note("battery_until_reserve", 3, loop=False, left_s=verdict.until_reserve_s) in verdict.notes
     short = replace(craft, energy=replace(craft.energy, battery_j=190_000.0))  # too little to reach the end
     assert [f.kind for f in flown(COPTER, A, WAIT, craft=short).findings] == ["battery"]
     unknown = replace(craft, energy=replace(craft.energy, hover_w=0.0))
-    assert any("is not known, for hover_w is 0" in n for n in flown(COPTER, A, WAIT, craft=unknown).notes)
+    assert Note("battery_lasts_unknown", 3) in flown(COPTER, A, WAIT, craft=unknown).notes
 
 
 def test_a_plane_that_circles_without_end_takes_what_its_way_takes() -> None:

@@ -41,6 +41,7 @@ from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.commands import command_name
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.return_route import Route
+from gcsplan.notes.note import Note
 from gcsplan.units import UnitText
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World
@@ -53,9 +54,6 @@ NOISE_M = 1e-3
 
 MOST_UNKNOWN = 5
 """Stretches from which a return that joins the mission is not known, that are told."""
-
-RETURNS_BY_ITSELF = "after the last item ArduPlane returns"
-"""The beginning of `flight`'s note on the return, which is judged here."""
 
 
 def way_home(
@@ -131,7 +129,7 @@ def way_home(
         profile=_profile(trace, refinement),
         lowest=lowest_agl(trace, trace.cut(refinement.first_m), target, vehicle, level),
         not_judged=(
-            *(w for w in flight.not_judged if not w.startswith(RETURNS_BY_ITSELF)),
+            *_but_the_return(flight),
             *(() if route == "straight" else _landing_sequence(mission)),
         ),
         notes=tuple(notes + list(proposal.notes if proposal else ())),
@@ -147,7 +145,7 @@ def _along_mission(
         why = "PX4's returns along the mission (RTL_TYPE above 0) are not judged: only its return straight home is"
         return replace(home, route="mission", not_judged=(why,))
     joins = joins_of(stored, flight, vehicle, trace.world)
-    known = tuple(w for w in flight.not_judged if not w.startswith(RETURNS_BY_ITSELF))
+    known = _but_the_return(flight)
     if joins.why_not:
         return replace(home, route="mission", starts=joins.starts, along_path=joins.path,
                        not_judged=(*joins.why_not, *known))  # fmt: skip
@@ -165,6 +163,11 @@ def _along_mission(
         irregular=found.irregular, battery=found.battery, notes=tuple(notes),
         not_judged=(*(UnitText("from {}", s.place_and_why) for s in found.unknown[:MOST_UNKNOWN]), *known),
     )  # fmt: skip
+
+
+def _but_the_return(flight: Flight) -> list[str]:
+    """What was not judged of a flight, without the return that ArduPlane flies by itself: that is judged here."""
+    return [str(w) for w in flight.not_judged if not (isinstance(w, Note) and w.code == "returns_by_itself")]
 
 
 def refinement_of(trace: MissionTrace, target: Target, vehicle: Vehicle, level: float) -> Refinement:

@@ -1,0 +1,164 @@
+"""`Note`: one thing to say of a mission, as a code, the item that it is about, and data; and how its sentence is made.
+
+A sentence of the catalogue names the data by fields of ``str.format``, each with the kind of number that it is:
+
+    {away_m:distance.0}         a length in the units of the reader, without decimals; ``path leg far distance height
+                                amsl speed climb_rate`` are the kinds of `gcsplan.units`
+    {low_m:height.1 down}       rounded down; also ``up``, ``trimmed`` (no trailing zeros) and ``bare`` (no unit)
+    {max_agl_m:height}          a value that was given, with the digits it has
+    {length_m:reach}            in kilometres if it is long
+    {left_s:seconds} {used_j:joules}
+    {count} {count:item|items}  the first word for 1 and True, else the second; of a list its length decides
+    {share:.1f} {zones}         anything else is formatted as Python does; a list is joined by commas
+    {unit:height}               the symbol of a kind's unit alone
+    {key:max_agl_m}             what the reader types for a key of the mission file: the key, or an option
+
+A note on an item begins with ``item 5: `` by itself, unless its sentence names the ``{item}``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from string import Formatter
+from typing import Any, TypeAlias, get_args
+
+from gcsplan.notes.catalogue import TEXTS
+from gcsplan.units import Joules, Kind, Quantity, Reach, Rounding, Seconds, Symbol, Units
+
+Datum: TypeAlias = "float | str | bool | Note | tuple[Datum, ...] | None"
+
+KINDS: tuple[str, ...] = get_args(Kind)
+
+
+@dataclass(frozen=True, slots=True)
+class Wording:
+    """How a reader is spoken to: the units, and the option for each key of the mission file that he typed as one.
+
+    ``units``: None writes SI as files have it, with seconds and joules.
+    """
+
+    units: Units | None = None
+    options: Mapping[str, str] = field(default_factory=dict)
+
+
+IN_FILES = Wording()
+"""SI, and the keys of the mission file."""
+
+
+class Note:
+    """One thing to say: ``code`` of the catalogue, ``item`` (wire number) or None, and the data of its sentence.
+
+    Notes are values: equal if all of that is equal, and hashable. Raises KeyError for a code that the catalogue lacks.
+    """
+
+    __slots__ = ("code", "data", "item")
+
+    code: str
+    item: int | None
+    data: Mapping[str, Datum]
+
+    def __init__(self, code: str, item: int | None = None, /, **data: Datum) -> None:
+        if code not in TEXTS:
+            raise KeyError(f"the catalogue of notes has no {code!r}")
+        self.code, self.item, self.data = code, item, data
+
+    def text(self, wording: Wording = IN_FILES, *, placed: bool = True) -> str:
+        """The sentence. ``placed``: with the item before it; without where the item's number stands elsewhere."""
+        template = TEXTS[self.code]
+        named = any(name == "item" for _, name, _ in parts_of(template))
+        before = f"item {self.item}: " if placed and self.item is not None and not named else ""
+        return before + sentence(template, {"item": self.item, **self.data}, wording)
+
+    def in_units(self, units: Units) -> str:
+        """The sentence with its quantities in ``units``."""
+        return self.text(Wording(units))
+
+    def as_dict(self) -> dict[str, Any]:
+        """The note for programs: ``code``, ``item`` and ``data`` in SI."""
+        return {"code": self.code, "item": self.item, "data": {name: _plain(v) for name, v in self.data.items()}}
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def __repr__(self) -> str:
+        return f"<{self.code}: {self.text()}>"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Note) and self._all == other._all
+
+    def __hash__(self) -> int:
+        return hash(self._all)
+
+    @property
+    def _all(self) -> tuple[object, ...]:
+        return self.code, self.item, tuple(self.data.items())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _revived, (self.code, self.item, dict(self.data))
+
+
+Said: TypeAlias = "str | Note"
+"""What is said where not all of it is data yet."""
+
+
+def _revived(code: str, item: int | None, data: dict[str, Datum]) -> Note:
+    return Note(code, item, **data)
+
+
+@cache
+def parts_of(template: str) -> tuple[tuple[str, str | None, str], ...]:
+    """The literals of a template, each with the field behind it and the field's kind."""
+    return tuple((literal, name, spec or "") for literal, name, spec, _ in Formatter().parse(template))
+
+
+def fields_of(template: str) -> set[str]:
+    """The names of the data that a sentence needs."""
+    return {name for _, name, _ in parts_of(template) if name} - {"item", "key", "unit"}
+
+
+def sentence(template: str, data: Mapping[str, Datum], wording: Wording = IN_FILES) -> str:
+    """A template with its fields filled; see this module."""
+    said = []
+    for literal, name, form in parts_of(template):
+        said.append(literal)
+        if name == "key":
+            said.append(wording.options.get(form, form))
+        elif name == "unit":
+            said.append(Symbol(form).text(wording.units))  # type: ignore[arg-type]
+        elif name is not None:
+            said.append(_shown(data[name], form, wording))
+    return "".join(said)
+
+
+def _shown(value: Any, spec: str, wording: Wording) -> str:
+    """A datum as its field in the sentence says."""
+    if "|" in spec:
+        one, several = spec.split("|")
+        return one if (len(value) if isinstance(value, tuple) else value) == 1 else several
+    if isinstance(value, tuple):
+        return ", ".join(_shown(each, spec, wording) for each in value)
+    if isinstance(value, Note):
+        return value.text(wording)
+    if value is None:
+        return ""
+    kind, *how = spec.split() or [""]
+    name, _, decimals = kind.partition(".")
+    if name in KINDS:
+        rounding: Rounding = "down" if "down" in how else "up" if "up" in how else "near"
+        places = int(decimals) if decimals else None
+        return Quantity(value, name, places, rounding, "trimmed" in how, "bare" in how).text(wording.units)  # type: ignore[arg-type]
+    if name == "reach":
+        return Reach(value).text(wording.units)
+    if name == "seconds":
+        return Seconds(value, int(decimals or 0)).text(wording.units)
+    if name == "joules":
+        return Joules(value).text(wording.units)
+    return format(value, spec)
+
+
+def _plain(value: Datum) -> Any:
+    if isinstance(value, Note):
+        return value.as_dict()
+    return [_plain(each) for each in value] if isinstance(value, tuple) else value
