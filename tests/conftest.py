@@ -1,30 +1,27 @@
 """Settings of the whole suite: reproducible random examples without a time limit, and plans without a clock.
 
 Hypothesis draws the same examples in every run, so a failure repeats. Plans end by counted work alone, so a path is
-the same on a busy machine. A test of the clock itself uses the fixture `clock`.
+the same on a busy machine. A test of the clock itself hands a clock to its budget.
 """
 
 from __future__ import annotations
 
 import contextlib
 import importlib
-import math
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 from hypothesis import is_hypothesis_test, settings
 
-from gcsplan.planners.budget import Budget
 from tests.support import effort
-
-_BY_THE_CLOCK = Budget.deadline_s
 
 
 def pytest_configure(config: pytest.Config) -> None:
     os.environ.pop("GCSPLAN_UNITS", None)  # the suite reads the words of the default
+    os.environ["GCSPLAN_CLOCK"] = "off"
     effort.full = config.getoption("markexpr") != "not slow"
     settings.register_profile("fixed", derandomize=True, deadline=None, max_examples=effort.draws(100))
     settings.load_profile("fixed")
@@ -64,17 +61,3 @@ def pytest_collection_modifyitems(items: Sequence[pytest.Item]) -> None:
     for item in items if effort.full else ():
         if item.get_closest_marker("draws") or is_hypothesis_test(getattr(item, "obj", None)):
             item.add_marker("slow")
-
-
-@pytest.fixture(scope="session", autouse=True)
-def counted_work_alone() -> Iterator[None]:
-    """Let no plan of this process be stopped by the clock."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Budget, "deadline_s", math.inf)
-        yield
-
-
-@pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the clock stop plans, as it does outside of tests."""
-    monkeypatch.setattr(Budget, "deadline_s", _BY_THE_CLOCK)

@@ -23,7 +23,7 @@ def within_budget(problem: Problem, tried: Sequence[Solution], begun_s: float) -
     if not tried:
         return problem
     until_s = begun_s + FIRST * problem.budget_s + FIRST_S
-    budget = Budget.endless(clocked=problem.budget.clocked, until_s=until_s)
+    budget = Budget.endless(clocked=problem.budget.clocked, until_s=until_s, clock=problem.budget.clock)
     return replace(problem, budget_s=problem.budget_s * 0.5 ** len(tried), budget=budget)
 
 

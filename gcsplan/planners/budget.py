@@ -9,8 +9,9 @@ only a plan that is slower still; the result then depends on the machine and say
 from __future__ import annotations
 
 import math
+import os
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -49,29 +50,39 @@ SPARE_S = 0.5
 """Seconds subtracted from the clock's last stop, for the work in progress when it comes."""
 
 
+def clock_stops_plans() -> bool:
+    """Whether the clock stops plans that do not say so themselves: unless the environment has GCSPLAN_CLOCK=off."""
+    return os.environ.get("GCSPLAN_CLOCK") != "off"
+
+
 @dataclass(eq=False)
 class Budget:
     """Seconds that one plan may take, megabytes that each of its searches may take, and the counted work so far.
 
     ``clocked``: whether the clock stops it too; if not, counted work alone does. ``until_s``: the latest stop by the
-    clock, on the scale of `time.perf_counter`, whatever the other numbers allow.
+    clock, whatever the other numbers allow. ``clock``: seconds, from any beginning.
     """
 
     seconds: float
     megabytes: float
-    clocked: bool = True
+    clocked: bool = field(default_factory=clock_stops_plans)
     until_s: float = math.inf
-    begun_s: float = field(default_factory=time.perf_counter)
+    clock: Callable[[], float] = time.perf_counter
     spent: float = 0.0
     """Counted seconds so far."""
     clocked_out: bool = False
     """Whether the clock stopped a search, so that another run may end differently."""
     ran_out: bool = False
     """Whether counted work ran out."""
+    begun_s: float = field(init=False)
+    """When it began, by its clock."""
     _first_s: float | None = None
     _first_spent: float = 0.0
     _kept: float = 0.0
     """Counted seconds that the search in progress may not spend, see `allow`."""
+
+    def __post_init__(self) -> None:
+        self.begun_s = self.clock()
 
     def spend(self, what: str, count: float) -> None:
         """Count ``count`` units of the work ``what``, a key of `RATES`."""
@@ -80,12 +91,12 @@ class Budget:
     def found_first(self) -> None:
         """Start the budget for improvements: call when the first path is found; later calls do nothing."""
         if self._first_s is None:
-            self._first_s, self._first_spent = time.perf_counter(), self.spent
+            self._first_s, self._first_spent = self.clock(), self.spent
 
     @property
     def elapsed_s(self) -> float:
         """Seconds by the clock since the plan began."""
-        return time.perf_counter() - self.begun_s
+        return self.clock() - self.begun_s
 
     @property
     def left(self) -> float:
@@ -95,7 +106,7 @@ class Budget:
 
     @property
     def deadline_s(self) -> float:
-        """The clock's last stop, on the scale of `time.perf_counter`."""
+        """The clock's last stop."""
         if not self.clocked:
             return math.inf
         if self._first_s is None:
@@ -107,7 +118,7 @@ class Budget:
         if self.left <= 0.0:
             self.ran_out = self.ran_out or self._kept == 0.0
             return False
-        if time.perf_counter() > self.deadline_s:
+        if self.clock() > self.deadline_s:
             self.clocked_out = True
             return False
         return True
@@ -134,9 +145,14 @@ class Budget:
 
     def anew(self, seconds: float, megabytes: float) -> Budget:
         """A budget that begins now, with the same stops by the clock as this one."""
-        return Budget(seconds, megabytes, self.clocked, self.until_s)
+        return Budget(seconds, megabytes, self.clocked, self.until_s, self.clock)
 
     @classmethod
-    def endless(cls, *, clocked: bool = True, until_s: float = math.inf) -> Budget:
-        """A budget without limits. A problem that carries one without ``clocked`` is planned without a clock."""
-        return cls(math.inf, math.inf, clocked, until_s)
+    def endless(
+        cls, *, clocked: bool | None = None, until_s: float = math.inf, clock: Callable[[], float] = time.perf_counter
+    ) -> Budget:
+        """A budget without limits. A problem that carries one without ``clocked`` is planned without a clock.
+
+        ``clocked``: None, as `clock_stops_plans` says.
+        """
+        return cls(math.inf, math.inf, clock_stops_plans() if clocked is None else clocked, until_s, clock)

@@ -74,11 +74,10 @@ def test_a_search_that_does_not_fit_is_refused_before_it_runs_and_recorded() -> 
 
 
 @pytest.mark.first_quick
-@pytest.mark.usefixtures("clock")
 @pytest.mark.parametrize("kind", ["hook", "levels", "peaks", "sample"])
-def test_a_clock_that_runs_faster_changes_nothing(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_clock_that_runs_faster_changes_nothing(kind: str) -> None:
     p = replace(mission(kind), budget_s=4.0)
-    first, second = (plan_on_a_clock(p, rate, monkeypatch) for rate in (1.0, 1.8))
+    first, second = (plan_on_a_clock(p, rate) for rate in (1.0, 1.8))
     if "time" not in (first.stopped_by, second.stopped_by):
         assert first.path.points.tobytes() == second.path.points.tobytes()
         assert first.lower_bound == second.lower_bound
@@ -86,24 +85,29 @@ def test_a_clock_that_runs_faster_changes_nothing(kind: str, monkeypatch: pytest
     assert first.stopped_by != "time"
 
 
-@pytest.mark.usefixtures("clock")
-def test_without_a_clock_counted_work_alone_ends_a_plan(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_clock_counted_work_alone_ends_a_plan() -> None:
     p = replace(mission("wall"), budget_s=1.0)
-    counted = replace(p, budget=Budget.endless(clocked=False))
-    slow, fast = (plan_on_a_clock(counted, rate, monkeypatch) for rate in (1.0, 1e6))
+    slow, fast = (plan_on_a_clock(p, rate, clocked=False) for rate in (1.0, 1e6))
     with pytest.raises(Refusal):
-        plan_on_a_clock(p, 1e6, monkeypatch)  # the clock stops it before there is a first path
+        plan_on_a_clock(p, 1e6)  # the clock stops it before there is a first path
     assert fast.stopped_by == slow.stopped_by != "time"
     assert fast.path.points.tobytes() == slow.path.points.tobytes()
     assert fast.lower_bound == slow.lower_bound
 
 
-def plan_on_a_clock(p: Problem, rate: float, monkeypatch: pytest.MonkeyPatch) -> Solution:
+def plan_on_a_clock(p: Problem, rate: float, *, clocked: bool = True) -> Solution:
     """Plan on a clock that runs at ``rate`` times the processor's time, so the machine's other load does not matter."""
-    begun, used = time.perf_counter(), time.thread_time()
-    with monkeypatch.context() as patch:
-        patch.setattr("gcsplan.planners.budget.time.perf_counter", lambda: begun + rate * (time.thread_time() - used))
-        return planner.plan(p)
+    used = time.thread_time()
+    budget = Budget.endless(clocked=clocked, clock=lambda: rate * (time.thread_time() - used))
+    return planner.plan(replace(p, budget=budget))
+
+
+@pytest.mark.parametrize("said", [None, "on", "off"])
+def test_the_environment_decides_for_budgets_that_do_not_say(said: str | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("GCSPLAN_CLOCK") if said is None else monkeypatch.setenv("GCSPLAN_CLOCK", said)
+    assert [Budget(1.0, 1.0).clocked, Budget.endless().clocked] == [said != "off"] * 2
+    assert Budget(1.0, 1.0, clocked=True).clocked
+    assert not Budget.endless(clocked=False).clocked
 
 
 def test_searches_are_told_with_what_they_gained() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from itertools import pairwise
 
 import numpy as np
@@ -237,7 +236,7 @@ class Incumbent:
             path=Path(self.best),
             lower_bound=self.bound,
             stopped_by="gap" if self.done() else budget.stopped_by,
-            planning_s=time.perf_counter() - budget.begun_s,
+            planning_s=budget.elapsed_s,
             first_path_s=self.first_s,
             search=tuple(self.steps),
         )

@@ -23,7 +23,6 @@ Each of these is a search that the governor can choose (`governor`); `searches` 
 from __future__ import annotations
 
 import math
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -137,7 +136,7 @@ def _turning(problem: Problem) -> Solution:
         path=Path(found.way_points),
         flown=Path(found.flown),
         stopped_by=sharp.stopped_by if near or sharp.stopped_by == "time" else "exhausted",
-        planning_s=time.perf_counter() - problem.budget.begun_s,
+        planning_s=problem.budget.elapsed_s,
         notes=(*sharp.notes, TURNS_NOTE),
     )
 
