@@ -18,8 +18,9 @@ import pytest
 from gcsplan.app import pipeline
 from gcsplan.app.flying import require_passing
 from gcsplan.cli.main import main
+from tests.support.paths import DATA
 
-FOLDER = Path(__file__).parents[1] / "data" / "mistakes"
+FOLDER = DATA / "mistakes"
 FILES = sorted(FOLDER.glob("*.yaml"))
 QUICK = {"start-swapped", "vehicle-instead-of-vehicles", "zone-file-not-there", "max-amsl-below-ground"}
 """Those that the quick suite mends, too; of the messages it looks at every third."""

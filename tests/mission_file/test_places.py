@@ -6,7 +6,6 @@ import csv
 import math
 import re
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -23,8 +22,9 @@ from gcsplan.mission_file.places import EXAMPLES, MAX_CHARS, read_place
 from gcsplan.mission_file.request import MissionFile
 from tests.oracles.grids import band_of, mgrs_of, utm_of
 from tests.support.effort import draws
+from tests.support.paths import DATA, REPOSITORY
 
-TABLE = Path(__file__).parents[1] / "data" / "mgrs.csv"
+TABLE = DATA / "mgrs.csv"
 DMS = (47.0 + 23.0 / 60.0 + 49.5 / 3600.0, 8.0 + 20.0 / 60.0 + 38.5 / 3600.0)
 GRID = (47.3967902883677, 8.643828630072571)  # 32T 473123 5249321, by PROJ's cct
 METRE_DEG = 1.0 / 111_000.0
@@ -416,7 +416,7 @@ def test_the_home_of_check_is_a_place_in_any_form() -> None:
 
 def test_the_examples_of_the_reference_are_read() -> None:
     """Each form in the table of docs/reference/mission-file.md, near the same place."""
-    page = (Path(__file__).parents[2] / "docs" / "reference" / "mission-file.md").read_text(encoding="utf-8")
+    page = (REPOSITORY / "docs" / "reference" / "mission-file.md").read_text(encoding="utf-8")
     rows = [
         line for line in page.split("## Places")[1].split("## Other units")[0].splitlines() if line.startswith("| ")
     ]

@@ -24,6 +24,7 @@ from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Zone
 from tests.support.effort import draws
+from tests.support.paths import REPOSITORY
 
 FRAME = Frame(36.6, -84.3)
 RING = [[-84.31, 36.59], [-84.29, 36.59], [-84.29, 36.61], [-84.31, 36.61], [-84.31, 36.59]]
@@ -495,6 +496,6 @@ def test_three_decimals_are_no_thousands_where_the_name_says_metres(tmp_path: Pa
 
 
 def test_the_page_about_zones_names_every_attribute() -> None:
-    page = (Path(__file__).parents[2] / "docs/how-to/zones.md").read_text(encoding="utf-8")
+    page = (REPOSITORY / "docs/how-to/zones.md").read_text(encoding="utf-8")
     for word in (*NAMES, *BOUNDS, *UNIT_NAMES, *REFERENCE_NAMES):
         assert f"`{word}`" in page

@@ -25,8 +25,9 @@ from tests.mission_file.airspace.made import (
     volume,
 )
 from tests.support.effort import draws
+from tests.support.paths import DATA
 
-DATA = Path(__file__).parents[2] / "data" / "airspace"
+AIRSPACE = DATA / "airspace"
 LAYER = {"upper": 150, "upperReference": "AGL", "lower": 50, "lowerReference": "AGL", "uom": "m"}
 
 
@@ -95,7 +96,7 @@ def test_what_ed269_cannot_say_is_named_with_its_feature(tmp_path: Path, zone: A
 
 
 def test_ed269_of_interuss_is_read_with_its_times(tmp_path: Path) -> None:
-    found = read(tmp_path, (DATA / "ed269_interuss.json").read_bytes(), hours=Hours.read("2026-11-28"))
+    found = read(tmp_path, (AIRSPACE / "ed269_interuss.json").read_bytes(), hours=Hours.read("2026-11-28"))
     assert not found.problems
     assert not any(z.faults for z in found.zones)
     assert [(z.name, *limits(z)) for z in found.zones if not z.unused] == [
@@ -105,12 +106,12 @@ def test_ed269_of_interuss_is_read_with_its_times(tmp_path: Path) -> None:
         ("Lake Geneva Wildlife Preserve", "ground", "120 m AGL"),
         ("Gantrisch Nature Park", "ground", "76.2 m AGL"),
     ]  # the circles ended in 2023, and one Gantrisch restricts nothing
-    always = read(tmp_path, (DATA / "ed269_interuss.json").read_bytes()).zones
+    always = read(tmp_path, (AIRSPACE / "ed269_interuss.json").read_bytes()).zones
     assert [z.radius_m for z in always if not z.unused][:4] == [3000.0, 1000.0, 2500.0, 3500.0]
 
 
 def test_ed269_in_the_form_of_its_first_version(tmp_path: Path) -> None:
-    found = read(tmp_path, (DATA / "ed269_zone_list.json").read_bytes())
+    found = read(tmp_path, (AIRSPACE / "ed269_zone_list.json").read_bytes())
     assert [(z.name, *limits(z)) for z in found.zones] == [("LSXX City Sample", "ground", "unlimited")]
     assert "UASZoneList[0]" in said(tmp_path, {"UASZoneList": [ed269(volume(lowerLimit="1e3"))]})
     assert limits(read(tmp_path, of(ed269(volume(lowerLimit="30.5")))).zones[0]) == ("30.5 m AGL", "120 m AGL")
@@ -126,7 +127,7 @@ def test_a_ceiling_that_nothing_reaches_is_none(tmp_path: Path, value: float, un
 
 
 def test_the_swiss_sample_is_read(tmp_path: Path) -> None:
-    found = read(tmp_path, (DATA / "ed318_switzerland.json").read_bytes())
+    found = read(tmp_path, (AIRSPACE / "ed318_switzerland.json").read_bytes())
     assert not found.problems
     assert not any(z.faults for z in found.zones)
     assert [(z.name, *limits(z)) for z in found.zones] == [
@@ -178,7 +179,7 @@ def test_the_times_of_one_table_are_read(tmp_path: Path) -> None:
 
 
 def test_the_standard_s_own_sample_is_read(tmp_path: Path) -> None:
-    found = read(tmp_path, (DATA / "ed318_collection.json").read_bytes())
+    found = read(tmp_path, (AIRSPACE / "ed318_collection.json").read_bytes())
     assert not found.problems
     assert not any(z.faults for z in found.zones)
     assert [(z.name, limits(z), z.radius_m) for z in found.zones] == [

@@ -16,8 +16,9 @@ from gcsplan.mission_file.airspace.times import Hours
 from gcsplan.mission_file.zone_draft import ZoneDraft
 from tests.mission_file.airspace.made import limits, read, remarks, said
 from tests.support.effort import draws
+from tests.support.paths import DATA
 
-DATA = Path(__file__).parents[2] / "data" / "airspace"
+AIRSPACE = DATA / "airspace"
 EARTH = Geod(ellps="WGS84")
 SQUARE = "DP 47:00:00 N 008:00:00 E\nDP 47:00:00 N 008:06:00 E\nDP 47:06:00 N 008:06:00 E\nDP 47:06:00 N 008:00:00 E\n"
 
@@ -150,7 +151,7 @@ def test_centre_holds_in_the_next_zone_and_the_direction_does_not(tmp_path: Path
 
 
 def test_published_pieces_of_seven_states_are_read(tmp_path: Path) -> None:
-    found = read(tmp_path, (DATA / "openair_openaip.txt").read_bytes(), "a.openair")
+    found = read(tmp_path, (AIRSPACE / "openair_openaip.txt").read_bytes(), "a.openair")
     assert not found.problems
     assert not any(z.faults for z in found.zones)
     names = {z.name: limits(z) for z in found.zones}
@@ -163,7 +164,7 @@ def test_published_pieces_of_seven_states_are_read(tmp_path: Path) -> None:
 
 
 def test_an_airway_is_refused_by_its_line(tmp_path: Path) -> None:
-    words = said(tmp_path, (DATA / "openair_airway.txt").read_bytes(), "a.txt")
+    words = said(tmp_path, (AIRSPACE / "openair_airway.txt").read_bytes(), "a.txt")
     assert "a.txt: line 8: zone 'Axe 1': 'DY 44:17:00 N" in words
     assert "airways are not read" in words
 
