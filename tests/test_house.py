@@ -271,6 +271,123 @@ def test_a_function_fits_on_a_screen() -> None:
     assert {name: long for name, long in found.items() if long} == LONG
 
 
+# -- the house in figures -----------------------------------------------------------------------------------------
+
+MOST_IN_A_FOLDER = 15
+
+MOST = {
+    "modules": 540,
+    "statements": 61_500,
+    "type names with two meanings": 100,
+    "constants with two values": 199,
+    "folders with more than 15 modules": 12,
+    "folders in a circle": 10,
+    "names of another module that begin with _": 17,
+}
+"""What is left to do, at most: a figure that falls is written down here, and none may rise."""
+
+
+@cache
+def trees() -> dict[str, ast.Module]:
+    """The syntax tree of each module."""
+    return {name_of(p): ast.parse(p.read_text(encoding="utf-8")) for p in MODULES}
+
+
+def names_with_two_meanings() -> dict[str, list[str]]:
+    """Names of classes and of types that are defined more than once, each with the modules that define it."""
+    found: dict[str, list[str]] = {}
+    for name, tree in trees().items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                found.setdefault(node.name, []).append(name)
+        for target, _ in assignments(tree):
+            if target.lstrip("_")[:1].isupper() and not target.isupper():
+                found.setdefault(target, []).append(name)
+    return {name: where for name, where in sorted(found.items()) if len(where) > 1}
+
+
+def constants_with_two_values() -> dict[str, list[str]]:
+    """Constants whose name has another value elsewhere, each with the modules that define it."""
+    found: dict[str, dict[str, list[str]]] = {}
+    for name, tree in trees().items():
+        for target, value in assignments(tree):
+            if target.isupper():
+                found.setdefault(target, {}).setdefault(value, []).append(name)
+    return {
+        name: [module for modules in values.values() for module in modules]
+        for name, values in sorted(found.items())
+        if len(values) > 1
+    }
+
+
+def assignments(tree: ast.Module) -> Iterator[tuple[str, str]]:
+    """The names that a module gives values to, with the values as they are written."""
+    for node in tree.body:
+        if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None:
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            yield from ((t.id, ast.unparse(node.value)) for t in targets if isinstance(t, ast.Name))
+
+
+def folder_of(module: str) -> str:
+    """The folder that a module lies in, as a dotted name; a package lies in itself."""
+    return module if (ROOT / "/".join(module.split(".")[1:]) / "__init__.py").exists() else module.rpartition(".")[0]
+
+
+def arrows_between_folders() -> dict[str, set[str]]:
+    """Folder to the folders that its modules import; the front door and the top's own modules stand apart."""
+    arrows: dict[str, set[str]] = {}
+    for path in MODULES:
+        here = folder_of(module_of(path))
+        arrows.setdefault(here, set()).update({folder_of(m) for m in own_imports(path)} - {here, "gcsplan"})
+    arrows.pop("gcsplan", None)
+    return arrows
+
+
+def reached_through() -> list[str]:
+    """Names that begin with _ and are not the module's own: imported, or looked up in something of another's."""
+    found = []
+    for name, tree in trees().items():
+        nodes = list(ast.walk(tree))
+        own_names = {n.name for n in nodes if isinstance(n, ast.FunctionDef | ast.ClassDef)}
+        own_names |= {n.attr for n in nodes if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
+        own_names |= {n.target.id for n in nodes if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)}
+        for node in nodes:
+            if isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.startswith("__"):
+                mine = isinstance(node.value, ast.Name) and node.value.id in ("self", "cls")
+                if not mine and node.attr not in (own_names | {"_replace", "_exit"}):
+                    found.append(f"{name}:{node.lineno}: {ast.unparse(node)}")
+            elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("gcsplan"):
+                found += [
+                    f"{name}:{node.lineno}: {node.module}.{a.name}"
+                    for a in node.names
+                    if a.name.startswith("_") and not a.name.startswith("__") and f"{node.module}.{a.name}" not in NAMES
+                ]
+    return found
+
+
+def figures() -> dict[str, list[str] | int]:
+    """What is counted of the house, by name: how many, or which."""
+    modules = [p for p in MODULES if p.name != "__init__.py"]
+    folders = {str(p.parent.relative_to(ROOT)) for p in modules}
+    crowded = [f for f in sorted(folders) if sum(p.parent == ROOT / f for p in modules) > MOST_IN_A_FOLDER]
+    return {
+        "modules": len(modules),
+        "statements": sum(isinstance(n, ast.stmt) for tree in trees().values() for n in ast.walk(tree)),
+        "type names with two meanings": list(names_with_two_meanings()),
+        "constants with two values": list(constants_with_two_values()),
+        "folders with more than 15 modules": crowded,
+        "folders in a circle": sorted({f for circle in circles(arrows_between_folders()) for f in circle}),
+        "names of another module that begin with _": reached_through(),
+    }
+
+
+@pytest.mark.parametrize("what", MOST)
+def test_the_house_does_not_grow_untidier(what: str) -> None:
+    found = figures()[what]
+    count = found if isinstance(found, int) else len(found)
+    assert count <= MOST[what], f"{count} {what}, at most {MOST[what]}: {found}"
+
+
 def arrows_between_packages() -> dict[str, set[str]]:
     """Package to the packages that its modules import."""
     arrows: dict[str, set[str]] = {}
@@ -292,6 +409,8 @@ def describe(longest: int = 12) -> str:
     said += [f"circles of packages: {circles(arrows_between_packages()) or 'none'}", "", "longest modules"]
     said += [f"{n:6}  {name}" for name, n in sorted(lines.items(), key=lambda item: -item[1])[:longest]]
     every = [(n, f"{name_of(p)}: {name}") for p in MODULES for name, n in functions(p)]
+    counted = {what: found if isinstance(found, int) else len(found) for what, found in figures().items()}
+    said += ["", "in figures", *(f"{count:6}  {what}" for what, count in counted.items())]
     said += ["", "longest functions", *(f"{n:6}  {name}" for n, name in sorted(every, reverse=True)[:longest])]
     return "\n".join(said)
 
