@@ -365,6 +365,7 @@ def reached_through() -> list[str]:
     return found
 
 
+@cache
 def figures() -> dict[str, list[str] | int]:
     """What is counted of the house, by name: how many, or which."""
     modules = [p for p in MODULES if p.name != "__init__.py"]
