@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ast
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -287,20 +287,15 @@ MOST = {
 """What is left to do, at most: a figure that falls is written down here, and none may rise."""
 
 
-@cache
-def trees() -> dict[str, ast.Module]:
-    """The syntax tree of each module."""
-    return {name_of(p): ast.parse(p.read_text(encoding="utf-8")) for p in MODULES}
-
-
 def names_with_two_meanings() -> dict[str, list[str]]:
     """Names of classes and of types that are defined more than once, each with the modules that define it."""
     found: dict[str, list[str]] = {}
-    for name, tree in trees().items():
-        for node in ast.walk(tree):
+    for path in MODULES:
+        name, nodes = name_of(path), nodes_of(path)
+        for node in nodes:
             if isinstance(node, ast.ClassDef):
                 found.setdefault(node.name, []).append(name)
-        for target, _ in assignments(tree):
+        for target, _ in assignments(nodes):
             if target.lstrip("_")[:1].isupper() and not target.isupper():
                 found.setdefault(target, []).append(name)
     return {name: where for name, where in sorted(found.items()) if len(where) > 1}
@@ -309,10 +304,10 @@ def names_with_two_meanings() -> dict[str, list[str]]:
 def constants_with_two_values() -> dict[str, list[str]]:
     """Constants whose name has another value elsewhere, each with the modules that define it."""
     found: dict[str, dict[str, list[str]]] = {}
-    for name, tree in trees().items():
-        for target, value in assignments(tree):
+    for path in MODULES:
+        for target, value in assignments(nodes_of(path)):
             if target.isupper():
-                found.setdefault(target, {}).setdefault(value, []).append(name)
+                found.setdefault(target, {}).setdefault(value, []).append(name_of(path))
     return {
         name: [module for modules in values.values() for module in modules]
         for name, values in sorted(found.items())
@@ -320,9 +315,11 @@ def constants_with_two_values() -> dict[str, list[str]]:
     }
 
 
-def assignments(tree: ast.Module) -> Iterator[tuple[str, str]]:
-    """The names that a module gives values to, with the values as they are written."""
-    for node in tree.body:
+def assignments(nodes: Sequence[ast.AST]) -> Iterator[tuple[str, str]]:
+    """The names that a module, whose nodes these are, gives values to, with the values as they are written."""
+    module = nodes[0]
+    assert isinstance(module, ast.Module)
+    for node in module.body:
         if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None:
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
             yield from ((t.id, ast.unparse(node.value)) for t in targets if isinstance(t, ast.Name))
@@ -346,8 +343,8 @@ def arrows_between_folders() -> dict[str, set[str]]:
 def reached_through() -> list[str]:
     """Names that begin with _ and are not the module's own: imported, or looked up in something of another's."""
     found = []
-    for name, tree in trees().items():
-        nodes = list(ast.walk(tree))
+    for path in MODULES:
+        name, nodes = name_of(path), nodes_of(path)
         own_names = {n.name for n in nodes if isinstance(n, ast.FunctionDef | ast.ClassDef)}
         own_names |= {n.attr for n in nodes if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
         own_names |= {n.target.id for n in nodes if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)}
@@ -373,7 +370,7 @@ def figures() -> dict[str, list[str] | int]:
     crowded = [f for f in sorted(folders) if sum(p.parent == ROOT / f for p in modules) > MOST_IN_A_FOLDER]
     return {
         "modules": len(modules),
-        "statements": sum(isinstance(n, ast.stmt) for tree in trees().values() for n in ast.walk(tree)),
+        "statements": sum(isinstance(n, ast.stmt) for path in MODULES for n in nodes_of(path)),
         "type names with two meanings": list(names_with_two_meanings()),
         "constants with two values": list(constants_with_two_values()),
         "folders with more than 15 modules": crowded,
