@@ -21,7 +21,7 @@ from gcsplan.cli import ending
 from gcsplan.mission_file import json_schema, schema, units
 from gcsplan.notes.catalogue import TEXTS
 from gcsplan.planners import registry
-from gcsplan.sim.firmware import CHANGES
+from gcsplan.sim.vehicle.firmware import CHANGES
 
 TOP = Path(__file__).resolve().parents[1]
 PACKAGE = Path(gcsplan.__file__).parent

@@ -22,7 +22,7 @@ from gcsplan.mavlink.link.link import Link, Steps, run
 from gcsplan.mavlink.link.session import discover
 from gcsplan.mavlink.link.watch import VehicleState
 from gcsplan.mavlink.mission.autopilots import autopilot_of
-from gcsplan.sim.firmware import ARDUPILOT, KNOWN, Firmware
+from gcsplan.sim.vehicle.firmware import ARDUPILOT, KNOWN, Firmware
 from gcsplan.vehicle import Autopilot
 from sitl_tests.peers import free_port
 

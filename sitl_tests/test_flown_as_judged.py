@@ -12,11 +12,11 @@ from gcsplan.check.judge import judge
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
-from gcsplan.sim import sitl as flown
+from gcsplan.sim.flight.trace import Trace
 from gcsplan.sim.outcome import Terms
 from gcsplan.sim.part import Part
-from gcsplan.sim.sitl_instances import sitl_instances
-from gcsplan.sim.trace import Trace
+from gcsplan.sim.sitl import flights as flown
+from gcsplan.sim.sitl.instances import sitl_instances
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
 from sitl_tests import sitl

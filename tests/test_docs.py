@@ -20,7 +20,7 @@ from gcsplan import errors
 from gcsplan.export.summary import ORDER
 from gcsplan.mission_file import schema
 from gcsplan.planners import registry
-from gcsplan.sim.firmware import CHANGES, KNOWN
+from gcsplan.sim.vehicle.firmware import CHANGES, KNOWN
 from gcsplan.world.airspace import Kind
 from tests.support.paths import REPOSITORY
 

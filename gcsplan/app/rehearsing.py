@@ -32,8 +32,8 @@ from gcsplan.sim.outcome import Rehearsal, Tally, Terms
 from gcsplan.sim.part import Part
 
 if TYPE_CHECKING:
+    from gcsplan.sim.flight.wind import Weather
     from gcsplan.sim.rehearsal import Block, Flights
-    from gcsplan.sim.wind import Weather
 
 __all__ = [
     "Part",
@@ -195,8 +195,8 @@ def rehearse_in_sitl(
     ``binary``: a program, or a folder with arducopter and arduplane; its instances have the mission's terrain. Raises
     UsageError if a vehicle has neither. See `sim.sitl` for the other arguments.
     """
-    from gcsplan.sim.sitl import rehearse_sitl, require_here
-    from gcsplan.sim.sitl_instances import SPEEDUP, sitl_instances
+    from gcsplan.sim.sitl.flights import rehearse_sitl, require_here
+    from gcsplan.sim.sitl.instances import SPEEDUP, sitl_instances
 
     parts, seats = parts_of(planned), dict(addresses or {})
     if not i_know:

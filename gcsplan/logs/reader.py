@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gcsplan.errors import InputError
+from gcsplan.logs.csv_log import read_csv
 from gcsplan.logs.dataflash import read_dataflash
 from gcsplan.logs.flight_log import FlightLog
-from gcsplan.logs.table import read_csv
-from gcsplan.logs.telemetry import read_telemetry
+from gcsplan.logs.tlog import read_telemetry
 
 MOST_BYTES = 256_000_000
 """Most bytes of a log, whatever its kind."""

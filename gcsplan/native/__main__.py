@@ -10,9 +10,9 @@ import subprocess
 import sys
 import time
 
-from gcsplan.native import shelf
-from gcsplan.native.machine import llvm_version
-from gcsplan.native.unit import Unit
+from gcsplan.native import cache
+from gcsplan.native.kernel_unit import Unit
+from gcsplan.native.llvm import llvm_version
 
 ALL = {
     "world": "gcsplan.world._compiled",
@@ -48,7 +48,7 @@ def main(names: list[str]) -> None:
     assert "numba" not in sys.modules
     os.environ.update({f"NUMBA_{key}": value for key, value in OPTIONS[unit.vectors].items()}, NUMBA_DISABLE_JIT="0")
     made_with = {name: importlib.metadata.version(name) for name in ("numba", "llvmlite")} | {"llvm": llvm_version()}
-    shelf.write_shipped(unit.shipped, digest, made_with, unit.bitcode_from_source())
+    cache.write_shipped(unit.shipped, digest, made_with, unit.bitcode_from_source())
     took = time.perf_counter() - began
     print(f"{unit.shipped}: {unit.shipped.stat().st_size:,} bytes, {took:.1f} s", flush=True)
 

@@ -10,8 +10,8 @@ from typing import Any
 from gcsplan.check.verdict import PAPER_MARK
 from gcsplan.errors import CheckFailed
 from gcsplan.figures import floored
+from gcsplan.sim.flight.trace import Judged, Meeting, Trace, examine, meetings
 from gcsplan.sim.part import Part, lateness
-from gcsplan.sim.trace import Judged, Meeting, Trace, examine, meetings
 from gcsplan.units import METRIC, Units, UnitText, duration
 from gcsplan.world.world import World
 

@@ -10,7 +10,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.sim.trace import Trace
+from gcsplan.sim.flight.trace import Trace
 from gcsplan.units import duration
 from gcsplan.vehicle import Vehicle
 

@@ -15,14 +15,14 @@ from gcsplan.errors import GcsplanError, InputError
 from gcsplan.mavlink.link.link import Link
 from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.sim.kinematics import Kinematics
-from gcsplan.sim.mission_flight import Flown, fly
+from gcsplan.sim.flight.kinematics import Kinematics
+from gcsplan.sim.flight.mission_flight import Flown, fly
+from gcsplan.sim.flight.track import Track, make_track
+from gcsplan.sim.flight.wind import Weather
 from gcsplan.sim.outcome import Rehearsal, Tally, Terms
 from gcsplan.sim.part import Part, energy_of
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.track import Track, make_track
-from gcsplan.sim.vehicle import LoopbackVehicle
-from gcsplan.sim.wind import Weather
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.world.world import World
 
 __all__ = ["Block", "Flights", "Part", "Rehearsal", "Terms", "concluded", "different", "flown", "prepared", "rehearse"]

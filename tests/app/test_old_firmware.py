@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 
 from gcsplan.mavlink.mission.parameter_names import PARAMETERS
-from gcsplan.sim import telemetry
-from gcsplan.sim.firmware import ARDUPILOT, PX4, Firmware
-from gcsplan.sim.misbehaviour import Misbehaviour
-from gcsplan.sim.parameters import Parameter, Parameters
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle import telemetry
+from gcsplan.sim.vehicle.firmware import ARDUPILOT, PX4, Firmware
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
+from gcsplan.sim.vehicle.parameters import Parameter, Parameters
 from gcsplan.vehicle import Autopilot
 from tests.app.test_parameters import CORNER, CRUISE, LAT, LON, WING, keys, planned, sent
 from tests.support.impatient import be_impatient

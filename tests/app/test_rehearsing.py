@@ -23,17 +23,18 @@ from gcsplan.app.rehearsing import parts_of, rehearse, rehearse_in_sitl, seats_o
 from gcsplan.cli.rehearse import rehearse as command
 from gcsplan.errors import CheckFailed, LinkError, UsageError, VehicleRefused
 from gcsplan.mission_file import load_mission
-from gcsplan.sim import hub, sitl
-from gcsplan.sim.mission_flight import fly
+from gcsplan.sim.flight.mission_flight import fly
+from gcsplan.sim.flight.wind import Weather
 from gcsplan.sim.outcome import Terms
 from gcsplan.sim.part import Part
 from gcsplan.sim.rehearsal import _track
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.sitl import rehearse_sitl, require_here
-from gcsplan.sim.sitl_instances import parameters_of, sitl_instances
-from gcsplan.sim.telemetry import Telemetry
-from gcsplan.sim.vehicle import LoopbackVehicle
-from gcsplan.sim.wind import Weather
+from gcsplan.sim.sitl import flights
+from gcsplan.sim.sitl.flights import rehearse_sitl, require_here
+from gcsplan.sim.sitl.instances import parameters_of, sitl_instances
+from gcsplan.sim.vehicle import hub
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.server import SimServer
+from gcsplan.sim.vehicle.telemetry import Telemetry
 
 FLEET = """
 version: 1
@@ -246,7 +247,7 @@ def test_vehicles_that_fly_by_themselves_are_armed_released_watched_and_judged(
     assert result.simulator == "sitl"
     assert result.breaches == ()
     # They leave at once. Their clock runs 40 times as fast as ours, so when they are released is less certain.
-    assert [v.errors_s[0] for v in result.vehicles] == pytest.approx([-sitl.LIFT_S] * 3, abs=3.0)
+    assert [v.errors_s[0] for v in result.vehicles] == pytest.approx([-flights.LIFT_S] * 3, abs=3.0)
     assert all(v.min_agl_m > 60.0 for v in result.vehicles)  # 65 is flown; on a busy machine it is seen seldom
     assert result.closest is not None
     assert {"waits for its position", "arms", "flies", "flies item 3"} <= {what for _, what in said}
@@ -268,7 +269,7 @@ def test_what_is_no_simulator_is_never_armed(planned: Plan, monkeypatch: pytest.
 def test_a_vehicle_that_will_not_arm_is_given_up_with_its_own_words(
     planned: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sitl, "_ARM_S", 0.3)
+    monkeypatch.setattr(flights, "_ARM_S", 0.3)
     parts = one(planned)
     with (
         flying(parts, planned, monkeypatch, arms=False) as seats,
@@ -279,10 +280,12 @@ def test_a_vehicle_that_will_not_arm_is_given_up_with_its_own_words(
 
 @pytest.mark.slow
 def test_a_vehicle_that_falls_silent_in_the_air_is_a_dead_link(planned: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sitl, "_SILENT_S", 0.3)
+    monkeypatch.setattr(flights, "_SILENT_S", 0.3)
     parts = one(planned)
     with flying(parts, planned, monkeypatch) as seats:
-        monkeypatch.setattr("gcsplan.sim.vehicle.LoopbackVehicle.flying_mission", property(lambda _: True, _go_silent))
+        monkeypatch.setattr(
+            "gcsplan.sim.vehicle.loopback.LoopbackVehicle.flying_mission", property(lambda _: True, _go_silent)
+        )
         with pytest.raises(LinkError, match="silent"):
             rehearse_sitl(parts, planned.world, Terms(), seats)
 

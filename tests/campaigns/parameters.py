@@ -36,13 +36,13 @@ from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.parameter_names import OnBoard
 from gcsplan.mission_file import load_mission
-from gcsplan.sim.firmware import firmware_of
-from gcsplan.sim.kinematics import Kinematics
-from gcsplan.sim.mission_flight import fly
-from gcsplan.sim.parameters import Parameters
+from gcsplan.sim.flight.kinematics import Kinematics
+from gcsplan.sim.flight.mission_flight import fly
+from gcsplan.sim.flight.trace import Trace
+from gcsplan.sim.flight.track import make_track
 from gcsplan.sim.part import Part
-from gcsplan.sim.trace import Trace
-from gcsplan.sim.track import make_track
+from gcsplan.sim.vehicle.firmware import firmware_of
+from gcsplan.sim.vehicle.parameters import Parameters
 from gcsplan.vehicle import Autopilot, Vehicle
 from tests.oracles.px4_smoothing import fly as smoothing
 

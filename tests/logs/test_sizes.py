@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from gcsplan.errors import InputError
-from gcsplan.logs import dataflash, flight_log, reader, table, telemetry
+from gcsplan.logs import csv_log, dataflash, flight_log, reader, tlog
 from gcsplan.logs.reader import read_log
 from tests.logs import test_fit as flights
 
@@ -50,7 +50,7 @@ def test_readings_are_counted_as_they_come(tmp_path: Path, monkeypatch: pytest.M
 
 def test_messages_of_a_ground_station_s_log_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = flights.tlog(tmp_path / "log.tlog")
-    monkeypatch.setattr(telemetry, "MOST_MESSAGES", 500)
+    monkeypatch.setattr(tlog, "MOST_MESSAGES", 500)
     assert "holds more than 500 messages, or is damaged; cut it to the flight (mavlogdump.py" in refused(file)
 
 
@@ -58,9 +58,9 @@ def test_lines_of_a_csv_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     file = tmp_path / "log.csv"
     rows = [f"{k},{46 + 1e-4 * k},14,{100 + k},300\n" for k in range(99)]
     file.write_text(HEADER + "".join(rows))
-    monkeypatch.setattr(table, "MOST_LINES", 100)
+    monkeypatch.setattr(csv_log, "MOST_LINES", 100)
     read_log(file)
-    monkeypatch.setattr(table, "MOST_LINES", 99)
+    monkeypatch.setattr(csv_log, "MOST_LINES", 99)
     assert "has more than 99 lines; cut it to the flight, or to every tenth line" in refused(file)
 
 

@@ -18,16 +18,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gcsplan.native import notice, shelf
-from gcsplan.native.form import Held, read_forms
-from gcsplan.native.machine import Machine
-from gcsplan.native.unit import Unit
+from gcsplan.native import cache, notice
+from gcsplan.native.kernel_unit import Unit
+from gcsplan.native.llvm import Machine
+from gcsplan.native.signature import Held, read_forms
 from gcsplan.world._compiled import UNIT as WORLD
 
 SOURCE = """
 from pathlib import Path
 
-from gcsplan.native.unit import Unit
+from gcsplan.native.kernel_unit import Unit
 
 UNIT = Unit("toy", Path(__file__).parent, "toys", ("weighing",))
 FACTOR = {factor}
@@ -108,7 +108,7 @@ def ship(of: Unit) -> None:
     assert digest is not None
     source = (of.shipped.parent / "weighing.py").read_text(encoding="utf-8")
     bitcode = MADE[source] = MADE.get(source) or of.bitcode_from_source()
-    shelf.write_shipped(of.shipped, digest, {}, bitcode)
+    cache.write_shipped(of.shipped, digest, {}, bitcode)
 
 
 def arguments() -> list[Any]:
@@ -133,7 +133,7 @@ def test_what_is_shipped_was_made_from_the_source_as_it_stands() -> None:
 
 
 def test_this_llvm_reads_what_is_shipped() -> None:
-    bitcode = shelf.read_shipped(WORLD.shipped, WORLD.digest())
+    bitcode = cache.read_shipped(WORLD.shipped, WORLD.digest())
     assert bitcode is not None
     code = Machine().compile(bitcode)
     assert code is not None
@@ -174,7 +174,7 @@ def test_bitcode_that_this_llvm_cannot_read_is_made_anew_from_source(room: Path)
     of = kernels(room)
     digest = of.digest()
     assert digest is not None
-    shelf.write_shipped(of.shipped, digest, {}, b"BC\xc0\xde from the future")
+    cache.write_shipped(of.shipped, digest, {}, b"BC\xc0\xde from the future")
     value(of)
 
 
@@ -196,17 +196,17 @@ def test_without_a_cache_to_write_to_kernels_are_compiled_each_time(room: Path) 
 
 
 def test_old_code_does_not_pile_up(room: Path) -> None:
-    cache = room / "cache" / "gcsplan"
-    for k in range(shelf.NEWEST + 5):
-        shelf.keep(f"toy-{k}.code", bytes([k]))
-        os.utime(cache / f"toy-{k}.code", (k, k))
-    (cache / "toy-1.codeabc.part").write_bytes(b"cut off")
-    (cache / "toy-2.codeabc.part").write_bytes(b"being written")
-    os.utime(cache / "toy-1.codeabc.part", (1, 1))
-    assert shelf.keep("toy-last.code", b"new")
-    assert len(list(cache.glob("*.code"))) == shelf.NEWEST
-    assert [p.name for p in cache.glob("*.part")] == ["toy-2.codeabc.part"]
-    assert shelf.read_kept("toy-last.code") == b"new"
+    folder = room / "cache" / "gcsplan"
+    for k in range(cache.NEWEST + 5):
+        cache.keep(f"toy-{k}.code", bytes([k]))
+        os.utime(folder / f"toy-{k}.code", (k, k))
+    (folder / "toy-1.codeabc.part").write_bytes(b"cut off")
+    (folder / "toy-2.codeabc.part").write_bytes(b"being written")
+    os.utime(folder / "toy-1.codeabc.part", (1, 1))
+    assert cache.keep("toy-last.code", b"new")
+    assert len(list(folder.glob("*.code"))) == cache.NEWEST
+    assert [p.name for p in folder.glob("*.part")] == ["toy-2.codeabc.part"]
+    assert cache.read_kept("toy-last.code") == b"new"
 
 
 # -- who may have put it there ----------------------------------------------------------------------------------------
@@ -221,7 +221,7 @@ def reading(name: str, monkeypatch: pytest.MonkeyPatch, **variables: str | None)
     for variable, value in variables.items():
         if value is not None:
             monkeypatch.setenv(variable, value)
-    return shelf.read_kept(name)
+    return cache.read_kept(name)
 
 
 @posix
@@ -242,8 +242,8 @@ def test_code_is_kept_in_the_users_own_cache_and_nowhere_relative(
         (None, {"HOME": str(home), "NUMBA_CACHE_DIR": "relative"}),
     ):
         assert reading("toy-1.code", monkeypatch, **variables) is None
-        assert shelf.keep("toy-1.code", b"code") is (wanted is not None)
-        assert shelf.read_kept("toy-1.code") == (None if wanted is None else b"code")
+        assert cache.keep("toy-1.code", b"code") is (wanted is not None)
+        assert cache.read_kept("toy-1.code") == (None if wanted is None else b"code")
         if wanted is not None:
             kept = wanted / "gcsplan" / "toy-1.code"
             assert kept.parent.stat().st_mode & 0o777 == 0o700
@@ -259,7 +259,7 @@ def test_without_any_home_kernels_are_compiled_in_memory(room: Path, monkeypatch
     ship(kernels(room))
     monkeypatch.setattr(Path, "home", homeless)
     assert reading("toy-1.code", monkeypatch) is None
-    assert not shelf.keep("toy-1.code", b"code")
+    assert not cache.keep("toy-1.code", b"code")
     value(kernels(room))
 
 
@@ -268,13 +268,13 @@ def test_without_any_home_kernels_are_compiled_in_memory(room: Path, monkeypatch
 def test_a_wider_folder_of_ours_is_tightened_and_emptied_if_others_could_write(
     room: Path, mode: int, kept: bool
 ) -> None:
-    cache = room / "cache" / "gcsplan"
-    assert shelf.keep("toy-1.code", b"code")
-    cache.chmod(mode)
-    assert shelf.read_kept("toy-1.code") == (b"code" if kept else None)
-    assert cache.stat().st_mode & 0o777 == 0o700
-    assert shelf.keep("toy-2.code", b"more")
-    assert shelf.read_kept("toy-2.code") == b"more"
+    folder = room / "cache" / "gcsplan"
+    assert cache.keep("toy-1.code", b"code")
+    folder.chmod(mode)
+    assert cache.read_kept("toy-1.code") == (b"code" if kept else None)
+    assert folder.stat().st_mode & 0o777 == 0o700
+    assert cache.keep("toy-2.code", b"more")
+    assert cache.read_kept("toy-2.code") == b"more"
 
 
 @posix
@@ -283,13 +283,13 @@ def test_a_file_that_others_may_have_written_is_not_run(
     room: Path, monkeypatch: pytest.MonkeyPatch, trick: str
 ) -> None:
     kept = room / "cache" / "gcsplan" / "toy-1.code"
-    assert shelf.keep("toy-1.code", b"code")
+    assert cache.keep("toy-1.code", b"code")
     if trick == "writable":
         kept.chmod(0o620)
     elif trick == "linked":
         os.link(kept, room / "another name")
     elif trick == "large":
-        monkeypatch.setattr(shelf, "MAX_CODE_BYTES", 20)
+        monkeypatch.setattr(cache, "MAX_CODE_BYTES", 20)
     else:
         kept.rename(room / "moved")
         if trick == "link":
@@ -298,7 +298,7 @@ def test_a_file_that_others_may_have_written_is_not_run(
             os.mkfifo(kept)
         else:
             kept.mkdir()
-    assert shelf.read_kept("toy-1.code") is None
+    assert cache.read_kept("toy-1.code") is None
 
 
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="only root can be somebody else")
@@ -306,17 +306,17 @@ def test_a_file_that_others_may_have_written_is_not_run(
 def test_somebody_elses_code_is_not_run_whatever_its_digest_says(room: Path, whose: str) -> None:
     ship(kernels(room))
     value(kernels(room))
-    cache = room / "cache" / "gcsplan"
-    [kept] = cache.glob("*.code")
+    folder = room / "cache" / "gcsplan"
+    [kept] = folder.glob("*.code")
     body = b"machine code of somebody else's"
     kept.write_bytes(hashlib.sha256(body).digest() + body)  # LLVM would take it for an object file, and end badly
-    os.chown(cache if whose == "folder" else kept, 65534, 65534)
+    os.chown(folder if whose == "folder" else kept, 65534, 65534)
     said: list[str] = []
     with notice.told(said.append):
         value(kernels(room))
     assert len(said) == 1
     if whose == "folder":
-        assert (cache.stat().st_uid, cache.stat().st_mode & 0o777) == (65534, 0o700)
+        assert (folder.stat().st_uid, folder.stat().st_mode & 0o777) == (65534, 0o700)
         assert kept.read_bytes()[32:] == body  # nothing of theirs is touched
 
 
@@ -400,7 +400,7 @@ import math
 from pathlib import Path
 
 from {package}.{helper} import SCALE, longest
-from gcsplan.native.unit import Unit
+from gcsplan.native.kernel_unit import Unit
 
 from {package}._unit import UNIT
 
@@ -431,7 +431,7 @@ import math
 UNIT_OF = """
 from pathlib import Path
 
-from gcsplan.native.unit import Unit
+from gcsplan.native.kernel_unit import Unit
 
 UNIT = Unit("marked", Path(__file__).parent, "{package}", ("_unit", "inner.helper", "marked"))
 """

@@ -19,11 +19,11 @@ from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.mission_file import load_mission
+from gcsplan.sim.flight.trace import Trace, examine, meetings
+from gcsplan.sim.flight.wind import Weather
 from gcsplan.sim.outcome import Rehearsal, Terms, percentile_95
 from gcsplan.sim.part import Part
 from gcsplan.sim.rehearsal import on_board, rehearse
-from gcsplan.sim.trace import Trace, examine, meetings
-from gcsplan.sim.wind import Weather
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Zone

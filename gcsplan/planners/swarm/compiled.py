@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gcsplan.native.unit import Unit
+from gcsplan.native.kernel_unit import Unit
 
 UNIT = Unit(
     "swarm",

@@ -16,9 +16,9 @@ from gcsplan.mavlink.mission.stored_ardupilot import RULES, read_back_altitudes,
 from gcsplan.mavlink.mission.stored_px4 import LOCATED, yaw
 from gcsplan.mavlink.mission.stored_px4 import LOCATED as PX4_LOCATED
 from gcsplan.mavlink.mission.stored_px4 import PLACELESS as PX4_PLACELESS
-from gcsplan.sim.ardupilot_storage import keep_fence_item, keep_mission_item, keep_rally_item
-from gcsplan.sim.board import Refused
-from gcsplan.sim.px4_storage import keep_item
+from gcsplan.sim.vehicle.ardupilot_storage import keep_fence_item, keep_mission_item, keep_rally_item
+from gcsplan.sim.vehicle.px4_storage import keep_item
+from gcsplan.sim.vehicle.stored_lists import Refused
 from gcsplan.vehicle import Autopilot
 from tests.support.effort import draws
 

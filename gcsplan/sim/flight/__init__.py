@@ -1,0 +1,1 @@
+"""The simulated flight: a stored mission as a track, flown in simulated time, and what was flown."""

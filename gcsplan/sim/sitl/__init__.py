@@ -1,0 +1,1 @@
+"""The rehearsal with real autopilots: ArduPilot in SITL."""
