@@ -232,7 +232,7 @@ def upload(
     targets = uploads.targets(words, [v.request.vehicle for v in planned.vehicles])
     require_passing({v.name: v.verdict for v in planned.vehicles if v.name in targets}, allow_unjudged=allow_unjudged)
     homes = returns.judged(planned, asked=False)
-    from gcsplan.sim.vehicle.fleet import loopback_fleet
+    from gcsplan.sim.vehicle.server import loopback_fleet
 
     options = UploadOptions(
         allow_armed=allow_armed, ignore_position=ignore_position, allow_parameters=allow_parameters, atomic=atomic,

@@ -14,7 +14,7 @@ from gcsplan.errors import InputError
 from gcsplan.figures import counted
 from gcsplan.logs.flight_log import FlightLog, Readings, watts_of
 
-NAMES: dict[str, tuple[str, ...]] = {
+COLUMN_NAMES: dict[str, tuple[str, ...]] = {
     "time_s": ("time_s", "time", "t", "seconds", "timestamp_s"),
     "lat": ("lat", "latitude", "lat_deg", "latitude_deg"),
     "lon": ("lon", "lng", "longitude", "lon_deg", "longitude_deg"),
@@ -29,24 +29,24 @@ NAMES: dict[str, tuple[str, ...]] = {
 }
 """Accepted column names for each quantity, in any case of letters."""
 
-WANTED = (
+WANTED_COLUMNS = (
     "time_s, lat and lon (or east_m and north_m), amsl_m, and power_w (or volt and amp); name others with "
     "--csv-columns time_s=Time,lat=Latitude"
 )
 MOST_BAD = 0.1
 """Part of the lines that may be unreadable before the file is refused."""
 
-MOST_LINES, MOST_CHARS = 1_000_000, 100_000
+MOST_CSV_LINES, MOST_CHARS = 1_000_000, 100_000
 """Most lines of a file (5 h at 50 Hz), and most characters of one."""
 
 
 def read_csv(file: Path, columns: Mapping[str, str]) -> FlightLog:
-    """The flight in a CSV file; ``columns`` maps a key of `NAMES` to the file's own name. Raises InputError."""
+    """The flight in a CSV file; ``columns`` maps a key of `COLUMN_NAMES` to the file's own name. Raises InputError."""
     for key in columns:
-        if key not in NAMES:
-            near = difflib.get_close_matches(key, NAMES, 1)
+        if key not in COLUMN_NAMES:
+            near = difflib.get_close_matches(key, COLUMN_NAMES, 1)
             hint = f"; did you mean {near[0]}?" if near else ""
-            raise InputError(f"--csv-columns knows {', '.join(NAMES)}, given {key!r}{hint}", where=str(file))
+            raise InputError(f"--csv-columns knows {', '.join(COLUMN_NAMES)}, given {key!r}{hint}", where=str(file))
     lines = _lines(file)
     names = [n.strip() for n in next(lines, [])]
     at = _places(names, columns, str(file))
@@ -103,9 +103,9 @@ def _counted(opened: TextIO, file: Path) -> Iterator[str]:
         number += 1
         if len(line) > MOST_CHARS:
             raise InputError(f"line {number} has more than {MOST_CHARS} characters: no log in CSV", where=str(file))
-        if number > MOST_LINES:
+        if number > MOST_CSV_LINES:
             raise InputError(
-                f"has more than {MOST_LINES} lines; cut it to the flight, or to every tenth line", where=str(file)
+                f"has more than {MOST_CSV_LINES} lines; cut it to the flight, or to every tenth line", where=str(file)
             )
         yield line
 
@@ -114,7 +114,7 @@ def _places(names: list[str], columns: Mapping[str, str], where: str) -> dict[st
     """The column number of each quantity; InputError if a required one is missing."""
     lower = [n.lower() for n in names]
     at: dict[str, int] = {}
-    for key, known in NAMES.items():
+    for key, known in COLUMN_NAMES.items():
         if key in columns:
             if columns[key] not in names:
                 raise InputError(f"has no column {columns[key]!r}; its header is {', '.join(names)[:200]}", where=where)
@@ -136,7 +136,7 @@ def _places(names: list[str], columns: Mapping[str, str], where: str) -> dict[st
     if lacking:
         raise InputError(
             f"has no column for {', '.join(lacking)}; its header is {', '.join(names)[:200] or 'empty'}. "
-            f"Wanted are {WANTED}",
+            f"Wanted are {WANTED_COLUMNS}",
             where=where,
         )
     return at

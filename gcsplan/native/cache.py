@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-SUFFIX = ".kernels"
+SHIPPED_SUFFIX = ".kernels"
 MAX_CODE_BYTES = 64_000_000
 NEWEST = 8
 """Newest machine codes of the same kernels that are kept, for versions side by side."""

@@ -9,7 +9,6 @@ from types import FunctionType
 from typing import Any, cast
 
 import llvmlite.binding as llvm  # type: ignore[import-untyped]
-import numpy as np
 from numba import njit, types
 from numba.core import cgutils
 from numba.core.cpu import CPUTargetOptions
@@ -18,9 +17,7 @@ from numba.core.options import TargetOptions
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 
-from gcsplan.native.signature import Form
-
-_DTYPES = {"f8": np.float64, "f4": np.float32, "i8": np.int64, "i4": np.int32, "i1": np.int8, "b1": np.bool_}
+from gcsplan.native.signature import DTYPES, ArgumentForm
 
 
 def options(**wanted: object) -> dict[str, Any]:
@@ -28,7 +25,7 @@ def options(**wanted: object) -> dict[str, Any]:
     return {name: value for name, value in wanted.items() if hasattr(CPUTargetOptions, name)}
 
 
-INSIDE = options(
+KERNEL_OPTIONS = options(
     nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True, no_rewrites=True, _nrt=False
 )
 """Options of kernels and of the functions that they call: division by zero gives inf or NaN; nothing is allocated."""
@@ -112,7 +109,7 @@ def result_of(typingctx, value):
     return types.int64(value), lower
 
 
-def bitcode(kernels: Mapping[str, tuple[Any, tuple[Form, ...]]], *, vectors: bool = False) -> bytes:
+def bitcode(kernels: Mapping[str, tuple[Any, tuple[ArgumentForm, ...]]], *, vectors: bool = False) -> bytes:
     """One module with a function of each name; the functions take addresses and lengths for arrays.
 
     ``vectors``: the kernels were made with `VECTORS`; from here on the order of every sum is fixed.
@@ -155,7 +152,7 @@ def with_numba(
         scope = scopes.setdefault(id(plain.__globals__), dict(plain.__globals__))
         twin = FunctionType(plain.__code__, scope, plain.__name__, plain.__defaults__, plain.__closure__)
         copied: dict[str, Any] = {"inline": "always"} if id(function) in inlined else {}
-        return njit(**copied, **INSIDE, **(VECTORS if vectors else {}))(twin)
+        return njit(**copied, **KERNEL_OPTIONS, **(VECTORS if vectors else {}))(twin)
 
     twins = {id(function): compiled(function) for function in {id(f): f for f in others.values()}.values()}
     for scope in scopes.values():
@@ -165,7 +162,7 @@ def with_numba(
     return {name: twins[id(function)] for name, function in kernels.items()}
 
 
-def _compiled(name: str, function: Any, forms: tuple[Form, ...]) -> str:
+def _compiled(name: str, function: Any, forms: tuple[ArgumentForm, ...]) -> str:
     """LLVM's intermediate form of a kernel and all that it calls, as text; the kernel has the name ``name``."""
     arguments = []
     at = 0
@@ -184,10 +181,10 @@ def _compiled(name: str, function: Any, forms: tuple[Form, ...]) -> str:
         "integer_at": integer_at,
         "kernel": function,
         "result_of": result_of,
-        **_DTYPES,
+        **{letters: dtype.type for letters, dtype in DTYPES.items()},
     }
     exec(f"def entry(block):\n    return result_of(kernel({', '.join(arguments)}))\n", scope)
-    entry = njit(**INSIDE)(scope["entry"])
+    entry = njit(**KERNEL_OPTIONS)(scope["entry"])
     entry.compile(types.int64(types.CPointer(types.int64)))
     [compiled] = entry.overloads.values()
     module = llvm.parse_assembly(compiled.library.get_llvm_str())

@@ -1,6 +1,6 @@
 """Kernels written as plain functions and marked as such; their machine code is found or made at the first call.
 
-    UNIT = Unit("planners", Path(__file__).parent, "gcsplan.planners", ("track_kernels", "lattice.search_kernels"))
+    UNIT = KernelUnit("planners", Path(__file__).parent, "gcsplan.planners", ("lattice.search_kernels",))
 
     @UNIT.device
     def inner(x, y): ...
@@ -20,21 +20,27 @@ import hashlib
 import importlib
 import struct
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
-from gcsplan.native import cache, notice
-from gcsplan.native.llvm import Machine
+from gcsplan.native import cache
+from gcsplan.native.llvm import HostMachine
 from gcsplan.native.signature import Held, read_forms, slots_of
 
-FORMAT = "2"
+CALLING_CONVENTION = "2"
 """Version of the calling convention of kernels."""
 
-Function = TypeVar("Function", bound=Callable[..., Any])
+_listeners: list[Callable[[str], None]] = []
+
+QUICK_NOTICE = "compiling the kernels for this machine (once, about a second)"
+SLOW_NOTICE = "compiling the kernels from source (once, up to two minutes)"
+
+KernelFunction = TypeVar("KernelFunction", bound=Callable[..., Any])
 
 
-class Unit:
+class KernelUnit:
     """Kernels in some modules of a package that are compiled together.
 
     ``folder``: the package's folder; ``modules``: all modules that hold a marked function or a constant that one uses,
@@ -65,12 +71,12 @@ class Unit:
         self._lock = threading.Lock()
         self._loaded: dict[str, Callable[..., int]] | None = None
 
-    def device(self, function: Function) -> Function:
+    def device(self, function: KernelFunction) -> KernelFunction:
         """Mark a function that kernels call. Python can call it too, as a plain function."""
         self._plain[id(function)] = function
         return function
 
-    def inlined(self, function: Function) -> Function:
+    def inlined(self, function: KernelFunction) -> KernelFunction:
         """The same for a function with one caller, into which it is copied: a sixth of the exact check's speed."""
         self._inlined.add(id(function))
         return self.device(function)
@@ -98,13 +104,13 @@ class Unit:
     @property
     def shipped(self) -> Path:
         """The file with the intermediate form."""
-        return self.folder / f"{self.name}{cache.SUFFIX}"
+        return self.folder / f"{self.name}{cache.SHIPPED_SUFFIX}"
 
     def digest(self) -> str | None:
         """The digest of everything that the intermediate form depends on; None if the sources cannot be read."""
         for module in self._modules:  # so that every kernel is known
             importlib.import_module(module)
-        return cache.digest_of(self.sources, repr((FORMAT, sorted(self.forms.items()))))
+        return cache.digest_of(self.sources, repr((CALLING_CONVENTION, sorted(self.forms.items()))))
 
     def __getitem__(self, name: str) -> Callable[..., int]:
         """The kernel of that name; called with arrays and numbers in its forms. Raises TypeError for others."""
@@ -127,11 +133,11 @@ class Unit:
         return bytes(source.bitcode(kernels, vectors=self.vectors))
 
     def _load(self) -> dict[str, Callable[..., int]]:
-        machine = Machine()
+        machine = HostMachine()
         digest = self.digest()
         shipped = cache.read_shipped(self.shipped, digest)
         made_of = hashlib.sha256(shipped).hexdigest() if shipped is not None else f"source {digest}"
-        key = hashlib.sha256("\0".join((FORMAT, made_of, *machine.marks)).encode()).hexdigest()
+        key = hashlib.sha256("\0".join((CALLING_CONVENTION, made_of, *machine.marks)).encode()).hexdigest()
         kept_as = cache.name_of_code(self.name, key)
         code = cache.read_kept(kept_as)
         if code is None:
@@ -140,14 +146,14 @@ class Unit:
         addresses = machine.link(code, tuple(self.forms))
         return {name: _callable(name, addresses[name], text) for name, text in self.forms.items()}
 
-    def _compile(self, machine: Machine, shipped: bytes | None) -> bytes:
+    def _compile(self, machine: HostMachine, shipped: bytes | None) -> bytes:
         """Machine code, from the shipped form if that can be read."""
         if shipped is not None:
-            with notice.compiling(self.name, quick=True):
+            with _compiling(self.name, quick=True):
                 code = machine.compile(shipped)
             if code is not None:
                 return code
-        with notice.compiling(self.name, quick=False):
+        with _compiling(self.name, quick=False):
             code = machine.compile(self.bitcode_from_source())
         if code is None:
             raise RuntimeError(f"LLVM does not read what numba made of the kernels of {self.name}")
@@ -186,3 +192,24 @@ def _callable(name: str, address: int, text: str) -> Callable[..., int]:
         return result.value
 
     return call
+
+
+# -- notices that kernels are being compiled ------------------------------------------------------------------------
+
+
+@contextmanager
+def compilation_told(listener: Callable[[str], None]) -> Iterator[None]:
+    """In this context ``listener`` is called with a sentence before kernels are compiled; never if they are cached."""
+    _listeners.append(listener)
+    try:
+        yield
+    finally:
+        _listeners.remove(listener)
+
+
+@contextmanager
+def _compiling(name: str, *, quick: bool) -> Iterator[None]:
+    """Report that the kernels ``name`` are compiled now."""
+    for listener in tuple(_listeners):
+        listener(f"{QUICK_NOTICE if quick else SLOW_NOTICE}: {name}")
+    yield

@@ -20,7 +20,7 @@ def llvm_version() -> str:
     return ".".join(str(part) for part in llvm.llvm_version_info)
 
 
-class Machine:
+class HostMachine:
     """This machine, as numba sees it: the same processor features, the same options."""
 
     def __init__(self) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-_NUMBERS: dict[str, np.dtype[Any]] = {
+DTYPES: dict[str, np.dtype[Any]] = {
     "f8": np.dtype(np.float64),
     "f4": np.dtype(np.float32),
     "i8": np.dtype(np.int64),
@@ -17,14 +17,14 @@ _NUMBERS: dict[str, np.dtype[Any]] = {
     "i1": np.dtype(np.int8),
     "b1": np.dtype(np.bool_),
 }
-_SHAPES = {"": 0, "[]": 1, "[,]": 2, "[,,]": 3}
+_DIMENSIONS = {"": 0, "[]": 1, "[,]": 2, "[,,]": 3}
 _ARRAYS_ONLY = {"f4", "i4", "i1"}
 _address_of = ctypes.addressof
 _over = ctypes.c_char.from_buffer
 
 
 @dataclass(frozen=True, slots=True)
-class Form:
+class ArgumentForm:
     """One argument: a number (``dimensions`` 0) or a C-contiguous array. ``letters``: f8, f4, i8, i4, i1 or b1."""
 
     letters: str
@@ -39,33 +39,33 @@ class Form:
 
 
 @functools.cache
-def read_forms(text: str) -> tuple[Form, ...]:
+def read_forms(text: str) -> tuple[ArgumentForm, ...]:
     """Forms from words such as ``f8`` (a number), ``f8[]``, ``f8[,]``, ``f8[,,]`` (arrays)."""
     forms = []
     for word in text.split():
         letters, shape = word[:2], word[2:]
-        if letters not in _NUMBERS or shape not in _SHAPES or word in _ARRAYS_ONLY:
+        if letters not in DTYPES or shape not in _DIMENSIONS or word in _ARRAYS_ONLY:
             raise ValueError(
                 f"a form is f8, i8 or b1, or an array of these, f4, i4 or i1, such as f8[,], given {word!r}"
             )
-        forms.append(_form(letters, _SHAPES[shape]))
+        forms.append(_form(letters, _DIMENSIONS[shape]))
     return tuple(forms)
 
 
 @functools.cache
-def _form(letters: str, dimensions: int) -> Form:
+def _form(letters: str, dimensions: int) -> ArgumentForm:
     """One object for each form, so that tuples of forms are compared by identity, at every call of a kernel."""
-    return Form(letters, dimensions)
+    return ArgumentForm(letters, dimensions)
 
 
-def slots_of(form: Form, argument: Any) -> tuple[Any, ...]:
+def slots_of(form: ArgumentForm, argument: Any) -> tuple[Any, ...]:
     """The contents of the slots of one argument. Raises TypeError if an array does not have the form.
 
     For an array this is its address: whoever holds the slots must hold the array.
     """
     if not form.dimensions:
         return (argument,)
-    if argument.dtype != _NUMBERS[form.letters] or argument.ndim != form.dimensions or not argument.flags.c_contiguous:
+    if argument.dtype != DTYPES[form.letters] or argument.ndim != form.dimensions or not argument.flags.c_contiguous:
         raise TypeError(
             f"a kernel wants a contiguous array of {form.letters} in {form.dimensions} dimensions, given "
             f"{argument.dtype.str[1:]} in {argument.ndim}{'' if argument.flags.c_contiguous else ', not contiguous'}"

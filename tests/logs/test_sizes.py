@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
+from pymavlink.DFReader import DFReader_binary
 
 from gcsplan.errors import InputError
 from gcsplan.logs import csv_log, dataflash, flight_log, reader, tlog
@@ -26,7 +27,7 @@ def refused(file: Path) -> str:
 @pytest.mark.parametrize("name", ["log.csv", "log.bin", "log.tlog"])
 def test_a_log_is_refused_by_its_size_before_it_is_read(name: str, tmp_path: Path) -> None:
     with (tmp_path / name).open("wb") as file:
-        file.truncate(reader.MOST_BYTES + 1)  # a hole: no byte of it is on the disk
+        file.truncate(reader.MOST_LOG_BYTES + 1)  # a hole: no byte of it is on the disk
     assert "has more than 256 MB; cut it to the flight" in refused(tmp_path / name)
 
 
@@ -38,7 +39,7 @@ def test_readings_of_an_ardupilot_log_are_counted_before_they_are_read(
     monkeypatch.setattr(dataflash, "MOST_READINGS", rows)
     read_log(file)
     monkeypatch.setattr(dataflash, "MOST_READINGS", rows - 1)
-    monkeypatch.setattr(dataflash, "_take", lambda *_: pytest.fail("it was read"))
+    monkeypatch.setattr(DFReader_binary, "recv_match", lambda *_, **__: pytest.fail("it was read"))
     assert "readings of place, battery and wind; cut it to the flight" in refused(file)
 
 
@@ -58,9 +59,9 @@ def test_lines_of_a_csv_are_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     file = tmp_path / "log.csv"
     rows = [f"{k},{46 + 1e-4 * k},14,{100 + k},300\n" for k in range(99)]
     file.write_text(HEADER + "".join(rows))
-    monkeypatch.setattr(csv_log, "MOST_LINES", 100)
+    monkeypatch.setattr(csv_log, "MOST_CSV_LINES", 100)
     read_log(file)
-    monkeypatch.setattr(csv_log, "MOST_LINES", 99)
+    monkeypatch.setattr(csv_log, "MOST_CSV_LINES", 99)
     assert "has more than 99 lines; cut it to the flight, or to every tenth line" in refused(file)
 
 

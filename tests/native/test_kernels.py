@@ -18,18 +18,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gcsplan.native import cache, notice
-from gcsplan.native.kernel_unit import Unit
-from gcsplan.native.llvm import Machine
+from gcsplan.native import cache
+from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE, KernelUnit, compilation_told
+from gcsplan.native.llvm import HostMachine
 from gcsplan.native.signature import Held, read_forms
 from gcsplan.world._compiled import UNIT as WORLD
 
 SOURCE = """
 from pathlib import Path
 
-from gcsplan.native.kernel_unit import Unit
+from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE, KernelUnit, compilation_told
 
-UNIT = Unit("toy", Path(__file__).parent, "toys", ("weighing",))
+UNIT = KernelUnit("toy", Path(__file__).parent, "toys", ("weighing",))
 FACTOR = {factor}
 
 
@@ -92,9 +92,9 @@ def imported_anew(name: str) -> Any:
         sys.dont_write_bytecode = before
 
 
-def kernels(room: Path) -> Unit:
+def kernels(room: Path) -> KernelUnit:
     unit = imported_anew("toys.weighing").UNIT
-    assert isinstance(unit, Unit)
+    assert isinstance(unit, KernelUnit)
     assert unit.folder == room / "toys"
     return unit
 
@@ -103,7 +103,7 @@ MADE: dict[str, bytes] = {}
 """Bitcode by the source that it was made from, which takes longer than all else here."""
 
 
-def ship(of: Unit) -> None:
+def ship(of: KernelUnit) -> None:
     digest = of.digest()
     assert digest is not None
     source = (of.shipped.parent / "weighing.py").read_text(encoding="utf-8")
@@ -118,7 +118,7 @@ def arguments() -> list[Any]:
     return [a, b, c, np.array([True, False, True]), 0.25, 7, True, np.zeros(1)]
 
 
-def value(of: Unit, factor: float = 1.0) -> float:
+def value(of: KernelUnit, factor: float = 1.0) -> float:
     given = arguments()
     assert of["weigh"](*given) == 2 + 7
     out = given[-1]
@@ -135,19 +135,19 @@ def test_what_is_shipped_was_made_from_the_source_as_it_stands() -> None:
 def test_this_llvm_reads_what_is_shipped() -> None:
     bitcode = cache.read_shipped(WORLD.shipped, WORLD.digest())
     assert bitcode is not None
-    code = Machine().compile(bitcode)
+    code = HostMachine().compile(bitcode)
     assert code is not None
-    assert set(Machine().link(code, tuple(WORLD.forms))) == {"judge", "pieces", "around", "local_extrema"}
+    assert set(HostMachine().link(code, tuple(WORLD.forms))) == {"judge", "pieces", "around", "local_extrema"}
 
 
 def test_a_kernel_from_source_from_what_is_shipped_and_from_the_cache_is_the_same(room: Path) -> None:
     said: list[str] = []
-    with notice.told(said.append):
+    with compilation_told(said.append):
         from_source = value(kernels(room))
-        assert [words.startswith(notice.SLOW) for words in said] == [True]
+        assert [words.startswith(SLOW_NOTICE) for words in said] == [True]
         ship(kernels(room))
         from_shipped = value(kernels(room))
-        assert [words.startswith(notice.QUICK) for words in said[1:]] == [True]
+        assert [words.startswith(QUICK_NOTICE) for words in said[1:]] == [True]
         assert value(kernels(room)) == from_shipped == from_source
         assert len(said) == 2  # the third was found in the cache
 
@@ -312,7 +312,7 @@ def test_somebody_elses_code_is_not_run_whatever_its_digest_says(room: Path, who
     kept.write_bytes(hashlib.sha256(body).digest() + body)  # LLVM would take it for an object file, and end badly
     os.chown(folder if whose == "folder" else kept, 65534, 65534)
     said: list[str] = []
-    with notice.told(said.append):
+    with compilation_told(said.append):
         value(kernels(room))
     assert len(said) == 1
     if whose == "folder":
@@ -400,7 +400,7 @@ import math
 from pathlib import Path
 
 from {package}.{helper} import SCALE, longest
-from gcsplan.native.kernel_unit import Unit
+from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE, KernelUnit, compilation_told
 
 from {package}._unit import UNIT
 
@@ -431,9 +431,9 @@ import math
 UNIT_OF = """
 from pathlib import Path
 
-from gcsplan.native.kernel_unit import Unit
+from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE, KernelUnit, compilation_told
 
-UNIT = Unit("marked", Path(__file__).parent, "{package}", ("_unit", "inner.helper", "marked"))
+UNIT = KernelUnit("marked", Path(__file__).parent, "{package}", ("_unit", "inner.helper", "marked"))
 """
 
 

@@ -22,7 +22,7 @@ from gcsplan.mission_file import load_mission
 from gcsplan.sim.flight.trace import Trace, examine, meetings
 from gcsplan.sim.flight.wind import Weather
 from gcsplan.sim.outcome import Rehearsal, Terms, percentile_95
-from gcsplan.sim.part import Part
+from gcsplan.sim.part import RehearsalPart
 from gcsplan.sim.rehearsal import on_board, rehearse
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.world import World
@@ -52,7 +52,7 @@ def a_part(
     arrive_s: float | None = None,
     vehicle: Vehicle | None = None,
     land: bool = True,
-) -> Part:
+) -> RehearsalPart:
     """A vehicle that takes off at the first place, passes the others at 10 m/s, and lands at the last."""
     vehicle = vehicle or replace(worlds.vehicle(), speed_max_m_s=CRUISE_M_S)
     vehicle = replace(vehicle, name=f"uav{number}", sysid=number)
@@ -66,7 +66,7 @@ def a_part(
     if land:
         items.append(at(cmd.LAND, *way[-1], 0))
     mission = Mission(vehicle.autopilot, home, tuple(items), vehicle.name, number)
-    return Part(vehicle, mission, judge(mission, vehicle, world), depart_s, arrive_s)
+    return RehearsalPart(vehicle, mission, judge(mission, vehicle, world), depart_s, arrive_s)
 
 
 def reached_s(length_m: float) -> float:

@@ -10,18 +10,21 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 
+import numpy as np
+
+from gcsplan.arrays import Floats
 from gcsplan.vehicle import Autopilot, Vehicle
 
 AT_ONCE_M_S2 = 1e4
 """Acceleration that stands for "unlimited", m/s²: 30 m/s in 3 ms."""
 
-FULL_ACCEL = 2.5 / 1.5
+CURVE_PEAK_ACCEL = 2.5 / 1.5
 """Peak acceleration of an S-curve per acceleration of the trapezoid that it is equivalent to."""
 
 AIRSPEED_SPARE = 1.2
 """Assumed highest airspeed of a vehicle, as a multiple of its fastest cruise: its reserve against wind."""
-FASTEST_M_S = 60.0
-STEP, STEEPEST, STEP_M = 0.01, 50, 25.0
+FASTEST_LEANING_M_S = 60.0
+SLOPE_STEP, STEEPEST_STEPS, AMSL_STEP_M = 0.01, 50, 25.0
 """Slopes (rise per metre) and altitudes are rounded to these where only the airspeed depends on them."""
 
 PX4_EVEN_ACCEL = 0.65
@@ -29,6 +32,13 @@ PX4_EVEN_ACCEL = 0.65
 
 PX4_LAND_BELOW_M = 7.0
 """Height above home, m, below which a landing PX4 is slow: the middle of MPC_LAND_ALT1 and MPC_LAND_ALT2 in time."""
+
+STANDS_M = 0.01
+"""Metres: positions nearer than this are the same."""
+CORNER_SAG_M = 0.02
+"""Metres by which the chords of a rounded corner may lie off its arc."""
+FAST_M_S = 60.0
+"""m/s: a corner that allows more than this, and is cut by at most half of `CORNER_SAG_M`, is not rounded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,7 +92,7 @@ class Kinematics:
             takes_off_below_m=10.0 if vehicle.smooths else 0.0,
             accepts_m=vehicle.acceptance_m if vehicle.smooths else 0.0,
             land_below_m=PX4_LAND_BELOW_M if vehicle.autopilot is Autopilot.PX4 else 10.0,
-            leg_accel_m_s2=FULL_ACCEL * vehicle.accel_m_s2,
+            leg_accel_m_s2=CURVE_PEAK_ACCEL * vehicle.accel_m_s2,
             lean_deg=vehicle.lean_angle_deg or math.inf,
         )  # fmt: skip
 
@@ -128,8 +138,11 @@ class Kinematics:
 
     def airspeed_on(self, rise: float, amsl_m: float) -> float:
         """Return the highest airspeed on a slope, about."""
-        steps, height_m = max(-STEEPEST, min(STEEPEST, round(rise / STEP))), STEP_M * round(amsl_m / STEP_M)
-        return min(self.airspeed_m_s, _leaning_m_s(self, STEP * steps, height_m))
+        steps, height_m = (
+            max(-STEEPEST_STEPS, min(STEEPEST_STEPS, round(rise / SLOPE_STEP))),
+            AMSL_STEP_M * round(amsl_m / AMSL_STEP_M),
+        )
+        return min(self.airspeed_m_s, _leaning_m_s(self, SLOPE_STEP * steps, height_m))
 
     def corner_m_s(self, radius_m: float) -> float:
         """Return the highest speed over ground on an arc."""
@@ -138,7 +151,7 @@ class Kinematics:
 
 @lru_cache(maxsize=4096)
 def _leaning_m_s(kinematics: Kinematics, rise: float, amsl_m: float) -> float:
-    return kinematics.leaning_m_s(rise, amsl_m, FASTEST_M_S)
+    return kinematics.leaning_m_s(rise, amsl_m, FASTEST_LEANING_M_S)
 
 
 MASS_KG, DISC_M2, ROTOR_DRAG = 3.0, 0.385, 0.2
@@ -168,3 +181,37 @@ def _pushes_on(lean_deg: float, speed_m_s: float, rise: float, amsl_m: float) ->
         across = weight_n * math.cos(lean) + push * above * abs(above) + of_rotors(thrust_n, amsl_m) * above
         thrust_n = max(across, 0.01 * weight_n)
     return push * ahead * abs(ahead) + of_rotors(thrust_n, amsl_m) * ahead < weight_n * math.sin(lean)
+
+
+def rounded(corner: Floats, kinematics: Kinematics) -> tuple[Floats, float]:
+    """Return the nodes of a rounded corner, an odd number, and the speed that it allows.
+
+    ``corner`` (3, 3): the way point between its neighbours. If there is no turn, the way point is the only node.
+    """
+    before, here, after = corner
+    into, out = here - before, after - here
+    run_in, run_out = math.hypot(into[0], into[1]), math.hypot(out[0], out[1])
+    sharp = here[None, :]
+    if min(run_in, run_out) <= STANDS_M:
+        return sharp, math.inf
+    cross, dot = into[0] * out[1] - into[1] * out[0], into[0] * out[0] + into[1] * out[1]
+    turn = min(abs(math.atan2(cross, dot)), math.pi - 1e-3)
+    radius = kinematics.corner_radius_m(turn, min(run_in, run_out))
+    corner_m_s = kinematics.corner_m_s(radius)
+    straight = radius * (1.0 / math.cos(0.5 * turn) - 1.0) <= 0.5 * CORNER_SAG_M and corner_m_s > FAST_M_S
+    if straight or radius <= 0.0:
+        return sharp, math.inf
+    tangent = radius * math.tan(0.5 * turn)
+    begin, end = here - into * (tangent / run_in), here + out * (tangent / run_out)
+    side = math.copysign(1.0, cross)
+    normal = side * np.array([-into[1], into[0]]) / run_in
+    centre = begin[:2] + radius * normal
+    parts = 2 * max(1, math.ceil(0.5 * turn / math.sqrt(8.0 * CORNER_SAG_M / radius)))
+    u = np.arange(parts + 1) / parts
+    angle = side * turn * u
+    spoke = begin[:2] - centre
+    turned = np.column_stack(
+        [spoke[0] * np.cos(angle) - spoke[1] * np.sin(angle), spoke[0] * np.sin(angle) + spoke[1] * np.cos(angle)]
+    )
+    height = np.interp(u, [0.0, 0.5, 1.0], [begin[2], here[2], end[2]])  # a change of slope is not rounded
+    return np.column_stack([centre + turned, height]), corner_m_s

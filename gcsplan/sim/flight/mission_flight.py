@@ -17,25 +17,26 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.sim.flight.kinematics import AT_ONCE_M_S2
 from gcsplan.sim.flight.trace import Trace
-from gcsplan.sim.flight.track import PASSED, Track
+from gcsplan.sim.flight.track import PASSED, CommandedTrack
 from gcsplan.sim.flight.wind import Air, Weather
 from gcsplan.vehicle import Vehicle
 
-STEP_S = 0.1
+FLIGHT_STEP_S = 0.1
 SAMPLE_STEPS = 2
-SAMPLE_S = STEP_S * SAMPLE_STEPS
+SAMPLE_S = FLIGHT_STEP_S * SAMPLE_STEPS
 """Seconds between recorded samples of the flight."""
 CRAWL_M_S = 0.05
 """Lowest speed in a corner, m/s: a vehicle comes to rest only at a stop."""
 HEADWAY_M_S = 0.3
 """Lowest speed over ground, m/s, against a wind that is too strong for the vehicle."""
 PATIENCE = 4.0
-"""Lanes are given up this many durations of the longest flight in still air, plus `SPARE_S`, after the last start."""
-SPARE_S = 300.0
+"""Lanes are given up this many durations of the longest flight in still air, plus `PATIENCE_SPARE_S`, after the last
+start."""
+PATIENCE_SPARE_S = 300.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Flown:
+class FlownLanes:
     """The flown motion of L lanes, sampled at ``times_s`` (J,), seconds since the fleet's common start.
 
     ``along_m`` (J, L): distance along its track; ``offset_m`` (J, L, 3): offset from it in east, north and up, None
@@ -46,7 +47,7 @@ class Flown:
     ``stops``: for each lane, (node, time reached, time left) of every stop.
     """
 
-    tracks: tuple[Track, ...]
+    tracks: tuple[CommandedTrack, ...]
     runs: int
     times_s: Floats
     along_m: Floats
@@ -76,7 +77,7 @@ class Flown:
         until_s = end_s if math.isfinite(end_s) else float(self.times_s[-1])
         return max(until_s - float(self.begin_s[lane]) - float(self.hold_s[lane]), 0.0)
 
-    def track_of(self, lane: int) -> Track:
+    def track_of(self, lane: int) -> CommandedTrack:
         """Return the track of a lane."""
         return self.tracks[lane % len(self.tracks)]
 
@@ -120,7 +121,7 @@ class Flown:
 class _Ways:
     """The pieces of all tracks in one array each, and for each piece the next stop."""
 
-    def __init__(self, tracks: Sequence[Track]) -> None:
+    def __init__(self, tracks: Sequence[CommandedTrack]) -> None:
         length = [t.length_m for t in tracks]
         along = [np.concatenate([[0.0], np.cumsum(one)]) for one in length]
         braking = [t.braking() for t in tracks]
@@ -160,7 +161,7 @@ class _Ways:
         return float(np.add.reduceat((self.end - self.begin) / slow + holds, self.first).max())
 
 
-def _next_stop(track: Track) -> Indices:
+def _next_stop(track: CommandedTrack) -> Indices:
     """(N - 1,) the next node at which the vehicle stops, for each piece; the last node is always a stop."""
     n = len(track.points)
     stops = np.where(track.hold_s != PASSED, np.arange(n), n - 1)[1:]
@@ -168,9 +169,9 @@ def _next_stop(track: Track) -> Indices:
 
 
 def fly(
-    tracks: Sequence[Track], depart_s: Sequence[float], *, weather: Weather | None = None, runs: int = 1, seed: int = 1,
-    first_run: int = 0,
-) -> Flown:  # fmt: skip
+    tracks: Sequence[CommandedTrack], depart_s: Sequence[float], *, weather: Weather | None = None, runs: int = 1,
+    seed: int = 1, first_run: int = 0,
+) -> FlownLanes:  # fmt: skip
     """Fly every track, each released at its ``depart_s``, in ``runs`` runs of different weather.
 
     In still air all runs are the same. The weather of run ``first_run`` + r does not depend on the other runs.
@@ -179,23 +180,23 @@ def fly(
     ways = _Ways(tracks)
     air = Air(weather, len(tracks), runs, seed, first_run)
     lanes = _Lanes(tracks, ways, np.tile(np.asarray(depart_s, dtype=np.float64), runs), runs)
-    latest_s = max(depart_s) + PATIENCE * ways.calm_s() + SPARE_S
+    latest_s = max(depart_s) + PATIENCE * ways.calm_s() + PATIENCE_SPARE_S
     times, along, offset = [0.0], [lanes.s.copy()], [air.offset]
     step = 0
-    while not lanes.done.all() and step * STEP_S < latest_s:
+    while not lanes.done.all() and step * FLIGHT_STEP_S < latest_s:
         step += 1
-        lanes.advance(step * STEP_S, None if weather.calm else air.wind)
+        lanes.advance(step * FLIGHT_STEP_S, None if weather.calm else air.wind)
         if step % SAMPLE_STEPS == 0:
-            times.append(step * STEP_S)
+            times.append(step * FLIGHT_STEP_S)
             along.append(lanes.s.copy())
             if not weather.calm:
                 air.step(SAMPLE_S)
                 offset.append(air.offset)
     if step % SAMPLE_STEPS:
-        times.append(step * STEP_S)
+        times.append(step * FLIGHT_STEP_S)
         along.append(lanes.s.copy())
         offset.append(air.offset)
-    return Flown(
+    return FlownLanes(
         tuple(tracks), runs, np.array(times), np.array(along), None if weather.calm else np.array(offset),
         lanes.begin, lanes.arrive, lanes.ended, lanes.stood, lanes.air, lanes.held_air,
         np.divide(lanes.cruised, lanes.cruised_s, out=np.zeros_like(lanes.cruised), where=lanes.cruised_s > 0.0),
@@ -206,7 +207,7 @@ def fly(
 class _Lanes:
     """The state of every lane: arrays (L,)."""
 
-    def __init__(self, tracks: Sequence[Track], ways: _Ways, depart_s: Floats, runs: int) -> None:
+    def __init__(self, tracks: Sequence[CommandedTrack], ways: _Ways, depart_s: Floats, runs: int) -> None:
         n = len(depart_s)
         self._ways, self._tracks = ways, tracks
         self._goal = np.tile([t.goal for t in tracks], runs)

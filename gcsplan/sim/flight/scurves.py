@@ -20,22 +20,22 @@ from gcsplan.sim.flight.kinematics import Kinematics
 
 __all__ = ["leg_limits", "step_legs"]
 
-STEP_S = 0.01
+CURVE_STEP_S = 0.01
 """Time step of the curves and of the look at the next leg."""
 TRAIL_STEP_S, TERRAIN_MARGIN_M = 0.05, 10.0
 """Time step over ground that is followed; WPNAV_TER_MARGIN, default."""
-SAMPLE_S = 0.25
+RAMP_SAMPLE_S = 0.25
 """Time between places while a leg speeds up or slows down."""
 LAG_S, LAG_FROM, REST_M_S = 0.36, 0.6, 0.96
 """Measured on ArduCopter 4.7: speeding up by a factor f takes LAG_S·(ln f - LAG_FROM) longer than the curves, for they
 wait for the vehicle; a standstill counts as REST_M_S."""
 JERK_RISE_S = 0.3
 """Seconds in which the jerk rises to its peak: twice ATC_INPUT_TC."""
-HALVINGS = 50
+CURVE_HALVINGS = 50
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class _Leg:
+class _CurvedLeg:
     """One leg: its start step by step (seconds, acceleration, speed, metres), and how long it keeps its peak speed.
 
     ``points`` (P, 3): from its beginning, metres; two for a straight leg, more for a curve. ``along_m`` (P,).
@@ -163,22 +163,24 @@ def _trailing_s(parts: Floats, free_m_s: list[float], climb: float, descent: flo
     return float(now_s - (gone_m - ends[-1]) / speed)
 
 
-def _sample_times(legs: list[_Leg], begin: list[float], turned: list[float]) -> Floats:
+def _sample_times(legs: list[_CurvedLeg], begin: list[float], turned: list[float]) -> Floats:
     """Times from 0 to the end: close together where a leg speeds up or slows down."""
     found = [np.array(turned), np.array([begin[-1] + legs[-1].time_s])]
     for leg, since in zip(legs, begin, strict=True):
-        ramp = np.append(np.arange(0.0, leg.start_s, SAMPLE_S), leg.start_s)
+        ramp = np.append(np.arange(0.0, leg.start_s, RAMP_SAMPLE_S), leg.start_s)
         found += [since + ramp, since + leg.time_s - ramp, since + leg.bends_s]
     times = np.unique(np.round(np.concatenate(found), 6))
-    return np.asarray(times[np.append(True, np.diff(times) > 0.1 * STEP_S)])
+    return np.asarray(times[np.append(True, np.diff(times) > 0.1 * CURVE_STEP_S)])
 
 
-def _begins_early(leg: _Leg, after: _Leg, slowest_m_s: float, kinematics: Kinematics) -> tuple[float, float]:
+def _begins_early(
+    leg: _CurvedLeg, after: _CurvedLeg, slowest_m_s: float, kinematics: Kinematics
+) -> tuple[float, float]:
     """How long before the end of ``leg`` the next one begins, and the speed in the middle of the turn.
 
     It begins at the first step of the braking at which all is right.
     """
-    left = np.arange(min(leg.start_s, after.start_s), 0.0, -STEP_S)
+    left = np.arange(min(leg.start_s, after.start_s), 0.0, -CURVE_STEP_S)
     into, out = leg.ways[1], after.ways[0]
 
     def added(of: str, sign: float) -> Floats:
@@ -199,12 +201,12 @@ def _begins_early(leg: _Leg, after: _Leg, slowest_m_s: float, kinematics: Kinema
     return float(left[first]), float(np.linalg.norm(speed[first]))
 
 
-def _lay_out(way: Floats, speed_m_s: float, accel_m_s2: float, jerk_m_s3: float) -> _Leg:
+def _lay_out(way: Floats, speed_m_s: float, accel_m_s2: float, jerk_m_s3: float) -> _CurvedLeg:
     along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(way, axis=0), axis=1)))
     length_m = float(along[-1])
     t, accel, speed, gone = _start(length_m, speed_m_s, accel_m_s2, jerk_m_s3)
     level_s = max(length_m - 2.0 * float(gone[-1]), 0.0) / float(speed[-1])
-    return _Leg(way - way[0], along, length_m, t, accel, speed, gone, level_s)
+    return _CurvedLeg(way - way[0], along, length_m, t, accel, speed, gone, level_s)
 
 
 @lru_cache(maxsize=256)
@@ -222,7 +224,7 @@ def _start(
     steady_s = _largest(speed_m_s / accel, lambda t: fits(accel, t)) if accel == accel_m_s2 else 0.0
     ramp_s, rise_s, jerk = _ramp(accel, jerk_m_s3)
     total_s = 2.0 * ramp_s + steady_s
-    t = np.linspace(0.0, total_s, max(2, math.ceil(total_s / STEP_S)) + 1)
+    t = np.linspace(0.0, total_s, max(2, math.ceil(total_s / CURVE_STEP_S)) + 1)
 
     def pushed(since: Floats) -> Floats:
         """The jerk of one ramp: it rises and falls as a cosine."""
@@ -248,7 +250,7 @@ def _largest(most: float, fits: Callable[[float], bool]) -> float:
     if fits(most):
         return most
     low, high = 0.0, most
-    for _ in range(HALVINGS):
+    for _ in range(CURVE_HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if fits(middle) else (low, middle)
     return low or high

@@ -26,10 +26,10 @@ CHORD = 16
 """Sample intervals that are checked as one straight leg if the samples between lie near it."""
 TRACK_M, HEIGHT_M = 0.25, 0.05
 """Metres, across and in altitude, by which those samples may lie off the leg; the leg is widened by their offset."""
-BLOCK = 16
+BLOCK_STEPS = 16
 """Time steps for which the distance between two aircraft is bounded at once."""
 
-WORDS = {
+BREACH_WORDS = {
     "min_agl": "came too low above ground",
     "max_agl": "came too high above ground",
     "max_amsl": "came above max_amsl_m",
@@ -147,7 +147,7 @@ def _off(a: Floats, b: Floats, inner: Floats) -> tuple[Floats, Floats]:
 def _finding(v: Violation, trace: Trace, sample: int, world: World) -> Finding:
     lat, lon = _degrees(world, np.array([v.east_m, v.north_m]))
     name = world.airspace.zones[v.zone].name if v.zone >= 0 else ""
-    what = WORDS.get(v.kind, v.kind) + (f" “{name}” or its clearance" if name else "")
+    what = BREACH_WORDS.get(v.kind, v.kind) + (f" “{name}” or its clearance" if name else "")
     by = UnitText(" by {}", measured(v.by, v.kind, v.unit)) if v.kind != "coverage" else ""
     message = UnitText(
         "{} {}{} at {}, item {} ({:.6f}, {:.6f}, {})",
@@ -214,9 +214,9 @@ def meetings(
 def _in_the_air(traces: Sequence[Trace], times: Floats, needed_m: float) -> list[Meeting]:
     flying = np.array([(times[1:] >= t.begin_s) & ((times[:-1] <= t.end_s) | t.stays) for t in traces])
     n = len(times) - 1
-    blocks = np.arange(0, n, BLOCK)
+    blocks = np.arange(0, n, BLOCK_STEPS)
     places = np.stack([t.at(times[blocks]) for t in traces])
-    reach = np.array([_reach(t, times[blocks], times[np.minimum(blocks + BLOCK, n)]) for t in traces])
+    reach = np.array([_reach(t, times[blocks], times[np.minimum(blocks + BLOCK_STEPS, n)]) for t in traces])
     i, j = np.triu_indices(len(traces), 1)
     bound = np.full((len(i), len(blocks)), np.inf)
     for m, (a, b) in enumerate(zip(i.tolist(), j.tolist(), strict=True)):
@@ -229,7 +229,7 @@ def _in_the_air(traces: Sequence[Trace], times: Floats, needed_m: float) -> list
         if bound[m].min() > max(best, needed_m):
             break
         a, b = traces[i[m]], traces[j[m]]
-        rows = (blocks[bound[m] <= max(best, needed_m)][:, None] + np.arange(BLOCK)).ravel()
+        rows = (blocks[bound[m] <= max(best, needed_m)][:, None] + np.arange(BLOCK_STEPS)).ravel()
         rows = rows[rows < n]
         rows = rows[flying[i[m], rows] & flying[j[m], rows]]
         least, when = _nearest(a, b, times, rows)

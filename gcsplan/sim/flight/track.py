@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,10 +18,8 @@ from gcsplan.check.flight import follow
 from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.sim.flight.kinematics import AT_ONCE_M_S2, Kinematics
-from gcsplan.sim.flight.rounding import rounded
+from gcsplan.sim.flight.kinematics import AT_ONCE_M_S2, STANDS_M, Kinematics, rounded
 from gcsplan.sim.flight.scurves import leg_limits, step_legs
-from gcsplan.sim.flight.true_speeds import SAME_M, as_measured, in_thin_air
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World
 
@@ -29,12 +27,14 @@ TERRAIN_PART_M = 10.0
 """Longest piece of a leg that follows the terrain, in metres."""
 PX4_TAKE_OFF_M_S = 1.5
 """m/s: PX4's speed in the first metres of a take-off (MPC_TKO_SPEED)."""
+SCALING_M_PER_DEGREE = 0.011131884502145034 * 1e7
+"""Metres per degree of latitude in ArduPilot (`LOCATION_SCALING_FACTOR`)."""
 PASSED = -1.0
-"""Value in `Track.hold_s` of a node that is passed without a stop."""
+"""Value in `CommandedTrack.hold_s` of a node that is passed without a stop."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Track:
+class CommandedTrack:
     """N nodes and the N - 1 straight pieces between them.
 
     ``points`` (N, 3): east_m, north_m, amsl_m. ``hold_s`` (N,): seconds that the vehicle stands at a node, `PASSED` if
@@ -155,7 +155,7 @@ def make_track(
     *,
     rtl_rel_home_m: float | None = None,
     airborne: bool = False,
-) -> Track:
+) -> CommandedTrack:
     """Return the path that ``mission`` (as stored on board) commands ``vehicle`` to fly.
 
     ``airborne``: it begins at the top of its take-off.
@@ -167,12 +167,12 @@ def make_track(
     if not flight.stretches:
         raise ValueError(f"{vehicle.name}: the mission flies nowhere")
     if vehicle.lays_curves:
-        flight.stretches = [as_measured(s, mission, world) for s in flight.stretches]
+        flight.stretches = [_as_measured(s, mission, world) for s in flight.stretches]
     wing = vehicle.turn_radius_m > 0.0
     if wing:
         bend(flight, mission, vehicle, world.frame)
         if vehicle.autopilot is Autopilot.ARDUPLANE:
-            flight.stretches = [in_thin_air(s, kinematics) for s in flight.stretches]
+            flight.stretches = [_in_thin_air(s, kinematics) for s in flight.stretches]
     places = np.array([(s.start, s.end) for s in flight.stretches])
     ends = np.empty_like(places)
     ends[..., :2] = world.frame.to_plane(places[..., 0], places[..., 1])
@@ -212,7 +212,9 @@ def _home_amsl_m(mission: Mission, world: World) -> float:
     return mission.home.amsl_m if math.isnan(ground) else ground
 
 
-def _track(vehicle: Vehicle, line: _Line, goal: int, flight: Flight, kinematics: Kinematics, last: Stretch) -> Track:
+def _track(
+    vehicle: Vehicle, line: _Line, goal: int, flight: Flight, kinematics: Kinematics, last: Stretch
+) -> CommandedTrack:
     name, turns = vehicle.name, []
     if vehicle.turn_radius_m > 0.0 and vehicle.autopilot is not Autopilot.ARDUPLANE:
         turns.append(f"its turns of {vehicle.turn_radius_m:g} m are flown as corners")
@@ -220,7 +222,7 @@ def _track(vehicle: Vehicle, line: _Line, goal: int, flight: Flight, kinematics:
     points = np.array(line.points)
     if not np.isfinite(points).all():
         raise InputError(f"{name}: the mission follows terrain that the terrain model does not know")
-    return Track(
+    return CommandedTrack(
         name, points, np.array(line.hold_s), np.array(cap), np.array(command), np.array(level),
         np.array(accel), np.array(column, dtype=np.bool_), np.array(seq, dtype=np.intp), goal,
         not (last.column and last.end[2] < last.start[2]), kinematics.slowing_m_s2,
@@ -232,7 +234,7 @@ def _track(vehicle: Vehicle, line: _Line, goal: int, flight: Flight, kinematics:
 def _airspeeds(points: Floats, kinematics: Kinematics) -> Floats:
     """(N - 1, 2) the highest airspeeds along each piece: level at its altitude, and on its slope."""
     way = np.diff(points, axis=0)
-    rise = way[:, 2] / np.maximum(np.linalg.norm(way, axis=1), SAME_M)
+    rise = way[:, 2] / np.maximum(np.linalg.norm(way, axis=1), STANDS_M)
     each = zip(rise.tolist(), points[1:, 2].tolist(), strict=True)
     return np.array([(kinematics.airspeed_on(0.0, z), kinematics.airspeed_on(r, z)) for r, z in each])
 
@@ -248,7 +250,7 @@ def _left_out(flight: Flight) -> list[str]:
 
 
 def _stands(ends: Floats) -> bool:
-    return bool(np.linalg.norm(ends[1] - ends[0]) <= SAME_M)
+    return bool(np.linalg.norm(ends[1] - ends[0]) <= STANDS_M)
 
 
 def _end_of_run(stretches: Sequence[Stretch], ends: Floats, first: int) -> int:
@@ -277,7 +279,7 @@ def _end_of_flight(stretches: Sequence[Stretch], first: int) -> int:
 
 
 def _slants(ends: Floats) -> bool:
-    return bool(np.hypot(*(ends[1] - ends[0])[:2]) > SAME_M)
+    return bool(np.hypot(*(ends[1] - ends[0])[:2]) > STANDS_M)
 
 
 def _column(line: _Line, ends: Floats, s: Stretch, kinematics: Kinematics, home_amsl_m: float | None) -> None:
@@ -364,3 +366,31 @@ def _over_ground(line: _Line, to: Floats, s: Stretch, kinematics: Kinematics, co
     agl = here[2] - ground[0]
     for point in np.column_stack([en, ground + agl + f * (to[2] - agl)])[1:]:
         line.add(point, s, kinematics, corner_m_s=corner_m_s)
+
+
+def _as_measured(s: Stretch, mission: Mission, world: World) -> Stretch:
+    """Return a leg with its true speed over ground, because ArduPilot flies the commanded speed in its own metres.
+
+    Those are measured on a sphere, from home; longitudes are scaled by the cosine of the latitude midway between home
+    and the way point (`Location::get_vector_xy_from_origin_NE`).
+    """
+    if s.column:
+        return s
+    home_lat, home_lon = mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7
+
+    def from_home(lat: float, lon: float) -> tuple[float, float]:
+        east = math.remainder(lon - home_lon, 360.0) * math.cos(math.radians(lat + home_lat) / 2.0)
+        return east * SCALING_M_PER_DEGREE, (lat - home_lat) * SCALING_M_PER_DEGREE
+
+    counted_m = math.dist(from_home(*s.start[:2]), from_home(*s.end[:2]))
+    places = np.array([s.start[:2], s.end[:2]])
+    true_m = math.dist(*world.frame.to_plane(places[:, 0], places[:, 1]).tolist())
+    return s if counted_m <= STANDS_M else replace(s, speed_m_s=s.speed_m_s * true_m / counted_m)
+
+
+def _in_thin_air(s: Stretch, kinematics: Kinematics) -> Stretch:
+    """Return a stretch with the true airspeed at its middle in place of the indicated one, and rates to match."""
+    kelvin_per_288 = 1.0 - 0.0065 * 0.5 * (s.start[2] + s.end[2]) / 288.15
+    faster = kelvin_per_288 ** (-0.5 * (9.80665 / (287.053 * 0.0065) - 1.0))  # the standard atmosphere
+    climb, descent = s.rates_m_s or (kinematics.climb_m_s, kinematics.descent_m_s)
+    return replace(s, speed_m_s=s.speed_m_s * faster, rates_m_s=(climb * faster, descent * faster))

@@ -15,13 +15,16 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.commands import flown_in_order
-from gcsplan.check.geodesy import offset_m
+from gcsplan.check.geodesy import flat_m, offset_m
+from gcsplan.check.stretch import Place
 from gcsplan.errors import GcsplanError, LinkError, UsageError, VehicleRefused
 from gcsplan.mavlink.link.frames import signing_key
 from gcsplan.mavlink.link.link import Channel, Link, PumpJob, Steps, pump
@@ -38,9 +41,8 @@ from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.sim.flight.trace import Trace
 from gcsplan.sim.flight.wind import Weather
 from gcsplan.sim.outcome import Rehearsal, Tally, Terms
-from gcsplan.sim.part import Part, energy_of
+from gcsplan.sim.part import RehearsalPart, energy_of
 from gcsplan.sim.sitl.flight_watch import FlightWatch
-from gcsplan.sim.sitl.planes import arrival_s, is_column, is_over
 from gcsplan.sim.sitl.wind_parameters import change_steps, wind_parameters, wind_vector
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.world import World
@@ -49,7 +51,7 @@ __all__ = ["rehearse_sitl", "require_here"]
 
 _ARMS_IN = {Autopilot.ARDUCOPTER: 4, Autopilot.ARDUPLANE: 0}
 """Custom modes in which a vehicle can be armed, and from which MISSION_START leads to AUTO: GUIDED, MANUAL."""
-_READY_S, _SILENT_S, _ARM_S, _ANSWER_S = 180.0, 30.0, 120.0, 3.0
+_READY_S, SILENT_S, ARM_S, _COMMAND_ANSWER_S = 180.0, 30.0, 120.0, 3.0
 _RATE_US = 100_000.0
 _ARMED_MS = 3000
 """Milliseconds from arming to MISSION_START: ArduCopter's motors do not turn for 2 s (ARMING_DELAY_SEC)."""
@@ -62,6 +64,12 @@ LIFT_S = 1.6
 _ODD_LIFT_S = 0.7
 _LATE = 1.5
 _SPARE_S = 300.0
+CIRCLE_RADII = 1.5
+"""A plane is at a circle within so many radii of its centre: it flew circles with 1.12 of the radius asked for."""
+LEAST_REACH_M = 100.0
+_CIRCLES = frozenset({cmd.LOITER_UNLIM, cmd.LOITER_TURNS, cmd.LOITER_TIME, cmd.LOITER_TO_ALT})
+CIRCLES_S = 60.0
+"""Seconds for which it is watched at its goal or, after an RTL, at home."""
 
 
 @dataclass(slots=True)
@@ -91,7 +99,7 @@ def require_here(urls: Sequence[str]) -> None:
 
 
 def rehearse_sitl(
-    parts: Sequence[Part],
+    parts: Sequence[RehearsalPart],
     world: World,
     terms: Terms,
     seats: Mapping[str, str],
@@ -158,7 +166,7 @@ def rehearse_sitl(
     return tally.result("sitl", seed if wind else 0, weather.as_dict() if wind else {}, [()] * len(parts))
 
 
-def _spent_j(trace: Trace, part: Part, weather: Weather, seed: int) -> float:
+def _spent_j(trace: Trace, part: RehearsalPart, weather: Weather, seed: int) -> float:
     """What a flight took, J: by its time, and the metres through the mean wind."""
     held_s = math.fsum(leg.hold_s * leg.times for leg in part.verdict.legs if math.isfinite(leg.hold_s))
     held_s = min(held_s, trace.end_s - trace.begin_s)
@@ -185,7 +193,7 @@ def _all(jobs: list[PumpJob[Any]]) -> list[Any]:
 
 
 def _ready(
-    channel: Channel, part: Part, report: Callable[[str, str], None], *, i_know: bool
+    channel: Channel, part: RehearsalPart, report: Callable[[str, str], None], *, i_know: bool
 ) -> Steps[tuple[VehicleState, list[str]]]:
     """Wait until the vehicle has a position and a home, and make sure that it is a simulator and not armed.
 
@@ -219,11 +227,11 @@ def _ready(
 
 
 def _fly(
-    channel: Channel, part: Part, state: VehicleState, world: World, report: Callable[[str, str], None]
+    channel: Channel, part: RehearsalPart, state: VehicleState, world: World, report: Callable[[str, str], None]
 ) -> Steps[_Log]:
     """Arm, start, and record until the vehicle is down, or at its goal if it stays in the air."""
     to, name, log = state.address, part.vehicle.name, _Log(FlightWatch(part.mission))
-    pilot = _Pilot(channel, to, log)
+    pilot = _SitlPilot(channel, to, log)
     for message, every_us in (
         (dialect.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, _RATE_US), (dialect.MAVLINK_MSG_ID_MISSION_CURRENT, _RATE_US)
     ):  # fmt: skip
@@ -234,7 +242,7 @@ def _fly(
     yield from pilot.insist(dialect.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
     armed_ms = pilot.boot_ms
     while pilot.boot_ms < armed_ms + _ARMED_MS:
-        yield from pilot.listen(_ANSWER_S)
+        yield from pilot.listen(_COMMAND_ANSWER_S)
     yield from pilot.insist(dialect.MAV_CMD_MISSION_START)
     report(name, "flies")
     planned_s = part.verdict.time_s if part.arrive_s is None else part.arrive_s - part.depart_s + part.verdict.time_s
@@ -244,7 +252,7 @@ def _fly(
     last = flown_in_order(part.mission)[-1].command
     item = 0
     while True:
-        yield from pilot.listen(_ANSWER_S)
+        yield from pilot.listen(_COMMAND_ANSWER_S)
         if item != pilot.item:
             item = pilot.item
             report(name, f"flies item {item}")
@@ -269,7 +277,7 @@ def _fly(
             return log
 
 
-class _Pilot:
+class _SitlPilot:
     """Sends commands to one vehicle and records its messages; its methods are generators of `link.Steps`."""
 
     def __init__(self, channel: Channel, to: Address, log: _Log) -> None:
@@ -281,7 +289,7 @@ class _Pilot:
         self.boot_ms, self.item = 0, 0
 
     def listen(self, within_s: float) -> Steps[None]:
-        """Record messages; return as soon as one came, or after ``within_s``. Raises LinkError after `_SILENT_S`."""
+        """Record messages; return as soon as one came, or after ``within_s``. Raises LinkError after `SILENT_S`."""
         clock = self._channel.link.clock
         if not self._channel.waits:
             yield clock() + within_s
@@ -289,9 +297,9 @@ class _Pilot:
             if heard.source == self._to:
                 self._heard_at = clock()
                 self._note(heard.message)
-        if clock() - self._heard_at > _SILENT_S:
+        if clock() - self._heard_at > SILENT_S:
             raise LinkError(
-                f"system {self._to.sysid} has been silent for {_SILENT_S:g} s in the middle of the rehearsal",
+                f"system {self._to.sysid} has been silent for {SILENT_S:g} s in the middle of the rehearsal",
                 where=self._channel.link.url,
             )
 
@@ -328,7 +336,7 @@ class _Pilot:
         self._results.pop(command, None)
         p = (*params, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)[:7]
         self._channel.send(dialect.MAVLink_command_long_message(*self._to, command, 0, *p), self._to)
-        end = clock() + _ANSWER_S
+        end = clock() + _COMMAND_ANSWER_S
         while command not in self._results and clock() < end:
             yield from self.listen(end - clock())
         return self._results.get(command)
@@ -336,10 +344,10 @@ class _Pilot:
     def insist(self, command: int, *params: float) -> Steps[None]:
         """Send a command until it is accepted; an autopilot that has just got its position does not arm at once.
 
-        Raises VehicleRefused after `_ARM_S`.
+        Raises VehicleRefused after `ARM_S`.
         """
         clock = self._channel.link.clock
-        end = clock() + _ARM_S
+        end = clock() + ARM_S
         while True:
             result = yield from self.command(command, *params)
             if result == dialect.MAV_RESULT_ACCEPTED:
@@ -359,7 +367,7 @@ class _Pilot:
 # -- what was flown -------------------------------------------------------------------------------------------------
 
 
-def _goal(part: Part) -> tuple[float, float, float]:
+def _goal(part: RehearsalPart) -> tuple[float, float, float]:
     """Return the end of the path: latitude, longitude, amsl_m."""
     legs = part.verdict.path_legs or part.verdict.legs
     return legs[-1].end
@@ -369,7 +377,7 @@ def _apart_m(a: tuple[float, float, float], b: tuple[float, float, float]) -> fl
     return math.hypot(*offset_m(a, b), b[2] - a[2])
 
 
-def _trace(log: _Log, part: Part, world: World) -> Trace:
+def _trace(log: _Log, part: RehearsalPart, world: World) -> Trace:
     """Return the positions as a trace in the fleet's time, from leaving the ground to the end."""
     name = part.vehicle.name
     if len(log.places) < 2:
@@ -406,3 +414,53 @@ def _trace(log: _Log, part: Part, world: World) -> Trace:
         arrive_s, _SLACK_M, np.full(len(times) - begin - 1, _SLACK_M),
         not log.down and last not in (cmd.LAND, cmd.RTL) and not part.leaves, part.leaves, log.watch.why(height_m),
     )  # fmt: skip
+
+
+# -- a plane: when it arrives at its goal, at which it does not stop, and when its flight is over --------------------
+
+
+def reach_m(part: RehearsalPart) -> float:
+    """How near to its goal, m, a plane is there."""
+    return max(LEAST_REACH_M, CIRCLE_RADII * part.vehicle.turn_radius_m)
+
+
+def arrival_s(part: RehearsalPart, times_s: Floats, apart_m: Floats, speed_m_s: Floats) -> float:
+    """When it is at its goal: where it is nearest to it, seconds; NaN if it never comes within `reach_m`.
+
+    A plane that is to circle about its goal turns aside before: it has arrived when it would have been there.
+    """
+    inside = apart_m <= reach_m(part)
+    if not inside.any():
+        return math.nan
+    first = nearest = int(inside.argmax())
+    while nearest + 1 < len(apart_m) and apart_m[nearest + 1] < apart_m[nearest]:
+        nearest += 1
+    if flown_in_order(part.mission)[-1].command in _CIRCLES:
+        return float(times_s[first] + apart_m[first] / max(float(speed_m_s[first]), 1.0))
+    return float(times_s[nearest])
+
+
+def is_column(part: RehearsalPart, points: Floats, items: Indices) -> Bools:
+    """(M - 1,) whether each piece between M points belongs to the climb-out or the glide.
+
+    A plane climbs out faster than planned: it is in its climb-out as long as the planned one is, whatever it flies to.
+    """
+    climb_out = takewhile(lambda leg: leg.column, part.verdict.legs)
+    climb_out_m = math.fsum(leg.horizontal_m for leg in climb_out)
+    flown_m = np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))
+    landing = part.mission.first_seq + len(part.mission.items) - 1
+    glides = (items[:-1] == landing) & (flown_in_order(part.mission)[-1].command == cmd.LAND)
+    return np.asarray((flown_m <= climb_out_m) | glides)
+
+
+def is_over(part: RehearsalPart, places: Sequence[Place], boot_ms: Sequence[int], goal: Place) -> bool:
+    """Whether it has been at the end of its flight for `CIRCLES_S`; a landing ends otherwise."""
+    last = flown_in_order(part.mission)[-1].command
+    home = part.mission.home
+    end = (home.lat_e7 / 1e7, home.lon_e7 / 1e7, home.amsl_m) if last == cmd.RTL else goal
+    if last == cmd.LAND or flat_m(places[-1], end) > reach_m(part):
+        return False
+    since = len(places) - 1
+    while since > 0 and boot_ms[-1] - boot_ms[since - 1] <= 1000.0 * CIRCLES_S:
+        since -= 1
+    return boot_ms[-1] - boot_ms[since] >= 990.0 * CIRCLES_S and flat_m(places[since], end) <= reach_m(part)

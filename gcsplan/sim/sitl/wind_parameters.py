@@ -16,9 +16,9 @@ from gcsplan.mavlink.link.watch import VehicleState
 from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA
 from gcsplan.sim.flight.wind import Weather
 
-NAMES = ("SIM_WIND_SPD", "SIM_WIND_DIR", "SIM_WIND_TURB", "SIM_WIND_T")
+WIND_PARAMETERS = ("SIM_WIND_SPD", "SIM_WIND_DIR", "SIM_WIND_TURB", "SIM_WIND_T")
 _SAME_AT_EVERY_HEIGHT = 1.0
-_TRIES, _ANSWER_S = 5, 2.0
+PARAMETER_TRIES, PARAMETER_ANSWER_S = 5, 2.0
 
 
 def wind_parameters(weather: Weather, seed: int) -> dict[str, float]:
@@ -32,7 +32,7 @@ def wind_parameters(weather: Weather, seed: int) -> dict[str, float]:
         return {}
     from_deg = _from_deg(weather, seed)
     values = (weather.wind_m_s, (from_deg + 180.0) % 360.0 - 180.0, math.sqrt(2.0) * weather.gusts_m_s)
-    return dict(zip(NAMES, (*values, _SAME_AT_EVERY_HEIGHT), strict=True))
+    return dict(zip(WIND_PARAMETERS, (*values, _SAME_AT_EVERY_HEIGHT), strict=True))
 
 
 def _from_deg(weather: Weather, seed: int) -> float:
@@ -65,9 +65,9 @@ def change_steps(channel: Channel, state: VehicleState, values: Mapping[str, flo
 def _until(channel: Channel, state: VehicleState, message: Any, name: str, value: float | None) -> Steps[float]:
     """Send a message until the parameter has ``value`` (None: any), and return what it has."""
     clock = channel.link.clock
-    for _ in range(_TRIES):
+    for _ in range(PARAMETER_TRIES):
         channel.send(message, state.address)
-        end = clock() + _ANSWER_S
+        end = clock() + PARAMETER_ANSWER_S
         while clock() < end:
             yield end
             told = _told(channel, name)

@@ -1,7 +1,7 @@
 """ArduPilot's side of the mission protocol: three independent lists, requested with the legacy MISSION_REQUEST.
 
 Source: ArduPilot 4.6.2 and 4.7 ``MissionItemProtocol.cpp`` with its three subclasses, ``AP_Mission.cpp`` and
-``GCS_Common.cpp``; `firmware` states what differs between the two. `board` states the rules of the tables.
+``GCS_Common.cpp``; `firmware` states what differs between the two. `stored_lists` states the rules of the tables.
 """
 
 from __future__ import annotations
@@ -21,23 +21,11 @@ from gcsplan.mavlink.protocol.messages import (
     Request,
     RequestList,
 )
+from gcsplan.mavlink.protocol.outcome import ACCEPTED, CANCELLED, DENIED, ERROR, INVALID_SEQUENCE, NO_SPACE, UNSUPPORTED
 from gcsplan.sim.vehicle import ardupilot_storage as storage
 from gcsplan.sim.vehicle.firmware import COUNTS_EVERY_LIST, KEEPS_HOME, KEEPS_RADII, TAKES_ARCS, Firmware
 from gcsplan.sim.vehicle.misbehaviour import Faults
-from gcsplan.sim.vehicle.stored_lists import (
-    ACCEPTED,
-    CANCELLED,
-    DENIED,
-    ERROR,
-    INVALID_SEQUENCE,
-    NO_SPACE,
-    UNSUPPORTED,
-    Board,
-    Out,
-    Phase,
-    Refused,
-    through_float,
-)
+from gcsplan.sim.vehicle.stored_lists import Board, ItemRefused, Out, Phase, through_float
 
 
 class ArduPilotServer:
@@ -170,7 +158,7 @@ class _ArduPilotList:
             return self._deny(message, sender, now)
         try:
             self._store(message)
-        except Refused as refused:
+        except ItemRefused as refused:
             self._phase = Phase.IDLE
             return [(sender, self._ack(refused.code))]
         self._heard_at = now
@@ -189,7 +177,7 @@ class _ArduPilotList:
         elif message.seq == len(stored):
             stored.append(kept)
         else:
-            raise Refused(ERROR)
+            raise ItemRefused(ERROR)
 
     def _kept(self, message: Item) -> MissionItem:
         if self._type == FENCE:
@@ -201,7 +189,7 @@ class _ArduPilotList:
         if kept.command == cmd.DO_JUMP:
             target, known = kept.params[0], max(len(self._board.lists[MISSION]), self._count)
             if target == 0 or target >= known:
-                raise Refused(ERROR)
+                raise ItemRefused(ERROR)
         return kept
 
     def _finish(self, sender: Address) -> Out:

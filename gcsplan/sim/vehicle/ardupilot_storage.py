@@ -8,27 +8,28 @@ Source: ArduPilot 4.6, ``AP_Mission.cpp`` (`sanity_check_params`, `mavlink_int_t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import FENCE, GLOBAL, MISSION, RALLY, RELATIVE, TERRAIN, Home, MissionItem, float32
+from gcsplan.mavlink.protocol.outcome import INVALID, UNSUPPORTED, UNSUPPORTED_FRAME
 from gcsplan.sim.vehicle.stored_lists import (
-    INVALID,
     INVALID_PARAM1,
     INVALID_X,
     INVALID_Y,
     INVALID_Z,
-    UNSUPPORTED,
-    UNSUPPORTED_FRAME,
-    Refused,
+    NOTHING_KEPT,
+    ItemRefused,
+    ParamsKept,
+    as_flag,
+    as_sent,
+    lost,
 )
 
 FLT_EPSILON = 1.1920929e-07
 
 
 # ── how one param is stored ───────────────────────────────────────────────────────────────────────────────────────
-
-Keep = Callable[[float], float]
 
 
 def _whole(value: float) -> int:
@@ -52,14 +53,6 @@ def _i16(value: float) -> float:
     return float((_whole(value) + 0x8000 & 0xFFFF) - 0x8000)
 
 
-def _same(value: float) -> float:
-    return value
-
-
-def _zero(value: float) -> float:
-    return 0.0
-
-
 def _byte_capped(value: float) -> float:
     return min(255.0, _u16(value))
 
@@ -76,116 +69,111 @@ def _land_sign(value: float) -> float:
     return -1.0 if value <= -FLT_EPSILON else 1.0
 
 
-def _positive(value: float) -> float:
-    return 1.0 if value > 0 else 0.0
-
-
-_NOTHING = (_zero, _zero, _zero, _zero)
-_FIRST_U16 = (_u16, _zero, _zero, _zero)
+_FIRST_U16 = (_u16, lost, lost, lost)
 
 # Commands with a location: latitude, longitude, altitude and frame are stored, and each param as listed here.
-_LOCATED: dict[int, tuple[Keep, Keep, Keep, Keep]] = {
+_ARDUPILOT_LOCATED: dict[int, ParamsKept] = {
     cmd.WAYPOINT: _FIRST_U16,  # waypoint: hold
-    cmd.LOITER_UNLIM: (_zero, _zero, _signed_u16, _zero),  # loiter unlimited: radius
-    cmd.LOITER_TURNS: _NOTHING,  # loiter turns: `_loiter_turns`
-    cmd.LOITER_TIME: (_u16, _zero, _sign, _positive),  # loiter time
-    cmd.LAND: (_u16, _zero, _zero, _land_sign),  # land: the yaw reads back as 1
+    cmd.LOITER_UNLIM: (lost, lost, _signed_u16, lost),  # loiter unlimited: radius
+    cmd.LOITER_TURNS: NOTHING_KEPT,  # loiter turns: `_loiter_turns`
+    cmd.LOITER_TIME: (_u16, lost, _sign, as_flag),  # loiter time
+    cmd.LAND: (_u16, lost, lost, _land_sign),  # land: the yaw reads back as 1
     cmd.TAKEOFF: _FIRST_U16,  # take-off
     cmd.CONTINUE_AND_CHANGE_ALT: _FIRST_U16,
-    cmd.LOITER_TO_ALT: (_zero, _signed_u16, _zero, _positive),
+    cmd.LOITER_TO_ALT: (lost, _signed_u16, lost, as_flag),
     cmd.SPLINE_WAYPOINT: _FIRST_U16,  # spline waypoint
-    cmd.ARC_WAYPOINT: (_same, _same, _same, _same),
-    cmd.VTOL_TAKEOFF: _NOTHING,
+    cmd.ARC_WAYPOINT: (as_sent, as_sent, as_sent, as_sent),
+    cmd.VTOL_TAKEOFF: NOTHING_KEPT,
     cmd.VTOL_LAND: _FIRST_U16,
     cmd.GUIDED_ENABLE: _FIRST_U16,
-    cmd.PAYLOAD_PLACE: (lambda p: float32(float32(0.01) * _u16(float32(p * 100.0))), _zero, _zero, _zero),
+    cmd.PAYLOAD_PLACE: (lambda p: float32(float32(0.01) * _u16(float32(p * 100.0))), lost, lost, lost),
     cmd.DO_SET_HOME: _FIRST_U16,  # set home
-    cmd.DO_RETURN_PATH_START: _NOTHING,
-    cmd.DO_LAND_START: _NOTHING,
-    cmd.DO_GO_AROUND: _NOTHING,
+    cmd.DO_RETURN_PATH_START: NOTHING_KEPT,
+    cmd.DO_LAND_START: NOTHING_KEPT,
+    cmd.DO_GO_AROUND: NOTHING_KEPT,
     cmd.DO_SET_ROI_LOCATION: _FIRST_U16,
     cmd.DO_SET_ROI: _FIRST_U16,
 }
 
 # Commands without a location: they read back in frame 0 at 0, 0, 0.
-_PLACELESS: dict[int, tuple[Keep, Keep, Keep, Keep]] = {
-    cmd.RTL: _NOTHING,  # return to launch
-    cmd.ALTITUDE_WAIT: (_same, _same, _u8, _zero),
-    cmd.DELAY: (_same, _i8, _i8, _i8),  # delay: seconds, or hours, minutes, seconds UTC
-    cmd.CONDITION_DELAY: (_same, _zero, _zero, _zero),
-    cmd.CONDITION_DISTANCE: (_same, _zero, _zero, _zero),
-    cmd.CONDITION_YAW: (_same, _same, _i8, _u8),
-    cmd.DO_JUMP: (_u16, _i16, _zero, _zero),  # jump
-    cmd.DO_CHANGE_SPEED: (_u8, _same, _same, _zero),  # change speed
-    cmd.DO_SET_RELAY: (_u8, _u8, _zero, _zero),
-    cmd.DO_REPEAT_RELAY: (_u8, _i16, _same, _zero),
-    cmd.DO_SET_SERVO: (_u8, _u16, _zero, _zero),
-    cmd.DO_REPEAT_SERVO: (_u8, _u16, _i16, _same),
+_ARDUPILOT_PLACELESS: dict[int, ParamsKept] = {
+    cmd.RTL: NOTHING_KEPT,  # return to launch
+    cmd.ALTITUDE_WAIT: (as_sent, as_sent, _u8, lost),
+    cmd.DELAY: (as_sent, _i8, _i8, _i8),  # delay: seconds, or hours, minutes, seconds UTC
+    cmd.CONDITION_DELAY: (as_sent, lost, lost, lost),
+    cmd.CONDITION_DISTANCE: (as_sent, lost, lost, lost),
+    cmd.CONDITION_YAW: (as_sent, as_sent, _i8, _u8),
+    cmd.DO_JUMP: (_u16, _i16, lost, lost),  # jump
+    cmd.DO_CHANGE_SPEED: (_u8, as_sent, as_sent, lost),  # change speed
+    cmd.DO_SET_RELAY: (_u8, _u8, lost, lost),
+    cmd.DO_REPEAT_RELAY: (_u8, _i16, as_sent, lost),
+    cmd.DO_SET_SERVO: (_u8, _u16, lost, lost),
+    cmd.DO_REPEAT_SERVO: (_u8, _u16, _i16, as_sent),
     cmd.DO_SET_ROI_NONE: _FIRST_U16,
-    cmd.DO_SET_CAM_TRIGG_DIST: (_same, _zero, _u8, _zero),
+    cmd.DO_SET_CAM_TRIGG_DIST: (as_sent, lost, _u8, lost),
     cmd.DO_FENCE_ENABLE: _FIRST_U16,
     cmd.DO_PARACHUTE: _FIRST_U16,
     cmd.DO_INVERTED_FLIGHT: _FIRST_U16,
-    cmd.DO_GRIPPER: (_u8, _u8, _zero, _zero),
+    cmd.DO_GRIPPER: (_u8, _u8, lost, lost),
     cmd.DO_AUTOTUNE_ENABLE: _FIRST_U16,
     cmd.DO_PAUSE_CONTINUE: _FIRST_U16,
     cmd.DO_SET_REVERSE: _FIRST_U16,
-    cmd.SET_YAW_SPEED: (_same, _same, _u8, _zero),  # angle, speed, relative
-    cmd.DO_SEND_SCRIPT_MESSAGE: (_u16, _same, _same, _same),
-    cmd.SET_CAMERA_ZOOM: (_u8, _same, _zero, _zero),
-    cmd.SET_CAMERA_FOCUS: (_u8, _same, _zero, _zero),
-    cmd.SET_CAMERA_SOURCE: (_u8, _u8, _u8, _zero),
-    cmd.IMAGE_START_CAPTURE: (_u8, _same, _u16, _u16),  # camera, interval, how many, number of the first
+    cmd.SET_YAW_SPEED: (as_sent, as_sent, _u8, lost),  # angle, speed, relative
+    cmd.DO_SEND_SCRIPT_MESSAGE: (_u16, as_sent, as_sent, as_sent),
+    cmd.SET_CAMERA_ZOOM: (_u8, as_sent, lost, lost),
+    cmd.SET_CAMERA_FOCUS: (_u8, as_sent, lost, lost),
+    cmd.SET_CAMERA_SOURCE: (_u8, _u8, _u8, lost),
+    cmd.IMAGE_START_CAPTURE: (_u8, as_sent, _u16, _u16),  # camera, interval, how many, number of the first
     cmd.IMAGE_STOP_CAPTURE: _FIRST_U16,
-    cmd.VIDEO_START_CAPTURE: (_u8, _zero, _zero, _zero),
-    cmd.VIDEO_STOP_CAPTURE: (_u8, _zero, _zero, _zero),
-    cmd.DO_VTOL_TRANSITION: (_u8, _zero, _zero, _zero),
-    cmd.DO_WINCH: (_u8, _u8, _same, _same),
+    cmd.VIDEO_START_CAPTURE: (_u8, lost, lost, lost),
+    cmd.VIDEO_STOP_CAPTURE: (_u8, lost, lost, lost),
+    cmd.DO_VTOL_TRANSITION: (_u8, lost, lost, lost),
+    cmd.DO_WINCH: (_u8, _u8, as_sent, as_sent),
     cmd.DO_SET_RESUME_REPEAT_DIST: _FIRST_U16,
     cmd.DO_SPRAYER: _FIRST_U16,
-    cmd.DO_AUX_FUNCTION: (_u16, _u8, _zero, _zero),
-    cmd.DO_GUIDED_LIMITS: (_u16, _same, _same, _same),
-    cmd.JUMP_TAG: (_u16, _zero, _zero, _zero),
-    cmd.DO_JUMP_TAG: (_u16, _i16, _zero, _zero),
+    cmd.DO_AUX_FUNCTION: (_u16, _u8, lost, lost),
+    cmd.DO_GUIDED_LIMITS: (_u16, as_sent, as_sent, as_sent),
+    cmd.JUMP_TAG: (_u16, lost, lost, lost),
+    cmd.DO_JUMP_TAG: (_u16, _i16, lost, lost),
 }
 
 _NAN_ALLOWED = {  # indices of params that may be NaN
     cmd.WAYPOINT: {3}, cmd.LOITER_UNLIM: {3}, cmd.LAND: {3}, cmd.TAKEOFF: {3}, cmd.VTOL_TAKEOFF: {3},
     cmd.VTOL_LAND: {2, 3},
 }  # fmt: skip
-_FRAMES = {0: GLOBAL, 2: GLOBAL, 5: GLOBAL, 3: RELATIVE, 6: RELATIVE, 10: TERRAIN, 11: TERRAIN}
+_FRAME_STORED = {0: GLOBAL, 2: GLOBAL, 5: GLOBAL, 3: RELATIVE, 6: RELATIVE, 10: TERRAIN, 11: TERRAIN}
 _ALT_LIMIT_M = 83_000.0
 
 
 def keep_mission_item(item: MissionItem, *, plane: bool, arcs: bool = False) -> MissionItem:
-    """Return ``item`` as it reads back from a mission; ``arcs``: arc way points are known. Raises `Refused`."""
+    """Return ``item`` as it reads back from a mission; ``arcs``: arc way points are known. Raises `ItemRefused`."""
     allowed = _NAN_ALLOWED.get(item.command, set())
     for index, value in enumerate(item.params):
         if math.isinf(value) or (math.isnan(value) and index not in allowed):
-            raise Refused(INVALID_PARAM1 + index)
+            raise ItemRefused(INVALID_PARAM1 + index)
     if item.command in (0, 1):
-        raise Refused(INVALID)
+        raise ItemRefused(INVALID)
     if (plane and item.command == cmd.SPLINE_WAYPOINT) or (item.command == cmd.ARC_WAYPOINT and not arcs):
-        raise Refused(UNSUPPORTED)
-    if item.command in _PLACELESS:
-        keeps = _PLACELESS[item.command]
+        raise ItemRefused(UNSUPPORTED)
+    if item.command in _ARDUPILOT_PLACELESS:
+        keeps = _ARDUPILOT_PLACELESS[item.command]
         return MissionItem(item.command, GLOBAL, _kept_params(keeps, item))
-    if item.command not in _LOCATED:
-        raise Refused(UNSUPPORTED)
-    keeps = _LOCATED[item.command]
+    if item.command not in _ARDUPILOT_LOCATED:
+        raise ItemRefused(UNSUPPORTED)
+    keeps = _ARDUPILOT_LOCATED[item.command]
     if plane and item.command == cmd.WAYPOINT:
-        keeps = (_zero, _byte_capped, _byte_capped, _zero)
+        keeps = (lost, _byte_capped, _byte_capped, lost)
     _need_place(item)
     if math.isnan(item.z) or abs(item.z) >= _ALT_LIMIT_M:
-        raise Refused(INVALID_Z)
-    if item.frame not in _FRAMES:
-        raise Refused(UNSUPPORTED_FRAME)
+        raise ItemRefused(INVALID_Z)
+    if item.frame not in _FRAME_STORED:
+        raise ItemRefused(UNSUPPORTED_FRAME)
     return MissionItem(
-        item.command, _FRAMES[item.frame], _kept_params(keeps, item), item.x, item.y, in_whole_centimetres(item.z)
+        item.command, _FRAME_STORED[item.frame], _kept_params(keeps, item), item.x, item.y, in_whole_centimetres(item.z)
     )
 
 
-def _kept_params(keeps: tuple[Keep, Keep, Keep, Keep], item: MissionItem) -> tuple[float, float, float, float]:
+def _kept_params(keeps: ParamsKept, item: MissionItem) -> tuple[float, float, float, float]:
     if item.command == cmd.LOITER_TURNS:
         return _loiter_turns(item.params)
     first, second, third, fourth = (keep(value) for keep, value in zip(keeps, item.params, strict=True))
@@ -203,15 +191,15 @@ def _loiter_turns(params: tuple[float, float, float, float]) -> tuple[float, flo
     word = int(_u16(min(255.0, turns * 256.0 if part else turns)))
     word |= int(_u8(min(255.0, float32(abs(radius_m) * float32(0.1))) if far else abs(radius_m))) << 8
     size_m = (word >> 8) * (10.0 if far else 1.0)
-    return (word & 0xFF) / (256.0 if part else 1.0), 0.0, math.copysign(size_m, _sign(radius_m)), _positive(exit_from)
+    return (word & 0xFF) / (256.0 if part else 1.0), 0.0, math.copysign(size_m, _sign(radius_m)), as_flag(exit_from)
 
 
 def _need_place(item: MissionItem) -> None:
     # ArduPilot compares in float32, so the limit is inexact by some units.
     if float32(abs(item.x)) > 9e8:
-        raise Refused(INVALID_X)
+        raise ItemRefused(INVALID_X)
     if float32(abs(item.y)) > 1.8e9:
-        raise Refused(INVALID_Y)
+        raise ItemRefused(INVALID_Y)
 
 
 def in_whole_centimetres(altitude_m: float) -> float:
@@ -231,17 +219,17 @@ _CIRCLE = {cmd.CIRCLE_IN, cmd.CIRCLE_OUT}
 
 
 def keep_fence_item(item: MissionItem, *, whole_radii: bool) -> MissionItem:
-    """Return one fence item as it reads back. Raises `Refused` for mistakes that the item alone shows.
+    """Return one fence item as it reads back. Raises `ItemRefused` for mistakes that the item alone shows.
 
     Frame 2 is refused, the altitude is dropped, and frame and autocontinue read back as 0. ``whole_radii``: a radius
     less than 1 mm above whole metres is stored as an integer.
     """
-    if item.frame not in _FRAMES or item.frame == 2:
-        raise Refused(UNSUPPORTED_FRAME)
+    if item.frame not in _FRAME_STORED or item.frame == 2:
+        raise ItemRefused(UNSUPPORTED_FRAME)
     first = item.params[0]
     if item.command in _VERTEX:
         if first > 255:
-            raise Refused(INVALID_PARAM1)
+            raise ItemRefused(INVALID_PARAM1)
         kept = _u8(first)
     elif item.command in _CIRCLE:
         whole = whole_radii and 0 < first < 2**31 and first - int(first) < 0.001
@@ -249,7 +237,7 @@ def keep_fence_item(item: MissionItem, *, whole_radii: bool) -> MissionItem:
     elif item.command == cmd.FENCE_RETURN_POINT:
         kept = 0.0
     else:
-        raise Refused(UNSUPPORTED)
+        raise ItemRefused(UNSUPPORTED)
     return MissionItem(item.command, GLOBAL, (kept, 0.0, 0.0, 0.0), item.x, item.y, 0.0, autocontinue=False)
 
 
@@ -282,16 +270,16 @@ def fence_is_valid(items: Sequence[MissionItem], storage_bytes: int) -> bool:
 
 
 def keep_rally_item(item: MissionItem) -> MissionItem:
-    """Return a rally point as it reads back: whole metres, no params, autocontinue 0. Raises `Refused`."""
+    """Return a rally point as it reads back: whole metres, no params, autocontinue 0. Raises `ItemRefused`."""
     if item.command != cmd.RALLY_POINT:
-        raise Refused(UNSUPPORTED)
+        raise ItemRefused(UNSUPPORTED)
     _need_place(item)
     if item.z < -32768 or item.z > 32767:
-        raise Refused(INVALID_Z)
-    if item.frame not in _FRAMES or item.frame == 2:
-        raise Refused(UNSUPPORTED_FRAME)
+        raise ItemRefused(INVALID_Z)
+    if item.frame not in _FRAME_STORED or item.frame == 2:
+        raise ItemRefused(UNSUPPORTED_FRAME)
     return MissionItem(
-        item.command, _FRAMES[item.frame], (0.0, 0.0, 0.0, 0.0), item.x, item.y, _i16(item.z), autocontinue=False
+        item.command, _FRAME_STORED[item.frame], (0.0, 0.0, 0.0, 0.0), item.x, item.y, _i16(item.z), autocontinue=False
     )
 
 

@@ -16,12 +16,12 @@ import dataclasses
 import random
 from collections.abc import Callable, Mapping, Sequence
 
-from gcsplan.mavlink.mission.mission import MISSION, Home, MissionItem
+from gcsplan.mavlink.mission.mission import MISSION, Home, Mission, MissionItem
 from gcsplan.mavlink.protocol.messages import Ack, Address, Count, Item, MissionMessage, Packet, Request, RequestList
 from gcsplan.sim.vehicle.ardupilot_protocol import ArduPilotServer
 from gcsplan.sim.vehicle.ardupilot_storage import home_item
 from gcsplan.sim.vehicle.firmware import Firmware, firmware_of
-from gcsplan.sim.vehicle.misbehaviour import Channel, Faults, Misbehaviour, spoilt
+from gcsplan.sim.vehicle.misbehaviour import Faults, LossyChannel, Misbehaviour, spoilt
 from gcsplan.sim.vehicle.px4_protocol import Px4Server
 from gcsplan.sim.vehicle.stored_lists import Board, MissionServer
 from gcsplan.vehicle import Autopilot
@@ -67,12 +67,21 @@ class LoopbackVehicle:
             else Px4Server(self._board, faults, self.firmware)
         )
         rng = random.Random(self.misbehave.seed)
-        self._inbound, self._outbound = Channel(self.misbehave, rng), Channel(self.misbehave, rng)
+        self._inbound, self._outbound = LossyChannel(self.misbehave, rng), LossyChannel(self.misbehave, rng)
         self._dead_until: float | None = None  # None: not yet switched on
         self._ready_at = 0.0
         self._received = self._items_received = 0
         self._rebooted = False
         self._edit_due_after: int | None = 0 if self.misbehave.edit is not None else None
+
+    @classmethod
+    def for_mission(cls, mission: Mission, parameters: Mapping[str, float] | None = None) -> LoopbackVehicle:
+        """Return a vehicle that stands at the start of its mission."""
+        home = mission.home
+        return cls(
+            mission.sysid, mission.autopilot, lat_deg=home.lat_e7 / 1e7, lon_deg=home.lon_e7 / 1e7, amsl_m=home.amsl_m,
+            name=mission.name, parameters=parameters,
+        )  # fmt: skip
 
     # state for tests and servers
 

@@ -1,7 +1,7 @@
 """Intentional faults: a bad link, bad memory, a second ground station, a reboot; random ones are drawn from a seed.
 
-`Misbehaviour` holds the settings, `Faults` is their interface for the protocol machines, `Channel` is one direction of
-a bad link.
+`Misbehaviour` holds the settings, `Faults` is their interface for the protocol machines, `LossyChannel` is one
+direction of a bad link.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from gcsplan.errors import Problem, UsageError
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import MISSION, MissionItem, float32
 from gcsplan.mavlink.protocol.messages import Packet
-from gcsplan.sim.vehicle.stored_lists import Refused
+from gcsplan.sim.vehicle.stored_lists import ItemRefused
 
 FIELDS = ("x", "y", "z", "param1", "param2", "param3", "param4", "command", "frame", "autocontinue")
 
@@ -155,9 +155,9 @@ class Faults:
         return self._order.no_space
 
     def refuse(self, mission_type: int, seq: int) -> None:
-        """Raise `Refused` if the item is the one to refuse."""
+        """Raise `ItemRefused` if the item is the one to refuse."""
         if mission_type == MISSION and seq == self._order.refuse:
-            raise Refused(self._order.refuse_code)
+            raise ItemRefused(self._order.refuse_code)
 
     def spoil(self, mission_type: int, seq: int, item: MissionItem) -> MissionItem:
         """Return ``item``, or its corrupted version if it is the one to corrupt."""
@@ -189,7 +189,7 @@ def _another(value: float) -> float:
     return more if math.isfinite(more) and more != value else 0.0 if value != 0.0 else 1.0
 
 
-class Channel:
+class LossyChannel:
     """One direction of a bad link: packets come out at once, later, twice, in another order, or not at all."""
 
     OVERTAKEN_WITHIN_S = 0.2

@@ -6,32 +6,35 @@ of the names that 4.7 changed.
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from gcsplan.mavlink.mission.mission import Home, Mission
+from gcsplan.mavlink.mission.parameter_list import parameter_list
 from gcsplan.sim.vehicle.firmware import NAMES_UNITS, Firmware
-from gcsplan.vehicle import Autopilot
+from gcsplan.vehicle import DEFAULT_LEAN_DEG, LARGEST_LEAN_DEG, Autopilot, Vehicle, lean_for_deg
 
 INT32, REAL32 = 6, 9  # MAV_PARAM_TYPE
 INT8, INT16 = 2, 4
-_WHOLE = {INT8: (-(2**7), 2**7 - 1), INT16: (-(2**15), 2**15 - 1), INT32: (-(2**31), 2**31 - 1)}
+_WHOLE_RANGES = {INT8: (-(2**7), 2**7 - 1), INT16: (-(2**15), 2**15 - 1), INT32: (-(2**31), 2**31 - 1)}
 
 
 @dataclass(frozen=True, slots=True)
-class Parameter:
+class StoredParameter:
     """One value with its MAV_PARAM_TYPE."""
 
     kind: int
     value: float
 
 
-def _r(value: float) -> Parameter:
-    return Parameter(REAL32, value)
+def _r(value: float) -> StoredParameter:
+    return StoredParameter(REAL32, value)
 
 
-def _i(value: int, kind: int = INT32) -> Parameter:
-    return Parameter(kind, value)
+def _i(value: int, kind: int = INT32) -> StoredParameter:
+    return StoredParameter(kind, value)
 
 
 _ARDUPILOT = {
@@ -56,7 +59,7 @@ _ARDUPILOT = {
     "TERRAIN_SPACING": _i(100, INT16),
 }
 
-_TABLES: dict[Autopilot, dict[str, Parameter]] = {
+_PARAMETER_TABLES: dict[Autopilot, dict[str, StoredParameter]] = {
     Autopilot.ARDUCOPTER: {
         **_ARDUPILOT,
         "ANGLE_MAX": _i(3000, INT16),
@@ -145,7 +148,7 @@ _TABLES: dict[Autopilot, dict[str, Parameter]] = {
 }
 
 
-_RENAMED = {
+_RENAMED_IN_4_7 = {
     "ANGLE_MAX": ("ATC_ANGLE_MAX", 0.01), "LAND_ALT_LOW": ("LAND_ALT_LOW_M", 0.01),
     "LAND_SPEED": ("LAND_SPD_MS", 0.01), "LAND_SPEED_HIGH": ("LAND_SPD_HIGH_MS", 0.01), "RTL_ALT": ("RTL_ALT_M", 0.01),
     "RTL_ALT_FINAL": ("RTL_ALT_FINAL_M", 0.01), "RTL_CLIMB_MIN": ("RTL_CLIMB_MIN_M", 0.01),
@@ -158,11 +161,11 @@ _RENAMED = {
 """Names of 4.6 with the name in 4.7 and the factor of the value; those in another unit are floats in 4.7."""
 
 
-def _in_4_7(table: dict[str, Parameter]) -> dict[str, Parameter]:
+def _in_4_7(table: dict[str, StoredParameter]) -> dict[str, StoredParameter]:
     """Return a table of 4.6 with the names and units of 4.7."""
     renamed = {}
     for old, parameter in table.items():
-        name, factor = _RENAMED.get(old, (old, 1.0))
+        name, factor = _RENAMED_IN_4_7.get(old, (old, 1.0))
         # Hundredths are decimals: 1500 * 0.01 is not 15.
         renamed[name] = parameter if factor == 1.0 else _r(parameter.value / round(1.0 / factor))
     if "ARMING_CHECK" in renamed:  # a mask of the checks to skip, no longer of those to make
@@ -181,7 +184,7 @@ class Parameters:
         self, autopilot: Autopilot, sysid: int, firmware: Firmware, given: Mapping[str, float] | None = None
     ) -> None:
         own_id = {} if autopilot is Autopilot.PX4 else {"SYSID_THISMAV": _i(sysid, INT16)}
-        self._table = dict(sorted({**_TABLES[autopilot], **own_id}.items()))
+        self._table = dict(sorted({**_PARAMETER_TABLES[autopilot], **own_id}.items()))
         if autopilot is Autopilot.PX4:
             self._table["MAV_SYS_ID"] = _i(sysid)
         # PX4 stores an integer's bytes in the float field, ArduPilot its value.
@@ -226,9 +229,23 @@ class Parameters:
         if not -3.5e38 < value < 3.5e38:  # NaN and infinities
             return False
         if parameter.kind != REAL32:
-            low, high = _WHOLE[parameter.kind]
+            low, high = _WHOLE_RANGES[parameter.kind]
             value = float(int(value))
             if not low <= value <= high:
                 return False
-        self._table[name] = Parameter(parameter.kind, value)
+        self._table[name] = StoredParameter(parameter.kind, value)
         return True
+
+
+def set_up(vehicle: Vehicle, home: Home) -> dict[str, float]:
+    """The parameters of a simulated vehicle that is set up as its mission file says, by their first names."""
+    listed = parameter_list(Mission(vehicle.autopilot, home, ()), vehicle)
+    return {s.parameter.names[0].name: s.parameter.names[0].value(s.value) for s in listed}
+
+
+def lean_parameters(mission: Mission) -> dict[str, float]:
+    """The parameters that a copter of this mission has: it leans as far as its speed needs."""
+    if mission.autopilot is not Autopilot.ARDUCOPTER:
+        return {}
+    lean_deg = min(max(DEFAULT_LEAN_DEG, math.ceil(lean_for_deg(mission.commanded_m_s))), LARGEST_LEAN_DEG)
+    return {"ANGLE_MAX": 100.0 * lean_deg}

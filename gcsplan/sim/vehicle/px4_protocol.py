@@ -1,6 +1,7 @@
 """PX4's side of the mission protocol: one transfer at a time, in order, and the new list replaces the old at the end.
 
-Source: PX4 1.16 to main ``mavlink_mission.cpp`` and ``mavlink_mission.h``. `board` states the rules of the table.
+Source: PX4 1.16 to main ``mavlink_mission.cpp`` and ``mavlink_mission.h``. `stored_lists` states the rules of the
+table.
 """
 
 from __future__ import annotations
@@ -21,21 +22,11 @@ from gcsplan.mavlink.protocol.messages import (
     Request,
     RequestList,
 )
+from gcsplan.mavlink.protocol.outcome import ACCEPTED, CANCELLED, ERROR, NO_SPACE, UNSUPPORTED
 from gcsplan.sim.vehicle import px4_storage as storage
 from gcsplan.sim.vehicle.firmware import TAKES_ARM_ITEMS, TAKES_AUTOTUNE_ITEMS, Firmware
 from gcsplan.sim.vehicle.misbehaviour import Faults
-from gcsplan.sim.vehicle.stored_lists import (
-    ACCEPTED,
-    CANCELLED,
-    ERROR,
-    NO_SPACE,
-    UNSUPPORTED,
-    Board,
-    Out,
-    Phase,
-    Refused,
-    through_float,
-)
+from gcsplan.sim.vehicle.stored_lists import Board, ItemRefused, Out, Phase, through_float
 
 _COMMANDS = {cmd.COMPONENT_ARM_DISARM: TAKES_ARM_ITEMS, cmd.DO_AUTOTUNE_ENABLE: TAKES_AUTOTUNE_ITEMS}
 """Commands that not every version takes."""
@@ -146,7 +137,7 @@ class Px4Server:
         try:
             self._faults.refuse(self._type, message.seq)
             kept = storage.keep_item(message.item, self._type, unknown=self._unknown)
-        except Refused as refused:
+        except ItemRefused as refused:
             self._phase = Phase.IDLE
             return self._answer(refused.code, sender)
         self._new.append(self._faults.spoil(self._type, message.seq, kept))

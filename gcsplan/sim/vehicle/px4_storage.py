@@ -6,25 +6,20 @@ Source: PX4 ``mavlink_mission.cpp`` (`parse_mavlink_mission_item`, `format_mavli
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Container
+from collections.abc import Container
 
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, NO_POSITION, RALLY, MissionItem, float32
-from gcsplan.sim.vehicle.stored_lists import ERROR, INVALID_PARAM1, UNSUPPORTED, UNSUPPORTED_FRAME, Refused
-
-Keep = Callable[[float], float]
-
-
-def _same(value: float) -> float:
-    return value
-
-
-def _zero(value: float) -> float:
-    return 0.0
-
-
-def _positive(value: float) -> float:
-    return 1.0 if value > 0 else 0.0
+from gcsplan.mavlink.protocol.outcome import ERROR, UNSUPPORTED, UNSUPPORTED_FRAME
+from gcsplan.sim.vehicle.stored_lists import (
+    INVALID_PARAM1,
+    NOTHING_KEPT,
+    ItemRefused,
+    ParamsKept,
+    as_flag,
+    as_sent,
+    lost,
+)
 
 
 def _u16(value: float) -> float:
@@ -50,35 +45,34 @@ def _vertices(value: float) -> float:
     return _u16(value + 0.5)
 
 
-_NOTHING = (_zero, _zero, _zero, _zero)
-_HEADING_ONLY = (_zero, _zero, _zero, _heading)
+_HEADING_ONLY = (lost, lost, lost, _heading)
 
 # Commands with a location, in frames 0, 3, 5, 6: how each param reads back.
-_LOCATED: dict[int, tuple[Keep, Keep, Keep, Keep]] = {
-    cmd.WAYPOINT: (_same, _same, _zero, _heading),  # waypoint: hold, acceptance radius
-    cmd.LOITER_UNLIM: (_zero, _zero, _same, _heading),  # loiter unlimited
-    cmd.LOITER_TIME: (_same, _positive, _same, _positive),  # loiter time
-    cmd.LAND: (_zero, _u16, _zero, _heading),  # land: precision
+_PX4_LOCATED: dict[int, ParamsKept] = {
+    cmd.WAYPOINT: (as_sent, as_sent, lost, _heading),  # waypoint: hold, acceptance radius
+    cmd.LOITER_UNLIM: (lost, lost, as_sent, _heading),  # loiter unlimited
+    cmd.LOITER_TIME: (as_sent, as_flag, as_sent, as_flag),  # loiter time
+    cmd.LAND: (lost, _u16, lost, _heading),  # land: precision
     cmd.TAKEOFF: _HEADING_ONLY,  # take-off
-    cmd.LOITER_TO_ALT: (_positive, _same, _zero, _positive),
+    cmd.LOITER_TO_ALT: (as_flag, as_sent, lost, as_flag),
     cmd.VTOL_TAKEOFF: _HEADING_ONLY,
     cmd.VTOL_LAND: _HEADING_ONLY,
-    cmd.ROI: _NOTHING,
-    cmd.DO_SET_ROI: _NOTHING,
-    cmd.DO_SET_ROI_LOCATION: _NOTHING,
-    cmd.DO_AUTOTUNE_ENABLE: _NOTHING,
-    cmd.COMPONENT_ARM_DISARM: _NOTHING,
-    cmd.CONDITION_GATE: _NOTHING,
-    cmd.FENCE_RETURN_POINT: _NOTHING,
-    cmd.POLYGON_IN: (_vertices, _zero, _zero, _zero),
-    cmd.POLYGON_OUT: (_vertices, _zero, _zero, _zero),
-    cmd.CIRCLE_IN: (_same, _zero, _zero, _zero),
-    cmd.CIRCLE_OUT: (_same, _zero, _zero, _zero),
-    cmd.RALLY_POINT: _NOTHING,
+    cmd.ROI: NOTHING_KEPT,
+    cmd.DO_SET_ROI: NOTHING_KEPT,
+    cmd.DO_SET_ROI_LOCATION: NOTHING_KEPT,
+    cmd.DO_AUTOTUNE_ENABLE: NOTHING_KEPT,
+    cmd.COMPONENT_ARM_DISARM: NOTHING_KEPT,
+    cmd.CONDITION_GATE: NOTHING_KEPT,
+    cmd.FENCE_RETURN_POINT: NOTHING_KEPT,
+    cmd.POLYGON_IN: (_vertices, lost, lost, lost),
+    cmd.POLYGON_OUT: (_vertices, lost, lost, lost),
+    cmd.CIRCLE_IN: (as_sent, lost, lost, lost),
+    cmd.CIRCLE_OUT: (as_sent, lost, lost, lost),
+    cmd.RALLY_POINT: NOTHING_KEPT,
 }
 
 # Commands that PX4 accepts only in frame 2.
-_PLACELESS = frozenset({
+_PX4_PLACELESS = frozenset({
         cmd.RTL, cmd.ROI, cmd.DELAY, cmd.CONDITION_DELAY, cmd.CONDITION_DISTANCE, cmd.DO_JUMP, cmd.DO_CHANGE_SPEED,
         cmd.DO_SET_HOME, cmd.DO_SET_SERVO, cmd.DO_SET_ACTUATOR, cmd.DO_LAND_START, cmd.DO_SET_ROI_NONE,
         cmd.DO_CONTROL_VIDEO, cmd.DO_SET_ROI, cmd.DO_DIGICAM_CONTROL, cmd.DO_MOUNT_CONFIGURE,
@@ -95,18 +89,18 @@ _IN_INT_MODE = {0: 5, 5: 5, 3: 6, 6: 6}
 
 
 def keep_item(item: MissionItem, mission_type: int, *, unknown: Container[int] = ()) -> MissionItem:
-    """Return ``item`` as it reads back in MISSION_ITEM_INT: frames 0 and 3 become 5 and 6. Raises `Refused`.
+    """Return ``item`` as it reads back in MISSION_ITEM_INT: frames 0 and 3 become 5 and 6. Raises `ItemRefused`.
 
     ``unknown``: commands that this version does not know yet.
     """
     kept = _kept(item)
     if item.command in unknown:
-        raise Refused(UNSUPPORTED)
+        raise ItemRefused(UNSUPPORTED)
     if mission_type == MISSION and item.command in _FENCE_AND_RALLY:
-        raise Refused(ERROR)
+        raise ItemRefused(ERROR)
     if mission_type == FENCE:
         if item.command in (cmd.POLYGON_IN, cmd.POLYGON_OUT) and kept.params[0] < 3:
-            raise Refused(ERROR)
+            raise ItemRefused(ERROR)
         if kept.frame != NO_POSITION:
             # PX4 stores neither "relative to home" nor autocontinue with a fence point.
             return MissionItem(kept.command, 5, kept.params, kept.x, kept.y, kept.z, autocontinue=False)
@@ -115,8 +109,8 @@ def keep_item(item: MissionItem, mission_type: int, *, unknown: Container[int] =
 
 def _kept(item: MissionItem) -> MissionItem:
     if item.frame == NO_POSITION:
-        if item.command not in _PLACELESS:
-            raise Refused(UNSUPPORTED)
+        if item.command not in _PX4_PLACELESS:
+            raise ItemRefused(UNSUPPORTED)
         _need_mode(item, (0, 1, 2))
         params = item.params
         if item.command == cmd.DO_JUMP:
@@ -124,12 +118,12 @@ def _kept(item: MissionItem) -> MissionItem:
         x, y = _through_float(item.x), _through_float(item.y)  # PX4 stores them as float32 in this frame
         return MissionItem(_renamed(item), NO_POSITION, params, x, y, item.z, item.autocontinue)
     if item.frame not in _IN_INT_MODE:
-        raise Refused(UNSUPPORTED_FRAME)
-    if item.command not in _LOCATED:
-        raise Refused(UNSUPPORTED)
+        raise ItemRefused(UNSUPPORTED_FRAME)
+    if item.command not in _PX4_LOCATED:
+        raise ItemRefused(UNSUPPORTED)
     _need_mode(item, (0, 3))
     first, second, third, fourth = (
-        keep(value) for keep, value in zip(_LOCATED[item.command], item.params, strict=True)
+        keep(value) for keep, value in zip(_PX4_LOCATED[item.command], item.params, strict=True)
     )
     frame = _IN_INT_MODE[item.frame]
     return MissionItem(_renamed(item), frame, (first, second, third, fourth), item.x, item.y, item.z, item.autocontinue)
@@ -139,7 +133,7 @@ def _need_mode(item: MissionItem, modes: tuple[int, ...]) -> None:
     """Refuse a region of interest whose mode, param1, does not go with its frame."""
     mode = item.params[0]
     if item.command in (cmd.ROI, cmd.DO_SET_ROI) and (not math.isfinite(mode) or int(mode) not in modes):
-        raise Refused(INVALID_PARAM1)
+        raise ItemRefused(INVALID_PARAM1)
 
 
 def _renamed(item: MissionItem) -> int:

@@ -14,15 +14,17 @@ import multiprocessing
 import socket
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from multiprocessing.connection import Connection
 from types import TracebackType
 
 from gcsplan.errors import LinkError, UsageError
 from gcsplan.mavlink.link.url import parse_url
+from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.sim.vehicle.hub import Hub
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
-from gcsplan.sim.vehicle.sockets import TcpTransport, Transport, UdpTransport
+from gcsplan.sim.vehicle.parameters import lean_parameters
+from gcsplan.sim.vehicle.sockets import ServerTransport, TcpTransport, UdpTransport
 
 _START_WAIT_S = 30.0  # for a process, which must import everything first
 
@@ -135,6 +137,14 @@ def serve(
             time.sleep(3600)
 
 
+@contextlib.contextmanager
+def loopback_fleet(missions: Sequence[Mission]) -> Iterator[str]:
+    """Serve a vehicle for each mission on one free port of this machine; yield the URL at which all of them answer."""
+    vehicles = [LoopbackVehicle.for_mission(mission, lean_parameters(mission)) for mission in missions]
+    with SimServer(vehicles, "udpin:127.0.0.1:0") as server:
+        yield server.url_for_gcs
+
+
 def _serve_in_child(vehicles: Sequence[LoopbackVehicle], url: str, speedup: float, pipe: Connection) -> None:
     try:
         server = SimServer(vehicles, url, speedup=speedup).start()
@@ -161,7 +171,7 @@ def _parsed(url: str) -> tuple[str, tuple[str, int]]:
         raise LinkError(f"there is no host {endpoint.host!r}: {error.strerror or error}", where=url) from error
 
 
-def _opened(kind: str, place: tuple[str, int]) -> Transport:
+def _opened(kind: str, place: tuple[str, int]) -> ServerTransport:
     host = place[0]
     try:
         if kind == "tcpin":
@@ -179,7 +189,7 @@ def _opened(kind: str, place: tuple[str, int]) -> Transport:
 class _Loop:
     """Waits for bytes and timers, and passes both to the hub."""
 
-    def __init__(self, hub: Hub, transport: Transport, speedup: float) -> None:
+    def __init__(self, hub: Hub, transport: ServerTransport, speedup: float) -> None:
         self._hub, self.transport, self._speedup = hub, transport, speedup
         self._wake, self._woken = socket.socketpair()
         self._stopping = False

@@ -15,7 +15,7 @@ _MOST_CONNECTIONS = 16
 _UNSENT_LIMIT = 1 << 20  # bytes that a slow TCP client may leave unread before it is dropped
 
 
-class Transport(Protocol):
+class ServerTransport(Protocol):
     """The interface of a socket that a server needs."""
 
     address: tuple[str, int]

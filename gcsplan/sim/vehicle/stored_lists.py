@@ -8,6 +8,7 @@ an entry is ignored, as the autopilot ignores it. (2) A handler returns the mess
 from __future__ import annotations
 
 import zlib
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import Protocol
@@ -15,15 +16,37 @@ from typing import Protocol
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, Home, MissionItem, float32
 from gcsplan.mavlink.protocol.messages import Address, MissionMessage
 
-# MAV_MISSION_RESULT.
-ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, NO_SPACE, INVALID = 0, 1, 2, 3, 4, 5
+# MAV_MISSION_RESULT, the codes of which `gcsplan.mavlink.protocol.outcome` has no name.
 INVALID_PARAM1, INVALID_PARAM2, INVALID_PARAM3, INVALID_PARAM4, INVALID_X, INVALID_Y, INVALID_Z = range(6, 13)
-INVALID_SEQUENCE, DENIED, CANCELLED = 13, 14, 15
 
 Out = list[tuple[Address, MissionMessage]]
 
 
-class Refused(Exception):
+ParamKept = Callable[[float], float]
+"""How one param reads back."""
+ParamsKept = tuple[ParamKept, ParamKept, ParamKept, ParamKept]
+"""How each of an item's four params reads back."""
+
+
+def as_sent(value: float) -> float:
+    """A param that is kept as a float."""
+    return value
+
+
+def lost(value: float) -> float:
+    """A param that is not kept."""
+    return 0.0
+
+
+def as_flag(value: float) -> float:
+    """A param of which is kept whether it is above 0."""
+    return 1.0 if value > 0 else 0.0
+
+
+NOTHING_KEPT: ParamsKept = (lost, lost, lost, lost)
+
+
+class ItemRefused(Exception):
     """The autopilot refuses the item; ``code`` is the MAV_MISSION_RESULT that it answers."""
 
     def __init__(self, code: int) -> None:

@@ -31,7 +31,7 @@ from gcsplan.world.terrain_grid import (
 
 CACHE_BLOCKS = 12  # TERRAIN_CACHE_SZ, default
 REQUEST_EVERY_S = 2.0
-AROUND = 0.7  # of a block's size: where the blocks around the vehicle are looked up (update_surrounding_tiles)
+AROUND_BLOCKS = 0.7  # of a block's size: where the blocks around the vehicle are looked up (update_surrounding_tiles)
 AROUND_WAY_POINT = 10.0  # spacings, at 45°, 135° …
 
 
@@ -61,7 +61,7 @@ class TerrainMemory:
         """Want the blocks around the vehicle; and those around its way points, one after another, as there is room."""
         for north in (-1, 0, 1):
             for east in (-1, 0, 1):
-                away = (north * POSTS[0] * AROUND * self.grid.spacing_m, east * POSTS[1] * AROUND * self.grid.spacing_m)
+                away = (m * AROUND_BLOCKS * self.grid.spacing_m for m in (north * POSTS[0], east * POSTS[1]))
                 self.read(*_moved(home.lat_e7, home.lon_e7, *away))
         if self.pending:
             return

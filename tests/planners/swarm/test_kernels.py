@@ -20,8 +20,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.native import cache
-from gcsplan.native.__main__ import ALL
-from gcsplan.native.kernel_unit import Unit
+from gcsplan.native.__main__ import KERNEL_UNITS
+from gcsplan.native.kernel_unit import KernelUnit
 from gcsplan.native.signature import Held
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.swarm import cost_kernels as k
@@ -67,9 +67,9 @@ def plain_terms(cost: Cost, controls: np.ndarray) -> np.ndarray:
     return out
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", KERNEL_UNITS)
 def test_what_is_shipped_was_made_from_the_source_as_it_stands(name: str) -> None:
-    unit: Unit = importlib.import_module(ALL[name]).UNIT
+    unit: KernelUnit = importlib.import_module(KERNEL_UNITS[name]).UNIT
     made_of = json.loads(unit.shipped.read_bytes().partition(b"\n")[0])["sources"]
     assert made_of == unit.digest(), f"run python -m gcsplan.native {name}"
 

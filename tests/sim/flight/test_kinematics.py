@@ -14,8 +14,8 @@ from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.sim.flight.kinematics import Kinematics
-from gcsplan.sim.flight.mission_flight import STEP_S, Flown, fly
-from gcsplan.sim.flight.track import Track, make_track
+from gcsplan.sim.flight.mission_flight import FLIGHT_STEP_S, FlownLanes, fly
+from gcsplan.sim.flight.track import CommandedTrack, make_track
 from gcsplan.sim.flight.wind import Weather
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World
@@ -41,13 +41,13 @@ def delay(seconds: float) -> MissionItem:
 
 def track(
     *items: MissionItem, vehicle: Vehicle = COPTER, world: World = FLAT, rtl_rel_home_m: float | None = None
-) -> Track:
+) -> CommandedTrack:
     lat, lon = (float(x) for x in FLAT.frame.to_degrees(0.0, 0.0))
     mission = Mission(vehicle.autopilot, Home.at(lat, lon, GROUND_M), items)
     return make_track(mission, vehicle, world, Kinematics.of(vehicle), rtl_rel_home_m=rtl_rel_home_m)
 
 
-def speed_at(flown: Flown, along_m: float) -> float:
+def speed_at(flown: FlownLanes, along_m: float) -> float:
     """Speed of the only lane where it has come so far along its track."""
     s = flown.along_m[:, 0]
     j = int(np.searchsorted(s, along_m))
@@ -268,7 +268,7 @@ def test_a_quarter_of_the_step_flies_the_same(monkeypatch: pytest.MonkeyPatch) -
         speed(4), at(cmd.WAYPOINT, 500, 0, 50), at(cmd.LAND, 500, 0, 0),
     )  # fmt: skip
     coarse = fly([way], [0.0])
-    monkeypatch.setattr("gcsplan.sim.flight.mission_flight.STEP_S", STEP_S / 4)
+    monkeypatch.setattr("gcsplan.sim.flight.mission_flight.FLIGHT_STEP_S", FLIGHT_STEP_S / 4)
     fine = fly([way], [0.0])
     assert coarse.arrive_s[0] == pytest.approx(fine.arrive_s[0], abs=0.03)
     assert coarse.end_s[0] == pytest.approx(fine.end_s[0], abs=0.05)

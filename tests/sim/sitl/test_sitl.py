@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import socket
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,19 +21,17 @@ from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.sim.flight.wind import Weather
-from gcsplan.sim.part import Part
+from gcsplan.sim.part import RehearsalPart
 from gcsplan.sim.sitl import instances, terrain_files
-from gcsplan.sim.sitl.airframes import heading_of, parameters_of
 from gcsplan.sim.sitl.flight_watch import FlightWatch
-from gcsplan.sim.sitl.planes import arrival_s, is_column, is_over, reach_m
+from gcsplan.sim.sitl.flights import arrival_s, is_column, is_over, reach_m
+from gcsplan.sim.sitl.instances import heading_of, parameters_of
 from gcsplan.sim.sitl.terrain_files import write_ground
-from gcsplan.sim.sitl.wind_parameters import NAMES, change_steps, wind_parameters
-from gcsplan.sim.vehicle import hub
+from gcsplan.sim.sitl.wind_parameters import WIND_PARAMETERS, change_steps, wind_parameters
+from gcsplan.sim.vehicle import telemetry
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
-from gcsplan.sim.vehicle.parameters import REAL32, Parameter
+from gcsplan.sim.vehicle.parameters import REAL32, Parameters, StoredParameter
 from gcsplan.sim.vehicle.server import SimServer
-from gcsplan.sim.vehicle.sockets import TcpTransport
-from gcsplan.sim.vehicle.telemetry import Telemetry
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.cell import Cell
 from gcsplan.world.limits import Limits
@@ -49,7 +48,7 @@ def ramp(slope: float = 0.1) -> Any:
     return world(lambda e, n: 500.0 - slope * e, half_m=3000.0)
 
 
-def a_part(where: Any, autopilot: Autopilot = COPTER, frame: int = m.RELATIVE, **craft: Any) -> Part:
+def a_part(where: Any, autopilot: Autopilot = COPTER, frame: int = m.RELATIVE, **craft: Any) -> RehearsalPart:
     vehicle = Vehicle(
         "uav1", 1, autopilot, Limits(10.0, track_error_m=3.0, altitude_error_m=5.0), speed_max_m_s=8.0, **craft
     )  # fmt: skip
@@ -60,7 +59,7 @@ def a_part(where: Any, autopilot: Autopilot = COPTER, frame: int = m.RELATIVE, *
 
     items = (at(cmd.TAKEOFF, 0.0, 60.0), at(cmd.WAYPOINT, 1500.0, 60.0), at(cmd.LAND, 1500.0, 0.0))
     mission = Mission(autopilot, m.Home.at(LAT, LON, where.ground_amsl(LAT, LON)), items, "uav1")
-    return Part(vehicle, mission, judge(mission, vehicle, where))
+    return RehearsalPart(vehicle, mission, judge(mission, vehicle, where))
 
 
 # -- parameters --------------------------------------------------------------------------------------------------------
@@ -93,20 +92,17 @@ def test_a_plane_gets_its_circle_its_speeds_and_the_direction_of_its_take_off() 
 
 def test_a_taken_port_is_passed_over_without_a_call() -> None:
     """An SITL that waits for its ground station ends when a caller leaves."""
-    free = instances._free(60)
-    taken = TcpTransport(("127.0.0.1", instances._port(free)))
-    try:
-        assert instances._free(free) > free
-        taken._listening.settimeout(0.05)
+    free = instances.free_instance(60)
+    with socket.create_server(("127.0.0.1", instances.port_of(free))) as taken:
+        assert instances.free_instance(free) > free
+        taken.settimeout(0.05)
         with pytest.raises(TimeoutError):
-            taken._listening.accept()
-    finally:
-        taken.close()
+            taken.accept()
 
 
 def test_an_sitl_counts_its_instances_in_a_byte(tmp_path: Path) -> None:
     """Number 256 would listen at the port of number 0."""
-    assert instances._LAST_INSTANCE < 256
+    assert instances.LAST_INSTANCE < 256
     with (
         pytest.raises(UsageError, match="at most 236 vehicles at once, and there are 237"),
         instances.sitl_instances(tmp_path, [a_part(ramp())] * 237),
@@ -160,18 +156,18 @@ def test_a_long_flight_gets_posts_farther_apart_and_too_long_a_one_is_refused(
 ) -> None:
     where = ramp()
     part = a_part(where)
-    monkeypatch.setattr(terrain_files, "MOST_BLOCKS", 8)
+    monkeypatch.setattr(terrain_files, "MOST_IN_FILES", 8)
     assert 30 < write_ground(part, where, tmp_path)["TERRAIN_SPACING"] < 500
-    monkeypatch.setattr(terrain_files, "MOST_BLOCKS", 0)
+    monkeypatch.setattr(terrain_files, "MOST_IN_FILES", 0)
     with pytest.raises(InputError, match="uav1: its flight is too long"):
         write_ground(part, where, tmp_path / "no")
     assert not (tmp_path / "no").exists()
 
 
-def test_no_terrain_is_written_where_none_is_known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_terrain_is_written_where_none_is_known(tmp_path: Path) -> None:
     where = ramp()
-    monkeypatch.setattr(terrain_files, "_ground", lambda *_: np.full(_[1].shape, np.nan))
-    assert write_ground(a_part(where), where, tmp_path) == {"TERRAIN_ENABLE": 0, "SIM_TERRAIN": 0}
+    unknown = world(lambda e, n: math.nan * e, half_m=3000.0)
+    assert write_ground(a_part(where), unknown, tmp_path) == {"TERRAIN_ENABLE": 0, "SIM_TERRAIN": 0}
     assert list(tmp_path.iterdir()) == []
 
 
@@ -182,7 +178,7 @@ def test_a_weather_is_told_in_sitls_parameters() -> None:
     assert wind_parameters(Weather(), 1) == {}
     assert wind_parameters(Weather(noise_m=1.0), 1) == {}
     given = wind_parameters(Weather(6.0, 270.0, 1.0), 1)
-    assert given == pytest.approx(dict(zip(NAMES, (6.0, -90.0, math.sqrt(2.0), 1.0), strict=True)))
+    assert given == pytest.approx(dict(zip(WIND_PARAMETERS, (6.0, -90.0, math.sqrt(2.0), 1.0), strict=True)))
     drawn = wind_parameters(Weather(6.0), 7)
     assert drawn == wind_parameters(Weather(6.0), 7)
     assert drawn != wind_parameters(Weather(6.0), 8)
@@ -190,25 +186,25 @@ def test_a_weather_is_told_in_sitls_parameters() -> None:
 
 
 def test_parameters_are_set_and_told_as_they_were(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Windy(Telemetry):
-        def __init__(self, vehicle: LoopbackVehicle) -> None:
-            super().__init__(vehicle)
-            self.parameters._table |= {name: Parameter(REAL32, 0.25) for name in NAMES}
+    class Windy(Parameters):
+        def __init__(self, *of_vehicle: Any) -> None:
+            super().__init__(*of_vehicle)
+            self._table |= {name: StoredParameter(REAL32, 0.25) for name in WIND_PARAMETERS}
 
-    monkeypatch.setattr(hub, "Telemetry", Windy)
+    monkeypatch.setattr(telemetry, "Parameters", Windy)
     vehicle = LoopbackVehicle(1, COPTER, lat_deg=LAT, lon_deg=LON, amsl_m=500.0)
     with SimServer([vehicle], "udpin:127.0.0.1:0") as server, Link(server.url_for_gcs) as link:
         state = discover(link, 1, 5.0, listen_s=0.0)
         wanted = wind_parameters(Weather(6.0, 10.0, 1.0), 1)
         assert run(link.channel(1), change_steps(link.channel(1), state, {})) == {}
         channel = link.channel(1)
-        assert run(channel, change_steps(channel, state, wanted)) == dict.fromkeys(NAMES, 0.25)
-        assert run(channel, change_steps(channel, state, dict.fromkeys(NAMES, 0.25))) == pytest.approx(wanted)
+        assert run(channel, change_steps(channel, state, wanted)) == dict.fromkeys(WIND_PARAMETERS, 0.25)
+        assert run(channel, change_steps(channel, state, dict.fromkeys(WIND_PARAMETERS, 0.25))) == pytest.approx(wanted)
 
 
 def test_what_takes_no_wind_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gcsplan.sim.sitl.wind_parameters._TRIES", 2)
-    monkeypatch.setattr("gcsplan.sim.sitl.wind_parameters._ANSWER_S", 0.05)
+    monkeypatch.setattr("gcsplan.sim.sitl.wind_parameters.PARAMETER_TRIES", 2)
+    monkeypatch.setattr("gcsplan.sim.sitl.wind_parameters.PARAMETER_ANSWER_S", 0.05)
     vehicle = LoopbackVehicle(1, COPTER, lat_deg=LAT, lon_deg=LON, amsl_m=500.0)
     with SimServer([vehicle], "udpin:127.0.0.1:0") as server, Link(server.url_for_gcs) as link:
         state = discover(link, 1, 5.0, listen_s=0.0)

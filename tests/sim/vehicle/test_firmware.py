@@ -3,11 +3,20 @@
 from __future__ import annotations
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mav
 
 from gcsplan.errors import UsageError
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, MissionItem
 from gcsplan.mavlink.protocol.messages import Ack, ClearAll, Count, Item, MissionMessage, Request, RequestList
-from gcsplan.sim.vehicle.firmware import CHANGES, KNOWN, NAMES_UNITS, Change, Firmware, firmware_of, firmwares
+from gcsplan.sim.vehicle.firmware import (
+    FIRMWARE_CHANGES,
+    KNOWN_FIRMWARE,
+    NAMES_UNITS,
+    Firmware,
+    FirmwareChange,
+    firmware_of,
+    firmwares,
+)
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.telemetry import Telemetry
 from gcsplan.vehicle import Autopilot
@@ -158,9 +167,10 @@ def test_ardupilot_does_not_count_home_among_the_items_of_its_mission() -> None:
 
 @pytest.mark.parametrize("autopilot", list(Autopilot))
 def test_a_vehicle_names_its_version(autopilot: Autopilot) -> None:
-    for firmware in KNOWN["ArduPilot" if autopilot.is_ardupilot else "PX4"]:
+    for firmware in KNOWN_FIRMWARE["ArduPilot" if autopilot.is_ardupilot else "PX4"]:
         telemetry = Telemetry(a_vehicle(autopilot, firmware.name))
-        number = telemetry._autopilot_version(0.0).flight_sw_version
+        (told,) = telemetry.answer(mav.MAVLink_autopilot_version_request_message(1, 1), 0.0)
+        number = told.flight_sw_version
         assert (number >> 24, number >> 16 & 255) == firmware.version
 
 
@@ -171,8 +181,8 @@ def test_a_version_counts_for_the_vehicles_that_have_it() -> None:
         firmwares([COPTER], "1.18")
 
 
-@pytest.mark.parametrize("change", CHANGES, ids=lambda change: change.what)
-def test_each_change_divides_the_known_versions_of_its_family(change: Change) -> None:
-    have = {f.has(change) for f in KNOWN[change.family]}
+@pytest.mark.parametrize("change", FIRMWARE_CHANGES, ids=lambda change: change.what)
+def test_each_change_divides_the_known_versions_of_its_family(change: FirmwareChange) -> None:
+    have = {f.has(change) for f in KNOWN_FIRMWARE[change.family]}
     assert have == {True, False}
     assert not Firmware("other", (99, 0)).has(change)
