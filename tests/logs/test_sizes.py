@@ -13,7 +13,7 @@ from pymavlink.DFReader import DFReader_binary
 from gcsplan.errors import InputError
 from gcsplan.logs import csv_log, dataflash, flight_log, reader, tlog
 from gcsplan.logs.reader import read_log
-from tests.logs import test_fit as flights
+from tests.support import flight_logs as flights
 
 HEADER = "time_s,lat,lon,alt_m,power_w\n"
 

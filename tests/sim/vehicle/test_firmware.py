@@ -20,7 +20,7 @@ from gcsplan.sim.vehicle.firmware import (
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.telemetry import Telemetry
 from gcsplan.vehicle import Autopilot
-from tests.sim.vehicle.test_vehicle import download, say, upload, waypoint
+from tests.support.loopback import download, say, upload, waypoint
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
 KINDS = (MISSION, FENCE, RALLY)
