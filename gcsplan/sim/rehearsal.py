@@ -171,21 +171,26 @@ def on_board(parts: Sequence[RehearsalPart]) -> list[Mission]:
     if len(set(names)) != len(names):
         raise InputError(f"every vehicle needs a name of its own, given {', '.join(names)}")
     with SimServer(vehicles, "udpin:127.0.0.1:0") as server, Link(server.url_for_gcs) as link:
-        orders = [
-            UploadOrder(
-                link, p.mission, p.verdict,
-                SessionOptions(unchecked=p.verdict.safe is None, listen_s=0.0, read_parameters=False, simulated=True),
-            )
-            for p in parts
-        ]  # fmt: skip
-        for result in upload_fleet(orders):
-            if isinstance(result, GcsplanError):
-                raise result
-            result.raise_for_outcome()
+        upload_parts(parts, [link] * len(parts))
     return [
         Mission.from_wire(v.autopilot, v.items(), home=v.home, name=p.mission.name, sysid=v.sysid)
         for v, p in zip(vehicles, parts, strict=True)
     ]
+
+
+def upload_parts(parts: Sequence[RehearsalPart], links: Sequence[Link]) -> None:
+    """Upload each part's mission over its link to a simulator. Raises what an upload raises."""
+    orders = [
+        UploadOrder(
+            link, p.mission, p.verdict,
+            SessionOptions(unchecked=p.verdict.safe is None, listen_s=0.0, read_parameters=False, simulated=True),
+        )
+        for link, p in zip(links, parts, strict=True)
+    ]  # fmt: skip
+    for result in upload_fleet(orders):
+        if isinstance(result, GcsplanError):
+            raise result
+        result.raise_for_outcome()
 
 
 def track_of(part: RehearsalPart, mission: Mission, world: World, airspeed_m_s: float | None) -> CommandedTrack:

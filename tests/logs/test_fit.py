@@ -27,7 +27,7 @@ def log_of(t: Floats, place: Floats, watts: Floats) -> FlightLog:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_what_a_flight_was_made_with_is_found_within_two_percent_at_five_percent_noise(seed: int) -> None:
+def test_a_flights_coefficients_are_found_within_2_percent_at_5_percent_noise(seed: int) -> None:
     found = fit_energy([log_of(*flown(seed=seed))])
     assert within(found)
     assert found.told

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from gcsplan.native import cache
-from gcsplan.native.kernel_unit import compilation_told
-from tests.support.toy_kernels import kernels, ship, value
+from gcsplan.native.kernel_unit import QUICK_NOTICE, compilation_told
+from tests.support.toy_kernels import kernels, notices, ship, value
 
 
 def test_kept_code_that_is_spoilt_is_compiled_again(room: Path) -> None:
@@ -26,8 +26,8 @@ def test_kept_code_that_is_spoilt_is_compiled_again(room: Path) -> None:
 def test_without_a_cache_to_write_to_kernels_are_compiled_each_time(room: Path) -> None:
     (room / "cache").write_text("a file where the folder should be", encoding="utf-8")
     ship(kernels(room))
-    value(kernels(room))
-    value(kernels(room))
+    assert notices(room) == notices(room) == [QUICK_NOTICE]
+    assert (room / "cache").is_file()
 
 
 def test_old_code_does_not_pile_up(room: Path) -> None:

@@ -58,7 +58,7 @@ def floors() -> dict[str, str]:
 
 
 @pytest.mark.parametrize("module", KERNEL_UNITS.values(), ids=KERNEL_UNITS)
-def test_every_shipped_form_names_the_llvm_that_made_it_and_the_oldest_allowed_one_reads_it(module: str) -> None:
+def test_every_shipped_form_names_its_llvm_and_the_oldest_allowed_one_reads_it(module: str) -> None:
     head = json.loads(importlib.import_module(module).UNIT.shipped.read_bytes().partition(b"\n")[0])
     assert set(head) == {"llvm", "llvmlite", "numba", "sources"}
     assert int(head["llvm"].split(".")[0]) <= FLOOR_LLVM, "raise the floor of llvmlite, or make it with an older one"

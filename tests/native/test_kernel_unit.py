@@ -12,7 +12,7 @@ import pytest
 
 from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE, compilation_told
 from gcsplan.world._compiled import UNIT as WORLD
-from tests.support.toy_kernels import imported_anew, kernels, ship, value, write
+from tests.support.toy_kernels import imported_anew, kernels, notices, ship, value, write
 
 
 def test_what_is_shipped_was_made_from_the_source_as_it_stands() -> None:
@@ -34,9 +34,10 @@ def test_a_kernel_from_source_from_what_is_shipped_and_from_the_cache_is_the_sam
 
 def test_a_change_of_the_source_is_never_answered_with_older_code(room: Path) -> None:
     ship(kernels(room))
-    value(kernels(room))
+    assert notices(room) == [QUICK_NOTICE]
     write(room, 3.0)
-    value(kernels(room), 3.0)
+    assert notices(room, 3.0) == [SLOW_NOTICE]
+    assert notices(room, 3.0) == []
 
 
 @pytest.mark.parametrize(
@@ -47,7 +48,7 @@ def test_what_is_shipped_may_be_missing_or_spoilt(room: Path, spoilt: bytes | No
     of = kernels(room)
     if spoilt is not None:
         of.shipped.write_bytes(spoilt)
-    value(of)
+    assert notices(room) == [SLOW_NOTICE]
 
 
 def test_threads_that_come_at_once_get_the_same_code(room: Path) -> None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from gcsplan.native import cache
+from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE
 from gcsplan.native.llvm import HostMachine
 from gcsplan.world._compiled import UNIT as WORLD
-from tests.support.toy_kernels import kernels, value
+from tests.support.toy_kernels import kernels, notices
 
 
 def test_this_llvm_reads_what_is_shipped() -> None:
@@ -23,4 +24,4 @@ def test_bitcode_that_this_llvm_cannot_read_is_made_anew_from_source(room: Path)
     digest = of.digest()
     assert digest is not None
     cache.write_shipped(of.shipped, digest, {}, b"BC\xc0\xde from the future")
-    value(of)
+    assert notices(room) == [QUICK_NOTICE, SLOW_NOTICE]

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from gcsplan.native import cache
-from gcsplan.native.kernel_unit import KernelUnit
+from gcsplan.native.kernel_unit import KernelUnit, compilation_told
 
 SOURCE = """
 from pathlib import Path
@@ -104,3 +104,11 @@ def value(of: KernelUnit, factor: float = 1.0) -> float:
     assert isinstance(out, np.ndarray)
     assert out[0] == pytest.approx(expected(given, factor), rel=1e-12)
     return float(out[0])
+
+
+def notices(room: Path, factor: float = 1.0) -> list[str]:
+    """What is said of compiling while the kernel, imported anew, is called: each notice without the unit's name."""
+    said: list[str] = []
+    with compilation_told(said.append):
+        value(kernels(room), factor)
+    return [words.rpartition(":")[0] for words in said]

@@ -25,11 +25,10 @@ from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.commands import flown_in_order
 from gcsplan.check.geodesy import flat_m, offset_m
 from gcsplan.check.stretch import Place
-from gcsplan.errors import GcsplanError, LinkError, UsageError, VehicleRefused
+from gcsplan.errors import LinkError, UsageError, VehicleRefused
 from gcsplan.mavlink.link.frames import signing_key
 from gcsplan.mavlink.link.link import Channel, Link, PumpJob, Steps, pump
 from gcsplan.mavlink.link.parameters import settings_words
-from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet
 from gcsplan.mavlink.link.steps import discover_steps, parameter_steps
 from gcsplan.mavlink.link.url import parse_url
 from gcsplan.mavlink.link.watch import VehicleState, Watch
@@ -42,6 +41,7 @@ from gcsplan.sim.flight.trace import Trace
 from gcsplan.sim.flight.wind import Weather
 from gcsplan.sim.outcome import Rehearsal, Tally, Terms
 from gcsplan.sim.part import RehearsalPart, energy_of
+from gcsplan.sim.rehearsal import upload_parts
 from gcsplan.sim.sitl.flight_watch import FlightWatch
 from gcsplan.sim.sitl.wind_parameters import change_steps, wind_parameters, wind_vector
 from gcsplan.vehicle import Autopilot
@@ -133,20 +133,7 @@ def rehearse_sitl(
         channels = [links[seats[p.vehicle.name]].channel(p.vehicle.sysid) for p in parts]
         found = _all([PumpJob(c, _ready(c, p, said, i_know=i_know)) for c, p in zip(channels, parts, strict=True)])
         states: list[VehicleState] = [state for state, _ in found]
-        for result in upload_fleet(
-            [
-                UploadOrder(
-                    c.link, p.mission, p.verdict,
-                    SessionOptions(
-                        unchecked=p.verdict.safe is None, listen_s=0.0, read_parameters=False, simulated=True
-                    ),
-                )
-                for c, p in zip(channels, parts, strict=True)
-            ]
-        ):  # fmt: skip
-            if isinstance(result, GcsplanError):
-                raise result
-            result.raise_for_outcome()
+        upload_parts(parts, [channel.link for channel in channels])
         weather = weather or Weather()
         wind = wind_parameters(weather, seed)
         calm = _all([PumpJob(c, change_steps(c, s, wind)) for c, s in zip(channels, states, strict=True)])

@@ -26,7 +26,7 @@ def delay(seconds: float) -> MissionItem:
 
 @pytest.mark.first_quick
 @pytest.mark.parametrize(("leg_m", "measured_m_s"), [(60.0, 7.0), (100.0, 4.0), (150.0, 3.0)])
-def test_a_lower_speed_commanded_on_the_move_takes_hold_as_slowly_as_on_a_real_arducopter(
+def test_a_lower_speed_on_the_move_takes_hold_as_slowly_as_on_a_real_arducopter(
     leg_m: float, measured_m_s: float
 ) -> None:
     way = track(

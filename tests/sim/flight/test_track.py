@@ -19,7 +19,7 @@ from tests.support import worlds
 from tests.support.short_flights import CLIMB_S, COPTER, GROUND_M, TAKEOFF, at, speed, speed_at, track
 
 
-def test_a_right_angle_is_rounded_two_metres_from_its_way_point_at_the_speed_of_the_arc() -> None:
+def test_a_right_angle_is_rounded_two_metres_off_at_the_speed_of_the_arc() -> None:
     way = track(TAKEOFF, at(cmd.WAYPOINT, 0, 500, 50), at(cmd.WAYPOINT, 500, 500, 50))
     nearest_m = np.linalg.norm(way.points - [0, 500, GROUND_M + 50], axis=1).min()
     assert nearest_m == pytest.approx(2.0, abs=0.05)
@@ -55,7 +55,7 @@ def test_a_speed_counts_in_the_metres_of_the_autopilot(lat_deg: float, autopilot
         assert flown.command_m_s[-1] == pytest.approx(8.0 * ratio, rel=2e-5)
 
 
-def test_a_change_of_pitch_alone_costs_nothing_and_a_way_point_on_a_straight_line_neither() -> None:
+def test_neither_a_change_of_pitch_nor_a_way_point_on_a_line_costs_time() -> None:
     straight = fly([track(TAKEOFF, at(cmd.WAYPOINT, 0, 800, 50))], [0.0])
     cut = fly([track(TAKEOFF, at(cmd.WAYPOINT, 0, 300, 50), at(cmd.WAYPOINT, 0, 800, 50))], [0.0])
     assert cut.arrive_s[0] == pytest.approx(straight.arrive_s[0], abs=0.05)

@@ -14,7 +14,7 @@ from gcsplan.sim.sitl.flights import arrival_s, is_column, is_over, reach_m
 from tests.support.sitl_parts import PLANE, a_part, ramp
 
 
-def test_a_plane_arrives_where_it_is_nearest_and_at_a_circle_when_it_would_be_at_its_centre() -> None:
+def test_a_plane_arrives_where_it_is_nearest_or_would_be_at_a_circles_centre() -> None:
     part = a_part(ramp(), PLANE, turn_radius_m=100.0)
     times, speed = np.arange(0.0, 60.0), np.full(60, 20.0)
     passes = np.hypot(20.0 * (times - 40.0), 4.0)

@@ -20,7 +20,7 @@ from tests.support.sitl_parts import a_part, ramp
 from tests.support.worlds import world
 
 
-def test_along_and_beside_the_flight_the_autopilot_reads_the_missions_ground_less_than_a_metre_higher(
+def test_the_autopilot_reads_the_missions_ground_within_a_metre_about_the_flight(
     tmp_path: Path,
 ) -> None:
     where = ramp()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gcsplan.mavlink.mission.mission import FENCE, RALLY, MissionItem
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, Home, MissionItem
 from gcsplan.mavlink.protocol.messages import (
     Ack,
     ClearAll,
@@ -14,8 +14,13 @@ from gcsplan.mavlink.protocol.messages import (
     Request,
     RequestList,
 )
+from gcsplan.sim.vehicle.ardupilot_protocol import ArduPilotServer
+from gcsplan.sim.vehicle.firmware import firmware_of
+from gcsplan.sim.vehicle.misbehaviour import Faults, Misbehaviour
+from gcsplan.sim.vehicle.stored_lists import Board
 from tests.support.loopback import (
     COPTER,
+    GCS,
     OTHER_GCS,
     PX4,
     a_mission,
@@ -80,7 +85,7 @@ def test_ardupilot_answers_any_request_in_any_order() -> None:
     assert say(vehicle, Request(5)) == [Count(5), Ack(1)]
 
 
-def test_ardupilot_denies_reading_during_an_upload_only_to_those_who_ask_in_the_new_form() -> None:
+def test_during_an_upload_ardupilot_denies_reading_in_the_new_form_alone() -> None:
     vehicle = a_vehicle()
     upload(vehicle, a_mission(3))
     say(vehicle, Count(3))
@@ -108,3 +113,17 @@ def test_ardupilot_does_not_clear_a_mission_that_it_flies() -> None:
     vehicle.flying_mission = True
     assert say(vehicle, ClearAll()) == [Ack(1)]
     assert len(vehicle.items()) == 3
+
+
+def test_each_list_has_its_own_timer_and_a_reset_ends_them_all() -> None:
+    board = Board(Home(0, 0, 0.0))
+    server = ArduPilotServer(board, Faults(Misbehaviour()), firmware_of(COPTER), plane=False)
+    assert server.deadline is None
+    assert server.receive(Count(3), GCS, 10.0) == [(GCS, Request(0, legacy=True))]
+    assert server.receive(Count(2, FENCE), OTHER_GCS, 10.4) == [(OTHER_GCS, Request(0, FENCE, legacy=True))]
+    assert server.deadline == 11.0
+    assert server.on_timer(11.0) == [(GCS, Request(0, legacy=True))]
+    assert server.deadline == 11.4
+    server.reset()
+    assert server.deadline is None
+    assert server.receive(RequestList(MISSION), GCS, 12.0) == [(GCS, Count(0))]

@@ -6,11 +6,19 @@ import math
 
 import pytest
 
-from gcsplan.mavlink.mission.mission import FENCE, RALLY, MissionItem
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, MissionItem
 from gcsplan.mavlink.protocol.messages import (
     Ack,
     Request,
 )
+from gcsplan.sim.vehicle.ardupilot_storage import (
+    fence_is_valid,
+    fence_storage_bytes,
+    in_whole_centimetres,
+    keep_mission_item,
+    most_items,
+)
+from gcsplan.sim.vehicle.stored_lists import ItemRefused
 from tests.support.loopback import (
     COPTER,
     PLANE,
@@ -126,3 +134,26 @@ def test_rally_points_are_kept_in_whole_metres_on_ardupilot() -> None:
     assert upload(vehicle, [at(5100, frame=2)], RALLY) == Ack(2, RALLY)
     assert upload(vehicle, [at(5100, z=40000.0)], RALLY) == Ack(12, RALLY)
     assert upload(vehicle, [at(16)], RALLY) == Ack(3, RALLY)
+
+
+def test_a_plane_has_more_room_than_a_copter() -> None:
+    assert [most_items(kind, plane=False) for kind in (MISSION, FENCE, RALLY)] == [650, 70, 46]
+    assert [most_items(kind, plane=True) for kind in (MISSION, FENCE, RALLY)] == [655, 84, 50]
+    circles = [circle(9.0)] * 51
+    for plane, fits in ((False, 42), (True, 51)):
+        room = fence_storage_bytes(plane=plane)
+        assert fence_is_valid(circles[:fits], room)
+        assert not fence_is_valid([*circles, circle(9.0)][: fits + 1], room)
+
+
+def test_an_arc_is_kept_by_those_that_know_arcs_and_refused_by_the_others() -> None:
+    arc = at(36, 10.0, 0.5, 3.0, 4.0)
+    assert keep_mission_item(arc, plane=False, arcs=True).params == (10.0, 0.5, 3.0, 4.0)
+    with pytest.raises(ItemRefused) as refused:
+        keep_mission_item(arc, plane=False, arcs=False)
+    assert refused.value.code == 3
+
+
+@pytest.mark.parametrize(("sent_m", "centimetres"), [(17.13, 1712), (17.12, 1712), (-0.019, -1), (0.0, 0)])
+def test_an_altitude_is_cut_towards_zero_in_whole_centimetres(sent_m: float, centimetres: int) -> None:
+    assert in_whole_centimetres(sent_m) == of_cm(centimetres)

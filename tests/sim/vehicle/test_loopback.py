@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, MissionItem
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, Home, Mission, MissionItem
 from gcsplan.mavlink.protocol.messages import (
     Ack,
     Address,
@@ -18,6 +18,7 @@ from gcsplan.mavlink.protocol.messages import (
     Request,
     RequestList,
 )
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
 from tests.support.effort import draws
 from tests.support.loopback import BOTH, COPTER, GCS, PX4, a_mission, a_vehicle, download, say, upload, waypoint
@@ -43,7 +44,7 @@ def test_count_cuts_the_old_list_at_once_on_ardupilot_and_not_on_px4() -> None:
         assert len(vehicle.items()) == left
 
 
-def test_a_refused_item_leaves_a_half_replaced_mission_on_ardupilot_and_the_old_one_on_px4() -> None:
+def test_a_refused_item_leaves_half_a_new_mission_on_ardupilot_the_old_one_on_px4() -> None:
     new = [waypoint(100 + i) for i in range(6)]
     new[4] = MissionItem(9999, 2)
     for autopilot, expected in ((COPTER, [101, 102, 103, 4, 5]), (PX4, [0, 1, 2, 3, 4, 5, 6, 7])):
@@ -175,3 +176,12 @@ def test_any_item_is_kept_or_refused_and_keeping_again_changes_nothing(
         assert again.code == 0
         twice = vehicle.items(mission_type)
         assert [(i.command, i.frame, i.x, i.y) for i in twice] == [(i.command, i.frame, i.x, i.y) for i in once]
+
+
+def test_a_vehicle_for_a_mission_stands_at_its_home_under_its_name() -> None:
+    mission = Mission(PX4, Home.at(36.6, -84.38, 371.0), (waypoint(0),), "uav7", 7)
+    vehicle = LoopbackVehicle.for_mission(mission, {"NAV_ACC_RAD": 5.0})
+    assert (vehicle.sysid, vehicle.autopilot, vehicle.name) == (7, PX4, "uav7")
+    assert vehicle.home == mission.home
+    assert vehicle.parameters == {"NAV_ACC_RAD": 5.0}
+    assert vehicle.items() == ()

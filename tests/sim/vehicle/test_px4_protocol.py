@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from gcsplan.mavlink.mission.mission import MissionItem
+from gcsplan.mavlink.mission.mission import MISSION, Home, MissionItem
 from gcsplan.mavlink.protocol.messages import (
     Ack,
+    Address,
     ClearAll,
     Count,
     Item,
     Request,
     RequestList,
 )
+from gcsplan.sim.vehicle.firmware import firmware_of
+from gcsplan.sim.vehicle.misbehaviour import Faults, Misbehaviour
+from gcsplan.sim.vehicle.px4_protocol import Px4Server
+from gcsplan.sim.vehicle.stored_lists import Board
 from tests.support.loopback import OTHER_GCS, PX4, a_mission, a_vehicle, download, say, upload, waypoint
 
 
@@ -81,3 +86,24 @@ def test_clear_of_all_types_is_px4s_alone() -> None:
     assert say(a_vehicle(), ClearAll(255)) == [Ack(3, 255)]
     assert say(a_vehicle(), RequestList(7)) == [Ack(3, 7)]
     assert say(a_vehicle(), Request(0, 7)) == []
+
+
+def test_the_new_list_replaces_the_old_one_at_its_last_item() -> None:
+    board = Board(Home(0, 0, 0.0))
+    board.lists[MISSION] = [waypoint(7)]
+    server, station = Px4Server(board, Faults(Misbehaviour()), firmware_of(PX4)), Address(255, 190)
+    assert server.receive(Count(2), station, 0.0) == [(station, Request(0))]
+    assert server.receive(Item(0, waypoint(0)), station, 0.1) == [(station, Request(1))]
+    assert [i.x for i in board.lists[MISSION]] == [waypoint(7).x]
+    ((to, ack),) = server.receive(Item(1, waypoint(1)), station, 0.2)
+    assert isinstance(ack, Ack)
+    assert (to, ack.code, board.uploads) == (station, 0, 1)
+    assert [i.x for i in board.lists[MISSION]] == [waypoint(0).x, waypoint(1).x]
+    assert server.deadline is None
+
+
+def test_a_mission_type_without_a_list_has_no_space() -> None:
+    server, station = Px4Server(Board(Home(0, 0, 0.0)), Faults(Misbehaviour()), firmware_of(PX4)), Address(255, 190)
+    assert server.receive(Count(1, 7), station, 0.0) == [(station, Ack(4, 7))]
+    assert server.receive(Count(0, 7), station, 0.0) == [(station, Ack(0, 7))]
+    assert server.receive(RequestList(7), station, 0.0) == [(station, Count(0, 7, 0))]

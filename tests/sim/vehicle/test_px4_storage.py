@@ -6,10 +6,12 @@ import math
 
 import pytest
 
-from gcsplan.mavlink.mission.mission import FENCE, MissionItem
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, MissionItem
 from gcsplan.mavlink.protocol.messages import (
     Ack,
 )
+from gcsplan.sim.vehicle.px4_storage import keep_item, most_items
+from gcsplan.sim.vehicle.stored_lists import ItemRefused
 from tests.support.loopback import PX4, a_vehicle, at, circle, kept, upload, vertices
 
 
@@ -64,3 +66,20 @@ def test_px4_keeps_fences_without_their_frame_and_wants_three_vertices() -> None
     place = {"x": 366_000_000, "y": -843_800_000, "z": 9.0}
     assert vehicle.items(FENCE)[0] == MissionItem(5004, 5, (50.5, 0.0, 0.0, 0.0), **place, autocontinue=False)
     assert upload(vehicle, vertices(2, 2), FENCE) == Ack(1, FENCE)
+
+
+def test_the_most_items_of_each_list() -> None:
+    assert [most_items(kind) for kind in (MISSION, FENCE, RALLY)] == [2000, 64, 32]
+
+
+def test_a_command_that_a_version_does_not_know_is_refused() -> None:
+    arm = MissionItem(400, 2, (1.0, 0.0, 0.0, 0.0))
+    assert keep_item(arm, MISSION).params == (1.0, 0.0, 0.0, 0.0)
+    with pytest.raises(ItemRefused) as refused:
+        keep_item(arm, MISSION, unknown={400})
+    assert refused.value.code == 3
+
+
+def test_a_region_of_interest_reads_back_under_its_newer_name() -> None:
+    assert keep_item(MissionItem(80, 2), MISSION).command == 201
+    assert keep_item(MissionItem(80, 3, (3.0, 0.0, 0.0, 0.0)), MISSION).params == (0.0, 0.0, 0.0, 0.0)

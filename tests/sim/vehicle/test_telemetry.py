@@ -11,6 +11,7 @@ from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.mavlink.protocol import wire
 from gcsplan.mavlink.protocol.messages import Address, Count
 from gcsplan.sim.vehicle.hub import Hub
+from gcsplan.sim.vehicle.telemetry import Telemetry
 from gcsplan.vehicle import Autopilot
 from tests.support.hub import COPTER, GCS, PLANE, PX4, a_vehicle, ask, command, messages
 
@@ -132,3 +133,18 @@ def test_what_is_meant_for_others_is_not_answered() -> None:
     hub = Hub([a_vehicle(1)])
     assert ask(hub, command(520, sysid=2)) == []
     assert ask(hub, mav.MAVLink_param_request_list_message(2, 1)) == []
+
+
+def test_a_vehicle_tells_its_terrain_once_that_was_asked_for() -> None:
+    telemetry = Telemetry(a_vehicle())
+    kinds = {m.get_type() for m in telemetry.each_second(0.0)}
+    assert {"HEARTBEAT", "HOME_POSITION", "EXTENDED_SYS_STATE"} <= kinds
+    assert not kinds & {"TERRAIN_REPORT", "TERRAIN_REQUEST"}
+    message = command(511, 133, 100_000)  # the interval of TERRAIN_REQUEST
+    message.pack(mav.MAVLink(None, srcSystem=255, srcComponent=190))
+    (ack,) = telemetry.answer(message, 0.5)
+    assert ack.result == 0
+    assert {"TERRAIN_REPORT", "TERRAIN_REQUEST"} <= {m.get_type() for m in telemetry.each_second(1.0)}
+    assert telemetry.terrain is not None
+    assert telemetry.terrain.grid.spacing_m == 100
+    assert Telemetry(a_vehicle(2, PX4)).terrain is None
