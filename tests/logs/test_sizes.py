@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import random
 import struct
 import time
 from pathlib import Path
@@ -81,7 +81,9 @@ def test_damage_is_bounded_in_time_and_leaves_nothing_behind(name: str, kind: st
     good = flights.dataflash(tmp_path / "log.bin", flights.dataflash_rows()[:200]).read_bytes()
     if name == "log.tlog":
         good = flights.tlog(tmp_path / "log.tlog").read_bytes()[:20_000]
-    bad = {"noise": os.urandom(200_000), "unknown": b"\xa3\x95\x99" * 60_000, "zeros": bytes(200_000)}[kind]
+    bad = {"noise": random.Random(1).randbytes(200_000), "unknown": b"\xa3\x95\x99" * 60_000, "zeros": bytes(200_000)}[
+        kind
+    ]
     (tmp_path / name).write_bytes(good + bad)
     before, begun = len(list(Path("/proc/self/fd").glob("*"))) if Path("/proc").is_dir() else 0, time.process_time()
     try:
@@ -97,5 +99,6 @@ def test_damage_that_pymavlink_tells_is_counted(tmp_path: Path, monkeypatch: pyt
     file = tmp_path / "log.bin"
     head = b"\xa3\x95\x80" + struct.pack("<BB4s16s64s", 128, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")
     monkeypatch.setenv("PYMAVLINK_FAST_INDEX", "0")
-    file.write_bytes(head + os.urandom(100_000))
+    # In one of ten such noises a false message hides the damage from pymavlink; not in this one.
+    file.write_bytes(head + random.Random(1).randbytes(100_000))
     assert "10000 places are damaged" in refused(file)
