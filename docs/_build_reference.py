@@ -21,7 +21,7 @@ from gcsplan.cli import ending
 from gcsplan.mission_file import json_schema, schema, units
 from gcsplan.notes.catalogue import TEXTS
 from gcsplan.planners import registry
-from gcsplan.sim.firmware import CHANGES
+from gcsplan.sim.vehicle.firmware import FIRMWARE_CHANGES
 
 TOP = Path(__file__).resolve().parents[1]
 PACKAGE = Path(gcsplan.__file__).parent
@@ -374,7 +374,7 @@ def planners() -> str:
 def firmware_changes() -> str:
     """The table of what differs between the versions of the simulated vehicles."""
     lines = ["| since | what | before | since then |", "| --- | --- | --- | --- |"]
-    for c in CHANGES:
+    for c in FIRMWARE_CHANGES:
         lines.append(f"| {c.family} {c.since[0]}.{c.since[1]} | {c.what} | {c.before} | {c.after} |")
     return "\n".join(lines)
 

@@ -6,8 +6,8 @@ import math
 
 from gcsplan.mavlink.mission.commands import DELAY, DO_CHANGE_SPEED, LAND, TAKEOFF, WAYPOINT
 from gcsplan.mavlink.mission.mission import GLOBAL, NO_POSITION, RELATIVE, Home, Mission, MissionItem, degrees_e7
-from gcsplan.sim.misbehaviour import Misbehaviour
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
 from gcsplan.vehicle import Autopilot
 
 HOME = Home.at(36.6000123, -84.3799877, 371.25)

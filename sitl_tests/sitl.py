@@ -22,7 +22,7 @@ from gcsplan.mavlink.link.link import Link, Steps, run
 from gcsplan.mavlink.link.session import discover
 from gcsplan.mavlink.link.watch import VehicleState
 from gcsplan.mavlink.mission.autopilots import autopilot_of
-from gcsplan.sim.firmware import ARDUPILOT, KNOWN, Firmware
+from gcsplan.sim.vehicle.firmware import ARDUPILOT_FAMILY, KNOWN_FIRMWARE, Firmware
 from gcsplan.vehicle import Autopilot
 from sitl_tests.peers import free_port
 
@@ -125,7 +125,7 @@ def firmware(link: Link, state: VehicleState) -> Firmware:
     """The simulated version that is to behave like it: its own, or the newest that is not newer."""
     number = run(link.channel(state.address.sysid), _flight_sw_version(link, state))
     version = (number >> 24, number >> 16 & 255)
-    return max((f for f in KNOWN[ARDUPILOT] if f.version <= version), key=lambda f: f.version)
+    return max((f for f in KNOWN_FIRMWARE[ARDUPILOT_FAMILY] if f.version <= version), key=lambda f: f.version)
 
 
 def _flight_sw_version(link: Link, state: VehicleState) -> Steps[int]:

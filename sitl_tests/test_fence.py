@@ -14,7 +14,7 @@ from gcsplan.mavlink.link.link import Link
 from gcsplan.mavlink.link.session import SessionOptions, clear_mission, download_items, upload_items
 from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.mavlink.mission.mission import FENCE, Mission
-from gcsplan.sim.server import SimServer
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Polygon, Zone

@@ -6,17 +6,15 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
-import pytest
 
 from gcsplan.check.judge import judge
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
-from gcsplan.sim import sitl as flown
 from gcsplan.sim.outcome import Terms
-from gcsplan.sim.part import Part
-from gcsplan.sim.sitl_instances import sitl_instances
-from gcsplan.sim.trace import Trace
+from gcsplan.sim.part import RehearsalPart
+from gcsplan.sim.sitl.flights import rehearse_sitl
+from gcsplan.sim.sitl.instances import sitl_instances
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
 from sitl_tests import sitl
@@ -26,7 +24,7 @@ TRACK_ERROR_M = 3.0
 
 
 @sitl.needs(Autopilot.ARDUCOPTER, program=True)
-def test_a_real_arducopter_flies_splines_and_jumps_as_they_are_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_real_arducopter_flies_splines_and_jumps_as_they_are_judged() -> None:
     where = world(half_m=1500.0)
     craft = Vehicle(
         "uav1", 1, Autopilot.ARDUCOPTER, Limits(10.0, track_error_m=TRACK_ERROR_M, altitude_error_m=5.0),
@@ -47,20 +45,11 @@ def test_a_real_arducopter_flies_splines_and_jumps_as_they_are_judged(monkeypatc
     mission = Mission(Autopilot.ARDUCOPTER, m.Home.at(36.6, -84.3, home_amsl_m), items, "uav1")
     verdict = judge(mission, craft, where)
     assert verdict.safe is True, verdict.describe()
-    traces: list[Trace] = []
-    traced = flown._trace
-
-    def keeping(*arguments: Any) -> Trace:
-        traces.append(traced(*arguments))
-        return traces[-1]
-
-    monkeypatch.setattr(flown, "_trace", keeping)
-    part = Part(craft, mission, verdict)
+    part = RehearsalPart(craft, mission, verdict)
     binary = sitl.binary(Autopilot.ARDUCOPTER)
     assert binary is not None
     with sitl_instances(binary, [part], speedup=10.0) as seats:
-        flown.rehearse_sitl([part], where, Terms(), seats)
-    (trace,) = traces
+        (trace,) = rehearse_sitl([part], where, Terms(), seats).flown
     judged = [seq for seq, _ in groupby(leg.seq for leg in verdict.legs)]
     order = [int(seq) for seq, _ in groupby(trace.seq.tolist())]
     assert order == judged == [1, 2, 3, 4, 5, 6, 7, 8, 6, 7, 8, 10]

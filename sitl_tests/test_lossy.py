@@ -19,7 +19,7 @@ from gcsplan.mavlink.link.session import (
 from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.mavlink.mission.mission import FENCE, MissionItem
 from gcsplan.mavlink.protocol.transfer import Timers
-from gcsplan.sim.server import SimServer
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 from sitl_tests.missions import a_mission, a_vehicle
 from sitl_tests.relay import LossyRelay

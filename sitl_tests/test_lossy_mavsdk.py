@@ -8,7 +8,7 @@ from gcsplan.errors import GcsplanError
 from gcsplan.mavlink.link.link import Link
 from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet, verify_mission
 from gcsplan.mavlink.mission.mission import MISSION
-from gcsplan.sim.server import SimServer
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 from sitl_tests.missions import a_mission, a_vehicle
 from sitl_tests.peers import MavsdkVehicle, mavsdk_station, row_for

@@ -19,7 +19,7 @@ from gcsplan.mavlink.files.formats import write_waypoints
 from gcsplan.mavlink.link.link import Link
 from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet
 from gcsplan.mavlink.mission.compare import compare, faults
-from gcsplan.sim.server import SimServer
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 from sitl_tests.missions import a_mission, a_vehicle
 from sitl_tests.relay import LossyRelay

@@ -19,7 +19,7 @@ from gcsplan.mavlink.link.session import (
     verify_mission,
 )
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, TERRAIN, Mission, MissionItem
-from gcsplan.sim.server import SimServer
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 from sitl_tests.missions import HOME, a_mission, a_vehicle
 from sitl_tests.peers import MavsdkVehicle, item_of, mavsdk_station, row_for

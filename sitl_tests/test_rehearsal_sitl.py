@@ -16,8 +16,8 @@ from gcsplan.app.rehearsing import parts_of, rehearse, rehearse_in_sitl
 from gcsplan.errors import LinkError, UsageError
 from gcsplan.mavlink.mission.commands import WAYPOINT
 from gcsplan.mission_file import load_mission
-from gcsplan.sim.sitl_instances import sitl_instances
-from gcsplan.sim.wind import Weather
+from gcsplan.sim.flight.wind import Weather
+from gcsplan.sim.sitl.instances import sitl_instances
 from gcsplan.vehicle import Autopilot
 from sitl_tests import sitl
 

@@ -41,9 +41,9 @@ from gcsplan.mavlink.protocol.messages import (
     Request,
     RequestList,
 )
-from gcsplan.sim.board import DENIED, INVALID_SEQUENCE
-from gcsplan.sim.firmware import Firmware
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.mavlink.protocol.outcome import DENIED, INVALID_SEQUENCE
+from gcsplan.sim.vehicle.firmware import Firmware
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
 from sitl_tests import sitl
 

@@ -16,8 +16,8 @@ from gcsplan.app.rehearsing import rehearse_in_sitl
 from gcsplan.arrays import Floats
 from gcsplan.check.verdict import LegFigures
 from gcsplan.mission_file import load_mission
+from gcsplan.sim.flight.trace import Trace
 from gcsplan.sim.outcome import Rehearsal
-from gcsplan.sim.trace import Trace
 from gcsplan.vehicle import Autopilot
 from sitl_tests import sitl
 from tests.support.paths import REPOSITORY

@@ -20,7 +20,7 @@ from gcsplan import errors
 from gcsplan.export.summary import ORDER
 from gcsplan.mission_file import schema
 from gcsplan.planners import registry
-from gcsplan.sim.firmware import CHANGES, KNOWN
+from gcsplan.sim.vehicle.firmware import FIRMWARE_CHANGES, KNOWN_FIRMWARE
 from gcsplan.world.airspace import Kind
 from tests.support.paths import REPOSITORY
 
@@ -131,9 +131,9 @@ def test_every_planner_stands_in_the_table(made: ModuleType) -> None:
 
 
 def test_every_change_of_a_firmware_stands_in_the_table(made: ModuleType) -> None:
-    assert [cells[1] for cells in rows(made.firmware_changes())][1:] == [change.what for change in CHANGES]
+    assert [cells[1] for cells in rows(made.firmware_changes())][1:] == [change.what for change in FIRMWARE_CHANGES]
     page = (DOCS / "reference" / "simulated-vehicles.md").read_text(encoding="utf-8")
-    for versions in KNOWN.values():
+    for versions in KNOWN_FIRMWARE.values():
         assert f"| {', '.join(sorted(f.name for f in versions))} | {versions[0].name} |" in page
 
 

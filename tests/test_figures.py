@@ -26,7 +26,7 @@ from gcsplan.export.summary import write_summary
 from gcsplan.figures import counted, floored, raised, steepened
 from gcsplan.report import markup, tables
 from gcsplan.report.subject import Subject
-from gcsplan.sim.outcome import Performance, _row
+from gcsplan.sim.outcome import Performance
 from gcsplan.units import METRIC
 from tests.support.paths import DATA
 
@@ -123,7 +123,7 @@ def test_a_height_that_the_nearest_number_flatters_is_the_same_everywhere() -> N
     assert "33.460" in [row["min_agl_on_leg_m"] for row in rows]
     assert json.loads(write_summary(outputs.verdict_of("file", verdict)))["min_agl_m"] == 33.46
     flown = Performance("uav1", 0.0, None, (1.0,), (2.0,), 33.46, (0.0, 0.0), None)
-    assert _row(flown, 1)["lowest AGL, m"] == "33.4"
+    assert flown.row(1)["lowest AGL, m"] == "33.4"
 
 
 def test_csv_and_json_have_the_same_least_height() -> None:

@@ -65,7 +65,13 @@ MAY_IMPORT: dict[str, set[str]] = {
 }
 
 PROJECTION = {"world/frame.py", "world/datum.py", "world/grids.py", "world/reprojection.py", "world/terrain.py"}
-SOCKETS = {"dem/download.py", "mavlink/link/link.py", "mavlink/link/transport.py", "sim/server.py", "sim/sockets.py"}
+SOCKETS = {
+    "dem/download.py",
+    "mavlink/link/link.py",
+    "mavlink/link/transport.py",
+    "sim/vehicle/server.py",
+    "sim/vehicle/sockets.py",
+}
 NETWORK = {"socket", "socketserver", "select", "selectors", "asyncio", "ssl", "http", "urllib", "serial"}
 DEGREES = ("lat_deg", "lon_deg", "lat_e7", "lon_e7")
 MOST_LINES = 600  # of a module

@@ -29,15 +29,15 @@ from gcsplan.mavlink.mission.parameter_file import read_param_file
 from gcsplan.mavlink.mission.parameter_list import off, vehicle_on_board
 from gcsplan.mavlink.mission.return_altitude import return_on_board_m
 from gcsplan.sim.outcome import Rehearsal, Tally, Terms
-from gcsplan.sim.part import Part
+from gcsplan.sim.part import RehearsalPart
 
 if TYPE_CHECKING:
-    from gcsplan.sim.rehearsal import Block, Flights
-    from gcsplan.sim.wind import Weather
+    from gcsplan.sim.flight.wind import Weather
+    from gcsplan.sim.rehearsal import Flights, RunBlock
 
 __all__ = [
-    "Part",
     "Rehearsal",
+    "RehearsalPart",
     "Terms",
     "parameters_of",
     "parts_of",
@@ -48,16 +48,16 @@ __all__ = [
 ]
 
 
-def parts_of(planned: Plan) -> list[Part]:
+def parts_of(planned: Plan) -> list[RehearsalPart]:
     """The part of each vehicle, with its departure and arrival in the fleet's time table."""
     return [_part(planned, v) for v in planned.vehicles]
 
 
-def _part(planned: Plan, v: VehiclePlan) -> Part:
+def _part(planned: Plan, v: VehiclePlan) -> RehearsalPart:
     request = v.request
     leaves = request.end == "none"
     slot = None if planned.fleet is None else planned.fleet.slot(v.name)
-    return Part(
+    return RehearsalPart(
         request.vehicle, v.mission, v.verdict,
         depart_s=0.0 if slot is None else slot.depart_s,
         arrive_s=v.verdict.arrive_s if slot is None else slot.arrive_s,
@@ -132,7 +132,7 @@ def _outside(planned: Plan, parameters: Mapping[str, Mapping[str, float]], resul
     return replace(result, vehicles=tuple(vehicles), notes=tuple(notes))
 
 
-def _set_up(part: Part, values: Mapping[str, float]) -> Part:
+def _set_up(part: RehearsalPart, values: Mapping[str, float]) -> RehearsalPart:
     """``part``, flown as these parameters make the vehicle fly."""
     if not values:
         return part
@@ -168,7 +168,7 @@ def parameters_of(words: Sequence[str], planned: Plan) -> dict[str, Mapping[str,
     return found
 
 
-def block_of(shared: tuple[Site, Flights], block: Block) -> Tally:
+def block_of(shared: tuple[Site, Flights], block: RunBlock) -> Tally:
     """Fly and judge a block of runs, in whatever process, over the terrain that it reads itself."""
     from gcsplan.sim.rehearsal import flown
 
@@ -195,8 +195,8 @@ def rehearse_in_sitl(
     ``binary``: a program, or a folder with arducopter and arduplane; its instances have the mission's terrain. Raises
     UsageError if a vehicle has neither. See `sim.sitl` for the other arguments.
     """
-    from gcsplan.sim.sitl import rehearse_sitl, require_here
-    from gcsplan.sim.sitl_instances import SPEEDUP, sitl_instances
+    from gcsplan.sim.sitl.flights import rehearse_sitl, require_here
+    from gcsplan.sim.sitl.instances import SPEEDUP, sitl_instances
 
     parts, seats = parts_of(planned), dict(addresses or {})
     if not i_know:

@@ -16,8 +16,8 @@ from gcsplan.fleet.motion import TimedPath
 from gcsplan.report.markup import stated
 from gcsplan.report.page import render_page
 from gcsplan.report.subject import Certificate, Compared, Page, Rehearsed, Subject
+from gcsplan.sim.flight.trace import Trace
 from gcsplan.sim.outcome import Rehearsal
-from gcsplan.sim.trace import Trace
 from gcsplan.units import METRIC, Units
 
 MOST_NAMES = 100

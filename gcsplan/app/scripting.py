@@ -232,7 +232,7 @@ def upload(
     targets = uploads.targets(words, [v.request.vehicle for v in planned.vehicles])
     require_passing({v.name: v.verdict for v in planned.vehicles if v.name in targets}, allow_unjudged=allow_unjudged)
     homes = returns.judged(planned, asked=False)
-    from gcsplan.sim.loopback import loopback_fleet
+    from gcsplan.sim.vehicle.server import loopback_fleet
 
     options = UploadOptions(
         allow_armed=allow_armed, ignore_position=ignore_position, allow_parameters=allow_parameters, atomic=atomic,
@@ -258,14 +258,14 @@ def rehearse(
 ) -> Rehearsal:
     """Upload a plan to simulated vehicles, fly what they store in simulated time, and judge that; all on this machine.
 
-    Wind, gusts and position noise (`gcsplan.sim.wind.Weather`) are drawn from ``seed``, anew for each of ``runs``.
-    ``progress(done, runs)`` is called from time to time. ``jobs`` processes or the workers of ``cluster`` share the
-    runs, as in `plan`, with the same result. The result's ``safe`` is True if the arrivals were in order, and the
-    separation and every limit were kept on the flown tracks; ``error()`` states what was not kept. Raises what an
-    upload raises, CheckFailed as `upload` does for a return that is required, and InputError for invalid weather.
+    Wind, gusts and position noise (`gcsplan.sim.flight.wind.Weather`) are drawn from ``seed``, anew for each of
+    ``runs``. ``progress(done, runs)`` is called from time to time. ``jobs`` processes or the workers of ``cluster``
+    share the runs, as in `plan`, with the same result. The result's ``safe`` is True if the arrivals were in order, and
+    the separation and every limit were kept on the flown tracks; ``error()`` states what was not kept. Raises what
+    an upload raises, CheckFailed as `upload` does for a return that is required, and InputError for invalid weather.
     """
     from gcsplan.app import rehearsing
-    from gcsplan.sim.wind import Weather
+    from gcsplan.sim.flight.wind import Weather
 
     require(
         "rehearse", planned=planned, wind_m_s=wind_m_s, from_deg=from_deg, gusts_m_s=gusts_m_s, noise_m=noise_m,

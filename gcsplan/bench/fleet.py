@@ -27,7 +27,7 @@ from gcsplan.bench.fleet_missions import fleet_document
 from gcsplan.export.outdir import write_outputs, write_whole
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.mission_file import load_mission
-from gcsplan.sim.loopback import loopback_fleet
+from gcsplan.sim.vehicle.server import loopback_fleet
 
 T = TypeVar("T")
 

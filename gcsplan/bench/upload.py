@@ -25,8 +25,8 @@ from gcsplan.mavlink.mission.commands import WAYPOINT
 from gcsplan.mavlink.mission.mission import RELATIVE, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.mavlink.protocol.transfer import Accepted, Upload, VerifiedUpload
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 
 VEHICLE = Address(1, 1)

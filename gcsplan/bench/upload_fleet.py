@@ -17,9 +17,9 @@ from gcsplan.mavlink.link.link import Link
 from gcsplan.mavlink.link.results import UploadResult
 from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet
 from gcsplan.mavlink.mission.mission import Home, Mission
-from gcsplan.sim.misbehaviour import Misbehaviour
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 
 SLOWEST = 3

@@ -31,11 +31,11 @@ def sim(
     """
     from gcsplan.cli.console import remark
     from gcsplan.mavlink.mission.mission import Home
-    from gcsplan.sim.firmware import firmwares
-    from gcsplan.sim.loopback import set_up
-    from gcsplan.sim.misbehaviour import Misbehaviour
-    from gcsplan.sim.server import SimServer, serve
-    from gcsplan.sim.vehicle import LoopbackVehicle
+    from gcsplan.sim.vehicle.firmware import firmwares
+    from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+    from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
+    from gcsplan.sim.vehicle.parameters import set_up
+    from gcsplan.sim.vehicle.server import SimServer, serve
     from gcsplan.vehicle import Autopilot
 
     trouble = Misbehaviour.parse(misbehave)

@@ -83,7 +83,7 @@ def upload(
     from gcsplan.cli.home_words import say_warnings
     from gcsplan.cli.verdict_table import verdict_table
     from gcsplan.export.outdir import require_settled, steady
-    from gcsplan.sim.loopback import loopback_fleet
+    from gcsplan.sim.vehicle.server import loopback_fleet
     from gcsplan.units import units_of
 
     if (mission is None) == (not unchecked):

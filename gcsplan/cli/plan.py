@@ -356,7 +356,7 @@ def _upload(jobs: list[UploadJob], options: UploadOptions, gate: GateTime | None
     """Upload all jobs with their progress shown."""
     from gcsplan.app import uploads
     from gcsplan.cli.console import transfer_progress
-    from gcsplan.sim.loopback import loopback_fleet
+    from gcsplan.sim.vehicle.server import loopback_fleet
 
     if gate is not None:
         gate.require_ahead(datetime.now(UTC))  # planning took time, so check again

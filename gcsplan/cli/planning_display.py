@@ -16,7 +16,6 @@ from rich.text import Text
 
 from gcsplan.cli import console as words
 from gcsplan.cli.screens import aside
-from gcsplan.native import notice
 from gcsplan.planners.problem import Progress
 
 REDRAWN_HZ = 4.0
@@ -71,12 +70,14 @@ def planning_display(names: Sequence[str], objective: str = "length") -> Iterato
     On a terminal it is one line that is redrawn several times a second and disappears at the end; elsewhere a line on
     standard error every `LINE_S` seconds. The compilation of kernels, which happens once, is reported there at once.
     """
+    from gcsplan.native.kernel_unit import compilation_told
+
     board, screen = PlanningBoard(names, objective), aside
     if screen.is_terminal and not screen.is_dumb_terminal:
-        with _redrawn(board, screen), notice.told(board.note):
+        with _redrawn(board, screen), compilation_told(board.note):
             yield board.report
     else:
-        with _repeated(board), notice.told(words.remark):
+        with _repeated(board), compilation_told(words.remark):
             yield board.report
 
 

@@ -108,7 +108,7 @@ def rehearse(
     from gcsplan.cli.planning_display import planning_display
     from gcsplan.cli.work_display import WorkDisplay
     from gcsplan.export.outdir import write_whole
-    from gcsplan.sim.wind import Weather
+    from gcsplan.sim.flight.wind import Weather
 
     weather = Weather(wind, wind_from, gusts, noise_m)
     if airspeed is not None and not airspeed > 0.0:

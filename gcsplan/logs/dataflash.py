@@ -21,10 +21,10 @@ from gcsplan.logs.flight_log import MOST_READINGS, FlightLog, Readings, together
 
 HEAD = b"\xa3\x95"
 FIX_3D = 3
-KINDS = ["BAT", "CURR", "POS", "GPS", "XKF2", "NKF2"]
+MESSAGES_READ = ["BAT", "CURR", "POS", "GPS", "XKF2", "NKF2"]
 MOST_BATTERIES = 16  # AP_BATT_MONITOR_MAX_INSTANCES of ArduPilot 4.6
 MOST_COMPLAINTS = 10_000  # of pymavlink, which makes one for each byte that it cannot read
-WHOLE = frozenset("bBhHiIqQ")
+UNSCALED = frozenset("bBhHiIqQ")
 """Format characters of whole numbers that DFReader does not scale."""
 
 
@@ -43,10 +43,10 @@ def read_dataflash(file: Path) -> FlightLog:
     with _overheard() as said:
         try:
             log.__init__(str(file))
-            wanted = {log.name_to_id.get(kind) for kind in KINDS} - {None}
+            wanted = {log.name_to_id.get(kind) for kind in MESSAGES_READ} - {None}
             if sum(log.counts[k] for k in wanted) > MOST_READINGS:
                 raise too_long(str(file))
-            while (m := log.recv_match(type=KINDS)) is not None:
+            while (m := log.recv_match(type=MESSAGES_READ)) is not None:
                 _take(m, read)
         except InputError:
             raise
@@ -131,7 +131,7 @@ def _take(m: Any, read: Readings) -> None:
 def _volt_and_ampere(m: Any) -> tuple[float, float]:
     """Voltage and current; whole numbers without a scale of their own are hundredths (ArduCopter until 3.3)."""
     form = dict(zip(m.fmt.columns, m.fmt.format, strict=False))
-    volt, ampere = (float(getattr(m, key)) * (0.01 if form.get(key) in WHOLE else 1.0) for key in ("Volt", "Curr"))
+    volt, ampere = (float(getattr(m, key)) * (0.01 if form.get(key) in UNSCALED else 1.0) for key in ("Volt", "Curr"))
     return volt, ampere
 
 

@@ -18,12 +18,26 @@ from typing import Any
 
 import numpy as np
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import InputError
 from gcsplan.logs.flight_log import FlightLog, require_power
-from gcsplan.logs.steps import STEP_S, STILL_M_S, STILL_RISE_M_S, steps_of
 
-LEAST = (20.0, 200.0, 20.0)
+LOG_STEP_S = 5.0
+"""Length of a step: long enough that height noise is small beside the climb, short enough to be of one kind."""
+
+HOVERS_BELOW_M_S, HOVER_RISE_M_S = 1.0, 0.3
+"""Horizontal and vertical speed below which the vehicle hovers."""
+
+UP_M, RUNNING = 2.0, 0.05
+"""In the air: this far above the lowest place, m, and with at least this part of the median power."""
+
+FASTEST_READING_M_S = 150.0
+"""A higher speed is a damaged reading."""
+
+GAP_S = 3.0
+"""Longest pause of positions or battery readings within a step that is used, s."""
+
+LEAST_MOTION = (20.0, 200.0, 20.0)
 """Least vertical metres, horizontal metres and seconds of hovering for a coefficient."""
 
 LEAST_STEPS = 4
@@ -32,19 +46,19 @@ LEAST_STEPS = 4
 UNIQUE = 0.03
 """Least part of a column's square that the other columns must leave unexplained."""
 
-WIDEST = 0.25
+WIDEST_HALF_95 = 0.25
 """Largest half of the 95 % interval, as a part of the value."""
 
-HUBER, ROUNDS = 1.345, 30
-NAMES = ("vertical_j_per_m", "horizontal_j_per_m", "hover_w", "base_w")
-WORDS = ("vertical metres", "horizontal metres", "hovering", "time")
+HUBER, HUBER_ROUNDS = 1.345, 30
+MODEL_NAMES = ("vertical_j_per_m", "horizontal_j_per_m", "hover_w", "base_w")
+MOTIONS = ("vertical metres", "horizontal metres", "hovering", "time")
 BASE = 3
 """The column of the seconds that are not hovering."""
 
-APART = 1.2
+LEAST_SPEED_RATIO = 1.2
 """The fastest airspeed over the slowest that tells a base power."""
 
-ALIKE = 0.1
+ALIKE_POWER = 0.1
 """Beside a base power: the part of the power to which what a metre adds must be known; it may be nothing."""
 
 AMOUNTS = ("m up and down", "m along", "s of hovering")
@@ -114,7 +128,7 @@ def fit_energy(logs: Iterable[FlightLog]) -> EnergyFit:
     parts, names, winds = [], [], []
     log_notes: list[str] = []
     for log in logs:
-        parts.append(steps_of(log))
+        parts.append(_steps_of(log))
         names.append(log.name)
         log_notes += log.notes
         winds.append(float(np.hypot(log.wind[:, 1], log.wind[:, 2]).mean()) if len(log.wind) else None)
@@ -124,17 +138,17 @@ def fit_energy(logs: Iterable[FlightLog]) -> EnergyFit:
     rise = np.concatenate([p.rise_m for p in parts])
     if len(y) < 6:
         raise InputError(
-            f"hold {len(y) * STEP_S:.0f} s of flight with battery readings, too little for a fit", where=where
+            f"hold {len(y) * LOG_STEP_S:.0f} s of flight with battery readings, too little for a fit", where=where
         )
-    require_power(y / STEP_S, where)
+    require_power(y / LOG_STEP_S, where)
     reasons = _too_little(x, rise)
     columns = [k for k in range(3) if not reasons[k]]
     kept = x[:, columns].sum(axis=1) > 0.0
     x, y, rise = x[kept], y[kept], rise[kept]
     if not columns or len(y) < 2 * len(columns):
         raise InputError("hold no flight: " + "; ".join(r for r in reasons if r), where=where)
-    moving = x[:, 1] > STILL_M_S * STEP_S
-    speeds = x[moving, 1] / STEP_S if moving.any() else np.zeros(1)
+    moving = x[:, 1] > HOVERS_BELOW_M_S * LOG_STEP_S
+    speeds = x[moving, 1] / LOG_STEP_S if moving.any() else np.zeros(1)
     slow, middle, fast = (float(v) for v in np.quantile(speeds, (0.05, 0.5, 0.95)))
     based, why = _with_base(x, y, columns, (slow, fast)) if 1 in columns else (None, "nothing was flown along")
     if based is not None:
@@ -161,15 +175,17 @@ def fit_energy(logs: Iterable[FlightLog]) -> EnergyFit:
 def _too_little(x: Floats, rise: Floats) -> list[str]:
     """Why too little of each motion was flown for its coefficient; empty: it is enough."""
     amount = x[:, :3].sum(axis=0)
-    up = np.abs(rise) > STILL_RISE_M_S * STEP_S
+    up = np.abs(rise) > HOVER_RISE_M_S * LOG_STEP_S
     amount[0] = x[up, 0].sum()  # smaller changes may be height noise
     steps = np.array([t.sum() for t in (up, x[:, 1] > 0.0, x[:, 2] > 0.0)])
     reasons = []
     for k in range(3):
-        if amount[k] < LEAST[k]:
-            reasons.append(f"{amount[k]:.0f} {AMOUNTS[k]} are too few: at least {LEAST[k]:.0f} are needed")
+        if amount[k] < LEAST_MOTION[k]:
+            reasons.append(f"{amount[k]:.0f} {AMOUNTS[k]} are too few: at least {LEAST_MOTION[k]:.0f} are needed")
         elif steps[k] < LEAST_STEPS:
-            reasons.append(f"{steps[k] * STEP_S:.0f} s of it are too little: {LEAST_STEPS * STEP_S:.0f} s are needed")
+            reasons.append(
+                f"{steps[k] * LOG_STEP_S:.0f} s of it are too little: {LEAST_STEPS * LOG_STEP_S:.0f} s are needed"
+            )
         else:
             reasons.append("")
     return reasons
@@ -196,12 +212,14 @@ class _Model:
         some = x[:, columns]
         beta, weight = _robust(some, y)
         half = 1.96 * np.sqrt(np.maximum(np.diag(_covariance(some, y, beta, weight)), 0.0))
-        alike = ALIKE * float(np.median(y)) / STEP_S if BASE in columns else None
+        alike = ALIKE_POWER * float(np.median(y)) / LOG_STEP_S if BASE in columns else None
         return cls(x, columns, beta, half, _unique(some * np.sqrt(weight)[:, None]), some @ beta, alike)
 
     def coefficients(self, reasons: Sequence[str]) -> list[Coefficient]:
         """R1, R2 and hover power; ``reasons``: why one of them has no column."""
-        return [self._one(k) if not reasons[k] else Coefficient(NAMES[k], None, None, reasons[k]) for k in range(3)]
+        return [
+            self._one(k) if not reasons[k] else Coefficient(MODEL_NAMES[k], None, None, reasons[k]) for k in range(3)
+        ]
 
     @property
     def base(self) -> Coefficient:
@@ -211,16 +229,16 @@ class _Model:
     def _one(self, k: int) -> Coefficient:
         j = self.columns.index(k)
         value, half, why = float(self.beta[j]), float(self.half[j]), ""
-        per_s = np.median(self.x[self.x[:, k] > 0.0, k]) / STEP_S
+        per_s = np.median(self.x[self.x[:, k] > 0.0, k]) / LOG_STEP_S
         alike = self.alike_w is not None and k < 2 and half * per_s <= self.alike_w
         if self.unique[j] < UNIQUE:
             why = _shadow(k, self.columns, self.x)
         elif value <= 0.0 and not alike:
-            why = f"the energy does not grow with {WORDS[k]} in this log"
-        elif half > WIDEST * value and not alike:
+            why = f"the energy does not grow with {MOTIONS[k]} in this log"
+        elif half > WIDEST_HALF_95 * value and not alike:
             about = f"{_three(value)} ± {_three(half)}"
             why = f"{about} is too uncertain: fly more of it, or in calmer air"
-        return Coefficient(NAMES[k], None, None, why) if why else Coefficient(NAMES[k], value, half, "")
+        return Coefficient(MODEL_NAMES[k], None, None, why) if why else Coefficient(MODEL_NAMES[k], value, half, "")
 
 
 def _with_base(
@@ -228,7 +246,7 @@ def _with_base(
 ) -> tuple[_Model | None, str]:
     """The model with a base power, or why the flights do not tell one."""
     slow, fast = speeds_m_s
-    if fast < APART * slow:
+    if fast < LEAST_SPEED_RATIO * slow:
         return None, f"flown at {_three(0.5 * (slow + fast))} m/s through the air alone: fly at two speeds or more"
     model = _Model.of(x, y, [*columns, BASE])
     if model.base.value is None:
@@ -253,7 +271,7 @@ def _robust(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     scale = np.maximum(y, 0.2 * np.median(y))
     weight = 1.0 / scale**2
     beta = np.zeros(x.shape[1])
-    for _ in range(ROUNDS):
+    for _ in range(HUBER_ROUNDS):
         root = np.sqrt(weight)
         before = beta
         beta, _ = nnls(x * root[:, None], y * root)
@@ -286,7 +304,7 @@ def _unique(x: Floats) -> Floats:
 
 
 def _shadow(k: int, columns: Sequence[int], x: Floats) -> str:
-    others = " and ".join(WORDS[c] for c in columns if c != k and (x[:, c] > 0.0).any())
+    others = " and ".join(MOTIONS[c] for c in columns if c != k and (x[:, c] > 0.0).any())
     if k == BASE:
         return f"cannot be told apart from {others}: the log has them always in the same proportion; fly at two speeds"
     if k < 2:
@@ -303,7 +321,7 @@ def _up_and_down(x: Floats, y: Floats, rise: Floats, made: Sequence[Coefficient]
         return []
     up, down = np.where(rise > 0.0, x[:, 0], 0.0), np.where(rise < 0.0, x[:, 0], 0.0)
     rest = y - x[:, 1] * made[1].value - x[:, 2] * (made[2].value or 0.0) - x[:, BASE] * (base.value or 0.0)
-    if up.sum() < LEAST[0] or down.sum() < LEAST[0]:
+    if up.sum() < LEAST_MOTION[0] or down.sum() < LEAST_MOTION[0]:
         flown = "climbs" if up.sum() >= down.sum() else "descents"
         return [f"the vertical metres are nearly all {flown}: R1 is theirs alone"]
     each = [float(side @ rest / (side @ side)) for side in (up, down)]
@@ -321,3 +339,89 @@ def _three(value: float) -> str:
         return f"{value:g}"
     digits = max(2 - math.floor(math.log10(abs(value))), 0)
     return f"{value:.{digits}f}"
+
+
+# -- a flight in steps of a few seconds: what each moved, how long, and what it took ---------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class FlightSteps:
+    """N steps: ``design`` (N, 4) vertical metres, horizontal metres through the air, seconds of hovering and of moving;
+    ``energy_j``; signed ``rise_m``."""
+
+    design: Floats
+    energy_j: Floats
+    rise_m: Floats
+
+
+def _steps_of(log: FlightLog) -> FlightSteps:
+    """The log in steps of `LOG_STEP_S`, in the air, without pauses."""
+    begin = max(log.place_s[0], log.power_s[0])
+    end = min(log.place_s[-1], log.power_s[-1])
+    if end - begin < 2.0 * LOG_STEP_S:
+        raise InputError("positions and battery readings do not overlap in time", where=log.name)
+    second = np.arange(begin, end, 1.0)
+    east, north, amsl = (_smoothed(log.place_s, a, second) for a in (log.east_m, log.north_m, log.amsl_m))
+    spent = _energy_until(log.power_s, log.power_w, second)
+    per = int(LOG_STEP_S)
+    n = (len(second) - 1) // per
+    at = np.arange(n + 1) * per
+    run = np.hypot(np.diff(east), np.diff(north))[: n * per].reshape(n, per)
+    rise = np.diff(amsl)[: n * per].reshape(n, per)
+    along, up = run.sum(axis=1), rise.sum(axis=1)
+    energy = np.diff(spent[at])
+    over_ground = along
+    if len(log.wind):
+        blown = np.stack([np.interp(second, log.wind[:, 0], log.wind[:, k]) for k in (1, 2)], axis=-1)
+        blown = 0.5 * (blown[1:] + blown[:-1])  # metres in each second
+        through = np.hypot(np.diff(east) - blown[:, 0], np.diff(north) - blown[:, 1])
+        along = through[: n * per].reshape(n, per).sum(axis=1)
+    chord = np.hypot(np.diff(east[at]), np.diff(north[at]))
+    slow = (run.max(axis=1) < HOVERS_BELOW_M_S) & (chord < HOVERS_BELOW_M_S * LOG_STEP_S)
+    level = np.abs(up) < HOVER_RISE_M_S * LOG_STEP_S
+    still = slow & level
+    watts = energy / LOG_STEP_S
+    flying = (amsl[at[:-1]] > amsl.min() + UP_M) & (amsl[at[1:]] > amsl.min() + UP_M)
+    flying &= watts > RUNNING * np.median(watts[flying]) if flying.any() else flying
+    whole = ~_paused(log.place_s, second[at]) & ~_paused(log.power_s, second[at])
+    # A step that turns from climb to descent, or begins or ends in a hover, is of two kinds and is left out.
+    one_kind = np.abs(up) > 0.8 * np.abs(rise).sum(axis=1) - HOVER_RISE_M_S * LOG_STEP_S
+    one_kind &= slow | (run.min(axis=1) >= HOVERS_BELOW_M_S) | (over_ground == 0.0)
+    # A climb on the spot counts no metres along: in a wind its power is taken with its climb.
+    columns = (
+        np.where(still, 0.0, np.abs(up)), np.where(slow, 0.0, along), np.where(still, LOG_STEP_S, 0.0),
+        np.where(still, 0.0, LOG_STEP_S),
+    )  # fmt: skip
+    design = np.stack(columns, axis=-1)
+    good = flying & whole & one_kind & (energy > 0.0) & (over_ground + np.abs(up) < FASTEST_READING_M_S * LOG_STEP_S)
+    return FlightSteps(design[good], energy[good], up[good])
+
+
+def _smoothed(t: Floats, a: Floats, at: Floats) -> Floats:
+    """The mean over a second around each of ``at`` if it has several readings; otherwise interpolated."""
+    total = np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]) * np.diff(t))])
+
+    def until(x: Floats) -> Floats:
+        x = np.clip(x, t[0], t[-1])
+        k = np.clip(np.searchsorted(t, x, "right") - 1, 0, len(t) - 2)
+        value = np.interp(x, t, a)
+        return np.asarray(total[k] + 0.5 * (a[k] + value) * (x - t[k]))
+
+    low, high = np.clip(at - 0.5, t[0], t[-1]), np.clip(at + 0.5, t[0], t[-1])
+    return np.asarray((until(high) - until(low)) / np.maximum(high - low, 1e-9))
+
+
+def _energy_until(t: Floats, watts: Floats, at: Floats) -> Floats:
+    """Joules from the first reading up to each of ``at``, with power linear between readings."""
+    total = np.concatenate([[0.0], np.cumsum(0.5 * (watts[1:] + watts[:-1]) * np.diff(t))])
+    k = np.clip(np.searchsorted(t, at, "right") - 1, 0, len(t) - 2)
+    return np.asarray(total[k] + 0.5 * (watts[k] + np.interp(at, t, watts)) * (at - t[k]))
+
+
+def _paused(t: Floats, at: Floats) -> Bools:
+    """(N,) whether a pause of the readings reaches into each step between neighbours of ``at``."""
+    long = np.flatnonzero(np.diff(t) > GAP_S)
+    out = np.zeros(len(at) - 1, np.bool_)
+    for k in long.tolist():
+        out |= (at[1:] > t[k]) & (at[:-1] < t[k + 1])
+    return out

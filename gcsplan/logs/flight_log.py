@@ -22,10 +22,10 @@ MOST_WIND_M_S = 60.0
 MOST_READINGS = 2_000_000
 """Most readings of one log, of all kinds together: 5 h of place and battery at 50 Hz."""
 
-Rows = Floats | Sequence[tuple[float, ...]]
-"""Rows of equally many numbers."""
+NumberRows = Floats | Sequence[tuple[float, ...]]
+"""NumberRows of equally many numbers."""
 
-LONGEST_S, FARTHEST_DEG = 86_400.0, 3.0
+LONGEST_LOG_S, FARTHEST_READING_DEG = 86_400.0, 3.0
 """Readings farther than this from the middle of a log, in time or place, are damaged, or from before the GPS fix."""
 
 
@@ -82,8 +82,8 @@ class FlightLog:
 
     @classmethod
     def of(
-        cls, name: str, places: Rows, power: Rows, notes: tuple[str, ...] = (), *, degrees: bool = True,
-        wind: Rows = (),
+        cls, name: str, places: NumberRows, power: NumberRows, notes: tuple[str, ...] = (), *, degrees: bool = True,
+        wind: NumberRows = (),
     ) -> FlightLog:  # fmt: skip
         """A log from (seconds, latitude, longitude, AMSL) and (seconds, watts), in any order, without rows with NaN.
 
@@ -94,7 +94,7 @@ class FlightLog:
         if degrees and len(at):
             away = np.abs(at[:, 1:3] - np.median(at[:, 1:3], axis=0))
             away[:, 1] = np.minimum(away[:, 1], 360.0 - away[:, 1])
-            at = at[(away < FARTHEST_DEG).all(axis=1)]
+            at = at[(away < FARTHEST_READING_DEG).all(axis=1)]
         for what, rows in (("position", at), ("battery reading", watts)):
             if len(rows) < LEAST_POINTS:
                 raise InputError(
@@ -120,7 +120,7 @@ def require_power(watts: Floats, name: str) -> None:
         )
 
 
-def watts_of(readings: Rows, name: str) -> Floats:
+def watts_of(readings: NumberRows, name: str) -> Floats:
     """(N, 2) seconds and watts of readings of (seconds, volt, ampere).
 
     Raises InputError if voltage or current is not that of an aircraft's battery: then a unit is mistaken.
@@ -138,13 +138,13 @@ def watts_of(readings: Rows, name: str) -> Floats:
     return np.column_stack([rows[:, 0], rows[:, 1] * rows[:, 2]])
 
 
-def _sorted(rows: Rows) -> Floats:
+def _sorted(rows: NumberRows) -> Floats:
     """The rows sorted by time, one row per clock reading."""
     if not len(rows):
         return np.zeros((0, 4))
     a = np.array(rows, dtype=np.float64)
     a = a[np.isfinite(a).all(axis=1)]
-    a = a[np.abs(a[:, 0] - np.median(a[:, 0])) < LONGEST_S] if len(a) else a  # a damaged log may hold any number
+    a = a[np.abs(a[:, 0] - np.median(a[:, 0])) < LONGEST_LOG_S] if len(a) else a  # a damaged log may hold any number
     a = a[np.argsort(a[:, 0], kind="stable")]
     return a[np.concatenate([[True], np.diff(a[:, 0]) > 0.0])] if len(a) else a
 
@@ -158,7 +158,7 @@ def _in_metres(lat_deg: Floats, lon_deg: Floats) -> tuple[Floats, Floats]:
     return EQUATOR_M / math.sqrt(w) * math.cos(lat) * np.radians(turned), north
 
 
-def together(batteries: Mapping[int, Rows]) -> Floats:
+def together(batteries: Mapping[int, NumberRows]) -> Floats:
     """The sum of the power of all batteries, at the times of the one with the most readings."""
     series = sorted(batteries.values(), key=len, reverse=True)
     if len(series) == 1:

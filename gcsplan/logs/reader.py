@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from gcsplan.errors import InputError
+from gcsplan.logs.csv_log import read_csv
 from gcsplan.logs.dataflash import read_dataflash
 from gcsplan.logs.flight_log import FlightLog
-from gcsplan.logs.table import read_csv
-from gcsplan.logs.telemetry import read_telemetry
+from gcsplan.logs.tlog import read_telemetry
 
-MOST_BYTES = 256_000_000
+MOST_LOG_BYTES = 256_000_000
 """Most bytes of a log, whatever its kind."""
 
 
@@ -27,9 +27,9 @@ def read_log(file: Path, *, columns: Mapping[str, str] | None = None, sysid: int
         raise InputError("is a folder; give one log, or several", where=str(file))
     if file.stat().st_size == 0:
         raise InputError("is empty: the log was not closed, or not copied whole", where=str(file))
-    if file.stat().st_size > MOST_BYTES:
+    if file.stat().st_size > MOST_LOG_BYTES:
         raise InputError(
-            f"has more than {MOST_BYTES // 10**6} MB; cut it to the flight, or give its parts as several logs",
+            f"has more than {MOST_LOG_BYTES // 10**6} MB; cut it to the flight, or give its parts as several logs",
             where=str(file),
         )
     kind = file.suffix.lower()

@@ -10,11 +10,11 @@ import subprocess
 import sys
 import time
 
-from gcsplan.native import shelf
-from gcsplan.native.machine import llvm_version
-from gcsplan.native.unit import Unit
+from gcsplan.native import cache
+from gcsplan.native.kernel_unit import KernelUnit
+from gcsplan.native.llvm import llvm_version
 
-ALL = {
+KERNEL_UNITS = {
     "world": "gcsplan.world._compiled",
     "planners": "gcsplan.planners.compiled",
     "swarm": "gcsplan.planners.swarm.compiled",
@@ -22,7 +22,7 @@ ALL = {
 }
 """The modules of kernel units, by name. Each is made in its own process, because numba reads its options once."""
 
-OPTIONS = {
+NUMBA_OPTIONS = {
     # For any processor, not vectorised.
     False: {"CPU_NAME": "generic", "CPU_FEATURES": "", "LOOP_VECTORIZE": "0", "SLP_VECTORIZE": "0"},
     # Vectorised for vectors of four numbers; processors without such vectors compute two at a time.
@@ -32,23 +32,25 @@ OPTIONS = {
 
 def main(names: list[str]) -> None:
     """Make each unit and print its size."""
-    if not set(names) <= set(ALL):
-        raise SystemExit(f"usage: python -m gcsplan.native [{' | '.join(ALL)}] …: without a name, all of them")
+    if not set(names) <= set(KERNEL_UNITS):
+        raise SystemExit(f"usage: python -m gcsplan.native [{' | '.join(KERNEL_UNITS)}] …: without a name, all of them")
     if len(names) != 1:
-        for name in names or ALL:
+        for name in names or KERNEL_UNITS:
             subprocess.run([sys.executable, "-m", "gcsplan.native", name], check=True)
         return
-    unit: Unit = importlib.import_module(ALL[names[0]]).UNIT
+    unit: KernelUnit = importlib.import_module(KERNEL_UNITS[names[0]]).UNIT
     began = time.perf_counter()
     digest = unit.digest()
     if digest is None:
-        raise SystemExit(f"the sources of {ALL[names[0]]} are not at hand")
+        raise SystemExit(f"the sources of {KERNEL_UNITS[names[0]]} are not at hand")
     if unit.vectors and platform.machine().lower() not in ("x86_64", "amd64"):
         raise SystemExit(f"{names[0]} is made on x86-64 alone: what is best in one vector is asked of that processor")
     assert "numba" not in sys.modules
-    os.environ.update({f"NUMBA_{key}": value for key, value in OPTIONS[unit.vectors].items()}, NUMBA_DISABLE_JIT="0")
+    os.environ.update(
+        {f"NUMBA_{key}": value for key, value in NUMBA_OPTIONS[unit.vectors].items()}, NUMBA_DISABLE_JIT="0"
+    )
     made_with = {name: importlib.metadata.version(name) for name in ("numba", "llvmlite")} | {"llvm": llvm_version()}
-    shelf.write_shipped(unit.shipped, digest, made_with, unit.bitcode_from_source())
+    cache.write_shipped(unit.shipped, digest, made_with, unit.bitcode_from_source())
     took = time.perf_counter() - began
     print(f"{unit.shipped}: {unit.shipped.stat().st_size:,} bytes, {took:.1f} s", flush=True)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gcsplan.native.unit import Unit
+from gcsplan.native.kernel_unit import KernelUnit
 
-UNIT = Unit(
+UNIT = KernelUnit(
     "planners",
     Path(__file__).parent,
     "gcsplan.planners",

@@ -10,12 +10,12 @@ from typing import Any
 from gcsplan.check.verdict import PAPER_MARK
 from gcsplan.errors import CheckFailed
 from gcsplan.figures import floored
-from gcsplan.sim.part import Part, lateness
-from gcsplan.sim.trace import Judged, Meeting, Trace, examine, meetings
+from gcsplan.sim.flight.trace import Judged, Meeting, Trace, examine, meetings
+from gcsplan.sim.part import RehearsalPart, lateness
 from gcsplan.units import METRIC, Units, UnitText, duration
 from gcsplan.world.world import World
 
-SHOWN = 8
+BREACHES_SHOWN = 8
 """Most violations that an error's message names."""
 MEETING_STEP_S = 0.2
 
@@ -96,6 +96,27 @@ class Performance:
             "not_flown": list(self.not_flown),
         }  # fmt: skip
 
+    def row(self, runs: int, units: Units = METRIC, decimals: int = 0) -> dict[str, str]:
+        """Return a table row over ``runs`` runs; its times have ``decimals``."""
+
+        def clock(value: float | None) -> str:
+            return duration(value, decimals) if value is None or math.isfinite(value) else "never"
+
+        row = {"vehicle": self.name, "leaves": clock(self.depart_s), "planned": clock(self.planned_s)}
+        arrived = _median(self.arrive_s)
+        row["arrives"] = clock(math.inf if arrived is None or math.isnan(arrived) else arrived)
+        error = _median(self.errors_s)
+        row["error, s"] = "–" if error is None else f"{error:+.2f}" if math.isfinite(error) else "never"
+        if runs > 1:
+            row["95 % within, s"] = "–" if self.p95_s is None else f"{self.p95_s:.2f}"
+        row["down"] = clock(_median(self.end_s))
+        height = units.height
+        lowest = floored(height.of(self.min_agl_m), height.decimals(1))
+        row[f"lowest AGL, {height.symbol}"] = "–" if math.isnan(self.min_agl_m) else f"{lowest:.{height.decimals(1)}f}"
+        mark = PAPER_MARK if self.paper_energy else ""
+        row["battery, %"] = "–" if self.battery_used_percent is None else f"{self.battery_used_percent:.0f}{mark}"
+        return row
+
 
 @dataclass(frozen=True)
 class Rehearsal:
@@ -140,8 +161,8 @@ class Rehearsal:
     def error(self, *, allow_unjudged: bool = False) -> CheckFailed | None:
         """Return the error for this result; None if all is well. ``allow_unjudged``: accept parts not flown."""
         if self.breaches:
-            lines = [b.describe(self.runs) for b in self.breaches[:SHOWN]]
-            rest = len(self.breaches) - SHOWN
+            lines = [b.describe(self.runs) for b in self.breaches[:BREACHES_SHOWN]]
+            rest = len(self.breaches) - BREACHES_SHOWN
             lines += [f"and {rest} more"] if rest > 0 else []
             return CheckFailed("the rehearsal found violations:\n  " + "\n  ".join(lines))
         if self.not_judged and not allow_unjudged:
@@ -172,32 +193,12 @@ class Rehearsal:
 
     def rows(self, units: Units = METRIC) -> list[dict[str, str]]:
         """Return a table row for each vehicle; times in the fleet's order have tenths."""
-        return [_row(v, self.runs, units, 1 if len(self.vehicles) > 1 else 0) for v in self.vehicles]
+        return [v.row(self.runs, units, 1 if len(self.vehicles) > 1 else 0) for v in self.vehicles]
 
 
 def percentile_95(values: Sequence[float]) -> float | None:
     """Return the smallest of ``values`` that 95 % of them do not exceed; None if there are none."""
     return sorted(values)[math.ceil(0.95 * len(values)) - 1] if values else None
-
-
-def _row(v: Performance, runs: int, units: Units = METRIC, decimals: int = 0) -> dict[str, str]:
-    def clock(value: float | None) -> str:
-        return duration(value, decimals) if value is None or math.isfinite(value) else "never"
-
-    row = {"vehicle": v.name, "leaves": clock(v.depart_s), "planned": clock(v.planned_s)}
-    arrived = _median(v.arrive_s)
-    row["arrives"] = clock(math.inf if arrived is None or math.isnan(arrived) else arrived)
-    error = _median(v.errors_s)
-    row["error, s"] = "–" if error is None else f"{error:+.2f}" if math.isfinite(error) else "never"
-    if runs > 1:
-        row["95 % within, s"] = "–" if v.p95_s is None else f"{v.p95_s:.2f}"
-    row["down"] = clock(_median(v.end_s))
-    height = units.height
-    lowest = floored(height.of(v.min_agl_m), height.decimals(1))
-    row[f"lowest AGL, {height.symbol}"] = "–" if math.isnan(v.min_agl_m) else f"{lowest:.{height.decimals(1)}f}"
-    mark = PAPER_MARK if v.paper_energy else ""
-    row["battery, %"] = "–" if v.battery_used_percent is None else f"{v.battery_used_percent:.0f}{mark}"
-    return row
 
 
 def _median(values: Sequence[float]) -> float | None:
@@ -220,7 +221,7 @@ class Tally:
     ``most_j``: the most energy that each vehicle took in a run. ``flown``: the traces of the first run.
     """
 
-    parts: Sequence[Part]
+    parts: Sequence[RehearsalPart]
     terms: Terms
     runs: int = 0
     order_kept: int = 0
@@ -303,11 +304,11 @@ class Tally:
             new = Breach(kind, vehicles, was.message, was.by, runs)
         self._breaches[key] = new
 
-    def _used_percent(self, part: Part, spent_j: float) -> float | None:
+    def _used_percent(self, part: RehearsalPart, spent_j: float) -> float | None:
         battery_j = part.vehicle.energy.battery_j
         return None if battery_j is None else 100.0 * spent_j / battery_j
 
-    def _battery(self, part: Part, spent_j: float) -> None:
+    def _battery(self, part: RehearsalPart, spent_j: float) -> None:
         used, reserve = self._used_percent(part, spent_j), part.vehicle.energy.reserve
         if used is not None and used > 100.0 * (1.0 - reserve) + 1e-9:
             mark = PAPER_MARK if part.vehicle.energy.papers else ""

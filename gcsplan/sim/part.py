@@ -10,18 +10,18 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.sim.trace import Trace
+from gcsplan.sim.flight.trace import Trace
 from gcsplan.units import duration
 from gcsplan.vehicle import Vehicle
 
-__all__ = ["Part", "energy_of", "lateness"]
+__all__ = ["RehearsalPart", "energy_of", "lateness"]
 
-LATE_PART, LATE_S = 0.1, 5.0
+LATE_FLIGHT_PART, LATE_FLIGHT_S = 0.1, 5.0
 """Later by more than this part of the flight that was told, and by more than these seconds, is not as planned."""
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class RehearsalPart:
     """One vehicle's part in a rehearsal: its mission with its verdict, and its planned departure and arrival.
 
     ``depart_s``, ``arrive_s``: seconds since the fleet's common start; ``arrive_s`` is None if none is planned.
@@ -46,7 +46,7 @@ class Part:
         return arrives_s, arrives_s + max(self.verdict.time_s - self.verdict.arrive_s, 0.0)
 
 
-def lateness(part: Part, trace: Trace) -> tuple[str, float] | None:
+def lateness(part: RehearsalPart, trace: Trace) -> tuple[str, float] | None:
     """In words and in seconds how much too late a flight came to its goal or to its end; None if it did not."""
     if part.told_s is None or not math.isfinite(trace.arrive_s):
         return None
@@ -54,7 +54,7 @@ def lateness(part: Part, trace: Trace) -> tuple[str, float] | None:
     worst: tuple[str, float] | None = None
     for does, told, took in zip(("arrived", "was down"), part.told_s, flown_s, strict=True):
         late_s = took - told
-        if not late_s > max(LATE_PART * told, LATE_S) or (worst is not None and worst[1] >= late_s):
+        if not late_s > max(LATE_FLIGHT_PART * told, LATE_FLIGHT_S) or (worst is not None and worst[1] >= late_s):
             continue
         words = f"{trace.name} {does} {duration(late_s)} late, after {duration(took)} instead of {duration(told)}"
         worst = words, late_s

@@ -15,17 +15,28 @@ from gcsplan.errors import GcsplanError, InputError
 from gcsplan.mavlink.link.link import Link
 from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.sim.kinematics import Kinematics
-from gcsplan.sim.mission_flight import Flown, fly
+from gcsplan.sim.flight.kinematics import Kinematics
+from gcsplan.sim.flight.mission_flight import FlownLanes, fly
+from gcsplan.sim.flight.track import CommandedTrack, make_track
+from gcsplan.sim.flight.wind import Weather
 from gcsplan.sim.outcome import Rehearsal, Tally, Terms
-from gcsplan.sim.part import Part, energy_of
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.track import Track, make_track
-from gcsplan.sim.vehicle import LoopbackVehicle
-from gcsplan.sim.wind import Weather
+from gcsplan.sim.part import RehearsalPart, energy_of
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.world.world import World
 
-__all__ = ["Block", "Flights", "Part", "Rehearsal", "Terms", "concluded", "different", "flown", "prepared", "rehearse"]
+__all__ = [
+    "Flights",
+    "Rehearsal",
+    "RehearsalPart",
+    "RunBlock",
+    "Terms",
+    "concluded",
+    "different",
+    "flown",
+    "prepared",
+    "rehearse",
+]
 
 MOST_LANES = 240
 """Most vehicles, over all runs, that are simulated at once; this bounds the memory."""
@@ -35,13 +46,13 @@ MOST_LANES = 240
 class Flights:
     """What all runs of a rehearsal share: the vehicles' parts, the tracks that they fly, and the weather."""
 
-    parts: Sequence[Part]
+    parts: Sequence[RehearsalPart]
     terms: Terms
-    tracks: Sequence[Track]
+    tracks: Sequence[CommandedTrack]
     weather: Weather
     seed: int
 
-    def blocks(self, runs: int, at_once: int) -> list[Block]:
+    def blocks(self, runs: int, at_once: int) -> list[RunBlock]:
         """All runs in blocks for ``at_once`` processes; each keeps the bound of `MOST_LANES`."""
         size = max(1, min(MOST_LANES // len(self.parts), -(-runs // at_once)))
         return [(first, min(size, runs - first)) for first in range(0, runs, size)]
@@ -54,7 +65,7 @@ class Flights:
         return LANE_S * len(self.parts) + STEPS_S * flown_s / most if math.isfinite(flown_s) else LANE_S
 
 
-Block = tuple[int, int]
+RunBlock = tuple[int, int]
 """The number of its first run, and how many runs it has."""
 
 LANE_S, STEPS_S = 0.02, 2e-3
@@ -62,7 +73,7 @@ LANE_S, STEPS_S = 0.02, 2e-3
 
 
 def rehearse(
-    parts: Sequence[Part],
+    parts: Sequence[RehearsalPart],
     world: World,
     terms: Terms,
     *,
@@ -89,7 +100,7 @@ def rehearse(
 
 
 def prepared(
-    parts: Sequence[Part],
+    parts: Sequence[RehearsalPart],
     world: World,
     terms: Terms,
     *,
@@ -102,7 +113,7 @@ def prepared(
     if runs < 1:
         raise InputError(f"at least one run is wanted, given {runs}")
     stored = on_board(parts)
-    tracks = [_track(part, mission, world, airspeed_m_s) for part, mission in zip(parts, stored, strict=True)]
+    tracks = [track_of(part, mission, world, airspeed_m_s) for part, mission in zip(parts, stored, strict=True)]
     return Flights(parts, terms, tracks, weather or Weather(), seed)
 
 
@@ -111,7 +122,7 @@ def different(flights: Flights, runs: int) -> int:
     return 1 if flights.weather.calm else runs
 
 
-def flown(flights: Flights, world: World, block: Block) -> Tally:
+def flown(flights: Flights, world: World, block: RunBlock) -> Tally:
     """Fly and judge a block of runs. A run does not depend on its block."""
     first, count = block
     parts = flights.parts
@@ -132,7 +143,7 @@ def flown(flights: Flights, world: World, block: Block) -> Tally:
     return tally
 
 
-def _spent_j(flights: Flights, flight: Flown, lane: int) -> float:
+def _spent_j(flights: Flights, flight: FlownLanes, lane: int) -> float:
     """What a lane's flight took, J: in still air that of its track, else of the air that it flew through."""
     k = lane % len(flights.parts)
     vehicle = flights.parts[k].vehicle
@@ -153,37 +164,37 @@ def concluded(flights: Flights, runs: int, tallies: Sequence[Tally]) -> Rehearsa
     return tally.result("gcsplan", flights.seed, flights.weather.as_dict(), not_flown)
 
 
-def on_board(parts: Sequence[Part]) -> list[Mission]:
+def on_board(parts: Sequence[RehearsalPart]) -> list[Mission]:
     """Return each part's mission as a simulated vehicle stores it, after a real upload over this machine's loopback."""
-    vehicles = [
-        LoopbackVehicle(
-            p.mission.sysid, p.mission.autopilot, lat_deg=p.mission.home.lat_e7 / 1e7,
-            lon_deg=p.mission.home.lon_e7 / 1e7, amsl_m=p.mission.home.amsl_m, name=p.mission.name,
-        )
-        for p in parts
-    ]  # fmt: skip
+    vehicles = [LoopbackVehicle.for_mission(p.mission) for p in parts]
     names = [p.vehicle.name for p in parts]
     if len(set(names)) != len(names):
         raise InputError(f"every vehicle needs a name of its own, given {', '.join(names)}")
     with SimServer(vehicles, "udpin:127.0.0.1:0") as server, Link(server.url_for_gcs) as link:
-        orders = [
-            UploadOrder(
-                link, p.mission, p.verdict,
-                SessionOptions(unchecked=p.verdict.safe is None, listen_s=0.0, read_parameters=False, simulated=True),
-            )
-            for p in parts
-        ]  # fmt: skip
-        for result in upload_fleet(orders):
-            if isinstance(result, GcsplanError):
-                raise result
-            result.raise_for_outcome()
+        upload_parts(parts, [link] * len(parts))
     return [
         Mission.from_wire(v.autopilot, v.items(), home=v.home, name=p.mission.name, sysid=v.sysid)
         for v, p in zip(vehicles, parts, strict=True)
     ]
 
 
-def _track(part: Part, mission: Mission, world: World, airspeed_m_s: float | None) -> Track:
+def upload_parts(parts: Sequence[RehearsalPart], links: Sequence[Link]) -> None:
+    """Upload each part's mission over its link to a simulator. Raises what an upload raises."""
+    orders = [
+        UploadOrder(
+            link, p.mission, p.verdict,
+            SessionOptions(unchecked=p.verdict.safe is None, listen_s=0.0, read_parameters=False, simulated=True),
+        )
+        for link, p in zip(links, parts, strict=True)
+    ]  # fmt: skip
+    for result in upload_fleet(orders):
+        if isinstance(result, GcsplanError):
+            raise result
+        result.raise_for_outcome()
+
+
+def track_of(part: RehearsalPart, mission: Mission, world: World, airspeed_m_s: float | None) -> CommandedTrack:
+    """Return the track of a part whose vehicle stored ``mission``. Raises InputError if that flies nowhere."""
     try:
         return make_track(
             mission, part.vehicle, world, Kinematics.of(part.vehicle, airspeed_m_s), rtl_rel_home_m=part.rtl_rel_home_m,

@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.native.form import Held
+from gcsplan.native.signature import Held
 from gcsplan.world._compiled import EXTREMA
 from gcsplan.world._extrema import local_extrema
 from gcsplan.world._field import Field

@@ -6,7 +6,7 @@ import threading
 
 import numpy as np
 
-from gcsplan.native.form import Held
+from gcsplan.native.signature import Held
 from gcsplan.world._compiled import WORK
 from gcsplan.world._shared import CUT
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.native.form import Held
+from gcsplan.native.signature import Held
 from gcsplan.world._compiled import FOUND, ONE_SURFACE, SURFACE, ZONES
 from gcsplan.world._entries import around, judge
 from gcsplan.world._field import Field

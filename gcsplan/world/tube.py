@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.native.form import Held
+from gcsplan.native.signature import Held
 from gcsplan.world._entries import pieces
 from gcsplan.world._field import Field
 from gcsplan.world._shapes import spans

@@ -16,7 +16,7 @@ from gcsplan.mavlink.link.parameters import judge_fence_parameters
 from gcsplan.mavlink.mission.fences import fences_in_force
 from gcsplan.mavlink.mission.parameter_names import OnBoard, unanswered
 from gcsplan.mavlink.mission.parameter_safety import needed_groups
-from gcsplan.sim.misbehaviour import Misbehaviour
+from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
 from gcsplan.vehicle import Autopilot
 from tests.app.test_parameters import CRUISE, LAT, LON, WING, board, keys, planned, sent
 from tests.support.impatient import be_impatient

@@ -21,9 +21,9 @@ from gcsplan.app.upload_orders import _judge_again
 from gcsplan.errors import InputError
 from gcsplan.mavlink.link.parameters import judge_parameters, lean_shortage
 from gcsplan.mission_file import load_mission
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.sitl_instances import parameters_of
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.sitl.instances import parameters_of
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot, lean_for_deg
 from tests.support.impatient import be_impatient
 from tests.support.paths import MISSIONS

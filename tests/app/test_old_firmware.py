@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 
 from gcsplan.mavlink.mission.parameter_names import PARAMETERS
-from gcsplan.sim import telemetry
-from gcsplan.sim.firmware import ARDUPILOT, PX4, Firmware
-from gcsplan.sim.misbehaviour import Misbehaviour
-from gcsplan.sim.parameters import Parameter, Parameters
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle import telemetry
+from gcsplan.sim.vehicle.firmware import ARDUPILOT_FAMILY, PX4_FAMILY, Firmware
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
+from gcsplan.sim.vehicle.parameters import Parameters, StoredParameter
 from gcsplan.vehicle import Autopilot
 from tests.app.test_parameters import CORNER, CRUISE, LAT, LON, WING, keys, planned, sent
 from tests.support.impatient import be_impatient
@@ -61,13 +61,13 @@ def board_of(
             table = dict(self._table)
             for new, (old, per_unit) in RENAMED.items():
                 if new in table:
-                    table[old] = Parameter(9, per_unit * table[new].value)
+                    table[old] = StoredParameter(9, per_unit * table[new].value)
             wanted = set(NAMES[autopilot, version].split())
             assert wanted <= set(table), wanted - set(table)
             self._table = {name: table[name] for name in sorted(table) if name in wanted or name not in deciding}
 
     monkeypatch.setattr(telemetry, "Parameters", Known)
-    firmware = Firmware(PX4 if autopilot is Autopilot.PX4 else ARDUPILOT, version)
+    firmware = Firmware(PX4_FAMILY if autopilot is Autopilot.PX4 else ARDUPILOT_FAMILY, version)
     return LoopbackVehicle(
         1, autopilot, lat_deg=LAT, lon_deg=LON, amsl_m=100.0, parameters=given, firmware=firmware,
         misbehave=Misbehaviour(mute=mute),

@@ -26,10 +26,10 @@ from gcsplan.check.judge import judge
 from gcsplan.errors import InputError, UsageError
 from gcsplan.fleet.lean import lean_needed_deg
 from gcsplan.mission_file import load_mission
-from gcsplan.sim.misbehaviour import Misbehaviour
 from gcsplan.sim.rehearsal import rehearse
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 from tests.support.impatient import be_impatient
 

@@ -13,8 +13,8 @@ from gcsplan.app.rehearsing import rehearse
 from gcsplan.errors import InputError
 from gcsplan.mavlink.link.px4_motion import slower_words, speed_shortage
 from gcsplan.mission_file import MissionFile, load_mission
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 from tests.support.impatient import be_impatient
 

@@ -19,7 +19,7 @@ from gcsplan.app.rehearsing import Rehearsal, rehearse
 from gcsplan.app.report_page import page_of_plan, render_rehearsal
 from gcsplan.report.rehearsal_view import rehearsal_html
 from gcsplan.report.subject import Compared, Rehearsed
-from gcsplan.sim.wind import Weather
+from gcsplan.sim.flight.wind import Weather
 from gcsplan.units import duration
 from tests.app.test_fleet_planning import CROSS
 from tests.cli.conftest import run

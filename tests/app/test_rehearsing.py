@@ -23,17 +23,20 @@ from gcsplan.app.rehearsing import parts_of, rehearse, rehearse_in_sitl, seats_o
 from gcsplan.cli.rehearse import rehearse as command
 from gcsplan.errors import CheckFailed, LinkError, UsageError, VehicleRefused
 from gcsplan.mission_file import load_mission
-from gcsplan.sim import hub, sitl
-from gcsplan.sim.mission_flight import fly
+from gcsplan.sim.flight.mission_flight import fly
+from gcsplan.sim.flight.wind import Weather
 from gcsplan.sim.outcome import Terms
-from gcsplan.sim.part import Part
-from gcsplan.sim.rehearsal import _track
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.sitl import rehearse_sitl, require_here
-from gcsplan.sim.sitl_instances import parameters_of, sitl_instances
-from gcsplan.sim.telemetry import Telemetry
-from gcsplan.sim.vehicle import LoopbackVehicle
-from gcsplan.sim.wind import Weather
+from gcsplan.sim.part import RehearsalPart
+from gcsplan.sim.rehearsal import track_of
+from gcsplan.sim.sitl import flights
+from gcsplan.sim.sitl.flights import rehearse_sitl, require_here
+from gcsplan.sim.sitl.instances import parameters_of, sitl_instances
+from gcsplan.sim.vehicle import hub, telemetry
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
+from gcsplan.sim.vehicle.parameters import REAL32, Parameters, StoredParameter
+from gcsplan.sim.vehicle.server import SimServer
+from gcsplan.sim.vehicle.telemetry import Telemetry
 
 FLEET = """
 version: 1
@@ -177,18 +180,21 @@ SPEEDUP = 40.0
 
 @contextmanager
 def flying(
-    parts: list[Part], planned: Plan, monkeypatch: pytest.MonkeyPatch, *, simulator: bool = True, arms: bool = True
+    parts: list[RehearsalPart],
+    planned: Plan,
+    monkeypatch: pytest.MonkeyPatch,
+    *,
+    simulator: bool = True,
+    arms: bool = True,
 ) -> Iterator[dict[str, str]]:
     """Loopback vehicles that fly as our own simulator does, their clocks faster than ours: peers as an SITL is one."""
-    flown = fly([_track(p, p.mission, planned.world, None) for p in parts], [0.0] * len(parts))
+    flown = fly([track_of(p, p.mission, planned.world, None) for p in parts], [0.0] * len(parts))
     traces = {p.vehicle.sysid: flown.trace(i) for i, p in enumerate(parts)}
 
     class Flying(Telemetry):
         def __init__(self, vehicle: LoopbackVehicle) -> None:
             super().__init__(vehicle)
             self._trace, self._started = traces[vehicle.sysid], math.inf
-            if simulator:
-                self.parameters._table["SIM_SPEEDUP"] = self.parameters._table["ANGLE_MAX"]
 
         def _carry_out(self, message: Any, now: float) -> tuple[int, list[Any]]:
             if message.command == mav.MAV_CMD_COMPONENT_ARM_DISARM and not arms:
@@ -219,7 +225,14 @@ def flying(
             piece = min(int((self._trace.times_s <= t).sum()) - 1, len(self._trace.seq) - 1)
             return mav.MAVLink_mission_current_message(int(self._trace.seq[piece]) if t >= 0 else 0)
 
+    class Simulators(Parameters):
+        def __init__(self, *of_vehicle: Any) -> None:
+            super().__init__(*of_vehicle)
+            self._table["SIM_SPEEDUP"] = StoredParameter(REAL32, 1.0)
+
     monkeypatch.setattr(hub, "Telemetry", Flying)
+    if simulator:
+        monkeypatch.setattr(telemetry, "Parameters", Simulators)
     with ExitStack() as stack:
         seats = {}
         for p in parts:
@@ -246,13 +259,13 @@ def test_vehicles_that_fly_by_themselves_are_armed_released_watched_and_judged(
     assert result.simulator == "sitl"
     assert result.breaches == ()
     # They leave at once. Their clock runs 40 times as fast as ours, so when they are released is less certain.
-    assert [v.errors_s[0] for v in result.vehicles] == pytest.approx([-sitl.LIFT_S] * 3, abs=3.0)
+    assert [v.errors_s[0] for v in result.vehicles] == pytest.approx([-flights.LIFT_S] * 3, abs=3.0)
     assert all(v.min_agl_m > 60.0 for v in result.vehicles)  # 65 is flown; on a busy machine it is seen seldom
     assert result.closest is not None
     assert {"waits for its position", "arms", "flies", "flies item 3"} <= {what for _, what in said}
 
 
-def one(planned: Plan) -> list[Part]:
+def one(planned: Plan) -> list[RehearsalPart]:
     return parts_of(planned)[:1]
 
 
@@ -268,7 +281,7 @@ def test_what_is_no_simulator_is_never_armed(planned: Plan, monkeypatch: pytest.
 def test_a_vehicle_that_will_not_arm_is_given_up_with_its_own_words(
     planned: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sitl, "_ARM_S", 0.3)
+    monkeypatch.setattr(flights, "ARM_S", 0.3)
     parts = one(planned)
     with (
         flying(parts, planned, monkeypatch, arms=False) as seats,
@@ -279,17 +292,19 @@ def test_a_vehicle_that_will_not_arm_is_given_up_with_its_own_words(
 
 @pytest.mark.slow
 def test_a_vehicle_that_falls_silent_in_the_air_is_a_dead_link(planned: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sitl, "_SILENT_S", 0.3)
+    monkeypatch.setattr(flights, "SILENT_S", 0.3)
     parts = one(planned)
     with flying(parts, planned, monkeypatch) as seats:
-        monkeypatch.setattr("gcsplan.sim.vehicle.LoopbackVehicle.flying_mission", property(lambda _: True, _go_silent))
+        monkeypatch.setattr(
+            "gcsplan.sim.vehicle.loopback.LoopbackVehicle.flying_mission", property(lambda _: True, _go_silent)
+        )
         with pytest.raises(LinkError, match="silent"):
             rehearse_sitl(parts, planned.world, Terms(), seats)
 
 
 def _go_silent(vehicle: LoopbackVehicle, value: bool) -> None:
     if vehicle.armed and vehicle.mode == 3:  # AUTO
-        vehicle._dead_until = math.inf
+        vehicle.misbehave = Misbehaviour(silent_after=0)
 
 
 def test_vehicles_without_an_address_and_other_autopilots_are_refused(planned: Plan) -> None:

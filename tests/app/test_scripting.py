@@ -27,9 +27,9 @@ from gcsplan.cli.commands import app
 from gcsplan.errors import CheckFailed, InputError, UsageError
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.mission_file import load, load_mission
-from gcsplan.sim.misbehaviour import Misbehaviour
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 from tests.app.test_fleet_planning import CROSS
 from tests.support.impatient import be_impatient

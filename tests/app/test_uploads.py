@@ -11,7 +11,7 @@ from gcsplan.app.pipeline import plan
 from gcsplan.app.upload_job import UploadOptions
 from gcsplan.errors import UsageError
 from gcsplan.mission_file import load_mission
-from gcsplan.sim.loopback import loopback_fleet
+from gcsplan.sim.vehicle.server import loopback_fleet
 
 PORTS = ("udpout:127.0.0.1:14560", "udpout:127.0.0.1:14570")
 

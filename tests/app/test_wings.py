@@ -42,9 +42,9 @@ from gcsplan.mavlink.mission.autopilots import stored
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.mission_file import VehicleRequest, load_mission
 from gcsplan.planners.problem import Problem
-from gcsplan.sim.kinematics import Kinematics
-from gcsplan.sim.mission_flight import fly
-from gcsplan.sim.track import make_track
+from gcsplan.sim.flight.kinematics import Kinematics
+from gcsplan.sim.flight.mission_flight import fly
+from gcsplan.sim.flight.track import make_track
 from gcsplan.vehicle import Autopilot, ClimbOut, Vehicle
 from gcsplan.world.atmosphere import true_per_indicated
 from gcsplan.world.path import Path

@@ -15,11 +15,11 @@ from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.mavlink.mission.mission import MISSION, Home, MissionItem
 from gcsplan.mavlink.protocol import wire
 from gcsplan.mavlink.protocol.messages import Ack, Address, Count, Item, Request
-from gcsplan.sim.firmware import firmware_of
-from gcsplan.sim.hub import Hub
-from gcsplan.sim.misbehaviour import spoilt
-from gcsplan.sim.parameters import REAL32, Parameters
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.firmware import firmware_of
+from gcsplan.sim.vehicle.hub import Hub
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.misbehaviour import spoilt
+from gcsplan.sim.vehicle.parameters import REAL32, Parameters
 from gcsplan.vehicle import Autopilot
 from tests.campaigns.air import STATION, Air
 

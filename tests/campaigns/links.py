@@ -37,8 +37,8 @@ from gcsplan.mavlink.mission.autopilots import altitude_of_cm
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.mavlink.protocol import wire
 from gcsplan.mavlink.protocol.messages import Address
-from gcsplan.sim.misbehaviour import Misbehaviour
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
 from gcsplan.vehicle import Autopilot
 from tests.campaigns.air import Air, Hang, Radio
 from tests.campaigns.crafts import SILENCE_S, Craft, Forger, OddParameters, Recorder, Voice

@@ -36,13 +36,13 @@ from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.parameter_names import OnBoard
 from gcsplan.mission_file import load_mission
-from gcsplan.sim.firmware import firmware_of
-from gcsplan.sim.kinematics import Kinematics
-from gcsplan.sim.mission_flight import fly
-from gcsplan.sim.parameters import Parameters
-from gcsplan.sim.part import Part
-from gcsplan.sim.trace import Trace
-from gcsplan.sim.track import make_track
+from gcsplan.sim.flight.kinematics import Kinematics
+from gcsplan.sim.flight.mission_flight import fly
+from gcsplan.sim.flight.trace import Trace
+from gcsplan.sim.flight.track import make_track
+from gcsplan.sim.part import RehearsalPart
+from gcsplan.sim.vehicle.firmware import firmware_of
+from gcsplan.sim.vehicle.parameters import Parameters
 from gcsplan.vehicle import Autopilot, Vehicle
 from tests.oracles.px4_smoothing import fly as smoothing
 
@@ -178,13 +178,13 @@ def px4_legs_s(mission: Mission, vehicle: Vehicle, raw: Values) -> float:
     return took_s
 
 
-def simulated_s(done: Plan, part: Part, moved: Kinematics, other: Vehicle) -> float:
+def simulated_s(done: Plan, part: RehearsalPart, moved: Kinematics, other: Vehicle) -> float:
     """Seconds of a flight in the built-in simulator."""
     trace = trace_of(done, part, moved, other)
     return trace.arrive_s if trace.stays else trace.end_s
 
 
-def trace_of(done: Plan, part: Part, moved: Kinematics, other: Vehicle) -> Trace:
+def trace_of(done: Plan, part: RehearsalPart, moved: Kinematics, other: Vehicle) -> Trace:
     """A flight in the built-in simulator."""
     track = make_track(part.mission, other, done.world, moved, rtl_rel_home_m=part.rtl_rel_home_m)
     return fly([track], [0.0]).trace(0, leaves=False)

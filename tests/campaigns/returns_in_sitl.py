@@ -15,7 +15,7 @@ from pymavlink import mavutil
 
 from gcsplan.arrays import Floats
 from gcsplan.mavlink.mission.mission import MissionItem
-from gcsplan.sim.sitl_instances import FRAME
+from gcsplan.sim.sitl.instances import FRAME
 from gcsplan.vehicle import Autopilot
 from tests.campaigns.returns import HOME_AMSL_M, Found, Scene, compare, scene
 

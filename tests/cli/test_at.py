@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 from tests.mission_file.airspace.made import ed269, volume
 

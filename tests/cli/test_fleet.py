@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 import yaml
 
-from gcsplan.sim.misbehaviour import Misbehaviour
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 from tests.app.test_fleet_planning import CROSS
 

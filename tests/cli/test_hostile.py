@@ -27,9 +27,9 @@ from gcsplan.cli.options import MISBEHAVIOURS
 from gcsplan.mavlink.files.formats import read_mission_file, write_plan
 from gcsplan.mavlink.link import session
 from gcsplan.mavlink.protocol.messages import Packet, Request
-from gcsplan.sim.misbehaviour import Misbehaviour
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 from tests.support.spoil import spoilt_bytes, spoilt_tree
 

@@ -14,9 +14,9 @@ import pytest
 
 import gcsplan
 from gcsplan.mavlink.files.formats import read_mission_file
-from gcsplan.sim.misbehaviour import Misbehaviour
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 from tests.support.paths import DATA
 

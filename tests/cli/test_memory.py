@@ -33,7 +33,7 @@ print(*sorted(sys.modules))
 SENDS_OR_DRAWS = {
     "PIL", "asyncio", "contourpy", "distributed", "matplotlib", "multiprocessing", "numba", "pymavlink", "rasterio",
     "scipy", "serial", "gcsplan.app.uploads", "gcsplan.bench", "gcsplan.check.rtl.rally", "gcsplan.check.rtl.verdict",
-    "gcsplan.fleet.resolve", "gcsplan.native.source", "gcsplan.optimisers", "gcsplan.planners.swarm", "gcsplan.report",
+    "gcsplan.fleet.resolve", "gcsplan.native.compile", "gcsplan.optimisers", "gcsplan.planners.swarm", "gcsplan.report",
     "gcsplan.sim",
 }  # fmt: skip
 """What sends, draws, rehearses, compiles, or belongs to another planner or command."""

@@ -14,8 +14,8 @@ import typer
 import gcsplan
 from gcsplan.cli import new
 from gcsplan.mission_file.json_schema import FILE_NAME, mission_schema
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 from tests.support.paths import REPOSITORY
 

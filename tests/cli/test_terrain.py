@@ -11,8 +11,8 @@ import pytest
 from gcsplan.dem.dat_file import read_dat
 from gcsplan.mavlink.link import terrain as link_terrain
 from gcsplan.mission_file import load_mission
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 
 Run = Callable[..., tuple[int, str, str]]

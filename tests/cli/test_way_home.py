@@ -12,9 +12,9 @@ import yaml
 
 import gcsplan
 from gcsplan.errors import CheckFailed
-from gcsplan.sim import parameters
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle import parameters
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 
 HEADLINE = "path safe; no safe return from "

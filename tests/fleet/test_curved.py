@@ -16,8 +16,8 @@ from gcsplan.fleet.curved import CORNER_M, Curved
 from gcsplan.fleet.lean import leaning_m_s
 from gcsplan.fleet.legs import legs
 from gcsplan.fleet.scurve import curves
-from gcsplan.sim.kinematics import Kinematics
-from gcsplan.sim.scurves import step_legs
+from gcsplan.sim.flight.kinematics import Kinematics
+from gcsplan.sim.flight.scurves import step_legs
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from gcsplan.native.__main__ import ALL
+from gcsplan.native.__main__ import KERNEL_UNITS
 from tests.support.paths import REPOSITORY
 
 FLOOR_LLVM = 22
@@ -24,13 +24,13 @@ FLOOR_LLVM = 22
 FIRST_RUN = """
 import json, sys, time
 import gcsplan
-from gcsplan.native import notice
-from gcsplan.native.__main__ import ALL
+from gcsplan.native.kernel_unit import SLOW_NOTICE, compilation_told
+from gcsplan.native.__main__ import KERNEL_UNITS
 import importlib, llvmlite, llvmlite.binding
 
 said, began = [], time.perf_counter()
-with notice.told(said.append):
-    for module in ALL.values():
+with compilation_told(said.append):
+    for module in KERNEL_UNITS.values():
         unit = importlib.import_module(module).UNIT
         unit.digest()
         unit[sorted(unit.forms)[0]]
@@ -43,7 +43,7 @@ with notice.told(said.append):
     })
 print(json.dumps({
     "llvmlite": llvmlite.__version__, "llvm": llvmlite.binding.llvm_version_info[0], "seconds": took_s,
-    "slow": [words for words in said if words.startswith(notice.SLOW)], "quick": len(said),
+    "slow": [words for words in said if words.startswith(SLOW_NOTICE)], "quick": len(said),
     "numba": "numba" in sys.modules, "safe": planned.vehicles[0].verdict.safe,
     "points": [list(map(repr, p)) for p in planned.vehicles[0].solution.path.points.tolist()],
 }))
@@ -57,8 +57,8 @@ def floors() -> dict[str, str]:
     return {match[1]: match[2] for match in found if match}
 
 
-@pytest.mark.parametrize("module", ALL.values(), ids=ALL)
-def test_every_shipped_form_names_the_llvm_that_made_it_and_the_oldest_allowed_one_reads_it(module: str) -> None:
+@pytest.mark.parametrize("module", KERNEL_UNITS.values(), ids=KERNEL_UNITS)
+def test_every_shipped_form_names_its_llvm_and_the_oldest_allowed_one_reads_it(module: str) -> None:
     head = json.loads(importlib.import_module(module).UNIT.shipped.read_bytes().partition(b"\n")[0])
     assert set(head) == {"llvm", "llvmlite", "numba", "sources"}
     assert int(head["llvm"].split(".")[0]) <= FLOOR_LLVM, "raise the floor of llvmlite, or make it with an older one"
@@ -93,7 +93,7 @@ def test_a_first_run_needs_no_numba(which: str, tmp_path: Path, seen: dict[str, 
     found = seen[which] = json.loads(run.stdout)
     print(which, {key: found[key] for key in ("llvmlite", "llvm", "seconds")})
     assert found["slow"] == []
-    assert found["quick"] == len(ALL)
+    assert found["quick"] == len(KERNEL_UNITS)
     assert (found["numba"], found["safe"]) == (False, True)
     if which == "oldest":
         assert found["llvm"] == FLOOR_LLVM

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gcsplan.app.rehearsing import rehearse
+from gcsplan.sim.flight.wind import Weather
 from gcsplan.sim.outcome import Rehearsal
-from gcsplan.sim.wind import Weather
 from tests.check.test_energy import ENERGY, integral_j, planned
 
 BATTERY_J = 400 * 3600.0

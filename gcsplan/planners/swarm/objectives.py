@@ -16,7 +16,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import unknown_name
-from gcsplan.native.form import Held
+from gcsplan.native.signature import Held
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.swarm import cost_kernels as k
 from gcsplan.planners.swarm.bspline import Curve, curve

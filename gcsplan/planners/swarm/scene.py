@@ -11,7 +11,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats, Indices, Singles
 from gcsplan.errors import InputError
-from gcsplan.native.form import Held
+from gcsplan.native.signature import Held
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.registry import VOLUME_KEYS
 from gcsplan.planners.swarm import scene_kernels as k

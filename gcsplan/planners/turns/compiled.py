@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gcsplan.native.unit import Unit
+from gcsplan.native.kernel_unit import KernelUnit
 
-UNIT = Unit("turns", Path(__file__).parent, "gcsplan.planners.turns", ("kernels",))
+UNIT = KernelUnit("turns", Path(__file__).parent, "gcsplan.planners.turns", ("kernels",))
 
 device = UNIT.device
 """Marks a function that only kernels call."""

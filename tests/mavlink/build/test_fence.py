@@ -32,10 +32,9 @@ from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.mavlink.mission.mission import FENCE, Mission, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.mavlink.protocol.transfer import VerifiedUpload
-from gcsplan.sim.loopback import loopback_fleet
-from gcsplan.sim.misbehaviour import Misbehaviour
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
+from gcsplan.sim.vehicle.server import SimServer, loopback_fleet
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.frame import Frame
 from gcsplan.world.path import Path as FlightPath

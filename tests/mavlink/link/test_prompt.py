@@ -26,8 +26,8 @@ from gcsplan.mavlink.protocol import wire
 from gcsplan.mavlink.protocol.messages import Ack, Address, Count, Item, Request
 from gcsplan.mavlink.protocol.outcome import Accepted
 from gcsplan.mavlink.protocol.transfer import Timers, Upload, VerifiedUpload
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 from tests.support.effort import draws
 

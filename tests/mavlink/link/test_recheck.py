@@ -35,9 +35,9 @@ from gcsplan.mavlink.protocol import wire
 from gcsplan.mavlink.protocol.machine import Wait
 from gcsplan.mavlink.protocol.messages import Ack, Address, Count, Item, Packet, Request, RequestList
 from gcsplan.mavlink.protocol.outcome import Changed
-from gcsplan.sim.misbehaviour import Misbehaviour
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 from tests.campaigns.air import Air, Radio
 from tests.campaigns.crafts import Craft, OddParameters

@@ -38,9 +38,9 @@ from gcsplan.mavlink.mission.firmware import flies_straight
 from gcsplan.mavlink.mission.mission import ALL, FENCE, RALLY, Home, Mission, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.mavlink.protocol.transfer import Progress, Timers
-from gcsplan.sim.misbehaviour import Misbehaviour
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4

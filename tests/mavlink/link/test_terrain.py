@@ -27,8 +27,8 @@ from gcsplan.mavlink.link.terrain import (
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import RELATIVE, TERRAIN, Home, Mission, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
-from gcsplan.sim.hub import Hub
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.hub import Hub
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.terrain_grid import Ground
 from tests.campaigns.air import Air, Radio

@@ -24,9 +24,9 @@ from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.mavlink.protocol.machine import Progress
 from gcsplan.mavlink.protocol.transfer import Timers
-from gcsplan.sim.misbehaviour import Misbehaviour
-from gcsplan.sim.server import SimServer
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
+from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 
 COPTER = Autopilot.ARDUCOPTER

@@ -16,9 +16,9 @@ from gcsplan.mavlink.mission.stored_ardupilot import RULES, read_back_altitudes,
 from gcsplan.mavlink.mission.stored_px4 import LOCATED, yaw
 from gcsplan.mavlink.mission.stored_px4 import LOCATED as PX4_LOCATED
 from gcsplan.mavlink.mission.stored_px4 import PLACELESS as PX4_PLACELESS
-from gcsplan.sim.ardupilot_storage import keep_fence_item, keep_mission_item, keep_rally_item
-from gcsplan.sim.board import Refused
-from gcsplan.sim.px4_storage import keep_item
+from gcsplan.sim.vehicle.ardupilot_storage import keep_fence_item, keep_mission_item, keep_rally_item
+from gcsplan.sim.vehicle.px4_storage import keep_item
+from gcsplan.sim.vehicle.stored_lists import ItemRefused
 from gcsplan.vehicle import Autopilot
 from tests.support.effort import draws
 
@@ -175,7 +175,7 @@ def test_ardupilots_rules_agree_with_an_independent_reading_of_its_source(
             theirs = keep_rally_item(one)
         else:
             theirs = keep_mission_item(one, plane=autopilot is PLANE)
-    except Refused:
+    except ItemRefused:
         stored(one, autopilot)  # whatever it is, it must not fail
         return
     assert repr(stored(one, autopilot)).replace("-0.0", "0.0") == repr(theirs).replace("-0.0", "0.0")
@@ -226,7 +226,7 @@ def test_px4s_rules_agree_with_an_independent_reading_of_its_source(shape: Missi
     one = MissionItem(command, shape.frame, shape.params, shape.x, shape.y, shape.z)
     try:
         theirs = keep_item(one, FENCE if command in range(5000, 5005) else RALLY if command == 5100 else 0)
-    except Refused:
+    except ItemRefused:
         stored(one, PX4)
         return
     ours = stored(one, PX4)
@@ -261,7 +261,7 @@ def test_what_is_refused_is_just_what_the_simulated_vehicle_refuses(autopilot: A
                 keep_item(one, 0)
             else:
                 keep_mission_item(one, plane=autopilot is PLANE)
-        except Refused:
+        except ItemRefused:
             return True
         return False
 

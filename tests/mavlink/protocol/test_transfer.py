@@ -37,8 +37,8 @@ from gcsplan.mavlink.protocol.transfer import (
     Upload,
     VerifiedUpload,
 )
-from gcsplan.sim.misbehaviour import Misbehaviour
-from gcsplan.sim.vehicle import LoopbackVehicle
+from gcsplan.sim.vehicle.loopback import LoopbackVehicle
+from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
 from gcsplan.vehicle import Autopilot
 from tests.support.effort import draws
 from tests.support.lossy import Weather, run

@@ -19,10 +19,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcsplan.native import shelf
-from gcsplan.native.__main__ import ALL
-from gcsplan.native.form import Held
-from gcsplan.native.unit import Unit
+from gcsplan.native import cache
+from gcsplan.native.__main__ import KERNEL_UNITS
+from gcsplan.native.kernel_unit import KernelUnit
+from gcsplan.native.signature import Held
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.swarm import cost_kernels as k
 from gcsplan.planners.swarm import curve_kernels as ck
@@ -67,9 +67,9 @@ def plain_terms(cost: Cost, controls: np.ndarray) -> np.ndarray:
     return out
 
 
-@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("name", KERNEL_UNITS)
 def test_what_is_shipped_was_made_from_the_source_as_it_stands(name: str) -> None:
-    unit: Unit = importlib.import_module(ALL[name]).UNIT
+    unit: KernelUnit = importlib.import_module(KERNEL_UNITS[name]).UNIT
     made_of = json.loads(unit.shipped.read_bytes().partition(b"\n")[0])["sources"]
     assert made_of == unit.digest(), f"run python -m gcsplan.native {name}"
 
@@ -85,7 +85,7 @@ def test_machine_code_gives_what_python_gives(objective: str, points: int) -> No
 
 def test_no_sum_of_what_is_shipped_may_still_be_reordered_or_fused() -> None:
     """Otherwise the result of a swarm would depend on the processor's instructions."""
-    bitcode = shelf.read_shipped(UNIT.shipped, UNIT.digest())
+    bitcode = cache.read_shipped(UNIT.shipped, UNIT.digest())
     assert bitcode is not None
     text = str(llvm.parse_bitcode(bitcode))
     assert "<4 x double>" in text

@@ -1,0 +1,50 @@
+"""Why a vehicle in SITL did not arrive, from what it says."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+from gcsplan.sim.sitl.flight_watch import FlightWatch
+from tests.support.sitl_parts import a_part, ramp
+
+
+def text(words: str, severity: int = 6) -> Any:
+    return SimpleNamespace(get_type=lambda: "STATUSTEXT", text=words, severity=severity)
+
+
+def beat(mode: int) -> Any:
+    return SimpleNamespace(get_type=lambda: "HEARTBEAT", custom_mode=mode)
+
+
+def test_ground_that_is_hit_on_the_way_ends_the_flight_with_its_cause() -> None:
+    watch = FlightWatch(a_part(ramp()).mission)
+    watch.note(beat(3), 1)
+    watch.note(text("SIM Hit ground at 0.9 m/s"), 1)  # at take-off
+    assert not watch.crashed
+    watch.note(text("SIM Hit ground at 0.01 m/s"), 2)
+    assert not watch.crashed
+    watch.note(text("SIM Hit ground at 1.502964 m/s"), 2)
+    assert watch.crashed
+    assert watch.why() == "it hit the ground at 1.5 m/s on its way to item 2"
+    assert "that is 90 m above the mission's ground: without terrain an SITL's ground is flat" in watch.why(90.0)
+
+
+def test_a_landing_touches_the_ground() -> None:
+    watch = FlightWatch(a_part(ramp()).mission)
+    watch.note(text("SIM Hit ground at 0.6 m/s"), 3)
+    assert not watch.crashed
+    assert watch.why(90.0) == ""
+
+
+def test_a_failsafe_is_named_with_what_the_vehicle_said() -> None:
+    watch = FlightWatch(a_part(ramp()).mission)
+    watch.note(text("Reached command #1"), 1)
+    watch.note(text("Battery Failsafe", 4), 2)
+    watch.note(beat(3), 2)
+    watch.note(beat(6), 2)
+    watch.note(beat(9), 2)
+    watch.timed_out = True
+    assert watch.why() == (
+        "it left AUTO for RTL at item 2; it still flew to item 2 when the time was up; it said: Battery Failsafe"
+    )

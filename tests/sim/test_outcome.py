@@ -1,0 +1,73 @@
+"""The result of a rehearsal: requirements that are not kept, figures over all runs, and its document."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from gcsplan.sim.outcome import Terms, percentile_95
+from gcsplan.sim.rehearsal import rehearse
+from gcsplan.vehicle import Energy
+from tests.support import worlds
+from tests.support.rehearsal_parts import BRAKING_S, CLIMB_S, FLAT, a_part, kinds, reached_s
+
+
+def test_another_order_of_arrival_is_a_violation() -> None:
+    parts = [a_part(1, (0, 0), (1000, 0)), a_part(2, (0, 300), (900, 300))]
+    result = rehearse(parts, FLAT, Terms(("uav1", "uav2"), 30.0))
+    assert kinds(result) == ["order"]
+    assert "uav2, uav1" in result.breaches[0].message
+    error = result.error()
+    assert error is not None
+    assert error.exit_code == 4
+
+
+def test_two_that_meet_are_named_with_the_moment() -> None:
+    parts = [a_part(1, (0, 0), (1000, 0)), a_part(2, (500, -500), (500, 500))]
+    result = rehearse(parts, FLAT, Terms((), 30.0))
+    assert kinds(result) == ["separation"]
+    assert result.breaches[0].vehicles == ("uav1", "uav2")
+    assert result.closest is not None
+    assert result.closest.distance_m < 1.0
+    assert result.closest.time_s == pytest.approx(CLIMB_S + 50 + BRAKING_S / 2, abs=0.5)
+    later = [parts[0], replace(parts[1], depart_s=10.0)]
+    assert rehearse(later, FLAT, Terms((), 30.0)).safe
+
+
+@pytest.mark.slow
+def test_landing_beside_one_that_stands_is_a_violation_until_the_pad_is_clear() -> None:
+    parts = [a_part(1, (0, 0), (1000, 0)), a_part(2, (0, 300), (1000, 20), depart_s=200.0)]
+    assert kinds(rehearse(parts, FLAT, Terms((), 30.0))) == ["separation"]
+    assert rehearse(parts, FLAT, Terms((), 30.0, pad_clear_s=60.0)).safe
+    assert rehearse(parts, FLAT, Terms((), 15.0)).safe
+
+
+def test_a_battery_that_is_flown_too_low_is_a_violation() -> None:
+    vehicle = replace(worlds.vehicle(), energy=Energy(120.0, 100.0, battery_j=130_000.0, reserve=0.2))
+    part = a_part(1, (0, 0), (1000, 0), vehicle=vehicle)
+    passing = replace(part.verdict, findings=())  # the check found the same
+    result = rehearse([replace(part, verdict=passing)], FLAT, Terms())
+    assert kinds(result) == ["battery"]
+    assert result.vehicles[0].battery_used_percent == pytest.approx(100 * (120 * 140 + 100 * 1000) / 130_000, rel=0.001)
+
+
+def test_the_document_has_its_keys_and_a_row_for_each_vehicle() -> None:
+    parts = [a_part(n, (0, 200.0 * n), (500, 200.0 * n), arrive_s=reached_s(500)) for n in (1, 2)]
+    result = rehearse(parts, FLAT, Terms((), 30.0), runs=9)
+    document = json.loads(json.dumps(result.as_dict(), allow_nan=False))
+    assert document["runs"] == 1  # in still air every run is the same
+    assert "every run is the same" in document["notes"][0]
+    assert document["safe"] is True
+    assert {"order_flown", "min_separation_m", "closest", "p95_error_s"} <= document["fleet"].keys()
+    assert {"planned_arrive_s", "arrive_s", "error_s", "min_agl_m", "battery_used_percent"} <= document["vehicles"][
+        0
+    ].keys()
+    assert [row["vehicle"] for row in result.rows()] == ["uav1", "uav2"]
+
+
+def test_ninety_five_percent() -> None:
+    assert percentile_95([]) is None
+    assert percentile_95([3.0]) == 3.0
+    assert percentile_95([float(x) for x in range(100)]) == 94.0
