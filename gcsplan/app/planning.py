@@ -73,6 +73,7 @@ def plan_vehicle(
         order = Order(
             request.end, source.altitude_frame, return_path=request.return_route == "mission",
             bow_m=bow_margin_m(limited, world),
+            exact=tuple((v.east_m, v.north_m) for v in problem.via if v.amsl_m is not None),
         )  # fmt: skip
         solution, order, mission, verdict = _built(over, request, problem, solution, order)
         if not verdict.findings:

@@ -14,8 +14,8 @@ from gcsplan.check.home_height import why_unknown
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
-from gcsplan.mavlink.build.multirotor import build_mission, corner_m
-from gcsplan.mavlink.build.order import BOW_M, LONGEST_LEG_M, MARGINS, Margins, Order
+from gcsplan.mavlink.build.multirotor import build_mission, corner_m, cuts_corners
+from gcsplan.mavlink.build.order import BOW_M, FLOWN_SLOPE, LONGEST_LEG_M, MARGINS, Margins, Order, slope_margin
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import Home, Mission
@@ -158,6 +158,7 @@ def make_problem(
     start_amsl = ends.amsl_m("start", request.start, "takeoff_agl_m", start_agl_m)
     goal_amsl = ends.amsl_m("goal", request.goal, "approach_agl_m", goal_agl_m)
     via = _vias(air, request, (start_amsl, goal_amsl), notes)
+    limits = _less_steep(limits, margins.slope + _slope_margin(source, request, limits, abs(goal_amsl - start_amsl)))
     settings = source.planner
     own = world.airspace.zones[len(source.zones) :]
     wider = Wider(source, world, request, own, objective, seed, given)
@@ -316,21 +317,38 @@ def _largest_bow_m(world: World, longest_m: float = LONGEST_LEG_M) -> float:
 
 
 def _with_margins(limits: Limits, margins: Margins, *, terrain: bool) -> Limits:
-    """The limits of the planner's paths: those of the check, reduced by what the wire's rounding and the bow may take.
+    """The limits of the planner's paths: those of the check, reduced by what the wire's rounding and the bow may take,
+    slopes yet as they are.
 
     In the terrain frame, too, by what a vehicle may read amiss and still be taken: an upload judges with it.
     """
-
-    def less(angle_deg: float) -> float:
-        return math.degrees(math.atan(math.tan(math.radians(angle_deg)) * (1.0 - margins.slope)))
 
     return replace(
         limits,
         track_error_m=limits.track_error_m + margins.track_m + margins.bow_m,
         altitude_error_m=limits.altitude_error_m + margins.altitude_m + (NEAR_ENOUGH_M if terrain else 0.0),
-        max_climb_deg=limits.max_climb_deg if limits.max_climb_deg >= 90 else less(limits.max_climb_deg),
-        max_descent_deg=limits.max_descent_deg if limits.max_descent_deg >= 90 else less(limits.max_descent_deg),
     )
+
+
+def _slope_margin(source: MissionFile, request: VehicleRequest, limits: Limits, rise_m: float) -> float:
+    """The part of the climb limits that paths keep for rounding, or for legs that are not straight. ``rise_m``: between
+    the ends; a path may climb more where it is longer than that needs."""
+    if request.vehicle.turn_radius_m > 0.0 or source.altitude_frame == "terrain":
+        return FLOWN_SLOPE
+    places = [request.start[:2], *(v[:2] for v in request.via), request.goal[:2]]
+    straight_m = sum(math.dist(a, b) for a, b in pairwise(places))
+    rise_m = max(rise_m, min(limits.max_climb_slope, limits.max_descent_slope, 1.0) * straight_m)
+    return slope_margin(rise_m, cut=request.vehicle.autopilot is Autopilot.ARDUCOPTER and cuts_corners(request.vehicle))
+
+
+def _less_steep(limits: Limits, part: float) -> Limits:
+    """``limits`` with slopes that are less than those of the check by ``part`` of them."""
+
+    up, down = (
+        deg if deg >= 90.0 else math.degrees(math.atan(math.tan(math.radians(deg)) * (1.0 - part)))
+        for deg in (limits.max_climb_deg, limits.max_descent_deg)
+    )
+    return replace(limits, max_climb_deg=up, max_descent_deg=down)
 
 
 def run_planner(run: Callable[[Problem], Solution], problem: Problem, vehicle: Vehicle, world: World) -> Solution:

@@ -20,7 +20,7 @@ from gcsplan.check.climb_out import REACHED_M, above_slant, beside_strip, circle
 from gcsplan.check.glide import flared
 from gcsplan.errors import NoMission
 from gcsplan.mavlink.build.fixed_wing import pitch_deg
-from gcsplan.mavlink.build.order import MARGINS
+from gcsplan.mavlink.build.order import FLOWN_SLOPE
 from gcsplan.mission_file import VehicleRequest
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace, Legs
@@ -99,7 +99,7 @@ def goals(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[
     if request.end != "land":
         yield None
         return
-    slope = request.vehicle.limits.max_descent_slope * (1.0 - MARGINS.slope)
+    slope = request.vehicle.limits.max_descent_slope * (1.0 - FLOWN_SLOPE)
     found = False
     for end in _ends(
         problem, request.goal, slope, request.approach_agl_m, sharp[::-1], None, request.vehicle.speed_max_m_s, 0.0

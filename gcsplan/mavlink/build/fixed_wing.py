@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.arrays import Floats
+from gcsplan.mavlink.build.heights import most_cm, whole_cm
 from gcsplan.mavlink.build.order import Order, split_legs
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
@@ -173,14 +174,8 @@ def build_wing(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[float
 
 def _heights_cm(points: Floats, base_m: float, vehicle: Vehicle) -> NDArray[np.int_]:
     """Return heights above ``base_m`` in whole centimetres; rounding makes no flown leg steeper than its limit."""
-    wanted = (points[:, 2] - base_m) * 100.0
-    run_cm = flown_m(points, vehicle.turn_radius_m) * 100.0 - 3.0
+    run_m = flown_m(points, vehicle.turn_radius_m) - 0.03
     # The check judges arcs by their chords, which are shorter by less than a thousandth.
     up, down = 0.999 * vehicle.limits.max_climb_slope, 0.999 * vehicle.limits.max_descent_slope
-    cm = np.rint(wanted).astype(int)
-    for i in range(1, len(cm) - 1):
-        high = cm[i - 1] + math.floor(up * run_cm[i - 1]) if math.isfinite(up) else cm[i]
-        low = cm[i - 1] - math.floor(down * run_cm[i - 1]) if math.isfinite(down) else cm[i]
-        if abs(np.clip(cm[i], low, high) - wanted[i]) <= 1.5:
-            cm[i] = np.clip(cm[i], low, high)
-    return cm
+    exact = np.zeros(len(points), np.bool_)
+    return whole_cm((points[:, 2] - base_m) * 100.0, most_cm(run_m, up), most_cm(run_m, down), exact)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.mavlink.build.fixed_wing import build_wing
+from gcsplan.mavlink.build.heights import most_cm, whole_cm
 from gcsplan.mavlink.build.order import Order, split_legs
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
@@ -27,6 +28,8 @@ from gcsplan.world.world import World
 COPTER_ACCEPTANCE_M = 2.0  # ArduCopter WPNAV_RADIUS, default
 SHORT_LEG_M, ROUNDED_M = 0.05, 0.02
 """Length of the leg that is put behind a corner which must not be cut, metres, and what rounding may add to it."""
+EXACT_M = 1e-3
+"""Metres within which a way point is at a place of `Order.exact`."""
 
 
 def acceptance_radius_m(vehicle: Vehicle) -> float:
@@ -86,7 +89,8 @@ def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[fl
     else:
         base = datum if order.altitude_frame == "relative" else 0.0
         frame = m.RELATIVE if order.altitude_frame == "relative" else m.GLOBAL
-        cm = _round_heights(points, base, vehicle)
+        rounded = world.frame.to_plane(lat_e7 / 1e7, lon_e7 / 1e7)
+        cm = _round_heights(points, rounded, base, vehicle, order)
     top_cm = round((path.points[0, 2] - datum) * 100)
     bearings = _bearings(points)
     px4, plane = vehicle.autopilot is Autopilot.PX4, vehicle.autopilot is Autopilot.ARDUPLANE
@@ -156,18 +160,19 @@ def spaced_out(points: Floats, vehicle: Vehicle) -> Floats:
     return np.array([*kept, points[-1]])
 
 
-def _round_heights(points: Floats, base_m: float, vehicle: Vehicle) -> NDArray[np.int_]:
-    """Return heights above ``base_m`` in whole centimetres; rounding makes no leg steeper than its limit."""
-    wanted = (points[:, 2] - base_m) * 100
-    run_cm = np.hypot(*np.diff(points[:, :2], axis=0).T) * 100 - 3.0
+def _round_heights(points: Floats, places_m: Floats, base_m: float, vehicle: Vehicle, order: Order) -> NDArray[np.int_]:
+    """Return heights above ``base_m`` in whole centimetres; rounding makes no leg steeper than its limit.
+
+    ``points`` (N, 3) are the path's, ``places_m`` (N, 2) what is left of their places on the wire.
+    """
     up, down = vehicle.limits.max_climb_slope, vehicle.limits.max_descent_slope
-    cm = np.rint(wanted).astype(int)
-    for i in range(1, len(cm) - 1):
-        high = cm[i - 1] + math.floor(up * run_cm[i - 1]) if math.isfinite(up) else cm[i]
-        low = cm[i - 1] - math.floor(down * run_cm[i - 1]) if math.isfinite(down) else cm[i]
-        if abs(np.clip(cm[i], low, high) - wanted[i]) <= 1.5:
-            cm[i] = np.clip(cm[i], low, high)
-    return cm
+    if order.return_path:  # flown backwards, too
+        up = down = min(up, down)
+    run_m = np.hypot(*np.diff(places_m, axis=0).T)
+    exact = np.zeros(len(points), np.bool_)
+    for place in order.exact:
+        exact |= np.hypot(*(points[:, :2] - place).T) < EXACT_M
+    return whole_cm((points[:, 2] - base_m) * 100.0, most_cm(run_m, up), most_cm(run_m, down), exact)
 
 
 def _bearings(points: Floats) -> Floats:

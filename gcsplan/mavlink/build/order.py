@@ -20,20 +20,35 @@ LONGEST_LEG_M = 5000.0
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """Margins that a planner keeps for the wire: rounding of altitudes, rounding and bow of tracks, slope for both.
+    """Margins that a planner keeps for the wire: rounding of altitudes, rounding and bow of tracks.
 
-    They make paths longer, never bounds. ``rounding_m``: how far a mission's place may lie beside the one that was
+    They make paths longer, never bounds. ``slope``: the part of the climb limits that is kept beyond `slope_margin`,
+    because a mission was too steep. ``rounding_m``: how far a mission's place may lie beside the one that was
     meant, in the plane and in altitude; bounds hold for all missions whose ends lie that near to the plan's.
     """
 
     altitude_m: float = 0.02
     track_m: float = 0.012
     bow_m: float = BOW_M
-    slope: float = 0.002
+    slope: float = 0.0
     rounding_m: tuple[float, float] = (0.011, 0.01)
 
 
 MARGINS = Margins()
+
+FLOWN_SLOPE = 0.002
+"""Part of the climb limits that is kept where legs are judged by arcs or over the posts of a terrain grid."""
+LEAST_SLOPE, ROUNDED_RISE_M, CORNER_RISE_M = 1e-4, 0.012, 0.01
+"""Part of the climb limits that every other path keeps; the metres of a climb that rounding may cost: a centimetre at a
+way point between two legs, and two millimetres for their lengths; and what a leg of centimetres behind a corner costs,
+for it does not climb."""
+
+
+def slope_margin(rise_m: float, *, cut: bool) -> float:
+    """Return the part of the climb limits that straight legs keep for rounding in a mission that climbs ``rise_m``;
+    ``cut``: its corners may need another way point."""
+    rounded_m = ROUNDED_RISE_M + (CORNER_RISE_M if cut else 0.0)
+    return min(LEAST_SLOPE + rounded_m / max(rise_m, 1e-3), FLOWN_SLOPE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +82,8 @@ class Order:
     until each is that straight in the plane and in degrees at once. ``gate_utc``: wait
     there until this hour, minute and second of the day, UTC, instead; only ArduCopter can. ``wing``: the ends of a
     fixed wing's mission, None for aircraft that can hover. ``return_path``: behind the end, add a return path back
-    along the track to a landing at home, to which ArduCopter returns by Auto RTL.
+    along the track to a landing at home, to which ArduCopter returns by Auto RTL. ``exact``: places (east_m, north_m)
+    whose altitude the mission file gives: it is the nearest centimetre, even where a leg beside it gets too steep.
     """
 
     end: End = "land"
@@ -79,6 +95,7 @@ class Order:
     wing: Wing | None = None
     return_path: bool = False
     bow_m: float = BOW_M
+    exact: tuple[tuple[float, float], ...] = ()
 
 
 def split_legs(points: Floats, world: World, most_bow_m: float = BOW_M) -> Floats:

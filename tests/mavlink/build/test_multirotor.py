@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.mavlink.build.multirotor import build_mission
-from gcsplan.mavlink.build.order import BOW_M, LONGEST_LEG_M, MARGINS, Order, split_legs
+from gcsplan.mavlink.build.order import BOW_M, LONGEST_LEG_M, MARGINS, Order, slope_margin, split_legs
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.autopilots import stored
@@ -98,17 +98,61 @@ def test_legs_are_split_until_the_bow_is_small() -> None:
     assert there[-1] == pytest.approx([11_000, 100, 500])
 
 
-def test_a_leg_at_the_climb_limit_does_not_grow_steeper_by_rounding() -> None:
-    craft = vehicle(max_climb_deg=15.0)
-    slope = np.tan(np.radians(15.0)) * (1 - MARGINS.slope)
-    run = np.arange(0, 3000, 61.7)
-    path = Path(np.column_stack([run, 0 * run, 366.0 + slope * run]))
-    mission = build_mission(path, WORLD, craft, HOME_DEG, Order(end="none"))
-    flown = [stored(i, craft.autopilot) for i in mission.items if i.command != cmd.DO_CHANGE_SPEED]
+def steepest_deg(mission: m.Mission) -> tuple[float, float]:
+    """The steepest climb and descent of a mission in the frame of home, as stored."""
+    flown = [stored(i, mission.autopilot) for i in mission.items if i.command != cmd.DO_CHANGE_SPEED]
     z = np.array([i.z for i in flown])
     en = WORLD.frame.to_plane([i.lat_deg for i in flown], [i.lon_deg for i in flown])
     rise = np.degrees(np.arctan2(np.diff(z), np.hypot(*np.diff(en, axis=0).T)))
-    assert rise.max() <= 15.0
+    return float(rise.max()), float(-rise.min())
+
+
+@pytest.mark.parametrize("autopilot", list(Autopilot))
+@pytest.mark.parametrize("leg_m", [2.81, 5.3, 61.7])
+@pytest.mark.parametrize("down", [False, True])
+def test_legs_at_the_climb_limit_do_not_grow_steeper_by_rounding(
+    autopilot: Autopilot, leg_m: float, down: bool
+) -> None:
+    """Of 30 legs of some metres each would lose half a centimetre: what all lose together is moved, not steep."""
+    craft = vehicle(autopilot, max_climb_deg=15.0, max_descent_deg=15.0)
+    slope = np.tan(np.radians(15.0)) * (1 - slope_margin(30 * leg_m * np.tan(np.radians(15.0)), cut=False))
+    run = np.arange(31) * leg_m
+    run = np.append(run, run[-1] + 500.0)
+    aside = np.where(np.arange(len(run)) % 2, 0.07 * leg_m, 0.0)
+    z = 600.0 + slope * (-1 if down else 1) * np.minimum(run, run[-2])
+    path = Path(np.column_stack([run, aside, z]))
+    mission = build_mission(path, WORLD, craft, HOME_DEG, Order(end="none", spaced=False))
+    assert max(steepest_deg(mission)) <= 15.0
+    flown = np.array([stored(i, autopilot).z for i in mission.items if i.command == cmd.WAYPOINT])
+    assert np.abs(flown + 300.0 - z[1:]).max() < 0.3
+
+
+def test_a_way_back_is_no_steeper_than_the_gentler_limit() -> None:
+    craft = vehicle(max_climb_deg=15.0, max_descent_deg=8.0)
+    run = np.arange(31) * 3.7
+    slope = np.tan(np.radians(8.0)) * (1 - 1e-4)
+    path = Path(np.column_stack([run, 0 * run, 366.0 + slope * np.minimum(run, run[-2])]))
+    mission = build_mission(path, WORLD, craft, HOME_DEG, Order(end="none", spaced=False))
+    assert steepest_deg(mission)[0] > 8.0
+    mission = build_mission(path, WORLD, craft, HOME_DEG, Order(end="none", spaced=False, return_path=True))
+    out = m.Mission(mission.autopilot, mission.home, mission.items[: len(run) + 1], mission.name, mission.sysid)
+    assert steepest_deg(out)[0] <= 8.0
+
+
+def test_a_place_whose_altitude_the_file_gives_keeps_it() -> None:
+    craft, slope = vehicle(max_climb_deg=15.0), np.tan(np.radians(15.0))
+    run = np.arange(21) * 2.81
+    run[-1] += 100.0
+    path = Path(np.column_stack([run, 0 * run, 366.0 + slope * np.minimum(run, run[-2])]))
+    at = tuple(path.points[19, :2].tolist())
+    free, given = (
+        build_mission(path, WORLD, craft, HOME_DEG, Order(end="none", spaced=False, exact=exact))
+        for exact in ((), (at,))
+    )
+    wanted = path.points[19, 2] - 300.0
+    z = [stored(mission.items[20], craft.autopilot).z for mission in (free, given)]
+    assert abs(z[0] - wanted) > 0.02
+    assert abs(z[1] - wanted) <= 0.005
 
 
 def test_points_nearer_than_two_acceptance_radii_are_dropped() -> None:
