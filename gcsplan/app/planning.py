@@ -6,20 +6,23 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from gcsplan.app.attempts import of_all, within_budget
-from gcsplan.app.corners import cut, sharpened
+from gcsplan.app.corners import cut, moved, sharpened
 from gcsplan.app.leaving_out import LeavingOut
 from gcsplan.app.margins import larger, on_path
 from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.problems import bow_margin_m, built, looked_over, make_problem, run_planner, unsafe
+from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mavlink.build.multirotor import acceptance_radius_m, cuts_corners, spaced_out
 from gcsplan.mavlink.build.order import MARGINS, Order
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import VehicleRequest
-from gcsplan.planners.problem import Problem, Progress, Solution, passes_vias
-from gcsplan.vehicle import Autopilot
+from gcsplan.planners.problem import PASSED_M, Problem, Progress, Solution, passes_vias
+from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
 from gcsplan.world.world import World
@@ -92,23 +95,36 @@ def _built(
     over: Brief, request: VehicleRequest, problem: Problem, solution: Solution, order: Order
 ) -> tuple[Solution, Order, Mission, Verdict]:
     """The mission of a solution, its verdict, and both as they were built: without way points nearer than the
-    acceptance radii, if that is legal; else with all; else with another one behind each corner that is cut too near."""
+    acceptance radii, if that is legal; else with all, and with corners mended that are cut too near."""
     vehicle, points = request.vehicle, solution.path.points
-    if passes_vias(problem, spaced_out(points, vehicle)):
+    spaced = spaced_out(points, vehicle)
+    if passes_vias(problem, spaced):
         mission, verdict = built(over, request, solution, order)
         if not verdict.findings:
             return solution, order, mission, verdict
+        if vehicle.autopilot is not Autopilot.ARDUCOPTER and cuts_corners(vehicle):
+            points = spaced  # corners that are turned before at once are cut by more than one
+            solution = replace(solution, path=Path(points))
     order = replace(order, spaced=False)
     corners: set[int] = set()
     while True:
         mission, verdict = built(over, request, solution, order)
         more: set[int] = set()
-        if cuts_corners(vehicle) and vehicle.autopilot is Autopilot.ARDUCOPTER:
+        if cuts_corners(vehicle):
             more = cut(mission, on_path(mission, verdict), points, over.world) - corners
         if not more:
             return solution, order, mission, verdict
         corners |= more
-        solution = replace(solution, path=Path(sharpened(points, corners)))
+        solution = replace(solution, path=Path(_mended(problem, vehicle, points, corners)))
+
+
+def _mended(problem: Problem, vehicle: Vehicle, points: Floats, corners: set[int]) -> Floats:
+    """The path (N, 3) with ``corners`` that are cut less; vias stay."""
+    if vehicle.autopilot is Autopilot.ARDUCOPTER:
+        return sharpened(points, corners)
+    for via in problem.via:
+        corners = corners - set(np.flatnonzero(np.hypot(*(points[:, :2] - (via.east_m, via.north_m)).T) < PASSED_M))
+    return moved(points, corners, acceptance_radius_m(vehicle))
 
 
 def _both_ways(request: VehicleRequest, altitude_frame: str) -> VehicleRequest:

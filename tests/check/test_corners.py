@@ -220,9 +220,9 @@ def test_a_plan_keeps_what_its_corners_take_beyond_the_track_error(autopilot: Au
     crossing["vehicles"][0]["autopilot"] = str(autopilot)
     (planned,) = plan(load_mission("corner.yaml", text=yaml.safe_dump(crossing))).vehicles
     assert planned.verdict.safe is True
-    # A copter's corners are mended where they are cut; PX4's take their radius everywhere.
+    # Corners are mended where they are cut: a copter's keep what is left to cut, PX4's are moved.
     kept_m = corner_m(planned.request.vehicle)
-    assert kept_m == pytest.approx(0.035 if autopilot is COPTER else 1.0)
+    assert kept_m == pytest.approx(0.035 if autopilot is COPTER else 0.0)
     nearest = planned.verdict.nearest
     assert nearest is None or nearest.zone_clearance_m >= 30.0 + 0.5 + (0.0 if autopilot is COPTER else kept_m)
 

@@ -41,22 +41,19 @@ def acceptance_radius_m(vehicle: Vehicle) -> float:
 
 def cuts_corners(vehicle: Vehicle) -> bool:
     """Return whether a vehicle that can hover cuts corners by more than its errors may include."""
-    errors_m = min(vehicle.limits.track_error_m, vehicle.limits.altitude_error_m)
+    errors_m = vehicle.limits.track_error_m
+    if vehicle.autopilot is Autopilot.ARDUCOPTER:  # a mended corner is not cut in height, either
+        errors_m = min(errors_m, vehicle.limits.altitude_error_m)
     bounded = vehicle.turn_radius_m <= 0.0 and math.isfinite(vehicle.corner_accel_m_s2)
     return bounded and acceptance_radius_m(vehicle) > errors_m
 
 
 def corner_m(vehicle: Vehicle) -> float:
-    """Return the planner's margin for corners that are cut by more than ``track_error_m``; mostly 0.
-
-    ArduCopter cuts what is left of a corner behind which a short leg begins; the others turn as far before it.
-    """
-    if vehicle.turn_radius_m > 0.0 or math.isinf(vehicle.corner_accel_m_s2):
+    """Return the planner's margin for corners that an ArduCopter cuts by more than ``track_error_m``: what is left to
+    cut of a corner behind which a short leg begins; mostly 0. Others' corners are moved where they are cut."""
+    if vehicle.autopilot is not Autopilot.ARDUCOPTER or not cuts_corners(vehicle):
         return 0.0
-    radius_m = acceptance_radius_m(vehicle)
-    if radius_m <= vehicle.limits.track_error_m:
-        return 0.0
-    return 0.5 * (SHORT_LEG_M + ROUNDED_M) if vehicle.autopilot is Autopilot.ARDUCOPTER else radius_m
+    return 0.5 * (SHORT_LEG_M + ROUNDED_M) if acceptance_radius_m(vehicle) > vehicle.limits.track_error_m else 0.0
 
 
 def build_mission(path: Path, world: World, vehicle: Vehicle, home_deg: tuple[float, float], order: Order) -> Mission:
