@@ -7,8 +7,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-import numpy as np
-
 from gcsplan.app.model import Brief
 from gcsplan.check.home_height import why_unknown
 from gcsplan.check.judge import judge
@@ -301,19 +299,9 @@ def bow_margin_m(request: VehicleRequest, world: World, margins: Margins = MARGI
     own_m = LEAST_BOW_M
     if request.vehicle.turn_radius_m > 0.0:
         own_m = BOW_M  # arcs, climb-outs and approaches have legs of their own
-    own_m = min(max(own_m, _largest_bow_m(world, longest_m)), BOW_M)
-    return min(own_m * margins.bow_m / BOW_M, _largest_bow_m(world))
-
-
-def _largest_bow_m(world: World, longest_m: float = LONGEST_LEG_M) -> float:
-    """Bow of the longest leg that may be flown in this world, m (small in the papers' 100 m worlds)."""
-    surface = world.airspace.surface
-    rows, cols = surface.ground_m.shape
-    corners = surface.grid.to_plane([0, cols - 1, 0, cols - 1], [0, 0, rows - 1, rows - 1])
-    north_m = float(corners[:, 1].max())
-    half_m = 0.5 * min(LONGEST_LEG_M, longest_m, float(np.linalg.norm(np.ptp(corners, axis=0))))
-    ends = world.frame.to_degrees([-half_m, half_m], [north_m, north_m])
-    return float(world.frame.bow_m(ends[0], ends[1])[0]) + 1e-3
+    straight_m = world.bow_m(min(longest_m, LONGEST_LEG_M))
+    wanted_m = min(max(own_m, straight_m), BOW_M) * margins.bow_m / BOW_M
+    return wanted_m if wanted_m <= straight_m else min(wanted_m, world.bow_m(LONGEST_LEG_M))
 
 
 def _with_margins(limits: Limits, margins: Margins, *, terrain: bool) -> Limits:

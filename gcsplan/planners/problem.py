@@ -46,6 +46,20 @@ class Progress:
     phase: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class Rounding:
+    """What the rounding of ends and vias takes from lower bounds: `Problem.connectors`, and the cost of the
+    ``straight`` line between places that lie as near to each other as they may."""
+
+    connectors: float
+    straight: float
+
+    def bound(self, bound: float) -> float:
+        """A lower bound of all paths, whose ends and vias may lie beside the exact ones, from one of paths between
+        those: less the connectors, or the straight line if that is longer."""
+        return max(bound - self.connectors, min(self.straight, bound))
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Problem:
     """Find a path from ``start`` to ``goal`` (east_m, north_m, amsl_m) that passes every ``via`` in order.
@@ -131,11 +145,9 @@ class Problem:
             each = self.horizontal_j_per_m * flat + self.vertical_j_per_m * rise
         return (2 + 2 * len(self.via)) * each
 
-    def rounded_bound(self, bound: float) -> float:
-        """A lower bound of all paths, whose ends and vias may lie beside the exact ones, from one of paths between
-        those: less the connectors, or the straight line between places that lie as near to each other as they may."""
-        straight = straight_bound(self, self.rounding_m) * (1.0 - 1e-12)
-        return max(bound - self.connectors, min(straight, bound))
+    def rounding(self) -> Rounding:
+        """What the rounding of ends and vias takes from lower bounds."""
+        return Rounding(self.connectors, straight_bound(self, self.rounding_m) * (1.0 - 1e-12))
 
     def leg_costs(self, start: Floats, end: Floats) -> Floats:
         """(...) costs of straight legs between points (..., 3); `cost` of a path is their sum."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.frame import Frame
 from gcsplan.world.terrain_grid import SPACING_M
@@ -47,6 +49,31 @@ class World:
     @cached_property
     def _grounds(self) -> dict[tuple[float, float], float]:
         """The ground at places that were asked for last: home is asked for again and again."""
+        return {}
+
+    def bow_m(self, longest_m: float) -> float:
+        """Metres that a leg of ``longest_m``, or the longest one that fits into this world, may lie beside the line
+        that is straight in degrees, wherever it is (little in the papers' 100 m worlds)."""
+        north_m, across_m = self._extent_m
+        half_m = 0.5 * min(longest_m, across_m)
+        if half_m not in self._bows:
+            if len(self._bows) >= KEPT:
+                self._bows.clear()
+            ends = self.frame.to_degrees([-half_m, half_m], [north_m, north_m])
+            self._bows[half_m] = float(self.frame.bow_m(ends[0], ends[1])[0]) + 1e-3
+        return self._bows[half_m]
+
+    @cached_property
+    def _extent_m(self) -> tuple[float, float]:
+        """The northernmost place of the surface, metres north, and the diagonal of the box around it, metres."""
+        surface = self.airspace.surface
+        rows, cols = surface.ground_m.shape
+        corners = surface.grid.to_plane([0, cols - 1, 0, cols - 1], [0, 0, rows - 1, rows - 1])
+        return float(corners[:, 1].max()), float(np.linalg.norm(np.ptp(corners, axis=0)))
+
+    @cached_property
+    def _bows(self) -> dict[float, float]:
+        """The bows of legs that were asked for last, by half their length: every attempt at a plan asks again."""
         return {}
 
     def read_amsl(self, lat_deg: float, lon_deg: float) -> float:

@@ -149,12 +149,12 @@ def _gate(order: Order, vehicle: Vehicle) -> MissionItem:
 
 def spaced_out(points: Floats, vehicle: Vehicle) -> Floats:
     """Drop inner points nearer than two acceptance radii to the previous kept point or to the last point."""
-    apart_m = 2.0 * acceptance_radius_m(vehicle)
-    kept = [points[0]]
-    for p in points[1:-1]:
-        if np.linalg.norm(p - kept[-1]) >= apart_m and np.linalg.norm(p - points[-1]) >= apart_m:
-            kept.append(p)
-    return np.array([*kept, points[-1]])
+    apart_m, places = 2.0 * acceptance_radius_m(vehicle), points.tolist()
+    kept = [0]
+    for k in range(1, len(places) - 1):
+        if math.dist(places[k], places[kept[-1]]) >= apart_m and math.dist(places[k], places[-1]) >= apart_m:
+            kept.append(k)
+    return points[[*kept, -1]]
 
 
 def _round_heights(points: Floats, places_m: Floats, base_m: float, vehicle: Vehicle, order: Order) -> NDArray[np.int_]:

@@ -39,6 +39,7 @@ class Incumbent:
     def __init__(self, problem: Problem, sharp: bool = True) -> None:
         self.problem, self.sharp = problem, sharp
         self.budget: Budget = problem.budget
+        self.rounding = problem.rounding()
         self.wanted = problem.gap_percent / 100.0
         self.nearer = NEARER * self.wanted
         self.judge = Judge(problem)
@@ -193,7 +194,7 @@ class Incumbent:
     def done(self) -> bool:
         """Whether the gap to the bound that is reported, of paths whose ends may lie beside the exact ones, is as small
         as wanted."""
-        return self.cost <= self.problem.rounded_bound(self.bound) * (1.0 + self.wanted)
+        return self.cost <= self.rounding.bound(self.bound) * (1.0 + self.wanted)
 
     def goes_on(self) -> bool:
         """Whether the gap is larger than wanted, more bound is of use, and budget is left."""

@@ -56,7 +56,7 @@ def plan(problem: Problem) -> Solution:
     problem = replace(problem, budget=problem.budget.anew(problem.budget_s, problem.budget_mb))
     found = plan_over(problem, _within)
     # The searches bound paths between the exact ends; those of the mission may lie beside them.
-    bound = None if found.lower_bound is None else problem.rounded_bound(found.lower_bound)
+    bound = None if found.lower_bound is None else problem.rounding().bound(found.lower_bound)
     return replace(found, lower_bound=bound)
 
 
