@@ -130,7 +130,8 @@ def bench_terrain(
     """Plan a set of problems made from a seed with every planner; the same exact check judges all."""
     from rich.console import Console
 
-    from gcsplan.bench import terrain, terrain_report
+    from gcsplan.bench.terrain import report as terrain_report
+    from gcsplan.bench.terrain import run as terrain
     from gcsplan.cli.console import remark
     from gcsplan.cli.screens import RESULTS
 
@@ -165,7 +166,7 @@ def bench_swarms(
     """Search 60 missions with room by every swarm: raw legal, repaired or refused, and the length over `optimal`."""
     from rich.console import Console
 
-    from gcsplan.bench import swarms
+    from gcsplan.bench.swarms import run as swarms
     from gcsplan.cli.console import remark
     from gcsplan.cli.screens import RESULTS
 
@@ -192,8 +193,8 @@ def bench_everyday(
     without: WithoutOption = None,
 ) -> None:
     """Plan short legs, walls, hooks, combs, rings, circles, polygons, vias, levels: flat, hills, the sample DEM."""
-    from gcsplan.bench import everyday
-    from gcsplan.bench.everyday_missions import KINDS
+    from gcsplan.bench.everyday import run as everyday
+    from gcsplan.bench.everyday.missions import KINDS
     from gcsplan.cli.console import remark
 
     try:
@@ -234,7 +235,7 @@ def bench_papers(
 ) -> None:
     """Run every scenario and algorithm of the five papers, beside their printed numbers, straight line and optimum."""
     if speed:
-        from gcsplan.bench import papers_speed
+        from gcsplan.bench.papers import speed as papers_speed
 
         measured = papers_speed.run(missions=missions)
         if as_json:
@@ -242,7 +243,8 @@ def bench_papers(
         else:
             put(papers_speed.report(measured))
         return
-    from gcsplan.bench import papers, papers_report
+    from gcsplan.bench.papers import report as papers_report
+    from gcsplan.bench.papers import run as papers
 
     result = papers.run(
         scenario or None, algorithm or None, runs, seed, jobs, out, cluster, None, missions=missions, readings=readings
@@ -273,7 +275,8 @@ def bench_metabox(
     as_json: JsonOption = False,
 ) -> None:
     """Run our optimisers beside MetaEvoBox's own on generated instances of its UAV family (extra `metabox`)."""
-    from gcsplan.bench import metabox, metabox_report
+    from gcsplan.bench.metabox import report as metabox_report
+    from gcsplan.bench.metabox import run as metabox
     from gcsplan.cli.console import remark
 
     def tell(done: int, of: int) -> None:
@@ -306,8 +309,8 @@ def bench_scale(
     as_json: JsonOption = False,
 ) -> None:
     """Measure time and memory against missions, vehicles, zones, cells of the DEM and workers (extra `cluster`)."""
-    from gcsplan.bench import papers
-    from gcsplan.bench import scale as bench
+    from gcsplan.bench.papers import run as papers
+    from gcsplan.bench.scale import run as bench
     from gcsplan.cli.console import remark
 
     papers.ready(out)  # find a bad directory before the long run

@@ -24,7 +24,7 @@ from typing import Any, TypeAlias
 
 import yaml
 
-from gcsplan.bench.everyday_missions import KINDS, draw
+from gcsplan.bench.everyday.missions import KINDS, draw
 from gcsplan.bench.fleet_missions import fleet_document
 from tests.support.paths import MISSIONS, REPOSITORY
 

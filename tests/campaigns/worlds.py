@@ -29,7 +29,7 @@ from scipy.ndimage import binary_erosion, gaussian_filter, maximum_filter
 from gcsplan.app.pipeline import world_of
 from gcsplan.app.problems import make_problem
 from gcsplan.arrays import Bools, Floats
-from gcsplan.bench.everyday_oracle import Plane, Unreachable
+from gcsplan.bench.everyday.oracle import Plane, Unreachable
 from gcsplan.errors import NoMission
 from gcsplan.mission_file import load_mission
 from gcsplan.planners.optimal.planner import plan

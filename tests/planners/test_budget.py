@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import pytest
 
-from gcsplan.bench import everyday
-from gcsplan.bench.everyday_missions import KINDS, draw
+from gcsplan.bench.everyday import run as everyday
+from gcsplan.bench.everyday.missions import KINDS, draw
 from gcsplan.errors import InputError
 from gcsplan.planners.budget import COUNTED, FIRST, FIRST_S, Budget
 from gcsplan.planners.optimal import planner
@@ -133,8 +133,8 @@ def test_every_name_of_a_search_is_known_and_others_are_refused() -> None:
 RUN = """
 import resource, sys
 from dataclasses import replace
-from gcsplan.bench import everyday
-from gcsplan.bench.everyday_missions import KINDS, draw
+from gcsplan.bench.everyday import run as everyday
+from gcsplan.bench.everyday.missions import KINDS, draw
 from gcsplan.planners.optimal.planner import plan
 kind, without, megabytes = sys.argv[1], tuple(sys.argv[2].split(",")), float(sys.argv[3])
 plan(everyday.problem_of(draw(1, 0)))

@@ -13,7 +13,7 @@ import yaml
 
 from gcsplan.app.pipeline import plan, world_of
 from gcsplan.app.problems import make_problem
-from gcsplan.bench.everyday_oracle import Plane, Unreachable
+from gcsplan.bench.everyday.oracle import Plane, Unreachable
 from gcsplan.errors import NoMission
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.planners.border import border, enclosed, exit_cost, goes_on, margin_for, within_m

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
-from gcsplan.bench.everyday_oracle import Plane, Unreachable
+from gcsplan.bench.everyday.oracle import Plane, Unreachable
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.navmesh import outlines
 from gcsplan.planners.optimal.navmesh.outlines import Solids

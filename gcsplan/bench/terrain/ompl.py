@@ -1,0 +1,175 @@
+"""OMPL's asymptotically optimal planners on a problem, with the same exact check, one leg at a time.
+
+They search the box of the surface between the lowest legal altitude and the ceiling, for length in space, with OMPL's
+own defaults. States and motions are judged by `exact.one_leg`: exact, with climb limit and zones, without
+sampling.
+
+Their seconds are processor seconds, so that other work on the machine does not count. The crossing from C++ to Python
+and back takes about as long as RRT*'s own work and is not counted either: its least time is measured before each run,
+and subtracted for every check. So they get about the time that they would have with the check in their own language.
+The time to the first path is the processor's, with nothing subtracted.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from gcsplan.errors import InputError
+from gcsplan.planners.problem import Problem
+from gcsplan.world.airspace import Legs
+
+PLANNERS = {"RRT*": "RRTstar", "InformedRRT*": "InformedRRTstar", "BIT*": "BITstar"}
+CROSSINGS = 2000
+CURE = "this benchmark needs OMPL and mealpy: pip install 'gcsplan[bench]', or say --no-rivals"
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A rival's answer: the path (None if there is none), its length as found and after simplification."""
+
+    points: list[list[float]] | None
+    cost: float | None
+    raw_cost: float | None
+    first_path_s: float | None
+    planning_s: float
+    checks: int
+    detail: str = ""
+
+
+def release() -> str:
+    """The installed version. Raises InputError if OMPL is missing."""
+    try:
+        return f"ompl {version('ompl')}"
+    except PackageNotFoundError:
+        raise InputError(CURE) from None
+
+
+def warm_up(problem: Problem) -> None:
+    """Compile the check of one leg, so that no run's time contains it."""
+    from gcsplan.bench.terrain.exact import one_leg
+
+    one_leg(problem.airspace, problem.limits)(*problem.start, *problem.start)
+
+
+def plan(problem: Problem, name: str, seconds: float, seed: int) -> Found:
+    """Run the planner of `PLANNERS` called ``name`` for ``seconds``, then simplify its path, which takes milliseconds.
+
+    The shorter of the path as found and as simplified is kept. ``seed`` has an effect only in the first run of a
+    process; planners that stop by the clock are not repeatable anyway. Raises InputError if OMPL is missing.
+    """
+    try:
+        base, geometric, util = (import_module(f"ompl.{name}") for name in ("base", "geometric", "util"))
+    except ImportError:
+        raise InputError(CURE) from None
+    util.setLogLevel(util.LOG_NONE)
+    util.RNG.setSeed(seed)
+    space = base.RealVectorStateSpace(3)
+    bounds = base.RealVectorBounds(3)
+    for axis, (low, high) in enumerate(box_of(problem)):
+        bounds.setLow(axis, low)
+        bounds.setHigh(axis, high)
+    space.setBounds(bounds)
+    info = base.SpaceInformation(space)
+    counts = [0]
+    judges = _judges(base, info, problem, counts)
+    info.setStateValidityChecker(judges[0])
+    info.setMotionValidator(judges[1])
+    info.setup()
+    start, goal = space.allocState(), space.allocState()
+    for axis in range(3):
+        start[axis], goal[axis] = problem.start[axis], problem.goal[axis]
+    asked = base.ProblemDefinition(info)
+    asked.setStartAndGoalStates(start, goal)
+    asked.setOptimizationObjective(base.PathLengthOptimizationObjective(info))
+    planner = getattr(geometric, PLANNERS[name])(info)
+    planner.setProblemDefinition(asked)
+    planner.setup()
+    crossing_s = _crossing_s(info, start, problem)
+    first: list[float] = []
+    counts[0] = 0
+    began = time.process_time()
+
+    def elapsed_s() -> float:
+        return time.process_time() - began - counts[0] * crossing_s
+
+    def over() -> bool:
+        if not first and math.isfinite(planner.bestCost().value()):
+            first.append(time.process_time() - began)
+        return elapsed_s() >= seconds
+
+    planner.solve(base.PlannerTerminationCondition(over))
+    planned_s = elapsed_s()
+    if not asked.hasExactSolution():
+        return Found(None, None, None, None, planned_s, counts[0])
+    path = asked.getSolutionPath()
+    raw = _points(path)
+    geometric.PathSimplifier(info).simplify(path, 10.0 * seconds)  # ends by itself long before that time
+    simple = _points(path) if path.check() else raw
+    best = min(raw, simple, key=_length)
+    took = elapsed_s()
+    return Found(best, _length(best), _length(raw), first[0] if first else planned_s, took, counts[0])
+
+
+def box_of(problem: Problem) -> list[tuple[float, float]]:
+    """East, north and altitude ranges of the search: the whole surface, lowest floor to highest ceiling."""
+    surface, limits = problem.airspace.surface, problem.limits
+    rows, cols = surface.ground_m.shape
+    corners = surface.grid.to_plane([0, 0, cols - 1, cols - 1], [0, rows - 1, 0, rows - 1])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    bottom = float(np.nanmin(surface.top_m)) + limits.min_agl_m
+    top = math.inf if limits.max_amsl_m is None else limits.max_amsl_m
+    if limits.max_agl_m is not None:
+        top = min(top, float(np.nanmax(surface.ground_m)) + limits.max_agl_m)
+    if math.isinf(top):
+        top = float(np.nanmax(surface.top_m)) + 2.0 * limits.min_agl_m
+    return [(float(low[0]), float(high[0])), (float(low[1]), float(high[1])), (bottom, top)]
+
+
+def _judges(base: Any, info: Any, problem: Problem, counts: list[int]) -> tuple[Any, Any]:
+    """Validity of a state and of a motion, both by the exact check, with a count of the checks."""
+    from gcsplan.bench.terrain.exact import one_leg  # imported here because only rivals need numba's compiler
+
+    clear = one_leg(problem.airspace, problem.limits)
+
+    class State(base.StateValidityChecker):  # type: ignore[misc]
+        def isValid(self, state: Any) -> bool:
+            e, n, h = state[0], state[1], state[2]
+            counts[0] += 1
+            return clear(e, n, h, e, n, h)
+
+    class Motion(base.MotionValidator):  # type: ignore[misc]
+        def checkMotion(self, a: Any, b: Any) -> bool:
+            counts[0] += 1
+            return clear(a[0], a[1], a[2], b[0], b[1], b[2])
+
+    return State(info), Motion(info)
+
+
+def _crossing_s(info: Any, state: Any, problem: Problem) -> float:
+    """Seconds of one check that neither the planner nor the kernel uses: the least of several timings."""
+    e, n, h = problem.start
+    legs = Legs.of_path(np.tile([[e, n, h]], (CROSSINGS + 1, 1)), problem.limits)
+    taken = []
+    for _ in range(9):
+        began = time.process_time()
+        for _ in range(CROSSINGS):
+            info.checkMotion(state, state)
+        between = time.process_time()
+        problem.airspace.clear(legs, problem.limits)
+        taken.append((between - began) - (time.process_time() - between))
+    return max(0.0, min(taken)) / CROSSINGS
+
+
+def _points(path: Any) -> list[list[float]]:
+    return [[float(state[axis]) for axis in range(3)] for state in path.getStates()]
+
+
+def _length(points: list[list[float]]) -> float:
+    return float(np.linalg.norm(np.diff(np.array(points), axis=0), axis=1).sum())

@@ -1,0 +1,125 @@
+"""Missions with room, for planners that search by samples: a wide corridor leads from start to goal.
+
+A mission has room if a *corridor* joins its ends: a strip that advances along the straight track, turns at most 45° off
+it and stays within half its length to either side, so that a point on each plane across the track can follow it. It is
+`WIDE_M` wide, `NARROW_M` within `NEAR_M` of an end. All over its width, the lowest legal altitude is below the ceiling
+and below a cone over either end that rises with `CONE` of the climb limit, and no zone reaches it, whatever the zone's
+floor and ceiling. The ceiling is drawn just above the lowest that leaves a corridor, and blocks the straight track.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import maximum_filter
+
+from gcsplan.arrays import Bools, Floats
+from gcsplan.bench.terrain.pairs import MOST_ZONE_SETS, Pair, draw_above, draw_zones, place, stratum
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.limits import Limits
+from gcsplan.world.zones import Circle, Zone
+
+STEP_M = 50.0
+WIDE_M, NARROW_M, NEAR_M = 600.0, 200.0, 1_000.0
+ASIDE = 0.5
+CONE = 0.7
+MOST_PAIRS = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Corridors:
+    """A lattice along the straight track, (stations, sides), of the corridors between two ends.
+
+    ``east_m``, ``north_m``: its places; ``needed_m``: the highest lowest-legal altitude within half a corridor's width
+    (inf where no corridor passes); ``half_m`` (stations,): half a corridor's width.
+    """
+
+    east_m: Floats
+    north_m: Floats
+    needed_m: Floats
+    half_m: Floats
+
+    @classmethod
+    def of(cls, pair: Pair, airspace: Airspace, limits: Limits) -> Corridors:
+        """The corridors of a pair; the airspace's zones do not count."""
+        a, b = np.array(pair.start), np.array(pair.goal)
+        way = float(math.dist(a, b))
+        stations, sides = math.ceil(way / STEP_M) + 1, 2 * math.ceil(ASIDE * way / STEP_M) + 1
+        along = (b - a) / way
+        s = np.linspace(0.0, way, stations)
+        aside = (np.arange(sides) - sides // 2) * STEP_M
+        places = a + s[:, None, None] * along + aside[:, None] * np.array([-along[1], along[0]])
+        floor = airspace.floor_amsl(places[..., 0], places[..., 1], limits)
+        floor = np.where(np.isfinite(floor), floor, np.inf)
+        ends_m = np.minimum(s, way - s)
+        half = np.where(ends_m < NEAR_M, 0.5 * NARROW_M, 0.5 * WIDE_M)
+        narrow, wide = (maximum_filter(floor, footprint=_disc(w / 2.0), mode="nearest") for w in (NARROW_M, WIDE_M))
+        needed = np.where((ends_m < NEAR_M)[:, None], narrow, wide)
+        rise = CONE * math.tan(math.radians(pair.steepest_deg))
+        for row, end in ((0, a), (-1, b)):
+            far = np.hypot(places[..., 0] - end[0], places[..., 1] - end[1])
+            cone = floor[row, sides // 2] + rise * far
+            # Within half a width of the end, its own floor counts instead of the corridor's.
+            beyond = (needed > cone) & (far > 0.5 * NARROW_M)
+            needed = np.where(beyond, np.inf, needed)
+            needed[row, sides // 2] = floor[row, sides // 2]
+        return cls(places[..., 0], places[..., 1], needed, half)
+
+    def open(self, ceiling_m: float, zones: tuple[Zone, ...] | list[Zone] = (), reach_m: float = 0.0) -> bool:
+        """Whether a corridor below ``ceiling_m`` joins the ends, clear of ``zones`` by ``reach_m``."""
+        free: Bools = self.needed_m <= ceiling_m
+        for zone in zones:
+            assert isinstance(zone.shape, Circle)
+            c = zone.shape
+            beside = np.hypot(self.east_m - c.east_m, self.north_m - c.north_m)
+            free &= beside > c.radius_m + reach_m + self.half_m[:, None]
+        middle = free.shape[1] // 2
+        here = np.zeros(free.shape[1], np.bool_)
+        here[middle] = free[0, middle]
+        for row in free[1:]:
+            spread = here.copy()
+            spread[1:] |= here[:-1]
+            spread[:-1] |= here[1:]
+            here = spread & row
+        return bool(here[middle])
+
+    def lowest(self) -> float:
+        """The lowest ceiling, to half a metre above, that leaves a corridor; inf if none does."""
+        known = self.needed_m[np.isfinite(self.needed_m)]
+        low, high = float(known.min()), float(known.max())
+        if not self.open(high):
+            return math.inf
+        while high - low > 0.5:
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if self.open(middle) else (middle, high)
+        return high
+
+
+def draw_with_room(rng: np.random.Generator, number: int, limits: Limits, zones: int) -> Pair:
+    """Pair ``number`` with room, its ceiling, and its ``zones``; ``limits`` have no ceiling.
+
+    Raises ValueError if `MOST_PAIRS` draws in a row had none."""
+    sets = 0
+    way_m, steepest_deg = stratum(rng, number)
+    for pairs in range(MOST_PAIRS):
+        pair = place(rng, number, way_m, steepest_deg)
+        airspace = Airspace(pair.surface, scale=pair.scale)
+        corridors = Corridors.of(pair, airspace, limits)
+        ceiling_m = draw_above(rng, pair, corridors.lowest(), limits)
+        if ceiling_m is None:
+            continue
+        reach = limits.horizontal_clearance_m + limits.track_error_m
+        for _ in range(MOST_ZONE_SETS):
+            found = draw_zones(rng, pair, zones)
+            if corridors.open(ceiling_m - limits.altitude_error_m, found, reach):
+                return replace(pair, ceiling_m=ceiling_m, zones=tuple(found), redraws=(pairs, sets))
+            sets += 1
+    raise ValueError(f"pair {number}: no pair of {MOST_PAIRS} has room for {zones} zones")
+
+
+def _disc(radius_m: float) -> Bools:
+    n = math.ceil(radius_m / STEP_M)
+    i, j = np.meshgrid(np.arange(-n, n + 1), np.arange(-n, n + 1))
+    return np.asarray(i * i + j * j <= (radius_m / STEP_M) ** 2 + 1e-9)
