@@ -56,14 +56,12 @@ def bench_upload(
     as_json: JsonOption = False,
 ) -> None:
     """Measure uploads to the loopback vehicle, side by side with MAVSDK's upload to the same vehicle (extra `test`)."""
-    if fleet is not None:
-        from gcsplan.bench import upload_fleet
-
-        measured = upload_fleet.run(fleet=fleet, items=50 if items is None else items, drop=drop)
-        _tell(measured, upload_fleet.report, as_json)
-        return
     from gcsplan.bench import upload as bench
 
+    if fleet is not None:
+        measured = bench.run_fleet(fleet=fleet, items=50 if items is None else items, drop=drop)
+        _tell(measured, bench.report_fleet, as_json)
+        return
     items = 600 if items is None else items
     result = bench.run(items=items, runs=runs)
     _tell(result, bench.report, as_json)
@@ -98,9 +96,10 @@ def bench_functions(
 ) -> None:
     """Run SSGWO's tables 1 and 2 again, beside the printed numbers, with optima in the middle and moved."""
     from gcsplan.bench import functions as bench
+    from gcsplan.bench.files import ready
 
     if out is not None:
-        bench.ready(out)  # find a bad directory before the long run
+        ready(out)  # find a bad directory before the long run
     result = bench.run(runs=runs, seed=seed, jobs=jobs)
     if out is not None:
         bench.write(result, out)
@@ -309,11 +308,11 @@ def bench_scale(
     as_json: JsonOption = False,
 ) -> None:
     """Measure time and memory against missions, vehicles, zones, cells of the DEM and workers (extra `cluster`)."""
-    from gcsplan.bench.papers import run as papers
+    from gcsplan.bench.files import ready
     from gcsplan.bench.scale import run as bench
     from gcsplan.cli.console import remark
 
-    papers.ready(out)  # find a bad directory before the long run
+    ready(out)  # find a bad directory before the long run
     result = bench.run(axes.split(","), missions, workers, seed, kill=kill, tell=remark)
     bench.write(result, out)
     _tell(result, bench.report, as_json)

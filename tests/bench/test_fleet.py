@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gcsplan.bench.fleet import report, run, sampled
-from gcsplan.bench.fleet_missions import APART_M, fleet_document
+from gcsplan.bench.fleet import APART_M, fleet_document, report, run, sampled
 from gcsplan.errors import InputError
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Rules, separation

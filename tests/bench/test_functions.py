@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gcsplan.bench.functions import _claims, _holm, ready, report, run, write
-from gcsplan.bench.functions_printed import PRINTED, RUNS, WOLVES, Printed
+from gcsplan.bench.files import ready
+from gcsplan.bench.functions import PRINTED, RUNS, WOLVES, Printed, claims_of, report, run, write
+from gcsplan.bench.measure import holm
 from gcsplan.errors import InputError
 from gcsplan.optimisers.functions import FUNCTIONS
 
@@ -93,8 +94,8 @@ def test_no_experiment_is_marked_by_mistake() -> None:
 
 
 def test_holms_correction_steps_down_and_never_falls() -> None:
-    assert _holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
-    assert _holm([0.9, 0.8]) == [1.0, 1.0]
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.9, 0.8]) == [1.0, 1.0]
 
 
 def test_a_claim_holds_only_where_the_runs_say_so() -> None:
@@ -103,17 +104,17 @@ def test_a_claim_holds_only_where_the_runs_say_so() -> None:
     costs = {("f1", wolf, setting): high for wolf in WOLVES for setting in ("middle", "shifted")}
     costs["f1", "ssgwo", "middle"] = low
     costs["f1", "ssgwo", "shifted"] = high + 1.0
-    claims = _claims(costs, ["f1"], WOLVES, 40, 30)
+    claims = claims_of(costs, ["f1"], WOLVES, 40, 30)
     assert {c["claim"] for c in claims} == {f"ssgwo < {w}" for w in WOLVES[:4]}
     assert all(c["reproduced"] == (c["setting"] == "middle") for c in claims)
     # Table 2 has MGWO and SSGWO level on f7.
     costs = {("f7", wolf, setting): high for wolf in ("mgwo", "ssgwo") for setting in ("middle", "shifted")}
     costs["f7", "ssgwo", "middle"] = low
-    tie = {c["setting"]: c for c in _claims(costs, ["f7"], ["mgwo", "ssgwo"], 40, 30)}
+    tie = {c["setting"]: c for c in claims_of(costs, ["f7"], ["mgwo", "ssgwo"], 40, 30)}
     assert tie["middle"]["claim"] == "ssgwo = mgwo"
     assert not tie["middle"]["reproduced"]
     assert tie["shifted"]["reproduced"]
-    assert _claims(costs, ["f7"], ["mgwo", "ssgwo"], 29, 30) == []
+    assert claims_of(costs, ["f7"], ["mgwo", "ssgwo"], 29, 30) == []
 
 
 def test_rankings_among_values_that_doubles_cannot_tell_apart_are_left_open() -> None:
@@ -122,11 +123,11 @@ def test_rankings_among_values_that_doubles_cannot_tell_apart_are_left_open() ->
     tiny, more = np.zeros(40), np.full(40, least / 2.0)
     costs = {("f1", wolf, setting): more for wolf in ("gwo", "ssgwo") for setting in ("middle", "shifted")}
     costs["f1", "ssgwo", "middle"] = tiny
-    middle = _claims(costs, ["f1"], ["gwo", "ssgwo"], 40, 30)[0]
+    middle = claims_of(costs, ["f1"], ["gwo", "ssgwo"], 40, 30)[0]
     assert middle["p"] < 0.05
     assert middle["reproduced"] is None
     costs["f1", "gwo", "middle"] = np.full(40, 2.0 * least)
-    assert _claims(costs, ["f1"], ["gwo", "ssgwo"], 40, 30)[0]["reproduced"] is True
+    assert claims_of(costs, ["f1"], ["gwo", "ssgwo"], 40, 30)[0]["reproduced"] is True
 
 
 @pytest.mark.slow

@@ -25,7 +25,7 @@ from typing import Any, TypeAlias
 import yaml
 
 from gcsplan.bench.everyday.missions import KINDS, draw
-from gcsplan.bench.fleet_missions import fleet_document
+from gcsplan.bench.fleet import fleet_document
 from tests.support.paths import MISSIONS, REPOSITORY
 
 SETS = ("gallery", "papers", "terrain", "everyday", "fleets", "turns", "batch")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats
-from gcsplan.bench.papers.statistics import compare, holm
+from gcsplan.bench.measure import compare, holm
 from gcsplan.optimisers.driver import minimise
 from gcsplan.optimisers.functions import FUNCTIONS
 from gcsplan.optimisers.registry import TABLE

@@ -25,6 +25,7 @@ import numpy as np
 import shapely
 
 from gcsplan.arrays import Floats
+from gcsplan.bench.sample import ROUND_DEGREE_M, SAMPLE
 
 Document = dict[str, Any]
 
@@ -38,7 +39,6 @@ SPARE_M = 2.0
 """Metres that places keep from zones beyond the margins, for what a plan adds for rounding."""
 MIN_AGL_M = 30.0
 SAMPLE_MIN_AGL_M = 60.0
-METRES_PER_DEGREE = 111_200.0
 DRAWS = 1000
 
 
@@ -89,7 +89,7 @@ def _legal(draft: _Draft, reach_m: float) -> bool:
 
 def _document(draft: _Draft, kind: str, name: str, rng: np.random.Generator, *, margins: bool) -> Document:
     lat0, lon0 = (36.58, -84.28) if kind == "sample" else (47.0, 8.0)
-    scale = METRES_PER_DEGREE * np.array([1.0, math.cos(math.radians(lat0))])
+    scale = ROUND_DEGREE_M * np.array([1.0, math.cos(math.radians(lat0))])
 
     def point(place: Floats) -> list[float] | Document:
         if draft.peaks:  # peaks are in local metres
@@ -116,7 +116,7 @@ def _document(draft: _Draft, kind: str, name: str, rng: np.random.Generator, *, 
     }  # fmt: skip
     terrain: Document = {"flat_m": 0}
     if kind == "sample":
-        terrain = {"dem": "sample:jacksboro", "vertical_datum": "EGM96"}
+        terrain = dict(SAMPLE)
     elif draft.peaks:
         terrain["peaks"] = [{**p, "center": [round(float(x), 2) for x in p["center"]]} for p in draft.peaks]
     frame = {"frame": {"origin": [lat0, lon0], "amsl_m": 0}} if draft.peaks else {}

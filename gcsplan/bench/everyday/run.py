@@ -22,7 +22,8 @@ from gcsplan.app.pipeline import world_of
 from gcsplan.app.problems import make_problem
 from gcsplan.bench.everyday.missions import KINDS, Everyday, draw
 from gcsplan.bench.everyday.oracle import Plane, Unreachable
-from gcsplan.bench.terrain.measure import Memory, passes, percentile
+from gcsplan.bench.files import write_all
+from gcsplan.bench.measure import Memory, passes, percentile
 from gcsplan.errors import InputError, NoMission
 from gcsplan.export.table import csv_of
 from gcsplan.mission_file import load_mission
@@ -112,9 +113,7 @@ def run(
             outcomes.append(found)
             tell(line(found))
     if directory is not None:
-        directory.mkdir(parents=True, exist_ok=True)
-        (directory / "everyday.csv").write_text(as_csv(outcomes), encoding="utf-8")
-        (directory / "everyday.md").write_text(report(outcomes), encoding="utf-8")
+        write_all(directory, {"everyday.csv": as_csv(outcomes), "everyday.md": report(outcomes)})
     return outcomes
 
 

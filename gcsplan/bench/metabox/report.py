@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from gcsplan.arrays import Floats
+from gcsplan.bench.files import write_all
+from gcsplan.bench.measure import compare, holm
 from gcsplan.bench.metabox.run import THEIRS
-from gcsplan.bench.papers.statistics import compare, holm
-from gcsplan.export.outdir import write_whole
 from gcsplan.export.table import csv_of
 
 COLUMNS = ("optimiser", "of", "place, %", "p", "over the best, %", "clear", "remarks")
@@ -63,14 +63,14 @@ def write(result: dict[str, Any], out: Path) -> list[Path]:
     """
     names = list(result["runs"][0])
     table = [names, *([run.get(name) for name in names] for run in result["runs"])]
-    files = {
-        out / "metabox.json": json.dumps(result | {"rows": rows(result)}, indent=1) + "\n",
-        out / "metabox.md": report(result),
-        out / "metabox-runs.csv": csv_of(table, end="\r\n"),
-    }
-    for path, content in files.items():
-        write_whole(path, content)
-    return list(files)
+    return write_all(
+        out,
+        {
+            "metabox.json": json.dumps(result | {"rows": rows(result)}, indent=1) + "\n",
+            "metabox.md": report(result),
+            "metabox-runs.csv": csv_of(table, end="\r\n"),
+        },
+    )
 
 
 def _finite(number: float) -> float | None:

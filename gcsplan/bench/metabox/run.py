@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from gcsplan.bench.functions import ready
+from gcsplan.bench.files import ready
 from gcsplan.bench.metabox.link import Worker
 from gcsplan.errors import InputError, unknown_name
 from gcsplan.optimisers.driver import minimise

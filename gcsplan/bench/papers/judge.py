@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 
 from gcsplan.arrays import Floats
+from gcsplan.bench.measure import compare, holm
 from gcsplan.bench.papers.claims import Claim, claims_of
 from gcsplan.bench.papers.readings import readings_of
 from gcsplan.bench.papers.runs import OPTIMA, Record
 from gcsplan.bench.papers.scenarios import SCENARIOS, Scenario
-from gcsplan.bench.papers.statistics import UNITS, compare, equal_evaluations, holm, values
+from gcsplan.bench.papers.statistics import UNITS, equal_evaluations, values
 
 LEAST_RUNS_TO_JUDGE = 30
 SIGNIFICANCE = 0.05

@@ -13,11 +13,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gcsplan.bench.papers.claims_report import claims_table, counts, readings_table, stands, times_tables
+from gcsplan.bench.files import write_all
 from gcsplan.bench.papers.printed import Number, Row
 from gcsplan.bench.papers.remarks import legend, remarks, schedules
-from gcsplan.bench.papers.tables import Table, significant
-from gcsplan.export.outdir import write_whole
+from gcsplan.bench.papers.tables import (
+    Table,
+    claims_table,
+    counts,
+    readings_table,
+    significant,
+    stands,
+    times_tables,
+)
 from gcsplan.export.table import csv_of
 
 IMPOSSIBLE, UNREACHED = "†", "‡"
@@ -216,7 +223,7 @@ def write(result: dict[str, Any], out: Path) -> list[Path]:
     Each file is written whole or not at all. Raises InputError if one cannot be written.
     """
     pictures = {name: data for summary in result["scenarios"] for name, data in _pictures(summary).items()}
-    files: dict[str, str | bytes] = {
+    contents: dict[str, str | bytes] = {
         "papers.csv": _csv([_flat(s, row) for s in result["scenarios"] for row in (*s["rows"], *s["reading_rows"])]),
         "papers-claims.csv": _csv(result["claims"]),
         "papers-claims.md": "\n".join(_claims(result)) + "\n",
@@ -227,9 +234,7 @@ def write(result: dict[str, Any], out: Path) -> list[Path]:
         "papers.html": "\n".join(_page(result, pictures)) + "\n",
         **pictures,
     }
-    for name, content in files.items():
-        write_whole(out / name, content)
-    return [out / name for name in files]
+    return write_all(out, contents)
 
 
 def _flat(summary: Summary, row: dict[str, Any]) -> dict[str, Any]:
@@ -281,8 +286,7 @@ def _claims(result: dict[str, Any]) -> Iterator[str]:
 
 def _pictures(summary: Summary) -> dict[str, bytes]:
     """PNG of a scenario by file name; none if readings alone were run."""
-    from gcsplan.bench.papers.pictures import draw_convergence, draw_map
-    from gcsplan.bench.papers.views import draw_boxes, draw_fleet, draw_space
+    from gcsplan.bench.papers.pictures import draw_boxes, draw_convergence, draw_fleet, draw_map, draw_space
 
     if not summary["records"]:
         return {}

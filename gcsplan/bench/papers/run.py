@@ -10,10 +10,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from gcsplan.bench.files import ready
 from gcsplan.bench.papers.claims import MEASURES
 from gcsplan.bench.papers.judge import judge
 from gcsplan.bench.papers.printed import PRINTED, Least, faults, least_of
-from gcsplan.bench.papers.runs import OPTIMA, Key, PaperRun, Record, Store, carry_out, code_digest
+from gcsplan.bench.papers.runs import OPTIMA, PaperRun, Record, Store, carry_out, code_digest, key_of
 from gcsplan.bench.papers.scenarios import Scenario, Set, choose, mission_text, prepare
 from gcsplan.bench.papers.statistics import equal_evaluations, row, time_row
 from gcsplan.errors import InputError
@@ -82,7 +83,7 @@ def run(
 
     def keep(record: Record) -> None:
         store.append(record)
-        there[_key(record)] = record
+        there[key_of(record)] = record
         at[0] += 1
         if done is not None:
             done(at[0], len(every))
@@ -103,14 +104,6 @@ def run(
     }
 
 
-def ready(out: Path) -> None:
-    """Create the directory. Raises InputError if that fails."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot be made: {error.strerror or error}", where=str(out)) from error
-
-
 def plain(result: dict[str, Any]) -> dict[str, Any]:
     """`run`'s result for JSON: without the runs and the world, and with printed numbers as printed."""
     left_out = ("set", "records", "best_path", "printed")
@@ -125,10 +118,6 @@ def plain(result: dict[str, Any]) -> dict[str, Any]:
 def _optima(scenario: Scenario) -> list[str]:
     energy = "energy" in MEASURES[scenario.paper.name].values()
     return [name for name, objective in OPTIMA.items() if objective == "length" or energy]
-
-
-def _key(record: Record) -> Key:
-    return (record["scenario"], record["algorithm"], record["seed"], record["number"], record["digest"])
 
 
 def _summary(

@@ -23,6 +23,7 @@ import numpy as np
 
 from gcsplan.app.executor import executor
 from gcsplan.arrays import Floats
+from gcsplan.bench.files import kept_rows
 from gcsplan.bench.papers.scenarios import SCENARIOS, Contender, Set, prepare, settings_of
 from gcsplan.errors import InputError, NoMission
 from gcsplan.planners.budget import Budget
@@ -101,6 +102,11 @@ class PaperRun:
         return next(c for c in SCENARIOS[self.scenario].contenders if c.name == self.algorithm)
 
 
+def key_of(record: Record) -> Key:
+    """The identity of the run that a record is of. Raises KeyError or TypeError for what is no record."""
+    return (record["scenario"], record["algorithm"], record["seed"], record["number"], record["digest"])
+
+
 class Store:
     """The file of runs. A line that cannot be read, such as a truncated last one, counts as not written."""
 
@@ -109,20 +115,10 @@ class Store:
 
     def load(self) -> dict[Key, Record]:
         """Every run in the file. Raises InputError if the file cannot be read."""
-        try:
-            lines = self.path.read_bytes().split(b"\n")
-        except FileNotFoundError:
-            return {}
-        except OSError as error:
-            raise InputError(f"cannot be read: {error.strerror or error}", where=str(self.path)) from error
         out: dict[Key, Record] = {}
-        for line in lines:
-            try:
-                record = json.loads(line)
-                key = tuple(record[name] for name in ("scenario", "algorithm", "seed", "number", "digest"))
-            except (ValueError, KeyError, TypeError):
-                continue
-            out[key] = record
+        for record in kept_rows(self.path):
+            with suppress(KeyError, TypeError):
+                out[key_of(record)] = record
         return out
 
     def append(self, record: Record) -> None:

@@ -56,28 +56,6 @@ def _value(record: Record, measure: str, evaluations: int) -> float:
     return math.inf if found is None else float(found)
 
 
-def compare(low: Floats, high: Floats) -> tuple[float, float]:
-    """Two-sided p by Mann and Whitney's U (normal approximation, corrected for ties), and the effect size: the
-    probability that a run of ``low`` is less than one of ``high``, ties counted half (Vargha and Delaney's A)."""
-    from scipy.stats import mannwhitneyu, rankdata
-
-    ranks = rankdata(np.concatenate([low, high]))  # infinities tie with each other
-    if np.ptp(ranks) == 0.0:
-        return 1.0, 0.5
-    found = mannwhitneyu(ranks[: len(low)], ranks[len(low) :], alternative="two-sided", method="asymptotic")
-    return float(found.pvalue), 1.0 - float(found.statistic) / (len(low) * len(high))
-
-
-def holm(p: Sequence[float]) -> list[float]:
-    """Holm's step-down correction."""
-    given = np.asarray(p, dtype=np.float64)
-    order = np.argsort(given, kind="stable")
-    steps = np.maximum.accumulate(given[order] * np.arange(len(given), 0, -1))
-    out = np.empty_like(given)
-    out[order] = np.minimum(steps, 1.0)
-    return [float(x) for x in out]
-
-
 def equal_evaluations(records: Iterable[Record]) -> int:
     """The number of evaluations that every run has reached: the least of all runs."""
     return min((int(r["evaluations"]) for r in records if r["status"] == "found"), default=0)

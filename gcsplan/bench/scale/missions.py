@@ -10,6 +10,7 @@ import numpy as np
 import yaml
 
 from gcsplan.arrays import Floats
+from gcsplan.bench.sample import SAMPLE
 from gcsplan.export.outdir import write_whole
 
 SAMPLE_BOX = (36.46, -84.40, 36.71, -84.10)
@@ -79,11 +80,10 @@ def mission(number: int, seed: int, tiles: Path, zones: int | None = None) -> di
     made = number % 2 == 1
     box = MADE_BOX if made else SAMPLE_BOX
     start, goal = _ends(rng, box)
-    terrain: dict[str, Any] = {"dem": str(tiles) if made else "sample:jacksboro", "vertical_datum": "EGM96"}
     return {
         "version": 1,
         "name": f"mission {number}",
-        "terrain": terrain,
+        "terrain": SAMPLE | ({"dem": str(tiles)} if made else {}),
         "limits": {
             "min_agl_m": 60, "horizontal_clearance_m": 30, "track_error_m": 3, "altitude_error_m": 5,
         },

@@ -22,14 +22,13 @@ import yaml
 from gcsplan.app.batch import Batch, BatchOptions, Record, missions_of, record_of
 from gcsplan.app.executor import Dask, Executor, Inline, executor
 from gcsplan.app.pipeline import plan
+from gcsplan.bench.measure import peak_mb
 from gcsplan.bench.scale.missions import mission
 from gcsplan.errors import GcsplanError
 from gcsplan.mission_file.samples import file_of
 
 EMPTY_PIECES = 1000
 """Pieces without work by which the scheduler's own time is measured."""
-
-PATIENCE_S = 120.0
 
 
 def batch_point(missions: str, out: str, jobs: int, kill: bool = False) -> dict[str, Any]:
@@ -136,10 +135,7 @@ class _Spent:
 
 def _usage() -> tuple[int, float, float]:
     """Process id, processor seconds so far, and the most memory so far, MB."""
-    import resource
-
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
-    return os.getpid(), time.process_time(), peak
+    return os.getpid(), time.process_time(), peak_mb()
 
 
 class _Watched:

@@ -12,7 +12,8 @@ from typing import Literal
 
 from rich.table import Table
 
-from gcsplan.bench.terrain.measure import percentile
+from gcsplan.bench.files import write_all
+from gcsplan.bench.measure import percentile
 from gcsplan.export.table import csv_of
 
 COLUMNS = (
@@ -160,12 +161,7 @@ class Result:
 
     def write(self, directory: Path) -> list[Path]:
         """Write ``swarms.md`` and ``swarms.csv``; returns their paths."""
-        from gcsplan.export.outdir import write_whole
-
-        directory.mkdir(parents=True, exist_ok=True)
-        for name, content in (("swarms.md", self.markdown()), ("swarms.csv", self.csv())):
-            write_whole(directory / name, content)
-        return [directory / name for name in ("swarms.md", "swarms.csv")]
+        return write_all(directory, {"swarms.md": self.markdown(), "swarms.csv": self.csv()})
 
 
 def _percent(value: float | None) -> str:

@@ -18,11 +18,12 @@ from typing import Any
 import numpy as np
 
 from gcsplan.app.executor import executor
+from gcsplan.bench.files import kept_rows
+from gcsplan.bench.measure import passes
 from gcsplan.bench.papers.runs import code_digest
 from gcsplan.bench.swarms import report
 from gcsplan.bench.swarms.report import Attempt, Method, Status
 from gcsplan.bench.terrain import swarms as terrain_swarms
-from gcsplan.bench.terrain.measure import passes
 from gcsplan.bench.terrain.problems import NamedProblem, problems
 from gcsplan.errors import GcsplanError, InputError
 from gcsplan.planners.budget import Budget
@@ -126,9 +127,8 @@ class Kept:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.known: dict[str, dict[str, Any]] = {}
-        for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
-            with suppress(ValueError, KeyError, TypeError):
-                row = json.loads(line)
+        for row in kept_rows(path):
+            with suppress(KeyError, TypeError):
                 self.known[row["key"]] = row["answer"]
 
     def add(self, key: str, answer: dict[str, Any]) -> None:

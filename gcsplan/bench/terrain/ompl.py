@@ -1,8 +1,9 @@
 """OMPL's asymptotically optimal planners on a problem, with the same exact check, one leg at a time.
 
 They search the box of the surface between the lowest legal altitude and the ceiling, for length in space, with OMPL's
-own defaults. States and motions are judged by `exact.one_leg`: exact, with climb limit and zones, without
-sampling.
+own defaults. States and motions are judged by `one_leg`: exact, with climb limit and zones, without sampling. For a
+single leg, `Airspace.clear` spends a hundred times the kernel's own time on entering compiled code. So everything but
+the leg's ends is kept in an object that is compiled around the same kernel, which leaves about 1.5 microseconds.
 
 Their seconds are processor seconds, so that other work on the machine does not count. The crossing from C++ to Python
 and back takes about as long as RRT*'s own work and is not counted either: its least time is measured before each run,
@@ -12,8 +13,10 @@ The time to the first path is the processor's, with nothing subtracted.
 
 from __future__ import annotations
 
+import inspect
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
@@ -23,11 +26,26 @@ import numpy as np
 
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem
-from gcsplan.world.airspace import Legs
+from gcsplan.world._compiled import UNIT
+from gcsplan.world._entries import judge
+from gcsplan.world._field import Field
+from gcsplan.world._neighbourhood import extrema_around
+from gcsplan.world._shared import BOW_M, Demands
+from gcsplan.world._zone_arrays import zones_as_arrays
+from gcsplan.world.airspace import Airspace, Legs
+from gcsplan.world.limits import Limits
 
 PLANNERS = {"RRT*": "RRTstar", "InformedRRT*": "InformedRRTstar", "BIT*": "BITstar"}
 CROSSINGS = 2000
 CURE = "this benchmark needs OMPL and mealpy: pip install 'gcsplan[bench]', or say --no-rivals"
+
+OneLeg = Callable[[float, float, float, float, float, float], bool]
+"""``clear(east0_m, north0_m, amsl0_m, east1_m, north1_m, amsl1_m)``."""
+
+NAMES = tuple(inspect.signature(judge).parameters)
+"""Names of the kernel's arguments, in its order."""
+
+_classes: dict[tuple[Any, ...], Any] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +71,6 @@ def release() -> str:
 
 def warm_up(problem: Problem) -> None:
     """Compile the check of one leg, so that no run's time contains it."""
-    from gcsplan.bench.terrain.exact import one_leg
-
     one_leg(problem.airspace, problem.limits)(*problem.start, *problem.start)
 
 
@@ -134,8 +150,6 @@ def box_of(problem: Problem) -> list[tuple[float, float]]:
 
 def _judges(base: Any, info: Any, problem: Problem, counts: list[int]) -> tuple[Any, Any]:
     """Validity of a state and of a motion, both by the exact check, with a count of the checks."""
-    from gcsplan.bench.terrain.exact import one_leg  # imported here because only rivals need numba's compiler
-
     clear = one_leg(problem.airspace, problem.limits)
 
     class State(base.StateValidityChecker):  # type: ignore[misc]
@@ -173,3 +187,65 @@ def _points(path: Any) -> list[list[float]]:
 
 def _length(points: list[list[float]]) -> float:
     return float(np.linalg.norm(np.diff(np.array(points), axis=0), axis=1).sum())
+
+
+# -- the check of one leg ----------------------------------------------------------------------------------------------
+
+
+def one_leg(airspace: Airspace, limits: Limits) -> OneLeg:
+    """A function with the answer of ``airspace.clear`` for one leg with the errors of ``limits``.
+
+    The first one in a process takes half a minute to compile.
+    """
+    import numba  # imported here because only rivals need its compiler
+
+    arguments = kernel_arguments(airspace, limits)
+    types = tuple(numba.typeof(a) for a in arguments)  # type: ignore[no-untyped-call]
+    if types not in _classes:
+        _classes[types] = _compiled(types)
+    checker = _classes[types](*arguments)
+    clear: OneLeg = checker.clear
+    return clear
+
+
+def kernel_arguments(airspace: Airspace, limits: Limits) -> tuple[Any, ...]:
+    """The arguments that `Airspace.clear` passes to the kernel, for one leg."""
+    surface, scale = airspace.surface, airspace.scale
+    field = Field.of(surface.grid)
+    zones = zones_as_arrays(airspace.zones, surface, field, scale)
+    near_m = limits.track_error_m * scale + (0.0 if field.affine else BOW_M + field.error_m)
+    near = extrema_around(field, surface.top_m, near_m)
+    far = extrema_around(field, surface.top_m, near_m + limits.horizontal_clearance_m * scale)
+    over = extrema_around(field, surface.ground_m, near_m)
+    nothing = np.zeros((0, 4)), np.zeros((0, 7, 2)), np.zeros(0, np.intp), np.zeros((0, 2), np.intp), np.zeros((0, 2))
+    return (
+        field.packed, surface.ground_m, surface.top_m, *near, *far, *over, *zones,
+        np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1, np.bool_), np.full(1, limits.track_error_m),
+        np.full(1, limits.altitude_error_m), *Demands.of(limits, scale), False, np.zeros(1, np.bool_), *nothing,
+        np.empty((256, 8)), np.zeros(12), np.empty(2 * zones.most_corners), np.full(len(airspace.zones), -1),
+        np.arange(len(airspace.zones)),
+    )  # fmt: skip
+
+
+def _compiled(types: tuple[Any, ...]) -> Any:
+    """A class with a field for each of the kernel's arguments, from source text, since numba takes no list of them."""
+    from numba.experimental import jitclass  # type: ignore[attr-defined]
+
+    source = "\n".join(
+        [
+            "class OneLeg:",
+            f"    def __init__(self, {', '.join(NAMES)}):",
+            *(f"        self.{n} = {n}" for n in NAMES),
+            "    def clear(self, e0, n0, h0, e1, n1, h1):",
+            "        start, end = self.start, self.end",
+            "        start[0, 0], start[0, 1], start[0, 2] = e0, n0, h0",
+            "        end[0, 0], end[0, 1], end[0, 2] = e1, n1, h1",
+            "        self.out[:] = 0.0",
+            "        self.seen[:] = -1",
+            f"        judge({', '.join('self.' + n for n in NAMES)})",
+            "        return self.ok[0]",
+        ]
+    )
+    scope = {"judge": UNIT.with_numba()["judge"]}
+    exec(source, scope)
+    return jitclass(list(zip(NAMES, types, strict=True)))(scope["OneLeg"])

@@ -8,7 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from gcsplan.bench.check import LIMITS, scene
-from gcsplan.bench.terrain.measure import OURS, OURS_LONG, Memory, Outcome, Status, passes
+from gcsplan.bench.measure import Memory, passes
+from gcsplan.bench.terrain.outcome import OURS, OURS_LONG, Outcome, Status
 from gcsplan.bench.terrain.problems import NamedProblem, key_of
 from gcsplan.errors import NoMission
 from gcsplan.planners.problem import Problem, Solution

@@ -15,16 +15,15 @@ from functools import cache
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats
+from gcsplan.bench.sample import SAMPLE_HALF_M, SAMPLE_MIDDLE_DEG, sample_spec
 from gcsplan.mission_file.world import make_box
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.frame import Frame, centre_of
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import NO_SIDES, Surface
-from gcsplan.world.terrain import Terrain, TerrainSpec, open_terrain
+from gcsplan.world.terrain import Terrain, open_terrain
 from gcsplan.world.zones import Circle, Level, Zone
 
-MIDDLE_DEG = (36.5896, -84.2458)  # middle of the sample DEM
-HALF_M = (13_000.0, 14_000.0)  # east and north from the middle: starts and goals lie within this box
 WAY_M = (5_000.0, 25_000.0)  # straight distance from start to goal: from the shortest to the longest stratum
 PAIRS = 20
 MIN_AGL_M = 60.0
@@ -119,7 +118,7 @@ class Cells:
 @cache
 def sample() -> Terrain:
     """The sample DEM, opened as for a mission file that names it."""
-    return open_terrain(TerrainSpec(dem=("sample:jacksboro",), vertical_datum="EGM96"), where="the benchmark's terrain")
+    return open_terrain(sample_spec(), where="the benchmark's terrain")
 
 
 def draw_pair(rng: np.random.Generator, number: int, limits: Limits, zones: int, *, ceiling: bool) -> Pair:
@@ -206,12 +205,12 @@ def draw_zones(
 
 def place(rng: np.random.Generator, number: int, way_m: float, steepest_deg: float) -> Pair:
     """A pair without ceiling and zones, over the part of the sample that a mission between its points would load."""
-    whole = Frame(*MIDDLE_DEG)
+    whole = Frame(*SAMPLE_MIDDLE_DEG)
     while True:
-        a = rng.uniform(-1.0, 1.0, 2) * HALF_M
+        a = rng.uniform(-1.0, 1.0, 2) * SAMPLE_HALF_M
         turn = rng.uniform(0.0, 2.0 * math.pi)
         b = a + way_m * np.array([math.cos(turn), math.sin(turn)])
-        if (np.abs(b) <= HALF_M).all():
+        if (np.abs(b) <= SAMPLE_HALF_M).all():
             break
     # Rounded, so that every machine has the same numbers to the last digit.
     degrees = np.round(whole.to_degrees(*np.stack([a, b], axis=-1)), 5)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 
 from rich.table import Table
 
-from gcsplan.bench.terrain.measure import OURS, OURS_LONG, Outcome, beyond, percentile
+from gcsplan.bench.files import png
+from gcsplan.bench.measure import percentile
+from gcsplan.bench.terrain.outcome import OURS, OURS_LONG, Outcome, beyond
 from gcsplan.export.table import csv_of
 
 LEAST_GAP = 1e-3
@@ -206,9 +207,7 @@ def figure(outcomes: Sequence[Outcome]) -> bytes:
         ax.legend(fontsize=7)
     axes[0].set_ylabel("above the certified lower bound (%)")
     picture.suptitle("Every solved mission; median with the 10th and 90th percentile; solved in brackets", fontsize=10)
-    out = io.BytesIO()
-    picture.savefig(out, format="png", dpi=110, metadata={"Software": None})
-    return out.getvalue()
+    return png(picture, dpi=110)
 
 
 def _number(value: float | None, digits: int) -> str:

@@ -14,9 +14,11 @@ from dataclasses import asdict, dataclass, fields, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 
+from gcsplan.bench.files import kept_rows
+from gcsplan.bench.measure import Memory, passes
 from gcsplan.bench.terrain import ompl as terrain_ompl
 from gcsplan.bench.terrain import swarms as terrain_swarms
-from gcsplan.bench.terrain.measure import Memory, Outcome, passes
+from gcsplan.bench.terrain.outcome import Outcome
 from gcsplan.bench.terrain.problems import NamedProblem, key_of, problems
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem
@@ -64,12 +66,11 @@ class Answers:
         self.path = path
         self._known: dict[tuple[str, str, str], Outcome] = {}
         names = {f.name for f in fields(Outcome)}
-        for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
+        for row in kept_rows(path):
             try:
-                row = json.loads(line)
                 outcome = Outcome(**{k: v for k, v in row.items() if k in names})
-            except (ValueError, TypeError, AttributeError):
-                continue  # a partial line of a run that was killed
+            except (TypeError, AttributeError):
+                continue
             if outcome.status != "failed":  # a crash is tried again
                 self._known[outcome.key, outcome.method, outcome.version] = outcome
 

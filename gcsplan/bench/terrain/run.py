@@ -13,9 +13,10 @@ from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 
+from gcsplan.bench.files import write_all
 from gcsplan.bench.terrain import ours, report
 from gcsplan.bench.terrain import rivals as others
-from gcsplan.bench.terrain.measure import OURS, OURS_LONG, Outcome
+from gcsplan.bench.terrain.outcome import OURS, OURS_LONG, Outcome
 from gcsplan.bench.terrain.problems import KINDS, MOUNTAINS, NamedProblem, problems
 from gcsplan.errors import InputError
 from gcsplan.planners.optimal.searches import require_names
@@ -39,17 +40,14 @@ class Result:
 
     def write(self, directory: Path) -> list[Path]:
         """Write ``terrain.md``, ``terrain.csv`` and ``terrain.png``; returns their paths."""
-        from gcsplan.export.outdir import write_whole
-
-        directory.mkdir(parents=True, exist_ok=True)
-        contents: dict[str, str | bytes] = {
-            "terrain.md": report.markdown(self.lines, self.outcomes, self.about),
-            "terrain.csv": report.as_csv(self.outcomes),
-            "terrain.png": report.figure(self.outcomes),
-        }
-        for name, content in contents.items():
-            write_whole(directory / name, content)
-        return [directory / name for name in contents]
+        return write_all(
+            directory,
+            {
+                "terrain.md": report.markdown(self.lines, self.outcomes, self.about),
+                "terrain.csv": report.as_csv(self.outcomes),
+                "terrain.png": report.figure(self.outcomes),
+            },
+        )
 
 
 def run(

@@ -19,7 +19,7 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.bench.terrain.measure import passes
+from gcsplan.bench.measure import passes
 from gcsplan.bench.terrain.ompl import CURE, Found, box_of
 from gcsplan.errors import InputError
 from gcsplan.optimisers.driver import History, Result

@@ -13,10 +13,10 @@ import pytest
 from gcsplan.bench.papers import judge as papers_judge
 from gcsplan.bench.papers import readings as papers_readings
 from gcsplan.bench.papers.claims import CLAIMS
-from gcsplan.bench.papers.claims_report import claims_table, readings_table
 from gcsplan.bench.papers.judge import FEW, HOLDS, IMPOSSIBLE, NO_LEGAL, NOT_RUN, REVERSED, TIE, judge, standing
 from gcsplan.bench.papers.readings import READINGS, Reading
 from gcsplan.bench.papers.scenarios import SCENARIOS, choose
+from gcsplan.bench.papers.tables import claims_table, readings_table
 from gcsplan.optimisers.registry import get as get_optimiser
 from gcsplan.planners.registry import get as get_planner
 from gcsplan.planners.swarm.encodings import get_encoding

@@ -19,10 +19,11 @@ from hypothesis import strategies as st
 from scipy.stats import false_discovery_control, mannwhitneyu
 
 from gcsplan.app import executor
+from gcsplan.bench.measure import compare, holm
 from gcsplan.bench.papers import runs as papers_runs
 from gcsplan.bench.papers import speed as papers_speed
 from gcsplan.bench.papers.judge import FEW
-from gcsplan.bench.papers.pictures import best_run, stepwise
+from gcsplan.bench.papers.pictures import best_run, distances, draw_fleet, spread, stepwise
 from gcsplan.bench.papers.printed import ENDS, PRINTED, Least, Number, faults, least_of
 from gcsplan.bench.papers.remarks import remarks, schedules
 from gcsplan.bench.papers.report import IMPOSSIBLE as MARK
@@ -30,8 +31,7 @@ from gcsplan.bench.papers.report import report, scenario_table, write
 from gcsplan.bench.papers.run import KEPT, plain, run
 from gcsplan.bench.papers.runs import PaperRun, Store, code_digest, seed_of, work
 from gcsplan.bench.papers.scenarios import SCENARIOS, choose, mission_text, prepare, settings_of
-from gcsplan.bench.papers.statistics import compare, holm, row, schedule, values
-from gcsplan.bench.papers.views import distances, draw_fleet, spread
+from gcsplan.bench.papers.statistics import row, schedule, values
 from gcsplan.errors import InputError
 from tests.support.effort import draws
 

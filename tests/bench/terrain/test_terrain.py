@@ -12,11 +12,13 @@ import pytest
 from scipy.ndimage import label
 
 from gcsplan.bench.everyday import missions as everyday_missions
+from gcsplan.bench.measure import Memory, flown, passes
+from gcsplan.bench.terrain import ompl
 from gcsplan.bench.terrain import ours as terrain_ours
 from gcsplan.bench.terrain import report as terrain_report
 from gcsplan.bench.terrain import rivals as terrain_rivals
 from gcsplan.bench.terrain import run as terrain
-from gcsplan.bench.terrain.measure import OURS, Memory, Outcome, flown, passes
+from gcsplan.bench.terrain.outcome import OURS, Outcome
 from gcsplan.bench.terrain.problems import KINDS, NamedProblem, key_of, problems
 from gcsplan.errors import InputError, NoMission
 from gcsplan.planners.problem import Problem, Solution
@@ -318,10 +320,9 @@ def test_a_path_that_the_exact_check_rejects_is_unsafe_whatever_its_planner_says
 
 
 def test_the_check_of_one_leg_is_the_airspaces_own(main: list[NamedProblem]) -> None:
-    exact = pytest.importorskip("gcsplan.bench.terrain.exact")
     p = main[48].problem
-    names = exact.NAMES
-    arguments = exact._arguments(p.airspace, p.limits)
+    names = ompl.NAMES
+    arguments = ompl.kernel_arguments(p.airspace, p.limits)
     assert len(names) == len(arguments)
     place = {name: arguments[i] for i, name in enumerate(names)}
     assert place["ground"] is p.airspace.surface.ground_m

@@ -1,4 +1,4 @@
-"""The outcome of one planner's attempt at one problem, and the measurement of its memory."""
+"""What benchmarks measure with: the exact check of a whole path, memory, percentiles, and rank tests."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import contextlib
 import ctypes
 import gc
 import math
+import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -17,50 +17,9 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Legs
 
-Status = Literal["solved", "infeasible", "not found", "unsafe", "failed"]
-OURS = "gcsplan"
-OURS_LONG = "gcsplan 60 s"
 SAGITTA_M = 0.05
 SAME_M = 1e-6
 """Points of a track within this distance, m, are merged: a climb angle between them would be a rounding error."""
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """One method's attempt at one problem; times are medians of ``runs``.
-
-    ``status``: solved means that the whole path from start to goal passes the exact check; infeasible, that no path
-    exists, with proof; unsafe, that the exact check rejects the returned path. ``cost`` and ``bound`` are in metres or
-    joules; ``raw_cost`` is the cost before a rival's path was simplified. ``sweep_s`` is the time of an exact check of
-    100,000 one-kilometre legs, measured in between. ``memory_mb`` is the peak above the use before. ``points`` is the
-    path, of rivals only. ``gap_asked_percent`` is the certified gap at which gcsplan's planner may stop.
-    """
-
-    key: str
-    name: str
-    kind: str
-    group: str
-    method: str
-    status: Status
-    detail: str = ""
-    cost: float | None = None
-    raw_cost: float | None = None
-    bound: float | None = None
-    first_path_s: float | None = None
-    planning_s: float | None = None
-    sweep_s: float | None = None
-    memory_mb: float | None = None
-    checks: int | None = None
-    gap_asked_percent: float | None = None
-    runs: int = 1
-    stopped_by: str = ""
-    version: str = ""
-    points: list[list[float]] = field(default_factory=list)
-
-    @property
-    def gap_percent(self) -> float | None:
-        """Percent above its own bound; None if cost or bound is missing."""
-        return None if not self.cost or not self.bound else 100.0 * (self.cost / self.bound - 1.0)
 
 
 def passes(problem: Problem, points: object) -> bool:
@@ -174,6 +133,30 @@ def percentile(values: list[float], percent: float) -> float | None:
     return float(np.percentile(values, percent)) if values else None
 
 
-def beyond(cost: float | None, bound: float | None) -> float | None:
-    """Percent of ``cost`` above ``bound``; None if either is missing."""
-    return None if cost is None or not bound or not math.isfinite(bound) else 100.0 * (cost / bound - 1.0)
+def peak_mb() -> float:
+    """The most memory that this process has had so far, MB."""
+    import resource  # not on every system
+
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
+
+
+def compare(low: Floats, high: Floats) -> tuple[float, float]:
+    """Two-sided p by Mann and Whitney's U (normal approximation, corrected for ties), and the effect size: the
+    probability that a run of ``low`` is less than one of ``high``, ties counted half (Vargha and Delaney's A)."""
+    from scipy.stats import mannwhitneyu, rankdata
+
+    ranks = rankdata(np.concatenate([low, high]))  # infinities tie with each other
+    if np.ptp(ranks) == 0.0:
+        return 1.0, 0.5
+    found = mannwhitneyu(ranks[: len(low)], ranks[len(low) :], alternative="two-sided", method="asymptotic")
+    return float(found.pvalue), 1.0 - float(found.statistic) / (len(low) * len(high))
+
+
+def holm(p: Sequence[float]) -> list[float]:
+    """Holm's step-down correction."""
+    given = np.asarray(p, dtype=np.float64)
+    order = np.argsort(given, kind="stable")
+    steps = np.maximum.accumulate(given[order] * np.arange(len(given), 0, -1))
+    out = np.empty_like(given)
+    out[order] = np.minimum(steps, 1.0)
+    return [float(x) for x in out]
