@@ -6,7 +6,7 @@ other, from every pad and from zones, but without a look at heights or at the ba
 copter whose place is too far or too high for it has no mission. Arrivals are in sequence, and the depots take turns.
 System ids repeat; each link has a system id once.
 
-The oracle shares nothing with the exact separation: every `STEP_S` it takes the places of all vehicles that fly, and
+The oracle shares nothing with the exact separation: every `ORACLE_S` it takes the places of all vehicles that fly, and
 looks for pairs that are too near with a tree of these places.
 """
 
@@ -30,18 +30,18 @@ from gcsplan.app.upload_job import SIM, UploadOptions
 from gcsplan.app.way_home import homes_of
 from gcsplan.arrays import Floats
 from gcsplan.bench.measure import peak_mb
-from gcsplan.bench.sample import ROUND_DEGREE_M, SAMPLE
+from gcsplan.bench.sample import ROUND_DEGREE_M, SAMPLE_TERRAIN
 from gcsplan.errors import InputError
 from gcsplan.export.outdir import write_outputs, write_whole
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.mission_file import load_mission
 from gcsplan.sim.vehicle.server import loopback_fleet
 
-T = TypeVar("T")
+Timed = TypeVar("Timed")
 
-MIDDLE_DEG = (36.575, -84.255)
-HALF_M = 11_000.0
-"""Half the side of the square of depots around `MIDDLE_DEG`, m."""
+DEPOTS_MIDDLE_DEG = (36.575, -84.255)
+DEPOTS_HALF_M = 11_000.0
+"""Half the side of the square of depots around `DEPOTS_MIDDLE_DEG`, m."""
 REACH_M = 14_000.0
 """The same of the square of goals, which is within the sample terrain."""
 
@@ -50,19 +50,19 @@ PADS = 10
 PAD_M = 90.0
 BATTERY_J, RESERVE = 6.2e5, 0.2
 """Battery of each copter, J, and the part of it that must be left: too little for about one flight in a hundred."""
-NEAREST_M, FARTHEST_M = 1500.0, 4000.0
+NEAREST_GOAL_M, FARTHEST_GOAL_M = 1500.0, 4000.0
 """Distance of a copter's goal from the middle of its depot, m."""
-APART_M = 100.0
+PLACES_APART_M = 100.0
 """Least distance of two places, m."""
 DEPOTS_APART_M = 4500.0
-ZONES = 40
+FLEET_ZONES = 40
 ON_A_LINK = 200
 """Most vehicles that one link carries; system ids go to 255."""
 FIRST_PORT = 14_600
 MOST_FLEET = 2000
-DRAWS = 10_000
+PLACE_DRAWS = 10_000
 
-STEP_S = 0.02
+ORACLE_S = 0.02
 BLOCK_S = 20.0
 """Seconds whose places are held at a time."""
 
@@ -106,7 +106,7 @@ def run(
     return result
 
 
-def sampled(paths: Sequence[TimedPath], needed_m: float, step_s: float = STEP_S) -> tuple[float, int]:
+def sampled(paths: Sequence[TimedPath], needed_m: float, step_s: float = ORACLE_S) -> tuple[float, int]:
     """The least distance of two vehicles in the air at the same moment, m, and the number of pairs below ``needed_m``.
 
     A pair farther apart than twice ``needed_m`` at every moment does not count for the least distance (inf).
@@ -145,7 +145,7 @@ class _Steps:
     def __init__(self) -> None:
         self.rows: list[dict[str, Any]] = []
 
-    def timed(self, name: str, what: Callable[[], T]) -> T:
+    def timed(self, name: str, what: Callable[[], Timed]) -> Timed:
         clock_s, busy_s = time.perf_counter(), time.process_time()
         result = what()
         self.rows.append(
@@ -163,7 +163,7 @@ def report(result: dict[str, Any]) -> str:
     lines = [
         f"{result['placed']} of {result['vehicles']} vehicles planned, {result['interval_s']:g} s apart; "
         f"left out: {out}",
-        f"least separation {result['least_m']:.2f} m exact, {result['sampled_m']:.2f} m sampled every {STEP_S:g} s; "
+        f"least separation {result['least_m']:.2f} m exact, {result['sampled_m']:.2f} m sampled every {ORACLE_S:g} s; "
         f"{result['too_near']} pairs too near",
     ]
     if "verified" in result:
@@ -188,14 +188,17 @@ def fleet_document(vehicles: int, seed: int = 1, interval_s: float = 4.0) -> dic
     rng = np.random.default_rng([seed, vehicles])
     depots = _apart(rng, math.ceil(vehicles / PADS**2), DEPOTS_APART_M)
     starts = _pads(depots, vehicles)
-    zones, radius_m = rng.uniform(-HALF_M, HALF_M, (ZONES, 2)), rng.uniform(100.0, 500.0, ZONES)
-    high = rng.random(ZONES) < 0.5
+    zones, radius_m = (
+        rng.uniform(-DEPOTS_HALF_M, DEPOTS_HALF_M, (FLEET_ZONES, 2)),
+        rng.uniform(100.0, 500.0, FLEET_ZONES),
+    )
+    high = rng.random(FLEET_ZONES) < 0.5
     clear = np.linalg.norm(zones[:, None] - depots[None], axis=2).min(axis=1) > PADS * PAD_M + radius_m
-    goals = _goals(rng, depots, starts, zones[clear], radius_m[clear] + APART_M)
+    goals = _goals(rng, depots, starts, zones[clear], radius_m[clear] + PLACES_APART_M)
     return {
         "version": 1,
         "name": f"{vehicles} from {len(depots)} depots",
-        "terrain": dict(SAMPLE),
+        "terrain": dict(SAMPLE_TERRAIN),
         "limits": {
             "min_agl_m": 40, "horizontal_clearance_m": 20, "track_error_m": 3, "altitude_error_m": 5,
             "max_climb_deg": 25,
@@ -224,9 +227,9 @@ def fleet_document(vehicles: int, seed: int = 1, interval_s: float = 4.0) -> dic
 def _apart(rng: np.random.Generator, count: int, apart_m: float) -> Floats:
     """Middles of depots (count, 2), metres east and north; the distance shrinks where they find no room."""
     found: list[Floats] = []
-    for draw in range(DRAWS):
-        one = rng.uniform(-HALF_M, HALF_M, 2)
-        if all(np.hypot(*(one - other)) >= apart_m * (1.0 - draw / DRAWS) for other in found):
+    for draw in range(PLACE_DRAWS):
+        one = rng.uniform(-DEPOTS_HALF_M, DEPOTS_HALF_M, 2)
+        if all(np.hypot(*(one - other)) >= apart_m * (1.0 - draw / PLACE_DRAWS) for other in found):
             found.append(one)
         if len(found) == count:
             return np.array(found)
@@ -246,12 +249,12 @@ def _goals(rng: np.random.Generator, depots: Floats, starts: Floats, zones: Floa
     count = len(starts)
     for k in range(count):
         middle = depots[k % len(depots)]
-        for _ in range(DRAWS):
-            far_m = math.sqrt(rng.uniform(NEAREST_M**2, FARTHEST_M**2))
+        for _ in range(PLACE_DRAWS):
+            far_m = math.sqrt(rng.uniform(NEAREST_GOAL_M**2, FARTHEST_GOAL_M**2))
             to = rng.uniform(0.0, 2.0 * math.pi)
             goal = middle + far_m * np.array([math.cos(to), math.sin(to)])
             outside = (np.hypot(*(zones - goal).T) >= radius_m).all()
-            if outside and np.abs(goal).max() <= REACH_M and np.hypot(*(taken - goal).T).min() >= APART_M:
+            if outside and np.abs(goal).max() <= REACH_M and np.hypot(*(taken - goal).T).min() >= PLACES_APART_M:
                 taken[count + k] = goal
                 break
         else:
@@ -260,7 +263,7 @@ def _goals(rng: np.random.Generator, depots: Floats, starts: Floats, zones: Floa
 
 
 def _degrees(place: Floats) -> list[float]:
-    lat, lon = MIDDLE_DEG
+    lat, lon = DEPOTS_MIDDLE_DEG
     east_m, north_m = (float(x) for x in place)
     per_east = ROUND_DEGREE_M * math.cos(math.radians(lat))
     return [round(lat + north_m / ROUND_DEGREE_M, 6), round(lon + east_m / per_east, 6)]

@@ -22,7 +22,7 @@ import numpy as np
 from gcsplan.app.executor import executor
 from gcsplan.arrays import Floats
 from gcsplan.bench.files import write_all
-from gcsplan.bench.measure import holm
+from gcsplan.bench.measure import LEAST_RUNS_TO_JUDGE, MOST_RUNS, SIGNIFICANCE, holm
 from gcsplan.errors import InputError
 from gcsplan.export.table import csv_of
 from gcsplan.optimisers.driver import minimise
@@ -30,7 +30,7 @@ from gcsplan.optimisers.functions import FUNCTIONS
 from gcsplan.optimisers.registry import get
 
 WOLVES = ("gwo", "mgwo", "igwo", "sogwo", "ssgwo")
-RUNS = 50
+PAPER_RUNS = 50
 
 # Table 2 of Feng et al. 2024 (Electronics 13, 68) as printed; columns in the order of WOLVES.
 _TABLE_2 = """
@@ -65,7 +65,7 @@ f9 best           0           0  2.7491e-05           0           0
 
 
 @dataclass(frozen=True, slots=True)
-class Printed:
+class PrintedWolf:
     """Mean, standard deviation and best of 50 runs, as printed."""
 
     mean: float
@@ -78,40 +78,37 @@ class Printed:
         if self.mean < self.best:
             return "the mean is below the best"
         # One value is mean − best below the mean; the spread is least if the other values make up for it evenly.
-        if self.std < 0.999 * (self.mean - self.best) / math.sqrt(RUNS - 1):
+        if self.std < 0.999 * (self.mean - self.best) / math.sqrt(PAPER_RUNS - 1):
             return "the spread is too small for this mean and best"
         # The spread is largest if one value holds the whole sum.
-        if self.std > 1.001 * self.mean * math.sqrt(RUNS):
+        if self.std > 1.001 * self.mean * math.sqrt(PAPER_RUNS):
             return "the spread is too large for this mean"
         return ""
 
 
-def _printed() -> dict[tuple[str, str], Printed]:
+def _printed() -> dict[tuple[str, str], PrintedWolf]:
     numbers = {(row[0], row[1]): row[2:] for row in map(str.split, _TABLE_2.strip().splitlines())}
     return {
-        (function, wolf): Printed(*(float(numbers[function, what][k]) for what in ("mean", "std", "best")))
+        (function, wolf): PrintedWolf(*(float(numbers[function, what][k]) for what in ("mean", "std", "best")))
         for function, _ in numbers
         for k, wolf in enumerate(WOLVES)
     }
 
 
-PRINTED = _printed()
+WOLVES_PRINTED = _printed()
 """Table 2, by function and algorithm."""
 
 CLAIMED = "ssgwo"  # the paper claims that it has the least mean, alone or shared, on every function
 SETTINGS = ("middle", "shifted")
 DIM, POPULATION, ITERATIONS = 30, 30, 500  # table 1 and section 5.1
-MOST_RUNS = 10_000
 PART_S = 2.0
 """Seconds that ten runs take, about."""
 
-LEAST_RUNS_TO_JUDGE = 30
-SIGNIFICANCE = 0.05
-VERDICTS = {True: "reproduced", False: "not reproduced", None: "too small to tell"}
+VERDICT_WORDS = {True: "reproduced", False: "not reproduced", None: "too small to tell"}
 
 
 @dataclass(frozen=True, slots=True)
-class _Job:
+class _FunctionRuns:
     function: str
     algorithm: str
     setting: str
@@ -123,7 +120,7 @@ class _Job:
 
 
 def run(
-    runs: int = RUNS,
+    runs: int = PAPER_RUNS,
     seed: int = 1,
     jobs: int | None = None,
     *,
@@ -149,7 +146,7 @@ def run(
     for name in algorithms:
         get(name)
     parts = [
-        _Job(function, algorithm, setting, tuple(chunk), seed, dim, population, iterations)
+        _FunctionRuns(function, algorithm, setting, tuple(chunk), seed, dim, population, iterations)
         for function in functions
         for algorithm in algorithms
         for setting in SETTINGS
@@ -245,7 +242,7 @@ def _chunks(count: int, size: int) -> Iterator[range]:
     return (range(first, min(first + size, count)) for first in range(0, count, size))
 
 
-def _work(_: None, job: _Job) -> list[tuple[float, int]]:
+def _work(_: None, job: _FunctionRuns) -> list[tuple[float, int]]:
     """Cost and evaluations of each run of a job."""
     function = FUNCTIONS[job.function]
     place = tuple(FUNCTIONS).index(job.function)
@@ -269,7 +266,7 @@ def _work(_: None, job: _Job) -> list[tuple[float, int]]:
 
 def _row(key: tuple[str, str, str], costs: Floats, evaluations: int) -> dict[str, Any]:
     function, algorithm, setting = key
-    printed = PRINTED.get((function, algorithm))
+    printed = WOLVES_PRINTED.get((function, algorithm))
     return {
         "function": function,
         "algorithm": algorithm,
@@ -284,7 +281,7 @@ def _row(key: tuple[str, str, str], costs: Floats, evaluations: int) -> dict[str
     }
 
 
-def _fields(printed: Printed | None) -> dict[str, float | None]:
+def _fields(printed: PrintedWolf | None) -> dict[str, float | None]:
     return asdict(printed) if printed else {"mean": None, "std": None, "best": None}
 
 
@@ -311,7 +308,7 @@ def claims_of(
     out = []
     for setting in SETTINGS:
         cases = [(f, rival) for f in functions for rival in rivals]
-        level = [PRINTED[f, CLAIMED].mean == PRINTED[f, rival].mean for f, rival in cases]
+        level = [WOLVES_PRINTED[f, CLAIMED].mean == WOLVES_PRINTED[f, rival].mean for f, rival in cases]
         p = holm(
             [
                 _signed_rank(costs[f, CLAIMED, setting], costs[f, rival, setting], two_sided=tie)
@@ -356,11 +353,11 @@ def _remarks(result: dict[str, Any]) -> list[str]:
     if any(row["mean"] == 0.0 for row in result["rows"]):
         lines.append("0 of ours: less than the unit box can tell apart about its middle, 1e−26 on f1.")
     if any(row["printed_fault"] for row in result["rows"]):
-        lines.append(f"‡ no {RUNS} values can have the mean, standard deviation and best that the paper prints.")
+        lines.append(f"‡ no {PAPER_RUNS} values can have the mean, standard deviation and best that the paper prints.")
     for setting in SETTINGS:
         claims = [claim for claim in result["claims"] if claim["setting"] == setting]
         if claims:
-            count = [sum(claim["reproduced"] is verdict for claim in claims) for verdict in VERDICTS]
+            count = [sum(claim["reproduced"] is verdict for claim in claims) for verdict in VERDICT_WORDS]
             lines.append(
                 f"{setting}: of {len(claims)} rankings of SSGWO in table 2, {count[0]} reproduced, {count[1]} not "
                 f"reproduced, {count[2]} too small to tell (Wilcoxon signed ranks, Holm, {SIGNIFICANCE:g})."
@@ -401,5 +398,5 @@ def _markdown(result: dict[str, Any]) -> Iterator[str]:
         yield "| setting | function | claim of table 2 | p | |"
         yield "| --- | --- | --- | ---: | --- |"
         for claim in result["claims"]:
-            verdict = VERDICTS[claim["reproduced"]]
+            verdict = VERDICT_WORDS[claim["reproduced"]]
             yield f"| {claim['setting']} | {claim['function']} | {claim['claim']} | {claim['p']:.2g} | {verdict} |"

@@ -17,8 +17,14 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Legs
 
-SAGITTA_M = 0.05
-SAME_M = 1e-6
+MOST_RUNS = 10_000
+"""Runs of an algorithm that one call may ask for."""
+LEAST_RUNS_TO_JUDGE = 30
+SIGNIFICANCE = 0.05
+"""Runs of each, at least, from which rankings are judged, and the p below which they differ."""
+
+CHORD_SAGITTA_M = 0.05
+MERGED_M = 1e-6
 """Points of a track within this distance, m, are merged: a climb angle between them would be a rounding error."""
 
 
@@ -39,14 +45,14 @@ def passes(problem: Problem, points: object) -> bool:
         if track is None:
             return False
         legs = Legs.of_path(track[0], problem.limits)
-        legs = replace(legs, track_error_m=legs.track_error_m + SAGITTA_M * track[1])
+        legs = replace(legs, track_error_m=legs.track_error_m + CHORD_SAGITTA_M * track[1])
     return not problem.airspace.examine(legs, problem.limits).violations
 
 
 def flown(points: Floats, radius_m: float) -> tuple[Floats, Bools] | None:
-    """The track that a fixed wing flies along way points (N, 3): legs, and arcs as chords within `SAGITTA_M`.
+    """The track that a fixed wing flies along way points (N, 3): legs, and arcs as chords within `CHORD_SAGITTA_M`.
 
-    Returns its points (M, 3), none within `SAME_M` of the one before, and (M - 1,) whether a chord leads to the next.
+    Returns its points (M, 3), none within `MERGED_M` of the one before, and (M - 1,) whether a chord leads to the next.
     The altitude of a way point is reached in the middle of its arc and is linear along the track between. None if the
     arcs of neighbours overlap, so that the track cannot be flown. Written for this check alone; it shares nothing with
     the planners.
@@ -61,7 +67,7 @@ def flown(points: Floats, radius_m: float) -> tuple[Floats, Bools] | None:
         reach = np.concatenate([[0.0], radius_m * np.tan(np.abs(turns) / 2.0), [0.0]])
     if (reach[:-1] + reach[1:] > lengths + 1e-3).any():
         return None
-    step = 2.0 * math.acos(max(0.0, 1.0 - SAGITTA_M / radius_m))
+    step = 2.0 * math.acos(max(0.0, 1.0 - CHORD_SAGITTA_M / radius_m))
     track, middle, chord = [points[0, :2]], [0], [False]
     for i, turn in enumerate(turns.tolist()):
         halves = max(1, math.ceil(abs(turn) / (2.0 * step)))
@@ -81,14 +87,14 @@ def flown(points: Floats, radius_m: float) -> tuple[Floats, Bools] | None:
 
 
 def _distinct(track: Floats, chord: Sequence[bool]) -> tuple[Floats, Bools]:
-    """The track without points within `SAME_M` of the last one kept; the first and the last point always stay.
+    """The track without points within `MERGED_M` of the last one kept; the first and the last point always stay.
 
     ``chord`` states for each point whether a chord leads to it. Distances are in space, so that no climb on the spot is
     lost.
     """
     kept = [0]
     for i in range(1, len(track)):
-        if math.dist(track[kept[-1]], track[i]) > SAME_M:
+        if math.dist(track[kept[-1]], track[i]) > MERGED_M:
             kept.append(i)
     if kept[-1] != len(track) - 1:
         kept[max(1, len(kept) - 1) :] = [len(track) - 1]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from gcsplan.world.sample import SAMPLE
 from gcsplan.world.terrain import TerrainSpec
 
-SAMPLE = {"dem": "sample:jacksboro", "vertical_datum": "EGM96"}
+SAMPLE_TERRAIN = {"dem": SAMPLE, "vertical_datum": "EGM96"}
 """The sample DEM as a mission file names it."""
 
 SAMPLE_MIDDLE_DEG = (36.5896, -84.2458)
@@ -17,4 +18,4 @@ ROUND_DEGREE_M = 111_200.0
 
 def sample_spec() -> TerrainSpec:
     """The sample DEM, opened as for a mission file that names it."""
-    return TerrainSpec(dem=(SAMPLE["dem"],), vertical_datum=SAMPLE["vertical_datum"])
+    return TerrainSpec(dem=(SAMPLE_TERRAIN["dem"],), vertical_datum=SAMPLE_TERRAIN["vertical_datum"])

@@ -193,14 +193,14 @@ def bench_everyday(
 ) -> None:
     """Plan short legs, walls, hooks, combs, rings, circles, polygons, vias, levels: flat, hills, the sample DEM."""
     from gcsplan.bench.everyday import run as everyday
-    from gcsplan.bench.everyday.missions import KINDS
+    from gcsplan.bench.everyday.missions import EVERYDAY_KINDS
     from gcsplan.cli.console import remark
 
     try:
         numbers = [int(s) for s in seeds.split(",")]
     except ValueError:
         raise UsageError(f"--seeds takes whole numbers such as 1,2,3, given {seeds!r}") from None
-    asked = KINDS if kinds is None else kinds.split(",")
+    asked = EVERYDAY_KINDS if kinds is None else kinds.split(",")
     outcomes = everyday.run(out, seeds=numbers, count=count, kinds=asked, without=without or (), tell=remark)
     put(everyday.report(outcomes))
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gcsplan.bench.files import ready
-from gcsplan.bench.functions import PRINTED, RUNS, WOLVES, Printed, claims_of, report, run, write
+from gcsplan.bench.functions import PAPER_RUNS, WOLVES, WOLVES_PRINTED, PrintedWolf, claims_of, report, run, write
 from gcsplan.bench.measure import holm
 from gcsplan.errors import InputError
 from gcsplan.optimisers.functions import FUNCTIONS
@@ -64,33 +64,33 @@ def test_only_the_sixth_function_is_noisy_and_its_noise_is_of_the_given_stream()
 
 
 def test_the_printed_table_is_whole() -> None:
-    assert set(PRINTED) == {(f"f{k}", wolf) for k in range(1, 10) for wolf in WOLVES}
-    assert PRINTED["f5", "sogwo"] == Printed(1.7322e-106, 2.7528e-107, 4.2975e-109)
+    assert set(WOLVES_PRINTED) == {(f"f{k}", wolf) for k in range(1, 10) for wolf in WOLVES}
+    assert WOLVES_PRINTED["f5", "sogwo"] == PrintedWolf(1.7322e-106, 2.7528e-107, 4.2975e-109)
     # The paper's claim, as far as its own numbers go.
-    for (function, wolf), row in PRINTED.items():
-        assert PRINTED[function, "ssgwo"].mean <= row.mean, (function, wolf)
+    for (function, wolf), row in WOLVES_PRINTED.items():
+        assert WOLVES_PRINTED[function, "ssgwo"].mean <= row.mean, (function, wolf)
 
 
 def test_printed_rows_that_no_experiment_can_give_are_marked() -> None:
-    assert PRINTED["f1", "ssgwo"].fault == "the mean is below the best"
-    assert "too small" in PRINTED["f3", "ssgwo"].fault
-    assert "too large" in PRINTED["f7", "gwo"].fault
-    assert not PRINTED["f1", "gwo"].fault
-    assert not PRINTED["f9", "mgwo"].fault
+    assert WOLVES_PRINTED["f1", "ssgwo"].fault == "the mean is below the best"
+    assert "too small" in WOLVES_PRINTED["f3", "ssgwo"].fault
+    assert "too large" in WOLVES_PRINTED["f7", "gwo"].fault
+    assert not WOLVES_PRINTED["f1", "gwo"].fault
+    assert not WOLVES_PRINTED["f9", "mgwo"].fault
 
 
 def test_no_experiment_is_marked_by_mistake() -> None:
     rng = np.random.default_rng(7)
     for _ in range(200):
-        values = rng.lognormal(sigma=rng.uniform(0.01, 5.0), size=RUNS)
+        values = rng.lognormal(sigma=rng.uniform(0.01, 5.0), size=PAPER_RUNS)
         for ddof in (0, 1):
-            assert not Printed(values.mean(), values.std(ddof=ddof), values.min()).fault
+            assert not PrintedWolf(values.mean(), values.std(ddof=ddof), values.min()).fault
     # Not even the two that have the least and the most spread.
-    low = np.append(np.full(RUNS - 1, 1.0), 0.0)
-    high = np.append(np.zeros(RUNS - 1), 1.0)
+    low = np.append(np.full(PAPER_RUNS - 1, 1.0), 0.0)
+    high = np.append(np.zeros(PAPER_RUNS - 1), 1.0)
     for values in (low, high):
         for ddof in (0, 1):
-            assert not Printed(values.mean(), values.std(ddof=ddof), values.min()).fault
+            assert not PrintedWolf(values.mean(), values.std(ddof=ddof), values.min()).fault
 
 
 def test_holms_correction_steps_down_and_never_falls() -> None:
@@ -145,7 +145,9 @@ def test_the_benchmark_gives_the_same_numbers_over_processes_as_in_one(tmp_path:
         assert row["best"] == min(costs)
         assert row["std"] == pytest.approx(float(np.std(costs, ddof=1)))
         assert row["evaluations"] == 8 * 13
-        assert row["printed_mean"] == (PRINTED[row["function"], "gwo"].mean if row["algorithm"] == "gwo" else None)
+        assert row["printed_mean"] == (
+            WOLVES_PRINTED[row["function"], "gwo"].mean if row["algorithm"] == "gwo" else None
+        )
 
     files = write(alone, tmp_path / "out")
     with files[0].open(encoding="utf-8", newline="") as file:

@@ -25,21 +25,21 @@ import numpy as np
 import shapely
 
 from gcsplan.arrays import Floats
-from gcsplan.bench.sample import ROUND_DEGREE_M, SAMPLE
+from gcsplan.bench.sample import ROUND_DEGREE_M, SAMPLE_TERRAIN
 
-Document = dict[str, Any]
+MissionDocument = dict[str, Any]
 
-KINDS = (
+EVERYDAY_KINDS = (
     "leg", "tiny", "wall", "detour", "hook", "comb", "ring", "discs", "blocks", "vias", "levels", "peaks", "sample",
 )  # fmt: skip
-SHORTEST_M, LONGEST_M = 400.0, 8000.0
+SHORTEST_WAY_M, LONGEST_WAY_M = 400.0, 8000.0
 CLEARANCE_M, TRACK_ERROR_M, ALTITUDE_ERROR_M = 30.0, 3.0, 5.0
 """Defaults of a mission file, m."""
-SPARE_M = 2.0
+PLACE_SPARE_M = 2.0
 """Metres that places keep from zones beyond the margins, for what a plan adds for rounding."""
-MIN_AGL_M = 30.0
+FLAT_MIN_AGL_M = 30.0
 SAMPLE_MIN_AGL_M = 60.0
-DRAWS = 1000
+MISSION_DRAWS = 1000
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -48,7 +48,7 @@ class Everyday:
 
     name: str
     kind: str
-    document: Document
+    document: MissionDocument
     redraws: int
 
 
@@ -66,17 +66,17 @@ class _Draft:
 
 
 def draw(seed: int, number: int) -> Everyday:
-    """Mission ``number`` of a seed. Raises RuntimeError if no legal one is found in `DRAWS` draws."""
-    kind = KINDS[number % len(KINDS)]
+    """Mission ``number`` of a seed. Raises RuntimeError if no legal one is found in `MISSION_DRAWS` draws."""
+    kind = EVERYDAY_KINDS[number % len(EVERYDAY_KINDS)]
     rng = np.random.default_rng([seed, number])
-    margins = bool((number // len(KINDS)) % 2)
+    margins = bool((number // len(EVERYDAY_KINDS)) % 2)
     reach_m = CLEARANCE_M + TRACK_ERROR_M if margins else 0.0
-    for redraws in range(DRAWS):
+    for redraws in range(MISSION_DRAWS):
         draft = _MAKERS[kind](rng)
-        if _legal(draft, reach_m + SPARE_M):
+        if _legal(draft, reach_m + PLACE_SPARE_M):
             document = _document(draft, kind, f"{kind} {seed}/{number}", rng, margins=margins)
             return Everyday(f"{seed}/{number:03d}", kind, document, redraws)
-    raise RuntimeError(f"no legal mission of kind {kind} in {DRAWS} draws of seed {seed}, number {number}")
+    raise RuntimeError(f"no legal mission of kind {kind} in {MISSION_DRAWS} draws of seed {seed}, number {number}")
 
 
 def _legal(draft: _Draft, reach_m: float) -> bool:
@@ -87,17 +87,17 @@ def _legal(draft: _Draft, reach_m: float) -> bool:
     return not any(shapely.dwithin(shape, places, reach_m * 1.01).any() for shape in shapes)
 
 
-def _document(draft: _Draft, kind: str, name: str, rng: np.random.Generator, *, margins: bool) -> Document:
+def _document(draft: _Draft, kind: str, name: str, rng: np.random.Generator, *, margins: bool) -> MissionDocument:
     lat0, lon0 = (36.58, -84.28) if kind == "sample" else (47.0, 8.0)
     scale = ROUND_DEGREE_M * np.array([1.0, math.cos(math.radians(lat0))])
 
-    def point(place: Floats) -> list[float] | Document:
+    def point(place: Floats) -> list[float] | MissionDocument:
         if draft.peaks:  # peaks are in local metres
             return {"east_m": round(float(place[0]), 2), "north_m": round(float(place[1]), 2)}
         return [round(float(x), 7) for x in np.array([lat0, lon0]) + np.asarray(place)[::-1] / scale]
 
-    agl_m = SAMPLE_MIN_AGL_M if kind == "sample" else MIN_AGL_M
-    zones: list[Document] = [
+    agl_m = SAMPLE_MIN_AGL_M if kind == "sample" else FLAT_MIN_AGL_M
+    zones: list[MissionDocument] = [
         {"name": f"ring {k}", "polygon": [point(p) for p in ring]} for k, ring in enumerate(draft.rings)
     ]
     zones += [
@@ -108,15 +108,15 @@ def _document(draft: _Draft, kind: str, name: str, rng: np.random.Generator, *, 
         zone |= {key: v for key, v in (("floor_agl_m", floor), ("ceiling_agl_m", ceiling)) if v is not None}
     errors = (CLEARANCE_M, TRACK_ERROR_M, ALTITUDE_ERROR_M) if margins else (0.0, 0.0, 0.0)
     keys = ("horizontal_clearance_m", "track_error_m", "altitude_error_m")
-    limits: Document = {"min_agl_m": agl_m, **dict(zip(keys, errors, strict=True))}
-    vehicle: Document = {
+    limits: MissionDocument = {"min_agl_m": agl_m, **dict(zip(keys, errors, strict=True))}
+    vehicle: MissionDocument = {
         "name": "uav1", "sysid": 1, "autopilot": "arducopter",
         "start": point(draft.start), "goal": point(draft.goal), "via": [point(v) for v in draft.vias],
         "max_climb_deg": float(rng.choice([10.0, 15.0, 30.0])),
     }  # fmt: skip
-    terrain: Document = {"flat_m": 0}
+    terrain: MissionDocument = {"flat_m": 0}
     if kind == "sample":
-        terrain = dict(SAMPLE)
+        terrain = dict(SAMPLE_TERRAIN)
     elif draft.peaks:
         terrain["peaks"] = [{**p, "center": [round(float(x), 2) for x in p["center"]]} for p in draft.peaks]
     frame = {"frame": {"origin": [lat0, lon0], "amsl_m": 0}} if draft.peaks else {}
@@ -129,7 +129,9 @@ def _document(draft: _Draft, kind: str, name: str, rng: np.random.Generator, *, 
 # ------------------------------------------------------------------------------------------------ the kinds
 
 
-def _ends(rng: np.random.Generator, low: float = SHORTEST_M, high: float = LONGEST_M) -> tuple[Floats, Floats, Floats]:
+def _ends(
+    rng: np.random.Generator, low: float = SHORTEST_WAY_M, high: float = LONGEST_WAY_M
+) -> tuple[Floats, Floats, Floats]:
     """Start, goal, and the unit vector from start to goal; the middle is the origin."""
     length = math.exp(rng.uniform(math.log(low), math.log(high)))
     turn = rng.uniform(0.0, 2.0 * math.pi)
@@ -152,7 +154,7 @@ def _thick(line: Floats, width: float) -> Floats:
 
 
 def _leg(rng: np.random.Generator) -> _Draft:
-    start, goal, _ = _ends(rng, 30.0, LONGEST_M)
+    start, goal, _ = _ends(rng, 30.0, LONGEST_WAY_M)
     return _plain(start, goal)
 
 

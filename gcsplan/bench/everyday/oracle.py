@@ -21,23 +21,23 @@ from gcsplan.world.zones import Circle, Zone
 
 SEGMENTS = 24
 """Chords per quarter circle."""
-TOUCH_M = 1e-4
+GRAPH_TOUCH_M = 1e-4
 """A line that enters a shape by less than this, m, only touches it."""
-ROUNDS = 400
+GRAPH_ROUNDS = 400
 
 
-class Unreachable(Exception):
+class EnclosedPlace(Exception):
     """There is no track: zones enclose one of the places."""
 
 
 @dataclass(eq=False)
-class Plane:
+class VisibilityGraph:
     """The shapes in the plane that no track may enter, grown by ``reach_m``."""
 
     shapes: list[shapely.Polygon]
 
     @classmethod
-    def of(cls, zones: Sequence[Zone], reach_m: float, scale: float = 1.0) -> Plane:
+    def of(cls, zones: Sequence[Zone], reach_m: float, scale: float = 1.0) -> VisibilityGraph:
         """The grown shapes of zones; ``scale`` multiplies the radii of circles, as in the check."""
         shapes = []
         for zone in zones:
@@ -54,9 +54,9 @@ class Plane:
         return sum(self._leg(np.array(a), np.array(b)) for a, b in pairwise(places))
 
     def _leg(self, a: Floats, b: Floats) -> float:
-        tree = shapely.STRtree([s.buffer(-TOUCH_M) for s in self.shapes])
+        tree = shapely.STRtree([s.buffer(-GRAPH_TOUCH_M) for s in self.shapes])
         known: set[int] = set()
-        for _ in range(ROUNDS):
+        for _ in range(GRAPH_ROUNDS):
             track = _past(a, b, [self.shapes[k] for k in sorted(known)])
             met = set(tree.query(shapely.LineString(track), predicate="intersects").tolist()) - known
             if not met:
@@ -76,7 +76,7 @@ def _past(a: Floats, b: Floats, shapes: list[shapely.Polygon]) -> Floats:
     rings = [np.asarray(r.coords)[:-1] for p in shapely.get_parts(union) for r in (p.exterior, *p.interiors)]
     turns = [_convex(_outward(ring, hole)) for ring, hole in zip(rings, _holes(union), strict=True)]
     corners, before, after = (np.vstack(x) for x in zip(*turns, strict=True))
-    inside = shapely.MultiPolygon(list(shapely.get_parts(union.buffer(-TOUCH_M))))
+    inside = shapely.MultiPolygon(list(shapely.get_parts(union.buffer(-GRAPH_TOUCH_M))))
     shapely.prepare(inside)
     nodes = np.vstack([a, b, corners])
     left, right = np.vstack([[a, b], before]), np.vstack([[a, b], after])
@@ -103,7 +103,7 @@ def _past(a: Floats, b: Floats, shapes: list[shapely.Polygon]) -> Floats:
             cost[j], parent[j] = cost[k] + way[j], k
             heapq.heappush(open_set, (float(cost[j] + ahead[j]), j))
     if not math.isfinite(cost[1]):
-        raise Unreachable
+        raise EnclosedPlace
     track = [1]
     while track[-1] != 0:
         track.append(int(parent[track[-1]]))

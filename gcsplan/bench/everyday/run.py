@@ -20,8 +20,8 @@ import yaml
 
 from gcsplan.app.pipeline import world_of
 from gcsplan.app.problems import make_problem
-from gcsplan.bench.everyday.missions import KINDS, Everyday, draw
-from gcsplan.bench.everyday.oracle import Plane, Unreachable
+from gcsplan.bench.everyday.missions import EVERYDAY_KINDS, Everyday, draw
+from gcsplan.bench.everyday.oracle import EnclosedPlace, VisibilityGraph
 from gcsplan.bench.files import write_all
 from gcsplan.bench.measure import Memory, passes, percentile
 from gcsplan.errors import InputError, NoMission
@@ -31,16 +31,16 @@ from gcsplan.planners.optimal.searches import require_names
 from gcsplan.planners.problem import Problem, Solution
 from gcsplan.planners.registry import get as get_planner
 
-COUNT = 100
+MISSIONS_OF_A_SEED = 100
 KILL_MB, KILL_S = 6000.0, 120.0
 """Megabytes and seconds above which a process is killed."""
 GROUND_ALIKE_M = 1e-6
-WORTH = 1e-3
+GAIN_PERCENT = 1e-3
 """Percent that a search must gain to count."""
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class MissionOutcome:
     """The result of one mission.
 
     ``oracle_m`` is the shortest track on flat ground around the zones; ``over_percent`` is how much longer the
@@ -81,8 +81,8 @@ def oracle_m(problem: Problem) -> float | None:
         return None
     places = [problem.start[:2], *((v.east_m, v.north_m) for v in problem.via), problem.goal[:2]]
     try:
-        return Plane.of(air.zones, air.beside_m(problem.limits), air.scale).shortest(places)
-    except Unreachable:
+        return VisibilityGraph.of(air.zones, air.beside_m(problem.limits), air.scale).shortest(places)
+    except EnclosedPlace:
         return math.inf
 
 
@@ -90,24 +90,24 @@ def run(
     directory: Path | None = None,
     *,
     seeds: Sequence[int] = (1,),
-    count: int = COUNT,
-    kinds: Sequence[str] = KINDS,
+    count: int = MISSIONS_OF_A_SEED,
+    kinds: Sequence[str] = EVERYDAY_KINDS,
     without: Sequence[str] = (),
     tell: Callable[[str], None] = lambda words: None,
-) -> list[Outcome]:
+) -> list[MissionOutcome]:
     """Plan ``count`` missions of each seed (those of ``kinds``); write ``everyday.csv`` and ``.md`` to ``directory``.
 
     ``without``: sources of paths and bounds that the planner must not use. Raises InputError for unknown kinds.
     """
     for kind in kinds:
-        if kind not in KINDS:
-            raise InputError(f"the kinds of missions are {', '.join(KINDS)}, given {kind!r}")
+        if kind not in EVERYDAY_KINDS:
+            raise InputError(f"the kinds of missions are {', '.join(EVERYDAY_KINDS)}, given {kind!r}")
     require_names(without)
     outcomes = []
-    _solve(problem_of(draw(1, KINDS.index("discs"))))  # compiles the kernels before anything is timed
+    _solve(problem_of(draw(1, EVERYDAY_KINDS.index("discs"))))  # compiles the kernels before anything is timed
     for seed in seeds:
         for number in range(count):
-            if KINDS[number % len(KINDS)] not in kinds:
+            if EVERYDAY_KINDS[number % len(EVERYDAY_KINDS)] not in kinds:
                 continue
             found = measure(draw(seed, number), without)
             outcomes.append(found)
@@ -117,14 +117,16 @@ def run(
     return outcomes
 
 
-def measure(one: Everyday, without: Sequence[str] = ()) -> Outcome:
+def measure(one: Everyday, without: Sequence[str] = ()) -> MissionOutcome:
     """Plan one mission in a separate process."""
     problem = problem_of(one)
     if without:
         problem = replace(problem, options={**problem.options, "without": tuple(without)})
     margins = problem.limits.horizontal_clearance_m > 0.0
     straight = math.dist(problem.start[:2], problem.goal[:2])
-    base = Outcome(one.name, one.kind, margins, straight, len(problem.airspace.zones), oracle_m=oracle_m(problem))
+    base = MissionOutcome(
+        one.name, one.kind, margins, straight, len(problem.airspace.zones), oracle_m=oracle_m(problem)
+    )
     receiver, sender = mp.get_context("fork").Pipe(duplex=False)
     child = mp.get_context("fork").Process(target=_child, args=(problem, sender), daemon=True)
     begun = time.perf_counter()
@@ -180,7 +182,7 @@ def _resident_mb(pid: int | None) -> float:
     return 0.0
 
 
-def line(o: Outcome) -> str:
+def line(o: MissionOutcome) -> str:
     """One mission in one line."""
 
     def number(value: float | None, form: str) -> str:
@@ -194,19 +196,19 @@ def line(o: Outcome) -> str:
     )
 
 
-def as_csv(outcomes: Sequence[Outcome]) -> str:
+def as_csv(outcomes: Sequence[MissionOutcome]) -> str:
     """CSV with one row per mission."""
-    return csv_of([[f.name for f in fields(Outcome)], *(asdict(o).values() for o in outcomes)], end="\r\n")
+    return csv_of([[f.name for f in fields(MissionOutcome)], *(asdict(o).values() for o in outcomes)], end="\r\n")
 
 
-def report(outcomes: Sequence[Outcome]) -> str:
+def report(outcomes: Sequence[MissionOutcome]) -> str:
     """Solved, gaps, lengths over the oracle's, seconds, megabytes, by kind and in total; Markdown."""
     lines = [
         "| kind | missions | solved | infeasible | not found | other | gap p50, p90, max % | over the graph max % | "
         "first path p50, max s | whole p50, p90, max s | MB max |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
-    kinds = [k for k in KINDS if any(o.kind == k for o in outcomes)]
+    kinds = [k for k in EVERYDAY_KINDS if any(o.kind == k for o in outcomes)]
     for name, group in [*((k, [o for o in outcomes if o.kind == k]) for k in kinds), ("all", list(outcomes))]:
         counts = [sum(o.status == s for o in group) for s in ("solved", "infeasible", "not found")]
         lines.append(
@@ -218,7 +220,7 @@ def report(outcomes: Sequence[Outcome]) -> str:
     return "\n".join([*lines, "", *_searches(outcomes)]) + "\n"
 
 
-def _searches(outcomes: Sequence[Outcome]) -> list[str]:
+def _searches(outcomes: Sequence[MissionOutcome]) -> list[str]:
     """The runs and results of each search over all missions; Markdown."""
     found: dict[str, list[dict[str, Any]]] = {}
     for outcome in outcomes:
@@ -231,14 +233,14 @@ def _searches(outcomes: Sequence[Outcome]) -> list[str]:
     for name, steps in sorted(found.items(), key=lambda item: -len(item[1])):
         gained, raised = ([step[key] for step in steps] for key in ("gained_percent", "bound_percent"))
         lines.append(
-            f"| {name} | {len(steps)} | {sum(g > WORTH for g in gained)} | {max(gained):.3g} | "
-            f"{sum(r > WORTH for r in raised)} | {max(raised):.3g} | {sum(step['refused'] for step in steps)} | "
+            f"| {name} | {len(steps)} | {sum(g > GAIN_PERCENT for g in gained)} | {max(gained):.3g} | "
+            f"{sum(r > GAIN_PERCENT for r in raised)} | {max(raised):.3g} | {sum(step['refused'] for step in steps)} | "
             f"{sum(step['s'] for step in steps):.1f} |"
         )
     return lines
 
 
-def _some(group: Sequence[Outcome], name: str, *percents: float) -> str:
+def _some(group: Sequence[MissionOutcome], name: str, *percents: float) -> str:
     values = [v for o in group if (v := getattr(o, name)) is not None]
     found = [percentile(values, p) for p in percents]
     return ", ".join("-" if v is None else f"{v:.3g}" for v in found)

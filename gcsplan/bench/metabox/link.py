@@ -21,12 +21,12 @@ from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 
 SCRIPT = Path(__file__).with_name("worker.py")
-START_S, ANSWER_S = 600.0, 3600.0
+WORKER_START_S, WORKER_ANSWER_S = 600.0, 3600.0
 """Longest wait for the start of a process, and for an answer."""
 TAIL = 400
 """Characters of MetaEvoBox's own complaint that a message repeats."""
 
-CURE = (
+METABOX_CURE = (
     "MetaEvoBox wants an environment of its own: python3.11 -m venv metabox-env, "
     "metabox-env/bin/pip install 'gcsplan[metabox]', then gcsplan bench metabox --python metabox-env/bin/python"
 )
@@ -45,11 +45,13 @@ class Worker:
             )
         except OSError as error:
             self._log.close()
-            raise InputError(f"cannot be run: {error.strerror or error}. {CURE}", where=str(python)) from error
+            raise InputError(f"cannot be run: {error.strerror or error}. {METABOX_CURE}", where=str(python)) from error
         try:
-            ready = self._answer(START_S)
+            ready = self._answer(WORKER_START_S)
             if "error" in ready:
-                raise InputError(f"MetaEvoBox cannot be imported there: {ready['error']}. {CURE}", where=str(python))
+                raise InputError(
+                    f"MetaEvoBox cannot be imported there: {ready['error']}. {METABOX_CURE}", where=str(python)
+                )
         except BaseException:
             self.close()
             raise
@@ -84,7 +86,7 @@ class Worker:
             stream.flush()
         except OSError:
             raise self._ended("ended") from None
-        answer = self._answer(ANSWER_S)
+        answer = self._answer(WORKER_ANSWER_S)
         if "error" in answer:
             raise InputError(f"MetaEvoBox failed at {what} {request}: {answer['error']}", where=str(self._python))
         return answer

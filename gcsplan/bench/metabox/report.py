@@ -15,7 +15,7 @@ from gcsplan.bench.measure import compare, holm
 from gcsplan.bench.metabox.run import THEIRS
 from gcsplan.export.table import csv_of
 
-COLUMNS = ("optimiser", "of", "place, %", "p", "over the best, %", "clear", "remarks")
+METABOX_COLUMNS = ("optimiser", "of", "place, %", "p", "over the best, %", "clear", "remarks")
 
 
 def rows(result: dict[str, Any]) -> list[dict[str, Any]]:
@@ -93,7 +93,7 @@ def _markdown(result: dict[str, Any]) -> Iterator[str]:
         f"{told['seed']}, {told['evaluations']} evaluations, {told['runs']} runs; its published instances are others."
     )
     yield ""
-    yield f"| {' | '.join(COLUMNS)} |"
+    yield f"| {' | '.join(METABOX_COLUMNS)} |"
     yield "| --- | --- | ---: | ---: | ---: | ---: | --- |"
     for row in rows(result):
         remarks = []

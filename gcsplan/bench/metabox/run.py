@@ -33,11 +33,10 @@ THEIRS = (
 )  # fmt: skip
 """MetaEvoBox's optimisers for one objective that need no training."""
 THREATS = (15, 30)
-MOST_INSTANCES, MOST_RUNS, LEAST_BUDGET = 56, 51, 100
+MOST_INSTANCES, MOST_METABOX_RUNS, LEAST_BUDGET = 56, 51, 100
 
-Record = dict[str, Any]
-Asked = TypeVar("Asked")
-Done = TypeVar("Done")
+Question = TypeVar("Question")
+Reply = TypeVar("Reply")
 
 
 def ours() -> tuple[str, ...]:
@@ -47,7 +46,7 @@ def ours() -> tuple[str, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class _Job:
+class _OptimiserRun:
     instance: int
     algorithm: str
     run: int
@@ -78,13 +77,18 @@ def run(
     for name in algorithms or ():
         if name not in known:
             raise unknown_name(f"there is no optimiser {name!r} in this benchmark", name, known)
-    if not (1 <= instances <= MOST_INSTANCES and 1 <= runs <= MOST_RUNS and evaluations >= LEAST_BUDGET and jobs >= 1):
+    if not (
+        1 <= instances <= MOST_INSTANCES
+        and 1 <= runs <= MOST_METABOX_RUNS
+        and evaluations >= LEAST_BUDGET
+        and jobs >= 1
+    ):
         raise InputError(
-            f"1 to {MOST_INSTANCES} instances, 1 to {MOST_RUNS} runs, {LEAST_BUDGET} evaluations or more and 1 job or "
-            f"more are wanted, given {instances}, {runs}, {evaluations} and {jobs}"
+            f"1 to {MOST_INSTANCES} instances, 1 to {MOST_METABOX_RUNS} runs, {LEAST_BUDGET} evaluations or more and "
+            f"1 job or more are wanted, given {instances}, {runs}, {evaluations} and {jobs}"
         )
     names = tuple(dict.fromkeys(algorithms)) if algorithms else known
-    asked = [_Job(i, name, k, seed) for i in range(instances) for name in names for k in range(runs)]
+    asked = [_OptimiserRun(i, name, k, seed) for i in range(instances) for name in names for k in range(runs)]
     ready(out)
     files = [out / f"instance-{k}-threats-{_threats(k)}-seed-{seed}.pkl" for k in range(instances)]
     with ExitStack() as stack:
@@ -121,13 +125,15 @@ def _generate(worker: Worker, file: Path, instance: int, seed: int) -> None:
     part.replace(file)
 
 
-def _each(workers: Sequence[Worker], asked: Sequence[Asked], work: Callable[[Worker, Asked], Done]) -> Iterator[Done]:
+def _each(
+    workers: Sequence[Worker], asked: Sequence[Question], work: Callable[[Worker, Question], Reply]
+) -> Iterator[Reply]:
     """The results of ``work`` in the order of ``asked``; each worker does one thing at a time."""
     idle: SimpleQueue[Worker] = SimpleQueue()
     for worker in workers:
         idle.put(worker)
 
-    def one(item: Asked) -> Done:
+    def one(item: Question) -> Reply:
         worker = idle.get()
         try:
             return work(worker, item)
@@ -141,9 +147,9 @@ def _each(workers: Sequence[Worker], asked: Sequence[Asked], work: Callable[[Wor
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _record(worker: Worker, job: _Job, evaluations: int) -> Record:
+def _record(worker: Worker, job: _OptimiserRun, evaluations: int) -> dict[str, Any]:
     """One run. ``cost`` and ``clear`` are those of the best point; ``outside``: evaluated points out of the box."""
-    record: Record = {"instance": job.instance, "algorithm": job.algorithm, "run": job.run}
+    record: dict[str, Any] = {"instance": job.instance, "algorithm": job.algorithm, "run": job.run}
     if job.algorithm in THEIRS:
         # MetaEvoBox's seeds are 32 bits.
         drawn = int(np.random.default_rng([job.seed, job.instance, job.run]).integers(1, 2**31))

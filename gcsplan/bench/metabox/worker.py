@@ -5,7 +5,7 @@ answer is a line of JSON on the real standard output, and what MetaEvoBox prints
 of gcsplan, which is not installed there.
 
 MetaEvoBox's cost of one point takes 10 to 20 ms, most of it in loops over threats and legs. The searches run on
-`Problem.func`, the same formula over whole arrays. Both are compared when an instance is loaded, and every reported
+`UavInstance.func`, the same formula over whole arrays. Both are compared when an instance is loaded, and every reported
 cost is computed once more by MetaEvoBox's own code.
 """
 
@@ -22,12 +22,12 @@ from importlib.metadata import version
 from types import SimpleNamespace
 from typing import Any, BinaryIO
 
-NODES = 10  # MetaEvoBox: way points of a path, three numbers each
-PENALTY = 1e4  # MetaEvoBox: cost of a collision
+WAY_POINTS = 10  # MetaEvoBox: way points of a path, three numbers each
+COLLISION_PENALTY = 1e4  # MetaEvoBox: cost of a collision
 LOGS = 50  # MetaEvoBox: records of a run, which its optimisers insist on
 PACKAGES = ("metaevobox", "torch", "numpy", "scipy", "deap", "cma", "pypop7")
 
-TRIED, NEAR = 64, 1e-9  # points at which both costs are compared, and the largest relative difference
+POINTS_COMPARED, COSTS_NEAR = 64, 1e-9  # points at which both costs are compared, and the largest relative difference
 
 problems: list[Any] = []
 
@@ -48,8 +48,8 @@ def make(file: str, threats: int, seed: int) -> dict[str, Any]:
 def load(files: list[str]) -> dict[str, Any]:
     """Load the instances in ``files``, one in each."""
     dataset = import_module("metaevobox.environment.problem.SOO.UAV.uav_dataset").UAV_Dataset
-    told = {"num": 1, "dv": NODES, "j_pen": PENALTY, "difficulty": "all"}
-    problems[:] = [Problem(dataset.get_datasets(path=file, **told)[0].data[0]) for file in files]
+    told = {"num": 1, "dv": WAY_POINTS, "j_pen": COLLISION_PENALTY, "difficulty": "all"}
+    problems[:] = [UavInstance(dataset.get_datasets(path=file, **told)[0].data[0]) for file in files]
     return {"dims": [problem.dim for problem in problems], "threats": [problem.threats for problem in problems]}
 
 
@@ -71,7 +71,7 @@ def judge(instance: int, points: Any) -> dict[str, Any]:
     try:
         without = problem.theirs.func(problem.lb + points * problem.span)
     finally:
-        told["J_pen"] = PENALTY
+        told["J_pen"] = COLLISION_PENALTY
     return {"costs": costs.tolist(), "clear": (costs == without).tolist()}
 
 
@@ -121,7 +121,7 @@ def solve(instance: int, optimiser: str, seed: int, evaluations: int) -> dict[st
     return run | {"cost": judged["costs"][0], "clear": judged["clear"][0]}
 
 
-class Problem:
+class UavInstance:
     """One instance: ``theirs``, and ``func`` with the same costs. Raises ValueError if they differ."""
 
     def __init__(self, theirs: Any) -> None:
@@ -130,11 +130,11 @@ class Problem:
         self.theirs, self.model = theirs, theirs.terrain_model
         self.lb, self.span, self.dim = theirs.lb, theirs.ub - theirs.lb, int(theirs.dim)
         self.threats = len(self.model["threats"])
-        points = self.lb + np.random.default_rng(1).random((TRIED, self.dim)) * self.span
-        points[: TRIED // 4, ::9] = 0.0  # some legs of no length
+        points = self.lb + np.random.default_rng(1).random((POINTS_COMPARED, self.dim)) * self.span
+        points[: POINTS_COMPARED // 4, ::9] = 0.0  # some legs of no length
         ours, wanted = self.func(points), theirs.func(points)
         worst = float(np.max(np.abs(ours - wanted) / wanted))
-        if worst > NEAR:
+        if worst > COSTS_NEAR:
             raise ValueError(f"the cost of MetaEvoBox is not the known one: they differ by {worst:.1e}")
 
     def func(self, points: Any) -> Any:

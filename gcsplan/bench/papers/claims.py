@@ -33,7 +33,7 @@ RANKS_ITS_BASELINES = frozenset({"krill", "ib-abc"})
 
 SAME_RULE = "with α = β = 1, the paper's own choice, its method is the parrot optimizer itself"
 
-SHOWN: tuple[tuple[str, str, str, str, str, str], ...] = (
+CLAIMS_SHOWN: tuple[tuple[str, str, str, str, str, str], ...] = (
     *(
         (scenario, "iterations", low, high, f"fig. {figure}", "")
         for scenario, figure in (("krill-mound", 14), ("krill-forest", 16), ("krill-hills", 18))
@@ -123,7 +123,7 @@ def _all() -> Iterator[Claim]:
         paper = scenario.paper.name
         shown = [
             (measure, low, high, source, ("", ""), why)
-            for place, measure, low, high, source, why in SHOWN
+            for place, measure, low, high, source, why in CLAIMS_SHOWN
             if place == scenario.name
         ]
         for measure, low, high, source, printed, why in (*_from_numbers(scenario), *shown):

@@ -15,22 +15,20 @@ from typing import Any
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.bench.measure import compare, holm
+from gcsplan.bench.measure import LEAST_RUNS_TO_JUDGE, SIGNIFICANCE, compare, holm
 from gcsplan.bench.papers.claims import Claim, claims_of
 from gcsplan.bench.papers.readings import readings_of
-from gcsplan.bench.papers.runs import OPTIMA, Record
+from gcsplan.bench.papers.runs import OPTIMA, RunRecord
 from gcsplan.bench.papers.scenarios import SCENARIOS, Scenario
-from gcsplan.bench.papers.statistics import UNITS, equal_evaluations, values
+from gcsplan.bench.papers.statistics import MEASURE_UNITS, equal_evaluations, values
 
-LEAST_RUNS_TO_JUDGE = 30
-SIGNIFICANCE = 0.05
-HOLDS, TIE, REVERSED, IMPOSSIBLE = "holds", "tie", "reversed", "impossible as printed"
-FEW, NO_LEGAL, NOT_RUN = "too few runs to tell", "no legal run", "not run"
+HOLDS, TIE, REVERSED, IMPOSSIBLE_AS_PRINTED = "holds", "tie", "reversed", "impossible as printed"
+TOO_FEW_RUNS, NO_LEGAL, NOT_RUN = "too few runs to tell", "no legal run", "not run"
 CLOCKED = frozenset({"time"})
 """Measures that a clock gives."""
 
-Cell = dict[str, Any]
-Runs = Mapping[tuple[str, str], Sequence[Record]]
+Comparison = dict[str, Any]
+Runs = Mapping[tuple[str, str], Sequence[RunRecord]]
 
 
 def judge(scenarios: Sequence[Scenario], runs: Runs) -> dict[str, list[dict[str, Any]]]:
@@ -54,7 +52,7 @@ def judge(scenarios: Sequence[Scenario], runs: Runs) -> dict[str, list[dict[str,
             done = [(c, cell) for c, cell in cells if cell["ranking"] != NOT_RUN]
             _correct([cell for _, cell in done])
             out["readings"] += [
-                {"claim": c.number, "scenario": c.scenario, "measure": UNITS[c.measure],
+                {"claim": c.number, "scenario": c.scenario, "measure": MEASURE_UNITS[c.measure],
                  "words": f"{c.low} < {c.high}", "reading": reading.name, "what": reading.what, **cell}
                 for c, cell in done
             ]  # fmt: skip
@@ -75,9 +73,9 @@ def _judged(claims: Sequence[Claim], runs: Runs, *, brief: bool = False) -> list
         if all(cell["ranking"] == NOT_RUN for cell in beside.values()):
             continue
         row: dict[str, Any] = {
-            "claim": c.number, "paper": c.paper, "scenario": c.scenario, "measure": UNITS[c.measure],
+            "claim": c.number, "paper": c.paper, "scenario": c.scenario, "measure": MEASURE_UNITS[c.measure],
             "words": f"{c.low} < {c.high}", "source": c.source, "printed_low": c.printed[0],
-            "printed_high": c.printed[1], "verdict": IMPOSSIBLE if c.impossible else beside[""]["ranking"],
+            "printed_high": c.printed[1], "verdict": IMPOSSIBLE_AS_PRINTED if c.impossible else beside[""]["ranking"],
             "impossible": c.impossible,
         }  # fmt: skip
         for prefix, cell in beside.items():
@@ -91,7 +89,7 @@ def _twin(scenario: str) -> str:
     return next((s.name for s in SCENARIOS.values() if s.twin_of == scenario), "")
 
 
-def _equal(claim: Claim, runs: Runs) -> Cell:
+def _equal(claim: Claim, runs: Runs) -> Comparison:
     """The claim at equal evaluations: the cost after as many as the shorter of both searches has made."""
     both = [runs.get((claim.scenario, name), ()) for name in (claim.low, claim.high)]
     if claim.measure not in ("length", "cost") or not all(both):
@@ -102,18 +100,18 @@ def _equal(claim: Claim, runs: Runs) -> Cell:
     return _compared(*(values(some, "cost, equal evaluations", level) for some in both)) | {"evaluations": level}
 
 
-def _cell(claim: Claim, runs: Runs, scenario: str, low: str, high: str) -> Cell:
+def _cell(claim: Claim, runs: Runs, scenario: str, low: str, high: str) -> Comparison:
     both = [runs.get((scenario, name), ()) for name in (low, high) if name not in OPTIMA]
     if not all(both):
         return _empty(NOT_RUN)
     return _compared(*(values(some, claim.measure) for some in both))
 
 
-def _empty(ranking: str) -> Cell:
+def _empty(ranking: str) -> Comparison:
     return {"runs": 0, "median_low": None, "median_high": None, "p": None, "effect": None, "ranking": ranking}
 
 
-def _compared(low: Floats, high: Floats) -> Cell:
+def _compared(low: Floats, high: Floats) -> Comparison:
     """A comparison with its raw p; `_correct` sets the ranking."""
     cell = _empty("")
     cell["runs"] = min(len(low), len(high))
@@ -121,7 +119,7 @@ def _compared(low: Floats, high: Floats) -> Cell:
         middle = float(np.median(numbers))
         cell[key] = middle if math.isfinite(middle) else None
     if cell["runs"] < LEAST_RUNS_TO_JUDGE:
-        cell["ranking"] = FEW
+        cell["ranking"] = TOO_FEW_RUNS
     elif not (np.isfinite(low).any() or np.isfinite(high).any()):
         cell["ranking"] = NO_LEGAL
     else:
@@ -129,7 +127,7 @@ def _compared(low: Floats, high: Floats) -> Cell:
     return cell
 
 
-def _correct(cells: Sequence[Cell]) -> None:
+def _correct(cells: Sequence[Comparison]) -> None:
     """Correct p over the column and set the rankings, in place."""
     tested = [cell for cell in cells if cell["p"] is not None]
     for cell, p in zip(tested, holm([cell["p"] for cell in tested]), strict=True):
@@ -141,18 +139,18 @@ def standing(judged: Mapping[str, Sequence[Mapping[str, Any]]], paper: str) -> I
     """What of a paper stands, in sentences: each measure with the claims that hold, tie and are reversed; then what
     each reading changes."""
     claims = {c["claim"]: c for c in judged["claims"] if c["paper"] == paper}
-    told = [c for c in claims.values() if c["ranking"] in _WORDS]
+    told = [c for c in claims.values() if c["ranking"] in _RANKING_WORDS]
     if not told:
         yield f"Rankings are judged from {LEAST_RUNS_TO_JUDGE} runs on: too few were made."
         return
     count = Counter(c["verdict"] for c in claims.values())
     yield (
         f"{len(claims)} claims: holds {count[HOLDS]}, reversed {count[REVERSED]}, no difference {count[TIE]}, "
-        f"impossible as printed {count[IMPOSSIBLE]}."
+        f"impossible as printed {count[IMPOSSIBLE_AS_PRINTED]}."
     )
     for measure in dict.fromkeys(c["measure"] for c in told):
         parts = []
-        for ranking, word in _WORDS.items():
+        for ranking, word in _RANKING_WORDS.items():
             places: dict[str, list[str]] = {}
             for c in told:
                 if c["measure"] == measure and c["ranking"] == ranking:
@@ -164,7 +162,7 @@ def standing(judged: Mapping[str, Sequence[Mapping[str, Any]]], paper: str) -> I
         yield _changed(name, [r for r in judged["readings"] if r["reading"] == name and r["claim"] in claims], claims)
 
 
-_WORDS = {HOLDS: "Holds", REVERSED: "Reversed", TIE: "No difference"}
+_RANKING_WORDS = {HOLDS: "Holds", REVERSED: "Reversed", TIE: "No difference"}
 
 
 def _changed(name: str, cases: Sequence[Mapping[str, Any]], claims: Mapping[str, Mapping[str, Any]]) -> str:
@@ -172,10 +170,10 @@ def _changed(name: str, cases: Sequence[Mapping[str, Any]], claims: Mapping[str,
     changes: dict[tuple[str, str], list[str]] = {}
     for case in cases:
         before, now = claims[case["claim"]]["ranking"], case["ranking"]
-        if before != now and {before, now} <= _WORDS.keys():
+        if before != now and {before, now} <= _RANKING_WORDS.keys():
             changes.setdefault((before, now), []).append(case["claim"])
     words = "; ".join(
-        f"from “{_WORDS[before].lower()}” to “{_WORDS[now].lower()}”: {', '.join(which)}"
+        f"from “{_RANKING_WORDS[before].lower()}” to “{_RANKING_WORDS[now].lower()}”: {', '.join(which)}"
         for (before, now), which in changes.items()
     )
     changed = sum(map(len, changes.values()))

@@ -19,31 +19,31 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from gcsplan.arrays import Floats
 from gcsplan.bench.files import png
-from gcsplan.bench.papers.runs import Record
-from gcsplan.bench.papers.scenarios import Set
+from gcsplan.bench.papers.runs import RunRecord
+from gcsplan.bench.papers.scenarios import ReadyScenario
 from gcsplan.bench.papers.statistics import legal, schedule
 from gcsplan.world.zones import Circle
 
-COLOURS = ("#d62728", "#1f77b4", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf", "#8c564b", "#e377c2")
-ZONE_COLOUR = "#ffbf00"
+ALGORITHM_COLOURS = ("#d62728", "#1f77b4", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf", "#8c564b", "#e377c2")
+MAP_ZONE_COLOUR = "#ffbf00"
 COST_UNITS = {
     "krill": "m", "ssgwo": "weighted sum (eq. 33)", "msfoa": "weighted m, all vehicles together", "abo": "m",
     "ib-abc": "parts of the straight line's, all vehicles",
 }  # fmt: skip
-WIDE = 4.0
+LOG_SCALE_FROM = 4.0
 """Ratio of costs above which they are drawn on a logarithmic scale."""
 MAP_CELLS = 400
-STEPS = 200
+CURVE_STEPS = 200
 SPACE_CELLS = 60
 """Cells a side of the ground that is drawn in space."""
 MOMENTS = 300
 """Moments at which a fleet's distances are drawn."""
-TALL = 1.25
+OPEN_ZONE_TALL = 1.25
 """A zone without a top is drawn this many times as high as the highest path."""
 _LINES = ("-", "--", "-.", ":")
 
 
-def best_run(records: Sequence[Record]) -> Record | None:
+def best_run(records: Sequence[RunRecord]) -> RunRecord | None:
     """The legal run of least cost, or, if no run is legal, the run of least cost; None if all were refused."""
     found = [r for r in records if r["status"] == "found" and r["cost"] is not None]
     return min(found, key=lambda r: (not legal(r), r["cost"]), default=None)
@@ -54,12 +54,12 @@ def draw_map(summary: dict[str, Any]) -> bytes:
     figure = Figure(figsize=(8.6, 10.2), layout="constrained")
     FigureCanvasAgg(figure)
     plan, profile = figure.subplots(2, 1, height_ratios=(3.2, 1.0))
-    ready: Set = summary["set"]
+    ready: ReadyScenario = summary["set"]
     shown = {name: best_run(records) for name, records in summary["records"].items()}
     paths = [np.array(p) for run in shown.values() if run is not None for p in run["paths"]]
     ends = np.array([[p.start, p.goal] for p in ready.problems]).reshape(-1, 3)
     _ground(plan, ready, np.concatenate([ends, *paths])[:, :2])
-    for rank, ((name, run), colour) in enumerate(zip(shown.items(), COLOURS, strict=False)):
+    for rank, ((name, run), colour) in enumerate(zip(shown.items(), ALGORITHM_COLOURS, strict=False)):
         if run is None:
             plan.plot([], [], color=colour, label=f"{name}: refused")
             continue
@@ -86,7 +86,7 @@ def draw_map(summary: dict[str, Any]) -> bytes:
     return png(figure)
 
 
-def _ground(ax: Axes, ready: Set, places: Floats) -> None:
+def _ground(ax: Axes, ready: ReadyScenario, places: Floats) -> None:
     low, high = places.min(axis=0), places.max(axis=0)
     pad = 0.06 * float((high - low).max())
     (west, south), (east, north) = low - pad, high + pad
@@ -111,14 +111,14 @@ def _ground(ax: Axes, ready: Set, places: Floats) -> None:
         else:
             patch = PolygonPatch(zone.shape.vertices)
             middle = tuple(zone.shape.vertices.mean(axis=0))
-        patch.set(facecolor=ZONE_COLOUR, edgecolor="#805000", alpha=0.45)
+        patch.set(facecolor=MAP_ZONE_COLOUR, edgecolor="#805000", alpha=0.45)
         ax.add_patch(patch)
         if zone.ceiling is not None:
             ax.annotate(f"to {zone.ceiling}", middle, ha="center", va="center", fontsize=6)
     ax.set(xlim=(west, east), ylim=(south, north))
 
 
-def _profile(ax: Axes, ready: Set, run: Record | None, name: str) -> None:
+def _profile(ax: Axes, ready: ReadyScenario, run: RunRecord | None, name: str) -> None:
     ax.set(xlabel="distance over ground, m", ylabel="altitude, m AMSL")
     ax.grid(alpha=0.3)
     if run is None:
@@ -130,7 +130,7 @@ def _profile(ax: Axes, ready: Set, run: Record | None, name: str) -> None:
         top = ready.world.airspace.surface.top_at(np.interp(at, s, path[:, 0]), np.interp(at, s, path[:, 1]))
         of = f" {ready.source.vehicles[k].vehicle.name}" if len(run["paths"]) > 1 else ""
         style = _LINES[k % len(_LINES)]
-        ax.plot(s, path[:, 2], color=COLOURS[0], ls=style, lw=1.4, label=f"path{of}")
+        ax.plot(s, path[:, 2], color=ALGORITHM_COLOURS[0], ls=style, lw=1.4, label=f"path{of}")
         ax.plot(at, top, color="#7a5c3c", ls=style, lw=0.9, label=f"ground{of}")
         if problem.limits.min_agl_m > 0.0:
             ax.plot(at, top + problem.limits.min_agl_m, color="0.5", ls=style, lw=0.6,
@@ -146,11 +146,13 @@ def draw_convergence(summary: dict[str, Any]) -> bytes:
     axes = figure.subplots(1, 2, sharey=True)
     lowest, least, most = math.inf, math.inf, -math.inf
     for ax, along in zip(axes, ("iterations", "evaluations"), strict=True):
-        for rank, ((name, records), colour) in enumerate(zip(summary["records"].items(), COLOURS, strict=False)):
+        for rank, ((name, records), colour) in enumerate(
+            zip(summary["records"].items(), ALGORITHM_COLOURS, strict=False)
+        ):
             found = [r["history"] for r in records if r["status"] == "found"]
             if not found:
                 continue
-            grid = np.linspace(0.0, max(h[along][-1] for h in found), STEPS)
+            grid = np.linspace(0.0, max(h[along][-1] for h in found), CURVE_STEPS)
             costs = np.array([stepwise(h[along], h["cost"], grid) for h in found])
             low, middle, high = (np.percentile(costs, q, axis=0, method="nearest") for q in (25, 50, 75))
             shown = np.isfinite(high)
@@ -166,7 +168,7 @@ def draw_convergence(summary: dict[str, Any]) -> bytes:
         ax.set(xlabel=along + (of if len(summary["set"].problems) > 1 else ""))
         ax.grid(alpha=0.3, which="both")
     if lowest > 0.0 and math.isfinite(most):
-        if most > WIDE * least:
+        if most > LOG_SCALE_FROM * least:
             axes[0].set_yscale("log")
             axes[0].yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             axes[0].yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -192,13 +194,13 @@ def draw_space(summary: dict[str, Any]) -> bytes:
     figure = Figure(figsize=(8.6, 7.0), layout="constrained")
     FigureCanvasAgg(figure)
     ax: Any = figure.add_subplot(projection="3d", computed_zorder=False)
-    ready: Set = summary["set"]
+    ready: ReadyScenario = summary["set"]
     shown = {name: best_run(records) for name, records in summary["records"].items()}
     drawn = [np.array(p) for run in shown.values() if run is not None for p in run["paths"]]
     drawn += [np.array([p.start, p.goal]) for p in ready.problems]
     every = np.concatenate(drawn)
     _ground_in_space(ax, ready, every)
-    for rank, ((name, run), colour) in enumerate(zip(shown.items(), COLOURS, strict=False)):
+    for rank, ((name, run), colour) in enumerate(zip(shown.items(), ALGORITHM_COLOURS, strict=False)):
         for k, points in enumerate([] if run is None else run["paths"]):
             path = np.array(points)
             ax.plot(*path.T, color=colour, lw=1.6, zorder=20 - rank, label=None if k else name)
@@ -211,7 +213,7 @@ def draw_space(summary: dict[str, Any]) -> bytes:
     return png(figure)
 
 
-def _ground_in_space(ax: Any, ready: Set, places: Floats) -> None:
+def _ground_in_space(ax: Any, ready: ReadyScenario, places: Floats) -> None:
     (west, south, _), (east, north, top) = places.min(axis=0), places.max(axis=0)
     e, n = np.meshgrid(np.linspace(west, east, SPACE_CELLS), np.linspace(south, north, SPACE_CELLS))
     ground = ready.world.airspace.surface.ground_at(e, n)
@@ -220,11 +222,13 @@ def _ground_in_space(ax: Any, ready: Set, places: Floats) -> None:
     turn = np.linspace(0.0, 2.0 * np.pi, 25)
     for zone in ready.world.airspace.zones:
         if isinstance(zone.shape, Circle):
-            level = zone.ceiling.value_m if zone.ceiling is not None else TALL * top
+            level = zone.ceiling.value_m if zone.ceiling is not None else OPEN_ZONE_TALL * top
             x, y = (c + zone.shape.radius_m * f(turn) for c, f in
                     ((zone.shape.east_m, np.cos), (zone.shape.north_m, np.sin)))  # fmt: skip
             sides = np.stack([np.full_like(turn, float(ground.min())), np.full_like(turn, level)])
-            ax.plot_surface(np.stack([x, x]), np.stack([y, y]), sides, color=ZONE_COLOUR, alpha=0.35, lw=0, zorder=2)
+            ax.plot_surface(
+                np.stack([x, x]), np.stack([y, y]), sides, color=MAP_ZONE_COLOUR, alpha=0.35, lw=0, zorder=2
+            )
 
 
 def draw_boxes(summary: dict[str, Any]) -> bytes:
@@ -236,7 +240,7 @@ def draw_boxes(summary: dict[str, Any]) -> bytes:
     for ax, key in ((left, "cost"), (right, "length_m")):
         numbers = [spread(summary["records"][name], key) for name in names]
         labels = [f"{name}\n{len(some)}" for name, some in zip(names, numbers, strict=True)]
-        ax.boxplot(numbers, tick_labels=labels, showfliers=True, medianprops={"color": COLOURS[0]})
+        ax.boxplot(numbers, tick_labels=labels, showfliers=True, medianprops={"color": ALGORITHM_COLOURS[0]})
         ax.grid(alpha=0.3, axis="y")
         ax.tick_params(axis="x", labelsize=8)
         flat = np.concatenate([*numbers, np.empty(0)])
@@ -252,7 +256,7 @@ def draw_boxes(summary: dict[str, Any]) -> bytes:
     return png(figure)
 
 
-def spread(records: Sequence[Record], key: str) -> Floats:
+def spread(records: Sequence[RunRecord], key: str) -> Floats:
     """The finite costs of all runs, or the lengths of the legal ones."""
     some = [r for r in records if r["status"] == "found" and r[key] is not None and (key == "cost" or legal(r))]
     return np.array([r[key] for r in some], dtype=np.float64)
@@ -263,7 +267,7 @@ def draw_fleet(summary: dict[str, Any]) -> bytes | None:
 
     IB-ABC's vehicles fly by its schedule, all others at one speed; all depart together, and each is gone on arrival.
     """
-    ready: Set = summary["set"]
+    ready: ReadyScenario = summary["set"]
     run = best_run(next(iter(summary["records"].values())))
     if len(ready.problems) < 2 or run is None:
         return None
@@ -278,7 +282,7 @@ def draw_fleet(summary: dict[str, Any]) -> bytes | None:
     FigureCanvasAgg(figure)
     ax = figure.subplots()
     names = [request.vehicle.name for request in ready.source.vehicles]
-    for (i, j), colour in zip(combinations(range(len(paths)), 2), COLOURS, strict=False):
+    for (i, j), colour in zip(combinations(range(len(paths)), 2), ALGORITHM_COLOURS, strict=False):
         t, gap = distances(paths[i], times[i], paths[j], times[j])
         ax.plot(t, gap, color=colour, lw=1.4, label=f"{names[i]} – {names[j]}: {gap.min():.1f} m at least")
     ax.set(xlabel="time, s", ylabel="distance, m", ylim=(0.0, None))

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from itertools import combinations
 from typing import Any
 
-from gcsplan.bench.papers.printed import PRINTED, Number, Row
-from gcsplan.bench.papers.scenarios import SCENARIOS, Set
+from gcsplan.bench.papers.printed import PRINTED, PrintedNumber, PrintedRow
+from gcsplan.bench.papers.scenarios import SCENARIOS, ReadyScenario
 from gcsplan.bench.papers.statistics import schedule
-
-Rows = list[tuple[str, ...]]
 
 _SAME_RATIO = 5e-4
 
@@ -38,7 +36,7 @@ def remarks(scenario: str) -> list[str]:
     ]
 
 
-def _krill(rows: dict[str, Row]) -> list[str]:
+def _krill(rows: dict[str, PrintedRow]) -> list[str]:
     every = [row for (_, _), row in PRINTED.items() if "energy_j" in row]
     ratios = [row["energy_j"].value / row["length_m"].value for row in every]
     common = max(ratios, key=lambda r: sum(abs(x - r) < _SAME_RATIO * r for x in ratios))
@@ -56,7 +54,7 @@ def _krill(rows: dict[str, Row]) -> list[str]:
     ]
 
 
-def _msfoa(rows: dict[str, Row]) -> list[str]:
+def _msfoa(rows: dict[str, PrintedRow]) -> list[str]:
     out = [
         "The paper shows its scenarios as pictures only: terrain, threats, starts and goal are ours, so its costs "
         "cannot be compared with ours, only rankings can. Vehicles are planned one by one in the order of priority, "
@@ -76,19 +74,19 @@ def _msfoa(rows: dict[str, Row]) -> list[str]:
     return out
 
 
-def schedules(summary: dict[str, Any]) -> tuple[tuple[str, ...], Rows]:
+def schedules(summary: dict[str, Any]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Header and rows of IB-ABC's schedule, by the measured and the printed lengths; no rows for other papers."""
     header = (
         "algorithm", "vehicle", "L, m", "T, s", "v = L/T, m/s", "", "printed L, m", "its T, s", "its v, m/s",
         "printed T, s", "printed v, m/s",
     )  # fmt: skip
-    ready: Set = summary["set"]
+    ready: ReadyScenario = summary["set"]
     arrival = ready.source.arrival
     if summary["paper"] != "ib-abc" or arrival is None:
         return header, []
     vehicle = ready.source.vehicles[0].vehicle
     told = (arrival.mode, arrival.interval_s, vehicle.speed_min_m_s, vehicle.speed_max_m_s)
-    out: Rows = []
+    out: list[tuple[str, ...]] = []
     for row in summary["rows"]:
         lengths = row["vehicle_lengths_m"]
         printed = summary["printed"].get(row["algorithm"])
@@ -120,7 +118,7 @@ def schedules(summary: dict[str, Any]) -> tuple[tuple[str, ...], Rows]:
     return header, out
 
 
-def _against(printed: Number, right: float, tolerance: float) -> str:
+def _against(printed: PrintedNumber, right: float, tolerance: float) -> str:
     """The printed number, marked if the arithmetic does not round to it."""
     off = printed.below(right - tolerance) or printed.above(right + tolerance)
     return f"{printed.text} ≠" if off else printed.text

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.bench.files import write_all
-from gcsplan.bench.papers.printed import Number, Row
+from gcsplan.bench.papers.printed import PrintedNumber, PrintedRow
 from gcsplan.bench.papers.remarks import legend, remarks, schedules
 from gcsplan.bench.papers.tables import (
-    Table,
+    PaperTable,
     claims_table,
     counts,
     readings_table,
@@ -27,16 +27,16 @@ from gcsplan.bench.papers.tables import (
 )
 from gcsplan.export.table import csv_of
 
-IMPOSSIBLE, UNREACHED = "†", "‡"
+IMPOSSIBLE_MARK, UNREACHED_MARK = "†", "‡"
 LEGEND = (
-    f"{IMPOSSIBLE} impossible: below the physical minimum (the straight line between the printed ends, its energy by "
-    "Table 1), or a mean pitch that no path of the printed mean length has.",
-    f"{UNREACHED} below the bound that is proven for the scenario as it stands here.",
+    f"{IMPOSSIBLE_MARK} impossible: below the physical minimum (the straight line between the printed ends, its energy "
+    "by Table 1), or a mean pitch that no path of the printed mean length has.",
+    f"{UNREACHED_MARK} below the bound that is proven for the scenario as it stands here.",
 )
-UNITS = {"m": "m", "j": "J", "deg": "°"}
-TITLE = "The five papers' experiments"
+FAULT_UNITS = {"m": "m", "j": "J", "deg": "°"}
+PAPERS_TITLE = "The five papers' experiments"
 
-Summary = dict[str, Any]
+ScenarioSummary = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,21 +88,21 @@ _COLUMNS = (
 )
 
 
-def scenario_table(summary: Summary, *, brief: bool = False) -> Table:
+def scenario_table(summary: ScenarioSummary, *, brief: bool = False) -> PaperTable:
     """A scenario's algorithms, then the planner optimal's path and its certified bound; each measured number is
     followed by the printed one if there is one."""
     header, rows = _cells(summary, summary["rows"], brief)
     rows += [_reference(header, summary, name, key) for name, key in (("optimal", "optimum"), ("its bound", "bound"))]
-    return Table(summary["name"], header, rows, _notes(summary))
+    return PaperTable(summary["name"], header, rows, _notes(summary))
 
 
-def readings_of_scenario(summary: Summary) -> Table:
+def readings_of_scenario(summary: ScenarioSummary) -> PaperTable:
     """The same numbers of other readings of the paper."""
     header, rows = _cells(summary, summary["reading_rows"], brief=False)
-    return Table(f"{summary['name']}: other readings", header, rows)
+    return PaperTable(f"{summary['name']}: other readings", header, rows)
 
 
-def _reference(header: Sequence[str], summary: Summary, name: str, key: str) -> tuple[str, ...]:
+def _reference(header: Sequence[str], summary: ScenarioSummary, name: str, key: str) -> tuple[str, ...]:
     """A row with the length, and the energy if it is known, of what no swarm has to do with."""
     cells = ["–"] * len(header)
     cells[0] = name
@@ -112,7 +112,9 @@ def _reference(header: Sequence[str], summary: Summary, name: str, key: str) -> 
     return tuple(cells)
 
 
-def _cells(summary: Summary, lines: Sequence[Any], brief: bool) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def _cells(
+    summary: ScenarioSummary, lines: Sequence[Any], brief: bool
+) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     cells: list[list[str]] = [[] for _ in lines]
     header: list[str] = []
     for column in _COLUMNS:
@@ -132,26 +134,26 @@ def _cells(summary: Summary, lines: Sequence[Any], brief: bool) -> tuple[tuple[s
     return tuple(header), [tuple(line) for line in cells]
 
 
-def _printed(summary: Summary, algorithm: str, names: Sequence[str]) -> str:
-    row: Row = summary["printed"].get(algorithm, {})
+def _printed(summary: ScenarioSummary, algorithm: str, names: Sequence[str]) -> str:
+    row: PrintedRow = summary["printed"].get(algorithm, {})
     for name in names:
         if name == "length_sum_m" and "length_1_m" in row:
             parts = [row[f"length_{i}_m"] for i in range(1, 5)]
             bad = any(f"length_{i}_m" in summary["faults"][algorithm] for i in range(1, 5))
-            return f"{sum(p.value for p in parts):.2f}" + (f" {IMPOSSIBLE}" if bad else "")
+            return f"{sum(p.value for p in parts):.2f}" + (f" {IMPOSSIBLE_MARK}" if bad else "")
         if name in row:
             return row[name].text + _mark(summary, algorithm, name, row[name])
     return ""
 
 
-def _mark(summary: Summary, algorithm: str, name: str, number: Number) -> str:
+def _mark(summary: ScenarioSummary, algorithm: str, name: str, number: PrintedNumber) -> str:
     if name in summary["faults"][algorithm]:
-        return f" {IMPOSSIBLE}"
+        return f" {IMPOSSIBLE_MARK}"
     bound = summary["bound_m"] if name in ("length_m", "best_length_m", "mean_length_m") else None
-    return f" {UNREACHED}" if bound is not None and number.below(bound) else ""
+    return f" {UNREACHED_MARK}" if bound is not None and number.below(bound) else ""
 
 
-def _notes(summary: Summary) -> list[str]:
+def _notes(summary: ScenarioSummary) -> list[str]:
     straight = f"Straight line: {summary['straight_m']:,.2f} m"
     if summary["optimum_j"] is not None:
         straight += f", {summary['straight_j']:,.0f} J"
@@ -172,15 +174,15 @@ def _notes(summary: Summary) -> list[str]:
     level = summary["equal_evaluations"]
     out.append(f"“Equal evaluations” are the first {level:,} of each run, its schedule being that of the whole run.")
     reasons = {
-        f"{name} {summary['printed'][name][measure].text} {UNITS[measure.rpartition('_')[2]]}: {why}"
+        f"{name} {summary['printed'][name][measure].text} {FAULT_UNITS[measure.rpartition('_')[2]]}: {why}"
         for name, bad in summary["faults"].items()
         for measure, why in bad.items()
     }
-    out += [f"{IMPOSSIBLE} {reason}." for reason in sorted(reasons)]
+    out += [f"{IMPOSSIBLE_MARK} {reason}." for reason in sorted(reasons)]
     return out + remarks(summary["name"])
 
 
-def tables(result: dict[str, Any]) -> Iterator[tuple[Summary | None, Table]]:
+def tables(result: dict[str, Any]) -> Iterator[tuple[ScenarioSummary | None, PaperTable]]:
     """All tables; those of scenarios come with their summary."""
     if result["claims"]:
         yield None, claims_table(result["claims"])
@@ -192,7 +194,7 @@ def tables(result: dict[str, Any]) -> Iterator[tuple[Summary | None, Table]]:
             yield None, readings_of_scenario(summary)
         header, rows = schedules(summary)
         if rows:
-            yield None, Table(f"{summary['name']}: schedule", header, rows, legend(rows))
+            yield None, PaperTable(f"{summary['name']}: schedule", header, rows, legend(rows))
 
 
 def report(result: dict[str, Any]) -> str:
@@ -237,7 +239,7 @@ def write(result: dict[str, Any], out: Path) -> list[Path]:
     return write_all(out, contents)
 
 
-def _flat(summary: Summary, row: dict[str, Any]) -> dict[str, Any]:
+def _flat(summary: ScenarioSummary, row: dict[str, Any]) -> dict[str, Any]:
     lengths = row["vehicle_lengths_m"]
     return row | {
         "vehicle_lengths_m": "" if lengths is None else " ".join(f"{x:.3f}" for x in lengths),
@@ -262,7 +264,7 @@ def _about(result: dict[str, Any]) -> str:
 
 
 def _times(result: dict[str, Any]) -> Iterator[str]:
-    yield from (f"# {TITLE}: times", "", "Seconds of one core.", "")
+    yield from (f"# {PAPERS_TITLE}: times", "", "Seconds of one core.", "")
     for table in times_tables(result["times"]):
         yield from (f"## {table.heading}", "")
         yield from table.markdown()
@@ -276,7 +278,7 @@ def _stands(result: dict[str, Any]) -> Iterator[str]:
 
 def _claims(result: dict[str, Any]) -> Iterator[str]:
     """The page that one cites: what stands, every claim, every reading; it needs no other file."""
-    yield from (f"# {TITLE}: what stands", "", _about(result), "")
+    yield from (f"# {PAPERS_TITLE}: what stands", "", _about(result), "")
     yield from _stands(result)
     for table in (claims_table(result["claims"]), readings_table(result["readings"])):
         if table.rows:
@@ -284,7 +286,7 @@ def _claims(result: dict[str, Any]) -> Iterator[str]:
             yield from table.markdown()
 
 
-def _pictures(summary: Summary) -> dict[str, bytes]:
+def _pictures(summary: ScenarioSummary) -> dict[str, bytes]:
     """PNG of a scenario by file name; none if readings alone were run."""
     from gcsplan.bench.papers.pictures import draw_boxes, draw_convergence, draw_fleet, draw_map, draw_space
 
@@ -296,7 +298,7 @@ def _pictures(summary: Summary) -> dict[str, bytes]:
     return out if fleet is None else out | {f"{summary['name']}-fleet.png": fleet}
 
 
-def _of(summary: Summary | None, pictures: Iterable[str]) -> list[str]:
+def _of(summary: ScenarioSummary | None, pictures: Iterable[str]) -> list[str]:
     """The pictures of a scenario."""
     if summary is None:
         return []
@@ -304,7 +306,7 @@ def _of(summary: Summary | None, pictures: Iterable[str]) -> list[str]:
 
 
 def _markdown(result: dict[str, Any], pictures: Iterable[str]) -> Iterator[str]:
-    yield from (f"# {TITLE}", "", _about(result), "")
+    yield from (f"# {PAPERS_TITLE}", "", _about(result), "")
     for line in LEGEND:
         yield from (line, "")
     yield from _stands(result)
@@ -326,8 +328,8 @@ _STYLE = (
 
 
 def _page(result: dict[str, Any], pictures: dict[str, bytes]) -> Iterator[str]:
-    yield f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{TITLE}</title>'
-    yield f"<style>{_STYLE}</style></head><body><h1>{TITLE}</h1><p>{html.escape(_about(result))}</p>"
+    yield f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{PAPERS_TITLE}</title>'
+    yield f"<style>{_STYLE}</style></head><body><h1>{PAPERS_TITLE}</h1><p>{html.escape(_about(result))}</p>"
     for line in LEGEND:
         yield f"<p>{html.escape(line)}</p>"
     yield "<h2>What stands</h2>"

@@ -11,16 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.bench.files import ready
+from gcsplan.bench.measure import MOST_RUNS
 from gcsplan.bench.papers.claims import MEASURES
 from gcsplan.bench.papers.judge import judge
-from gcsplan.bench.papers.printed import PRINTED, Least, faults, least_of
-from gcsplan.bench.papers.runs import OPTIMA, PaperRun, Record, Store, carry_out, code_digest, key_of
-from gcsplan.bench.papers.scenarios import Scenario, Set, choose, mission_text, prepare
+from gcsplan.bench.papers.printed import PRINTED, StraightFlight, faults, least_of
+from gcsplan.bench.papers.runs import OPTIMA, PaperRun, RunRecord, Store, carry_out, code_digest, key_of
+from gcsplan.bench.papers.scenarios import ReadyScenario, Scenario, choose, mission_text, prepare
 from gcsplan.bench.papers.statistics import equal_evaluations, row, time_row
 from gcsplan.errors import InputError
 
-MOST_RUNS = 10_000
-KEPT = "papers-runs.jsonl"
+PAPER_RUNS_FILE = "papers-runs.jsonl"
 
 
 def run(
@@ -44,7 +44,7 @@ def run(
         runs: runs of each algorithm in each scenario; None: the paper's number (30 if it names none).
         seed: seed from which the seeds of all runs are derived.
         jobs: local processes; None: one for each core. Unused with ``cluster``.
-        out: directory of the runs (`KEPT`) and the report; created if missing.
+        out: directory of the runs (`PAPER_RUNS_FILE`) and the report; created if missing.
         cluster: a dask scheduler whose workers do the runs instead (`app.executor`).
         done: called with the number of finished runs and of all runs.
         missions: directory of the scenarios' mission files; None: the usual folders.
@@ -72,7 +72,7 @@ def run(
         for c in contenders:
             asked[scenario.name, c.name] = [PaperRun(scenario.name, c.name, text, seed, k, code) for k in range(count)]
     ready(out)
-    store = Store(out / KEPT)
+    store = Store(out / PAPER_RUNS_FILE)
     there = store.load()
     # The references come first, so that a table that is read half way has its optimum.
     every = sorted((job for some in asked.values() for job in some), key=lambda job: job.algorithm not in OPTIMA)
@@ -81,7 +81,7 @@ def run(
     if done is not None:
         done(at[0], len(every))
 
-    def keep(record: Record) -> None:
+    def keep(record: RunRecord) -> None:
         store.append(record)
         there[key_of(record)] = record
         at[0] += 1
@@ -121,14 +121,14 @@ def _optima(scenario: Scenario) -> list[str]:
 
 
 def _summary(
-    scenario: Scenario, prepared: Set, names: Sequence[str], found: dict[tuple[str, str], list[Record]]
+    scenario: Scenario, prepared: ReadyScenario, names: Sequence[str], found: dict[tuple[str, str], list[RunRecord]]
 ) -> dict[str, Any]:
     """All that the report says of a scenario; ``set`` and ``records`` are for its pictures."""
     own = {c.name for c in scenario.paper.contenders}
     records = {name: found[scenario.name, name] for name in names if name in own}
     others = {name: found[scenario.name, name] for name in names if name not in own}
     level = equal_evaluations(r for some in records.values() for r in some)
-    least = Least.sum_of(prepared.least)
+    least = StraightFlight.sum_of(prepared.least)
     energy = prepared.source.vehicles[0].vehicle.energy
     rates = (energy.vertical_j_per_m, energy.horizontal_j_per_m)
     printed = {name: PRINTED[scenario.name, name] for name in names if (scenario.name, name) in PRINTED}
@@ -155,7 +155,7 @@ def _summary(
     }
 
 
-def _optimum(record: Record) -> dict[str, Any]:
+def _optimum(record: RunRecord) -> dict[str, Any]:
     if record["status"] != "found":
         return {"cost": None, "bound": None, "refused": record["detail"]}
     known = all(b is not None for b in record["bounds"])

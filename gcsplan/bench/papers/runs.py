@@ -24,7 +24,7 @@ import numpy as np
 from gcsplan.app.executor import executor
 from gcsplan.arrays import Floats
 from gcsplan.bench.files import kept_rows
-from gcsplan.bench.papers.scenarios import SCENARIOS, Contender, Set, prepare, settings_of
+from gcsplan.bench.papers.scenarios import SCENARIOS, Contender, ReadyScenario, prepare, settings_of
 from gcsplan.errors import InputError, NoMission
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.problem import Problem
@@ -37,7 +37,7 @@ from gcsplan.planners.swarm.settings import Settings
 from gcsplan.world.path import Path as FlownPath
 from gcsplan.world.zones import Circle
 
-Record = dict[str, Any]
+RunRecord = dict[str, Any]
 Key = tuple[str, str, int, int, str]
 
 OPTIMA = {"optimal": "length", "optimal-energy": "energy"}
@@ -46,9 +46,9 @@ OPTIMA = {"optimal": "length", "optimal-energy": "energy"}
 POINTS_OF_HISTORY = 100
 DRAWN_M = 1e-4
 """Part of a path's length by which the points kept for the map may be off its curve."""
-PIECE_S = 5.0
+RUN_S = 5.0
 """Seconds that a run takes, about."""
-CLOSE = 0.01
+CONVERGED_PART = 0.01
 """A run has converged when its cost is within this part of its final cost."""
 
 CODE = (
@@ -102,7 +102,7 @@ class PaperRun:
         return next(c for c in SCENARIOS[self.scenario].contenders if c.name == self.algorithm)
 
 
-def key_of(record: Record) -> Key:
+def key_of(record: RunRecord) -> Key:
     """The identity of the run that a record is of. Raises KeyError or TypeError for what is no record."""
     return (record["scenario"], record["algorithm"], record["seed"], record["number"], record["digest"])
 
@@ -113,15 +113,15 @@ class Store:
     def __init__(self, path: Path) -> None:
         self.path = path
 
-    def load(self) -> dict[Key, Record]:
+    def load(self) -> dict[Key, RunRecord]:
         """Every run in the file. Raises InputError if the file cannot be read."""
-        out: dict[Key, Record] = {}
+        out: dict[Key, RunRecord] = {}
         for record in kept_rows(self.path):
             with suppress(KeyError, TypeError):
                 out[key_of(record)] = record
         return out
 
-    def append(self, record: Record) -> None:
+    def append(self, record: RunRecord) -> None:
         """Append a run, on a line of its own even if the line before it is truncated."""
         try:
             with self.path.open("ab+") as file:
@@ -136,7 +136,7 @@ class Store:
             raise InputError(f"cannot be written: {error.strerror or error}", where=str(self.path)) from error
 
 
-def work(job: PaperRun) -> Record:
+def work(job: PaperRun) -> RunRecord:
     """Do one run. Raises InputError if the code on this machine differs from the code that requested the run."""
     optimal = job.algorithm in OPTIMA
     if job.code != code_digest():
@@ -144,7 +144,7 @@ def work(job: PaperRun) -> Record:
             "a worker runs another version of gcsplan, numpy or scipy: install the same on every machine of the cluster"
         )
     ready = prepare(job.scenario, job.text)
-    record: Record = {
+    record: RunRecord = {
         "scenario": job.scenario, "algorithm": job.algorithm, "seed": job.seed, "number": job.number,
         "digest": job.digest,
     }  # fmt: skip
@@ -155,7 +155,7 @@ def work(job: PaperRun) -> Record:
     return record
 
 
-def _best(ready: Set, objective: str) -> Record:
+def _best(ready: ReadyScenario, objective: str) -> RunRecord:
     """The paths of the planner `optimal`, vehicle by vehicle, with their costs and lower bounds.
 
     Counted work alone stops it, so that the reference is the same on every machine and under any load.
@@ -203,7 +203,7 @@ def _warm(scenario: str, text: str, algorithm: str) -> list[Scene]:
     return scenes
 
 
-def _swarm(job: PaperRun, ready: Set) -> Record:
+def _swarm(job: PaperRun, ready: ReadyScenario) -> RunRecord:
     contender = job.contender
     settings = settings_of(contender, ready.source)
     scenes = _warm(job.scenario, job.text, job.algorithm)
@@ -255,11 +255,11 @@ def _history(found: Sequence[Found]) -> dict[str, list[Any]]:
 
 
 def _converged(history: dict[str, list[Any]]) -> int | None:
-    """The first kept iteration whose best cost is within `CLOSE` of the final one."""
+    """The first kept iteration whose best cost is within `CONVERGED_PART` of the final one."""
     costs = history["cost"]
     if costs[-1] is None:
         return None
-    enough = costs[-1] + CLOSE * abs(costs[-1])
+    enough = costs[-1] + CONVERGED_PART * abs(costs[-1])
     return int(next(i for i, c in zip(history["iterations"], costs, strict=True) if c is not None and c <= enough))
 
 
@@ -274,12 +274,14 @@ def _nearest_m(found: Found, problem: Problem) -> float | None:
     return float(np.maximum(np.min(wall, axis=0), 0.0).mean())
 
 
-def carry_out(todo: Sequence[PaperRun], jobs: int | None, cluster: str | None, keep: Callable[[Record], None]) -> None:
+def carry_out(
+    todo: Sequence[PaperRun], jobs: int | None, cluster: str | None, keep: Callable[[RunRecord], None]
+) -> None:
     """Do every job and ``keep`` each record at once; after Ctrl-C, runs in progress are finished and kept."""
-    with executor(jobs, cluster, pieces=len(todo), piece_s=PIECE_S) as workers:
+    with executor(jobs, cluster, pieces=len(todo), piece_s=RUN_S) as workers:
         for _, record in workers.each(_piece, None, todo, finish=True):
             keep(record)
 
 
-def _piece(_: None, job: PaperRun) -> Record:
+def _piece(_: None, job: PaperRun) -> RunRecord:
     return work(job)

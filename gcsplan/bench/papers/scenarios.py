@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from gcsplan.bench.papers.printed import Least
+from gcsplan.bench.papers.printed import StraightFlight
 from gcsplan.bench.papers.readings import readings_of
 from gcsplan.errors import InputError, unknown_name
 from gcsplan.mavlink.build.order import Margins
@@ -20,7 +20,7 @@ from gcsplan.planners.registry import get as get_planner
 from gcsplan.planners.swarm.settings import Settings
 from gcsplan.world.world import World
 
-FOLDERS = (Path("missions", "papers"), *(folder / "papers" for folder in samples.FOLDERS))
+MISSION_FOLDERS = (Path("missions", "papers"), *(folder / "papers" for folder in samples.FOLDERS))
 """Folders in which the mission files are searched: here, then those of the samples."""
 
 
@@ -90,25 +90,25 @@ def _adapted(alpha: int, beta: int) -> Contender:
     return Contender(f"abo-{alpha}-{beta}", "abo", MappingProxyType({"parameters": more}))
 
 
-_KRILL = Paper(
+_PAPER_KRILL = Paper(
     "krill", "Xu, Zhu, Sun 2024, Biomimetics 9, 353", 30, _plain("krill", "abc", "aco"),
 )  # fmt: skip
-_SSGWO = Paper(
+_PAPER_SSGWO = Paper(
     "ssgwo", "Feng et al. 2024, Electronics 13, 68", 50, _plain("ssgwo", "gwo", "mgwo", "igwo", "sogwo"),
 )  # fmt: skip
 # Table 1 gives the bees 50 employed and 50 onlookers: 50 food sources. They fly together: one by one, the 60,000 costs
 # of a run take as long as ten other runs, and in the other papers' scenarios the order makes no difference.
 _MSFOA_ABC = Contender("abc", "abc", MappingProxyType({"population": 50, "parameters": {"bees": "together"}}))
-_MSFOA = Paper(
+_PAPER_MSFOA = Paper(
     "msfoa", "Shi, Zhang, Xia 2020, Applied Sciences 10, 2822", 40,
     (*_plain("msfoa", "foa", "pso", "de"), _MSFOA_ABC, *_plain("iffo", "mfoa")),
     fleet="priority",
 )  # fmt: skip
-_ABO = Paper(
+_PAPER_ABO = Paper(
     "abo", "Li et al. 2024, adaptive budgerigar optimization", 30,
     (*_plain("abo", "po", "pso"), _adapted(1, 2), _adapted(2, 1), _adapted(2, 2)),
 )  # fmt: skip
-_IB_ABC = Paper(
+_PAPER_IB_ABC = Paper(
     "ib-abc", "Tan et al. 2023, Robotica 41, 1244-1257", 10, _plain("ib-abc", "b-abc", "abc", "gwo"),
     fleet="alone",
 )  # fmt: skip
@@ -117,15 +117,15 @@ SCENARIOS: Mapping[str, Scenario] = MappingProxyType(
     {
         s.name: s
         for s in (
-            Scenario("krill-mound", _KRILL, "table 2"),
-            Scenario("krill-forest", _KRILL, "table 3"),
-            Scenario("krill-hills", _KRILL, "table 4"),
-            *(Scenario(f"ssgwo-table{n}{twin}", _SSGWO, f"table {n + 1}", f"ssgwo-table{n}" if twin else "")
+            Scenario("krill-mound", _PAPER_KRILL, "table 2"),
+            Scenario("krill-forest", _PAPER_KRILL, "table 3"),
+            Scenario("krill-hills", _PAPER_KRILL, "table 4"),
+            *(Scenario(f"ssgwo-table{n}{twin}", _PAPER_SSGWO, f"table {n + 1}", f"ssgwo-table{n}" if twin else "")
               for n in (3, 5, 7) for twin in ("", "-tall")),
-            *(Scenario(f"msfoa-{n}", _MSFOA, "tables 2, 3") for n in (1, 2, 3)),
-            Scenario("abo", _ABO, "figs. 3-6"),
-            Scenario("ib-abc-together", _IB_ABC, "table II"),
-            Scenario("ib-abc-sequence", _IB_ABC, "table IV"),
+            *(Scenario(f"msfoa-{n}", _PAPER_MSFOA, "tables 2, 3") for n in (1, 2, 3)),
+            Scenario("abo", _PAPER_ABO, "figs. 3-6"),
+            Scenario("ib-abc-together", _PAPER_IB_ABC, "table II"),
+            Scenario("ib-abc-sequence", _PAPER_IB_ABC, "table IV"),
         )
     }
 )  # fmt: skip
@@ -161,7 +161,7 @@ def _known(what: str, names: Sequence[str] | None, known: Mapping[str, object]) 
 
 def mission_text(name: str, folder: Path | None = None) -> str:
     """The text of the scenario's mission file. Raises InputError with the folders that were searched."""
-    folders = FOLDERS if folder is None else (folder,)
+    folders = MISSION_FOLDERS if folder is None else (folder,)
     for place in folders:
         file = place / f"{name}.yaml"
         if file.is_file():
@@ -173,7 +173,7 @@ def mission_text(name: str, folder: Path | None = None) -> str:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Set:
+class ReadyScenario:
     """A scenario's mission, ready for a search: one problem per vehicle."""
 
     source: MissionFile
@@ -181,13 +181,13 @@ class Set:
     problems: tuple[Problem, ...]
 
     @property
-    def least(self) -> tuple[Least, ...]:
+    def least(self) -> tuple[StraightFlight, ...]:
         """The straight flight of each vehicle between the mission's ends."""
-        return tuple(Least.between(p.start, p.goal) for p in self.problems)
+        return tuple(StraightFlight.between(p.start, p.goal) for p in self.problems)
 
 
 @lru_cache(maxsize=20)
-def prepare(name: str, text: str) -> Set:
+def prepare(name: str, text: str) -> ReadyScenario:
     """The mission ``text`` of scenario ``name``, without margins for the wire, since nothing is sent."""
     from gcsplan.app.pipeline import load_mission, world_of
     from gcsplan.app.problems import make_problem
@@ -197,7 +197,7 @@ def prepare(name: str, text: str) -> Set:
     bare = Margins(0.0, 0.0, 0.0, 0.0, (0.0, 0.0))
     objective = source.planner.objective
     problems = tuple(make_problem(source, r, world, objective, source.planner.seed, bare)[0] for r in source.vehicles)
-    return Set(source, world, problems)
+    return ReadyScenario(source, world, problems)
 
 
 def settings_of(contender: Contender, source: MissionFile) -> Settings:

@@ -31,13 +31,13 @@ CASE = "ssgwo-table5"
 KRILL = ("krill-mound", "krill-forest", "krill-hills")
 BATCH = 2048
 COSTS = (("krill", "bspline"), ("ssgwo", "bspline"), ("msfoa", "bspline"), ("ib-abc", "sections"))
-GROUPS = {
+TERM_GROUPS = {
     "turns and slopes between nodes": k.ANGLES, "turns in space": k.ANGLES | k.BENDS, "exponentials of angles": k.YAWS,
     "nodes near zones": k.NODES_NEAR, "samples near zones": k.SAMPLES_NEAR, "heights above ground": k.HEIGHTS,
     "concealment": k.HIDING, "counts of samples": k.COUNTS,
 }  # fmt: skip
 """The optional groups of terms, in words; those of turns in space contain the other turns."""
-BARE, DIVIDED, ZONES = "curve, lengths, floor", "denser samples on long legs", "zones"
+BARE_PART, DIVIDED_PART, ZONES_PART = "curve, lengths, floor", "denser samples on long legs", "zones"
 AIMS = {"run_s": 0.25, "mealpy_ratio": 10.0, "single_ratio": 3.0, "costs_per_s": 300_000.0, "krill_s": 0.5}
 """The aims: most seconds, least ratios and rates."""
 
@@ -162,7 +162,7 @@ def _batch(objective: str, encoding: str) -> Callable[[], object]:
 
 
 def _parts() -> dict[str, Callable[[], object]]:
-    """The kernel of all costs with more and more of its work, then with each of `GROUPS` on top."""
+    """The kernel of all costs with more and more of its work, then with each of `TERM_GROUPS` on top."""
     scene_ = Scene.of(_bench_problem())
     code = Code.of("bspline", scene_, 8)
     drawn, stride = sampled(scene_, code.points)
@@ -179,15 +179,19 @@ def _parts() -> dict[str, Callable[[], object]]:
 
     none = scene_.zones[:0]
     return {
-        BARE: work(0, none, whole),
-        DIVIDED: work(0, none, scene_.numbers),
-        ZONES: work(0, scene_.zones, scene_.numbers),
-        **{name: work(bits, scene_.zones, scene_.numbers) for name, bits in GROUPS.items()},
+        BARE_PART: work(0, none, whole),
+        DIVIDED_PART: work(0, none, scene_.numbers),
+        ZONES_PART: work(0, scene_.zones, scene_.numbers),
+        **{name: work(bits, scene_.zones, scene_.numbers) for name, bits in TERM_GROUPS.items()},
     }
 
 
 def _differences(took: Mapping[str, float]) -> dict[str, float]:
     """What each part adds to the work before it."""
-    whole = took[ZONES]
-    first = {BARE: took[BARE], DIVIDED: took[DIVIDED] - took[BARE], ZONES: whole - took[DIVIDED]}
-    return first | {name: took[name] - whole for name in GROUPS}
+    whole = took[ZONES_PART]
+    first = {
+        BARE_PART: took[BARE_PART],
+        DIVIDED_PART: took[DIVIDED_PART] - took[BARE_PART],
+        ZONES_PART: whole - took[DIVIDED_PART],
+    }
+    return first | {name: took[name] - whole for name in TERM_GROUPS}

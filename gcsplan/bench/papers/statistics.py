@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.bench.papers.runs import Record
+from gcsplan.bench.papers.runs import RunRecord
 
-UNITS = {
+MEASURE_UNITS = {
     "length": "length, m", "energy": "energy, J", "cost": "cost", "cost, equal evaluations": "cost, equal evaluations",
     "time": "time, s", "iterations": "iterations to within 1 %", "collisions": "legs in collision", "pitch": "pitch, °",
     "yaw": "yaw, °",
 }  # fmt: skip
-_PLAIN = {
+_RECORD_KEYS = {
     "time": "time_s",
     "iterations": "converged",
     "collisions": "collisions",
@@ -30,17 +30,17 @@ _PLAIN = {
 _LEGAL_FIRST = {"length": "length_m", "energy": "energy_j"}
 
 
-def legal(record: Record) -> bool:
+def legal(record: RunRecord) -> bool:
     """Whether the run found a path that passes the exact check."""
     return bool(record["status"] == "found" and record["violations"] == 0)
 
 
-def values(records: Iterable[Record], measure: str, evaluations: int = 0) -> Floats:
+def values(records: Iterable[RunRecord], measure: str, evaluations: int = 0) -> Floats:
     """A number for each run, less is better: inf for a refusal, and for an illegal run's length or energy."""
     return np.array([_value(r, measure, evaluations) for r in records], dtype=np.float64)
 
 
-def _value(record: Record, measure: str, evaluations: int) -> float:
+def _value(record: RunRecord, measure: str, evaluations: int) -> float:
     if record["status"] != "found":
         return math.inf
     if measure == "cost, equal evaluations":
@@ -52,16 +52,16 @@ def _value(record: Record, measure: str, evaluations: int) -> float:
     elif measure in _LEGAL_FIRST:
         found = record[_LEGAL_FIRST[measure]] if legal(record) else None
     else:
-        found = record[_PLAIN[measure]]
+        found = record[_RECORD_KEYS[measure]]
     return math.inf if found is None else float(found)
 
 
-def equal_evaluations(records: Iterable[Record]) -> int:
+def equal_evaluations(records: Iterable[RunRecord]) -> int:
     """The number of evaluations that every run has reached: the least of all runs."""
     return min((int(r["evaluations"]) for r in records if r["status"] == "found"), default=0)
 
 
-def row(scenario: str, algorithm: str, records: Sequence[Record], evaluations: int) -> dict[str, Any]:
+def row(scenario: str, algorithm: str, records: Sequence[RunRecord], evaluations: int) -> dict[str, Any]:
     """A row of the table. Lengths, pitch, yaw and energy cover all runs, legal or not, as in the papers."""
     found = [r for r in records if r["status"] == "found"]
     out: dict[str, Any] = {
@@ -90,7 +90,7 @@ def row(scenario: str, algorithm: str, records: Sequence[Record], evaluations: i
     return out
 
 
-def time_row(scenario: str, algorithm: str, records: Sequence[Record]) -> dict[str, Any]:
+def time_row(scenario: str, algorithm: str, records: Sequence[RunRecord]) -> dict[str, Any]:
     """The processor's seconds of an algorithm's runs: the only numbers that differ from one benchmark to the next."""
     numbers = np.array([r["time_s"] for r in records if r["status"] == "found"], dtype=np.float64)
     spread = {f"{what}_time_s": value for what, value in _spread(numbers).items()}
@@ -109,7 +109,7 @@ def _spread(numbers: Floats) -> dict[str, float | None]:
 
 
 @dataclass(frozen=True, slots=True)
-class Slot:
+class ScheduleSlot:
     """Arrival time and speed of a vehicle; ``trouble`` is empty, or the reason why it cannot."""
 
     time_s: float
@@ -119,7 +119,7 @@ class Slot:
 
 def schedule(
     lengths_m: Sequence[float], mode: str, interval_s: float, slowest_m_s: float, fastest_m_s: float
-) -> list[Slot]:
+) -> list[ScheduleSlot]:
     """IB-ABC's arithmetic: v_i = L_i / T_i.
 
     ``together``: T is the longest path at full speed. ``sequence``: T_1 = L_1 / v_max, T_i = T_1 + interval·(i - 1).
@@ -136,5 +136,5 @@ def schedule(
             trouble = f"faster than {fastest_m_s:g} m/s: the first must wait"
         elif speed < slowest_m_s:
             trouble = f"slower than {slowest_m_s:g} m/s"
-        out.append(Slot(t, speed, trouble))
+        out.append(ScheduleSlot(t, speed, trouble))
     return out

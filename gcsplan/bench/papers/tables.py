@@ -8,22 +8,21 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from gcsplan.bench.measure import LEAST_RUNS_TO_JUDGE, SIGNIFICANCE
 from gcsplan.bench.papers.judge import (
-    FEW,
     HOLDS,
-    IMPOSSIBLE,
-    LEAST_RUNS_TO_JUDGE,
+    IMPOSSIBLE_AS_PRINTED,
     NO_LEGAL,
     NOT_RUN,
     REVERSED,
-    SIGNIFICANCE,
     TIE,
+    TOO_FEW_RUNS,
     standing,
 )
 from gcsplan.bench.papers.printed import PRINTED
 from gcsplan.bench.papers.scenarios import SCENARIOS
 
-Rows = Sequence[Mapping[str, Any]]
+ClaimRows = Sequence[Mapping[str, Any]]
 METHOD = (
     "Two-sided Mann and Whitney's U, Holm-corrected over all claims of a paper within each column (as run, at equal "
     f"evaluations, twin, each reading); {HOLDS} and {REVERSED} need p < {SIGNIFICANCE:g}, {TIE} means that no "
@@ -32,13 +31,13 @@ METHOD = (
     "of the runs or more)."
 )
 IMPOSSIBLE_MEANS = (
-    f"“{IMPOSSIBLE}”: a printed number that the claim rests on is below the physical minimum, or the two methods are "
-    "one; how the ranking comes out here stands beside it."
+    f"“{IMPOSSIBLE_AS_PRINTED}”: a printed number that the claim rests on is below the physical minimum, or the two "
+    "methods are one; how the ranking comes out here stands beside it."
 )
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class PaperTable:
     """Plain cells under a heading, with notes."""
 
     heading: str
@@ -94,7 +93,7 @@ def _numbers(case: Mapping[str, Any]) -> tuple[str, ...]:
     return (*map(_median, medians), _p(case["p"]), _effect(case["effect"]))
 
 
-def claims_table(claims: Rows, heading: str = "Claims") -> Table:
+def claims_table(claims: ClaimRows, heading: str = "Claims") -> PaperTable:
     """Every claim once, with its verdict; at equal evaluations and in the twin where there is one."""
     header = ["claim", "scenario", "printed in", "measure", "says", "printed", "median", "against", "p", "A", "here",
               "verdict"]  # fmt: skip
@@ -107,7 +106,7 @@ def claims_table(claims: Rows, heading: str = "Claims") -> Table:
         beside = (_beside(c, "equal_"), _beside(c, "twin_")) if wide else ()
         rows.append((*cells, c["verdict"], *beside))
     bad = [f"{c['claim']}: {c['impossible']}." for c in claims if c["impossible"]]
-    return Table(heading, tuple(header), rows, [METHOD, IMPOSSIBLE_MEANS, *counts(claims), *bad])
+    return PaperTable(heading, tuple(header), rows, [METHOD, IMPOSSIBLE_MEANS, *counts(claims), *bad])
 
 
 def _beside(claim: Mapping[str, Any], prefix: str) -> str:
@@ -118,7 +117,7 @@ def _beside(claim: Mapping[str, Any], prefix: str) -> str:
     return ranking if p is None else f"{ranking} (p {p:.2g}, A {claim[f'{prefix}effect']:.2f})"
 
 
-def readings_table(readings: Rows) -> Table:
+def readings_table(readings: ClaimRows) -> PaperTable:
     """Claims judged once more under each reading that changes one of their algorithms."""
     header = ("claim", "scenario", "measure", "says", "reading", "median", "against", "p", "A", "here")
     rows = [
@@ -126,10 +125,10 @@ def readings_table(readings: Rows) -> Table:
         for r in readings
     ]
     what = dict.fromkeys(f"{r['reading']}: {r['what']}." for r in readings)
-    return Table("Readings", header, rows, list(what))
+    return PaperTable("Readings", header, rows, list(what))
 
 
-def times_tables(times: Mapping[str, Rows]) -> Iterator[Table]:
+def times_tables(times: Mapping[str, ClaimRows]) -> Iterator[PaperTable]:
     """All that a clock has measured: seconds of each algorithm, and the claims on time."""
     rows = []
     for row in times["rows"]:
@@ -137,21 +136,21 @@ def times_tables(times: Mapping[str, Rows]) -> Iterator[Table]:
         words = tuple("–" if row[f"{k}_time_s"] is None else f"{row[f'{k}_time_s']:.3f}" for k in ("median", "mean"))
         rows.append((row["scenario"], row["algorithm"], *words, "–" if printed is None else printed.text))
     header = ("scenario", "algorithm", "median, CPU s", "mean, CPU s", "printed, s")
-    yield Table("Times", header, rows, ["These numbers, and no others, differ from one benchmark to the next."])
+    yield PaperTable("Times", header, rows, ["These numbers, and no others, differ from one benchmark to the next."])
     if times["claims"]:
         yield claims_table(times["claims"], "Claims on time")
 
 
-def counts(claims: Rows) -> list[str]:
+def counts(claims: ClaimRows) -> list[str]:
     """How many claims of each paper have which verdict, in words."""
     out = []
-    order = (HOLDS, TIE, REVERSED, IMPOSSIBLE, NO_LEGAL, FEW, NOT_RUN)
+    order = (HOLDS, TIE, REVERSED, IMPOSSIBLE_AS_PRINTED, NO_LEGAL, TOO_FEW_RUNS, NOT_RUN)
     for paper in dict.fromkeys(c["paper"] for c in claims):
         count = Counter(c["verdict"] for c in claims if c["paper"] == paper)
         told = ", ".join(f"{count[verdict]} {verdict}" for verdict in order if count[verdict])
         total = sum(count.values())
         out.append(f"{paper}: {total} claim{'' if total == 1 else 's'}, {told}.")
-    if any(c.get(f"{prefix}ranking") == FEW for c in claims for prefix in ("", "equal_", "twin_")):
+    if any(c.get(f"{prefix}ranking") == TOO_FEW_RUNS for c in claims for prefix in ("", "equal_", "twin_")):
         out.append(f"Rankings are judged from {LEAST_RUNS_TO_JUDGE} runs on.")
     return out
 

@@ -10,7 +10,7 @@ import numpy as np
 import yaml
 
 from gcsplan.arrays import Floats
-from gcsplan.bench.sample import SAMPLE
+from gcsplan.bench.sample import SAMPLE_TERRAIN
 from gcsplan.export.outdir import write_whole
 
 SAMPLE_BOX = (36.46, -84.40, 36.71, -84.10)
@@ -19,14 +19,14 @@ MADE_BOX = (46.55, 8.05, 46.95, 8.75)
 MADE_TILES = (46.5, 8.0, 0.1, 5, 8)
 """South, west and size of a made tile in degrees; rows and columns of tiles."""
 LENGTHS_M = (5000.0, 40_000.0)
-DEGREE_M = 111_320.0
-POSTS = 120
+EQUATOR_DEGREE_M = 111_320.0
+TILE_POSTS = 120
 """Posts of a made tile along each side: 3 arc seconds."""
 ROUGH_M, WAVES = 900.0, 40
-TRIES = 1000
+END_DRAWS = 1000
 
 
-def make_mosaic(folder: Path, seed: int, posts: int = POSTS) -> list[Path]:
+def make_mosaic(folder: Path, seed: int, posts: int = TILE_POSTS) -> list[Path]:
     """Write tiles of hills into ``folder``, each with ``posts`` × ``posts`` cells; the hills do not depend on that."""
     import rasterio
     from rasterio.transform import Affine
@@ -53,7 +53,7 @@ def make_mosaic(folder: Path, seed: int, posts: int = POSTS) -> list[Path]:
 def _hills(lat: Floats, lon: Floats, seed: int) -> Floats:
     """(rows, cols) heights, m: waves of 3 to 40 km in all directions, the long ones higher."""
     rng = np.random.default_rng(seed)
-    north, east = (lat - 46.7) * DEGREE_M, (lon - 8.4) * DEGREE_M * math.cos(math.radians(46.7))
+    north, east = (lat - 46.7) * EQUATOR_DEGREE_M, (lon - 8.4) * EQUATOR_DEGREE_M * math.cos(math.radians(46.7))
     heights = np.full((len(lat), len(lon)), ROUGH_M)
     for _ in range(WAVES):
         wave_m = math.exp(rng.uniform(math.log(3e3), math.log(40e3)))
@@ -83,7 +83,7 @@ def mission(number: int, seed: int, tiles: Path, zones: int | None = None) -> di
     return {
         "version": 1,
         "name": f"mission {number}",
-        "terrain": SAMPLE | ({"dem": str(tiles)} if made else {}),
+        "terrain": SAMPLE_TERRAIN | ({"dem": str(tiles)} if made else {}),
         "limits": {
             "min_agl_m": 60, "horizontal_clearance_m": 30, "track_error_m": 3, "altitude_error_m": 5,
         },
@@ -102,10 +102,10 @@ def mission(number: int, seed: int, tiles: Path, zones: int | None = None) -> di
 def _ends(rng: np.random.Generator, box: tuple[float, float, float, float]) -> tuple[Floats, Floats]:
     """Start and goal in a box, as far apart as drawn; the box is wider than the longest in one direction."""
     south, west, north, east = box
-    scale = np.array([DEGREE_M, DEGREE_M * math.cos(math.radians(south))])
+    scale = np.array([EQUATOR_DEGREE_M, EQUATOR_DEGREE_M * math.cos(math.radians(south))])
     low, high = np.array([south, west]), np.array([north, east])
     longest_m = 0.95 * float(np.hypot(*((high - low) * scale)))
-    for _ in range(TRIES):  # most succeed within ten
+    for _ in range(END_DRAWS):  # most succeed within ten
         length_m = rng.uniform(LENGTHS_M[0], min(LENGTHS_M[1], longest_m))
         turn = rng.uniform(0.0, 2.0 * math.pi)
         start = rng.uniform(low, high)
@@ -117,7 +117,7 @@ def _ends(rng: np.random.Generator, box: tuple[float, float, float, float]) -> t
 
 def _zones(rng: np.random.Generator, start: Floats, goal: Floats, count: int) -> list[dict[str, Any]]:
     """Circles beside and on the straight line, none within 1.5 km of its ends; smaller where there are many."""
-    scale = np.array([DEGREE_M, DEGREE_M * math.cos(math.radians(float(start[0])))])
+    scale = np.array([EQUATOR_DEGREE_M, EQUATOR_DEGREE_M * math.cos(math.radians(float(start[0])))])
     way = (goal - start) * scale
     length_m = float(np.hypot(*way))
     along, across = way / length_m, np.array([-way[1], way[0]]) / length_m

@@ -203,7 +203,7 @@ def digest_of(out: Path) -> str:
     return total.hexdigest()
 
 
-POINTS: dict[str, Callable[..., dict[str, Any]]] = {
+POINT_KINDS: dict[str, Callable[..., dict[str, Any]]] = {
     "batch": batch_point, "vehicles": vehicles_point, "zones": zones_point, "cells": cells_point,
 }  # fmt: skip
 
@@ -211,7 +211,7 @@ POINTS: dict[str, Callable[..., dict[str, Any]]] = {
 def main() -> None:
     """Measure the point that the argument names, and print the figures as JSON."""
     asked = json.loads(sys.argv[1])
-    print(json.dumps(POINTS[asked.pop("point")](**asked)))
+    print(json.dumps(POINT_KINDS[asked.pop("point")](**asked)))
 
 
 if __name__ == "__main__":

@@ -24,19 +24,19 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 AXES = ("missions", "vehicles", "zones", "cells", "workers")
-VEHICLES = (1, 4, 16, 64)
-ZONES = (0, 10, 100, 400)
-POSTS = (60, 120, 240, 480)
+MEASURED_VEHICLES = (1, 4, 16, 64)
+MEASURED_ZONES = (0, 10, 100, 400)
+MEASURED_POSTS = (60, 120, 240, 480)
 """Cells along a side of a made tile: 6, 3, 1.5 and 0.75 arc seconds."""
 EACH = 4
 """Missions over which the cost of zones and cells is averaged."""
 CORES = (1, 10, 100, 1000)
-LONGEST_S = 3600.0
+LONGEST_POINT_S = 3600.0
 """Seconds after which a point is given up."""
-MOST_MISSIONS, MOST_WORKERS = 10_000, 64
+MOST_SCALE_MISSIONS, MOST_WORKERS = 10_000, 64
 TIME_COLOUR, MEMORY_COLOUR = "#1f77b4", "#d62728"
 
-COLUMNS = (
+SCALE_COLUMNS = (
     "axis", "size", "wall_s", "cpu_s", "own_cpu_s", "peak_mb", "planned", "refused", "speed_up", "speed_up_by_cpu",
     "start_s", "scheduler_ms", "item_bytes", "result_bytes", "done_again", "same_bytes",
 )  # fmt: skip
@@ -57,20 +57,21 @@ def run(
         tell: called with a line before each point.
 
     Returns:
-        ``settings``; ``rows``, one for each point (`COLUMNS`); ``cluster`` (`cluster_of`), None without workers.
+        ``settings``; ``rows``, one for each point (`SCALE_COLUMNS`); ``cluster`` (`cluster_of`), None without workers.
 
     Raises UsageError for what cannot be measured, GcsplanError if a point ends with an error.
     """
     unknown = [a for a in axes if a not in AXES]
     if unknown or not axes:
         raise UsageError(f"axes are {', '.join(AXES)}, given {', '.join(unknown) or 'none'}")
-    if not 4 <= missions <= MOST_MISSIONS or not 2 <= workers <= MOST_WORKERS:
+    if not 4 <= missions <= MOST_SCALE_MISSIONS or not 2 <= workers <= MOST_WORKERS:
         raise UsageError(
-            f"4 to {MOST_MISSIONS} missions and 2 to {MOST_WORKERS} workers are wanted, given {missions} and {workers}"
+            f"4 to {MOST_SCALE_MISSIONS} missions and 2 to {MOST_WORKERS} workers are wanted, given {missions} and "
+            f"{workers}"
         )
     rows: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory(prefix="gcsplan-scale-") as folder:
-        place = _Place(Path(folder), seed, tell)
+        place = _ScaleFolder(Path(folder), seed, tell)
         for axis in AXES:
             if axis in axes:
                 rows += _ROWS[axis](place, missions, workers, kill)
@@ -80,7 +81,7 @@ def run(
     return {"settings": settings, "rows": rows, "cluster": cluster}
 
 
-class _Place:
+class _ScaleFolder:
     """The folder with everything made, and how points are measured there."""
 
     def __init__(self, folder: Path, seed: int, tell: Callable[[str], None]) -> None:
@@ -113,9 +114,9 @@ class _Place:
         self._tell(f"{point}: {', '.join(f'{k} {v}' for k, v in sizes.items())}")
         command = [sys.executable, "-m", "gcsplan.bench.scale.point", json.dumps({"point": point, **asked})]
         try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_S, check=False)
+            done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_POINT_S, check=False)
         except subprocess.TimeoutExpired as error:
-            raise GcsplanError(f"{point} took longer than {LONGEST_S:g} s") from error
+            raise GcsplanError(f"{point} took longer than {LONGEST_POINT_S:g} s") from error
         if done.returncode:
             last = done.stderr.strip().splitlines()[-1:] or ["it said nothing"]
             raise GcsplanError(f"{point} ended with an error: {last[0]}")
@@ -123,29 +124,29 @@ class _Place:
         return found
 
 
-def _missions(place: _Place, missions: int, workers: int, kill: bool) -> list[dict[str, Any]]:
+def _missions(place: _ScaleFolder, missions: int, workers: int, kill: bool) -> list[dict[str, Any]]:
     sizes = sorted({max(1, missions // 8), max(1, missions // 4), missions // 2, missions})
     return [{"axis": "missions", "size": n} | place.batch(n, 1) for n in sizes]
 
 
-def _vehicles(place: _Place, missions: int, workers: int, kill: bool) -> list[dict[str, Any]]:
-    return [{"axis": "vehicles", "size": n} | place.measured("vehicles", count=n) for n in VEHICLES]
+def _vehicles(place: _ScaleFolder, missions: int, workers: int, kill: bool) -> list[dict[str, Any]]:
+    return [{"axis": "vehicles", "size": n} | place.measured("vehicles", count=n) for n in MEASURED_VEHICLES]
 
 
-def _zones(place: _Place, missions: int, workers: int, kill: bool) -> list[dict[str, Any]]:
+def _zones(place: _ScaleFolder, missions: int, workers: int, kill: bool) -> list[dict[str, Any]]:
     asked: dict[str, Any] = {"seed": place.seed, "tiles": str(place.tiles()), "missions": EACH}
-    return [{"axis": "zones", "size": n} | place.measured("zones", zones=n, **asked) for n in ZONES]
+    return [{"axis": "zones", "size": n} | place.measured("zones", zones=n, **asked) for n in MEASURED_ZONES]
 
 
-def _cells(place: _Place, missions: int, workers: int, kill: bool) -> list[dict[str, Any]]:
+def _cells(place: _ScaleFolder, missions: int, workers: int, kill: bool) -> list[dict[str, Any]]:
     rows = []
-    for posts in POSTS:
+    for posts in MEASURED_POSTS:
         row = place.measured("cells", posts=posts, seed=place.seed, tiles=str(place.tiles(posts)), missions=EACH)
         rows.append({"axis": "cells", "size": round(row["cells"])} | row)
     return rows
 
 
-def _workers(place: _Place, missions: int, workers: int, kill: bool) -> list[dict[str, Any]]:
+def _workers(place: _ScaleFolder, missions: int, workers: int, kill: bool) -> list[dict[str, Any]]:
     alone = place.batch(missions, 1)
     found = [(n, place.batch(missions, n)) for n in sorted({2, workers})]
     if kill:
@@ -164,7 +165,7 @@ def _workers(place: _Place, missions: int, workers: int, kill: bool) -> list[dic
     return rows
 
 
-_ROWS: dict[str, Callable[[_Place, int, int, bool], list[dict[str, Any]]]] = {
+_ROWS: dict[str, Callable[[_ScaleFolder, int, int, bool], list[dict[str, Any]]]] = {
     "missions": _missions, "vehicles": _vehicles, "zones": _zones, "cells": _cells, "workers": _workers,
 }  # fmt: skip
 
@@ -230,12 +231,12 @@ def report(result: dict[str, Any]) -> str:
 
 def write(result: dict[str, Any], out: Path) -> list[Path]:
     """Write the figures as JSON, CSV and Markdown, and a picture. Raises InputError for a directory that cannot be."""
-    rows = [{key: row.get(key, "") for key in COLUMNS} for row in result["rows"]]
+    rows = [{key: row.get(key, "") for key in SCALE_COLUMNS} for row in result["rows"]]
     return write_all(
         out,
         {
             "scale.json": json.dumps(result, indent=1) + "\n",
-            "scale.csv": csv_text(COLUMNS, rows),
+            "scale.csv": csv_text(SCALE_COLUMNS, rows),
             "scale.md": report(result),
             "scale.png": draw(result),
         },

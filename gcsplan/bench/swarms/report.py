@@ -16,16 +16,16 @@ from gcsplan.bench.files import write_all
 from gcsplan.bench.measure import percentile
 from gcsplan.export.table import csv_of
 
-COLUMNS = (
+SWARM_COLUMNS = (
     "method", "encoding", "cost", "raw legal", "repaired", "refused", "solved %", "after restarts %", "over p50 %",
     "over p90 %", "over max %", "raw over p50 %", "repaired over p50 %", "search s", "repair s",
 )  # fmt: skip
 
 
-LENGTH = "krill"
+LENGTH_COST = "krill"
 """The cost that is the length, with penalties: that of every method unless it says otherwise."""
 
-Status = Literal["raw legal", "repaired", "refused"]
+AttemptStatus = Literal["raw legal", "repaired", "refused"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class Method:
     family: str
     name: str
     encoding: str = "offsets"
-    cost: str = LENGTH
+    cost: str = LENGTH_COST
     warm: bool = False
 
     @property
@@ -56,7 +56,7 @@ class Attempt:
     mission: str
     group: str
     method: Method
-    status: Status
+    status: AttemptStatus
     length_m: float | None
     evaluations: int
     search_s: float
@@ -74,7 +74,7 @@ class Optimum:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Result:
+class SwarmsResult:
     """All attempts, and the reference of each mission; ``redraws``: pairs and sets of zones drawn in vain before it."""
 
     seed: int
@@ -90,7 +90,7 @@ class Result:
         return 100.0 * (attempt.length_m / self.optima[attempt.mission].length_m - 1.0)
 
     def lines(self) -> list[tuple[str, ...]]:
-        """A row of `COLUMNS` for each method, in the order of their first attempts."""
+        """A row of `SWARM_COLUMNS` for each method, in the order of their first attempts."""
         groups: dict[Method, list[Attempt]] = {}
         for attempt in self.attempts:
             groups.setdefault(attempt.method, []).append(attempt)
@@ -103,7 +103,7 @@ class Result:
         restarted = sum(a.searches is not None for a in found)
         return (
             f"{method.label}, warm" if method.warm else method.label, method.encoding,
-            {LENGTH: "length", "own": "its paper's"}[method.cost],
+            {LENGTH_COST: "length", "own": "its paper's"}[method.cost],
             *(str(len(some)) for some in by.values()), f"{100.0 * len(every) / len(found):.0f}",
             "–" if method.family == "mealpy" else f"{100.0 * restarted / len(found):.0f}",
             *(_percent(percentile(every, p)) for p in (50, 90, 100)),
@@ -131,7 +131,7 @@ class Result:
 
     def markdown(self) -> str:
         """The table as Markdown."""
-        rows = [COLUMNS, tuple("---" for _ in COLUMNS), *self.lines()]
+        rows = [SWARM_COLUMNS, tuple("---" for _ in SWARM_COLUMNS), *self.lines()]
         return "\n".join(
             ["# Swarms over real terrain", "", *self.about, "", *(f"| {' | '.join(r)} |" for r in rows), ""]
         )
@@ -139,7 +139,7 @@ class Result:
     def table(self) -> Table:
         """The table for the terminal."""
         out = Table(title=f"swarms, seed {self.seed}")
-        for k, name in enumerate(COLUMNS):
+        for k, name in enumerate(SWARM_COLUMNS):
             out.add_column(name, justify="left" if k < 3 else "right")
         for line in self.lines():
             out.add_row(*line)

@@ -22,7 +22,7 @@ from gcsplan.bench.files import kept_rows
 from gcsplan.bench.measure import passes
 from gcsplan.bench.papers.runs import code_digest
 from gcsplan.bench.swarms import report
-from gcsplan.bench.swarms.report import Attempt, Method, Status
+from gcsplan.bench.swarms.report import Attempt, AttemptStatus, Method
 from gcsplan.bench.terrain import swarms as terrain_swarms
 from gcsplan.bench.terrain.problems import NamedProblem, problems
 from gcsplan.errors import GcsplanError, InputError
@@ -33,15 +33,15 @@ from gcsplan.planners.registry import get as get_planner
 from gcsplan.planners.swarm import warm_start
 from gcsplan.planners.swarm.planner import Found, cost_of, drawn, search, settle, until_found
 from gcsplan.planners.swarm.settings import Settings
+from gcsplan.planners.swarm.warm_start import OPTIMAL
 
 EVALUATIONS = 10_000
 ATTEMPT_S = 0.5
 """Seconds that an attempt takes, about."""
 
-SYSTEMS = ("krill", "ssgwo", "msfoa", "abo", "ib-abc")
-ENCODINGS = ("paper", "sections", "bspline", "offsets")
-KEPT = "swarms.jsonl"
-OPTIMAL = "optimal"
+PAPER_SWARMS = ("krill", "ssgwo", "msfoa", "abo", "ib-abc")
+COMPARED_ENCODINGS = ("paper", "sections", "bspline", "offsets")
+ATTEMPTS_FILE = "swarms.jsonl"
 
 
 def methods(*, encodings: bool = False, warm: bool = False) -> list[Method]:
@@ -50,9 +50,10 @@ def methods(*, encodings: bool = False, warm: bool = False) -> list[Method]:
     ``warm``: searches that begin around the path of `optimal`, too.
     """
     if encodings:
-        return [Method("gcsplan", name, encoding) for encoding in ENCODINGS for name in (*SYSTEMS, "lshade")
+        return [Method("gcsplan", name, encoding)
+                for encoding in COMPARED_ENCODINGS for name in (*PAPER_SWARMS, "lshade")
                 if (name, encoding) != ("lshade", "paper")]  # fmt: skip
-    ours = [Method("gcsplan", name) for name in (*SYSTEMS, "lshade", "cmaes")]
+    ours = [Method("gcsplan", name) for name in (*PAPER_SWARMS, "lshade", "cmaes")]
     ours += [Method("mealpy", name) for name in terrain_swarms.BASELINES]
     return ours + [Method("gcsplan", name, warm=True) for name in ("ib-abc", "lshade") if warm]
 
@@ -68,7 +69,7 @@ def run(
     warm: bool = False,
     jobs: int | None = 1,
     tell: Callable[[str], None] = lambda words: None,
-) -> report.Result:
+) -> report.SwarmsResult:
     """Measure, and write ``swarms.md`` and ``swarms.csv`` to ``directory``.
 
     ``count``: missions of each group; ``names``: labels of methods; None: all. ``encodings``: compare encodings
@@ -85,8 +86,8 @@ def run(
     if any(m.family == "mealpy" for m in asked):
         terrain_swarms.release()
     named = problems("room", seed, count=count)
-    jobs_of = [Job(seed, evaluations, one.name, method) for method in [None, *asked] for one in named]
-    kept = Kept(directory / KEPT)
+    jobs_of = [SwarmJob(seed, evaluations, one.name, method) for method in [None, *asked] for one in named]
+    kept = Kept(directory / ATTEMPTS_FILE)
     left = [job for job in jobs_of if job.key not in kept.known]
     with executor(jobs, pieces=len(left), piece_s=ATTEMPT_S) as workers:
         for done, (number, answer) in enumerate(workers.each(answer_of, None, left), 1):
@@ -101,13 +102,13 @@ def run(
             optima[job.mission] = report.Optimum(**known_answer)
         else:
             attempts.append(Attempt(**{**known_answer, "method": job.method}))
-    result = report.Result(seed, evaluations, optima, attempts, [one.redraws for one in named])
+    result = report.SwarmsResult(seed, evaluations, optima, attempts, [one.redraws for one in named])
     result.write(directory)
     return result
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class SwarmJob:
     """An attempt to make; ``method`` None: the reference."""
 
     seed: int
@@ -144,7 +145,7 @@ def _missions(seed: int) -> dict[str, NamedProblem]:
     return {one.name: one for one in problems("room", seed)}
 
 
-def answer_of(_: None, job: Job) -> dict[str, Any]:
+def answer_of(_: None, job: SwarmJob) -> dict[str, Any]:
     """Do one job, in whatever process."""
     one = _missions(job.seed)[job.mission]
     if job.method is None:
@@ -177,7 +178,7 @@ def attempt_of(one: NamedProblem, method: Method, evaluations: int) -> Attempt:
     searched = time.process_time()
     ended = settle(problem, found)
     repaired = time.process_time()
-    status: Status = "refused" if ended is None else "raw legal" if ended[1] is None else "repaired"
+    status: AttemptStatus = "refused" if ended is None else "raw legal" if ended[1] is None else "repaired"
     length, searches = None, None if ended is None else 1
     if ended is not None:
         if not passes(problem, ended[0]):

@@ -37,19 +37,19 @@ from gcsplan.world.limits import Limits
 
 PLANNERS = {"RRT*": "RRTstar", "InformedRRT*": "InformedRRTstar", "BIT*": "BITstar"}
 CROSSINGS = 2000
-CURE = "this benchmark needs OMPL and mealpy: pip install 'gcsplan[bench]', or say --no-rivals"
+RIVALS_CURE = "this benchmark needs OMPL and mealpy: pip install 'gcsplan[bench]', or say --no-rivals"
 
 OneLeg = Callable[[float, float, float, float, float, float], bool]
 """``clear(east0_m, north0_m, amsl0_m, east1_m, north1_m, amsl1_m)``."""
 
-NAMES = tuple(inspect.signature(judge).parameters)
+KERNEL_ARGUMENTS = tuple(inspect.signature(judge).parameters)
 """Names of the kernel's arguments, in its order."""
 
 _classes: dict[tuple[Any, ...], Any] = {}
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class RivalAnswer:
     """A rival's answer: the path (None if there is none), its length as found and after simplification."""
 
     points: list[list[float]] | None
@@ -66,7 +66,7 @@ def release() -> str:
     try:
         return f"ompl {version('ompl')}"
     except PackageNotFoundError:
-        raise InputError(CURE) from None
+        raise InputError(RIVALS_CURE) from None
 
 
 def warm_up(problem: Problem) -> None:
@@ -74,7 +74,7 @@ def warm_up(problem: Problem) -> None:
     one_leg(problem.airspace, problem.limits)(*problem.start, *problem.start)
 
 
-def plan(problem: Problem, name: str, seconds: float, seed: int) -> Found:
+def plan(problem: Problem, name: str, seconds: float, seed: int) -> RivalAnswer:
     """Run the planner of `PLANNERS` called ``name`` for ``seconds``, then simplify its path, which takes milliseconds.
 
     The shorter of the path as found and as simplified is kept. ``seed`` has an effect only in the first run of a
@@ -83,7 +83,7 @@ def plan(problem: Problem, name: str, seconds: float, seed: int) -> Found:
     try:
         base, geometric, util = (import_module(f"ompl.{name}") for name in ("base", "geometric", "util"))
     except ImportError:
-        raise InputError(CURE) from None
+        raise InputError(RIVALS_CURE) from None
     util.setLogLevel(util.LOG_NONE)
     util.RNG.setSeed(seed)
     space = base.RealVectorStateSpace(3)
@@ -123,14 +123,14 @@ def plan(problem: Problem, name: str, seconds: float, seed: int) -> Found:
     planner.solve(base.PlannerTerminationCondition(over))
     planned_s = elapsed_s()
     if not asked.hasExactSolution():
-        return Found(None, None, None, None, planned_s, counts[0])
+        return RivalAnswer(None, None, None, None, planned_s, counts[0])
     path = asked.getSolutionPath()
     raw = _points(path)
     geometric.PathSimplifier(info).simplify(path, 10.0 * seconds)  # ends by itself long before that time
     simple = _points(path) if path.check() else raw
     best = min(raw, simple, key=_length)
     took = elapsed_s()
-    return Found(best, _length(best), _length(raw), first[0] if first else planned_s, took, counts[0])
+    return RivalAnswer(best, _length(best), _length(raw), first[0] if first else planned_s, took, counts[0])
 
 
 def box_of(problem: Problem) -> list[tuple[float, float]]:
@@ -152,18 +152,18 @@ def _judges(base: Any, info: Any, problem: Problem, counts: list[int]) -> tuple[
     """Validity of a state and of a motion, both by the exact check, with a count of the checks."""
     clear = one_leg(problem.airspace, problem.limits)
 
-    class State(base.StateValidityChecker):  # type: ignore[misc]
+    class StateCheck(base.StateValidityChecker):  # type: ignore[misc]
         def isValid(self, state: Any) -> bool:
             e, n, h = state[0], state[1], state[2]
             counts[0] += 1
             return clear(e, n, h, e, n, h)
 
-    class Motion(base.MotionValidator):  # type: ignore[misc]
+    class MotionCheck(base.MotionValidator):  # type: ignore[misc]
         def checkMotion(self, a: Any, b: Any) -> bool:
             counts[0] += 1
             return clear(a[0], a[1], a[2], b[0], b[1], b[2])
 
-    return State(info), Motion(info)
+    return StateCheck(info), MotionCheck(info)
 
 
 def _crossing_s(info: Any, state: Any, problem: Problem) -> float:
@@ -234,18 +234,18 @@ def _compiled(types: tuple[Any, ...]) -> Any:
     source = "\n".join(
         [
             "class OneLeg:",
-            f"    def __init__(self, {', '.join(NAMES)}):",
-            *(f"        self.{n} = {n}" for n in NAMES),
+            f"    def __init__(self, {', '.join(KERNEL_ARGUMENTS)}):",
+            *(f"        self.{n} = {n}" for n in KERNEL_ARGUMENTS),
             "    def clear(self, e0, n0, h0, e1, n1, h1):",
             "        start, end = self.start, self.end",
             "        start[0, 0], start[0, 1], start[0, 2] = e0, n0, h0",
             "        end[0, 0], end[0, 1], end[0, 2] = e1, n1, h1",
             "        self.out[:] = 0.0",
             "        self.seen[:] = -1",
-            f"        judge({', '.join('self.' + n for n in NAMES)})",
+            f"        judge({', '.join('self.' + n for n in KERNEL_ARGUMENTS)})",
             "        return self.ok[0]",
         ]
     )
     scope = {"judge": UNIT.with_numba()["judge"]}
     exec(source, scope)
-    return jitclass(list(zip(NAMES, types, strict=True)))(scope["OneLeg"])
+    return jitclass(list(zip(KERNEL_ARGUMENTS, types, strict=True)))(scope["OneLeg"])

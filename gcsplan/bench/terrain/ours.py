@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from gcsplan.bench.check import LIMITS, scene
 from gcsplan.bench.measure import Memory, passes
-from gcsplan.bench.terrain.outcome import OURS, OURS_LONG, Outcome, Status
+from gcsplan.bench.terrain.outcome import OUR_LONG_METHOD, OUR_METHOD, MethodOutcome, OutcomeStatus
 from gcsplan.bench.terrain.problems import NamedProblem, key_of
 from gcsplan.errors import NoMission
 from gcsplan.planners.problem import Problem, Solution
@@ -18,7 +18,7 @@ from gcsplan.world.airspace import Airspace
 from gcsplan.world.surface import Surface
 
 SWEEP_LEGS = 100_000
-LONG_S = 60.0
+LONG_RUN_S = 60.0
 
 
 class Sweep:
@@ -45,13 +45,15 @@ def warm_up(problems: Sequence[NamedProblem], planner: str = "optimal") -> float
     return time.perf_counter() - began
 
 
-def measure(one: NamedProblem, sweep: Sweep, *, runs: int = 9, planner: str = "optimal", long: bool = False) -> Outcome:
+def measure(
+    one: NamedProblem, sweep: Sweep, *, runs: int = 9, planner: str = "optimal", long: bool = False
+) -> MethodOutcome:
     """The outcome of gcsplan's planner: medians of ``runs``; ``long`` runs it once with a minute and no gap.
 
     Every run gets its own airspace and surface (over the same heights), so that nothing kept from the run before helps.
     Creating them is not counted, but what the planner derives from them is.
     """
-    problem = replace(one.problem, budget_s=LONG_S, gap_percent=0.0) if long else one.problem
+    problem = replace(one.problem, budget_s=LONG_RUN_S, gap_percent=0.0) if long else one.problem
     memory, answers, swept, took = Memory(), [], [], []
     for number in range(1 if long else runs):
         anew = _anew(problem)
@@ -64,8 +66,8 @@ def measure(one: NamedProblem, sweep: Sweep, *, runs: int = 9, planner: str = "o
         took.append(answer[1])
         swept.append(sweep())
     found = [a for a in answers if isinstance(a, Solution)]
-    base = Outcome(
-        key_of(one.problem), one.name, one.kind, one.group, OURS_LONG if long else OURS, "failed",
+    base = MethodOutcome(
+        key_of(one.problem), one.name, one.kind, one.group, OUR_LONG_METHOD if long else OUR_METHOD, "failed",
         planning_s=statistics.median(took), sweep_s=statistics.median(swept), memory_mb=memory.peak_mb, runs=len(took),
         gap_asked_percent=problem.gap_percent,
     )  # fmt: skip
@@ -105,7 +107,7 @@ def _attempt(problem: Problem, planner: str) -> tuple[Solution | Exception, floa
     return answer, time.perf_counter() - began
 
 
-def _refused(answer: Solution | Exception) -> Status:
+def _refused(answer: Solution | Exception) -> OutcomeStatus:
     if not isinstance(answer, NoMission):
         return "failed"
     return "infeasible" if answer.reason == "infeasible" else "not found"

@@ -6,13 +6,13 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
-Status = Literal["solved", "infeasible", "not found", "unsafe", "failed"]
-OURS = "gcsplan"
-OURS_LONG = "gcsplan 60 s"
+OutcomeStatus = Literal["solved", "infeasible", "not found", "unsafe", "failed"]
+OUR_METHOD = "gcsplan"
+OUR_LONG_METHOD = "gcsplan 60 s"
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class MethodOutcome:
     """One method's attempt at one problem; times are medians of ``runs``.
 
     ``status``: solved means that the whole path from start to goal passes the exact check; infeasible, that no path
@@ -27,7 +27,7 @@ class Outcome:
     kind: str
     group: str
     method: str
-    status: Status
+    status: OutcomeStatus
     detail: str = ""
     cost: float | None = None
     raw_cost: float | None = None

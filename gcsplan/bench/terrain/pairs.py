@@ -26,8 +26,8 @@ from gcsplan.world.zones import Circle, Level, Zone
 
 WAY_M = (5_000.0, 25_000.0)  # straight distance from start to goal: from the shortest to the longest stratum
 PAIRS = 20
-MIN_AGL_M = 60.0
-STEEPEST_DEG = (10.0, 15.0)
+PAIR_MIN_AGL_M = 60.0
+CLIMB_LIMITS_DEG = (10.0, 15.0)
 ABOVE_JOIN_M = (5.0, 60.0)  # height of the ceiling above the lowest one that joins start and goal
 RADIUS_M = (200.0, 1200.0)
 SMALL_RADIUS_M = (30.0, 150.0)
@@ -36,7 +36,7 @@ MOST_ZONE_SETS = 200  # drawn for one pair before the pair itself is drawn again
 
 
 @dataclass(frozen=True, eq=False)
-class Pair:
+class TerrainPair:
     """A start and a goal, (east_m, north_m) in the plane of ``frame``, and the surface that a mission would load.
 
     ``ceiling_m`` is the max AMSL that blocks the straight line. ``steepest_deg`` is the climb and descent limit: they
@@ -57,7 +57,7 @@ class Pair:
 
 
 @dataclass(frozen=True, eq=False)
-class Cells:
+class FloorCells:
     """The cells of a surface.
 
     ``floor_m`` (rows, cols) is the lowest altitude that is legal everywhere in the cell, NaN or inf if unknown;
@@ -70,7 +70,7 @@ class Cells:
     reach_m: float
 
     @classmethod
-    def of(cls, airspace: Airspace, limits: Limits) -> Cells:
+    def of(cls, airspace: Airspace, limits: Limits) -> FloorCells:
         """The cells of the airspace's surface under ``limits``, without zones."""
         surface = airspace.surface
         rows, cols = surface.ground_m.shape
@@ -121,14 +121,14 @@ def sample() -> Terrain:
     return open_terrain(sample_spec(), where="the benchmark's terrain")
 
 
-def draw_pair(rng: np.random.Generator, number: int, limits: Limits, zones: int, *, ceiling: bool) -> Pair:
+def draw_pair(rng: np.random.Generator, number: int, limits: Limits, zones: int, *, ceiling: bool) -> TerrainPair:
     """Pair ``number`` of `PAIRS`, with its ceiling (if ``ceiling``) and its zones; ``limits`` have no ceiling."""
     pairs = sets = 0
     way, steepest_deg = stratum(rng, number)
     while True:
         pair = place(rng, number, way, steepest_deg)
         airspace = Airspace(pair.surface, scale=pair.scale)
-        cells = Cells.of(airspace, limits)
+        cells = FloorCells.of(airspace, limits)
         top = draw_ceiling(rng, pair, cells, limits) if ceiling else None
         if top is not None or not ceiling:
             below = cells.floor_m <= (1e9 if top is None else top - limits.altitude_error_m)
@@ -136,7 +136,7 @@ def draw_pair(rng: np.random.Generator, number: int, limits: Limits, zones: int,
                 found = draw_zones(rng, pair, zones)
                 free = below & cells.outside(found, limits.horizontal_clearance_m + limits.track_error_m)
                 if cells.joined(pair.surface, pair.start, pair.goal, free):
-                    return Pair(
+                    return TerrainPair(
                         number, pair.frame, pair.start, pair.goal, pair.surface, pair.scale, top, steepest_deg,
                         tuple(found), (pairs, sets),
                     )  # fmt: skip
@@ -148,15 +148,15 @@ def stratum(rng: np.random.Generator, number: int) -> tuple[float, float]:
     """The straight distance of pair ``number``, m, in its stratum of `WAY_M`, and its climb limit, degrees."""
     step = (WAY_M[1] - WAY_M[0]) / PAIRS
     way = WAY_M[0] + (number + rng.uniform()) * step
-    return way, round(float(rng.uniform(*STEEPEST_DEG)), 1)
+    return way, round(float(rng.uniform(*CLIMB_LIMITS_DEG)), 1)
 
 
-def draw_ceiling(rng: np.random.Generator, pair: Pair, cells: Cells, limits: Limits) -> float | None:
+def draw_ceiling(rng: np.random.Generator, pair: TerrainPair, cells: FloorCells, limits: Limits) -> float | None:
     """`draw_above` the lowest altitude that joins start and goal."""
     return draw_above(rng, pair, cells.lowest_join(pair.surface, pair.start, pair.goal), limits)
 
 
-def draw_above(rng: np.random.Generator, pair: Pair, lowest_m: float, limits: Limits) -> float | None:
+def draw_above(rng: np.random.Generator, pair: TerrainPair, lowest_m: float, limits: Limits) -> float | None:
     """A max AMSL at x.5 m, some metres (`ABOVE_JOIN_M`) above ``lowest_m`` and below the straight line's highest floor.
 
     The half metre keeps it off all sums of whole metres, the heights of this DEM. None if there is none.
@@ -173,7 +173,7 @@ def draw_above(rng: np.random.Generator, pair: Pair, lowest_m: float, limits: Li
 
 
 def draw_zones(
-    rng: np.random.Generator, pair: Pair, count: int, radius_m: tuple[float, float] = RADIUS_M
+    rng: np.random.Generator, pair: TerrainPair, count: int, radius_m: tuple[float, float] = RADIUS_M
 ) -> list[Zone]:
     """Discs around the line from start to goal, none over either; radii are spread evenly in their logarithm.
 
@@ -203,7 +203,7 @@ def draw_zones(
     return zones
 
 
-def place(rng: np.random.Generator, number: int, way_m: float, steepest_deg: float) -> Pair:
+def place(rng: np.random.Generator, number: int, way_m: float, steepest_deg: float) -> TerrainPair:
     """A pair without ceiling and zones, over the part of the sample that a mission between its points would load."""
     whole = Frame(*SAMPLE_MIDDLE_DEG)
     while True:
@@ -219,7 +219,7 @@ def place(rng: np.random.Generator, number: int, way_m: float, steepest_deg: flo
     box = make_box([(e0, n0), (e1, n1)], [], local=False)
     scale = frame.scale_at(max(math.hypot(e, n) for e in (box[0], box[2]) for n in (box[1], box[3])))
     surface = replace(sample().load(frame, box), goes_on=NO_SIDES)  # the window is the whole world, for rivals too
-    return Pair(number, frame, (e0, n0), (e1, n1), surface, scale, None, steepest_deg, (), (0, 0))
+    return TerrainPair(number, frame, (e0, n0), (e1, n1), surface, scale, None, steepest_deg, (), (0, 0))
 
 
 def _nodes(surface: Surface, col: Floats, row: Floats) -> tuple[Floats, Floats]:

@@ -34,11 +34,11 @@ from gcsplan.bench.everyday import missions as everyday_missions
 from gcsplan.bench.everyday import run as everyday
 from gcsplan.bench.terrain.pairs import (
     ABOVE_JOIN_M,
-    MIN_AGL_M,
+    PAIR_MIN_AGL_M,
     PAIRS,
     SMALL_RADIUS_M,
-    Cells,
-    Pair,
+    FloorCells,
+    TerrainPair,
     draw_pair,
     draw_zones,
     sample,
@@ -51,14 +51,14 @@ from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.zones import Circle, Polygon
 
-ZONES, ROOM_ZONES = (0, 10, 40), (0, 10, 20)
+MAIN_ZONES, ROOM_ZONES = (0, 10, 40), (0, 10, 20)
 BAND_M, BAND_DEG = (60.0, 120.0), (10.0, 15.0)
-FINER, LARGE_PAIRS = 10, (1, 5, 9, 13, 17)
+LARGE_FINER, LARGE_PAIRS = 10, (1, 5, 9, 13, 17)
 MANY_PAIR, MANY_ZONES = 10, 1000
 TURN_RADII_M = (100.0, 200.0)
 
-NO_ERRORS = Limits(min_agl_m=MIN_AGL_M)
-REAL_ERRORS = Limits(min_agl_m=MIN_AGL_M, horizontal_clearance_m=30.0, track_error_m=3.0, altitude_error_m=5.0)
+NO_ERRORS = Limits(min_agl_m=PAIR_MIN_AGL_M)
+REAL_ERRORS = Limits(min_agl_m=PAIR_MIN_AGL_M, horizontal_clearance_m=30.0, track_error_m=3.0, altitude_error_m=5.0)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -84,9 +84,9 @@ def problems(
 
     ``errors``: with the clearance and errors of a real mission; ceilings and zones are then drawn for those.
     """
-    make = _KINDS.get(kind)
+    make = _PROBLEM_MAKERS.get(kind)
     if make is None:
-        raise InputError(f"the kinds of problems are {', '.join(_KINDS)}, given {kind!r}")
+        raise InputError(f"the kinds of problems are {', '.join(_PROBLEM_MAKERS)}, given {kind!r}")
     found = []
     seen: dict[str, int] = {}
     for one in make(seed, REAL_ERRORS if errors else NO_ERRORS, count):
@@ -127,16 +127,16 @@ def key_of(problem: Problem) -> str:
 
 
 @cache
-def pair_of(seed: int, number: int, limits: Limits, kind: str = "main") -> Pair:
+def pair_of(seed: int, number: int, limits: Limits, kind: str = "main") -> TerrainPair:
     """Pair ``number``; each has its own random numbers, so that none depends on how many are requested."""
     rng = np.random.default_rng([seed, number, {"main": 0, "band": 1, "room": 3}[kind]])
     if kind == "room":
         return draw_with_room(rng, number, limits, max(ROOM_ZONES))
-    return draw_pair(rng, number, limits, max(ZONES) if kind == "main" else 0, ceiling=kind == "main")
+    return draw_pair(rng, number, limits, max(MAIN_ZONES) if kind == "main" else 0, ceiling=kind == "main")
 
 
 def _main(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:
-    for zones in ZONES:
+    for zones in MAIN_ZONES:
         for number in _spread(count):
             pair = pair_of(seed, number, limits)
             problem = _problem(pair, Airspace(pair.surface, pair.zones[:zones], scale=pair.scale), _held(pair, limits))
@@ -175,7 +175,7 @@ def _large(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProble
         assert pair.ceiling_m is not None
         if not _joined(airspace, pair, limits, pair.ceiling_m):
             # Sometimes a spline rises above the saddles between the nodes of the DEM.
-            join = Cells.of(airspace, limits).lowest_join(surface, pair.start, pair.goal)
+            join = FloorCells.of(airspace, limits).lowest_join(surface, pair.start, pair.goal)
             held = replace(held, max_amsl_m=math.floor(join + ABOVE_JOIN_M[0] + limits.altitude_error_m) + 0.5)
         name = f"large {seed}/{number:02d}, 10 zones"
         problem = _problem(pair, airspace, held)
@@ -211,8 +211,8 @@ def _turn(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem
 
 
 def _everyday(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:
-    each = everyday.COUNT // len(everyday_missions.KINDS) if count is None else count
-    for number in range(each * len(everyday_missions.KINDS)):
+    each = everyday.MISSIONS_OF_A_SEED // len(everyday_missions.EVERYDAY_KINDS) if count is None else count
+    for number in range(each * len(everyday_missions.EVERYDAY_KINDS)):
         one = everyday_missions.draw(seed, number)
         problem = everyday.problem_of(one)
         if not problem.via:
@@ -229,12 +229,12 @@ def _room(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem
             yield NamedProblem(name, problem, "room", f"room, {zones} zones", pair.redraws)
 
 
-_KINDS: dict[str, Callable[[int, Limits, int | None], Iterator[NamedProblem]]] = {
+_PROBLEM_MAKERS: dict[str, Callable[[int, Limits, int | None], Iterator[NamedProblem]]] = {
     "main": _main, "energy": _energy, "band": _band, "large": _large, "many": _many, "turn": _turn,
     "everyday": _everyday, "room": _room,
 }  # fmt: skip
-KINDS = tuple(_KINDS)
-MOUNTAINS = KINDS[:-2]
+PROBLEM_KINDS = tuple(_PROBLEM_MAKERS)
+MOUNTAINS = PROBLEM_KINDS[:-2]
 """The kinds over real mountains that are measured unless others are named."""
 
 
@@ -245,33 +245,33 @@ def _spread(count: int | None) -> list[int]:
     return [(2 * k + 1) * PAIRS // (2 * count) for k in range(count)]
 
 
-def _held(pair: Pair, limits: Limits) -> Limits:
+def _held(pair: TerrainPair, limits: Limits) -> Limits:
     return replace(
         limits, max_amsl_m=pair.ceiling_m, max_climb_deg=pair.steepest_deg, max_descent_deg=pair.steepest_deg
     )
 
 
-def _problem(pair: Pair, airspace: Airspace, limits: Limits) -> Problem:
+def _problem(pair: TerrainPair, airspace: Airspace, limits: Limits) -> Problem:
     (e0, n0), (e1, n1) = pair.start, pair.goal
     floors = airspace.floor_amsl(np.array([e0, e1]), np.array([n0, n1]), limits)
     z0, z1 = (math.ceil(100.0 * z - 1e-4) / 100.0 for z in floors.tolist())
     return Problem(airspace, limits, (e0, n0, z0), (e1, n1, z1))
 
 
-def _joined(airspace: Airspace, pair: Pair, limits: Limits, ceiling_m: float) -> bool:
+def _joined(airspace: Airspace, pair: TerrainPair, limits: Limits, ceiling_m: float) -> bool:
     """Whether start and goal are joined under the ceiling and among the zones of unlimited height."""
-    cells = Cells.of(airspace, limits)
+    cells = FloorCells.of(airspace, limits)
     free = cells.outside(airspace.zones, limits.horizontal_clearance_m + limits.track_error_m)
     free &= cells.floor_m <= ceiling_m - limits.altitude_error_m
     return cells.joined(airspace.surface, pair.start, pair.goal, free)
 
 
 def _refined(surface: Surface) -> Surface:
-    """The surface on a grid that is `FINER` times finer: cubic splines through the nodes, rounded to the centimetre."""
+    """The surface on a grid `LARGE_FINER` times finer: cubic splines through the nodes, rounded to the centimetre."""
     grid = surface.grid
-    finer = GridMap(grid.coefficients * FINER, grid.centre, grid.scale_m, grid.error_m)
+    finer = GridMap(grid.coefficients * LARGE_FINER, grid.centre, grid.scale_m, grid.error_m)
     ground = _refined_ground(surface.ground_m.tobytes(), surface.ground_m.shape)
-    return Surface(ground, ground, finer, {**surface.info, "resolution_m": round(92.0 / FINER, 1)})
+    return Surface(ground, ground, finer, {**surface.info, "resolution_m": round(92.0 / LARGE_FINER, 1)})
 
 
 @cache
@@ -279,5 +279,5 @@ def _refined_ground(nodes: bytes, shape: tuple[int, int]) -> Floats:
     from scipy.ndimage import zoom
 
     ground = np.frombuffer(nodes).reshape(shape)
-    size = [(n - 1) * FINER + 1 for n in shape]
+    size = [(n - 1) * LARGE_FINER + 1 for n in shape]
     return np.round(zoom(ground, [m / n for m, n in zip(size, shape, strict=True)], order=3), 2)

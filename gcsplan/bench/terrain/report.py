@@ -9,21 +9,21 @@ from rich.table import Table
 
 from gcsplan.bench.files import png
 from gcsplan.bench.measure import percentile
-from gcsplan.bench.terrain.outcome import OURS, OURS_LONG, Outcome, beyond
+from gcsplan.bench.terrain.outcome import OUR_LONG_METHOD, OUR_METHOD, MethodOutcome, beyond
 from gcsplan.export.table import csv_of
 
 LEAST_GAP = 1e-3
 """Percent at which smaller gaps are drawn."""
 
 MAIN_GROUPS = ("0 zones", "10 zones", "40 zones")
-COLUMNS = (
+TERRAIN_COLUMNS = (
     "problems", "method", "solved", "gap p50 %", "gap p90 %", "gap max %", "shorter than ours", "first p50 s",
     "first p90 s", "done p50 s", "done p90 s", "done / sweep", "memory MB",
 )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class MethodLine:
     """One method on one group of problems.
 
     ``gaps`` are percent above the best certified bound of the problem if there is one; for gcsplan's own runs, above
@@ -46,17 +46,18 @@ class Line:
 
     @property
     def cells(self) -> tuple[str, ...]:
-        """The line's cells in the order of `COLUMNS`."""
+        """The line's cells in the order of `TERRAIN_COLUMNS`."""
         proved = f" +{self.infeasible} proved infeasible" if self.infeasible else ""
         gap = [percentile(list(self.gaps), p) for p in (50, 90, 100)]
         return (
             self.group, self.method, f"{self.solved}/{self.problems}{proved}", *(_number(g, 3) for g in gap),
-            "–" if self.method == OURS else str(self.shorter), *(_number(s, 3) for s in (*self.first_s, *self.done_s)),
+            "–" if self.method == OUR_METHOD else str(self.shorter),
+            *(_number(s, 3) for s in (*self.first_s, *self.done_s)),
             _number(self.ratio, 2), _number(self.memory_mb, 0),
         )  # fmt: skip
 
 
-def best_bounds(outcomes: Sequence[Outcome]) -> dict[str, float]:
+def best_bounds(outcomes: Sequence[MethodOutcome]) -> dict[str, float]:
     """The highest certified lower bound of each problem, by its key."""
     best: dict[str, float] = {}
     for o in outcomes:
@@ -65,11 +66,11 @@ def best_bounds(outcomes: Sequence[Outcome]) -> dict[str, float]:
     return best
 
 
-def lines(outcomes: Sequence[Outcome]) -> list[Line]:
+def lines(outcomes: Sequence[MethodOutcome]) -> list[MethodLine]:
     """A line for each group and method, in the order of their first outcomes."""
     bounds = best_bounds(outcomes)
-    ours = {o.key: o.cost for o in outcomes if o.method == OURS and o.status == "solved" and o.cost is not None}
-    groups: dict[tuple[str, str], list[Outcome]] = {}
+    ours = {o.key: o.cost for o in outcomes if o.method == OUR_METHOD and o.status == "solved" and o.cost is not None}
+    groups: dict[tuple[str, str], list[MethodOutcome]] = {}
     order: dict[str, None] = {}
     for o in outcomes:
         order[o.group] = None
@@ -82,16 +83,16 @@ def lines(outcomes: Sequence[Outcome]) -> list[Line]:
 
 
 def _line(
-    group: str, method: str, found: Sequence[Outcome], bounds: Mapping[str, float], ours: Mapping[str, float]
-) -> Line:
+    group: str, method: str, found: Sequence[MethodOutcome], bounds: Mapping[str, float], ours: Mapping[str, float]
+) -> MethodLine:
     solved = [o for o in found if o.status == "solved"]
-    own = method in (OURS, OURS_LONG)
+    own = method in (OUR_METHOD, OUR_LONG_METHOD)
     gaps = [o.gap_percent if own else beyond(o.cost, bounds.get(o.key)) for o in solved]
     first = [o.first_path_s for o in solved if o.first_path_s is not None]
     done = [o.planning_s for o in solved if o.planning_s is not None]
     ratios = [o.planning_s / o.sweep_s for o in solved if o.planning_s is not None and o.sweep_s]
     memory = [o.memory_mb for o in found if o.memory_mb is not None]
-    return Line(
+    return MethodLine(
         group, method, len(found), len(solved), sum(o.status == "infeasible" for o in found),
         tuple(g for g in gaps if g is not None),
         sum(o.cost < ours[o.key] * (1.0 - 1e-9) for o in solved if o.cost is not None and o.key in ours),
@@ -100,32 +101,32 @@ def _line(
     )  # fmt: skip
 
 
-def unsolved(outcomes: Sequence[Outcome]) -> list[str]:
+def unsolved(outcomes: Sequence[MethodOutcome]) -> list[str]:
     """Every problem that gcsplan's planner did not solve, in words, and the methods that did."""
     out = []
     for o in outcomes:
-        if o.method == OURS and o.status != "solved":
-            others = [x for x in outcomes if x.key == o.key and x.method != OURS and x.status == "solved"]
+        if o.method == OUR_METHOD and o.status != "solved":
+            others = [x for x in outcomes if x.key == o.key and x.method != OUR_METHOD and x.status == "solved"]
             by = f" (solved by {', '.join(x.method for x in others)})" if others else ""
             out.append(f"{o.name}: {o.status}, {' '.join(o.detail.split())}{by}")
     return out
 
 
-def beaten_by(outcomes: Sequence[Outcome]) -> list[str]:
+def beaten_by(outcomes: Sequence[MethodOutcome]) -> list[str]:
     """Every problem on which another planner's path is shorter than gcsplan's, with both costs."""
-    ours = {o.key: o.cost for o in outcomes if o.method == OURS and o.status == "solved" and o.cost is not None}
+    ours = {o.key: o.cost for o in outcomes if o.method == OUR_METHOD and o.status == "solved" and o.cost is not None}
     return [
         f"{o.name}: {o.method} {o.cost:.2f} against {ours[o.key]:.2f}"
         for o in outcomes
-        if o.method not in (OURS, OURS_LONG) and o.status == "solved" and o.cost is not None
+        if o.method not in (OUR_METHOD, OUR_LONG_METHOD) and o.status == "solved" and o.cost is not None
         and o.key in ours and o.cost < ours[o.key] * (1.0 - 1e-9)
     ]  # fmt: skip
 
 
-def table(found: Sequence[Line], title: str) -> Table:
+def table(found: Sequence[MethodLine], title: str) -> Table:
     """The table for the terminal."""
     out = Table(title=title)
-    for k, name in enumerate(COLUMNS):
+    for k, name in enumerate(TERRAIN_COLUMNS):
         out.add_column(name, justify="left" if k < 2 else "right", no_wrap=k < 3)
     last = ""
     for line in found:
@@ -136,9 +137,9 @@ def table(found: Sequence[Line], title: str) -> Table:
     return out
 
 
-def markdown(found: Sequence[Line], outcomes: Sequence[Outcome], about: Sequence[str]) -> str:
+def markdown(found: Sequence[MethodLine], outcomes: Sequence[MethodOutcome], about: Sequence[str]) -> str:
     """The table with what was measured, and the problems that were not solved."""
-    rows = [COLUMNS, tuple("---" for _ in COLUMNS), *(line.cells for line in found)]
+    rows = [TERRAIN_COLUMNS, tuple("---" for _ in TERRAIN_COLUMNS), *(line.cells for line in found)]
     text = ["# Planners over real terrain", "", *about, "", *(f"| {' | '.join(row)} |" for row in rows), ""]
     for heading, items in (
         ("Not solved by ours", unsolved(outcomes)),
@@ -149,13 +150,13 @@ def markdown(found: Sequence[Line], outcomes: Sequence[Outcome], about: Sequence
     return "\n".join(text)
 
 
-def _failed(o: Outcome) -> bool:
-    return o.method != OURS and o.status in ("failed", "unsafe")
+def _failed(o: MethodOutcome) -> bool:
+    return o.method != OUR_METHOD and o.status in ("failed", "unsafe")
 
 
-def as_csv(outcomes: Sequence[Outcome]) -> str:
+def as_csv(outcomes: Sequence[MethodOutcome]) -> str:
     """CSV with one row per outcome, without the paths."""
-    names = [f.name for f in fields(Outcome) if f.name != "points"]
+    names = [f.name for f in fields(MethodOutcome) if f.name != "points"]
     bounds = best_bounds(outcomes)
     rows: list[list[object]] = [[*names, "gap_percent"]]
     for o in outcomes:
@@ -165,7 +166,7 @@ def as_csv(outcomes: Sequence[Outcome]) -> str:
     return csv_of(rows)
 
 
-def figure(outcomes: Sequence[Outcome]) -> bytes:
+def figure(outcomes: Sequence[MethodOutcome]) -> bytes:
     """PNG: gap against time of every method, one panel for each number of zones of the main set."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

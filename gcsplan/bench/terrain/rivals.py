@@ -18,15 +18,15 @@ from gcsplan.bench.files import kept_rows
 from gcsplan.bench.measure import Memory, passes
 from gcsplan.bench.terrain import ompl as terrain_ompl
 from gcsplan.bench.terrain import swarms as terrain_swarms
-from gcsplan.bench.terrain.outcome import Outcome
+from gcsplan.bench.terrain.outcome import MethodOutcome
 from gcsplan.bench.terrain.problems import NamedProblem, key_of, problems
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem
 
-KINDS = ("main", "band", "everyday")
+RIVAL_KINDS = ("main", "band", "everyday")
 """The kinds that all rivals can solve: length without a turn radius."""
 
-START_S = 180.0  # seconds to import, make the problems and compile
+RIVAL_START_S = 180.0  # seconds to import, make the problems and compile
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,24 +64,24 @@ class Answers:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._known: dict[tuple[str, str, str], Outcome] = {}
-        names = {f.name for f in fields(Outcome)}
+        self._known: dict[tuple[str, str, str], MethodOutcome] = {}
+        names = {f.name for f in fields(MethodOutcome)}
         for row in kept_rows(path):
             try:
-                outcome = Outcome(**{k: v for k, v in row.items() if k in names})
+                outcome = MethodOutcome(**{k: v for k, v in row.items() if k in names})
             except (TypeError, AttributeError):
                 continue
             if outcome.status != "failed":  # a crash is tried again
                 self._known[outcome.key, outcome.method, outcome.version] = outcome
 
-    def get(self, key: str, method: str, version: str | None) -> Outcome | None:
+    def get(self, key: str, method: str, version: str | None) -> MethodOutcome | None:
         """The known answer, or None; with ``version`` None, the last line of any version."""
         if version is not None:
             return self._known.get((key, method, version))
         found = [o for (k, m, _), o in self._known.items() if (k, m) == (key, method)]
         return found[-1] if found else None
 
-    def add(self, outcome: Outcome) -> None:
+    def add(self, outcome: MethodOutcome) -> None:
         """Keep an answer; it is on the disk when this returns."""
         self._known[outcome.key, outcome.method, outcome.version] = outcome
         self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -95,7 +95,7 @@ class Answers:
 def compare(
     named: Sequence[NamedProblem], asked: Sequence[Rival], answers: Answers, seed: int,
     tell: Callable[[str], None] = lambda words: None, *, kept_only: bool = False,
-) -> Iterator[Outcome]:  # fmt: skip
+) -> Iterator[MethodOutcome]:  # fmt: skip
     """Every rival's outcome on every problem, as they come; ``tell`` receives a message on each.
 
     Raises InputError if a rival is not installed. With ``kept_only``, answers come only from the file, of any version.
@@ -129,7 +129,7 @@ def compare(
             worker.close()
 
 
-def judged(outcome: Outcome, problem: Problem) -> Outcome:
+def judged(outcome: MethodOutcome, problem: Problem) -> MethodOutcome:
     """The outcome, which stays solved only if the exact check passes the path."""
     if outcome.status == "solved" and not passes(problem, outcome.points):
         return replace(outcome, status="unsafe", detail="the path does not pass the exact check")
@@ -146,11 +146,11 @@ class _Worker:
         self._process = context.Process(target=_serve, args=(theirs,), daemon=True)
         self._process.start()
         theirs.close()
-        self._room_s = START_S
+        self._room_s = RIVAL_START_S
 
-    def ask(self, one: NamedProblem, rival: Rival, seed: int) -> Outcome:
+    def ask(self, one: NamedProblem, rival: Rival, seed: int) -> MethodOutcome:
         """The rival's outcome; failed if it crashes or does not answer in time."""
-        base = Outcome(key_of(one.problem), one.name, one.kind, one.group, rival.method, "failed")
+        base = MethodOutcome(key_of(one.problem), one.name, one.kind, one.group, rival.method, "failed")
         try:
             self._ours.send((one.kind, one.name, one.seed, one.errors, rival, seed, base))
             if not self._ours.poll(self._room_s + rival.limit_s):
@@ -159,7 +159,7 @@ class _Worker:
         except (EOFError, OSError):
             return replace(base, detail="its process crashed")
         self._room_s = 0.0
-        if isinstance(answer, Outcome):
+        if isinstance(answer, MethodOutcome):
             return answer
         return replace(base, detail=str(answer))
 
@@ -187,7 +187,7 @@ def _serve(questions: Connection) -> None:
             questions.send(f"{type(error).__name__}: {error}")
 
 
-def _attempt(problem: Problem, rival: Rival, seed: int, base: Outcome) -> Outcome:
+def _attempt(problem: Problem, rival: Rival, seed: int, base: MethodOutcome) -> MethodOutcome:
     if rival.family == "ompl":
         terrain_ompl.warm_up(problem)
     memory = Memory()

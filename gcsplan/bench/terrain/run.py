@@ -16,8 +16,8 @@ from pathlib import Path
 from gcsplan.bench.files import write_all
 from gcsplan.bench.terrain import ours, report
 from gcsplan.bench.terrain import rivals as others
-from gcsplan.bench.terrain.outcome import OURS, OURS_LONG, Outcome
-from gcsplan.bench.terrain.problems import KINDS, MOUNTAINS, NamedProblem, problems
+from gcsplan.bench.terrain.outcome import OUR_LONG_METHOD, OUR_METHOD, MethodOutcome
+from gcsplan.bench.terrain.problems import MOUNTAINS, PROBLEM_KINDS, NamedProblem, problems
 from gcsplan.errors import InputError
 from gcsplan.planners.optimal.searches import require_names
 
@@ -27,14 +27,14 @@ GAP_PERCENT = 0.1
 
 
 @dataclass
-class Result:
+class TerrainResult:
     """All outcomes so far, and the report's lines about the run."""
 
-    outcomes: list[Outcome] = field(default_factory=list)
+    outcomes: list[MethodOutcome] = field(default_factory=list)
     about: list[str] = field(default_factory=list)
 
     @property
-    def lines(self) -> list[report.Line]:
+    def lines(self) -> list[report.MethodLine]:
         """The lines by group and method."""
         return report.lines(self.outcomes)
 
@@ -67,7 +67,7 @@ def run(
     gap_percent: float = GAP_PERCENT,
     without: Sequence[str] = (),
     tell: Callable[[str], None] = lambda words: None,
-) -> Result:
+) -> TerrainResult:
     """Measure and write the report to ``directory``; ``tell`` receives messages on the progress.
 
     ``seconds`` are the times of OMPL's planners. ``long`` runs gcsplan's again with a minute per problem. ``errors``
@@ -77,8 +77,8 @@ def run(
     all results so far are written. Raises InputError for unknown kinds and if a rival is not installed.
     """
     for kind in kinds:
-        if kind not in KINDS:
-            raise InputError(f"the kinds of problems are {', '.join(KINDS)}, given {kind!r}")
+        if kind not in PROBLEM_KINDS:
+            raise InputError(f"the kinds of problems are {', '.join(PROBLEM_KINDS)}, given {kind!r}")
     if runs < 1 or (count is not None and count < 1) or any(not s > 0.0 for s in seconds):
         raise InputError("runs and count must be 1 or more, seconds more than 0")
     if not (math.isfinite(gap_percent) and gap_percent >= 0.0):
@@ -88,7 +88,7 @@ def run(
         others.require(asked)
     require_names(without)
     options = {"without": tuple(without)} if without else {}
-    result = Result()
+    result = TerrainResult()
     redraws: list[tuple[int, int]] = []
     warm_s = 0.0
 
@@ -109,12 +109,12 @@ def run(
             tell(f"{kind}: warming up")
             warm_s += ours.warm_up(named, planner)
             for one in named:
-                tell(f"{OURS}: {one.name}")
+                tell(f"{OUR_METHOD}: {one.name}")
                 result.outcomes.append(ours.measure(one, sweep, runs=runs, planner=planner))
                 if long:
-                    tell(f"{OURS_LONG}: {one.name}")
+                    tell(f"{OUR_LONG_METHOD}: {one.name}")
                     result.outcomes.append(ours.measure(one, sweep, planner=planner, long=True))
-            if kind in others.KINDS:
+            if kind in others.RIVAL_KINDS:
                 compared += named
             write()
         if asked:
@@ -127,7 +127,7 @@ def run(
 
 
 def _about(
-    outcomes: Sequence[Outcome], seed: int, runs: int, warm_s: float, redraws: Sequence[tuple[int, int]],
+    outcomes: Sequence[MethodOutcome], seed: int, runs: int, warm_s: float, redraws: Sequence[tuple[int, int]],
     errors: bool, asked: Sequence[others.Rival],
 ) -> list[str]:  # fmt: skip
     """Lines on what was measured, and on which machine."""
@@ -154,7 +154,7 @@ def _about(
     return told
 
 
-def _gaps_asked(outcomes: Sequence[Outcome]) -> str:
+def _gaps_asked(outcomes: Sequence[MethodOutcome]) -> str:
     """The requested gaps by method, in words."""
     asked = {(o.method, o.gap_asked_percent) for o in outcomes if o.gap_asked_percent is not None}
     return ", ".join(f"{gap:g} % ({method})" for method, gap in sorted(asked)) or "no size"

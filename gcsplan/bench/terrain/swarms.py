@@ -20,7 +20,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.bench.measure import passes
-from gcsplan.bench.terrain.ompl import CURE, Found, box_of
+from gcsplan.bench.terrain.ompl import RIVALS_CURE, RivalAnswer, box_of
 from gcsplan.errors import InputError
 from gcsplan.optimisers.driver import History, Result
 from gcsplan.planners.problem import Problem
@@ -29,10 +29,10 @@ from gcsplan.world.zones import Circle, Level
 SWARMS = {"GWO": "OriginalGWO", "PSO": "OriginalPSO", "DE": "OriginalDE", "ABC": "OriginalABC", "FOA": "OriginalFOA"}
 BASELINES = {"DE": SWARMS["DE"], "GWO": SWARMS["GWO"]}
 """Those of `gcsplan bench swarms`."""
-POPULATION, EPOCHS = 30, 500
-CONTROL, SAMPLES = 8, 200
-SPARE_M, SPARE_SLOPE = 5.0, 0.95
-WEIGHT = 30.0
+SWARM_MEMBERS, EPOCHS = 30, 500
+CONTROL, SPLINE_SAMPLES = 8, 200
+SAMPLE_SPARE_M, SAMPLE_SPARE_SLOPE = 5.0, 0.95
+VIOLATION_WEIGHT = 30.0
 """Metres of length that each metre of violation of each sample counts. Any violation at all costs a hundred times that
 in addition, so that no illegal path beats a legal one of similar length."""
 
@@ -42,15 +42,15 @@ def release() -> str:
     try:
         return f"mealpy {version('mealpy')}"
     except PackageNotFoundError:
-        raise InputError(CURE) from None
+        raise InputError(RIVALS_CURE) from None
 
 
-def plan(problem: Problem, name: str, seed: int) -> Found:
+def plan(problem: Problem, name: str, seed: int) -> RivalAnswer:
     """Run the swarm of `SWARMS` called ``name``: 30 members, 500 epochs. Raises InputError if mealpy is missing."""
     try:
         mealpy = import_module("mealpy")
     except ImportError:
-        raise InputError(CURE) from None
+        raise InputError(RIVALS_CURE) from None
     decode, cost = encoding(problem)
     calls = [0]
 
@@ -58,7 +58,7 @@ def plan(problem: Problem, name: str, seed: int) -> Found:
         calls[0] += 1
         return cost(x)
 
-    model = getattr(getattr(mealpy, name), SWARMS[name])(epoch=EPOCHS, pop_size=POPULATION)
+    model = getattr(getattr(mealpy, name), SWARMS[name])(epoch=EPOCHS, pop_size=SWARM_MEMBERS)
     size = 2 * CONTROL
     began = time.perf_counter()
     best = model.solve(
@@ -69,9 +69,9 @@ def plan(problem: Problem, name: str, seed: int) -> Found:
     took = time.perf_counter() - began
     points = decode(np.asarray(best.solution, dtype=np.float64))
     if not passes(problem, points):
-        return Found(None, None, None, None, took, calls[0], "the best member does not pass the exact check")
+        return RivalAnswer(None, None, None, None, took, calls[0], "the best member does not pass the exact check")
     length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
-    return Found(points.tolist(), length, length, took, took, calls[0])
+    return RivalAnswer(points.tolist(), length, length, took, took, calls[0])
 
 
 def encoding(problem: Problem) -> tuple[Callable[[Floats], Floats], Callable[[Floats], float]]:
@@ -86,7 +86,7 @@ def encoding(problem: Problem) -> tuple[Callable[[Floats], Floats], Callable[[Fl
     aside = max(3_000.0, 0.75 * way)
     bottom, top = box_of(problem)[2]
     knots = np.concatenate([np.zeros(3), np.linspace(0.0, 1.0, CONTROL), np.ones(3)])
-    basis = BSpline.design_matrix(np.linspace(0.0, 1.0, SAMPLES), knots, 3).toarray()
+    basis = BSpline.design_matrix(np.linspace(0.0, 1.0, SPLINE_SAMPLES), knots, 3).toarray()
 
     def decode(x: Floats) -> Floats:
         middle = np.column_stack(
@@ -100,7 +100,7 @@ def encoding(problem: Problem) -> tuple[Callable[[Floats], Floats], Callable[[Fl
         points = decode(x)
         length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
         depth = _depths(problem, points)
-        return length + WEIGHT * depth + (100.0 * WEIGHT if depth > 0.0 else 0.0)
+        return length + VIOLATION_WEIGHT * depth + (100.0 * VIOLATION_WEIGHT if depth > 0.0 else 0.0)
 
     return decode, cost
 
@@ -113,7 +113,7 @@ def _depths(problem: Problem, points: Floats) -> float:
     known = ~np.isnan(ground)
     total = 1000.0 * float(np.count_nonzero(~known))
     # The ends are at the lowest legal altitude, so spare height is required only away from them.
-    spare = np.full(len(points), SPARE_M)
+    spare = np.full(len(points), SAMPLE_SPARE_M)
     spare[:4] = spare[-4:] = 0.0
     low = surface.top_at(e, n) + limits.min_agl_m + limits.altitude_error_m + spare - z
     total += float(np.where(known, np.maximum(low, 0.0), 0.0).sum())
@@ -123,9 +123,9 @@ def _depths(problem: Problem, points: Floats) -> float:
         high = z + limits.altitude_error_m + spare - ground - limits.max_agl_m
         total += float(np.where(known, np.maximum(high, 0.0), 0.0).sum())
     run, rise = np.hypot(*np.diff(points[:, :2], axis=0).T), np.diff(z)
-    total += float(np.maximum(rise - SPARE_SLOPE * limits.max_climb_slope * run, 0.0).sum())
-    total += float(np.maximum(-rise - SPARE_SLOPE * limits.max_descent_slope * run, 0.0).sum())
-    reach = (limits.horizontal_clearance_m + limits.track_error_m) * problem.airspace.scale + SPARE_M
+    total += float(np.maximum(rise - SAMPLE_SPARE_SLOPE * limits.max_climb_slope * run, 0.0).sum())
+    total += float(np.maximum(-rise - SAMPLE_SPARE_SLOPE * limits.max_descent_slope * run, 0.0).sum())
+    reach = (limits.horizontal_clearance_m + limits.track_error_m) * problem.airspace.scale + SAMPLE_SPARE_M
     for zone in problem.airspace.zones:
         assert isinstance(zone.shape, Circle)
         c = zone.shape
@@ -154,7 +154,7 @@ def minimised(cost: Callable[[Floats], Floats], dim: int, name: str, evaluations
     try:
         mealpy = import_module("mealpy")
     except ImportError:
-        raise InputError(CURE) from None
+        raise InputError(RIVALS_CURE) from None
     best, trace = np.full(dim, 0.5), [(0, 0, math.inf)]
 
     class Spent(Exception):
@@ -173,7 +173,8 @@ def minimised(cost: Callable[[Floats], Floats], dim: int, name: str, evaluations
 
     # Its L-SHADE draws from numpy's global generator, and no swarm takes fewer evaluations than members a round.
     np.random.seed(seed)  # noqa: NPY002
-    model = getattr(getattr(mealpy, name), BASELINES[name])(epoch=evaluations // POPULATION + 1, pop_size=POPULATION)
+    epochs = evaluations // SWARM_MEMBERS + 1
+    model = getattr(getattr(mealpy, name), BASELINES[name])(epoch=epochs, pop_size=SWARM_MEMBERS)
     bounds = mealpy.FloatVar(lb=[0.0] * dim, ub=[1.0] * dim)
     with contextlib.suppress(Spent):
         model.solve({"bounds": bounds, "minmax": "min", "obj_func": one, "log_to": None}, seed=seed)

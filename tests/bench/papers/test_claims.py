@@ -13,8 +13,18 @@ import pytest
 from gcsplan.bench.papers import judge as papers_judge
 from gcsplan.bench.papers import readings as papers_readings
 from gcsplan.bench.papers.claims import CLAIMS
-from gcsplan.bench.papers.judge import FEW, HOLDS, IMPOSSIBLE, NO_LEGAL, NOT_RUN, REVERSED, TIE, judge, standing
-from gcsplan.bench.papers.readings import READINGS, Reading
+from gcsplan.bench.papers.judge import (
+    HOLDS,
+    IMPOSSIBLE_AS_PRINTED,
+    NO_LEGAL,
+    NOT_RUN,
+    REVERSED,
+    TIE,
+    TOO_FEW_RUNS,
+    judge,
+    standing,
+)
+from gcsplan.bench.papers.readings import READINGS, PaperReading
 from gcsplan.bench.papers.scenarios import SCENARIOS, choose
 from gcsplan.bench.papers.tables import claims_table, readings_table
 from gcsplan.optimisers.registry import get as get_optimiser
@@ -75,7 +85,7 @@ def test_a_claim_holds_ties_or_is_reversed_only_where_the_runs_say_so() -> None:
     assert _case(ssgwo=high, gwo=low)["effect"] == 0.0
     assert _case(words="ssgwo < igwo", ssgwo=low, igwo=level)["verdict"] == TIE
     few = _case(ssgwo=low[:29], gwo=high)
-    assert (few["verdict"], few["p"]) == (FEW, None)
+    assert (few["verdict"], few["p"]) == (TOO_FEW_RUNS, None)
     # A short path through a cylinder is worth less than any that passes the check.
     through = _runs("gwo", 1131.0, violations=3)
     assert _case(ssgwo=low, gwo=through)["verdict"] == HOLDS
@@ -87,7 +97,7 @@ def test_what_is_impossible_as_printed_still_tells_how_it_ranks_here() -> None:
     found = {("krill-mound", "krill"): _runs("krill", 155.0), ("krill-mound", "abc"): _runs("abc", 160.0)}
     judged = judge([SCENARIOS["krill-mound"]], found)
     first = judged["claims"][0]
-    assert (first["claim"], first["verdict"], first["ranking"]) == ("krill-1", IMPOSSIBLE, HOLDS)
+    assert (first["claim"], first["verdict"], first["ranking"]) == ("krill-1", IMPOSSIBLE_AS_PRINTED, HOLDS)
     assert all("time" not in c["measure"] for c in judged["claims"])
     assert [(c["claim"], c["verdict"]) for c in judged["times"]] == [("krill-7", HOLDS)]
     assert any(re.search(r"impossible as printed [1-9]", line) for line in standing(judged, "krill"))
@@ -124,7 +134,7 @@ def test_p_is_corrected_over_the_claims_of_a_paper() -> None:
 
 
 def test_a_reading_is_judged_on_the_claims_of_the_algorithms_that_it_changes(monkeypatch: pytest.MonkeyPatch) -> None:
-    reading = Reading("other", "another rule", {"ssgwo": {}})
+    reading = PaperReading("other", "another rule", {"ssgwo": {}})
     monkeypatch.setattr(papers_judge, "readings_of", lambda _: (reading,))
     runs = {"ssgwo": _runs("ssgwo", 1170.0), "gwo": _runs("gwo", 1160.0), "ssgwo:other": _runs("other", 1150.0)}
     judged = judge([SCENARIOS[SCENARIO]], {(SCENARIO, name): some for name, some in runs.items()})

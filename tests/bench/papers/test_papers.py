@@ -22,13 +22,13 @@ from gcsplan.app import executor
 from gcsplan.bench.measure import compare, holm
 from gcsplan.bench.papers import runs as papers_runs
 from gcsplan.bench.papers import speed as papers_speed
-from gcsplan.bench.papers.judge import FEW
+from gcsplan.bench.papers.judge import TOO_FEW_RUNS
 from gcsplan.bench.papers.pictures import best_run, distances, draw_fleet, spread, stepwise
-from gcsplan.bench.papers.printed import ENDS, PRINTED, Least, Number, faults, least_of
+from gcsplan.bench.papers.printed import PRINTED, PRINTED_ENDS, PrintedNumber, StraightFlight, faults, least_of
 from gcsplan.bench.papers.remarks import remarks, schedules
-from gcsplan.bench.papers.report import IMPOSSIBLE as MARK
+from gcsplan.bench.papers.report import IMPOSSIBLE_MARK as MARK
 from gcsplan.bench.papers.report import report, scenario_table, write
-from gcsplan.bench.papers.run import KEPT, plain, run
+from gcsplan.bench.papers.run import PAPER_RUNS_FILE, plain, run
 from gcsplan.bench.papers.runs import PaperRun, Store, code_digest, seed_of, work
 from gcsplan.bench.papers.scenarios import SCENARIOS, choose, mission_text, prepare, settings_of
 from gcsplan.bench.papers.statistics import row, schedule, values
@@ -82,12 +82,12 @@ def test_a_change_of_anything_that_a_run_calls_makes_kept_runs_old(
 
 
 def test_a_printed_number_is_below_another_only_after_rounding() -> None:
-    assert Number("1129").below(1131.47)
-    assert not Number("1131").below(1131.47)  # 1131.47 rounds to it
-    assert Number("1131.0").below(1131.47)
-    assert Number("150.6818").below(150.682)
-    assert Number("29").above(28.4)
-    assert not Number("29").above(28.6)
+    assert PrintedNumber("1129").below(1131.47)
+    assert not PrintedNumber("1131").below(1131.47)  # 1131.47 rounds to it
+    assert PrintedNumber("1131.0").below(1131.47)
+    assert PrintedNumber("150.6818").below(150.682)
+    assert PrintedNumber("29").above(28.4)
+    assert not PrintedNumber("29").above(28.6)
 
 
 def _impossible(scenario: str) -> dict[tuple[str, str], str]:
@@ -112,10 +112,10 @@ def test_impossible_numbers_are_those_below_the_straight_way() -> None:
     assert not _impossible("msfoa-1")
 
 
-@pytest.mark.parametrize("scenario", ENDS)
+@pytest.mark.parametrize("scenario", PRINTED_ENDS)
 def test_marks_follow_from_the_ends_and_not_from_a_list(scenario: str) -> None:
-    near = tuple(Least.between(start, start) for start, _ in ENDS[scenario])
-    far = tuple(Least(1e6, 1e6, 1e6) for _ in ENDS[scenario])
+    near = tuple(StraightFlight.between(start, start) for start, _ in PRINTED_ENDS[scenario])
+    far = tuple(StraightFlight(1e6, 1e6, 1e6) for _ in PRINTED_ENDS[scenario])
     for (place, _), printed in PRINTED.items():
         if place == scenario:
             lengths = {m for m in printed if m.endswith("_m") and "length" in m}
@@ -128,7 +128,7 @@ def test_marks_follow_from_the_ends_and_not_from_a_list(scenario: str) -> None:
 def test_no_path_of_even_steps_pitches_more_than_its_length_allows(steps: list[tuple[float, float]]) -> None:
     heading, pitch = np.array(steps).T
     legs = np.stack([np.cos(pitch) * np.cos(heading), np.cos(pitch) * np.sin(heading), np.sin(pitch)], axis=-1)
-    least = Least.between((0.0, 0.0, 0.0), legs.sum(axis=0))
+    least = StraightFlight.between((0.0, 0.0, 0.0), legs.sum(axis=0))
     assert np.degrees(np.abs(pitch)).mean() <= least.most_pitch_deg(float(len(steps))) + 1e-4
 
 
@@ -347,7 +347,7 @@ def test_a_run_is_what_its_search_gives(finished: tuple[dict[str, Any], Path]) -
             assert history["cost"][-1] == pytest.approx(record["cost"])
             path = np.array(record["paths"][0])
             assert np.linalg.norm(np.diff(path, axis=0), axis=1).sum() == pytest.approx(record["length_m"], rel=1e-3)
-    assert {c["twin_ranking"] for c in result["claims"]} == {FEW}
+    assert {c["twin_ranking"] for c in result["claims"]} == {TOO_FEW_RUNS}
     assert len(result["claims"]) == 4  # those on length, collisions, pitch and yaw of these two
 
 
@@ -357,8 +357,8 @@ def test_what_is_finished_is_not_run_again(
     result, out = finished
     calls: list[str] = []
     monkeypatch.setattr(papers_runs, "work", lambda job: calls.append(job.algorithm) or work(job))
-    kept = (out / KEPT).read_bytes()
-    (tmp_path / KEPT).write_bytes(kept[:-30])  # the last run was being written when the power failed
+    kept = (out / PAPER_RUNS_FILE).read_bytes()
+    (tmp_path / PAPER_RUNS_FILE).write_bytes(kept[:-30])  # the last run was being written when the power failed
     last = json.loads(kept.splitlines()[-1])
     told: list[tuple[int, int]] = []
     again = run([SCENARIO], PAIR, 2, jobs=1, out=tmp_path, missions=missions, done=lambda k, n: told.append((k, n)))
@@ -387,7 +387,7 @@ def test_ctrl_c_loses_nothing_that_is_finished_and_processes_give_the_same_numbe
 
     with pytest.raises(KeyboardInterrupt):
         run([SCENARIO], PAIR, 2, jobs=2, out=tmp_path, missions=missions, done=interrupt)
-    kept = Store(tmp_path / KEPT).load()
+    kept = Store(tmp_path / PAPER_RUNS_FILE).load()
     assert 1 <= len(kept) <= 5
     told: list[int] = []
     again = run([SCENARIO], PAIR, 2, jobs=1, out=tmp_path, missions=missions, done=lambda k, n: told.append(k))
@@ -429,7 +429,7 @@ def test_a_cluster_gives_the_same_numbers(
     ) as cluster:
         again = run([SCENARIO], PAIR, 2, out=tmp_path, missions=missions, cluster=cluster.scheduler_address)
     assert _same(again) == _same(finished[0])
-    assert len(Store(tmp_path / KEPT).load()) == 5
+    assert len(Store(tmp_path / PAPER_RUNS_FILE).load()) == 5
 
 
 # -- the report --------------------------------------------------------------------------------------------------------
@@ -483,10 +483,10 @@ def test_another_clock_changes_the_files_of_times_alone(
     monkeypatch.setattr("gcsplan.bench.papers.report._pictures", lambda _: {})
     (tmp_path / "slow").mkdir()
     (tmp_path / "fast").mkdir()
-    runs = [json.loads(line) for line in (finished[1] / KEPT).read_text(encoding="utf-8").splitlines()]
+    runs = [json.loads(line) for line in (finished[1] / PAPER_RUNS_FILE).read_text(encoding="utf-8").splitlines()]
     for record in runs[::-1]:  # finished in another order, at another speed
-        Store(tmp_path / "slow" / KEPT).append(record | {"time_s": 7.0 + record["time_s"]})
-    (tmp_path / "fast" / KEPT).write_bytes((finished[1] / KEPT).read_bytes())
+        Store(tmp_path / "slow" / PAPER_RUNS_FILE).append(record | {"time_s": 7.0 + record["time_s"]})
+    (tmp_path / "fast" / PAPER_RUNS_FILE).write_bytes((finished[1] / PAPER_RUNS_FILE).read_bytes())
     said, seen = [], []
     for place in (tmp_path / "slow", tmp_path / "fast"):
         result = run([SCENARIO], PAIR, 2, jobs=1, out=place, missions=missions)
@@ -560,9 +560,9 @@ def test_the_parts_of_the_costs_time_add_up() -> None:
     took = {name: float(i) for i, name in enumerate(papers_speed._parts(), start=1)}
     parts = papers_speed._differences(took)
     assert list(parts) == list(took)
-    bare = (papers_speed.BARE, papers_speed.DIVIDED, papers_speed.ZONES)
-    assert sum(parts[name] for name in bare) == took[papers_speed.ZONES]
-    for name in papers_speed.GROUPS:
-        assert parts[name] + took[papers_speed.ZONES] == took[name]
+    bare = (papers_speed.BARE_PART, papers_speed.DIVIDED_PART, papers_speed.ZONES_PART)
+    assert sum(parts[name] for name in bare) == took[papers_speed.ZONES_PART]
+    for name in papers_speed.TERM_GROUPS:
+        assert parts[name] + took[papers_speed.ZONES_PART] == took[name]
     for measured in papers_speed._parts().values():
         measured()

@@ -12,7 +12,7 @@ import yaml
 
 from gcsplan.app import executor
 from gcsplan.bench.scale import run as scale
-from gcsplan.bench.scale.missions import DEGREE_M, make_missions, make_mosaic, mission
+from gcsplan.bench.scale.missions import EQUATOR_DEGREE_M, make_missions, make_mosaic, mission
 from gcsplan.errors import UsageError
 from gcsplan.world.frame import Frame
 from gcsplan.world.terrain import TerrainSpec, load_terrain
@@ -26,7 +26,7 @@ def test_missions_are_those_of_their_seed_and_5_to_40_km_long(tmp_path: Path) ->
     lengths_m = []
     for content in contents:
         (a, b), (c, d) = content["vehicles"][0]["start"], content["vehicles"][0]["goal"]
-        lengths_m.append(DEGREE_M * np.hypot(c - a, (d - b) * np.cos(np.radians(a))))
+        lengths_m.append(EQUATOR_DEGREE_M * np.hypot(c - a, (d - b) * np.cos(np.radians(a))))
     assert 4990 < min(lengths_m) < 8000
     assert 30_000 < max(lengths_m) < 40_200
     assert {c["terrain"]["dem"] for c in contents} == {"sample:jacksboro", str(tmp_path / "tiles")}

@@ -11,41 +11,49 @@ import numpy as np
 import pytest
 
 from gcsplan.bench.swarms import run as swarms
-from gcsplan.bench.swarms.report import Attempt, Method, Optimum, Result
-from gcsplan.bench.terrain.pairs import Pair
+from gcsplan.bench.swarms.report import Attempt, Method, Optimum, SwarmsResult
+from gcsplan.bench.terrain.pairs import TerrainPair
 from gcsplan.bench.terrain.problems import REAL_ERRORS, pair_of, problems
-from gcsplan.bench.terrain.room import ASIDE, CONE, NARROW_M, NEAR_M, STEP_M, WIDE_M, Corridors
+from gcsplan.bench.terrain.room import (
+    CORRIDOR_ASIDE,
+    CORRIDOR_CONE,
+    CORRIDOR_NARROW_M,
+    CORRIDOR_NEAR_M,
+    CORRIDOR_STEP_M,
+    CORRIDOR_WIDE_M,
+    Corridors,
+)
 from gcsplan.errors import InputError
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.zones import Circle
 
 
-def has_corridor(pair: Pair, ceiling_m: float) -> bool:
+def has_corridor(pair: TerrainPair, ceiling_m: float) -> bool:
     """Whether a corridor joins a pair's ends, by the definition, place by place: the oracle of `Corridors.open`."""
     a, b = np.array(pair.start), np.array(pair.goal)
     way = math.dist(a, b)
-    count, sides = math.ceil(way / STEP_M) + 1, math.ceil(ASIDE * way / STEP_M)
+    count, sides = math.ceil(way / CORRIDOR_STEP_M) + 1, math.ceil(CORRIDOR_ASIDE * way / CORRIDOR_STEP_M)
     air = Airspace(pair.surface, scale=pair.scale)
     ahead = (b - a) / way
     places = {
-        (i, j): a + way * i / (count - 1) * ahead + j * STEP_M * np.array([-ahead[1], ahead[0]])
+        (i, j): a + way * i / (count - 1) * ahead + j * CORRIDOR_STEP_M * np.array([-ahead[1], ahead[0]])
         for i in range(count)
         for j in range(-sides, sides + 1)
     }
     at = np.array(list(places.values()))
     floors = dict(zip(places, air.floor_amsl(at[:, 0], at[:, 1], REAL_ERRORS).tolist(), strict=True))
     reach = REAL_ERRORS.horizontal_clearance_m + REAL_ERRORS.track_error_m
-    rise = CONE * math.tan(math.radians(pair.steepest_deg))
+    rise = CORRIDOR_CONE * math.tan(math.radians(pair.steepest_deg))
 
     def open_(i: int, j: int) -> bool:
         s = way * i / (count - 1)
-        half = 0.5 * (NARROW_M if min(s, way - s) < NEAR_M else WIDE_M)
-        n = math.ceil(half / STEP_M)
+        half = 0.5 * (CORRIDOR_NARROW_M if min(s, way - s) < CORRIDOR_NEAR_M else CORRIDOR_WIDE_M)
+        n = math.ceil(half / CORRIDOR_STEP_M)
         around = [
             (min(max(i + x, 0), count - 1), min(max(j + y, -sides), sides))
             for x in range(-n, n + 1)
             for y in range(-n, n + 1)
-            if math.hypot(x, y) * STEP_M <= half + 1e-6
+            if math.hypot(x, y) * CORRIDOR_STEP_M <= half + 1e-6
         ]
         if (i, j) in ((0, 0), (count - 1, 0)):
             highest = floors[i, j]
@@ -53,7 +61,7 @@ def has_corridor(pair: Pair, ceiling_m: float) -> bool:
             highest = max(floors[k] for k in around)
             for end, place in (((0, 0), a), ((count - 1, 0), b)):
                 far = math.dist(places[i, j], place)
-                if far > 0.5 * NARROW_M and highest > floors[end] + rise * far:
+                if far > 0.5 * CORRIDOR_NARROW_M and highest > floors[end] + rise * far:
                     return False
         beside = [math.dist(places[i, j], (z.shape.east_m, z.shape.north_m)) - z.shape.radius_m  # type: ignore[union-attr]
                   for z in pair.zones]  # fmt: skip
@@ -109,7 +117,7 @@ def attempts() -> list[Attempt]:
 
 def test_the_table_tells_raw_legal_repaired_and_refused_apart() -> None:
     optima = {f"m{k}": Optimum(100.0 if k < 2 else 200.0, 99.0, 0.1) for k in range(5)}
-    [line] = Result(1, 10, optima, attempts(), [(0, 0)]).lines()
+    [line] = SwarmsResult(1, 10, optima, attempts(), [(0, 0)]).lines()
     assert line[:8] == ("de", "offsets", "length", "1", "2", "2", "60", "80")
     assert line[8:] == ("2.00", "4.40", "5.00", "2.00", "3.00", "0.20", "0.50")
 

@@ -18,8 +18,8 @@ from gcsplan.bench.terrain import ours as terrain_ours
 from gcsplan.bench.terrain import report as terrain_report
 from gcsplan.bench.terrain import rivals as terrain_rivals
 from gcsplan.bench.terrain import run as terrain
-from gcsplan.bench.terrain.outcome import OURS, Outcome
-from gcsplan.bench.terrain.problems import KINDS, NamedProblem, key_of, problems
+from gcsplan.bench.terrain.outcome import OUR_METHOD, MethodOutcome
+from gcsplan.bench.terrain.problems import PROBLEM_KINDS, NamedProblem, key_of, problems
 from gcsplan.errors import InputError, NoMission
 from gcsplan.planners.problem import Problem, Solution
 from gcsplan.world.airspace import Airspace, Legs
@@ -101,7 +101,7 @@ def test_zones_are_a_mix_that_covers_no_start_and_no_goal(main: list[NamedProble
 
 def test_everyday_missions_are_problems_too() -> None:
     few = problems("everyday", 1, count=1)
-    assert {p.group for p in few} <= set(everyday_missions.KINDS) - {"vias"}
+    assert {p.group for p in few} <= set(everyday_missions.EVERYDAY_KINDS) - {"vias"}
     assert len(few) >= 10
     assert not any(p.problem.via for p in few)  # over the sample, some missions have vias, too
     all_of_them = {p.name: key_of(p.problem) for p in problems("everyday", 1)}
@@ -299,7 +299,7 @@ def test_every_answer_of_ours_is_an_outcome(
     monkeypatch.setattr(terrain_ours, "get_planner", lambda name: fake)
     one = easy(main)
     outcome = terrain_ours.measure(one, lambda: 0.01, runs=3)  # type: ignore[arg-type]
-    assert (outcome.status, outcome.method, outcome.runs, outcome.sweep_s) == (status, OURS, 3, 0.01)
+    assert (outcome.status, outcome.method, outcome.runs, outcome.sweep_s) == (status, OUR_METHOD, 3, 0.01)
     assert len(fake.airspaces) == 3
     assert id(one.problem.airspace) not in fake.airspaces
     if error is None:
@@ -321,7 +321,7 @@ def test_a_path_that_the_exact_check_rejects_is_unsafe_whatever_its_planner_says
 
 def test_the_check_of_one_leg_is_the_airspaces_own(main: list[NamedProblem]) -> None:
     p = main[48].problem
-    names = ompl.NAMES
+    names = ompl.KERNEL_ARGUMENTS
     arguments = ompl.kernel_arguments(p.airspace, p.limits)
     assert len(names) == len(arguments)
     place = {name: arguments[i] for i, name in enumerate(names)}
@@ -330,9 +330,9 @@ def test_the_check_of_one_leg_is_the_airspaces_own(main: list[NamedProblem]) -> 
     assert place["max_amsl_m"] == p.limits.max_amsl_m
 
 
-def outcome(key: str, method: str, cost: float | None, **more: object) -> Outcome:
+def outcome(key: str, method: str, cost: float | None, **more: object) -> MethodOutcome:
     status = "not found" if cost is None else "solved"
-    return replace(Outcome(key, f"p {key}", "main", "0 zones", method, status, cost=cost), **more)  # type: ignore[arg-type]
+    return replace(MethodOutcome(key, f"p {key}", "main", "0 zones", method, status, cost=cost), **more)  # type: ignore[arg-type]
 
 
 def test_answers_outlive_a_run_that_is_cut_off_in_the_middle_of_a_line(tmp_path: Path) -> None:
@@ -403,11 +403,11 @@ def test_a_swarms_path_begins_and_ends_where_it_should_and_legal_ones_cost_their
 # -- the report -------------------------------------------------------------------------------------------------------
 
 
-def several() -> list[Outcome]:
+def several() -> list[MethodOutcome]:
     return [
-        outcome("a", OURS, 101.0, bound=100.0, first_path_s=0.02, planning_s=0.1, sweep_s=0.05, memory_mb=10.0),
-        outcome("b", OURS, 204.0, bound=200.0, first_path_s=0.04, planning_s=0.3, sweep_s=0.05, memory_mb=20.0),
-        replace(outcome("c", OURS, None), status="infeasible", detail="no way"),
+        outcome("a", OUR_METHOD, 101.0, bound=100.0, first_path_s=0.02, planning_s=0.1, sweep_s=0.05, memory_mb=10.0),
+        outcome("b", OUR_METHOD, 204.0, bound=200.0, first_path_s=0.04, planning_s=0.3, sweep_s=0.05, memory_mb=20.0),
+        replace(outcome("c", OUR_METHOD, None), status="infeasible", detail="no way"),
         outcome("a", "OMPL RRT* 1 s", 110.0, planning_s=1.0),
         outcome("b", "OMPL RRT* 1 s", 202.0, planning_s=1.0),
         outcome("c", "OMPL RRT* 1 s", None),
@@ -431,7 +431,7 @@ def test_the_report_is_written_whole_even_when_the_run_is_interrupted(
     asked: list[str] = []
     gaps: list[float] = []
 
-    def measure(one: NamedProblem, sweep: object, **more: object) -> Outcome:
+    def measure(one: NamedProblem, sweep: object, **more: object) -> MethodOutcome:
         asked.append(one.name)
         gaps.append(one.problem.gap_percent)
         if len(asked) > 2:
@@ -462,4 +462,4 @@ def test_the_report_is_written_whole_even_when_the_run_is_interrupted(
 def test_wrong_orders_are_refused_before_anything_is_done(wrong: dict[str, object], tmp_path: Path) -> None:
     with pytest.raises(InputError):
         terrain.run(tmp_path, **wrong)  # type: ignore[arg-type]
-    assert set(KINDS) >= {"main", "band", "large", "many", "turn", "energy"}
+    assert set(PROBLEM_KINDS) >= {"main", "band", "large", "many", "turn", "energy"}
