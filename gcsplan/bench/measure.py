@@ -49,6 +49,11 @@ def passes(problem: Problem, points: object) -> bool:
     return not problem.airspace.examine(legs, problem.limits).violations
 
 
+def length_m(points: object) -> float:
+    """The length in space of a path (N, 3), m."""
+    return float(np.linalg.norm(np.diff(np.asarray(points, dtype=np.float64), axis=0), axis=1).sum())
+
+
 def flown(points: Floats, radius_m: float) -> tuple[Floats, Bools] | None:
     """The track that a fixed wing flies along way points (N, 3): legs, and arcs as chords within `CHORD_SAGITTA_M`.
 

@@ -19,6 +19,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from gcsplan.arrays import Floats
 from gcsplan.bench.files import png
+from gcsplan.bench.measure import length_m
 from gcsplan.bench.papers.runs import RunRecord
 from gcsplan.bench.papers.scenarios import ReadyScenario
 from gcsplan.bench.papers.statistics import legal, schedule
@@ -273,7 +274,7 @@ def draw_fleet(summary: dict[str, Any]) -> bytes | None:
         return None
     paths = [np.array(p) for p in run["paths"]]
     vehicle, arrival = ready.source.vehicles[0].vehicle, ready.source.arrival
-    lengths = [float(np.linalg.norm(np.diff(p, axis=0), axis=1).sum()) for p in paths]
+    lengths = [length_m(p) for p in paths]
     times = [length / vehicle.speed_max_m_s for length in lengths]
     if arrival is not None:
         slots = schedule(lengths, arrival.mode, arrival.interval_s, vehicle.speed_min_m_s, vehicle.speed_max_m_s)

@@ -218,13 +218,28 @@ def report(result: dict[str, Any]) -> str:
     return "\n".join([*lines, *LEGEND, *counts(judged)]) + "\n"
 
 
-def write(result: dict[str, Any], out: Path) -> list[Path]:
+def pictures_of(summary: ScenarioSummary) -> dict[str, bytes]:
+    """PNG of a scenario by file name; none if readings alone were run."""
+    from gcsplan.bench.papers.pictures import draw_boxes, draw_convergence, draw_fleet, draw_map, draw_space
+
+    if not summary["records"]:
+        return {}
+    drawn = {"map": draw_map, "space": draw_space, "convergence": draw_convergence, "boxes": draw_boxes}
+    out = {f"{summary['name']}-{what}.png": draw(summary) for what, draw in drawn.items()}
+    fleet = draw_fleet(summary)
+    return out if fleet is None else out | {f"{summary['name']}-fleet.png": fleet}
+
+
+def write(
+    result: dict[str, Any], out: Path, draw: Callable[[ScenarioSummary], dict[str, bytes]] = pictures_of
+) -> list[Path]:
     """Write ``papers.csv``, ``papers.md``, ``papers.html``, ``papers-claims.csv`` and ``.md``, ``papers-readings.csv``,
     pictures of each scenario, and apart from them ``papers-times.csv`` and ``.md`` with all that a clock has measured.
 
-    Each file is written whole or not at all. Raises InputError if one cannot be written.
+    ``draw`` makes a scenario's pictures. Each file is written whole or not at all. Raises InputError if one cannot be
+    written.
     """
-    pictures = {name: data for summary in result["scenarios"] for name, data in _pictures(summary).items()}
+    pictures = {name: data for summary in result["scenarios"] for name, data in draw(summary).items()}
     contents: dict[str, str | bytes] = {
         "papers.csv": _csv([_flat(s, row) for s in result["scenarios"] for row in (*s["rows"], *s["reading_rows"])]),
         "papers-claims.csv": _csv(result["claims"]),
@@ -284,18 +299,6 @@ def _claims(result: dict[str, Any]) -> Iterator[str]:
         if table.rows:
             yield from (f"## {table.heading}", "")
             yield from table.markdown()
-
-
-def _pictures(summary: ScenarioSummary) -> dict[str, bytes]:
-    """PNG of a scenario by file name; none if readings alone were run."""
-    from gcsplan.bench.papers.pictures import draw_boxes, draw_convergence, draw_fleet, draw_map, draw_space
-
-    if not summary["records"]:
-        return {}
-    drawn = {"map": draw_map, "space": draw_space, "convergence": draw_convergence, "boxes": draw_boxes}
-    out = {f"{summary['name']}-{what}.png": draw(summary) for what, draw in drawn.items()}
-    fleet = draw_fleet(summary)
-    return out if fleet is None else out | {f"{summary['name']}-fleet.png": fleet}
 
 
 def _of(summary: ScenarioSummary | None, pictures: Iterable[str]) -> list[str]:

@@ -46,7 +46,7 @@ def run(repeats: int = 3, *, missions: Path | None = None, mealpy: bool = True) 
     """Time everything, best of ``repeats``; ``mealpy``: its GWO too. Raises InputError if that is not installed."""
     if repeats < 1:
         raise InputError(f"repeats must be 1 or more, given {repeats}")
-    cost, size, rounds = _cost_of(CASE, missions)
+    cost, size, rounds = cost_of(CASE, missions)
 
     def single(u: Floats) -> Floats:
         return np.array([cost(x[None])[0] for x in u])
@@ -61,10 +61,10 @@ def run(repeats: int = 3, *, missions: Path | None = None, mealpy: bool = True) 
     krill = _best_s({name: _whole(name, missions) for name in KRILL}, repeats)
     batches = {f"{objective} cost, {encoding}": _batch(objective, encoding) for objective, encoding in COSTS}
     rates = {name: BATCH / seconds for name, seconds in _best_s(batches, repeats).items()}
-    parts = {name: 1e6 * seconds / BATCH for name, seconds in _best_s(_parts(), repeats).items()}
+    parts = {name: 1e6 * seconds / BATCH for name, seconds in _best_s(parts_of_cost(), repeats).items()}
     return {
         "repeats": repeats, "population": size, "iterations": rounds, **took, "krill_s": krill, "costs_per_s": rates,
-        "parts_us": _differences(parts),
+        "parts_us": differences(parts),
         "single_ratio": took["single_s"] / took["run_s"],
         "mealpy_ratio": took["mealpy_s"] / took["run_s"] if mealpy else None,
     }  # fmt: skip
@@ -114,7 +114,7 @@ def _best_s(asked: Mapping[str, Callable[[], object]], repeats: int) -> dict[str
     return {name: min(seconds) for name, seconds in took.items()}
 
 
-def _cost_of(name: str, missions: Path | None) -> tuple[Cost, int, int]:
+def cost_of(name: str, missions: Path | None) -> tuple[Cost, int, int]:
     """The objective of a scenario's own algorithm, its population and iterations."""
     ready = prepare(name, mission_text(name, missions))
     told = settings_of(SCENARIOS[name].paper.contenders[0], ready.source)
@@ -128,7 +128,7 @@ def _cost_of(name: str, missions: Path | None) -> tuple[Cost, int, int]:
 
 def _whole(name: str, missions: Path | None) -> Callable[[], object]:
     """A whole run of a scenario's own algorithm."""
-    cost, size, rounds = _cost_of(name, missions)
+    cost, size, rounds = cost_of(name, missions)
     optimiser = SCENARIOS[name].paper.contenders[0].planner
     return lambda: minimise(optimiser, cost, cost.dim, population=size, iterations=rounds, seed=1)
 
@@ -161,7 +161,7 @@ def _batch(objective: str, encoding: str) -> Callable[[], object]:
     return lambda: cost(u)
 
 
-def _parts() -> dict[str, Callable[[], object]]:
+def parts_of_cost() -> dict[str, Callable[[], object]]:
     """The kernel of all costs with more and more of its work, then with each of `TERM_GROUPS` on top."""
     scene_ = Scene.of(_bench_problem())
     code = Code.of("bspline", scene_, 8)
@@ -186,7 +186,7 @@ def _parts() -> dict[str, Callable[[], object]]:
     }
 
 
-def _differences(took: Mapping[str, float]) -> dict[str, float]:
+def differences(took: Mapping[str, float]) -> dict[str, float]:
     """What each part adds to the work before it."""
     whole = took[ZONES_PART]
     first = {

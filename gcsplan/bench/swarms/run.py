@@ -15,15 +15,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from gcsplan.app.executor import executor
 from gcsplan.bench.files import kept_rows
-from gcsplan.bench.measure import passes
+from gcsplan.bench.measure import length_m, passes
 from gcsplan.bench.papers.runs import code_digest
 from gcsplan.bench.swarms import report
 from gcsplan.bench.swarms.report import Attempt, AttemptStatus, Method
 from gcsplan.bench.terrain import swarms as terrain_swarms
+from gcsplan.bench.terrain.ompl import release
 from gcsplan.bench.terrain.problems import NamedProblem, problems
 from gcsplan.errors import GcsplanError, InputError
 from gcsplan.planners.budget import Budget
@@ -84,7 +83,7 @@ def run(
             raise InputError(f"the methods are {', '.join(known)}, given {name!r}")
     asked = [m for m in methods(encodings=encodings, warm=warm) if names is None or m.label in names]
     if any(m.family == "mealpy" for m in asked):
-        terrain_swarms.release()
+        release("mealpy")
     named = problems("room", seed, count=count)
     jobs_of = [SwarmJob(seed, evaluations, one.name, method) for method in [None, *asked] for one in named]
     kept = Kept(directory / ATTEMPTS_FILE)
@@ -179,15 +178,15 @@ def attempt_of(one: NamedProblem, method: Method, evaluations: int) -> Attempt:
     ended = settle(problem, found)
     repaired = time.process_time()
     status: AttemptStatus = "refused" if ended is None else "raw legal" if ended[1] is None else "repaired"
-    length, searches = None, None if ended is None else 1
+    way_m, searches = None, None if ended is None else 1
     if ended is not None:
         if not passes(problem, ended[0]):
             raise GcsplanError(f"{one.name}, {method}: the path does not pass the exact check")
-        length = float(np.linalg.norm(np.diff(ended[0], axis=0), axis=1).sum())
+        way_m = length_m(ended[0])
     elif ours:
         searches = _searches(one.problem, row, settings)
     return Attempt(
-        one.name, one.group, method, status, length, found.result.evaluations, searched - began, repaired - searched,
+        one.name, one.group, method, status, way_m, found.result.evaluations, searched - began, repaired - searched,
         searches,
     )  # fmt: skip
 

@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 
+from gcsplan.bench.measure import length_m
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem
 from gcsplan.world._compiled import UNIT
@@ -61,11 +62,19 @@ class RivalAnswer:
     detail: str = ""
 
 
-def release() -> str:
-    """The installed version. Raises InputError if OMPL is missing."""
+def release(package: str) -> str:
+    """A rival's package and its installed version. Raises InputError if it is missing."""
     try:
-        return f"ompl {version('ompl')}"
+        return f"{package} {version(package)}"
     except PackageNotFoundError:
+        raise InputError(RIVALS_CURE) from None
+
+
+def rival_module(name: str) -> Any:
+    """A module of a rival's package. Raises InputError if it is missing."""
+    try:
+        return import_module(name)
+    except ImportError:
         raise InputError(RIVALS_CURE) from None
 
 
@@ -80,10 +89,7 @@ def plan(problem: Problem, name: str, seconds: float, seed: int) -> RivalAnswer:
     The shorter of the path as found and as simplified is kept. ``seed`` has an effect only in the first run of a
     process; planners that stop by the clock are not repeatable anyway. Raises InputError if OMPL is missing.
     """
-    try:
-        base, geometric, util = (import_module(f"ompl.{name}") for name in ("base", "geometric", "util"))
-    except ImportError:
-        raise InputError(RIVALS_CURE) from None
+    base, geometric, util = (rival_module(f"ompl.{part}") for part in ("base", "geometric", "util"))
     util.setLogLevel(util.LOG_NONE)
     util.RNG.setSeed(seed)
     space = base.RealVectorStateSpace(3)
@@ -128,9 +134,9 @@ def plan(problem: Problem, name: str, seconds: float, seed: int) -> RivalAnswer:
     raw = _points(path)
     geometric.PathSimplifier(info).simplify(path, 10.0 * seconds)  # ends by itself long before that time
     simple = _points(path) if path.check() else raw
-    best = min(raw, simple, key=_length)
+    best = min(raw, simple, key=length_m)
     took = elapsed_s()
-    return RivalAnswer(best, _length(best), _length(raw), first[0] if first else planned_s, took, counts[0])
+    return RivalAnswer(best, length_m(best), length_m(raw), first[0] if first else planned_s, took, counts[0])
 
 
 def box_of(problem: Problem) -> list[tuple[float, float]]:
@@ -183,10 +189,6 @@ def _crossing_s(info: Any, state: Any, problem: Problem) -> float:
 
 def _points(path: Any) -> list[list[float]]:
     return [[float(state[axis]) for axis in range(3)] for state in path.getStates()]
-
-
-def _length(points: list[list[float]]) -> float:
-    return float(np.linalg.norm(np.diff(np.array(points), axis=0), axis=1).sum())
 
 
 # -- the check of one leg ----------------------------------------------------------------------------------------------

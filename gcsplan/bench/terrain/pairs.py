@@ -9,6 +9,7 @@ Whether the climb limit and the other zones leave a path is for the planners to 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -96,14 +97,7 @@ class FloorCells:
 
     def lowest_join(self, surface: Surface, a: tuple[float, float], b: tuple[float, float]) -> float:
         """The lowest altitude, to half a metre above, below which ``a`` and ``b`` are joined; inf if there is none."""
-        known = self.floor_m[np.isfinite(self.floor_m)]  # near the map's border nothing is legal: inf
-        low, high = float(known.min()), float(known.max())
-        if not self.joined(surface, a, b, self.floor_m <= high):
-            return math.inf
-        while high - low > 0.5:
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if self.joined(surface, a, b, self.floor_m <= middle) else (middle, high)
-        return high
+        return lowest_ceiling(self.floor_m, lambda ceiling_m: self.joined(surface, a, b, self.floor_m <= ceiling_m))
 
     def outside(self, zones: tuple[Zone, ...] | list[Zone], clearance_m: float = 0.0) -> Bools:
         """(rows, cols) the cells that no zone of unlimited height touches."""
@@ -113,6 +107,21 @@ class FloorCells:
                 c, reach = zone.shape, zone.shape.radius_m + clearance_m + self.reach_m
                 free &= (self.east_m - c.east_m) ** 2 + (self.north_m - c.north_m) ** 2 > reach * reach
         return free
+
+
+def lowest_ceiling(floors_m: Floats, joined: Callable[[float], bool]) -> float:
+    """The lowest ceiling, to half a metre above, under which ends are ``joined``; inf if they are under none.
+
+    ``floors_m`` are the altitudes that matter; near the map's border nothing is legal, and they are NaN or inf.
+    """
+    known = floors_m[np.isfinite(floors_m)]
+    low, high = float(known.min()), float(known.max())
+    if not joined(high):
+        return math.inf
+    while high - low > 0.5:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if joined(middle) else (middle, high)
+    return high
 
 
 @cache

@@ -56,7 +56,7 @@ def rivals(seconds: Sequence[float], *, ompl: bool = True, swarms: bool = True) 
 
 def release(rival: Rival) -> str:
     """The version of the rival's package, which separates valid kept answers from outdated ones. Raises InputError."""
-    return terrain_ompl.release() if rival.family == "ompl" else terrain_swarms.release()
+    return terrain_ompl.release(rival.family)
 
 
 class Answers:
@@ -103,7 +103,7 @@ def compare(
     Paths are judged again here by the exact check, those of earlier runs too: the file is not trusted.
     """
     versions = {rival: None if kept_only else release(rival) for rival in asked}
-    worker: _Worker | None = None
+    worker: RivalProcess | None = None
     try:
         for one in named:
             key = key_of(one.problem)
@@ -114,7 +114,7 @@ def compare(
                     continue
                 if outcome is None:
                     tell(f"{rival.method}: {one.name}")
-                    worker = worker or _Worker()
+                    worker = worker or RivalProcess()
                     outcome = worker.ask(one, rival, seed)
                     if outcome.status == "failed":
                         worker.close()
@@ -136,7 +136,7 @@ def judged(outcome: MethodOutcome, problem: Problem) -> MethodOutcome:
     return outcome
 
 
-class _Worker:
+class RivalProcess:
     """The worker process: it receives questions and sends answers."""
 
     def __init__(self) -> None:

@@ -17,7 +17,15 @@ import numpy as np
 from scipy.ndimage import maximum_filter
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.bench.terrain.pairs import MOST_ZONE_SETS, TerrainPair, draw_above, draw_zones, place, stratum
+from gcsplan.bench.terrain.pairs import (
+    MOST_ZONE_SETS,
+    TerrainPair,
+    draw_above,
+    draw_zones,
+    lowest_ceiling,
+    place,
+    stratum,
+)
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Zone
@@ -94,14 +102,7 @@ class Corridors:
 
     def lowest(self) -> float:
         """The lowest ceiling, to half a metre above, that leaves a corridor; inf if none does."""
-        known = self.needed_m[np.isfinite(self.needed_m)]
-        low, high = float(known.min()), float(known.max())
-        if not self.open(high):
-            return math.inf
-        while high - low > 0.5:
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if self.open(middle) else (middle, high)
-        return high
+        return lowest_ceiling(self.needed_m, self.open)
 
 
 def draw_with_room(rng: np.random.Generator, number: int, limits: Limits, zones: int) -> TerrainPair:

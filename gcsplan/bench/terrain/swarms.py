@@ -13,15 +13,12 @@ import contextlib
 import math
 import time
 from collections.abc import Callable
-from importlib import import_module
-from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.bench.measure import passes
-from gcsplan.bench.terrain.ompl import RIVALS_CURE, RivalAnswer, box_of
-from gcsplan.errors import InputError
+from gcsplan.bench.measure import length_m, passes
+from gcsplan.bench.terrain.ompl import RivalAnswer, box_of, rival_module
 from gcsplan.optimisers.driver import History, Result
 from gcsplan.planners.problem import Problem
 from gcsplan.world.zones import Circle, Level
@@ -37,20 +34,9 @@ VIOLATION_WEIGHT = 30.0
 in addition, so that no illegal path beats a legal one of similar length."""
 
 
-def release() -> str:
-    """The installed version. Raises InputError if mealpy is missing."""
-    try:
-        return f"mealpy {version('mealpy')}"
-    except PackageNotFoundError:
-        raise InputError(RIVALS_CURE) from None
-
-
 def plan(problem: Problem, name: str, seed: int) -> RivalAnswer:
     """Run the swarm of `SWARMS` called ``name``: 30 members, 500 epochs. Raises InputError if mealpy is missing."""
-    try:
-        mealpy = import_module("mealpy")
-    except ImportError:
-        raise InputError(RIVALS_CURE) from None
+    mealpy = rival_module("mealpy")
     decode, cost = encoding(problem)
     calls = [0]
 
@@ -70,8 +56,8 @@ def plan(problem: Problem, name: str, seed: int) -> RivalAnswer:
     points = decode(np.asarray(best.solution, dtype=np.float64))
     if not passes(problem, points):
         return RivalAnswer(None, None, None, None, took, calls[0], "the best member does not pass the exact check")
-    length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
-    return RivalAnswer(points.tolist(), length, length, took, took, calls[0])
+    way_m = length_m(points)
+    return RivalAnswer(points.tolist(), way_m, way_m, took, took, calls[0])
 
 
 def encoding(problem: Problem) -> tuple[Callable[[Floats], Floats], Callable[[Floats], float]]:
@@ -98,9 +84,8 @@ def encoding(problem: Problem) -> tuple[Callable[[Floats], Floats], Callable[[Fl
 
     def cost(x: Floats) -> float:
         points = decode(x)
-        length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
         depth = _depths(problem, points)
-        return length + VIOLATION_WEIGHT * depth + (100.0 * VIOLATION_WEIGHT if depth > 0.0 else 0.0)
+        return length_m(points) + VIOLATION_WEIGHT * depth + (100.0 * VIOLATION_WEIGHT if depth > 0.0 else 0.0)
 
     return decode, cost
 
@@ -151,10 +136,7 @@ def minimised(cost: Callable[[Floats], Floats], dim: int, name: str, evaluations
 
     Raises InputError if mealpy is missing.
     """
-    try:
-        mealpy = import_module("mealpy")
-    except ImportError:
-        raise InputError(RIVALS_CURE) from None
+    mealpy = rival_module("mealpy")
     best, trace = np.full(dim, 0.5), [(0, 0, math.inf)]
 
     class Spent(Exception):

@@ -478,9 +478,8 @@ def test_the_files_hold_the_numbers_and_the_page_needs_no_other_file(finished: t
 
 
 def test_another_clock_changes_the_files_of_times_alone(
-    finished: tuple[dict[str, Any], Path], missions: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    finished: tuple[dict[str, Any], Path], missions: Path, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("gcsplan.bench.papers.report._pictures", lambda _: {})
     (tmp_path / "slow").mkdir()
     (tmp_path / "fast").mkdir()
     runs = [json.loads(line) for line in (finished[1] / PAPER_RUNS_FILE).read_text(encoding="utf-8").splitlines()]
@@ -491,7 +490,7 @@ def test_another_clock_changes_the_files_of_times_alone(
     for place in (tmp_path / "slow", tmp_path / "fast"):
         result = run([SCENARIO], PAIR, 2, jobs=1, out=place, missions=missions)
         said.append(report(result))
-        seen.append({file.name: file.read_bytes() for file in write(result, place)})
+        seen.append({file.name: file.read_bytes() for file in write(result, place, draw=lambda _: {})})
     assert said[0] == said[1]
     assert {name for name in seen[0] if seen[0][name] != seen[1][name]} == {"papers-times.csv", "papers-times.md"}
 
@@ -531,7 +530,7 @@ def test_a_fleet_has_its_distances_drawn_and_one_vehicle_none(finished: tuple[di
 
 
 def test_speed_is_measured_on_one_and_the_same_objective(monkeypatch: pytest.MonkeyPatch) -> None:
-    cost, size, rounds = papers_speed._cost_of(papers_speed.CASE, None)
+    cost, size, rounds = papers_speed.cost_of(papers_speed.CASE, None)
     assert (cost.dim, size, rounds) == (90, 30, 500)
     u = np.random.default_rng(1).random((40, 90))
     assert np.array([cost(x[None])[0] for x in u]) == pytest.approx(cost(u))
@@ -557,12 +556,12 @@ def test_the_speed_report_says_what_was_missed() -> None:
 
 
 def test_the_parts_of_the_costs_time_add_up() -> None:
-    took = {name: float(i) for i, name in enumerate(papers_speed._parts(), start=1)}
-    parts = papers_speed._differences(took)
+    took = {name: float(i) for i, name in enumerate(papers_speed.parts_of_cost(), start=1)}
+    parts = papers_speed.differences(took)
     assert list(parts) == list(took)
     bare = (papers_speed.BARE_PART, papers_speed.DIVIDED_PART, papers_speed.ZONES_PART)
     assert sum(parts[name] for name in bare) == took[papers_speed.ZONES_PART]
     for name in papers_speed.TERM_GROUPS:
         assert parts[name] + took[papers_speed.ZONES_PART] == took[name]
-    for measured in papers_speed._parts().values():
+    for measured in papers_speed.parts_of_cost().values():
         measured()

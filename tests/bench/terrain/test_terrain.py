@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import asdict, replace
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import numpy as np
@@ -358,7 +359,7 @@ def test_what_is_kept_is_not_run_again_and_is_judged_again(
     one = easy(main)
     good, bad = terrain_rivals.rivals([1.0], swarms=False)[:2]
     monkeypatch.setattr(terrain_rivals, "release", lambda rival: "v")
-    monkeypatch.setattr(terrain_rivals, "_Worker", None)  # nobody may be asked
+    monkeypatch.setattr(terrain_rivals, "RivalProcess", None)  # nobody may be asked
     answers = terrain_rivals.Answers(tmp_path / "rivals.jsonl")
     key = key_of(one.problem)
     answers.add(outcome(key, good.method, 1.0, version="v", points=straight(one.problem).tolist()))
@@ -372,9 +373,9 @@ def test_what_is_kept_is_not_run_again_and_is_judged_again(
 
 def test_a_rival_that_is_not_installed_is_named_with_the_cure(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def missing(name: str) -> str:
-        raise terrain_rivals.terrain_ompl.PackageNotFoundError(name)
+        raise PackageNotFoundError(name)
 
-    monkeypatch.setattr(terrain_rivals.terrain_ompl, "version", missing)
+    monkeypatch.setattr(ompl, "version", missing)
     with pytest.raises(InputError, match=r"gcsplan\[bench\]"):
         terrain.run(tmp_path, kinds=["main"], runs=1, count=1)
     assert list(tmp_path.iterdir()) == []
