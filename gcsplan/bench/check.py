@@ -10,16 +10,15 @@ from typing import Any
 import numpy as np
 
 from gcsplan.arrays import Indices
+from gcsplan.bench.sample import SAMPLE_HALF_M, SAMPLE_MIDDLE_DEG, sample_spec
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.frame import Frame
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
-from gcsplan.world.terrain import TerrainSpec, load_terrain
+from gcsplan.world.terrain import load_terrain
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 
-MIDDLE_DEG = (36.5896, -84.2458)  # middle of the sample DEM
 LEG_M = 1000.0
-HALF_M = (13_000.0, 14_000.0)  # east and north from the middle; legs start within this box
 AGL_M = (70.0, 200.0)  # range of the random heights of both ends of a leg
 LIMITS = Limits(
     min_agl_m=60.0,
@@ -63,12 +62,11 @@ def run(legs: int = 200_000, seed: int = 1, repeats: int = 5) -> dict[str, Any]:
 
 def scene(legs: int, seed: int) -> tuple[Airspace, Legs]:
     """The sample DEM with a dozen zones, and random one-kilometre legs over it, made from a seed."""
-    frame = Frame(MIDDLE_DEG[0], MIDDLE_DEG[1])
-    box = (-HALF_M[0] - LEG_M, -HALF_M[1] - LEG_M, HALF_M[0] + LEG_M, HALF_M[1] + LEG_M)
-    spec = TerrainSpec(dem=("sample:jacksboro",), vertical_datum="EGM96")
-    surface = load_terrain(spec, frame, box, where="the benchmark's terrain")
+    frame = Frame(*SAMPLE_MIDDLE_DEG)
+    box = (-SAMPLE_HALF_M[0] - LEG_M, -SAMPLE_HALF_M[1] - LEG_M, SAMPLE_HALF_M[0] + LEG_M, SAMPLE_HALF_M[1] + LEG_M)
+    surface = load_terrain(sample_spec(), frame, box, where="the benchmark's terrain")
     rng = np.random.default_rng(seed)
-    airspace = Airspace(surface, _zones(rng), scale=frame.scale_at(float(np.hypot(*HALF_M)) + LEG_M))
+    airspace = Airspace(surface, _zones(rng), scale=frame.scale_at(float(np.hypot(*SAMPLE_HALF_M)) + LEG_M))
     return airspace, _legs(rng, surface, legs)
 
 
@@ -108,7 +106,7 @@ def _zones(rng: np.random.Generator) -> list[Zone]:
     ]
     out = []
     for k in range(12):
-        east, north = rng.uniform(-1.0, 1.0, 2) * HALF_M
+        east, north = rng.uniform(-1.0, 1.0, 2) * SAMPLE_HALF_M
         turn, radius = np.sort(rng.uniform(0.0, 2.0 * np.pi, 8)), rng.uniform(300.0, 900.0, 8)
         corners = np.stack([east + radius * np.cos(turn), north + radius * np.sin(turn)], axis=-1)
         shape = Polygon(corners) if k % 3 == 2 else Circle(float(east), float(north), float(radius[0]))
@@ -119,7 +117,7 @@ def _zones(rng: np.random.Generator) -> list[Zone]:
 def _legs(rng: np.random.Generator, surface: Surface, count: int) -> Legs:
     """Legs at random places and in random directions, with both ends at random heights above their own ground."""
     turn = rng.uniform(0.0, 2.0 * np.pi, count)
-    a = rng.uniform(-1.0, 1.0, (count, 2)) * HALF_M
+    a = rng.uniform(-1.0, 1.0, (count, 2)) * SAMPLE_HALF_M
     b = a + LEG_M * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     heights = [surface.top_at(p[:, 0], p[:, 1]) + rng.uniform(*AGL_M, count) for p in (a, b)]
     return Legs(

@@ -11,7 +11,8 @@ Every algorithm starts from the same population in the same run, so runs are com
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -20,28 +21,94 @@ import numpy as np
 
 from gcsplan.app.executor import executor
 from gcsplan.arrays import Floats
-from gcsplan.bench.functions_printed import PRINTED, RUNS, WOLVES, Printed
+from gcsplan.bench.files import write_all
+from gcsplan.bench.measure import LEAST_RUNS_TO_JUDGE, MOST_RUNS, SIGNIFICANCE, holm
 from gcsplan.errors import InputError
-from gcsplan.export.outdir import write_whole
 from gcsplan.export.table import csv_of
 from gcsplan.optimisers.driver import minimise
 from gcsplan.optimisers.functions import FUNCTIONS
 from gcsplan.optimisers.registry import get
 
-CLAIMED = "ssgwo"  # the paper claims that it has the least mean, alone or shared, on every function
-SETTINGS = ("middle", "shifted")
-DIM, POPULATION, ITERATIONS = 30, 30, 500  # table 1 and section 5.1
-MOST_RUNS = 10_000
-PART_S = 2.0
-"""Seconds that ten runs take, about."""
+WOLVES = ("gwo", "mgwo", "igwo", "sogwo", "ssgwo")
+PAPER_RUNS = 50
 
-LEAST_RUNS_TO_JUDGE = 30
-SIGNIFICANCE = 0.05
-VERDICTS = {True: "reproduced", False: "not reproduced", None: "too small to tell"}
+# Table 2 of Feng et al. 2024 (Electronics 13, 68) as printed; columns in the order of WOLVES.
+_TABLE_2 = """
+f1 mean  3.2532e-26 3.5394e-196  2.8327e-28  3.3227e-76           0
+f1 std   1.3267e-26 2.8467e-198  3.2597e-29 2.79548e-78 2.6741e-199
+f1 best  4.4327e-30           0  1.3879e-32  1.3261e-80 1.1349e-199
+f2 mean  3.2671e-13  1.5371e-77  3.1679e-19  1.8342e-65  1.1463e-85
+f2 std   3.2481e-14  2.6137e-78  3.2467e-20  2.8643e-68  2.7239e-86
+f2 best  2.2738e-15  1.3367e-80  3.2497e-23  2.1973e-70  1.2371e-87
+f3 mean   2.8237e01   2.7136e01   2.4837e01   2.5197e01   2.0637e01
+f3 std   2.2537e-01  6.2276e-01  2.6927e-01  2.4977e-01  4.1876e-02
+f3 best  2.6192e-01  4.7431e-01  4.4293e-01  2.3291e-01  2.4037e-02
+f4 mean  2.6217e-06  5.2739e-90  3.3392e-46  3.5731e-96           0
+f4 std   3.5127e-06  3.2267e-90  1.9643e-45  4.3797e-98           0
+f4 best  6.1837e-07  1.6239e-91  1.7234e-48 2.7944e-101           0
+f5 mean  2.7945e-07 3.3754e-160  2.2738e-04 1.7322e-106 2.7254e-178
+f5 std   2.8153e-06 4.7687e-161  3.7327e-04 2.7528e-107 3.3784e-180
+f5 best  4.1687e-08           0  1.7822e-06 4.2975e-109 4.8374e-181
+f6 mean  1.4687e-03  1.7225e-04  1.2769e-04  3.6728e-04  2.9271e-05
+f6 std   1.3573e-03  1.2539e-04  1.2677e-04  3.7392e-05  3.2795e-05
+f6 best  2.6874e-04  7.1783e-05  2.5723e-05  1.5973e-05  5.3764e-06
+f7 mean  2.1733e-09           0  4.3651e-12  1.8327e-45           0
+f7 std   4.2734e-08           0  5.7532e-13  4.3687e-46           0
+f7 best           0           0           0           0           0
+f8 mean  1.2764e-13  3.9763e-15  2.3715e-14  3.7941e-18           0
+f8 std   1.4791e-14  5.7219e-15  3.7912e-15  2.7646e-18           0
+f8 best  2.5794e-14  2.4564e-16  1.3741e-14           0           0
+f9 mean  3.7911e-04           0  7.7497e-04           0           0
+f9 std   2.3257e-03           0  5.4259e-04           0           0
+f9 best           0           0  2.7491e-05           0           0
+"""
 
 
 @dataclass(frozen=True, slots=True)
-class _Job:
+class PrintedWolf:
+    """Mean, standard deviation and best of 50 runs, as printed."""
+
+    mean: float
+    std: float
+    best: float
+
+    @property
+    def fault(self) -> str:
+        """The reason why no 50 values, none negative, can have these three numbers; empty if some can."""
+        if self.mean < self.best:
+            return "the mean is below the best"
+        # One value is mean − best below the mean; the spread is least if the other values make up for it evenly.
+        if self.std < 0.999 * (self.mean - self.best) / math.sqrt(PAPER_RUNS - 1):
+            return "the spread is too small for this mean and best"
+        # The spread is largest if one value holds the whole sum.
+        if self.std > 1.001 * self.mean * math.sqrt(PAPER_RUNS):
+            return "the spread is too large for this mean"
+        return ""
+
+
+def _printed() -> dict[tuple[str, str], PrintedWolf]:
+    numbers = {(row[0], row[1]): row[2:] for row in map(str.split, _TABLE_2.strip().splitlines())}
+    return {
+        (function, wolf): PrintedWolf(*(float(numbers[function, what][k]) for what in ("mean", "std", "best")))
+        for function, _ in numbers
+        for k, wolf in enumerate(WOLVES)
+    }
+
+
+WOLVES_PRINTED = _printed()
+"""Table 2, by function and algorithm."""
+
+CLAIMED = "ssgwo"  # the paper claims that it has the least mean, alone or shared, on every function
+SETTINGS = ("middle", "shifted")
+DIM, POPULATION, ITERATIONS = 30, 30, 500  # table 1 and section 5.1
+PART_S = 2.0
+"""Seconds that ten runs take, about."""
+
+VERDICT_WORDS = {True: "reproduced", False: "not reproduced", None: "too small to tell"}
+
+
+@dataclass(frozen=True, slots=True)
+class _FunctionRuns:
     function: str
     algorithm: str
     setting: str
@@ -53,7 +120,7 @@ class _Job:
 
 
 def run(
-    runs: int = RUNS,
+    runs: int = PAPER_RUNS,
     seed: int = 1,
     jobs: int | None = None,
     *,
@@ -79,7 +146,7 @@ def run(
     for name in algorithms:
         get(name)
     parts = [
-        _Job(function, algorithm, setting, tuple(chunk), seed, dim, population, iterations)
+        _FunctionRuns(function, algorithm, setting, tuple(chunk), seed, dim, population, iterations)
         for function in functions
         for algorithm in algorithms
         for setting in SETTINGS
@@ -108,7 +175,7 @@ def run(
         },
         "rows": [_row(key, costs_of[key], evaluations[key]) for key in order],
         "costs": {"/".join(key): costs_of[key].tolist() for key in order},
-        "claims": _claims(costs_of, functions, algorithms, runs, dim),
+        "claims": claims_of(costs_of, functions, algorithms, runs, dim),
     }
 
 
@@ -150,41 +217,32 @@ def report(result: dict[str, Any]) -> str:
     return "\n".join(lines + _remarks(result)) + "\n"
 
 
-def ready(out: Path) -> None:
-    """Create the output directory before the long run. Raises InputError if that fails."""
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot be made: {error.strerror or error}", where=str(out)) from error
-
-
 def write(result: dict[str, Any], out: Path) -> list[Path]:
     """Write ``functions.csv`` (a row per function, algorithm and setting), ``functions-runs.csv`` and ``functions.md``.
 
     Each file is written whole or not at all. Raises InputError if one cannot be written.
     """
-    ready(out)
     names = list(result["rows"][0])
     lines = [names, *([row.get(name) for name in names] for row in result["rows"])]
     runs = [
         ["function", "algorithm", "setting", "run", "cost"],
         *([*key.split("/"), k, repr(v)] for key, values in result["costs"].items() for k, v in enumerate(values)),
     ]
-    files = {
-        out / "functions.csv": csv_of(lines, end="\r\n"),
-        out / "functions-runs.csv": csv_of(runs, end="\r\n"),
-        out / "functions.md": "\n".join(_markdown(result)) + "\n",
-    }
-    for path, content in files.items():
-        write_whole(path, content)
-    return list(files)
+    return write_all(
+        out,
+        {
+            "functions.csv": csv_of(lines, end="\r\n"),
+            "functions-runs.csv": csv_of(runs, end="\r\n"),
+            "functions.md": "\n".join(_markdown(result)) + "\n",
+        },
+    )
 
 
 def _chunks(count: int, size: int) -> Iterator[range]:
     return (range(first, min(first + size, count)) for first in range(0, count, size))
 
 
-def _work(_: None, job: _Job) -> list[tuple[float, int]]:
+def _work(_: None, job: _FunctionRuns) -> list[tuple[float, int]]:
     """Cost and evaluations of each run of a job."""
     function = FUNCTIONS[job.function]
     place = tuple(FUNCTIONS).index(job.function)
@@ -208,7 +266,7 @@ def _work(_: None, job: _Job) -> list[tuple[float, int]]:
 
 def _row(key: tuple[str, str, str], costs: Floats, evaluations: int) -> dict[str, Any]:
     function, algorithm, setting = key
-    printed = PRINTED.get((function, algorithm))
+    printed = WOLVES_PRINTED.get((function, algorithm))
     return {
         "function": function,
         "algorithm": algorithm,
@@ -223,11 +281,11 @@ def _row(key: tuple[str, str, str], costs: Floats, evaluations: int) -> dict[str
     }
 
 
-def _fields(printed: Printed | None) -> dict[str, float | None]:
+def _fields(printed: PrintedWolf | None) -> dict[str, float | None]:
     return asdict(printed) if printed else {"mean": None, "std": None, "best": None}
 
 
-def _claims(
+def claims_of(
     costs: Mapping[tuple[str, str, str], Floats],
     functions: Sequence[str],
     algorithms: Sequence[str],
@@ -250,10 +308,12 @@ def _claims(
     out = []
     for setting in SETTINGS:
         cases = [(f, rival) for f in functions for rival in rivals]
-        level = [PRINTED[f, CLAIMED].mean == PRINTED[f, rival].mean for f, rival in cases]
-        p = _holm(
-            _signed_rank(costs[f, CLAIMED, setting], costs[f, rival, setting], two_sided=tie)
-            for (f, rival), tie in zip(cases, level, strict=True)
+        level = [WOLVES_PRINTED[f, CLAIMED].mean == WOLVES_PRINTED[f, rival].mean for f, rival in cases]
+        p = holm(
+            [
+                _signed_rank(costs[f, CLAIMED, setting], costs[f, rival, setting], two_sided=tie)
+                for (f, rival), tie in zip(cases, level, strict=True)
+            ]
         )
         for (f, rival), tie, value in zip(cases, level, p, strict=True):
             differs = value < SIGNIFICANCE
@@ -280,16 +340,6 @@ def _signed_rank(ours: Floats, theirs: Floats, *, two_sided: bool) -> float:
     return float(wilcoxon(ours, theirs, alternative="less").pvalue)
 
 
-def _holm(p: Iterable[float]) -> list[float]:
-    """Holm's step-down correction."""
-    values = np.array(list(p))
-    order = np.argsort(values)
-    steps = np.maximum.accumulate(values[order] * (len(values) - np.arange(len(values))))
-    out = np.empty_like(values)
-    out[order] = np.minimum(steps, 1.0)
-    return [float(x) for x in out]
-
-
 def _experiment(s: Mapping[str, Any]) -> str:
     return f"D {s['dim']}, population {s['population']}, {s['iterations']} iterations, {s['runs']} runs"
 
@@ -303,11 +353,11 @@ def _remarks(result: dict[str, Any]) -> list[str]:
     if any(row["mean"] == 0.0 for row in result["rows"]):
         lines.append("0 of ours: less than the unit box can tell apart about its middle, 1e−26 on f1.")
     if any(row["printed_fault"] for row in result["rows"]):
-        lines.append(f"‡ no {RUNS} values can have the mean, standard deviation and best that the paper prints.")
+        lines.append(f"‡ no {PAPER_RUNS} values can have the mean, standard deviation and best that the paper prints.")
     for setting in SETTINGS:
         claims = [claim for claim in result["claims"] if claim["setting"] == setting]
         if claims:
-            count = [sum(claim["reproduced"] is verdict for claim in claims) for verdict in VERDICTS]
+            count = [sum(claim["reproduced"] is verdict for claim in claims) for verdict in VERDICT_WORDS]
             lines.append(
                 f"{setting}: of {len(claims)} rankings of SSGWO in table 2, {count[0]} reproduced, {count[1]} not "
                 f"reproduced, {count[2]} too small to tell (Wilcoxon signed ranks, Holm, {SIGNIFICANCE:g})."
@@ -348,5 +398,5 @@ def _markdown(result: dict[str, Any]) -> Iterator[str]:
         yield "| setting | function | claim of table 2 | p | |"
         yield "| --- | --- | --- | ---: | --- |"
         for claim in result["claims"]:
-            verdict = VERDICTS[claim["reproduced"]]
+            verdict = VERDICT_WORDS[claim["reproduced"]]
             yield f"| {claim['setting']} | {claim['function']} | {claim['claim']} | {claim['p']:.2g} | {verdict} |"

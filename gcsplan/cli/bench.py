@@ -56,14 +56,12 @@ def bench_upload(
     as_json: JsonOption = False,
 ) -> None:
     """Measure uploads to the loopback vehicle, side by side with MAVSDK's upload to the same vehicle (extra `test`)."""
-    if fleet is not None:
-        from gcsplan.bench import upload_fleet
-
-        measured = upload_fleet.run(fleet=fleet, items=50 if items is None else items, drop=drop)
-        _tell(measured, upload_fleet.report, as_json)
-        return
     from gcsplan.bench import upload as bench
 
+    if fleet is not None:
+        measured = bench.run_fleet(fleet=fleet, items=50 if items is None else items, drop=drop)
+        _tell(measured, bench.report_fleet, as_json)
+        return
     items = 600 if items is None else items
     result = bench.run(items=items, runs=runs)
     _tell(result, bench.report, as_json)
@@ -98,9 +96,10 @@ def bench_functions(
 ) -> None:
     """Run SSGWO's tables 1 and 2 again, beside the printed numbers, with optima in the middle and moved."""
     from gcsplan.bench import functions as bench
+    from gcsplan.bench.files import ready
 
     if out is not None:
-        bench.ready(out)  # find a bad directory before the long run
+        ready(out)  # find a bad directory before the long run
     result = bench.run(runs=runs, seed=seed, jobs=jobs)
     if out is not None:
         bench.write(result, out)
@@ -130,7 +129,8 @@ def bench_terrain(
     """Plan a set of problems made from a seed with every planner; the same exact check judges all."""
     from rich.console import Console
 
-    from gcsplan.bench import terrain, terrain_report
+    from gcsplan.bench.terrain import report as terrain_report
+    from gcsplan.bench.terrain import run as terrain
     from gcsplan.cli.console import remark
     from gcsplan.cli.screens import RESULTS
 
@@ -165,7 +165,7 @@ def bench_swarms(
     """Search 60 missions with room by every swarm: raw legal, repaired or refused, and the length over `optimal`."""
     from rich.console import Console
 
-    from gcsplan.bench import swarms
+    from gcsplan.bench.swarms import run as swarms
     from gcsplan.cli.console import remark
     from gcsplan.cli.screens import RESULTS
 
@@ -192,15 +192,15 @@ def bench_everyday(
     without: WithoutOption = None,
 ) -> None:
     """Plan short legs, walls, hooks, combs, rings, circles, polygons, vias, levels: flat, hills, the sample DEM."""
-    from gcsplan.bench import everyday
-    from gcsplan.bench.everyday_missions import KINDS
+    from gcsplan.bench.everyday import run as everyday
+    from gcsplan.bench.everyday.missions import EVERYDAY_KINDS
     from gcsplan.cli.console import remark
 
     try:
         numbers = [int(s) for s in seeds.split(",")]
     except ValueError:
         raise UsageError(f"--seeds takes whole numbers such as 1,2,3, given {seeds!r}") from None
-    asked = KINDS if kinds is None else kinds.split(",")
+    asked = EVERYDAY_KINDS if kinds is None else kinds.split(",")
     outcomes = everyday.run(out, seeds=numbers, count=count, kinds=asked, without=without or (), tell=remark)
     put(everyday.report(outcomes))
 
@@ -234,7 +234,7 @@ def bench_papers(
 ) -> None:
     """Run every scenario and algorithm of the five papers, beside their printed numbers, straight line and optimum."""
     if speed:
-        from gcsplan.bench import papers_speed
+        from gcsplan.bench.papers import speed as papers_speed
 
         measured = papers_speed.run(missions=missions)
         if as_json:
@@ -242,7 +242,8 @@ def bench_papers(
         else:
             put(papers_speed.report(measured))
         return
-    from gcsplan.bench import papers, papers_report
+    from gcsplan.bench.papers import report as papers_report
+    from gcsplan.bench.papers import run as papers
 
     result = papers.run(
         scenario or None, algorithm or None, runs, seed, jobs, out, cluster, None, missions=missions, readings=readings
@@ -273,7 +274,8 @@ def bench_metabox(
     as_json: JsonOption = False,
 ) -> None:
     """Run our optimisers beside MetaEvoBox's own on generated instances of its UAV family (extra `metabox`)."""
-    from gcsplan.bench import metabox, metabox_report
+    from gcsplan.bench.metabox import report as metabox_report
+    from gcsplan.bench.metabox import run as metabox
     from gcsplan.cli.console import remark
 
     def tell(done: int, of: int) -> None:
@@ -306,11 +308,11 @@ def bench_scale(
     as_json: JsonOption = False,
 ) -> None:
     """Measure time and memory against missions, vehicles, zones, cells of the DEM and workers (extra `cluster`)."""
-    from gcsplan.bench import papers
-    from gcsplan.bench import scale as bench
+    from gcsplan.bench.files import ready
+    from gcsplan.bench.scale import run as bench
     from gcsplan.cli.console import remark
 
-    papers.ready(out)  # find a bad directory before the long run
+    ready(out)  # find a bad directory before the long run
     result = bench.run(axes.split(","), missions, workers, seed, kill=kill, tell=remark)
     bench.write(result, out)
     _tell(result, bench.report, as_json)

@@ -10,7 +10,7 @@ import yaml
 
 from gcsplan.app.corners import moved, sharpened
 from gcsplan.app.pipeline import plan
-from gcsplan.bench.everyday_missions import draw
+from gcsplan.bench.everyday.missions import draw
 from gcsplan.mavlink.build.multirotor import SHORT_LEG_M
 from gcsplan.mission_file import load_mission
 

@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gcsplan.bench.fleet import report, run, sampled
-from gcsplan.bench.fleet_missions import APART_M, fleet_document
+from gcsplan.bench.fleet import PLACES_APART_M, fleet_document, report, run, sampled
 from gcsplan.errors import InputError
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Rules, separation
@@ -28,7 +27,7 @@ def test_the_mission_is_a_fleet_with_places_apart_and_each_system_id_once_on_a_l
     assert max(Counter(v.sysid for v in vehicles).values()) == 5
     goals = np.array([r.goal[:2] for r in source.vehicles])
     apart = np.linalg.norm(goals[:, None] - goals[None], axis=2) + 1e9 * np.eye(1000)
-    assert apart.min() > 0.99 * APART_M
+    assert apart.min() > 0.99 * PLACES_APART_M
     for vehicles_, interval_s in ((1, 4.0), (2001, 4.0), (10, 0.0)):
         with pytest.raises(InputError, match="2 to 2000 vehicles"):
             fleet_document(vehicles_, interval_s=interval_s)

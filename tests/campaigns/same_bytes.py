@@ -24,8 +24,8 @@ from typing import Any, TypeAlias
 
 import yaml
 
-from gcsplan.bench.everyday_missions import KINDS, draw
-from gcsplan.bench.fleet_missions import fleet_document
+from gcsplan.bench.everyday.missions import EVERYDAY_KINDS, draw
+from gcsplan.bench.fleet import fleet_document
 from tests.support.paths import MISSIONS, REPOSITORY
 
 SETS = ("gallery", "papers", "terrain", "everyday", "fleets", "turns", "batch")
@@ -71,7 +71,7 @@ def missions(sets: Sequence[str], count: int) -> Iterator[tuple[str, str]]:
                 yield f"fleets-{vehicles}", yaml.safe_dump(fleet_document(vehicles, SEED))
         elif which != "batch":
             for k in range(count):
-                number = len(KINDS) * k + KINDS.index("sample") if which == "terrain" else k
+                number = len(EVERYDAY_KINDS) * k + EVERYDAY_KINDS.index("sample") if which == "terrain" else k
                 document = draw(SEED, number).document
                 if which == "turns":
                     document = turning(document, random.Random(k))

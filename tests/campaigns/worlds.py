@@ -29,7 +29,7 @@ from scipy.ndimage import binary_erosion, gaussian_filter, maximum_filter
 from gcsplan.app.pipeline import world_of
 from gcsplan.app.problems import make_problem
 from gcsplan.arrays import Bools, Floats
-from gcsplan.bench.everyday_oracle import Plane, Unreachable
+from gcsplan.bench.everyday.oracle import EnclosedPlace, VisibilityGraph
 from gcsplan.errors import NoMission
 from gcsplan.mission_file import load_mission
 from gcsplan.planners.optimal.planner import plan
@@ -327,10 +327,10 @@ def flat(rng: np.random.Generator, folder: Path) -> Case:
 
     def known(problem: Problem) -> float:
         air, limits = problem.airspace, problem.limits
-        plane = Plane.of(air.zones, limits.horizontal_clearance_m + limits.track_error_m, air.scale)
+        plane = VisibilityGraph.of(air.zones, limits.horizontal_clearance_m + limits.track_error_m, air.scale)
         try:
             track = plane.shortest([problem.start[:2], problem.goal[:2]])
-        except Unreachable:
+        except EnclosedPlace:
             return math.inf
         track *= 1.0 + 2e-4  # chords lie inside their arcs
         rise = abs(problem.goal[2] - problem.start[2])

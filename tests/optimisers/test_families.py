@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats
-from gcsplan.bench.papers_statistics import compare, holm
+from gcsplan.bench.measure import compare, holm
 from gcsplan.optimisers.driver import minimise
 from gcsplan.optimisers.functions import FUNCTIONS
 from gcsplan.optimisers.registry import TABLE
@@ -53,9 +53,9 @@ def theirs(rule: Rule, cost: Cost, dim: int) -> Floats:
 
 
 def problems(name: str) -> dict[str, tuple[Cost, int]]:
-    from gcsplan.bench.papers_speed import _cost_of
+    from gcsplan.bench.papers.speed import cost_of
 
-    cost, _, _ = _cost_of(SCENARIOS[name], None)
+    cost, _, _ = cost_of(SCENARIOS[name], None)
     functions = {f: (FUNCTIONS[f].on_unit_box(DIM, shifted=True), DIM) for f in ("f1", "f3", "f7")}
     return functions | {SCENARIOS[name]: (cost, cost.dim)}
 

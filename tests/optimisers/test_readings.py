@@ -58,9 +58,9 @@ def test_a_reading_evaluates_the_points_of_the_text(name: str, function: str) ->
 @pytest.mark.parametrize("name", [name for name in READINGS if name != "abc, pairs"])  # a path may have no pairs
 @pytest.mark.parametrize("scenario", ["krill-mound", "ssgwo-table3", "ib-abc-together"])
 def test_a_reading_evaluates_the_points_of_the_text_on_paths_too(name: str, scenario: str) -> None:
-    from gcsplan.bench.papers_speed import _cost_of  # the quick tests need no map
+    from gcsplan.bench.papers.speed import cost_of  # the quick tests need no map
 
-    cost, _, _ = _cost_of(scenario, None)
+    cost, _, _ = cost_of(scenario, None)
     same_points(name, cost, cost.dim)
 
 

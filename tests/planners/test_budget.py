@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import pytest
 
-from gcsplan.bench import everyday
-from gcsplan.bench.everyday_missions import KINDS, draw
+from gcsplan.bench.everyday import run as everyday
+from gcsplan.bench.everyday.missions import EVERYDAY_KINDS, draw
 from gcsplan.errors import InputError
 from gcsplan.planners.budget import COUNTED, FIRST, FIRST_S, Budget
 from gcsplan.planners.optimal import planner
@@ -21,7 +21,7 @@ from gcsplan.planners.problem import Problem, Refusal, Solution
 
 
 def mission(kind: str, seed: int = 1) -> Problem:
-    return everyday.problem_of(draw(seed, KINDS.index(kind)))
+    return everyday.problem_of(draw(seed, EVERYDAY_KINDS.index(kind)))
 
 
 def test_work_before_the_first_path_is_counted_by_itself() -> None:
@@ -133,12 +133,12 @@ def test_every_name_of_a_search_is_known_and_others_are_refused() -> None:
 RUN = """
 import resource, sys
 from dataclasses import replace
-from gcsplan.bench import everyday
-from gcsplan.bench.everyday_missions import KINDS, draw
+from gcsplan.bench.everyday import run as everyday
+from gcsplan.bench.everyday.missions import EVERYDAY_KINDS, draw
 from gcsplan.planners.optimal.planner import plan
 kind, without, megabytes = sys.argv[1], tuple(sys.argv[2].split(",")), float(sys.argv[3])
 plan(everyday.problem_of(draw(1, 0)))
-p = everyday.problem_of(draw(1, KINDS.index(kind)))
+p = everyday.problem_of(draw(1, EVERYDAY_KINDS.index(kind)))
 p = replace(p, budget_s=2.0, budget_mb=megabytes, options={"without": without})
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 try:

@@ -13,9 +13,8 @@ from rich.console import Console
 
 from gcsplan.app import uploads
 from gcsplan.app.upload_job import JobResult, UploadJob
-from gcsplan.bench import upload_fleet as upload_fleet_bench
 from gcsplan.cli import console
-from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, VehicleRefused
+from gcsplan.errors import GcsplanError, LinkError, ReadBackDiffers, VehicleRefused
 from gcsplan.mavlink.link import session
 from gcsplan.mavlink.link.link import Link
 from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet
@@ -202,16 +201,3 @@ def test_the_live_table_is_for_terminals_and_shows_where_each_vehicle_is(monkeyp
     with console.transfer_progress(["uav1"]) as tell:
         tell("uav1", Progress("upload", 3, 12))
     assert plain.getvalue() == ""
-
-
-def test_the_measurement_of_a_fleet_wants_a_fleet() -> None:
-    with pytest.raises(InputError, match="2 to 254 vehicles"):
-        upload_fleet_bench.run(fleet=1)
-    told = upload_fleet_bench.report(
-        {
-            "vehicles": 20, "items": 50, "drop": 0.05, "autopilot": "px4", "together_s": 9.0, "slowest_alone_s": 8.0,
-            "slowest_sysid": 7, "ratio": 1.125, "retries": 3,
-        }
-    )  # fmt: skip
-    assert "1.125" in told
-    assert "5 %" in told

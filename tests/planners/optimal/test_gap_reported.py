@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from gcsplan.bench.everyday import problem_of
-from gcsplan.bench.everyday_missions import draw
+from gcsplan.bench.everyday.missions import draw
+from gcsplan.bench.everyday.run import problem_of
 from gcsplan.planners import problem as problems
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.planner import plan

@@ -13,7 +13,7 @@ import yaml
 
 from gcsplan.app.pipeline import plan, world_of
 from gcsplan.app.problems import make_problem
-from gcsplan.bench.everyday_oracle import Plane, Unreachable
+from gcsplan.bench.everyday.oracle import EnclosedPlace, VisibilityGraph
 from gcsplan.errors import NoMission
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.planners.border import border, enclosed, exit_cost, goes_on, margin_for, within_m
@@ -273,10 +273,10 @@ def frame_walls(half_m: float) -> list[Zone]:
 
 def shortest(problem: Problem, half_m: float) -> float:
     """Length (m) of the shortest track within a square; inf if there is none."""
-    plane = Plane.of([*problem.airspace.zones, *frame_walls(half_m)], 25.0)
+    plane = VisibilityGraph.of([*problem.airspace.zones, *frame_walls(half_m)], 25.0)
     try:
         return math.hypot(plane.shortest([problem.start[:2], problem.goal[:2]]), 0.0)
-    except Unreachable:
+    except EnclosedPlace:
         return math.inf
 
 
@@ -339,7 +339,7 @@ def test_bounds_and_proofs_hold_for_the_world_beyond_the_window(first: int) -> N
 
         p = Problem(over(4000.0), LOW, *ends, progress=said.append)
         p = replace(p, widen=lambda m, mb, p=p: widen(4000.0, m, p))
-        touched = Plane.of(zones, 25.0).shapes
+        touched = VisibilityGraph.of(zones, 25.0).shapes
         if any(s.buffer(2.0).covers(shapely.Point(e[:2])) for s in touched for e in ends):
             continue
         optimum = shortest(p, WORLD_M)

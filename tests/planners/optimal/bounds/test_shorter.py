@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcsplan.bench.terrain_problems import problems
+from gcsplan.bench.terrain.problems import problems
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.bounds.shorter import _bound_cheaper, _longest_track
 from gcsplan.planners.optimal.plane_search import PlaneSearch

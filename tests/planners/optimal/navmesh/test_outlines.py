@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
-from gcsplan.bench.everyday_oracle import Plane, Unreachable
+from gcsplan.bench.everyday.oracle import EnclosedPlace, VisibilityGraph
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.navmesh import outlines
 from gcsplan.planners.optimal.navmesh.outlines import Solids
@@ -55,8 +55,8 @@ def test_bound_and_path_enclose_the_visibility_graphs_track(seed: int) -> None:
     places = [(-1500.0, 0.0), (1500.0, 0.0)]
     every = np.ones(len(zones), np.bool_)
     try:
-        oracle = Plane.of(zones, reach_m).shortest(places)
-    except Unreachable:
+        oracle = VisibilityGraph.of(zones, reach_m).shortest(places)
+    except EnclosedPlace:
         pytest.skip("the zones enclose a place")
     found = [
         Solids(zones, reach_m, 1.0, [2e-3] * len(zones), Budget.endless(), outer=o).shortest(*places, every)
@@ -91,7 +91,7 @@ def test_any_number_of_triangles_may_meet_at_a_corner(seed: int) -> None:
     places = [(float(east), float(rng.uniform(-500.0, -200.0))), (float(-west), float(rng.uniform(50.0, 180.0)))]
     if math.dist(places[1], (0.0, radius_m + slit_m)) < radius_m + 5.0:
         pytest.skip("the goal lies in the disc")
-    oracle = Plane.of(zones, 0.0).shortest(places)
+    oracle = VisibilityGraph.of(zones, 0.0).shortest(places)
     for outer in (False, True):
         track = Solids(zones, 0.0, 1.0, [2e-3] * 2, Budget.endless(), outer=outer).shortest(*places, np.ones(2, bool))
         assert track is not None
@@ -114,8 +114,8 @@ def test_plans_on_flat_ground_are_certified_to_a_hair(seed: int) -> None:
     rng = np.random.default_rng([7, seed])
     p = mission(random_zones(rng, int(rng.integers(1, 60))), float(rng.choice([0.0, 33.0])))
     try:
-        Plane.of(p.airspace.zones, p.airspace.beside_m(p.limits)).shortest([p.start[:2], p.goal[:2]])
-    except Unreachable:
+        VisibilityGraph.of(p.airspace.zones, p.airspace.beside_m(p.limits)).shortest([p.start[:2], p.goal[:2]])
+    except EnclosedPlace:
         with pytest.raises(Refusal, match="proved"):
             plan(p)
         return
@@ -144,7 +144,7 @@ def test_a_c_around_the_goal_leaves_no_gap() -> None:
     shape = shape if shapely.LinearRing(shape).is_ccw else shape[::-1]
     p = mission([Zone("c", Polygon(shape))], 33.0)
     found = plan(p)
-    oracle = Plane.of(p.airspace.zones, 33.0).shortest([p.start[:2], p.goal[:2]])
+    oracle = VisibilityGraph.of(p.airspace.zones, 33.0).shortest([p.start[:2], p.goal[:2]])
     assert found.stopped_by == "gap"
     assert p.cost(found.path) == pytest.approx(oracle, rel=1e-3)
 

@@ -17,7 +17,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.bench.terrain_problems import problems
+from gcsplan.bench.terrain.problems import problems
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal import planner as optimal
 from gcsplan.planners.optimal.navmesh import polyanya, portals

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gcsplan.arrays import Floats
-from gcsplan.bench.terrain_problems import problems
+from gcsplan.bench.terrain.problems import problems
 from gcsplan.planners.lattice.planner import plan_band
 from gcsplan.planners.optimal.plane_search import PlaneSearch
 from gcsplan.planners.optimal.planner import plan

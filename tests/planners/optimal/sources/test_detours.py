@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from gcsplan.bench.terrain_problems import problems
+from gcsplan.bench.terrain.problems import problems
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.plane_search import PAST, PlaneSearch
 from gcsplan.planners.optimal.searches import PAST_FINE

@@ -1,0 +1,1 @@
+"""Our optimisers beside MetaEvoBox's."""

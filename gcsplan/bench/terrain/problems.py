@@ -1,0 +1,283 @@
+"""The problem set of ``gcsplan bench terrain``: real ground, made from a seed alone, the same on every machine.
+
+Kinds:
+
+- ``main``: 20 pairs 5 to 25 km apart, each with 0, 10 and 40 zones (the ten are the first of the forty); at least 60 m
+  above ground, a max AMSL that blocks the straight line, climb and descent of 10 to 15 degrees;
+- ``energy``: all of ``main``, in joules;
+- ``band``: 20 pairs, 60 to 120 m above ground, climb and descent of 10 degrees and again of 15, no max AMSL, no zones:
+  it is not known beforehand whether a path exists;
+- ``large``: five pairs of ``main`` with ten zones over the whole sample, refined ten times by cubic splines (3431 ×
+  4021 nodes);
+- ``many``: a pair of ``main`` with a thousand small zones;
+- ``turn``: all of ``main`` with a turn radius of 100 m, and again of 200 m;
+- ``everyday``: missions of ``gcsplan bench everyday`` without vias, half of them with clearance and errors;
+- ``room``: 20 pairs as in ``main``, each with 0, 10 and 20 zones, whose ceilings and zones leave a wide corridor
+  (`room`), for planners that search by samples; always with the clearance and errors of a real mission.
+
+Starts and goals are at the lowest legal altitude, rounded up to a centimetre. Clearance and errors are zero, so that
+other planners need only a yes or no; ``errors`` sets those of a real mission. Everyday missions have their own.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from gcsplan.arrays import Floats
+from gcsplan.bench.everyday import missions as everyday_missions
+from gcsplan.bench.everyday import run as everyday
+from gcsplan.bench.terrain.pairs import (
+    ABOVE_JOIN_M,
+    PAIR_MIN_AGL_M,
+    PAIRS,
+    SMALL_RADIUS_M,
+    FloorCells,
+    TerrainPair,
+    draw_pair,
+    draw_zones,
+    sample,
+)
+from gcsplan.bench.terrain.room import draw_with_room
+from gcsplan.errors import InputError
+from gcsplan.planners.problem import Objective, Problem
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.limits import Limits
+from gcsplan.world.surface import GridMap, Surface
+from gcsplan.world.zones import Circle, Polygon
+
+MAIN_ZONES, ROOM_ZONES = (0, 10, 40), (0, 10, 20)
+BAND_M, BAND_DEG = (60.0, 120.0), (10.0, 15.0)
+LARGE_FINER, LARGE_PAIRS = 10, (1, 5, 9, 13, 17)
+MANY_PAIR, MANY_ZONES = 10, 1000
+TURN_RADII_M = (100.0, 200.0)
+
+NO_ERRORS = Limits(min_agl_m=PAIR_MIN_AGL_M)
+REAL_ERRORS = Limits(min_agl_m=PAIR_MIN_AGL_M, horizontal_clearance_m=30.0, track_error_m=3.0, altitude_error_m=5.0)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class NamedProblem:
+    """A problem with its name (kind, seed, pair, what varies), its kind, and the group for the report.
+
+    ``redraws`` are the pairs and the sets of zones that were drawn in vain before it.
+    """
+
+    name: str
+    problem: Problem
+    kind: str
+    group: str
+    redraws: tuple[int, int] = (0, 0)
+    seed: int = 1
+    errors: bool = False
+
+
+def problems(
+    kind: str, seed: int = 1, *, objective: Objective = "length", errors: bool = False, count: int | None = None
+) -> list[NamedProblem]:
+    """The problems of one kind, or the first ``count`` of each group. Raises InputError for an unknown kind.
+
+    ``errors``: with the clearance and errors of a real mission; ceilings and zones are then drawn for those.
+    """
+    make = _PROBLEM_MAKERS.get(kind)
+    if make is None:
+        raise InputError(f"the kinds of problems are {', '.join(_PROBLEM_MAKERS)}, given {kind!r}")
+    found = []
+    seen: dict[str, int] = {}
+    for one in make(seed, REAL_ERRORS if errors else NO_ERRORS, count):
+        seen[one.group] = seen.get(one.group, 0) + 1
+        if count is None or seen[one.group] <= count:
+            goal: Objective = "energy" if kind == "energy" else objective
+            found.append(replace(one, problem=replace(one.problem, objective=goal), seed=seed, errors=errors))
+    return found
+
+
+def key_of(problem: Problem) -> str:
+    """A hash of everything in ``problem`` that affects its answer, the same for equal problems on every machine.
+
+    Metres are rounded to a millimetre in it, because libraries differ in the last digits of a projection.
+    """
+    surface, p = problem.airspace.surface, problem
+    zones = [
+        (f"{z.shape.east_m:.3f} {z.shape.north_m:.3f} {z.shape.radius_m:.3f}", str(z.floor), str(z.ceiling))
+        for z in p.airspace.zones
+        if isinstance(z.shape, Circle)
+    ]
+    zones += [
+        (" ".join(f"{x:.3f}" for x in z.shape.vertices.ravel()), str(z.floor), str(z.ceiling))
+        for z in p.airspace.zones
+        if isinstance(z.shape, Polygon)
+    ]
+    rows, cols = surface.ground_m.shape
+    corners = surface.grid.to_plane([0.0, cols - 1.0], [0.0, rows - 1.0])
+    told = (
+        [f"{x:.3f}" for x in (*p.start, *p.goal, *corners.ravel().tolist())], p.via, zones, p.limits,
+        p.objective, p.vertical_j_per_m, p.horizontal_j_per_m, p.turn_radius_m, round(p.airspace.scale, 9),
+    )  # fmt: skip
+    digest = hashlib.sha256(repr(told).encode())
+    digest.update(surface.ground_m.tobytes())
+    if surface.top_m is not surface.ground_m:
+        digest.update(surface.top_m.tobytes())
+    return digest.hexdigest()[:20]
+
+
+@cache
+def pair_of(seed: int, number: int, limits: Limits, kind: str = "main") -> TerrainPair:
+    """Pair ``number``; each has its own random numbers, so that none depends on how many are requested."""
+    rng = np.random.default_rng([seed, number, {"main": 0, "band": 1, "room": 3}[kind]])
+    if kind == "room":
+        return draw_with_room(rng, number, limits, max(ROOM_ZONES))
+    return draw_pair(rng, number, limits, max(MAIN_ZONES) if kind == "main" else 0, ceiling=kind == "main")
+
+
+def _main(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:
+    for zones in MAIN_ZONES:
+        for number in _spread(count):
+            pair = pair_of(seed, number, limits)
+            problem = _problem(pair, Airspace(pair.surface, pair.zones[:zones], scale=pair.scale), _held(pair, limits))
+            yield NamedProblem(
+                f"main {seed}/{number:02d}, {zones} zones", problem, "main", f"{zones} zones", pair.redraws
+            )
+
+
+def _energy(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:
+    for one in _main(seed, limits, count):
+        yield replace(one, name=one.name.replace("main", "energy"), kind="energy", group=f"{one.group}, energy")
+
+
+def _band(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:
+    for degrees in BAND_DEG:
+        for number in _spread(count):
+            pair = pair_of(seed, number, limits, "band")
+            held = replace(
+                limits, min_agl_m=BAND_M[0], max_agl_m=BAND_M[1], max_climb_deg=degrees, max_descent_deg=degrees
+            )
+            problem = _problem(pair, Airspace(pair.surface, scale=pair.scale), held)
+            name = f"band {seed}/{number:02d}, {degrees:g}°"
+            yield NamedProblem(name, problem, "band", f"{BAND_M[0]:g}–{BAND_M[1]:g} m, {degrees:g}°", pair.redraws)
+
+
+def _large(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:
+    for number in LARGE_PAIRS[:count]:
+        pair = pair_of(seed, number, limits)
+        far = (-1e5, -1e5, 1e5, 1e5)  # the whole sample, wherever the pair is on it
+        surface = _refined(sample().load(pair.frame, far))
+        rows, cols = surface.ground_m.shape
+        corners = surface.grid.to_plane([0, 0, cols - 1, cols - 1], [0, rows - 1, 0, rows - 1])
+        scale = pair.frame.scale_at(float(np.hypot(*corners.T).max()))
+        airspace = Airspace(surface, pair.zones[:10], scale=scale)
+        held = _held(pair, limits)
+        assert pair.ceiling_m is not None
+        if not _joined(airspace, pair, limits, pair.ceiling_m):
+            # Sometimes a spline rises above the saddles between the nodes of the DEM.
+            join = FloorCells.of(airspace, limits).lowest_join(surface, pair.start, pair.goal)
+            held = replace(held, max_amsl_m=math.floor(join + ABOVE_JOIN_M[0] + limits.altitude_error_m) + 0.5)
+        name = f"large {seed}/{number:02d}, 10 zones"
+        problem = _problem(pair, airspace, held)
+        # A new airspace, because the data derived for the old one takes hundreds of megabytes.
+        problem = replace(problem, airspace=Airspace(surface, airspace.zones, scale=scale))
+        yield NamedProblem(name, problem, "large", f"{rows} × {cols} nodes", pair.redraws)
+
+
+def _many(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:
+    pair = pair_of(seed, MANY_PAIR, limits)
+    rng = np.random.default_rng([seed, MANY_PAIR, 2])
+    held = _held(pair, limits)
+    assert pair.ceiling_m is not None
+    for redraws in range(1000):
+        zones = draw_zones(rng, pair, MANY_ZONES, SMALL_RADIUS_M)
+        airspace = Airspace(pair.surface, zones, scale=pair.scale)
+        if _joined(airspace, pair, limits, pair.ceiling_m):
+            problem = _problem(pair, airspace, held)
+            name = f"many {seed}/{MANY_PAIR:02d}, {MANY_ZONES} zones"
+            yield NamedProblem(name, problem, "many", f"{MANY_ZONES} zones", (pair.redraws[0], redraws))
+            return
+    raise InputError(f"no set of {MANY_ZONES} zones leaves a way for seed {seed}: give another seed")
+
+
+def _turn(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:
+    for radius_m in TURN_RADII_M:
+        for one in _main(seed, limits, count):
+            problem = replace(one.problem, turn_radius_m=radius_m)
+            name = f"{one.name.replace('main', 'turn')}, radius {radius_m:g} m"
+            yield replace(
+                one, name=name, problem=problem, kind="turn", group=f"{one.group}, turn radius {radius_m:g} m"
+            )
+
+
+def _everyday(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:
+    each = everyday.MISSIONS_OF_A_SEED // len(everyday_missions.EVERYDAY_KINDS) if count is None else count
+    for number in range(each * len(everyday_missions.EVERYDAY_KINDS)):
+        one = everyday_missions.draw(seed, number)
+        problem = everyday.problem_of(one)
+        if not problem.via:
+            yield NamedProblem(f"everyday {one.name}, {one.kind}", problem, "everyday", one.kind, (0, one.redraws))
+
+
+def _room(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:
+    for zones in ROOM_ZONES:
+        for number in _spread(count):
+            pair = pair_of(seed, number, REAL_ERRORS, "room")
+            airspace = Airspace(pair.surface, pair.zones[:zones], scale=pair.scale)
+            problem = _problem(pair, airspace, _held(pair, REAL_ERRORS))
+            name = f"room {seed}/{number:02d}, {zones} zones"
+            yield NamedProblem(name, problem, "room", f"room, {zones} zones", pair.redraws)
+
+
+_PROBLEM_MAKERS: dict[str, Callable[[int, Limits, int | None], Iterator[NamedProblem]]] = {
+    "main": _main, "energy": _energy, "band": _band, "large": _large, "many": _many, "turn": _turn,
+    "everyday": _everyday, "room": _room,
+}  # fmt: skip
+PROBLEM_KINDS = tuple(_PROBLEM_MAKERS)
+MOUNTAINS = PROBLEM_KINDS[:-2]
+"""The kinds over real mountains that are measured unless others are named."""
+
+
+def _spread(count: int | None) -> list[int]:
+    """The numbers of the pairs: all, or ``count`` of them from short to long."""
+    if count is None or count >= PAIRS:
+        return list(range(PAIRS))
+    return [(2 * k + 1) * PAIRS // (2 * count) for k in range(count)]
+
+
+def _held(pair: TerrainPair, limits: Limits) -> Limits:
+    return replace(
+        limits, max_amsl_m=pair.ceiling_m, max_climb_deg=pair.steepest_deg, max_descent_deg=pair.steepest_deg
+    )
+
+
+def _problem(pair: TerrainPair, airspace: Airspace, limits: Limits) -> Problem:
+    (e0, n0), (e1, n1) = pair.start, pair.goal
+    floors = airspace.floor_amsl(np.array([e0, e1]), np.array([n0, n1]), limits)
+    z0, z1 = (math.ceil(100.0 * z - 1e-4) / 100.0 for z in floors.tolist())
+    return Problem(airspace, limits, (e0, n0, z0), (e1, n1, z1))
+
+
+def _joined(airspace: Airspace, pair: TerrainPair, limits: Limits, ceiling_m: float) -> bool:
+    """Whether start and goal are joined under the ceiling and among the zones of unlimited height."""
+    cells = FloorCells.of(airspace, limits)
+    free = cells.outside(airspace.zones, limits.horizontal_clearance_m + limits.track_error_m)
+    free &= cells.floor_m <= ceiling_m - limits.altitude_error_m
+    return cells.joined(airspace.surface, pair.start, pair.goal, free)
+
+
+def _refined(surface: Surface) -> Surface:
+    """The surface on a grid `LARGE_FINER` times finer: cubic splines through the nodes, rounded to the centimetre."""
+    grid = surface.grid
+    finer = GridMap(grid.coefficients * LARGE_FINER, grid.centre, grid.scale_m, grid.error_m)
+    ground = _refined_ground(surface.ground_m.tobytes(), surface.ground_m.shape)
+    return Surface(ground, ground, finer, {**surface.info, "resolution_m": round(92.0 / LARGE_FINER, 1)})
+
+
+@cache
+def _refined_ground(nodes: bytes, shape: tuple[int, int]) -> Floats:
+    from scipy.ndimage import zoom
+
+    ground = np.frombuffer(nodes).reshape(shape)
+    size = [(n - 1) * LARGE_FINER + 1 for n in shape]
+    return np.round(zoom(ground, [m / n for m, n in zip(size, shape, strict=True)], order=3), 2)
