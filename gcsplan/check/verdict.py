@@ -6,15 +6,14 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gcsplan.check.misses import Miss
 from gcsplan.check.stretch import Place, StretchKind
 from gcsplan.check.zone_heights import ZonePass
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.parameter_safety import Extent
-from gcsplan.notes.note import Said
-from gcsplan.units import UnitText, joined
+from gcsplan.notes.note import IN_FILES, Note, Said, Wording, told
 
 if TYPE_CHECKING:
     from gcsplan.fleet.arrival import Slot
@@ -25,11 +24,14 @@ PAPER_MARK = " (paper's figures)"
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One limit broken by wire item ``seq``: the place, by how much, and a message. ``zone`` is its name or empty."""
+    """One limit broken by wire item ``seq``: what is said of it, the place, and by how much.
+
+    ``zone`` is the zone's name or empty.
+    """
 
     seq: int
     kind: str
-    message: str
+    note: Note
     lat_deg: float
     lon_deg: float
     amsl_m: float
@@ -38,6 +40,18 @@ class Finding:
     by: float
     unit: str
     zone: str = ""
+
+    @property
+    def message(self) -> str:
+        """What is said of it, in SI."""
+        return str(self.note)
+
+    def as_dict(self, wording: Wording = IN_FILES) -> dict[str, Any]:
+        """The finding for programs: its fields with the message, and the note's code and data."""
+        fields = {name: getattr(self, name) for name in self.__slots__ if name != "note"}
+        said = self.note.as_dict()
+        begins = {"seq": fields.pop("seq"), "kind": fields.pop("kind"), "message": self.note.text(wording)}
+        return begins | fields | {"code": said["code"], "data": said["data"]}
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,6 +270,7 @@ class Verdict:
         """The steepest angle of all stretches except columns, up or down, degrees."""
         return max((abs(leg.climb_deg) for leg in self.legs if not leg.column and leg.horizontal_m > 0), default=0.0)
 
-    def describe(self) -> UnitText:
+    def describe(self, wording: Wording = IN_FILES) -> str:
         """All findings and all that is not judged, one per line."""
-        return joined("\n", [f.message for f in self.findings] + [f"not judged: {what}" for what in self.not_judged])
+        unjudged = [f"not judged: {told(what, wording)}" for what in self.not_judged]
+        return "\n".join([f.note.text(wording) for f in self.findings] + unjudged)
