@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
@@ -91,55 +91,42 @@ class LegFigures:
     speed_m_s: float = math.nan
 
 
-@dataclass(frozen=True, slots=True)
-class ItemFigures:
-    """Figures of all stretches that are flown for one item in a row: the chords of a spline, a track and its landing.
+def by_item(legs: Sequence[LegFigures]) -> Iterator[tuple[LegFigures, int]]:
+    """The figures of each item in the order flown, and how many stretches they are of: a spline's chords, for example.
 
-    ``kind`` and ``end`` are those of the last one. ``min_agl_m`` and ``climb_deg`` leave columns out; without another
-    stretch the height is NaN, and the angle that of the column. ``stretches``: how many they are; ``times``: how often
-    they are flown in a row; energy and time are those of one pass.
+    An item that a jump leads back to comes again. ``kind`` and ``end`` are those of its last stretch. ``min_agl_m`` and
+    ``climb_deg`` leave columns out; without another stretch the height is NaN, and the angle that of the column.
     """
-
-    seq: int
-    kind: StretchKind
-    end: Place
-    length_m: float
-    climb_deg: float
-    agl_end_m: float
-    min_agl_m: float
-    max_agl_m: float
-    zone_clearance_m: float
-    nearest_zone: str
-    energy_j: float
-    time_s: float
-    column: bool
-    stretches: int
-    times: int
-
-
-def by_item(legs: Sequence[LegFigures]) -> Iterator[ItemFigures]:
-    """The figures of each item in the order flown; an item that a jump leads back to comes again."""
     group: list[LegFigures] = []
     for leg in legs:
         if group and (leg.jumped_from is not None or (leg.seq, leg.times) != (group[-1].seq, group[-1].times)):
-            yield _together(group)
+            yield _together(group), len(group)
             group = []
         group.append(leg)
     if group:
-        yield _together(group)
+        yield _together(group), len(group)
 
 
-def _together(legs: Sequence[LegFigures]) -> ItemFigures:
-    last = legs[-1]
+def _together(legs: Sequence[LegFigures]) -> LegFigures:
+    first, last = legs[0], legs[-1]
     flown = [leg for leg in legs if not leg.column]
-    heights = [leg.min_agl_m for leg in flown if not math.isnan(leg.min_agl_m)]
-    tops = [leg.max_agl_m for leg in legs if not math.isnan(leg.max_agl_m)]
+    low = min((leg for leg in flown if not math.isnan(leg.min_agl_m)), key=lambda leg: leg.min_agl_m, default=None)
     near = min((leg for leg in legs if leg.nearest_zone), key=lambda leg: leg.zone_clearance_m, default=last)
-    return ItemFigures(
-        last.seq, last.kind, last.end, math.fsum(leg.length_m for leg in legs),
-        max((leg.climb_deg for leg in flown or legs), key=abs), last.agl_end_m, min(heights, default=math.nan),
-        max(tops, default=math.nan), near.zone_clearance_m, near.nearest_zone, math.fsum(leg.energy_j for leg in legs),
-        math.fsum(leg.time_s for leg in legs), not flown, len(legs), last.times,
+
+    def total(of: Callable[[LegFigures], float]) -> float:
+        return math.fsum(map(of, legs))
+
+    return replace(
+        last, start=first.start, jumped_from=first.jumped_from, column=not flown,
+        on_path=any(leg.on_path for leg in legs),
+        horizontal_m=total(lambda leg: leg.horizontal_m), length_m=total(lambda leg: leg.length_m),
+        energy_j=total(lambda leg: leg.energy_j), time_s=total(lambda leg: leg.time_s),
+        hold_s=total(lambda leg: leg.hold_s), hold_j=total(lambda leg: leg.hold_j),
+        lead_j=total(lambda leg: leg.lead_j),
+        climb_deg=max((leg.climb_deg for leg in flown or legs), key=abs),
+        min_agl_m=math.nan if low is None else low.min_agl_m, min_agl_at=(low or last).min_agl_at,
+        max_agl_m=max((leg.max_agl_m for leg in legs if not math.isnan(leg.max_agl_m)), default=math.nan),
+        zone_clearance_m=near.zone_clearance_m, nearest_zone=near.nearest_zone,
     )  # fmt: skip
 
 

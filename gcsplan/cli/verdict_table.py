@@ -53,7 +53,7 @@ def verdict_table(
                ("climb °", True), (f"nearest zone {near.symbol}", True), ("energy kJ", True),
                ("time", True)]  # fmt: skip
     bad = {f.seq for f in verdict.findings}
-    items = list(by_item(verdict.legs))
+    items = [item for item, _ in by_item(verdict.legs)]
     rows = [
         (
             str(item.seq), item.kind, number(item.length_m, 0, units.leg), number(item.end[2], 1, height),
