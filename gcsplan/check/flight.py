@@ -37,7 +37,7 @@ from gcsplan.check.early_turn import turns_early
 from gcsplan.check.geodesy import flat_m
 from gcsplan.check.glide import glide
 from gcsplan.check.route import fly_all
-from gcsplan.check.rtl.model import RULES, return_pieces
+from gcsplan.check.rtl.model import RULES, returned
 from gcsplan.check.rtl.run_on import about_turn_m
 from gcsplan.check.spline import NO_DIRECTION, chords, slowed, towards
 from gcsplan.check.stretch import Flight, Place, StretchKind
@@ -344,16 +344,15 @@ class _Pilot(Aboard):
             self.landed = True
             return
         self.pace = replace(self.pace, speed_m_s=self.vehicle.return_speed_m_s or self.pace.speed_m_s)
-        pieces = return_pieces(
+        flown, instead = returned(
+            lambda start, end, **more: self.stretch(seq, "rtl", start, end, more),
             RULES[self.autopilot], self.at, self.home, self.home[2] + self.rtl_rel_home_m,
             about_m=about_turn_m(self.vehicle, self.pace.speed_m_s, self.at[2], flat_m(self.at, self.home)),
             waits_s=self.vehicle.return_waits_s,
         )  # fmt: skip
-        for piece in pieces:
-            fly = self.instead if piece.instead else self.add
-            fly(seq, "rtl", piece.start, piece.end, column=piece.column, band_m=piece.band_m, reach_m=piece.reach_m,
-                hold_s=piece.hold_s)  # fmt: skip
-        self.at = pieces[-1].end
+        self.flight.stretches += flown
+        self.flight.instead += instead
+        self.at = flown[-1].end
         self.landed = True
 
     def _wait(self, seq: int, item: MissionItem) -> None:
