@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from gcsplan.notes import battery_texts, file_texts, finding_texts, flight_texts, return_texts, turn_texts
+from gcsplan.notes import battery_texts, finding_texts, flight_texts, return_texts, site_texts, turn_texts
 
 TEXTS: Mapping[str, str] = MappingProxyType({
     code: text
-    for room in (battery_texts, file_texts, finding_texts, flight_texts, return_texts, turn_texts)
+    for room in (battery_texts, site_texts, finding_texts, flight_texts, return_texts, turn_texts)
     for code, text in room.TEXTS.items()
 })  # fmt: skip

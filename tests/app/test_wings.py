@@ -52,8 +52,8 @@ from gcsplan.world.path import Path
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Zone
 from tests.support.effort import draws
+from tests.support.noted import coded, codes, within
 from tests.support.paths import MISSIONS
-from tests.support.said import coded, codes, within
 from tests.support.worlds import vehicle, world
 
 pytestmark = pytest.mark.xdist_group("wings")  # one process plans the missions, not three

@@ -18,7 +18,7 @@ from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Zone
-from tests.support.said import codes
+from tests.support.noted import codes
 from tests.support.worlds import vehicle, world
 
 COPTER, PLANE = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE

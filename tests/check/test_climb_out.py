@@ -18,7 +18,7 @@ from gcsplan.vehicle import Autopilot, ClimbOut, Vehicle
 from gcsplan.world.atmosphere import true_per_indicated
 from gcsplan.world.limits import Limits
 from gcsplan.world.zones import Circle, Level, Zone
-from tests.support.said import codes
+from tests.support.noted import codes
 from tests.support.worlds import Height, world
 
 TOP_M = 80.0

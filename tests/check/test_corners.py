@@ -26,8 +26,8 @@ from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Zone
+from tests.support.noted import coded, within
 from tests.support.paths import DATA
-from tests.support.said import coded, within
 from tests.support.worlds import vehicle, world
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4

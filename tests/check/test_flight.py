@@ -14,7 +14,7 @@ from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
-from tests.support.said import codes
+from tests.support.noted import codes
 
 GROUND_M = 300.0
 HOME = Home.at(36.6, -84.3, GROUND_M)

@@ -11,7 +11,7 @@ from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.notes.note import Said
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
-from tests.support.said import coded, codes
+from tests.support.noted import coded, codes
 from tests.support.worlds import world
 
 

@@ -19,7 +19,7 @@ from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
 from tests.support.effort import draws
-from tests.support.said import codes
+from tests.support.noted import codes
 
 HOME = Home.at(36.6, -84.3, 300.0)
 TAKEOFF = MissionItem(cmd.TAKEOFF, m.RELATIVE, z=65.0)

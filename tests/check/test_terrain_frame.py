@@ -25,7 +25,7 @@ from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.terrain_grid import TerrainGrid
 from gcsplan.world.world import World
 from tests.oracles import terrain_grid as oracle
-from tests.support.said import coded
+from tests.support.noted import coded
 from tests.support.worlds import Height, vehicle
 
 

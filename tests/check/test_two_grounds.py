@@ -23,7 +23,7 @@ from gcsplan.world.path import Path
 from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Zone
-from tests.support.said import coded
+from tests.support.noted import coded
 from tests.support.worlds import vehicle
 
 HOME_DEG = (36.6, -84.3)

@@ -14,7 +14,7 @@ from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
-from tests.support.said import codes
+from tests.support.noted import codes
 from tests.support.worlds import vehicle, world
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4

@@ -10,7 +10,7 @@ import pytest
 from gcsplan.app.outputs import outputs_of, summary_of
 from gcsplan.app.pipeline import plan
 from gcsplan.mission_file import load_mission
-from tests.support.said import codes
+from tests.support.noted import codes
 
 WIDE = {"max_climb_deg": 60}
 

@@ -22,7 +22,7 @@ from gcsplan.world.zones import Circle, Zone
 from tests.check.rtl.test_way_home import BARE, OVER, judged, mission, ridge
 from tests.oracles.joins import join_breach, random_path_case
 from tests.oracles.returns import run_on
-from tests.support.said import codes, within
+from tests.support.noted import codes, within
 from tests.support.worlds import vehicle, world
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4

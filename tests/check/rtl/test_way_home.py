@@ -36,7 +36,7 @@ from gcsplan.world.limits import Limits
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.oracles.returns import breach, random_case, run_on
-from tests.support.said import codes, within
+from tests.support.noted import codes, within
 from tests.support.worlds import vehicle, world
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
