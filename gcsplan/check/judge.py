@@ -263,13 +263,13 @@ def _most(agl_m: Floats) -> float:
     return float(np.fmax.reduce(agl_m))
 
 
-HEIGHTS = {
+BROKEN_HEIGHTS = {
     "min_agl": "too_low",
     "max_agl": "too_high",
     "max_amsl": "above_ceiling",
     "terrain_clearance": "near_rising_ground",
 }
-ANGLES = {"climb": "climbs_too_steeply", "descent": "descends_too_steeply"}
+BROKEN_ANGLES = {"climb": "climbs_too_steeply", "descent": "descends_too_steeply"}
 """The notes on limits of height and of angle, by the kind of the violation."""
 
 
@@ -317,13 +317,21 @@ def _said(s: Stretch, v: Violation, zone: str, at: tuple[float, float]) -> Note:
         return Note("over_unknown_ground", s.seq, way=way, lat=lat, lon=lon, amsl_m=v.amsl_m)
     if v.kind == "zone":
         return Note("inside_zone", s.seq, way=way, zone=zone, by_m=v.by, lat=lat, lon=lon, amsl_m=v.amsl_m)
-    if v.kind in ANGLES:
+    if v.kind in BROKEN_ANGLES:
         return Note(
-            ANGLES[v.kind], s.seq, way=way, value_deg=v.value, limit_deg=v.limit, by_deg=v.by, lat=lat, lon=lon,
+            BROKEN_ANGLES[v.kind], s.seq, way=way, value_deg=v.value, limit_deg=v.limit, by_deg=v.by, lat=lat, lon=lon,
             amsl_m=v.amsl_m,
         )  # fmt: skip
     return Note(
-        HEIGHTS[v.kind], s.seq, way=way, value_m=v.value, limit_m=v.limit, by_m=v.by, lat=lat, lon=lon, amsl_m=v.amsl_m
+        BROKEN_HEIGHTS[v.kind],
+        s.seq,
+        way=way,
+        value_m=v.value,
+        limit_m=v.limit,
+        by_m=v.by,
+        lat=lat,
+        lon=lon,
+        amsl_m=v.amsl_m,
     )
 
 

@@ -44,17 +44,17 @@ class Miss:
         """What is said of it."""
         spare = self.room >= 0.0
         room = abs(self.room)
-        if self.kind in ANGLES:
+        if self.kind in NEAR_ANGLES:
             left = Note("spare_angle", room_deg=room) if spare else Note("broken_angle", room_deg=room)
             return Note(
-                ANGLES[self.kind], value_deg=self.value, limit_deg=self.limit, left=left, seq=self.seq,
+                NEAR_ANGLES[self.kind], value_deg=self.value, limit_deg=self.limit, left=left, seq=self.seq,
                 lat=self.lat_deg, lon=self.lon_deg, amsl_m=self.amsl_m,
             )  # fmt: skip
         if not self.zone:
             left = Note("spare_height", room_m=room) if spare else Note("broken_height", room_m=room)
             return Note(
-                HEIGHTS[self.kind], value_m=self.value, limit_m=self.limit, left=left, seq=self.seq, lat=self.lat_deg,
-                lon=self.lon_deg, amsl_m=self.amsl_m,
+                NEAR_HEIGHTS[self.kind], value_m=self.value, limit_m=self.limit, left=left, seq=self.seq,
+                lat=self.lat_deg, lon=self.lon_deg, amsl_m=self.amsl_m,
             )  # fmt: skip
         left = Note("spare_distance", room_m=room) if spare else Note("broken_distance", room_m=room)
         return Note(
@@ -63,11 +63,11 @@ class Miss:
         )  # fmt: skip
 
 
-HEIGHTS = {
+NEAR_HEIGHTS = {
     "min_agl": "lowest_above_ground", "max_agl": "highest_above_ground", "max_amsl": "highest_altitude",
     "terrain_clearance": "lowest_within_clearance",
 }  # fmt: skip
-ANGLES = {"climb": "steepest_climb", "descent": "steepest_descent"}
+NEAR_ANGLES = {"climb": "steepest_climb", "descent": "steepest_descent"}
 """The notes on limits of height and of angle, by kind."""
 LIFT_M = 50_000.0
 """An added altitude error, m, that breaks every limit of height on every leg; it breaks a limit by less the larger the
@@ -119,11 +119,11 @@ def _heights(stretches: Sequence[Stretch], legs: Legs, owner: Indices, vehicle: 
     lifted = replace(legs, altitude_error_m=legs.altitude_error_m + LIFT_M)
     worst: dict[str, Violation] = {}
     for v in world.airspace.examine(lifted, limits).violations:
-        if v.kind in HEIGHTS:
+        if v.kind in NEAR_HEIGHTS:
             worst[v.kind] = max(worst.get(v.kind, v), v, key=lambda w: w.by)
     limits_m = {"min_agl": limits.min_agl_m, "max_agl": limits.max_agl_m or 0.0, "max_amsl": limits.max_amsl_m or 0.0}
     found = []
-    for kind in HEIGHTS:
+    for kind in NEAR_HEIGHTS:
         if (found_one := worst.get(kind)) is None or abs(found_one.by) > 1.5 * LIFT_M:
             continue
         room, limit = LIFT_M - found_one.by, limits_m.get(kind, 0.0)
