@@ -434,6 +434,11 @@ def test_without_a_mission_file_the_options_are_named_and_with_one_its_keys(
     assert "write the vehicle's own as --rtl-altitude" in out + err
     assert "above --max-amsl" in out
     assert not re.search(r"rtl_rel_home_m|max_amsl_m|min_agl_m", out + err)
+    run(file, *world, "--max-amsl", "500", "--way-home", "--report", folder / "page.html")
+    page = (folder / "page.html").read_text()
+    assert "above --max-amsl" in page
+    assert "as --rtl-altitude" in page
+    assert not re.search(r"rtl_rel_home_m|max_amsl_m|min_agl_m", page)
     round_trip = corpus.cases()[0].items
     (folder / "back.waypoints").write_text(
         corpus.qgroundcontrol((*round_trip[:-1], replace(round_trip[-1], command=20)))
