@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from gcsplan.check.rtl.verdict import WayHome
     from gcsplan.mavlink.protocol.machine import Progress as Transfer
     from gcsplan.mission_file import MissionFile
+    from gcsplan.notes.note import Said
 
 WIDEST = 100_000
 MOST_WHOLE = 30
@@ -253,15 +254,15 @@ def release_table(plan: Plan, results: Sequence[JobResult], gate: GateTime | Non
         say(f"T+0 is {gate.start:%Y-%m-%d %H:%M:%S} UTC")
 
 
-def say_notes(notes: Sequence[str]) -> None:
+def say_notes(notes: Sequence[Said]) -> None:
     """Print notes, each once, in order."""
     for note in dict.fromkeys(notes):
         aside.print(f"note: {note}", style="dim", markup=False)
 
 
-def say_notes_of(notes: Sequence[tuple[str, str]]) -> None:
+def say_notes_of(notes: Sequence[tuple[str, Said]]) -> None:
     """Print notes on vehicles, (name, note) each; a note on several is printed once with all their names."""
-    names: dict[str, list[str]] = {}
+    names: dict[Said, list[str]] = {}
     for name, note in dict.fromkeys(notes):
         names.setdefault(note, []).append(name)
     lines = [f"{names_of(of)}: {note}" for note, of in names.items()]

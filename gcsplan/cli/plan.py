@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from gcsplan.app.upload_job import JobResult, UploadJob, UploadOptions
     from gcsplan.check.rtl.verdict import WayHome
     from gcsplan.mission_file import MissionFile
+    from gcsplan.notes.note import Said
     from gcsplan.units import Units
 
 SHOWN = 15
@@ -195,7 +196,7 @@ def plan(
         if upload or fence or fence_infinite:
             where = targets or dict.fromkeys((v.name for v in planned.vehicles), "")
             orders = uploads.jobs_of(planned, where, homes, is_required(source, require_way_home))
-        fence_notes: list[tuple[str, str]] = []
+        fence_notes: list[tuple[str, Said]] = []
         if fence or fence_infinite:  # a fence that the mission would breach is refused before anything is written
             orders, fence_notes = fencing.with_fences(orders, infinite=fence_infinite)
         fences = {job.name: job.fence.items for job in orders if job.fence is not None}

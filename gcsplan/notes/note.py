@@ -7,25 +7,28 @@ A sentence of the catalogue names the data by fields of ``str.format``, each wit
     {low_m:height.1 down}       rounded down; also ``up``, ``trimmed`` (no trailing zeros) and ``bare`` (no unit)
     {max_agl_m:height}          a value that was given, with the digits it has
     {length_m:reach}            in kilometres if it is long
+    {climb_deg:angle.1 up}      an angle in degrees
     {left_s:seconds} {used_j:joules}
     {count} {count:item|items}  the first word for 1 and True, else the second; of a list its length decides
     {share:.1f} {zones}         anything else is formatted as Python does; a list is joined by commas
     {unit:height}               the symbol of a kind's unit alone
     {key:max_agl_m}             what the reader types for a key of the mission file: the key, or an option
 
-A note on an item begins with ``item 5: `` by itself, unless its sentence names the ``{item}``.
+A note on an item begins with ``item 5: `` by itself, unless its sentence names the ``{item}``; with ``way`` among its
+data, what is flown for the item, with ``item 5 (cruise): ``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from string import Formatter
 from typing import Any, TypeAlias, get_args
 
+from gcsplan.figures import floored, raised
 from gcsplan.notes.catalogue import TEXTS
-from gcsplan.units import Joules, Kind, Quantity, Reach, Rounding, Seconds, Symbol, Units
+from gcsplan.units import Joules, Kind, Quantity, Reach, Rounding, Seconds, Symbol, Units, in_units
 
 Datum: TypeAlias = "float | str | bool | Note | tuple[Datum, ...] | None"
 
@@ -65,10 +68,18 @@ class Note:
         self.code, self.item, self.data = code, item, data
 
     def text(self, wording: Wording = IN_FILES, *, placed: bool = True) -> str:
-        """The sentence. ``placed``: with the item before it; without where the item's number stands elsewhere."""
+        """The sentence. ``placed``: with the item before it; without where the item's number and way stand elsewhere.
+
+        A ``way`` that is a note says more than the kind of the stretch, so it stands before the sentence anyway.
+        """
         template = TEXTS[self.code]
         named = any(name == "item" for _, name, _ in parts_of(template))
-        before = f"item {self.item}: " if placed and self.item is not None and not named else ""
+        way, before = self.data.get("way"), ""
+        shown = "" if way is None else f"({_shown(way, '', wording)})"
+        if placed and self.item is not None and not named:
+            before = f"item {self.item} {shown}: " if shown else f"item {self.item}: "
+        elif not placed and isinstance(way, Note):
+            before = f"{shown}: "
         return before + sentence(template, {"item": self.item, **self.data}, wording)
 
     def in_units(self, units: Units) -> str:
@@ -101,6 +112,21 @@ class Note:
 
 Said: TypeAlias = "str | Note"
 """What is said where not all of it is data yet."""
+
+
+def told(said: Said, wording: Wording = IN_FILES) -> str:
+    """The sentence of a note, or a text in the reader's units."""
+    if isinstance(said, Note):
+        return said.text(wording)
+    return str(said) if wording.units is None else in_units(said, wording.units)
+
+
+def in_json(key: str, notes: Iterable[Said], wording: Wording = IN_FILES) -> dict[str, Any]:
+    """A list of notes for programs: its sentences under ``key``, and under ``key_data`` what they are made of."""
+    every = list(notes)
+    nothing: dict[str, Any] = {"code": None, "item": None, "data": {}}
+    data = [note.as_dict() if isinstance(note, Note) else nothing for note in every]
+    return {key: [told(note, wording) for note in every], f"{key}_data": data}
 
 
 def _revived(code: str, item: int | None, data: dict[str, Datum]) -> Note:
@@ -146,9 +172,12 @@ def _shown(value: Any, spec: str, wording: Wording) -> str:
     kind, *how = spec.split() or [""]
     name, _, decimals = kind.partition(".")
     if name in KINDS:
-        rounding: Rounding = "down" if "down" in how else "up" if "up" in how else "near"
-        places = int(decimals) if decimals else None
-        return Quantity(value, name, places, rounding, "trimmed" in how, "bare" in how).text(wording.units)  # type: ignore[arg-type]
+        exactly = int(decimals) if decimals else None
+        return Quantity(value, name, exactly, _rounding(how), "trimmed" in how, "bare" in how).text(wording.units)  # type: ignore[arg-type]
+    if name == "angle":
+        rounding, places = _rounding(how), int(decimals or 0)
+        degrees = floored(value, places) if rounding == "down" else raised(value, places) if rounding == "up" else value
+        return f"{degrees:.{places}f} °"
     if name == "reach":
         return Reach(value).text(wording.units)
     if name == "seconds":
@@ -156,6 +185,10 @@ def _shown(value: Any, spec: str, wording: Wording) -> str:
     if name == "joules":
         return Joules(value).text(wording.units)
     return format(value, spec)
+
+
+def _rounding(how: Sequence[str]) -> Rounding:
+    return "down" if "down" in how else "up" if "up" in how else "near"
 
 
 def _plain(value: Datum) -> Any:

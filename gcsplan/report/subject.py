@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 from gcsplan.check.rtl.verdict import WayHome
@@ -13,7 +13,8 @@ from gcsplan.fleet.arrival import Slot
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Separation
 from gcsplan.mavlink.mission.parameter_list import Setting
-from gcsplan.units import METRIC, Units, UnitText
+from gcsplan.notes.note import Note, Said, Wording, told
+from gcsplan.units import METRIC, Units
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
 
@@ -37,7 +38,8 @@ class Subject:
     ``slot`` is its part of the time table, None for a checked file, and so is ``motion``, the whole flight over time.
     ``flown`` is what it flew in a rehearsal, from that track alone. ``leaves``: it is gone where its motion ends.
     ``home`` is the way home from every point, if it was judged. ``upload`` holds the keys of ``upload.json``, None if
-    nothing was sent. ``settings``: the parameters that its mission was judged with.
+    nothing was sent. ``settings``: the parameters that its mission was judged with. ``typed``: the options that the
+    reader types, by their keys in a mission file; empty if he has one.
     """
 
     name: str
@@ -52,6 +54,11 @@ class Subject:
     flown: TimedPath | None = None
     leaves: bool = False
     settings: tuple[Setting, ...] = ()
+    typed: Mapping[str, str] = field(default_factory=dict)
+
+    def wording(self, units: Units | None = None) -> Wording:
+        """How the reader is spoken to, in ``units``, or in SI."""
+        return Wording(units, self.typed)
 
     @property
     def depart_s(self) -> float:
@@ -69,7 +76,7 @@ class Subject:
         return self.home is None or self.home.safe is not True
 
     @property
-    def words(self) -> UnitText:
+    def words(self) -> Note:
         """The verdict in a sentence."""
         return verdict_words(self.verdict.safe, self.home)
 
@@ -96,7 +103,7 @@ class Rehearsed:
     safe: bool | None
     how: str
     compared: tuple[Compared, ...]
-    violations: tuple[str, ...] = ()
+    violations: tuple[Said, ...] = ()
     not_flown: tuple[str, ...] = ()
 
 
@@ -147,7 +154,9 @@ class CheckedFile(Protocol):
     @property
     def verdict(self) -> Verdict: ...
     @property
-    def notes(self) -> tuple[str, ...]: ...
+    def notes(self) -> tuple[Said, ...]: ...
+    @property
+    def typed(self) -> Mapping[str, str]: ...
 
 
 def page_of_check(
@@ -168,8 +177,9 @@ def page_of_check(
     subjects = tuple(
         Subject(
             c.vehicle.name if names.count(c.vehicle.name) == 1 else str(c.file),
-            c.verdict, c.vehicle, None, tuple(dict.fromkeys((*c.notes, *map(str, c.verdict.notes)))),
-            home=homes[i] if i < len(homes) else None,
+            c.verdict, c.vehicle, None,
+            tuple(dict.fromkeys(told(note, Wording(options=c.typed)) for note in (*c.notes, *c.verdict.notes))),
+            home=homes[i] if i < len(homes) else None, typed=c.typed,
         )
         for i, c in enumerate(checked)
     )  # fmt: skip

@@ -10,6 +10,7 @@ from typing import Any
 from gcsplan.check.verdict import PAPER_MARK
 from gcsplan.errors import CheckFailed
 from gcsplan.figures import floored
+from gcsplan.notes.note import Said
 from gcsplan.sim.flight.trace import Judged, Meeting, Trace, examine, meetings
 from gcsplan.sim.part import RehearsalPart, lateness
 from gcsplan.units import METRIC, Units, UnitText, duration
@@ -38,18 +39,18 @@ class Breach:
 
     kind: str
     vehicles: tuple[str, ...]
-    message: str
+    message: Said
     by: float
     runs: int
 
-    def describe(self, of_runs: int) -> str:
+    def describe(self, of_runs: int) -> Said:
         """Return one line; ``of_runs``: the number of all runs."""
         return self.message if of_runs == 1 else UnitText("{} (in {} of {} runs)", self.message, self.runs, of_runs)
 
     def as_dict(self) -> dict[str, Any]:
         """Return a dict for JSON."""
         return {
-            "kind": self.kind, "vehicles": list(self.vehicles), "message": self.message, "by": _number(self.by),
+            "kind": self.kind, "vehicles": list(self.vehicles), "message": str(self.message), "by": _number(self.by),
             "runs": self.runs,
         }  # fmt: skip
 
@@ -161,7 +162,7 @@ class Rehearsal:
     def error(self, *, allow_unjudged: bool = False) -> CheckFailed | None:
         """Return the error for this result; None if all is well. ``allow_unjudged``: accept parts not flown."""
         if self.breaches:
-            lines = [b.describe(self.runs) for b in self.breaches[:BREACHES_SHOWN]]
+            lines = [str(b.describe(self.runs)) for b in self.breaches[:BREACHES_SHOWN]]
             rest = len(self.breaches) - BREACHES_SHOWN
             lines += [f"and {rest} more"] if rest > 0 else []
             return CheckFailed("the rehearsal found violations:\n  " + "\n  ".join(lines))
@@ -258,7 +259,7 @@ class Tally:
             if (late := lateness(part, trace)) is not None:
                 self.breach("late", (trace.name,), *late)
             for f in judged.findings:
-                self.breach(f.kind, (trace.name,), f.message, f.by, f.zone)
+                self.breach(f.kind, (trace.name,), f.note, f.by, f.zone)
         self._order(traces)
         self._separation(traces)
 
@@ -293,7 +294,7 @@ class Tally:
         if meeting is not None and (self.closest is None or meeting.distance_m < self.closest.distance_m):
             self.closest = meeting
 
-    def breach(self, kind: str, vehicles: tuple[str, ...], message: str, by: float, more: object = None) -> None:
+    def breach(self, kind: str, vehicles: tuple[str, ...], message: Said, by: float, more: object = None) -> None:
         """Record a breach; of one kind, vehicle set and ``more``, keep the worst and count each run once."""
         key = (kind, vehicles, more)
         was = self._breaches.get(key)
