@@ -14,11 +14,7 @@ from gcsplan.app.leaving_out import LeavingOut
 from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.refusals import plan_or_explain
 from gcsplan.app.sites import Site, site_of, widened, world_of
-from gcsplan.check.verdict import Verdict
 from gcsplan.errors import GcsplanError, NoMission
-from gcsplan.mavlink.build.order import Order
-from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.planners.problem import Problem, Solution
 from gcsplan.planners.registry import get as get_planner
 
 __all__ = ["planned_by"]
@@ -38,18 +34,8 @@ class Asked:
     options: Mapping[str, object]
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """A vehicle's plan without the terrain, which is that of ``level``."""
-
-    problem: Problem
-    solution: Solution
-    mission: Mission
-    verdict: Verdict
-    speed_m_s: float
-    notes: tuple[str, ...]
-    order: Order
-    level: int
+Answer = tuple[VehiclePlan, int]
+"""A vehicle's packed plan, and the level of the terrain that it was made over."""
 
 
 def planned_by(
@@ -71,10 +57,10 @@ def planned_by(
     answers: dict[int, Answer] = {}
     refused: dict[int, GcsplanError] = {}
     for number, answer in workers.each(answer_of, asked, names):
-        if isinstance(answer, Answer):
-            answers[number] = answer
-        else:
+        if isinstance(answer, GcsplanError):
             refused[number] = answer
+        else:
+            answers[number] = answer
         if told is not None:
             told(names[number], len(answers) + len(refused))
         fatal = [k for k, why in refused.items() if not (leaving.allowed and isinstance(why, NoMission))]
@@ -83,7 +69,7 @@ def planned_by(
     for number, why in sorted(refused.items()):
         if isinstance(why, NoMission):
             leaving.leave(names[number], why)
-    return [_restored(brief, k, answers[k]) for k in sorted(answers)]
+    return [_restored(brief, *answers[k]) for k in sorted(answers)]
 
 
 def answer_of(asked: Asked, name: str) -> Answer | GcsplanError:
@@ -95,11 +81,7 @@ def answer_of(asked: Asked, name: str) -> Answer | GcsplanError:
     except GcsplanError as why:
         return why
     assert plan.brief is not None
-    return Answer(
-        replace(plan.problem, airspace=None, widen=None, progress=None),  # type: ignore[arg-type]
-        replace(plan.solution, problem=None),
-        plan.mission, plan.verdict, plan.speed_m_s, plan.notes, plan.order, plan.brief.source.level,
-    )  # fmt: skip
+    return plan.packed(), plan.brief.source.level
 
 
 def _brief_of(asked: Asked) -> Brief:
@@ -108,11 +90,7 @@ def _brief_of(asked: Asked) -> Brief:
     return Brief(source, world, run, asked.objective, asked.seed, asked.options)
 
 
-def _restored(brief: Brief, number: int, answer: Answer) -> VehiclePlan:
-    source = widened(brief.source, answer.level)
+def _restored(brief: Brief, plan: VehiclePlan, level: int) -> VehiclePlan:
+    source = widened(brief.source, level)
     over = brief if source is brief.source else replace(brief, source=source, world=world_of(source))
-    problem = replace(answer.problem, airspace=over.world.airspace)
-    return VehiclePlan(
-        brief.source.vehicles[number], problem, answer.solution, answer.mission, answer.verdict, answer.speed_m_s,
-        answer.notes, answer.order, over,
-    )  # fmt: skip
+    return plan.restored(over)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import TYPE_CHECKING
 
@@ -83,6 +83,15 @@ class VehiclePlan:
         """How far the flown path may be above the best one, in percent of the lower bound; None without a bound."""
         bound = self.solution.lower_bound
         return None if not bound else max(0.0, 100.0 * (self.cost / bound - 1.0))  # below by rounding alone, see above
+
+    def packed(self) -> VehiclePlan:
+        """The plan without its terrain, for another process; `restored` is the way back."""
+        problem = replace(self.problem, airspace=None, widen=None, progress=None)  # type: ignore[arg-type]
+        return replace(self, problem=problem, solution=replace(self.solution, problem=None), brief=None)
+
+    def restored(self, over: Brief) -> VehiclePlan:
+        """A `packed` plan over the terrain of ``over``, under which it was made."""
+        return replace(self, problem=replace(self.problem, airspace=over.world.airspace), brief=over)
 
 
 @dataclass(frozen=True, eq=False)
