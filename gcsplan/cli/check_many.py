@@ -85,9 +85,10 @@ class Rows:
 
     def end(self, header: Header, summary: Summary, error: dict[str, Any] | None) -> None:
         """See `Printer`."""
-        from gcsplan.export.summary import json_of
+        from gcsplan.export.summary import SCHEMA, json_of
 
-        put(json_of(_head(header) | {"summary": summary.as_dict()} | _error(error), "", lines=False) + "\n")
+        last = {"schema": SCHEMA} | _head(header) | {"summary": summary.as_dict()} | _error(error)
+        put(json_of(last, "", lines=False) + "\n")
 
 
 class Document:
@@ -112,9 +113,9 @@ class Document:
 
     def end(self, header: Header, summary: Summary, error: dict[str, Any] | None) -> None:
         """See `Printer`."""
-        from gcsplan.export.summary import write_summary
+        from gcsplan.export.summary import json_of
 
-        rest = write_summary({"summary": summary.as_dict()} | _error(error), clocks=True)
+        rest = json_of({"summary": summary.as_dict()} | _error(error), "") + "\n"
         put(("\n  ]" if self._count else "]") + "," + rest.removeprefix("{"))
 
 
