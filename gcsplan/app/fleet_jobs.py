@@ -6,20 +6,14 @@ results hold no terrain: the caller puts them into its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable
 
 from gcsplan.app.executor import Executor
 from gcsplan.app.leaving_out import LeavingOut
 from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.refusals import plan_or_explain
 from gcsplan.app.sites import Site, site_of, widened, world_of
-from gcsplan.check.verdict import Verdict
 from gcsplan.errors import GcsplanError, NoMission
-from gcsplan.mavlink.build.order import Order
-from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.planners.problem import Problem, Solution
-from gcsplan.planners.registry import get as get_planner
 
 __all__ = ["planned_by"]
 
@@ -27,35 +21,16 @@ PIECE_S = 0.6
 """Seconds that planning a vehicle takes, about: the median of 60 over mountains with margins."""
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """What all vehicles of a mission share: its terrain and zones, and the planner."""
+Asked = tuple[Site, Brief]
+"""What all vehicles of a mission share: its terrain and zones, and the packed brief."""
 
-    site: Site
-    planner: str
-    objective: str
-    seed: int
-    options: Mapping[str, object]
-
-
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """A vehicle's plan without the terrain, which is that of ``level``."""
-
-    problem: Problem
-    solution: Solution
-    mission: Mission
-    verdict: Verdict
-    speed_m_s: float
-    notes: tuple[str, ...]
-    order: Order
-    level: int
+Answer = tuple[VehiclePlan, int]
+"""A vehicle's packed plan, and the level of the terrain that it was made over."""
 
 
 def planned_by(
     workers: Executor,
     brief: Brief,
-    planner: str,
     told: Callable[[str, int], None] | None = None,
     leaving: LeavingOut | None = None,
 ) -> list[VehiclePlan]:
@@ -66,15 +41,15 @@ def planned_by(
     """
     leaving = leaving or LeavingOut(allowed=False)
     source = brief.source
-    asked = Asked(site_of(source), planner, brief.objective, brief.seed, dict(brief.options))
+    asked = site_of(source), brief.packed()
     names = [r.vehicle.name for r in source.vehicles]
     answers: dict[int, Answer] = {}
     refused: dict[int, GcsplanError] = {}
     for number, answer in workers.each(answer_of, asked, names):
-        if isinstance(answer, Answer):
-            answers[number] = answer
-        else:
+        if isinstance(answer, GcsplanError):
             refused[number] = answer
+        else:
+            answers[number] = answer
         if told is not None:
             told(names[number], len(answers) + len(refused))
         fatal = [k for k, why in refused.items() if not (leaving.allowed and isinstance(why, NoMission))]
@@ -83,36 +58,22 @@ def planned_by(
     for number, why in sorted(refused.items()):
         if isinstance(why, NoMission):
             leaving.leave(names[number], why)
-    return [_restored(brief, k, answers[k]) for k in sorted(answers)]
+    return [_restored(brief, *answers[k]) for k in sorted(answers)]
 
 
 def answer_of(asked: Asked, name: str) -> Answer | GcsplanError:
     """Plan one vehicle, in whatever process; why there is no plan is returned, so that the caller can order it."""
     try:
-        brief = _brief_of(asked)
+        site, packed = asked
+        brief = packed.over(*site.read())
         [request] = [r for r in brief.source.vehicles if r.vehicle.name == name]
         plan = plan_or_explain(brief, request)
     except GcsplanError as why:
         return why
     assert plan.brief is not None
-    return Answer(
-        replace(plan.problem, airspace=None, widen=None, progress=None),  # type: ignore[arg-type]
-        replace(plan.solution, problem=None),
-        plan.mission, plan.verdict, plan.speed_m_s, plan.notes, plan.order, plan.brief.source.level,
-    )  # fmt: skip
+    return plan.packed(), plan.brief.source.level
 
 
-def _brief_of(asked: Asked) -> Brief:
-    source, world = asked.site.read()
-    run = get_planner(asked.planner).plan
-    return Brief(source, world, run, asked.objective, asked.seed, asked.options)
-
-
-def _restored(brief: Brief, number: int, answer: Answer) -> VehiclePlan:
-    source = widened(brief.source, answer.level)
-    over = brief if source is brief.source else replace(brief, source=source, world=world_of(source))
-    problem = replace(answer.problem, airspace=over.world.airspace)
-    return VehiclePlan(
-        brief.source.vehicles[number], problem, answer.solution, answer.mission, answer.verdict, answer.speed_m_s,
-        answer.notes, answer.order, over,
-    )  # fmt: skip
+def _restored(brief: Brief, plan: VehiclePlan, level: int) -> VehiclePlan:
+    source = widened(brief.source, level)
+    return plan.restored(brief if source is brief.source else brief.over(source, world_of(source)))

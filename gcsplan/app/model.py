@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,9 @@ from gcsplan.fleet.motion import TimedPath
 from gcsplan.mavlink.build.order import Order
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest
+from gcsplan.notes.note import Note, Said
 from gcsplan.planners.problem import Problem, Solution
+from gcsplan.planners.registry import get as get_planner
 from gcsplan.world.world import World
 
 if TYPE_CHECKING:
@@ -28,18 +30,31 @@ TOUCH_M, TOUCH = 1e-3, 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Brief:
-    """How all vehicles of a mission file are planned: ``run`` is the planner, ``options`` are those that only it knows.
+    """How all vehicles of a mission file are planned: by which planner, with ``options`` that only it knows.
 
     ``by_priority``: each vehicle is planned with knowledge of those before it, and gives way to them.
     """
 
     source: MissionFile
     world: World
-    run: Callable[[Problem], Solution]
+    planner: str
     objective: str
     seed: int
     options: Mapping[str, object]
     by_priority: bool = False
+
+    @property
+    def run(self) -> Callable[[Problem], Solution]:
+        """The planner."""
+        return get_planner(self.planner).plan
+
+    def packed(self) -> Brief:
+        """The brief without mission and world, for another process, which has read both: `over` puts them in again."""
+        return replace(self, source=None, world=None)  # type: ignore[arg-type]
+
+    def over(self, source: MissionFile, world: World) -> Brief:
+        """The same for a mission over other terrain."""
+        return replace(self, source=source, world=world)
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +67,7 @@ class VehiclePlan:
     mission: Mission
     verdict: Verdict
     speed_m_s: float
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     order: Order = field(default_factory=Order)
     brief: Brief | None = None
 
@@ -84,6 +99,20 @@ class VehiclePlan:
         bound = self.solution.lower_bound
         return None if not bound else max(0.0, 100.0 * (self.cost / bound - 1.0))  # below by rounding alone, see above
 
+    def packed(self) -> VehiclePlan:
+        """The plan without its terrain, for another process; `restored` is the way back."""
+        problem = replace(self.problem, airspace=None, widen=None, progress=None)  # type: ignore[arg-type]
+        return replace(self, problem=problem, solution=replace(self.solution, problem=None), brief=None)
+
+    def restored(self, over: Brief) -> VehiclePlan:
+        """A `packed` plan over the terrain of ``over``, under which it was made."""
+        return replace(self, problem=replace(self.problem, airspace=over.world.airspace), brief=over)
+
+    def all_notes(self, fleet: FleetPlan | None) -> tuple[Said, ...]:
+        """What is said of this vehicle: of its request, its search, its mission, and its part of the time table."""
+        slot = () if fleet is None else fleet.slot(self.name).notes
+        return tuple(dict.fromkeys((*self.notes, *self.solution.notes, *self.verdict.notes, *slot)))
+
 
 @dataclass(frozen=True, eq=False)
 class FleetPlan:
@@ -99,7 +128,7 @@ class FleetPlan:
     slots: tuple[Slot, ...]
     motions: tuple[TimedPath, ...]
     separation: Separation | None = None
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     start_utc: datetime | None = None
 
     def slot(self, name: str) -> Slot:
@@ -129,7 +158,7 @@ class Plan:
     objective: str
     seed: int
     vehicles: tuple[VehiclePlan, ...]
-    notes: tuple[str, ...] = ()
+    notes: tuple[Said, ...] = ()
     fleet: FleetPlan | None = None
     left_out: tuple[LeftOut, ...] = ()
     leaves_out: bool = False

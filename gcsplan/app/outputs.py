@@ -130,7 +130,7 @@ def summary_of(plan: Plan, results: Sequence[JobResult] = (), homes: Homes = Map
         ],
         "fleet": _fleet(plan),
         "left_out": [v.as_dict() for v in plan.left_out],
-        "notes": list(dict.fromkeys(plan.notes)),
+        **in_json("notes", dict.fromkeys(plan.notes)),
     }
 
 
@@ -156,7 +156,6 @@ def _vehicle(
     lowest = verdict.lowest
     length = v.problem.objective == "length"
     bound = v.solution.lower_bound
-    notes = (*v.notes, *v.solution.notes, *map(str, verdict.notes), *(slot.notes if slot else ()))
     return {
         "name": v.name,
         "items": len(v.mission.wire_items()),
@@ -181,7 +180,7 @@ def _vehicle(
         "safe": verdict.safe,
         **in_json("not_judged", verdict.not_judged),
         "hold_s": slot.hold_s if slot else 0.0,
-        "notes": list(dict.fromkeys(notes)),
+        **in_json("notes", v.all_notes(fleet)),
         "upload": result.as_dict() if result else None,
         "verdict": str(verdict_words(verdict.safe, home)),
     } | _of_search(v) | ({} if home is None else {"way_home": home.as_dict()})  # fmt: skip

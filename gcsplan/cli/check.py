@@ -175,7 +175,7 @@ def check(
     form: Form = "whole" if as_json else "row" if json_lines else "lines"
     shown = Shown(form, allow_unjudged, units_of(units), len(arguments) > 1)
     archive = _archive(mission, arguments, given, asked, shown, at)
-    printer = Document() if as_json else Rows() if json_lines else Lines(summed=not quiet)
+    printer = Document() if as_json else Rows() if json_lines else Lines(shown.units, summed=not quiet)
     reading = steady(check_sites.split_name(file)[1] for file in arguments)
     if report is None and (rows or quiet or len(arguments) > TABLES):
         raise typer.Exit(tell_archive(archive, printer, jobs, cluster, reading))
@@ -284,13 +284,13 @@ def _say_all(batch: Batch, units: Units) -> None:
     from gcsplan.cli.home_words import say_home, say_warnings
     from gcsplan.cli.verdict_table import verdict_table
     from gcsplan.export.profile_text import profile_lines
-    from gcsplan.notes.note import Wording, told
+    from gcsplan.notes.note import Wording
 
-    wording, in_si = Wording(units, batch.typed), Wording(options=batch.typed)
-    say_notes([told(note, in_si) for note in batch.notes])
+    wording = Wording(units, batch.typed)
+    say_notes(batch.notes, wording)
     say_heights(batch.inputs)
     for c in batch.checked:
-        say_notes([told(note, in_si) for note in c.notes])
+        say_notes(c.notes, wording)
         name = f"{c.file} as {c.vehicle.name} ({c.vehicle.autopilot})"
         verdict_table(name, c.verdict, c.way_home, wording=wording, energy=c.vehicle.energy)
         for miss in c.verdict.misses:
@@ -312,7 +312,7 @@ def _report(batch: Batch, file: Path, units: Units) -> None:
     worlds: list[Checked] = list({id(c.world): c for c in batch.checked}.values())
     if len(worlds) != 1:
         raise InputError("a report shows files of one area; none could be judged, or they lie too far apart")
-    wording = Wording(options=batch.typed)
+    wording = Wording(units, batch.typed)
     notes = [told(note, wording) for note in batch.notes]
     notes += [f"not read, and not on this page: {error}" for _, error in batch.unreadable]
     homes = [c.way_home for c in batch.checked]

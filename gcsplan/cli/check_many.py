@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from gcsplan.app.archive_words import Summary, Told
     from gcsplan.app.checking import Failing
     from gcsplan.notes.note import Said
+    from gcsplan.units import Units
 
 LINE_S = 5.0
 """Seconds between two lines of progress."""
@@ -42,16 +43,16 @@ class Printer(Protocol):
 class Lines:
     """The findings, a line for each; ``summed``: with notes before them, and the summary after them."""
 
-    def __init__(self, *, summed: bool) -> None:
-        self.summed = summed
+    def __init__(self, units: Units, *, summed: bool) -> None:
+        self.units, self.summed = units, summed
 
     def begin(self, header: Header) -> None:
         """See `Printer`."""
         from gcsplan.cli.console import say_heights, say_notes
-        from gcsplan.notes.note import Wording, told
+        from gcsplan.notes.note import Wording
 
         if self.summed:
-            say_notes([told(note, Wording(options=header[3])) for note in header[2]])
+            say_notes(header[2], Wording(self.units, header[3]))
             say_heights(header[1])
 
     def tell(self, told: Told) -> None:
@@ -87,9 +88,10 @@ class Rows:
 
     def end(self, header: Header, summary: Summary, error: dict[str, Any] | None) -> None:
         """See `Printer`."""
-        from gcsplan.export.summary import json_of
+        from gcsplan.export.summary import SCHEMA, json_of
 
-        put(json_of(_head(header) | {"summary": summary.as_dict()} | _error(error), "", lines=False) + "\n")
+        last = {"schema": SCHEMA} | _head(header) | {"summary": summary.as_dict()} | _error(error)
+        put(json_of(last, "", lines=False) + "\n")
 
 
 class Document:
@@ -114,9 +116,9 @@ class Document:
 
     def end(self, header: Header, summary: Summary, error: dict[str, Any] | None) -> None:
         """See `Printer`."""
-        from gcsplan.export.summary import write_summary
+        from gcsplan.export.summary import json_of
 
-        rest = write_summary({"summary": summary.as_dict()} | _error(error), clocks=True)
+        rest = json_of({"summary": summary.as_dict()} | _error(error), "") + "\n"
         put(("\n  ]" if self._count else "]") + "," + rest.removeprefix("{"))
 
 

@@ -16,6 +16,7 @@ from typing import Any, ClassVar, NoReturn
 
 from gcsplan.cli.signals import Watch
 from gcsplan.errors import GcsplanError, InputError, UsageError
+from gcsplan.export.summary import SCHEMA, write_summary
 
 
 class Interrupted(GcsplanError):
@@ -94,7 +95,7 @@ def _end_at_once(number: int) -> NoReturn:
         if closers:
             closers[-1](error)
         elif any(_as_json):
-            put(json.dumps({"error": error.as_dict()}) + "\n")
+            put(json.dumps({"schema": SCHEMA, "error": error.as_dict()}) + "\n")
         sys.stdout.flush()
     os._exit(error.exit_code)
 
@@ -107,8 +108,6 @@ def interrupted(words: str = "") -> Interrupted:
 
 def emit(document: dict[str, Any], error: dict[str, Any] | None = None) -> None:
     """Write the single JSON document of ``--json``, with the error if there is one."""
-    from gcsplan.export.summary import write_summary
-
     put(write_summary(document | ({"error": error} if error else {}), clocks=True))
 
 
@@ -212,5 +211,5 @@ def fail(error: GcsplanError, as_json: bool, debug: bool) -> NoReturn:
     complain(error)
     if as_json:
         with suppress(InputError):
-            put(json.dumps({"error": error.as_dict()}) + "\n")
+            emit({}, error.as_dict())
     sys.exit(error.exit_code)

@@ -111,7 +111,7 @@ def upload(
         if not as_json:
             wording = Wording(units_of(units))
             for c in checked:
-                say_notes(c.notes)
+                say_notes(c.notes, wording)
                 name = f"{c.file} as {c.vehicle.name}"
                 verdict_table(name, c.verdict, c.way_home, wording=wording, energy=c.vehicle.energy)
         verdicts = {c.vehicle.name: c.verdict for c in checked}
@@ -123,14 +123,14 @@ def upload(
         jobs = uploads.jobs_of_files(source, checked, to)
         if fence or fence_infinite:
             jobs, fence_notes = fencing.with_fences(jobs, infinite=fence_infinite)
-            say_notes_of(fence_notes)
+            say_notes_of(fence_notes, Wording(units_of(units)))
     else:
         if len(files) > 1:
             raise UsageError("--unchecked takes one FILE, for the vehicle --sysid; send the others one by one")
         require_settled([check_sites.split_name(files[0])[1]])
         job, notes = uploads.unchecked_job(files[0], to, sysid or 1)
         jobs = [job]
-        say_notes(notes)
+        say_notes(notes, Wording(units_of(units)))
     names = [job.name for job in jobs]
     with talking(names), transfer_progress(names) as moved_on:
         results = uploads.run_jobs(jobs, options, moved_on, simulator=loopback_fleet)

@@ -20,7 +20,7 @@ from gcsplan.cli.console import (
     verdict_cell,
 )
 from gcsplan.cli.screens import console
-from gcsplan.notes.note import Wording, told
+from gcsplan.notes.note import Wording
 from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Units, charge, duration
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ def verdict_table(
         else:
             say(", ".join([flight, *used]))
         say_heights(verdict, units)
-    say_notes([told(note, Wording(options=wording.options)) for note in verdict.notes])
+    say_notes(verdict.notes, wording)
 
 
 def say_heights(verdict: Verdict, units: Units) -> None:

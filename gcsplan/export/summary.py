@@ -9,8 +9,12 @@ from typing import Any
 
 from gcsplan.figures import floored, raised
 
+SCHEMA = 1
+"""The form of all JSON that gcsplan writes for programs: it grows by one when a key is taken away or means another
+thing, not when one is added."""
+
 ORDER: dict[str, tuple[str, ...]] = {
-    "": ("name", "gcsplan", "planner", "objective", "seed", "inputs", "vehicles", "fleet"),
+    "": ("schema", "name", "gcsplan", "planner", "objective", "seed", "inputs", "vehicles", "fleet"),
     "inputs": (
         "dem_sha256", "vertical_datum", "heights_read", "resolution_m", "bare_dem", "dem_source", "dem_kind",
         "dem_tiles", "dem_notice", "sea_tiles", "zones_sha256",
@@ -48,11 +52,12 @@ OTHER_DECIMALS = 6
 def write_summary(summary: Mapping[str, Any], *, clocks: bool = False) -> str:
     """The JSON text of ``summary``; NaN and infinity become null, numpy's numbers become plain ones.
 
-    ``clocks`` keeps the clock readings. Floats are rounded by their unit; least values and lower bounds (``min_…``,
-    ``lower_bound_…``) are rounded down, greatest values (``max_…``) up, so that none looks better than it is. Raises
-    TypeError for a type that JSON lacks.
+    The first key is ``schema``. ``clocks`` keeps the clock readings. Floats are rounded by their unit; least values and
+    lower bounds (``min_…``, ``lower_bound_…``) are rounded down, greatest values (``max_…``) up, so that none looks
+    better than it is. Raises TypeError for a type that JSON lacks.
     """
-    return json.dumps(_plain(summary, "", clocks), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    document = _plain({"schema": SCHEMA, **summary}, "", clocks)
+    return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def json_of(value: Mapping[str, Any], key: str, *, lines: bool = True) -> str:

@@ -5,10 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from gcsplan.notes import battery_texts, finding_texts, flight_texts, return_texts, site_texts, turn_texts
+from gcsplan.notes import (
+    battery_texts,
+    finding_texts,
+    fleet_texts,
+    flight_texts,
+    plan_texts,
+    rehearsal_texts,
+    return_texts,
+    site_texts,
+    turn_texts,
+    upload_texts,
+)
+
+ROOMS = (
+    battery_texts, finding_texts, fleet_texts, flight_texts, plan_texts, rehearsal_texts, return_texts, site_texts,
+    turn_texts, upload_texts,
+)  # fmt: skip
 
 TEXTS: Mapping[str, str] = MappingProxyType({
     code: text
-    for room in (battery_texts, site_texts, finding_texts, flight_texts, return_texts, turn_texts)
+    for room in ROOMS
     for code, text in room.TEXTS.items()
 })  # fmt: skip

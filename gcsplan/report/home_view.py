@@ -69,9 +69,7 @@ def _one(
     if line is not None and home.profile:
         name = f"home-{index}"
         chart = tools(name) + _chart(name, subject, home, line, index, charts, wording) + _legend(home)
-    in_si = Wording(options=wording.options)
-    said = [*(note.text(wording) for note in home.not_judged), *(note.text(in_si) for note in home.notes)]
-    listed = "".join(f"<li>{esc(text)}</li>" for text in said)
+    listed = "".join(f"<li>{esc(note.text(wording))}</li>" for note in (*home.not_judged, *home.notes))
     headline = esc(home.headline.text(wording))
     return (
         f"<details{' open' if open_ else ''}><summary>{esc(subject.name)}: {headline}</summary>"

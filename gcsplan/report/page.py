@@ -15,7 +15,7 @@ import numpy as np
 from gcsplan import __version__
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.figures import steepened
-from gcsplan.notes.note import told
+from gcsplan.notes.note import Said, Wording, told
 from gcsplan.report import tables
 from gcsplan.report.briefing import briefing_html
 from gcsplan.report.document import document
@@ -57,7 +57,7 @@ def render_check(
     checked: Sequence[CheckedFile],
     *,
     inputs: Mapping[str, object],
-    notes: Sequence[str] = (),
+    notes: Sequence[Said] = (),
     homes: Sequence[WayHome | None] = (),
     units: Units = METRIC,
 ) -> str:
@@ -304,7 +304,8 @@ def _unjudged(page: Page) -> list[tuple[Subject, str]]:
 
 
 def _end(page: Page) -> str:
-    notes = [(n, "") for n in page.notes] + [(n, s.name) for s in page.subjects for n in s.notes]
+    notes = [(told(n, Wording(page.units)), "") for n in page.notes]
+    notes += [(told(n, s.wording(page.units)), s.name) for s in page.subjects for n in s.notes]
     several = len(page.subjects) > 1
     listed = "".join(
         f"<li>{f'<b>{esc(who)}</b>: ' if who and several else ''}{esc(n)}</li>" for n, who in dict.fromkeys(notes)

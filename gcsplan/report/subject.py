@@ -13,7 +13,7 @@ from gcsplan.fleet.arrival import Slot
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Separation
 from gcsplan.mavlink.mission.parameter_list import Setting
-from gcsplan.notes.note import Note, Said, Wording, told
+from gcsplan.notes.note import Note, Said, Wording
 from gcsplan.units import METRIC, Units
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
@@ -38,19 +38,20 @@ class Subject:
     ``slot`` is its part of the time table, None for a checked file, and so is ``motion``, the whole flight over time.
     ``flown`` is what it flew in a rehearsal, from that track alone. ``leaves``: it is gone where its motion ends.
     ``home`` is the way home from every point, if it was judged. ``upload`` holds the keys of ``upload.json``, None if
-    nothing was sent. ``settings``: the parameters that its mission was judged with. ``typed``: the options that the
-    reader types, by their keys in a mission file; empty if he has one.
+    nothing was sent, ``warnings`` what was said of it. ``settings``: the parameters that its mission was judged with.
+    ``typed``: the options that the reader types, by their keys in a mission file; empty if he has one.
     """
 
     name: str
     verdict: Verdict
     vehicle: Vehicle
     certificate: Certificate | None = None
-    notes: tuple[str, ...] = ()
+    notes: tuple[Said, ...] = ()
     motion: TimedPath | None = None
     slot: Slot | None = None
     home: WayHome | None = None
     upload: Mapping[str, object] | None = None
+    warnings: tuple[Said, ...] = ()
     flown: TimedPath | None = None
     leaves: bool = False
     settings: tuple[Setting, ...] = ()
@@ -104,15 +105,14 @@ class Rehearsed:
     how: str
     compared: tuple[Compared, ...]
     violations: tuple[Said, ...] = ()
-    not_flown: tuple[str, ...] = ()
+    not_flown: tuple[Said, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Page:
     """Everything that one report shows. ``facts`` are names and values of what was requested, in the order shown.
 
-    ``left_out`` are names of vehicles without a mission, and why. ``units`` are those of all numbers on the page; notes
-    are in metres, as they say what to write into a file.
+    ``left_out`` are names of vehicles without a mission, and why. ``units`` are those of all numbers on the page.
     """
 
     title: str
@@ -120,7 +120,7 @@ class Page:
     subjects: tuple[Subject, ...]
     inputs: Mapping[str, object]
     facts: tuple[tuple[str, str], ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Said, ...] = ()
     separation: Separation | None = None
     order: tuple[str, ...] = ()
     units: Units = METRIC
@@ -165,7 +165,7 @@ def page_of_check(
     checked: Sequence[CheckedFile],
     *,
     inputs: Mapping[str, object],
-    notes: Sequence[str] = (),
+    notes: Sequence[Said] = (),
     homes: Sequence[WayHome | None] = (),
     units: Units = METRIC,
 ) -> Page:
@@ -177,8 +177,7 @@ def page_of_check(
     subjects = tuple(
         Subject(
             c.vehicle.name if names.count(c.vehicle.name) == 1 else str(c.file),
-            c.verdict, c.vehicle, None,
-            tuple(dict.fromkeys(told(note, Wording(options=c.typed)) for note in (*c.notes, *c.verdict.notes))),
+            c.verdict, c.vehicle, None, tuple(dict.fromkeys((*c.notes, *c.verdict.notes))),
             home=homes[i] if i < len(homes) else None, typed=c.typed,
         )
         for i, c in enumerate(checked)

@@ -23,7 +23,7 @@ from gcsplan.export.geojson import write_geojson
 from gcsplan.export.kml import DRAWN_TOP_M, write_kml
 from gcsplan.export.profile import write_profile
 from gcsplan.export.rows import ItemRow, Track, WayPoint, outlines_deg
-from gcsplan.export.summary import ORDER, write_summary
+from gcsplan.export.summary import ORDER, SCHEMA, write_summary
 from gcsplan.export.table import csv_of
 from gcsplan.mission_file.zone_draft import place_zones
 from gcsplan.mission_file.zone_reader import read_zones
@@ -408,7 +408,7 @@ def summary() -> dict[str, Any]:
 
 def test_the_summary_has_the_contracts_keys_in_its_order() -> None:
     document = json.loads(write_summary(summary()))
-    assert list(document) == ["name", "planner", "seed", "inputs", "vehicles", "fleet"]
+    assert list(document) == ["schema", "name", "planner", "seed", "inputs", "vehicles", "fleet"]
     vehicle = document["vehicles"][0]
     known = [key for key in ORDER["vehicles"] if key in vehicle]
     assert list(vehicle) == [*known, "extra"]
@@ -447,7 +447,8 @@ def test_plain_words_and_nothing_else_go_into_json() -> None:
 @given(st.dictionaries(st.sampled_from(["a_m", "min_b_m", "lat", "c"]), st.floats() | st.integers() | st.text()))
 def test_any_numbers_make_valid_json(values: dict[str, Any]) -> None:
     document = json.loads(write_summary(values), parse_constant=lambda word: pytest.fail(word))
-    assert set(document) == set(values)
+    assert set(document) == {"schema", *values}
+    assert document["schema"] == SCHEMA
     for key, value in values.items():
         if isinstance(value, float) and math.isfinite(value):
             assert document[key] == pytest.approx(value, rel=1e-9, abs=1.1e-3)

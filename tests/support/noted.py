@@ -24,3 +24,9 @@ def within(note: Note) -> Iterator[Note]:
 def coded(notes: Iterable[Said], code: str) -> Note:
     """The first note with a code. Raises StopIteration if there is none."""
     return next(note for note in notes if isinstance(note, Note) and note.code == code)
+
+
+def one(code: str, notes: Iterable[Said]) -> Note:
+    """The only note with ``code``."""
+    [found] = [note for note in notes if isinstance(note, Note) and note.code == code]
+    return found

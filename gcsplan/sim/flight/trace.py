@@ -18,7 +18,6 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.verdict import Finding
 from gcsplan.notes.note import Note
-from gcsplan.units import Quantity, Seconds, UnitText
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Legs, Violation
 from gcsplan.world.world import World
@@ -61,7 +60,7 @@ class Trace:
     slack_m: Floats
     stays: bool = False
     leaves: bool = False
-    why: str = ""
+    why: tuple[Note, ...] = ()
 
     @property
     def begin_s(self) -> float:
@@ -176,14 +175,12 @@ class Meeting:
     time_s: float
     kind: str = "air"
 
-    def describe(self, needed_m: float) -> UnitText:
-        """Return one sentence; ``needed_m`` is the required separation."""
-        a, b = self.names
-        how = "{} and {} came as near as" if self.kind == "air" else "{} landed beside {}, which stood there:"
-        return UnitText(
-            how + " {}, needed are {}, at {}",
-            a, b, Quantity(self.distance_m, "distance", 1, "down"), Quantity(needed_m, "distance", None),
-            Seconds(self.time_s, 1),
+    def note(self, needed_m: float) -> Note:
+        """Return how near they came; ``needed_m`` is the required separation."""
+        first, second = self.names
+        return Note(
+            "came_too_near" if self.kind == "air" else "landed_too_near", first=first, second=second,
+            distance_m=self.distance_m, needed_m=needed_m, time_s=self.time_s,
         )  # fmt: skip
 
 
