@@ -8,6 +8,7 @@ from enum import StrEnum
 from typing import TypeVar
 
 from gcsplan.arrays import Floats
+from gcsplan.notes.note import Note
 from gcsplan.world.atmosphere import true_per_indicated
 from gcsplan.world.limits import Limits
 
@@ -53,12 +54,9 @@ def fastest_at_m_s(lean_deg: float) -> float:
     return lean_deg / LEAN_DEG_PER_M_S
 
 
-def lean_words(lean_deg: float) -> str:
+def lean_words(lean_deg: float) -> Note:
     """The parameter of the lean angle with its value, for every version of ArduCopter."""
-    return (
-        f"ATC_ANGLE_MAX {lean_deg:g} (degrees, since ArduPilot 4.7) or ANGLE_MAX {100.0 * lean_deg:g} (hundredths of a "
-        f"degree, before)"
-    )
+    return Note("lean_parameter", lean_deg=lean_deg, lean_cdeg=100.0 * lean_deg)
 
 
 Amount = TypeVar("Amount", float, Floats)

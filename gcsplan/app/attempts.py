@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gcsplan.notes.note import Note
 from gcsplan.planners.budget import FIRST, FIRST_S, Budget
 from gcsplan.planners.problem import Problem, Solution
 
@@ -39,14 +40,13 @@ def of_all(tried: Sequence[Solution], problem: Problem) -> Solution:
     alike = [s.lower_bound for s in tried if s.lower_bound is not None and same_ends(s, last)]
     last = with_bound(last, max(alike, default=None), problem)
     stopped_by = "time" if "time" in (s.stopped_by for s in tried) else last.stopped_by
-    note = f"planned {len(tried)} times, each time with larger margins: the first mission breaks a limit as it is flown"
     return replace(
         last,
         stopped_by=stopped_by,
         planning_s=sum(s.planning_s for s in tried),
         first_path_s=first.first_path_s,
         search=tuple(step for s in tried for step in s.search),
-        notes=(*last.notes, note),
+        notes=(*last.notes, Note("planned_again", times=len(tried))),
     )
 
 

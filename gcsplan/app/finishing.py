@@ -11,6 +11,7 @@ from gcsplan.app.gate import GateTime
 from gcsplan.app.leaving_out import LeavingOut
 from gcsplan.app.model import Brief, Plan, VehiclePlan
 from gcsplan.app.planning import over_one_terrain
+from gcsplan.notes.note import Note, Said
 from gcsplan.planners.problem import Progress
 
 __all__ = ["finished"]
@@ -31,13 +32,13 @@ def finished(
     source = brief.source
     flown, fleet = fleet_of(vehicles, brief, gate, leaving)
     flown = within_hours(source, flown, fleet)
-    notes = list(source.notes)
+    notes: list[Said] = list(source.notes)
     if len(flown) > 1 and source.arrival is None:
-        notes.append("the file asks for no `arrival`: the separation between vehicles is not judged")
+        notes.append(Note("no_arrival_asked"))
     notes += fleet.notes
     if brief.objective == "energy" and any(not v.verdict.energy_stated for v in flown):
         flown = tuple(replace(v, verdict=replace(v.verdict, energy_stated=True, paper_energy=True)) for v in flown)
-        notes.append("the energy that is minimised is the paper's: a vehicle has no `energy:`")
+        notes.append(Note("paper_energy_minimised"))
     return Plan(
         source, brief.world, planner, brief.objective, brief.seed, flown, tuple(notes), fleet, tuple(leaving.found),
         leaving.allowed,

@@ -36,7 +36,7 @@ class FleetOnBoard:
         plan = self._plan
         if not self.keeps_apart or plan.fleet is None or plan.source.arrival is None:
             return ""
-        from gcsplan.app.fleet_planning import conflict_words, motion_of, rules_of
+        from gcsplan.app.fleet_planning import motion_of, rules_of, too_near
         from gcsplan.fleet.separation import separation
 
         planned = next(v for v in plan.vehicles if v.name == name)
@@ -48,4 +48,4 @@ class FleetOnBoard:
         kept = [flown if v.name == name else v for v in plan.vehicles]
         found = separation([motion, *others], rules_of(plan.source.arrival, kept))
         met = [c for c in found.conflicts if name in c.worst.vehicles]
-        return conflict_words(met, plan.world) if met else ""
+        return str(too_near(met, plan.world)) if met else ""

@@ -26,17 +26,20 @@ from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, sched
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.timing import Course, Route, motion_error_m
 from gcsplan.mission_file import ArrivalRequest
+from gcsplan.notes.note import Note
 from gcsplan.world.world import World
 
 if TYPE_CHECKING:
-    from gcsplan.fleet.separation import Conflict, Place, Rules, Separation
+    from gcsplan.fleet.separation import Conflict, Place, Rules, Separation, Where
 
 LATER_S = 600.0
 """Seconds by which all arrivals may be delayed to keep a fleet apart, if the mission file sets no arrival time."""
 SEPARATION_M = 30.0
 """Separation that is judged if the file has no `arrival`, m."""
+MOST_CONFLICTS = 8
+"""Most conflicts that a refusal or a note names."""
 
-__all__ = ["conflict_words", "crew_of", "fleet_of", "motion_of", "route_of", "rules_of", "without"]
+__all__ = ["crew_of", "fleet_of", "motion_of", "route_of", "rules_of", "too_near", "without"]
 
 
 def fleet_of(
@@ -51,7 +54,7 @@ def fleet_of(
     world, arrival = brief.world, brief.source.arrival
     leaving = leaving or LeavingOut(allowed=False)
     crews = [crew_of(v, world) for v in vehicles]
-    notes: list[str] = []
+    notes: list[Note] = []
     if arrival is None:
         plan = schedule(crews, "none")
     else:
@@ -69,25 +72,19 @@ def fleet_of(
     if found is not None and not found.safe and arrival is not None:
         # The missions as built are what is flown, so this check decides.
         if not leaving.allowed:
-            raise NoMission(conflict_words(found.conflicts, world), reason="separation")
+            raise NoMission(str(too_near(found.conflicts, world)), reason="separation")
         leave = least_to_leave(found.conflicts)
         for name, conflict in leave.items():
-            leaving.leave(name, NoMission(conflict_words([conflict], world), reason="separation"))
+            leaving.leave(name, NoMission(str(too_near([conflict], world)), reason="separation"))
         rows = [k for k, v in enumerate(flown) if v.name not in leave]
         flown, slots, motions = [flown[k] for k in rows], [slots[k] for k in rows], [motions[k] for k in rows]
         found = _separation(motions, flown, arrival)
     if found is not None:
         notes += found.notes
         if not found.safe:
-            notes.append(
-                f"the file asks for no `arrival`, so nothing keeps the vehicles apart; released together, "
-                f"{conflict_words(found.conflicts, world)}"
-            )
+            notes.append(Note("nothing_keeps_apart", met=too_near(found.conflicts, world)))
     if gate is not None:
-        notes.append(
-            f"the gates open from T+0 = {gate.start:%Y-%m-%d %H:%M:%S} UTC on: a vehicle that comes to its gate after "
-            f"its second waits there for nearly a day; release each by its time, {SLACK_S:g} s are to spare"
-        )
+        notes.append(Note("gates_open", start_utc=f"{gate.start:%Y-%m-%d %H:%M:%S}", spare_s=SLACK_S))
     names = {v.name for v in flown}
     order = tuple(name for name in plan.order if name in names)
     return tuple(flown), FleetPlan(
@@ -206,7 +203,7 @@ def rules_of(arrival: ArrivalRequest | None, vehicles: Sequence[VehiclePlan]) ->
 
 def _scheduled(
     crews: Sequence[Crew], arrival: ArrivalRequest, detours: Detours, leaving: LeavingOut
-) -> tuple[Schedule, list[str]]:
+) -> tuple[Schedule, list[Note]]:
     """The requested schedule, and notes on it.
 
     If the file does not set `clock`, the first vehicle's clock is tried, then that of the whole fleet.
@@ -232,11 +229,11 @@ def _scheduled(
             raise
     plan = by_clock("fleet", leave_out=leaving.allowed)
     first = plan.slots[0]
-    early_s = min(Craft(c).fast_s for c in crews if c.name == first.name)
-    return plan, [
-        f"{first.name}, the first, arrives at {first.arrive_s:.1f} s instead of {early_s:.1f} s, so that the others "
-        f"can follow {plan.interval_s:g} s apart (clock: fleet)"
-    ]
+    alone_s = min(Craft(c).fast_s for c in crews if c.name == first.name)
+    note = Note(
+        "clock_of_fleet", first=first.name, arrive_s=first.arrive_s, alone_s=alone_s, interval_s=plan.interval_s
+    )  # fmt: skip
+    return plan, [note]
 
 
 def _kept_apart(
@@ -257,7 +254,7 @@ def _kept_apart(
         hold=arrival.hold,
         later_s=0.0 if arrival.arrive_s is not None else LATER_S,
         replan=detours,
-        where=lambda place: words_of(brief.world, place),
+        where=on_map(brief.world),
         leave_out=leaving.allowed,
     )  # fmt: skip
     for why in settled.left_out:
@@ -271,14 +268,20 @@ def motion_of(v: VehiclePlan, slot: Slot, world: World) -> TimedPath:
     return course.fly(slot.speed_m_s, slot.depart_s, slot.hold_s if v.order.gate_utc else 0.0)
 
 
-def words_of(world: World, place: Place) -> str:
-    """A place in words that a person can find on a map."""
-    lat, lon = (float(x) for x in world.frame.to_degrees(place[0], place[1]))
-    return f"{lat:.6f}, {lon:.6f}, {place[2]:.0f} m AMSL"
+def on_map(world: World) -> Where:
+    """A function that names a place so that a person can find it on a map."""
+
+    def named(place: Place) -> Note:
+        lat_deg, lon_deg = (float(x) for x in world.frame.to_degrees(place[0], place[1]))
+        return Note("place_on_map", lat_deg=lat_deg, lon_deg=lon_deg, amsl_m=place[2])
+
+    return named
 
 
-def conflict_words(conflicts: Sequence[Conflict], world: World) -> str:
-    """Which vehicles come too near to each other, when and where."""
-    lines = [f"  {c.describe(lambda place: words_of(world, place))}" for c in conflicts[:8]]
-    more = f"\n  and {len(conflicts) - 8} more" if len(conflicts) > 8 else ""
-    return "the vehicles come too near to each other:\n" + "\n".join(lines) + more
+def too_near(conflicts: Sequence[Conflict], world: World) -> Note:
+    """Which vehicles come too near to each other, when and where; the first `MOST_CONFLICTS` of all."""
+    where = on_map(world)
+    told = [c.note(where) for c in conflicts[:MOST_CONFLICTS]]
+    if len(conflicts) > MOST_CONFLICTS:
+        told.append(Note("more_conflicts", count=len(conflicts) - MOST_CONFLICTS))
+    return Note("too_near", conflicts=tuple(told))

@@ -15,6 +15,7 @@ from gcsplan.fleet.motion import TimedPath
 from gcsplan.mavlink.build.order import Order
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest
+from gcsplan.notes.note import Note, Said
 from gcsplan.planners.problem import Problem, Solution
 from gcsplan.world.world import World
 
@@ -52,7 +53,7 @@ class VehiclePlan:
     mission: Mission
     verdict: Verdict
     speed_m_s: float
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     order: Order = field(default_factory=Order)
     brief: Brief | None = None
 
@@ -93,6 +94,11 @@ class VehiclePlan:
         """A `packed` plan over the terrain of ``over``, under which it was made."""
         return replace(self, problem=replace(self.problem, airspace=over.world.airspace), brief=over)
 
+    def all_notes(self, fleet: FleetPlan | None) -> tuple[Said, ...]:
+        """What is said of this vehicle: of its request, its search, its mission, and its part of the time table."""
+        slot = () if fleet is None else fleet.slot(self.name).notes
+        return tuple(dict.fromkeys((*self.notes, *self.solution.notes, *self.verdict.notes, *slot)))
+
 
 @dataclass(frozen=True, eq=False)
 class FleetPlan:
@@ -108,7 +114,7 @@ class FleetPlan:
     slots: tuple[Slot, ...]
     motions: tuple[TimedPath, ...]
     separation: Separation | None = None
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     start_utc: datetime | None = None
 
     def slot(self, name: str) -> Slot:
@@ -138,7 +144,7 @@ class Plan:
     objective: str
     seed: int
     vehicles: tuple[VehiclePlan, ...]
-    notes: tuple[str, ...] = ()
+    notes: tuple[Said, ...] = ()
     fleet: FleetPlan | None = None
     left_out: tuple[LeftOut, ...] = ()
     leaves_out: bool = False

@@ -28,6 +28,7 @@ from gcsplan.mavlink.files.formats import write_plan, write_waypoints
 from gcsplan.mavlink.mission.commands import command_name
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.mavlink.mission.parameter_file import PARAM_ENDING, param_file
+from gcsplan.notes.note import in_json
 from gcsplan.units import METRIC, Units
 
 if TYPE_CHECKING:
@@ -129,7 +130,7 @@ def summary_of(plan: Plan, results: Sequence[JobResult] = (), homes: Homes = Map
         ],
         "fleet": _fleet(plan),
         "left_out": [v.as_dict() for v in plan.left_out],
-        "notes": list(dict.fromkeys(plan.notes)),
+        **in_json("notes", dict.fromkeys(plan.notes)),
     }
 
 
@@ -155,7 +156,6 @@ def _vehicle(
     lowest = verdict.lowest
     length = v.problem.objective == "length"
     bound = v.solution.lower_bound
-    notes = (*v.notes, *v.solution.notes, *map(str, verdict.notes), *(slot.notes if slot else ()))
     return {
         "name": v.name,
         "items": len(v.mission.wire_items()),
@@ -178,9 +178,9 @@ def _vehicle(
         "stopped_by": v.solution.stopped_by,
         "search": [asdict(step) for step in v.solution.search],
         "safe": verdict.safe,
-        "not_judged": [str(note) for note in verdict.not_judged],
+        **in_json("not_judged", verdict.not_judged),
         "hold_s": slot.hold_s if slot else 0.0,
-        "notes": list(dict.fromkeys(notes)),
+        **in_json("notes", v.all_notes(fleet)),
         "upload": result.as_dict() if result else None,
         "verdict": verdict_words(verdict.safe, home),
     } | _of_search(v) | ({} if home is None else {"way_home": home.as_dict()})  # fmt: skip
@@ -228,8 +228,8 @@ def verdict_of(name: str, verdict: Verdict, home: WayHome | None = None) -> dict
         "min_agl_m": lowest.min_agl_m if lowest else None,
         **_extremes(verdict),
         "violations": [flat(f) for f in verdict.findings],
-        "not_judged": [str(note) for note in verdict.not_judged],
-        "notes": [str(note) for note in verdict.notes],
+        **in_json("not_judged", verdict.not_judged),
+        **in_json("notes", verdict.notes),
     }
 
 

@@ -18,6 +18,7 @@ from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import Home, Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest
+from gcsplan.notes.note import Note
 from gcsplan.planners.cures import FILLED
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -130,7 +131,7 @@ def make_problem(
     margins: Margins = MARGINS,
     progress: Callable[[Progress], None] | None = None,
     options: Mapping[str, object] | None = None,
-) -> tuple[Problem, tuple[str, ...]]:
+) -> tuple[Problem, tuple[Note, ...]]:
     """The planner's problem for one vehicle, with the wire's margins in the limits of its paths, those of the check for
     its bounds, and notes for the user.
 
@@ -148,7 +149,7 @@ def make_problem(
         checked = replace(checked, altitude_error_m=checked.altitude_error_m + source.terrain_error_m)
     limits = _with_margins(checked, margins, terrain=source.altitude_frame == "terrain")
     air = world.airspace
-    notes: list[str] = []
+    notes: list[Note] = []
 
     start_agl_m = _wanted_agl_m(request.takeoff_agl_m, request.start_amsl_m, request.start[2])
     goal_agl_m = _wanted_agl_m(request.approach_agl_m, request.goal_amsl_m, request.goal[2])
@@ -181,10 +182,7 @@ def make_problem(
         widen=None if source.wider is None else wider,
     )
     if vehicle.autopilot is Autopilot.ARDUPLANE and vehicle.turn_radius_m <= 0.0:
-        notes.append(
-            "arduplane with turn_radius_m 0 is flown as a VTOL (QuadPlane): vertical take-off and landing; corners "
-            "are cut and the landing place is overshot while braking: track_error_m must hold both"
-        )
+        notes.append(Note("flown_as_quadplane"))
     return problem, tuple(notes)
 
 
@@ -213,7 +211,7 @@ class _Ends:
     world: World
     limits: Limits
     checked: Limits
-    notes: list[str]
+    notes: list[Note]
 
     def amsl_m(self, what: str, place: tuple[float, float, float], key: str, wanted_agl_m: float | None) -> float:
         """The altitude AMSL of one end, as ``wanted_agl_m`` above ground or raised, with a note. Raises InputError,
@@ -237,8 +235,11 @@ class _Ends:
         amsl = datum + math.ceil((amsl - datum) * 100.0 - 1e-6) / 100.0
         if wanted_agl_m is not None and amsl - ground > wanted_agl_m + 0.011:
             self.notes.append(
-                f"{key} {wanted_agl_m:g} raised to {amsl - ground:.2f}: so far the ground rises within the track error"
-            )
+                Note(
+                    "takeoff_raised" if what == "start" else "approach_raised",
+                    asked_m=wanted_agl_m, raised_m=amsl - ground,
+                )
+            )  # fmt: skip
         return amsl
 
 
@@ -250,7 +251,7 @@ def _require_one_height(source: MissionFile, request: VehicleRequest, world: Wor
 
 
 def _vias(
-    air: Airspace, request: VehicleRequest, ends_amsl_m: tuple[float, float], notes: list[str]
+    air: Airspace, request: VehicleRequest, ends_amsl_m: tuple[float, float], notes: list[Note]
 ) -> tuple[Via, ...]:
     """The via points. Planners need a leg between two altitudes: for a multicopter, a via that is one place with the
     terminal before it, or with the goal behind it, at another altitude is moved aside by `SPOT_M`, with a note."""
@@ -267,7 +268,7 @@ def _vias(
             # Not all to the same side: the one before may have been moved from the same place.
             east_m, north_m = (SPOT_M, 0.0) if k % 2 == 0 else (0.0, SPOT_M)
             v = replace(v, east_m=v.east_m + east_m, north_m=v.north_m + north_m)
-            notes.append(f"via point {k + 1} is moved {100.0 * SPOT_M:g} cm aside: the climb there is on the spot")
+            notes.append(Note("via_moved", via=k + 1, aside_m=SPOT_M))
         out.append(v)
     return tuple(out)
 

@@ -51,10 +51,9 @@ def page_of_plan(
             v.cost, v.solution.lower_bound, v.gap_percent, v.solution.stopped_by,
         )  # fmt: skip
         slot = None if fleet is None else fleet.slot(v.name)
-        notes = (*v.notes, *v.solution.notes, *map(str, v.verdict.notes), *(slot.notes if slot is not None else ()))
         subjects.append(
             Subject(
-                v.name, v.verdict, v.request.vehicle, certificate, tuple(dict.fromkeys(notes)),
+                v.name, v.verdict, v.request.vehicle, certificate, v.all_notes(fleet),
                 None if fleet is None else fleet.motion(v.name), slot,
                 (homes or {}).get(v.name), uploads.get(v.name), leaves=v.request.end == "none",
                 settings=settings_of_plan(v, (homes or {}).get(v.name)),
@@ -74,7 +73,7 @@ def render_rehearsal(
     page = page_of_plan(plan, (), homes, units)
     flown = {trace.name: trace for trace in result.flown}
     subjects = tuple(replace(s, flown=_motion(flown[s.name]) if s.name in flown else None) for s in page.subjects)
-    violations = tuple(b.describe(result.runs) for b in result.breaches)
+    violations = tuple(b.note(result.runs) for b in result.breaches)
     compared = tuple(_compared(plan, result))
     rehearsed = Rehearsed(result.safe, _how(result, units), compared, violations, result.not_judged)
     return render_page(replace(page, subjects=subjects, rehearsed=rehearsed, notes=(*page.notes, *result.notes)))

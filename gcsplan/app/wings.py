@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import count, islice
 
@@ -29,6 +29,7 @@ from gcsplan.errors import NoMission
 from gcsplan.mavlink.build.fixed_wing import flown_m, tangents_m, thinned
 from gcsplan.mavlink.build.order import MARGINS, Order, Wing
 from gcsplan.mission_file import VehicleRequest
+from gcsplan.notes.note import Note
 from gcsplan.planners.cures import FILLED
 from gcsplan.planners.problem import Problem, Progress, Solution, straight_bound
 from gcsplan.vehicle import Vehicle
@@ -138,7 +139,7 @@ def _joined(
             bound = _bound_between(brief, inner, solution.path.points, start, goal, vehicle, world)
             solution = with_bound(solution, bound, problem)
         speed = vehicle.speed_max_m_s
-        return VehiclePlan(request, inner, solution, mission, verdict, speed, tuple(_words(start, goal)), order, over)
+        return VehiclePlan(request, inner, solution, mission, verdict, speed, tuple(_notes(start, goal)), order, over)
     if refused and not why:
         raise refused[0] from refused[0].__cause__
     raise NoMission(
@@ -199,8 +200,9 @@ def _whole(problem: Problem, solution: Solution, start: FlightEnd, goal: FlightE
     behind = np.empty((0, 3)) if goal is None else np.vstack([goal.chain[-2::-1], goal.top])
     points = thinned(np.vstack([before[1:], inner, behind]), problem.turn_radius_m)
     points = _slowed(points, start.leaves, problem)
-    note = "the lower bound is that of missions with this climb-out" + (" and this approach" if goal else "")
-    notes = (*solution.notes, note) if solution.lower_bound is not None else solution.notes
+    notes = solution.notes
+    if solution.lower_bound is not None:
+        notes = (*notes, Note("bound_with_climb_out", approach=goal is not None))
     return replace(solution, path=Path(points), flown=None, lower_bound=None, notes=notes)
 
 
@@ -277,23 +279,19 @@ def _unfitting(points: Floats, order: Order, radius: float) -> Indices:
     return np.flatnonzero(tangent[:-1] + tangent[1:] > run + 0.05)
 
 
-def _words(start: FlightEnd, goal: FlightEnd | None) -> Sequence[str]:
-    """Notes on the ends, for the user."""
-    heading = (90.0 - math.degrees(start.heading)) % 360.0
-    far_m = math.dist(start.top[:2], start.ground[:2])
-    words = [
-        f"launch it on a heading of {heading:.0f}°: it climbs straight ahead for {far_m:.0f} m to "
-        f"{start.top[2] - start.ground[2]:.0f} m above home"
-    ]
-    if start.circle is not None:
-        words[0] += (
-            f", and goes on in circles of {abs(start.circle_m):.0f} m up to {start.circle[2] - start.ground[2]:.0f} m"
-        )
+def _notes(start: FlightEnd, goal: FlightEnd | None) -> Iterator[Note]:
+    """How to launch it, and how it lands."""
+    heading_deg = (90.0 - math.degrees(start.heading)) % 360.0
+    far_m, up_m = math.dist(start.top[:2], start.ground[:2]), float(start.top[2] - start.ground[2])
+    if start.circle is None:
+        yield Note("climb_out", heading_deg=heading_deg, far_m=far_m, up_m=up_m)
+    else:
+        yield Note(
+            "climb_out_in_circles", heading_deg=heading_deg, far_m=far_m, up_m=up_m, circle_m=abs(start.circle_m),
+            circled_m=float(start.circle[2] - start.ground[2]),
+        )  # fmt: skip
     if goal is not None:
-        heading = (270.0 - math.degrees(goal.heading)) % 360.0
-        far_m = math.dist(goal.top[:2], goal.ground[:2])
-        words.append(
-            f"it lands on a heading of {heading:.0f}°, gliding straight for {far_m:.0f} m from "
-            f"{goal.top[2] - goal.ground[2]:.0f} m above the goal"
-        )
-    return words
+        yield Note(
+            "approach", heading_deg=(270.0 - math.degrees(goal.heading)) % 360.0,
+            far_m=math.dist(goal.top[:2], goal.ground[:2]), up_m=float(goal.top[2] - goal.ground[2]),
+        )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -14,6 +14,7 @@ from rich.table import Table
 from gcsplan.check.rtl.words import verdict_words
 from gcsplan.cli.screens import RESULTS, aside, console
 from gcsplan.figures import floored, raised, steepened
+from gcsplan.notes.note import IN_FILES, Wording, told
 from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Unit, Units, charge, duration, in_units
 from gcsplan.world.model_words import heights_line, what_is_not_in
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from gcsplan.check.rtl.verdict import WayHome
     from gcsplan.mavlink.protocol.machine import Progress as Transfer
     from gcsplan.mission_file import MissionFile
+    from gcsplan.notes.note import Said
 
 WIDEST = 100_000
 MOST_WHOLE = 30
@@ -108,20 +110,15 @@ def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) 
     else:
         _columns_table(title, rows)
     _say_fleet(plan, units)
-    say_notes(plan.notes)
-    if plan.fleet is not None:
-        notes = [(slot.name, note) for slot in plan.fleet.slots for note in slot.notes]
-        say_notes_of([(name, note.removeprefix(f"{name} ")) for name, note in notes])
-    say_notes_of(
-        [(v.name, n) for v in plan.vehicles for n in (*v.notes, *v.solution.notes, *map(str, v.verdict.notes))]
-    )
+    say_notes(plan.notes, Wording(units))
+    say_notes_of([(v.name, note) for v in plan.vehicles for note in v.all_notes(plan.fleet)], Wording(units))
     say_heights(plan.source.inputs)
     if words := what_is_not_in(plan.source.inputs):
         console.print(words, style="yellow", markup=False)
 
 
 def say_heights(inputs: Mapping[str, object]) -> None:
-    """Print how the terrain's heights were read, as one note; like all notes in SI."""
+    """Print how the terrain's heights were read, as one note, in SI."""
     if (line := heights_line(inputs)) is not None:
         say_notes([line])
 
@@ -131,7 +128,7 @@ def say_terrain(source: MissionFile) -> None:
     is no mission."""
     notes = source.surface.info.get("notes", ())
     if isinstance(notes, tuple) and notes:
-        say_notes([str(note) for note in notes])
+        say_notes(notes)
         say_heights(source.inputs)
 
 
@@ -217,7 +214,7 @@ def _plan_row(
     }
 
 
-def upload_table(results: Sequence[JobResult], title: str = "upload") -> None:
+def upload_table(results: Sequence[JobResult], title: str = "upload", units: Units = METRIC) -> None:
     """Print one row for each vehicle that was sent to or compared with."""
     sent = title == "upload"
     columns = [("vehicle", False), ("link", False), ("items", True), *([("outcome", False)] if sent else []),
@@ -232,7 +229,7 @@ def upload_table(results: Sequence[JobResult], title: str = "upload") -> None:
         outcome = [outcome_words] if sent else []  # a comparison sends nothing
         table.add_row(escape(d.vehicle), link, str(d.items), *outcome, verified, number(d.seconds, 2), str(d.retries))
     print_table(table)
-    say_notes_of([(d.vehicle, w) for d in results for w in d.warnings])
+    say_notes_of([(d.vehicle, w) for d in results for w in d.warnings], Wording(units))
     for d in results:
         if d.message:
             aside.print(f"{d.vehicle}: {d.message}", style="red", markup=False)
@@ -253,18 +250,18 @@ def release_table(plan: Plan, results: Sequence[JobResult], gate: GateTime | Non
         say(f"T+0 is {gate.start:%Y-%m-%d %H:%M:%S} UTC")
 
 
-def say_notes(notes: Sequence[str]) -> None:
+def say_notes(notes: Iterable[Said], wording: Wording = IN_FILES) -> None:
     """Print notes, each once, in order."""
     for note in dict.fromkeys(notes):
-        aside.print(f"note: {note}", style="dim", markup=False)
+        aside.print(f"note: {told(note, wording)}", style="dim", markup=False)
 
 
-def say_notes_of(notes: Sequence[tuple[str, str]]) -> None:
+def say_notes_of(notes: Sequence[tuple[str, Said]], wording: Wording = IN_FILES) -> None:
     """Print notes on vehicles, (name, note) each; a note on several is printed once with all their names."""
-    names: dict[str, list[str]] = {}
+    names: dict[Said, list[str]] = {}
     for name, note in dict.fromkeys(notes):
         names.setdefault(note, []).append(name)
-    lines = [f"{names_of(of)}: {note}" for note, of in names.items()]
+    lines = [f"{names_of(of)}: {told(note, wording)}" for note, of in names.items()]
     if len(lines) > MOST_NOTES:
         lines = [*lines[:MOST_NOTES], f"… and {len(lines) - MOST_NOTES} more on vehicles: --json has all"]
     say_notes(lines)

@@ -36,8 +36,8 @@ UnitsOption = Annotated[
         "--units",
         envvar="GCSPLAN_UNITS",
         metavar="NAME",
-        help="Of tables, findings and report: metric, imperial (ft, mi, mph) or aviation (ft, NM, kt). Other files, "
-        "JSON and notes stay in SI.",
+        help="Of tables, findings, notes and report: metric, imperial (ft, mi, mph) or aviation (ft, NM, kt). Other "
+        "files and JSON stay in SI.",
     ),
 ]
 MissionArgument = Annotated[

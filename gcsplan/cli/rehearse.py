@@ -108,6 +108,7 @@ def rehearse(
     from gcsplan.cli.planning_display import planning_display
     from gcsplan.cli.work_display import WorkDisplay
     from gcsplan.export.outdir import write_whole
+    from gcsplan.notes.note import Wording
     from gcsplan.sim.flight.wind import Weather
 
     weather = Weather(wind, wind_from, gusts, noise_m)
@@ -156,7 +157,7 @@ def rehearse(
         emit({"name": source.name} | result.as_dict() | judged, failure)
     else:
         _show(planned, result, units_of(units))
-        say_notes(result.notes)
+        say_notes(result.notes, Wording(units_of(units)))
         for line in _ending(result, units_of(units)):
             say(line)
         say_homes(homes, units_of(units))
@@ -190,7 +191,7 @@ def _ending(result: Rehearsal, units: Units) -> list[str]:
         lines.append(least)
     if result.runs > 1 and result.p95_s is not None:
         lines.append(f"95 % of all arrivals lie within {result.p95_s:.2f} s of the plan")
-    lines += [f"violation: {in_units(b.describe(result.runs), units)}" for b in result.breaches]
+    lines += [f"violation: {in_units(b.note(result.runs), units)}" for b in result.breaches]
     lines += [f"not flown: {in_units(what, units)}" for what in result.not_judged]
     lines.append(
         {True: "flown as planned", False: "VIOLATIONS were found", None: "not everything was flown"}[result.safe]

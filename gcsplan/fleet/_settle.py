@@ -11,8 +11,9 @@ from gcsplan.fleet._changes import Chooser, Freedom, Option
 from gcsplan.fleet._taken import Taken
 from gcsplan.fleet.arrival import Craft, Crew, Hold, Schedule, Slot, schedule
 from gcsplan.fleet.motion import TimedPath
-from gcsplan.fleet.separation import TOLERANCE_M, Conflict, Rules, Where, in_metres, separation
+from gcsplan.fleet.separation import TOLERANCE_M, Conflict, Rules, separation
 from gcsplan.fleet.timing import Route
+from gcsplan.notes.note import Note
 
 Replan = Callable[[str, Sequence[Conflict], int], Route | None]
 """``replan(name, avoid, attempt)``: another route for a vehicle that keeps away from the places of ``avoid`` (or flies
@@ -41,24 +42,23 @@ class Change:
     extra_j: float
     because: Conflict
 
-    def describe(self, where: Where = in_metres) -> str:
-        """One line for the user."""
-        said = []
-        later = self.slot.depart_s - self.was.depart_s
-        if abs(later) > 0.005:
-            said.append(f"leaves {abs(later):.1f} s {'later' if later > 0.0 else 'earlier'}")
+    def note(self) -> Note:
+        """What changes, and which vehicle it keeps clear of."""
+        changes = []
+        later_s = self.slot.depart_s - self.was.depart_s
+        if abs(later_s) > 0.005:
+            changes.append(Note("leaves_later" if later_s > 0.0 else "leaves_earlier", by_s=abs(later_s)))
         if abs(self.slot.speed_m_s - self.was.speed_m_s) > 0.005:
-            said.append(f"flies at {self.slot.speed_m_s:.2f} instead of {self.was.speed_m_s:.2f} m/s")
+            changes.append(Note("flies_at", speed_m_s=self.slot.speed_m_s, was_m_s=self.was.speed_m_s))
         if self.slot.hold_s > self.was.hold_s:
-            said.append(f"holds {self.slot.hold_s - self.was.hold_s:g} s at the gate")
+            changes.append(Note("holds_longer", by_s=self.slot.hold_s - self.was.hold_s))
         if self.how == "path":
-            said.append("takes another path")
+            changes.append(Note("takes_another_path"))
         if abs(self.extra_j) >= 1.0:
-            said.append(f"needs {self.extra_j:+.0f} J")
-        a, b = self.because.worst.vehicles
-        other = b if a == self.name else a
-        at = f"{self.because.worst.time_s:.1f} s, {where(self.because.worst.middle)}"
-        return f"{self.name} {', '.join(said)}: to keep clear of {other} ({at})"
+            changes.append(Note("needs_more_energy", more_j=self.extra_j))
+        met = self.because.worst
+        [other] = {*met.vehicles} - {self.name}
+        return Note("keeps_clear", changes=tuple(changes), other=other, time_s=met.time_s, amsl_m=met.middle[2])
 
 
 def maker(plan: Schedule, crews: Sequence[Crew], hold: Hold) -> Again:
@@ -207,8 +207,7 @@ def _choice(chooser: Chooser, plan: Schedule, ask: Ask) -> Choice | Stuck:
         near_goals = [c for c in met if _at_goals(c, plan, ask.rules)]  # what no departure, speed or path can help
         return Stuck(was.name, [*near_goals, *met][0], others, bool(near_goals))
     change = Change(was.name, best.how, was, best.slot, best.extra_j, met[0])
-    note = change.describe(lambda place: f"{place[2]:.0f} m above sea level")
-    best = replace(best, slot=replace(best.slot, notes=(*best.slot.notes, note)))
+    best = replace(best, slot=replace(best.slot, notes=(*best.slot.notes, change.note())))
     return Choice(best, replace(change, slot=best.slot))
 
 

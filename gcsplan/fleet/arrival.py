@@ -23,6 +23,7 @@ from gcsplan.arrays import Floats
 from gcsplan.errors import NoMission
 from gcsplan.fleet.craft import LONGEST_HOLD_S, Craft, Crew, Hold, Longer, Slot
 from gcsplan.fleet.order import WITHIN_S, Clock, best_order, earliest_first, interval_range
+from gcsplan.notes.note import Note
 
 __all__ = [
     "WITHIN_S", "Clock", "Craft", "Crew", "Hold", "Longer", "Mode", "NoSchedule", "Schedule", "Slot",
@@ -135,12 +136,11 @@ def schedule(
     return Schedule(mode, tuple(s.name for s in slots), tuple(slots), step_s, tuple(left_out))
 
 
-def _why_later(craft: Sequence[Craft], first_s: float, step_s: float) -> str:
-    last = max(range(len(craft)), key=lambda k: craft[k].fast_s - k * step_s)
-    return (
-        f"the first arrives at {first_s:.1f} s instead of {craft[0].fast_s:.1f} s, so that {craft[last].name}, which "
-        f"needs {craft[last].fast_s:.1f} s at its fastest, can follow"
-    )
+def _why_later(craft: Sequence[Craft], first_s: float, step_s: float) -> Note:
+    last = craft[max(range(len(craft)), key=lambda k: craft[k].fast_s - k * step_s)]
+    return Note(
+        "first_waits_for", arrive_s=first_s, alone_s=craft[0].fast_s, last=last.name, needs_s=last.fast_s
+    )  # fmt: skip
 
 
 def _least_interval(craft: Sequence[Craft], hold: Hold, clock: Clock, arrive_s: float | None) -> float | None:

@@ -16,6 +16,7 @@ import numpy as np
 from gcsplan.fleet.lean import lean_needed_deg
 from gcsplan.fleet.order import WITHIN_S
 from gcsplan.fleet.timing import Course, Route, speed_for
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import DEFAULT_LEAN_DEG, LARGEST_LEAN_DEG, Autopilot, Vehicle, lean_for_deg, lean_words
 
 Hold = Literal["ground", "gate", "none"]
@@ -59,7 +60,7 @@ class Slot:
     arrive_s: float
     energy_j: float
     route: Route
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
 
 
 class Craft:
@@ -95,7 +96,7 @@ class Craft:
             return energy.hold_w()
         return max(energy.horizontal_j_per_m, 1.0) * self.slowest_m_s + energy.base_w
 
-    def fly(self, speed_m_s: float, depart_s: float = 0.0, hold_s: float = 0.0, notes: Sequence[str] = ()) -> Slot:
+    def fly(self, speed_m_s: float, depart_s: float = 0.0, hold_s: float = 0.0, notes: Sequence[Note] = ()) -> Slot:
         """The slot of a flight with this speed (put into range), departure and hold."""
         speed = min(max(float(np.float32(speed_m_s)), self.slowest_m_s), self.fastest_m_s)
         arrive_s = depart_s + self.course.time_to_goal_s(speed, hold_s)
@@ -115,7 +116,7 @@ class Craft:
         if spare_s <= WITHIN_S:
             return self.fly(self._speed_for(arrive_s))
         if hold == "ground":
-            return self.fly(self.slowest_m_s, spare_s, notes=[f"waits {spare_s:.1f} s on the ground"])
+            return self.fly(self.slowest_m_s, spare_s, notes=[Note("waits_on_ground", wait_s=spare_s)])
         if hold == "gate" and self.vehicle.can_hold and spare_s <= LONGEST_HOLD_S:
             return self._held(arrive_s, spare_s)
         return None if longer is None else self._longer(arrive_s, longer)
@@ -128,12 +129,11 @@ class Craft:
         hold_s = math.ceil(spare_s - WITHIN_S)
         joules = self.vehicle.energy.hold_w() * hold_s
         if arrive_s - hold_s >= self.fast_s:
-            note = f"holds {hold_s} s at the gate ({joules:.0f} J)"
+            note = Note("holds_at_gate", hold_s=hold_s, energy_j=joules)
             return self.fly(self._speed_for(arrive_s - hold_s), 0.0, float(hold_s), [note])
         hold_s = math.floor(spare_s)
         joules = self.vehicle.energy.hold_w() * hold_s
-        note = f"holds {hold_s} s at the gate ({joules:.0f} J); a hold is whole seconds: "
-        note += f"the rest, {spare_s - hold_s:.2f} s, it waits on the ground"
+        note = Note("holds_and_waits", hold_s=hold_s, energy_j=joules, wait_s=spare_s - hold_s)
         return self.fly(self.slowest_m_s, spare_s - hold_s, float(hold_s), [note])
 
     def _longer(self, arrive_s: float, longer: Longer) -> Slot | None:
@@ -148,8 +148,7 @@ class Craft:
                 more_m = route.length_m - self.crew.route.length_m
                 slot = other.at(arrive_s, "none")
                 assert slot is not None
-                note = f"flies {more_m:.0f} m more, to arrive so late"
-                return other.fly(slot.speed_m_s, notes=[note])
+                return other.fly(slot.speed_m_s, notes=[Note("flies_longer", more_m=more_m)])
             off_s = arrive_s - (other.slow_s if arrive_s > other.slow_s else 0.5 * (other.slow_s + other.fast_s))
             wanted_m += off_s * self.slowest_m_s
         return None
@@ -167,7 +166,7 @@ def _float32_range(low: float, high: float) -> tuple[float, float]:
     return float(inside_low), float(inside_high)
 
 
-def _speed_notes(vehicle: Vehicle, speed_m_s: float) -> list[str]:
+def _speed_notes(vehicle: Vehicle, speed_m_s: float) -> list[Note]:
     """What an ArduCopter must be able to lean: for the speed in still air, and as far as forecasts in wind count."""
     if vehicle.autopilot is not Autopilot.ARDUCOPTER:
         return []
@@ -175,17 +174,9 @@ def _speed_notes(vehicle: Vehicle, speed_m_s: float) -> list[str]:
     counts_deg = vehicle.lean_angle_deg or 0.0
     notes = []
     if lean_deg > LARGEST_LEAN_DEG:
-        return [
-            f"{speed_m_s:.2f} m/s needs a lean of more than {LARGEST_LEAN_DEG:g}°, which is ArduCopter's largest: a "
-            f"vehicle that flies this mission arrives late"
-        ]
+        return [Note("lean_beyond_largest", speed_m_s=speed_m_s, largest_deg=LARGEST_LEAN_DEG)]
     if lean_deg > DEFAULT_LEAN_DEG:
-        notes.append(
-            f"{speed_m_s:.2f} m/s needs a lean of about {lean_deg}°: set {lean_words(lean_deg)} before it flies"
-        )
+        notes.append(Note("lean_to_set", speed_m_s=speed_m_s, lean_deg=lean_deg, parameter=lean_words(lean_deg)))
     if counts_deg > max(lean_deg, DEFAULT_LEAN_DEG):
-        notes.append(
-            f"times, and forecasts in wind, count with lean_angle_deg: {counts_deg:g}: they hold with "
-            f"{lean_words(counts_deg)}"
-        )
+        notes.append(Note("lean_counted_with", lean_deg=counts_deg, parameter=lean_words(counts_deg)))
     return notes

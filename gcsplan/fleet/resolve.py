@@ -52,15 +52,6 @@ class Resolved:
     later_s: float = 0.0
     left_out: tuple[NotSeparated, ...] = ()
 
-    def notes(self, where: Where = in_metres) -> tuple[str, ...]:
-        """The changes in words for the user, one line each."""
-        lines = [change.describe(where) for change in self.changes]
-        if self.later_s > 0.0:
-            lines.insert(
-                0, f"all arrive {self.later_s:.1f} s later than the clock asks: it left somebody no room to evade"
-            )
-        return tuple(lines)
-
 
 class NotSeparated(NoMission):
     """No possibility was found to keep two vehicles apart.
@@ -150,7 +141,7 @@ def resolve(
     changes = tuple(choice.change for choice in done.values() if choice.change is not None)
     if not judged.safe and not leave_out:  # a cross-check: shifts and judgement are computed independently
         worst = judged.conflicts[0]
-        raise NotSeparated(f"{worst.describe(where)}: resolving it failed", conflict=worst)
+        raise NotSeparated(f"{worst.note(where)}: resolving it failed", conflict=worst)
     timed = replace(plan, order=tuple(s.name for s in slots), slots=slots)
     return Resolved(timed, paths, changes, judged, moved_s, left_out)
 
@@ -187,7 +178,7 @@ def _refuse_goals(plan: Schedule, ask: Ask, where: Where) -> None:
         goals_m = least_goals_m(plan, crews, rules, (a.name, b.name), hold=ask.hold) or rounded_up(rules.needed_m)
         raise NotSeparated(
             f"the goals of {a.name} and {b.name} are {flat:.1f} m apart, and {why}; {_asked(rules)}: put the goals at "
-            f"least {goals_m:g} m apart{_other_cure(plan, ends)}; {conflict.describe(where)}",
+            f"least {goals_m:g} m apart{_other_cure(plan, ends)}; {conflict.note(where)}",
             conflict=conflict,
             vehicle=b.name,
             goals_m=goals_m,
@@ -214,7 +205,7 @@ def _asked(rules: Rules) -> str:
 def _refusal(plan: Schedule, ask: Ask, stuck: Stuck, again: Again, where: Where, *, cures: bool) -> NotSeparated:
     """Why a vehicle is stuck and, with ``cures``, what would work."""
     conflict, rules = stuck.conflict, ask.rules
-    words = f"{conflict.describe(where)}; no departure, speed, hold or other path of {stuck.name} that was tried helps"
+    words = f"{conflict.note(where)}; no departure, speed, hold or other path of {stuck.name} that was tried helps"
     interval, goals_m = None, None
     if stuck.at_goals and cures:
         goals_m = least_goals_m(plan, ask.crews, rules, conflict.worst.vehicles, hold=ask.hold, later_s=ask.later_s)

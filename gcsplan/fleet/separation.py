@@ -16,14 +16,14 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.errors import InputError
-from gcsplan.figures import floored
 from gcsplan.fleet._nearest import below, nearest
 from gcsplan.fleet._sweep import Fleet, Least
 from gcsplan.fleet.motion import TimedPath
+from gcsplan.notes.note import Note
 
 Place = tuple[float, float, float]
-Where = Callable[[Place], str]
-"""Turns east_m, north_m, amsl_m into words for the user. Callers that know degrees pass their own function."""
+Where = Callable[[Place], Note]
+"""Names the place of east_m, north_m, amsl_m. Callers that know degrees pass their own function."""
 
 Kind = Literal["air", "take-off", "landing"]
 
@@ -31,9 +31,9 @@ TOLERANCE_M = 1e-6
 """Allowance for rounding, m: a distance equal to the separation is legal."""
 
 
-def in_metres(place: Place) -> str:
-    """A place in words, the default if the caller has no better words."""
-    return f"east {place[0]:.0f} m, north {place[1]:.0f} m, {place[2]:.0f} m above sea level"
+def in_metres(place: Place) -> Note:
+    """A place in the plane, the default if the caller knows no degrees."""
+    return Note("place_in_plane", east_m=place[0], north_m=place[1], amsl_m=place[2])
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,15 +99,14 @@ class Conflict:
     from_s: float
     until_s: float
 
-    def describe(self, where: Where = in_metres) -> str:
-        """One sentence: which vehicles, how near, when, and where."""
-        a, b = self.worst.vehicles
-        near = f"{floored(self.worst.distance_m, 1):.1f} m, needed {self.needed_m:g} m"
-        at = f"at {self.worst.time_s:.1f} s ({where(self.worst.middle)})"
-        if self.kind == "air":
-            return f"{a} and {b} come as near as {near}, {at}"
-        verb = "takes off from" if self.kind == "take-off" else "lands at"
-        return f"{a} {verb} a place {near} from where {b} stands, {at}"
+    def note(self, where: Where = in_metres) -> Note:
+        """Which vehicles, how near, when, and where."""
+        worst = self.worst
+        return Note(
+            "come_near" if self.kind == "air" else "takes_off_beside" if self.kind == "take-off" else "lands_beside",
+            first=worst.vehicles[0], second=worst.vehicles[1], distance_m=worst.distance_m, needed_m=self.needed_m,
+            time_s=worst.time_s, place=where(worst.middle),
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -123,7 +122,7 @@ class Separation:
     distance_m: Floats
     least: Encounter | None
     conflicts: tuple[Conflict, ...]
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
     _pairs: Pairs = field(repr=False)
 
     @property
@@ -285,7 +284,7 @@ def on_the_pads(paths: Sequence[TimedPath], rules: Rules) -> list[Conflict]:
     return found
 
 
-def waiting_note(paths: Sequence[TimedPath], rules: Rules) -> tuple[str, ...]:
+def waiting_note(paths: Sequence[TimedPath], rules: Rules) -> tuple[Note, ...]:
     """A note on start places that are nearer to each other than needed."""
     starts = np.array([p.points[0, :2] for p in paths])
     i, j = np.triu_indices(len(paths), 1)
@@ -294,10 +293,14 @@ def waiting_note(paths: Sequence[TimedPath], rules: Rules) -> tuple[str, ...]:
     if not near.any():
         return ()
     m = int(apart.argmin())
+    first, second = paths[i[m]].name, paths[j[m]].name
+    pairs, apart_m = int(near.sum()), float(apart[m])
     return (
-        f"{int(near.sum())} pairs of start places are nearer than {rules.needed_m:g} m (nearest: {paths[i[m]].name}, "
-        f"{paths[j[m]].name}: {apart[m]:.1f} m): vehicles that wait on the ground are not judged against each other",
-    )
+        Note(
+            "starts_within_separation", pairs=pairs, needed_m=rules.needed_m, first=first, second=second,
+            apart_m=apart_m,
+        ),
+    )  # fmt: skip
 
 
 def encounter(

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from gcsplan.notes import battery_texts, flight_texts
+from gcsplan.notes import battery_texts, fleet_texts, flight_texts, plan_texts, rehearsal_texts
 
 TEXTS: Mapping[str, str] = MappingProxyType({
     code: text
-    for texts in (battery_texts.TEXTS, flight_texts.TEXTS)
-    for code, text in texts.items()
+    for room in (battery_texts, fleet_texts, flight_texts, plan_texts, rehearsal_texts)
+    for code, text in room.TEXTS.items()
 })  # fmt: skip

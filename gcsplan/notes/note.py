@@ -10,26 +10,32 @@ A sentence of the catalogue names the data by fields of ``str.format``, each wit
     {left_s:seconds} {used_j:joules}
     {count} {count:item|items}  the first word for 1 and True, else the second; of a list its length decides
     {share:.1f} {zones}         anything else is formatted as Python does; a list is joined by commas
+    {conflicts:lines}           a list, each of it in a line of its own below the sentence
     {unit:height}               the symbol of a kind's unit alone
     {key:max_agl_m}             what the reader types for a key of the mission file: the key, or an option
 
-A note on an item begins with ``item 5: `` by itself, unless its sentence names the ``{item}``.
+The place stands around the sentence by itself, unless the sentence names it: a note on an item begins with
+``item 5: ``, one whose data have a ``file``, a ``place`` in it or a ``vehicle`` with that, and one with ``zones`` ends
+with them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from string import Formatter
 from typing import Any, TypeAlias, get_args
 
 from gcsplan.notes.catalogue import TEXTS
-from gcsplan.units import Joules, Kind, Quantity, Reach, Rounding, Seconds, Symbol, Units
+from gcsplan.units import Joules, Kind, Quantity, Reach, Rounding, Seconds, Symbol, Units, in_units
 
 Datum: TypeAlias = "float | str | bool | Note | tuple[Datum, ...] | None"
 
 KINDS: tuple[str, ...] = get_args(Kind)
+
+BEFORE = ("file", "place", "vehicle")
+"""Data that stand before the sentence, in this order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,9 +73,18 @@ class Note:
     def text(self, wording: Wording = IN_FILES, *, placed: bool = True) -> str:
         """The sentence. ``placed``: with the item before it; without where the item's number stands elsewhere."""
         template = TEXTS[self.code]
-        named = any(name == "item" for _, name, _ in parts_of(template))
-        before = f"item {self.item}: " if placed and self.item is not None and not named else ""
-        return before + sentence(template, {"item": self.item, **self.data}, wording)
+        named = {name for _, name, _ in parts_of(template)}
+        before = "".join(f"{self.data[place]}: " for place in BEFORE if place in self.data and place not in named)
+        if placed and self.item is not None and "item" not in named:
+            before += f"item {self.item}: "
+        behind = (
+            "" if "zones" in named or not self.data.get("zones") else f": {_shown(self.data['zones'], '', wording)}"
+        )
+        return before + sentence(template, {"item": self.item, **self.data}, wording) + behind
+
+    def of(self, **place: Datum) -> Note:
+        """The same note of a ``file``, ``place``, ``vehicle`` or ``zones``, which whoever made it did not know."""
+        return Note(self.code, self.item, **{**place, **self.data})
 
     def in_units(self, units: Units) -> str:
         """The sentence with its quantities in ``units``."""
@@ -93,7 +108,7 @@ class Note:
 
     @property
     def _all(self) -> tuple[object, ...]:
-        return self.code, self.item, tuple(self.data.items())
+        return self.code, self.item, frozenset(self.data.items())
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _revived, (self.code, self.item, dict(self.data))
@@ -101,6 +116,26 @@ class Note:
 
 Said: TypeAlias = "str | Note"
 """What is said where not all of it is data yet."""
+
+
+def told(said: Said, wording: Wording = IN_FILES) -> str:
+    """The sentence of a note, or a text in the reader's units."""
+    if isinstance(said, Note):
+        return said.text(wording)
+    return str(said) if wording.units is None else in_units(said, wording.units)
+
+
+def of_vehicle(name: str, said: Said) -> Said:
+    """What is said, as that of a vehicle."""
+    return said.of(vehicle=name) if isinstance(said, Note) else f"{name}: {said}"
+
+
+def in_json(key: str, notes: Iterable[Said], wording: Wording = IN_FILES) -> dict[str, Any]:
+    """A list of notes for programs: its sentences under ``key``, and under ``key_data`` what they are made of."""
+    every = list(notes)
+    nothing: dict[str, Any] = {"code": None, "item": None, "data": {}}
+    data = [note.as_dict() if isinstance(note, Note) else nothing for note in every]
+    return {key: [told(note, wording) for note in every], f"{key}_data": data}
 
 
 def _revived(code: str, item: int | None, data: dict[str, Datum]) -> Note:
@@ -137,6 +172,8 @@ def _shown(value: Any, spec: str, wording: Wording) -> str:
     if "|" in spec:
         one, several = spec.split("|")
         return one if (len(value) if isinstance(value, tuple) else value) == 1 else several
+    if spec == "lines":
+        return "".join(f"\n  {_shown(each, '', wording)}" for each in value)
     if isinstance(value, tuple):
         return ", ".join(_shown(each, spec, wording) for each in value)
     if isinstance(value, Note):

@@ -13,6 +13,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import NoMission, NoMissionReason
+from gcsplan.notes.note import Note
 from gcsplan.planners.budget import Budget
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
@@ -212,7 +213,7 @@ class Solution:
     stopped_by: str = "exhausted"
     planning_s: float = 0.0
     first_path_s: float = 0.0
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     flown: Path | None = None
     raw_violations: int | None = None
     repaired: bool | None = None

@@ -15,6 +15,7 @@ import numpy as np
 from gcsplan import __version__
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.figures import steepened
+from gcsplan.notes.note import Said
 from gcsplan.report import tables
 from gcsplan.report.briefing import briefing_html
 from gcsplan.report.document import document
@@ -56,7 +57,7 @@ def render_check(
     checked: Sequence[CheckedFile],
     *,
     inputs: Mapping[str, object],
-    notes: Sequence[str] = (),
+    notes: Sequence[Said] = (),
     homes: Sequence[WayHome | None] = (),
     units: Units = METRIC,
 ) -> str:
@@ -302,7 +303,8 @@ def _end(page: Page) -> str:
     notes = [(n, "") for n in page.notes] + [(n, s.name) for s in page.subjects for n in s.notes]
     several = len(page.subjects) > 1
     listed = "".join(
-        f"<li>{f'<b>{esc(who)}</b>: ' if who and several else ''}{esc(n)}</li>" for n, who in dict.fromkeys(notes)
+        f"<li>{f'<b>{esc(who)}</b>: ' if who and several else ''}{esc(in_units(n, page.units))}</li>"
+        for n, who in dict.fromkeys(notes)
     )
     unjudged = [(s.name, in_units(what, page.units)) for s in page.subjects for what in s.verdict.not_judged]
     missing = "".join(f"<li><b>{esc(who)}</b>: {esc(what)}</li>" for who, what in unjudged)

@@ -13,6 +13,7 @@ from gcsplan.fleet.arrival import Slot
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Separation
 from gcsplan.mavlink.mission.parameter_list import Setting
+from gcsplan.notes.note import Said
 from gcsplan.units import METRIC, Units, UnitText
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
@@ -44,7 +45,7 @@ class Subject:
     verdict: Verdict
     vehicle: Vehicle
     certificate: Certificate | None = None
-    notes: tuple[str, ...] = ()
+    notes: tuple[Said, ...] = ()
     motion: TimedPath | None = None
     slot: Slot | None = None
     home: WayHome | None = None
@@ -96,16 +97,15 @@ class Rehearsed:
     safe: bool | None
     how: str
     compared: tuple[Compared, ...]
-    violations: tuple[str, ...] = ()
-    not_flown: tuple[str, ...] = ()
+    violations: tuple[Said, ...] = ()
+    not_flown: tuple[Said, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Page:
     """Everything that one report shows. ``facts`` are names and values of what was requested, in the order shown.
 
-    ``left_out`` are names of vehicles without a mission, and why. ``units`` are those of all numbers on the page; notes
-    are in metres, as they say what to write into a file.
+    ``left_out`` are names of vehicles without a mission, and why. ``units`` are those of all numbers on the page.
     """
 
     title: str
@@ -113,7 +113,7 @@ class Page:
     subjects: tuple[Subject, ...]
     inputs: Mapping[str, object]
     facts: tuple[tuple[str, str], ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Said, ...] = ()
     separation: Separation | None = None
     order: tuple[str, ...] = ()
     units: Units = METRIC
@@ -147,7 +147,7 @@ class CheckedFile(Protocol):
     @property
     def verdict(self) -> Verdict: ...
     @property
-    def notes(self) -> tuple[str, ...]: ...
+    def notes(self) -> tuple[Said, ...]: ...
 
 
 def page_of_check(
@@ -156,7 +156,7 @@ def page_of_check(
     checked: Sequence[CheckedFile],
     *,
     inputs: Mapping[str, object],
-    notes: Sequence[str] = (),
+    notes: Sequence[Said] = (),
     homes: Sequence[WayHome | None] = (),
     units: Units = METRIC,
 ) -> Page:
@@ -168,7 +168,7 @@ def page_of_check(
     subjects = tuple(
         Subject(
             c.vehicle.name if names.count(c.vehicle.name) == 1 else str(c.file),
-            c.verdict, c.vehicle, None, tuple(dict.fromkeys((*c.notes, *map(str, c.verdict.notes)))),
+            c.verdict, c.vehicle, None, tuple(dict.fromkeys((*c.notes, *c.verdict.notes))),
             home=homes[i] if i < len(homes) else None,
         )
         for i, c in enumerate(checked)

@@ -10,9 +10,10 @@ from typing import Any
 from gcsplan.check.verdict import PAPER_MARK
 from gcsplan.errors import CheckFailed
 from gcsplan.figures import floored
+from gcsplan.notes.note import Note, Said, in_json, of_vehicle
 from gcsplan.sim.flight.trace import Judged, Meeting, Trace, examine, meetings
 from gcsplan.sim.part import RehearsalPart, lateness
-from gcsplan.units import METRIC, Units, UnitText, duration
+from gcsplan.units import METRIC, Units, duration
 from gcsplan.world.world import World
 
 BREACHES_SHOWN = 8
@@ -34,23 +35,26 @@ class Terms:
 
 @dataclass(frozen=True, slots=True)
 class Breach:
-    """A violated requirement: its worst instance in words, and the number of runs in which it happened."""
+    """A violated requirement: its worst instance, and the number of runs in which it happened."""
 
     kind: str
     vehicles: tuple[str, ...]
-    message: str
+    message: Said
     by: float
     runs: int
 
-    def describe(self, of_runs: int) -> str:
-        """Return one line; ``of_runs``: the number of all runs."""
-        return self.message if of_runs == 1 else UnitText("{} (in {} of {} runs)", self.message, self.runs, of_runs)
+    def note(self, of_runs: int) -> Said:
+        """Return what was broken, and in how many of ``of_runs``, all runs."""
+        return (
+            self.message if of_runs == 1 else Note("in_some_runs", what=self.message, runs=self.runs, of_runs=of_runs)
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Return a dict for JSON."""
+        said = self.message.as_dict() if isinstance(self.message, Note) else {"code": None, "data": {}}
         return {
-            "kind": self.kind, "vehicles": list(self.vehicles), "message": self.message, "by": _number(self.by),
-            "runs": self.runs,
+            "kind": self.kind, "vehicles": list(self.vehicles), "message": str(self.message), "by": _number(self.by),
+            "runs": self.runs, "code": said["code"], "data": said["data"],
         }  # fmt: skip
 
 
@@ -66,7 +70,7 @@ class Performance:
     min_agl_m: float
     min_agl_at: tuple[float, float]
     battery_used_percent: float | None
-    not_flown: tuple[str, ...] = ()
+    not_flown: tuple[Said, ...] = ()
     paper_energy: bool = False
 
     @property
@@ -93,7 +97,7 @@ class Performance:
             "min_agl_at": {"lat": _number(self.min_agl_at[0]), "lon": _number(self.min_agl_at[1])},
             "battery_used_percent": self.battery_used_percent,
             "energy_figures": None if self.battery_used_percent is None else "paper" if self.paper_energy else "own",
-            "not_flown": list(self.not_flown),
+            **in_json("not_flown", self.not_flown),
         }  # fmt: skip
 
     def row(self, runs: int, units: Units = METRIC, decimals: int = 0) -> dict[str, str]:
@@ -138,13 +142,13 @@ class Rehearsal:
     separation_kept_runs: int
     closest: Meeting | None
     breaches: tuple[Breach, ...]
-    notes: tuple[str, ...] = ()
+    notes: tuple[Said, ...] = ()
     flown: tuple[Trace, ...] = field(default=(), compare=False, repr=False)
 
     @property
-    def not_judged(self) -> tuple[str, ...]:
+    def not_judged(self) -> tuple[Said, ...]:
         """The parts of the missions that were not flown."""
-        return tuple(f"{v.name}: {what}" for v in self.vehicles for what in v.not_flown)
+        return tuple(of_vehicle(v.name, what) for v in self.vehicles for what in v.not_flown)
 
     @property
     def safe(self) -> bool | None:
@@ -161,13 +165,13 @@ class Rehearsal:
     def error(self, *, allow_unjudged: bool = False) -> CheckFailed | None:
         """Return the error for this result; None if all is well. ``allow_unjudged``: accept parts not flown."""
         if self.breaches:
-            lines = [b.describe(self.runs) for b in self.breaches[:BREACHES_SHOWN]]
+            lines = [str(b.note(self.runs)) for b in self.breaches[:BREACHES_SHOWN]]
             rest = len(self.breaches) - BREACHES_SHOWN
             lines += [f"and {rest} more"] if rest > 0 else []
             return CheckFailed("the rehearsal found violations:\n  " + "\n  ".join(lines))
         if self.not_judged and not allow_unjudged:
             words = "not everything could be flown (--allow-unjudged takes it as it is):\n  "
-            return CheckFailed(words + "\n  ".join(self.not_judged), reason="not_judged")
+            return CheckFailed(words + "\n  ".join(map(str, self.not_judged)), reason="not_judged")
         return None
 
     def as_dict(self) -> dict[str, Any]:
@@ -187,8 +191,8 @@ class Rehearsal:
                 "separation_kept_runs": None if self.terms.separation_m is None else self.separation_kept_runs,
                 "p95_error_s": _number(self.p95_s),
             },
-            "violations": [b.as_dict() for b in self.breaches], "not_judged": list(self.not_judged),
-            "notes": list(self.notes),
+            "violations": [b.as_dict() for b in self.breaches], **in_json("not_judged", self.not_judged),
+            **in_json("notes", self.notes),
         }  # fmt: skip
 
     def rows(self, units: Units = METRIC) -> list[dict[str, str]]:
@@ -228,7 +232,7 @@ class Tally:
     separation_kept: int = 0
     closest: Meeting | None = None
     order_flown: tuple[str, ...] = ()
-    notes: list[str] = field(default_factory=list)
+    notes: list[Said] = field(default_factory=list)
     flown: tuple[Trace, ...] = ()
     _breaches: dict[tuple[object, ...], Breach] = field(default_factory=dict)
     _seen: set[tuple[object, ...]] = field(default_factory=set)
@@ -249,8 +253,10 @@ class Tally:
             self._arrive[i].append(trace.arrive_s)
             self._end[i].append(trace.end_s if arrived else math.nan)
             if not arrived:
-                why = f": {trace.why}" if trace.why else ""
-                self.breach("arrival", (trace.name,), f"{trace.name} never arrived at its goal{why}", math.inf)
+                never = Note("never_arrived", name=trace.name)
+                if trace.why:
+                    never = Note("never_arrived_for", name=trace.name, why=trace.why)
+                self.breach("arrival", (trace.name,), never, math.inf)
             judged = examine(trace, part.vehicle, world)
             self._lower(i, judged)
             self.most_j[i] = max(self.most_j[i], spent_j[i])
@@ -293,7 +299,7 @@ class Tally:
         if meeting is not None and (self.closest is None or meeting.distance_m < self.closest.distance_m):
             self.closest = meeting
 
-    def breach(self, kind: str, vehicles: tuple[str, ...], message: str, by: float, more: object = None) -> None:
+    def breach(self, kind: str, vehicles: tuple[str, ...], message: Said, by: float, more: object = None) -> None:
         """Record a breach; of one kind, vehicle set and ``more``, keep the worst and count each run once."""
         key = (kind, vehicles, more)
         was = self._breaches.get(key)
@@ -311,9 +317,9 @@ class Tally:
     def _battery(self, part: RehearsalPart, spent_j: float) -> None:
         used, reserve = self._used_percent(part, spent_j), part.vehicle.energy.reserve
         if used is not None and used > 100.0 * (1.0 - reserve) + 1e-9:
-            mark = PAPER_MARK if part.vehicle.energy.papers else ""
-            said = f"{part.vehicle.name} used {used:.0f} % of its battery{mark}, of which {100 * reserve:g} % must stay"
-            self.breach("battery", (part.vehicle.name,), said, used - 100.0 * (1.0 - reserve))
+            name, paper = part.vehicle.name, part.vehicle.energy.papers
+            said = Note("battery_used_up", name=name, used_percent=used, paper=paper, reserve_percent=100.0 * reserve)
+            self.breach("battery", (name,), said, used - 100.0 * (1.0 - reserve))
 
     def _order(self, traces: Sequence[Trace]) -> None:
         came = [t.name for t in sorted(traces, key=lambda t: math.inf if math.isnan(t.arrive_s) else t.arrive_s)]
@@ -326,8 +332,7 @@ class Tally:
             self.order_kept += 1
             return
         self.order_flown = tuple(came)
-        said = f"the order of arrival was {', '.join(came)}; planned was {', '.join(wanted)}"
-        self.breach("order", (), said, 1.0)
+        self.breach("order", (), Note("order_lost", came=tuple(came), planned=tuple(wanted)), 1.0)
 
     def _separation(self, traces: Sequence[Trace]) -> None:
         needed = self.terms.separation_m
@@ -338,11 +343,11 @@ class Tally:
             return
         close = [m for m in found if m.distance_m < needed - 1e-6]
         for m in close:
-            self.breach("separation", m.names, m.describe(needed), needed - m.distance_m, m.kind)
+            self.breach("separation", m.names, m.note(needed), needed - m.distance_m, m.kind)
         self.separation_kept += not close
 
     def result(
-        self, simulator: str, seed: int, weather: dict[str, Any], not_flown: Sequence[tuple[str, ...]]
+        self, simulator: str, seed: int, weather: dict[str, Any], not_flown: Sequence[tuple[Said, ...]]
     ) -> Rehearsal:
         """Return the rehearsal's result."""
         performances = []

@@ -10,8 +10,8 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.notes.note import Note
 from gcsplan.sim.flight.trace import Trace
-from gcsplan.units import duration
 from gcsplan.vehicle import Vehicle
 
 __all__ = ["RehearsalPart", "energy_of", "lateness"]
@@ -46,18 +46,20 @@ class RehearsalPart:
         return arrives_s, arrives_s + max(self.verdict.time_s - self.verdict.arrive_s, 0.0)
 
 
-def lateness(part: RehearsalPart, trace: Trace) -> tuple[str, float] | None:
-    """In words and in seconds how much too late a flight came to its goal or to its end; None if it did not."""
+def lateness(part: RehearsalPart, trace: Trace) -> tuple[Note, float] | None:
+    """How much too late a flight came to its goal or to its end, also in seconds; None if it did not."""
     if part.told_s is None or not math.isfinite(trace.arrive_s):
         return None
     flown_s = trace.arrive_s - part.depart_s, trace.end_s - part.depart_s
-    worst: tuple[str, float] | None = None
-    for does, told, took in zip(("arrived", "was down"), part.told_s, flown_s, strict=True):
+    worst: tuple[Note, float] | None = None
+    for arrived, told, took in zip((True, False), part.told_s, flown_s, strict=True):
         late_s = took - told
         if not late_s > max(LATE_FLIGHT_PART * told, LATE_FLIGHT_S) or (worst is not None and worst[1] >= late_s):
             continue
-        words = f"{trace.name} {does} {duration(late_s)} late, after {duration(took)} instead of {duration(told)}"
-        worst = words, late_s
+        late = Note(
+            "arrived_late" if arrived else "down_late", name=trace.name, late_s=late_s, took_s=took, told_s=told
+        )  # fmt: skip
+        worst = late, late_s
     return worst
 
 

@@ -15,6 +15,7 @@ from gcsplan.errors import GcsplanError, InputError
 from gcsplan.mavlink.link.link import Link
 from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet
 from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.notes.note import Note
 from gcsplan.sim.flight.kinematics import Kinematics
 from gcsplan.sim.flight.mission_flight import FlownLanes, fly
 from gcsplan.sim.flight.track import CommandedTrack, make_track
@@ -137,9 +138,11 @@ def flown(flights: Flights, world: World, block: RunBlock) -> Tally:
             if part.vehicle.energy.unlike_fitted(speed := float(flight.cruise_m_s[lane])) and not flights.weather.calm:
                 slow, fast = part.vehicle.energy.fitted_m_s or (0.0, 0.0)
                 tally.notes.append(
-                    f"{part.vehicle.name}: its energy is fitted to flights at {slow:g} to {fast:g} m/s through the "
-                    f"air, and it flew at {speed:.0f} m/s in this wind: what it used may be far off"
-                )
+                    Note(
+                        "energy_fitted_to_other_air", vehicle=part.vehicle.name, slow_m_s=slow, fast_m_s=fast,
+                        speed_m_s=round(speed),
+                    )
+                )  # fmt: skip
     return tally
 
 
@@ -157,7 +160,7 @@ def concluded(flights: Flights, runs: int, tallies: Sequence[Tally]) -> Rehearsa
     """The result of all blocks, given in their order."""
     tally = Tally(flights.parts, flights.terms)
     if runs > different(flights, runs):
-        tally.notes.append("without wind, gusts and noise every run is the same: one was flown")
+        tally.notes.append(Note("runs_alike"))
     for one in tallies:
         tally.join(one)
     not_flown = [t.not_flown for t in flights.tracks]

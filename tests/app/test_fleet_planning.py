@@ -15,12 +15,16 @@ import yaml
 
 from gcsplan.app.fleet_planning import route_of
 from gcsplan.app.model import Plan
-from gcsplan.app.outputs import outputs_of, summary_of
+from gcsplan.app.outputs import outputs_of, report_of, summary_of
 from gcsplan.app.pipeline import plan
+from gcsplan.cli.console import plan_table
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mission_file import load_mission
+from gcsplan.notes.note import Note
+from gcsplan.units import AVIATION
 from tests.support.paths import MISSIONS
+from tests.support.said import one
 
 # Two vehicles across flat ground whose straight ways cross in the middle at right angles, 1000 m each.
 CROSS: dict[str, Any] = {
@@ -125,7 +129,7 @@ def test_a_first_that_would_leave_the_others_behind_waits_for_the_fleet_unless_i
     west, south = summary_of(done)["vehicles"]
     assert south["speed_m_s"] == 10.0
     assert south["arrive_s"] - west["arrive_s"] == pytest.approx(9.0, abs=1e-4)
-    assert any("clock: fleet" in note for note in done.notes)
+    assert one("clock_of_fleet", done.notes).data["interval_s"] == 9.0
     with pytest.raises(NoMission, match="interval_s") as refused:
         planned(sequence(9, clock="first"), {}, far)
     assert refused.value.reason == "time"
@@ -154,15 +158,17 @@ def test_two_that_would_meet_are_kept_apart_and_their_arrivals_stay() -> None:
     assert nearest_m(done) == pytest.approx(summary["fleet"]["min_separation_m"], abs=0.05)
     arrivals = [v["arrive_s"] for v in summary["vehicles"]]
     assert arrivals[0] == pytest.approx(arrivals[1], abs=1e-3)
-    notes = [note for v in summary["vehicles"] for note in v["notes"]]
-    assert any("keep clear of" in note for note in notes)
+    told = [note["code"] for v in summary["vehicles"] for note in v["notes_data"]]
+    assert "keeps_clear" in told
 
 
 def test_without_an_arrival_nothing_is_changed_and_a_meeting_is_told() -> None:
     done = planned(None)
     assert [v["depart_s"] for v in summary_of(done)["vehicles"]] == [0.0, 0.0]
     assert speeds_of(done) == [10.0, 10.0]
-    assert any("nothing keeps the vehicles apart" in note and "west and south" in note for note in done.notes)
+    apart = one("nothing_keeps_apart", done.notes)
+    assert str(apart).startswith("the file asks for no `arrival`, so nothing keeps the vehicles apart; released")
+    assert "\n  west and south come as near as" in str(apart)
 
 
 def test_where_times_may_not_change_another_path_is_flown_and_judged_like_any_other() -> None:
@@ -172,8 +178,9 @@ def test_where_times_may_not_change_another_path_is_flown_and_judged_like_any_ot
     lengths = [v.verdict.length_m for v in done.vehicles]
     assert max(lengths) > 1001.0
     assert all(v.verdict.safe is True for v in done.vehicles)
-    notes = [note for v in summary_of(done)["vehicles"] for note in v["notes"]]
-    assert any("another path" in note for note in notes)
+    assert done.fleet is not None
+    [kept] = [note for slot in done.fleet.slots for note in slot.notes if note.code == "keeps_clear"]
+    assert Note("takes_another_path") in kept.data["changes"]  # type: ignore[operator]
 
 
 def test_a_goal_for_two_is_refused_with_the_distance_that_works() -> None:
@@ -224,7 +231,7 @@ def test_where_nobody_may_wait_a_longer_path_makes_up_for_the_time() -> None:
     assert (south["depart_s"], south["hold_s"]) == (0.0, 0.0)
     assert 9.0 <= south["speed_m_s"] <= 10.0
     assert south["length_m"] > 1300
-    assert any("m more, to arrive so late" in note for note in south["notes"])
+    assert [note["code"] for note in south["notes_data"]].count("flies_longer") == 1
     assert done.vehicles[1].verdict.safe is True
     assert south["lower_bound_m"] == pytest.approx(1000.0, abs=0.1)  # of its own request, not of the zigzag's vias
 
@@ -344,3 +351,19 @@ def test_the_file_of_a_hundred_is_a_fleet_of_a_hundred() -> None:
 def test_bad_arrivals_are_input_errors() -> None:
     with pytest.raises(InputError, match="interval_s"):
         planned({"mode": "sequence"})
+
+
+def test_a_note_is_a_sentence_and_data_in_json_and_in_the_readers_units_on_page_and_terminal(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    done = planned(sequence(60, hold="none"), {}, {"speed_m_s": [9, 10]})
+    told = json.loads(outputs_of(done)["summary.json"])["vehicles"][1]
+    assert len(told["notes"]) == len(told["notes_data"])
+    [data] = [d for d in told["notes_data"] if d["code"] == "flies_longer"]
+    more_m = data["data"]["more_m"]
+    assert data["item"] is None
+    assert told["notes"][told["notes_data"].index(data)] == f"flies {more_m:.0f} m more, to arrive so late"
+    in_feet = f"flies {more_m / 0.3048:.0f} ft more, to arrive so late"
+    assert in_feet in report_of(done, units=AVIATION)
+    plan_table(done, {}, AVIATION)
+    assert f"note: south: {in_feet}" in " ".join(capsys.readouterr().err.split())

@@ -32,6 +32,7 @@ from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
 from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 from tests.support.impatient import be_impatient
+from tests.support.said import one
 
 LAT, LON = 46.5, 8.0
 
@@ -316,9 +317,9 @@ def test_the_lean_that_a_speed_needs_has_something_to_spare() -> None:
     assert lean_needed_deg(14.0) > 42.0  # 42° flew 13.7 m/s
     assert lean_needed_deg(15.0) == 45.0  # flown as told, 593 m above the sea
     assert lean_needed_deg(15.0, 0.0) > 45.0
-    notes = " ".join(planned(keys(speed_m_s=[14, 14], lean_angle_deg=50)).fleet.slots[0].notes)  # type: ignore[union-attr]
-    assert "needs a lean of about 43°" in notes
-    assert "count with lean_angle_deg: 50" in notes
+    notes = planned(keys(speed_m_s=[14, 14], lean_angle_deg=50)).fleet.slots[0].notes  # type: ignore[union-attr]
+    assert one("lean_to_set", notes).data["lean_deg"] == 43
+    assert one("lean_counted_with", notes).data["lean_deg"] == 50
 
 
 # -- a rehearsal with the vehicle's own --------------------------------------------------------------------------------

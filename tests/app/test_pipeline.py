@@ -20,8 +20,10 @@ from gcsplan.mavlink.files.formats import read_plan, read_waypoints
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mission_file import load_mission
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 from tests.support.paths import DATA
+from tests.support.said import codes, one
 
 CROSSING: dict[str, Any] = yaml.safe_load((DATA / "crossing.yaml").read_text())
 
@@ -155,7 +157,9 @@ def test_a_take_off_below_the_limits_is_bad_input_and_one_just_at_them_is_raised
     with pytest.raises(InputError, match="takeoff_agl_m"):
         planned({"takeoff_agl_m": 50})
     done = planned({"takeoff_agl_m": 65})
-    assert any("takeoff_agl_m 65 raised" in n for n in done.vehicles[0].notes)
+    raised = one("takeoff_raised", done.vehicles[0].notes)
+    assert raised.data["asked_m"] == 65.0
+    assert raised.data["raised_m"] > 65.0  # type: ignore[operator]
 
 
 @pytest.mark.slow
@@ -225,7 +229,7 @@ def test_a_plan_with_larger_margins_has_a_bound_under_the_limits_of_the_check(mo
     assert len(again.solution.search) > len(once.solution.search)
     assert again.problem.budget_s == 0.5 * once.problem.budget_s
     assert again.gap_percent == pytest.approx(100.0 * (again.cost / again.solution.lower_bound - 1.0))
-    assert any("planned 2 times" in note for note in again.solution.notes)
+    assert Note("planned_again", times=2) in again.solution.notes
     assert once.solution.notes == ()
 
 
@@ -244,6 +248,6 @@ def test_vias_over_one_place_are_climbs_on_the_spot(climb_deg: float, vias: list
     assert v.verdict.safe is True
     points = v.solution.path.points
     assert np.ptp(points[:, 2]) >= 60.0
-    assert sum("on the spot" in note for note in v.notes) == 3
+    assert codes(v.notes).count("via_moved") == 3
     assert v.gap_percent is not None
     assert v.gap_percent < 1.0

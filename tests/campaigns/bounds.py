@@ -190,7 +190,7 @@ def _bounded(
 
 
 def _replanned(v: VehiclePlan) -> bool:
-    return any("planned" in note and "times" in note for note in v.solution.notes)
+    return any(note.code == "planned_again" for note in v.solution.notes)
 
 
 def _refused(

@@ -18,12 +18,14 @@ from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, schedule
 from gcsplan.fleet.order import best_order, interval_range
 from gcsplan.fleet.timing import Route
 from gcsplan.mission_file.request import ArrivalRequest
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.limits import Limits
 from tests.mission_file.test_load import base, load, local, the_problem
 from tests.mission_file.test_load import vehicle as keys
 from tests.support.effort import draws
 from tests.support.flights import fly, time_to_goal_s
+from tests.support.said import codes, one
 
 INF = math.inf
 FREE = {
@@ -144,7 +146,7 @@ def test_who_cannot_fly_so_slowly_leaves_later_and_pays_nothing() -> None:
     assert near.hold_s == 0
     assert near.depart_s == pytest.approx(plan.of("far").arrive_s - time_to_goal_s(near.route, crews[1].vehicle, 3.0))
     assert near.energy_j == schedule(crews, "none").of("near").energy_j
-    assert any("on the ground" in note for note in near.notes)
+    assert near.notes == (Note("waits_on_ground", wait_s=near.depart_s),)
     require_sound(plan, crews)
 
 
@@ -209,7 +211,7 @@ def test_a_longer_path_is_asked_for_where_nobody_may_wait() -> None:
     assert near.depart_s == near.hold_s == 0
     assert near.arrive_s == pytest.approx(plan.of("far").arrive_s, abs=1e-5)
     assert near.route.length_m > 300
-    assert any("more, to arrive so late" in note for note in near.notes)
+    assert near.notes == (Note("flies_longer", more_m=near.route.length_m - crews[1].route.length_m),)
     require_sound(plan, crews)
     for useless in (lambda name, length_m: None, lambda name, length_m: crews[1].route):
         with pytest.raises(NoSchedule, match="near cannot arrive so late"):
@@ -257,11 +259,12 @@ def test_the_first_waits_where_another_could_not_keep_its_turn_and_says_for_whom
     plan = schedule(crews, "sequence", interval_s=9.0)
     fast = Craft(crews[1]).fast_s
     assert arrivals(plan) == pytest.approx([fast - 9, fast, fast + 9], abs=1e-5)
-    assert any(f"so that b, which needs {fast:.1f} s" in note for note in plan.slots[0].notes)
+    waits = one("first_waits_for", plan.slots[0].notes)
+    assert (waits.data["last"], waits.data["needs_s"]) == ("b", fast)
     assert plan.of("b").depart_s == 0
     require_sound(plan, crews)
     on_time = schedule(crews, "sequence", interval_s=200.0)
-    assert not any("so that" in note for s in on_time.slots for note in s.notes)
+    assert "first_waits_for" not in codes(note for s in on_time.slots for note in s.notes)
     assert arrivals(on_time) == arrivals(schedule(crews, "sequence", interval_s=200.0, clock="first"))
 
 
@@ -425,14 +428,21 @@ def test_speeds_are_float32_within_the_range() -> None:
 
 
 def test_speeds_that_need_more_lean_than_arducopters_default_are_told() -> None:
-    def notes(speed: float, **more: Any) -> str:
-        return " ".join(schedule([crew("a", 300, speed_max_m_s=speed, **more)], "none").slots[0].notes)
+    def notes(speed: float, **more: Any) -> tuple[Note, ...]:
+        return schedule([crew("a", 300, speed_max_m_s=speed, **more)], "none").slots[0].notes
 
-    assert notes(10.0) == ""
-    assert "12.00 m/s needs a lean of about 36°: set ATC_ANGLE_MAX 36 (degrees, since ArduPilot 4.7)" in notes(12.0)
-    assert "ANGLE_MAX 4800 (hundredths of a degree, before)" in notes(16.0)
-    assert "a lean of more than 80°" in notes(27.0)
-    assert notes(16.0, autopilot=Autopilot.PX4) == ""
+    def lean(deg: float) -> Note:
+        return Note("lean_parameter", lean_deg=deg, lean_cdeg=100.0 * deg)
+
+    assert notes(10.0) == ()
+    assert notes(12.0) == (Note("lean_to_set", speed_m_s=12.0, lean_deg=36, parameter=lean(36)),)
+    assert notes(16.0) == (Note("lean_to_set", speed_m_s=16.0, lean_deg=48, parameter=lean(48)),)
+    assert notes(27.0) == (Note("lean_beyond_largest", speed_m_s=27.0, largest_deg=80.0),)
+    assert notes(16.0, autopilot=Autopilot.PX4) == ()
+    assert str(notes(12.0)[0]) == (
+        "12.00 m/s needs a lean of about 36°: set ATC_ANGLE_MAX 36 (degrees, since ArduPilot 4.7) or ANGLE_MAX 3600 "
+        "(hundredths of a degree, before) before it flies"
+    )
 
 
 # -- the mission file ---------------------------------------------------------------------------------------------

@@ -17,14 +17,16 @@ from gcsplan.fleet._taken import Taken
 from gcsplan.fleet.arrival import Craft, Crew, Schedule, Slot, schedule
 from gcsplan.fleet.goals import least_interval_s
 from gcsplan.fleet.motion import TimedPath
-from gcsplan.fleet.resolve import NotSeparated, Resolved, resolve
+from gcsplan.fleet.resolve import Change, NotSeparated, Resolved, resolve
 from gcsplan.fleet.separation import Conflict, Rules, separation
 from gcsplan.fleet.timing import End, Route
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.limits import Limits
 from tests.fleet.test_separation import random_fleet
 from tests.support.effort import draws
 from tests.support.flights import motions
+from tests.support.said import codes
 
 RULES = Rules(30.0, error_m=0.25)
 Point = tuple[float, float]
@@ -44,6 +46,11 @@ def crew(
     vehicle = Vehicle(name, 1, autopilot, Limits(20.0), speed_min_m_s=slowest, energy=Energy(hover_w=hover_w))
     grounds = (0.0, 0.0 if end == "land" else None) if end != "none" else (None, None)
     return Crew(vehicle, Route(name, points, *grounds, end))
+
+
+def codes_of(change: Change) -> list[str]:
+    """The codes of what a change changes."""
+    return codes(change.note().data["changes"])  # type: ignore[arg-type]
 
 
 def crossing() -> list[Crew]:
@@ -124,8 +131,11 @@ def test_the_later_in_order_leaves_later_by_the_least_that_does() -> None:
     for part in np.linspace(0.0, 1.0, 21):
         sooner = moved.delayed(-0.1 - part * (later - 0.1))
         assert not separation([fixed, sooner], RULES).safe
-    assert "leaves" in change.describe()
-    assert f"keep clear of {plan.order[0]}" in change.slot.notes[-1]
+    said = change.slot.notes[-1]
+    assert said == change.note()
+    assert said.data["changes"] == (Note("leaves_later", by_s=later),)
+    assert said.data["other"] == plan.order[0]
+    assert str(said).startswith(f"leaves {later:.1f} s later: to keep clear of {plan.order[0]} (")
     assert change.extra_j == 0.0
 
 
@@ -188,10 +198,7 @@ def test_where_the_clock_leaves_no_room_all_arrive_later_by_the_same() -> None:
     assert late == pytest.approx([found.later_s] * 2, abs=1e-5)
     assert min(s.depart_s for s in found.schedule.slots) == 0.0
     assert [c.name for c in found.changes] == ["b"]
-    assert "leaves" in found.changes[0].describe()
-    assert "earlier" in found.changes[0].describe()
-    assert [line.split()[0] for line in found.notes()] == ["all", "b"]
-    assert f"all arrive {found.later_s:.1f} s later" in found.notes()[0]
+    assert codes_of(found.changes[0])[0] == "leaves_earlier"
     with pytest.raises(NotSeparated):
         resolve(plan, crews, RULES, later_s=0.0)
 
@@ -240,7 +247,7 @@ def test_another_path_is_asked_for_with_what_to_avoid_until_one_does() -> None:
     assert change.how == "path"
     assert change.extra_j > 0.0
     assert found.schedule.of("b").route.points[0, 2] == 100.0
-    assert "takes another path" in change.describe()
+    assert codes_of(change) == ["takes_another_path", "needs_more_energy"]
 
 
 def test_a_path_too_long_for_the_clock_lets_all_arrive_later_if_that_is_allowed() -> None:

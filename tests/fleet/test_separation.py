@@ -17,6 +17,7 @@ from gcsplan.fleet._nearest import Pieces, nearest
 from gcsplan.fleet._sweep import Fleet
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Conflict, Rules, in_metres, separation
+from gcsplan.notes.note import Note
 from tests.support.effort import draws
 
 FLEETS = [range(250), pytest.param(range(250, 1000), marks=pytest.mark.slow)]
@@ -229,11 +230,16 @@ def test_two_that_cross_are_told_with_moment_place_and_span() -> None:
     assert math.isclose(only.until_s, 10.0 + half)
     assert not found.safe
     assert found.least == only.worst
-    assert only.describe(lambda place: f"height {place[2]:g}") == (
-        "a and b come as near as 10.0 m, needed 30 m, at 10.0 s (height 55)"
+    met = only.note()
+    assert met.code == "come_near"
+    assert (
+        met.data["place"]
+        == in_metres(only.worst.middle)
+        == Note("place_in_plane", east_m=0.0, north_m=0.0, amsl_m=55.0)
     )
-    assert "east 0 m" in only.describe()
-    assert "above sea level" in in_metres((0.0, 0.0, 0.0))
+    assert str(met) == (
+        "a and b come as near as 10.0 m, needed 30 m, at 10.0 s (east 0 m, north 0 m, 55 m above sea level)"
+    )
 
 
 def test_touching_the_separation_is_legal_and_errors_widen_it() -> None:
@@ -292,7 +298,7 @@ def test_landing_beside_one_that_has_landed_is_a_conflict_until_its_pad_is_clear
     assert math.isclose(only.worst.distance_m, 20.0)
     assert only.from_s == 100.0
     assert only.until_s == math.inf
-    assert "b lands at a place 20.0 m, needed 30 m from where a stands" in only.describe()
+    assert "b lands at a place 20.0 m, needed 30 m from where a stands" in str(only.note())
 
 
 def test_taking_off_beside_one_that_has_landed_is_a_conflict() -> None:
@@ -307,8 +313,7 @@ def test_vehicles_that_wait_side_by_side_are_told_and_not_judged() -> None:
     found = separation([a, b], Rules(30.0))
     assert found.safe
     assert found.notes == (
-        "1 pairs of start places are nearer than 30 m (nearest: a, b: 10.0 m): vehicles that wait on the ground are "
-        "not judged against each other",
+        Note("starts_within_separation", pairs=1, needed_m=30.0, first="a", second="b", apart_m=10.0),
     )
     # Both in the air at once they are.
     assert not separation([a, b.delayed(-60.0)], Rules(30.0)).safe

@@ -14,7 +14,7 @@ from gcsplan.notes.catalogue import TEXTS
 from gcsplan.notes.note import KINDS, fields_of, parts_of
 
 ROOT = Path(gcsplan.__file__).parent
-FORMS = {*KINDS, "reach", "seconds", "joules"}
+FORMS = {*KINDS, "reach", "seconds", "joules", "lines", "g"}
 
 
 def made() -> Iterator[tuple[str, ast.Call]]:

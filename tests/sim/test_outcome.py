@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from gcsplan.notes.note import Note
 from gcsplan.sim.outcome import Terms, percentile_95
 from gcsplan.sim.rehearsal import rehearse
 from gcsplan.vehicle import Energy
@@ -18,7 +19,11 @@ def test_another_order_of_arrival_is_a_violation() -> None:
     parts = [a_part(1, (0, 0), (1000, 0)), a_part(2, (0, 300), (900, 300))]
     result = rehearse(parts, FLAT, Terms(("uav1", "uav2"), 30.0))
     assert kinds(result) == ["order"]
-    assert "uav2, uav1" in result.breaches[0].message
+    lost = Note("order_lost", came=("uav2", "uav1"), planned=("uav1", "uav2"))
+    assert result.breaches[0].message == lost
+    [told] = result.as_dict()["violations"]
+    assert (told["code"], told["data"]) == ("order_lost", lost.as_dict()["data"])
+    assert told["message"] == "the order of arrival was uav2, uav1; planned was uav1, uav2"
     error = result.error()
     assert error is not None
     assert error.exit_code == 4
@@ -58,7 +63,8 @@ def test_the_document_has_its_keys_and_a_row_for_each_vehicle() -> None:
     result = rehearse(parts, FLAT, Terms((), 30.0), runs=9)
     document = json.loads(json.dumps(result.as_dict(), allow_nan=False))
     assert document["runs"] == 1  # in still air every run is the same
-    assert "every run is the same" in document["notes"][0]
+    assert document["notes_data"] == [Note("runs_alike").as_dict()]
+    assert document["notes"] == [str(Note("runs_alike"))]
     assert document["safe"] is True
     assert {"order_flown", "min_separation_m", "closest", "p95_error_s"} <= document["fleet"].keys()
     assert {"planned_arrive_s", "arrive_s", "error_s", "min_agl_m", "battery_used_percent"} <= document["vehicles"][

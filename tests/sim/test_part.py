@@ -10,6 +10,7 @@ import pytest
 
 from gcsplan.sim.flight.trace import Trace
 from gcsplan.sim.part import energy_of, lateness
+from gcsplan.units import METRIC
 from gcsplan.vehicle import Energy
 from tests.support import worlds
 from tests.support.rehearsal_parts import a_part
@@ -31,7 +32,9 @@ def test_a_flight_is_late_by_more_than_a_tenth_of_what_was_told() -> None:
     late = lateness(part, trace(5.0 + 221.0, 5.0 + ends_s))
     assert late is not None
     assert late[1] == pytest.approx(21.0)
-    assert late[0].startswith("uav1 arrived 0:00:21 late")
+    assert late[0].code == "arrived_late"
+    assert late[0].data["told_s"] == 200.0
+    assert late[0].in_units(METRIC) == "uav1 arrived 0:00:21 late, after 0:03:41 instead of 0:03:20"
 
 
 def test_the_later_of_arrival_and_end_counts() -> None:
@@ -40,7 +43,7 @@ def test_the_later_of_arrival_and_end_counts() -> None:
     late = lateness(part, trace(230.0, part.told_s[1] + 50.0))
     assert late is not None
     assert late[1] == pytest.approx(50.0)
-    assert late[0].startswith("uav1 was down")
+    assert late[0].code == "down_late"
 
 
 def test_nothing_is_late_that_never_arrives_or_has_no_plan() -> None:

@@ -29,6 +29,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import NoMission
+from gcsplan.notes.note import Note
 from gcsplan.planners.optimal.governor import govern
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.searches import Searches, left_out
@@ -38,9 +39,6 @@ from gcsplan.planners.profile.climb_laps import on_the_spot
 from gcsplan.planners.refusal import check_ends, explain
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
-
-TURNS_NOTE = "the lower bound is that of paths with sharp corners: it ignores turn_radius_m"
-BAND_NOTE = "the lower bound knows the room between min and max AGL only cell by cell of the terrain"
 
 
 def plan(problem: Problem) -> Solution:
@@ -89,7 +87,7 @@ def _sharp(problem: Problem, sharp: bool = True) -> Solution:
         raise explain(problem, proved=True if incumbent.proved_infeasible else None)
     found = incumbent.solution()
     if incumbent.problem.limits.max_agl_m is not None and found.stopped_by != "gap":
-        found = replace(found, notes=(BAND_NOTE,))
+        found = replace(found, notes=(Note("bound_by_cells"),))
     return found
 
 
@@ -137,7 +135,7 @@ def _turning(problem: Problem) -> Solution:
         flown=Path(found.flown),
         stopped_by=sharp.stopped_by if near or sharp.stopped_by == "time" else "exhausted",
         planning_s=problem.budget.elapsed_s,
-        notes=(*sharp.notes, TURNS_NOTE),
+        notes=(*sharp.notes, Note("bound_ignores_turns")),
     )
 
 

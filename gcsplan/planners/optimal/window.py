@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gcsplan.notes.note import Note
 from gcsplan.planners.border import enclosed, exit_cost, goes_on, margin_for, within_m
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
 from gcsplan.planners.refusal import NoPath, check_ends
@@ -117,10 +118,7 @@ def held_to_border(problem: Problem, found: Solution, leaving: float) -> Solutio
     near = cost - leaving <= problem.gap_percent / 100.0 * leaving
     if near:
         return replace(found, lower_bound=leaving)
-    note = (
-        f"the terrain was looked at within {within_m(problem) / 1000.0:.1f} km of the straight track: the lower bound "
-        "is that of paths which go farther"
-    )
+    note = Note("bound_of_farther_paths", within_m=within_m(problem))
     stopped = "exhausted" if found.stopped_by == "gap" else found.stopped_by
     return replace(found, lower_bound=leaving, stopped_by=stopped, notes=(*found.notes, note))
 

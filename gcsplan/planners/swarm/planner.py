@@ -9,7 +9,6 @@ mission.
 from __future__ import annotations
 
 import time
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices
+from gcsplan.notes.note import Note
 from gcsplan.optimisers.driver import Result, State, minimise
 from gcsplan.optimisers.registry import Entry as Row
 from gcsplan.optimisers.registry import get as get_optimiser
@@ -39,6 +39,8 @@ CORRIDORS = (2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 0.0)
 THRESHOLD = 1.5
 """Cost at which MSFOA switches from global to local search, as a multiple of JL + JH of the straight line (D)."""
 
+MOST_LIMITS = 4
+"""Most broken limits that a note names."""
 SEARCHES = 20
 """Most searches of one plan, each with another seed."""
 
@@ -170,8 +172,7 @@ def until_found(problem: Problem, row: Entry, once: Callable[[Problem, Settings]
             ) from None
         if number == 0:
             return solution
-        before = "1 search" if number == 1 else f"{number} searches"
-        note = f"{before} of {row.optimiser} ended without a path before this one"
+        note = Note("searches_failed", searches=number, optimiser=row.optimiser)
         return replace(solution, notes=(note, *solution.notes))
     raise AssertionError("the last search returns or raises")
 
@@ -183,27 +184,27 @@ def finish(problem: Problem, found: Found, begun: float) -> Solution:
     ended = settle(problem, found)
     if ended is None:
         raise Refusal(
-            f"no mission: the curve that {name} found breaks {summary_of(problem, wrong)}, and pushing it sideways "
+            f"no mission: the curve that {name} found breaks {broken_limits(problem, wrong)}, and pushing it sideways "
             f"and giving it new altitudes does not repair it: try another encoding (bspline, sections), seed or "
             f"more iterations, or the planner optimal",
             reason="not_found",
             place=(wrong[0].east_m, wrong[0].north_m) if wrong else None,
         )
     points, pushed_m = ended
-    notes: tuple[str, ...] = ()
-    if pushed_m is not None:
-        how = "it was given new altitudes"
-        if pushed_m > 0.0:
-            how = f"it was pushed sideways by up to {pushed_m:.0f} m and given new altitudes"
-        notes = (f"the curve that {name} found breaks {summary_of(problem, wrong)}; {how}, and it passes the check",)
+    notes: list[Note] = []
+    broken = broken_limits(problem, wrong)
+    if pushed_m:
+        notes.append(Note("curve_pushed", optimiser=name, broken=broken, pushed_m=pushed_m))
+    elif pushed_m is not None:
+        notes.append(Note("curve_lifted", optimiser=name, broken=broken))
     elif wrong:  # the curve broke a limit that the fewer way points keep
-        notes = (f"the curve that {name} found breaks {summary_of(problem, wrong)}; its way points pass",)
+        notes.append(Note("curve_thinned", optimiser=name, broken=broken))
     return Solution(
         path=Path(points),
         stopped_by="evaluations" if found.result.stopped_by == "evaluations" else "exhausted",
         planning_s=time.perf_counter() - begun,
         first_path_s=searched_s,
-        notes=notes,
+        notes=tuple(notes),
         raw_violations=len(wrong),
         repaired=pushed_m is not None,
     )
@@ -234,17 +235,27 @@ def way_points_beside(problem: Problem, found: Found) -> Floats | None:
     return None
 
 
-def summary_of(problem: Problem, wrong: Sequence[Violation]) -> str:
-    """The broken limits in a few words: ``12 legs (min_agl by 3.2 m, zone 'x' by 10.0 m)``."""
-    worst: dict[str, tuple[float, str]] = {}
+def broken_limits(problem: Problem, wrong: Sequence[Violation]) -> Note:
+    """The broken limits: ``limits on 12 of its legs (min_agl by 3.2 m, zone 'x' by 10.0 m)``."""
+    if not wrong:
+        return Note("only_way_points_break")
+    worst: dict[str, Violation] = {}
     for v in wrong:
-        what = f"zone {problem.airspace.zones[v.zone].name!r}" if v.kind == "zone" else v.kind
-        if v.by > worst.get(what, (-1.0, ""))[0]:
-            worst[what] = v.by, v.unit
-    legs = Counter(v.leg for v in wrong)
-    words = ", ".join(f"{what} by {by:.1f} {unit}" for what, (by, unit) in list(worst.items())[:4])
-    more = f" and {len(worst) - 4} more" if len(worst) > 4 else ""
-    return f"limits on {len(legs)} of its legs ({words}{more})" if wrong else "no limit, but its way points do"
+        what = f"zone {v.zone}" if v.kind == "zone" else v.kind
+        if what not in worst or v.by > worst[what].by:
+            worst[what] = v
+    limits = [_broken(problem, v) for v in list(worst.values())[:MOST_LIMITS]]
+    if len(worst) > MOST_LIMITS:
+        limits.append(Note("more_limits", count=len(worst) - MOST_LIMITS))
+    return Note("limits_broken", legs=len({v.leg for v in wrong}), limits=tuple(limits))
+
+
+def _broken(problem: Problem, v: Violation) -> Note:
+    if v.kind == "zone":
+        return Note("zone_by", zone=problem.airspace.zones[v.zone].name, by_m=v.by)
+    if v.unit == "m":
+        return Note("limit_by_length", limit=v.kind, by_m=v.by)
+    return Note("limit_by_angle", limit=v.kind, by_deg=v.by)
 
 
 def _teller(problem: Problem) -> Any:

@@ -17,6 +17,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.verdict import Finding
+from gcsplan.notes.note import Note
 from gcsplan.units import Quantity, Seconds, UnitText, measured
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Legs, Violation
@@ -176,14 +177,12 @@ class Meeting:
     time_s: float
     kind: str = "air"
 
-    def describe(self, needed_m: float) -> UnitText:
-        """Return one sentence; ``needed_m`` is the required separation."""
-        a, b = self.names
-        how = "{} and {} came as near as" if self.kind == "air" else "{} landed beside {}, which stood there:"
-        return UnitText(
-            how + " {}, needed are {}, at {}",
-            a, b, Quantity(self.distance_m, "distance", 1, "down"), Quantity(needed_m, "distance", None),
-            Seconds(self.time_s, 1),
+    def note(self, needed_m: float) -> Note:
+        """Return how near they came; ``needed_m`` is the required separation."""
+        first, second = self.names
+        return Note(
+            "came_too_near" if self.kind == "air" else "landed_too_near", first=first, second=second,
+            distance_m=self.distance_m, needed_m=needed_m, time_s=self.time_s,
         )  # fmt: skip
 
 

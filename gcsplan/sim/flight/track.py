@@ -18,6 +18,7 @@ from gcsplan.check.flight import follow
 from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.notes.note import Note, Said
 from gcsplan.sim.flight.kinematics import AT_ONCE_M_S2, STANDS_M, Kinematics, rounded
 from gcsplan.sim.flight.scurves import leg_limits, step_legs
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -58,7 +59,7 @@ class CommandedTrack:
     ends_in_air: bool
     slowing_m_s2: float
     airspeed_m_s: Floats
-    not_flown: tuple[str, ...]
+    not_flown: tuple[Said, ...]
     keeps_airspeed: bool = False
 
     @property
@@ -217,7 +218,7 @@ def _track(
 ) -> CommandedTrack:
     name, turns = vehicle.name, []
     if vehicle.turn_radius_m > 0.0 and vehicle.autopilot is not Autopilot.ARDUPLANE:
-        turns.append(f"its turns of {vehicle.turn_radius_m:g} m are flown as corners")
+        turns.append(Note("turns_flown_as_corners", radius_m=vehicle.turn_radius_m))
     cap, command, level, accel, column, seq = zip(*line.pieces, strict=True)
     points = np.array(line.points)
     if not np.isfinite(points).all():
@@ -227,7 +228,7 @@ def _track(
         np.array(accel), np.array(column, dtype=np.bool_), np.array(seq, dtype=np.intp), goal,
         not (last.column and last.end[2] < last.start[2]), kinematics.slowing_m_s2,
         _airspeeds(points, kinematics),
-        (*map(str, flight.not_judged), *_left_out(flight), *turns), vehicle.keeps_airspeed,
+        (*flight.not_judged, *_left_out(flight), *turns), vehicle.keeps_airspeed,
     )  # fmt: skip
 
 
@@ -239,13 +240,13 @@ def _airspeeds(points: Floats, kinematics: Kinematics) -> Floats:
     return np.array([(kinematics.airspeed_on(0.0, z), kinematics.airspeed_on(r, z)) for r, z in each])
 
 
-def _left_out(flight: Flight) -> list[str]:
-    """Return in words what is flown more simply than an autopilot would."""
+def _left_out(flight: Flight) -> list[Note]:
+    """Return what is flown more simply than an autopilot would."""
     circles = sorted({s.seq for s in flight.stretches if s.kind == "loiter" and s.reach_m > 0.0})
     again = sorted({s.seq for s in flight.stretches if s.times > 1})
     return [
-        *(f"item {seq}: its circle is not flown, the simulated vehicle waits at the middle" for seq in circles),
-        *(f"item {seq}: a jump flies it again and again, the simulated vehicle once" for seq in again),
+        *(Note("circle_not_flown", seq) for seq in circles),
+        *(Note("jump_flown_once", seq) for seq in again),
     ]
 
 

@@ -37,6 +37,7 @@ from gcsplan.mavlink.mission.fences import FENCE_DECIDES
 from gcsplan.mavlink.mission.parameter_list import parameter_list
 from gcsplan.mavlink.mission.parameter_safety import safety_list
 from gcsplan.mavlink.protocol.messages import Address
+from gcsplan.notes.note import Note, Said, of_vehicle
 from gcsplan.sim.flight.trace import Trace
 from gcsplan.sim.flight.wind import Weather
 from gcsplan.sim.outcome import Rehearsal, Tally, Terms
@@ -144,9 +145,9 @@ def rehearse_sitl(
     traces = [_trace(log, part, world) for log, part in zip(logs, parts, strict=True)]
     tally.add(traces, world, [_spent_j(t, p, weather, seed) for t, p in zip(traces, parts, strict=True)])
     tally.notes += [words for _, unlike in found for words in unlike]
-    tally.notes.append(f"every vehicle was released {LIFT_S:g} s before its departure, for its motors to spin up")
+    tally.notes.append(Note("released_early", before_s=LIFT_S))
     tally.notes += [
-        f"{t.name} left the ground {t.begin_s - p.depart_s:+.1f} s from its departure"
+        Note("left_ground_off_time", vehicle=t.name, off_s=t.begin_s - p.depart_s)
         for t, p in zip(traces, parts, strict=True)
         if abs(t.begin_s - p.depart_s) > _ODD_LIFT_S
     ]
@@ -181,7 +182,7 @@ def _all(jobs: list[PumpJob[Any]]) -> list[Any]:
 
 def _ready(
     channel: Channel, part: RehearsalPart, report: Callable[[str, str], None], *, i_know: bool
-) -> Steps[tuple[VehicleState, list[str]]]:
+) -> Steps[tuple[VehicleState, list[Said]]]:
     """Wait until the vehicle has a position and a home, and make sure that it is a simulator and not armed.
 
     Return its state, and which of its parameters are not those that the mission was judged with.
@@ -210,7 +211,7 @@ def _ready(
         )
     if state.armed:
         raise VehicleRefused(f"{name}: it is armed already: let it land, or start it anew", where=channel.link.url)
-    return state, [f"{name}: {words}" for words in settings_words(settings, values, part.vehicle.autopilot)]
+    return state, [of_vehicle(name, off) for off in settings_words(settings, values, part.vehicle.autopilot)]
 
 
 def _fly(

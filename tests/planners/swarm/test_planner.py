@@ -10,6 +10,7 @@ import pytest
 
 from gcsplan.app.pipeline import plan
 from gcsplan.errors import InputError, NoMission
+from gcsplan.notes.note import Note
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.planners.registry import TABLE, get, names
 from gcsplan.planners.swarm import planner as swarm_planner
@@ -90,8 +91,12 @@ def test_a_cost_that_sees_nothing_cannot_pass_a_path_through_a_zone(monkeypatch:
     solution = get("de").plan(problem)
     assert solution.repaired
     assert solution.raw_violations == len(found.violations)
-    assert "zone 'wall'" in solution.notes[0]
-    assert "passes the check" in solution.notes[0]
+    [repaired] = solution.notes
+    assert repaired.code in ("curve_pushed", "curve_lifted")
+    broken = repaired.data["broken"]
+    assert isinstance(broken, Note)
+    assert broken.data["legs"] == len({v.leg for v in found.violations})
+    assert "zone 'wall' by " in str(repaired)
     assert violations(problem, solution.path.points) == ()
     assert faults(problem, solution.path) == []
 
@@ -126,7 +131,7 @@ def test_a_planner_searches_again_with_other_seeds(monkeypatch: pytest.MonkeyPat
     solution = get("de").plan(problem)
     assert luck.seeds[0] == problem.seed
     assert len(set(luck.seeds)) == 3
-    assert solution.notes[0] == "2 searches of de ended without a path before this one"
+    assert solution.notes[0] == Note("searches_failed", searches=2, optimiser="de")
     assert violations(problem, solution.path.points) == ()
     assert solution.path.points.tobytes() == get("de").plan(replace(problem, seed=luck.seeds[2])).path.points.tobytes()
 
