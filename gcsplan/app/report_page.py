@@ -35,7 +35,7 @@ def page_of_plan(
     plan: Plan, results: Sequence[JobResult] = (), homes: Mapping[str, WayHome] | None = None, units: Units = METRIC
 ) -> Page:
     """The page of a plan, with the results of its uploads and the way home of each vehicle named in ``homes``."""
-    uploads = {d.vehicle: d.as_dict() for d in results}
+    uploads = {d.vehicle: d for d in results}
     source, fleet = plan.source, plan.fleet
     facts = [("planner", plan.planner), ("objective", plan.objective), ("seed", str(plan.seed)),
              ("altitude frame", source.altitude_frame)]  # fmt: skip
@@ -50,12 +50,13 @@ def page_of_plan(
             v.problem.objective, "m" if v.problem.objective == "length" else "J",
             v.cost, v.solution.lower_bound, v.gap_percent, v.solution.stopped_by,
         )  # fmt: skip
-        slot = None if fleet is None else fleet.slot(v.name)
+        slot, sent = None if fleet is None else fleet.slot(v.name), uploads.get(v.name)
         subjects.append(
             Subject(
                 v.name, v.verdict, v.request.vehicle, certificate, v.all_notes(fleet),
                 None if fleet is None else fleet.motion(v.name), slot,
-                (homes or {}).get(v.name), uploads.get(v.name), leaves=v.request.end == "none",
+                (homes or {}).get(v.name), None if sent is None else sent.as_dict(),
+                () if sent is None else sent.warnings, leaves=v.request.end == "none",
                 settings=settings_of_plan(v, (homes or {}).get(v.name)),
             )
         )  # fmt: skip

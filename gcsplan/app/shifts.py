@@ -16,6 +16,7 @@ from gcsplan.mavlink.link.preflight import distance_m
 from gcsplan.mavlink.link.results import UploadResult
 from gcsplan.mavlink.mission.compare import Difference
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
+from gcsplan.notes.note import Note
 
 CUTTING = "MAVProxy and Mission Planner"
 """Programs that cut degrees: MAVProxy's `wp_to_mission_item_int`, Mission Planner's `setWP`."""
@@ -77,26 +78,29 @@ def shift_of(sent: Mission, read: Sequence[MissionItem], faults: Sequence[Differ
     return Shift(len(moved), max(away_m), CUTTING if cut else "")
 
 
-def within(result: UploadResult, sent: Mission, tolerance_m: float | None) -> tuple[UploadResult, str, str]:
-    """The result where a shift of at most ``tolerance_m`` is excused, a note, and what to add to an error.
+def within(result: UploadResult, sent: Mission, tolerance_m: float | None) -> tuple[UploadResult, Note | None, str]:
+    """The result where a shift of at most ``tolerance_m`` is excused, with a note, and what to add to an error.
 
     The caller's check must have judged what was read back: its failure stays one.
     """
     shift = shift_of(sent, result.read_back or (), result.faults)
     if shift is None:
         only = "; --tolerance-m is for positions alone" if tolerance_m is not None and result.faults else ""
-        return result, "", only
+        return result, None, only
     if tolerance_m is None:
         if shift.most_m > LARGEST_TOLERANCE_M:
-            return result, "", ""
+            return result, None, ""
         enough_m = min(math.ceil(shift.most_m * 100.0 + 0.1) / 100.0, LARGEST_TOLERANCE_M)
         cure = f"--mission MISSION.yaml --tolerance-m {enough_m:g} judges what is on board, and takes it if it is safe"
-        return result, "", f". {shift}: {cure}"
+        return result, None, f". {shift}: {cure}"
     if shift.most_m > tolerance_m:
-        return result, "", f". {shift}, more than --tolerance-m {tolerance_m:g}"
+        return result, None, f". {shift}, more than --tolerance-m {tolerance_m:g}"
     excused = tuple(replace(d, excused=True) for d in result.differences)
     result = replace(result, differences=excused, verified=result.outcome == "accepted" and result.failed_check is None)
-    return result, f"{shift}; judged again: {'safe' if result.verified else 'not safe'}", ""
+    note = Note("positions_shifted", items=shift.items, most_m=shift.most_m, safe=result.verified)
+    if shift.sender:
+        note = Note("positions_cut", items=shift.items, most_m=shift.most_m, sender=shift.sender, safe=result.verified)
+    return result, note, ""
 
 
 def _placed(item: MissionItem) -> bool:

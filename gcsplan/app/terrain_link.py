@@ -14,6 +14,7 @@ from gcsplan.app.ground import MissionGround
 from gcsplan.app.uploads import LISTEN_S, open_link, targets
 from gcsplan.errors import GcsplanError, UsageError
 from gcsplan.mission_file import MissionFile
+from gcsplan.notes.note import Said, in_json
 from gcsplan.world.terrain_grid import PostHeights
 
 if TYPE_CHECKING:
@@ -44,14 +45,14 @@ class ServedTo:
     loaded: int
     pending: int
     complete: bool
-    notes: tuple[str, ...]
+    notes: tuple[Said, ...]
 
     def as_dict(self) -> dict[str, Any]:
         """The values for JSON."""
         return {
             "name": self.vehicle, "url": self.url, "requests": self.requests, "parts": self.parts,
             "blocks": self.blocks, "unknown_parts": self.unknown_parts, "loaded": self.loaded,
-            "pending": self.pending, "complete": self.complete, "notes": list(self.notes),
+            "pending": self.pending, "complete": self.complete, **in_json("notes", self.notes),
         }  # fmt: skip
 
 

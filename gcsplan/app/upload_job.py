@@ -13,6 +13,7 @@ from gcsplan.mavlink.build.fence import Fence
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.protocol.machine import Progress
 from gcsplan.mission_file.airspace.times import Hours
+from gcsplan.notes.note import Said, in_json
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.terrain_grid import Ground
 from gcsplan.world.world import World
@@ -77,7 +78,7 @@ class JobResult:
     retries: int = 0
     simulated: bool = False
     message: str = ""
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Said, ...] = ()
     code: int = 0
     reason: str = ""
     details: Mapping[str, Any] | None = None
@@ -91,6 +92,6 @@ class JobResult:
             "url": self.url, "outcome": self.outcome, "verified": self.verified, "simulated": self.simulated,
             "items": self.items, "seconds": self.seconds, "retries": self.retries,
         }  # fmt: skip
-        said = {"message": self.message, "warnings": list(self.warnings)}
+        said = {"message": self.message} | in_json("warnings", self.warnings)
         more = said | dict(self.details or {}) | said
         return fixed | {key: value for key, value in more.items() if value and key not in fixed}

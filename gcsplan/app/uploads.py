@@ -31,12 +31,12 @@ from gcsplan.app.upload_job import LINK, SIM, JobResult, ProgressCall, UploadJob
 from gcsplan.app.upload_orders import order_of, report_end
 from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, UsageError, VehicleRefused
 from gcsplan.export.outdir import write_whole
-from gcsplan.figures import counted
 from gcsplan.mavlink.files.formats import read_mission_file, write_plan, write_waypoints
 from gcsplan.mavlink.link.url import parse_url
 from gcsplan.mavlink.mission.autopilots import autopilot_of
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, Mission
 from gcsplan.mission_file import MissionFile
+from gcsplan.notes.note import Note, Said
 from gcsplan.vehicle import Autopilot, Vehicle
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ def _job(c: Checked, url: str) -> UploadJob:
     )  # fmt: skip
 
 
-def unchecked_job(argument: str, url: str, sysid: int) -> tuple[UploadJob, list[str]]:
+def unchecked_job(argument: str, url: str, sysid: int) -> tuple[UploadJob, list[Said]]:
     """The job of a file for ``--unchecked``, and what of the file is not sent with it or was not read.
 
     The vehicle is asked for its autopilot if the file does not name one.
@@ -279,10 +279,10 @@ def _with_fence(result: JobResult, fence: UploadResult | GcsplanError | None) ->
         "items": fence.items,
         "seconds": fence.seconds,
     }
-    words = f"a fence of {counted(fence.items, 'item')} is on board too, read back and compared"
+    note = Note("fence_on_board", items=fence.items)
     return replace(
         result,
-        warnings=tuple(dict.fromkeys((words, *result.warnings, *fence.warnings))),
+        warnings=tuple(dict.fromkeys((note, *result.warnings, *fence.warnings))),
         details=dict(result.details or {}) | {"fence": fence_result},
     )
 
@@ -361,9 +361,9 @@ def verify_file(
         result = session.verify_mission(link, job.mission, options=options, judge=judge)
         result, shifted, cure = shifts.within(result, job.mission, tolerance_m)
         done = _result(job, result)
-    if checked is not None and done.verified and not shifted:
-        shifted = "what is on board is judged again: safe"
-    warnings = (*([shifted] if shifted else []), *notes, *done.warnings)
+    if checked is not None and done.verified and shifted is None:
+        shifted = Note("judged_again_safe")
+    warnings = (*([] if shifted is None else [shifted]), *notes, *done.warnings)
     return replace(done, message=done.message + cure if done.message else "", warnings=warnings)
 
 

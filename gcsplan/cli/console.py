@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 WIDEST = 100_000
 MOST_WHOLE = 30
 """Most vehicles whose table has all columns, and whose transfers have a bar each."""
-BRIEF = ("vehicle", "length", "battery", "lowest", "speed", "departs", "arrives", "verdict")
-"""How the names of the columns begin that the table of a larger fleet has."""
 MOST_NOTES, MOST_NAMES = 120, 110
 """Most notes on vehicles that are printed, and most names in one line."""
 
@@ -103,7 +101,8 @@ def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) 
         if all(row[rare] == "–" for row in rows):
             rows = [{name: words for name, words in row.items() if name != rare} for row in rows]
     if len(rows) > MOST_WHOLE:
-        rows = [{name: words for name, words in row.items() if name.startswith(BRIEF)} for row in rows]
+        brief = _brief(units)
+        rows = [{name: row[name] for name in brief} for row in rows]
     title = f"[bold]{escape(plan.source.name)}[/]  planner {plan.planner}, objective {plan.objective}"
     if len(rows) > 4:
         rows_table(title, rows, left=("vehicle", "verdict"))
@@ -115,6 +114,14 @@ def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) 
     say_heights(plan.source.inputs)
     if words := what_is_not_in(plan.source.inputs):
         console.print(words, style="yellow", markup=False)
+
+
+def _brief(units: Units) -> tuple[str, ...]:
+    """The columns that the table of a larger fleet has."""
+    return (
+        "vehicle", f"length, {units.path.symbol}", "battery, %", f"lowest AGL, {units.height.symbol}",
+        f"speed, {units.speed.symbol}", "departs", "arrives", "verdict",
+    )  # fmt: skip
 
 
 def say_heights(inputs: Mapping[str, object]) -> None:

@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from gcsplan.app.upload_job import JobResult, UploadJob, UploadOptions
     from gcsplan.check.rtl.verdict import WayHome
     from gcsplan.mission_file import MissionFile
+    from gcsplan.notes.note import Said
     from gcsplan.units import Units
 
 SHOWN = 15
@@ -154,7 +155,7 @@ def plan(
     from gcsplan.app.flying import flyable
     from gcsplan.app.gate import GateTime
     from gcsplan.app.way_home import is_required
-    from gcsplan.cli.console import plan_table, release_table, remark, say_notes_of, upload_table
+    from gcsplan.cli.console import plan_table, release_table, remark, upload_table
     from gcsplan.cli.home_words import say_homes
     from gcsplan.cli.planning_display import planning_display
     from gcsplan.export.outdir import settle_outputs
@@ -195,7 +196,7 @@ def plan(
         if upload or fence or fence_infinite:
             where = targets or dict.fromkeys((v.name for v in planned.vehicles), "")
             orders = uploads.jobs_of(planned, where, homes, is_required(source, require_way_home))
-        fence_notes: list[tuple[str, str]] = []
+        fence_notes: Sequence[tuple[str, Said]] = ()
         if fence or fence_infinite:  # a fence that the mission would breach is refused before anything is written
             orders, fence_notes = fencing.with_fences(orders, infinite=fence_infinite)
         fences = {job.name: job.fence.items for job in orders if job.fence is not None}
@@ -212,8 +213,7 @@ def plan(
     if not as_json:
         plan_table(planned, homes, system)
         say_homes(homes, system)
-        say_notes_of(fence_notes)
-        _say_files(directory, list(files))
+        _say_written(directory, list(files), fence_notes, system)
     results: list[JobResult] = []
     if targets:
         options = UploadOptions(
@@ -223,7 +223,7 @@ def plan(
         results = _upload(orders, options, gate)
         _add_results(directory, planned, results, homes, system if report else None)
         if not as_json:
-            upload_table(results)
+            upload_table(results, units=system)
             release_table(planned, results, gate)
     left_out = _left_out(planned, mission)
     failure = (uploads.failure(results) if targets else None) or left_out
@@ -335,10 +335,12 @@ def _add(directory: Path, files: Mapping[str, Callable[[], str]]) -> None:
         remark(f"note: what became of the upload is not written: {error}")
 
 
-def _say_files(directory: Path, files: list[str]) -> None:
-    """Print what was written; a fleet has hundreds of files."""
-    from gcsplan.cli.console import say
+def _say_written(directory: Path, files: list[str], notes: Sequence[tuple[str, Said]], units: Units) -> None:
+    """Print the notes on the fences, and what was written; a fleet has hundreds of files."""
+    from gcsplan.cli.console import say, say_notes_of
+    from gcsplan.notes.note import Wording
 
+    say_notes_of(notes, Wording(units))
     shown = [*files[:SHOWN], f"… and {len(files) - SHOWN} more"] if len(files) > SHOWN + 1 else files
     say(f"written to {directory}{os.sep}: {', '.join(shown)}")
 

@@ -124,7 +124,7 @@ def serve(
         say(f"{d.vehicle}: {counted(d.parts, 'part')} of {counted(d.blocks, 'block')} sent"
             f"{', nothing pending' if d.complete else ''}")  # fmt: skip
         for note in d.notes:
-            remark(note)
+            remark(str(note))
     if late:
         raise error
 

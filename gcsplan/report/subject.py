@@ -38,7 +38,7 @@ class Subject:
     ``slot`` is its part of the time table, None for a checked file, and so is ``motion``, the whole flight over time.
     ``flown`` is what it flew in a rehearsal, from that track alone. ``leaves``: it is gone where its motion ends.
     ``home`` is the way home from every point, if it was judged. ``upload`` holds the keys of ``upload.json``, None if
-    nothing was sent. ``settings``: the parameters that its mission was judged with.
+    nothing was sent, ``warnings`` what was said of it. ``settings``: the parameters that its mission was judged with.
     """
 
     name: str
@@ -50,6 +50,7 @@ class Subject:
     slot: Slot | None = None
     home: WayHome | None = None
     upload: Mapping[str, object] | None = None
+    warnings: tuple[Said, ...] = ()
     flown: TimedPath | None = None
     leaves: bool = False
     settings: tuple[Setting, ...] = ()

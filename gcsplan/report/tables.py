@@ -27,7 +27,7 @@ from gcsplan.report.plan_view import zone_heights
 from gcsplan.report.profile_view import passed
 from gcsplan.report.samples import Line, Passage
 from gcsplan.report.subject import Page, Subject
-from gcsplan.units import KILOJOULE, Unit, Units, duration
+from gcsplan.units import KILOJOULE, Unit, Units, duration, in_units
 from gcsplan.world.model_words import what_is_not_in
 
 CLOSE = 0.02
@@ -267,14 +267,9 @@ def upload_table(page: Page) -> str:
     if not rows:
         return '<p class="note">Nothing was sent to any vehicle when this report was written.</p>'
     head = ("vehicle|", "link|", "items", "outcome|", "read back|", "took", "said|")
-    warned = [(s.name, w) for s in page.subjects if s.upload is not None for w in _warnings(s.upload)]
+    warned = [(s.name, in_units(note, page.units)) for s in page.subjects for note in s.warnings]
     listed = "".join(f"<li><b>{esc(who)}</b>: {esc(words)}</li>" for who, words in warned)
     return table("Upload", head, rows, marks=marks) + (f"<ul>{listed}</ul>" if listed else "")
-
-
-def _warnings(upload: Mapping[str, object]) -> Sequence[object]:
-    found = upload.get("warnings", ())
-    return found if isinstance(found, list | tuple) else ()
 
 
 def inputs_table(inputs: Mapping[str, object], facts: Sequence[tuple[str, str]], units: Units) -> str:

@@ -103,7 +103,7 @@ def test_what_is_no_position_has_no_tolerance(index: int, fields: dict[str, obje
     kept, note, more = within(result(sent, read), sent, 10.0)
     assert not kept.verified
     assert isinstance(kept.error(), ReadBackDiffers)
-    assert note == ""
+    assert note is None
     assert "for positions alone" in more
 
 
@@ -126,11 +126,11 @@ def test_a_tolerance_takes_what_lies_within_it_and_nothing_else(
     )
     if off_m > 0.0 and abs(off_m - tolerance_m) > 0.01 + 1e-3 * off_m:
         assert kept.verified == (off_m < tolerance_m)
-        assert ("judged again: safe" in note) == (off_m < tolerance_m)
+        assert (note is not None and note.data["safe"] is True) == (off_m < tolerance_m)
         assert ("more than --tolerance-m" in more) == (off_m > tolerance_m)
     failing, note, _ = within(result(sent, read, "too low"), sent, tolerance_m)
     assert not failing.verified
-    assert ": safe" not in note
+    assert note is None or note.data["safe"] is False
 
 
 def test_what_is_not_safe_is_no_verified_mission_however_near() -> None:
@@ -138,7 +138,9 @@ def test_what_is_not_safe_is_no_verified_mission_however_near() -> None:
     read = changed(sent, 2, x=366_849_291)
     kept, note, _ = within(result(sent, read, "too low above ground"), sent, 1.0)
     assert isinstance(kept.error(), CheckFailed)
-    assert "not safe" in note
+    assert note is not None
+    assert (note.code, note.data["items"], note.data["safe"]) == ("positions_shifted", 1, False)
+    assert str(note) == "1 item differs by 0.011 m; judged again: not safe"
 
 
 def test_without_a_tolerance_the_cure_is_told() -> None:
@@ -146,7 +148,7 @@ def test_without_a_tolerance_the_cure_is_told() -> None:
     kept, note, more = within(result(sent, changed(sent, 2, x=366_849_291)), sent, None)
     assert isinstance(kept.error(), ReadBackDiffers)
     assert (note, more) == (
-        "",
+        None,
         ". 1 item differs by 1.1 cm: --mission MISSION.yaml --tolerance-m 0.02 judges what is on board, and takes it "
         "if it is safe",
     )  # fmt: skip

@@ -76,7 +76,10 @@ def test_what_mavproxy_cuts_is_named_judged_and_taken(run: Any, url: str) -> Non
     document = json.loads(said)
     assert code == 0
     assert document["verified"] is True
-    assert any("judged again: safe" in words for words in document["warnings"])
+    [judged] = [note for note in document["warnings_data"] if note["code"] == "positions_cut"]
+    assert judged["data"]["safe"] is True
+    assert judged["data"]["items"] == number
+    assert len(document["warnings"]) == len(document["warnings_data"])
     assert "within the tolerance" in document["differences"][0]
     code, said = run(*verify, "--mission", CROSSING, "--tolerance-m", "0.001")
     assert code == 7

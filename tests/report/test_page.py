@@ -29,6 +29,7 @@ from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Rules, separation
 from gcsplan.mavlink.build.multirotor import build_mission
 from gcsplan.mavlink.build.order import Order
+from gcsplan.notes.note import Note
 from gcsplan.report import fleet_view, markup, tables
 from gcsplan.report.chart import Axes, ticks
 from gcsplan.report.page import render_check, render_page
@@ -309,6 +310,11 @@ def test_the_uploads_end_is_told() -> None:
     read = Reader(render_page(replace(page, subjects=(replace(page.subjects[0], upload=bad),))))
     assert "not verified" in read.text
     assert "(simulated)" in read.text
+    warned = replace(
+        page.subjects[0], upload=sent, warnings=(Note("positions_shifted", items=1, most_m=3.048, safe=True),)
+    )
+    read = Reader(render_page(replace(page, subjects=(warned,), units=AVIATION)))
+    assert "1 item differs by 10.000 ft; judged again: safe" in read.text
 
 
 # -- hostile names ------------------------------------------------------------------------------------------------

@@ -394,7 +394,7 @@ def test_a_fence_is_uploaded_read_back_and_compared(autopilot: Autopilot) -> Non
         assert result.outcome == "accepted"
         assert result.verified, result.differences
         enforced = autopilot is Autopilot.PX4
-        assert enforced or any("FENCE_ENABLE is 0" in w for w in result.warnings)
+        assert enforced or any("FENCE_ENABLE is 0" in str(w) for w in result.warnings)
         read = session.download_items(link, 1, FENCE, options=options)
     assert faults(compare(fence.items, read, autopilot, FENCE)) == ()
     back = areas_of(read, FRAME)
@@ -444,7 +444,7 @@ def test_fences_go_before_the_missions_and_a_vehicle_that_is_not_there_stops_nob
         first, second = uploads.run_jobs(jobs, uploads.UploadOptions())
     assert first.verified
     assert first.as_dict()["fence"]["verified"] is True
-    assert any("FENCE_ENABLE is 0" in w for w in first.warnings)
+    assert any("FENCE_ENABLE is 0" in str(w) for w in first.warnings)
     assert len(boards[0].items(FENCE)) == 6
     assert second.verified is False
     assert "fence is not on board" in second.message
