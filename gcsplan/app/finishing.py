@@ -20,12 +20,11 @@ __all__ = ["finished"]
 def finished(
     brief: Brief,
     vehicles: Sequence[VehiclePlan],
-    planner: str,
     progress: Callable[[str, Progress], None] | None = None,
     leaving: LeavingOut | None = None,
     gate: GateTime | None = None,
 ) -> Plan:
-    """The plan of a mission from its vehicles' own ones; ``planner`` made them. Raises InputError, NoMission."""
+    """The plan of a mission from its vehicles' own ones. Raises InputError, NoMission."""
     leaving = leaving or LeavingOut(allowed=False)
     brief, vehicles = over_one_terrain(brief, vehicles, progress, leaving)
     leaving.require_some(vehicles)
@@ -40,6 +39,6 @@ def finished(
         flown = tuple(replace(v, verdict=replace(v.verdict, energy_stated=True, paper_energy=True)) for v in flown)
         notes.append(Note("paper_energy_minimised"))
     return Plan(
-        source, brief.world, planner, brief.objective, brief.seed, flown, tuple(notes), fleet, tuple(leaving.found),
-        leaving.allowed,
+        source, brief.world, brief.planner, brief.objective, brief.seed, flown, tuple(notes), fleet,
+        tuple(leaving.found), leaving.allowed,
     )  # fmt: skip

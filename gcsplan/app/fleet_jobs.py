@@ -6,8 +6,7 @@ results hold no terrain: the caller puts them into its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable
 
 from gcsplan.app.executor import Executor
 from gcsplan.app.leaving_out import LeavingOut
@@ -15,7 +14,6 @@ from gcsplan.app.model import Brief, VehiclePlan
 from gcsplan.app.refusals import plan_or_explain
 from gcsplan.app.sites import Site, site_of, widened, world_of
 from gcsplan.errors import GcsplanError, NoMission
-from gcsplan.planners.registry import get as get_planner
 
 __all__ = ["planned_by"]
 
@@ -23,16 +21,8 @@ PIECE_S = 0.6
 """Seconds that planning a vehicle takes, about: the median of 60 over mountains with margins."""
 
 
-@dataclass(frozen=True, slots=True)
-class Asked:
-    """What all vehicles of a mission share: its terrain and zones, and the planner."""
-
-    site: Site
-    planner: str
-    objective: str
-    seed: int
-    options: Mapping[str, object]
-
+Asked = tuple[Site, Brief]
+"""What all vehicles of a mission share: its terrain and zones, and the packed brief."""
 
 Answer = tuple[VehiclePlan, int]
 """A vehicle's packed plan, and the level of the terrain that it was made over."""
@@ -41,7 +31,6 @@ Answer = tuple[VehiclePlan, int]
 def planned_by(
     workers: Executor,
     brief: Brief,
-    planner: str,
     told: Callable[[str, int], None] | None = None,
     leaving: LeavingOut | None = None,
 ) -> list[VehiclePlan]:
@@ -52,7 +41,7 @@ def planned_by(
     """
     leaving = leaving or LeavingOut(allowed=False)
     source = brief.source
-    asked = Asked(site_of(source), planner, brief.objective, brief.seed, dict(brief.options))
+    asked = site_of(source), brief.packed()
     names = [r.vehicle.name for r in source.vehicles]
     answers: dict[int, Answer] = {}
     refused: dict[int, GcsplanError] = {}
@@ -75,7 +64,8 @@ def planned_by(
 def answer_of(asked: Asked, name: str) -> Answer | GcsplanError:
     """Plan one vehicle, in whatever process; why there is no plan is returned, so that the caller can order it."""
     try:
-        brief = _brief_of(asked)
+        site, packed = asked
+        brief = packed.over(*site.read())
         [request] = [r for r in brief.source.vehicles if r.vehicle.name == name]
         plan = plan_or_explain(brief, request)
     except GcsplanError as why:
@@ -84,13 +74,6 @@ def answer_of(asked: Asked, name: str) -> Answer | GcsplanError:
     return plan.packed(), plan.brief.source.level
 
 
-def _brief_of(asked: Asked) -> Brief:
-    source, world = asked.site.read()
-    run = get_planner(asked.planner).plan
-    return Brief(source, world, run, asked.objective, asked.seed, asked.options)
-
-
 def _restored(brief: Brief, plan: VehiclePlan, level: int) -> VehiclePlan:
     source = widened(brief.source, level)
-    over = brief if source is brief.source else replace(brief, source=source, world=world_of(source))
-    return plan.restored(over)
+    return plan.restored(brief if source is brief.source else brief.over(source, world_of(source)))

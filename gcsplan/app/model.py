@@ -17,6 +17,7 @@ from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.notes.note import Note, Said
 from gcsplan.planners.problem import Problem, Solution
+from gcsplan.planners.registry import get as get_planner
 from gcsplan.world.world import World
 
 if TYPE_CHECKING:
@@ -29,18 +30,31 @@ TOUCH_M, TOUCH = 1e-3, 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Brief:
-    """How all vehicles of a mission file are planned: ``run`` is the planner, ``options`` are those that only it knows.
+    """How all vehicles of a mission file are planned: by which planner, with ``options`` that only it knows.
 
     ``by_priority``: each vehicle is planned with knowledge of those before it, and gives way to them.
     """
 
     source: MissionFile
     world: World
-    run: Callable[[Problem], Solution]
+    planner: str
     objective: str
     seed: int
     options: Mapping[str, object]
     by_priority: bool = False
+
+    @property
+    def run(self) -> Callable[[Problem], Solution]:
+        """The planner."""
+        return get_planner(self.planner).plan
+
+    def packed(self) -> Brief:
+        """The brief without mission and world, for another process, which has read both: `over` puts them in again."""
+        return replace(self, source=None, world=None)  # type: ignore[arg-type]
+
+    def over(self, source: MissionFile, world: World) -> Brief:
+        """The same for a mission over other terrain."""
+        return replace(self, source=source, world=world)
 
 
 @dataclass(frozen=True, eq=False)

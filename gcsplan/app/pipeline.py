@@ -88,13 +88,12 @@ def plan(
         source = load_mission(source, departure=gate_utc, at=at)
     elif at is not None:
         raise InputError("the mission is read already: give `at` to load_mission", where="at")
-    name = planner or source.planner.name
-    brief = _brief_of(source, name, objective, seed, options or {})
+    brief = _brief_of(source, planner or source.planner.name, objective, seed, options or {})
     if leave_out is None:
         leave_out = source.arrival is not None and source.arrival.leave_out
     leaving = LeavingOut(allowed=leave_out)
-    vehicles = _planned(brief, name, progress, jobs, cluster, leaving)
-    return finished(brief, vehicles, name, progress, leaving, None if gate_utc is None else GateTime(gate_utc))
+    vehicles = _planned(brief, progress, jobs, cluster, leaving)
+    return finished(brief, vehicles, progress, leaving, None if gate_utc is None else GateTime(gate_utc))
 
 
 def _brief_of(
@@ -109,11 +108,11 @@ def _brief_of(
     by_priority = bool(entry.optimiser) and (merged.get("cost") or entry.defaults.get("cost")) == "msfoa"
     _require_warm_start(source, name, merged)
     number = source.planner.seed if seed is None else seed
-    return Brief(source, world_of(source), entry.plan, goal, number, merged, by_priority and len(source.vehicles) > 1)
+    return Brief(source, world_of(source), name, goal, number, merged, by_priority and len(source.vehicles) > 1)
 
 
 def _planned(
-    brief: Brief, planner: str, progress: Callable[[str, Progress], None] | None, jobs: int | None, cluster: Any,
+    brief: Brief, progress: Callable[[str, Progress], None] | None, jobs: int | None, cluster: Any,
     leaving: LeavingOut,
 ) -> list[VehiclePlan]:  # fmt: skip
     """Every vehicle's own plan, in this process or by workers. By priority, or to begin around another vehicle's path,
@@ -131,7 +130,7 @@ def _planned(
         if isinstance(workers, Inline):
             return _one_by_one(brief, progress, leaving)
         watched = f", workers at {workers.dashboard}" if workers.dashboard else ""
-        return planned_by(workers, brief, planner, told, leaving)
+        return planned_by(workers, brief, told, leaving)
 
 
 def _one_by_one(

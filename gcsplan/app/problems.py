@@ -80,7 +80,7 @@ def looked_over(brief: Brief, solution: Solution) -> Brief:
     if over.zones:  # zones that only the search sees do not count in the check
         air = Airspace(world.airspace.surface, over.source.zones, scale=over.source.airspace_scale)
         world = World(world.frame, air)
-    return replace(brief, source=over.source, world=world)
+    return brief.over(over.source, world)
 
 
 def built(brief: Brief, request: VehicleRequest, solution: Solution, order: Order) -> tuple[Mission, Verdict]:

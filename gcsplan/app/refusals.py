@@ -64,7 +64,7 @@ def _explained(
 
     def whole(changed: Problem) -> Solution:
         tried, found = planned(changed)
-        flyable(finished(tried, [found], brief.source.planner.name))
+        flyable(finished(tried, [found]))
         return found.solution
 
     problem, _ = make_problem(

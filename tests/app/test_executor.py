@@ -155,7 +155,7 @@ def test_planning_with_an_executor_is_planning(monkeypatch: pytest.MonkeyPatch) 
     seen: list[tuple[str, int]] = []
     monkeypatch.setattr(
         "gcsplan.app.pipeline._planned",
-        lambda brief, planner, *_: planned_by(Pickled(), brief, planner, lambda n, k: seen.append((n, k))),
+        lambda brief, *_: planned_by(Pickled(), brief, lambda n, k: seen.append((n, k))),
     )
     assert told(plan(fleet())) == told(alone)
     assert seen == [("uav1", 1), ("uav2", 2), ("uav3", 3), ("uav4", 4)]
@@ -171,9 +171,7 @@ def test_the_first_refusal_in_the_file_is_raised(monkeypatch: pytest.MonkeyPatch
     given = fleet(no_fly=closed, planner={"budget_s": 0.5})
     given["vehicles"][1]["start"] = {"east_m": 0, "north_m": 400}
     given["vehicles"][2]["start"] = {"east_m": 0, "north_m": 800}
-    monkeypatch.setattr(
-        "gcsplan.app.pipeline._planned", lambda brief, planner, *_: planned_by(Backwards(), brief, planner)
-    )
+    monkeypatch.setattr("gcsplan.app.pipeline._planned", lambda brief, *_: planned_by(Backwards(), brief))
     with pytest.raises((NoMission, InputError)) as caught:
         plan(given)
     monkeypatch.undo()
@@ -270,9 +268,7 @@ def test_terrain_that_planning_widened_is_the_same_here(monkeypatch: pytest.Monk
     }  # fmt: skip
     alone = plan(mission)
     assert alone.source.level > 0
-    monkeypatch.setattr(
-        "gcsplan.app.pipeline._planned", lambda brief, planner, *_: planned_by(Pickled(), brief, planner)
-    )
+    monkeypatch.setattr("gcsplan.app.pipeline._planned", lambda brief, *_: planned_by(Pickled(), brief))
     other = plan(mission)
     assert other.source.level == alone.source.level
     assert told(other) == told(alone)

@@ -22,7 +22,6 @@ from gcsplan.app.pipeline import plan
 from gcsplan.errors import NoMission
 from gcsplan.fleet.separation import Conflict, Encounter
 from gcsplan.mission_file import load_mission
-from gcsplan.planners.registry import get as get_planner
 
 # uav2 lands beside uav1, uav3 may not carry enough energy, and a fourth is walled in.
 FLAT: dict[str, Any] = {
@@ -110,13 +109,13 @@ def test_nothing_is_planned_if_all_are_left_out() -> None:
 
 def test_workers_leave_out_the_same_vehicles() -> None:
     source = load_mission(text=yaml.safe_dump(mission(WEAK, GOOD[0], SHUT, GOOD[1])))
-    brief = Brief(source, fleet_jobs.world_of(source), get_planner("optimal").plan, "length", 1, {})
+    brief = Brief(source, fleet_jobs.world_of(source), "optimal", "length", 1, {})
     leaving = LeavingOut(allowed=True)
-    found = fleet_jobs.planned_by(Inline(), brief, "optimal", None, leaving)
+    found = fleet_jobs.planned_by(Inline(), brief, None, leaving)
     assert [v.name for v in found] == ["uav1", "uav3"]
     assert [v.name for v in leaving.found] == ["uav5", "uav2"]
     with pytest.raises(NoMission, match="battery"):
-        fleet_jobs.planned_by(Inline(), brief, "optimal")
+        fleet_jobs.planned_by(Inline(), brief)
 
 
 def test_a_batch_has_a_row_for_each_that_is_left_out(tmp_path: Path) -> None:
