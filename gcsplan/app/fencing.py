@@ -245,14 +245,15 @@ def upload_fences(
     """
     from gcsplan.mavlink.link import session
 
-    def order_of(job: UploadJob, fence: Fence) -> session.ListOrder:
+    def task_of(job: UploadJob, fence: Fence) -> session.Task:
         simulated = job.url == "sim"
         own = replace(options, simulated=simulated, listen_s=0.0 if simulated else options.listen_s)
         mission = job.mission
-        return session.ListOrder(links[job.name], mission.sysid, fence.items, mission.autopilot, job.name, own)
+        return session.Task(job.name, mission.sysid, mission.autopilot, fence.items, FENCE, own)
 
-    orders = [order_of(j, j.fence) for j in jobs if j.fence is not None and j.fence.items and j.name in links]
-    return dict(zip([o.name for o in orders], session.upload_lists(orders, FENCE), strict=True))
+    tasks = [task_of(j, j.fence) for j in jobs if j.fence is not None and j.fence.items and j.name in links]
+    ended = session.upload_lists([(links[task.name], task) for task in tasks])
+    return dict(zip([task.name for task in tasks], ended, strict=True))
 
 
 def not_fenced(ended: Mapping[str, UploadResult | GcsplanError]) -> dict[str, GcsplanError]:

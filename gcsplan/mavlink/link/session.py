@@ -36,9 +36,9 @@ __all__ = [
     "Checked",
     "EndCall",
     "Judge",
-    "ListOrder",
     "ProgressCall",
     "SessionOptions",
+    "Task",
     "UploadOrder",
     "UploadResult",
     "clear_fleet",
@@ -164,27 +164,14 @@ def upload_fleet(orders: Sequence[UploadOrder], *, ended: EndCall | None = None)
     return _together([(order.link, order.mission.sysid, starting(order)) for order in orders])
 
 
-@dataclass(frozen=True)
-class ListOrder:
-    """A fence or rally points for one vehicle of a fleet."""
+def upload_lists(orders: Sequence[tuple[Link, Task]]) -> list[UploadResult | GcsplanError]:
+    """Upload fences or rally points of several vehicles at once and verify each; results as `upload_fleet`."""
 
-    link: Link
-    sysid: int
-    items: tuple[MissionItem, ...]
-    autopilot: Autopilot
-    name: str = ""
-    options: SessionOptions = field(default_factory=SessionOptions)
-
-
-def upload_lists(orders: Sequence[ListOrder], mission_type: int) -> list[UploadResult | GcsplanError]:
-    """Upload fences (1) or rally points (2) of several vehicles at once and verify each; results as `upload_fleet`."""
-    _require_list(mission_type)
-
-    def starting(order: ListOrder) -> Callable[[Channel], Steps[UploadResult]]:
-        task = Task(order.name, order.sysid, order.autopilot, order.items, mission_type, order.options)
+    def starting(task: Task) -> Callable[[Channel], Steps[UploadResult]]:
+        _require_list(task.mission_type)
         return lambda channel: uploading(channel, task)
 
-    return _together([(order.link, order.sysid, starting(order)) for order in orders])
+    return _together([(link, task.sysid, starting(task)) for link, task in orders])
 
 
 def clear_fleet(
