@@ -31,7 +31,7 @@ from gcsplan.export.outdir import retire_outputs, settle_outputs, write_outputs
 from gcsplan.mission_file.samples import file_of, is_sample
 from gcsplan.world.input_files import Reading, reading
 
-__all__ = ["Batch", "BatchOptions", "Record", "exit_code", "missions_of"]
+__all__ = ["BatchOptions", "MissionBatch", "Record", "exit_code", "missions_of"]
 
 RULES = 3
 """Counts the changes of what lets a mission fly: records of earlier rules do not hold."""
@@ -86,7 +86,7 @@ def _named(text: str) -> list[Path]:
 
 
 @dataclass(frozen=True, slots=True)
-class Batch:
+class MissionBatch:
     """The missions of a batch and the directory of its results."""
 
     missions: Sequence[tuple[str, Path]]

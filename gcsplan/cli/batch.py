@@ -55,13 +55,13 @@ def batch(
     Nothing is sent. A mission that fails never stops the others, and the exit code is the worst. What is done and
     unchanged is not planned again, so that the same command goes on after an interruption.
     """
-    from gcsplan.app.batch import PIECE_S, Batch, BatchOptions, exit_code, missions_of
+    from gcsplan.app.batch import PIECE_S, BatchOptions, MissionBatch, exit_code, missions_of
     from gcsplan.app.executor import executor
     from gcsplan.cli.console import remark, say
     from gcsplan.cli.work_display import WorkDisplay
 
     options = BatchOptions(planner, objective, seed, report, allow_unjudged, at)
-    work = Batch(missions_of(missions), out, options)
+    work = MissionBatch(missions_of(missions), out, options)
     display = WorkDisplay(len(work.missions), "missions")
     with work.alone():
         done, todo = work.known()

@@ -13,7 +13,7 @@ import yaml
 from typer import testing as runner
 
 from gcsplan.app import batch as module
-from gcsplan.app.batch import Batch, BatchOptions, exit_code, missions_of
+from gcsplan.app.batch import BatchOptions, MissionBatch, exit_code, missions_of
 from gcsplan.app.executor import Dask, Inline, executor
 from gcsplan.app.records import Record
 from gcsplan.cli.commands import app
@@ -47,7 +47,7 @@ def folder(tmp_path: Path) -> Path:
 
 def ran(folder: Path, out: Path, **options: Any) -> tuple[dict[str, Record], int]:
     """The records by mission, and how many of them were planned now."""
-    work = Batch(missions_of([str(folder)]), out, BatchOptions(**options))
+    work = MissionBatch(missions_of([str(folder)]), out, BatchOptions(**options))
     done, todo = work.known()
     work.run(Inline(), todo, done.append)
     return {r.mission: r for r in done}, len(todo)
@@ -184,14 +184,14 @@ def test_processes_make_the_same_files(folder: Path, tmp_path: Path) -> None:
     pytest.importorskip("distributed")
     alone, shared = tmp_path / "alone", tmp_path / "shared"
     ran(folder, alone)
-    work = Batch(missions_of([str(folder)]), shared, BatchOptions())
+    work = MissionBatch(missions_of([str(folder)]), shared, BatchOptions())
     with executor(2, pieces=100, piece_s=1.0) as workers:
         assert isinstance(workers, Dask)
         work.run(workers, work.known()[1], lambda record: None)
     for file in sorted(p.relative_to(alone) for p in alone.rglob("*") if p.is_file()):
         if file.suffix in (".waypoints", ".plan", ".kml", ".geojson", ".csv"):
             assert (shared / file).read_bytes() == (alone / file).read_bytes(), file
-    assert not Batch(missions_of([str(folder)]), shared, BatchOptions()).known()[1]
+    assert not MissionBatch(missions_of([str(folder)]), shared, BatchOptions()).known()[1]
 
 
 def test_a_mission_that_no_worker_outlives_is_a_row_and_stops_nobody(folder: Path, tmp_path: Path) -> None:
@@ -201,7 +201,7 @@ def test_a_mission_that_no_worker_outlives_is_a_row_and_stops_nobody(folder: Pat
                 dies = item[0] == "good"
                 yield number, lost(item, GcsplanError("workers died")) if dies else function(shared, item)
 
-    work = Batch(missions_of([str(folder)]), tmp_path / "out", BatchOptions())
+    work = MissionBatch(missions_of([str(folder)]), tmp_path / "out", BatchOptions())
     done: list[Record] = []
     work.run(Deadly(), work.known()[1], done.append)
     assert {r.mission: r.code for r in done} == {"good": 70, "north/good": 0, "north/broken": 2, "shut": 2}

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from gcsplan.app.batch import COLUMNS, Batch, BatchOptions
+from gcsplan.app.batch import COLUMNS, BatchOptions, MissionBatch
 from gcsplan.app.executor import Inline
 from gcsplan.app.outputs import outputs_of, report_of, summary_of
 from gcsplan.app.pipeline import plan
@@ -64,7 +64,7 @@ def test_table_json_kml_and_report_tell_the_same_sentence(capsys: pytest.Capture
 def test_a_batch_tells_in_index_and_csv_what_its_pages_tell(tmp_path: Path) -> None:
     for report, ends in ((False, "return not judged"), (True, "of it")):
         out = tmp_path / str(report)
-        batch = Batch([("crossing", DATA / "crossing.yaml")], out, BatchOptions(report=report))
+        batch = MissionBatch([("crossing", DATA / "crossing.yaml")], out, BatchOptions(report=report))
         records: list[Any] = []
         batch.run(Inline(), [0], records.append)
         [row] = records[0].rows

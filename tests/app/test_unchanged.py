@@ -14,7 +14,7 @@ import pytest
 from typer import testing as runner
 
 from gcsplan import load_mission
-from gcsplan.app.batch import Batch, BatchOptions, missions_of
+from gcsplan.app.batch import BatchOptions, MissionBatch, missions_of
 from gcsplan.app.executor import Inline
 from gcsplan.app.records import Record
 from gcsplan.cli.commands import app
@@ -26,11 +26,11 @@ from tests.app.test_batch import mission
 from tests.support.mission_inputs import CASES, SCALED, Case, geotiff, made, published, tif
 
 
-def batch_of(*given: Path, out: Path) -> Batch:
-    return Batch(missions_of([str(g) for g in given]), out, BatchOptions())
+def batch_of(*given: Path, out: Path) -> MissionBatch:
+    return MissionBatch(missions_of([str(g) for g in given]), out, BatchOptions())
 
 
-def ran(batch: Batch) -> list[Record]:
+def ran(batch: MissionBatch) -> list[Record]:
     """The records of the missions that were planned now."""
     done: list[Record] = []
     batch.run(Inline(), batch.known()[1], done.append)
@@ -110,7 +110,7 @@ def test_files_above_16_mb_go_by_size_time_and_inode(tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def two(tmp_path: Path) -> Batch:
+def two(tmp_path: Path) -> MissionBatch:
     """A batch of two missions, done."""
     given = tmp_path / "missions"
     given.mkdir()
@@ -132,7 +132,7 @@ OUTPUT_CHANGES: list[Callable[[Path], object]] = [
 
 
 @pytest.mark.parametrize("change", OUTPUT_CHANGES)
-def test_outputs_that_are_not_the_record_s_are_made_anew(two: Batch, change: Callable[[Path], object]) -> None:
+def test_outputs_that_are_not_the_record_s_are_made_anew(two: MissionBatch, change: Callable[[Path], object]) -> None:
     before = {p.name: p.read_bytes() for p in (two.directory / "a").iterdir() if p.is_file()}
     change(two.directory)
     assert two.known()[1] == [0]
@@ -142,7 +142,7 @@ def test_outputs_that_are_not_the_record_s_are_made_anew(two: Batch, change: Cal
 
 
 def test_a_run_that_is_killed_after_any_step_leaves_no_record_that_holds(
-    two: Batch, monkeypatch: pytest.MonkeyPatch
+    two: MissionBatch, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Between a record and its outputs, either way round: of a new plan, and of a mission that fails now."""
     file = two.missions[0][1]
@@ -175,12 +175,12 @@ def test_a_run_that_is_killed_after_any_step_leaves_no_record_that_holds(
     assert not (two.directory / "a" / "uav1.plan").exists()
 
 
-def _record(two: Batch) -> Path:
+def _record(two: MissionBatch) -> Path:
     return two.directory / "records" / "a.json"
 
 
-def _edited(edit: Callable[[Any], object]) -> Callable[[Batch], object]:
-    def apply(two: Batch) -> None:
+def _edited(edit: Callable[[Any], object]) -> Callable[[MissionBatch], object]:
+    def apply(two: MissionBatch) -> None:
         kept = json.loads(_record(two).read_text())
         edit(kept)
         _record(two).write_text(json.dumps(kept))
@@ -188,7 +188,7 @@ def _edited(edit: Callable[[Any], object]) -> Callable[[Batch], object]:
     return apply
 
 
-def _of_body(**changes: Any) -> Callable[[Batch], object]:
+def _of_body(**changes: Any) -> Callable[[MissionBatch], object]:
     """Another body, with its right digest."""
     import hashlib
 
@@ -199,7 +199,7 @@ def _of_body(**changes: Any) -> Callable[[Batch], object]:
     return _edited(edit)
 
 
-DAMAGE: dict[str, Callable[[Batch], object]] = {
+DAMAGE: dict[str, Callable[[MissionBatch], object]] = {
     "empty": lambda two: _record(two).write_text(""),
     "cut": lambda two: os.truncate(_record(two), 300),
     "bytes": lambda two: _record(two).write_bytes(b"\xff\xfe\0"),
@@ -217,7 +217,7 @@ DAMAGE: dict[str, Callable[[Batch], object]] = {
 }  # fmt: skip
 
 
-def test_a_record_with_anything_odd_counts_as_none(two: Batch) -> None:
+def test_a_record_with_anything_odd_counts_as_none(two: MissionBatch) -> None:
     whole = _record(two).read_bytes()
     for damage, apply in DAMAGE.items():
         apply(two)
@@ -247,7 +247,7 @@ def test_a_mission_whose_files_change_while_it_is_planned_is_no_plan(tmp_path: P
     assert [r.code for r in ran(batch)] == [0]
 
 
-def test_a_second_batch_in_one_folder_is_refused(two: Batch, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_second_batch_in_one_folder_is_refused(two: MissionBatch, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("gcsplan.export.durable.LOCK_WAIT_S", 0.1)
     with locked(two.directory):
         ended = runner.CliRunner().invoke(app, ["batch", str(two.missions[0][1]), "-o", str(two.directory)])

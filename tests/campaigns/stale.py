@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from gcsplan.app.batch import Batch, BatchOptions, missions_of
+from gcsplan.app.batch import BatchOptions, MissionBatch, missions_of
 from gcsplan.app.executor import Inline
 from gcsplan.app.records import Record
 from gcsplan.errors import GcsplanError
@@ -64,9 +64,9 @@ class Site:
         """The folder of results."""
         return self.root / "out"
 
-    def batch(self, out: Path) -> Batch:
+    def batch(self, out: Path) -> MissionBatch:
         """A batch of all missions into a folder."""
-        return Batch(missions_of([str(c.mission) for c in self.cases.values()]), out, BatchOptions())
+        return MissionBatch(missions_of([str(c.mission) for c in self.cases.values()]), out, BatchOptions())
 
     def files(self, name: str) -> list[Path]:
         """Every file that a mission reads or would read."""
@@ -240,7 +240,7 @@ STEPS_OF: dict[Callable[[Site], set[str]], int] = {
 # -- the run and its judgement -------------------------------------------------------------------------------------
 
 
-def _run(batch: Batch) -> tuple[dict[str, Record], set[str]]:
+def _run(batch: MissionBatch) -> tuple[dict[str, Record], set[str]]:
     """The records of all missions, and the names of those that were planned now."""
     with batch.alone():
         done, todo = batch.known()

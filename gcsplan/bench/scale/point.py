@@ -19,7 +19,7 @@ from typing import Any
 
 import yaml
 
-from gcsplan.app.batch import Batch, BatchOptions, Record, missions_of, record_of
+from gcsplan.app.batch import BatchOptions, MissionBatch, Record, missions_of, record_of
 from gcsplan.app.executor import Dask, Executor, Inline, executor
 from gcsplan.app.pipeline import plan
 from gcsplan.bench.measure import peak_mb
@@ -33,7 +33,7 @@ EMPTY_PIECES = 1000
 
 def batch_point(missions: str, out: str, jobs: int, kill: bool = False) -> dict[str, Any]:
     """Plan a folder of missions with ``jobs`` processes; with ``kill``, one of them is killed after a third."""
-    work = Batch(missions_of([missions]), Path(out), BatchOptions())
+    work = MissionBatch(missions_of([missions]), Path(out), BatchOptions())
     done: list[Record] = []
     count = len(work.missions)
     begun_s = time.perf_counter()
