@@ -148,8 +148,8 @@ def test_over_flat_ground_it_hits_that_and_says_so(below: Plan) -> None:
     with sitl_instances(binary, parts_of(below), speedup=10.0) as addresses:
         result = rehearse_in_sitl(below, addresses=addresses)
     (breach,) = [b for b in result.breaches if b.kind == "arrival"]
-    assert "it hit the ground at 1." in breach.message
-    assert "m above the mission's ground: without terrain an SITL's ground is flat" in breach.message
+    assert "it hit the ground at 1." in str(breach.message)
+    assert "m above the mission's ground: without terrain an SITL's ground is flat" in str(breach.message)
 
 
 def test_addresses_off_this_machine_are_refused_before_anything_is_opened(planned: Plan) -> None:

@@ -4,6 +4,14 @@ TEXTS = {
     # -- what was not kept
     "never_arrived": "{name} never arrived at its goal",
     "never_arrived_for": "{name} never arrived at its goal: {why}",
+    "hit_ground": "it hit the ground at {speed_m_s:speed.1} on its way to item {item}",
+    "left_auto": "it left AUTO for {mode} at item {item}",
+    "time_was_up": "it still flew to item {item} when the time was up",
+    "other_ground": (
+        "that is {height_m:height.0} above the mission's ground: without terrain an SITL's ground is flat at the "
+        "altitude of home, and --sitl-binary starts one with the mission's terrain"
+    ),
+    "vehicle_said": "it said: {texts}",
     "arrived_late": "{name} arrived {late_s:seconds} late, after {took_s:seconds} instead of {told_s:seconds}",
     "down_late": "{name} was down {late_s:seconds} late, after {took_s:seconds} instead of {told_s:seconds}",
     "battery_used_up": (

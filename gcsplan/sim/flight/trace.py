@@ -62,7 +62,7 @@ class Trace:
     slack_m: Floats
     stays: bool = False
     leaves: bool = False
-    why: str = ""
+    why: tuple[Note, ...] = ()
 
     @property
     def begin_s(self) -> float:

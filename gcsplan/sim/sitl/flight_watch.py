@@ -9,6 +9,7 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 
 _HIT = "SIM Hit ground at "
@@ -38,8 +39,8 @@ class FlightWatch:
     crashed: bool = False
     timed_out: bool = False
     item: int = 0
-    _hit: str = ""
-    _left: str = ""
+    _hit: Note | None = None
+    _left: Note | None = None
     _texts: list[str] = field(default_factory=list)
 
     def note(self, message: Any, item: int) -> None:
@@ -48,15 +49,15 @@ class FlightWatch:
         if message.get_type() == "HEARTBEAT":
             modes = _MODES[self.mission.autopilot]
             name = modes.get(message.custom_mode, f"mode {message.custom_mode}")
-            if name != "AUTO" and not self._left:
-                self._left = f"it left AUTO for {name} at item {item}"
+            if name != "AUTO" and self._left is None:
+                self._left = Note("left_auto", item, mode=name)
         elif message.get_type() == "STATUSTEXT":
             self._text(str(message.text), message.severity)
 
     def _text(self, text: str, severity: int) -> None:
         if text.startswith(_HIT) and self._on_the_way() and _speed_m_s(text) >= _HARD_M_S:
             self.crashed = True
-            self._hit = f"it hit the ground at {_speed_m_s(text):.1f} m/s on its way to item {self.item}"
+            self._hit = Note("hit_ground", self.item, speed_m_s=_speed_m_s(text))
         elif severity <= dialect.MAV_SEVERITY_WARNING and text not in self._texts:
             self._texts = [*self._texts, text][-_TEXTS:]
 
@@ -64,21 +65,19 @@ class FlightWatch:
         index = self.item - self.mission.first_seq
         return 0 <= index < len(self.mission.items) and self.mission.items[index].command not in _ON_GROUND
 
-    def why(self, height_m: float = 0.0) -> str:
-        """Why it did not arrive, as far as it is known; empty if it is not.
+    def why(self, height_m: float = 0.0) -> tuple[Note, ...]:
+        """Why it did not arrive, as far as it is known.
 
         ``height_m``: above the mission's ground at the end; a simulator that hits ground in the air has another ground.
         """
-        late = f"it still flew to item {self.item} when the time was up" if self.timed_out else ""
-        known = [words for words in (self._hit, self._left, late) if words]
+        known = [note for note in (self._hit, self._left) if note is not None]
+        if self.timed_out:
+            known.append(Note("time_was_up", self.item))
         if self.crashed and height_m > _OTHER_GROUND_M:
-            known.append(
-                f"that is {height_m:.0f} m above the mission's ground: without terrain an SITL's ground is flat at the "
-                f"altitude of home, and --sitl-binary starts one with the mission's terrain"
-            )
+            known.append(Note("other_ground", height_m=height_m))
         if self._texts:
-            known.append(f"it said: {' / '.join(self._texts)}")
-        return "; ".join(known)
+            known.append(Note("vehicle_said", texts=" / ".join(self._texts)))
+        return tuple(known)
 
 
 def _speed_m_s(text: str) -> float:
