@@ -153,13 +153,6 @@ def _same(value: float, decimals: int) -> float:
     return value
 
 
-def measured(value: float, kind: str, unit: str) -> Quantity | str:
-    """A number of a violation of this kind, with hundredths: metres as a quantity, anything else as it is."""
-    if unit != "m":
-        return f"{value:.2f} {unit}"
-    return Quantity(value, "distance" if kind == "zone" else "height", 2)
-
-
 @dataclass(frozen=True, slots=True)
 class Symbol:
     """The symbol of a kind's unit alone, before numbers that are bare."""
@@ -229,16 +222,6 @@ class UnitText(str):
     def __getnewargs__(self) -> tuple[Any, ...]:
         return (self.template, *self.parts)
 
-    def exchanged(self, old: str, new: str) -> UnitText:
-        """The text with some of its words exchanged."""
-        return self.changed(lambda words: words.replace(old, new))
-
-    def changed(self, change: Callable[[str], str]) -> UnitText:
-        """The text with ``change`` applied to each piece of its words."""
-        parts = (p.changed(change) if isinstance(p, UnitText) else change(p) if isinstance(p, str) else p
-                 for p in self.parts)  # fmt: skip
-        return UnitText(change(self.template), *parts)
-
 
 Part = Quantity | Symbol | Reach | Seconds | Joules
 
@@ -255,11 +238,6 @@ def in_units(text: str | Readable, units: Units) -> str:
     if not isinstance(text, str):
         return text.in_units(units)
     return _filled(text.template, text.parts, units) if isinstance(text, UnitText) else text
-
-
-def joined(between: str, texts: Sequence[str | Readable]) -> UnitText:
-    """Texts joined by the words ``between``, which have no braces."""
-    return UnitText(between.join("{}" for _ in texts), *texts)
 
 
 def _filled(template: str, parts: Sequence[object], units: Units | None) -> str:

@@ -105,8 +105,8 @@ def test_the_highest_and_the_steepest_are_the_same_everywhere_and_not_flattered(
     assert "690.5\u202fm" in table
     assert "690.46\u202fm" in tables.limits_table(subject, None, METRIC)
     miss = Miss("max_amsl", 0.0499, 690.4501, 690.5, "m", 1, 36.6, -84.3, 685.4)
-    assert miss.describe().startswith("highest altitude, with the errors: 690.5 m of 690.5, 0.0 m to spare")
-    assert Miss("climb", 10.19, 4.8101, 15.0, "°", 1, 36.6, -84.3, 0.0).describe().startswith("steepest climb: 4.9 °")
+    assert str(miss.note).startswith("highest altitude, with the errors: 690.5 m of 690.5, 0.0 m to spare")
+    assert Miss("climb", 10.19, 4.8101, 15.0, "°", 1, 36.6, -84.3, 0.0).note.text().startswith("steepest climb: 4.9 °")
 
 
 def test_a_height_that_the_nearest_number_flatters_is_the_same_everywhere() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from gcsplan.app.check_sites import Checked
@@ -47,13 +48,16 @@ def told_of(c: Checked, form: str, *, allow_unjudged: bool, units: Units) -> Tol
     if c.way_home is not None and c.way_home.safe is not True:
         kinds["way_home"] = 1
     code = 0 if failing is None else failing.code
-    lines = () if form == "whole" else tuple(finding_lines(c, allow_unjudged=allow_unjudged, units=units))
+    verdict = partial(verdict_of, str(c.file), c.verdict, c.way_home, c.wording())
+    lines: tuple[str, ...] = ()
+    if form != "whole":
+        lines = tuple(finding_lines(c, allow_unjudged=allow_unjudged, wording=c.wording(units)))
     text = ""
     if form == "whole":
-        text = json_of(verdict_of(str(c.file), c.verdict, c.way_home) | more_of(c), "verdicts")
+        text = json_of(verdict() | more_of(c), "verdicts")
     elif form == "row":
-        row = {"file": str(c.file), "code": code} | verdict_of(str(c.file), c.verdict, c.way_home)
-        home = {} if c.way_home is None else {"way_home": c.way_home.as_dict()}
+        row = {"file": str(c.file), "code": code} | verdict()
+        home = {} if c.way_home is None else {"way_home": c.way_home.as_dict(c.wording())}
         text = json_of(row | home, "verdicts", lines=False)
     return Told(str(c.file), code, dict(kinds), lines, None, text, failing)
 

@@ -11,7 +11,7 @@ import os
 import re
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -19,7 +19,6 @@ import numpy as np
 
 from gcsplan.app.fencing import own_fence
 from gcsplan.app.flight_hours import beyond_hours
-from gcsplan.app.option_words import all_in_options, home_in_options, verdict_in_options
 from gcsplan.app.pipeline import world_of
 from gcsplan.app.way_home import home_of
 from gcsplan.arrays import Floats
@@ -34,7 +33,9 @@ from gcsplan.mavlink.mission.commands import LOITER_TIME, LOITER_TO_ALT, LOITER_
 from gcsplan.mavlink.mission.mission import NO_POSITION, Home, Mission, MissionItem
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.mission_file.airspace.times import Hours
-from gcsplan.mission_file.from_options import Extent, OpenWorld, WorldOptions
+from gcsplan.mission_file.from_options import OPTIONS, Extent, OpenWorld, WorldOptions
+from gcsplan.notes.note import Note, Said, Wording
+from gcsplan.units import Units
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.frame import FARTHEST_M
 from gcsplan.world.world import World
@@ -54,7 +55,8 @@ class Checked:
 
     ``fence`` and ``rally`` are the file's own. ``terrain_error_m`` is the error that terrain-frame legs were judged
     with. ``hours`` are those of the flight, if a zone was left out for them. ``way_home`` is None unless it was
-    requested; ``home_required``: the mission flies only with a safe return.
+    requested; ``home_required``: the mission flies only with a safe return. ``typed``: the options that the reader
+    types, by their keys in a mission file; empty if he has one.
     """
 
     file: Path
@@ -62,7 +64,7 @@ class Checked:
     request: VehicleRequest
     mission: Mission
     verdict: Verdict
-    notes: tuple[str, ...]
+    notes: tuple[Said, ...]
     world: World
     fence: tuple[MissionItem, ...] = ()
     rally: tuple[MissionItem, ...] = ()
@@ -70,6 +72,11 @@ class Checked:
     way_home: WayHome | None = None
     home_required: bool = False
     hours: Hours | None = None
+    typed: Mapping[str, str] = field(default_factory=dict)
+
+    def wording(self, units: Units | None = None) -> Wording:
+        """How the reader is spoken to, in ``units``, or in SI as files have it."""
+        return Wording(units, self.typed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +115,12 @@ class Site(Protocol):
         """A file that was read, judged. Raises InputError."""
 
     @property
-    def said(self) -> tuple[Mapping[str, object], tuple[str, ...]]:
+    def said(self) -> tuple[Mapping[str, object], tuple[Said, ...]]:
         """What describes the world's sources, and notes; empty before a world is loaded."""
+
+    @property
+    def typed(self) -> Mapping[str, str]:
+        """The options that the reader types, by their keys in a mission file; empty if he has one."""
 
 
 class MissionSite:
@@ -141,9 +152,14 @@ class MissionSite:
         return judged(request, file, read, self._world, error_m, wanted, source.hours)
 
     @property
-    def said(self) -> tuple[Mapping[str, object], tuple[str, ...]]:
+    def said(self) -> tuple[Mapping[str, object], tuple[Said, ...]]:
         """See `Site.said`."""
         return self.source.inputs, self.source.notes
+
+    @property
+    def typed(self) -> Mapping[str, str]:
+        """See `Site.typed`."""
+        return {}
 
 
 class OptionsSite:
@@ -158,7 +174,7 @@ class OptionsSite:
         self._hint = None if options.home is None else Home.at(*options.home, 0.0)
         self.extent: Extent | None = None
         self._world: World | None = None
-        self._said: tuple[Mapping[str, object], tuple[str, ...]] = {}, ()
+        self._said: tuple[Mapping[str, object], tuple[Said, ...]] = {}, ()
 
     def read(self, argument: str) -> MissionFileRead:
         """See `Site.read`."""
@@ -189,21 +205,24 @@ class OptionsSite:
         file = Path(argument)
         request = _request(self.opened, read.mission, file.stem, world)
         done = judged(request, file, read, world, self.options.terrain_error_m, wanted, self.opened.hours)
-        verdict, home = verdict_in_options(done.verdict), home_in_options(done.way_home)
-        return replace(done, verdict=verdict, way_home=home, notes=all_in_options(done.notes))
+        return replace(done, typed=self.typed)
 
     def _tell(self, world: World, inputs: Mapping[str, object]) -> World:
         """``world``; what describes the first one is told of all."""
         if not self._said[0]:
             notes = inputs.get("notes", ())
-            words = all_in_options(notes) if isinstance(notes, tuple) else ()
-            self._said = {k: v for k, v in inputs.items() if k != "notes"}, words
+            self._said = {k: v for k, v in inputs.items() if k != "notes"}, notes if isinstance(notes, tuple) else ()
         return world
 
     @property
-    def said(self) -> tuple[Mapping[str, object], tuple[str, ...]]:
+    def said(self) -> tuple[Mapping[str, object], tuple[Said, ...]]:
         """See `Site.said`."""
         return self._said
+
+    @property
+    def typed(self) -> Mapping[str, str]:
+        """See `Site.typed`."""
+        return OPTIONS
 
 
 def split_name(argument: str) -> tuple[str | None, Path]:
@@ -235,13 +254,14 @@ def at_start(read: MissionFileRead, start: Home, vehicle: Vehicle) -> MissionFil
     """The mission as ``vehicle`` flies it from its start: no autopilot flies from a file's home row."""
     from gcsplan.mavlink.link.preflight import distance_m  # loads the MAVLink dialect, which planning does not need
 
-    mission, notes = replace(read.mission, name=vehicle.name, sysid=vehicle.sysid), list(read.notes)
+    mission = replace(read.mission, name=vehicle.name, sysid=vehicle.sysid)
+    notes: list[Said] = list(read.notes)
     home, place = mission.home, (start.lat_e7 / 1e7, start.lon_e7 / 1e7)
     if home.lat_e7 == 0 and home.lon_e7 == 0:
-        notes.append("the file's home row is blank: the vehicle's start in the mission file was taken for home")
+        notes.append(Note("home_row_blank"))
         mission = replace(mission, home=start)
     elif distance_m(home.lat_e7 / 1e7, home.lon_e7 / 1e7, *place) > SAME_PLACE_M:
-        notes.append("the file's home row lies elsewhere: the vehicle's start in the mission file was taken for home")
+        notes.append(Note("home_row_elsewhere"))
         mission = replace(mission, home=start)
     return replace(read, mission=mission, notes=tuple(notes))
 
@@ -286,7 +306,7 @@ def _with_home(read: MissionFileRead, given: Home | None, argument: str) -> Miss
     """The mission with the home of the options, if they have one. Raises InputError if no home is known."""
     home = read.mission.home
     if given is not None:
-        note = () if home == given else ("--home was taken for the file's home",)
+        note = () if home == given else (Note("home_given"),)
         return replace(read, mission=replace(read.mission, home=given), notes=(*read.notes, *note))
     if home.lat_e7 == home.lon_e7 == 0:
         raise InputError(
@@ -313,11 +333,12 @@ def judged(
     ``hours``: those for which the world's zones were left out, from the departure on; a flight beyond is not judged.
     """
     returns, asks_home = wanted.returns, wanted.returns.judged or wanted.returns.required
-    vehicle, mission, notes = request.vehicle, read.mission, list(read.notes)
+    vehicle, mission = request.vehicle, read.mission
+    notes: list[Said] = list(read.notes)
     if mission.autopilot is not vehicle.autopilot:
         raise InputError(f"is for {mission.autopilot}, and {vehicle.name} is {vehicle.autopilot}", where=str(file))
     ground = world.ground_amsl(mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7)
-    if not math.isnan(ground) and "--home was taken for the file's home" in notes:
+    if not math.isnan(ground) and Note("home_given") in notes:
         mission = replace(mission, home=replace(mission.home, amsl_m=round(ground, 2)))
     mission = replace(mission, name=vehicle.name, sysid=vehicle.sysid)
     verdict = judge(
@@ -325,11 +346,12 @@ def judged(
         misses=wanted.misses, times=wanted.times or asks_home or hours is not None,
     )  # fmt: skip
     verdict, fence_notes = own_fence(read.fence, verdict, vehicle, world)
-    more = [words for words in (read.unread_fence, beyond_hours(verdict, hours)) if words]
+    more = [said for said in (read.unread_fence, beyond_hours(verdict, hours)) if said]
     verdict = replace(verdict, not_judged=(*verdict.not_judged, *more))
     notes += fence_notes
-    if verdict.legs and verdict.legs[-1].kind == "cruise" and not any("without end" in str(n) for n in verdict.notes):
-        notes.append("the mission ends in the air: what becomes of the vehicle after its last item is not in it")
+    loops = any(isinstance(n, Note) and n.code == "jumps_without_end" for n in verdict.notes)
+    if verdict.legs and verdict.legs[-1].kind == "cruise" and not loops:
+        notes.append(Note("ends_in_the_air"))
     home: WayHome | None = None
     if asks_home:
         home = home_of(verdict, request, world, terrain_error_m)

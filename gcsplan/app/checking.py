@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -30,19 +29,23 @@ from gcsplan.mavlink.files.file_items import MissionFileRead
 from gcsplan.mavlink.mission.mission import Home, Mission
 from gcsplan.mission_file import MissionFile
 from gcsplan.mission_file.from_options import WorldOptions
-from gcsplan.units import METRIC, Units, UnitText, in_units
+from gcsplan.notes.note import IN_FILES, Note, Said, Wording, told
 from gcsplan.vehicle import Autopilot
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Several files: those that were judged, and the errors of the others. ``inputs`` describes the world."""
+    """Several files: those that were judged, and the errors of the others.
+
+    ``inputs`` describes the world; ``typed``: as in `check_sites.Checked`.
+    """
 
     name: str
     checked: tuple[Checked, ...]
     unreadable: tuple[tuple[str, InputError], ...] = ()
     inputs: Mapping[str, object] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    notes: tuple[Said, ...] = ()
+    typed: Mapping[str, str] = field(default_factory=dict)
 
 
 def check_files(source: MissionFile, arguments: Sequence[str], *, returns: Returns = UNASKED) -> list[Checked]:
@@ -111,7 +114,7 @@ def check_at(site: Site, name: str, arguments: Sequence[str], wanted: Wanted) ->
         except InputError as error:
             unreadable.append((argument, error))
     inputs, notes = site.said
-    return Batch(name, tuple(checked), tuple(unreadable), inputs, notes)
+    return Batch(name, tuple(checked), tuple(unreadable), inputs, notes, site.typed)
 
 
 def passes(c: Checked, *, allow_unjudged: bool) -> bool:
@@ -120,25 +123,19 @@ def passes(c: Checked, *, allow_unjudged: bool) -> bool:
     return path and lets_fly(c.way_home, required=c.home_required)
 
 
-def finding_lines(c: Checked, *, allow_unjudged: bool = False, units: Units = METRIC) -> list[str]:
+def finding_lines(c: Checked, *, allow_unjudged: bool = False, wording: Wording = IN_FILES) -> list[str]:
     """One line per finding, ``file:item: kind: message``, in the format of compilers and linters.
 
     A way home that is only reported is one line, ``file:item: warning: way_home: message``.
     """
-    lines = [f"{c.file}:{f.seq}: {f.kind}: {_without_item(in_units(f.message, units))}" for f in c.verdict.findings]
+    lines = [f"{c.file}:{f.seq}: {f.kind}: {f.note.text(wording, placed=False)}" for f in c.verdict.findings]
     if not allow_unjudged:
-        lines += [
-            f"{c.file}:{_item_in(str(w))}: not_judged: {_without_item(in_units(w, units))}"
-            for w in c.verdict.not_judged
-        ]
-    return lines + home_lines(c, units)
+        lines += [_not_judged(c, said, wording) for said in c.verdict.not_judged]
+    return lines + home_lines(c, wording)
 
 
-def home_lines(c: Checked, units: Units | None = None) -> list[str]:
-    """The lines of `finding_lines` on a way home that is not safe; none if it is, or was not judged at all.
-
-    They are in ``units``; None: as files have them, in SI.
-    """
+def home_lines(c: Checked, wording: Wording = IN_FILES) -> list[str]:
+    """The lines of `finding_lines` on a way home that is not safe; none if it is, or was not judged at all."""
     home = c.way_home
     if home is None or home.safe is True:
         return []
@@ -146,32 +143,23 @@ def home_lines(c: Checked, units: Units | None = None) -> list[str]:
     battery = home.battery
     if not home.unsafe and battery is not None and battery.no_return_seq is not None:
         first = battery.no_return_seq
+    headline, advice = home.headline.text(wording), home.advice
     if lets_fly(home, required=c.home_required):
-        return [_said(UnitText("{}:{}: warning: way_home: {}", c.file, first, home.headline), units)]
-    advice = UnitText("; {}", home.advice) if home.advice else ""
-    lines: list[str] = [UnitText("{}:{}: way_home: {}{}", c.file, first, home.headline, advice)]
+        return [f"{c.file}:{first}: warning: way_home: {headline}"]
+    lines = [f"{c.file}:{first}: way_home: {headline}" + ("" if advice is None else f"; {advice.text(wording)}")]
     lines += [
-        UnitText("{}:{}: way_home: no safe return from {}", c.file, s.from_seq, s.describe()) for s in home.unsafe
-    ]  # fmt: skip
-    if battery is not None and battery.short:
-        lines.append(UnitText("{}:{}: way_home: {}", c.file, battery.no_return_seq or 0, battery.describe()))
-    lines += [
-        f"{c.file}:{_item_in(w)}: not_judged: the way home: {_without_item(_said(w, units))}" for w in home.not_judged
+        f"{c.file}:{s.from_seq}: way_home: no safe return from {s.described().text(wording)}" for s in home.unsafe
     ]
-    return [_said(line, units) for line in lines]
+    if battery is not None and battery.short:
+        lines.append(f"{c.file}:{battery.no_return_seq or 0}: way_home: {battery.note.text(wording)}")
+    return lines + [_not_judged(c, note, wording, "the way home: ") for note in home.not_judged]
 
 
-def _said(words: str, units: Units | None) -> str:
-    return str(words) if units is None else in_units(words, units)
-
-
-def _item_in(words: str) -> int:
-    found = re.match(r"item (\d+)", words)
-    return int(found[1]) if found else 0
-
-
-def _without_item(words: str) -> str:
-    return re.sub(r"^item \d+(?:[ :]+|$)(?:\((\w+)\): )?", "", words)
+def _not_judged(c: Checked, said: Said, wording: Wording, of: str = "") -> str:
+    """The line on what was not judged of a file."""
+    if isinstance(said, Note):
+        return f"{c.file}:{said.item or 0}: not_judged: {of}{said.text(wording, placed=False)}"
+    return f"{c.file}:0: not_judged: {of}{told(said, wording)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,8 +179,8 @@ def failing_of(c: Checked, *, allow_unjudged: bool) -> Failing | None:
     if passes(c, allow_unjudged=allow_unjudged):
         return None
     broken = c.verdict.safe is False or _home_broken(c)
-    lines = tuple(f"{c.vehicle.name}: {line}" for line in c.verdict.describe().splitlines())
-    home = () if lets_fly(c.way_home, required=c.home_required) else tuple(home_lines(c))
+    lines = tuple(f"{c.vehicle.name}: {line}" for line in c.verdict.describe(c.wording()).splitlines())
+    home = () if lets_fly(c.way_home, required=c.home_required) else tuple(home_lines(c, c.wording()))
     return Failing(str(c.file), CheckFailed.exit_code, "violation" if broken else "not_judged", lines, home)
 
 
@@ -241,4 +229,4 @@ def more_of(c: Checked) -> dict[str, Any]:
         "legs": [flat(leg) for leg in c.verdict.legs],
         "fence_items": len(c.fence),
         "rally_points": len(c.rally),
-    } | ({"way_home": c.way_home.as_dict()} if c.way_home is not None else {})
+    } | ({"way_home": c.way_home.as_dict(c.wording())} if c.way_home is not None else {})

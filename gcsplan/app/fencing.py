@@ -23,11 +23,10 @@ from gcsplan.check.plane_legs import legs_in_plane
 from gcsplan.check.tuning import DEFAULTS, Tuning
 from gcsplan.check.verdict import Finding, Verdict
 from gcsplan.errors import CheckFailed, GcsplanError, InputError
-from gcsplan.figures import counted
 from gcsplan.mavlink.build.fence import Area, Fence, areas_of, fence_of
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import FENCE, Mission, MissionItem
-from gcsplan.units import Quantity, UnitText
+from gcsplan.notes.note import Note, Said
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.world import World
@@ -116,15 +115,16 @@ def breaches(
         clearance_m = max(0.0, vehicle.limits.horizontal_clearance_m - ROUNDING_M)
         craft = replace(vehicle, limits=replace(vehicle.limits, horizontal_clearance_m=clearance_m))
         verdict = judge(mission, craft, fenced, rtl_rel_home_m=rtl_rel_home_m, tuning=tuning)
-        found += [replace(f, kind="fence", message=_of_fence(f.message)) for f in verdict.findings if f.kind == "zone"]
+        found += [_of_fence(f) for f in verdict.findings if f.kind == "zone"]
     inside = [a for a in areas if a.inclusion]
     return found + (_outside(inside, mission, vehicle, world, rtl_rel_home_m, tuning) if inside else [])
 
 
-def _of_fence(message: str) -> str:
-    """The message on a zone, as one on an area of the fence."""
-    old, new = "inside no-fly zone", "inside the fence's area"
-    return message.exchanged(old, new) if isinstance(message, UnitText) else message.replace(old, new)
+def _of_fence(f: Finding) -> Finding:
+    """A finding on a zone, as one on an area of the fence."""
+    way, lat, lon = f.note.data["way"], f.lat_deg, f.lon_deg
+    note = Note("inside_fence_area", f.seq, way=way, zone=f.zone, by_m=f.by, lat=lat, lon=lon, amsl_m=f.amsl_m)
+    return replace(f, kind="fence", note=note)
 
 
 def _outside(
@@ -150,14 +150,10 @@ def _outside(
             leg = int(np.argmax(beyond_m > 0.0))
             s, short_m = flown[plane.owner[leg]], float(beyond_m[leg])
             lat, lon, amsl = s.end
-            by = (
-                UnitText(" (by {})", Quantity(short_m, "distance", 1))
-                if math.isfinite(short_m)
-                else ", which is far away"
-            )
-            words = UnitText("item {} ({}): leaves the fence's area “{}”{}", s.seq, s.kind, area.name, by)
-            by_m = short_m if math.isfinite(short_m) else math.nan
-            found.append(Finding(s.seq, "fence", words, lat, lon, amsl, -by_m, 0.0, by_m, "m", area.name))
+            note, by_m = Note("far_outside_fence_area", s.seq, way=s.kind, zone=area.name), math.nan
+            if math.isfinite(short_m):
+                note, by_m = Note("outside_fence_area", s.seq, way=s.kind, zone=area.name, by_m=short_m), short_m
+            found.append(Finding(s.seq, "fence", note, lat, lon, amsl, -by_m, 0.0, by_m, "m", area.name))
     return found
 
 
@@ -193,31 +189,32 @@ def _beyond_shape_m(shape: Circle | Polygon, legs: Legs, scale: float) -> Floats
 
 def own_fence(
     items: Sequence[MissionItem], verdict: Verdict, vehicle: Vehicle, world: World
-) -> tuple[Verdict, tuple[str, ...]]:
+) -> tuple[Verdict, tuple[Note, ...]]:
     """``verdict`` plus the breaches of the file's own fence, and notes on that fence."""
     if not items:
         return verdict, ()
     try:
         areas = areas_of(items, world.frame)
     except InputError as error:
-        return replace(verdict, not_judged=(*verdict.not_judged, f"the file's fence: {error.message}")), ()
+        why = Note("fence_unread", why=error.message)
+        return replace(verdict, not_judged=(*verdict.not_judged, why)), ()
     out = sum(not a.inclusion for a in areas)
     inside = len(areas) - out
-    words = f"the file brings a fence of its own: {counted(out, 'area')} to stay out of, {inside} to stay inside of"
+    note = Note("brings_fence", out=out, inside=inside)
     # A fence acts at its border. Only errors can carry the aircraft across, so the clearance from zones is left out.
     plain = replace(vehicle, limits=replace(vehicle.limits, horizontal_clearance_m=0.0))
     found = breaches(areas, verdict.mission, plain, world) if verdict.legs else []
-    return replace(verdict, findings=(*verdict.findings, *found)), (words,)
+    return replace(verdict, findings=(*verdict.findings, *found)), (note,)
 
 
-def with_fences(jobs: Sequence[UploadJob], *, infinite: bool = False) -> tuple[list[UploadJob], list[tuple[str, str]]]:
-    """``jobs``, each with the fence that its world's zones make for its mission, and notes as (name, words).
+def with_fences(jobs: Sequence[UploadJob], *, infinite: bool = False) -> tuple[list[UploadJob], list[tuple[str, Said]]]:
+    """``jobs``, each with the fence that its world's zones make for its mission, and notes as (name, note).
 
     Raises what `fence_for` raises, and InputError for a mission that was not checked, since nobody knows what it would
     breach.
     """
     fenced: list[UploadJob] = []
-    notes: list[tuple[str, str]] = []
+    notes: list[tuple[str, Said]] = []
     for job in jobs:
         if job.vehicle is None or job.world is None:
             raise InputError("a fence is made of the zones that a mission was checked with, and this one was not")
@@ -227,10 +224,10 @@ def with_fences(jobs: Sequence[UploadJob], *, infinite: bool = False) -> tuple[l
     return fenced, notes
 
 
-def _notes(name: str, fence: Fence) -> list[tuple[str, str]]:
-    notes = [(name, words) for words in fence.notes]
+def _notes(name: str, fence: Fence) -> list[tuple[str, Said]]:
+    notes: list[tuple[str, Said]] = [(name, words) for words in fence.notes]
     if not fence.items:
-        notes.append((name, "no zone can be sent as a fence: the fence on board is left as it is"))
+        notes.append((name, Note("no_zone_for_fence")))
     return notes
 
 

@@ -12,6 +12,7 @@ from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError
 from gcsplan.mission_file import MissionFile
 from gcsplan.mission_file.airspace.times import Hours
+from gcsplan.notes.note import Note
 
 FAR_S = 1e8
 """A flight that lasts longer lands in no year that a date is written in, s."""
@@ -19,10 +20,6 @@ FAR_S = 1e8
 LANDINGS = ("land", "rtl")
 
 WRITE = "write at: [from, to] with all of the flight in it"
-ENDLESS = (
-    "it ends in the air, and when it lands is not known: end it with a landing (a multicopter also with an RTL), or "
-    "leave `at` out, so that all zones count"
-)
 
 
 def landing_of(verdict: Verdict, departure: datetime) -> datetime | None:
@@ -35,20 +32,14 @@ def landing_of(verdict: Verdict, departure: datetime) -> datetime | None:
     return departure + timedelta(seconds=math.ceil(min(lasts_s, FAR_S)))
 
 
-def beyond_hours(verdict: Verdict, hours: Hours | None) -> str:
-    """Why the hours, which begin with the departure, do not hold the flight; empty if they do, or if none are given."""
+def beyond_hours(verdict: Verdict, hours: Hours | None) -> Note | None:
+    """Why the hours, which begin with the departure, do not hold the flight; None if they do, or if none are given."""
     if hours is None or not verdict.legs:
-        return ""
+        return None
     end = landing_of(verdict, hours.start)
-    if end is not None and end <= hours.end:
-        return ""
-    lasts = ENDLESS if end is None else f"it lasts to {_shown(end)}; {WRITE}"
-    return _beyond(hours, lasts)
-
-
-def _beyond(hours: Hours, lasts: str) -> str:
-    left_out = f"the hours of zones: those that do not apply from {hours} were left out, and the flight from then on"
-    return f"{left_out}: {lasts}"
+    if end is None:
+        return Note("hours_without_landing", hours=str(hours))
+    return None if end <= hours.end else Note("flies_beyond_hours", hours=str(hours), until=_shown(end))
 
 
 def within_hours(source: MissionFile, flown: Sequence[VehiclePlan], fleet: FleetPlan) -> tuple[VehiclePlan, ...]:
@@ -70,8 +61,8 @@ def within_hours(source: MissionFile, flown: Sequence[VehiclePlan], fleet: Fleet
                 f"{WRITE}",
                 where=f"{source.path}: at",
             )
-        words = () if end is not None else (_beyond(hours, ENDLESS),)
-        judged.append(replace(v, verdict=replace(v.verdict, not_judged=(*v.verdict.not_judged, *words))))
+        why = () if end is not None else (Note("hours_without_landing", hours=str(hours)),)
+        judged.append(replace(v, verdict=replace(v.verdict, not_judged=(*v.verdict.not_judged, *why))))
     return tuple(judged)
 
 

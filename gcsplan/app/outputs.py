@@ -28,7 +28,7 @@ from gcsplan.mavlink.files.formats import write_plan, write_waypoints
 from gcsplan.mavlink.mission.commands import command_name
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.mavlink.mission.parameter_file import PARAM_ENDING, param_file
-from gcsplan.notes.note import in_json
+from gcsplan.notes.note import IN_FILES, Wording, in_json
 from gcsplan.units import METRIC, Units
 
 if TYPE_CHECKING:
@@ -182,7 +182,7 @@ def _vehicle(
         "hold_s": slot.hold_s if slot else 0.0,
         **in_json("notes", v.all_notes(fleet)),
         "upload": result.as_dict() if result else None,
-        "verdict": verdict_words(verdict.safe, home),
+        "verdict": str(verdict_words(verdict.safe, home)),
     } | _of_search(v) | ({} if home is None else {"way_home": home.as_dict()})  # fmt: skip
 
 
@@ -211,14 +211,14 @@ def flat(figures: Any) -> dict[str, Any]:
     return {name: getattr(figures, name) for name in figures.__slots__}
 
 
-def verdict_of(name: str, verdict: Verdict, home: WayHome | None = None) -> dict[str, Any]:
+def verdict_of(name: str, verdict: Verdict, home: WayHome | None = None, wording: Wording = IN_FILES) -> dict[str, Any]:
     """A verdict as plain values, for ``check --json``; ``home``: the way home, if it was judged."""
-    lowest = verdict.lowest
+    lowest, words = verdict.lowest, verdict_words(verdict.safe, home)
     return {
         "file": name,
         "vehicle": verdict.mission.name,
         "safe": verdict.safe,
-        "verdict": verdict_words(verdict.safe, home),
+        "verdict": words.text(wording),
         "items": len(verdict.mission.wire_items()),
         "length_m": verdict.length_m,
         "energy_j": verdict.told_j(verdict.path_energy_j),
@@ -227,9 +227,9 @@ def verdict_of(name: str, verdict: Verdict, home: WayHome | None = None) -> dict
         "battery_used_percent": verdict.battery_used_percent,
         "min_agl_m": lowest.min_agl_m if lowest else None,
         **_extremes(verdict),
-        "violations": [flat(f) for f in verdict.findings],
-        **in_json("not_judged", verdict.not_judged),
-        **in_json("notes", verdict.notes),
+        "violations": [f.as_dict(wording) for f in verdict.findings],
+        **in_json("not_judged", verdict.not_judged, wording),
+        **in_json("notes", verdict.notes, wording),
     }
 
 

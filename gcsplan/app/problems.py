@@ -247,7 +247,7 @@ def _require_one_height(source: MissionFile, request: VehicleRequest, world: Wor
     """Raise InputError where home's ground is not one number: altitudes count from it."""
     unsure = why_unknown(Home.at(*request.start_deg, request.start[2]), request.vehicle, world)
     if unsure is not None:
-        raise InputError(unsure, where=f"{source.path}: vehicles.{request.vehicle.name}.start")
+        raise InputError(str(unsure), where=f"{source.path}: vehicles.{request.vehicle.name}.start")
 
 
 def _vias(

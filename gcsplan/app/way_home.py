@@ -18,7 +18,7 @@ from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.return_altitude import on_board, return_on_board_m, returns_otherwise
 from gcsplan.mavlink.mission.return_route import route_setting, takes_another_route
 from gcsplan.mission_file import MissionFile, VehicleRequest
-from gcsplan.units import Reach, UnitText
+from gcsplan.notes.note import IN_FILES, Note, Wording
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.world import World
 
@@ -81,12 +81,10 @@ def _with_path_back(v: VehiclePlan, home: WayHome) -> WayHome:
         home.set_leaves_m if home.set_leaves_m is not None else home.no_return_m
     ):
         return home
-    left = "every return safe" if path.safe else UnitText("all but {} of it safe", Reach(path.no_return_m))
-    words = UnitText(
-        "return_route: mission writes a return path back along the track, which makes {}: needs ArduCopter 4.6 or "
-        "later, and {}", left, route_setting(request.vehicle.autopilot, path=True),
-    )  # fmt: skip
-    return replace(home, path_back=words)
+    route = route_setting(request.vehicle.autopilot, path=True)
+    if path.safe:
+        return replace(home, path_back=Note("path_back_makes_safe", setting=route))
+    return replace(home, path_back=Note("path_back_helps", left_m=path.no_return_m, setting=route))
 
 
 def writes_path_back(request: VehicleRequest, altitude_frame: str) -> bool:
@@ -121,11 +119,12 @@ def require(homes: Mapping[str, WayHome | None], *, required: bool) -> None:
     raise CheckFailed("\n".join([what, *lines]), reason="violation" if broken else "not_judged")
 
 
-def _lines(name: str, home: WayHome | None) -> list[str]:
+def _lines(name: str, home: WayHome | None, wording: Wording = IN_FILES) -> list[str]:
     """The headline, what to set, and what a return path would do."""
     if home is None:
         return [f"{name}: the return was not judged"]
-    return [UnitText("{}: {}", name, line) for line in (home.headline, home.advice, home.path_back) if line]
+    notes = (home.headline, home.advice, home.path_back)
+    return [f"{name}: {note.text(wording)}" for note in notes if note is not None]
 
 
 def against_on_board(home: WayHome, values: Mapping[str, float], mission: Mission) -> str | None:
@@ -148,12 +147,12 @@ def against_on_board(home: WayHome, values: Mapping[str, float], mission: Missio
     )
 
 
-def warnings(homes: Mapping[str, WayHome | None]) -> list[str]:
+def warnings(homes: Mapping[str, WayHome | None], wording: Wording = IN_FILES) -> list[str]:
     """A headline for each vehicle whose return is not safe, with what to set; one line for all others of a fleet."""
     bad = [(name, home) for name, home in homes.items() if home is not None and home.safe is not True]
     lines: list[str] = []
     for name, home in bad[:MOST_SHOWN]:
-        lines += _lines(name, home)
+        lines += _lines(name, home, wording)
     if len(bad) > MOST_SHOWN:
         lines.append(f"… and {len(bad) - MOST_SHOWN} more of {len(homes)} vehicles: no safe return, or not judged")
     return lines

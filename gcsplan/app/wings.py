@@ -24,7 +24,6 @@ from gcsplan.app.problems import built, looked_over, make_problem, run_planner, 
 from gcsplan.app.wing_ends import FlightEnd, circle_m, goals, starts
 from gcsplan.arrays import Floats, Indices
 from gcsplan.check.circles import circle_growth
-from gcsplan.check.turn_words import UNFITTING
 from gcsplan.errors import NoMission
 from gcsplan.mavlink.build.fixed_wing import flown_m, tangents_m, thinned
 from gcsplan.mavlink.build.order import MARGINS, Order, Wing
@@ -48,6 +47,9 @@ MOST_REFUSED = 3
 """Most pairs without a path: it may be that another climb-out leaves room for the first turn."""
 
 JOINTS = "none that joins the climb-out and the approach: give another takeoff_heading_deg, or move start or goal"
+UNFITTING = ("arcs_too_long", "turn_too_early")
+"""Notes on arcs that do not fit."""
+
 APART = "none whose turns all fit between its way points: put vias farther apart, or allow tighter turns"
 
 PART_OF_SLOPE = 0.9993
@@ -131,7 +133,7 @@ def _joined(
             continue
         over = looked_over(brief, solution)
         mission, verdict = built(over, request, solution, order)
-        crowded = [str(words) for words in verdict.not_judged if str(words).endswith(UNFITTING)]
+        crowded = [note for note in verdict.not_judged if isinstance(note, Note) and note.code in UNFITTING]
         if crowded:
             why = f"{APART}\n  {crowded[0]}"
             continue

@@ -11,12 +11,14 @@ from gcsplan.check.stretch import Flight, Place, Stretch, StretchKind
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.atmosphere import true_per_indicated
 
 PLANE_GLIDE_SLOPE_MIN_M = 15.0  # ArduPlane GLIDE_SLOPE_MIN, default
 PLANE_LOW_M = 20.0  # ArduPlane setup_glide_slope: below this height above home it climbs at once
 
+PX4_DOWN_M_S = 1.5  # MPC_Z_VEL_MAX_DN, default
 PX4_SLOW_BELOW_M = 5.0
 """MPC_LAND_ALT2, default: below this height over home a landing PX4 is as slow as MPC_LAND_SPEED."""
 
@@ -46,13 +48,10 @@ class Aboard:
         lat, lon = mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7
         ground = ground_amsl(lat, lon)
         if math.isnan(ground):
-            self.flight.not_judged.append(f"the ground at home ({lat:.7f}, {lon:.7f}) is unknown")
+            self.flight.not_judged.append(Note("home_ground_unknown", lat=lat, lon=lon))
             ground = mission.home.amsl_m
         elif abs(ground - mission.home.amsl_m) > max(1.0, vehicle.limits.altitude_error_m):
-            self.flight.notes.append(
-                f"home is given as {mission.home.amsl_m:.1f} m AMSL and the terrain model says {ground:.1f} m there: "
-                f"the terrain model was taken"
-            )
+            self.flight.notes.append(Note("home_height_differs", given_m=mission.home.amsl_m, ground_m=ground))
         self.home: Place = (lat, lon, ground)
         self.at: Place = self.home
         self.airborne = False
@@ -60,10 +59,10 @@ class Aboard:
         self.landed = self.stopped = False
         self.low_m, self.around_m = 0.0, 0.0  # how far below `at`, and to the side, the next leg may begin, m
 
-    def note(self, words: str) -> None:
-        """Add ``words`` to the notes unless they are there: a round may be flown more than once."""
-        if words and words not in self.flight.notes:
-            self.flight.notes.append(words)
+    def note(self, note: Note | None) -> None:
+        """Add a note unless it is there, if there is one: a round may be flown more than once."""
+        if note is not None and note not in self.flight.notes:
+            self.flight.notes.append(note)
 
     def instead(self, seq: int, kind: StretchKind, start: Place, end: Place, **more: object) -> None:
         """Add a stretch that some autopilot versions fly in place of another one."""
@@ -133,10 +132,7 @@ class Aboard:
         """Note a landing so far above home that PX4 does not slow down for it."""
         above_m = ground_amsl_m - self.home[2]
         if self.autopilot is Autopilot.PX4 and above_m > PX4_SLOW_BELOW_M:
-            self.note(
-                f"item {seq}: it lands {above_m:.0f} m above home, and PX4 without a range finder slows down by its "
-                f"height over home: it may touch down at up to MPC_Z_VEL_MAX_DN (1.5 m/s, the default)"
-            )
+            self.note(Note("lands_fast", seq, above_m=above_m, speed_m_s=PX4_DOWN_M_S))
 
     def hold(self, item: MissionItem) -> float:
         """Seconds for which the vehicle holds at a way point."""

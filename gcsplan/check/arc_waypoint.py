@@ -20,6 +20,7 @@ from gcsplan.check.stretch import Place
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import MissionItem
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 
 DEGREE_M = 111318.84502145034
@@ -64,7 +65,7 @@ def fly_arc(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | Non
     for a, b in pairwise(places):
         pilot.add(seq, "cruise", a, b, reach_m=bulge_m, on_path=True, steep=steep)
     pilot.pace, pilot.at, pilot.direction = pace, target, None
-    pilot.note("arcs are judged as ArduCopter 4.7 and later fly them; older ones refuse them on upload")
+    pilot.note(Note("arcs_by_version"))
     return True
 
 

@@ -32,9 +32,9 @@ from gcsplan.check.geodesy import flat_m
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.check.tracking import tracking_m, true_m_s
 from gcsplan.check.tuning import DEFAULTS, Tuning
-from gcsplan.check.turn_words import too_banked, too_tight, turns_late, unread_arcs
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.frame import Frame
 
@@ -79,23 +79,25 @@ def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tunin
     """
     radius = vehicle.turn_radius_m
     if mission.autopilot is not Autopilot.ARDUPLANE:
-        flight.not_judged.append(unread_arcs(radius, vehicle.name, mission.autopilot))
+        flight.not_judged.append(
+            Note("arcs_unread", radius_m=radius, vehicle=vehicle.name, autopilot=mission.autopilot.value)
+        )
         return
     least_s, most_s = L1_PERIODS_S
     if not least_s <= tuning.l1_period_s <= most_s:
-        flight.not_judged.append(
-            f"NAVL1_PERIOD is {tuning.l1_period_s:g} s, and ArduPlane takes {least_s:g} to {most_s:g} s: the arcs that "
-            f"it flies at its corners are not judged"
-        )
+        period_s = tuning.l1_period_s
+        flight.not_judged.append(Note("l1_period_out_of_range", period_s=period_s, least_s=least_s, most_s=most_s))
         return
     fastest = max((s.speed_m_s for s in flight.stretches), default=0.0)
     bank_deg = math.degrees(math.atan(fastest**2 / (GRAVITY_M_S2 * radius)))
     if bank_deg > MOST_BANK_DEG:
-        flight.not_judged.append(too_banked(radius, fastest, bank_deg, MOST_BANK_DEG))
+        flight.not_judged.append(
+            Note("arcs_too_banked", radius_m=radius, speed_m_s=fastest, bank_deg=bank_deg, most_deg=MOST_BANK_DEG)
+        )
     bent, other = [], list(flight.instead)
     new: list[Stretch] = []
     flight.not_judged += [
-        turns_late(k, float(item.params[2]))
+        Note("turns_late", k, past_m=float(item.params[2]))
         for k, item in enumerate(mission.items, mission.first_seq)
         if item.command == cmd.WAYPOINT and item.params[2] >= 1.0
     ]
@@ -118,14 +120,11 @@ def bend(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tunin
     flight.stretches[:] = climbed(bent, vehicle)
     flight.instead[:] = other + new
     error_m = vehicle.limits.track_error_m
-    note = (
-        f"turns are judged as arcs of {radius:g} m that begin at the acceptance radius of their way point; that the "
-        f"aircraft follows them within track_error_m {error_m:g} is assumed (NAVL1_PERIOD, wind; "
-        f"a bank of {bank_deg:.0f}° at {fastest:g} m/s)"
-    )
+    off = None
     if wander_m > 0.0:
-        note += f"; in calm air ArduPlane with NAVL1_PERIOD {tuning.l1_period_s:g} is up to {wander_m:.0f} m off them"
-        note += ", so the sharpest are judged wider" if wander_m > error_m else ""
+        wider = wander_m > error_m
+        off = Note("turns_off_arcs", period_s=tuning.l1_period_s, wander_m=wander_m, wider=wider)
+    note = Note("turns_as_arcs", radius_m=radius, error_m=error_m, bank_deg=bank_deg, speed_m_s=fastest, off=off)
     if note not in flight.notes:
         flight.notes.append(note)
 
@@ -177,8 +176,11 @@ class _Run:
                 found.append(_Corner())
                 continue
             if s.terrain or after.terrain or abs(turn) > ABOUT:
-                why = "in the terrain frame" if abs(turn) <= ABOUT else f"that turns by {math.degrees(abs(turn)):.0f}°"
-                flight.not_judged.append(f"item {s.seq}: what a fixed wing flies at a corner {why} is not judged")
+                flight.not_judged.append(
+                    Note("corner_in_terrain_frame", s.seq)
+                    if abs(turn) <= ABOUT
+                    else Note("corner_turns_back", s.seq, turn_deg=math.degrees(abs(turn)))
+                )
                 found.append(_Corner())
                 continue
             tangent = tangent_m(self.radius, turn)
@@ -194,9 +196,12 @@ class _Run:
             a, b = found[k], found[k + 1]
             if max(a.tangent + b.tangent, b.begins_m) <= self.long_m[k] + FIT_M:
                 continue
-            seqs = ", ".join(dict.fromkeys(str(x.seq) for x in self.run[max(k - 1, 0) : k + 1]))
-            leg = (s.seq, self.long_m[k], FIT_M)
-            flight.not_judged.append(too_tight(seqs, self.radius, a.tangent + b.tangent, b.begins_m, leg))
+            seq, leg_m, arcs_m = self.run[max(k - 1, 0)].seq, float(self.long_m[k]), a.tangent + b.tangent
+            flight.not_judged.append(
+                Note("arcs_too_long", seq, radius_m=self.radius, arcs_m=arcs_m, leg=s.seq, leg_m=leg_m)
+                if arcs_m > leg_m + FIT_M
+                else Note("turn_too_early", seq, begins_m=b.begins_m, leg=s.seq, leg_m=leg_m)
+            )
             # Left sharp, so that the rest can be judged.
             found[k], found[k + 1] = _Corner(off_m=a.off_m), _Corner(off_m=b.off_m)
         for k in range(len(self.run) - 1):  # on a leg too short to settle, the offset remains at the next turn
@@ -212,13 +217,13 @@ class _Run:
             return 0.0, 0.0  # a take-off ends where its height is reached, not before
         if math.isfinite(item.params[1]) and item.params[1] > 0.0:
             return item.params[1], item.params[1]
-        words = (
-            f"item {s.seq} gives no acceptance radius: its turn is judged as begun by "
-            f"{self.tuning.says('WP_RADIUS', self.tuning.plane_radius_m)}, and "
-            f"{self.tuning.says('NAVL1_PERIOD', self.tuning.l1_period_s, 's')}"
-        )
-        if words not in flight.notes:
-            flight.notes.append(words)
+        tuning = self.tuning
+        note = Note(
+            "arc_begun_by_default", s.seq, radius_m=tuning.plane_radius_m, radius_read="WP_RADIUS" in tuning.read,
+            period_s=tuning.l1_period_s, period_read="NAVL1_PERIOD" in tuning.read,
+        )  # fmt: skip
+        if note not in flight.notes:
+            flight.notes.append(note)
         thin = circle_growth(max(s.start[2], s.end[2]))  # WP_RADIUS grows with altitude as circles do
         least = self.tuning.plane_turns_m(s.speed_m_s, turn)
         return least, self.tuning.plane_turns_m(s.speed_m_s * math.sqrt(thin), turn, thin)

@@ -23,7 +23,7 @@ from gcsplan.check.rtl.run_on import more_m
 from gcsplan.check.stretch import Place
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.figures import raised
-from gcsplan.units import Quantity, Symbol, UnitText
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 
 HALVINGS = 50
@@ -83,19 +83,16 @@ class BatteryHome:
             "short": [list(part) for part in self.short],
         }
 
-    def describe(self) -> UnitText:
-        """Describe it in one line."""
-        usable = 100.0 * self.usable_j / self.battery_j
+    @property
+    def note(self) -> Note:
+        """What is said of it."""
+        most, usable = raised(self.most_percent, 0), 100.0 * self.usable_j / self.battery_j
         if self.point_of_no_return is None or self.no_return_m is None:
-            return UnitText(
-                "enough from everywhere: flight and return use {:.0f} % at most, from {} {}; {:.0f} % may be used",
-                raised(self.most_percent, 0), Symbol("far"), Quantity(self.most_m, "far", 2, bare=True), usable,
-            )  # fmt: skip
-        return UnitText(
-            "point of no return at {} {} (item {}, {:.6f}, {:.6f}): from beyond it flight and return use up to {:.0f} "
-            "%, and {:.0f} % may be used",
-            Symbol("far"), Quantity(self.no_return_m, "far", 2, bare=True), self.no_return_seq,
-            *self.point_of_no_return[:2], raised(self.most_percent, 0), usable,
+            return Note("battery_enough", most_percent=most, at_m=self.most_m, usable_percent=usable)
+        lat, lon, _ = self.point_of_no_return
+        return Note(
+            "point_of_no_return", at_m=self.no_return_m, seq=self.no_return_seq, lat=lat, lon=lon, most_percent=most,
+            usable_percent=usable,
         )  # fmt: skip
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-
+from gcsplan.notes.note import Note
 from gcsplan.world.atmosphere import density_ratio
 
 PLANE_LOITER_RADIUS_M = 60.0  # ArduPlane WP_LOITER_RAD, default
@@ -24,12 +23,9 @@ def circle_growth(amsl_m: float) -> float:
     return float(HOT_DAY / density_ratio(max(amsl_m, 0.0)))
 
 
-def circle_words(seq: int, radius_m: float, amsl_m: float) -> str:
-    """What ArduPlane makes of a circle's radius at an altitude; empty where that is nearly the same."""
+def circle_widened(seq: int, radius_m: float, amsl_m: float) -> Note | None:
+    """What ArduPlane makes of a circle's radius at an altitude; None where that is nearly the same."""
     flown_m, most_m = radius_m / float(density_ratio(amsl_m)), radius_m * circle_growth(amsl_m)
     if flown_m - radius_m < TOLD_M:
-        return ""
-    return (
-        f"item {seq}: ArduPlane widens its circle of {radius_m:g} m in the thin air at {amsl_m:.0f} m AMSL to about "
-        f"{flown_m:.0f} m; it is judged with {math.ceil(most_m)} m, for a hot day"
-    )
+        return None
+    return Note("circle_widened", seq, radius_m=radius_m, amsl_m=amsl_m, flown_m=flown_m, judged_m=most_m)

@@ -31,7 +31,7 @@ from gcsplan.check.stretch import Place, Stretch
 from gcsplan.check.verdict import Finding
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import MissionItem
-from gcsplan.units import Quantity, UnitText
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
@@ -81,14 +81,11 @@ def climb_out(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | N
     ahead = place_of(pilot, item)
     if ahead is None and after is not None:
         ahead = place_of(pilot, after)
-        pilot.note(f"item {seq} gives no place: the take-off is judged as launched towards the item after it")
+        pilot.note(Note("climb_out_towards_next", seq))
     pilot.airborne = True
     frame = m.FRAME_SYNONYMS.get(item.frame, item.frame)
     if ahead is None or top is None or top <= ground or frame == m.TERRAIN:
-        pilot.flight.not_judged.append(
-            f"item {seq}: a take-off of a fixed wing is judged where it has an altitude above home, and itself or the "
-            f"item after it a place to climb towards"
-        )
+        pilot.flight.not_judged.append(Note("climb_out_unclear", seq))
         pilot.known = False
         return
     pitch = item.params[0] if item.params[0] > 0.0 else LEAST_PITCH_DEG
@@ -98,18 +95,13 @@ def climb_out(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | N
     for _ in range(2):  # metres per degree change with the latitude, so the first end is millimetres off
         part = run_m / flat_m((lat, lon, 0.0), end)
         end = (lat + part * (end[0] - lat), lon + part * (end[1] - lon), top)
-    known, counted = pilot.vehicle.climb_out, "that climb: with power to spare it is seconds early (climb_out_m_s)"
-    if known is not None:
-        counted = f"{known.climb_m_s:g} m/s up"
+    known = pilot.vehicle.climb_out
+    counted = Note("climb_as_judged") if known is None else Note("climb_as_given", climb_m_s=known.climb_m_s)
+    heading_deg = _bearing(pilot.home, ahead)
     pilot.note(
-        f"item {seq}: the take-off is judged as a straight climb at {climb_deg:g}° on a heading of "
-        f"{_bearing(pilot.home, ahead):.0f}° over {run_m:.0f} m: launch it that way; ArduPlane holds the heading that "
-        f"it is launched on, and turns when it is high enough; times count {counted}"
+        Note("climb_out_straight", seq, climb_deg=climb_deg, heading_deg=heading_deg, run_m=run_m, counted=counted)
     )
-    pilot.note(
-        f"item {seq}: in a cross wind it drifts aside, by up to {run_m / max(pilot.pace.speed_m_s, 1.0):.0f} m for "
-        f"each m/s, as its nose holds the heading: launch into the wind, or let track_error_m hold that"
-    )
+    pilot.note(Note("climb_out_drifts", seq, drift_m=run_m / max(pilot.pace.speed_m_s, 1.0)))
     pilot.add(seq, "takeoff", pilot.home, end, column=True)
     for low, high, band_m in above_slant(pilot.home, end, pilot.vehicle.limits, over_m(pilot.vehicle)):
         pilot.instead(seq, "takeoff", low, high, column=True, band_m=band_m)
@@ -169,7 +161,7 @@ def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bo
     middle, half = 0.5 * (low[2] + target[2]), 0.5 * (target[2] - low[2])
     start, end = ((*place[:2], middle) for place in (pilot.home, pilot.at))
     pilot.instead(seq, "takeoff", start, end, column=True, band_m=half)
-    pilot.note(f"item {seq}: the take-off goes on in circles, judged as {reach_m:.0f} m wide all the way up")
+    pilot.note(Note("climb_out_circles", seq, reach_m=reach_m))
     pilot.low_m, pilot.around_m = min(REACHED_M, target[2] - low[2]), reach_m
     pilot.at, pilot.direction = target, None
     return True
@@ -218,8 +210,8 @@ def slant_findings(stretches: Sequence[Stretch], vehicle: Vehicle, world: World)
             steep = math.degrees(math.atan2(s.start[2] - s.end[2], max(flat_m(s.start, s.end), 1e-9)))
             limit = vehicle.limits.max_descent_deg
             if kind == "land" and s is mine[0] and steep > limit * 1.01 + 0.01:
-                words = f"item {s.seq} (land): glides down too steeply: {steep:.2f}°, limit {limit:g}°"
-                found.append(Finding(s.seq, "descent", words, *s.start, steep, limit, steep - limit, "deg"))
+                note = Note("glides_too_steeply", s.seq, way="land", value_deg=steep, limit_deg=limit)
+                found.append(Finding(s.seq, "descent", note, *s.start, steep, limit, steep - limit, "deg"))
     return found
 
 
@@ -277,26 +269,18 @@ def bare(air: Airspace) -> Airspace:
     return Airspace(Surface(surface.ground_m, surface.high, surface.grid, high_m=surface.high), (), scale=air.scale)
 
 
-def beside_strip(air: Airspace) -> str:
-    """What a refused climb-out or glide has to do with obstacles, and what to do; empty over bare ground."""
-    if air.surface.top_m is air.surface.high_m:
-        return ""
-    return (
-        "; from twice altitude_error_m above the strip on trees and buildings count too, and obstacle_height_m "
-        "puts them everywhere: above altitude_error_m no way over level ground clears them. Where the way is open, "
-        "give `canopy`, a raster with 0 there, in place of obstacle_height_m"
-    )
+def beside_strip(air: Airspace) -> Note | None:
+    """What a refused climb-out or glide has to do with obstacles, and what to do; None over bare ground."""
+    return None if air.surface.top_m is air.surface.high_m else Note("obstacles_beside_strip")
 
 
 def _low(s: Stretch, east: float, north: float, amsl: float, by: float, world: World) -> Finding:
     lat, lon = (float(x) for x in world.frame.to_degrees(east, north))
-    way = "climb-out" if s.kind == "takeoff" else "glide"
-    message = UnitText(
-        "item {} ({}): the {} comes too near to the ground, by {}, at {:.6f}, {:.6f}, {}{}",
-        s.seq, s.kind, way, Quantity(by, "height", 2), lat, lon, Quantity(amsl, "amsl", 1),
-        beside_strip(world.airspace),
+    note = Note(
+        "near_ground_on_slant", s.seq, way=s.kind, glide=s.kind != "takeoff", by_m=by, lat=lat, lon=lon, amsl_m=amsl,
+        obstacles=beside_strip(world.airspace),
     )  # fmt: skip
-    return Finding(s.seq, "min_agl", message, lat, lon, amsl, -by, 0.0, by, "m")
+    return Finding(s.seq, "min_agl", note, lat, lon, amsl, -by, 0.0, by, "m")
 
 
 def place_of(pilot: Aboard, item: MissionItem) -> Place | None:

@@ -10,6 +10,7 @@ from itertools import pairwise
 
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 
 RELEASE = 2.0  # PARACHUTE_ACTION
@@ -58,36 +59,37 @@ FW_DESCENT = 1.0  # NAV_VTOL_LAND_OPTIONS
 
 
 WHY_LOST = {
-    cmd.ARC_WAYPOINT: "an arc is known only for ArduCopter, up to 359°, without terrain frame, with an item after it "
-    "that is no spline, and not from a circle",
-    cmd.SPLINE_WAYPOINT: "a spline is known only for ArduCopter, without terrain frame and with an item after it",
-    cmd.VTOL_TAKEOFF: "it changes to forward flight after its climb, in a direction that is not known",
-    cmd.TAKEOFF: "it comes in the air, or its altitude cannot be told",
-    cmd.ALTITUDE_WAIT: "it waits for an altitude that a balloon may bring",
-    cmd.GUIDED_ENABLE: "another computer flies from there on",
-    cmd.PAYLOAD_PLACE: "it descends until it feels the ground",
-    cmd.DO_SET_HOME: "it moves home, from which altitudes and the return count",
-    cmd.DO_PARACHUTE: "it releases the parachute",
-    cmd.DO_AUX_FUNCTION: "a switch may change the flight mode",
-    cmd.DO_ENGINE_CONTROL: "it starts or stops the engine",
-    cmd.DO_SET_PARAMETER: "it may change any parameter",
-    cmd.DO_GO_AROUND: "it breaks a landing off",
+    cmd.ARC_WAYPOINT: "arc_unknown",
+    cmd.SPLINE_WAYPOINT: "spline_unknown",
+    cmd.VTOL_TAKEOFF: "changes_to_forward_flight",
+    cmd.TAKEOFF: "take_off_unknown",
+    cmd.ALTITUDE_WAIT: "waits_for_altitude",
+    cmd.GUIDED_ENABLE: "flown_by_computer",
+    cmd.PAYLOAD_PLACE: "descends_until_ground",
+    cmd.DO_SET_HOME: "moves_home",
+    cmd.DO_PARACHUTE: "releases_parachute",
+    cmd.DO_AUX_FUNCTION: "switches_mode",
+    cmd.DO_ENGINE_CONTROL: "controls_engine",
+    cmd.DO_SET_PARAMETER: "sets_parameter",
+    cmd.DO_GO_AROUND: "breaks_off_landing",
 }
-"""Why what is flown for a command is not known, where that does not depend on the item's numbers."""
+"""The note on why what is flown for a command is not known, where that does not depend on the item's numbers."""
 
 
-def why_lost(item: MissionItem, mission: Mission) -> str:
+def why_lost(item: MissionItem, mission: Mission) -> Note:
     """Return why what the autopilot flies for an item is not known."""
     if item.command == cmd.WAYPOINT:
-        return "waypoint: the ground there, or under the leg to it, is not known, or its altitude cannot be told"
+        return Note("way_point_unknown")
+    name = cmd.command_name(item.command)
     if item.command in (cmd.TAKEOFF, cmd.VTOL_TAKEOFF) and mission.autopilot.is_ardupilot:
-        return f"{cmd.command_name(item.command)}: it comes in the air, or its altitude cannot be told"
-    name = "" if item.command not in cmd.WORDS else f"{cmd.command_name(item.command)}: "
-    return name + WHY_LOST.get(item.command, "its motion is not known")
+        return Note("take_off_unknown", name=name)
+    if item.command in WHY_LOST:
+        return Note(WHY_LOST[item.command], name=name)
+    return Note("motion_unknown", name=name) if item.command in cmd.WORDS else Note("command_unknown")
 
 
-def flown_otherwise(item: MissionItem, mission: Mission) -> str:
-    """Return why the autopilot flies ``item`` (as stored) differently from what its command says; empty if it does not.
+def flown_otherwise(seq: int, item: MissionItem, mission: Mission) -> Note | None:
+    """Return why the autopilot flies ``item`` (as stored) differently from what its command says; None if it does not.
 
     PX4: a precision landing searches for its beacon (navigator/precland.cpp); a hold time that is not finite has no
     known end. ArduPlane: a VTOL landing may begin as a fixed wing's spiral (quadplane.cpp,
@@ -97,12 +99,12 @@ def flown_otherwise(item: MissionItem, mission: Mission) -> str:
     first, second = item.params[:2]
     if mission.autopilot is Autopilot.PX4:
         if item.command == cmd.LAND and second >= 1.0:
-            return "a precision landing (param2) looks for its beacon, and where is not known (0 lands without it)"
+            return Note("precision_landing", seq)
         if item.command in (cmd.WAYPOINT, cmd.LOITER_TIME, cmd.DELAY) and not math.isfinite(first):
-            return f"a hold of {first} s (param1) has no end that is known (give its seconds)"
+            return Note("hold_without_known_end", seq, hold_s=first)
     if mission.autopilot is Autopilot.ARDUPLANE:
         if item.command == cmd.VTOL_LAND and first == FW_DESCENT:
-            return "a descent as a fixed wing (param1) is flown as the autopilot likes (0 lands as a multicopter)"
+            return Note("lands_as_wing", seq)
         if item.command == cmd.RTL and any(i.command in LAND_STARTS for i in mission.items):
-            return "a return leads on to DO_LAND_START, by RTL_AUTOLAND (end with the landing itself)"
-    return ""
+            return Note("return_leads_to_landing", seq)
+    return None

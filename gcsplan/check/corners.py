@@ -36,9 +36,9 @@ from gcsplan.check.circles import circle_growth
 from gcsplan.check.geodesy import flat_m, offset_m
 from gcsplan.check.stretch import Flight, Place, Stretch
 from gcsplan.check.tuning import DEFAULTS, Tuning
-from gcsplan.check.turn_words import turns_late
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.frame import Frame
 
@@ -66,7 +66,7 @@ def round_corners(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Fra
     cutter = _Cutter(flight, mission, vehicle, tuning)
     flight.instead += cutter.widened(flight.stretches)
     flight.not_judged += cutter.not_judged
-    flight.notes += [words for words in cutter.notes if words not in flight.notes]
+    flight.notes += [note for note in cutter.notes if note not in flight.notes]
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,8 +95,8 @@ class _Cutter:
         self.twins: dict[tuple[object, ...], list[Stretch]] = {}
         for s in flight.instead:
             self.twins.setdefault(_way(s), []).append(s)
-        self.notes: list[str] = []
-        self.not_judged: list[str] = []
+        self.notes: list[Note] = []
+        self.not_judged: list[Note] = []
 
     def widened(self, stretches: Sequence[Stretch]) -> list[Stretch]:
         """The stretches flown in place of ``stretches`` wherever corners are cut by more than the errors include."""
@@ -164,15 +164,16 @@ class _Cutter:
             curves = nearby is not None and nearby.command == cmd.SPLINE_WAYPOINT
             fast = item.command in (cmd.WAYPOINT, cmd.ARC_WAYPOINT) and after.kind == "cruise" and not (stops or curves)
             if fast and self.tuning.copter_radius_m > self.limits.track_error_m:
-                self._say(f"corners are cut within {self.tuning.says('WPNAV_RADIUS', self.tuning.copter_radius_m)}")
+                read = "WPNAV_RADIUS" in self.tuning.read
+                self._say(Note("corners_cut", radius_m=self.tuning.copter_radius_m, read=read))
             return self.tuning.copter_radius_m if fast else 0.0
         if self.mission.autopilot is Autopilot.PX4:
             accepts_m, own = self.tuning.px4_accepts_m(item)
             if own:
                 return accepts_m
             if self.tuning.px4_radius_m > self.limits.track_error_m:
-                radius = self.tuning.says("NAV_ACC_RAD", self.tuning.px4_radius_m)
-                self._say(f"item {s.seq} gives no acceptance radius: it counts as reached within {radius}")
+                read = "NAV_ACC_RAD" in self.tuning.read
+                self._say(Note("reached_within_default", s.seq, radius_m=self.tuning.px4_radius_m, read=read))
             return self.tuning.px4_radius_m
         return self._plane_radius_m(s, item, turn)
 
@@ -180,13 +181,13 @@ class _Cutter:
         if item.command != cmd.WAYPOINT:
             return 0.0
         if item.params[2] >= 1.0:
-            words = turns_late(s.seq, float(item.params[2]))
-            if words not in self.not_judged:
-                self.not_judged.append(words)
+            note = Note("turns_late", s.seq, past_m=float(item.params[2]))
+            if note not in self.not_judged:
+                self.not_judged.append(note)
         if item.params[1] > 0.0:
             return float(item.params[1])
-        radius = self.tuning.says("WP_RADIUS", self.tuning.plane_radius_m)
-        self._say(f"item {s.seq} gives no acceptance radius: its turn is judged as begun by {radius}")
+        read = "WP_RADIUS" in self.tuning.read
+        self._say(Note("turn_begun_by_default", s.seq, radius_m=self.tuning.plane_radius_m, read=read))
         thin = circle_growth(max(s.start[2], s.end[2]))
         return self.tuning.plane_turns_m(s.speed_m_s * math.sqrt(thin), turn, thin)
 
@@ -241,9 +242,9 @@ class _Cutter:
         item = self._item(seq)
         return item is not None and (item.x != 0 or item.y != 0)
 
-    def _say(self, words: str) -> None:
-        if words not in self.notes:
-            self.notes.append(words)
+    def _say(self, note: Note) -> None:
+        if note not in self.notes:
+            self.notes.append(note)
 
 
 def _way(s: Stretch) -> tuple[object, ...]:

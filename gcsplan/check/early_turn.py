@@ -11,6 +11,7 @@ from gcsplan.check.rtl.run_on import about_turn_m
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import MissionItem
+from gcsplan.notes.note import Note
 
 STEEPEST_DEG = 45.0
 """No aircraft climbs out more steeply; 30° were flown in simulation, with TECS_PITCH_MAX 25."""
@@ -52,7 +53,4 @@ def turns_early(pilot: Aboard, seq: int, after: MissionItem | None) -> None:
             near = min(1.0, OVER_FOR_M / max(flat_m(start, target), 1.0))
             low, high = (*start[:2], end[2] + half), (*between(start, target, near), end[2] + half)
             pilot.instead(seq, "takeoff", low, high, column=True, reach_m=swing_m + gap_m, band_m=half)
-    pilot.note(
-        f"item {seq}: it turns towards the next item as soon as it is high enough, so all straight ways there from the "
-        f"climb-out are judged"
-    )
+    pilot.note(Note("turns_early", seq))

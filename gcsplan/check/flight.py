@@ -30,18 +30,17 @@ from itertools import pairwise
 
 from gcsplan.check.aboard import Aboard
 from gcsplan.check.arc_waypoint import fly_arc
-from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth, circle_words
+from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth, circle_widened
 from gcsplan.check.climb_out import REACHED_M, circle_up, climb_out, is_wing
 from gcsplan.check.commands import flown_otherwise, moves_nothing, why_lost
 from gcsplan.check.early_turn import turns_early
 from gcsplan.check.geodesy import flat_m
 from gcsplan.check.glide import glide
 from gcsplan.check.route import fly_all
-from gcsplan.check.rtl.model import RULES, return_pieces
+from gcsplan.check.rtl.model import RULES, returned
 from gcsplan.check.rtl.run_on import about_turn_m
 from gcsplan.check.spline import NO_DIRECTION, chords, slowed, towards
 from gcsplan.check.stretch import Flight, Place, StretchKind
-from gcsplan.check.turn_words import takes_off_elsewhere
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
@@ -88,8 +87,8 @@ class _Pilot(Aboard):
 
     def fly(self, seq: int, item: MissionItem) -> None:
         flown = len(self.flight.stretches)
-        if words := flown_otherwise(item, self.mission):
-            self.flight.not_judged.append(f"item {seq}: {words}: that is not judged")
+        if note := flown_otherwise(seq, item, self.mission):
+            self.flight.not_judged.append(note)
         self._fly(seq, item)
         if self.autopilot is Autopilot.PX4 and not (item.autocontinue or self.landed):
             self.stopped = True
@@ -100,7 +99,7 @@ class _Pilot(Aboard):
 
     def _fly(self, seq: int, item: MissionItem) -> None:
         if self.landed:
-            self.flight.not_judged.append(f"item {seq} comes after the landing: what it does is not judged; remove it")
+            self.flight.not_judged.append(Note("comes_after_landing", seq))
             return
         command = item.command
         if self.autopilot is Autopilot.PX4 and self.off_africa(item):
@@ -123,9 +122,8 @@ class _Pilot(Aboard):
         elif command == cmd.RTL:
             self._return_home(seq)
         elif command == cmd.DO_CHANGE_SPEED:
-            self.pace, note = self.pace.changed(item, self.vehicle)
-            if note:
-                self.note(f"item {seq}: {note}")
+            self.pace, note = self.pace.changed(seq, item, self.vehicle)
+            self.note(note)
         elif command == cmd.DELAY:
             self._wait(seq, item)
         elif not moves_nothing(command, item.params[0]):
@@ -149,10 +147,7 @@ class _Pilot(Aboard):
                 climb_out(self, seq, item, after := self._next(seq))
                 turns_early(self, seq, after)
                 return
-            self.flight.not_judged.append(
-                f"item {seq}: a runway take-off (NAV_TAKEOFF on ArduPlane) leaves straight ahead on a heading that "
-                f"the mission does not hold; a fixed wing with turn_radius_m is judged from its launch on"
-            )
+            self.flight.not_judged.append(Note("runway_take_off", seq))
             self.airborne, self.known = True, False
             return
         if item.command == cmd.VTOL_TAKEOFF and self.autopilot is Autopilot.PX4:
@@ -162,19 +157,14 @@ class _Pilot(Aboard):
         if self.autopilot is Autopilot.PX4 and self.has_place(item):
             away_m = flat_m((lat, lon, 0.0), (item.lat_deg, item.lon_deg, 0.0))
             if away_m > 1.0:
-                self.flight.not_judged.append(takes_off_elsewhere(seq, away_m))
+                self.flight.not_judged.append(Note("takes_off_elsewhere", seq, away_m=away_m))
         elif self.autopilot is Autopilot.ARDUCOPTER and self.has_place(item):
             away_m = flat_m((lat, lon, 0.0), (item.lat_deg, item.lon_deg, 0.0))
             if away_m > TAKE_OFF_ELSEWHERE_M:
-                self.flight.notes.append(
-                    f"item {seq}: take-off is written {away_m:.0f} m from home; ArduCopter takes off where it stands"
-                )
+                self.flight.notes.append(Note("takes_off_where_it_stands", seq, away_m=away_m))
         top = self.altitude(item, (lat, lon, ground))
         if self.autopilot is Autopilot.ARDUPLANE and m.FRAME_SYNONYMS.get(item.frame, item.frame) != m.RELATIVE:
-            self.flight.not_judged.append(
-                f"item {seq}: ArduPlane's VTOL take-off climbs by its altitude, whatever its frame, unless Q_OPTIONS "
-                f"says otherwise: only an altitude relative to home (frame 3) is judged"
-            )
+            self.flight.not_judged.append(Note("vtol_climbs_by_altitude", seq))
             top = None if top is None else max(top, ground + item.z)
         if top is None:
             self._lose(seq, item)
@@ -192,10 +182,7 @@ class _Pilot(Aboard):
             return
         if not self.airborne or not self.known:
             if not self.airborne:
-                self.flight.not_judged.append(
-                    f"item {seq} is the first to fly to and there is no take-off before it: the way from home to it "
-                    f"is not judged; put a take-off before it"
-                )
+                self.flight.not_judged.append(Note("no_take_off", seq))
             self.airborne = self.known = True
             self.at = target
         terrain, away_m = item.frame in (m.TERRAIN, 11), flat_m(self.at, target) if short_m > 0.0 else 0.0
@@ -230,7 +217,7 @@ class _Pilot(Aboard):
         self.pace, self.at, self.direction = pace, target, None if self.hold(item) else arrives
         if hold_s := self.hold(item):
             self.add(seq, "loiter", target, target, hold_s=hold_s)
-        self.note("splines are judged as ArduCopter 4.1 and later fly them")
+        self.note(Note("splines_by_version"))
 
     def _next(self, seq: int) -> MissionItem | None:
         """The next item that is flown to after ``seq``, an RTL if none is left; None if a jump decides."""
@@ -272,7 +259,7 @@ class _Pilot(Aboard):
             return
         hold_s = self.turns_s(item, reach_m) if turns else self.loiter_s(item)
         if plane:
-            self.note(circle_words(seq, reach_m, self.at[2]))
+            self.note(circle_widened(seq, reach_m, self.at[2]))
             reach_m *= circle_growth(self.at[2])
         self.add(seq, "loiter", self.at, self.at, reach_m=reach_m, hold_s=hold_s)
         self.direction = None
@@ -286,7 +273,7 @@ class _Pilot(Aboard):
         parameter, default_m = (
             ("WP_LOITER_RAD", PLANE_LOITER_RADIUS_M) if plane else ("CIRCLE_RADIUS", COPTER_CIRCLE_RADIUS_M)
         )
-        self.note(f"item {seq}: the circle is judged with {parameter} {default_m:g} m, the default")
+        self.note(Note("circle_by_default", seq, parameter=parameter, radius_m=default_m))
         return max(default_m, self.circle_m, self.vehicle.turn_radius_m)
 
     def _change_altitude(self, seq: int, item: MissionItem) -> None:
@@ -304,7 +291,7 @@ class _Pilot(Aboard):
         place = self.at[:2]
         if plane:
             around = (*place, 0.5 * (low + high))
-            self.note(circle_words(seq, reach_m, high))
+            self.note(circle_widened(seq, reach_m, high))
             reach_m *= circle_growth(high)
             self.add(seq, "loiter", around, around, band_m=0.5 * (high - low), reach_m=reach_m)
             self.low_m, self.around_m = min(REACHED_M, self.at[2] - low), reach_m
@@ -320,19 +307,14 @@ class _Pilot(Aboard):
             if is_wing(self.vehicle):
                 glide(self, seq, item)
                 return
-            self.flight.not_judged.append(
-                f"item {seq}: a runway landing's glide (NAV_LAND on ArduPlane) is not judged; "
-                "that of a fixed wing with turn_radius_m is"
-            )
+            self.flight.not_judged.append(Note("runway_landing", seq))
             self.landed = True
             return
         if self.has_place(item):
             self._fly_to_landing(seq, item)
         ground = self.ground(self.at[0], self.at[1])
         if math.isnan(ground):
-            self.flight.not_judged.append(
-                f"item {seq}: the ground at the landing place is unknown; give terrain that knows it"
-            )
+            self.flight.not_judged.append(Note("landing_ground_unknown", seq))
         else:
             down = (self.at[0], self.at[1], ground)
             self.lands_fast(seq, ground)
@@ -357,21 +339,20 @@ class _Pilot(Aboard):
 
     def _return_home(self, seq: int) -> None:
         if not self.known or not self.airborne or self.rtl_rel_home_m is None:
-            why = "its altitude is the vehicle's own (give rtl_rel_home_m)" if self.known else "its start is unknown"
-            self.flight.not_judged.append(f"item {seq}: the return home is not judged: {why}")
+            why = Note("return_altitude_not_given" if self.known else "return_start_unknown", seq)
+            self.flight.not_judged.append(why)
             self.landed = True
             return
         self.pace = replace(self.pace, speed_m_s=self.vehicle.return_speed_m_s or self.pace.speed_m_s)
-        pieces = return_pieces(
+        flown, instead = returned(
+            lambda start, end, **more: self.stretch(seq, "rtl", start, end, more),
             RULES[self.autopilot], self.at, self.home, self.home[2] + self.rtl_rel_home_m,
             about_m=about_turn_m(self.vehicle, self.pace.speed_m_s, self.at[2], flat_m(self.at, self.home)),
             waits_s=self.vehicle.return_waits_s,
         )  # fmt: skip
-        for piece in pieces:
-            fly = self.instead if piece.instead else self.add
-            fly(seq, "rtl", piece.start, piece.end, column=piece.column, band_m=piece.band_m, reach_m=piece.reach_m,
-                hold_s=piece.hold_s)  # fmt: skip
-        self.at = pieces[-1].end
+        self.flight.stretches += flown
+        self.flight.instead += instead
+        self.at = flown[-1].end
         self.landed = True
 
     def _wait(self, seq: int, item: MissionItem) -> None:
@@ -381,15 +362,13 @@ class _Pilot(Aboard):
         if 0 < item.params[0] < math.inf:
             self.add(seq, "loiter", self.at, self.at, hold_s=item.params[0], column=not self.airborne)
         else:
-            self.flight.not_judged.append(
-                f"item {seq}: a wait until a time of day costs what is not known beforehand; give its seconds (param1)"
-            )
+            self.flight.not_judged.append(Note("waits_until_time", seq))
 
     def _lose(self, seq: int, item: MissionItem) -> None:
         self.direction = None
+        why = why_lost(item, self.mission)
         self.flight.not_judged.append(
-            f"item {seq}: what {self.autopilot} flies for command {item.command} is not judged: "
-            f"{why_lost(item, self.mission)}; leave it out to have the rest judged"
+            Note("flown_unknown", seq, autopilot=self.autopilot.value, command=item.command, why=why)
         )
         target = self.target(item) if self.has_place(item) else None
         if target is not None and cmd.is_nav(item.command):

@@ -13,8 +13,8 @@ from itertools import pairwise
 from gcsplan.check.aboard import Aboard
 from gcsplan.check.geodesy import flat_m, offset_m
 from gcsplan.check.stretch import Place
-from gcsplan.check.turn_words import glides_to
 from gcsplan.mavlink.mission.mission import MissionItem
+from gcsplan.notes.note import Note
 
 FLARE_S, FLARE_MOST_M, LAND_SINK_M_S = 2.0, 6.0, 0.25
 """Defaults of LAND_FLARE_SEC, of twice LAND_FLARE_ALT, and of TECS_LAND_SINK."""
@@ -29,33 +29,31 @@ def glide(pilot: Aboard, seq: int, item: MissionItem) -> None:
     target = pilot.target(item) if pilot.has_place(item) else None
     pilot.landed = True
     if target is None:
-        pilot.flight.not_judged.append(
-            f"item {seq}: a landing of a fixed wing without a place is not judged; give it one"
-        )
+        pilot.flight.not_judged.append(Note("landing_without_place", seq))
         return
     ground = pilot.ground(*target[:2])
     off_m = target[2] - ground
     if not abs(off_m) <= max(1.0, pilot.vehicle.limits.altitude_error_m):
-        pilot.flight.not_judged.append(glides_to(seq, off_m))
+        pilot.flight.not_judged.append(
+            Note("glide_to_unknown_ground", seq)
+            if math.isnan(off_m)
+            else Note("glide_off_ground", seq, off_m=abs(off_m), below=off_m > 0.0)
+        )
         return
     end = (*target[:2], ground)
-    pilot.note(
-        f"item {seq}: the landing is judged as a straight glide from the way point before it, and as ArduPlane's "
-        f"defaults (LAND_FLARE_SEC, LAND_FLARE_ALT) flare it"
-    )
-    if words := _downhill(pilot, seq, end):
-        pilot.note(words)
+    pilot.note(Note("glide_straight", seq))
+    pilot.note(_downhill(pilot, seq, end))
     pilot.add(seq, "land", pilot.at, end, column=True)
     for a, b in pairwise(flared(pilot.at, end, flat_m(pilot.at, end), pilot.pace.speed_m_s)):
         pilot.instead(seq, "land", a, b, column=True)
     pilot.at = end
 
 
-def _downhill(pilot: Aboard, seq: int, end: Place) -> str:
-    """That a landing leads down a slope, where the aircraft meets the ground before its place; empty if not."""
+def _downhill(pilot: Aboard, seq: int, end: Place) -> Note | None:
+    """That a landing leads down a slope, where the aircraft meets the ground before its place; None if not."""
     top, run_m = pilot.at, flat_m(pilot.at, end)
     if run_m < STEP_M:
-        return ""
+        return None
     steepest, early_m = (0.0, 0.0), 0.0
     for k in range(1, int(min(BEFORE_M, run_m) / STEP_M) + 1):
         away_m = k * STEP_M
@@ -68,15 +66,13 @@ def _downhill(pilot: Aboard, seq: int, end: Place) -> str:
             early_m = away_m
     slope, away_m = steepest
     if slope == 0.0:
-        return ""
+        return None
     east_m, north_m = offset_m(top, end)
     uphill_deg = (math.degrees(math.atan2(east_m, north_m)) + 180.0) % 360.0
-    return (
-        f"item {seq}: it lands downhill: {away_m:.0f} m before its place the ground is {slope * away_m:.0f} m higher "
-        f"({100.0 * slope:.0f} %): within the altitude error it touches down up to {early_m:.0f} m before its "
-        f"place, and elsewhere with a wind along the runway: land on a heading of {uphill_deg:.0f}°, uphill, or "
-        f"give another goal"
-    )
+    return Note(
+        "lands_downhill", seq, away_m=away_m, higher_m=slope * away_m, slope_percent=100.0 * slope, early_m=early_m,
+        uphill_deg=uphill_deg,
+    )  # fmt: skip
 
 
 def flared(top: Place, ground: Place, run_m: float, speed_m_s: float) -> list[Place]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from gcsplan.figures import raised
 from gcsplan.mavlink.mission.mission import Home
-from gcsplan.units import Quantity, UnitText
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
 
@@ -16,20 +16,16 @@ def spread_at_home_m(home: Home, world: World) -> float:
     return world.spread_m(home.lat_e7 / 1e7, home.lon_e7 / 1e7)
 
 
-def why_unknown(home: Home, vehicle: Vehicle, world: World) -> str | None:
+def why_unknown(home: Home, vehicle: Vehicle, world: World) -> Note | None:
     """Why altitudes above home cannot be judged: its ground is not one number within the altitude error; else None."""
     spread_m, error_m = spread_at_home_m(home, world), vehicle.limits.altitude_error_m
     if spread_m <= error_m:
         return None
     lat, lon = home.lat_e7 / 1e7, home.lon_e7 / 1e7
     low_m = world.ground_amsl(lat, lon)
-    return UnitText(
-        "the ground at home ({:.7f}, {:.7f}) is not one number: by the terrain's own files it lies between {} and {}, "
-        "and altitudes count from it; what helps is a home away from where they differ, terrain of one file there, "
-        "or altitude_error_m of {} and more",
-        lat, lon, Quantity(low_m, "amsl", 1, "down"), Quantity(low_m + spread_m, "amsl", 1, "up"),
-        Quantity(raised(spread_m, 1), "height", 1),
-    )  # fmt: skip
+    return Note(
+        "home_has_two_heights", lat=lat, lon=lon, low_m=low_m, high_m=low_m + spread_m, spread_m=raised(spread_m, 1)
+    )
 
 
 def with_error_of_home(vehicle: Vehicle, home: Home, world: World) -> Vehicle:

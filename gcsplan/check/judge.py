@@ -28,10 +28,9 @@ from gcsplan.check.tuning import DEFAULTS, Tuning
 from gcsplan.check.verdict import Finding, LegFigures, Verdict
 from gcsplan.check.zone_heights import nearest_pass
 from gcsplan.mavlink.mission.autopilots import profile_of
-from gcsplan.mavlink.mission.firmware import STRAIGHT_NOTE, needs_straight
+from gcsplan.mavlink.mission.firmware import needs_straight
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.notes.note import Note
-from gcsplan.units import Joules, Quantity, UnitText, measured
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import LegReport, Violation
 from gcsplan.world.frame import EARTH_RADIUS_M, FARTHEST_M
@@ -43,8 +42,6 @@ TERRAIN_ERROR_M = 30.0
 
 NEAR_DEG = FARTHEST_M / 111_700.0
 """Degrees of latitude, or of longitude anywhere, that are surely no more than `FARTHEST_M`."""
-
-NO_CEILING = "max_agl_m is not set: nothing limits the height above ground"
 
 HIGHEST_M = 20_000.0
 """Above any aircraft that gcsplan plans for, m; keeps absurd numbers out of the exact check."""
@@ -79,13 +76,14 @@ def judge(
     if table.max_items is not None and count > table.max_items:
         findings.append(
             _finding(
-                0, "too_many_items", f"the mission has {count} items and {mission.autopilot} takes {table.max_items}",
+                0, "too_many_items",
+                Note("too_many_items", count=count, autopilot=mission.autopilot.value, most=table.max_items),
                 float(count), float(table.max_items), float(count - table.max_items), "items",
             )
         )  # fmt: skip
     findings += _refused(mission) + _unreached(flight)
     if not flight.stretches:
-        flight.not_judged.append("the mission flies nowhere: it has no item that moves the vehicle; add one")
+        flight.not_judged.append(Note("flies_nowhere"))
         return Verdict(mission, (), tuple(findings), tuple(flight.not_judged), tuple(flight.notes))
     far = [_too_far(s) for s in (*flight.stretches, *flight.others) if _is_too_far(s, world)]
     if far:  # beyond the projected plane and any terrain model that could be loaded
@@ -116,14 +114,11 @@ def judge(
         findings = _worst(findings, _findings(others, plane, report, vehicle.limits, world))
     flight.notes += _unlike_fitted(flight.stretches, vehicle)
     if needs_straight(mission.items, mission.autopilot):
-        flight.notes.append(STRAIGHT_NOTE)
+        flight.notes.append(Note("straight_legs_until"))
     if any(s.terrain for s in flight.stretches):
-        flight.notes.append(
-            f"terrain-frame legs depend on the terrain data in the vehicle; judged as it reads this terrain, at posts "
-            f"every {world.post_spacing_m} m, with {terrain_error_m:g} m of error"
-        )
+        flight.notes.append(Note("reads_terrain_on_board", spacing_m=world.post_spacing_m, error_m=terrain_error_m))
     flight.notes += [Note("paper_energy")] if vehicle.energy.papers else []
-    flight.notes += [NO_CEILING] if vehicle.limits.max_agl_m is None else []
+    flight.notes += [Note("no_ceiling")] if vehicle.limits.max_agl_m is None else []
     verdict = Verdict(
         mission, figures, tuple(findings), tuple(flight.not_judged), tuple(flight.notes), misses=near, zone_pass=over,
         energy_stated=vehicle.energy.stated, paper_energy=vehicle.energy.papers,
@@ -149,15 +144,15 @@ def _refused(mission: Mission) -> list[Finding]:
     refuses, found = profile_of(mission.autopilot).refuses, []
     for seq, item in enumerate(mission.items, mission.first_seq):
         if why := refuses(item):
-            words = f"item {seq}: would be refused on upload: {why}"
-            found.append(_finding(seq, "refused", words, float(item.frame), math.nan, math.nan, ""))
+            note = Note("refused_on_upload", seq, why=why)
+            found.append(_finding(seq, "refused", note, float(item.frame), math.nan, math.nan, ""))
     return found
 
 
 def _unreached(flight: Flight) -> list[Finding]:
     """Findings for the items after a hold or a loop without end."""
     return [
-        _finding(u.first, "unreachable", u.describe(), float(u.last - u.first + 1), 0.0, math.nan, "items")
+        _finding(u.first, "unreachable", u.note, float(u.last - u.first + 1), 0.0, math.nan, "items")
         for u in flight.unreached
     ]
 
@@ -167,11 +162,8 @@ def _unread(stretches: Sequence[Stretch], plane: PlaneLegs) -> list[Finding]:
     found = []
     for s in (stretches[i] for i in plane.unread):
         lat, lon, amsl = s.end
-        message = UnitText(
-            "item {} ({}): over ground that the vehicle's terrain grid does not know, on the way to {:.6f}, {:.6f}, {}",
-            s.seq, s.kind, lat, lon, Quantity(amsl, "amsl", 1),
-        )  # fmt: skip
-        found.append(Finding(s.seq, "coverage", message, lat, lon, amsl, math.nan, math.nan, math.nan, "m"))
+        note = Note("over_ground_unread", s.seq, way=s.kind, lat=lat, lon=lon, amsl_m=amsl)
+        found.append(Finding(s.seq, "coverage", note, lat, lon, amsl, math.nan, math.nan, math.nan, "m"))
     return found
 
 
@@ -193,11 +185,8 @@ def _is_too_far(stretch: Stretch, world: World) -> bool:
 
 def _too_far(s: Stretch) -> Finding:
     lat, lon, amsl = s.end
-    message = UnitText(
-        "item {} ({}): goes to {:.6f}, {:.6f}, {}: too far from the mission's terrain to be judged",
-        s.seq, s.kind, lat, lon, Quantity(amsl, "amsl", 1),
-    )  # fmt: skip
-    return Finding(s.seq, "coverage", message, lat, lon, amsl, math.nan, math.nan, math.nan, "m")
+    note = Note("too_far_away", s.seq, way=s.kind, lat=lat, lon=lon, amsl_m=amsl)
+    return Finding(s.seq, "coverage", note, lat, lon, amsl, math.nan, math.nan, math.nan, "m")
 
 
 def _figures(
@@ -274,16 +263,14 @@ def _most(agl_m: Floats) -> float:
     return float(np.fmax.reduce(agl_m))
 
 
-WORDS = {
-    "min_agl": "too low above ground",
-    "max_agl": "too high above ground",
-    "max_amsl": "above max_amsl_m",
-    "terrain_clearance": "too near to rising ground at flight level",
-    "zone": "inside no-fly zone",
-    "climb": "climbs too steeply",
-    "descent": "descends too steeply",
-    "coverage": "over ground that the terrain model does not know",
+BROKEN_HEIGHTS = {
+    "min_agl": "too_low",
+    "max_agl": "too_high",
+    "max_amsl": "above_ceiling",
+    "terrain_clearance": "near_rising_ground",
 }
+BROKEN_ANGLES = {"climb": "climbs_too_steeply", "descent": "descends_too_steeply"}
+"""The notes on limits of height and of angle, by the kind of the violation."""
 
 
 def _worst(findings: list[Finding], more: list[Finding]) -> list[Finding]:
@@ -317,17 +304,35 @@ def _findings(
         v = enough(v, np.array(broken[owner, kind, zone]), plane.legs, limits, world.airspace)
         lat, lon = (float(x) for x in world.frame.to_degrees(v.east_m, v.north_m))
         name = world.airspace.zones[zone].name if zone >= 0 else ""
-        what = WORDS[kind] + (f" “{name}” or its clearance" if name else "")
-        value, limit, over = (measured(number, kind, v.unit) for number in (v.value, v.limit, v.by))
-        numbers = UnitText(": {}, limit {}", value, limit) if kind not in ("coverage", "zone") else ""
-        by = UnitText(" (by {})", over) if kind != "coverage" else ""
-        way = s.kind if s.jumped_from is None else f"{s.kind}, after the jump at item {s.jumped_from}"
-        message = UnitText(
-            "item {} ({}): {}{}{} at {:.6f}, {:.6f}, {}",
-            s.seq, way, what, numbers, by, lat, lon, Quantity(v.amsl_m, "amsl", 1),
-        )  # fmt: skip
-        found.append(Finding(s.seq, kind, message, lat, lon, v.amsl_m, v.value, v.limit, v.by, v.unit, name))
+        note = _said(s, v, name, (lat, lon))
+        found.append(Finding(s.seq, kind, note, lat, lon, v.amsl_m, v.value, v.limit, v.by, v.unit, name))
     return found
+
+
+def _said(s: Stretch, v: Violation, zone: str, at: tuple[float, float]) -> Note:
+    """What is said of a violation on a stretch; ``at``: latitude and longitude."""
+    way = s.kind if s.jumped_from is None else Note("after_jump", way=s.kind, jump=s.jumped_from)
+    lat, lon = at
+    if v.kind == "coverage":
+        return Note("over_unknown_ground", s.seq, way=way, lat=lat, lon=lon, amsl_m=v.amsl_m)
+    if v.kind == "zone":
+        return Note("inside_zone", s.seq, way=way, zone=zone, by_m=v.by, lat=lat, lon=lon, amsl_m=v.amsl_m)
+    if v.kind in BROKEN_ANGLES:
+        return Note(
+            BROKEN_ANGLES[v.kind], s.seq, way=way, value_deg=v.value, limit_deg=v.limit, by_deg=v.by, lat=lat, lon=lon,
+            amsl_m=v.amsl_m,
+        )  # fmt: skip
+    return Note(
+        BROKEN_HEIGHTS[v.kind],
+        s.seq,
+        way=way,
+        value_m=v.value,
+        limit_m=v.limit,
+        by_m=v.by,
+        lat=lat,
+        lon=lon,
+        amsl_m=v.amsl_m,
+    )
 
 
 def _with_battery(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> Verdict:
@@ -338,11 +343,11 @@ def _with_battery(verdict: Verdict, vehicle: Vehicle, flight: Flight) -> Verdict
     verdict = replace(verdict, battery_used_percent=100.0 * used / energy.battery_j)
     last = verdict.legs[-1]
     if used > usable:
-        message = UnitText(
-            "battery: the flight needs {} and {} may be used ({} less {:g} % reserve)",
-            Joules(used), Joules(usable), Joules(energy.battery_j), 100 * energy.reserve,
+        note = Note(
+            "battery_not_enough", needs_j=used, usable_j=usable, battery_j=energy.battery_j,
+            reserve_percent=100 * energy.reserve,
         )  # fmt: skip
-        finding = _finding(last.seq, "battery", message, used, usable, used - usable, "J")
+        finding = _finding(last.seq, "battery", note, used, usable, used - usable, "J")
         return replace(verdict, findings=(*verdict.findings, finding))
     power_w = _power_w(verdict, vehicle, flight)
     if power_w is None:
@@ -386,5 +391,5 @@ def _lead_j(vehicle: Vehicle, s: Stretch, run_m: float, time_s: float) -> float:
     return base_w * max(0.0, time_s - run_m / top_m_s)
 
 
-def _finding(seq: int, kind: str, message: str, value: float, limit: float, by: float, unit: str) -> Finding:
-    return Finding(seq, kind, message, math.nan, math.nan, math.nan, value, limit, by, unit)
+def _finding(seq: int, kind: str, note: Note, value: float, limit: float, by: float, unit: str) -> Finding:
+    return Finding(seq, kind, note, math.nan, math.nan, math.nan, value, limit, by, unit)

@@ -10,8 +10,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats, Indices
 from gcsplan.check.stretch import Stretch
-from gcsplan.figures import floored, raised
-from gcsplan.units import Kind, Quantity, Rounding, UnitText
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import LegReport, Legs, Violation
 from gcsplan.world.world import World
@@ -40,43 +39,36 @@ class Miss:
     amsl_m: float
     zone: str = ""
 
-    def describe(self) -> UnitText:
-        """Describe it in one line."""
-        beyond, with_error = (" beyond the track error", " with the track error") if self.zone else ("", "")
-        left = (
-            UnitText("{} to spare{}", self._number(self.room, "down"), beyond)
-            if self.room >= 0.0
-            else UnitText("broken by {}{}", self._number(-self.room, "up"), with_error)
-        )
-        limit = Quantity(self.limit, self._measured, None, bare=True) if self.unit == "m" else f"{self.limit:g}"
-        found = UnitText(
-            "{}{}: {} of {}", WORDS[self.kind], f" {self.zone}" if self.zone else "",
-            self._number(self.value, "down" if self.kind in LEAST else "up"), limit,
-        )  # fmt: skip
-        if self.zone and self.value < 0.0:
-            found = UnitText("inside zone {}: {} from its edge", self.zone, self._number(-self.value, "up"))
-        at = Quantity(self.amsl_m, "amsl", 0)
-        return UnitText("{}, {}, item {} ({:.6f}, {:.6f}, {})", found, left, self.seq, self.lat_deg, self.lon_deg, at)
-
     @property
-    def _measured(self) -> Kind:
-        return "distance" if self.kind == "zone" else "height"
+    def note(self) -> Note:
+        """What is said of it."""
+        spare = self.room >= 0.0
+        room = abs(self.room)
+        if self.kind in NEAR_ANGLES:
+            left = Note("spare_angle", room_deg=room) if spare else Note("broken_angle", room_deg=room)
+            return Note(
+                NEAR_ANGLES[self.kind], value_deg=self.value, limit_deg=self.limit, left=left, seq=self.seq,
+                lat=self.lat_deg, lon=self.lon_deg, amsl_m=self.amsl_m,
+            )  # fmt: skip
+        if not self.zone:
+            left = Note("spare_height", room_m=room) if spare else Note("broken_height", room_m=room)
+            return Note(
+                NEAR_HEIGHTS[self.kind], value_m=self.value, limit_m=self.limit, left=left, seq=self.seq,
+                lat=self.lat_deg, lon=self.lon_deg, amsl_m=self.amsl_m,
+            )  # fmt: skip
+        left = Note("spare_distance", room_m=room) if spare else Note("broken_distance", room_m=room)
+        return Note(
+            "nearest_zone" if self.value >= 0.0 else "nearest_inside_zone", zone=self.zone, value_m=abs(self.value),
+            limit_m=self.limit, left=left, seq=self.seq, lat=self.lat_deg, lon=self.lon_deg, amsl_m=self.amsl_m,
+        )  # fmt: skip
 
-    def _number(self, value: float, rounding: Rounding) -> Quantity | str:
-        if self.unit == "m":
-            return Quantity(value, self._measured, 1, rounding)
-        shown = floored(value, 1) if rounding == "down" else raised(value, 1) if rounding == "up" else value
-        return f"{shown:.1f} {self.unit}"
 
-
-WORDS = {
-    "min_agl": "lowest above ground, less the errors", "max_agl": "highest above ground, with the errors",
-    "max_amsl": "highest altitude, with the errors",
-    "terrain_clearance": "lowest above ground within the clearance, less the errors",
-    "zone": "nearest to zone", "climb": "steepest climb", "descent": "steepest descent",
+NEAR_HEIGHTS = {
+    "min_agl": "lowest_above_ground", "max_agl": "highest_above_ground", "max_amsl": "highest_altitude",
+    "terrain_clearance": "lowest_within_clearance",
 }  # fmt: skip
-"""Heights are not those of the table of legs, which has the path as it is planned: the words say which way they go."""
-LEAST = ("min_agl", "terrain_clearance", "zone")
+NEAR_ANGLES = {"climb": "steepest_climb", "descent": "steepest_descent"}
+"""The notes on limits of height and of angle, by kind."""
 LIFT_M = 50_000.0
 """An added altitude error, m, that breaks every limit of height on every leg; it breaks a limit by less the larger the
 margin."""
@@ -127,11 +119,11 @@ def _heights(stretches: Sequence[Stretch], legs: Legs, owner: Indices, vehicle: 
     lifted = replace(legs, altitude_error_m=legs.altitude_error_m + LIFT_M)
     worst: dict[str, Violation] = {}
     for v in world.airspace.examine(lifted, limits).violations:
-        if v.kind in WORDS and v.kind not in ("zone", "climb", "descent"):
+        if v.kind in NEAR_HEIGHTS:
             worst[v.kind] = max(worst.get(v.kind, v), v, key=lambda w: w.by)
     limits_m = {"min_agl": limits.min_agl_m, "max_agl": limits.max_agl_m or 0.0, "max_amsl": limits.max_amsl_m or 0.0}
     found = []
-    for kind in WORDS:
+    for kind in NEAR_HEIGHTS:
         if (found_one := worst.get(kind)) is None or abs(found_one.by) > 1.5 * LIFT_M:
             continue
         room, limit = LIFT_M - found_one.by, limits_m.get(kind, 0.0)

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from gcsplan.mavlink.mission.mission import MissionItem
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 
 AIRSPEED, GROUND_SPEED, CLIMB, DESCENT = 0.0, 1.0, 2.0, 3.0  # SPEED_TYPE
@@ -25,8 +26,8 @@ class Pace:
         """The pace at the beginning of a mission: the vehicle's own speeds."""
         return cls(vehicle.speed_max_m_s, (vehicle.climb_m_s, vehicle.descent_m_s))
 
-    def changed(self, item: MissionItem, vehicle: Vehicle) -> tuple[Pace, str]:
-        """The pace after a DO_CHANGE_SPEED, and a note on it (mostly empty).
+    def changed(self, seq: int, item: MissionItem, vehicle: Vehicle) -> tuple[Pace, Note | None]:
+        """The pace after a DO_CHANGE_SPEED, the item ``seq``, and a note on it (mostly there is none).
 
         On ArduPlane a ground speed is a lower bound, not a target (commands_logic.cpp, `do_change_speed`).
         """
@@ -34,14 +35,14 @@ class Pace:
         plane = vehicle.autopilot is Autopilot.ARDUPLANE
         cruise = (AIRSPEED,) if plane else (AIRSPEED, GROUND_SPEED)
         if vehicle.autopilot is Autopilot.PX4 and kind in (CLIMB, DESCENT):
-            return self, "a rate of climb or descent for PX4 is not counted in the time"
+            return self, Note("climb_rate_uncounted", seq)
         if kind in cruise and value == DEFAULT:
-            return replace(self, speed_m_s=vehicle.speed_max_m_s), ""
+            return replace(self, speed_m_s=vehicle.speed_max_m_s), None
         if not 0.0 < value < math.inf:
-            return self, ""
+            return self, None
         if kind in cruise:
-            return replace(self, speed_m_s=value), ""
+            return replace(self, speed_m_s=value), None
         if kind in (CLIMB, DESCENT) and not plane:
             up, down = self.rates_m_s
-            return replace(self, rates_m_s=(value, down) if kind == CLIMB else (up, value)), ""
-        return self, ""
+            return replace(self, rates_m_s=(value, down) if kind == CLIMB else (up, value)), None
+        return self, None

@@ -23,6 +23,7 @@ from gcsplan.check.commands import LAND_STARTS
 from gcsplan.check.stretch import Flight, Unreached
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
+from gcsplan.notes.note import Note
 
 MOST_JUMPS = 15  # AP_MISSION_MAX_NUM_DO_JUMP_COMMANDS on small boards, 100 on large ones; the rest count as used up
 MOST_STEPS = 100_000
@@ -92,10 +93,8 @@ def fly_all(mission: Mission, make_pilot: Callable[[], Pilot]) -> Flight:
         flight.adopt(pilot.flight)
         last, start = start, pilot.flight.apart_from
     if start is not None:
-        flight.not_judged.append(
-            f"items {mission.first_seq + start} to {mission.first_seq + len(mission.items) - 1}: a jump leads back "
-            f"from what only a return leads to: what follows is not judged; end what a return leads to with a landing"
-        )
+        first, last_seq = mission.first_seq + start, mission.first_seq + len(mission.items) - 1
+        flight.not_judged.append(Note("jumps_back_into_return", first=first, last=last_seq))
     return flight
 
 
@@ -107,17 +106,12 @@ def fly_in_order(mission: Mission, pilot: Pilot, start: int = 0) -> bool:
     jumps = _jumps(mission)
     flight, first, items = pilot.flight, mission.first_seq, mission.items
     if mission.autopilot.is_ardupilot and len(jumps) > MOST_JUMPS:
-        flight.not_judged.append(
-            f"the mission has {len(jumps)} jumps, and ArduPilot counts {MOST_JUMPS} on small boards and passes the "
-            "rest; write some rounds out"
-        )
+        flight.not_judged.append(Note("too_many_jumps", count=len(jumps), most=MOST_JUMPS))
     index, steps = start, 0
     while index < len(items):
         steps += 1
         if steps > MOST_STEPS:
-            flight.not_judged.append(
-                f"the jumps lead through more than {MOST_STEPS} items: the rest is not judged; give them fewer rounds"
-            )
+            flight.not_judged.append(Note("too_many_steps", most=MOST_STEPS))
             return False
         if pilot.over and mission.autopilot.is_ardupilot and items[index].command in LAND_STARTS:
             flight.apart_from = index
@@ -131,7 +125,7 @@ def fly_in_order(mission: Mission, pilot: Pilot, start: int = 0) -> bool:
                 return False
             continue
         if jump.target is None:
-            flight.not_judged.append(f"item {seq} jumps to an item that the mission has not; correct its number")
+            flight.not_judged.append(Note("jump_target_missing", seq))
             return False
         if jump.rounds is not None and jump.done >= jump.rounds:
             _pass(mission, flight, seq, jump)
@@ -180,11 +174,7 @@ def _pass(mission: Mission, flight: Flight, seq: int, jump: _Jump) -> None:
     """Skip a jump that is used up; the second time, say that another version of ArduPilot does not."""
     jump.passed += 1
     if jump.passed == 2 and jump.rounds and mission.autopilot.is_ardupilot:
-        flight.not_judged.append(
-            f"item {seq} is reached again after its {jump.rounds} jumps: ArduPilot before 4.7 skips it then, and 4.7 "
-            f"begins its count anew (MIS_OPTIONS bit 3 stops that), so how long it flies depends on the version; "
-            "write the outer rounds out"
-        )
+        flight.not_judged.append(Note("jump_counted_by_version", seq, rounds=jump.rounds))
 
 
 def _again(flight: Flight, jump: _Jump, was: tuple[Hashable, int, int]) -> None:
@@ -215,13 +205,8 @@ def _never(mission: Mission, flight: Flight, seq: int, index: int, *, loop: bool
 
 def _without_end(flight: Flight, seq: int, target: int, last: int, was: tuple[Hashable, int, int]) -> None:
     if len(flight.stretches) == was[1]:
-        flight.not_judged.append(
-            f"item {seq} jumps to item {target} for ever and nothing is flown between them; remove it"
-        )
+        flight.not_judged.append(Note("jump_flies_nothing", seq, target=target))
         return
     flight.loop_seq = seq
-    never = "" if seq == last else f"; the items after it, {seq + 1} to {last}, are never flown"
-    flight.notes.append(
-        f"item {seq} jumps back to item {target} without end: its round is judged and counted once, what ends it (a "
-        f"pilot, a failsafe) is not judged{never}"
-    )
+    never = None if seq == last else Note("items_after_jump", first=seq + 1, last=last)
+    flight.notes.append(Note("jumps_without_end", seq, target=target, never=never))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from gcsplan.notes.note import Said
+from gcsplan.notes.note import Note
 
 StretchKind = Literal["takeoff", "cruise", "land", "loiter", "rtl"]
 Place = tuple[float, float, float]
@@ -50,11 +50,12 @@ class Unreached:
     last: int
     loop: bool = False
 
-    def describe(self) -> str:
-        """Describe it in one line."""
-        does = "jumps back" if self.loop else "holds"
-        behind = f"item {self.first} is" if self.first == self.last else f"items {self.first} to {self.last} are"
-        return f"item {self.seq} {does} without end: {behind} never reached"
+    @property
+    def note(self) -> Note:
+        """What is said of it."""
+        if self.first == self.last:
+            return Note("item_unreached", self.first, by=self.seq, jumps=self.loop)
+        return Note("items_unreached", self.first, last=self.last, by=self.seq, jumps=self.loop)
 
 
 @dataclass(slots=True)
@@ -69,8 +70,8 @@ class Flight:
 
     stretches: list[Stretch] = field(default_factory=list)
     instead: list[Stretch] = field(default_factory=list)
-    not_judged: list[Said] = field(default_factory=list)
-    notes: list[Said] = field(default_factory=list)
+    not_judged: list[Note] = field(default_factory=list)
+    notes: list[Note] = field(default_factory=list)
     unreached: list[Unreached] = field(default_factory=list)
     loop_seq: int | None = None
     apart_from: int | None = None

@@ -45,10 +45,6 @@ class Tuning:
         fields = {known[name][0]: value * known[name][1] for name, value in usable.items()}
         return cls(**fields, read=frozenset(usable))
 
-    def says(self, parameter: str, value: float, unit: str = "m") -> str:
-        """``parameter``, its value and the source of the value, in words."""
-        return f"{parameter} {value:g} {unit}, {'read from the vehicle' if parameter in self.read else 'the default'}"
-
     def px4_accepts_m(self, item: MissionItem) -> tuple[float, bool]:
         """The radius within which PX4 counts an item as reached, m, and whether it is the item's own."""
         own = item.params[1] if item.command == cmd.WAYPOINT else 0.0

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import accumulate
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gcsplan.check.misses import Miss
 from gcsplan.check.stretch import Place, StretchKind
 from gcsplan.check.zone_heights import ZonePass
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.parameter_safety import Extent
-from gcsplan.notes.note import Said
-from gcsplan.units import UnitText, joined
+from gcsplan.notes.note import IN_FILES, Note, Said, Wording, told
 
 if TYPE_CHECKING:
     from gcsplan.fleet.arrival import Slot
@@ -25,11 +24,14 @@ PAPER_MARK = " (paper's figures)"
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One limit broken by wire item ``seq``: the place, by how much, and a message. ``zone`` is its name or empty."""
+    """One limit broken by wire item ``seq``: what is said of it, the place, and by how much.
+
+    ``zone`` is the zone's name or empty.
+    """
 
     seq: int
     kind: str
-    message: str
+    note: Note
     lat_deg: float
     lon_deg: float
     amsl_m: float
@@ -38,6 +40,18 @@ class Finding:
     by: float
     unit: str
     zone: str = ""
+
+    @property
+    def message(self) -> str:
+        """What is said of it, in SI."""
+        return str(self.note)
+
+    def as_dict(self, wording: Wording = IN_FILES) -> dict[str, Any]:
+        """The finding for programs: its fields with the message, and the note's code and data."""
+        fields = {name: getattr(self, name) for name in self.__slots__ if name != "note"}
+        said = self.note.as_dict()
+        begins = {"seq": fields.pop("seq"), "kind": fields.pop("kind"), "message": self.note.text(wording)}
+        return begins | fields | {"code": said["code"], "data": said["data"]}
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,55 +91,42 @@ class LegFigures:
     speed_m_s: float = math.nan
 
 
-@dataclass(frozen=True, slots=True)
-class ItemFigures:
-    """Figures of all stretches that are flown for one item in a row: the chords of a spline, a track and its landing.
+def by_item(legs: Sequence[LegFigures]) -> Iterator[tuple[LegFigures, int]]:
+    """The figures of each item in the order flown, and how many stretches they are of: a spline's chords, for example.
 
-    ``kind`` and ``end`` are those of the last one. ``min_agl_m`` and ``climb_deg`` leave columns out; without another
-    stretch the height is NaN, and the angle that of the column. ``stretches``: how many they are; ``times``: how often
-    they are flown in a row; energy and time are those of one pass.
+    An item that a jump leads back to comes again. ``kind`` and ``end`` are those of its last stretch. ``min_agl_m`` and
+    ``climb_deg`` leave columns out; without another stretch the height is NaN, and the angle that of the column.
     """
-
-    seq: int
-    kind: StretchKind
-    end: Place
-    length_m: float
-    climb_deg: float
-    agl_end_m: float
-    min_agl_m: float
-    max_agl_m: float
-    zone_clearance_m: float
-    nearest_zone: str
-    energy_j: float
-    time_s: float
-    column: bool
-    stretches: int
-    times: int
-
-
-def by_item(legs: Sequence[LegFigures]) -> Iterator[ItemFigures]:
-    """The figures of each item in the order flown; an item that a jump leads back to comes again."""
     group: list[LegFigures] = []
     for leg in legs:
         if group and (leg.jumped_from is not None or (leg.seq, leg.times) != (group[-1].seq, group[-1].times)):
-            yield _together(group)
+            yield _together(group), len(group)
             group = []
         group.append(leg)
     if group:
-        yield _together(group)
+        yield _together(group), len(group)
 
 
-def _together(legs: Sequence[LegFigures]) -> ItemFigures:
-    last = legs[-1]
+def _together(legs: Sequence[LegFigures]) -> LegFigures:
+    first, last = legs[0], legs[-1]
     flown = [leg for leg in legs if not leg.column]
-    heights = [leg.min_agl_m for leg in flown if not math.isnan(leg.min_agl_m)]
-    tops = [leg.max_agl_m for leg in legs if not math.isnan(leg.max_agl_m)]
+    low = min((leg for leg in flown if not math.isnan(leg.min_agl_m)), key=lambda leg: leg.min_agl_m, default=None)
     near = min((leg for leg in legs if leg.nearest_zone), key=lambda leg: leg.zone_clearance_m, default=last)
-    return ItemFigures(
-        last.seq, last.kind, last.end, math.fsum(leg.length_m for leg in legs),
-        max((leg.climb_deg for leg in flown or legs), key=abs), last.agl_end_m, min(heights, default=math.nan),
-        max(tops, default=math.nan), near.zone_clearance_m, near.nearest_zone, math.fsum(leg.energy_j for leg in legs),
-        math.fsum(leg.time_s for leg in legs), not flown, len(legs), last.times,
+
+    def total(of: Callable[[LegFigures], float]) -> float:
+        return math.fsum(map(of, legs))
+
+    return replace(
+        last, start=first.start, jumped_from=first.jumped_from, column=not flown,
+        on_path=any(leg.on_path for leg in legs),
+        horizontal_m=total(lambda leg: leg.horizontal_m), length_m=total(lambda leg: leg.length_m),
+        energy_j=total(lambda leg: leg.energy_j), time_s=total(lambda leg: leg.time_s),
+        hold_s=total(lambda leg: leg.hold_s), hold_j=total(lambda leg: leg.hold_j),
+        lead_j=total(lambda leg: leg.lead_j),
+        climb_deg=max((leg.climb_deg for leg in flown or legs), key=abs),
+        min_agl_m=math.nan if low is None else low.min_agl_m, min_agl_at=(low or last).min_agl_at,
+        max_agl_m=max((leg.max_agl_m for leg in legs if not math.isnan(leg.max_agl_m)), default=math.nan),
+        zone_clearance_m=near.zone_clearance_m, nearest_zone=near.nearest_zone,
     )  # fmt: skip
 
 
@@ -256,6 +257,7 @@ class Verdict:
         """The steepest angle of all stretches except columns, up or down, degrees."""
         return max((abs(leg.climb_deg) for leg in self.legs if not leg.column and leg.horizontal_m > 0), default=0.0)
 
-    def describe(self) -> UnitText:
+    def describe(self, wording: Wording = IN_FILES) -> str:
         """All findings and all that is not judged, one per line."""
-        return joined("\n", [f.message for f in self.findings] + [f"not judged: {what}" for what in self.not_judged])
+        unjudged = [f"not judged: {told(what, wording)}" for what in self.not_judged]
+        return "\n".join([f.note.text(wording) for f in self.findings] + unjudged)

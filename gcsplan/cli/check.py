@@ -185,7 +185,8 @@ def check(
         _report(batch, report, units_of(units))
     if rows or quiet or len(arguments) > TABLES:
         told = told_of_batch(batch, form, allow_unjudged=allow_unjudged, units=units_of(units))
-        raise typer.Exit(tell((batch.name, batch.inputs, batch.notes), told, printer, len(arguments)))
+        header = (batch.name, batch.inputs, batch.notes, batch.typed)
+        raise typer.Exit(tell(header, told, printer, len(arguments)))
     _say_all(batch, units_of(units))
     failing = [f for c in batch.checked if (f := checking.failing_of(c, allow_unjudged=allow_unjudged)) is not None]
     raise typer.Exit(worst_of({*(f.code for f in failing), *(error.exit_code for _, error in batch.unreadable)}))
@@ -283,33 +284,37 @@ def _say_all(batch: Batch, units: Units) -> None:
     from gcsplan.cli.home_words import say_home, say_warnings
     from gcsplan.cli.verdict_table import verdict_table
     from gcsplan.export.profile_text import profile_lines
-    from gcsplan.units import in_units
+    from gcsplan.notes.note import Wording
 
-    say_notes(batch.notes)
+    wording = Wording(units, batch.typed)
+    say_notes(batch.notes, wording)
     say_heights(batch.inputs)
     for c in batch.checked:
-        say_notes(c.notes)
+        say_notes(c.notes, wording)
         name = f"{c.file} as {c.vehicle.name} ({c.vehicle.autopilot})"
-        verdict_table(name, c.verdict, c.way_home, units=units, energy=c.vehicle.energy)
+        verdict_table(name, c.verdict, c.way_home, wording=wording, energy=c.vehicle.energy)
         for miss in c.verdict.misses:
-            say(in_units(miss.describe(), units))
+            say(miss.note.text(wording))
         for line in profile_lines(c.verdict, c.world, units):
             say(line)
         if c.way_home is not None:
-            say_home(c.way_home, units)
-    say_warnings({str(c.file): c.way_home for c in batch.checked}, units)
+            say_home(c.way_home, wording)
+    say_warnings({str(c.file): c.way_home for c in batch.checked}, wording)
     for _, error in batch.unreadable:
         complain(error)
 
 
 def _report(batch: Batch, file: Path, units: Units) -> None:
     from gcsplan.export.outdir import write_whole
+    from gcsplan.notes.note import Wording, told
     from gcsplan.report.page import render_check
 
     worlds: list[Checked] = list({id(c.world): c for c in batch.checked}.values())
     if len(worlds) != 1:
         raise InputError("a report shows files of one area; none could be judged, or they lie too far apart")
-    notes = [*batch.notes, *(f"not read, and not on this page: {error}" for _, error in batch.unreadable)]
+    wording = Wording(options=batch.typed)
+    notes = [told(note, wording) for note in batch.notes]
+    notes += [f"not read, and not on this page: {error}" for _, error in batch.unreadable]
     homes = [c.way_home for c in batch.checked]
     page = render_check(
         batch.name, worlds[0].world, batch.checked, inputs=batch.inputs, notes=notes, homes=homes, units=units

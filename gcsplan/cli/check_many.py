@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from gcsplan.app.archive import Archive
     from gcsplan.app.archive_words import Summary, Told
     from gcsplan.app.checking import Failing
+    from gcsplan.notes.note import Said
 
 LINE_S = 5.0
 """Seconds between two lines of progress."""
@@ -21,8 +22,8 @@ LINE_S = 5.0
 MOST_FAILING = 100
 """Files of which the ``error`` of a document says why they do not pass; the verdicts say it of all."""
 
-Header = tuple[str, Mapping[str, object], tuple[str, ...]]
-"""The name of the mission, what describes the world's sources, notes."""
+Header = tuple[str, Mapping[str, object], "tuple[Said, ...]", Mapping[str, str]]
+"""The name of the mission, what describes the world's sources, notes, and the options that the reader types."""
 
 
 class Printer(Protocol):
@@ -47,9 +48,10 @@ class Lines:
     def begin(self, header: Header) -> None:
         """See `Printer`."""
         from gcsplan.cli.console import say_heights, say_notes
+        from gcsplan.notes.note import Wording
 
         if self.summed:
-            say_notes(header[2])
+            say_notes(header[2], Wording(options=header[3]))
             say_heights(header[1])
 
     def tell(self, told: Told) -> None:
@@ -120,8 +122,10 @@ class Document:
 
 
 def _head(header: Header) -> dict[str, Any]:
-    name, inputs, notes = header
-    return {"name": name, "inputs": dict(inputs), "notes": list(notes)}
+    from gcsplan.notes.note import Wording, in_json
+
+    name, inputs, notes, typed = header
+    return {"name": name, "inputs": dict(inputs), **in_json("notes", notes, Wording(options=typed))}
 
 
 def _error(error: dict[str, Any] | None) -> dict[str, Any]:
@@ -154,7 +158,9 @@ def tell_archive(
             remark(f"the workers can be watched at {link}")
         with reading:
             archive.read(workers, lambda read: progress(f"{read} of {count} files read"))
-        return tell((archive.name, *archive.said), archive.judged(workers), printer, count, progress)
+        inputs, notes = archive.said
+        header = (archive.name, inputs, notes, archive.site.typed)
+        return tell(header, archive.judged(workers), printer, count, progress)
 
 
 def tell(

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 
 from gcsplan.app.way_home import warnings
-from gcsplan.check.rtl.words import NO_RETURN, STILL_NO_RETURN
 from gcsplan.cli.console import rows_table, say
 from gcsplan.cli.screens import aside, console
 from gcsplan.figures import raised
 from gcsplan.mavlink.mission.return_altitude import setting
-from gcsplan.units import Reach, Unit, Units, in_units
+from gcsplan.notes.note import Wording
+from gcsplan.units import Reach, Unit, Units
 
 if TYPE_CHECKING:
     from gcsplan.check.rtl.verdict import WayHome
@@ -47,7 +47,7 @@ def say_homes(homes: Mapping[str, WayHome], units: Units) -> None:
     for (autopilot, best_m), words in known.items():
         if best_m is not None:
             say(f"{words} {unit.symbol} above home: {setting(autopilot, best_m)}")
-    say_warnings(homes, units)
+    say_warnings(homes, Wording(units))
 
 
 def _return_at(home: WayHome, unit: Unit) -> str:
@@ -64,22 +64,22 @@ def _to_set(home: WayHome, unit: Unit) -> str:
     return unit.stated(home.set_rel_home_m, *([] if same else [raised]))
 
 
-def say_home(home: WayHome, units: Units) -> None:
+def say_home(home: WayHome, wording: Wording) -> None:
     """Print the rows of one way home; of many stretches the first `MOST_ROWS`."""
-    say(f"way home: {in_units(home.headline, units)}")
+    say(f"way home: {home.headline.text(wording)}")
     seen: dict[str, int] = {}
-    rows = home.rows()
-    for label, words in rows:
-        seen[label] = seen.get(label, 0) + 1
-        bad = label in (NO_RETURN, STILL_NO_RETURN)
-        if seen[label] <= MOST_ROWS:
-            console.print(f"  {label}: {in_units(words, units)}", style="red" if bad else None, markup=False)
+    for row in home.rows():
+        seen[row.label] = seen.get(row.label, 0) + 1
+        bad = row.about in ("no_return", "still_no_return")
+        if seen[row.label] <= MOST_ROWS:
+            text = f"  {row.label}: {row.note.text(wording)}"
+            console.print(text, style="red" if bad else None, markup=False)
     for label, count in seen.items():
         if count > MOST_ROWS:
             say(f"  {label}: … and {count - MOST_ROWS} more (all of them: --report, --json)")
 
 
-def say_warnings(homes: Mapping[str, WayHome | None], units: Units) -> None:
+def say_warnings(homes: Mapping[str, WayHome | None], wording: Wording) -> None:
     """Print a headline for each vehicle without a safe return; the path's own verdict stands elsewhere."""
-    for line in warnings(homes):
-        aside.print(f"warning: {in_units(line, units)}", style="bold yellow", markup=False)
+    for line in warnings(homes, wording):
+        aside.print(f"warning: {line}", style="bold yellow", markup=False)

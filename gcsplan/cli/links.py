@@ -83,6 +83,7 @@ def upload(
     from gcsplan.cli.home_words import say_warnings
     from gcsplan.cli.verdict_table import verdict_table
     from gcsplan.export.outdir import require_settled, steady
+    from gcsplan.notes.note import Wording
     from gcsplan.sim.vehicle.server import loopback_fleet
     from gcsplan.units import units_of
 
@@ -108,27 +109,28 @@ def upload(
         with steady(check_sites.split_name(file)[1] for file in files):
             checked = checking.check_files(source, files, returns=check_sites.Returns(way_home, require_way_home))
         if not as_json:
+            wording = Wording(units_of(units))
             for c in checked:
-                say_notes(c.notes)
+                say_notes(c.notes, wording)
                 name = f"{c.file} as {c.vehicle.name}"
-                verdict_table(name, c.verdict, c.way_home, units=units_of(units), energy=c.vehicle.energy)
+                verdict_table(name, c.verdict, c.way_home, wording=wording, energy=c.vehicle.energy)
         verdicts = {c.vehicle.name: c.verdict for c in checked}
         require_passing(verdicts, allow_unjudged=allow_unjudged)
         homes = {c.vehicle.name: c.way_home for c in checked}
         returns.require(homes, required=returns.is_required(source, require_way_home))
         if not as_json:
-            say_warnings(homes, units_of(units))
+            say_warnings(homes, Wording(units_of(units)))
         jobs = uploads.jobs_of_files(source, checked, to)
         if fence or fence_infinite:
             jobs, fence_notes = fencing.with_fences(jobs, infinite=fence_infinite)
-            say_notes_of(fence_notes)
+            say_notes_of(fence_notes, Wording(units_of(units)))
     else:
         if len(files) > 1:
             raise UsageError("--unchecked takes one FILE, for the vehicle --sysid; send the others one by one")
         require_settled([check_sites.split_name(files[0])[1]])
         job, notes = uploads.unchecked_job(files[0], to, sysid or 1)
         jobs = [job]
-        say_notes(notes)
+        say_notes(notes, Wording(units_of(units)))
     names = [job.name for job in jobs]
     with talking(names), transfer_progress(names) as moved_on:
         results = uploads.run_jobs(jobs, options, moved_on, simulator=loopback_fleet)

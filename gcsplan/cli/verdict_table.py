@@ -20,7 +20,8 @@ from gcsplan.cli.console import (
     verdict_cell,
 )
 from gcsplan.cli.screens import console
-from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Units, charge, duration, in_units
+from gcsplan.notes.note import Wording
+from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Units, charge, duration
 
 if TYPE_CHECKING:
     from gcsplan.check.rtl.verdict import WayHome
@@ -28,14 +29,23 @@ if TYPE_CHECKING:
     from gcsplan.vehicle import Energy
 
 
+IN_METRES = Wording(METRIC)
+
+
 def verdict_table(
-    name: str, verdict: Verdict, home: WayHome | None = None, *, units: Units = METRIC, energy: Energy | None = None
+    name: str,
+    verdict: Verdict,
+    home: WayHome | None = None,
+    *,
+    wording: Wording = IN_METRES,
+    energy: Energy | None = None,
 ) -> None:
     """Print what was found, then one row for each item that is flown, and for each time that a jump leads to it."""
+    units = wording.units or METRIC
     title = f"[bold]{escape(name)}[/]  {verdict_cell(verdict.safe, home, units)}"
     if verdict.findings or verdict.not_judged:
         console.print(title)
-        console.print(in_units(verdict.describe(), units), style="red" if verdict.findings else "yellow", markup=False)
+        console.print(verdict.describe(wording), style="red" if verdict.findings else "yellow", markup=False)
         title = ""
     height, near = units.height, units.distance
     columns = [("item", True), ("", False), (f"leg {units.leg.symbol}", True), (f"AMSL {height.symbol}", True),
@@ -43,7 +53,7 @@ def verdict_table(
                ("climb °", True), (f"nearest zone {near.symbol}", True), ("energy kJ", True),
                ("time", True)]  # fmt: skip
     bad = {f.seq for f in verdict.findings}
-    items = list(by_item(verdict.legs))
+    items = [item for item, _ in by_item(verdict.legs)]
     rows = [
         (
             str(item.seq), item.kind, number(item.length_m, 0, units.leg), number(item.end[2], 1, height),
@@ -76,7 +86,7 @@ def verdict_table(
         else:
             say(", ".join([flight, *used]))
         say_heights(verdict, units)
-    say_notes([str(note) for note in verdict.notes])
+    say_notes(verdict.notes, wording)
 
 
 def say_heights(verdict: Verdict, units: Units) -> None:

@@ -5,10 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from gcsplan.notes import battery_texts, fleet_texts, flight_texts, plan_texts, rehearsal_texts, upload_texts
+from gcsplan.notes import (
+    battery_texts,
+    finding_texts,
+    fleet_texts,
+    flight_texts,
+    plan_texts,
+    rehearsal_texts,
+    return_texts,
+    site_texts,
+    turn_texts,
+    upload_texts,
+)
 
 TEXTS: Mapping[str, str] = MappingProxyType({
     code: text
-    for room in (battery_texts, fleet_texts, flight_texts, plan_texts, rehearsal_texts, upload_texts)
+    for room in (
+        battery_texts, finding_texts, fleet_texts, flight_texts, plan_texts, rehearsal_texts, return_texts,
+        site_texts, turn_texts, upload_texts,
+    )
     for code, text in room.TEXTS.items()
 })  # fmt: skip

@@ -7,6 +7,7 @@ A sentence of the catalogue names the data by fields of ``str.format``, each wit
     {low_m:height.1 down}       rounded down; also ``up``, ``trimmed`` (no trailing zeros) and ``bare`` (no unit)
     {max_agl_m:height}          a value that was given, with the digits it has
     {length_m:reach}            in kilometres if it is long
+    {climb_deg:angle.1 up}      an angle in degrees
     {left_s:seconds} {used_j:joules}
     {count} {count:item|items}  the first word for 1 and True, else the second; of a list its length decides
     {share:.1f} {zones}         anything else is formatted as Python does; a list is joined by commas
@@ -15,18 +16,19 @@ A sentence of the catalogue names the data by fields of ``str.format``, each wit
     {key:max_agl_m}             what the reader types for a key of the mission file: the key, or an option
 
 The place stands around the sentence by itself, unless the sentence names it: a note on an item begins with
-``item 5: ``, one whose data have a ``file``, a ``place`` in it or a ``vehicle`` with that, and one with ``zones`` ends
-with them.
+``item 5: ``, with ``way`` among its data, what is flown for the item, with ``item 5 (cruise): ``; one whose data have a
+``file``, a ``place`` in it or a ``vehicle`` with that, and one with ``zones`` ends with them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from string import Formatter
 from typing import Any, TypeAlias, get_args
 
+from gcsplan.figures import floored, raised
 from gcsplan.notes.catalogue import TEXTS
 from gcsplan.units import Joules, Kind, Quantity, Reach, Rounding, Seconds, Symbol, Units, in_units
 
@@ -71,12 +73,19 @@ class Note:
         self.code, self.item, self.data = code, item, data
 
     def text(self, wording: Wording = IN_FILES, *, placed: bool = True) -> str:
-        """The sentence. ``placed``: with the item before it; without where the item's number stands elsewhere."""
+        """The sentence. ``placed``: with the item before it; without where the item's number and way stand elsewhere.
+
+        A ``way`` that is a note says more than the kind of the stretch, so it stands before the sentence anyway.
+        """
         template = TEXTS[self.code]
         named = {name for _, name, _ in parts_of(template)}
         before = "".join(f"{self.data[place]}: " for place in BEFORE if place in self.data and place not in named)
+        way = self.data.get("way")
+        shown = "" if way is None else f"({_shown(way, '', wording)})"
         if placed and self.item is not None and "item" not in named:
-            before += f"item {self.item}: "
+            before += f"item {self.item} {shown}: " if shown else f"item {self.item}: "
+        elif not placed and isinstance(way, Note):
+            before += f"{shown}: "
         behind = (
             "" if "zones" in named or not self.data.get("zones") else f": {_shown(self.data['zones'], '', wording)}"
         )
@@ -183,9 +192,12 @@ def _shown(value: Any, spec: str, wording: Wording) -> str:
     kind, *how = spec.split() or [""]
     name, _, decimals = kind.partition(".")
     if name in KINDS:
-        rounding: Rounding = "down" if "down" in how else "up" if "up" in how else "near"
-        places = int(decimals) if decimals else None
-        return Quantity(value, name, places, rounding, "trimmed" in how, "bare" in how).text(wording.units)  # type: ignore[arg-type]
+        exactly = int(decimals) if decimals else None
+        return Quantity(value, name, exactly, _rounding(how), "trimmed" in how, "bare" in how).text(wording.units)  # type: ignore[arg-type]
+    if name == "angle":
+        rounding, places = _rounding(how), int(decimals or 0)
+        degrees = floored(value, places) if rounding == "down" else raised(value, places) if rounding == "up" else value
+        return f"{degrees:.{places}f} °"
     if name == "reach":
         return Reach(value).text(wording.units)
     if name == "seconds":
@@ -193,6 +205,10 @@ def _shown(value: Any, spec: str, wording: Wording) -> str:
     if name == "joules":
         return Joules(value).text(wording.units)
     return format(value, spec)
+
+
+def _rounding(how: Sequence[str]) -> Rounding:
+    return "down" if "down" in how else "up" if "up" in how else "near"
 
 
 def _plain(value: Datum) -> Any:

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from gcsplan import __version__
 from gcsplan.figures import counted
 from gcsplan.mavlink.mission.return_altitude import setting
+from gcsplan.notes.note import told
 from gcsplan.report.fleet_view import motions_of, separation_words
 from gcsplan.report.marks import Mark, marks_html
 from gcsplan.report.markup import energy, esc, greatest, least, num, place, plain, stated, steepest, table
@@ -65,11 +66,13 @@ def _shown(page: Page) -> list[tuple[int, Subject]]:
 
 def _problems(page: Page) -> str:
     """What is broken and what was not judged, the first of each."""
-    found = [f"{s.name}: {in_units(f.message, page.units)}" for s in page.subjects for f in s.verdict.findings]
+    found = [f"{s.name}: {f.note.text(s.wording(page.units))}" for s in page.subjects for f in s.verdict.findings]
     found += [f"{name}: no mission, left out: {why}" for name, why in page.left_out]
     found += [in_units(text, page.units) for text in page.rehearsed.violations] if page.rehearsed is not None else []
     unjudged = [
-        f"{s.name}: not judged: {in_units(what, page.units)}" for s in page.subjects for what in s.verdict.not_judged
+        f"{s.name}: not judged: {told(what, s.wording(page.units))}"
+        for s in page.subjects
+        for what in s.verdict.not_judged
     ]
     out = [*found[:MOST_FINDINGS], *unjudged[:MOST_NOTES]]
     rest = len(found) + len(unjudged) - len(out)
@@ -160,11 +163,11 @@ def _way_home(s: Subject, units: Units) -> Iterator[tuple[str, str]]:
     if home is None:
         yield "way home", "not judged"
         return
-    yield "way home", esc(_short(in_units(home.headline, units), MESSAGE))
-    if home.set_rel_home_m is not None:
+    yield "way home", esc(_short(home.headline.text(s.wording(units)), MESSAGE))
+    if home.set_rel_home_m is not None and home.then is not None:
         yield "to set", esc(setting(home.autopilot, home.set_rel_home_m))
         points = f"with {counted(len(home.rally), 'rally point')} on board: " if home.rally else ""
-        yield "what that leaves", esc(_short(points + in_units(home.then, units), MESSAGE))
+        yield "what that leaves", esc(_short(points + home.then.text(s.wording(units)), MESSAGE))
 
 
 def _rally(page: Page, shown: Sequence[tuple[int, Subject]]) -> str:

@@ -8,8 +8,8 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.check.rtl.verdict import WayHome
-from gcsplan.check.rtl.words import NO_RETURN, NOT_JUDGED, STILL_NO_RETURN
 from gcsplan.figures import counted
+from gcsplan.notes.note import Wording
 from gcsplan.report.chart import chart_html
 from gcsplan.report.markup import at_least, between, energy, esc, num, place, stated, table, tools
 from gcsplan.report.plan_view import COLOURS
@@ -17,7 +17,7 @@ from gcsplan.report.profile_view import along_axes
 from gcsplan.report.samples import Line
 from gcsplan.report.shown import only_some
 from gcsplan.report.subject import Page, Subject
-from gcsplan.units import Units, in_units
+from gcsplan.units import METRIC
 
 TALL = 0.3
 
@@ -28,7 +28,7 @@ MOST_LINES = 4
 def home_lines(page: Page) -> str:
     """Lines for the page's head on ways home that are unsafe or not judged; one line for all if there are many."""
     several = len(page.subjects) > 1
-    lines = [(s, line) for s in page.subjects if (line := _home_line(s, several, page.units))]
+    lines = [(s, line) for s in page.subjects if (line := _home_line(s, several, s.wording(page.units)))]
     if len(lines) <= MOST_LINES:
         return "".join(line for _, line in lines)
     names = ", ".join(esc(s.name) for s, _ in lines[:MOST_LINES])
@@ -36,16 +36,16 @@ def home_lines(page: Page) -> str:
     return f'<p class="bare bad">{text}: see <a href="#home">the way home</a></p>'
 
 
-def _home_line(subject: Subject, several: bool, units: Units) -> str:
+def _home_line(subject: Subject, several: bool, wording: Wording) -> str:
     """The headline for the page's head if the way home is unsafe or not judged; empty otherwise."""
     home = subject.home
     if home is None or home.safe is True:
         return ""
     who = f"{esc(subject.name)}: " if several else ""
-    cure = f": {esc(in_units(home.advice, units))}" if home.advice else ""
+    cure = f": {esc(home.advice.text(wording))}" if home.advice is not None else ""
     bad = " bad" if home.safe is False else ""
     see = 'see <a href="#home">the way home</a>'
-    return f'<p class="bare{bad}"><b>{who}{esc(in_units(home.headline, units))}</b>{cure}; {see}</p>'
+    return f'<p class="bare{bad}"><b>{who}{esc(home.headline.text(wording))}</b>{cure}; {see}</p>'
 
 
 def home_html(page: Page, lines: Sequence[Line | None], charts: dict[str, object], full: frozenset[int]) -> str:
@@ -54,7 +54,7 @@ def home_html(page: Page, lines: Sequence[Line | None], charts: dict[str, object
     for i in sorted(full):
         subject = page.subjects[i]
         if subject.home is not None:
-            parts.append(_one(subject, subject.home, lines[i], i, charts, page.units, open_=not parts))
+            parts.append(_one(subject, subject.home, lines[i], i, charts, subject.wording(page.units), open_=not parts))
     if not parts:
         return ""
     head = '<section id="home"><h2>The way home after a failsafe</h2>'
@@ -62,27 +62,30 @@ def home_html(page: Page, lines: Sequence[Line | None], charts: dict[str, object
 
 
 def _one(
-    subject: Subject, home: WayHome, line: Line | None, index: int, charts: dict[str, object], units: Units, *,
+    subject: Subject, home: WayHome, line: Line | None, index: int, charts: dict[str, object], wording: Wording, *,
     open_: bool,
 ) -> str:  # fmt: skip
     chart = ""
     if line is not None and home.profile:
         name = f"home-{index}"
-        chart = tools(name) + _chart(name, subject, home, line, index, charts, units) + _legend(home)
-    listed = "".join(f"<li>{esc(n)}</li>" for n in (*(in_units(w, units) for w in home.not_judged), *home.notes))
-    headline = esc(in_units(home.headline, units))
+        chart = tools(name) + _chart(name, subject, home, line, index, charts, wording) + _legend(home)
+    in_si = Wording(options=wording.options)
+    said = [*(note.text(wording) for note in home.not_judged), *(note.text(in_si) for note in home.notes)]
+    listed = "".join(f"<li>{esc(text)}</li>" for text in said)
+    headline = esc(home.headline.text(wording))
     return (
         f"<details{' open' if open_ else ''}><summary>{esc(subject.name)}: {headline}</summary>"
-        f"{chart}{_facts(home, units)}{_stretches(subject, home, units)}{_battery(subject, home)}"
+        f"{chart}{_facts(home, wording)}{_stretches(subject, home, wording)}{_battery(subject, home)}"
         + (f"<ul>{listed}</ul>" if listed else "")
         + "</details>"
     )
 
 
-def _facts(home: WayHome, units: Units) -> str:
-    rows = [(a, in_units(words, units)) for a, words in home.rows()]
-    listed = [(esc(a), esc(words)) for a, words in rows if a not in (NO_RETURN, NOT_JUDGED, STILL_NO_RETURN)]
-    left = "".join(f"<li>{esc(words)}</li>" for a, words in rows if a == STILL_NO_RETURN)
+def _facts(home: WayHome, wording: Wording) -> str:
+    rows = [(row.about, esc(row.label), esc(row.note.text(wording))) for row in home.rows()]
+    elsewhere = ("no_return", "not_judged", "still_no_return")
+    listed = [(label, text) for about, label, text in rows if about not in elsewhere]
+    left = "".join(f"<li>{text}</li>" for about, _, text in rows if about == "still_no_return")
     title = f"No safe return even so: {counted(len(home.left), 'stretch', 'stretches')}"
     folded = f"<details><summary>{title}</summary><ul>{left}</ul></details>" if left else ""
     caption = f"Return of {esc(home.vehicle)}, judged from every point of its path"
@@ -90,8 +93,9 @@ def _facts(home: WayHome, units: Units) -> str:
 
 
 def _chart(
-    name: str, subject: Subject, home: WayHome, line: Line, index: int, charts: dict[str, object], units: Units
+    name: str, subject: Subject, home: WayHome, line: Line, index: int, charts: dict[str, object], wording: Wording
 ) -> str:
+    units = wording.units or METRIC
     x = np.array([(p.from_m, p.to_m) for p in home.profile]).ravel()
     clear, legal = (
         np.repeat([np.nan if v is None else v for v in values], 2)
@@ -108,9 +112,7 @@ def _chart(
     for s in home.unsafe:
         ends = [s.from_m, max(s.to_m, s.from_m + 0.002 * long)]
         shapes.append(
-            axes.area(
-                ends, [-np.inf, -np.inf], [np.inf, np.inf], "nowhere", f"no safe return: {in_units(s.why, units)}"
-            )
+            axes.area(ends, [-np.inf, -np.inf], [np.inf, np.inf], "nowhere", f"no safe return: {s.why.text(wording)}")
         )
     shapes += [
         axes.line(x, legal, "legal"), axes.line(x, clear, "clear"),
@@ -151,14 +153,15 @@ def _numbers(x: Floats, clear: Floats, legal: Floats, amsl: Floats, level: float
     }  # fmt: skip
 
 
-def _stretches(subject: Subject, home: WayHome, units: Units) -> str:
+def _stretches(subject: Subject, home: WayHome, wording: Wording) -> str:
+    units = wording.units or METRIC
     rows, marks = [], []
     for kind, stretches in (("no safe return", home.unsafe), ("outside a limit", home.irregular)):
         for s in stretches:
             rows.append(
                 (
-                    esc(s.items), kind, between(s.from_m, s.to_m, units.far),
-                    esc(in_units(s.why, units)),
+                    esc(str(s.items)), kind, between(s.from_m, s.to_m, units.far),
+                    esc(s.why.text(wording)),
                     place(*s.obstacle[:2]) + f", {num(s.obstacle[2], 0, units.amsl)}" if s.obstacle else "–",
                     at_least(s.lowest_rel_home_m, 1, units.height) if s.lowest_rel_home_m is not None else "none",
                 )

@@ -15,7 +15,7 @@ import numpy as np
 from gcsplan import __version__
 from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.figures import steepened
-from gcsplan.notes.note import Said
+from gcsplan.notes.note import Said, Wording, told
 from gcsplan.report import tables
 from gcsplan.report.briefing import briefing_html
 from gcsplan.report.document import document
@@ -143,8 +143,8 @@ def _verdict(page: Page) -> tuple[str, str, str, str]:
 
 def _header(page: Page) -> str:
     kind, sign, word, words = _verdict(page)
-    wrong = [(s, in_units(f.message, page.units)) for s in page.subjects for f in s.verdict.findings]
-    wrong += [(s, f"not judged: {in_units(what, page.units)}") for s in page.subjects for what in s.verdict.not_judged]
+    wrong = [(s, f.note.text(s.wording(page.units))) for s in page.subjects for f in s.verdict.findings]
+    wrong += [(s, f"not judged: {text}") for s, text in _unjudged(page)]
     several = len(page.subjects) > 1
     listed = "".join(f"<li>{f'<b>{esc(s.name)}</b>: ' if several else ''}{esc(text)}</li>" for s, text in wrong)
     said = "" if several else "".join(f"<b>{esc(in_units(s.words, page.units))}.</b> " for s in page.subjects)
@@ -299,15 +299,18 @@ def _details(
     return parts
 
 
+def _unjudged(page: Page) -> list[tuple[Subject, str]]:
+    return [(s, told(what, s.wording(page.units))) for s in page.subjects for what in s.verdict.not_judged]
+
+
 def _end(page: Page) -> str:
-    notes = [(n, "") for n in page.notes] + [(n, s.name) for s in page.subjects for n in s.notes]
+    notes = [(told(n, Wording(page.units)), "") for n in page.notes]
+    notes += [(told(n, s.wording(page.units)), s.name) for s in page.subjects for n in s.notes]
     several = len(page.subjects) > 1
     listed = "".join(
-        f"<li>{f'<b>{esc(who)}</b>: ' if who and several else ''}{esc(in_units(n, page.units))}</li>"
-        for n, who in dict.fromkeys(notes)
+        f"<li>{f'<b>{esc(who)}</b>: ' if who and several else ''}{esc(n)}</li>" for n, who in dict.fromkeys(notes)
     )
-    unjudged = [(s.name, in_units(what, page.units)) for s in page.subjects for what in s.verdict.not_judged]
-    missing = "".join(f"<li><b>{esc(who)}</b>: {esc(what)}</li>" for who, what in unjudged)
+    missing = "".join(f"<li><b>{esc(s.name)}</b>: {esc(text)}</li>" for s, text in _unjudged(page))
     inputs = tables.inputs_table(page.inputs, page.facts, page.units)
     return (
         f'<section id="sent"><h2>Upload</h2>{tables.upload_table(page)}</section>'

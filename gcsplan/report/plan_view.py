@@ -8,13 +8,12 @@ from collections.abc import Container, Sequence
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.report.marks import Mark, marks_html
 from gcsplan.report.markup import at_least, esc, least, num, place, stated
 from gcsplan.report.relief import TINTS, Extent, Relief, nice_step, tints
 from gcsplan.report.samples import Line, distance_m
 from gcsplan.report.subject import Page, Subject
-from gcsplan.units import Unit, Units, duration, in_units
+from gcsplan.units import Unit, Units, duration
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Zone
 
@@ -49,7 +48,7 @@ def map_html(
         f'<path class="contour" d="{relief.contours}"/>' if relief.contours else "",
         *(_zone_svg(zone, i, extent, page.units) for i, zone in enumerate(zones)),
         *(
-            _no_return_svg(s.home, line, extent, page.units)
+            _no_return_svg(s, line, extent, page.units)
             for s, line in zip(page.subjects, lines, strict=True)
             if line is not None
         ),
@@ -187,15 +186,15 @@ def _track_marks(
     return marks + [Mark(*_part(extent, e, n), kind, many + label, tip, 0) for e, n, kind, label, tip in places]
 
 
-def _no_return_svg(home: WayHome | None, line: Line, extent: Extent, units: Units) -> str:
+def _no_return_svg(subject: Subject, line: Line, extent: Extent, units: Units) -> str:
     """Lines along the parts of the track from which the way home is not safe."""
-    paths = []
+    home, paths = subject.home, []
     for s in home.unsafe if home is not None else ():
         mine = np.flatnonzero((line.run_m >= s.from_m) & (line.run_m <= s.to_m))
         if len(mine) > 1:
             xy = extent.units(line.east_m[mine], line.north_m[mine])
             points = " ".join(f"{x:.1f},{y:.1f}" for x, y in xy)
-            why = esc(in_units(s.why, units))
+            why = esc(s.why.text(subject.wording(units)))
             paths.append(f'<polyline class="nohome" points="{points}"><title>no safe return: {why}</title></polyline>')
     return "".join(paths)
 
@@ -210,7 +209,7 @@ def _home_places(subject: Subject, world: World, units: Units) -> list[tuple[flo
     battery = home.battery if home is not None else None
     if battery is not None and battery.point_of_no_return is not None:
         e, n = (float(v) for v in world.frame.to_plane(*battery.point_of_no_return[:2]))
-        found.append((e, n, "broken", "no return", f"{subject.name}: {in_units(battery.describe(), units)}"))
+        found.append((e, n, "broken", "no return", f"{subject.name}: {battery.note.text(subject.wording(units))}"))
     return found
 
 
@@ -241,7 +240,7 @@ def tight_places(subject: Subject, line: Line, world: World, units: Units) -> li
                     n,
                     "broken",
                     f"item {f.seq}: {f.kind.replace('_', ' ')}",
-                    f"{subject.name}: {in_units(f.message, units)}",
+                    f"{subject.name}: {f.note.text(subject.wording(units))}",
                 )
             )
     return [t for t in found if math.isfinite(t[0]) and math.isfinite(t[1])]

@@ -13,7 +13,7 @@ from gcsplan.report.markup import greatest, least, num, place, stated
 from gcsplan.report.plan_view import COLOURS, zone_heights
 from gcsplan.report.samples import Line, Passage, level_amsl
 from gcsplan.report.subject import Subject
-from gcsplan.units import Units, in_units
+from gcsplan.units import Units
 from gcsplan.world.world import World
 
 TALL = 0.38
@@ -158,7 +158,8 @@ def _broken(subject: Subject, line: Line, axes: Axes, world: World, units: Units
             e, n = (float(v) for v in world.frame.to_plane(f.lat_deg, f.lon_deg))
             away = np.hypot(np.hypot(line.east_m[mine] - e, line.north_m[mine] - n), line.amsl_m[mine] - f.amsl_m)
             x = line.run_m[int(mine[int(away.argmin())])]
-            marks.append(axes.mark(x, f.amsl_m, "broken", f.kind.replace("_", " "), in_units(f.message, units), 0))
+            text = f.note.text(subject.wording(units))
+            marks.append(axes.mark(x, f.amsl_m, "broken", f.kind.replace("_", " "), text, 0))
     return marks
 
 

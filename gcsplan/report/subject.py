@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 from gcsplan.check.rtl.verdict import WayHome
@@ -13,8 +13,8 @@ from gcsplan.fleet.arrival import Slot
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.separation import Separation
 from gcsplan.mavlink.mission.parameter_list import Setting
-from gcsplan.notes.note import Said
-from gcsplan.units import METRIC, Units, UnitText
+from gcsplan.notes.note import Note, Said, Wording
+from gcsplan.units import METRIC, Units
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
 
@@ -39,6 +39,7 @@ class Subject:
     ``flown`` is what it flew in a rehearsal, from that track alone. ``leaves``: it is gone where its motion ends.
     ``home`` is the way home from every point, if it was judged. ``upload`` holds the keys of ``upload.json``, None if
     nothing was sent, ``warnings`` what was said of it. ``settings``: the parameters that its mission was judged with.
+    ``typed``: the options that the reader types, by their keys in a mission file; empty if he has one.
     """
 
     name: str
@@ -54,6 +55,11 @@ class Subject:
     flown: TimedPath | None = None
     leaves: bool = False
     settings: tuple[Setting, ...] = ()
+    typed: Mapping[str, str] = field(default_factory=dict)
+
+    def wording(self, units: Units | None = None) -> Wording:
+        """How the reader is spoken to, in ``units``, or in SI."""
+        return Wording(units, self.typed)
 
     @property
     def depart_s(self) -> float:
@@ -71,7 +77,7 @@ class Subject:
         return self.home is None or self.home.safe is not True
 
     @property
-    def words(self) -> UnitText:
+    def words(self) -> Note:
         """The verdict in a sentence."""
         return verdict_words(self.verdict.safe, self.home)
 
@@ -149,6 +155,8 @@ class CheckedFile(Protocol):
     def verdict(self) -> Verdict: ...
     @property
     def notes(self) -> tuple[Said, ...]: ...
+    @property
+    def typed(self) -> Mapping[str, str]: ...
 
 
 def page_of_check(
@@ -170,7 +178,7 @@ def page_of_check(
         Subject(
             c.vehicle.name if names.count(c.vehicle.name) == 1 else str(c.file),
             c.verdict, c.vehicle, None, tuple(dict.fromkeys((*c.notes, *c.verdict.notes))),
-            home=homes[i] if i < len(homes) else None,
+            home=homes[i] if i < len(homes) else None, typed=c.typed,
         )
         for i, c in enumerate(checked)
     )  # fmt: skip

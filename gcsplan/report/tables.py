@@ -66,9 +66,9 @@ def legs_table(subject: Subject, units: Units) -> str:
     battery = subject.vehicle.energy.battery_j
     clock = subject.verdict.clock_s(subject.slot)
     used, flown, rows, marks = 0.0, 0, [], []
-    for item in by_item(subject.verdict.legs):
+    for item, stretches in by_item(subject.verdict.legs):
         used += item.energy_j * item.times
-        flown += item.stretches
+        flown += stretches
         name = f"{item.seq} {item.kind}" + (f" ×{THIN}{item.times}" if item.times > 1 else "")
         away = least(item.zone_clearance_m, 0, units.distance)
         near = f"{away} {esc(item.nearest_zone)}" if item.nearest_zone else "–"

@@ -264,7 +264,7 @@ class Tally:
             if (late := lateness(part, trace)) is not None:
                 self.breach("late", (trace.name,), *late)
             for f in judged.findings:
-                self.breach(f.kind, (trace.name,), f.message, f.by, f.zone)
+                self.breach(f.kind, (trace.name,), f.note, f.by, f.zone)
         self._order(traces)
         self._separation(traces)
 

@@ -272,7 +272,7 @@ def test_the_document_is_written_as_one_would_be(run: Any, files: list[str], wor
     for some in (files, files[:1], files[7:8]):
         _, out, _ = run(*some, *world, "--json")
         assert json.dumps(json.loads(out), indent=2, ensure_ascii=False) + "\n" == out
-    assert list(json.loads(out)) == ["schema", "name", "inputs", "notes", "verdicts", "summary", "error"]
+    assert list(json.loads(out)) == ["schema", "name", "inputs", "notes", "notes_data", "verdicts", "summary", "error"]
 
 
 @pytest.mark.parametrize("option", ["--json", "--json-lines", "-q"])

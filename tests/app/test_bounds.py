@@ -17,7 +17,7 @@ from gcsplan.check.verdict import Verdict
 from gcsplan.errors import GcsplanError, NoMission
 from gcsplan.mavlink.build.multirotor import SHORT_LEG_M
 from gcsplan.mavlink.mission import commands as cmd
-from tests.support.said import codes
+from tests.support.noted import codes
 
 ERRORS = {"min_agl_m": 30, "horizontal_clearance_m": 20, "track_error_m": 3, "altitude_error_m": 5}
 NONE = {"min_agl_m": 30, "horizontal_clearance_m": 0, "track_error_m": 0, "altitude_error_m": 0}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,8 @@ from gcsplan.app.checking import Batch, check_with_options, finding_lines
 from gcsplan.cli import main as cli
 from gcsplan.errors import InputError
 from gcsplan.mission_file.from_options import WorldOptions
+from gcsplan.notes.catalogue import TEXTS
+from gcsplan.notes.note import fields_of
 from gcsplan.vehicle import Autopilot
 from tests.support import corpus
 from tests.support.corpus import Case
@@ -384,6 +387,45 @@ def test_the_way_home_is_judged_where_that_is_asked_for(run: Any, folder: Path, 
     assert "way_home" in json.loads(out)["error"]["message"]
 
 
+def said_and_data(value: Any) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Every sentence of a document that has its data beside it, with them."""
+    if isinstance(value, dict):
+        for key, said in value.items():
+            if f"{key}_data" in value:
+                data = value[f"{key}_data"]
+                pairs = zip(said, data, strict=True) if isinstance(said, list) else [(said, data)]
+                yield from ((sentence, of) for sentence, of in pairs if of is not None)
+        if "message" in value and "seq" in value:
+            yield value["message"], value
+        for each in value.values():
+            yield from said_and_data(each)
+    elif isinstance(value, list):
+        for each in value:
+            yield from said_and_data(each)
+
+
+@pytest.mark.parametrize("form", ["--json", "--json-lines"])
+def test_each_sentence_of_json_has_its_code_and_data(run: Any, folder: Path, world: list[str], form: str) -> None:
+    files = [file_of(folder, name) for name in ("round", "jump_for_ever", "low_take_off")]
+    _, out, _ = run(*files, *world, "--way-home", form)
+    found = [
+        pair for line in ([out] if form == "--json" else out.splitlines()) for pair in said_and_data(json.loads(line))
+    ]
+    known = {data["code"]: said for said, data in found if data["code"] is not None}
+    assert {"no_ceiling", "jumps_without_end", "items_unreached", "inside_zone", "too_low", "return_fails"} <= set(
+        known
+    )
+    for said, data in found:
+        if data["code"] is not None:
+            fields = fields_of(TEXTS[data["code"]])
+            assert fields <= set(data["data"]), said
+    # Sentences name what was typed; data do not.
+    assert known["no_ceiling"].startswith("--max-agl is not set")
+    assert next(data for _, data in found if data["code"] == "no_ceiling")["data"] == {}
+    low = next(data for _, data in found if data["code"] == "too_low")
+    assert low["data"]["by_m"] == low["by"]
+
+
 def test_without_a_mission_file_the_options_are_named_and_with_one_its_keys(
     run: Any, folder: Path, world: list[str]
 ) -> None:
@@ -392,6 +434,11 @@ def test_without_a_mission_file_the_options_are_named_and_with_one_its_keys(
     assert "write the vehicle's own as --rtl-altitude" in out + err
     assert "above --max-amsl" in out
     assert not re.search(r"rtl_rel_home_m|max_amsl_m|min_agl_m", out + err)
+    run(file, *world, "--max-amsl", "500", "--way-home", "--report", folder / "page.html")
+    page = (folder / "page.html").read_text()
+    assert "above --max-amsl" in page
+    assert "as --rtl-altitude" in page
+    assert not re.search(r"rtl_rel_home_m|max_amsl_m|min_agl_m", page)
     round_trip = corpus.cases()[0].items
     (folder / "back.waypoints").write_text(
         corpus.qgroundcontrol((*round_trip[:-1], replace(round_trip[-1], command=20)))

@@ -23,8 +23,8 @@ from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mission_file import load_mission
 from gcsplan.notes.note import Note
 from gcsplan.units import AVIATION
+from tests.support.noted import one
 from tests.support.paths import MISSIONS
-from tests.support.said import one
 
 # Two vehicles across flat ground whose straight ways cross in the middle at right angles, 1000 m each.
 CROSS: dict[str, Any] = {

@@ -20,7 +20,7 @@ from gcsplan.errors import InputError, UsageError
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mission_file import load_mission
 from tests.app.test_fleet_planning import CROSS
-from tests.support.said import one
+from tests.support.noted import one
 
 NOW = datetime(2026, 3, 1, 12, 0, 0, tzinfo=UTC)
 START = datetime(2026, 3, 1, 23, 59, 0, tzinfo=UTC)

@@ -13,7 +13,7 @@ from gcsplan.app.pipeline import plan
 from gcsplan.bench.everyday.missions import draw
 from gcsplan.mavlink.build.multirotor import SHORT_LEG_M
 from gcsplan.mission_file import load_mission
-from tests.support.said import codes
+from tests.support.noted import codes
 
 
 @pytest.mark.parametrize(("number", "most_m"), [(64, 5425.0), pytest.param(38, 702.0, marks=pytest.mark.slow)])

@@ -42,7 +42,7 @@ NOT_JUDGED = "path safe, return not judged"
     ],
 )
 def test_the_sentence_names_what_was_judged(path: bool | None, home: Any, said: str) -> None:
-    assert verdict_words(path, home) == said
+    assert str(verdict_words(path, home)) == said
 
 
 def test_table_json_kml_and_report_tell_the_same_sentence(capsys: pytest.CaptureFixture[str]) -> None:
@@ -123,5 +123,5 @@ def test_an_advised_return_altitude_above_max_agl_is_told() -> None:
     [home] = homes_of(plan(load_mission(raw))).values()
     assert home.set_rel_home_m is not None
     assert home.set_rel_home_m > 200.0
-    assert "but above max_agl_m (200 m) over home" in home.advice
+    assert "but above max_agl_m (200 m) over home" in str(home.advice)
     assert home.as_dict()["set_above_max_agl"] is True

@@ -32,7 +32,7 @@ from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
 from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 from tests.support.impatient import be_impatient
-from tests.support.said import one
+from tests.support.noted import one
 
 LAT, LON = 46.5, 8.0
 

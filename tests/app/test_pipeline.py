@@ -22,8 +22,8 @@ from gcsplan.mavlink.mission import mission as m
 from gcsplan.mission_file import load_mission
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
+from tests.support.noted import codes, one
 from tests.support.paths import DATA
-from tests.support.said import codes, one
 
 CROSSING: dict[str, Any] = yaml.safe_load((DATA / "crossing.yaml").read_text())
 
@@ -216,7 +216,9 @@ def test_a_plan_with_larger_margins_has_a_bound_under_the_limits_of_the_check(mo
         mission, verdict = real(*args)
         built.append(verdict.length_m)
         seq = mission.first_seq + next(k for k, i in enumerate(mission.items) if i.command == cmd.WAYPOINT)
-        low = Finding(seq, "min_agl", "too low", 0.0, 0.0, 0.0, value=25.0, limit=30.0, by=5.0, unit="m")
+        low = Finding(
+            seq, "min_agl", Note("over_unknown_ground", seq), 0.0, 0.0, 0.0, value=25.0, limit=30.0, by=5.0, unit="m"
+        )
         return mission, replace(verdict, findings=(low,)) if len(built) <= 2 else verdict
 
     monkeypatch.setattr(planning, "built", low_at_first)

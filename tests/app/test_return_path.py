@@ -43,11 +43,12 @@ def planned(**vehicle: Any) -> Plan:
 def test_where_no_altitude_helps_a_path_back_is_proposed() -> None:
     home = homes_of(planned())["uav1"]
     assert home.safe is False
-    assert "return_route: mission writes a return path back along the track" in home.path_back
-    assert "every return safe" in home.path_back
-    assert home.path_back in "\n".join(warnings({"uav1": home}))
-    assert home.as_dict()["path_back"] == home.path_back
-    assert ("instead", home.path_back) in home.rows()
+    assert home.path_back is not None
+    assert home.path_back.code == "path_back_makes_safe"
+    assert str(home.path_back).startswith("return_route: mission writes a return path back along the track")
+    assert str(home.path_back) in "\n".join(warnings({"uav1": home}))
+    assert home.as_dict()["path_back"] == str(home.path_back)
+    assert ("instead", home.path_back) in [(row.label, row.note) for row in home.rows()]
 
 
 def test_the_path_back_is_written_judged_and_makes_every_return_safe() -> None:

@@ -52,8 +52,8 @@ from gcsplan.world.path import Path
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Zone
 from tests.support.effort import draws
+from tests.support.noted import coded, codes, within
 from tests.support.paths import MISSIONS
-from tests.support.said import codes
 from tests.support.worlds import vehicle, world
 
 pytestmark = pytest.mark.xdist_group("wings")  # one process plans the missions, not three
@@ -205,8 +205,8 @@ def test_chords_follow_one_another_and_add_up_to_the_length_of_legs_and_arcs() -
 def test_a_verdict_on_arcs_can_be_safe_and_says_what_it_assumes() -> None:
     verdict = judge(through([(1500.0, 0.0, 80.0), (2500.0, 1000.0, 80.0), (2500.0, 2500.0, 80.0)]), wing(), FLAT)
     assert verdict.safe is True, verdict.describe()
-    assert any("arcs of 100 m" in n and "track_error_m" in n for n in verdict.notes)
-    assert any("heading of 90°" in n for n in verdict.notes)
+    arcs, climb = coded(verdict.notes, "turns_as_arcs"), coded(verdict.notes, "climb_out_straight")
+    assert (arcs.data["radius_m"], climb.data["heading_deg"]) == (100.0, pytest.approx(90.0, abs=0.1))
 
 
 @pytest.mark.first_quick
@@ -293,22 +293,22 @@ def test_without_an_acceptance_radius_the_default_is_taken_and_said() -> None:
     bare = replace(flown.items[1], params=(0.0, 0.0, 0.0, 0.0))
     verdict = judge(replace(flown, items=(flown.items[0], bare, *flown.items[2:])), wing(), FLAT)
     assert verdict.safe is True
-    assert any("WP_RADIUS 90" in n for n in verdict.notes)
+    assert coded(verdict.notes, "arc_begun_by_default").data["radius_m"] == 90.0
 
 
 @pytest.mark.parametrize(
-    ("points", "words"),
+    ("points", "code"),
     [
-        ([(1500.0, 0.0, 80.0), (1500.0, 150.0, 80.0), (3000.0, 150.0, 80.0)], "item 2, 3: arcs of 100 m take 200 m"),
-        ([(1500.0, 0.0, 80.0), (700.0, 20.0, 80.0)], "turns by 179°"),
+        ([(1500.0, 0.0, 80.0), (1500.0, 150.0, 80.0), (3000.0, 150.0, 80.0)], "arcs_too_long"),
+        ([(1500.0, 0.0, 80.0), (700.0, 20.0, 80.0)], "corner_turns_back"),
     ],
 )
 def test_corners_whose_arcs_do_not_fit_are_named_as_not_judged(
-    points: list[tuple[float, float, float]], words: str
+    points: list[tuple[float, float, float]], code: str
 ) -> None:
     verdict = judge(through(points, [100.0] * len(points)), wing(), FLAT)
     assert verdict.safe is None
-    assert any(words in n for n in verdict.not_judged), verdict.not_judged
+    assert code in codes(verdict.not_judged)
 
 
 def test_a_turn_that_needs_too_much_bank_is_not_judged() -> None:
@@ -317,13 +317,13 @@ def test_a_turn_that_needs_too_much_bank_is_not_judged() -> None:
         through([(1500.0, 0.0, 80.0), (1500.0, 2000.0, 80.0)]), replace(wing(), speed_max_m_s=40.0), FLAT
     )  # fmt: skip
     assert slow.safe is True
-    assert any("bank of 58°" in n for n in fast.not_judged)
+    assert coded(fast.not_judged, "arcs_too_banked").data["bank_deg"] == pytest.approx(58.0, abs=0.5)
 
 
 def test_px4_begins_its_turns_where_it_likes_so_its_arcs_are_not_judged() -> None:
     craft = replace(wing(), autopilot=Autopilot.PX4)
     flown = replace(through([(1500.0, 0.0, 80.0), (1500.0, 2000.0, 80.0)]), autopilot=Autopilot.PX4)
-    assert any("the arcs of 100 m" in n for n in judge(flown, craft, FLAT).not_judged)
+    assert "arcs_unread" in codes(judge(flown, craft, FLAT).not_judged)
 
 
 # -- leaving the ground and coming back ------------------------------------------------------------------------------
@@ -353,7 +353,7 @@ def test_a_take_off_without_a_place_leads_towards_the_next_item_and_says_so() ->
     placeless = replace(take_off(), x=0, y=0)
     flight = bent(mission(placeless, at(cmd.LOITER_UNLIM, 0, 2000, 80, 0, 0, 100)), wing())
     assert FLAT.frame.to_plane(*flight.stretches[0].end[:2])[1] > 500.0
-    assert any("towards the item after it" in n for n in flight.notes)
+    assert "climb_out_towards_next" in codes(flight.notes)
 
 
 @pytest.mark.parametrize(
@@ -365,7 +365,7 @@ def test_a_climb_out_is_held_against_the_ground_below_it(place: tuple[int, int],
     verdict = judge(mission(*items), wing(), where)
     assert verdict.safe is safe, verdict.describe()
     if not safe:
-        assert all("climb-out comes too near to the ground" in f.message for f in verdict.findings)
+        assert {(f.note.code, f.note.data["glide"]) for f in verdict.findings} == {("near_ground_on_slant", False)}
 
 
 def test_a_zone_in_the_climb_out_is_a_violation_though_min_agl_is_not() -> None:
@@ -382,7 +382,7 @@ def test_a_glide_is_judged_straight_and_one_that_is_too_steep_is_named() -> None
     assert [f.kind for f in steep.findings] == ["descent"]
     high = judge(mission(take_off(), at(cmd.WAYPOINT, 2000, 0, 80, 0, 1), at(cmd.LAND, 2700, 0, 30)), wing(), FLAT)
     assert high.safe is None
-    assert any("30.0 m below" in n for n in high.not_judged)
+    assert Note("glide_off_ground", 3, off_m=30.0, below=True) in high.not_judged
 
 
 @settings(max_examples=draws(40))
@@ -446,7 +446,7 @@ def test_a_turn_that_the_l1_law_cuts_short_is_judged_wider_than_its_arc() -> Non
     points = [(1500.0, 0.0, 80.0), (1500.0, 2500.0, 80.0)]
     wide = bent(through(points, [255.0, 1.0]), wing(250.0))
     assert max(s.reach_m for s in wide.stretches if s.kind == "cruise") > 20.0
-    assert any("judged wider" in n for n in wide.notes)
+    assert [n.data["wider"] for n in within(coded(wide.notes, "turns_as_arcs")) if n.code == "turns_off_arcs"] == [True]
 
 
 def test_a_pass_by_distance_is_not_judged() -> None:
@@ -454,7 +454,7 @@ def test_a_pass_by_distance_is_not_judged() -> None:
     beyond = replace(flown.items[1], params=(0.0, 100.0, 50.0, 0.0))
     verdict = judge(replace(flown, items=(flown.items[0], beyond, *flown.items[2:])), wing(), FLAT)
     assert verdict.safe is None
-    assert any("50 m past its way point" in n for n in verdict.not_judged)
+    assert coded(verdict.not_judged, "turns_late").data["past_m"] == 50.0
 
 
 def test_a_zone_above_the_slant_is_hit_by_one_that_climbs_steeper() -> None:

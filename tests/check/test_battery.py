@@ -70,7 +70,8 @@ def test_the_point_of_no_return_on_a_straight_way_out() -> None:
     # does not brake.
     assert found.most_j == pytest.approx(160 * R1 + (5000 + 5000 + MORE_M) * R2 + WAITS_J, rel=1e-5)
     assert found.legs[-1].return_j == pytest.approx(5000 * R2 + 2 * 15 * R1 + WAITS_J, rel=1e-5)
-    assert "point of no return at km 2.25" in found.describe()
+    assert found.note.code == "point_of_no_return"
+    assert "point of no return at km 2.25" in str(found.note)
 
 
 def test_a_battery_that_reaches_has_no_point_of_no_return() -> None:
@@ -79,7 +80,7 @@ def test_a_battery_that_reaches_has_no_point_of_no_return() -> None:
     assert found.point_of_no_return is None
     assert found.short == ()
     assert found.most_percent == pytest.approx(100.0 * found.most_j / 2_000_000.0)
-    assert "enough from everywhere" in found.describe()
+    assert found.note.code == "battery_enough"
     assert found.as_dict()["no_return_m"] is None
 
 

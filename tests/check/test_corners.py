@@ -21,10 +21,12 @@ from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.mission_file import load_mission
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Zone
+from tests.support.noted import coded, within
 from tests.support.paths import DATA
 from tests.support.worlds import vehicle, world
 
@@ -79,7 +81,7 @@ def test_px4_takes_its_own_parameter_where_the_item_gives_no_radius() -> None:
     for radius in (0.0, -3.0, math.nan, math.inf):
         one = verdict(around(PX4, radius), near, craft)
         assert one.safe is False, radius
-        assert any("NAV_ACC_RAD 10 m, the default" in n for n in one.notes)
+        assert Note("reached_within_default", 1, radius_m=10.0, read=False) in one.notes
     assert verdict(around(PX4, 2.0), near, craft).safe is True
     read = verdict(around(PX4, 0.0), near, craft, Tuning.of({"NAV_ACC_RAD": 2.0}))
     assert read.safe is True, read.describe()
@@ -97,7 +99,7 @@ def test_arduplane_flying_past_its_way_point_is_not_judged() -> None:
     one = mission(PLANE, at(cmd.WAYPOINT, 1000, 0, 100, 0, 5.0, 40.0), at(cmd.WAYPOINT, 1000, 1000, 100, 0, 5.0))
     found = verdict(one, FLAT)
     assert found.safe is None
-    assert any(words.startswith("item 2: flies 40 m past") for words in found.not_judged)
+    assert Note("turns_late", 2, past_m=40.0) in found.not_judged
 
 
 def test_arducopter_cuts_within_its_own_radius_and_stops_at_a_hold() -> None:
@@ -255,11 +257,11 @@ def test_a_wing_with_a_slower_l1_controller_than_usual_is_judged_wider() -> None
     assert verdict(flown, beside, craft).safe is True
     slow = verdict(flown, beside, craft, Tuning.of({"NAVL1_PERIOD": 30.0}))
     assert {(f.kind, f.zone) for f in slow.findings} == {("zone", "inside")}
-    assert any("NAVL1_PERIOD 30" in note for note in slow.notes)
+    assert [n.data["period_s"] for told in slow.notes for n in within(told) if n.code == "turns_off_arcs"] == [30.0]
     for period_s in (1e6, 1e-6):
         odd = verdict(flown, beside, craft, Tuning.of({"NAVL1_PERIOD": period_s}))
         assert odd.safe is None
-        assert any(f"NAVL1_PERIOD is {period_s:g} s" in words for words in odd.not_judged)
+        assert coded(odd.not_judged, "l1_period_out_of_range").data["period_s"] == period_s
 
 
 def test_a_copters_blended_corners_lie_within_the_widened_legs() -> None:

@@ -8,12 +8,14 @@ from gcsplan.check.judge import judge
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
+from gcsplan.notes.note import Said
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
+from tests.support.noted import coded, codes
 from tests.support.worlds import world
 
 
-def notes(slope: float, error_m: float = 8.0) -> list[str]:
+def notes(slope: float, error_m: float = 8.0) -> list[Said]:
     """Of a landing towards the north on a place 2 km north of home; the ground there falls by ``slope`` northwards."""
     where = world(lambda east, north: 300.0 - slope * (north - 2000.0))
 
@@ -34,14 +36,13 @@ def notes(slope: float, error_m: float = 8.0) -> list[str]:
 
 @pytest.mark.parametrize("slope", [0.0, -0.05, 0.005])
 def test_a_landing_on_the_level_or_uphill_is_not_told(slope: float) -> None:
-    assert not any("downhill" in note for note in notes(slope))
+    assert "lands_downhill" not in codes(notes(slope))
 
 
 def test_a_landing_downhill_is_told_with_where_it_touches_down() -> None:
-    [told] = [note for note in notes(0.06) if "downhill" in note]
+    told = coded(notes(0.06), "lands_downhill")
     # 70 m over 500 m are 14 %: at 100 m it is 14 m high, and within 8 m of the 6 m of ground there.
-    assert "item 3: it lands downhill: " in told
-    assert "(6 %)" in told
-    assert "up to 100 m before its place" in told
-    assert "land on a heading of 180°" in told
-    assert "up to 20 m before" in next(note for note in notes(0.06, 2.0) if "downhill" in note)
+    assert told.item == 3
+    assert told.data["slope_percent"] == pytest.approx(6.0, abs=0.1)
+    assert (told.data["early_m"], coded(notes(0.06, 2.0), "lands_downhill").data["early_m"]) == (100.0, 20.0)
+    assert told.data["uphill_deg"] == pytest.approx(180.0, abs=0.1)

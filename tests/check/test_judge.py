@@ -23,6 +23,7 @@ from gcsplan.world.path import Path
 from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Zone
+from tests.support.noted import coded
 from tests.support.worlds import vehicle, world
 
 HOME_DEG = (36.6, -84.3)
@@ -86,7 +87,7 @@ def test_a_vehicle_that_flies_arcs_is_not_called_safe_on_the_strength_of_its_str
     verdict = verdict_of(world(), HIGH_ENOUGH, replace(vehicle(), turn_radius_m=80.0))
     assert verdict.safe is None
     assert verdict.findings == ()
-    assert any("the arcs of 80 m" in words for words in verdict.not_judged)
+    assert coded(verdict.not_judged, "arcs_unread").data["radius_m"] == 80.0
 
 
 def test_the_altitude_error_is_taken_off() -> None:

@@ -27,10 +27,10 @@ def test_a_zone_whose_clearance_is_kept_is_not_called_broken_for_a_bound_of_its_
     stretch: Any = SimpleNamespace(seq=3)
     (miss,) = [m for m in nearest_misses([stretch], legs, np.zeros(1, np.intp), close, craft, where) if m.zone]
     assert miss.room == 0.0
-    assert ": 33.0 m of 30, 0.0 m to spare beyond the track error, item 3 (" in miss.describe()
+    assert ": 33.0 m of 30, 0.0 m to spare beyond the track error, item 3 (" in str(miss.note)
 
 
 def test_inside_a_zone_no_negative_distance_is_told() -> None:
     miss = Miss("zone", -206.61, -173.61, 30.0, "m", 3, 36.6, -84.3, 579.7, "dam")
     words = "inside zone dam: 173.7 m from its edge, broken by 206.7 m with the track error, item 3 ("
-    assert miss.describe().startswith(words)
+    assert str(miss.note).startswith(words)

@@ -16,6 +16,7 @@ from gcsplan.mavlink.build.order import MARGINS, Order
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.frame import Frame
@@ -24,6 +25,7 @@ from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.terrain_grid import TerrainGrid
 from gcsplan.world.world import World
 from tests.oracles import terrain_grid as oracle
+from tests.support.noted import coded
 from tests.support.worlds import Height, vehicle
 
 
@@ -63,7 +65,7 @@ def test_a_ridge_between_the_posts_is_there_although_the_vehicle_does_not_know_i
     way = ((-2000.0, 0.0), (2000.0, 0.0))
     safe = judge(flown(flat, 125.0, *way), craft, flat)
     assert safe.safe is True
-    assert any("posts every 100 m" in note for note in safe.notes)
+    assert coded(safe.notes, "reads_terrain_on_board").data["spacing_m"] == 100
     verdict = judge(flown(ridge, 125.0, *way), craft, ridge)
     [finding] = [f for f in verdict.findings if f.kind == "min_agl"]
     # 125 m above its own flat ground, less 5 m and 30 m of errors and the ridge, whose top the nodes cut by up to 10 m.
@@ -145,7 +147,7 @@ def test_ground_that_the_vehicle_does_not_get_is_not_flown_over() -> None:
     for north in (-200.0, -100.0, 0.0, 100.0, 500.0, 600.0, 700.0):
         found += judge(flown(where, 130.0, (-1500.0, north), (2000.0, north)), craft, where).findings
     assert {f.kind for f in found} == {"coverage"}
-    assert any("the vehicle's terrain grid does not know" in f.message for f in found)
+    assert "over_ground_unread" in {f.note.code for f in found}
     path = Path(np.array([[-1500.0, 150.0, 430.0], [hole, 150.0, 430.0], [2000.0, 150.0, 430.0]]))
     lat, lon = where.frame.to_degrees(-1500.0, 150.0)
     with pytest.raises(ValueError, match="terrain grid does not know"):
@@ -153,7 +155,7 @@ def test_ground_that_the_vehicle_does_not_get_is_not_flown_over() -> None:
 
 
 def test_margins_never_turn_a_climb_limit_around() -> None:
-    steep = Finding(3, "climb", "", 0.0, 0.0, 0.0, 30.0, 6.0, 24.0, "deg")
+    steep = Finding(3, "climb", Note("over_unknown_ground", 3), 0.0, 0.0, 0.0, 30.0, 6.0, 24.0, "deg")
     assert larger(MARGINS, [steep]).slope == MOST_SLOPE < 1.0
 
 

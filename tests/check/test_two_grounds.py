@@ -23,6 +23,7 @@ from gcsplan.world.path import Path
 from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Zone
+from tests.support.noted import coded
 from tests.support.worlds import vehicle
 
 HOME_DEG = (36.6, -84.3)
@@ -67,8 +68,8 @@ def test_home_without_one_height_is_not_judged_and_says_what_would_be() -> None:
     verdict = judge(mission, craft, both)
     assert verdict.safe is None
     assert not verdict.findings
-    assert "between 300.0 m AMSL and 360.0 m AMSL" in verdict.not_judged[0]
-    assert "altitude_error_m of 60.0 m" in verdict.not_judged[0]
+    data = coded(verdict.not_judged, "home_has_two_heights").data
+    assert (data["low_m"], data["high_m"], data["spread_m"]) == (300.0, 360.0, 60.0)
     assert way_home(verdict, craft, both).safe is None
     wide = vehicle(altitude_error_m=60.0)
     assert judge(flown(both, 300.0 + 60.0 + 60.0 + 60.0 + 60.0, wide), wide, both).safe is True

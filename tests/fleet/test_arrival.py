@@ -25,7 +25,7 @@ from tests.mission_file.test_load import base, load, local, the_problem
 from tests.mission_file.test_load import vehicle as keys
 from tests.support.effort import draws
 from tests.support.flights import fly, time_to_goal_s
-from tests.support.said import codes, one
+from tests.support.noted import codes, one
 
 INF = math.inf
 FREE = {

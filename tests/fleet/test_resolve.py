@@ -26,7 +26,7 @@ from gcsplan.world.limits import Limits
 from tests.fleet.test_separation import random_fleet
 from tests.support.effort import draws
 from tests.support.flights import motions
-from tests.support.said import codes
+from tests.support.noted import codes
 
 RULES = Rules(30.0, error_m=0.25)
 Point = tuple[float, float]

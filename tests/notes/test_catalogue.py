@@ -14,36 +14,54 @@ from gcsplan.notes.catalogue import TEXTS
 from gcsplan.notes.note import KINDS, fields_of, parts_of
 
 ROOT = Path(gcsplan.__file__).parent
-FORMS = {*KINDS, "reach", "seconds", "joules", "lines", "g"}
+FORMS = {*KINDS, "angle", "reach", "seconds", "joules", "lines", "g"}
 
 
-def made() -> Iterator[tuple[str, ast.Call]]:
-    """Every `Note(…)` of the code, with its place."""
+def made() -> Iterator[tuple[str, ast.Call, dict[str, list[str]]]]:
+    """Every `Note(…)` of the code, with its place, and the tables of codes of its module."""
     for path in sorted(ROOT.rglob("*.py")):
         source = path.read_text(encoding="utf-8")
         if "Note(" not in source:
             continue
-        for node in ast.walk(ast.parse(source)):
+        tree = ast.parse(source)
+        tables = dict(tables_in(tree))
+        for node in ast.walk(tree):
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Note":
-                yield f"{path.relative_to(ROOT)}:{node.lineno}", node
+                yield f"{path.relative_to(ROOT)}:{node.lineno}", node, tables
 
 
-MADE = [(where, node) for where, node in made() if not where.startswith("notes/note.py")]
+def tables_in(tree: ast.Module) -> Iterator[tuple[str, list[str]]]:
+    """The dicts of a module whose values are all strings, by name."""
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Dict) and isinstance(node.targets[0], ast.Name):
+            values = [v.value for v in node.value.values if isinstance(v, ast.Constant) and isinstance(v.value, str)]
+            if len(values) == len(node.value.values):
+                yield node.targets[0].id, values
 
 
-def codes(node: ast.expr) -> list[str]:
-    """The codes that the first argument of a note may be: a literal, or one of two."""
+def codes_of(node: ast.expr, tables: dict[str, list[str]]) -> list[str]:
+    """The codes that the first argument of a note may be: a literal, one of two, or one of a table of its module."""
     if isinstance(node, ast.IfExp):
-        return codes(node.body) + codes(node.orelse)
+        return codes_of(node.body, tables) + codes_of(node.orelse, tables)
+    if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id in tables:
+        return tables[node.value.id]
     assert isinstance(node, ast.Constant), f"the code of a note is written out where it is made: {ast.unparse(node)}"
     return [str(node.value)]
 
 
+MADE = [
+    (where, node, codes)
+    for where, node, tables in made()
+    if not where.startswith("notes/note.py")
+    for codes in [codes_of(node.args[0], tables)]
+]
+
+
 def test_every_note_has_a_sentence_with_its_data_and_no_other() -> None:
     wrong = []
-    for where, node in MADE:
+    for where, node, codes in MADE:
         given = {keyword.arg for keyword in node.keywords}
-        for code in codes(node.args[0]):
+        for code in codes:
             if code not in TEXTS:
                 wrong.append(f"{where}: the catalogue has no {code!r}")
             elif fields_of(TEXTS[code]) - given:
@@ -54,7 +72,7 @@ def test_every_note_has_a_sentence_with_its_data_and_no_other() -> None:
 
 
 def test_every_sentence_is_said_somewhere() -> None:
-    said = {code for _, node in MADE for code in codes(node.args[0])}
+    said = {code for *_, codes in MADE for code in codes}
     assert sorted(set(TEXTS) - said) == []
 
 

@@ -7,7 +7,7 @@ import pickle
 
 import pytest
 
-from gcsplan.notes.note import Datum, Note, Wording, sentence
+from gcsplan.notes.note import Datum, Note, Wording, in_json, sentence
 from gcsplan.units import AVIATION, IMPERIAL, METRIC
 
 
@@ -83,3 +83,27 @@ def test_a_code_that_the_catalogue_lacks_is_an_error() -> None:
 def test_a_note_is_told_in_imperial_units_too() -> None:
     made = Note("battery_until_reserve", 4, loop=False, left_s=12.0)
     assert made.in_units(IMPERIAL).startswith("item 4: its hold has no end")
+
+
+def test_the_way_stands_behind_the_item_and_by_itself_where_it_says_more_than_the_kind() -> None:
+    place: dict[str, Datum] = {"lat": 36.6, "lon": -84.3, "amsl_m": 450.0}
+    straight = Note("over_unknown_ground", 4, way="cruise", **place)
+    jumped = Note("over_unknown_ground", 4, way=Note("after_jump", way="cruise", jump=7), **place)
+    said = "over ground that the terrain model does not know at 36.600000, -84.300000, 450.0 m AMSL"
+    assert (str(straight), straight.text(placed=False)) == (f"item 4 (cruise): {said}", said)
+    assert str(jumped) == f"item 4 (cruise, after the jump at item 7): {said}"
+    assert jumped.text(placed=False) == f"(cruise, after the jump at item 7): {said}"
+
+
+def test_angles_are_rounded_away_from_the_limit_too() -> None:
+    assert (
+        sentence("{up_deg:angle.1 up}, {down_deg:angle.1 down}", {"up_deg": 4.81, "down_deg": 10.19}) == "4.9 °, 10.1 °"
+    )
+
+
+def test_programs_get_a_list_of_sentences_and_what_they_are_made_of() -> None:
+    made = in_json("notes", ["a text", Note("no_ceiling")], Wording(options={"max_agl_m": "--max-agl"}))
+    assert made == {
+        "notes": ["a text", "--max-agl is not set: nothing limits the height above ground"],
+        "notes_data": [{"code": None, "item": None, "data": {}}, {"code": "no_ceiling", "item": None, "data": {}}],
+    }

@@ -11,6 +11,7 @@ import pytest
 
 from gcsplan.check.rtl.verdict import RallyPoint
 from gcsplan.check.rtl.way_home import way_home
+from gcsplan.notes.note import Note
 from gcsplan.report import markup
 from gcsplan.report.page import render_page
 from gcsplan.report.subject import Page, Rehearsed
@@ -38,7 +39,7 @@ def fleet_of_four(*, worst: bool) -> Page:
         home = way_home(s.verdict, s.vehicle, told.world, rtl_rel_home_m=20.0 if worst else 300.0)
         if worst:
             point = RallyPoint(36.6, -84.3, 300.0, 120.0, 900.0, "a place")
-            home = replace(home, rally=(point,) * 6, not_judged=("the arcs of 80 m and what comes after them",))
+            home = replace(home, rally=(point,) * 6, not_judged=(Note("mission_not_followed"),))
             s = replace(s, verdict=replace(s.verdict, not_judged=("the arcs of 80 m " * 30,) * 2))
         subjects.append(replace(s, motion=told.subjects[0].motion, home=home))
     order = tuple(s.name for s in subjects)
@@ -59,7 +60,7 @@ def test_the_briefing_says_what_where_limits_margins_times_way_home_and_has_line
         "mission briefing", "Four", "uav1", "uav4", markup.place(*verdict.legs[0].start[:2]),
         markup.place(*verdict.legs[-1].end[:2]), f"{markup.least(low.min_agl_m, 1, 'm')}; at least",
         markup.num(limits.min_agl_m, 0, "m"), f"{markup.least(near.zone_clearance_m, 1, 'm')}, {near.nearest_zone}",
-        markup.num(limits.max_amsl_m, 0, "m"), "0:08:00", home.headline, "RTL_ALT ", "Separation", "Bare DEM",
+        markup.num(limits.max_amsl_m, 0, "m"), "0:08:00", str(home.headline), "RTL_ALT ", "Separation", "Bare DEM",
         "planned by", "flown by", "name", "date", "signature",
     ):  # fmt: skip
         assert " ".join(words.split()) in text, words

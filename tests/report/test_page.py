@@ -7,7 +7,8 @@ import io
 import json
 import math
 import re
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cache
 from html.parser import HTMLParser
 from itertools import combinations
@@ -290,6 +291,7 @@ def test_a_checked_file_is_named_by_itself_where_one_vehicle_has_several() -> No
         vehicle: Vehicle
         verdict: Verdict
         notes: tuple[str, ...] = ()
+        typed: Mapping[str, str] = field(default_factory=dict)
 
     page = small_page()
     craft, verdict = page.subjects[0].vehicle, page.subjects[0].verdict
@@ -636,10 +638,10 @@ def test_the_way_home_is_drawn_and_told_at_the_top_where_it_is_not_safe() -> Non
     home = way_home(subject.verdict, subject.vehicle, page.world, rtl_rel_home_m=20.0)
     assert home.safe is False
     read = Reader(render_page(replace(page, subjects=(replace(subject, home=home),))))
-    assert home.headline in read.text
+    assert str(home.headline) in read.text
     assert "PATH SAFE" in read.text
     assert "✓" not in read.text  # nothing is called safe above the red line
-    assert home.unsafe[0].why in read.text
+    assert str(home.unsafe[0].why) in read.text
     assert "home-0" in read.data["charts"]
     assert [a for _, a in read.elements if a.get("class") == "nohome"]
     calm = way_home(subject.verdict, subject.vehicle, page.world, rtl_rel_home_m=home.lowest_rel_home_m or 300.0)

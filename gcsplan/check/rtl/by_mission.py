@@ -34,7 +34,7 @@ from gcsplan.check.rtl.verdict import UnsafeStretch
 from gcsplan.check.rtl.ways import Ways, candidates
 from gcsplan.check.stretch import Stretch
 from gcsplan.check.verdict import Verdict
-from gcsplan.units import Quantity, UnitText
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Legs, Violation
 from gcsplan.world.limits import Limits
@@ -259,7 +259,7 @@ class _Judge:
             trace.place(a), trace.place(b), from_m, max(from_m, to_m), why, zone, None, None,
         )  # fmt: skip
 
-    def _why(self, parts: TraceParts, grade: int) -> tuple[str, str]:
+    def _why(self, parts: TraceParts, grade: int) -> tuple[Note, str]:
         """What the returns from ``parts`` do, worst first; the first zone's name."""
         near = candidates(self.trace, self.joins, self.vehicle, parts)
         worst: dict[tuple[str, int], tuple[Violation, int]] = {}
@@ -267,16 +267,13 @@ class _Judge:
             some = np.flatnonzero(near[:, k])
             if not len(some):
                 continue
-            reached, there = self.reached[k], f"the return, which joins the mission at item {join.seq},"
+            reached = self.reached[k]
             if grade == KNOWN and not reached[KNOWN]:
-                if join.unknown:
-                    return f"{there} leads straight to a landing, and how is not known", ""
-                return f"{there} is not on its line again before the landing: the legs behind are too short", ""
+                return Note("joins_landing" if join.unknown else "joins_short_legs", join=join.seq), ""
             if grade == KNOWN and not self._climbs(self._ways(parts.take(some), join)).all():
-                return f"{there} may be too short for its climb or descent", ""
+                return Note("joins_too_steeply", join=join.seq), ""
             if grade != KNOWN and not reached[grade]:
-                does = "descends" if self.copter else "swings wide"
-                return f"{there} {does} there into what the limits forbid", ""
+                return Note("joins_into_limit", join=join.seq, descends=self.copter), ""
             if grade == KNOWN:
                 continue
             ways = self._ways(parts.take(some), join)
@@ -288,28 +285,31 @@ class _Judge:
         names = [z.name for z in self.trace.world.airspace.zones]
         found = sorted(worst.values(), key=lambda pair: pair[0].by, reverse=True)
         if not found:
-            return "the return is not clear", ""
+            return Note("joining_not_clear"), ""
         v, seq = found[0]
         zone = next((names[w.zone] for w, _ in found if w.zone >= 0), "")
         lat, lon = (float(x) for x in self.trace.world.frame.to_degrees(v.east_m, v.north_m))
-        what: str = "meets ground" if grade == CLEAR else WHAT.get(v.kind, "breaks a limit")
-        if v.kind == "coverage":
-            what = WHAT["coverage"]
-        if v.kind == "zone":
-            what = f"meets no-fly zone “{names[v.zone]}”" + (" or its clearance" if grade == LEGAL else "")
-        words = UnitText(
-            "the return, which joins the mission at item {}, {} at {:.6f}, {:.6f}, {}",
-            seq, what, lat, lon, Quantity(v.amsl_m, "amsl", 0),
-        )  # fmt: skip
-        return words, zone
+        zone_name = names[v.zone] if v.zone >= 0 else ""
+        does = _does(v.kind, zone_name, grade)
+        return Note("joining_fails", join=seq, does=does, lat=lat, lon=lon, amsl_m=v.amsl_m), zone
 
 
 WHAT = {
-    "min_agl": "comes nearer than min_agl_m to ground",
-    "terrain_clearance": "comes too near to rising ground",
-    "coverage": "leads over ground that is unknown to the terrain model,",
-    "max_agl": "comes higher above ground than max_agl_m",
-    "max_amsl": "rises above max_amsl_m",
-    "climb": "climbs more steeply than max_climb_deg",
-    "descent": "descends more steeply than max_descent_deg",
+    "min_agl": "way_near_ground",
+    "terrain_clearance": "way_near_rising_ground",
+    "max_agl": "does_above_max_agl",
+    "max_amsl": "does_above_ceiling",
+    "climb": "way_climbs_too_steeply",
+    "descent": "way_descends_too_steeply",
 }
+"""What a return does that breaks a limit, by the kind of the violation."""
+
+
+def _does(kind: str, zone: str, grade: int) -> Note:
+    if kind == "coverage":
+        return Note("way_over_unknown_ground")
+    if kind == "zone":
+        return Note("way_meets_clearance" if grade == LEGAL else "way_meets_zone", zone=zone)
+    if grade == CLEAR:
+        return Note("way_meets_ground")
+    return Note(WHAT[kind]) if kind in WHAT else Note("way_breaks_limit")

@@ -31,6 +31,7 @@ from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World
 
@@ -69,7 +70,7 @@ class Joins:
     path: bool
     starts: tuple[int, ...]
     joins: tuple[Join, ...] = ()
-    why_not: tuple[str, ...] = ()
+    why_not: tuple[Note, ...] = ()
     past_seq: int | None = None
 
     @property
@@ -88,11 +89,11 @@ def joins_of(mission: Mission, flight: Flight, vehicle: Vehicle, world: World) -
     paths, landings = (land_starts(mission, c) for c in LAND_STARTS)
     starts = tuple(mission.first_seq + k for k in (paths or landings))
     if not starts:
-        names = " nor ".join(cmd.command_name(c) for c in LAND_STARTS)
-        return Joins(False, (), why_not=(f"the mission holds neither {names}: there is nothing that a return joins",))
+        one, other = (cmd.command_name(c) for c in LAND_STARTS)
+        return Joins(False, (), why_not=(Note("nothing_to_join", one=one, other=other),))
     finder = _Finder(mission, flight, vehicle, world)
     if (jump := _jump_at_starts(mission, min(*paths, *landings, len(mission.items)))) is not None:
-        finder.why_not.append(f"item {jump} jumps: what a return joins depends on the jumps that are left")
+        finder.why_not.append(Note("jump_decides_join", jump))
     for k in paths:
         finder.path(k)
     for k in () if paths else landings:
@@ -126,7 +127,7 @@ class _Finder:
     flight: Flight
     vehicle: Vehicle
     world: World
-    why_not: list[str] = field(default_factory=list)
+    why_not: list[Note] = field(default_factory=list)
     legs: dict[int, list[tuple[Floats, Floats]]] = field(default_factory=dict)
 
     def path(self, start: int) -> None:
@@ -135,12 +136,12 @@ class _Finder:
         for k in range(start, len(self.mission.items)):
             item = self.mission.items[k]
             if k > start and item.command not in (cmd.WAYPOINT, *LANDS, cmd.DO_LAND_START, *WITHOUT_PLACE):
-                self._no(k, "the return path holds it, and how it is joined there is not known")
+                self.why_not.append(Note("join_unknown_on_path", self._seq(k), way=self._name(k)))
                 return
             if item.command not in WITHOUT_PLACE and (item.x, item.y, item.z) != (0, 0, 0.0):
                 place = self._place(item)
                 if place is None:
-                    self._no(k, "how near it is depends on its frame or its place, which cannot be told")
+                    self.why_not.append(Note("join_distance_unknown", self._seq(k), way=self._name(k)))
                     return
                 if before is None:
                     self.join(k, ((place, place),))
@@ -156,7 +157,7 @@ class _Finder:
         items = self.mission.items
         first = next((k for k in range(index, len(items)) if cmd.is_nav(items[k].command)), None)
         if first is None:
-            self._no(index, "nothing follows it that a return could fly to")
+            self.why_not.append(Note("join_leads_nowhere", self._seq(index), way=self._name(index)))
             return
         self.legs.setdefault(first, []).extend(legs)
 
@@ -164,7 +165,7 @@ class _Finder:
         """The joins; empty if one of them is not known."""
         joins = [j for k, legs in sorted(self.legs.items()) if (j := self._join(k, legs)) is not None]
         if not joins:
-            self.why_not.append("no item that moves the vehicle follows the start that a return joins")
+            self.why_not.append(Note("join_without_item"))
         return () if self.why_not else tuple(joins)
 
     @property
@@ -179,7 +180,7 @@ class _Finder:
         if item.command in LANDS and not lands and (place := self._place(item)) is not None:
             return Join(seq, place, False, np.array(legs).reshape(-1, 2, 3), 0.0, (), unknown=True)
         if (item.command != cmd.WAYPOINT and not lands) or item.frame in (m.TERRAIN, 11) or not (item.x or item.y):
-            self._no(index, "a return joins it, and only way points and landings with a place are judged")
+            self.why_not.append(Note("join_not_way_point", self._seq(index), way=self._name(index)))
             return None
         for part in (self.flight, *self.flight.apart):
             mine = [k for k, s in enumerate(part.stretches) if s.seq == seq and (lands or s.kind == "cruise")]
@@ -187,13 +188,13 @@ class _Finder:
                 continue
             rest = part.stretches[mine[-1] + (0 if lands else 1) :]
             if part.stretches[-1].kind not in ("land", "rtl") or any(math.isinf(s.hold_s) for s in rest):
-                self._no(index, "a return joins it, and what follows does not end with a landing")
+                self.why_not.append(Note("join_without_landing", self._seq(index), way=self._name(index)))
                 return None
             lat, lon, amsl = part.stretches[mine[-1]].end
             east, north = (float(x) for x in self.world.frame.to_plane(lat, lon))
             pairs = np.array(legs).reshape(-1, 2, 3)
             return Join(seq, np.array([east, north, amsl]), lands, pairs, self._energy_j(rest), tuple(rest))
-        self._no(index, "a return joins it, and the mission could not be followed there")
+        self.why_not.append(Note("join_not_followed", self._seq(index), way=self._name(index)))
         return None
 
     def _energy_j(self, stretches: Sequence[Stretch]) -> float:
@@ -217,6 +218,8 @@ class _Finder:
         east, north = (float(x) for x in self.world.frame.to_plane(item.lat_deg, item.lon_deg))
         return np.array([east, north, base + item.z])
 
-    def _no(self, index: int, why: str) -> None:
-        item = self.mission.items[index]
-        self.why_not.append(f"item {self.mission.first_seq + index} ({cmd.command_name(item.command)}): {why}")
+    def _seq(self, index: int) -> int:
+        return self.mission.first_seq + index
+
+    def _name(self, index: int) -> str:
+        return cmd.command_name(self.mission.items[index].command)

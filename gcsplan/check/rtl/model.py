@@ -13,25 +13,26 @@
 
 How far each goes on before it flies home is in `run_on`.
 
-Two modules read these rules. `return_pieces` is the return of an RTL item, from one place; `sweep` judges the return
+Two modules read these rules. `returned` is the return of an RTL item, from one place; `sweep` judges the return
 after a failsafe, from every point of a mission. Where an autopilot may fly one of several altitudes, both judge all of
 them: in the cone from the cone's altitude up to the return altitude, on a plane's flight home from its altitude to the
 return altitude. Not judged: RTL_ALT_TYPE 1 (terrain), RTL_CLIMB_MIN, fences that cap the return, Q_RTL_MODE, missions
-with DO_LAND_START. `cone_differs` is judged in `return_pieces` alone.
+with DO_LAND_START. `cone_differs` is judged in `returned` alone.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import pairwise
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 from gcsplan.arrays import Floats
 from gcsplan.check.circles import PLANE_LOITER_RADIUS_M, circle_growth
 from gcsplan.check.geodesy import flat_m
-from gcsplan.check.stretch import Place
+from gcsplan.check.stretch import Place, Stretch
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.limits import Limits
 
@@ -107,23 +108,21 @@ def at_home_m(limits: Limits) -> float:
     return max(AT_HOME_M, limits.track_error_m)
 
 
-@dataclass(frozen=True, slots=True)
-class Piece:
-    """One straight piece; ``instead``: some versions fly it in place of another one. Other fields: see `Stretch`."""
-
-    start: Place
-    end: Place
-    column: bool = False
-    band_m: float = 0.0
-    reach_m: float = 0.0
-    hold_s: float = 0.0
-    instead: bool = False
+Flies: TypeAlias = Callable[..., Stretch]
+"""Makes a stretch of a return from its two places, and other fields of `Stretch` by name."""
 
 
-def return_pieces(
-    rule: ReturnRule, at: Place, home: Place, return_amsl_m: float, *, about_m: float, waits_s: float = 0.0
-) -> list[Piece]:
-    """The return from ``at`` to ``home`` (a place on the ground); the last piece ends where the return ends.
+def returned(
+    flies: Flies,
+    rule: ReturnRule,
+    at: Place,
+    home: Place,
+    return_amsl_m: float,
+    *,
+    about_m: float,
+    waits_s: float = 0.0,
+) -> tuple[list[Stretch], list[Stretch]]:
+    """The return from ``at`` to ``home`` (a place on the ground); and what some versions fly in place of parts of it.
 
     ``waits_s``: the seconds over home before it descends. ``about_m``: see `run_on.about_turn_m`; a plane flies home
     from anywhere that far from ``at``.
@@ -132,12 +131,13 @@ def return_pieces(
     level = rule.level_amsl_m(return_amsl_m, at[2])
     over = (lat, lon, level)
     if not rule.climbs_first:
-        aside = _band(at, home, at[2], level, instead=True)
+        aside = _band(flies, at, home, at[2], level)
         return [
-            Piece(at, at, reach_m=about_m, instead=True),
-            _band(at, home, at[2], level),
+            aside,
+            flies(over, over, reach_m=rule.circle_m(level), hold_s=math.inf),
+        ], [
+            flies(at, at, reach_m=about_m),
             *(_part(aside, a, b, (1.0 - a) * about_m) for a, b in pairwise(ASIDE)),
-            Piece(over, over, reach_m=rule.circle_m(level), hold_s=math.inf),
         ]
     cone = rule.cone_amsl_m(ground, flat_m(at, home))
     if rule.cone_differs and cone < level:
@@ -145,22 +145,21 @@ def return_pieces(
     lowest = max(at[2], min(cone, level))
     up = (*at[:2], level)
     return [
-        *([_band(at, home, lowest, level, instead=True)] if lowest < level else []),
-        Piece(at, up, column=True),
-        Piece(up, over),
-        *([Piece(over, over, hold_s=waits_s)] if waits_s > 0.0 else []),
-        Piece(over, (lat, lon, ground), column=True),
-    ]
+        flies(at, up, column=True),
+        flies(up, over),
+        *([flies(over, over, hold_s=waits_s)] if waits_s > 0.0 else []),
+        flies(over, (lat, lon, ground), column=True),
+    ], [_band(flies, at, home, lowest, level)] if lowest < level else []
 
 
-def _part(piece: Piece, a: float, b: float, reach_m: float) -> Piece:
-    """A part of a level piece, widened."""
-    (lat, lon, amsl), end = piece.start, piece.end
+def _part(way: Stretch, a: float, b: float, reach_m: float) -> Stretch:
+    """A part of a level stretch, widened."""
+    (lat, lon, amsl), end = way.start, way.end
     places = [(lat + f * (end[0] - lat), lon + f * (end[1] - lon), amsl) for f in (a, b)]
-    return replace(piece, start=places[0], end=places[1], reach_m=reach_m)
+    return replace(way, start=places[0], end=places[1], reach_m=reach_m)
 
 
-def _band(at: Place, home: Place, a_amsl_m: float, b_amsl_m: float, *, instead: bool = False) -> Piece:
+def _band(flies: Flies, at: Place, home: Place, a_amsl_m: float, b_amsl_m: float) -> Stretch:
     """A level flight home at any altitude between two."""
     middle, half = 0.5 * (a_amsl_m + b_amsl_m), 0.5 * abs(b_amsl_m - a_amsl_m)
-    return Piece((*at[:2], middle), (*home[:2], middle), band_m=half, instead=instead)
+    return flies((*at[:2], middle), (*home[:2], middle), band_m=half)

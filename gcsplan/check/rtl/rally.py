@@ -26,6 +26,7 @@ from gcsplan.check.rtl.trace import MissionTrace, TraceParts
 from gcsplan.check.rtl.verdict import RallyPoint, UnsafeStretch
 from gcsplan.mavlink.mission.commands import RALLY_POINT
 from gcsplan.mavlink.mission.mission import RELATIVE, MissionItem
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 
 MOST_POINTS = 6
@@ -52,7 +53,7 @@ class Proposal:
     points: tuple[RallyPoint, ...]
     rel_home_m: float
     left: tuple[UnsafeStretch, ...]
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,7 +119,7 @@ def propose(
     closer = _judged_with(trace, vehicle, used, refinement)
     left = stretches_of(trace, closer, CLEAR, closer.start, None)
     if not chosen:
-        return Proposal((), level - ground, left, ("no rally point under the mission makes more of it safe",))
+        return Proposal((), level - ground, left, (Note("no_rally_point_helps"),))
     served_m = [float(size[nearest == i].sum()) for i in range(len(used))]
     points = tuple(_point(trace, p, m, vehicle, ground) for p, m in zip(used[1:], served_m[1:], strict=True))
     return Proposal(points, level - ground, left, _conditions(vehicle, float(apart.min(axis=0).max())))
@@ -252,16 +253,12 @@ def _point(trace: MissionTrace, place: _Place, serves_m: float, vehicle: Vehicle
     lat, lon = trace.world.frame.to_degrees(t.east_m, t.north_m).tolist()
     on_ground = RULES[vehicle.autopilot].rally is RallyAltitude.GROUND
     rel = round((t.ground_amsl_m if on_ground else place.level) - home_amsl_m, 2)
-    why = "where the mission ends" if place.at_end else f"under the mission, ground slopes {100.0 * place.slope:.0f} %"
+    why = Note("where_mission_ends") if place.at_end else Note("under_mission", slope_percent=100.0 * place.slope)
     return RallyPoint(round(lat, 7), round(lon, 7), t.ground_amsl_m, rel, serves_m, why)
 
 
-def _conditions(vehicle: Vehicle, farthest_m: float) -> tuple[str, ...]:
-    look = "look at each rally point before it is used: the terrain model knows no trees, wires, people or owners"
+def _conditions(vehicle: Vehicle, farthest_m: float) -> tuple[Note, ...]:
+    look = Note("look_at_rally_points")
     if RULES[vehicle.autopilot].rally is RallyAltitude.GROUND:
-        return ("the rally points are judged with RTL_TYPE 0: the nearest of home and rally points", look)
-    return (
-        f"the rally points are judged with RALLY_INCL_HOME 1 and RALLY_LIMIT_KM 0 (or {farthest_m / 1e3 + 0.05:.1f} "
-        f"at least): the nearest of home and rally points",
-        look,
-    )
+        return Note("rally_points_of_px4"), look
+    return Note("rally_points_of_ardupilot", limit_km=farthest_m / 1e3 + 0.05), look

@@ -10,11 +10,12 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.rtl.obstacles import AHEAD, GROUND, MAX_AGL, MAX_AMSL, Obstacles
 from gcsplan.check.rtl.places import Target
-from gcsplan.check.rtl.refinement import CLEAR, Refinement
+from gcsplan.check.rtl.refinement import CLEAR, LEGAL, Refinement
 from gcsplan.check.rtl.trace import MissionTrace
 from gcsplan.check.rtl.verdict import UnsafeStretch
+from gcsplan.check.rtl.words import both
 from gcsplan.check.stretch import Place
-from gcsplan.units import Quantity, UnitText, joined
+from gcsplan.notes.note import Note
 
 ROUND_M = 0.1
 LOOKED_AT = 500
@@ -121,21 +122,21 @@ def _stretch(
         end=trace.place(b),
         from_m=from_m,
         to_m=to_m,
-        why=UnitText("the return {}", joined(" and ", clauses)),
+        why=Note("return_fails", does=both(clauses)),
         zone=zone,
         obstacle=obstacle,
         lowest_rel_home_m=None if target is None else rel_home(own, together, home),
-        because=_because(trace, own, refinement.start, level) if math.isinf(together) else "",
+        because=_because(trace, own, refinement.start, level) if math.isinf(together) else None,
     )
 
 
 def _reasons(
     trace: MissionTrace, own: Obstacles, middle: Floats, level: float, grade: int, target: Target | None
-) -> tuple[list[UnitText | str], str, Place | None]:
+) -> tuple[list[Note], str, Place | None]:
     """What the returns of a stretch do at the level, worst first; the first zone's name; the place of the ground."""
     hit, kind, over = own.hit(level), own.kind(), own.over()
     names = [z.name for z in trace.world.airspace.zones]
-    clauses: list[tuple[tuple[bool, float], UnitText | str]] = []
+    clauses: list[tuple[tuple[bool, float], Note]] = []
     obstacle = None
     zone = ""
     for one in np.unique(kind[hit]).tolist():
@@ -149,21 +150,21 @@ def _reasons(
             zone = zone or names[one]
         clauses.append(((math.isinf(over[row]), float(own.top[row])), _why(own, row, names, grade, place)))
     clauses.sort(key=lambda c: c[0], reverse=True)
-    return [words for _, words in clauses], zone, obstacle
+    return [does for _, does in clauses], zone, obstacle
 
 
-def _because(trace: MissionTrace, own: Obstacles, start: float, level: float) -> UnitText | str:
+def _because(trace: MissionTrace, own: Obstacles, start: float, level: float) -> Note | None:
     """Why no return altitude helps, if that is not among the reasons at the level itself."""
     last = own.last_hit(start)
     if not last.any():
-        return "what one part of it needs is too high for another"
+        return Note("needs_differ")
     kind = own.kind()
     known = set(kind[own.hit(level) & np.isinf(own.over())].tolist())
     rows = [int(np.flatnonzero(last & (kind == k))[0]) for k in np.unique(kind[last]).tolist() if k not in known]
     if not rows or known:
-        return ""
+        return None
     names = [z.name for z in trace.world.airspace.zones]
-    return UnitText("at another altitude it {}", joined(" and ", [_why(own, row, names, CLEAR, None) for row in rows]))
+    return Note("at_another_altitude", does=both([_why(own, row, names, CLEAR, None) for row in rows]))
 
 
 def _obstacle(trace: MissionTrace, u: float, target: Target) -> Place | None:
@@ -178,30 +179,34 @@ def _obstacle(trace: MissionTrace, u: float, target: Target) -> Place | None:
     return lat, lon, float(top[k])
 
 
-def _why(obstacles: Obstacles, row: int, names: Sequence[str], grade: int, obstacle: Place | None) -> UnitText | str:
-    """What a return does that hits an obstacle: a verb and its objects."""
+ON_CLIMB = {CLEAR: "does_meet_ground_on_climb", LEGAL: "does_near_ground_on_climb"}
+
+
+def _why(obstacles: Obstacles, row: int, names: Sequence[str], grade: int, obstacle: Place | None) -> Note:
+    """What a return does that hits an obstacle."""
     what, top, bottom = int(obstacles.what[row]), float(obstacles.top[row]), float(obstacles.bottom[row])
     if what == MAX_AMSL:
-        return "rises above max_amsl_m"
+        return Note("does_above_ceiling")
     if what == MAX_AGL:
-        return "comes higher above ground than max_agl_m"
+        return Note("does_above_max_agl")
     if what in (GROUND, AHEAD):
         if math.isinf(top):
-            return "leads over ground that is unknown to the terrain model"
+            return Note("does_over_unknown_ground")
         if what == AHEAD:
-            return UnitText("brakes into ground ahead, below {}", Quantity(top, "amsl", 0, "up"))
-        place: str = ""
+            return Note("does_brake_into_ground", top_m=top)
+        at = None
         if obstacle is not None:
-            place = UnitText(" at {:.6f}, {:.6f} ({})", *obstacle[:2], Quantity(obstacle[2], "amsl", 0))
-        meets = "meets ground" if grade == CLEAR else "comes nearer than min_agl_m to ground"
+            lat, lon, amsl = obstacle
+            at = Note("at_place", lat=lat, lon=lon, amsl_m=amsl)
         if math.isinf(obstacles.over()[row]):
-            return UnitText("{}{} before it has climbed over it, to {}", meets, place, Quantity(top, "amsl", 0, "up"))
-        would = "clear" if grade == CLEAR else "keep"
-        return UnitText("{}{} and would {} it at {}", meets, place, would, Quantity(top, "amsl", 0, "up"))
-    height: str = ""
+            return Note(
+                "does_meet_ground_on_climb" if grade == CLEAR else "does_near_ground_on_climb", at=at, top_m=top
+            )
+        return Note("does_meet_ground" if grade == CLEAR else "does_near_ground", at=at, top_m=top)
+    height = None
     if math.isinf(top):
-        height = " (no top)" if math.isinf(bottom) else UnitText(" (from {} up)", Quantity(bottom, "amsl", 0))
-    return UnitText("meets no-fly zone “{}”{} or its clearance", names[what], height)
+        height = Note("zone_without_top") if math.isinf(bottom) else Note("zone_from", bottom_m=bottom)
+    return Note("does_meet_zone", zone=names[what], height=height)
 
 
 def without_doubles(found: list[UnsafeStretch]) -> tuple[UnsafeStretch, ...]:

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from gcsplan.check.battery import BatteryHome
-from gcsplan.check.rtl.words import NO_RETURN, NOT_JUDGED, STILL_NO_RETURN, together_m, verdict_words
+from gcsplan.check.rtl.words import Row, listed, together_m, verdict_words
 from gcsplan.check.stretch import Place
-from gcsplan.figures import counted
 from gcsplan.mavlink.mission.return_altitude import setting, settings
 from gcsplan.mavlink.mission.return_route import Route, route_setting
-from gcsplan.units import Quantity, Reach, Symbol, UnitText, joined
+from gcsplan.notes.note import IN_FILES, Note, Wording, in_json
 from gcsplan.vehicle import Autopilot
 
 
@@ -21,7 +20,7 @@ class UnsafeStretch:
     """A part of the mission from which the return is not safe at the judged altitude.
 
     ``from_seq``, ``to_seq``: wire items that the vehicle flies to at its ends; ``start``, ``end``: where the vehicle is
-    there; ``from_m``, ``to_m``: horizontal metres along the mission (equal for a column). ``why``: the reason in words;
+    there; ``from_m``, ``to_m``: horizontal metres along the mission (equal for a column). ``why``: the reason;
     ``obstacle``: the highest ground in the way, if ground is the reason. ``lowest_rel_home_m``: the lowest return
     altitude that is safe from all of the stretch, None if there is none; ``because``: why there is none, if ``why``
     does not say so.
@@ -33,13 +32,13 @@ class UnsafeStretch:
     end: Place
     from_m: float
     to_m: float
-    why: str
+    why: Note
     zone: str
     obstacle: Place | None
     lowest_rel_home_m: float | None
-    because: str = ""
+    because: Note | None = None
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self, wording: Wording = IN_FILES) -> dict[str, Any]:
         """Plain values; places as [latitude, longitude, AMSL]."""
         return {
             "from_seq": self.from_seq,
@@ -48,31 +47,35 @@ class UnsafeStretch:
             "end": list(self.end),
             "from_m": self.from_m,
             "to_m": self.to_m,
-            "why": self.why,
+            "why": self.why.text(wording),
+            "why_data": self.why.as_dict(),
             "zone": self.zone or None,
             "obstacle": None if self.obstacle is None else list(self.obstacle),
             "lowest_rel_home_m": self.lowest_rel_home_m,
         }
 
     @property
-    def items(self) -> str:
+    def items(self) -> Note:
         """``item 3`` or ``items 3 to 7``."""
-        return f"item {self.from_seq}" if self.from_seq == self.to_seq else f"items {self.from_seq} to {self.to_seq}"
+        if self.from_seq == self.to_seq:
+            return Note("one_item", seq=self.from_seq)
+        return Note("several_items", first=self.from_seq, last=self.to_seq)
 
     @property
-    def place_and_why(self) -> UnitText:
+    def place_and_why(self) -> Note:
         """``km 1.49 to 3.45 (items 4 to 9): the return meets …``."""
-        ends = [self.from_m, *([self.to_m] if self.to_m - self.from_m >= 5.0 else [])]
-        numbers = joined(" to ", [UnitText("{}", Quantity(at_m, "far", 2, bare=True)) for at_m in ends])
-        return UnitText("{} {} ({}): {}", Symbol("far"), numbers, self.items, self.why)
+        if self.to_m - self.from_m < 5.0:
+            return Note("from_one_place", from_m=self.from_m, items=self.items, why=self.why)
+        return Note("from_part", from_m=self.from_m, to_m=self.to_m, items=self.items, why=self.why)
 
-    def describe(self, good: str = "safe") -> UnitText:
-        """Where, why, and which altitude would help; ``good``: what the return is at that altitude."""
-        if self.lowest_rel_home_m is None:
-            why: str = UnitText(": {}", self.because) if self.because else ""
-            return UnitText("{}; no return altitude is {} from there{}", self.place_and_why, good, why)
-        lowest = _at_least(self.lowest_rel_home_m)
-        return UnitText("{}; {} from there at {} above home", self.place_and_why, good, lowest)
+    def described(self, *, legal: bool = False) -> Note:
+        """Where, why, and which altitude would help; ``legal``: to keep all limits, else to be safe."""
+        stretch = self.place_and_why
+        if self.lowest_rel_home_m is not None:
+            return Note("altitude_helps", stretch=stretch, legal=legal, lowest_m=self.lowest_rel_home_m)
+        if self.because is not None:
+            return Note("no_altitude_helps_because", stretch=stretch, legal=legal, because=self.because)
+        return Note("no_altitude_helps", stretch=stretch, legal=legal)
 
 
 def worst_first(stretches: Sequence[UnsafeStretch]) -> list[UnsafeStretch]:
@@ -103,9 +106,9 @@ class RallyPoint:
     ground_amsl_m: float
     rel_home_m: float
     serves_m: float
-    why: str
+    why: Note
 
-    def as_dict(self) -> dict[str, Any]:
+    def as_dict(self, wording: Wording = IN_FILES) -> dict[str, Any]:
         """The fields as plain values."""
         return {
             "lat": self.lat_deg,
@@ -113,7 +116,8 @@ class RallyPoint:
             "ground_amsl_m": self.ground_amsl_m,
             "rel_home_m": self.rel_home_m,
             "serves_m": self.serves_m,
-            "why": self.why,
+            "why": self.why.text(wording),
+            "why_data": self.why.as_dict(),
         }
 
 
@@ -164,7 +168,7 @@ class WayHome:
 
     ``route``: whether the returns were judged straight home, or to where they join the mission, behind the wire items
     ``starts``; ``along_path``: along a return path, else to a landing sequence. Altitudes say nothing then.
-    ``path_back``: what a return path along the mission's own track would do, where no altitude is enough; mostly empty.
+    ``path_back``: what a return path along the mission's own track would do, where no altitude is enough; mostly None.
     ``max_agl_m``: the limit on heights above ground, which a return at a greater altitude breaks over home at least.
     """
 
@@ -188,12 +192,12 @@ class WayHome:
     left: tuple[UnsafeStretch, ...]
     profile: tuple[ProfilePoint, ...]
     lowest: LowestAgl | None
-    not_judged: tuple[str, ...]
-    notes: tuple[str, ...]
+    not_judged: tuple[Note, ...]
+    notes: tuple[Note, ...]
     route: Route = "straight"
     starts: tuple[int, ...] = ()
     along_path: bool = False
-    path_back: str = ""
+    path_back: Note | None = None
     max_agl_m: float | None = None
 
     @property
@@ -210,72 +214,70 @@ class WayHome:
         return together_m([*((s.from_m, s.to_m) for s in self.unsafe), *short])
 
     @property
-    def headline(self) -> UnitText:
-        """Both truths in one line: ``path safe; no safe return from 9.5 km of it``."""
-        return UnitText("{}{}", verdict_words(self.path_safe, self), self._more())
-
-    def _more(self) -> str:
-        """What follows the verdict's words: why it was not judged, where, or for want of what."""
+    def headline(self) -> Note:
+        """Both truths in one line: ``path safe; no safe return from 9.5 km of it``, and what is missing for more."""
+        verdict = verdict_words(self.path_safe, self)
         if self.safe is True:
-            return ""
+            return verdict
         if self.safe is None:
-            return f": {'; '.join(self.not_judged)}"
+            return Note("why_not_judged", verdict=verdict, why=listed(self.not_judged))
         short = self.battery.short if self.battery is not None else ()
         if self.no_return_m < 0.5:
             seq = self.unsafe[0].from_seq if self.unsafe else 0 if self.battery is None else self.battery.no_return_seq
-            return f", at item {seq}"
+            return Note("no_return_at_item", verdict=verdict, seq=seq)
         if not short:
-            return ""
-        return UnitText(" (battery: from {})", Reach(together_m(short))) if self.unsafe else " (battery)"
+            return verdict
+        if not self.unsafe:
+            return Note("no_return_for_battery", verdict=verdict)
+        return Note("no_return_for_battery_from", verdict=verdict, short_m=together_m(short))
 
     @property
-    def advice(self) -> str:
-        """The parameter and value to set, and what that leaves; empty if there is no value to name."""
+    def advice(self) -> Note | None:
+        """The parameter and value to set, and what that leaves; None if there is no value to name."""
         if self.route == "mission":
-            return f"set {route_setting(self.autopilot, path=self.along_path)}" if self.starts else ""
-        if self.set_rel_home_m is None:
-            return ""
-        with_points = f", with {counted(len(self.rally), 'rally point')} on board (--rally)" if self.rally else ""
-        return UnitText("set {}{}: then {}", setting(self.autopilot, self.set_rel_home_m), with_points, self.then)
+            route = route_setting(self.autopilot, path=self.along_path)
+            return Note("set_route", setting=route) if self.starts else None
+        then = self.then
+        if self.set_rel_home_m is None or then is None:
+            return None
+        value = setting(self.autopilot, self.set_rel_home_m)
+        if self.rally:
+            return Note("set_with_rally_points", setting=value, count=len(self.rally), then=then)
+        return Note("set_altitude", setting=value, then=then)
 
     @property
-    def then(self) -> str:
-        """What the value to set leaves, with the rally points if there are any; empty if there is no value to name."""
+    def then(self) -> Note | None:
+        """What the value to set leaves, with the rally points if there are any; None if there is no value to name."""
         if self.set_rel_home_m is None:
-            return ""
-        left = self.set_leaves_m or 0.0
-        then: str = "safe return from all of it"
-        but: list[str] = []
+            return None
+        left, legal_m = self.set_leaves_m or 0.0, self.lowest_legal_rel_home_m
+        above = Note("above_max_agl", max_agl_m=self.max_agl_m) if self.set_above_max_agl else None
+        rally, part = bool(self.rally and self.battery is not None), bool(self.not_judged)
         if left:
-            then = UnitText(
-                "no safe return from {} of it{}", Reach(left), "" if self.rally or self.left else " (battery)"
-            )
-        elif self.lowest_legal_rel_home_m is not None and self.set_rel_home_m >= self.lowest_legal_rel_home_m:
-            but.append(", within all limits")
-        if self.set_above_max_agl and self.max_agl_m is not None:
-            but.append(UnitText(", but above max_agl_m ({}) over home", Quantity(self.max_agl_m, "height", None)))
-        if self.rally and self.battery is not None:
-            but.append(", the battery not counted")
-        if self.not_judged:
-            but.append(", as far as it was judged")
-        return UnitText("{}{}", then, joined("", but))
+            battery = not (self.rally or self.left)
+            return Note("then_no_return", left_m=left, battery=battery, above=above, rally=rally, part=part)
+        legal = legal_m is not None and self.set_rel_home_m >= legal_m
+        return Note("then_return_safe", legal=legal, above=above, rally=rally, part=part)
 
     @property
     def set_above_max_agl(self) -> bool:
         """Whether a return at the altitude to set is higher above home than the mission may fly above ground."""
         return None not in (self.max_agl_m, self.set_rel_home_m) and self.set_rel_home_m > self.max_agl_m  # type: ignore[operator]
 
-    def as_dict(self, *, profile: bool = False) -> dict[str, Any]:
+    def as_dict(self, wording: Wording = IN_FILES, *, profile: bool = False) -> dict[str, Any]:
         """Plain values for ``summary.json``; the profile on request."""
+        back = self.path_back
         out: dict[str, Any] = {
             "parameter": self.parameter,
             "route": self.route,
             "joins": list(self.starts),
-            "path_back": self.path_back or None,
+            "path_back": None if back is None else back.text(wording),
+            "path_back_data": None if back is None else back.as_dict(),
             "rtl_rel_home_m": self.rtl_rel_home_m,
             "assumed": self.assumed,
             "safe": self.safe,
-            "headline": self.headline,
+            "headline": self.headline.text(wording),
+            "headline_data": self.headline.as_dict(),
             "no_return_m": self.no_return_m,
             "set_rel_home_m": self.set_rel_home_m,
             "set": [] if self.set_rel_home_m is None else settings(self.autopilot, self.set_rel_home_m),
@@ -284,15 +286,15 @@ class WayHome:
             "lowest_rel_home_m": self.lowest_rel_home_m,
             "highest_rel_home_m": self.highest_rel_home_m,
             "lowest_legal_rel_home_m": self.lowest_legal_rel_home_m,
-            "unsafe": [s.as_dict() for s in self.unsafe],
-            "irregular": [s.as_dict() for s in self.irregular],
+            "unsafe": [s.as_dict(wording) for s in self.unsafe],
+            "irregular": [s.as_dict(wording) for s in self.irregular],
             "battery": None if self.battery is None else self.battery.as_dict(),
             "lowest_agl_m": None if self.lowest is None else self.lowest.agl_m,
             "advised_rel_home_m": self.advised_rel_home_m,
-            "rally": [r.as_dict() for r in self.rally],
-            "left": [s.as_dict() for s in self.left],
-            "not_judged": list(self.not_judged),
-            "notes": list(self.notes),
+            "rally": [r.as_dict(wording) for r in self.rally],
+            "left": [s.as_dict(wording) for s in self.left],
+            **in_json("not_judged", self.not_judged, wording),
+            **in_json("notes", self.notes, wording),
         }
         if profile:
             out["profile"] = [
@@ -300,88 +302,83 @@ class WayHome:
             ]
         return out
 
-    def rows(self) -> list[tuple[str, str]]:
-        """(label, words) for a table of two columns, below the headline."""
+    def rows(self) -> list[Row]:
+        """The rows of a table of two columns, below the headline."""
         if self.route == "mission":
             return self._rows_of_mission()
-        source = "the autopilot's default" if self.assumed else "as given"
-        judged_at = UnitText("{} above home, {}", Quantity(self.rtl_rel_home_m, "height", None), source)
-        out: list[tuple[str, str]] = [("judged at", judged_at)]
-        if self.advice:
-            out.append(("on the vehicle", self.advice))
-        if self.path_back:
-            out.append(("instead", self.path_back))
-        out += [(NO_RETURN, UnitText("from {}", s.describe())) for s in worst_first(self.unsafe)]
+        out = [Row("judged_at", Note("judged_at", rel_home_m=self.rtl_rel_home_m, assumed=self.assumed))]
+        if self.advice is not None:
+            out.append(Row("set", self.advice))
+        if self.path_back is not None:
+            out.append(Row("path_back", self.path_back))
+        out += [Row("no_return", Note("from_stretch", stretch=s.described())) for s in worst_first(self.unsafe)]
         if self.irregular:
-            first, length = self.irregular[0], together_m((s.from_m, s.to_m) for s in self.irregular)
-            where = UnitText("from {} of the path", Reach(length)) if length >= 0.5 else "from a point of the path"
-            words = "{} the return hits nothing but breaks a limit; first from {}"
-            out.append(("outside a limit", UnitText(words, where, first.describe("within all limits"))))
+            first, length = self.irregular[0].described(legal=True), self._irregular_m
+            from_part = Note("outside_limit_from", length_m=length, first=first)
+            out.append(Row("irregular", from_part if length >= 0.5 else Note("outside_limit_at", first=first)))
         if self.not_judged and not self.unsafe and self.lowest_rel_home_m is None:
-            return out + self._battery() + [(NOT_JUDGED, words) for words in self.not_judged]
+            return out + self._last_rows()
         out += [
-            ("clear of ground and zones", _altitudes(self.lowest_rel_home_m, self.highest_rel_home_m)),
-            ("within all limits too", _altitudes(self.lowest_legal_rel_home_m, None)),
+            Row("clear", _altitudes(self.lowest_rel_home_m, self.highest_rel_home_m)),
+            Row("legal", _altitudes(self.lowest_legal_rel_home_m, None)),
             *self._lowest(),
             *self._battery(),
         ]
         out += [
-            (
-                f"rally point {number}",
-                UnitText(
-                    "{:.7f}, {:.7f}, {} above home: {}; nearest for {}",
-                    r.lat_deg, r.lon_deg, Quantity(r.rel_home_m, "height", 0, "up"), r.why, Reach(r.serves_m),
+            Row(
+                "rally",
+                Note(
+                    "rally_point", lat=r.lat_deg, lon=r.lon_deg, rel_home_m=r.rel_home_m, why=r.why,
+                    serves_m=r.serves_m,
                 ),
+                number,
             )
             for number, r in enumerate(self.rally, start=1)
         ]  # fmt: skip
-        out += [(STILL_NO_RETURN, UnitText("from {}", s.place_and_why)) for s in worst_first(self.left)]
-        out += [(NOT_JUDGED, words) for words in self.not_judged]
-        return out
+        left = [Note("from_stretch", stretch=s.place_and_why) for s in worst_first(self.left)]
+        return out + [Row("still_no_return", note) for note in left] + self._last_rows(battery=False)
 
-    def _rows_of_mission(self) -> list[tuple[str, str]]:
-        what = "return path" if self.along_path else "landing sequence"
-        out: list[tuple[str, str]] = []
+    def _rows_of_mission(self) -> list[Row]:
+        out: list[Row] = []
         if self.starts:
-            items = f"item {self.starts[0]}" + "".join(f", {k}" for k in self.starts[1:])
-            out.append(("judged as", f"joined to the mission's {what} ({items})"))
-        if self.advice:
-            out.append(("on the vehicle", self.advice))
-        out += [(NO_RETURN, UnitText("from {}", s.place_and_why)) for s in worst_first(self.unsafe)]
+            out.append(
+                Row("judged_as", Note("joined_to_path" if self.along_path else "joined_to_landing", items=self.starts))
+            )
+        if self.advice is not None:
+            out.append(Row("set", self.advice))
+        out += [Row("no_return", Note("from_stretch", stretch=s.place_and_why)) for s in worst_first(self.unsafe)]
         if self.irregular:
-            length = together_m((s.from_m, s.to_m) for s in self.irregular)
-            words = "from {} of the path the return hits nothing but breaks a limit; first from {}"
-            out.append(("outside a limit", UnitText(words, Reach(length), self.irregular[0].place_and_why)))
-        return out + self._battery() + [(NOT_JUDGED, words) for words in self.not_judged]
+            first = self.irregular[0].place_and_why
+            out.append(Row("irregular", Note("outside_limit_from", length_m=self._irregular_m, first=first)))
+        return out + self._last_rows()
 
-    def _lowest(self) -> list[tuple[str, str]]:
+    @property
+    def _irregular_m(self) -> float:
+        return together_m((s.from_m, s.to_m) for s in self.irregular)
+
+    def _last_rows(self, *, battery: bool = True) -> list[Row]:
+        return (self._battery() if battery else []) + [Row("not_judged", note) for note in self.not_judged]
+
+    def _lowest(self) -> list[Row]:
         if self.lowest is None:
             return []
-        below = self.lowest.agl_m < 0.0
-        agl = Quantity(abs(self.lowest.agl_m), "height", 0, "up" if below else "down")
-        at = Quantity(self.lowest.at_m, "far", 2, bare=True)
-        words = "{} {} ground, on the return from {} {} (item {})"
-        side = "below" if below else "above"
-        return [("lowest on a return", UnitText(words, agl, side, Symbol("far"), at, self.lowest.seq))]
+        agl_m, at_m, seq = self.lowest.agl_m, self.lowest.at_m, self.lowest.seq
+        if agl_m < 0.0:
+            return [Row("lowest", Note("lowest_below_ground", below_m=-agl_m, at_m=at_m, seq=seq))]
+        return [Row("lowest", Note("lowest_on_return", agl_m=agl_m, at_m=at_m, seq=seq))]
 
-    def _battery(self) -> list[tuple[str, str]]:
-        return [] if self.battery is None else [("battery for the return", self.battery.describe())]
+    def _battery(self) -> list[Row]:
+        return [] if self.battery is None else [Row("battery", self.battery.note)]
 
-    def describe(self) -> str:
+    def describe(self, wording: Wording = IN_FILES) -> str:
         """All of `rows` and the notes, one per line."""
-        lines = [f"{label}: {text}" for label, text in self.rows()] + [f"note: {text}" for text in self.notes]
-        return "\n".join(lines)
+        lines = [f"{row.label}: {row.note.text(wording)}" for row in self.rows()]
+        return "\n".join(lines + [f"note: {note.text(wording)}" for note in self.notes])
 
 
-def _altitudes(lowest: float | None, highest: float | None) -> str:
-    if lowest is None:
-        return "no single return altitude is, from all of the path"
-    upper: str = " or more"
-    if highest is not None:
-        upper = UnitText(" to {}", Quantity(highest, "height", 1, "down", trimmed=True))
-    return UnitText("from all of the path at {}{} above home", _at_least(lowest), upper)
-
-
-def _at_least(rel_home_m: float) -> Quantity:
-    """A return altitude that must at least be set."""
-    return Quantity(rel_home_m, "height", 1, "up", trimmed=True)
+def _altitudes(lowest_m: float | None, highest_m: float | None) -> Note:
+    if lowest_m is None:
+        return Note("no_single_altitude")
+    if highest_m is None:
+        return Note("from_altitude", lowest_m=lowest_m)
+    return Note("between_altitudes", lowest_m=lowest_m, highest_m=highest_m)

@@ -36,13 +36,11 @@ from gcsplan.check.rtl.verdict import ProfilePoint, RallyPoint, UnsafeStretch, W
 from gcsplan.check.rtl.words import together_m
 from gcsplan.check.stretch import Flight, Place
 from gcsplan.check.verdict import Verdict
-from gcsplan.figures import floored, raised
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.commands import command_name
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.return_route import Route
 from gcsplan.notes.note import Note
-from gcsplan.units import UnitText
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World
 
@@ -83,7 +81,7 @@ def way_home(
         round_corners(flight, stored, vehicle, world.frame)
     trace = trace_of(flight, vehicle, world, terrain_error_m) if verdict.legs else None
     if trace is None or math.isnan(ground) or unsure is not None:
-        why = unsure or ("the mission could not be followed" if trace is None else "the ground at home is unknown")
+        why = unsure or Note("mission_not_followed" if trace is None else "home_not_on_ground")
         return _not_judged(verdict, vehicle, judged_m, rtl_rel_home_m is None, (why,))
     if route == "mission":
         return _along_mission(verdict, vehicle, stored, flight, trace, judged_m)
@@ -142,8 +140,7 @@ def _along_mission(
     """The way home if returns join the mission, at a return path or a landing sequence."""
     home = _not_judged(verdict, vehicle, judged_m, False, ())
     if vehicle.autopilot is Autopilot.PX4:
-        why = "PX4's returns along the mission (RTL_TYPE above 0) are not judged: only its return straight home is"
-        return replace(home, route="mission", not_judged=(why,))
+        return replace(home, route="mission", not_judged=(Note("px4_joins_unread"),))
     joins = joins_of(stored, flight, vehicle, trace.world)
     known = _but_the_return(flight)
     if joins.why_not:
@@ -153,21 +150,21 @@ def _along_mission(
     found = return_by_mission(trace, joins, landing, verdict, vehicle)
     notes = list(home.notes)
     if joins.path:
-        notes.append("DO_RETURN_PATH_START: ArduCopter 4.6.0 and ArduPlane 4.6.2 are the first to know it")
+        notes.append(Note("return_path_by_version"))
     if vehicle.autopilot is Autopilot.ARDUCOPTER:
-        notes.append("a breach of the fence (FENCE_ACTION) and RTL itself still return straight home")
+        notes.append(Note("fence_returns_straight"))
     if found.stopped_early:
-        notes.append("the mission is too long to look at all of it closely: unsafe stretches may be drawn too long")
+        notes.append(Note("mission_too_long"))
     return replace(
         home, route="mission", starts=joins.starts, along_path=joins.path, unsafe=found.unsafe,
         irregular=found.irregular, battery=found.battery, notes=tuple(notes),
-        not_judged=(*(UnitText("from {}", s.place_and_why) for s in found.unknown[:MOST_UNKNOWN]), *known),
+        not_judged=(*(Note("from_stretch", stretch=s.place_and_why) for s in found.unknown[:MOST_UNKNOWN]), *known),
     )  # fmt: skip
 
 
-def _but_the_return(flight: Flight) -> list[str]:
+def _but_the_return(flight: Flight) -> list[Note]:
     """What was not judged of a flight, without the return that ArduPlane flies by itself: that is judged here."""
-    return [str(w) for w in flight.not_judged if not (isinstance(w, Note) and w.code == "returns_by_itself")]
+    return [note for note in flight.not_judged if note.code != "returns_by_itself"]
 
 
 def refinement_of(trace: MissionTrace, target: Target, vehicle: Vehicle, level: float) -> Refinement:
@@ -230,20 +227,17 @@ def _profile(trace: MissionTrace, refinement: Refinement) -> tuple[ProfilePoint,
     )
 
 
-def _notes(vehicle: Vehicle, judged_m: float, assumed: bool) -> list[str]:
+def _notes(vehicle: Vehicle, judged_m: float, assumed: bool) -> list[Note]:
     rule = RULES[vehicle.autopilot]
     notes = []
     if assumed:
-        notes.append(
-            f"the return is judged at {judged_m:g} m above home, the default of {rule.parameter}: write the vehicle's "
-            f"own as rtl_rel_home_m"
-        )
+        notes.append(Note("return_altitude_assumed", rel_home_m=judged_m, parameter=rule.parameter))
     if not rule.climbs_first:
-        notes.append("a plane's return is judged from its flight, not from its take-off and landing")
+        notes.append(Note("return_from_flight"))
     return notes
 
 
-def _landing_sequence(mission: Mission) -> list[str]:
+def _landing_sequence(mission: Mission) -> list[Note]:
     """That ArduPlane's return may lead to a landing sequence of the mission; empty if there is none.
 
     With DO_LAND_START or DO_RETURN_PATH_START in its mission ArduPlane arms only with RTL_AUTOLAND set, and RTL then
@@ -254,27 +248,26 @@ def _landing_sequence(mission: Mission) -> list[str]:
     if mission.autopilot is not Autopilot.ARDUPLANE or not starts:
         return []
     name = command_name(mission.items[starts[0] - mission.first_seq].command)
-    return [
-        f"item {starts[0]}: {name}: the return leads on to it, by RTL_AUTOLAND; only the flight straight home is "
-        f"judged: say return_route: mission for RTL_AUTOLAND 2 or 4, or return_route: straight for 3"
-    ]
+    return [Note("return_leads_on", starts[0], command=name)]
 
 
-def _warnings(refinement: Refinement, vehicle: Vehicle, ground: float, lowest: float | None) -> list[str]:
+def _warnings(refinement: Refinement, vehicle: Vehicle, ground: float, lowest: float | None) -> list[Note]:
     """What the user must know of the altitudes that were found."""
     notes = []
     most_amsl = vehicle.limits.max_amsl_m
     if most_amsl is not None and lowest is not None and ground + lowest > most_amsl - vehicle.limits.altitude_error_m:
         most_m = most_amsl - vehicle.limits.altitude_error_m - ground
-        allowed = f"it allows {floored(most_m, 0):.0f} m above home" if most_m > 0.0 else "home is not below it"
-        need = f"the lowest that is clear from all of the path, {raised(lowest, 1):g} m above home"
-        notes.append(f"every clear return altitude rises above max_amsl_m: {need}; {allowed}")
+        notes.append(
+            Note("clear_above_ceiling", lowest_m=lowest, most_m=most_m)
+            if most_m > 0.0
+            else Note("clear_above_low_ceiling", lowest_m=lowest)
+        )
     if refinement.stopped_early:
-        notes.append("the terrain is too fine to look at all of it closely: unsafe stretches may be drawn too long")
+        notes.append(Note("terrain_too_fine"))
     return notes
 
 
-def _not_judged(verdict: Verdict, vehicle: Vehicle, judged_m: float, assumed: bool, why: tuple[str, ...]) -> WayHome:
+def _not_judged(verdict: Verdict, vehicle: Vehicle, judged_m: float, assumed: bool, why: tuple[Note, ...]) -> WayHome:
     home = verdict.mission.home
     return WayHome(
         vehicle=vehicle.name, autopilot=vehicle.autopilot, path_safe=verdict.safe,

@@ -1,15 +1,35 @@
-"""Words that verdicts and the way home are told in, and lengths of overlapping parts."""
+"""The sentence of a verdict, the labels of the rows on a way home, and lengths of overlapping parts."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Protocol
+from functools import reduce
+from typing import NamedTuple, Protocol
 
-from gcsplan.units import Reach, UnitText
+from gcsplan.notes.note import Note
 
-PATH = {True: "path safe", False: "path UNSAFE", None: "path not judged in full"}
-NO_RETURN, STILL_NO_RETURN, NOT_JUDGED = "no safe return", "still no safe return", "not judged"
-"""Labels of `rows` that may come several times."""
+PATH = {True: Note("path_safe"), False: Note("path_unsafe"), None: Note("path_not_judged")}
+
+LABELS = {
+    "judged_at": "judged at", "judged_as": "judged as", "set": "on the vehicle", "path_back": "instead",
+    "no_return": "no safe return", "irregular": "outside a limit", "clear": "clear of ground and zones",
+    "legal": "within all limits too", "lowest": "lowest on a return", "battery": "battery for the return",
+    "rally": "rally point", "still_no_return": "still no safe return", "not_judged": "not judged",
+}  # fmt: skip
+"""What stands before the rows on a way home, by what they are about."""
+
+
+class Row(NamedTuple):
+    """One row on a way home: what it is about, a key of `LABELS`, and what is said; ``number`` of several."""
+
+    about: str
+    note: Note
+    number: int = 0
+
+    @property
+    def label(self) -> str:
+        """What stands before it."""
+        return LABELS[self.about] + (f" {self.number}" if self.number else "")
 
 
 class Return(Protocol):
@@ -24,19 +44,29 @@ class Return(Protocol):
         """Metres of the mission without a safe return."""
 
 
-def verdict_words(path_safe: bool | None, home: Return | None) -> UnitText:
+def verdict_words(path_safe: bool | None, home: Return | None) -> Note:
     """The one sentence of a verdict in every output, which names what was judged: the path, and the return.
 
     ``home``: the way home, None if it was not judged.
     """
     path = PATH[path_safe]
     if home is None or home.safe is None:
-        return UnitText("{}, return not judged", path)
+        return Note("return_not_judged", path=path)
     if home.safe:
-        return UnitText("{}; safe return from all of it", path)
+        return Note("return_safe", path=path)
     if home.no_return_m < 0.5:
-        return UnitText("{}; no safe return from a point of it", path)
-    return UnitText("{}; no safe return from {} of it", path, Reach(home.no_return_m))
+        return Note("no_return_from_point", path=path)
+    return Note("no_return_from_part", path=path, no_return_m=home.no_return_m)
+
+
+def both(notes: Iterable[Note]) -> Note:
+    """Notes joined by "and"; at least one."""
+    return reduce(lambda one, other: Note("and_also", one=one, other=other), notes)
+
+
+def listed(notes: Iterable[Note]) -> Note:
+    """Notes joined by semicolons; at least one."""
+    return reduce(lambda one, other: Note("and_then", one=one, other=other), notes)
 
 
 def together_m(parts: Iterable[tuple[float, float]]) -> float:

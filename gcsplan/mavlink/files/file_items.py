@@ -23,6 +23,7 @@ from gcsplan.mavlink.mission.mission import (
     MissionItem,
     float32,
 )
+from gcsplan.notes.note import Said
 
 MAX_BYTES = 20_000_000
 """Largest mission file that is read, in bytes."""
@@ -74,7 +75,7 @@ class MissionFileRead:
     """
 
     mission: Mission
-    notes: tuple[str, ...] = ()
+    notes: tuple[Said, ...] = ()
     fence: tuple[MissionItem, ...] = ()
     rally: tuple[MissionItem, ...] = ()
     unread_fence: str = ""

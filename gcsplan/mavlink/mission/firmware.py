@@ -14,16 +14,10 @@ from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, NO_POSITION, MissionItem
 from gcsplan.vehicle import Autopilot
 
-__all__ = ["STRAIGHT_NOTE", "STRAIGHT_UNTIL", "flies_straight", "needs_straight", "version_of", "version_words"]
+__all__ = ["STRAIGHT_UNTIL", "flies_straight", "needs_straight", "version_of", "version_words"]
 
 STRAIGHT_UNTIL = (1, 17)
 """The last version (major, minor) of PX4 that is known to fly straight legs."""
-
-STRAIGHT_NOTE = (
-    "judged with straight legs, as PX4 until 1.17 flies them; later ones may change their altitude at the beginning of "
-    "a leg and fly past way points (upstream issue 28507), so an upload to them is refused"
-)
-"""What a verdict says of a mission that `needs_straight`."""
 
 _BETA = 128
 _KINDS = ((255, ""), (192, " release candidate"), (_BETA, " beta"), (64, " alpha"), (0, " development"))

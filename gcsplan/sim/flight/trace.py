@@ -18,7 +18,6 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.verdict import Finding
 from gcsplan.notes.note import Note
-from gcsplan.units import Quantity, Seconds, UnitText, measured
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Legs, Violation
 from gcsplan.world.world import World
@@ -30,14 +29,13 @@ TRACK_M, HEIGHT_M = 0.25, 0.05
 BLOCK_STEPS = 16
 """Time steps for which the distance between two aircraft is bounded at once."""
 
-BREACH_WORDS = {
-    "min_agl": "came too low above ground",
-    "max_agl": "came too high above ground",
-    "max_amsl": "came above max_amsl_m",
-    "terrain_clearance": "came too near to rising ground at its level",
-    "zone": "came into no-fly zone",
-    "coverage": "came over ground that the terrain model does not know",
+FLOWN_NOTES = {
+    "min_agl": "flew_too_low",
+    "max_agl": "flew_too_high",
+    "max_amsl": "flew_above_ceiling",
+    "terrain_clearance": "flew_near_rising_ground",
 }
+"""The notes on limits of height, by the kind of the violation."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -148,14 +146,14 @@ def _off(a: Floats, b: Floats, inner: Floats) -> tuple[Floats, Floats]:
 def _finding(v: Violation, trace: Trace, sample: int, world: World) -> Finding:
     lat, lon = _degrees(world, np.array([v.east_m, v.north_m]))
     name = world.airspace.zones[v.zone].name if v.zone >= 0 else ""
-    what = BREACH_WORDS.get(v.kind, v.kind) + (f" “{name}” or its clearance" if name else "")
-    by = UnitText(" by {}", measured(v.by, v.kind, v.unit)) if v.kind != "coverage" else ""
-    message = UnitText(
-        "{} {}{} at {}, item {} ({:.6f}, {:.6f}, {})",
-        trace.name, what, by, Seconds(float(trace.times_s[sample]), 1), int(trace.seq[sample]), lat, lon,
-        Quantity(v.amsl_m, "amsl", 1),
-    )  # fmt: skip
-    return Finding(int(trace.seq[sample]), v.kind, message, lat, lon, v.amsl_m, v.value, v.limit, v.by, v.unit, name)
+    time_s, seq, who, at_m = float(trace.times_s[sample]), int(trace.seq[sample]), trace.name, v.amsl_m
+    if v.kind == "coverage":
+        note = Note("flew_over_unknown_ground", seq, name=who, time_s=time_s, lat=lat, lon=lon, amsl_m=at_m)
+    elif v.kind == "zone":
+        note = Note("flew_into_zone", seq, name=who, zone=name, by_m=v.by, time_s=time_s, lat=lat, lon=lon, amsl_m=at_m)
+    else:
+        note = Note(FLOWN_NOTES[v.kind], seq, name=who, by_m=v.by, time_s=time_s, lat=lat, lon=lon, amsl_m=at_m)
+    return Finding(seq, v.kind, note, lat, lon, v.amsl_m, v.value, v.limit, v.by, v.unit, name)
 
 
 def _degrees(world: World, place: Floats) -> tuple[float, float]:

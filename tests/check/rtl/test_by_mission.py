@@ -15,12 +15,14 @@ from gcsplan.check.rtl.way_home import WayHome, way_home
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import NO_POSITION, RELATIVE, Mission
 from gcsplan.mavlink.mission.mission import MissionItem as Item
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Zone
 from tests.check.rtl.test_way_home import BARE, OVER, judged, mission, ridge
 from tests.oracles.joins import join_breach, random_path_case
 from tests.oracles.returns import run_on
+from tests.support.noted import codes, within
 from tests.support.worlds import vehicle, world
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
@@ -67,10 +69,10 @@ def test_the_way_to_the_path_is_judged_not_only_the_path() -> None:
     assert home.safe is False
     (stretch,) = home.unsafe
     # Up to 1000 m it flies to (0, 300), from there on to (1000, 300), past which the tower is in the way.
-    assert "meets no-fly zone “tower”" in stretch.why
+    assert Note("way_meets_zone", zone="tower") in within(stretch.why)
     assert 1000.0 - 45.0 - 110.0 < stretch.from_m < 1000.0  # it stops in 45 m, and one leg is not much nearer
     assert stretch.to_m < 1300.0
-    assert home.headline.startswith("path safe; no safe return from ")
+    assert home.headline.code == "no_return_from_part"
 
 
 def test_a_landing_sequence_is_joined_at_its_first_place_from_everywhere() -> None:
@@ -133,22 +135,22 @@ def test_rounds_before_a_start_cost_their_energy_and_change_nothing_else() -> No
 
 
 @pytest.mark.parametrize(
-    ("items", "words"),
+    ("items", "code"),
     [
-        ([], "holds neither"),
-        ([START, Item(cmd.LOITER_UNLIM, RELATIVE, x=366000000, y=-843000000, z=80.0)], "loiter"),
-        ([START, Item(cmd.WAYPOINT, 10, x=366010000, y=-843000000, z=80.0)], "frame"),
-        ([START, Item(cmd.WAYPOINT, RELATIVE, x=366010000, y=-843000000, z=80.0)], "does not end with a landing"),
-        ([START], "no item that moves"),
-        ([START, Item(cmd.DO_JUMP, NO_POSITION, (2.0, 1.0, 0.0, 0.0))], "jumps"),
-        ([Item(cmd.DO_JUMP, NO_POSITION, (7.0, 1.0, 0.0, 0.0)), START], "jumps"),
+        ([], "nothing_to_join"),
+        ([START, Item(cmd.LOITER_UNLIM, RELATIVE, x=366000000, y=-843000000, z=80.0)], "join_unknown_on_path"),
+        ([START, Item(cmd.WAYPOINT, 10, x=366010000, y=-843000000, z=80.0)], "join_distance_unknown"),
+        ([START, Item(cmd.WAYPOINT, RELATIVE, x=366010000, y=-843000000, z=80.0)], "join_without_landing"),
+        ([START], "join_without_item"),
+        ([START, Item(cmd.DO_JUMP, NO_POSITION, (2.0, 1.0, 0.0, 0.0))], "jump_decides_join"),
+        ([Item(cmd.DO_JUMP, NO_POSITION, (7.0, 1.0, 0.0, 0.0)), START], "jump_decides_join"),
     ],
 )
-def test_what_is_not_known_is_not_judged(items: list[Item], words: str) -> None:
+def test_what_is_not_known_is_not_judged(items: list[Item], code: str) -> None:
     m = mission(world(), [(0, 0, 80), (2000, 0, 80)])
     home = joined(world(), replace(m, items=(*m.items, *items)))
     assert home.safe is None
-    assert any(words in line for line in home.not_judged), home.not_judged
+    assert code in codes(home.not_judged)
 
 
 def test_px4_is_not_judged_and_a_plane_needs_to_say_which_way_it_returns() -> None:
@@ -174,10 +176,10 @@ def test_a_plane_swings_wide_where_it_joins() -> None:
     held = replace(m, items=(*m.items, START, *ways, down))
     short = joined(w, replace(held, items=(*held.items[:-2], replace(down, x=ways[-2].x, y=ways[-2].y))), v)
     assert short.safe is None
-    assert "not on its line again before the landing" in short.describe()
+    assert "joins_short_legs" in codes(within(short.not_judged[0]))
     home = joined(w, held, v)
     assert home.safe is True, home.describe()
-    assert "RTL_AUTOLAND 4" in home.advice
+    assert home.advice == Note("set_route", setting="RTL_AUTOLAND 4")
     tower = world(half_m=9000.0, zones=[Zone("tower", Circle(2000.0, 150.0, 20.0))])
     assert joined(tower, held, v).safe is False
     away = world(half_m=9000.0, zones=[Zone("tower", Circle(2000.0, 1500.0, 20.0))])
@@ -185,7 +187,7 @@ def test_a_plane_swings_wide_where_it_joins() -> None:
     climbs = replace(held, items=(*held.items[:5], *(replace(i, z=600.0) for i in held.items[5:7]), *held.items[7:]))
     high = joined(w, climbs, v)  # 450 m of climb on the way back
     assert high.safe is None
-    assert any("too short for its climb" in words for words in high.not_judged)
+    assert "joins_too_steeply" in codes(note for said in high.not_judged for note in within(said))
 
 
 def _reported(home: WayHome, seq: int, along_m: float, *, legal: bool) -> bool:

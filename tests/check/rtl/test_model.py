@@ -5,18 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 
 from gcsplan.check.circles import circle_growth
 from gcsplan.check.geodesy import flat_m
-from gcsplan.check.rtl.model import RULES, Piece, at_home_m, return_pieces
+from gcsplan.check.rtl.model import RULES, at_home_m, returned
 from gcsplan.check.rtl.places import Target
 from gcsplan.check.rtl.run_on import about_turn_m, run_on_m, run_past_m
 from gcsplan.check.rtl.sweep import obstacles_of_returns
 from gcsplan.check.rtl.trace import MissionTrace
-from gcsplan.check.stretch import Place
+from gcsplan.check.stretch import Place, Stretch
 from gcsplan.vehicle import Autopilot
 from tests.campaigns.returns import in_twin
 from tests.oracles.returning import Begin, plane
@@ -34,7 +35,11 @@ def away(metres: float, amsl_m: float) -> Place:
     return place
 
 
-def spans(pieces: list[Piece]) -> list[tuple[float, float]]:
+def flies(start: Place, end: Place, **more: Any) -> Stretch:
+    return Stretch(5, "rtl", start, end, 10.0, **more)
+
+
+def spans(pieces: list[Stretch]) -> list[tuple[float, float]]:
     """Lowest and highest altitude of each piece that leads home."""
     return [
         (p.start[2] - p.band_m, p.start[2] + p.band_m)
@@ -60,16 +65,17 @@ def spans(pieces: list[Piece]) -> list[tuple[float, float]]:
 def test_the_altitudes_of_the_way_home(
     autopilot: Autopilot, metres: float, amsl_m: float, expected: list[tuple[float, float]]
 ) -> None:
-    pieces = return_pieces(RULES[autopilot], away(metres, amsl_m), HOME, 360.0, about_m=8.0)
-    for found, want in zip(spans(pieces), expected, strict=True):
+    flown, instead = returned(flies, RULES[autopilot], away(metres, amsl_m), HOME, 360.0, about_m=8.0)
+    for found, want in zip(spans([*instead, *flown]), expected, strict=True):
         assert found == pytest.approx(want, abs=1e-3)
 
 
 def test_a_copter_ends_on_the_ground_and_a_plane_on_a_circle() -> None:
-    assert return_pieces(RULES[COPTER], away(500.0, 320.0), HOME, 360.0, about_m=8.0)[-1].end == HOME
-    about, _, *aside, circle = return_pieces(RULES[PLANE], away(500.0, 320.0), HOME, 360.0, about_m=8.0)
-    assert (about.reach_m, about.instead) == (8.0, True)
-    assert [(p.reach_m, p.instead, p.band_m) for p in aside] == [(w, True, 20.0) for w in (8.0, 6.0, 4.0, 2.0)]
+    down, _ = returned(flies, RULES[COPTER], away(500.0, 320.0), HOME, 360.0, about_m=8.0)
+    assert down[-1].end == HOME
+    (_, circle), (about, *aside) = returned(flies, RULES[PLANE], away(500.0, 320.0), HOME, 360.0, about_m=8.0)
+    assert about.reach_m == 8.0
+    assert [(s.reach_m, s.band_m) for s in aside] == [(w, 20.0) for w in (8.0, 6.0, 4.0, 2.0)]
     assert aside[0].start == (*away(500.0, 320.0)[:2], 340.0)
     assert aside[-1].end == (*HOME[:2], 340.0)
     for one, two in pairwise(aside):
@@ -99,8 +105,8 @@ def test_the_sweep_has_the_cone_of_a_single_return(metres: float, amsl_m: float)
     met = obstacles_of_returns(trace, trace.cut(1.0), Target(0.0, 0.0, 300.0, 300.0), v, whole=True).clear
     (base,), (limit,) = met.base[:1], met.limit[:1]
     lowest = max(base, min(max(345.0, amsl_m), limit))
-    pieces = return_pieces(RULES[COPTER], away(metres, amsl_m), HOME, 345.0, about_m=0.0)
-    assert lowest == pytest.approx(min(low for low, _ in spans(pieces)), abs=0.01)
+    flown, instead = returned(flies, RULES[COPTER], away(metres, amsl_m), HOME, 345.0, about_m=0.0)
+    assert lowest == pytest.approx(min(low for low, _ in spans([*instead, *flown])), abs=0.01)
 
 
 @pytest.mark.parametrize("speed", [2.0, 5.0, 9.0, 10.0])

@@ -29,12 +29,14 @@ from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.commands import LAND, RTL, TAKEOFF, VTOL_LAND, VTOL_TAKEOFF, WAYPOINT
 from gcsplan.mavlink.mission.mission import RELATIVE, Home, Mission
 from gcsplan.mavlink.mission.mission import MissionItem as Item
+from gcsplan.notes.note import Note
 from gcsplan.units import Reach
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.oracles.returns import breach, random_case, run_on
+from tests.support.noted import codes, within
 from tests.support.worlds import vehicle, world
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
@@ -84,9 +86,9 @@ def test_over_flat_ground_any_altitude_is_safe() -> None:
     words = "outside a limit: from a point of the path the return hits nothing but breaks a limit; first from km 3.00"
     assert words in home.describe()
     assert "; within all limits from there at 65" in home.describe()
-    assert home.headline == "path safe; safe return from all of it"
-    assert "RTL_ALT 6600 (cm)" in home.advice
-    assert home.advice.endswith("then safe return from all of it, within all limits")
+    assert str(home.headline) == "path safe; safe return from all of it"
+    assert "RTL_ALT 6600 (cm)" in str(home.advice)
+    assert str(home.advice).endswith("then safe return from all of it, within all limits")
 
 
 def test_behind_a_ridge_the_return_must_clear_it() -> None:
@@ -107,7 +109,7 @@ def test_behind_a_ridge_the_return_must_clear_it() -> None:
     east, north = w.frame.to_plane(*stretch.obstacle[:2])
     assert 890.0 <= float(east) <= 1110.0
     assert abs(float(north)) < 1.0
-    assert "meets ground" in stretch.describe()
+    assert "does_meet_ground" in codes(within(stretch.why))
 
 
 @pytest.mark.parametrize("autopilot", [COPTER, PX4])
@@ -126,7 +128,7 @@ def test_without_an_altitude_the_autopilots_default_is_judged_and_said_so() -> N
     ):  # fmt: skip
         home = judged(world(), mission(world(), [(0, 0, 120), (2000, 0, 120)], autopilot))
         assert (home.parameter, home.rtl_rel_home_m, home.assumed) == (parameter, default, True)
-        assert any("default" in n and parameter in n for n in home.notes)
+        assert Note("return_altitude_assumed", rel_home_m=default, parameter=parameter) in home.notes
     home = judged(world(), mission(world(), [(0, 0, 120), (2000, 0, 120)]), rtl=40.0)
     assert not home.assumed
     assert home.notes == ()
@@ -171,8 +173,8 @@ def test_what_stays_unsafe_without_rally_points_is_not_called_a_matter_of_the_ba
     left = home.left or home.unsafe
     assert left
     told = replace(home, rally=(), left=left, set_rel_home_m=60.0, set_leaves_m=200.0)
-    assert told.advice.endswith("then no safe return from 200 m of it")
-    assert replace(told, left=()).advice.endswith("then no safe return from 200 m of it (battery)")
+    assert str(told.advice).endswith("then no safe return from 200 m of it")
+    assert str(replace(told, left=()).advice).endswith("then no safe return from 200 m of it (battery)")
 
 
 def test_a_column_must_not_climb_into_a_zone_and_home_may_lie_under_one() -> None:
@@ -194,10 +196,10 @@ def test_a_wall_without_a_top_leaves_no_altitude_and_rally_points_mend_it() -> N
     assert home.unsafe
     assert all(s.lowest_rel_home_m is None for s in home.unsafe)
     assert {s.zone for s in home.unsafe} == {"tower"}
-    assert "no top" in home.unsafe[0].why
+    assert "zone_without_top" in codes(within(home.unsafe[0].why))
     assert home.rally
     assert sum(s.to_m - s.from_m for s in home.left) < 0.3 * home.no_return_m
-    assert any("RALLY_LIMIT_KM" in n for n in home.notes)
+    assert "rally_points_of_ardupilot" in codes(home.notes)
     for item, point in zip(rally_items(home.rally), home.rally, strict=True):
         assert (item.command, item.frame) == (5100, RELATIVE)
         assert item.lat_deg == pytest.approx(point.lat_deg)
@@ -303,7 +305,7 @@ def test_a_planes_columns_are_left_out_and_said_so() -> None:
     home = judged(world(), m, vehicle(PLANE, **BARE), 100.0)
     assert home.safe is True
     assert home.lowest_rel_home_m is not None
-    assert any("take-off and landing" in n for n in home.notes)
+    assert "return_from_flight" in codes(home.notes)
     v = replace(vehicle(PLANE, **dict(BARE, track_error_m=15.0)), turn_radius_m=60.0)
     bent = judged(world(), mission(world(), [(0, 0, 120), (1500, 0, 120), (1500, 1500, 120)], PLANE), v, 100.0)
     assert bent.unsafe == ()
@@ -327,8 +329,8 @@ def test_the_lowest_height_of_all_returns_is_told() -> None:
     assert high.lowest is not None
     assert low.lowest.agl_m == pytest.approx(-50.0, abs=1.0)  # the ridge is 100 m above home
     assert high.lowest.agl_m == pytest.approx(30.0, abs=1.0)
-    told = [dict(home.rows())["lowest on a return"] for home in (low, high)]
-    assert [" ".join(words.split()[1:4]) for words in told] == ["m below ground,", "m above ground,"]
+    told = [row.note.code for home in (low, high) for row in home.rows() if row.about == "lowest"]
+    assert told == ["lowest_below_ground", "lowest_on_return"]
     assert high.as_dict()["lowest_agl_m"] == high.lowest.agl_m
 
 
@@ -344,18 +346,16 @@ def test_all_reasons_of_a_return_are_named_together_and_stretches_are_cut_where_
     assert both
     assert ground
     for s in both:
-        assert "meets ground" in s.why
-        assert (
-            " and meets no-fly zone “tower” (no top)" in s.why or "“tower” (no top) or its clearance and meets" in s.why
-        )
-        assert s.describe().endswith("no return altitude is safe from there")
+        assert {"and_also", "does_meet_zone", "zone_without_top"} < set(codes(within(s.why)))
+        assert {"does_meet_ground", "does_meet_ground_on_climb"} & set(codes(within(s.why)))
+        assert s.described().code == "no_altitude_helps"
     for s in ground:
-        assert "tower" not in s.why
-        assert "meets ground" in s.why
+        assert "does_meet_zone" not in codes(within(s.why))
+        assert "does_meet_ground" in codes(within(s.why))
         assert s.lowest_rel_home_m == pytest.approx(105.0, abs=3.0)
-        assert "no return altitude" not in s.describe()
-    told = [words for label, words in home.rows() if label == "no safe return"]
-    assert "tower" in told[0]  # the worst first: no altitude helps
+        assert s.described().code == "altitude_helps"
+    told = [row.note for row in home.rows() if row.about == "no_return"]
+    assert "does_meet_zone" in codes(within(told[0]))  # the worst first: no altitude helps
     assert [s.from_m for s in home.unsafe] == sorted(s.from_m for s in home.unsafe)
 
 
@@ -364,7 +364,7 @@ def test_where_no_altitude_helps_though_each_obstacle_could_be_passed_it_says_wh
     w = world(ridge, [lid])
     home = judged(w, mission(w, [(0, 0, 40), (0, 1500, 40), (2000, 1500, 130), (2500, 0, 40)]), vehicle(**BARE), 50.0)
     (worst, *_) = [s for s in worst_first(home.unsafe) if s.lowest_rel_home_m is None]
-    words = worst.describe()
+    words = str(worst.described())
     assert re.search("meets ground at .* and would clear it at 40[0-9] m AMSL; no return", words)
     assert (
         "no return altitude is safe from there: at another altitude it meets no-fly zone “lid” (from 397 m AMSL up)"
@@ -379,7 +379,7 @@ def test_over_unknown_ground_no_return_is_safe() -> None:
     w = world(hole)
     home = judged(w, mission(w, [(0, 0, 80), (0, 1500, 80), (2500, 0, 80)]), vehicle(**BARE), 60.0)
     assert home.unsafe
-    assert "unknown" in home.unsafe[0].why
+    assert "does_over_unknown_ground" in codes(within(home.unsafe[0].why))
     assert home.lowest_rel_home_m is None
 
 
@@ -391,11 +391,11 @@ def test_max_agl_and_max_amsl_are_limits_but_not_obstacles() -> None:
     m = mission(w, [(0, 0, 60), (0, 800, 60), (2500, 0, 60)])
     home = judged(w, m, vehicle(**BARE, max_agl_m=120.0), 60.0)
     assert home.safe is True
-    assert {"max_agl_m" in s.why for s in home.irregular} == {True}
+    assert all("does_above_max_agl" in codes(within(s.why)) for s in home.irregular)
     home = judged(w, m, vehicle(**BARE, max_amsl_m=370.0), 100.0)
     assert home.safe is True
     assert home.lowest_legal_rel_home_m is not None
-    assert {"max_amsl_m" in s.why for s in home.irregular} == {True}
+    assert all("does_above_ceiling" in codes(within(s.why)) for s in home.irregular)
 
 
 def test_a_low_landing_column_is_told_from_the_flight_above_it() -> None:
@@ -442,7 +442,7 @@ def test_the_altitude_to_set_is_safe_within_all_limits_and_hardly_higher_than_it
     assert best is not None
     assert legal is not None
     assert legal <= best < legal + 1.0
-    assert f"{name}{best:g} (m)" in home.advice
+    assert f"{name}{best:g} (m)" in str(home.advice)
     set_to = judged(w, m, v, best)
     assert (set_to.unsafe, set_to.irregular) == ((), ())
     assert (set_to.set_rel_home_m, set_to.no_return_m) == (best, 0.0)
@@ -452,21 +452,21 @@ def test_the_headline_tells_path_and_return_and_counts_overlaps_once() -> None:
     w = world(ridge)
     v = vehicle(**BARE)
     home = judged(w, mission(w, OVER), v, 50.0)
-    assert home.headline == "path safe; no safe return from 1.0 km of it"
+    assert str(home.headline) == "path safe; no safe return from 1.0 km of it"
     short = replace(v, energy=replace(v.energy, battery_j=450_000.0))
     low = judged(w, mission(w, OVER), short, 50.0)
     assert low.battery is not None
     [(a, b)] = low.battery.short
     assert low.no_return_m == pytest.approx(max(b, low.unsafe[0].to_m) - min(a, low.unsafe[0].from_m))
-    assert f"(battery: from {(b - a) / 1e3:.1f} km)" in low.headline or f"(battery: from {b - a:.0f} m)" in low.headline
+    assert (low.headline.code, low.headline.data["short_m"]) == ("no_return_for_battery_from", pytest.approx(b - a))
     assert low.set_leaves_m == pytest.approx(b - a, abs=60.0)  # the climb to a higher return takes energy
     high = judged(w, mission(w, OVER), short, 130.0)
-    assert high.headline.endswith("km of it (battery)") or high.headline.endswith("m of it (battery)")
+    assert high.headline.code == "no_return_for_battery"
     broken = judged(w, mission(w, OVER), replace(v, limits=replace(v.limits, min_agl_m=45.0)), 50.0)
-    assert broken.headline.startswith("path UNSAFE; no safe return from ")
+    assert str(broken.headline).startswith("path UNSAFE; no safe return from ")
     nothing = judged(w, replace(mission(w, OVER), items=()), rtl=60.0)
-    assert nothing.headline.endswith(", return not judged: the mission could not be followed")
-    assert nothing.advice == ""
+    assert str(nothing.headline).endswith(", return not judged: the mission could not be followed")
+    assert nothing.advice is None
 
 
 def test_words_know_one_from_many() -> None:
@@ -620,7 +620,7 @@ def test_a_planes_return_that_leads_on_to_a_landing_sequence_is_not_called_safe(
     home = judged(w, m, vehicle(PLANE, **BARE), 100.0)
     assert home.unsafe == ()
     assert home.safe is None
-    assert any("start: the return leads on to it, by RTL_AUTOLAND" in words for words in home.not_judged)
+    assert "return_leads_on" in codes(home.not_judged)
     copter = mission(w, [(0, 0, 120), (3000, 0, 120)])
     copter = replace(copter, items=(*copter.items[:2], Item(command, 2), *copter.items[2:]))
     assert judged(w, copter, vehicle(**BARE), 100.0).safe is True  # its RTL does not look for one
