@@ -157,7 +157,7 @@ def unchecked_job(argument: str, url: str, sysid: int) -> tuple[UploadJob, list[
             autopilot = _autopilot_of(link, sysid)
     read = read_mission_file(file, autopilot=autopilot)
     job = UploadJob(name or file.stem, endpoint.url, replace(read.mission, name=name or file.stem, sysid=sysid))
-    return job, [*map(str, read.notes), *([read.unread_fence] if read.unread_fence else [])]
+    return job, [*read.notes, *([read.unread_fence] if read.unread_fence else [])]
 
 
 def open_link(url: str) -> Link:

@@ -137,7 +137,7 @@ def test_the_report_shows_it(case: str) -> None:
         if true["battery_percent"] is not None:
             shown_as(quantity(cells["battery"]), true["battery_percent"], 1)
         legs, items = text_rows(page, f"Legs of {v.name},"), list(by_item(v.verdict.legs))
-        for row, item in zip(legs, items, strict=True):
+        for row, (item, _) in zip(legs, items, strict=True):
             shown_as(quantity(row[1]), item.length_m, 0)
             if not item.column and math.isfinite(item.min_agl_m):
                 shown_as(quantity(row[4]), item.min_agl_m, 1, least=True)

@@ -82,10 +82,10 @@ def test_table_json_csv_and_report_say_the_same_times(case: str) -> None:
         assert seconds(shown) == pytest.approx(slot.arrive_s, abs=off_s)
         table = text_rows(page, f"Legs of {v.name},")
         items = list(by_item(legs))
-        ends = [clock[n - 1] for n in accumulate(item.stretches for item in items)]
+        ends = [clock[n - 1] for n in accumulate(stretches for _, stretches in items)]
         assert [row[-1] for row in table] == [duration(at) for at in ends]
         assert [seconds(row[-1]) for row in table] == pytest.approx(ends, abs=0.501)
-        assert [seconds(row[-2]) for row in table] == pytest.approx([item.time_s for item in items], abs=0.501)
+        assert [seconds(row[-2]) for row in table] == pytest.approx([item.time_s for item, _ in items], abs=0.501)
         drawn = re.findall(
             rf'"vehicle"><value>{v.name}</value>.*?"number"><value>(\d+)</value>.*?"time_s"><value>([\d.]+)<',
             files["mission.kml"],
