@@ -187,7 +187,7 @@ def test_where_a_safe_return_is_required_nothing_flyable_is_left_and_nothing_is_
 
 
 @pytest.mark.parametrize("way", ["plan", "upload"])
-def test_a_vehicle_that_returns_at_another_altitude_than_the_required_one_is_refused_before_anything_is_sent(
+def test_a_vehicle_with_another_return_altitude_is_refused_before_anything_is_sent(
     run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, planned: Path, way: str
 ) -> None:
     mission = write(tmp_path, rtl_rel_home_m=200.0, way_home="required")
@@ -207,7 +207,7 @@ def test_a_vehicle_that_returns_at_another_altitude_than_the_required_one_is_ref
 
 @pytest.mark.first_quick
 @pytest.mark.parametrize("told", [{}, {"RTL_ALT": math.nan}], ids=["nothing", "no number"])
-def test_a_vehicle_that_does_not_tell_its_return_altitude_gets_no_mission_that_requires_one(
+def test_a_vehicle_that_hides_its_return_altitude_gets_no_mission_that_requires_one(
     run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: dict[str, float]
 ) -> None:
     mission = write(tmp_path, rtl_rel_home_m=200.0, way_home="required")

@@ -466,7 +466,7 @@ def test_a_mission_across_the_antimeridian_is_small() -> None:
 # -- local metres -------------------------------------------------------------------------------------------------
 
 
-def test_a_mission_in_local_metres_has_no_errors_of_its_own_and_may_hang_its_goal_in_the_air() -> None:
+def test_a_mission_in_local_metres_has_no_errors_and_may_hang_its_goal_in_the_air() -> None:
     mission = load(local())
     assert mission.local
     one = mission.vehicles[0]

@@ -99,7 +99,7 @@ def test_the_cuts_are_those_of_edges_that_are_all_measured() -> None:
 
 
 @pytest.mark.parametrize("great_circles", [False, True])
-def test_polygons_that_are_projected_together_are_those_that_are_looked_at_one_by_one(great_circles: bool) -> None:
+def test_polygons_projected_together_are_those_looked_at_one_by_one(great_circles: bool) -> None:
     rng = np.random.default_rng(5)
     rings = []
     for _ in range(300):  # small and large, near and far, either way around, in both conventions of longitudes

@@ -452,7 +452,7 @@ def test_a_vehicle_that_keeps_its_first_partner_hears_every_link_from_the_same_p
     assert len(ports) == 1
 
 
-def test_a_link_sends_from_the_port_that_was_given_and_from_a_free_one_if_that_is_taken(peers: list[Peer]) -> None:
+def test_a_link_sends_from_the_given_port_or_from_a_free_one_if_that_is_taken(peers: list[Peer]) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("", 0))
         own = free.getsockname()[1]

@@ -472,7 +472,7 @@ def test_a_timeout_that_is_none_is_refused() -> None:
         uploaded(vehicle(), timeout_s=0.0)
 
 
-def test_a_vehicle_that_boots_longer_than_the_timeout_is_not_written_to_and_left_at_once() -> None:
+def test_a_vehicle_that_boots_beyond_the_timeout_is_left_at_once_and_unwritten() -> None:
     """The time until it was ready is none of the transfer's."""
     board = Acting(COPTER, lambda *_: None, seed=1)
     board._boot_s = 4.5

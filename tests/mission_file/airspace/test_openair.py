@@ -263,9 +263,7 @@ def test_a_file_without_zones_is_refused_in_few_words(tmp_path: Path, text: str,
 
 
 @pytest.mark.parametrize("line", ["DP 50:00:00 N 008:99:00 E", "DP 47:03:00 N", "V X=here", "lost words", "DC 400"])
-def test_a_zone_whose_outline_is_not_understood_is_refused_wherever_the_rest_of_it_lies(
-    tmp_path: Path, line: str
-) -> None:
+def test_an_outline_that_is_not_understood_is_refused_wherever_its_rest_lies(tmp_path: Path, line: str) -> None:
     text = f"AC R\nAN far\nV X=47:00:00 N 008:00:00 E\n{SQUARE}{line}\nAC R\nAN whole\n{SQUARE}"
     found = read(tmp_path, text, "a.txt")
     assert len(found.problems) == 1

@@ -43,7 +43,7 @@ def test_layers_are_stops_and_sections_of_21_by_21() -> None:
     assert np.abs(across[:, :2] @ ahead[:2]).max() < 1e-6 * np.linalg.norm(ahead) ** 2
 
 
-def test_an_edge_is_open_exactly_where_dense_points_are_allowed_and_it_is_not_too_steep() -> None:
+def test_an_edge_is_open_exactly_where_dense_points_are_allowed_and_not_too_steep() -> None:
     problem = mission()
     scene = Scene.of(problem)
     a, b = make_layers(scene, (2,))[1:3]

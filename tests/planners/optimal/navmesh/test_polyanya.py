@@ -248,7 +248,7 @@ def test_ways_are_as_long_as_the_shortest_by_visibility_there_and_back(form: str
 
 @pytest.mark.first_quick
 @pytest.mark.parametrize("form", EACH_FORM)
-def test_where_walls_touch_exactly_ways_are_legal_and_shorter_than_round_the_touching_places(form: str) -> None:
+def test_where_walls_touch_exactly_ways_are_legal_and_no_detours(form: str) -> None:
     """A touching point may be passed or not, but tracks beside it must be found, and no wall may be crossed."""
     rng = np.random.default_rng(list(form.encode()))
     compared = 0
