@@ -76,8 +76,8 @@ print([name for name in heavy if name in sys.modules])
 
 
 def test_a_command_is_made_without_the_options_of_the_others() -> None:
-    every = set(main._commands("").commands)
+    every = set(main.command_of("").commands)
     assert {"plan", "fit-energy", "dem"} <= every
-    assert every == set(main._commands("no such command").commands)
+    assert every == set(main.command_of("no such command").commands)
     for name in every:
-        assert set(main._commands(name).commands) == {name}
+        assert set(main.command_of(name).commands) == {name}

@@ -178,7 +178,7 @@ def test_ssgwo_with_leaders_apart_moves_them_by_eq_17_to_19_and_wolves_by_eq_23(
                 assert moved[first[k], d] == pytest.approx(clip(value), abs=1e-12)
         f_moved = bowl(moved)
         # The trial's random numbers are the next that the generator gives.
-        state = play.rng._rng.bit_generator.state
+        state = play.rng.generator.bit_generator.state
         rand = np.random.default_rng(0)
         rand.bit_generator.state = state
         trial = rand.random(n)

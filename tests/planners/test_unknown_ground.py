@@ -75,7 +75,7 @@ def test_a_way_past_a_void_is_found_without_a_warning() -> None:
 
 def test_a_stretch_over_unknown_ground_is_shut() -> None:
     over = np.subtract([10.0, np.inf, np.inf, 10.0], [90.0, -np.inf, 90.0, 90.0])
-    assert bound_corridor._stretches(over) == [(0, 3)]
+    assert bound_corridor.shut_stretches(over) == [(0, 3)]
 
 
 def test_a_side_of_a_merged_cell_between_known_nodes_lies_on_the_ground() -> None:

@@ -95,7 +95,7 @@ def test_the_cuts_are_those_of_edges_that_are_all_measured() -> None:
             bow = frame.bow_m(ring[:, ::-1], following[:, ::-1])
             pieces = np.maximum(1, np.ceil(np.sqrt(bow / degree_shapes.EDGE_BOW_M))).astype(int)
             whole = [a + (b - a) * (np.arange(n) / n)[:, None] for a, b, n in zip(ring, following, pieces, strict=True)]
-            assert np.array_equal(degree_shapes._cut_edges(ring, following, frame), np.concatenate(whole))
+            assert np.array_equal(degree_shapes.cut_edges(ring, following, frame), np.concatenate(whole))
 
 
 @pytest.mark.parametrize("great_circles", [False, True])

@@ -36,6 +36,7 @@ from gcsplan.world.peaks import Peak
 from gcsplan.world.raster import open_raster
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import TerrainSpec, load_terrain, open_terrain
+from gcsplan.world.tiles import tiles_of
 from tests.support.effort import draws
 
 FRAME = Frame(36.5, -84.5)
@@ -764,7 +765,7 @@ def test_a_small_file_that_unpacks_into_a_large_block_is_refused(
     monkeypatch.setattr(raster, "MAX_BLOCK_BYTES", 64 * 64 * 4 * 3)
     open_raster(path, where="m")
     monkeypatch.setattr(raster, "MAX_BLOCK_BYTES", 64 * 64 * 4 * 3 - 1)
-    monkeypatch.setattr(raster, "_headers", {})  # opened a moment ago
+    monkeypatch.setattr(raster, "remembered_headers", {})  # opened a moment ago
     with pytest.raises(InputError, match="TILED"):
         open_raster(path, where="m")
 
@@ -1091,8 +1092,7 @@ def test_many_tiles_are_read_by_windows(tmp_path: Path) -> None:
     assert np.unique(again.ground_m).tolist() == [123.0]
     assert first.info == again.info
 
-    tiles = open_terrain(spec, where="m")._mosaic.rasters  # type: ignore[attr-defined]
-    assert len(tiles) == 36
+    assert len(tiles_of([str(tmp_path)], where="m")) == 36
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("gcsplan.world.tiles.HASHED_BYTES", 0)
         patch.setattr("gcsplan.world.raster.sha256_of_all", lambda path: pytest.fail(f"{path} is read whole"))

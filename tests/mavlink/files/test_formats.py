@@ -157,7 +157,7 @@ def test_a_row_is_read_at_once_as_it_is_number_by_number(
             return str(why)
 
     at_once = read()
-    monkeypatch.setattr("gcsplan.mavlink.files.waypoints_file._plain", lambda line, fields: [])
+    monkeypatch.setattr("gcsplan.mavlink.files.waypoints_file.numbers_at_once", lambda line, fields: [])
     assert read() == at_once
 
 

@@ -169,7 +169,7 @@ def test_a_parser_never_holds_more_than_a_frame() -> None:
     for _ in range(300):
         junk = bytes(rng.choice([0xFD, 0xFE, 0, 255, rng.randrange(256)]) for _ in range(rng.randrange(600)))
         parser.feed(junk, datagram=rng.random() < 0.5)
-        assert len(parser._rest) <= 300
+        assert len(parser.rest) <= 300
 
 
 @settings(max_examples=draws(150))
@@ -417,8 +417,8 @@ def test_a_flood_of_strangers_is_forgotten_in_turn() -> None:
         await_messages(link, link.channel(9))
         for _ in range(20):
             link.poll()
-        assert len(link._parsers) <= 260
-        assert len(link._heard_at) <= 260
+        assert len(link.parsers) <= 260
+        assert len(link.heard_at) <= 260
 
 
 def test_an_inbox_is_bounded() -> None:
@@ -488,7 +488,7 @@ def test_a_link_over_tcp_carries_frames_both_ways_and_connects_again() -> None:
                 heard = _await_both(vehicle, gcs, theirs)
                 vehicle.send(wire.encode(Count(3 + round_), GCS), heard.source)
                 assert _await_both(gcs, vehicle, mine).message.count == 3 + round_
-                for stream in list(vehicle.transport._clients.values()):  # type: ignore[attr-defined]
+                for stream in list(vehicle.transport.clients.values()):  # type: ignore[attr-defined]
                     stream.close()
                 until = time.monotonic() + BOUND_S
                 while gcs.transport.handles and time.monotonic() < until:
