@@ -101,7 +101,10 @@ def test_old_items_with_nonsense_for_degrees_are_read_all_the_same() -> None:
     for x in (float("nan"), float("inf"), 1e30):
         message = dialect.MAVLink_mission_item_message(255, 190, 0, 3, 16, 0, 1, 0, 0, 0, 0, x, x, 1.0, 0)
         (received,) = FrameParser().feed(FrameWriter(VEHICLE).pack(message))
-        assert wire.decode(received) is not None
+        packet = wire.decode(received)
+        assert packet is not None
+        assert type(packet.message) is LegacyItem
+        assert (packet.message.seq, packet.message.item.command, packet.message.item.z) == (0, 16, 1.0)
 
 
 def test_other_messages_are_no_packets() -> None:
@@ -177,8 +180,12 @@ def test_a_parser_never_holds_more_than_a_frame() -> None:
 def test_raw_bytes_never_break_the_parser(chunks: list[bytes]) -> None:
     parser, datagrams = FrameParser(), FrameParser()
     for chunk in chunks:
-        for message in [*parser.feed(chunk), *datagrams.feed(chunk, datagram=True)]:
-            wire.decode(message)
+        heard = [*parser.feed(chunk), *datagrams.feed(chunk, datagram=True)]
+        assert sum(len(message.get_msgbuf()) for message in heard) <= 2 * sum(map(len, chunks))
+        assert all(packet is None or packet.message is not None for packet in map(wire.decode, heard))
+    # What came before neither is part of the next frame nor swallows it.
+    datagrams.rest = b""
+    assert [m.get_type() for m in datagrams.feed(packed(RequestList()), datagram=True)] == ["MISSION_REQUEST_LIST"]
 
 
 def test_frames_of_an_unknown_kind_are_passed_over_whole() -> None:
@@ -364,7 +371,9 @@ def test_a_vehicle_that_moves_to_another_port_is_answered_there(peers: list[Peer
             peer.send(heartbeat(), port)
             await_messages(link, channel)
         channel.send_packets([Packet(GCS, VEHICLE, RequestList())])
-        moved.hear("MISSION_REQUEST_LIST")
+        request, _ = moved.hear("MISSION_REQUEST_LIST")
+        assert (request.target_system, request.get_srcSystem()) == (VEHICLE.sysid, GCS.sysid)
+        assert peers[0].hears_nothing_but_heartbeats()
 
 
 def test_our_heartbeat_goes_out_as_a_ground_stations(peers: list[Peer]) -> None:
