@@ -8,7 +8,8 @@ import pytest
 from gcsplan.fleet import _groups
 from gcsplan.fleet._groups import groups_of, settle_groups
 from gcsplan.fleet._settle import Ask, moved, settle
-from gcsplan.fleet.arrival import Crew, schedule
+from gcsplan.fleet.arrival import schedule
+from gcsplan.fleet.craft import Crew
 from gcsplan.fleet.resolve import resolve
 from gcsplan.fleet.separation import Rules, separation
 from tests.fleet.test_resolve import crew

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import inspect
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats
+from gcsplan.optimisers import classics, fruit_flies, krill, registry
 from gcsplan.optimisers.bees import roulette
+from gcsplan.optimisers.box import Steps
 from gcsplan.optimisers.budgerigars import LEVY_SPREAD
 from tests.support.swarm_play import Play, bowl, clip, crowd
 
@@ -20,6 +24,21 @@ def skip(drawn: int, *taken: int) -> int:
     for other in sorted(taken):
         drawn += drawn >= other
     return drawn
+
+
+@pytest.mark.parametrize(
+    ("name", "rule"),
+    [
+        ("pso", classics.pso), ("de", classics.de), ("krill", krill.krill), ("foa", fruit_flies.foa),
+        ("iffo", fruit_flies.iffo), ("mfoa", fruit_flies.mfoa), ("msfoa", fruit_flies.msfoa),
+    ],
+)  # fmt: skip
+def test_a_name_of_the_table_runs_the_rule_of_its_module(name: str, rule: Callable[..., Steps]) -> None:
+    entry = registry.get(name)
+    assert entry.rule() is rule
+    taken = inspect.signature(rule).parameters
+    assert set(entry.defaults) == set(taken) - {"run"}
+    assert all(taken[key].kind is inspect.Parameter.KEYWORD_ONLY for key in entry.defaults)
 
 
 def test_particles_turn_to_their_own_and_the_swarms_best_and_stop_at_a_bound() -> None:

@@ -17,10 +17,10 @@ from gcsplan.errors import CheckFailed, GcsplanError, InputError, LinkError, Rea
 from gcsplan.mavlink.link import steps
 from gcsplan.mavlink.link.frames import SigningKey
 from gcsplan.mavlink.link.link import Heard, Link
+from gcsplan.mavlink.link.options import SessionOptions
 from gcsplan.mavlink.link.parameters import judge_fence_parameters, judge_parameters
 from gcsplan.mavlink.link.preflight import preflight
 from gcsplan.mavlink.link.session import (
-    SessionOptions,
     UploadOrder,
     clear_mission,
     discover,

@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission.mission import ALL, FENCE, MISSION, RALLY, MissionItem
+from gcsplan.mavlink.protocol.download import Download
+from gcsplan.mavlink.protocol.machine import ImpossibleTransition, Machine, Timers
 from gcsplan.mavlink.protocol.messages import (
     Ack,
     Address,
@@ -24,19 +26,8 @@ from gcsplan.mavlink.protocol.messages import (
     RequestList,
 )
 from gcsplan.mavlink.protocol.outcome import CANCELLED, DENIED, ERROR, INVALID_SEQUENCE, NO_SPACE, code_cure, code_words
-from gcsplan.mavlink.protocol.transfer import (
-    Accepted,
-    Clear,
-    Download,
-    ImpossibleTransition,
-    Machine,
-    Refused,
-    Settled,
-    Timers,
-    Unknown,
-    Upload,
-    VerifiedUpload,
-)
+from gcsplan.mavlink.protocol.transfer import Accepted, Refused, Settled, Unknown, VerifiedUpload
+from gcsplan.mavlink.protocol.upload import Clear, Upload
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
 from gcsplan.vehicle import Autopilot

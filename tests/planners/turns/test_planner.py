@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.planners.turns import planner
-from gcsplan.planners.turns.arc_path import CHORD_M, MOST_DEG, moved
+from gcsplan.planners.turns.arc_path import MOST_DEG, moved
+from gcsplan.planners.turns.kernels import CHORD_M
 from gcsplan.planners.turns.planner import LEVELS, Rounded, arc_path_of, rounded, with_more_clearance
 from gcsplan.planners.turns.repair import tried
 from gcsplan.world.airspace import Airspace, Legs
