@@ -398,8 +398,12 @@ def test_nodes_that_are_looked_at_lie_around_the_cells_that_are_wanted(rows: int
                 assert found[j, 0] >= found[j, 1]
 
 
-@pytest.mark.parametrize("goes_on", [(False,) * 4, (True, False, True, False), (True,) * 4])
-@pytest.mark.parametrize("shear", [0.0, 0.4])
+@pytest.mark.parametrize(
+    ("goes_on", "shear"),
+    [((False,) * 4, 0.0), ((True, False, True, False), 0.4), ((True,) * 4, 0.0),
+     pytest.param((False,) * 4, 0.4, marks=pytest.mark.slow), pytest.param((True,) * 4, 0.4, marks=pytest.mark.slow),
+     pytest.param((True, False, True, False), 0.0, marks=pytest.mark.slow)],
+)  # fmt: skip
 def test_no_track_runs_nearer_to_the_terrains_border_than_ground_must_be_known(
     goes_on: tuple[bool, bool, bool, bool], shear: float
 ) -> None:
