@@ -13,7 +13,11 @@ import pytest
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.complaints import few, key_path, unknown_keys
 from gcsplan.mission_file.other_files import FIRST_BYTES, SUFFIXES, what_else
+from gcsplan.mission_file.zone_csv import read_csv
+from gcsplan.mission_file.zone_geojson import read_geojson
 from gcsplan.mission_file.zone_json import load_json
+from gcsplan.mission_file.zone_kml import read_kml
+from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.mission_file.zone_text import decoded
 from gcsplan.mission_file.zone_zip import unpack
 
@@ -70,6 +74,31 @@ def test_of_an_archive_the_one_file_of_its_kind_and_those_beside_it_are_unpacked
 def test_an_archive_that_is_not_one_file_of_its_size_is_refused(data: bytes, words: str) -> None:
     with pytest.raises(InputError, match=words):
         unpack(Path("z.kmz"), data, (".kml",), 100)
+
+
+@pytest.mark.parametrize(
+    ("name", "data"),
+    [
+        ("z.csv", b"name,lat,lon,height_m,radius_m\nmast,36.6,-84.3,95,50\n"),
+        ("z.geojson", b'{"type": "Feature", "properties": {"name": "mast", "radius_m": 50, "ceiling_agl_m": 95}, '
+         b'"geometry": {"type": "Point", "coordinates": [-84.3, 36.6]}}'),
+        ("z.kml", b"<kml><Placemark><name>mast</name><ExtendedData><Data name='radius_m'><value>50</value></Data>"
+         b"<Data name='ceiling_agl_m'><value>95</value></Data></ExtendedData><Point><coordinates>-84.3,36.6"
+         b"</coordinates></Point></Placemark></kml>"),
+    ],
+)  # fmt: skip
+def test_a_mast_is_the_same_zone_in_each_format_and_alone_or_by_its_name(
+    tmp_path: Path, name: str, data: bytes
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(data)
+    alone = {".csv": lambda: read_csv(path, data), ".kml": lambda: read_kml(path, data),
+             ".geojson": lambda: read_geojson(path, load_json(path, data))}[path.suffix]()  # fmt: skip
+    (zone,), (by_name,) = alone.zones, read_zones(path, where="m").zones
+    for found in (zone, by_name):
+        assert (found.name, str(found.floor or ""), str(found.ceiling)) == ("mast", "", "95 m AGL")
+        assert (found.radius_m, found.points) == (50.0, ((36.6, -84.3),))
+    assert alone.problems == []
 
 
 # -- another file where a mission belongs
