@@ -140,7 +140,7 @@ def test_whatever_the_second_opinion_finds_in_a_tampered_mission_the_judge_finds
     assert seen >= 3
 
 
-def test_a_file_whose_home_row_lies_elsewhere_is_judged_from_where_the_vehicle_stands(tmp_path: Path) -> None:
+def test_a_file_with_its_home_row_elsewhere_is_judged_from_where_the_vehicle_is(tmp_path: Path) -> None:
     done = planned("copter")
     mission = done.vehicles[0].mission
     file = tmp_path / "uav1.waypoints"

@@ -93,7 +93,7 @@ def test_the_highest_and_the_steepest_are_the_same_everywhere_and_not_flattered(
     legs = tuple(leg if leg.column else replace(leg, climb_deg=4.8101, max_agl_m=690.4501) for leg in v.verdict.legs)
     verdict = replace(v.verdict, legs=legs)
     changed = replace(v, verdict=verdict)
-    assert console._plan_row(changed, None)["steepest, °"].split(" of ")[0] == "4.9"
+    assert console.plan_row(changed, None)["steepest, °"].split(" of ")[0] == "4.9"
     rows = csv.DictReader(io.StringIO(write_profile(outputs.item_rows("uav1", verdict))))
     assert "4.811" in {row["climb_deg"] for row in rows}
     assert json.loads(write_summary(outputs.verdict_of("file", verdict)))["max_climb_deg"] == 4.811
@@ -116,7 +116,7 @@ def test_a_height_that_the_nearest_number_flatters_is_the_same_everywhere() -> N
     assert low is not None
     legs = tuple(replace(leg, min_agl_m=33.46) if leg is low else leg for leg in v.verdict.legs)
     verdict = replace(v.verdict, legs=legs)
-    table = console._plan_row(replace(v, verdict=verdict), None)["lowest AGL, m"]
+    table = console.plan_row(replace(v, verdict=verdict), None)["lowest AGL, m"]
     assert table.split(" of ")[0] == "33.4"
     assert markup.least(verdict.lowest.min_agl_m, 1) == "33.4"
     rows = csv.DictReader(io.StringIO(write_profile(outputs.item_rows("uav1", verdict))))

@@ -200,7 +200,7 @@ def test_every_number_of_the_report_is_the_same_in_every_system(units: Units) ->
 
 def plan_rows(units: Units) -> list[dict[str, str]]:
     done, homes = planned()
-    return [console._plan_row(v, done.fleet, homes[v.name], units) for v in done.vehicles]
+    return [console.plan_row(v, done.fleet, homes[v.name], units) for v in done.vehicles]
 
 
 def columns(rows: list[dict[str, str]]) -> tuple[list[dict[str, str]], list[tuple[float, float]]]:

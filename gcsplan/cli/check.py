@@ -234,10 +234,10 @@ def _archive(
     if name is not None and name not in tuple(Autopilot):
         raise UsageError(f"--autopilot {name}: {', '.join(Autopilot)} is wanted")
     pilot = None if name is None else Autopilot(str(name))
-    return Archive.with_options(_options(given, at), pilot, files, returns, shown)
+    return Archive.with_options(world_options(given, at), pilot, files, returns, shown)
 
 
-def _options(given: dict[str, object], at: str | None = None) -> WorldOptions:
+def world_options(given: dict[str, object], at: str | None = None) -> WorldOptions:
     from gcsplan.mission_file.airspace.times import texts_of
     from gcsplan.mission_file.from_options import OPTIONS, WorldOptions
 

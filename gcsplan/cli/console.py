@@ -96,7 +96,7 @@ def verdict_cell(safe: bool | None, home: WayHome | None, units: Units, *, lines
 
 def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) -> None:
     """Print a plan: a column for each vehicle, values beside their limits; a row for each in a large fleet."""
-    rows = [_plan_row(v, plan.fleet, homes.get(v.name), units, lines=len(plan.vehicles) > 1) for v in plan.vehicles]
+    rows = [plan_row(v, plan.fleet, homes.get(v.name), units, lines=len(plan.vehicles) > 1) for v in plan.vehicles]
     for rare in ("energy, mAh", f"over or under a zone, {units.distance.symbol}"):  # mostly there is none
         if all(row[rare] == "–" for row in rows):
             rows = [{name: words for name, words in row.items() if name != rare} for row in rows]
@@ -172,7 +172,7 @@ def _columns(title: str, rows: Sequence[Mapping[str, str]], each: int) -> list[T
     return tables
 
 
-def _plan_row(
+def plan_row(
     v: VehiclePlan,
     fleet: FleetPlan | None,
     home: WayHome | None = None,

@@ -37,7 +37,8 @@ if _hears:
     signal.signal(signal.SIGINT, _before)
 
 
-def _commands(called: str) -> Any:
+def command_of(called: str) -> Any:
+    """The command ``called``; its imports, the most of the time until it begins, are made here."""
     from gcsplan.cli.commands import commands
 
     return commands(called)
@@ -56,7 +57,7 @@ def main() -> NoReturn:
         # gcsplan uses no plug-ins of pydantic; a search for them reads the lists of all installed packages
         os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
         # With standalone_mode=False click returns the code of typer.Exit instead of exiting.
-        code = _commands(arguments[0] if arguments else "")(args=arguments, prog_name="gcsplan", standalone_mode=False)
+        code = command_of(arguments[0] if arguments else "")(args=arguments, prog_name="gcsplan", standalone_mode=False)
         if code == Interrupted.exit_code:  # typer's code for Ctrl-C
             raise KeyboardInterrupt
         put("")

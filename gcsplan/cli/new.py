@@ -99,7 +99,7 @@ def new(
     if said and flat is not None:
         raise UsageError(f"{', '.join(as_options(said))}: goes with --dem: --flat is above sea level, in metres")
     kind = _autopilot(autopilot)
-    asks = not as_json and _on_a_terminal()
+    asks = not as_json and on_a_terminal()
     seen: Seen | None = None if source is None else seen_at(source, sysid, kind)
     where_from = start or (seen.start if seen is not None else None)
     missing = [name for name, value in (("--start", where_from), ("--goal", goal)) if value is None]
@@ -117,7 +117,7 @@ def new(
     if kind is None and seen is None and asks and missing:
         kind = _ask(f"Autopilot ({', '.join(Autopilot)})", _autopilot, default="arducopter")
     draft = Draft(
-        start=begin, goal=end, dem=tuple(_beside(d, out) for d in dem or ()), vertical_datum=vertical_datum,
+        start=begin, goal=end, dem=tuple(beside(d, out) for d in dem or ()), vertical_datum=vertical_datum,
         height_unit=height_unit, nodata=nodata, flat_m=flat,
         autopilot=seen.autopilot if seen else kind or Autopilot.ARDUCOPTER, sysid=sysid, min_agl_m=min_agl,
     )  # fmt: skip
@@ -137,7 +137,7 @@ def new(
     say(f"plan it: gcsplan plan {shlex.quote(str(out))}")
 
 
-def _on_a_terminal() -> bool:
+def on_a_terminal() -> bool:
     return all(stream is not None and stream.isatty() for stream in (sys.stdin, sys.stderr))
 
 
@@ -196,7 +196,7 @@ def _ask(question: str, read: Callable[[str], T], default: str | None = None) ->
     raise UsageError(f"{question}: no answer could be read")
 
 
-def _beside(dem: str, out: Path) -> str:
+def beside(dem: str, out: Path) -> str:
     """A raster of the current folder as the mission file names it; a name that is no file stays as it is."""
     if os.path.isabs(dem) or not os.path.exists(dem):
         return dem

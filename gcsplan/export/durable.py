@@ -65,7 +65,7 @@ def _uncut() -> Iterator[None]:
 def _replace(target: Path, data: bytes) -> None:
     try:
         _sweep(target.parent)
-        handle, part = _new_part(target.parent)
+        handle, part = new_part(target.parent)
         try:
             try:
                 _write(handle, data)
@@ -181,7 +181,7 @@ def _write(handle: int, data: bytes) -> None:
         left = left[os.write(handle, left) :]
 
 
-def _new_part(directory: Path) -> tuple[int, Path]:
+def new_part(directory: Path) -> tuple[int, Path]:
     """Create a locked file with a unique name."""
     for _ in range(_ATTEMPTS):
         part = directory / f"{PART}{secrets.token_hex(8)}"

@@ -73,11 +73,11 @@ class Smoothed:
 
     def time_s(self, cruise_m_s: float) -> float:
         """Seconds for the stretch at a cruise speed."""
-        return float(self._times(cruise_m_s)[2][-1])
+        return float(self.times(cruise_m_s)[2][-1])
 
     def shares_s(self, cruise_m_s: float, legs: int) -> Floats:
         """(``legs``,) the seconds of each leg, 0 to ``legs`` - 1 in ``owner``; together they are `time_s`."""
-        s, v, t = self._times(cruise_m_s)
+        s, v, t = self.times(cruise_m_s)
         ends = np.append(_clock(self.begin_m, s, v, t), t[-1])
         return np.bincount(self.owner, weights=np.diff(ends), minlength=legs).astype(np.float64)
 
@@ -87,7 +87,7 @@ class Smoothed:
         Straight motion at constant speed between them is at most ``error_m`` away from the true motion: with an
         acceleration A, a piece of t seconds differs by A·t²/8.
         """
-        s, v, t = self._times(cruise_m_s)
+        s, v, t = self.times(cruise_m_s)
         span, change = np.maximum(np.diff(t), 0.0), np.abs(np.diff(v))
         pieces = np.maximum(np.ceil(np.sqrt(change * span / (8.0 * error_m)) - 1e-9), 1).astype(np.intp)
         phase = np.repeat(np.arange(len(span)), pieces)
@@ -104,7 +104,7 @@ class Smoothed:
         leg = np.clip(np.searchsorted(self.begin_m, along - _LEAST_M, side="right") - 1, 0, len(self.leg_m) - 1)
         return times, places, self.owner[leg]
 
-    def _times(self, cruise_m_s: float) -> tuple[Floats, Floats, Floats]:
+    def times(self, cruise_m_s: float) -> tuple[Floats, Floats, Floats]:
         """Metres along the track, speeds and times at nodes; between two of them the speed changes evenly in time."""
         s, v = self._nodes(cruise_m_s)
         s = np.maximum.accumulate(s)
@@ -319,7 +319,7 @@ def _rounded(
 
 
 def _clock(along: Floats, s: Floats, v: Floats, t: Floats) -> Floats:
-    """The times at which ``along`` (M,) metres are passed; ``s``, ``v``, ``t``: see `Smoothed._times`."""
+    """The times at which ``along`` (M,) metres are passed; ``s``, ``v``, ``t``: see `Smoothed.times`."""
     k = np.clip(np.searchsorted(s, along, side="left") - 1, 0, len(s) - 2)
     long, span = s[k + 1] - s[k], t[k + 1] - t[k]
     gone = np.clip(along - s[k], 0.0, long)

@@ -36,7 +36,7 @@ _SPECIAL = re.compile(r"(?:[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))\Z")
 _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
-class _Loader(_Base):  # type: ignore[misc]
+class Loader(_Base):  # type: ignore[misc]
     """Marks plain scalars with a tag of their own, so that `_scalar` decides their type."""
 
     def resolve(self, kind: type[yaml.Node], value: str, implicit: Any) -> str:
@@ -55,7 +55,7 @@ def read_yaml(text: str, *, where: str) -> Any:
         raise InputError(f"the file has {len(text)} characters, more than {MAX_BYTES // 10**6} million", where=where)
     try:
         _measure(text, where)
-        node = yaml.compose(text, Loader=_Loader)
+        node = yaml.compose(text, Loader=Loader)
         if node is None:
             raise InputError(
                 "the file is empty: a mission has at least version, terrain, limits, vehicles", where=where
@@ -82,7 +82,7 @@ def lines_of(text: str, paths: Iterable[str]) -> list[int | None]:
 
     That of the nearest section around it if the key is not there; None if not even its first key is.
     """
-    root = yaml.compose(text, Loader=_Loader)
+    root = yaml.compose(text, Loader=Loader)
     known: dict[int, dict[str, tuple[yaml.Node, yaml.Node]]] = {}
     return [_line_of(root, path, known) for path in paths]
 
@@ -109,7 +109,7 @@ def _line_of(node: yaml.Node | None, path: str, known: dict[int, dict[str, tuple
 def _measure(text: str, where: str) -> None:
     """Refuse oversized text by its stream of events, since composing it first could recurse without end."""
     depth = nodes = aliases = 0
-    for event in yaml.parse(text, Loader=_Loader):
+    for event in yaml.parse(text, Loader=Loader):
         nodes += isinstance(event, yaml.NodeEvent)
         aliases += isinstance(event, yaml.AliasEvent)
         if isinstance(event, yaml.CollectionStartEvent):

@@ -37,7 +37,7 @@ def lshade(run: Run, *, memory: int, archive_share: float, best_share: float, le
         archive = _thinned(run.rng, archive, round(archive_share * n))
         drawn = run.rng.integers(0, memory, size=n)
         rate = np.nan_to_num(np.clip(run.rng.normal(rates[drawn], SPREAD), 0.0, 1.0), nan=0.0)
-        scale = _positive_cauchy(run.rng, scales[drawn])
+        scale = positive_cauchy(run.rng, scales[drawn])
         pbest = order[run.rng.integers(0, min(n, max(2, round(best_share * n))), size=n)]
         (r1,) = partners(run.rng, n, n, 1)
         r2 = _third(run.rng, r1, n + len(archive))
@@ -51,14 +51,14 @@ def lshade(run: Run, *, memory: int, archive_share: float, best_share: float, le
         better = f_tried < f
         if better.any():
             gain = f[better] - f_tried[better]
-            rates[place], scales[place] = _learnt(rates[place], rate[better], scale[better], gain / gain.sum())
+            rates[place], scales[place] = learnt(rates[place], rate[better], scale[better], gain / gain.sum())
             place = (place + 1) % memory
             archive = np.concatenate([archive, x[better]])
         kept = f_tried <= f
         x, f = np.where(kept[:, None], tried, x), np.where(kept, f_tried, f)
 
 
-def _positive_cauchy(rng: np.random.Generator, middle: Floats) -> Floats:
+def positive_cauchy(rng: np.random.Generator, middle: Floats) -> Floats:
     """Scale factors (n,) about ``middle``: Cauchy above 0, which equals drawing again; at most 1."""
     below = 0.5 + np.arctan(-middle / SPREAD) / math.pi
     u = below + (1.0 - below) * rng.random(len(middle))
@@ -79,7 +79,7 @@ def _thinned(rng: np.random.Generator, archive: Floats, most: int) -> Floats:
     return archive if len(archive) <= most else archive[rng.permutation(len(archive))[:most]]
 
 
-def _learnt(old_rate: float, rate: Floats, scale: Floats, weight: Floats) -> tuple[float, float]:
+def learnt(old_rate: float, rate: Floats, scale: Floats, weight: Floats) -> tuple[float, float]:
     """Weighted Lehmer means of the rates and scale factors that made a better member."""
     gone = math.isnan(old_rate) or rate.max() == 0.0
     new_rate = math.nan if gone else float((weight * rate**2).sum() / (weight * rate).sum())

@@ -70,11 +70,11 @@ class Neighbourhood:
     def __init__(self, grid: GridMap, field: Field, heights: Floats, reach_m: float) -> None:
         self._grid, self._field, self._heights, self._reach_m = grid, field, heights, reach_m
         self._lock = threading.Lock()
-        self._seen = np.ones((0, 0), np.bool_)
+        self.seen = np.ones((0, 0), np.bool_)
         rows, cols = heights.shape[0] - 1, heights.shape[1] - 1
         if rows * cols > LARGE:
             self.extrema = _empty(field, heights, reach_m)
-            self._seen = np.zeros((-(-rows // TILE), -(-cols // TILE)), np.bool_)
+            self.seen = np.zeros((-(-rows // TILE), -(-cols // TILE)), np.bool_)
         else:
             self.extrema = extrema_around(field, heights, reach_m)
         self._held = Held(EXTREMA, *self.extrema)
@@ -85,13 +85,13 @@ class Neighbourhood:
 
     def along(self, lines: Lines) -> Held:
         """The extrema in the kernels' form, examined along lines."""
-        if self._seen.size and not self._seen.all():
-            tiles = lines.tiles(self._grid, self._field, self._seen.shape)
+        if self.seen.size and not self.seen.all():
+            tiles = lines.tiles(self._grid, self._field, self.seen.shape)
             with self._lock:  # a caller who waits here finds the tiles done
-                for i, j in np.argwhere(tiles & ~self._seen).tolist():
+                for i, j in np.argwhere(tiles & ~self.seen).tolist():
                     rows, cols = (slice(k * TILE, (k + 1) * TILE) for k in (i, j))
                     _look_at(self._field, self._heights, self.extrema, rows, cols)
-                    self._seen[i, j] = True
+                    self.seen[i, j] = True
         return self._held
 
 

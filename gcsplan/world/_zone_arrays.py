@@ -91,7 +91,7 @@ def zones_as_arrays(zones: Sequence[Zone], surface: Surface, field: Field, scale
         rows.append(row)
     table = np.array(rows, np.float64).reshape(len(zones), ZONE_NUMBERS)
     most = max((len(v) for v in vertices), default=0)
-    return Zones(table, np.concatenate(vertices) if vertices else np.zeros((0, 2)), *_lattice(table[:, BOX]), most)
+    return Zones(table, np.concatenate(vertices) if vertices else np.zeros((0, 2)), *lattice_over(table[:, BOX]), most)
 
 
 def _cells(box: Floats, surface: Surface, field: Field) -> tuple[int, int, int, int]:
@@ -120,7 +120,7 @@ def _ground_range(cell: tuple[int, int, int, int], ground: Floats) -> tuple[floa
     return float(part.min()), float(part.max())
 
 
-def _lattice(box: Floats) -> tuple[Floats, Int64s, Int64s]:
+def lattice_over(box: Floats) -> tuple[Floats, Int64s, Int64s]:
     """The lattice of coarse squares over all zones, and the zones of each square, one square after the other."""
     if not len(box):
         return np.array([0.0, 0.0, 1.0, 1.0, 1.0]), np.zeros(2, np.int64), np.zeros(0, np.int64)

@@ -108,7 +108,7 @@ def near_polygons(ring: Sequence[Corner], frame: Frame, *, great_circles: bool =
     rings = _turned(ring, frame.lon_deg)
     wholes = _with_great_circles(rings, frame) if great_circles else [rings]
     parts = [p for one in wholes for p in _near_parts(one, frame)]
-    cut = [_cut_edges(part, np.roll(part, -1, axis=0), frame) for part in parts]
+    cut = [cut_edges(part, np.roll(part, -1, axis=0), frame) for part in parts]
     return [counter_clockwise(frame.to_plane(points[:, 1], points[:, 0])) for points in cut]
 
 
@@ -153,16 +153,16 @@ def near_corridors(
         bent = _great_circles(whole[:-1], whole[1:], _window(frame, buffer_m)) if great_circles else None
         lines = [whole] if bent is None else [whole, np.concatenate([bent, whole[-1:]])]
         near = [p for one in lines for p in _near_parts(one, frame, spare_m=buffer_m, is_line=True)]
-        cut = [np.concatenate([_cut_edges(part[:-1], part[1:], frame), part[-1:]]) for part in near]
+        cut = [np.concatenate([cut_edges(part[:-1], part[1:], frame), part[-1:]]) for part in near]
         parts = [frame.to_plane(points[:, 1], points[:, 0]) for points in cut]
     corridors = []
     for points in parts:
         scale = frame.scale_at(float(np.hypot(points[:, 0], points[:, 1]).max()) + buffer_m)
-        corridors += [counter_clockwise(ring) for ring in _rings_around(points, buffer_m * scale + EDGE_BOW_M)]
+        corridors += [counter_clockwise(ring) for ring in rings_around(points, buffer_m * scale + EDGE_BOW_M)]
     return corridors
 
 
-def _rings_around(points: Floats, buffer_m: float) -> list[Floats]:
+def rings_around(points: Floats, buffer_m: float) -> list[Floats]:
     """The outlines, not closed, of polygons without holes that hold every point within ``buffer_m`` of a line."""
     import shapely
 
@@ -170,7 +170,7 @@ def _rings_around(points: Floats, buffer_m: float) -> list[Floats]:
     most = MOST_OF_POINT * len(points)
     tangled = UNTANGLED < len(points) <= MOST_POINTS and crossings(points, most, closed=False) > most
     if len(points) > MOST_POINTS or tangled:
-        return _rings_around(points[: half + 1], buffer_m) + _rings_around(points[half:], buffer_m)
+        return rings_around(points[: half + 1], buffer_m) + rings_around(points[half:], buffer_m)
     line, begin = shapely.LineString(points), shapely.Point(points[0])
     shapely.prepare(line)  # distances from all corners to all legs would take minutes
     # Corners closer to their neighbours' line than this are left out; the buffer that follows is measured from all.
@@ -185,7 +185,7 @@ def _rings_around(points: Floats, buffer_m: float) -> list[Floats]:
         if not line.dwithin(shape.exterior, buffer_m):
             return [np.asarray(shape.exterior.coords)[:-1]]
     if len(points) > 2:
-        return _rings_around(points[: half + 1], buffer_m) + _rings_around(points[half:], buffer_m)
+        return rings_around(points[: half + 1], buffer_m) + rings_around(points[half:], buffer_m)
     raise InputError(
         f"no corridor of {buffer_m:g} m was found around a line of {len(points)} points; simplify the line"
     )
@@ -474,7 +474,7 @@ def unwrapped(points: Sequence[Corner] | Floats, near_lon_deg: float) -> Floats:
     return np.stack([p[:, 1] + 360.0 * np.round((lon - p[:, 1]) / 360.0), p[:, 0]], axis=-1)
 
 
-def _cut_edges(begins: Floats, ends: Floats, frame: Frame) -> Floats:
+def cut_edges(begins: Floats, ends: Floats, frame: Frame) -> Floats:
     """The edges (N, 2) longitude, latitude cut into equal pieces near their chords in the plane, without the last
     end."""
     long = _may_bow(begins, ends)

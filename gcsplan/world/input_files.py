@@ -44,8 +44,8 @@ ABSENT, SPECIAL = "absent", "no regular file"
 _MARK = 32
 _MOST_KEPT, _MOST_FOLDERS = 100_000, 1_000
 
-_hashes: dict[tuple[int, ...], str] = {}
-_names: dict[tuple[object, ...], tuple[tuple[str, str], ...]] = {}
+known_hashes: dict[tuple[int, ...], str] = {}
+known_names: dict[tuple[object, ...], tuple[tuple[str, str], ...]] = {}
 _now: ContextVar[Reading | None] = ContextVar("reading", default=None)
 
 
@@ -152,16 +152,16 @@ def beside(path: str | os.PathLike[str]) -> list[Path]:
     except (OSError, ValueError, RuntimeError):
         return []
     key = (real.parent, folder.st_dev, folder.st_ino, folder.st_mtime_ns, folder.st_ctime_ns)
-    names = _names.get(key)
+    names = known_names.get(key)
     if names is None:
         try:
             names = tuple(sorted((name.casefold(), name) for name in os.listdir(real.parent)))
         except OSError:
             return []
         if time.time_ns() - max(folder.st_mtime_ns, folder.st_ctime_ns) > SETTLED_NS:
-            if len(_names) >= _MOST_FOLDERS:
-                _names.clear()
-            _names[key] = names
+            if len(known_names) >= _MOST_FOLDERS:
+                known_names.clear()
+            known_names[key] = names
     stem = real.stem.casefold()
     found = []
     for k in range(bisect_left(names, (stem, "")), len(names)):
@@ -216,7 +216,7 @@ def _tell(kind: str, path: str | os.PathLike[str]) -> None:
 
 def _of_content(path: str | Path, about: os.stat_result) -> str:
     key = (about.st_dev, about.st_ino, about.st_size, about.st_mtime_ns, about.st_ctime_ns)
-    known = _hashes.get(key)
+    known = known_hashes.get(key)
     if known is not None:
         return known
     began_ns = time.time_ns()
@@ -226,9 +226,9 @@ def _of_content(path: str | Path, about: os.stat_result) -> str:
     except OSError as why:
         return f"unreadable {why.errno}"
     if began_ns - max(about.st_mtime_ns, about.st_ctime_ns) > SETTLED_NS:
-        if len(_hashes) >= _MOST_KEPT:
-            _hashes.clear()
-        _hashes[key] = mark
+        if len(known_hashes) >= _MOST_KEPT:
+            known_hashes.clear()
+        known_hashes[key] = mark
     return mark
 
 

@@ -95,7 +95,7 @@ class Said:
     nodata: float | None = None
 
 
-_headers: dict[tuple[object, ...], tuple[Raster, tuple[float, float]]] = {}
+remembered_headers: dict[tuple[object, ...], tuple[Raster, tuple[float, float]]] = {}
 """Headers of files, with scale and offset that make metres of their numbers."""
 
 
@@ -121,13 +121,13 @@ def open_raster(
     said = Said(crs, height_unit, datum_unit, nodata)
     key = (path.absolute(), said, neighbours(path))
     try:
-        if key not in _headers:
+        if key not in remembered_headers:
             with gdal(path) as dataset:
                 found = _header(dataset, path, said, where=where)
-            if len(_headers) >= MOST_HEADERS:
-                _headers.clear()
-            _headers[key] = found
-        header, to_metres = _headers[key]
+            if len(remembered_headers) >= MOST_HEADERS:
+                remembered_headers.clear()
+            remembered_headers[key] = found
+        header, to_metres = remembered_headers[key]
         for file in header.files:
             tell_file(file)
         return replace(header, read=_reader(path, *to_metres, said.nodata, where=where))

@@ -18,7 +18,7 @@ from gcsplan.app.outputs import outputs_of, report_of, summary_of, verdict_of
 from gcsplan.app.rehearsing import rehearse
 from gcsplan.app.report_page import render_rehearsal
 from gcsplan.check.verdict import Verdict, by_item
-from gcsplan.cli.console import _plan_row
+from gcsplan.cli.console import plan_row
 from gcsplan.cli.verdict_table import verdict_table
 from gcsplan.export.summary import write_summary
 from gcsplan.figures import floored, steepened
@@ -60,7 +60,7 @@ def test_there_are_twelve_missions() -> None:
 def test_the_table_shows_it(case: str) -> None:
     _, done = planned(case)
     for v in done.vehicles:
-        row, true = _plan_row(v, done.fleet), truth(v, done)
+        row, true = plan_row(v, done.fleet), truth(v, done)
         assert row["items"] == str(true["items"])
         shown_as(row["length, m"], true["length_m"], 0)
         if true["energy_j"] is None:  # nobody stated what a metre takes

@@ -19,7 +19,7 @@ from gcsplan.app.outputs import outputs_of, report_of, summary_of
 from gcsplan.app.pipeline import plan
 from gcsplan.app.rehearsing import rehearse
 from gcsplan.check.verdict import by_item
-from gcsplan.cli.console import _plan_row
+from gcsplan.cli.console import plan_row
 from gcsplan.fleet.arrival import Slot
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.mission_file import load_mission
@@ -70,7 +70,7 @@ def test_table_json_csv_and_report_say_the_same_times(case: str) -> None:
     for v, slot, _ in parts(done):
         legs, clock = v.verdict.legs, v.verdict.clock_s(slot)
         assert told[v.name]["arrive_s"] == slot.arrive_s
-        assert seconds(_plan_row(v, done.fleet)["arrives"]) == pytest.approx(slot.arrive_s, abs=off_s)
+        assert seconds(plan_row(v, done.fleet)["arrives"]) == pytest.approx(slot.arrive_s, abs=off_s)
         until = {leg.seq: slot.depart_s + at for leg, at in zip(legs, clock, strict=True)}
         mine = {int(r["seq"]): float(r["time_s"]) for r in rows if r["vehicle"] == v.name and r["time_s"]}
         assert mine == pytest.approx(until, abs=0.00501)

@@ -71,7 +71,7 @@ class Air:
         self._queue: list[tuple[float, int, Peer, object | None, bytes]] = []  # None: sent by us, not by a place
         self._acts: list[tuple[float, int, Callable[[], None]]] = []
         self._inbox: list[tuple[Peer, bytes, object]] = []
-        self._senders: list[object] = []
+        self.senders: list[object] = []
         self._count = 0
 
     def clock(self) -> float:
@@ -110,7 +110,7 @@ class Air:
 
     def read(self) -> list[Heard]:
         heard, self._inbox = self._inbox, []
-        self._senders = [by for *_, by in heard]
+        self.senders = [by for *_, by in heard]
         return [(address, data) for address, data, _ in heard]
 
     def write(self, data: bytes, peer: Peer) -> None:
@@ -177,11 +177,11 @@ class _Link(Link):
         self._air, self._by = air, None
         super().__init__(url, **more)
 
-    def _take_in(self, peer: Peer, data: bytes, now: float) -> None:
-        self._by = self._air._senders.pop(0)
-        super()._take_in(peer, data, now)
+    def take_in(self, peer: Peer, data: bytes, now: float) -> None:
+        self._by = self._air.senders.pop(0)
+        super().take_in(peer, data, now)
 
-    def _route(self, peer: Peer, message: Any, now: float) -> None:
+    def route(self, peer: Peer, message: Any, now: float) -> None:
         if not message.late:
             self._air.heard(self._by, peer, message)
-        super()._route(peer, message, now)
+        super().route(peer, message, now)

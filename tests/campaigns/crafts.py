@@ -72,17 +72,17 @@ class Craft:
             return []
         sent = self.hub.take(client, data, now)
         self.deadline = self.hub.deadline
-        self._look()
+        self.look()
         return sent
 
     def on_timer(self, now: float) -> list[tuple[Any, bytes]]:
         """What it sends at this time without being asked."""
         sent = self.hub.on_timer(now)
         self.deadline = self.hub.deadline
-        self._look()
+        self.look()
         return [] if self.silent else sent
 
-    def _look(self) -> None:
+    def look(self) -> None:
         items = list(self.vehicle.items())
         if items == self._last or not self.wanted:
             return
@@ -94,7 +94,7 @@ class Craft:
 
     def was_equal(self, since: float, until: float) -> bool:
         """Whether the wanted items were on board at some time between ``since`` and ``until``."""
-        self._look()
+        self.look()
         spans = [*self.equal, (self._equal_since, math.inf)]
         return any(begin <= until and end >= since for begin, end in spans)
 

@@ -134,7 +134,7 @@ class Run:
             old = mission_of(sysid, autopilot, rng.choice((2, 9, 300)), Home.at(36.7, -84.3, 371.0))
             craft.vehicle.load(old.wire_items())
         if rng.random() < 0.3:
-            craft.hub._vehicles[0][1].parameters = OddParameters(autopilot, sysid, rng)
+            craft.hub.vehicles[0][1].parameters = OddParameters(autopilot, sysid, rng)
         address = f"address {sysid}" if rng.random() < 0.8 else "router"
         seat = self.seats[sysid] = Seat(craft, address, mission)
         self._put(craft, address)
@@ -390,7 +390,7 @@ class Run:
         with self._links():
             uploads.run_jobs([uploads.UploadJob(seat.mission.name, URL, seat.mission)], self.options)
         seat.craft.vehicle.load(())
-        seat.craft._look()
+        seat.craft.look()
         if rng.random() < 0.5:
             there = air.at(seat.address)
             there[:] = [one for one in there if one is not seat.craft]

@@ -257,7 +257,7 @@ def _tree(folder: Path) -> Tree:
 
 def _afresh(site: Site) -> dict[str, Expected]:
     """Codes, files and rows of a new batch into an empty folder, with nothing remembered in this process."""
-    remembered = (raster._headers, input_files._hashes, input_files._names)
+    remembered = (raster.remembered_headers, input_files.known_hashes, input_files.known_names)
     before: list[dict[Any, Any]] = [dict(one) for one in remembered]
     for one in remembered:
         one.clear()

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from gcsplan.cli import main
+from gcsplan.cli import completion, main
 from gcsplan.mission_file import samples
 from gcsplan.planners import registry
 from gcsplan.vehicle import Autopilot
@@ -57,6 +57,29 @@ def test_values_are_completed(complete: Any, line: str, words: list[str]) -> Non
     assert complete(line) == words
 
 
+@pytest.mark.parametrize(
+    "complete", [completion.autopilots, completion.planners, completion.encodings, completion.costs,
+                 completion.words("length", "energy")],
+)  # fmt: skip
+def test_what_is_completed_is_each_word_that_begins_alike(complete: completion.Complete) -> None:
+    every = complete("")
+    assert len(every) == len(set(every)) > 1
+    for word in every:
+        for end in range(len(word) + 1):
+            assert complete(word[:end]) == [other for other in every if other.startswith(word[:end])]
+    assert complete("no such word") == []
+
+
+def test_where_a_file_is_meant_nothing_is_completed_but_samples(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "sample[1].tif").write_text("")
+    assert completion.missions("") == completion.dems("") == completion.dems("other") == []
+    assert completion.dems("sample[") == []  # it does not begin like a sample
+    assert completion.dems("sample") == ["sample[1].tif", "sample:jacksboro"]
+
+
 def test_files_that_begin_like_a_sample_are_completed_too(complete: Any, tmp_path: Path) -> None:
     (tmp_path / "sam.yaml").write_text("")
     found = complete("plan sam")
@@ -76,8 +99,8 @@ print([name for name in heavy if name in sys.modules])
 
 
 def test_a_command_is_made_without_the_options_of_the_others() -> None:
-    every = set(main._commands("").commands)
+    every = set(main.command_of("").commands)
     assert {"plan", "fit-energy", "dem"} <= every
-    assert every == set(main._commands("no such command").commands)
+    assert every == set(main.command_of("no such command").commands)
     for name in every:
-        assert set(main._commands(name).commands) == {name}
+        assert set(main.command_of(name).commands) == {name}

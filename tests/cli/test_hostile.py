@@ -36,6 +36,7 @@ from tests.support.spoil import spoilt_bytes, spoilt_tree
 pytestmark = pytest.mark.slow
 
 CODES = {0, 2, 3, 4, 5, 6, 7}
+JUDGED = {0, 4}  # of a check: safe; unsafe or not judged
 MISSION = """
 version: 1
 terrain: {flat_m: 400}
@@ -66,7 +67,7 @@ def run(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
     return run
 
 
-def require_civil(ended: tuple[int, str, str], what: object) -> None:
+def require_civil(ended: tuple[int, str, str], what: object) -> int:
     """What every ``--json`` run owes: a code of the contract, one document, one message and nothing beside it."""
     code, out, err = ended
     assert code in CODES, (code, what, err)
@@ -78,10 +79,16 @@ def require_civil(ended: tuple[int, str, str], what: object) -> None:
         assert err.startswith("gcsplan: "), (what, err)
     assert "Traceback" not in err
     assert "Warning" not in err, (what, err)
+    return code
+
+
+def ends(codes: set[int]) -> set[str]:
+    """How checks ended: ``judged`` (safe, unsafe or not judged), ``refused`` as an input, or in another code."""
+    return {"judged" if code in JUDGED else "refused" if code == 2 else str(code) for code in codes}
 
 
 def test_spoilt_mission_files_end_in_a_message(run: Run, tmp_path: Path) -> None:
-    rng, whole = random.Random(1), yaml.safe_load(MISSION)
+    rng, whole, codes = random.Random(1), yaml.safe_load(MISSION), set[int]()
     words = (
         b"&a ",
         b"*a",
@@ -99,11 +106,12 @@ def test_spoilt_mission_files_end_in_a_message(run: Run, tmp_path: Path) -> None
         tree, text = spoilt_tree(whole, rng), spoilt_bytes(MISSION.encode(), rng, words)
         data = yaml.safe_dump(tree).encode() if i % 3 else text
         (tmp_path / "m.yaml").write_bytes(data)
-        require_civil(run("check", "m.yaml", "uav1=uav1.waypoints", "--json"), data)
+        codes.add(require_civil(run("check", "m.yaml", "uav1=uav1.waypoints", "--json"), data))
+    assert ends(codes) == {"judged", "refused"}
 
 
 def test_spoilt_waypoints_and_plans_end_in_a_message(run: Run, tmp_path: Path) -> None:
-    rng = random.Random(2)
+    rng, codes = random.Random(2), set[int]()
     plain = (tmp_path / "uav1.waypoints").read_bytes()
     plan = json.loads(write_plan(read_mission_file("uav1.waypoints", autopilot=Autopilot.ARDUCOPTER).mission))
     numbers = tuple(
@@ -115,11 +123,12 @@ def test_spoilt_waypoints_and_plans_end_in_a_message(run: Run, tmp_path: Path) -
         else:
             name, data = "uav1.plan", json.dumps(spoilt_tree(plan, rng)).encode()
         (tmp_path / name).write_bytes(data)
-        require_civil(run("check", "m.yaml", name, "--json"), data)
+        codes.add(require_civil(run("check", "m.yaml", name, "--json"), data))
+    assert ends(codes) == {"judged", "refused"}
 
 
 def test_spoilt_zone_files_end_in_a_message(run: Run, tmp_path: Path) -> None:
-    rng = random.Random(3)
+    rng, codes = random.Random(3), set[int]()
     ring = [[-84.37, 36.62], [-84.36, 36.62], [-84.36, 36.63], [-84.37, 36.62]]
     zone = {"type": "Feature", "properties": {"name": "a", "ceiling_agl_m": 90}}
     point = {
@@ -150,11 +159,12 @@ def test_spoilt_zone_files_end_in_a_message(run: Run, tmp_path: Path) -> None:
         data = spoilt_bytes(kml, rng, words) if i % 2 else json.dumps(spoilt_tree(geojson, rng)).encode()
         (tmp_path / name).write_bytes(data)
         (tmp_path / "m.yaml").write_text(MISSION.replace("no_fly:", f"no_fly:\n  - {{file: {name}}}"))
-        require_civil(run("check", "m.yaml", "uav1.waypoints", "--json"), data)
+        codes.add(require_civil(run("check", "m.yaml", "uav1.waypoints", "--json"), data))
+    assert ends(codes) == {"judged", "refused"}
 
 
 def test_spoilt_terrain_ends_in_a_message(run: Run, tmp_path: Path) -> None:
-    rng = random.Random(4)
+    rng, codes = random.Random(4), set[int]()
     heights = "\n".join(" ".join("400" for _ in range(60)) for _ in range(60))
     header = b"ncols 60\nnrows 60\nxllcorner -84.41\nyllcorner 36.57\ncellsize 0.001\nNODATA_value -9999\n"
     words = (b"ncols 2147483647", b"nrows 99999999", b"-1", b"nan", b"1e400", b"cellsize 0", b"\x00")
@@ -165,7 +175,8 @@ def test_spoilt_terrain_ends_in_a_message(run: Run, tmp_path: Path) -> None:
         data = rng.choice((tile[:-1], tile[:99], tile * 2)) if i % 6 == 0 else spoilt_bytes(header, rng, words)
         (tmp_path / name).write_bytes(data + (b"" if i % 6 == 0 else heights.encode()))
         (tmp_path / "m.yaml").write_text(MISSION.replace("{flat_m: 400}", dem % name))
-        require_civil(run("check", "m.yaml", "uav1.waypoints", "--json"), data)
+        codes.add(require_civil(run("check", "m.yaml", "uav1.waypoints", "--json"), data))
+    assert ends(codes) == {"judged", "refused"}
 
 
 class Meddler(threading.Thread):

@@ -57,7 +57,7 @@ def test_a_plan_that_is_sent_nowhere_imports_nothing_of_what_sends_or_draws(tmp_
     assert imported_by("plan", str(CROSSING), "-o", str(tmp_path / "out")) & SENDS_OR_DRAWS == set()
 
 
-def test_a_leg_over_flat_ground_imports_nothing_that_reads_files_or_keeps_a_fleet_apart(tmp_path: Path) -> None:
+def test_a_leg_over_flat_ground_imports_no_file_reader_and_no_separation(tmp_path: Path) -> None:
     mission = tmp_path / "flat.yaml"
     mission.write_text(FLAT)
     used = imported_by("plan", str(mission), "-o", str(tmp_path / "out"))
@@ -68,7 +68,7 @@ def test_the_version_is_told_without_what_reads_other_options() -> None:
     assert imported_by("--version") & {"numpy", "pydantic", "rich.console", "yaml"} == set()
 
 
-def test_a_process_can_settle_its_memory_more_than_once_and_where_the_c_library_cannot() -> None:
+def test_memory_is_settled_more_than_once_and_without_help_of_the_c_library() -> None:
     words = """
 import ctypes, gc
 from gcsplan.cli.memory import OBJECTS, settle_memory

@@ -98,8 +98,8 @@ def test_a_raster_is_named_from_the_mission_s_folder_and_json_says_what_was_writ
     _, out, _ = run("new", *PLACES, *SAMPLE, "-o", "missions/a.yaml", "--json")
     document = json.loads(out)
     assert document["files"] == [str(Path("missions", name)) for name in ("a.yaml", FILE_NAME)]
-    assert new._beside("tile.asc", Path("missions/a.yaml")) == "../tile.asc"
-    assert new._beside("sample:jacksboro", Path("missions/a.yaml")) == "sample:jacksboro"
+    assert new.beside("tile.asc", Path("missions/a.yaml")) == "../tile.asc"
+    assert new.beside("sample:jacksboro", Path("missions/a.yaml")) == "sample:jacksboro"
 
 
 def test_a_vehicle_tells_start_autopilot_and_settings(run: Any, tmp_path: Path) -> None:
@@ -134,7 +134,7 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return answers.pop(0) or (default or "")
 
     monkeypatch.setattr(typer, "prompt", prompt)
-    monkeypatch.setattr(new, "_on_a_terminal", lambda: True)
+    monkeypatch.setattr(new, "on_a_terminal", lambda: True)
     return answers
 
 

@@ -40,7 +40,7 @@ def wait_until(seen: Callable[[], object]) -> None:
         time.sleep(0.01)
 
 
-def test_a_terminal_shows_the_time_at_least_twice_a_second_while_the_planner_is_silent(
+def test_while_the_planner_is_silent_a_terminal_shows_the_time_twice_a_second(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     assert display.REDRAWN_HZ >= 2.0

@@ -33,7 +33,7 @@ def command(**_):
         shapely.is_valid(np.array([ring] * 9))  # half a minute
     print("ended", file=sys.stderr, flush=True)
 
-cli._commands = lambda called: command
+cli.command_of = lambda called: command
 cli.main()
 """
 
@@ -97,7 +97,7 @@ def command(**_):
     finally:
         print("undone", flush=True)
 
-cli._commands = lambda called: command
+cli.command_of = lambda called: command
 cli.main()
 """
     ended = subprocess.run([sys.executable, "-c", busy], cwd=REPOSITORY, capture_output=True, text=True, timeout=60)
@@ -136,7 +136,7 @@ def test_the_exit_code_is_the_signal_s_though_python_executes_a_text() -> None:
     """As dataclasses are made while modules are imported: Python would then end as if by Ctrl-C."""
     words = """
 from gcsplan.cli import main as cli
-cli._commands = lambda called: lambda **_: exec("send(signal.SIGTERM)\\nfor k in range(10**9): pass")
+cli.command_of = lambda called: lambda **_: exec("send(signal.SIGTERM)\\nfor k in range(10**9): pass")
 cli.entry()
 """
     assert ended_by(words, "plan").returncode == 143
@@ -153,7 +153,7 @@ def told(error):
     print("gcsplan:", error, file=sys.stderr)
     send()
     for k in range(10**9): pass
-cli._commands, ending.complain = lambda called: command, told
+cli.command_of, ending.complain = lambda called: command, told
 cli.entry()
 """
     ended = ended_by(words, "plan")

@@ -76,7 +76,7 @@ def test_a_margin_that_is_too_wide_is_refused(run: Run, mission: Path, tmp_path:
 
 
 def test_serve_until_loaded_and_check(run: Run, mission: Path, vehicle: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(link_terrain, "_ASK_AFTER_S", 0.0)
+    monkeypatch.setattr(link_terrain, "ASK_AFTER_S", 0.0)
     monkeypatch.setattr("gcsplan.app.terrain_link.QUIET_S", 0.3)
     monkeypatch.setattr("gcsplan.app.terrain_link.LISTEN_S", 0.0)
     code, text, err = run("terrain", "serve", mission, "--link", vehicle, "--until-loaded", "--seconds", 60, "--json")

@@ -48,8 +48,10 @@ def write(tmp_path: Path, name: str = "hill", *, rtl_rel_home_m: float | None = 
     return file
 
 
-def board() -> LoopbackVehicle:
-    return LoopbackVehicle(1, Autopilot.ARDUCOPTER, lat_deg=36.6, lon_deg=-84.3, amsl_m=0.0)
+def board(**parameters: float) -> LoopbackVehicle:
+    return LoopbackVehicle(
+        1, Autopilot.ARDUCOPTER, lat_deg=36.6, lon_deg=-84.3, amsl_m=0.0, parameters=parameters
+    )  # fmt: skip
 
 
 def flyable(folder: Path) -> list[str]:
@@ -187,13 +189,12 @@ def test_where_a_safe_return_is_required_nothing_flyable_is_left_and_nothing_is_
 
 
 @pytest.mark.parametrize("way", ["plan", "upload"])
-def test_a_vehicle_that_returns_at_another_altitude_than_the_required_one_is_refused_before_anything_is_sent(
-    run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, planned: Path, way: str
+def test_a_vehicle_with_another_return_altitude_is_refused_before_anything_is_sent(
+    run: Any, tmp_path: Path, planned: Path, way: str
 ) -> None:
     mission = write(tmp_path, rtl_rel_home_m=200.0, way_home="required")
     for centimetres, expected in ((1500, 5), (20000, 0)):
-        monkeypatch.setitem(parameters._TABLES[Autopilot.ARDUCOPTER], "RTL_ALT", parameters._i(centimetres))
-        with SimServer([board()], "udpin:127.0.0.1:0", speedup=10.0) as server:
+        with SimServer([board(RTL_ALT=centimetres)], "udpin:127.0.0.1:0", speedup=10.0) as server:
             url = server.url_for_gcs
             call = ["plan", mission, "--upload", url] if way == "plan" else \
                    ["upload", planned, "--mission", mission, "--to", url]  # fmt: skip
@@ -207,12 +208,12 @@ def test_a_vehicle_that_returns_at_another_altitude_than_the_required_one_is_ref
 
 @pytest.mark.first_quick
 @pytest.mark.parametrize("told", [{}, {"RTL_ALT": math.nan}], ids=["nothing", "no number"])
-def test_a_vehicle_that_does_not_tell_its_return_altitude_gets_no_mission_that_requires_one(
+def test_a_vehicle_that_hides_its_return_altitude_gets_no_mission_that_requires_one(
     run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: dict[str, float]
 ) -> None:
     mission = write(tmp_path, rtl_rel_home_m=200.0, way_home="required")
-    table = {name: parameters._r(value) for name, value in told.items()}
-    monkeypatch.setitem(parameters._TABLES, Autopilot.ARDUCOPTER, table)
+    table = {name: parameters.StoredParameter(parameters.REAL32, value) for name, value in told.items()}
+    monkeypatch.setitem(parameters.PARAMETER_TABLES, Autopilot.ARDUCOPTER, table)
     with SimServer([board()], "udpin:127.0.0.1:0", speedup=10.0) as server:
         code, text, _ = run("plan", mission, "--upload", server.url_for_gcs, "--timeout", "2")
         assert (code, server.vehicles[0].items()) == (5, ()), text
@@ -223,16 +224,13 @@ def test_a_vehicle_that_does_not_tell_its_return_altitude_gets_no_mission_that_r
         assert "WPNAV_RADIUS or WP_RADIUS_M" in text
 
 
-def test_an_rtl_item_is_judged_at_the_altitude_of_the_vehicle_before_it_is_sent(
-    run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_rtl_item_is_judged_at_the_altitude_of_the_vehicle_before_it_is_sent(run: Any, tmp_path: Path) -> None:
     # The mission itself returns over the hill. At 15 m above home, as the vehicle is set, it would meet it.
     mission = tmp_path / "back.yaml"
     vehicle = UAV1 | {"rtl_rel_home_m": 200.0, "end": "rtl"}
     mission.write_text(yaml.safe_dump(HILL | {"vehicles": [vehicle]}))
     for centimetres, expected in ((1500, 5), (20000, 0)):
-        monkeypatch.setitem(parameters._TABLES[Autopilot.ARDUCOPTER], "RTL_ALT", parameters._i(centimetres))
-        with SimServer([board()], "udpin:127.0.0.1:0", speedup=10.0) as server:
+        with SimServer([board(RTL_ALT=centimetres)], "udpin:127.0.0.1:0", speedup=10.0) as server:
             code, text, _ = run("plan", mission, "--upload", server.url_for_gcs)
             assert (code, bool(server.vehicles[0].items())) == (expected, expected == 0), text
             assert ("(rtl): too low above ground" in text) == (expected == 5)

@@ -232,7 +232,7 @@ def test_elements_stand_in_the_order_of_the_schema(count: int) -> None:
     assert {u.text for u in root.iter(KML + "styleUrl")} <= {f"#{i}" for i in ids}
 
 
-def test_of_a_large_fleet_the_way_points_are_there_to_tick_and_tracks_have_no_curtain() -> None:
+def test_a_large_fleets_way_points_are_there_to_tick_and_its_tracks_lack_curtains() -> None:
     root = ET.fromstring(write_kml("m", [replace(TRACK, vehicle=f"uav{n}") for n in range(101)], ZONES, FRAME))
     whole = ET.fromstring(write_kml("m", [TRACK], ZONES, FRAME))
     tracks = [p for p in root.iter(f"{KML}Placemark") if p.find(f"{KML}LineString") is not None]

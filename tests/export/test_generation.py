@@ -438,7 +438,7 @@ def test_what_killed_writers_left_is_swept_and_what_living_ones_write_is_not(tmp
     dead = tmp_path / f"{PART}{'0' * 16}"
     dead.write_text("half")
     (tmp_path / f"{PART}notes").write_text("mine")
-    handle, living = durable._new_part(tmp_path)
+    handle, living = durable.new_part(tmp_path)
     write_whole(tmp_path / "x.plan", "whole")
     assert files(tmp_path) == {"x.plan": b"whole", living.name: b"", f"{PART}notes": b"mine"}
     os.close(handle)

@@ -14,7 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
-from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, schedule
+from gcsplan.fleet.arrival import NoSchedule, Schedule, schedule
+from gcsplan.fleet.craft import Craft, Crew
 from gcsplan.fleet.order import best_order, interval_range
 from gcsplan.fleet.timing import Route
 from gcsplan.mission_file.request import ArrivalRequest
@@ -279,7 +280,7 @@ def test_too_early_a_common_arrival_is_refused_with_the_earliest() -> None:
         schedule(crews, "together", arrive_s=earliest - 0.001)
 
 
-def test_too_late_a_turn_is_refused_where_nobody_may_wait_with_the_intervals_that_work() -> None:
+def test_too_late_a_turn_where_nobody_may_wait_is_refused_with_intervals_that_work() -> None:
     crews = [crew("a", 300), crew("b", 400)]
     with pytest.raises(NoSchedule, match=r"b cannot arrive so late.*interval_s from.*hold: ground") as caught:
         schedule(crews, "sequence", interval_s=500.0, hold="none", clock="first")
@@ -489,7 +490,7 @@ def test_a_mistake_in_the_arrival_is_told(change: dict[str, Any], key: str, word
     assert words in message
 
 
-def test_accelerations_have_defaults_on_the_earth_and_bound_nothing_in_local_metres_unless_given() -> None:
+def test_accelerations_have_defaults_on_the_earth_and_none_in_local_metres() -> None:
     names = ("climb_m_s", "descent_m_s", "land_m_s", "accel_m_s2", "corner_accel_m_s2", "vertical_accel_m_s2")
     mission = load(base())
     assert [getattr(mission.vehicles[0].vehicle, n) for n in names] == [2.5, 1.5, 0.5, 1.5, 2.5, 1.0]

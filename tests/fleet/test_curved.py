@@ -66,7 +66,7 @@ def test_the_built_in_simulator_flies_as_a_real_arducopter_flew(flight: dict[str
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_the_flight_takes_as_long_and_is_in_the_same_places_as_curves_stepped_in_time(seed: int) -> None:
+def test_times_and_places_of_the_flight_are_those_of_curves_stepped_in_time(seed: int) -> None:
     rng = np.random.default_rng(seed)
     points, speed_m_s = random_points(rng), float(rng.uniform(2, 16))
     way = np.diff(points, axis=0)

@@ -8,7 +8,8 @@ import pytest
 from gcsplan.fleet import _groups
 from gcsplan.fleet._groups import groups_of, settle_groups
 from gcsplan.fleet._settle import Ask, moved, settle
-from gcsplan.fleet.arrival import Crew, schedule
+from gcsplan.fleet.arrival import schedule
+from gcsplan.fleet.craft import Crew
 from gcsplan.fleet.resolve import resolve
 from gcsplan.fleet.separation import Rules, separation
 from tests.fleet.test_resolve import crew
@@ -37,6 +38,7 @@ def test_groups_are_the_clusters() -> None:
     assert sorted(map(sorted, groups_of(plan, RULES))) == [[f"c{c}v{k}" for k in range(4)] for c in range(3)]
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("seed", range(4))
 def test_group_by_group_is_the_same_as_all_at_once(seed: int) -> None:
     crews = clusters(seed)

@@ -38,7 +38,7 @@ def seconds(vehicle: Vehicle, *points: tuple[float, float, float], speed: float 
     return found.time_s(speed)
 
 
-def test_a_fixed_wing_flies_the_true_airspeed_of_the_one_it_indicates_as_a_real_one_does() -> None:
+def test_a_fixed_wing_flies_the_true_airspeed_of_the_one_it_indicates() -> None:
     for amsl, flown in FLOWN_M_S.items():
         speed = 5000.0 / seconds(WING, (0, 0, amsl), (5000, 0, amsl))
         assert speed**2 / 20.0 == pytest.approx(flown, rel=2e-3)

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from gcsplan.errors import NoMission
 from gcsplan.fleet._taken import Taken
-from gcsplan.fleet.arrival import Craft, Crew, Schedule, Slot, schedule
+from gcsplan.fleet.arrival import Schedule, schedule
+from gcsplan.fleet.craft import Craft, Crew, Slot
 from gcsplan.fleet.goals import least_interval_s
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.resolve import Change, NotSeparated, Resolved, resolve

@@ -55,7 +55,7 @@ def test_a_corner_is_flown_at_the_speed_that_its_angle_and_radius_allow(turn_deg
     least = 0.5 * (math.sqrt(81.0 + 8.0 * 3.0 * RADIUS_M + 4.0 * allowed**2) - 9.0)  # it brakes that late
     _, [flown] = fly(points[:, :2], 10.0, RADIUS_M)
     assert flown == pytest.approx(max(allowed, least), abs=0.15)
-    s, v, _ = stretch(points)._times(10.0)
+    s, v, _ = stretch(points).times(10.0)
     assert np.interp(150.0 - RADIUS_M, s, v) == pytest.approx(max(allowed, least), abs=0.01)
 
 

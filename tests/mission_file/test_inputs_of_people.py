@@ -47,7 +47,9 @@ def test_openair_in_compact_places_and_other_encodings(tmp_path: Path, written: 
 def test_places_that_are_none_stay_refused(tmp_path: Path, place: str) -> None:
     path = tmp_path / "a.txt"
     path.write_text(OPENAIR.format(place, *PLAIN[1:]), encoding="utf-8")
-    assert read_zones(path, where="zones").problems
+    found = read_zones(path, where="zones")
+    assert found.zones == []
+    assert [place in str(problem) for problem in found.problems] == [True]
 
 
 @pytest.mark.parametrize("head", ["sep=;\n", '"sep=;"\n', "SEP=;;;;\n\n"])

@@ -11,7 +11,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from gcsplan.mission_file import load_mission, units
-from gcsplan.mission_file.json_schema import MODELINE, mission_schema
+from gcsplan.mission_file.json_schema import FILE_NAME, MODELINE, mission_schema
 from gcsplan.mission_file.schema import MissionKeys
 from gcsplan.mission_file.strict_yaml import read_yaml
 from gcsplan.planners import registry
@@ -151,4 +151,5 @@ def test_every_key_is_there_in_every_unit_and_says_what_it_is(told: dict[str, An
 
 
 def test_the_line_for_editors_is_a_comment_that_names_the_file() -> None:
+    assert MODELINE.endswith(f"$schema={FILE_NAME}")
     assert re.fullmatch(r"# yaml-language-server: \$schema=[\w.]+\.json", MODELINE)

@@ -13,7 +13,7 @@ import yaml
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from gcsplan.cli.check import _options
+from gcsplan.cli.check import world_options
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file import schema
 from gcsplan.mission_file.from_options import OpenWorld
@@ -403,15 +403,15 @@ def test_a_vehicle_without_a_space_after_its_colon_is_told() -> None:
 
 
 def test_the_home_of_check_is_a_place_in_any_form() -> None:
-    plain = _options({"--home": "36.6,-84.38"})
+    plain = world_options({"--home": "36.6,-84.38"})
     assert plain.home == (36.6, -84.38)
     assert plain.notes == ()
-    assert _options({"--home": "36.6 N, 84.38 W"}) == plain
-    coarse = _options({"--home": "32TMT 7312 4932", "--dem": "sample:jacksboro", "--min-agl": 60})
+    assert world_options({"--home": "36.6 N, 84.38 W"}) == plain
+    coarse = world_options({"--home": "32TMT 7312 4932", "--dem": "sample:jacksboro", "--min-agl": 60})
     assert apart_m(coarse.home, GRID) < 10.0
     assert any(note.startswith("--home: ") and "square of 10 m" in note for note in OpenWorld(coarse).notes)
     with pytest.raises(InputError, match=r"--home 136.6, 84.38: .*look swapped"):
-        _options({"--home": "136.6, 84.38"})
+        world_options({"--home": "136.6, 84.38"})
 
 
 def test_the_examples_of_the_reference_are_read() -> None:

@@ -12,7 +12,7 @@ import pytest
 from gcsplan.errors import InputError
 from gcsplan.mission_file import load_mission, zone_draft
 from gcsplan.mission_file.zone_draft import MOST_CORNERS
-from gcsplan.world._zone_arrays import MOST_LISTED, _lattice
+from gcsplan.world._zone_arrays import MOST_LISTED, lattice_over
 from gcsplan.world.zones import Polygon
 from tests.campaigns import sizes
 
@@ -135,7 +135,7 @@ def test_what_is_no_zone_is_counted_too(name: str, text: str, words: str, within
 
 def test_zones_that_all_lie_over_each_other_take_little_memory() -> None:
     box = np.array([[-6e4, -6e4, 6e4, 6e4]]) + np.random.default_rng(1).uniform(-1e4, 1e4, (20_000, 1))
-    lattice, bucket, near = _lattice(box)
+    lattice, bucket, near = lattice_over(box)
     assert len(near) <= MOST_LISTED  # 300 million before
     assert bucket[-1] == len(near)
     at = ((box[7, :2] - lattice[:2]) * lattice[2]).astype(int)

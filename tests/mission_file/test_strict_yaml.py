@@ -44,9 +44,9 @@ def test_both_of_pyyamls_parsers_read_alike(monkeypatch: pytest.MonkeyPatch) -> 
     first = read_yaml(text, where="m.yaml")
 
     class Slow(yaml.SafeLoader):
-        resolve = strict_yaml._Loader.resolve
+        resolve = strict_yaml.Loader.resolve
 
-    monkeypatch.setattr(strict_yaml, "_Loader", Slow)
+    monkeypatch.setattr(strict_yaml, "Loader", Slow)
     assert read_yaml(text, where="m.yaml") == first
     assert first["g"] == {"b": [2, None, "no"], "c": 5.0e6, "d": "1", "e": "1", "f": None}
 

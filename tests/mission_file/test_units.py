@@ -48,7 +48,7 @@ def problems(content: dict) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("kind", kinds(), ids=lambda kind: kind.__name__)
-def test_every_key_with_a_convertible_unit_has_its_other_names_and_none_is_a_key_itself(kind: type[schema.Keys]):
+def test_every_key_with_a_convertible_unit_has_other_names_that_are_no_keys(kind: type[schema.Keys]):
     names = other_names(kind.model_fields)
     assert not names.keys() & kind.model_fields.keys()
     for key in kind.model_fields:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import copy
 import json
 import math
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import shapely
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import InputError, Problem
@@ -21,6 +22,7 @@ from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from tests.support.attacks import draw_attacks, require_told
 from tests.support.effort import draws
 
 FRAME = Frame(36.6, -84.3)
@@ -415,9 +417,12 @@ def paths_into(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     return found
 
 
-@settings(max_examples=draws(200), suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.data())
-def test_any_geojson_gives_zones_or_clear_problems(tmp_path: Path, data: st.DataObject) -> None:
+@pytest.mark.draws
+def test_any_geojson_gives_zones_or_clear_problems(tmp_path: Path) -> None:
+    assert draw_attacks(200, partial(spoilt_geojson, tmp_path / "z.geojson")) == {"zones", "problems"}
+
+
+def spoilt_geojson(path: Path, data: st.DataObject) -> str:
     multi = feature({"type": "MultiPolygon", "coordinates": [[SQUARE, HOLE]]})
     whole: Any = copy.deepcopy(collection(square(name="a", ceiling_agl_m=50), point(-84.3, 36.6, radius_m=60), multi))
     for _ in range(data.draw(st.integers(1, 3))):
@@ -434,12 +439,15 @@ def test_any_geojson_gives_zones_or_clear_problems(tmp_path: Path, data: st.Data
     text = json.dumps(whole)
     if data.draw(st.booleans()):
         text = text[: data.draw(st.integers(0, len(text)))]
-    judged(tmp_path / "z.geojson", text.encode())
+    return judged(path, text.encode())
 
 
-@settings(max_examples=draws(200), suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.data())
-def test_any_kml_gives_zones_or_clear_problems(tmp_path: Path, data: st.DataObject) -> None:
+@pytest.mark.draws
+def test_any_kml_gives_zones_or_clear_problems(tmp_path: Path) -> None:
+    assert draw_attacks(200, partial(spoilt_kml, tmp_path / "z.kml")) == {"zones", "problems"}
+
+
+def spoilt_kml(path: Path, data: st.DataObject) -> str:
     broken = bytearray(KML.encode())
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(0, len(broken) - 1))
@@ -448,18 +456,20 @@ def test_any_kml_gives_zones_or_clear_problems(tmp_path: Path, data: st.DataObje
             st.sampled_from([b"", b"<", b"</Polygon>", b"<Point>", b",", b" ", b"1e999", b"\x00", b"&lt;", b"-"])
         )
         broken[at : at + length] = junk
-    judged(tmp_path / "z.kml", bytes(broken))
+    return judged(path, bytes(broken))
 
 
-def judged(path: Path, content: bytes) -> None:
-    """Zones that can be placed, or problems that say where: nothing else may come out."""
+def judged(path: Path, content: bytes) -> str:
+    """``zones`` that can be placed, or ``problems`` that say where: nothing else may come out."""
     path.write_bytes(content)
     try:
         found = read_zones(path, where="m")
-    except InputError:
-        return
+    except InputError as error:
+        require_told(error)
+        return "problems"
     assert all(p.where and p.message for p in found.problems)
     drafts: list[ZoneDraft] = found.zones
     for _, zone in place_zones(drafts, FRAME)[0]:
         assert all(math.isfinite(x) for x in zone.bounds)
         assert isinstance(zone.shape, Circle) or shapely.is_ccw(shapely.LinearRing(zone.shape.vertices))
+    return "zones" if drafts else "problems"

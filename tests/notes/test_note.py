@@ -85,7 +85,7 @@ def test_a_note_is_told_in_imperial_units_too() -> None:
     assert made.in_units(IMPERIAL).startswith("item 4: its hold has no end")
 
 
-def test_the_way_stands_behind_the_item_and_by_itself_where_it_says_more_than_the_kind() -> None:
+def test_the_way_stands_behind_the_item_or_by_itself_if_it_says_more_than_the_kind() -> None:
     place: dict[str, Datum] = {"lat": 36.6, "lon": -84.3, "amsl_m": 450.0}
     straight = Note("over_unknown_ground", 4, way="cruise", **place)
     jumped = Note("over_unknown_ground", 4, way=Note("after_jump", way="cruise", jump=7), **place)

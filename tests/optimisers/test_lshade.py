@@ -10,7 +10,7 @@ import pytest
 from gcsplan.arrays import Floats
 from gcsplan.optimisers.driver import minimise
 from gcsplan.optimisers.functions import FUNCTIONS
-from gcsplan.optimisers.lshade import SPREAD, _learnt, _positive_cauchy
+from gcsplan.optimisers.lshade import SPREAD, learnt, positive_cauchy
 from tests.oracles import swarms
 
 
@@ -34,16 +34,16 @@ def test_lshade_evaluates_the_points_of_the_paper(function: str, n: int, memory:
 
 def test_a_crossover_rate_that_only_ever_was_0_stays_0() -> None:
     one, some = np.ones(3), np.array([0.0, 0.5, 1.0])
-    assert math.isnan(_learnt(0.5, 0.0 * one, one, one / 3.0)[0])  # the paper's terminal value
-    assert math.isnan(_learnt(math.nan, some, one, one / 3.0)[0])
-    rate, scale = _learnt(0.5, some, np.array([0.2, 0.4, 0.9]), np.array([0.5, 0.25, 0.25]))
+    assert math.isnan(learnt(0.5, 0.0 * one, one, one / 3.0)[0])  # the paper's terminal value
+    assert math.isnan(learnt(math.nan, some, one, one / 3.0)[0])
+    rate, scale = learnt(0.5, some, np.array([0.2, 0.4, 0.9]), np.array([0.5, 0.25, 0.25]))
     assert rate == pytest.approx((0.25 * 0.25 + 0.25) / (0.25 * 0.5 + 0.25))
     assert scale == pytest.approx((0.5 * 0.04 + 0.25 * 0.16 + 0.25 * 0.81) / (0.5 * 0.2 + 0.25 * 0.4 + 0.25 * 0.9))
 
 
 def test_scale_factors_are_a_cauchy_distribution_drawn_again_below_0() -> None:
     middle = np.full(40_000, 0.2)
-    got = np.sort(_positive_cauchy(np.random.default_rng(1), middle))
+    got = np.sort(positive_cauchy(np.random.default_rng(1), middle))
     drawn = 0.2 + SPREAD * np.random.default_rng(2).standard_cauchy(100_000)
     wanted = np.sort(np.minimum(drawn[drawn > 0.0], 1.0))
     at = np.linspace(0.01, 0.99, 50)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import inspect
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats
+from gcsplan.optimisers import classics, fruit_flies, krill, registry
 from gcsplan.optimisers.bees import roulette
+from gcsplan.optimisers.box import Steps
 from gcsplan.optimisers.budgerigars import LEVY_SPREAD
 from tests.support.swarm_play import Play, bowl, clip, crowd
 
@@ -22,7 +26,22 @@ def skip(drawn: int, *taken: int) -> int:
     return drawn
 
 
-def test_particles_carry_on_turn_to_their_own_and_the_swarms_best_and_stop_at_a_bound() -> None:
+@pytest.mark.parametrize(
+    ("name", "rule"),
+    [
+        ("pso", classics.pso), ("de", classics.de), ("krill", krill.krill), ("foa", fruit_flies.foa),
+        ("iffo", fruit_flies.iffo), ("mfoa", fruit_flies.mfoa), ("msfoa", fruit_flies.msfoa),
+    ],
+)  # fmt: skip
+def test_a_name_of_the_table_runs_the_rule_of_its_module(name: str, rule: Callable[..., Steps]) -> None:
+    entry = registry.get(name)
+    assert entry.rule() is rule
+    taken = inspect.signature(rule).parameters
+    assert set(entry.defaults) == set(taken) - {"run"}
+    assert all(taken[key].kind is inspect.Parameter.KEYWORD_ONLY for key in entry.defaults)
+
+
+def test_particles_turn_to_their_own_and_the_swarms_best_and_stop_at_a_bound() -> None:
     def cost(x: Floats) -> Floats:
         return np.asarray((1.2 - x).sum(axis=1))
 
@@ -72,7 +91,7 @@ def test_differential_evolution_crosses_a_mutant_of_three_others_and_reflects_it
     assert reflected > 0
 
 
-def test_bees_that_fly_together_try_one_element_onlookers_where_the_fitness_is_and_a_spent_source_is_left() -> None:
+def test_bees_together_try_one_element_and_onlookers_the_fit_and_leave_spent_sources() -> None:
     group, dim, limit = 2, 5, 3
     x = crowd(N, dim)
     f = bowl(x)
@@ -223,7 +242,7 @@ def test_mfoa_searches_around_several_places_and_at_their_mean() -> None:
 
 
 @pytest.mark.parametrize("threshold", [None, 0.2])
-def test_msfoa_searches_far_above_the_threshold_near_below_and_lets_offspring_compete(threshold: float | None) -> None:
+def test_msfoa_searches_far_above_the_threshold_and_near_below_and_offspring_compete(threshold: float | None) -> None:
     swarms, n = 3, 7
     centres = crowd(swarms, D, seed=8)
     f = bowl(centres)
@@ -268,7 +287,7 @@ def advanced(x: Floats, target: Floats, rand: float, step: float) -> list[float]
     return [a + rand * step * (b - a) / (length or 1.0) for a, b in zip(x, target, strict=True)]
 
 
-def test_krill_avoid_enemies_and_cruise_or_forage_and_take_the_better_result_be_it_worse() -> None:
+def test_krill_avoid_enemies_cruise_or_forage_and_take_the_better_of_the_results() -> None:
     n, sight, step, crowding, attempts = 8, 0.45, 0.1, 0.618, 3
     x = crowd(n, 2, seed=21)
     f = bowl(x)

@@ -68,7 +68,7 @@ def test_mgwo_weighs_leaders_falls_exponentially_and_moves_only_to_improve() -> 
         x = np.array([moved[i] if f_moved[i] < f[i] else x[i] for i in range(N)])
 
 
-def test_igwo_tries_gwos_move_and_one_learnt_from_neighbours_and_takes_the_better_if_it_improves() -> None:
+def test_igwo_takes_the_better_of_gwos_and_a_learnt_move_if_it_improves() -> None:
     x = crowd(N, D)
     play = Play("igwo", bowl, x, T=T)
     beyond = 0
@@ -103,7 +103,7 @@ def test_igwo_tries_gwos_move_and_one_learnt_from_neighbours_and_takes_the_bette
     assert beyond > 0
 
 
-def test_sogwo_turns_wolves_unlike_alpha_to_the_far_side_where_they_are_close_before_gwos_move() -> None:
+def test_sogwo_turns_close_elements_of_wolves_unlike_alpha_before_gwos_move() -> None:
     dim = 4
     x = crowd(14, dim, seed=3)
     play = Play("sogwo", bowl, x, T=T)
@@ -148,7 +148,7 @@ def taken(f: float, f_new: float, temperature: float, rand: float) -> bool:
     return f_new < f or rand < math.exp(-(f_new - f) / temperature)
 
 
-def test_ssgwo_with_leaders_apart_moves_wolves_by_eq_23_leaders_by_eq_17_to_19_and_anneals_the_wolves_alone() -> None:
+def test_ssgwo_with_leaders_apart_moves_them_by_eq_17_to_19_and_wolves_by_eq_23() -> None:
     n, long = 12, 60
     x = crowd(n, D, seed=5)
     f = bowl(x)
@@ -178,7 +178,7 @@ def test_ssgwo_with_leaders_apart_moves_wolves_by_eq_23_leaders_by_eq_17_to_19_a
                 assert moved[first[k], d] == pytest.approx(clip(value), abs=1e-12)
         f_moved = bowl(moved)
         # The trial's random numbers are the next that the generator gives.
-        state = play.rng._rng.bit_generator.state
+        state = play.rng.generator.bit_generator.state
         rand = np.random.default_rng(0)
         rand.bit_generator.state = state
         trial = rand.random(n)
@@ -215,7 +215,7 @@ def test_ssgwo_as_printed_moves_all_wolves_by_eq_17_to_23() -> None:
             assert moved[i, d] == pytest.approx(clip(value), abs=1e-12)
 
 
-def test_the_two_convergence_factors_share_their_ends_and_middle_and_only_the_cosine_remains_high() -> None:
+def test_convergence_factors_share_ends_and_middle_and_the_cosine_stays_high() -> None:
     for factor in FACTORS.values():
         assert [factor(0.0), factor(0.5), factor(1.0)] == pytest.approx([2.0, 1.0, 0.0], abs=1e-12)
     assert FACTORS["printed"](0.25) == pytest.approx(1.292893, abs=1e-6)

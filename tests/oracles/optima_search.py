@@ -102,13 +102,13 @@ class Lattice:
             starts.append(np.arange(n) * count + k)
             ends.append(np.arange(n) * count + k + 1)
         out = cls(problem, points, np.concatenate(starts), np.concatenate(ends), np.zeros(0))
-        out._keep_clear()
+        out.keep_clear()
         out.stops = [
             np.flatnonzero(number == k)[:1].repeat(count) * count + np.arange(count) for k in range(len(stops))
         ]
         return out
 
-    def _keep_clear(self) -> None:
+    def keep_clear(self) -> None:
         """Keep each leg, in each direction, that the exact check and the climb limits pass; set the costs."""
         limits = self.problem.limits
         p, q = self.points[self.start], self.points[self.end]

@@ -48,7 +48,7 @@ def fleet_of_four(*, worst: bool) -> Page:
     return replace(told, title=title, subjects=tuple(subjects), order=order, rehearsed=rehearsed)
 
 
-def test_the_briefing_says_what_where_limits_margins_times_way_home_and_has_lines_to_sign_on() -> None:
+def test_the_briefing_says_what_where_and_when_and_has_lines_to_sign_on() -> None:
     page = fleet_of_four(worst=False)
     text = briefing(page)
     verdict, limits = page.subjects[0].verdict, page.subjects[0].vehicle.limits

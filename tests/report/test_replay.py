@@ -116,7 +116,7 @@ def test_a_checked_file_has_no_replay_and_one_vehicle_has_one() -> None:
 
 
 @in_node
-def test_the_script_finds_every_vehicle_where_its_motion_has_it_and_the_nearest_other_one() -> None:
+def test_the_script_finds_every_vehicle_where_its_motion_is_and_the_nearest_other() -> None:
     motions = [wavy(k, 40, f"uav{k}") for k in range(4)]
     motions[1] = replace(motions[1], ends_in_air=True)
     page = page_with(motions)

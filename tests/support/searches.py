@@ -33,5 +33,5 @@ def looked(problem: Problem) -> PlaneSearch:
 def improve(plane: PlaneSearch, without: tuple[str, ...] = ()) -> None:
     """Run all searches, except those named in ``without``, over these lattices."""
     searches = Searches(plane.incumbent)
-    searches._plane = plane
+    searches.plane = plane
     govern(plane.incumbent, searches.table(), without)

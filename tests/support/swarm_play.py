@@ -18,11 +18,11 @@ class Recorded:
     """A random generator that records, in order, the numbers it has returned."""
 
     def __init__(self, seed: int) -> None:
-        self._rng = np.random.default_rng(seed)
+        self.generator = np.random.default_rng(seed)
         self.drawn: list[Any] = []
 
     def __getattr__(self, name: str) -> Any:
-        method = getattr(self._rng, name)
+        method = getattr(self.generator, name)
         if name not in DRAWS:
             return method
 

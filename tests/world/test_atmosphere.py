@@ -17,7 +17,7 @@ def test_the_density_is_that_of_the_standard_atmosphere(amsl_m: float, kg_per_m3
     assert true_per_indicated(amsl_m) ** 2 * kg_per_m3 == pytest.approx(1.225, rel=3e-3)
 
 
-def test_above_the_tropopause_it_stays_and_the_pressure_below_is_the_weight_of_the_air_above() -> None:
+def test_above_the_tropopause_it_stays_and_pressure_is_the_weight_of_air_above() -> None:
     assert density_ratio(20_000.0) == density_ratio(TROPOPAUSE_M) > 0.0
     height = np.linspace(0.0, TROPOPAUSE_M, 100_001)
     weight = np.trapezoid(9.80665 * 1.225 * density_ratio(height), height)

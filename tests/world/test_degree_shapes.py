@@ -95,11 +95,11 @@ def test_the_cuts_are_those_of_edges_that_are_all_measured() -> None:
             bow = frame.bow_m(ring[:, ::-1], following[:, ::-1])
             pieces = np.maximum(1, np.ceil(np.sqrt(bow / degree_shapes.EDGE_BOW_M))).astype(int)
             whole = [a + (b - a) * (np.arange(n) / n)[:, None] for a, b, n in zip(ring, following, pieces, strict=True)]
-            assert np.array_equal(degree_shapes._cut_edges(ring, following, frame), np.concatenate(whole))
+            assert np.array_equal(degree_shapes.cut_edges(ring, following, frame), np.concatenate(whole))
 
 
 @pytest.mark.parametrize("great_circles", [False, True])
-def test_polygons_that_are_projected_together_are_those_that_are_looked_at_one_by_one(great_circles: bool) -> None:
+def test_polygons_projected_together_are_those_looked_at_one_by_one(great_circles: bool) -> None:
     rng = np.random.default_rng(5)
     rings = []
     for _ in range(300):  # small and large, near and far, either way around, in both conventions of longitudes

@@ -97,7 +97,7 @@ def test_lines_find_all_that_they_meet_looked_at_and_little_else(
         cells = np.floor(grid(*(start + t * (end - start)).reshape(-1, 2).T)).astype(np.intp)
         cells = cells[((cells >= 0) & (cells < [1099, 899])).all(axis=1)]
         assert same_where_seen(ours.extrema, whole, cells[:, 1], cells[:, 0])
-        assert not ours._seen.all()
+        assert not ours.seen.all()
     copy = pickle.loads(pickle.dumps(ours))
     copy.along(Lines(start, end))
     assert same_where_seen(copy.extrema, whole, cells[:, 1], cells[:, 0])

@@ -11,7 +11,7 @@ import pytest
 import shapely
 
 from gcsplan.arrays import Floats
-from gcsplan.world.degree_shapes import _rings_around, outline_of
+from gcsplan.world.degree_shapes import outline_of, rings_around
 from gcsplan.world.outlines import MOST_CROSSINGS, MOST_PAIRS, crossings, fewer_corners, overlapping_pairs
 from tests.campaigns.sizes import smooth, spiky
 
@@ -77,7 +77,7 @@ def test_an_outline_that_would_take_minutes_is_refused_at_once() -> None:
 def test_the_corridor_of_a_tangled_line_holds_it_and_is_found_in_time() -> None:
     line = np.random.default_rng(1).uniform(0.0, 4000.0, (500, 2))
     begun = time.process_time()
-    rings = _rings_around(line, 50.0)
+    rings = rings_around(line, 50.0)
     assert time.process_time() - begun < 2.0  # 4 s before
     whole = shapely.union_all([shapely.Polygon(r) for r in rings])
     assert shapely.LineString(line).buffer(49.9).difference(whole).area < 1e-6

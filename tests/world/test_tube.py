@@ -10,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.arrays import Floats
-from gcsplan.world.airspace import Airspace, Legs, Tube
+from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface
+from gcsplan.world.tube import Tube
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.oracles.legs import deepest
 from tests.support.effort import draws

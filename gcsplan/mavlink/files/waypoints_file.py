@@ -148,7 +148,7 @@ def _row(line: str, number: int, place: str, problems: list[Problem]) -> _Row | 
     if len(fields) != len(COLUMNS):
         problems.append(Problem(place, f"a row has {len(COLUMNS)} columns, this one has {len(fields)}"))
         return None
-    values = _plain(line, fields)
+    values = numbers_at_once(line, fields)
     for name, field in zip(COLUMNS, fields, strict=True) if not values else ():
         if name.startswith("param") and field.lower() in ("nan", "-nan"):
             values.append(math.nan)
@@ -168,7 +168,7 @@ def _row(line: str, number: int, place: str, problems: list[Problem]) -> _Row | 
     return _Row(number, seq, raw, (_decimals(fields[8]), _decimals(fields[9])))
 
 
-def _plain(line: str, fields: list[str]) -> list[float]:
+def numbers_at_once(line: str, fields: list[str]) -> list[float]:
     """The numbers of a row that holds nothing but finite ones, at once; else none."""
     if _ROW.fullmatch(line) is None or max(map(len, fields)) > MAX_NUMBER:
         return []

@@ -135,13 +135,13 @@ class FrameParser:
     def __init__(self, signing: Signing | None = None) -> None:
         self._mav = dialect.MAVLink(None)  # without a key, because `Signing` checks signatures
         self._signing = signing or Signing()
-        self._rest = b""
+        self.rest = b""
         self.bad = 0
         self.unsigned = 0
 
     def feed(self, data: bytes, *, datagram: bool = False) -> list[Any]:
         """Return every message that ``data`` completes. A ``datagram`` ends with its last frame, a stream goes on."""
-        buffer, carried = self._rest + data, len(self._rest)
+        buffer, carried = self.rest + data, len(self.rest)
         messages: list[Any] = []
         position, rest = 0, b""
         while found := _MARKERS.search(buffer, position):
@@ -173,7 +173,7 @@ class FrameParser:
             if self._is_taken(message, buffer[start:end]):
                 messages.append(message)
             position, rest = end, b""  # a whole frame, even if badly signed: an incomplete one before it was garbage
-        self._rest = rest
+        self.rest = rest
         return messages
 
     def _decode(self, frame: bytes) -> Any:

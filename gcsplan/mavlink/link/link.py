@@ -114,8 +114,8 @@ class Link:
         self.clock = clock
         self._signing = signing or Signing(key)
         self._writer = FrameWriter(us, self._signing)
-        self._parsers: dict[Peer, FrameParser] = {}
-        self._heard_at: dict[Peer, float] = {}
+        self.parsers: dict[Peer, FrameParser] = {}
+        self.heard_at: dict[Peer, float] = {}
         self._routes: dict[Address | int, Peer] = {}
         self._channels: dict[int, list[Channel]] = {}
         self._heartbeat_s = heartbeat_s
@@ -158,12 +158,12 @@ class Link:
     @property
     def garbage(self) -> int:
         """Number of frames with a wrong checksum, or with a missing, wrong or late signature."""
-        return self._bad + sum(parser.bad for parser in self._parsers.values())
+        return self._bad + sum(parser.bad for parser in self.parsers.values())
 
     @property
     def unsigned(self) -> int:
         """Number of frames whose signature is missing, wrong or late."""
-        return self._unsigned + sum(parser.unsigned for parser in self._parsers.values())
+        return self._unsigned + sum(parser.unsigned for parser in self.parsers.values())
 
     def channel(self, sysid: int) -> Channel:
         """Return a new channel for one system id; `drop` it when done."""
@@ -192,7 +192,7 @@ class Link:
         System id 0 means every known peer.
         """
         if to.sysid == 0:
-            peers = [p for p in dict.fromkeys((*self._heard_at, self.transport.default)) if p is not None]
+            peers = [p for p in dict.fromkeys((*self.heard_at, self.transport.default)) if p is not None]
             frame = self._writer.pack(message)
             for each in peers:
                 self.transport.write(frame, each)
@@ -207,7 +207,7 @@ class Link:
         """Move received messages into the inboxes, and send our heartbeat if it is due."""
         now = self.clock()
         for peer, data in self.transport.read():
-            self._take_in(peer, data, now)
+            self.take_in(peer, data, now)
         self._beat(now)
 
     def answer(self, until: float) -> bool:
@@ -219,15 +219,16 @@ class Link:
             return False
         rest = self.transport.exchange(self.prompt, until, self.clock)
         now, answered = self.clock(), self.prompt.answered()
-        self._heard_at.update((peer, now) for peer in answered & self._heard_at.keys())
+        self.heard_at.update((peer, now) for peer in answered & self.heard_at.keys())
         for peer, data in rest:
-            self._take_in(peer, data, now)
+            self.take_in(peer, data, now)
         self._beat(now)
         return bool(rest or answered)
 
-    def _take_in(self, peer: Peer, data: bytes, now: float) -> None:
+    def take_in(self, peer: Peer, data: bytes, now: float) -> None:
+        """Route the messages in what a peer has sent."""
         for message in self._parser(peer, now).feed(data, datagram=self.transport.datagrams):
-            self._route(peer, message, now)
+            self.route(peer, message, now)
 
     @property
     def next_heartbeat(self) -> float:
@@ -238,21 +239,22 @@ class Link:
         return self._routes.get(to) or self._routes.get(to.sysid) or self.transport.default
 
     def _parser(self, peer: Peer, now: float) -> FrameParser:
-        parser = self._parsers.get(peer)
+        parser = self.parsers.get(peer)
         if parser is None:
-            if len(self._parsers) >= _MOST_PEERS:
-                self._forget(min(self._heard_at, key=lambda p: self._heard_at[p]))
-            parser = self._parsers[peer] = FrameParser(self._signing)
-        self._heard_at[peer] = now
+            if len(self.parsers) >= _MOST_PEERS:
+                self._forget(min(self.heard_at, key=lambda p: self.heard_at[p]))
+            parser = self.parsers[peer] = FrameParser(self._signing)
+        self.heard_at[peer] = now
         return parser
 
     def _forget(self, peer: Peer) -> None:
-        parser = self._parsers.pop(peer)
+        parser = self.parsers.pop(peer)
         self._bad, self._unsigned = self._bad + parser.bad, self._unsigned + parser.unsigned
-        self._heard_at.pop(peer, None)
+        self.heard_at.pop(peer, None)
         self._routes = {to: where for to, where in self._routes.items() if where != peer}
 
-    def _route(self, peer: Peer, message: Any, now: float) -> None:
+    def route(self, peer: Peer, message: Any, now: float) -> None:
+        """Give a message to the channels of its system, and remember where that system is heard from."""
         source = Address(message.get_srcSystem(), message.get_srcComponent())
         if source == self.us:
             return  # our own message, sent back by a hub
@@ -267,7 +269,7 @@ class Link:
         if not self._heartbeat_s or now < self._next_heartbeat:
             return
         self._next_heartbeat = now + self._heartbeat_s
-        for peer in [p for p, at in self._heard_at.items() if now - at > _FORGET_S]:
+        for peer in [p for p, at in self.heard_at.items() if now - at > _FORGET_S]:
             self._forget(peer)
         gcs = dialect.MAV_TYPE_GCS
         self.send(

@@ -43,7 +43,7 @@ _PAUSE_S = 0.01
 _AT_ONCE = 4
 _SERIAL_SHARE = 0.25
 _BYTES_OF_PART = 43 + 12 + 13  # payload, frame, signature
-_ASK_AFTER_S, _ASK_EVERY_S, _ASKED_TIMES = 3.0, 5.0, 3
+ASK_AFTER_S, _ASK_EVERY_S, _ASKED_TIMES = 3.0, 5.0, 3
 _REQUESTS_EVERY_US = 500_000.0
 
 
@@ -118,7 +118,7 @@ class _Answers:
 
     def steps(self) -> Steps[None]:
         clock = self._channel.link.clock
-        ask_at, asked, send_at = clock() + _ASK_AFTER_S, 0, -math.inf
+        ask_at, asked, send_at = clock() + ASK_AFTER_S, 0, -math.inf
         vehicle: Heard | None = None
         while True:
             for heard in self._channel.take():

@@ -313,11 +313,11 @@ class TcpServer:
         except OSError:
             self._socket.close()
             raise
-        self._clients: dict[Peer, _Stream] = {}
+        self.clients: dict[Peer, _Stream] = {}
 
     @property
     def handles(self) -> Sequence[int]:
-        return (self._socket.fileno(), *(s.socket.fileno() for s in self._clients.values() if s.open))
+        return (self._socket.fileno(), *(s.socket.fileno() for s in self.clients.values() if s.open))
 
     @property
     def place(self) -> str:
@@ -326,23 +326,23 @@ class TcpServer:
         return f"{host}:{port}"
 
     def read(self) -> list[Heard]:
-        while len(self._clients) < _MOST_CLIENTS:
+        while len(self.clients) < _MOST_CLIENTS:
             try:
                 sock, peer = self._socket.accept()
             except OSError:
                 break
-            self._clients[peer] = _Stream(sock)
-        heard = [(peer, stream.read()) for peer, stream in self._clients.items()]
-        self._clients = {peer: stream for peer, stream in self._clients.items() if stream.open}
+            self.clients[peer] = _Stream(sock)
+        heard = [(peer, stream.read()) for peer, stream in self.clients.items()]
+        self.clients = {peer: stream for peer, stream in self.clients.items() if stream.open}
         return [(peer, data) for peer, data in heard if data]
 
     def write(self, data: bytes, peer: Peer) -> None:
-        stream = self._clients.get(peer)
+        stream = self.clients.get(peer)
         if stream:
             stream.write(data)
 
     def close(self) -> None:
-        for stream in self._clients.values():
+        for stream in self.clients.values():
             stream.close()
         self._socket.close()
 

@@ -136,7 +136,7 @@ def _flat(points: Floats) -> float:
     return float(np.hypot(*np.diff(points[:, :2], axis=0).T).sum())
 
 
-def _sides(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> dict[int, bool]:
+def sides_to_pass(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> dict[int, bool]:
     """For each zone within reach of a path, by index: whether the path passes over it."""
     track = make_track(problem, points[:, :2], pinned, pin_m)
     s = distances(points[:, :2])  # of all points: a track keeps one of two that are less than a millimetre apart
@@ -195,7 +195,7 @@ class _Work:
     def begin(self, points: Floats) -> None:
         """Take the line pulled from the track of a path (N, 3). Zones are passed over or under as that path does."""
         pinned, pin_m = pins_of(self.problem, points)
-        self.over = _sides(self.problem, points, pinned, pin_m)
+        self.over = sides_to_pass(self.problem, points, pinned, pin_m)
         flat = np.ascontiguousarray(points[:, :2])
         self.guide = self._guide([flat])
         self.line = self.guide.pull(line_of(flat, pinned, pin_m), self._steps(FINE_STEPS), FINE_GAIN * self.way_m)

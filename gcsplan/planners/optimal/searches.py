@@ -6,6 +6,7 @@ import contextlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -79,14 +80,11 @@ class Searches:
         self.incumbent, self.problem = incumbent, incumbent.problem
         self._straight: Obstruction | None = None
         self._outlines: OutlineTracks | None = None
-        self._plane: PlaneSearch | None = None
 
-    @property
+    @cached_property
     def plane(self) -> PlaneSearch:
         """The lattices of the legs, made at first use."""
-        if self._plane is None:
-            self._plane = PlaneSearch(self.incumbent, in_window(self.incumbent))
-        return self._plane
+        return PlaneSearch(self.incumbent, in_window(self.incumbent))
 
     def table(self) -> list[Search]:
         """All searches: name, share of the gap that each closes, when it applies, its size, and what runs it."""

@@ -157,7 +157,7 @@ def fly(
     """
     tube, limits = track.tube, problem.limits
     ends = (problem.start[2], problem.goal[2])
-    sections = _sections(problem, track, known)
+    sections = sections_of(problem, track, known)
     horizontal = float(sections.s_m[-1])
 
     def solve(over: Sides) -> Profile | Blocked:
@@ -208,7 +208,7 @@ def lacking(problem: Problem, track: Track) -> Lacking | Closed:
     string is the cheapest profile here too. Sides of bands are searched as in `fly`.
     """
     tube, limits = track.tube, problem.limits
-    sections = _sections(problem, track, ())
+    sections = sections_of(problem, track, ())
     up, down = (min(slope, NO_LIMIT) + 1e-9 for slope in (limits.max_climb_slope, limits.max_descent_slope))
     closed = Closed(math.inf, ())
     deepest_zone: tuple[int, ...] = ()
@@ -315,7 +315,7 @@ def _narrow(low: Floats, high: Floats) -> None:
     low[[0, -1]], high[[0, -1]] = ends
 
 
-def _sections(problem: Problem, track: Track, known: Sequence[tuple[float, float, float]]) -> _Sections:
+def sections_of(problem: Problem, track: Track, known: Sequence[tuple[float, float, float]]) -> _Sections:
     tube, z0, z1 = track.tube, problem.start[2], problem.goal[2]
     fixed = track.pinned & np.isfinite(track.pin_m)
     close = _close_to_ends(problem, tube)

@@ -139,7 +139,7 @@ def march(
         if count <= 0:
             break
         spent += count
-        ways = _walk(rng, count, eager, scent, rule.alpha)
+        ways = walk(rng, count, eager, scent, rule.alpha)
         long = sum((d[ways[:, i], ways[:, i + 1]] for i, d in enumerate(lengths)), np.zeros(len(ways)))
         for i, s in enumerate(scent):
             s *= 1.0 - rule.evaporation  # eq. 2
@@ -160,7 +160,7 @@ def march(
     return Result(np.zeros(0), best_cost, spent, len(trace) - 1, account, stopped, "aco"), best  # type: ignore[arg-type]
 
 
-def _walk(rng: np.random.Generator, ants: int, eager: list[Floats], scent: list[Floats], alpha: float) -> Indices:
+def walk(rng: np.random.Generator, ants: int, eager: list[Floats], scent: list[Floats], alpha: float) -> Indices:
     """Nodes (arrived, layers) of the ants that arrive; each step is drawn by eq. 1."""
     ways = np.zeros((ants, 1), np.intp)
     for e, s in zip(eager, scent, strict=True):

@@ -214,12 +214,12 @@ class Cost:
         scene = code.scene
         self.curve, self.stride = sampled(scene, code.points)
         wanted = objective.wanted | (k.CEILING if scene.ceiling_follows_ground else 0)
-        self._before = Held(
+        self.held = Held(
             f"{CURVE} {SCENE} i8 i8 {k.ROOM}",
             self.curve.bands, self.curve.spans, scene.heights, scene.quadratic, scene.floors, scene.floor_map,
             scene.numbers, scene.zones, scene.corners, self.stride, wanted, *k.room(self.curve.basis.shape[1]),
         )  # fmt: skip
-        straight = self.terms(self._straight()[None])[0]
+        straight = self.terms(self.straight_controls()[None])[0]
         self.unit = Unit(
             straight,
             max(scene.straight_m, 1e-9),
@@ -254,7 +254,7 @@ class Cost:
     def terms(self, controls: Floats) -> Floats:
         """Terms (n, TERMS) of control points (n, N, 3)."""
         out = np.empty((len(controls), k.TERMS))
-        k.measure(controls, self._before, out)
+        k.measure(controls, self.held, out)
         return out
 
     def straight_cost(self) -> float:
@@ -262,7 +262,7 @@ class Cost:
         s = self.unit.straight
         return float(s[k.LENGTH] * (1.0 + s[k.HIGH] / self.unit.height_m))
 
-    def _straight(self) -> Floats:
+    def straight_controls(self) -> Floats:
         """Control points (N, 3) of the straight line from terminal to terminal."""
         terminals, rows = self.code.scene.terminals, []
         for i, count in enumerate(self.code.points):

@@ -47,7 +47,7 @@ class Hub:
         ids = [v.sysid for v in vehicles]
         if not ids or len(set(ids)) != len(ids):
             raise UsageError(f"a simulator wants at least one vehicle and each system id once, given {ids}")
-        self._vehicles = [(v, Telemetry(v), random.Random(v.misbehave.seed + 1)) for v in vehicles]
+        self.vehicles = [(v, Telemetry(v), random.Random(v.misbehave.seed + 1)) for v in vehicles]
         self._always = always
         self._signing = signing or Signing()
         self._listeners: OrderedDict[Client, _Listener] = OrderedDict()
@@ -84,7 +84,7 @@ class Hub:
 
     def _handle(self, message: Message, client: Client, now: float) -> Sent:
         source = Address(message.get_srcSystem(), message.get_srcComponent())
-        if any(v.sysid == source.sysid for v, *_ in self._vehicles):
+        if any(v.sysid == source.sysid for v, *_ in self.vehicles):
             return []  # our own message, sent back
         self._whereabouts[source] = client
         self._whereabouts.move_to_end(source)
@@ -92,7 +92,7 @@ class Hub:
             self._whereabouts.popitem(last=False)
         packet = wire.decode(message)
         sent: Sent = []
-        for vehicle, telemetry, _ in self._vehicles:
+        for vehicle, telemetry, _ in self.vehicles:
             if packet is not None:
                 sent += self._routed(vehicle.receive(packet, now), source, client)
             else:
@@ -118,13 +118,13 @@ class Hub:
     @property
     def deadline(self) -> float | None:
         """The next time to call `on_timer`, or None if no vehicle needs it and it was never called."""
-        due = (self._next_second, *(v.deadline for v, *_ in self._vehicles))
+        due = (self._next_second, *(v.deadline for v, *_ in self.vehicles))
         return min((at for at in due if at is not None), default=None)
 
     def on_timer(self, now: float) -> Sent:
         """Return what is due at ``now``; the first call starts the heartbeats."""
         sent: Sent = []
-        for vehicle, *_ in self._vehicles:
+        for vehicle, *_ in self.vehicles:
             sent += self._routed(vehicle.on_timer(now))
         if self._next_second is None or now >= self._next_second:
             # Not "+= 1": after a pause of the machine one heartbeat is due, not one for each missed second.
@@ -137,7 +137,7 @@ class Hub:
         for client in gone:
             self.forget(client)
         sent: Sent = []
-        for vehicle, telemetry, rng in self._vehicles:
+        for vehicle, telemetry, rng in self.vehicles:
             for message in telemetry.each_second(now):
                 if rng.random() >= vehicle.misbehave.drop:
                     frame = self._frame(message, vehicle.address)

@@ -59,7 +59,7 @@ _ARDUPILOT = {
     "TERRAIN_SPACING": _i(100, INT16),
 }
 
-_PARAMETER_TABLES: dict[Autopilot, dict[str, StoredParameter]] = {
+PARAMETER_TABLES: dict[Autopilot, dict[str, StoredParameter]] = {
     Autopilot.ARDUCOPTER: {
         **_ARDUPILOT,
         "ANGLE_MAX": _i(3000, INT16),
@@ -184,7 +184,7 @@ class Parameters:
         self, autopilot: Autopilot, sysid: int, firmware: Firmware, given: Mapping[str, float] | None = None
     ) -> None:
         own_id = {} if autopilot is Autopilot.PX4 else {"SYSID_THISMAV": _i(sysid, INT16)}
-        self._table = dict(sorted({**_PARAMETER_TABLES[autopilot], **own_id}.items()))
+        self._table = dict(sorted({**PARAMETER_TABLES[autopilot], **own_id}.items()))
         if autopilot is Autopilot.PX4:
             self._table["MAV_SYS_ID"] = _i(sysid)
         # PX4 stores an integer's bytes in the float field, ArduPilot its value.

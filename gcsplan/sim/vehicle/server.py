@@ -45,7 +45,7 @@ class SimServer:
         self.vehicles = tuple(vehicles)
         self._speedup = speedup
         self._kind, self._place = _parsed(url)
-        self._hub = Hub(self.vehicles, always=self._place if self._kind == "udpout" else None)
+        self.hub = Hub(self.vehicles, always=self._place if self._kind == "udpout" else None)
         self._in_process = process
         self._child: multiprocessing.process.BaseProcess | None = None
         self._pipe: Connection | None = None
@@ -70,7 +70,7 @@ class SimServer:
     @property
     def mishandled(self) -> int:
         """Number of messages that raised an error because of a bug in the simulator."""
-        return self._hub.mishandled
+        return self.hub.mishandled
 
     def start(self) -> SimServer:
         """Open the socket and serve until `stop`; return this server."""
@@ -79,7 +79,7 @@ class SimServer:
         if self._in_process:
             self._start_process()
             return self
-        self._loop = _Loop(self._hub, _opened(self._kind, self._place), self._speedup)
+        self._loop = _Loop(self.hub, _opened(self._kind, self._place), self._speedup)
         self._address = self._loop.transport.address
         self._thread = threading.Thread(target=self._loop.run, name="gcsplan-sim", daemon=True)
         self._thread.start()
@@ -190,7 +190,7 @@ class _Loop:
     """Waits for bytes and timers, and passes both to the hub."""
 
     def __init__(self, hub: Hub, transport: ServerTransport, speedup: float) -> None:
-        self._hub, self.transport, self._speedup = hub, transport, speedup
+        self.hub, self.transport, self._speedup = hub, transport, speedup
         self._wake, self._woken = socket.socketpair()
         self._stopping = False
 
@@ -203,7 +203,7 @@ class _Loop:
         return time.monotonic() * self._speedup
 
     def run(self) -> None:
-        hub, transport = self._hub, self.transport
+        hub, transport = self.hub, self.transport
         try:
             while not self._stopping:
                 for client, data in hub.on_timer(self._now()):

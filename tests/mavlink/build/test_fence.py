@@ -142,7 +142,7 @@ def circles(count: int) -> list[Zone]:
     return [Zone(f"c{i}", Circle(100.0 * i, 0, 40)) for i in range(count)]
 
 
-def test_more_circles_than_arducopter_keeps_are_refused_and_circles_in_circles_are_joined() -> None:
+def test_circles_in_circles_are_joined_and_more_than_arducopter_keeps_are_refused() -> None:
     assert len(fence_of(circles(42), FRAME, COPTER).items) == 42
     with pytest.raises(InputError, match=r"43 circle.*42 circles"):
         fence_of(circles(43), FRAME, COPTER)
@@ -241,7 +241,7 @@ def test_a_fence_that_the_mission_flies_over_is_refused_by_name() -> None:
     assert "yard" not in str(refused.value)
 
 
-def test_a_vehicle_whose_parameters_would_cut_a_corner_into_the_fence_is_refused_the_mission() -> None:
+def test_a_vehicle_whose_parameters_cut_a_corner_into_the_fence_is_refused() -> None:
     # The flight turns left above the shed's ceiling, 40 m outside it; with WPNAV_RADIUS 100 m it cuts the corner over
     # the shed, which is legal, and which a fence without a height would end.
     shed = Zone("shed", Circle(2940, 60, 20), None, Level(40, "agl"))
@@ -272,7 +272,7 @@ def test_start_and_goal_keep_their_clearance_from_the_fence_too(east: float, nor
         fencing.fence_for(mission_in(where, craft), craft, where, infinite=True)
 
 
-def test_a_mission_that_touches_its_clearance_does_not_fail_for_the_rounding_of_the_fence() -> None:
+def test_a_mission_that_touches_its_clearance_passes_the_rounded_fence() -> None:
     zone = Zone("near", Circle(1500, 133.025, 100.0))
     where, craft = world(zones=[zone]), vehicle(horizontal_clearance_m=30)
     assert len(fencing.fence_for(mission_in(where, craft), craft, where).items) == 1
@@ -427,7 +427,7 @@ def job_of(name: str, sysid: int, url: str, mission: Mission, craft: Vehicle, wh
     return uploads.UploadJob(name, url, mission, judge(mission, craft, where), craft, where)
 
 
-def test_fences_go_before_the_missions_and_a_vehicle_that_is_not_there_stops_nobody_else(
+def test_fences_go_before_missions_and_an_absent_vehicle_stops_nobody_else(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     be_impatient(monkeypatch)

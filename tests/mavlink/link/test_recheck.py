@@ -52,8 +52,12 @@ FAR = Home(HOME.lat_e7 + 3_000_000, HOME.lon_e7, HOME.amsl_m)
 class Acting(LoopbackVehicle):
     """Does ``act(self, message)`` before every mission message that it gets."""
 
-    def __init__(self, autopilot: Autopilot, act: Callable[[Acting, Any], None], **trouble: Any) -> None:
-        super().__init__(1, autopilot, lat_deg=36.6, lon_deg=-84.38, amsl_m=371.0, misbehave=Misbehaviour(**trouble))
+    def __init__(
+        self, autopilot: Autopilot, act: Callable[[Acting, Any], None], *, boot_s: float = 0.0, **trouble: Any
+    ) -> None:
+        super().__init__(
+            1, autopilot, lat_deg=36.6, lon_deg=-84.38, amsl_m=371.0, boot_s=boot_s, misbehave=Misbehaviour(**trouble)
+        )  # fmt: skip
         self.act = act
         self.got: list[Any] = []
 
@@ -91,7 +95,7 @@ def arm(board: LoopbackVehicle) -> None:
 
 
 def carry_off(board: LoopbackVehicle) -> None:
-    board._board.home = FAR
+    board.carry_to(FAR)
 
 
 @pytest.mark.parametrize(("change", "word"), [(arm, "armed"), (carry_off, "moved")])
@@ -374,7 +378,7 @@ def test_reading_and_comparing_refuse_two_with_one_number() -> None:
 
 def fleet(*boards: LoopbackVehicle, judge: Callable[[Mission], str | None] | None = None, **options: Any) -> list[Any]:
     with SimServer(boards, "udpin:127.0.0.1:0", speedup=10.0) as server:
-        for n, (_, telemetry, _) in enumerate(server._hub._vehicles):
+        for n, (_, telemetry, _) in enumerate(server.hub.vehicles):
             if n == 0:
                 telemetry.parameters = OddParameters(boards[0].autopilot, 1, random.Random(1))
         with Link(server.url_for_gcs) as link:
@@ -472,10 +476,9 @@ def test_a_timeout_that_is_none_is_refused() -> None:
         uploaded(vehicle(), timeout_s=0.0)
 
 
-def test_a_vehicle_that_boots_longer_than_the_timeout_is_not_written_to_and_left_at_once() -> None:
+def test_a_vehicle_that_boots_beyond_the_timeout_is_left_at_once_and_unwritten() -> None:
     """The time until it was ready is none of the transfer's."""
-    board = Acting(COPTER, lambda *_: None, seed=1)
-    board._boot_s = 4.5
+    board = Acting(COPTER, lambda *_: None, boot_s=4.5, seed=1)
     result, _ = on_patient_air(board, 5.0, 2)
     assert result.verified
     assert board.count(Count) == 1

@@ -17,10 +17,10 @@ from gcsplan.errors import CheckFailed, GcsplanError, InputError, LinkError, Rea
 from gcsplan.mavlink.link import steps
 from gcsplan.mavlink.link.frames import SigningKey
 from gcsplan.mavlink.link.link import Heard, Link
+from gcsplan.mavlink.link.options import SessionOptions
 from gcsplan.mavlink.link.parameters import judge_fence_parameters, judge_parameters
 from gcsplan.mavlink.link.preflight import preflight
 from gcsplan.mavlink.link.session import (
-    SessionOptions,
     UploadOrder,
     clear_mission,
     discover,
@@ -221,6 +221,9 @@ def test_what_may_be_overridden_is_taken_with_a_warning() -> None:
 
 def test_the_ground_that_the_caller_gives_counts() -> None:
     sent = replace(mission(), home=Home.at(36.6, -84.38, 340.0))
+    with air(vehicle()) as link, pytest.raises(VehicleRefused) as refused:
+        upload_mission(link, sent, options=OPTIONS)
+    assert refused.value.reason == "wrong_height"
     with air(vehicle()) as link:
         assert upload_mission(link, sent, options=replace(OPTIONS, ground_amsl_m=370.0)).verified
 
@@ -229,6 +232,7 @@ def test_a_vehicle_that_is_booting_is_waited_for() -> None:
     board = vehicle(boot_s=5.0)  # half a second of ours
     with air(board) as link:
         assert upload_mission(link, mission(), options=replace(OPTIONS, standby_s=8.0)).verified
+    assert len(board.items()[1:]) == len(mission().items)
 
 
 def test_two_vehicles_with_one_number_are_refused() -> None:

@@ -95,7 +95,7 @@ def test_a_vehicle_gets_all_that_it_asks_for(loss: float, spacing_m: int) -> Non
         assert len(served.blocks) >= 4
         assert served.notes == []
         [hub] = air.at("vehicle")
-        [(_, telemetry, _)] = hub._vehicles  # type: ignore[attr-defined]
+        [(_, telemetry, _)] = hub.vehicles  # type: ignore[attr-defined]
         assert telemetry.terrain.pending == 0
         assert telemetry.terrain.loaded == 56 * len(served.blocks)
 

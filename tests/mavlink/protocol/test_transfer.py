@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission.mission import ALL, FENCE, MISSION, RALLY, MissionItem
+from gcsplan.mavlink.protocol.download import Download
+from gcsplan.mavlink.protocol.machine import ImpossibleTransition, Machine, Timers
 from gcsplan.mavlink.protocol.messages import (
     Ack,
     Address,
@@ -24,19 +26,8 @@ from gcsplan.mavlink.protocol.messages import (
     RequestList,
 )
 from gcsplan.mavlink.protocol.outcome import CANCELLED, DENIED, ERROR, INVALID_SEQUENCE, NO_SPACE, code_cure, code_words
-from gcsplan.mavlink.protocol.transfer import (
-    Accepted,
-    Clear,
-    Download,
-    ImpossibleTransition,
-    Machine,
-    Refused,
-    Settled,
-    Timers,
-    Unknown,
-    Upload,
-    VerifiedUpload,
-)
+from gcsplan.mavlink.protocol.transfer import Accepted, Refused, Settled, Unknown, VerifiedUpload
+from gcsplan.mavlink.protocol.upload import Clear, Upload
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
 from gcsplan.vehicle import Autopilot
@@ -168,7 +159,7 @@ def test_invalid_sequence_is_not_the_end() -> None:
 def test_invalid_sequence_and_then_silence_is_unknown_and_no_refusal() -> None:
     upload = upload_asked_for([0, 1])
     says(upload, Ack(INVALID_SEQUENCE))
-    wait_out(upload)
+    assert wait_out(upload) > 0.0
     assert isinstance(upload.outcome, Unknown)
 
 
@@ -247,6 +238,7 @@ def test_a_vehicle_that_starts_over_for_ever_does_not_hang_an_upload() -> None:
         now += 1.0
         upload.on_timer(now)
     assert isinstance(upload.outcome, Unknown)
+    assert now < 1000
 
 
 @pytest.mark.parametrize(
@@ -605,8 +597,10 @@ def test_a_vehicle_without_room_refuses_before_anything_is_lost() -> None:
 
 @pytest.mark.parametrize("autopilot", [COPTER, PX4])
 def test_a_foreign_system_that_lies_is_passed_over(autopilot: Autopilot) -> None:
-    settled, _ = fly(vehicle(autopilot, stray_sysid=2))
+    board = vehicle(autopilot, stray_sysid=2)
+    settled, _ = fly(board)
     assert settled.verified
+    assert settled.read_back == board.items()
 
 
 @pytest.mark.parametrize("autopilot", [COPTER, PX4])
@@ -618,8 +612,10 @@ def test_answers_under_a_foreign_system_id_never_count(autopilot: Autopilot) -> 
 
 @pytest.mark.parametrize("autopilot", [COPTER, PX4])
 def test_answers_about_a_stale_mission_type_are_passed_over(autopilot: Autopilot) -> None:
-    settled, _ = fly(vehicle(autopilot, stale_type=RALLY))
+    board = vehicle(autopilot, stale_type=RALLY)
+    settled, _ = fly(board)
     assert settled.verified
+    assert settled.read_back == board.items()
 
 
 @pytest.mark.parametrize("after", [0, 1, 5, 12, 14, 20])
@@ -706,5 +702,9 @@ def test_in_any_weather_nothing_is_falsely_verified_and_nothing_hangs(autopilot:
 
 @pytest.mark.parametrize("autopilot", [COPTER, PX4])
 def test_a_long_mission_gets_through_ten_percent_loss(autopilot: Autopilot) -> None:
-    settled, _ = fly(vehicle(autopilot), 600, Weather(loss=0.1), 1)
+    board = vehicle(autopilot)
+    settled, _ = fly(board, 600, Weather(loss=0.1), 1)
     assert settled.verified
+    assert settled.retries > 0
+    assert settled.read_back == board.items()
+    assert len(board.items()) == 600

@@ -11,6 +11,7 @@ from gcsplan.mission_file.airspace.policy import Policy
 from gcsplan.mission_file.zone_draft import ZoneDraft
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_reader import read_zones
+from tests.support.attacks import require_told
 
 RING = [[8.0, 47.0], [8.1, 47.0], [8.1, 47.1], [8.0, 47.1], [8.0, 47.0]]
 HOLE = [[8.04, 47.04], [8.06, 47.04], [8.06, 47.06], [8.04, 47.04]]
@@ -30,6 +31,18 @@ def said(folder: Path, content: Any, name: str = "zones.json", **policy: Any) ->
     except InputError as error:
         return str(error)
     return "\n".join(str(p) for p in [*found.problems, *(f for z in found.zones for f in z.faults)])
+
+
+def outcome(folder: Path, content: Any, name: str = "zones.json") -> str:
+    """How a file ends: with ``zones`` alone, or ``refused``, whole or in parts, with a place and words for each."""
+    try:
+        found = read(folder, content, name)
+    except InputError as error:
+        require_told(error)
+        return "refused"
+    assert all(p.where and p.message for p in found.problems)
+    assert all(zone.name for zone in found.zones)
+    return "refused" if found.problems or any(zone.faults for zone in found.zones) else "zones"
 
 
 def limits(zone: ZoneDraft) -> tuple[str, str]:

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from gcsplan.mission_file.airspace.times import Hours
@@ -19,12 +18,13 @@ from tests.mission_file.airspace.made import (
     ed318,
     limits,
     openaip,
+    outcome,
     read,
     remarks,
     said,
     volume,
 )
-from tests.support.effort import draws
+from tests.support.attacks import draw_attacks
 from tests.support.paths import DATA
 
 AIRSPACE = DATA / "airspace"
@@ -285,7 +285,8 @@ def test_limits_that_move_and_hours_of_a_week_make_no_zone_smaller(tmp_path: Pat
     ],
 )
 def test_broken_files_end_in_a_message(tmp_path: Path, content: Any) -> None:
-    assert said(tmp_path, content)
+    assert "zones.json" in said(tmp_path, content)
+    assert outcome(tmp_path, content) == "refused"
 
 
 JUNK = st.recursive(
@@ -312,10 +313,12 @@ def spoilt(draw: Any, value: Any) -> Any:
     return draw(JUNK)
 
 
-@given(st.data())
-@settings(max_examples=draws(240), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_no_spoilt_file_ends_in_a_traceback(tmp_path: Path, data: st.DataObject) -> None:
-    value = data.draw(st.sampled_from(SAMPLES))
-    for _ in range(data.draw(st.integers(1, 3))):
-        value = spoilt(data.draw, value)
-    said(tmp_path, json.dumps(value).encode("utf-8", "surrogatepass"))
+@pytest.mark.draws
+def test_a_spoilt_file_gives_its_zones_or_words_of_what_is_wrong(tmp_path: Path) -> None:
+    def attack(data: st.DataObject) -> str:
+        value = data.draw(st.sampled_from(SAMPLES))
+        for _ in range(data.draw(st.integers(1, 3))):
+            value = spoilt(data.draw, value)
+        return outcome(tmp_path, json.dumps(value).encode("utf-8", "surrogatepass"))
+
+    assert draw_attacks(240, attack) == {"zones", "refused"}

@@ -14,7 +14,8 @@ from pyproj import Geod
 from gcsplan.mission_file.airspace.arcs import Arc, outline
 from gcsplan.mission_file.airspace.times import Hours
 from gcsplan.mission_file.zone_draft import ZoneDraft
-from tests.mission_file.airspace.made import limits, read, remarks, said
+from tests.mission_file.airspace.made import limits, outcome, read, remarks, said
+from tests.support.attacks import draw_attacks
 from tests.support.effort import draws
 from tests.support.paths import DATA
 
@@ -263,9 +264,7 @@ def test_a_file_without_zones_is_refused_in_few_words(tmp_path: Path, text: str,
 
 
 @pytest.mark.parametrize("line", ["DP 50:00:00 N 008:99:00 E", "DP 47:03:00 N", "V X=here", "lost words", "DC 400"])
-def test_a_zone_whose_outline_is_not_understood_is_refused_wherever_the_rest_of_it_lies(
-    tmp_path: Path, line: str
-) -> None:
+def test_an_outline_that_is_not_understood_is_refused_wherever_its_rest_lies(tmp_path: Path, line: str) -> None:
     text = f"AC R\nAN far\nV X=47:00:00 N 008:00:00 E\n{SQUARE}{line}\nAC R\nAN whole\n{SQUARE}"
     found = read(tmp_path, text, "a.txt")
     assert len(found.problems) == 1
@@ -287,10 +286,14 @@ RECORDS = st.sampled_from(
 )  # fmt: skip
 
 
-@given(st.lists(st.one_of(RECORDS, st.text(max_size=20)), max_size=30))
-@settings(max_examples=draws(150), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_no_text_ends_in_a_traceback(tmp_path: Path, lines: list[str]) -> None:
-    said(tmp_path, "\n".join(lines).encode("utf-8", "surrogatepass"), "a.txt")
+@pytest.mark.draws
+def test_any_text_gives_its_zones_or_words_of_what_is_wrong(tmp_path: Path) -> None:
+    def attack(data: st.DataObject) -> str:
+        lines = data.draw(st.lists(st.one_of(RECORDS, st.text(max_size=20)), max_size=30))
+        text = data.draw(st.sampled_from(["", f"AC R\nAN first\n{SQUARE}"])) + "\n".join(lines)
+        return outcome(tmp_path, text.encode("utf-8", "surrogatepass"), "a.txt")
+
+    assert draw_attacks(150, attack) == {"zones", "refused"}
 
 
 def test_a_day_alone_as_the_end_of_an_activation_is_all_of_it(tmp_path: Path) -> None:

@@ -92,7 +92,8 @@ def test_periods_against_every_minute(given_: list[Any], first: int, quarters: i
 )  # fmt: skip
 def test_what_is_not_understood_applies_always(given_: Any) -> None:
     periods, _ = read_periods(given_)
-    assert apply_in(periods, Hours.read("2026-11-24T12:00Z"))
+    for at in ("1970-01-01T00:00Z", "2026-11-24T12:00Z", "2099-12-31T23:59Z"):
+        assert apply_in(periods, Hours.read(at)) is True
 
 
 def test_offsets_and_the_end_of_a_day() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gcsplan.planners.lattice.corridor_raster import make_guide
-from gcsplan.planners.lattice.planner import _sides, cheaper
+from gcsplan.planners.lattice.planner import cheaper, sides_to_pass
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
@@ -29,7 +29,7 @@ def test_a_line_is_pulled_on_the_side_of_a_zone_that_its_path_passes_it_on() -> 
     ends, free = np.array([True, False, False, True]), np.full(4, np.nan)
     for path, side in ((under, False), (over, True)):
         assert faults(p, Path(path)) == []
-        assert _sides(p, path, ends, free) == {0: side}
+        assert sides_to_pass(p, path, ends, free) == {0: side}
         better = cheaper(p, lambda *_: None, path, 1700.0)
         assert better is not None
         assert faults(p, Path(better)) == []

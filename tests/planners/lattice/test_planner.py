@@ -11,7 +11,7 @@ import pytest
 
 from gcsplan.errors import NoMission
 from gcsplan.planners.budget import Budget
-from gcsplan.planners.lattice.planner import _sides, plan_band
+from gcsplan.planners.lattice.planner import plan_band, sides_to_pass
 from gcsplan.planners.optimal import planner as optimal
 from gcsplan.planners.problem import Problem, Progress, Via, straight_bound
 from gcsplan.planners.profile.climb_laps import climb_tracks, extend, laps, pins_of
@@ -112,7 +112,7 @@ def test_a_path_with_two_points_at_one_place_has_sides() -> None:
     low, high = Zone("low", disc(middle, 300.0), None, Level(1.0, "agl")), Zone("high", disc(middle, 300.0), None, None)
     problem = replace(bare, airspace=Airspace(bare.airspace.surface, (low, high)))
     points = np.array([start, middle, (middle[0] + 1e-4, *middle[1:]), goal])
-    assert _sides(problem, points, *pins_of(problem, points)) == {0: True, 1: False}
+    assert sides_to_pass(problem, points, *pins_of(problem, points)) == {0: True, 1: False}
 
 
 def test_vias_are_passed_at_their_altitudes() -> None:

@@ -65,7 +65,7 @@ def test_no_way_out_of_a_ring_of_overlapping_discs() -> None:
     assert math.isfinite(shortest_past_discs((0.0, 0.0), (30.0, 0.0), ring[1:]))
 
 
-def test_shortest_past_discs_is_no_longer_than_past_polygons_around_and_no_shorter_than_past_those_within() -> None:
+def test_shortest_past_discs_lies_between_past_polygons_within_and_around_them() -> None:
     for seed in range(6):
         rng = np.random.default_rng(seed)
         discs = np.column_stack([rng.uniform(2.0, 8.0, (8, 2)), rng.uniform(0.3, 1.6, 8)])

@@ -315,7 +315,7 @@ def test_no_path_past_vias_costs_less_than_the_bound(objective: Objective, climb
 
 
 @pytest.mark.parametrize(("seed", "least_percent"), [(1, 0.04), (13, 0.1), (29, 0.2)])
-def test_with_a_track_error_fine_tracks_pass_as_near_to_terrain_as_the_exact_check_allows(
+def test_fine_tracks_with_a_track_error_pass_as_near_to_terrain_as_allowed(
     seed: int, least_percent: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     limits = Limits(min_agl_m=20.0, track_error_m=5.0, altitude_error_m=2.0, horizontal_clearance_m=10.0)

@@ -305,31 +305,36 @@ def test_ssgwo_table_3_is_solved_within_one_percent(unlimited: bool, optimum_m: 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_random_missions_on_the_sample_are_solved_safely(seed: int) -> None:
-    _is_solved(random_mission(seed))
+    assert faults_of_plan(random_mission(seed)) == []
 
 
 @pytest.mark.first_quick
 @pytest.mark.parametrize("seed", [20, pytest.param(21, marks=pytest.mark.slow), 22])
 def test_random_missions_under_the_120_m_rule(seed: int) -> None:
-    _is_solved(random_mission(seed, replace(FIELD, min_agl_m=50.0, max_agl_m=120.0), zones=6))
+    assert faults_of_plan(random_mission(seed, replace(FIELD, min_agl_m=50.0, max_agl_m=120.0), zones=6)) == []
 
 
 @pytest.mark.first_quick
 @pytest.mark.parametrize("seed", [40, 42, pytest.param(44, marks=pytest.mark.slow)])
 def test_random_missions_under_a_ceiling(seed: int) -> None:
-    _is_solved(random_mission(seed, replace(FIELD, max_amsl_m=690.5)))
+    assert faults_of_plan(random_mission(seed, replace(FIELD, max_amsl_m=690.5))) == []
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [60, pytest.param(61, marks=pytest.mark.slow)])
 def test_random_missions_for_energy(seed: int) -> None:
-    _is_solved(random_mission(seed, objective="energy"))
+    assert faults_of_plan(random_mission(seed, objective="energy")) == []
 
 
-def _is_solved(p: Problem) -> None:
+def faults_of_plan(p: Problem) -> list[str]:
+    """What the brute-force oracle has against the plan of a mission, or what keeps it from being one."""
     s = solve(p)
-    gaps = np.linalg.norm(np.diff(s.path.points, axis=0), axis=1)
-    assert gaps.min() > 1.0
+    found = list(faults(p, s.path, step_m=10.0))
+    if np.linalg.norm(np.diff(s.path.points, axis=0), axis=1).min() <= 1.0:
+        found.append("two way points within a metre")
+    if s.lower_bound is None or not s.lower_bound <= p.cost(s.path) * (1.0 + 1e-9):
+        found.append(f"a bound of {s.lower_bound} for a path that costs {p.cost(s.path)}")
+    return found
 
 
 @pytest.mark.slow

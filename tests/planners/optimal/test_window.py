@@ -68,7 +68,7 @@ def box(west: float, south: float, east: float, north: float) -> Zone:
 
 
 @pytest.mark.slow
-def test_a_way_round_the_ridge_that_leaves_the_first_window_is_found_and_judged_where_it_leads() -> None:
+def test_a_way_that_leaves_the_first_window_is_found_and_judged_where_it_leads() -> None:
     source = source_of(ROW_4)
     done = plan(source)
     (vehicle,) = done.vehicles
@@ -129,7 +129,7 @@ def test_a_raster_tells_on_which_sides_it_goes_on() -> None:
     assert wide.wider(math.inf, 10**6) is None
 
 
-def test_a_wider_window_is_as_wide_as_asked_one_and_the_same_for_all_and_never_too_large() -> None:
+def test_a_wider_window_is_as_wide_as_asked_the_same_for_all_and_never_too_large() -> None:
     source = source_of(ROW_4)
     assert source.wider is not None
     wide = source.wider(7000.0, 10**6)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from gcsplan.arrays import Floats
 from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Via, passes_vias
+from gcsplan.planners.profile.climb_laps import MOST_LAPS, laps, wound
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface
@@ -48,3 +51,25 @@ def test_a_path_that_leaves_a_via_out_is_not_taken() -> None:
     assert not taken(first)
     assert not taken(second, first)
     assert not taken((100.0, 50.0, 41.0), second)
+
+
+@pytest.mark.parametrize("heading", [None, 0.7])
+@pytest.mark.parametrize(("length_m", "radius_m"), [(300.0, 0.0), (5000.0, 0.0), (900.0, 30.0), (9000.0, 30.0)])
+def test_laps_come_back_to_their_place_and_are_as_long_as_asked(
+    length_m: float, radius_m: float, heading: float | None
+) -> None:
+    problem = replace(problem_of((0.0, 0.0, 20.0), (500.0, 0.0, 20.0)), turn_radius_m=radius_m)
+    counts = []
+    for one, count in laps(problem, length_m, heading):
+        whole = np.vstack([np.zeros((1, 2)), wound(one, count), np.zeros((1, 2))])
+        assert float(np.hypot(*np.diff(whole, axis=0).T).sum()) == pytest.approx(length_m)
+        counts.append(count)
+    assert counts == sorted(counts)
+    assert (counts[0], max(counts) <= MOST_LAPS) == (1, True)
+
+
+def test_the_first_lap_beside_a_track_leads_sideways() -> None:
+    problem = problem_of((0.0, 0.0, 20.0), (500.0, 0.0, 20.0))
+    one, _ = next(laps(problem, 200.0, 0.7))
+    along = np.array([np.cos(0.7), np.sin(0.7)])
+    assert float(abs(one @ along).max()) == pytest.approx(0.0, abs=1e-9)

@@ -10,7 +10,7 @@ import pytest
 from gcsplan.errors import InputError, NoMission
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.planners.registry import get
-from gcsplan.planners.swarm.aco import _walk, make_layers, open_between, search
+from gcsplan.planners.swarm.aco import make_layers, open_between, search, walk
 from gcsplan.planners.swarm.repair import violations
 from gcsplan.planners.swarm.scene import Scene
 from gcsplan.planners.swarm.settings import Settings
@@ -43,7 +43,7 @@ def test_layers_are_stops_and_sections_of_21_by_21() -> None:
     assert np.abs(across[:, :2] @ ahead[:2]).max() < 1e-6 * np.linalg.norm(ahead) ** 2
 
 
-def test_an_edge_is_open_exactly_where_dense_points_are_allowed_and_it_is_not_too_steep() -> None:
+def test_an_edge_is_open_exactly_where_dense_points_are_allowed_and_not_too_steep() -> None:
     problem = mission()
     scene = Scene.of(problem)
     a, b = make_layers(scene, (2,))[1:3]
@@ -72,7 +72,7 @@ def test_steps_are_drawn_by_scent_and_nearness() -> None:
     lengths = np.array([[1.0, 2.0, np.inf]])
     scent = np.array([[1.0, 4.0, 50.0]])
     eager = lengths**-5.0
-    ways = _walk(np.random.default_rng(0), 20_000, [eager], [scent], 1.0)
+    ways = walk(np.random.default_rng(0), 20_000, [eager], [scent], 1.0)
     share = (ways[:, 1] == 0).mean()
     assert share == pytest.approx(1.0 / (1.0 + 4.0 / 32.0), abs=0.01)
     assert (ways[:, 1] < 2).all()  # never along a forbidden edge
@@ -80,7 +80,7 @@ def test_steps_are_drawn_by_scent_and_nearness() -> None:
 
 def test_an_ant_in_a_dead_end_is_dropped() -> None:
     first, second = np.array([[1.0, 1.0]]), np.array([[0.0], [1.0]])
-    ways = _walk(np.random.default_rng(0), 1000, [first, second], [np.ones((1, 2)), np.ones((2, 1))], 1.0)
+    ways = walk(np.random.default_rng(0), 1000, [first, second], [np.ones((1, 2)), np.ones((2, 1))], 1.0)
     assert 400 < len(ways) < 600
     assert (ways[:, 1] == 1).all()
 

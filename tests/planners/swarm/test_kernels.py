@@ -61,7 +61,7 @@ def controls_of(cost: Cost, count: int, seed: int = 3) -> np.ndarray:
 def plain_terms(cost: Cost, controls: np.ndarray) -> np.ndarray:
     """Terms computed by the same functions, run by Python."""
     out = np.empty((len(controls), k.TERMS))
-    before: Held = cost._before
+    before: Held = cost.held
     with np.errstate(invalid="ignore"):
         k.measure.__wrapped__(controls, *before.arguments, out)  # type: ignore[attr-defined]
     return out
@@ -199,7 +199,7 @@ def test_a_leap_through_a_cylinder_between_two_samples_is_charged() -> None:
         Airspace(ground(0.0), (wall,)), Limits(0.0), (100.0, 1000.0, 50.0), (1900.0, 1000.0, 50.0)
     )  # fmt: skip
     cost = Cost(problem, Code.of("box", Scene.of(problem), 30), OBJECTIVES["ssgwo"])
-    controls = cost._straight()[None].copy()
+    controls = cost.straight_controls()[None].copy()
     controls[0, 1:-1] = controls[0, 0] + np.linspace(0.0, 5.0, 30)[:, None] * (1.0, 0.0, 0.0)
     samples = cost.curve.samples(controls)[0]
     apart = np.hypot(samples[:, 0] - 1500.0, samples[:, 1] - 1000.0)

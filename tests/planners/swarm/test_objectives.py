@@ -313,7 +313,7 @@ def test_a_vehicle_with_the_right_of_way_is_kept_apart_from_in_time() -> None:
     scene = Scene.of(p)
     code = Code.of("box", scene, 3)
     base = Cost(p, code, OBJECTIVES["krill"])
-    controls = base._straight()[None]
+    controls = base.straight_controls()[None]
     path = base.curve.samples(controls)[0]
     alone = base.of_controls(controls)[0]
     same = Earlier.at_speed(path, 15.0)
@@ -377,7 +377,7 @@ def test_float_noise_of_the_straight_line_is_no_turn_to_weigh_bends_by() -> None
     cost = cost_of("ib-abc", p)
     straight = cost.unit.straight
     assert straight[k.BEND] < 1e-9
-    controls = cost._straight()[None].copy()
+    controls = cost.straight_controls()[None].copy()
     controls[0, 2, :2] += (40.0, -30.0)
     terms = cost.terms(controls)[0]
     assert terms[k.BEND] > 0.01

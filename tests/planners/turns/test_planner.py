@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.planners.turns import planner
-from gcsplan.planners.turns.arc_path import CHORD_M, MOST_DEG, moved
+from gcsplan.planners.turns.arc_path import MOST_DEG, moved
+from gcsplan.planners.turns.kernels import CHORD_M
 from gcsplan.planners.turns.planner import LEVELS, Rounded, arc_path_of, rounded, with_more_clearance
 from gcsplan.planners.turns.repair import tried
 from gcsplan.world.airspace import Airspace, Legs
@@ -167,7 +168,7 @@ def _distance(x: Floats, a: Floats, b: Floats) -> float:
 
 
 @pytest.mark.slow
-def test_random_paths_that_touch_zones_at_their_corners_are_rounded_and_legal_as_flown(
+def test_random_paths_that_touch_zones_at_corners_are_rounded_and_legal_as_flown(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(planner, "TRIES", 200)
@@ -234,7 +235,7 @@ def way_below(problem: Problem, step_m: float = 100.0) -> Floats:
 
 @pytest.mark.first_quick
 @pytest.mark.parametrize("seed", [0, 2])
-def test_paths_between_hills_are_rounded_with_altitudes_that_climb_no_steeper_than_allowed(seed: int) -> None:
+def test_paths_between_hills_are_rounded_and_climb_no_steeper_than_allowed(seed: int) -> None:
     problem = hills(seed, 145.0)
     points = way_below(problem)
     assert len(points) > 3
@@ -246,7 +247,7 @@ def test_paths_between_hills_are_rounded_with_altitudes_that_climb_no_steeper_th
         assert found.cost < 1.05 * Path(points).length_m
 
 
-def test_what_is_known_of_a_belt_tells_of_one_like_it_exactly_what_looking_anew_would() -> None:
+def test_what_is_known_of_a_belt_is_exactly_what_looking_anew_at_its_like_tells() -> None:
     problem = replace(hills(0, 145.0), turn_radius_m=100.0)
     points = way_below(problem)
     belt = arc_path_of(problem, points, no_pins(points), 0.5)
@@ -369,7 +370,7 @@ def through_the_walls(gap_m: float) -> Floats:
     return at_100((500, 2000 + middle), (x, 2000 + middle), (x, 2300 + middle), (4500, 2300 + middle))
 
 
-def test_a_passage_too_narrow_for_the_radius_is_refused_and_the_same_passage_is_flown_with_a_small_one(
+def test_a_passage_too_narrow_for_the_radius_is_refused_and_flown_with_a_small_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(planner, "TRIES", 150)

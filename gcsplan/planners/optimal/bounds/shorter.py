@@ -48,7 +48,7 @@ def halve(plane: PlaneSearch, *, far: bool = False) -> None:
         # No path is cheaper than `low`; is any cheaper than `middle`?
         middle = where if where < high else low + part * (high - low)
         middle = max(middle, nearer if at_once else 0.0)
-        found = _bound_cheaper(plane, middle)
+        found = bound_cheaper(plane, middle)
         if found < middle:
             high = middle
         part = 0.5 if found < middle else min(2.0 * part, 0.5)
@@ -80,7 +80,7 @@ def _raise_by_intervals(plane: PlaneSearch) -> None:
     high = incumbent.cost
     middle = incumbent.bound + _least_step(plane)
     while high - incumbent.bound >= _least_step(plane) and not incumbent.done() and incumbent.budget.goes_on():
-        if all(len(leg.intervals(limit).cell) for leg, limit in _limits(plane, _longest_track(plane, middle))):
+        if all(len(leg.intervals(limit).cell) for leg, limit in _limits(plane, longest_track(plane, middle))):
             high = middle
         else:
             incumbent.raise_bound(middle)
@@ -93,10 +93,10 @@ def _limits(plane: PlaneSearch, most_m: float) -> list[tuple[Leg, float]]:
     return [(leg, leg.lower_m + spare) for leg in plane.legs]
 
 
-def _bound_cheaper(plane: PlaneSearch, cost: float) -> float:
+def bound_cheaper(plane: PlaneSearch, cost: float) -> float:
     """A lower bound of all paths cheaper than ``cost``: from their tracks on the fine lattice, then their climb;
     ``cost`` or more if there are none."""
-    most_m = _longest_track(plane, cost)
+    most_m = longest_track(plane, cost)
 
     def least(tracks: list[float]) -> float:
         if sum(tracks) >= most_m * (1.0 - 1e-12):
@@ -118,7 +118,7 @@ def _bound_cheaper(plane: PlaneSearch, cost: float) -> float:
     return least(tracks)
 
 
-def _longest_track(plane: PlaneSearch, cost: float) -> float:
+def longest_track(plane: PlaneSearch, cost: float) -> float:
     """An upper bound of the track length of paths cheaper than ``cost``: climbing leaves less than that for it."""
     legs, incumbent = plane.legs, plane.incumbent
     longest_m = incumbent.longest(sum(leg.reach_m for leg in legs), cost)

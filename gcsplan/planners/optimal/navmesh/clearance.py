@@ -88,7 +88,7 @@ class ClearanceGrid:
         self._array = Scratch().array if whole else plane.scratch.array
         self._excess, self._floor, self._ground, self._x, self._y = (self._array(f"{k}", self.shape) for k in range(5))
         self._span = _spans(wanted[inner], fineness)
-        self._around = np.tile(np.array([0, cols], np.int32), (rows, 1)) if whole else _around(self._span, cols)
+        self._around = np.tile(np.array([0, cols], np.int32), (rows, 1)) if whole else columns_around(self._span, cols)
         self._diagonal = np.zeros((rows - 1) * (cols - 1), np.int8)
         looked_at = float((self._around[:, 1] - self._around[:, 0]).clip(0).sum())
         plane.problem.budget.spend("node", looked_at)
@@ -374,7 +374,7 @@ def _spans(wanted: Bools, fineness: int) -> Int32s:
     return np.ascontiguousarray(np.repeat(spans, fineness, axis=0), np.int32)
 
 
-def _around(span: Int32s, cols: int) -> Int32s:
+def columns_around(span: Int32s, cols: int) -> Int32s:
     """(rows + 1, 2) for each row of nodes: the first column no farther than `AROUND` nodes from cells of the ``span``,
     and that after the last."""
     first, last = np.full(len(span) + 1, cols), np.zeros(len(span) + 1, np.int64)

@@ -196,7 +196,7 @@ class Triangles(Portals):
         return np.flatnonzero((left >= -1e-6).all(axis=1)).tolist()
 
 
-def _shortest(a: Place, b: Place, shapes: Sequence[shapely.Polygon]) -> GroundTrack | None:
+def shortest_past(a: Place, b: Place, shapes: Sequence[shapely.Polygon]) -> GroundTrack | None:
     """The shortest track around some polygons; None if they separate the places. Raises Exhausted."""
     places = np.array([a, b])
     bounds = np.array([*(s.bounds for s in shapes), (*places.min(axis=0), *places.max(axis=0))])
@@ -267,4 +267,4 @@ class Solids:
             return GroundTrack(np.array([a, b]), math.dist(a, b))
         shapes = [s for k in known if not (s := self.outlines[k].shape).is_empty]
         self._budget.spend("corner", sum(shapely.get_num_coordinates(s) for s in shapes))
-        return _shortest(a, b, shapes)
+        return shortest_past(a, b, shapes)

@@ -130,7 +130,7 @@ def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
     does; None if none was found."""
     on_path = distances(path[:, :2])
     at, s, places = _sampled(leg.last_track)
-    away, nearest = _nearest(places, path[:, :2])
+    away, nearest = nearest_on(places, path[:, :2])
     better: list[tuple[float, float, Floats]] = []
     for first, last in _runs(away > BESIDE_M):
         low, high = max(first - 1, 0), min(last + 1, len(s) - 1)
@@ -200,7 +200,7 @@ def _past(
 ) -> Floats | None:  # fmt: skip
     """`_along` past the stretches that are shut; ``low``, ``high`` (N,): what is free at the places."""
     # An infinite floor is shut (unknown ground), or given (an end), whatever is free below the cap.
-    stretches = _stretches(np.subtract(low, high, out=low.copy(), where=np.isfinite(low)))
+    stretches = shut_stretches(np.subtract(low, high, out=low.copy(), where=np.isfinite(low)))
     if len(stretches) > MOST:
         return None
     cuts = sorted({0, len(s) - 1, *(k for stretch in stretches for k in stretch)})
@@ -233,7 +233,7 @@ def _past(
     return np.vstack(out)
 
 
-def _nearest(places: Floats, track: Floats) -> tuple[Floats, Floats]:
+def nearest_on(places: Floats, track: Floats) -> tuple[Floats, Floats]:
     """(N,) distances of places from a track, and metres along the track (N,) of the points nearest to them."""
     a, d, s = track[:-1], np.diff(track, axis=0), distances(track)
     away, where = np.empty(len(places)), np.empty(len(places))
@@ -259,7 +259,7 @@ def _point(place: Floats) -> Point:
     return east, north, z
 
 
-def _stretches(over: Floats) -> list[tuple[int, int]]:
+def shut_stretches(over: Floats) -> list[tuple[int, int]]:
     """First and last index of each stretch with less than `OPEN_M` of free altitudes, and somewhere none; ``over``: the
     lowest minus the highest free altitude (N,), inf over unknown ground."""
     runs = [run for run in _runs(over > -OPEN_M) if (over[run[0] : run[1] + 1] > 0.0).any()]

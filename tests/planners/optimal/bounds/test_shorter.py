@@ -9,7 +9,7 @@ import pytest
 
 from gcsplan.bench.terrain.problems import problems
 from gcsplan.planners.budget import Budget
-from gcsplan.planners.optimal.bounds.shorter import _bound_cheaper, _longest_track
+from gcsplan.planners.optimal.bounds.shorter import bound_cheaper, longest_track
 from gcsplan.planners.optimal.plane_search import PlaneSearch
 from gcsplan.planners.optimal.planner import search
 from gcsplan.planners.problem import Problem, Via
@@ -54,8 +54,8 @@ def test_a_cost_that_the_climb_alone_exceeds_leaves_no_track() -> None:
     plane = PlaneSearch(found)
     assert plane.reach_longest()
     for part in (0.01, 0.5, 0.9):
-        assert _longest_track(plane, part * found.cost) >= sum(leg.lower_m for leg in plane.legs)
-        assert 0.0 < _bound_cheaper(plane, part * found.cost) <= found.cost * (1.0 + 1e-9)
+        assert longest_track(plane, part * found.cost) >= sum(leg.lower_m for leg in plane.legs)
+        assert 0.0 < bound_cheaper(plane, part * found.cost) <= found.cost * (1.0 + 1e-9)
 
 
 @pytest.mark.slow

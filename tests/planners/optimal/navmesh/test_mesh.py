@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.planners.optimal.navmesh.clearance import AROUND, ClearanceGrid, _around, mesh_of
+from gcsplan.planners.optimal.navmesh.clearance import AROUND, ClearanceGrid, columns_around, mesh_of
 from gcsplan.planners.optimal.navmesh.grid import Plane, make_plane
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.zone_shapes import convex_parts
@@ -385,7 +385,7 @@ def test_nodes_that_are_looked_at_lie_around_the_cells_that_are_wanted(rows: int
     for _ in range(20):
         cols = int(rng.integers(2, 60))
         span = np.sort(rng.integers(0, cols, (rows, 2)), axis=1).astype(np.int32)
-        found = _around(span, cols)
+        found = columns_around(span, cols)
         near = np.zeros((rows + 1, cols), bool)
         for j, (first, last) in enumerate(span.tolist()):
             if first < last:
@@ -398,8 +398,12 @@ def test_nodes_that_are_looked_at_lie_around_the_cells_that_are_wanted(rows: int
                 assert found[j, 0] >= found[j, 1]
 
 
-@pytest.mark.parametrize("goes_on", [(False,) * 4, (True, False, True, False), (True,) * 4])
-@pytest.mark.parametrize("shear", [0.0, 0.4])
+@pytest.mark.parametrize(
+    ("goes_on", "shear"),
+    [((False,) * 4, 0.0), ((True, False, True, False), 0.4), ((True,) * 4, 0.0),
+     pytest.param((False,) * 4, 0.4, marks=pytest.mark.slow), pytest.param((True,) * 4, 0.4, marks=pytest.mark.slow),
+     pytest.param((True, False, True, False), 0.0, marks=pytest.mark.slow)],
+)  # fmt: skip
 def test_no_track_runs_nearer_to_the_terrains_border_than_ground_must_be_known(
     goes_on: tuple[bool, bool, bool, bool], shear: float
 ) -> None:

@@ -103,7 +103,7 @@ def test_a_track_turns_where_rounding_has_made_two_corners_of_one() -> None:
     corners = [(73.5, -61.25), (43.11033185386742, -26.057106177671713), (43.11033185386742, -26.05710617767171),
                (124.5, 106.75)]  # fmt: skip
     a, b, south = (0.0, 0.0), (183.7, 14.35), [(0.0, 0.0), (73.5, -61.25), (183.7, 14.35)]
-    found = outlines._shortest(a, b, [shapely.Polygon(corners)])
+    found = outlines.shortest_past(a, b, [shapely.Polygon(corners)])
     assert found is not None
     assert found.length_m == pytest.approx(sum(math.dist(*leg) for leg in itertools.pairwise(south)), abs=1e-3)
 

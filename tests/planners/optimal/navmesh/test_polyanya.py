@@ -133,9 +133,9 @@ class Free:
                 if all(z[list(t)].min() < 0.0 or (z <= 0.0).all() for z in walls):
                     below = [shapely.Polygon(below_zero(place[list(t)], z[list(t)])) for z in walls]
                     parts.append(shapely.intersection_all(below))
-        self._hold(shapely.union_all(parts))
+        self.hold(shapely.union_all(parts))
 
-    def _hold(self, area: shapely.Geometry) -> None:
+    def hold(self, area: shapely.Geometry) -> None:
         self.area = area
         self.grown = _wider(self.area, REACH_M)
         shapely.prepare(self.grown)
@@ -145,7 +145,7 @@ class Free:
     def narrowed(self) -> Free:
         """The area without places that are less than about 2 µm wide, where cells meet only at a node."""
         out = object.__new__(Free)
-        out._hold(_wider(self.grown, -10.0 * REACH_M))
+        out.hold(_wider(self.grown, -10.0 * REACH_M))
         return out
 
     def sight(self, a: Floats, b: Floats) -> Bools:
@@ -248,7 +248,7 @@ def test_ways_are_as_long_as_the_shortest_by_visibility_there_and_back(form: str
 
 @pytest.mark.first_quick
 @pytest.mark.parametrize("form", EACH_FORM)
-def test_where_walls_touch_exactly_ways_are_legal_and_shorter_than_round_the_touching_places(form: str) -> None:
+def test_where_walls_touch_exactly_ways_are_legal_and_no_detours(form: str) -> None:
     """A touching point may be passed or not, but tracks beside it must be found, and no wall may be crossed."""
     rng = np.random.default_rng(list(form.encode()))
     compared = 0

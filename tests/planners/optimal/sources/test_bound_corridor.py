@@ -90,7 +90,7 @@ places = st.lists(st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0)), min
 @given(places, places)
 def test_the_nearest_place_of_a_track_is_as_near_as_any(some: list[tuple[float, float]], track: object) -> None:
     line = np.array(track, dtype=float)
-    away, where = bound_corridor._nearest(np.array(some), line)
+    away, where = bound_corridor.nearest_on(np.array(some), line)
     s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
     t = np.linspace(0.0, s[-1], 2001)
     dense = np.stack([np.interp(t, s, line[:, k]) for k in range(2)], axis=-1)

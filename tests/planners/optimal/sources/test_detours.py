@@ -21,7 +21,7 @@ from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.climb_laps import extend
 from gcsplan.planners.profile.exact import sampled_track
 from gcsplan.planners.profile.taut_string import Blocked, taut_string
-from gcsplan.planners.profile.track import Closed, Flown, Lacking, _sections, fly, lacking
+from gcsplan.planners.profile.track import Closed, Flown, Lacking, fly, lacking, sections_of
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
 from gcsplan.world.path import Path
@@ -144,7 +144,7 @@ def test_no_choice_of_sides_costs_less_than_what_is_lacking_tells(seed: int) -> 
     p = crossing(*zones, limits=replace(TENTH, max_amsl_m=150.0))
     track = sampled_track(p, *straight(p))
     costs = []
-    room = _sections(p, track, ())
+    room = sections_of(p, track, ())
     for sides in product((True, False), repeat=len(track.tube.bands)):
         low_m, high_m = room.between(sides)
         string = taut_string(room.s_m, low_m, high_m, 10.0, 10.0)

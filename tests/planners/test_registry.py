@@ -1,0 +1,47 @@
+"""The table of planners: each row can be called, and names a source and an optimiser that exist."""
+
+from __future__ import annotations
+
+import inspect
+from importlib import import_module
+from typing import get_args
+
+import pytest
+
+from gcsplan.errors import InputError
+from gcsplan.mission_file.schema import Encoding
+from gcsplan.optimisers import registry as optimisers
+from gcsplan.planners import registry
+
+
+def test_the_default_planner_stands_first_and_every_name_finds_its_row() -> None:
+    assert registry.names()[0] == "optimal"
+    assert [registry.get(name).name for name in registry.names()] == list(registry.names())
+
+
+@pytest.mark.parametrize("name", registry.names())
+def test_a_row_names_a_planner_that_takes_what_it_is_called_with(name: str) -> None:
+    entry = registry.get(name)
+    plan = import_module(entry.module).plan
+    inspect.signature(plan).bind(*([None, entry] if entry.optimiser else [None]))
+    assert entry.summary
+    assert bool(entry.paper) == bool(entry.optimiser)
+
+
+@pytest.mark.parametrize("name", [name for name in registry.names() if registry.get(name).optimiser])
+def test_a_swarm_has_its_optimiser_and_encodings_that_a_mission_may_ask_for(name: str) -> None:
+    entry = registry.get(name)
+    assert name in ("aco", "cmaes") or entry.optimiser in optimisers.TABLE  # ants on a grid, and a package
+    assert {entry.space["encoding"], entry.defaults["encoding"]} <= set(get_args(Encoding))
+
+
+def test_an_unknown_name_is_refused_with_the_nearest() -> None:
+    with pytest.raises(InputError, match="Did you mean 'krill'"):
+        registry.get("kril")
+
+
+def test_the_rows_cannot_be_changed() -> None:
+    with pytest.raises(TypeError):
+        registry.TABLE["mine"] = registry.get("optimal")  # type: ignore[index]
+    with pytest.raises(TypeError):
+        registry.get("krill").defaults["points"] = 3  # type: ignore[index]
