@@ -46,7 +46,11 @@ _ENDINGS: dict[int, type[Interrupted]] = {
 ENDED = {Interrupted.exit_code} | {kind.exit_code for kind in _ENDINGS.values()}
 """Exit codes of a command that was interrupted."""
 
+AGAIN_S = 0.01
+"""Seconds after which a signal is sent again whose KeyboardInterrupt was lost."""
+
 _received: list[int] = []
+_last: list[int] = []
 _watch: list[Watch] = []
 _as_json: list[bool] = []
 
@@ -64,11 +68,13 @@ def end_in_good_order(*, as_json: bool = False) -> None:
         return
     if not _watch:  # one for a process, which may run several commands
         _watch.append(Watch(_end_at_once))
+        _raise_again()
     _as_json[:] = [as_json]
     owner, watch = os.getpid(), _watch[0]
 
     def stop(number: int, _: object) -> None:
         watch.heard()
+        _last[:] = [number]
         if number in _ENDINGS:
             if os.getpid() != owner:  # a forked child dies by the signal's default
                 signal.signal(number, signal.SIG_DFL)
@@ -80,6 +86,25 @@ def end_in_good_order(*, as_json: bool = False) -> None:
     for number, default in defaults.items():
         if signal.getsignal(number) is default:
             signal.signal(number, stop)
+
+
+def _raise_again() -> None:
+    """Send a signal once more if its KeyboardInterrupt was raised where Python drops exceptions.
+
+    Callbacks of weak references and finalizers are such places, and imports have many of them: the exception is told of
+    with a traceback, and the command would go on.
+    """
+    before = sys.unraisablehook
+
+    def told(lost: Any) -> None:
+        if not isinstance(lost.exc_value, KeyboardInterrupt) or not _last:
+            before(lost)
+            return
+        again = threading.Timer(AGAIN_S, os.kill, (os.getpid(), _last[0]))
+        again.daemon = True
+        again.start()
+
+    sys.unraisablehook = told
 
 
 def _end_at_once(number: int) -> NoReturn:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from itertools import islice
 from typing import Any
 
 from gcsplan.figures import floored, raised
@@ -48,6 +49,9 @@ DECIMALS = (
 )
 OTHER_DECIMALS = 6
 
+TOGETHER = 10_000
+"""Pieces of JSON, each a number, a key or a comma, that are joined at once."""
+
 
 def write_summary(summary: Mapping[str, Any], *, clocks: bool = False) -> str:
     """The JSON text of ``summary``; NaN and infinity become null, numpy's numbers become plain ones.
@@ -56,13 +60,22 @@ def write_summary(summary: Mapping[str, Any], *, clocks: bool = False) -> str:
     lower bounds (``min_…``, ``lower_bound_…``) are rounded down, greatest values (``max_…``) up, so that none looks
     better than it is. Raises TypeError for a type that JSON lacks.
     """
-    document = _plain({"schema": SCHEMA, **summary}, "", clocks)
-    return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return _text(_plain({"schema": SCHEMA, **summary}, "", clocks), lines=True) + "\n"
 
 
 def json_of(value: Mapping[str, Any], key: str, *, lines: bool = True) -> str:
     """The JSON text of an element of the list ``key``, as `write_summary` writes it there, or on one line."""
-    return json.dumps(_plain(value, key, True), indent=2 if lines else None, ensure_ascii=False, allow_nan=False)
+    return _text(_plain(value, key, True), lines=lines)
+
+
+def _text(plain: Any, *, lines: bool) -> str:
+    """As ``json.dumps`` writes it, which however keeps every number and comma in a list of its own until all are there:
+    400 MB for a mission that is flown around for 100,000 items."""
+    encoder = json.JSONEncoder(indent=2 if lines else None, ensure_ascii=False, allow_nan=False)
+    if not lines:
+        return encoder.encode(plain)
+    chunks = encoder.iterencode(plain)
+    return "".join(iter(lambda: "".join(islice(chunks, TOGETHER)), ""))
 
 
 def _plain(value: Any, key: str, clocks: bool) -> Any:

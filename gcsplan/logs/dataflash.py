@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import math
+import mmap
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
@@ -22,6 +23,10 @@ from gcsplan.logs.flight_log import MOST_READINGS, FlightLog, Readings, together
 HEAD = b"\xa3\x95"
 FIX_3D = 3
 MESSAGES_READ = ["BAT", "CURR", "POS", "GPS", "XKF2", "NKF2"]
+FORMAT_RECORD, FORMAT_LENGTH = 0x80, 89
+MOST_RECORDS = 10_000_000
+"""Most records of a log, of all kinds: pymavlink keeps the place of each, 50 bytes. Logs of 256 MB have 6 million."""
+
 MOST_BATTERIES = 16  # AP_BATT_MONITOR_MAX_INSTANCES of ArduPilot 4.6
 MOST_COMPLAINTS = 10_000  # of pymavlink, which makes one for each byte that it cannot read
 UNSCALED = frozenset("bBhHiIqQ")
@@ -33,6 +38,7 @@ def read_dataflash(file: Path) -> FlightLog:
     with file.open("rb") as opened:
         if opened.read(2) != HEAD:
             raise InputError("is no ArduPilot log: it does not begin with A3 95", where=str(file))
+    _require_few(file)
     from pymavlink import DFReader
 
     own = {f"battery {k}": 3 for k in range(MOST_BATTERIES)}
@@ -108,6 +114,31 @@ class _Complaints(io.TextIOBase):
         if self.count > MOST_COMPLAINTS:
             raise ValueError(f"{MOST_COMPLAINTS} places are damaged")
         return len(text)
+
+
+def _require_few(file: Path) -> None:
+    """Raise InputError if there are more than `MOST_RECORDS`: the length of each kind is in its format record."""
+    lengths, count, at = {FORMAT_RECORD: FORMAT_LENGTH}, 0, 0
+    with file.open("rb") as opened, mmap.mmap(opened.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        size = len(data)
+        if size < len(HEAD) * MOST_RECORDS:
+            return
+        while at + FORMAT_LENGTH <= size:
+            first, second, kind = data[at : at + 3]
+            if first != HEAD[0] or second != HEAD[1]:
+                at = data.find(HEAD, at + 1)  # damage
+                if at < 0:
+                    return
+                continue
+            count += 1
+            if count > MOST_RECORDS:
+                raise InputError(
+                    f"holds more than {MOST_RECORDS} records; cut it to the flight, or give its parts as several logs",
+                    where=str(file),
+                )
+            if kind == FORMAT_RECORD:
+                lengths[data[at + 3]] = max(data[at + 4], 1)
+            at += lengths.get(kind, 1)
 
 
 def _take(m: Any, read: Readings) -> None:

@@ -11,7 +11,7 @@ import math
 
 from gcsplan.arrays import Floats, Singles
 from gcsplan.world._compiled import device
-from gcsplan.world._shared import BOW_M, ERROR_M, STEP_X, STEP_Y, LocalExtrema
+from gcsplan.world._shared import BOW_M, ERROR_M, MASK, SHIFT, STEP_X, STEP_Y, LocalExtrema
 from gcsplan.world._sweep import parts_of, slab, to_grid
 from gcsplan.world._sweep_beside import unknown_near
 from gcsplan.world._sweep_terrain import EDGE
@@ -30,7 +30,7 @@ def steepest_in(
     rows, cols = z.shape
     i0, i1, j0, j1 = math.floor(c0), math.floor(c1), math.floor(r0), math.floor(r1)
     if (i1 - i0 + 1) * (j1 - j0 + 1) > MOST_CELLS:
-        return float(abs(slopes[j, i]))
+        return float(abs(slopes[i >> SHIFT, j, i & MASK]))
     square = 0.0
     for jj in range(max(j0, 0), min(j1, rows - 2) + 1):
         for ii in range(max(i0, 0), min(i1, cols - 2) + 1):
@@ -55,9 +55,10 @@ def lift_beside(
 
     The segment's ends are given in the plane, then in the grid.
     """
-    if extrema.slope[j, i] == math.inf or extrema.slope[j, i] == 0.0:
+    slope = extrema.slope[i >> SHIFT, j, i & MASK]
+    if slope == math.inf or slope == 0.0:
         return math.nan
-    if extrema.slope[j, i] < 0.0:
+    if slope < 0.0:
         d, _ = unknown_near(m, z, extrema.cols, extrema.rows, ea, na, eb, nb, reach, i, j)
         if d < reach:
             return math.nan
@@ -151,8 +152,9 @@ def pieces(
                     continue
                 turn = dc * dr * (tb - t) * (tb - t)
                 cuts = math.ceil(math.sqrt(0.25 * max(abs(gd * turn), abs(td * turn)) / CHORD_M))
-                edge = under.slope[jj, ii] < 0.0 or beside.slope[jj, ii] < 0.0 or beyond.slope[jj, ii] < 0.0
-                if edge:
+                strip, own = ii >> SHIFT, ii & MASK
+                edge = under.slope[strip, jj, own] < 0.0 or beside.slope[strip, jj, own] < 0.0
+                if edge or beyond.slope[strip, jj, own] < 0.0:
                     cuts = max(cuts, math.ceil((tb - t) * run / NEAR_UNKNOWN_M))
                 cuts = min(max(cuts, 1), MOST_CUTS)
                 g_bulge, t_bulge = 0.25 * gd * turn / (cuts * cuts), 0.25 * td * turn / (cuts * cuts)
@@ -184,11 +186,11 @@ def pieces(
                         extrema = under if which == 0 else (beside if which == 1 else beyond)
                         lift = lift_beside(m, z, extrema, ea, na, eb, nb, va, vb, wa, wb, ii, jj, reach)
                         if which == 0:
-                            bound = extrema.low[jj, ii]
+                            bound = extrema.low[ii >> SHIFT, jj, ii & MASK]
                             whole = min(low0, low1) - lift < bound
                             low0, low1 = (bound, bound) if whole else (low0 - lift, low1 - lift)
                             continue
-                        bound = extrema.high[jj, ii]
+                        bound = extrema.high[ii >> SHIFT, jj, ii & MASK]
                         whole = max(up0, up1) + lift > bound
                         if which == 1:
                             near0, near1 = (bound, bound) if whole else (up0 + lift, up1 + lift)
@@ -218,7 +220,8 @@ def around(
         if not (-EDGE <= c <= cols - 1.0 + EDGE and -EDGE <= r <= rows - 1.0 + EDGE):
             continue
         i, j = min(max(int(math.floor(c)), 0), cols - 2), min(max(int(math.floor(r)), 0), rows - 2)
-        slope = extrema.slope[j, i]
+        strip, own = i >> SHIFT, i & MASK
+        slope = extrema.slope[strip, j, own]
         if slope == math.inf or slope == 0.0:
             continue
         u, v = min(max(c - i, 0.0), 1.0), min(max(r - j, 0.0), 1.0)
@@ -237,7 +240,7 @@ def around(
                 continue
             slope = -slope
         x, y = reach_m / m[STEP_X], reach_m / m[STEP_Y]
-        best = min(h + reach_m * slope, extrema.high[j, i] if sign > 0.0 else -extrema.low[j, i])
+        best = min(h + reach_m * slope, extrema.high[strip, j, own] if sign > 0.0 else -extrema.low[strip, j, own])
         if x <= u <= 1.0 - x and y <= v <= 1.0 - y:
             gx, gy = (kb + kd * v) / m[STEP_X], (kc + kd * u) / m[STEP_Y]
             best = min(best, h + reach_m * math.sqrt(gx * gx + gy * gy) + 0.5 * abs(kd) * x * y)

@@ -8,22 +8,22 @@ import numpy as np
 
 from gcsplan.arrays import Floats, Int64s, Singles
 from gcsplan.world._compiled import device, kernel
-from gcsplan.world._shared import LEAST_SLOPE
+from gcsplan.world._shared import LEAST_SLOPE, MASK, SHIFT
 
 SLOPE, HIGH, LOW, LOST = range(4)
 
 
-@kernel("f8[,] f8 f8 i8 i8 i8[] f4[,,] f4[,] f4[,] f4[,]")
+@kernel("f8[,] f8 f8 i8 i8 i8[] f4[,,] f4[,,] f4[,,] f4[,,]")
 def local_extrema(
     z: Floats, step_x: float, step_y: float, cols: int, rows: int, box: Int64s, room: Singles, slope: Singles,
     high: Singles, low: Singles,
 ) -> int:  # fmt: skip
-    """Fill a ``box`` of a `LocalExtrema` of nodes ``z``: ``slope``, ``high``, ``low`` (rows - 1, cols - 1).
+    """Fill a ``box`` of a `LocalExtrema` of nodes ``z``: ``slope``, ``high``, ``low`` (strips, rows - 1, `STRIP`).
 
     ``box``: first row, end of rows, first column, end of columns. ``room``: work array for a block and the
     cells around it.
     """
-    n, m = min(box[1], slope.shape[0]), min(box[3], slope.shape[1])
+    n, m = min(box[1], z.shape[0] - 1), min(box[3], z.shape[1] - 1)
     tall, wide = room.shape[0] - 2 * rows, room.shape[2] - 2 * cols
     for top in range(box[0], n, tall):
         height = min(tall, n - top)
@@ -37,15 +37,20 @@ def local_extrema(
             fields = 4 if any_lost else 3
             for i in range(height):
                 # Which cells are themselves unknown, before that is spread.
-                lost, out = room[rows + i, LOST, cols:], slope[top + i, left : left + width]
-                for j in range(width):
-                    out[j] = lost[j]
+                lost = room[rows + i, LOST, cols:]
+                for j in range(left, left + width):
+                    slope[j >> SHIFT, top + i, j & MASK] = lost[j - left]
             for k in range(fields):
                 for i in range(height + 2 * rows):
                     _spread_along(room[i, k], far, 2 * cols + 1)
                 _spread_down(room, k, height + 2 * rows, width, 2 * rows + 1)
             for i in range(height):
-                _put(room[i], any_lost, slope[top + i], high[top + i], low[top + i], left, width)
+                for k in range(left >> SHIFT, ((left + width - 1) >> SHIFT) + 1):
+                    begin, end = max(k << SHIFT, left), min((k + 1) << SHIFT, left + width)
+                    _put(
+                        room[i], any_lost, slope[k, top + i], high[k, top + i], low[k, top + i], begin - left,
+                        begin & MASK, end - begin,
+                    )  # fmt: skip
     return 0
 
 
@@ -119,9 +124,14 @@ def _spread_down(room: Singles, k: int, count: int, width: int, window: int) -> 
 
 
 @device
-def _put(line: Singles, any_lost: bool, slope: Singles, high: Singles, low: Singles, left: int, width: int) -> None:
-    """Write a row of the spread values; ``slope`` holds the flags of the cells that are themselves unknown."""
-    of_slope, of_high, of_low, near = line[SLOPE], line[HIGH], line[LOW], line[LOST]
+def _put(
+    line: Singles, any_lost: bool, slope: Singles, high: Singles, low: Singles, first: int, left: int, width: int
+) -> None:
+    """Write ``width`` spread values from the ``first`` on to a strip's row, from its column ``left`` on.
+
+    ``slope`` holds the flags of the cells that are themselves unknown.
+    """
+    of_slope, of_high, of_low, near = line[SLOPE, first:], line[HIGH, first:], line[LOW, first:], line[LOST, first:]
     slope, high, low = slope[left : left + width], high[left : left + width], low[left : left + width]
     for j in range(width):
         high[j] = of_high[j]

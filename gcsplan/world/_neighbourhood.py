@@ -6,25 +6,33 @@ A large surface is examined only where the bounds are needed: a mission uses a f
 from __future__ import annotations
 
 import math
+import mmap
 import threading
+from contextlib import suppress
 from itertools import product
 
 import numpy as np
 
-from gcsplan.arrays import Bools, Floats
+from gcsplan.arrays import Bools, Floats, Singles
 from gcsplan.native.signature import Held
 from gcsplan.world._compiled import EXTREMA
 from gcsplan.world._extrema import local_extrema
 from gcsplan.world._field import Field
-from gcsplan.world._shared import LocalExtrema
+from gcsplan.world._shared import STRIP, LocalExtrema
 from gcsplan.world.surface import GridMap
 
 LARGE = 2_000_000
 """Surfaces with more cells than this are examined tile by tile."""
-TILE, SPACING = 128, 32
+TILE, SPACING = STRIP, 32
 """Columns and rows of a tile, and the largest spacing, in cells, of the places on a line whose tiles are examined."""
 BOW = 2
 """Upper bound, in cells, of how far a line of the plane leaves the straight grid line between two such places."""
+CELL_BYTES = 12
+"""Of a cell that was examined: a slope and two heights."""
+MOST_BYTES = 250_000_000
+"""Of what all neighbourhoods of an airspace have examined: those that were asked for least lately forget it."""
+AT_ONCE = 3
+"""Neighbourhoods that one call of a kernel takes."""
 TALL, WIDE, WIDER = 64, 1024, 4
 """Fewest rows and columns worked on at once, so that they stay in the processor's cache; and the fewest as a multiple
 of the reach around them, in cells."""
@@ -78,6 +86,8 @@ class Neighbourhood:
         else:
             self.extrema = extrema_around(field, heights, reach_m)
         self._held = Held(EXTREMA, *self.extrema)
+        self.examined_bytes = 0 if self.seen.size else self.extrema.slope.size * CELL_BYTES
+        """What its arrays take; those of a large surface take what was examined."""
 
     def __reduce__(self) -> tuple[type[Neighbourhood], tuple[GridMap, Field, Floats, float]]:
         """Pickle the inputs only: a copy in another process examines its tiles anew."""
@@ -92,22 +102,71 @@ class Neighbourhood:
                     rows, cols = (slice(k * TILE, (k + 1) * TILE) for k in (i, j))
                     _look_at(self._field, self._heights, self.extrema, rows, cols)
                     self.seen[i, j] = True
+                    self.examined_bytes += TILE * TILE * CELL_BYTES
         return self._held
+
+
+class Neighbourhoods:
+    """The local extrema of an airspace for each reach that is asked for, of at most `MOST_BYTES` or a little more.
+
+    A way home asks for a dozen reaches along lines that cover all of the terrain: 40 million cells took 4 GB.
+    """
+
+    def __init__(self, grid: GridMap, field: Field) -> None:
+        self._grid, self._field = grid, field
+        self._kept: dict[tuple[bool, int, int], Neighbourhood] = {}
+        """The least lately asked for come first."""
+        self._lock = threading.Lock()
+
+    def __reduce__(self) -> tuple[type[Neighbourhoods], tuple[GridMap, Field]]:
+        """Pickle none of the extrema: a copy in another process examines its own."""
+        return Neighbourhoods, (self._grid, self._field)
+
+    def along(self, of_top: bool, heights: Floats, reach_m: float, lines: Lines) -> Held:
+        """The extrema of ``heights`` along lines, in the kernels' form; one for each size of the reach in cells."""
+        key = of_top, math.ceil(reach_m / self._field.step_x), math.ceil(reach_m / self._field.step_y)
+        with self._lock:
+            own = self._kept.pop(key, None)
+            if own is None or own.examined_bytes > MOST_BYTES // AT_ONCE:
+                own = Neighbourhood(self._grid, self._field, heights, reach_m)
+            self._kept[key] = own
+        held = own.along(lines)  # the arrays live as long as somebody uses them, forgotten or not
+        with self._lock:
+            held_bytes = sum(one.examined_bytes for one in self._kept.values())
+            for old in list(self._kept)[:-AT_ONCE]:
+                if held_bytes <= MOST_BYTES:
+                    break
+                held_bytes -= self._kept.pop(old).examined_bytes
+        return held
 
 
 def extrema_around(field: Field, heights: Floats, reach_m: float) -> LocalExtrema:
     """The local extrema of a surface, examined everywhere."""
     extrema = _empty(field, heights, reach_m)
-    _look_at(field, heights, extrema, slice(0, extrema.slope.shape[0]), slice(0, extrema.slope.shape[1]))
+    _look_at(field, heights, extrema, slice(0, heights.shape[0] - 1), slice(0, heights.shape[1] - 1))
     return extrema
 
 
 def _empty(field: Field, heights: Floats, reach_m: float) -> LocalExtrema:
-    """Local extrema that are unknown everywhere; zeros take no memory until they are written over."""
-    shape = heights.shape[0] - 1, heights.shape[1] - 1
+    """Local extrema that are unknown everywhere."""
+    shape = -(-(heights.shape[1] - 1) // STRIP), heights.shape[0] - 1, STRIP
     cols, rows = (math.ceil(reach_m / step) for step in (field.step_x, field.step_y))
-    slope, high, low = (np.zeros(shape, np.float32) for _ in range(3))
+    slope, high, low = (_zeros(shape) for _ in range(3))
     return LocalExtrema(slope, high, low, cols, rows)
+
+
+def _zeros(shape: tuple[int, ...]) -> Singles:
+    """Zeros (float32) that take no memory until they are written over, and then in pages of 4 kB.
+
+    ``np.zeros`` asks Linux for pages of 2 MB, and the tiles of one long line are in most of them.
+    """
+    size = 4 * math.prod(shape)
+    if not hasattr(mmap, "MADV_NOHUGEPAGE") or size < mmap.PAGESIZE:
+        return np.zeros(shape, np.float32)
+    room = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    with suppress(OSError):  # a kernel without huge pages
+        room.madvise(mmap.MADV_NOHUGEPAGE)
+    return np.frombuffer(room, np.float32).reshape(shape)
 
 
 def _look_at(field: Field, heights: Floats, extrema: LocalExtrema, rows: slice, cols: slice) -> None:

@@ -60,8 +60,15 @@ LEAST_SLOPE = 1e-37
 """The slope of level ground in `LocalExtrema`: no height that is added to one of metres."""
 
 
+STRIP, SHIFT, MASK = 128, 7, 127
+"""Columns of a strip of `LocalExtrema`; column i is in strip ``i >> SHIFT``, the ``i & MASK``th there."""
+
+
 class LocalExtrema(NamedTuple):
-    """Bounds over the known cells within ``cols`` and ``rows`` of each cell, (rows - 1, cols - 1) float32.
+    """Bounds over the known cells within ``cols`` and ``rows`` of each cell, (strips, rows - 1, `STRIP`) float32.
+
+    Cell (j, i) is at ``[i >> SHIFT, j, i & MASK]``: where a few tiles of a large surface are examined, memory is taken
+    for these alone, and not for a page of each row.
 
     ``slope`` (rise over run) is ``inf`` in a cell that is itself unknown, 0 in one that was not examined, which counts
     as unknown too, and negative (its magnitude is the slope) if an unknown cell, or the border, lies within reach;

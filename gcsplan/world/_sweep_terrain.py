@@ -16,7 +16,7 @@ import math
 
 from gcsplan.arrays import Floats, Singles
 from gcsplan.world._compiled import device
-from gcsplan.world._shared import BEND, BOW_M, CUT, ERROR_M, TOUCH_M
+from gcsplan.world._shared import BEND, BOW_M, CUT, ERROR_M, MASK, SHIFT, TOUCH_M
 from gcsplan.world._sweep import parts_of, slab, to_grid
 from gcsplan.world._sweep_beside import bar_above, beside_point, deepest, unknown_near
 
@@ -95,7 +95,7 @@ def glance(
             kd = z[j + 1, i + 1] - za - kb - kc
             u, v = c0 + tb * dc - i, r0 + tb * dr - j
             after = h + tb * rise - sign * (za + kb * u + kc * v + kd * u * v)
-            slope = slopes[j, i]
+            slope = slopes[i >> SHIFT, j, i & MASK]
             turn = dc * dr * (tb - t) * (tb - t)
             # The line dips below its lower end by at most a quarter of the bulge.
             least = min(agl, after) + min(0.25 * sign * kd * turn, 0.0)
@@ -197,7 +197,7 @@ def sweep(
                 za = z[j, i]
                 kb, kc = z[j, i + 1] - za, z[j + 1, i] - za
                 kd = z[j + 1, i + 1] - za - kb - kc
-                slope = slopes[j, i]
+                slope = slopes[i >> SHIFT, j, i & MASK]
                 failing = False
                 if slope == math.inf or slope == 0.0:
                     agl = math.nan
@@ -239,7 +239,7 @@ def sweep(
                         bar = bar_above(out[DEPTH])
                         if beside and need + r * slope - least > bar:
                             ends = min(sign * (h + t * rise), sign * (h + tb * rise))
-                            failing = need + sign * extremes[j, i] - ends > bar
+                            failing = need + sign * extremes[i >> SHIFT, j, i & MASK] - ends > bar
                 if tx <= ty:
                     i = next_i
                 if ty <= tx:

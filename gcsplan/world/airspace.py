@@ -24,7 +24,7 @@ from gcsplan.native.signature import Held
 from gcsplan.world._compiled import FOUND, ONE_SURFACE, SURFACE, ZONES
 from gcsplan.world._entries import around, judge
 from gcsplan.world._field import Field
-from gcsplan.world._neighbourhood import Lines, Neighbourhood
+from gcsplan.world._neighbourhood import Lines, Neighbourhoods
 from gcsplan.world._shapes import deepest_in_circle, deepest_inside
 from gcsplan.world._shared import (
     ANGLE_DEG,
@@ -175,7 +175,7 @@ class Airspace:
         self._field = Field.of(surface.grid)
         self.zones = over_both_grounds(zones, surface, self._field, scale)
         self._zones = zones_as_arrays(self.zones, surface, self._field, scale)
-        self._neighbourhoods: dict[tuple[bool, int, int], Neighbourhood] = {}
+        self._neighbourhoods = Neighbourhoods(surface.grid, self._field)
         ground, top = (np.ascontiguousarray(a, dtype=np.float64) for a in (surface.ground_m, surface.top_m))
         self._heights = ground, top
         self._surfaces = Held(SURFACE, self._field.packed, ground, top)
@@ -271,14 +271,9 @@ class Airspace:
         return out.reshape(e.shape)
 
     def _held(self, of_top: bool, reach_m: float, lines: Lines) -> Held:
-        """The kernels' extrema of top or ground for a reach, along lines; one for each size in cells."""
-        f = self._field
+        """The kernels' extrema of top or ground for a reach, along lines."""
         of_top = of_top and self.surface.top_m is not self.surface.ground_m
-        key = (of_top, math.ceil(reach_m / f.step_x), math.ceil(reach_m / f.step_y))
-        if key not in self._neighbourhoods:
-            heights = self._heights[of_top]
-            self._neighbourhoods[key] = Neighbourhood(self.surface.grid, f, heights, reach_m)
-        return self._neighbourhoods[key].along(lines)
+        return self._neighbourhoods.along(of_top, self._heights[of_top], reach_m, lines)
 
     def _judge(
         self,

@@ -136,7 +136,7 @@ def over(
     error = limits.altitude_error_m
     margin = reach.near_margin_m if wide_m == 0.0 else MARGIN_M
     found: list[tuple[Indices, Floats, Floats, Floats, Floats]] = []
-    for first, last in pairwise(_batches(air, starts, ends)):
+    for first, last in pairwise(batches(air, starts, ends, MOST_ROWS)):
         line, s0, rows = _pieces(
             air, starts[first:last], ends[first:last],
             (near if limits.max_agl_m is not None else UNUSED, near, far), of_top=True,
@@ -162,13 +162,13 @@ def over(
     return LevelLines(clear_m, legal_m, ceiling_m, crossings, line, s0, high, legal)
 
 
-def _batches(air: Airspace, starts: Floats, ends: Floats) -> list[int]:
-    """The first line of each batch of some `MOST_ROWS` pieces, and the number of lines.
+def batches(air: Airspace, starts: Floats, ends: Floats, most: int) -> list[int]:
+    """The first line of each batch of some ``most`` pieces, and the number of lines.
 
     Batches begin with an even line: `_pieces` follows every other one backwards.
     """
     cells = 16.0 + 3.0 * np.hypot(*(ends - starts).T) / min(air._field.step_x, air._field.step_y)
-    batch = np.floor(np.cumsum(cells) / MOST_ROWS)[::2]
+    batch = np.floor(np.cumsum(cells) / most)[::2]
     return [0, *(2 * (1 + np.flatnonzero(np.diff(batch)))).tolist(), len(starts)]
 
 

@@ -433,12 +433,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--inputs", type=int, default=10**9, help="at most this many inputs, with --sizes")
     parser.add_argument("--families", nargs="+", default=list(FAMILIES), choices=list(FAMILIES))
     parser.add_argument("--all", action="store_true", help="print every mission")
     parser.add_argument("--sizes", action="store_true", help="large worlds instead (tests.campaigns.sizes)")
     given = parser.parse_args()
     if given.sizes:
-        raise SystemExit(sizes.campaign(sizes.WORLDS, given.seconds, given.seed))
+        raise SystemExit(sizes.campaign(sizes.WORLDS, given.seconds, given.seed, given.inputs))
     resource.setrlimit(resource.RLIMIT_AS, (MOST_BYTES, MOST_BYTES))
     outcomes: list[Outcome] = []
     begun, seed = time.monotonic(), given.seed

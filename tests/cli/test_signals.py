@@ -158,3 +158,28 @@ cli.entry()
 """
     ended = ended_by(words, "plan")
     assert (ended.returncode, ended.stderr) == (130, "gcsplan: wrong\n")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize(("number", "code"), [("SIGTERM", 143), ("SIGINT", 130)])
+def test_a_signal_in_a_callback_whose_exceptions_python_drops_is_not_lost(number: str, code: int) -> None:
+    """As while modules are imported: it was told of with a traceback, and the command went on."""
+    words = f"""
+import time, weakref
+from gcsplan.cli import main as cli
+class Thing: pass
+def gone(_):
+    send(signal.{number})
+    for k in range(1000): pass
+def command(**_):
+    thing = Thing()
+    watched = weakref.ref(thing, gone)
+    del thing
+    for k in range(200): time.sleep(0.05)
+cli._commands = lambda called: command
+cli.entry()
+"""
+    ended = ended_by(words, "plan")
+    assert ended.returncode == code
+    assert ended.stderr.startswith("gcsplan: ")
+    assert ended.stderr.count("\n") == 1

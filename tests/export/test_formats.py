@@ -7,6 +7,7 @@ import io
 import json
 import math
 import re
+import tracemalloc
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -23,7 +24,7 @@ from gcsplan.export.geojson import write_geojson
 from gcsplan.export.kml import DRAWN_TOP_M, write_kml
 from gcsplan.export.profile import write_profile
 from gcsplan.export.rows import ItemRow, Track, WayPoint, outlines_deg
-from gcsplan.export.summary import ORDER, SCHEMA, write_summary
+from gcsplan.export.summary import ORDER, SCHEMA, json_of, write_summary
 from gcsplan.export.table import csv_of
 from gcsplan.mission_file.zone_draft import place_zones
 from gcsplan.mission_file.zone_reader import read_zones
@@ -391,6 +392,22 @@ def test_a_zone_across_the_antimeridian_becomes_two_polygons_of_the_same_area() 
 
 
 # -- summary.json -------------------------------------------------------------------------------------------------
+
+
+def test_json_is_that_of_the_library_and_takes_little_more_than_its_text() -> None:
+    """A mission that is flown around for 100,000 items took a gigabyte, most of it for commas and numbers in a list."""
+    value = {"legs": [{"leg": i, "length_m": 0.5 * i, "what": "Übung", "none": None} for i in range(5_000)]}
+    expected = json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False)
+    tracemalloc.start()
+    try:
+        text = json_of(value, "verdicts")
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert text == expected
+    assert json_of(value, "verdicts", lines=False) == json.dumps(value, ensure_ascii=False)
+    plain = 5_000 * 500  # the rounded copy
+    assert most < 3 * len(text) + plain, (most, len(text))
 
 
 def summary() -> dict[str, Any]:

@@ -43,6 +43,22 @@ def test_readings_of_an_ardupilot_log_are_counted_before_they_are_read(
     assert "readings of place, battery and wind; cut it to the flight" in refused(file)
 
 
+def test_records_of_an_ardupilot_log_are_counted_before_they_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """250 MB of heads without a body took 4 GB."""
+    file = flights.dataflash(tmp_path / "log.bin", flights.dataflash_rows())
+    records = len(flights.dataflash_rows()) + 1 + len(flights.FORMATS)
+    monkeypatch.setattr(dataflash, "MOST_RECORDS", records)
+    read_log(file)
+    damaged = tmp_path / "damaged.bin"
+    damaged.write_bytes(file.read_bytes() + random.Random(1).randbytes(50_000).replace(b"\xa3\x95", b"") + bytes(100))
+    read_log(damaged)
+    monkeypatch.setattr(dataflash, "MOST_RECORDS", records - 1 - 5)  # the last bytes are not walked through
+    monkeypatch.setattr("pymavlink.DFReader.DFReader_binary.__init__", lambda *_: pytest.fail("it was read"))
+    assert "records; cut it to the flight, or give its parts as several logs" in refused(file)
+
+
 def test_readings_are_counted_as_they_come(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = flights.tlog(tmp_path / "log.tlog")
     monkeypatch.setattr(flight_log, "MOST_READINGS", 500)

@@ -14,7 +14,7 @@ from gcsplan.mission_file import load_mission, zone_draft
 from gcsplan.mission_file.zone_draft import MOST_CORNERS
 from gcsplan.world._zone_arrays import MOST_LISTED, lattice_over
 from gcsplan.world.zones import Polygon
-from tests.campaigns import sizes
+from tests.campaigns import large_inputs, sizes
 
 
 @pytest.fixture(autouse=True)
@@ -90,14 +90,14 @@ def test_via_points_are_counted(amount: int, what: str) -> None:
 
 
 def test_vehicles_are_counted() -> None:
-    sizes.mission(vehicles=[0] * 2001)
+    large_inputs.mission(vehicles=[0] * 2001)
     with pytest.raises(InputError) as refusal:
         load_mission("m.yaml")
     assert "must be a list of 1 to 2000 vehicles, given" in str(refusal.value.problems)
 
 
 def test_terrain_files_are_counted() -> None:
-    sizes.mission(terrain={"dem": [f"t{k}.tif" for k in range(2001)], "vertical_datum": "EGM96"})
+    large_inputs.mission(terrain={"dem": [f"t{k}.tif" for k in range(2001)], "vertical_datum": "EGM96"})
     with pytest.raises(InputError) as refusal:
         load_mission("m.yaml")
     assert "2000" in str(refusal.value.problems)
@@ -105,7 +105,7 @@ def test_terrain_files_are_counted() -> None:
 
 def test_mistakes_are_counted(within_s: list[float]) -> None:
     within_s.append(6.0)  # 10,000 lines: 30 s before, and 25 minutes for a file of 5 MB
-    sizes.mission()
+    large_inputs.mission()
     text = Path("m.yaml").read_text() + "".join(f"k{k}: 1\n" for k in range(10_000))
     Path("m.yaml").write_text(text)
     with pytest.raises(InputError) as refusal:
@@ -126,7 +126,7 @@ def test_mistakes_are_counted(within_s: list[float]) -> None:
 def test_what_is_no_zone_is_counted_too(name: str, text: str, words: str, within_s: list[float]) -> None:
     within_s.append(2.0)
     Path(name).write_text(text)
-    sizes.mission([{"file": name}])
+    large_inputs.mission([{"file": name}])
     with pytest.raises(InputError) as refusal:
         load_mission("m.yaml")
     assert len(refusal.value.problems) <= 1001

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +12,8 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 from gcsplan.world import _neighbourhood
 from gcsplan.world._field import Field
-from gcsplan.world._neighbourhood import Lines, Neighbourhood, extrema_around
-from gcsplan.world._shared import LocalExtrema
+from gcsplan.world._neighbourhood import Lines, Neighbourhood, Neighbourhoods, extrema_around
+from gcsplan.world._shared import MASK, SHIFT, LocalExtrema
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import GridMap, Surface
@@ -52,29 +53,35 @@ def by_hand(field: Field, z: Floats, extrema: LocalExtrema) -> tuple[Floats, Flo
     return slope, high, low
 
 
+def in_rows(extrema: LocalExtrema, z: Floats) -> tuple[Floats, Floats, Floats]:
+    """Slope, highest and lowest height, (rows - 1, cols - 1), out of the strips."""
+    n, m = z.shape[0] - 1, z.shape[1] - 1
+    slope, high, low = (np.swapaxes(a, 0, 1).reshape(n, -1)[:, :m] for a in extrema[:3])
+    return slope, high, low
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_it_bounds_all_that_is_around_and_hardly_more(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    z = rough(rng, (int(rng.integers(2, 60)), int(rng.integers(2, 60))), float(rng.choice([0.0, 0.002, 0.1])))
+    most = 60, 60 if seed % 3 else 400  # beyond a strip
+    z = rough(rng, (int(rng.integers(2, most[0])), int(rng.integers(2, most[1]))), float(rng.choice([0.0, 0.002, 0.1])))
     grid = GridMap.affine(0.0, 0.0, float(rng.uniform(1.0, 30.0)), float(rng.uniform(1.0, 30.0)))
     field = Field.of(grid)
     extrema = extrema_around(field, z, float(rng.choice([0.0, 1.0, 10.0, 90.0])))
     slope, high, low = by_hand(field, z, extrema)
-    assert np.array_equal(np.isinf(extrema.slope), np.isinf(slope))
+    of_slope, of_high, of_low = in_rows(extrema, z)
+    assert np.array_equal(np.isinf(of_slope), np.isinf(slope))
     known = np.isfinite(slope)
-    assert np.array_equal(np.signbit(extrema.slope[known]), np.signbit(slope[known]))
-    for ours, theirs, sign in (
-        (abs(extrema.slope), abs(slope), 1.0),
-        (extrema.high, high, 1.0),
-        (extrema.low, low, -1.0),
-    ):
+    assert np.array_equal(np.signbit(of_slope[known]), np.signbit(slope[known]))
+    for ours, theirs, sign in ((abs(of_slope), abs(slope), 1.0), (of_high, high, 1.0), (of_low, low, -1.0)):
         a, b = sign * ours[known].astype(float), sign * theirs[known]
         assert (a >= b).all()
         assert (a <= b + 1e-3 + 3e-6 * abs(b)).all()
 
 
 def same_where_seen(part: LocalExtrema, whole: LocalExtrema, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> bool:
-    return all(np.array_equal(a[rows, cols], b[rows, cols]) for a, b in zip(part[:3], whole[:3], strict=True))
+    at = cols >> SHIFT, rows, cols & MASK
+    return all(np.array_equal(a[at], b[at]) for a, b in zip(part[:3], whole[:3], strict=True))
 
 
 @pytest.mark.first_quick
@@ -149,3 +156,48 @@ def test_what_was_not_looked_at_is_unknown(monkeypatch: pytest.MonkeyPatch) -> N
     assert blind.examine(legs_of(a, b), limits).violations
     assert np.isinf(blind.floor_amsl(a[:, 0], a[:, 1], limits)).all()
     assert np.isinf(blind.tube(np.concatenate([a, b])[:, :2], limits).floor_m).all()
+
+
+def test_neighbourhoods_forget_those_asked_for_least_lately_and_judge_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A way home asks for many reaches: those of 40 million cells took 4 GB."""
+    rng = np.random.default_rng(5)
+    z = rough(rng, (500, 900), 1e-5)
+    grid = GridMap.affine(0.0, 0.0, 5.0, 5.0)
+    field = Field.of(grid)
+    monkeypatch.setattr(_neighbourhood, "LARGE", 1000)
+    tile = _neighbourhood.TILE**2 * _neighbourhood.CELL_BYTES
+    monkeypatch.setattr(_neighbourhood, "MOST_BYTES", 30 * tile)
+    kept = Neighbourhoods(grid, field)
+    reaches = [5.0 * k for k in (1, 2, 3, 4, 5, 6)]
+    whole = {reach_m: extrema_around(field, z, reach_m) for reach_m in reaches}
+    for _ in range(60):
+        reach_m = float(rng.choice(reaches))
+        start, end = np.stack([rng.uniform(0.0, 4490.0, (2, 2)), -rng.uniform(0.0, 2490.0, (2, 2))], axis=-1)
+        kept.along(False, z, reach_m, Lines(start, end))
+        extrema = next(reversed(kept._kept.values())).extrema
+        t = np.linspace(0.0, 1.0, 2000)[:, None, None]
+        cells = np.floor(grid(*(start + t * (end - start)).reshape(-1, 2).T)).astype(np.intp)
+        cells = cells[((cells >= 0) & (cells < [899, 499])).all(axis=1)]
+        assert same_where_seen(extrema, whole[reach_m], cells[:, 1], cells[:, 0])
+        held = [one.examined_bytes for one in kept._kept.values()]
+        assert sum(held) <= 30 * tile or len(held) <= _neighbourhood.AT_ONCE
+    assert pickle.loads(pickle.dumps(kept))._kept == {}
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads the memory that is held as Linux tells it")
+def test_a_line_across_a_large_surface_takes_memory_for_its_tiles_alone() -> None:
+    """A page of 4 kB for every row of every tile, or of 2 MB, were ten and a hundred times as much."""
+
+    def held_bytes() -> int:
+        words = Path("/proc/self/status").read_text().split()
+        return 1024 * int(words[words.index("VmRSS:") + 1])
+
+    z = np.full((6000, 6000), 100.0)
+    grid = GridMap.affine(0.0, 0.0, 5.0, 5.0)
+    field = Field.of(grid)
+    line = Lines(np.array([[2500.0, 0.0]]), np.array([[27_000.0, -29_990.0]]))
+    before = held_bytes()
+    ours = Neighbourhood(grid, field, z, 5.0)
+    ours.along(line)
+    assert ours.examined_bytes < 20_000_000
+    assert held_bytes() - before < ours.examined_bytes + 10_000_000

@@ -13,7 +13,7 @@ import shapely
 from gcsplan.arrays import Floats
 from gcsplan.world.degree_shapes import outline_of, rings_around
 from gcsplan.world.outlines import MOST_CROSSINGS, MOST_PAIRS, crossings, fewer_corners, overlapping_pairs
-from tests.campaigns.sizes import smooth, spiky
+from tests.campaigns.large_inputs import smooth, spiky
 
 
 def ring_of(kind: str, count: int, seed: int) -> Floats:

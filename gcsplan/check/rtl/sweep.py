@@ -11,6 +11,7 @@ its errors; the clearance from zones is kept by returns from the mission's own l
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -33,6 +34,9 @@ GROUPS = 6
 """Most groups into which lines home of similar width are put; each group is judged with its greatest width."""
 
 LEAST_IN_GROUP = 50
+
+MOST_PIECES = 1_000_000
+"""Most pieces of ground under lines home held at once, 80 MB; over 240 km of cells of 30 m there are millions."""
 
 CIRCLE_ABOVE_M = 1000.0
 """The height above home, m, whose radius is used to judge a circle over home."""
@@ -80,21 +84,23 @@ def obstacles_of_returns(
         kinds = (np.flatnonzero(which & corner) for corner in (~places.corner, places.corner))
         return [some for kind in kinds for some in alike_in_width(extra + aside, kind)]
 
-    for some in groups(away):
-        wide, swept = float((extra + aside)[some].max()), places.swept(some, air.scale)
-        met = level_lines.over(air, start[some], end[some], limits, wide, swept)
-        found.cost += len(met.piece_line)
-        at = met.crossings
-        i = some[at.line]
-        if rule.climbs_first:
-            found.ground(some, met, low[some], cone[some], np.full(len(some), np.inf))
-            found.zones(i, at, low[i], cone[i])
-            spots = some[np.unique(at.line[at.begins])]
-            if len(spots):
-                _climbs_on_the_spot(found, trace, sides, limits, spots, places)
-        else:
-            _flies_home(found, air, limits, some, (start, end), (reach, extra, aside), low, climb)
-            found.zones(i, at, -np.inf, low[i] + climb * np.maximum(at.s0_m - reach[i] - aside[i], 0.0))
+    for alike in groups(away):
+        wide, spots = float((extra + aside)[alike].max()), []
+        if not rule.climbs_first:
+            _flies_home(found, air, limits, alike, (start, end), (reach, extra, aside), low, climb)
+        for some in _in_turn(air, start, end, alike):
+            met = level_lines.over(air, start[some], end[some], limits, wide, places.swept(some, air.scale))
+            found.cost += len(met.piece_line)
+            at = met.crossings
+            i = some[at.line]
+            if rule.climbs_first:
+                found.ground(some, met, low[some], cone[some], np.full(len(some), np.inf))
+                found.zones(i, at, low[i], cone[i])
+                spots.append(some[np.unique(at.line[at.begins])])
+            else:
+                found.zones(i, at, -np.inf, low[i] + climb * np.maximum(at.s0_m - reach[i] - aside[i], 0.0))
+        if rule.climbs_first and len(on_spot := np.concatenate(spots)):
+            _climbs_on_the_spot(found, trace, sides, limits, on_spot, places)
     if rule.climbs_first:  # near home the altitude is not known: no zone may be within reach
         for some in groups(~away):
             wide, swept = float(extra[some].max()), places.swept(some, air.scale)
@@ -136,10 +142,17 @@ def _flies_home(
     length = np.hypot(*step.T)
     for a, b in pairwise(ASIDE):
         wide = float((extra + (1.0 - a) * aside)[some].max())
-        met = level_lines.over(air, start + a * step, start + b * step, limits, wide)
-        found.cost += len(met.piece_line)
         spare = (reach + aside)[some] - a * length
-        found.ground(some, met, -np.inf, *_climbs(met, low[some], spare, climb))
+        for k in _in_turn(air, start + a * step, start + b * step, np.arange(len(some))):
+            met = level_lines.over(air, start[k] + a * step[k], start[k] + b * step[k], limits, wide)
+            found.cost += len(met.piece_line)
+            found.ground(some[k], met, -np.inf, *_climbs(met, low[some[k]], spare[k], climb))
+
+
+def _in_turn(air: Airspace, starts: Floats, ends: Floats, some: Indices) -> Iterator[Indices]:
+    """Parts of the lines ``some`` that have about `MOST_PIECES` pieces together, and of which only one is held."""
+    for first, last in pairwise(level_lines.batches(air, starts[some], ends[some], MOST_PIECES)):
+        yield some[first:last]
 
 
 def _brakes(found: _Builder, trace: MissionTrace, limits: Limits, places: ReturnPlaces) -> None:

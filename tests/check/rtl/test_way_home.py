@@ -8,6 +8,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ import pytest
 from gcsplan.arrays import Floats
 from gcsplan.check.flight import follow
 from gcsplan.check.judge import judge
+from gcsplan.check.rtl import sweep
 from gcsplan.check.rtl.obstacles import Obstacles
 from gcsplan.check.rtl.places import Target
 from gcsplan.check.rtl.rally import rally_items
@@ -32,6 +34,7 @@ from gcsplan.mavlink.mission.mission import MissionItem as Item
 from gcsplan.notes.note import Note
 from gcsplan.units import Reach
 from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world import level_lines
 from gcsplan.world.limits import Limits
 from gcsplan.world.world import World
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
@@ -120,6 +123,31 @@ def test_at_the_lowest_altitude_it_is_safe_and_a_little_below_it_is_not(autopilo
     assert lowest is not None
     assert judged(w, m, v, lowest).safe is True
     assert judged(w, m, v, lowest - 1.2).safe is False
+
+
+@pytest.mark.parametrize("autopilot", [Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE])
+def test_lines_home_that_are_judged_a_few_at_once_give_the_same(
+    autopilot: Autopilot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of 240 km had millions of pieces of ground, and all were held together: half a gigabyte."""
+    w = world(ridge, [Zone("mast", Circle(1500.0, 60.0, 40.0), ceiling=Level(390.0, "amsl"))])
+    m, v = mission(w, OVER, autopilot), vehicle(autopilot, **BARE)
+    together = judged(w, m, v, 90.0)
+    counted_at_once: list[int] = []
+    over = level_lines.over
+
+    def counting(*arguments: Any) -> level_lines.LevelLines:
+        met = over(*arguments)
+        counted_at_once.append(len(met.piece_line))
+        return met
+
+    monkeypatch.setattr(level_lines, "over", counting)
+    judged(w, m, v, 90.0)
+    calls = len(counted_at_once)
+    monkeypatch.setattr(sweep, "MOST_PIECES", max(counted_at_once) // 10)
+    counted_at_once.clear()
+    assert json.dumps(judged(w, m, v, 90.0).as_dict()) == json.dumps(together.as_dict())
+    assert len(counted_at_once) > calls
 
 
 def test_without_an_altitude_the_autopilots_default_is_judged_and_said_so() -> None:

@@ -1,0 +1,88 @@
+"""A short run of the campaign of sizes, what it draws, and what it counts as a fault."""
+
+from __future__ import annotations
+
+import ast
+import os
+import random
+import re
+import subprocess
+import sys
+from collections import Counter
+
+import pytest
+
+from tests.campaigns import sizes
+from tests.support.paths import REPOSITORY
+
+SHORT = """
+import sys
+from tests.campaigns import sizes
+if __name__ == "__main__":
+    sys.exit(sizes.campaign({}, 60.0, 1, 60))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="runs forks")
+@pytest.mark.parametrize("kinds", ["sizes.FILES", "sizes.WORLDS"])
+def test_a_short_campaign_of_sizes_finds_nothing(kinds: str) -> None:
+    command = [sys.executable, "-c", SHORT.format(kinds)]
+    ended = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=300)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert re.search(r"^\d+ inputs, 0 faults, the next seed is \d+$", ended.stdout, re.MULTILINE)
+
+
+def test_amounts_lie_where_they_are_said_to() -> None:
+    rng = random.Random(1)
+    drawn: Counter[str] = Counter()
+    for size in sizes.SIZES.values():
+        for _ in range(300):
+            count, where = sizes.amount(size, rng)
+            drawn[where] += 1
+            if where == "beyond":
+                assert size.refused is not None
+                assert count > size.refused
+            else:
+                assert size.least <= count <= size.most
+    assert drawn["below"] > drawn["beyond"] > drawn["at"] > 0
+
+
+def test_what_an_input_owes() -> None:
+    size = sizes.Size(sizes.SIZES["items"].make, 10, 5.0, 10)
+    assert sizes.faults(size, "at", 0, 4.9, 900.0, "") == []
+    assert sizes.faults(size, "beyond", 2, 1.0, 100.0, "gcsplan: too many") == []
+    for where, code, took_s, held_mb, words in (
+        ("at", 70, 1.0, 100.0, ""), ("at", 0, 5.1, 100.0, ""), ("at", 0, 1.0, 1001.0, ""),
+        ("at", 4, 1.0, 100.0, "Traceback (most recent call last):"), ("beyond", 0, 1.0, 100.0, ""),
+        ("below", 2, 1.0, 100.0, "gcsplan: refused"), ("at", -9, 1.0, 100.0, ""),
+    ):  # fmt: skip
+        assert sizes.faults(size, where, code, took_s, held_mb, words)
+
+
+def test_every_kind_is_in_the_table_of_limits() -> None:
+    """With the seconds that the campaign holds it to."""
+    text = (REPOSITORY / "docs" / "safety.md").read_text(encoding="utf-8")
+    table = text[text.index("## How much is taken") : text.index("## Files and folders")]
+    rows = [line for line in table.splitlines() if line.startswith("| ")]
+    for kind, size in sizes.SIZES.items():
+        (row,) = [r for r in rows if f"`{kind}`" in r]
+        assert re.search(rf"`{kind}`[^;|]*, at most {size.within_s:g} s", row), kind
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="runs forks")
+@pytest.mark.parametrize("kind", list(sizes.SIZES))
+def test_an_input_at_the_limit_takes_what_is_stated(kind: str) -> None:
+    size = sizes.SIZES[kind]
+    words = (
+        "from tests.campaigns import sizes\n"
+        "if __name__ == '__main__':\n"
+        "    sizes.warm()\n"
+        f"    with sizes.place(): ended = sizes.run({kind!r}, {size.most!r}, 1)\n"
+        "    print(ended)"
+    )
+    done = subprocess.run([sys.executable, "-c", words], cwd=REPOSITORY, capture_output=True, text=True, timeout=1800)
+    assert done.returncode == 0, done.stderr
+    ended = ast.literal_eval(done.stdout.splitlines()[-1])
+    assert sizes.faults(size, "at", *ended) == []
