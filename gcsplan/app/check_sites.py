@@ -154,7 +154,7 @@ class MissionSite:
     @property
     def said(self) -> tuple[Mapping[str, object], tuple[Said, ...]]:
         """See `Site.said`."""
-        return self.source.inputs, self.source.notes
+        return self.source.inputs, tuple(map(str, self.source.notes))
 
     @property
     def typed(self) -> Mapping[str, str]:

@@ -31,7 +31,7 @@ def finished(
     source = brief.source
     flown, fleet = fleet_of(vehicles, brief, gate, leaving)
     flown = within_hours(source, flown, fleet)
-    notes = list(source.notes)
+    notes = list(map(str, source.notes))
     if len(flown) > 1 and source.arrival is None:
         notes.append("the file asks for no `arrival`: the separation between vehicles is not judged")
     notes += fleet.notes

@@ -260,7 +260,7 @@ def _options(given: dict[str, object], at: str | None = None) -> WorldOptions:
         rtl_rel_home_m=rtl if isinstance(rtl, float) else None,
         return_route=_route(route),
         at=texts_of(at),
-        notes=() if home is None or not home.note else (f"--home: {home.note}",),
+        notes=() if home is None or not home.note else (home.note.of(place="--home"),),
     )
 
 

@@ -15,7 +15,7 @@ from gcsplan.check.rtl.words import verdict_words
 from gcsplan.cli.screens import RESULTS, aside, console
 from gcsplan.figures import floored, raised, steepened
 from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Unit, Units, charge, duration, in_units
-from gcsplan.world.model_words import heights_line, what_is_not_in
+from gcsplan.world.model_words import heights_line, notes_on, what_is_not_in
 
 if TYPE_CHECKING:
     from gcsplan.app.gate import GateTime
@@ -130,8 +130,7 @@ def say_heights(inputs: Mapping[str, object]) -> None:
 def say_terrain(source: MissionFile) -> None:
     """Print what a mission's terrain has to note, if anything, and how its heights were read: it may explain why there
     is no mission."""
-    notes = source.surface.info.get("notes", ())
-    if isinstance(notes, tuple) and notes:
+    if notes := notes_on(source.surface.info):
         say_notes([str(note) for note in notes])
         say_heights(source.inputs)
 

@@ -25,7 +25,8 @@ def show_zones(files: Sequence[Path], units: Units, *, as_json: bool, at: str | 
 
     zones, notes = list_zones(files, at)
     if as_json:
-        emit({"zones": [zone.as_dict() for zone in zones], "notes": notes})
+        emit({"zones": [zone.as_dict() for zone in zones], "notes": [str(note) for note in notes],
+              "notes_data": [note.as_dict() for note in notes]})  # fmt: skip
         return
     table = new_table("", [])
     for name in ("name", "shape", "size", "floor", "ceiling", "source"):
@@ -42,7 +43,7 @@ def show_zones(files: Sequence[Path], units: Units, *, as_json: bool, at: str | 
     if zones:
         console.print(table, soft_wrap=False)
     say(counted(len(zones), "zone"))
-    say_notes(notes)
+    say_notes([str(note) for note in notes])
 
 
 def _size(zone: ListedZone, units: Units) -> str:

@@ -26,7 +26,7 @@ FORMAT = 1
 MOST_RECORD_BYTES = 65_536
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MissingTiles(Problem):
     """Tiles that are needed and not in the cache."""
 
@@ -122,7 +122,7 @@ class Cache:
             f"{len(cells)} {self.source.name} {tiles} {why} ({self.root}); run "
             f"`gcsplan dem fetch --source {self.source.name} --tiles {names_of(cells)}`"
         )
-        return MissingTiles(where, words, self.source.name, cells)
+        return MissingTiles(where, words, source=self.source.name, cells=cells)
 
 
 def text_of(record: Record) -> str:

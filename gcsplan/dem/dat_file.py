@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
-from gcsplan.figures import counted
+from gcsplan.notes.note import Note
 from gcsplan.world.cell import Cell, cell_of
 from gcsplan.world.raster import require_file
 from gcsplan.world.terrain_grid import (
@@ -50,21 +50,20 @@ _CRC_AT = slice(16, 18)
 class DatFile:
     """One file: its tile, its spacing, and the heights of its good blocks (NaN for parts that are not known).
 
-    ``left_out``: how many blocks are not used, by the reason.
+    ``left_out``: how many blocks are not used, by what is wrong with them.
     """
 
     name: str
     cell: Cell
     grid: TerrainGrid
     blocks: Mapping[Block, Floats]
-    left_out: Mapping[str, int]
+    left_out: Mapping[Note, int]
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[Note, ...]:
         """What a user should know of it."""
         return tuple(
-            f"{self.name}: {counted(n, 'block')} not used: {why}; the ground there is unknown"
-            for why, n in self.left_out.items()
+            Note("terrain_blocks_unused", file=self.name, count=n, why=why) for why, n in self.left_out.items()
         )
 
 
@@ -132,13 +131,13 @@ def read_dat(path: Path, *, where: str) -> DatFile:
     records = np.frombuffer(data, RECORD)
     used = [int(k) for k in np.flatnonzero(records["bitmap"] & np.uint64(ALL_PARTS))]
     spacings = Counter(int(records["spacing"][k]) for k in used)
-    left_out: Counter[str] = Counter()
+    left_out: Counter[Note] = Counter()
     if not used:
         raise InputError(f"{path} holds no block of terrain: copy it after the autopilot has filled it", where=where)
     grid = TerrainGrid(max(spacings, key=lambda s: (spacings[s], -s)))
     blocks: dict[Block, Floats] = {}
     for k in used:
-        fault = _fault(records, k, data, grid, cell) if grid.spacing_m > 0 else "its spacing is 0"
+        fault = _fault(records, k, data, grid, cell) if grid.spacing_m > 0 else Note("spacing_is_zero")
         if fault:
             left_out[fault] += 1
             continue
@@ -149,22 +148,22 @@ def read_dat(path: Path, *, where: str) -> DatFile:
     return DatFile(path.name, cell, grid, blocks, dict(left_out))
 
 
-def _fault(records: NDArray[np.void], k: int, data: bytes, grid: TerrainGrid, cell: Cell) -> str:
-    """Why the autopilot does not take a record; empty if it does."""
+def _fault(records: NDArray[np.void], k: int, data: bytes, grid: TerrainGrid, cell: Cell) -> Note | None:
+    """Why the autopilot does not take a record; None if it does."""
     record = records[k]
     if int(record["crc"]) != crc_of(data[k * RECORD_BYTES : (k + 1) * RECORD_BYTES]):
-        return "its checksum is wrong"
+        return Note("checksum_wrong")
     if int(record["version"]) != VERSION:
-        return f"its format is version {int(record['version'])}, wanted {VERSION}"
+        return Note("format_of_other_version", version=int(record["version"]), wanted=VERSION)
     if int(record["spacing"]) != grid.spacing_m:
-        return f"its spacing is {int(record['spacing'])} m, that of most is {grid.spacing_m} m"
+        return Note("spacing_differs", spacing_m=int(record["spacing"]), most_m=grid.spacing_m)
     block = Block(cell, int(record["north"]), int(record["east"]))
     lat, lon = grid.corner_e7(block)
     stated = (int(record["lat_degrees"]), int(record["lon_degrees"]))
     misplaced = max(abs(lat - int(record["lat"])), abs(lon - int(record["lon"]))) > SAME_CORNER_E7
     if stated != cell or misplaced or k != block.north * grid.blocks_a_row(cell) + block.east:
-        return "it lies elsewhere than its corner says (older tools placed blocks otherwise)"
-    return ""
+        return Note("block_lies_elsewhere")
+    return None
 
 
 def _heights(record: np.void) -> Floats:

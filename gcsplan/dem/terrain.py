@@ -19,6 +19,7 @@ from gcsplan.dem.cells import cells_in, names_of
 from gcsplan.dem.dat_terrain import DatTerrain, dat_files
 from gcsplan.dem.sources import SOURCES, Source
 from gcsplan.errors import InputError
+from gcsplan.notes.note import Note
 from gcsplan.world.cell import Cell
 from gcsplan.world.datum import VerticalDatum, take_apart
 from gcsplan.world.frame import Frame
@@ -90,7 +91,7 @@ class _SourceTerrain:
 
 def _told(
     source: Source, records: Mapping[Cell, Record], sea: list[Cell], absent: list[Cell]
-) -> tuple[dict[str, object], tuple[str, ...]]:
+) -> tuple[dict[str, object], tuple[Note, ...]]:
     """What reports say of the terrain, and notes."""
     info: dict[str, object] = {
         "dem_source": source.name,
@@ -102,28 +103,22 @@ def _told(
     notes = []
     if source.kind == "surface":
         info["bare_dem"] = False
-        notes.append(
-            f"{source.name} is a surface model: where trees or buildings stand at the start, its ground is too high, "
-            "and altitudes relative to home are flown lower by that; start in the open, or let altitude_error_m hold it"
-        )
+        notes.append(Note("terrain_is_a_surface", source=source.name))
     if sea:
         info["sea_tiles"] = names_of(sea)
         said = [c for c in sea if records[c].state == "absent"]
         listed = [c for c in sea if c not in said]
         if listed:
-            notes.append(f"sea, 0 m: {names_of(listed)}, which neither {source.name} nor GLO-90 has a tile of")
+            notes.append(Note("tiles_are_sea", tiles=names_of(listed), source=source.name))
         if said:
-            notes.append(f"sea, 0 m, because the mission says so: {names_of(said)}; GLO-90 shows land there")
+            notes.append(Note("tiles_are_sea_by_mission", tiles=names_of(said)))
     if absent:
         notes.append(_not_published(source, absent))
     return info, tuple(notes)
 
 
-def _not_published(source: Source, cells: list[Cell]) -> str:
-    return (
-        f"{source.name} does not publish {names_of(cells)}, and GLO-90 shows land there: the ground is unknown and "
-        "cannot be flown over"
-    )
+def _not_published(source: Source, cells: list[Cell]) -> Note:
+    return Note("tiles_not_published", source=source.name, tiles=names_of(cells))
 
 
 def _tile(cache: Cache, cell: Cell, record: Record, where: str) -> Raster:

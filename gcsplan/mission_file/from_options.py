@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from gcsplan.arrays import Floats
 from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError, Problem
-from gcsplan.figures import counted
 from gcsplan.mavlink.mission.return_route import Route
 from gcsplan.mission_file.airspace.left_out import faults_near, left_out_by_hours, unused_notes, used
 from gcsplan.mission_file.airspace.policy import Policy
@@ -29,9 +28,11 @@ from gcsplan.mission_file.vehicles import make_vehicle
 from gcsplan.mission_file.world import Box, make_spec, settle_zones
 from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, one_line, place_zones, zone_notes, zones_sha256
 from gcsplan.mission_file.zone_reader import read_zones
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.frame import FARTHEST_M, Frame, centre_of
+from gcsplan.world.model_words import notes_on
 from gcsplan.world.terrain import OpenTerrain
 from gcsplan.world.world import World
 from gcsplan.world.zones import Zone
@@ -67,7 +68,7 @@ class WorldOptions:
     rtl_rel_home_m: float | None = None
     return_route: Route | None = None
     terrain_error_m: float = TERRAIN_ERROR_M
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     at: tuple[str, ...] | None = None
 
 
@@ -85,7 +86,7 @@ class OpenWorld:
     def __init__(self, options: WorldOptions) -> None:
         problems: list[Problem] = []
         self.options = options
-        self.notes: list[str] = [*options.notes]
+        self.notes: list[Note] = [*options.notes]
         hours = hours_of(None, None, "--at", problems, instead=options.at)
         self._drafts = _drafts(options.zones, problems, self.notes, hours)
         self.hours = hours if left_out_by_hours(self._drafts) else None
@@ -113,7 +114,7 @@ class OpenWorld:
     def _make(self, autopilot: str) -> Vehicle:
         """See `vehicle`."""
         problems: list[Problem] = []
-        notes: list[str] = []
+        notes: list[Note] = []
         given = {"name": "file", "sysid": 1, "autopilot": autopilot, "start": [0.0, 0.0], "goal": [0.0, 0.0]}
         keys = read_section(VehicleKeys, given | dict(self.options.vehicle), "", problems)
         made = None
@@ -121,7 +122,7 @@ class OpenWorld:
             made = make_vehicle(keys, self._limits, "", problems, notes, local=False, obstacle_m=self._obstacle_m)
         if made is None:
             raise InputError.of([_renamed(p) for p in problems])
-        self.notes += [n.removeprefix("file: ") for n in notes if n.removeprefix("file: ") not in self.notes]
+        self.notes += [note for note in notes if note not in self.notes]
         return made
 
     def around(self, places: ArrayLike, reach_m: float = 0.0) -> tuple[World, dict[str, object]]:
@@ -180,11 +181,9 @@ class OpenWorld:
             problems += own
         if problems:
             raise InputError.of([_renamed(p) for p in problems])
-        notes = surface.info.get("notes", ())
-        said = [*self.notes, *(str(n) for n in (notes if isinstance(notes, tuple) else ()))]
-        said += [*zone_notes(placed), *unused_notes(self._drafts, frame, box)]
+        said = [*self.notes, *notes_on(surface.info), *zone_notes(placed), *unused_notes(self._drafts, frame, box)]
         if far:
-            said.append(f"left out: {counted(len(far), 'zone')} of files, too far away to matter")
+            said.append(Note("zones_left_out", count=len(far)))
         inputs = {k: v for k, v in surface.info.items() if k not in ("notes", "source")}
         inputs["zones_sha256"] = zones_sha256(drafts)
         inputs["notes"] = tuple(dict.fromkeys(said))
@@ -199,7 +198,7 @@ class OpenWorld:
         return low[0] - margin, low[1] - margin, high[0] + margin, high[1] + margin
 
 
-def _drafts(files: Sequence[str], problems: list[Problem], notes: list[str], hours: Hours | None) -> list[ZoneDraft]:
+def _drafts(files: Sequence[str], problems: list[Problem], notes: list[Note], hours: Hours | None) -> list[ZoneDraft]:
     """The zones of all files, each with a unique name; those are not used that do not apply in the hours."""
     drafts: list[ZoneDraft] = []
     for file in files:
@@ -223,4 +222,4 @@ def _renamed(problem: Problem) -> Problem:
     """The problem with its option as the place, in place of a key such as ``.min_agl_m``."""
     key = problem.where.removeprefix(".").split(".")[-1].split("[")[0]
     option = OPTIONS.get(key)
-    return Problem(option, problem.message) if option is not None else problem
+    return replace(problem, where=option) if option is not None else problem

@@ -20,6 +20,7 @@ from gcsplan.mission_file.terminals import Terminals, make_request
 from gcsplan.mission_file.world import LOCAL_MARGIN_M, MARGIN_M, Box, Place, settle_zones
 from gcsplan.mission_file.zone_draft import ZoneDraft
 from gcsplan.world.frame import FARTHEST_M, Frame
+from gcsplan.world.model_words import notes_on
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import RASTER_SPARE_M, OpenTerrain, Terrain, TerrainSpec, open_terrain
 from gcsplan.world.zones import Zone
@@ -196,11 +197,8 @@ def _is_larger(wide: Surface, surface: Surface) -> bool:
 
 def _moved(source: MissionFile, ground: Ground, level: int) -> MissionFile:
     """``source`` with another window."""
-    before, now = source.surface.info, ground.surface.info
-    old, new = (info.get("notes", ()) for info in (before, now))
-    assert isinstance(old, tuple)
-    assert isinstance(new, tuple)
-    inputs = {k: v for k, v in now.items() if k not in ("notes", "source")}
+    old, new = notes_on(source.surface.info), notes_on(ground.surface.info)
+    inputs = {k: v for k, v in ground.surface.info.items() if k not in ("notes", "source")}
     return replace(
         source,
         surface=ground.surface,
@@ -208,7 +206,7 @@ def _moved(source: MissionFile, ground: Ground, level: int) -> MissionFile:
         airspace_scale=ground.scale,
         vehicles=ground.vehicles,
         inputs={**source.inputs, **inputs},
-        notes=(*(n for n in source.notes if n not in old), *(str(n) for n in new)),
+        notes=(*(n for n in source.notes if n not in old), *new),
         level=level,
     )
 

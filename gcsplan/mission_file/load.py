@@ -15,7 +15,6 @@ from functools import partial
 from typing import Any, get_args
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.figures import counted
 from gcsplan.mission_file.airspace.left_out import faults_near, left_out_by_hours, unused_notes, used
 from gcsplan.mission_file.airspace.times import Hours, hours_of, texts_of
 from gcsplan.mission_file.complaints import MOST_TOLD, few, read_section, told_once, unknown_keys, with_lines
@@ -44,7 +43,14 @@ from gcsplan.mission_file.schema import (
 )  # fmt: skip
 from gcsplan.mission_file.terminals import Terminals
 from gcsplan.mission_file.units import in_own_units
-from gcsplan.mission_file.vehicles import check_unique, make_arrival, make_vehicle, within_lean, within_vel_max
+from gcsplan.mission_file.vehicles import (
+    check_unique,
+    make_arrival,
+    make_vehicle,
+    unbounded_motion,
+    within_lean,
+    within_vel_max,
+)
 from gcsplan.mission_file.world import (
     covered,
     make_box,
@@ -55,7 +61,9 @@ from gcsplan.mission_file.world import (
     place_notes,
 )  # fmt: skip
 from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, one_line, place_zones, zone_notes, zones_sha256
+from gcsplan.notes.note import Note
 from gcsplan.world.frame import Frame
+from gcsplan.world.model_words import notes_on
 from gcsplan.world.terrain import OpenTerrain, Terrain, TerrainSpec
 
 __all__ = ["ArrivalRequest", "MissionFile", "PlannerRequest", "VehicleRequest", "load_mission"]
@@ -125,7 +133,7 @@ def load_content(content: Content) -> MissionFile:
     return _Reading(content).mission()
 
 
-def read_no_fly(source: str | os.PathLike[str], at: Sequence[str] | None = None) -> tuple[list[ZoneDraft], list[str]]:
+def read_no_fly(source: str | os.PathLike[str], at: Sequence[str] | None = None) -> tuple[list[ZoneDraft], list[Note]]:
     """All zones of a mission file, used or not, and the notes on them, whatever else is wrong. Raises InputError."""
     file, where, raw, written = read_content(source, None)
     return _Reading(Content(file, where, raw, written, at=texts_of(at))).zones_alone()
@@ -140,14 +148,16 @@ class _Reading:
         self.units = in_own_units(content.given, self.where)
         self.raw = self.units.raw
         self.problems: list[Problem] = [*self.units.problems]
-        self.notes: list[str] = [*self.units.notes]
+        self.notes: list[Note] = [*self.units.notes]
         self.local = content.given.get("frame") is not None
 
     def mission(self) -> MissionFile:
         raw, problems = self.raw, self.problems
         problems += unknown_keys(raw, TOP_KEYS, self.where)
         problems += [
-            Problem(self.where + key, f"is missing; {cure}") for key, cure in WANTED.items() if raw.get(key) is None
+            Problem(self.where + key, f"is missing; {cure}", "missing")
+            for key, cure in WANTED.items()
+            if raw.get(key) is None
         ]
         name = self._name()
         altitude_frame: AltitudeFrame = self._choice("altitude_frame", get_args(AltitudeFrame), "relative")
@@ -191,8 +201,7 @@ class _Reading:
         if problems or frame is None or site is None or ground is None:
             raise self._refusal(problems)
         info = ground.surface.info
-        notes = info.get("notes", ())
-        self.notes += [str(n) for n in notes] if isinstance(notes, tuple) else []
+        self.notes += notes_on(info)
         inputs = {k: v for k, v in info.items() if k not in ("notes", "source")}
         inputs["zones_sha256"] = zones_sha256(drafts)
         source = MissionFile(
@@ -205,7 +214,7 @@ class _Reading:
         )  # fmt: skip
         return replace(source, wider=partial(site.wider, source), at_level=partial(site.at_level, source))
 
-    def zones_alone(self) -> tuple[list[ZoneDraft], list[str]]:
+    def zones_alone(self) -> tuple[list[ZoneDraft], list[Note]]:
         """All zones, far ones and those that are not used too, and the notes on them. Raises InputError."""
         self.problems = [p for p in self.problems if p.where.startswith(f"{self.where}no_fly")]
         self.notes = []
@@ -254,7 +263,7 @@ class _Reading:
             )
             return TERRAIN_ERROR_M
         if altitude_frame != "terrain":
-            self.notes.append("terrain_error_m counts with altitude_frame: terrain only")
+            self.notes.append(Note("terrain_error_without_frame"))
             return 0.0
         return float(value)
 
@@ -304,10 +313,13 @@ class _Reading:
             if keys is None:
                 continue
             obstacle_m = 0.0 if terrain is None else terrain.obstacle_height_m
-            vehicle = make_vehicle(keys, shared, at, self.problems, self.notes, local=self.local, obstacle_m=obstacle_m)
+            own: list[Note] = []
+            vehicle = make_vehicle(keys, shared, at, self.problems, own, local=self.local, obstacle_m=obstacle_m)
+            if free := unbounded_motion(keys, local=self.local):
+                self.notes.append(Note("motion_unbounded", keys=free))
             if vehicle is not None:
                 for within in (within_lean, within_vel_max):
-                    vehicle = within(vehicle, keys, at, self.problems, self.notes, local=self.local)
+                    vehicle = within(vehicle, keys, at, self.problems, own, local=self.local)
             if altitude_frame == "terrain" and keys.autopilot == "px4":
                 self.problems.append(
                     Problem(f"{at}.autopilot", "px4 flies no terrain frame; use altitude_frame: relative or amsl")
@@ -321,7 +333,7 @@ class _Reading:
                 make_place(p, f"{at}.via[{j}]", self.problems, self.notes, local=self.local)
                 for j, p in enumerate(keys.via)
             ]
-            self.notes += _one_speed(one, keys)
+            self.notes += [note.of(vehicle=keys.name) for note in (*own, *_one_speed(one, keys))]
             terminals.append(Terminals(keys, vehicle, start, goal, tuple(via)))
         return terminals
 
@@ -371,7 +383,7 @@ class _Reading:
             else:
                 left_out += 1
         if left_out:
-            self.notes.append(f"left out: {counted(left_out, 'zone')} of files, too far away to matter")
+            self.notes.append(Note("zones_left_out", count=left_out))
 
     def _open(self, spec: TerrainSpec) -> OpenTerrain | None:
         where = f"{self.where}terrain"
@@ -394,9 +406,9 @@ class _Reading:
             return None
 
 
-def _one_speed(given: Mapping[str, Any], keys: VehicleKeys) -> list[str]:
+def _one_speed(given: Mapping[str, Any], keys: VehicleKeys) -> list[Note]:
     """A note if one number stands for the slowest and the fastest speed."""
     if isinstance(given.get("speed_m_s"), list | None):
         return []
     slow, fast = keys.speed_m_s
-    return [f"{keys.name}: speed_m_s is one number, read as [{slow:g}, {fast:g}]: always this speed"]
+    return [Note("one_speed", slow_m_s=slow, fast_m_s=fast)]

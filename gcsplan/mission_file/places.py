@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
 
+from gcsplan.notes.note import Note
 from gcsplan.world import grids
 
 MAX_CHARS = 100
@@ -31,7 +32,7 @@ class Degrees:
     lat_deg: float
     lon_deg: float
     agl_m: float | None = None
-    note: str = ""
+    note: Note | None = None
 
 
 class _Angle(NamedTuple):
@@ -117,7 +118,7 @@ def range_fault(lat_deg: float, lon_deg: float, *, most_lon_deg: float = 180.0) 
     """Why the numbers are no place on Earth, or an empty text."""
     if abs(lat_deg) <= 90.0 and abs(lon_deg) <= most_lon_deg:
         return ""
-    if 90.0 < abs(lat_deg) <= 180.0 and abs(lon_deg) <= 90.0:
+    if is_swapped(lat_deg, lon_deg):
         return (
             f"latitude and longitude look swapped: {lat_deg:g} is no latitude; wanted [lat, lon], did you mean "
             f"{lon_deg:.10g}, {lat_deg:.10g}?"
@@ -132,6 +133,11 @@ def range_fault(lat_deg: float, lon_deg: float, *, most_lon_deg: float = 180.0) 
     turned = (lon_deg + 180.0) % 360.0 - 180.0
     cure = f": write {turned:.10g}" if abs(lon_deg) <= 720.0 else ""
     return f"longitude must be within ±{most_lon_deg:g}°, given {lon_deg:.10g}{cure}"
+
+
+def is_swapped(lat_deg: float, lon_deg: float) -> bool:
+    """Whether numbers that are no place would be one if latitude and longitude were exchanged."""
+    return 90.0 < abs(lat_deg) <= 180.0 and abs(lon_deg) <= 90.0
 
 
 def _plain(text: str) -> str:

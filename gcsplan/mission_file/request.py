@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from gcsplan.mavlink.mission.return_route import Route
 from gcsplan.mission_file.airspace.times import Hours
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.frame import Frame
 from gcsplan.world.geoid import GeoidGrid
@@ -132,7 +133,7 @@ class MissionFile:
     terrain_error_m: float
     local: bool
     inputs: dict[str, object]
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
     wider: Callable[[float, int], MissionFile | None] | None = None
     level: int = 0
     way_home: ReturnRule = "reported"

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gcsplan.dem.sources import source_or_path
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Problem, ProblemCode
 from gcsplan.mission_file.airspace.times import Hours
 from gcsplan.mission_file.places import Degrees
 from gcsplan.mission_file.point_keys import LocalPoint
@@ -25,6 +25,7 @@ from gcsplan.mission_file.zone_draft import (
     corridor,
     polygon,
 )
+from gcsplan.notes.note import Note
 from gcsplan.world.degree_shapes import MOST_LON_DEG
 from gcsplan.world.frame import FARTHEST_M, Frame, centre_of
 from gcsplan.world.peaks import Peak
@@ -73,7 +74,7 @@ class Place:
 
 
 def make_place(
-    point: Degrees | LocalPoint, where: str, problems: list[Problem], notes: list[str], *, local: bool,
+    point: Degrees | LocalPoint, where: str, problems: list[Problem], notes: list[Note], *, local: bool,
     most_lon_deg: float = 180.0,
 ) -> Place | None:  # fmt: skip
     """A point of the file; None, and ``problems``, if it cannot be a place."""
@@ -89,9 +90,9 @@ def make_place(
     return Place(where, degrees, agl_m=point.agl_m)
 
 
-def place_notes(point: Degrees, where: str) -> list[str]:
+def place_notes(point: Degrees, where: str) -> list[Note]:
     """What a user has to know about how a place was read; ``where`` is its key behind the name of the file."""
-    return [f"{where.split(': ', 1)[-1]}: {point.note}"] if point.note else []
+    return [point.note.of(place=where.split(": ", 1)[-1])] if point.note else []
 
 
 def make_spec(keys: TerrainKeys, folder: Path) -> TerrainSpec:
@@ -117,15 +118,17 @@ def covered(places: Sequence[Place], terrain: OpenTerrain, problems: list[Proble
     """The places that the DEM covers; the others go to ``problems``, with a guess at swapped numbers."""
     good = []
     for place in places:
+        code: ProblemCode = ""
         if place.degrees is None or terrain.covers(*place.degrees):
             good.append(place)
             continue
         lat, lon = place.degrees
         if abs(lon) <= 90.0 and terrain.covers(lon, lat):
+            code = "swapped"
             message = f"latitude and longitude look swapped: the DEM holds [{lon:g}, {lat:g}], not [{lat:g}, {lon:g}]"
         else:
             message = f"{lat:g}, {lon:g} lies outside the DEM, where the ground is unknown; add the tile of this place"
-        problems.append(Problem(place.where, message))
+        problems.append(Problem(place.where, message, code))
     return good
 
 
@@ -204,7 +207,7 @@ def make_box(points: Sequence[tuple[float, float]], zones: Sequence[Zone], *, lo
 
 
 def make_zones(
-    keys: ZoneKeys, where: str, folder: Path, fallback: str, problems: list[Problem], notes: list[str], *, local: bool,
+    keys: ZoneKeys, where: str, folder: Path, fallback: str, problems: list[Problem], notes: list[Note], *, local: bool,
     hours: Hours | None = None,
 ) -> list[ZoneDraft]:  # fmt: skip
     """The zones of one entry of ``no_fly``: a single zone, or all zones of a file, at the mission's ``hours``."""
@@ -222,7 +225,7 @@ def make_zones(
 
 
 def _zones_of_file(
-    keys: ZoneKeys, file: str, where: str, folder: Path, problems: list[Problem], notes: list[str], hours: Hours | None
+    keys: ZoneKeys, file: str, where: str, folder: Path, problems: list[Problem], notes: list[Note], hours: Hours | None
 ) -> list[ZoneDraft]:
     others = sorted(keys.given.keys() - {"file", "layer", *SIZES, *OF_FILES})
     words = "stands in the file itself, in a feature's properties; leave it out here"
@@ -250,7 +253,7 @@ def _zones_of_file(
 
 
 def _own_zone(
-    keys: ZoneKeys, where: str, fallback: str, problems: list[Problem], notes: list[str], *, local: bool
+    keys: ZoneKeys, where: str, fallback: str, problems: list[Problem], notes: list[Note], *, local: bool
 ) -> list[ZoneDraft]:
     """The zone whose shape stands in the mission file."""
     name = keys.name or fallback
@@ -267,7 +270,7 @@ def _own_zone(
         problems.append(Problem(f"{where}.{kind}", "give all corners in degrees, or all in local metres"))
     for size, owner, words in zip(SIZES, ("center", "line"), ("the radius", "half the corridor's width"), strict=True):
         if kind == owner and getattr(keys, size) is None:
-            problems.append(Problem(f"{where}.{size}", f"is missing: {words}, m"))
+            problems.append(Problem(f"{where}.{size}", f"is missing: {words}, m", "missing"))
         if kind != owner and getattr(keys, size) is not None:
             problems.append(Problem(f"{where}.{size}", f"belongs to a {owner}, not to a {kind}"))
     if keys.layer is not None:

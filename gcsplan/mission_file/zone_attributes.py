@@ -14,7 +14,7 @@ from functools import lru_cache
 from typing import Any
 
 from gcsplan.errors import Problem
-from gcsplan.mission_file.zone_draft import SIZES, Bounds, Remark
+from gcsplan.mission_file.zone_draft import SIZES, Bounds, Remark, one_line
 from gcsplan.mission_file.zone_levels import (
     EXAMPLES,
     LARGEST_M,
@@ -24,6 +24,7 @@ from gcsplan.mission_file.zone_levels import (
     Limit,
     read_level,
 )
+from gcsplan.notes.note import Note
 from gcsplan.world.zones import Level
 
 MOST_SHOWN = 6
@@ -40,12 +41,10 @@ BOUNDS = {
 UNIT_NAMES = ("unit", "units", "uom")
 REFERENCE_NAMES = ("reference", "ref", "datum", "code")
 
-READ = "floors and ceilings are read from other attributes than gcsplan's own"
-NOT_READ = "these attributes are not read, and limit nothing"
-TIMES_NOT_READ = "these attributes of times are not read: the zones count as always"
-_PRESSURE = "flight levels are pressure altitudes, which move with the weather"
-UNDER_PRESSURE = f"{_PRESSURE}: these zones count from the ground up, and no mission passes under them"
-OVER_PRESSURE = f"{_PRESSURE}: these zones have no upper end, and no mission passes over them"
+ATTRIBUTES_UNREAD = Note("zone_attributes_unread")
+TIMES_UNREAD = Note("zone_times_unread")
+UNDER_PRESSURE = Note("zone_floor_at_flight_level")
+OVER_PRESSURE = Note("zone_ceiling_at_flight_level")
 
 _WORD = "|".join(sorted({w.lower() for w in (*UNITS, *REFERENCES)}, key=len, reverse=True))
 _LIMIT = re.compile(
@@ -117,7 +116,7 @@ class Attribute:
         return meaning_of(self.stands_for or self.key)
 
     def __str__(self) -> str:
-        return f"{self.key[:40]} {repr(self.value)[:60]}"
+        return one_line(f"{self.key[:40]} {repr(self.value)[:60]}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,13 +151,18 @@ def read_attributes(given: Sequence[Attribute], name: str, problems: list[Proble
     before = len(problems)
     radius_m, buffer_m = (reading.size_m([a for a in known if a.meaning.lower == size]) for size in SIZES)
     bounds = reading.bounds(known)
-    for sentence, some in ((NOT_READ, ignored), (TIMES_NOT_READ, times)):
+    for note, some in ((ATTRIBUTES_UNREAD, ignored), (TIMES_UNREAD, times)):
         if some:
-            more = ", …" if len(some) > MOST_SHOWN else ""
-            reading.remarks.append((sentence, ", ".join(str(a) for a in some[:MOST_SHOWN]) + more))
+            more = ("…",) if len(some) > MOST_SHOWN else ()
+            reading.remarks.append((note, (*map(str, some[:MOST_SHOWN]), *more)))
     if len(problems) > before:
         return None
     return Said(reading.name, radius_m, bounds, tuple(reading.remarks), reading.of_levels, buffer_m)
+
+
+def level_read(given: object, bound: str, level: Level) -> Note:
+    """How a limit as it is written was understood: ``bound`` is floor or ceiling."""
+    return Note("level_of_attribute", given=str(given), bound=bound, level_m=level.value_m, datum=level.datum.upper())
 
 
 def shown(value: Any) -> str:
@@ -203,7 +207,7 @@ class _Reading:
     problems: list[Problem]
     remarks: list[Remark] = field(default_factory=list)
     of_levels: bool = False
-    read_as: list[str] = field(default_factory=list)
+    read_as: list[Note] = field(default_factory=list)
 
     def size_m(self, given: Sequence[Attribute]) -> float | None:
         found = {self._metres(a): a for a in given}
@@ -236,7 +240,7 @@ class _Reading:
                     read.setdefault(level, a)
             levels |= self._settled(bound, read)
         if self.read_as:
-            self.remarks.append((READ, ", ".join(self.read_as)))
+            self.remarks.append((Note("zone_limits_read"), tuple(self.read_as)))
         return Bounds(**levels)
 
     def _settled(self, bound: str, read: dict[Level | Limit, Attribute]) -> dict[str, float]:
@@ -253,7 +257,7 @@ class _Reading:
                 self._wrong(attribute, "is a ceiling at the ground, and the zone would lie wholly under ground")
                 return {}
             if not attribute.meaning.own and level != Level(0.0, "agl"):
-                self.read_as.append(f"{attribute}: {bound} at {level}")
+                self.read_as.append(level_read(attribute, bound, level))
             return {f"{bound}_{level.datum}_m": level.value_m}
         if level is Limit.PRESSURE:
             self.remarks.append((UNDER_PRESSURE if bound == "floor" else OVER_PRESSURE, str(attribute)))

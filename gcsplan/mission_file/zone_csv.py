@@ -130,7 +130,7 @@ def _place(found: ZoneFile, columns: _Columns, cells: list[str], where: str) -> 
         found.problems.append(Problem(where, str(why)))
         return None
     if place.note:
-        found.said.append(f"{where.rpartition(': ')[2]}: {place.note}")
+        found.said.append(place.note.of(place=where.rpartition(": ")[2]))
     return place.lat_deg, place.lon_deg
 
 

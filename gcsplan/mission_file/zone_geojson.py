@@ -8,14 +8,11 @@ from typing import Any
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.export.geojson import GENERATOR
-from gcsplan.figures import counted
 from gcsplan.mission_file.zone_attributes import Attribute, Said, is_number, read_attributes, shown
 from gcsplan.mission_file.zone_draft import SIZES
-from gcsplan.mission_file.zone_file import Drawn, ZoneFile
+from gcsplan.mission_file.zone_file import Drawn, ZoneFile, drawn_unread
+from gcsplan.notes.note import Note
 from gcsplan.world.degree_shapes import beyond_outline
-
-ALTITUDES = "the altitudes of corners are not read as limits"
-
 
 MOST_MISTAKES = 1000
 """Most mistakes of a file that are looked for."""
@@ -44,9 +41,7 @@ def read_geojson(path: Path, whole: Any) -> ZoneFile:
         if not flown[i]:
             _feature(found, feature, where, f"{path.stem}[{i}]")
     if any(flown):
-        found.said.append(
-            f"not used: {counted(sum(flown), 'track or way point', 'tracks and way points')} of a mission"
-        )
+        found.said.append(Note("tracks_unused", count=sum(flown)))
     return found
 
 
@@ -156,8 +151,7 @@ def _attributes(properties: dict[str, Any], geometry: dict[str, Any], where: str
 
 def _unread(positions: list[Any]) -> Drawn:
     """What is said of altitudes in positions; GeoJSON does not tell whether they are a floor, a ceiling or ground."""
-    heights = [p[2] for p in positions if len(p) > 2 and is_number(p[2]) and p[2] != 0]
-    return Drawn(remarks=((ALTITUDES, f"up to {max(heights):g} m"),)) if heights else Drawn()
+    return drawn_unread([p[2] for p in positions if len(p) > 2 and is_number(p[2]) and p[2] != 0])
 
 
 def _rings(found: ZoneFile, rings: Any, said: Said, part: str, where: str, at: str) -> None:

@@ -22,6 +22,7 @@ from gcsplan.mission_file.zone_attributes import Attribute, Said, as_figure, rea
 from gcsplan.mission_file.zone_draft import SIZES
 from gcsplan.mission_file.zone_file import NOT_DRAWN, Drawn, ZoneFile
 from gcsplan.mission_file.zone_levels import LARGEST_M
+from gcsplan.notes.note import Note
 from gcsplan.world.degree_shapes import beyond_outline
 from gcsplan.world.zones import Level
 
@@ -35,8 +36,6 @@ MODES: dict[str, Literal["agl", "amsl"]] = {"relativeToGround": "agl", "absolute
 Corner = tuple[float, float, float]
 """Latitude, longitude and altitude of a corner; not a number if it has no altitude."""
 
-READ = "the ceiling is the height to which the zone is drawn; one over the ground follows it point by point"
-NOT_READ = "the drawn altitudes are not read as limits"
 _PICTURES = ("PhotoOverlay", "ScreenOverlay", "Tour")
 """What shows the map and limits nothing."""
 
@@ -72,7 +71,8 @@ def read_kml(path: Path, data: bytes) -> ZoneFile:
         elif kind in ("NetworkLink", "NetworkLinkControl", "GroundOverlay"):
             found.problems.append(Problem(f"{path}: {kind}", f"a {kind} cannot be read as a zone; remove it"))
     if pictures:
-        found.said.append(f"not used: {', '.join(counted(count, kind) for kind, count in pictures.items())}")
+        kinds = tuple(counted(count, kind) for kind, count in pictures.items())
+        found.said.append(Note("pictures_unused", kinds=kinds))
     for kind, count in loose.items():
         words = f"{counted(count, kind)} outside of a Placemark cannot be read as a zone; put each into a Placemark"
         found.problems.append(Problem(f"{path}: {kind}", words))
@@ -165,15 +165,20 @@ def _drawn(shape: Any, points: list[Corner]) -> Drawn:
     if not any(heights) or (mode == "relativeToGround" and top_m <= 0.0):
         return _unread(points, mode)
     ceiling = Level(top_m, MODES[mode])
-    uneven = "" if min(heights) == top_m else ", the highest corner's"
-    return Drawn(ceiling, ((READ, f"{ceiling}{uneven}"),))
+    height = Note(
+        "drawn_height" if min(heights) == top_m else "drawn_height_of_highest_corner",
+        top_m=top_m, datum=ceiling.datum.upper(),
+    )  # fmt: skip
+    return Drawn(ceiling, ((Note("zone_ceiling_as_drawn"), height),))
 
 
 def _unread(points: list[Corner], mode: str = "") -> Drawn:
     heights = [p[2] for p in points if math.isfinite(p[2]) and p[2] != 0.0]
     if not heights:
         return NOT_DRAWN
-    return Drawn(remarks=((NOT_READ, " ".join(filter(None, [f"up to {max(heights):g} m", mode[:40]]))),))
+    top_m = max(heights)
+    up_to = Note("drawn_up_to_in_mode", top_m=top_m, mode=mode[:40]) if mode else Note("drawn_up_to", top_m=top_m)
+    return Drawn(remarks=((Note("zone_drawn_altitudes_unread"), up_to),))
 
 
 def _coordinates(found: ZoneFile, parent: Any, where: str) -> list[Corner] | None:

@@ -15,9 +15,9 @@ import numpy as np
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.zone_attributes import Attribute, Said, as_figure, read_attributes
 from gcsplan.mission_file.zone_draft import MAX_VERTICES, SIZES
-from gcsplan.mission_file.zone_file import MAX_ZONES, Drawn, ZoneFile
-from gcsplan.mission_file.zone_geojson import ALTITUDES
+from gcsplan.mission_file.zone_file import MAX_ZONES, Drawn, ZoneFile, drawn_unread
 from gcsplan.mission_file.zone_zip import unpack
+from gcsplan.notes.note import Note
 from gcsplan.world.degree_shapes import beyond_outline
 from gcsplan.world.input_files import tell_file
 from gcsplan.world.reprojection import ToDegrees
@@ -62,7 +62,7 @@ def read_vector(path: Path, data: bytes, *, layer: str | None, most_bytes: int) 
                 raise
             reason = str(why).replace(str(source), path.name)[:200]
             raise InputError(f"GDAL cannot read it: {reason}", where=str(path)) from None
-    found.said += dict.fromkeys(f"GDAL warns: {str(w.message)[:200]}" for w in heard[:MOST_WARNINGS])
+    found.said += dict.fromkeys(Note("gdal_warns", warning=str(w.message)[:200]) for w in heard[:MOST_WARNINGS])
     return found
 
 
@@ -213,4 +213,4 @@ def _parts(geometry: shapely.Geometry) -> list[Any]:
 def _unread(line: Any) -> Drawn:
     """What is said of altitudes in corners, which limit nothing."""
     heights = [p[2] for p in line.coords if len(p) > 2 and math.isfinite(p[2]) and p[2] != 0.0] if line.has_z else []
-    return Drawn(remarks=((ALTITUDES, f"up to {max(heights):g} m"),)) if heights else Drawn()
+    return drawn_unread(heights)

@@ -13,9 +13,11 @@ A sentence of the catalogue names the data by fields of ``str.format``, each wit
     {share:.1f} {zones}         anything else is formatted as Python does; a list is joined by commas
     {unit:height}               the symbol of a kind's unit alone
     {key:max_agl_m}             what the reader types for a key of the mission file: the key, or an option
+    {limit:key}                 the same for a datum that is the name of a key
 
-A note on an item begins with ``item 5: `` by itself, unless its sentence names the ``{item}``; with ``way`` among its
-data, what is flown for the item, with ``item 5 (cruise): ``.
+Where it belongs stands around the sentence by itself, unless the sentence names it: a note on an item begins with
+``item 5: `` (with ``way`` among its data, what is flown for the item, with ``item 5 (cruise): ``), one whose data have
+a ``file``, a ``place`` in it or a ``vehicle`` with that, and one with ``zones`` ends with them.
 """
 
 from __future__ import annotations
@@ -33,6 +35,9 @@ from gcsplan.units import Joules, Kind, Quantity, Reach, Rounding, Seconds, Symb
 Datum: TypeAlias = "float | str | bool | Note | tuple[Datum, ...] | None"
 
 KINDS: tuple[str, ...] = get_args(Kind)
+
+BEFORE = ("file", "place", "vehicle")
+"""Data that stand before the sentence, in this order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,14 +78,21 @@ class Note:
         A ``way`` that is a note says more than the kind of the stretch, so it stands before the sentence anyway.
         """
         template = TEXTS[self.code]
-        named = any(name == "item" for _, name, _ in parts_of(template))
-        way, before = self.data.get("way"), ""
+        named = {name for _, name, _ in parts_of(template)}
+        before = "".join(f"{self.data[place]}: " for place in BEFORE if place in self.data and place not in named)
+        way = self.data.get("way")
         shown = "" if way is None else f"({_shown(way, '', wording)})"
-        if placed and self.item is not None and not named:
-            before = f"item {self.item} {shown}: " if shown else f"item {self.item}: "
+        if placed and self.item is not None and "item" not in named:
+            before += f"item {self.item} {shown}: " if shown else f"item {self.item}: "
         elif not placed and isinstance(way, Note):
-            before = f"{shown}: "
-        return before + sentence(template, {"item": self.item, **self.data}, wording)
+            before += f"{shown}: "
+        zones = "" if "zones" in named else _shown(self.data.get("zones"), "", wording)
+        behind = f": {zones}" if zones else ""
+        return before + sentence(template, {"item": self.item, **self.data}, wording) + behind
+
+    def of(self, **place: Datum) -> Note:
+        """The same note of a ``file``, ``place``, ``vehicle`` or ``zones``, which whoever made it did not know."""
+        return Note(self.code, self.item, **place, **self.data)
 
     def in_units(self, units: Units) -> str:
         """The sentence with its quantities in ``units``."""
@@ -104,7 +116,7 @@ class Note:
 
     @property
     def _all(self) -> tuple[object, ...]:
-        return self.code, self.item, tuple(self.data.items())
+        return self.code, self.item, frozenset(self.data.items())
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _revived, (self.code, self.item, dict(self.data))
@@ -178,6 +190,8 @@ def _shown(value: Any, spec: str, wording: Wording) -> str:
         rounding, places = _rounding(how), int(decimals or 0)
         degrees = floored(value, places) if rounding == "down" else raised(value, places) if rounding == "up" else value
         return f"{degrees:.{places}f} °"
+    if name == "key":
+        return wording.options.get(value, value)
     if name == "reach":
         return Reach(value).text(wording.units)
     if name == "seconds":

@@ -10,6 +10,8 @@ import re
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
+from gcsplan.notes.note import Note
+
 if TYPE_CHECKING:
     from pyproj import Proj
 
@@ -55,7 +57,7 @@ class Found(NamedTuple):
 
     lat_deg: float
     lon_deg: float
-    note: str = ""
+    note: Note | None = None
 
 
 def read_utm(plain: str) -> Found | None:
@@ -108,7 +110,7 @@ def read_mgrs(plain: str) -> Found | None:
     size_m = 10 ** (5 - half)
     within_m = tuple(int(part) * size_m for part in (digits[:half], digits[half:]))
     found = _square_corner(zone, match[2], match[3], match[4], within_m, size_m)
-    note = "" if half == 5 else f"{plain!r} is a square of {SIZES[half]} in MGRS; its south-west corner is taken"
+    note = None if half == 5 else Note("place_is_a_square", given=plain, size=SIZES[half])
     return Found(found.lat_deg, found.lon_deg, note)
 
 
@@ -175,7 +177,7 @@ def _read_s(zone: int, easting: str, northing: str) -> Found:
         )
     if south.lat_deg < -80.0 - EDGE_DEG:
         raise Refused(f"UTM reaches from 80° S to 84° N, and this is at {south.lat_deg:.4f}°; write lat, lon")
-    return south._replace(note=f"the S of zone {zone}S is the southern hemisphere: the northing is not in band S")
+    return south._replace(note=Note("zone_letter_is_the_hemisphere", zone=zone))
 
 
 def _square_corner(zone: int, band: str, column: str, row: str, within_m: tuple[int, ...], size_m: int) -> Found:

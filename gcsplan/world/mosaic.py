@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import InputError
+from gcsplan.notes.note import Note
 from gcsplan.world.datum import plane_to_raster, to_wgs84
 from gcsplan.world.frame import Frame
 from gcsplan.world.height_unit import BY_NOBODY, METRE, OF_KEY
@@ -50,7 +51,7 @@ class Window:
     grid: GridMap
     x: Floats
     y: Floats
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
     goes_on: Sides = NO_SIDES
     low_m: Floats | None = None
 
@@ -218,12 +219,10 @@ class Mosaic:
                 where=self.where,
             )
         heights, notes = read_tiles(parts, c0, r0, c1 - c0, r1 - r0, self.where)
-        if accuracy_m < 0.0 or accuracy_m > 1.0:
-            good = "unknown" if accuracy_m < 0.0 else f"{accuracy_m:g} m"
-            notes.append(
-                f"the accuracy of the datum shift between WGS84 and {self.crs.horizontal.name} is {good}; "
-                "track_error_m should hold it"
-            )
+        if accuracy_m < 0.0:
+            notes.append(Note("datum_shift_of_unknown_accuracy", crs=self.crs.horizontal.name))
+        elif accuracy_m > 1.0:
+            notes.append(Note("datum_shift_inaccurate", crs=self.crs.horizontal.name, accuracy_m=accuracy_m))
         goes_on = (c0 > first_col, r0 > first_row, c1 < last_col, r1 < last_row)
         return Window(heights.high_m, grid, x, y, tuple(notes), goes_on, heights.low_m)
 

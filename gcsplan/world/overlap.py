@@ -13,6 +13,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
+from gcsplan.notes.note import Note
 from gcsplan.world.raster import MAX_CELLS, Raster
 
 Shared = tuple[int, int, int, int]
@@ -88,7 +89,7 @@ class Heights:
 
 def read_tiles(
     parts: Sequence[tuple[Placed, Shared]], c0: int, r0: int, cols: int, rows: int, where: str = ""
-) -> tuple[Heights, list[str]]:
+) -> tuple[Heights, list[Note]]:
     """The heights of a window that begins at column ``c0`` and row ``r0``, and notes on what differs or is unknown.
 
     ``where`` names the files in messages. Raises InputError.
@@ -107,13 +108,10 @@ def read_tiles(
     notes = []
     if heights.nodes:
         worst_m = max(heights.worst_m, 0.001)  # what single precision makes of one height in two units is less
-        notes.append(
-            f"tiles differ where they overlap ({heights.nodes} nodes, {worst_m:g} m at most); each limit "
-            "counts the unfavourable height"
-        )
+        notes.append(Note("tiles_differ", nodes=heights.nodes, worst_m=worst_m))
     unknown = int(np.count_nonzero(np.isnan(heights.high_m)))
     if unknown:
-        notes.append(f"{unknown} of {rows * cols} DEM nodes around the mission are unknown (void or no tile)")
+        notes.append(Note("nodes_unknown", unknown=unknown, nodes=rows * cols))
     return heights, notes
 
 

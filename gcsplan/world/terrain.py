@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.errors import InputError
+from gcsplan.notes.note import Note
 from gcsplan.world.datum import VerticalDatum, stated_datum, vertical_datum
 from gcsplan.world.frame import FARTHEST_M, Frame
 from gcsplan.world.geoid import GeoidGrid
@@ -154,7 +155,7 @@ def terrain_of(
     *,
     where: str,
     info: Mapping[str, object] | None = None,
-    notes: Sequence[str] = (),
+    notes: Sequence[Note] = (),
 ) -> Terrain:
     """Terrain of tiles on one grid; ``spec`` says the rest, ``info`` and ``notes`` go with its surfaces too.
 
@@ -175,7 +176,7 @@ class _RasterTerrain:
         spec: TerrainSpec,
         where: str,
         info: Mapping[str, object],
-        notes: Sequence[str],
+        notes: Sequence[Note],
     ) -> None:
         self._spec, self._where = spec, where
         self._info, self._notes = info, notes
@@ -252,13 +253,10 @@ class _RasterTerrain:
             unknown_m = np.nan if spec.canopy_nodata_m is None else spec.canopy_nodata_m
             canopy = self._canopy.window(frame, window.plane_box, most_cells=MAX_CELLS // CANOPY)
             trees = canopy_on(window, canopy, unknown_m=unknown_m)
-            notes += [n for n in (*self._canopy.rasters[0].notes, *canopy.notes) if "DEM nodes" not in n]
+            notes += [n for n in (*self._canopy.rasters[0].notes, *canopy.notes) if n.code != "nodes_unknown"]
             blind = int(np.count_nonzero(np.isnan(trees) & ~np.isnan(ground)))
             if blind:
-                notes.append(
-                    f"the canopy is unknown at {blind} of {rows * cols} DEM nodes, which cannot be flown over; "
-                    "canopy_nodata_m gives them a height"
-                )
+                notes.append(Note("canopy_unknown", unknown=blind, nodes=rows * cols))
             top = np.maximum(trees, spec.obstacle_height_m, out=trees)  # in place: these are the largest arrays
             top += high
             info["canopy_sha256"] = self._canopy.rasters[0].sha256()
@@ -325,7 +323,7 @@ class _LocalTerrain:
             "resolution_m": _rounded(float(grid.metres_per_cell(0.0, 0.0).max())) if spec.peaks else 0,
             "bare_dem": spec.obstacle_height_m == 0.0,
             "source": f"{len(spec.peaks)} peaks" if spec.peaks else "flat",
-            "notes": (self._datum.note,) if self._datum.note else (),
+            "notes": () if self._datum.note is None else (self._datum.note,),
         }
         top = heights + spec.obstacle_height_m if spec.obstacle_height_m > 0.0 else heights
         west, south, east, north = box

@@ -120,7 +120,7 @@ def test_the_shipped_missions_lean_as_far_as_their_speeds_need() -> None:
         wanted = {v["name"]: v["speed_m_s"][1] for v in yaml.safe_load(file.read_text())["vehicles"]}
         source = load_mission(file)
         assert {r.vehicle.name: r.vehicle.speed_max_m_s for r in source.vehicles} == wanted
-        assert not any("planned with" in note for note in source.notes)
+        assert not any("bounds_speed" in note.code for note in source.notes)
 
 
 # -- before an upload ---------------------------------------------------------------------------------------------

@@ -37,10 +37,11 @@ def loaded(**vehicle: Any) -> MissionFile:
 def test_a_px4_is_planned_no_faster_than_its_parameter_allows() -> None:
     capped, fast, slow = loaded(), loaded(mpc_xy_vel_max_m_s=20), loaded(speed_m_s=[3, 9])
     assert [f.vehicles[0].vehicle.speed_max_m_s for f in (capped, fast, slow)] == [12.0, 15.0, 9.0]
-    [note] = [n for n in capped.notes if "MPC_XY_VEL_MAX" in n]
-    assert "planned with 12 m/s, not 15" in note
-    assert "write mpc_xy_vel_max_m_s: 15, and set MPC_XY_VEL_MAX 15" in note
-    assert not any("MPC_XY_VEL_MAX" in n for n in (*fast.notes, *slow.notes))
+    [note] = [n for n in capped.notes if n.code == "velocity_bounds_speed"]
+    assert (note.data["most_m_s"], note.data["wanted_m_s"], note.data["by_default"]) == (12.0, 15.0, True)
+    assert "planned with 12 m/s, not 15" in str(note)
+    assert "write mpc_xy_vel_max_m_s: 15, and set MPC_XY_VEL_MAX 15" in str(note)
+    assert not any(n.code == "velocity_bounds_speed" for n in (*fast.notes, *slow.notes))
     with pytest.raises(InputError, match="is PX4's alone"):
         loaded(autopilot="arducopter", mpc_xy_vel_max_m_s=20)
 

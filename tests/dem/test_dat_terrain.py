@@ -15,6 +15,7 @@ from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError
 from gcsplan.world.cell import Cell
 from gcsplan.world.frame import Frame
+from gcsplan.world.model_words import notes_on
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import Box, TerrainSpec
 from gcsplan.world.terrain_grid import Ground, PostHeights, TerrainGrid
@@ -167,9 +168,9 @@ def test_a_block_that_the_autopilot_does_not_take_is_left_out_and_told(tmp_path:
     file = read_dat(path, where="")
     assert len(file.blocks) == count - 1
     [note] = file.notes
-    assert words in note
+    assert words in str(note)
     _, surface = surface_of(tmp_path, 36.55, -84.40)
-    assert any(words in str(n) for n in surface.info["notes"])  # type: ignore[attr-defined]
+    assert any(words in str(n) for n in notes_on(surface.info))
 
 
 @pytest.mark.parametrize(

@@ -17,9 +17,11 @@ from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError
 from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.from_options import OpenWorld, WorldOptions
+from gcsplan.notes.note import Note
 from gcsplan.world.cell import Cell
 from gcsplan.world.frame import Frame
 from gcsplan.world.input_files import sha256_of
+from gcsplan.world.model_words import notes_on
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import TerrainSpec
 from tests.support.tiles import ROWS, height_at, heights_of, tile
@@ -100,7 +102,7 @@ def test_ground_is_that_of_the_source_with_its_datum_and_its_kind(cache: Path, s
     assert info["vertical_datum"] == {"copernicus-glo30": "EGM2008", "srtm": "EGM96"}[source.name]
     assert (info["dem_source"], info["dem_kind"], info["bare_dem"]) == (source.name, "surface", False)
     assert info["dem_tiles"] == "N36W085"
-    assert any("altitudes relative to home are flown lower" in str(n) for n in info["notes"])  # type: ignore[attr-defined]
+    assert any(n.code == "terrain_is_a_surface" for n in notes_on(surface.info))
     assert info["dem_sha256"] == sha256_of(Cache(source, cache).tile_path(Cell(36, -85)))
 
 
@@ -128,7 +130,7 @@ def test_tiles_with_columns_of_different_widths_join(cache: Path, south: int) ->
     for cell in (Cell(lat, lon) for lat in (south, south + 1) for lon in (9, 10, 11)):
         hold(cache, cell, heights=heights_of(cell, rows=rows))
     surface, frame = surface_at((south + 1.0, 10.5))
-    assert not any("unknown" in str(n) for n in surface.info["notes"])  # type: ignore[attr-defined]
+    assert not any(n.code == "nodes_unknown" for n in notes_on(surface.info))
     for cell, offset_m in ((north, 1500.0), (below, -1500.0)):  # beyond the row of cells that both share
         e = np.random.default_rng(3).uniform(-2500.0, 2500.0, 100)
         n = offset_m + np.linspace(-300.0, 300.0, 100)
@@ -204,7 +206,7 @@ def test_sea_is_0_m_and_is_told(cache: Path) -> None:
     assert surface.ground_at(2000.0, 0.0) == 0.0
     assert surface.ground_at(-2900.0, 0.0) > 1.0
     assert surface.info["sea_tiles"] == "N10E011"
-    assert "sea, 0 m: N10E011, which neither copernicus-glo30 nor GLO-90 has a tile of" in surface.info["notes"]
+    assert Note("tiles_are_sea", tiles="N10E011", source="copernicus-glo30") in notes_on(surface.info)
 
 
 @pytest.mark.first_quick
@@ -221,7 +223,7 @@ def test_a_tile_that_the_source_lacks_is_unknown_ground_and_never_0_m(cache: Pat
     hold(cache, Cell(40, 46), state="absent")
     surface, _ = surface_at((40.5, 46.0))
     assert np.isnan(surface.ground_at(2000.0, 0.0))
-    assert any("does not publish N40E046, and GLO-90 shows land there" in str(n) for n in surface.info["notes"])  # type: ignore[attr-defined]
+    assert any("does not publish N40E046, and GLO-90 shows land there" in str(n) for n in notes_on(surface.info))
     hold(cache, Cell(40, 45), state="absent")
     assert "does not publish N40E045,N40E046" in refusal((40.5, 46.0)).message
 
@@ -231,7 +233,7 @@ def test_a_mission_may_say_that_it_is_sea(cache: Path) -> None:
     hold(cache, Cell(40, 46), state="absent")
     surface, _ = surface_at((40.5, 46.0), sea=True)
     assert surface.ground_at(2000.0, 0.0) == 0.0
-    assert "sea, 0 m, because the mission says so: N40E046; GLO-90 shows land there" in surface.info["notes"]
+    assert Note("tiles_are_sea_by_mission", tiles="N40E046") in notes_on(surface.info)
     assert "not in the cache" in refusal((41.5, 46.0), sea=True).message  # nobody knows that it is not published
 
 

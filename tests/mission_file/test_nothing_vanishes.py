@@ -29,8 +29,8 @@ def told(file: Path, text: Any) -> str:
     except InputError as why:
         return "\n".join(map(str, why.problems))
     faults = [fault for draft in found.zones for fault in draft.faults]
-    return "\n".join([*map(str, found.problems), *found.notes, *zone_notes([(d, None) for d in found.zones]),
-                      *map(str, faults)])  # fmt: skip
+    notes = [*found.notes, *zone_notes([(d, None) for d in found.zones])]
+    return "\n".join(map(str, [*found.problems, *notes, *faults]))
 
 
 def feature(geometry: Any, **properties: Any) -> dict[str, Any]:

@@ -73,7 +73,7 @@ def limits(draft: ZoneDraft) -> tuple[str, str]:
 
 def notes(found: ZoneFile) -> str:
     assert found.problems == []
-    return "\n".join(zone_notes(place_zones(found.zones, FRAME)[0]))
+    return "\n".join(map(str, zone_notes(place_zones(found.zones, FRAME)[0])))
 
 
 # -- one level ----------------------------------------------------------------------------------------------------

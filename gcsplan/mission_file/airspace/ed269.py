@@ -16,12 +16,13 @@ from gcsplan.mission_file.airspace.members import (
     unread,
     word,
 )
-from gcsplan.mission_file.airspace.policy import ASKED, UNREAD_TIMES, Policy, Published
+from gcsplan.mission_file.airspace.policy import UNREAD_TIMES, Policy, Published
 from gcsplan.mission_file.airspace.times import read_periods
 from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
 from gcsplan.mission_file.zone_attributes import is_number, shown
 from gcsplan.mission_file.zone_draft import Remark
 from gcsplan.mission_file.zone_file import ZoneFile
+from gcsplan.notes.note import Note
 
 KINDS = ("PROHIBITED", "REQ_AUTHORISATION", "CONDITIONAL", "NO_RESTRICTION")
 FREE = frozenset({"NO_RESTRICTION"})
@@ -37,8 +38,6 @@ VOLUME = frozenset({
     "horizontalProjection",
 })  # fmt: skip
 SHAPE = {"Circle": frozenset({"type", "center", "radius"}), "Polygon": frozenset({"type", "coordinates"})}
-
-CONDITIONS = "these zones may be entered under conditions, which are not judged: they are no-fly"
 
 
 def is_ed269(whole: Any) -> bool:
@@ -94,11 +93,11 @@ def published(feature: dict[str, Any], kind: Any, key: str, times: Any, fallback
     remarks: list[Remark] = [(UNREAD_TIMES, why)] if why else []
     remarks += unread(feature, MEMBERS)
     if restriction in ("REQ_AUTHORISATION", "REQ_AUTHORIZATION"):
-        remarks.append((ASKED, authority_of(feature.get("zoneAuthority"))))
+        remarks.append((Note("zone_needs_authorisation"), authority_of(feature.get("zoneAuthority"))))
     elif restriction == "CONDITIONAL":
         conditions = feature.get("restrictionConditions")
         joined = ", ".join(str(c) for c in conditions) if isinstance(conditions, list) else text_of(conditions)
-        remarks.append((CONDITIONS, joined[:60]))
+        remarks.append((Note("zone_conditions_not_judged"), joined[:60]))
     return Published(name, (restriction,), restriction not in FREE, identifier, periods, tuple(remarks))
 
 

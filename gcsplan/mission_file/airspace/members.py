@@ -9,8 +9,8 @@ from typing import Any
 
 from gcsplan.mission_file.airspace.policy import Published
 from gcsplan.mission_file.airspace.volumes import AirspaceFile, Corner, Limits
-from gcsplan.mission_file.zone_attributes import MOST_SHOWN, NOT_READ, is_number, meaning_of, shown
-from gcsplan.mission_file.zone_draft import Remark
+from gcsplan.mission_file.zone_attributes import ATTRIBUTES_UNREAD, MOST_SHOWN, is_number, meaning_of, shown
+from gcsplan.mission_file.zone_draft import Remark, one_line
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.world.degree_shapes import beyond_outline
 
@@ -52,8 +52,8 @@ def unread(given: dict[str, Any], known: Collection[str], *, all_of_them: bool =
         meaning = meaning_of(key)
         seems = all_of_them or meaning.limit is not None or meaning.seems_a_limit or meaning.seems_a_time
         if key not in known and seems and value not in (None, "", [], {}):
-            found.append(f"{key[:40]} {shown(value)}")
-    return [(NOT_READ, ", ".join(found[:MOST_SHOWN]))] if found else []
+            found.append(one_line(f"{key[:40]} {shown(value)}"))
+    return [(ATTRIBUTES_UNREAD, tuple(found[:MOST_SHOWN]))] if found else []
 
 
 def position(given: Any) -> Corner:

@@ -14,6 +14,7 @@ from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
 from gcsplan.mission_file.zone_attributes import is_number, shown
 from gcsplan.mission_file.zone_draft import Remark
 from gcsplan.mission_file.zone_file import ZoneFile
+from gcsplan.notes.note import Note
 
 TYPES = (
     "OTHER", "RESTRICTED", "DANGER", "PROHIBITED", "CTR", "TMZ", "RMZ", "TMA", "TRA", "TSA", "FIR", "UIR", "ADIZ",
@@ -31,10 +32,6 @@ DATUMS = {0: "GND", 1: "MSL", 2: "STD"}
 
 FREE_TYPES = frozenset({"OTHER", "FIR", "UIR", "ACC_SECTOR", "VFR_SECTOR", "FIS_SECTOR", "TRP"})
 FREE_CLASSES = frozenset({"G"})
-
-NOT_CLAIMED = "openAIP's hours of operation are not read: these zones count as always"
-FLOATING = "the limits of these zones move: at that end they count from the ground up, or without end"
-UNREAD_SPAN = "the time of activation is not understood: these zones count as always"
 
 
 def is_openaip(whole: Any) -> bool:
@@ -105,7 +102,7 @@ def _limits(members: dict[str, Any], where: str, policy: Policy) -> Limits:
     for side, farther in (("lower", "lowerLimitMin"), ("upper", "upperLimitMax")):
         limit = members.get(f"{side}Limit")
         if members.get(farther) is not None:
-            floating.append((FLOATING, farther))
+            floating.append((Note("zone_limits_move"), farther))
         if limit is None or members.get(farther) is not None:
             given.append(None)
             continue
@@ -131,10 +128,10 @@ def _times(members: dict[str, Any]) -> tuple[tuple[Period, ...], tuple[Remark, .
     try:
         span = Period(_moment(members.get("activeFrom"), read_instant), _moment(members.get("activeUntil"), read_end))
     except TimeError as why:
-        return (), ((UNREAD_SPAN, str(why)),)
+        return (), ((Note("zone_activation_not_understood"), str(why)),)
     hours = members.get("hoursOfOperation")
     unread = any(_is_limited(h) for h in _hours(hours))
-    remarks: tuple[Remark, ...] = ((NOT_CLAIMED, ""),) if unread else ()
+    remarks: tuple[Remark, ...] = ((Note("zone_hours_of_operation_unread"), None),) if unread else ()
     return (() if span == ALWAYS else (span,)), remarks
 
 

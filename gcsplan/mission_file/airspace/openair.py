@@ -18,9 +18,10 @@ from gcsplan.mission_file.airspace.arcs import Arc, ArcError, Corner, corners_of
 from gcsplan.mission_file.airspace.policy import UNREAD_TIMES, Policy, Published
 from gcsplan.mission_file.airspace.times import Period, TimeError, read_end, read_instant
 from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
-from gcsplan.mission_file.zone_draft import MAX_VERTICES, Remark
+from gcsplan.mission_file.zone_draft import MAX_VERTICES, Remark, one_line
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_text import decoded
+from gcsplan.notes.note import Datum, Note
 from gcsplan.world.degree_shapes import MOST_LON_DEG
 
 SUFFIXES = (".openair", ".air", ".txt")
@@ -45,10 +46,7 @@ IGNORED = frozenset({"AF", "AG", "AX", "AI", "AT", "SP", "SB"})
 
 DRAWN = frozenset({"DP", "DA", "DB", "DC", "DY"})
 
-SPARED = "limits without a unit or a reference are read as OpenAir's programs do, in feet above sea level"
-CARRIED = "arcs without a centre (V X=…) in their own zone are drawn around that of the zone before"
-BEHIND = "text behind a place is not read"
-UNPLACED = "text behind the height is not read"
+SPARED = Note("zone_limits_in_feet_above_sea")
 
 _RECORD = re.compile(r"(V|[A-Z]{2})\s+(\S.*)", re.IGNORECASE)
 _VARIABLE = re.compile(r"([A-Z])\s*=\s*(.*)", re.IGNORECASE)
@@ -148,9 +146,10 @@ class _Reading:
                     (self.block.mistakes if of_limits else self.block.lost).append((number, words))
         self._end()
         if self.terrain:
-            more = f", and {len(self.terrain) - MOST_MISTAKES} more" if len(self.terrain) > MOST_MISTAKES else ""
-            shown = ", ".join(self.terrain[:MOST_MISTAKES])
-            self.file.found.said.append(f"not used, because they draw terrain: {shown}{more}")
+            more = len(self.terrain) - MOST_MISTAKES
+            records: list[Datum] = [*self.terrain[:MOST_MISTAKES]]
+            records += [Note("further_zones", count=more)] if more > 0 else []
+            self.file.found.said.append(Note("terrain_records_unused", records=tuple(records)))
         if not self.zones and not self.file.found.problems:
             self._fault(1, "the file holds no zone: an OpenAir zone begins with a line such as `AC R`")
         return self.file.finished()
@@ -235,7 +234,7 @@ class _Reading:
                 raise _RecordError(
                     "has no centre of its own (V X=… in this zone); the centre of the zone before does not count"
                 )
-            block.remarks.append((CARRIED, f"line {self.number}: {code} {value[:40]}"))
+            block.remarks.append((Note("zone_centre_carried_over"), self._line(f"{code} {value[:40]}")))
         if code == "DC":
             block.circles.append((self.centre, _numbers(value, 1)[0] * NAUTICAL_MILE_M))
         elif code == "DA":
@@ -250,8 +249,12 @@ class _Reading:
         """The first places of a text, after which none stands; a remark says what follows them."""
         places, rest = _places(text, count)
         if rest and self.block is not None:
-            self.block.remarks.append((BEHIND, f"line {self.number}: {rest[:40]}"))
+            self.block.remarks.append((Note("zone_text_behind_place_unread"), self._line(rest[:40])))
         return places
+
+    def _line(self, text: str) -> Note:
+        """What stands on the line that is read."""
+        return Note("line_of_file", line=self.number, text=one_line(text))
 
     def _end(self) -> None:
         """Add the zone that ends here."""
@@ -297,7 +300,7 @@ def _limits(block: _Block, where: str, policy: Policy) -> Limits:
         plain = text
         if text is not None and (match := re.fullmatch(r"([^()]*\S)\s*\([^()]*\)", text)):
             plain = match[1]
-            said.append((UNPLACED, f"{key} {text[:60]}"))
+            said.append((Note("zone_text_behind_height_unread"), f"{key} {text[:60]}"))
         given.append(None if plain is None else Given(plain, (), ("FT", "AMSL"), key))
     limits = Limits.read(given[0], given[1], where, SPARED, policy=policy)
     limits.remarks += said

@@ -29,9 +29,6 @@ _OF_PERIOD = ("permanent", "startDateTime", "endDateTime", "schedule")
 _OF_LINE = ("day", "startTime", "endTime", "startEvent", "endEvent")
 
 WEEK = ("MON", "TUE", "WED", "THU", "FRI", "SAT", "SUN")
-OUT_OF_HOURS = "they do not apply in the hours of the mission"
-"""Why such zones are not used."""
-
 WANTED = "2026-11-23T10:00Z, a day such as 2026-11-23 (UTC), or [from, to]"
 
 

@@ -15,10 +15,11 @@ import numpy as np
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.airspace.policy import Judge, Policy, Published
-from gcsplan.mission_file.zone_attributes import OVER_PRESSURE, UNDER_PRESSURE
-from gcsplan.mission_file.zone_draft import ACROSS, MAX_VERTICES, Bounds, Remark, ZoneDraft, check_degrees
+from gcsplan.mission_file.zone_attributes import OVER_PRESSURE, UNDER_PRESSURE, level_read
+from gcsplan.mission_file.zone_draft import ACROSS, MAX_VERTICES, Bounds, Remark, ZoneDraft, check_degrees, one_line
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_levels import EXAMPLES, LevelError, Limit, read_level
+from gcsplan.notes.note import Note
 from gcsplan.world.degree_shapes import (
     HALF_TURN_DEG,
     LARGEST_RADIUS_M,
@@ -49,14 +50,6 @@ AROUND_DEG = 0.01
 
 CURE = "complete its outline, or delete it from the file if it is no zone"
 
-WIDENED = (
-    "limits above the ellipsoid are no heights above sea level: these zones are larger by the most that the two differ "
-    "anywhere"
-)
-OFF_LEVEL = "flight levels lie as far from their heights above sea level as the mission says (flight_level_error_m)"
-CROSSES = "the outlines of these zones cross or touch themselves: all that they enclose is no-fly"
-FAULTY = "the limits of these zones are not understood: they count from the ground up without end"
-
 
 @dataclass(frozen=True, slots=True)
 class Given:
@@ -69,7 +62,7 @@ class Given:
 
     def __str__(self) -> str:
         words = " ".join(w for w in self.words if w)
-        return f"{self.key} {str(self.value)[:60]}{f' {words[:40]}' if words else ''}".strip()
+        return one_line(f"{self.key} {str(self.value)[:60]}{f' {words[:40]}' if words else ''}")
 
 
 @dataclass
@@ -81,8 +74,10 @@ class Limits:
     faults: list[Problem] = field(default_factory=list)
 
     @classmethod
-    def read(cls, lower: Given | None, upper: Given | None, where: str, spared: str = "", *, policy: Policy) -> Limits:
-        """The limits; a missing one is no limit. ``spared`` is the remark on a limit that needs its spare words."""
+    def read(
+        cls, lower: Given | None, upper: Given | None, where: str, spared: Note | None = None, *, policy: Policy
+    ) -> Limits:
+        """The limits; a missing one is no limit. ``spared`` is said of a limit that needs its spare words."""
         found = cls()
         error_m = policy.flight_level_error_m
         levels: dict[str, float] = {}
@@ -102,7 +97,7 @@ class Limits:
             found.bounds.levels(where, found.faults)
         return found
 
-    def _level(self, bound: str, given: Given, spared: str, error_m: float | None) -> Level | None:
+    def _level(self, bound: str, given: Given, spared: Note | None, error_m: float | None) -> Level | None:
         words = tuple("AMSL" if w.upper() == ELLIPSOID else w for w in given.words)
         try:
             level = _read(given.value, words)
@@ -110,9 +105,9 @@ class Limits:
             if not given.spare:
                 raise
             level = read_level(given.value, words, given.spare)
-            self.remarks.append((spared, str(given)))
+            self.remarks += [(spared, str(given))] if spared else []
         if level is Limit.PRESSURE and error_m is not None:
-            return self._off(bound, given, _of_flight_level(given), error_m, OFF_LEVEL)
+            return self._off(bound, given, _of_flight_level(given), error_m, Note("zone_flight_levels_uncertain"))
         if level is Limit.PRESSURE:
             self.remarks.append((UNDER_PRESSURE if bound == "floor" else OVER_PRESSURE, str(given)))
             return None
@@ -125,13 +120,13 @@ class Limits:
             return None
         if words != given.words:
             error_m = GREATEST_GEOID_M if bound == "floor" else -LEAST_GEOID_M
-            return self._off(bound, given, level.value_m, error_m, WIDENED)
+            return self._off(bound, given, level.value_m, error_m, Note("zone_limits_above_ellipsoid"))
         return level
 
-    def _off(self, bound: str, given: Given, amsl_m: float, error_m: float, sentence: str) -> Level:
+    def _off(self, bound: str, given: Given, amsl_m: float, error_m: float, note: Note) -> Level:
         """A level that may lie ``error_m`` lower or higher: the one with which the zone is larger."""
         level = Level(amsl_m - error_m if bound == "floor" else amsl_m + error_m, "amsl")
-        self.remarks.append((sentence, f"{given}: {bound} at {level}"))
+        self.remarks.append((note, level_read(given, bound, level)))
         return level
 
 
@@ -219,7 +214,7 @@ class AirspaceFile:
                 self._add(zone, part, where, self._around(ring), None, limits, [Problem(where, too_many.message)])
                 return
             parts = parts if bent is None else enclosed(outline, bent)
-        limits = Limits(limits.bounds, [*limits.remarks, (CROSSES, "")], limits.faults)
+        limits = Limits(limits.bounds, [*limits.remarks, (Note("zone_outline_crosses"), None)], limits.faults)
         for i, piece in enumerate(parts):
             name = part if len(parts) == 1 else f"{part}/{i + 1}"
             self._add(zone, name, where, tuple(piece), None, limits, [], doubt)
@@ -252,9 +247,9 @@ class AirspaceFile:
         floor, ceiling = (None, None) if faults else limits.bounds.levels(where, [])
         remarks = [*zone.remarks, *limits.remarks]
         if faults:
-            remarks.append((FAULTY, ""))
+            remarks.append((Note("zone_limits_not_understood"), None))
         if doubt:
-            remarks.append((ACROSS, ""))
+            remarks.append((ACROSS, None))
         draft = ZoneDraft(
             part[:200], where, points, False, radius_m, floor, ceiling,
             unused=self.judge.reason(zone), faults=tuple(faults),
