@@ -90,7 +90,7 @@ def serve(
         done.append(
             ServedTo(
                 name, url, served.requests, served.parts, len(served.blocks), sum(served.unknown.values()),
-                state.loaded, state.pending, state.complete, tuple(served.notes),
+                state.loaded, state.pending, state.complete, tuple(map(str, served.notes)),
             )
         )  # fmt: skip
     return done

@@ -157,7 +157,7 @@ def unchecked_job(argument: str, url: str, sysid: int) -> tuple[UploadJob, list[
             autopilot = _autopilot_of(link, sysid)
     read = read_mission_file(file, autopilot=autopilot)
     job = UploadJob(name or file.stem, endpoint.url, replace(read.mission, name=name or file.stem, sysid=sysid))
-    return job, [*map(str, read.notes), *([read.unread_fence] if read.unread_fence else [])]
+    return job, [str(note) for note in (*read.notes, read.unread_fence) if note]
 
 
 def open_link(url: str) -> Link:
@@ -282,7 +282,7 @@ def _with_fence(result: JobResult, fence: UploadResult | GcsplanError | None) ->
     words = f"a fence of {counted(fence.items, 'item')} is on board too, read back and compared"
     return replace(
         result,
-        warnings=tuple(dict.fromkeys((words, *result.warnings, *fence.warnings))),
+        warnings=tuple(dict.fromkeys((words, *result.warnings, *map(str, fence.warnings)))),
         details=dict(result.details or {}) | {"fence": fence_result},
     )
 
@@ -297,7 +297,7 @@ def _result(job: UploadJob, ended: UploadResult | GcsplanError) -> JobResult:
     error = ended.error()
     return JobResult(
         job.name, job.url if job.url == SIM else ended.url, ended.outcome, ended.verified, ended.items, ended.seconds,
-        ended.retries, ended.simulated, str(error) if error else "", ended.warnings,
+        ended.retries, ended.simulated, str(error) if error else "", tuple(map(str, ended.warnings)),
         error.exit_code if error else 0, error.reason if error else "", ended.as_dict(),
     )  # fmt: skip
 
@@ -352,7 +352,7 @@ def verify_file(
             autopilot = None if file.suffix.lower() == ".plan" else _autopilot_of(link, sysid)
             read = read_mission_file(file, autopilot=autopilot)
             job = UploadJob(file.stem, link.url, replace(read.mission, sysid=sysid))
-            notes = (*read.notes, *([read.unread_fence] if read.unread_fence else []))
+            notes = tuple(str(note) for note in (*read.notes, read.unread_fence) if note)
         options = session.SessionOptions(
             listen_s=LISTEN_S, timeout_s=timeout_s, rtl_rel_home_m=job.rtl_rel_home_m,
             read_parameters=checked is not None, settings=settings_of(job), vehicle=job.vehicle,

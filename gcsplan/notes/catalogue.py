@@ -7,8 +7,10 @@ from types import MappingProxyType
 
 from gcsplan.notes import (
     battery_texts,
+    file_texts,
     finding_texts,
     flight_texts,
+    link_texts,
     mission_file_texts,
     return_texts,
     site_texts,
@@ -21,7 +23,7 @@ TEXTS: Mapping[str, str] = MappingProxyType({
     code: text
     for room in (
         battery_texts, site_texts, finding_texts, flight_texts, return_texts, turn_texts, mission_file_texts,
-        terrain_texts, zone_texts,
+        file_texts, link_texts, terrain_texts, zone_texts,
     )
     for code, text in room.TEXTS.items()
 })  # fmt: skip

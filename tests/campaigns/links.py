@@ -406,7 +406,7 @@ class Run:
         there = [o for o in (checked, *here) if o is not None]
         if d.verified and not any(o.was_equal(seat.asked_at, now) for o in there):
             self.found.append(f"false verified: {d.vehicle}: {d.as_dict()}")
-        if d.code == 0 and d.verified and not any("after the read-back" in w for w in d.warnings):
+        if d.code == 0 and d.verified and not any("after the read-back" in str(w) for w in d.warnings):
             self.found += [f"untold: {d.vehicle} {words}, and exit 0" for words in self._untold(seat, here)]
 
     def _untold(self, seat: Seat, here: list[Craft]) -> Iterator[str]:

@@ -21,6 +21,7 @@ from gcsplan.figures import counted
 from gcsplan.mavlink.mission.autopilots import max_items, profile_of
 from gcsplan.mavlink.mission.commands import CIRCLE_IN, CIRCLE_OUT, FENCE_RETURN_POINT, POLYGON_IN, POLYGON_OUT
 from gcsplan.mavlink.mission.mission import FENCE, GLOBAL, MissionItem, degrees_e7
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.degree_shapes import LARGEST_RADIUS_M, near_circle, near_polygons, outline_of, unwrapped
 from gcsplan.world.zones import Circle, Polygon, Zone
@@ -50,7 +51,7 @@ class Area:
 
 @dataclass(frozen=True, slots=True)
 class Fence:
-    """A fence for one autopilot: its items in wire order, the zones in it, and remarks for the user (``notes``).
+    """A fence for one autopilot: its items in wire order, the zones in it, and ``notes`` for the user.
 
     ``left_out`` names the zones that a fence cannot express.
     """
@@ -58,7 +59,7 @@ class Fence:
     items: tuple[MissionItem, ...]
     zones: tuple[Zone, ...]
     left_out: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
 
 
 def fence_of(zones: Sequence[Zone], frame: Frame, autopilot: Autopilot, *, infinite: bool = False) -> Fence:
@@ -67,19 +68,16 @@ def fence_of(zones: Sequence[Zone], frame: Frame, autopilot: Autopilot, *, infin
     Zones with a floor or a ceiling are left out and named; with ``infinite`` they are included without floor and
     ceiling. A circle inside another one is dropped. Raises InputError if the autopilot cannot store the fence.
     """
-    notes: list[str] = []
+    notes: list[Note] = []
     bounded = [z for z in zones if z.floor is not None or z.ceiling is not None]
     taken = list(zones) if infinite else [z for z in zones if z.floor is None and z.ceiling is None]
     if bounded and infinite:
-        notes.append(f"a fence has no height: {_names(bounded)} would be forbidden from the ground to the sky on board")
+        notes.append(Note("fence_without_heights", names=_names(bounded)))
     elif bounded:
-        notes.append(
-            f"a fence has no height: {_names(bounded)} {'is' if len(bounded) == 1 else 'are'} left out of it, having a "
-            f"floor or a ceiling"
-        )
+        notes.append(Note("fence_leaves_out", names=_names(bounded)))
     inside = [z for k, z in enumerate(taken) if any(_holds(o, z, j < k) for j, o in enumerate(taken) if j != k)]
     if inside:
-        notes.append(f"{_names(inside)} {'lies' if len(inside) == 1 else 'lie'} inside another circle of the fence")
+        notes.append(Note("fence_circles_inside", names=_names(inside)))
     taken = [z for z in taken if z not in inside]
     items: list[MissionItem] = []
     for zone in taken:
@@ -222,5 +220,5 @@ def _holds(outer: Zone, inner: Zone, first: bool) -> bool:
     return slack >= 0.0 and (a.radius_m > b.radius_m or first)
 
 
-def _names(zones: Sequence[Zone]) -> str:
-    return ", ".join(repr(z.name) for z in zones)
+def _names(zones: Sequence[Zone]) -> tuple[str, ...]:
+    return tuple(repr(z.name) for z in zones)

@@ -39,6 +39,7 @@ from gcsplan.mavlink.mission.commands import (
     WAYPOINT,
 )
 from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, Home, Mission, MissionItem
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 
 HEADER = "QGC WPL 110"
@@ -181,18 +182,18 @@ def _decimals(field: str) -> int:
 
 
 def _mission(rows: list[_Row], has_home: bool, autopilot: Autopilot, where: str, hint: Home | None) -> MissionFileRead:
-    notes: list[str] = []
+    notes: list[Note] = []
     home: Home | None = None
     if has_home and rows and rows[0].seq == 0:
         home = _home(rows[0], where)
         rows = rows[1:]
         if home.lat_e7 == home.lon_e7 == 0 and hint is not None:
-            notes.append("the home row holds no place (0, 0): the mission's own home was taken")
+            notes.append(Note("home_row_without_place"))
             home = hint
         elif home.lat_e7 == home.lon_e7 == 0:
-            notes.append("the home row holds the place 0, 0, which is what a vehicle without a position writes")
+            notes.append(Note("home_row_at_zero"))
     elif hint is not None:
-        notes.append("the file has no home row: the mission's own home was taken")
+        notes.append(Note("home_row_missing"))
         home = hint
     if home is None and not has_home:
         raise InputError(
@@ -230,10 +231,7 @@ def _mission(rows: list[_Row], has_home: bool, autopilot: Autopilot, where: str,
     items_tuple = jumps_from_file(items, index_of, first_seq, where)
     placed = [r for r in rows if r.raw.x != 0.0 or r.raw.y != 0.0]
     if placed and all(row.decimals == (6, 6) for row in placed):
-        notes.append(
-            "the coordinates have six decimals (0.11 m), as MAVProxy and pymavlink save them: coarser than the wire, "
-            "so this file cannot verify exactly what is on board"
-        )
+        notes.append(Note("six_decimals"))
     return MissionFileRead(Mission(autopilot, home, items_tuple), tuple(notes))
 
 

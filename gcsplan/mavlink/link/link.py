@@ -24,6 +24,7 @@ from gcsplan.mavlink.link.transport import Clock, Peer, Transport, Udp, open_tra
 from gcsplan.mavlink.link.url import Endpoint, parse_url
 from gcsplan.mavlink.protocol import wire
 from gcsplan.mavlink.protocol.messages import Address, Packet
+from gcsplan.notes.note import Note
 
 _log = logging.getLogger(__name__)
 T = TypeVar("T")
@@ -151,9 +152,9 @@ class Link:
         return self.transport.place
 
     @property
-    def note(self) -> str:
-        """What a user should know of how the link was opened; mostly empty."""
-        return self.transport.note if isinstance(self.transport, Udp) else ""
+    def note(self) -> Note | None:
+        """What a user should know of how the link was opened, if anything."""
+        return self.transport.note if isinstance(self.transport, Udp) else None
 
     @property
     def garbage(self) -> int:

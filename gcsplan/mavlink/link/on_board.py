@@ -24,6 +24,7 @@ from gcsplan.mavlink.mission.mission import FENCE, Mission
 from gcsplan.mavlink.mission.parameter_names import OnBoard
 from gcsplan.mavlink.mission.parameter_safety import needed_groups
 from gcsplan.mavlink.mission.return_route import deciding
+from gcsplan.notes.note import Note
 
 __all__ = ["judging", "reading_parameters"]
 
@@ -32,13 +33,13 @@ _LOOK_S = 0.02
 
 def reading_parameters(
     channel: Channel, task: Task, state: VehicleState, watch: Watch, recheck: Recheck
-) -> Steps[tuple[list[str], OnBoard]]:
+) -> Steps[tuple[list[Note], OnBoard]]:
     """Read the parameters on board; return warnings about those that do not fit the list, and the values read.
 
     Those that the judge needs are asked for until the timeout.
     """
     options, mission = task.options, task.mission
-    warnings: list[str] = []
+    warnings: list[Note] = []
     values = OnBoard()
     if mission and options.read_parameters:
         terrain = TERRAIN_GROUPS if flies_terrain(task.items) else ()

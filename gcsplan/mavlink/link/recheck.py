@@ -27,8 +27,9 @@ from gcsplan.mavlink.link.watch import FRESH_S, VehicleState, Watch
 from gcsplan.mavlink.protocol.machine import Wait
 from gcsplan.mavlink.protocol.messages import MissionMessage, Request
 from gcsplan.mavlink.protocol.outcome import Changed, Outcome, Unknown
+from gcsplan.notes.note import Note
 
-Judge = Callable[[VehicleState], tuple[Reasons, list[str]]]
+Judge = Callable[[VehicleState], tuple[Reasons, list[Note]]]
 
 LOOK_S = 10.0
 """Seconds that a look waits for a vehicle that has fallen silent."""

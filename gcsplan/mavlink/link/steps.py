@@ -149,7 +149,7 @@ def dead_link(link: Link, sysid: int, timeout_s: float) -> LinkError:
             "restart the vehicle, or send from that program's port (udpout:HOST:PORT,LOCAL)"
         )
     if link.note:
-        hints.append(link.note)
+        hints.append(str(link.note))
     how = link.endpoint.understood() + (f" from port {link.place.rsplit(':', 1)[-1]}" if sends else "")
     return LinkError(
         f"no heartbeat of system {sysid} within {timeout_s:g} s ({how}); {'; '.join(hints)}",

@@ -42,6 +42,7 @@ from gcsplan.mavlink.protocol.transfer import (
     Settled,
     VerifiedUpload,
 )
+from gcsplan.notes.note import Note
 
 # Longest list that is read. ArduPilot: 64 KB of missions on an SD card (BRD_SD_MISSION) at 15 bytes per item.
 _MOST_HELD = {ARDUPILOTMEGA: 4369, MAV_PX4: 2000}
@@ -107,10 +108,10 @@ def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
         seen = yield from recheck.last_look()
         changed = seen if isinstance(seen, Changed) else None
         if seen is not None and changed is None:
-            warnings.append(f"after the read-back: {seen}")
+            warnings.append(Note("changed_after_read_back", outcome=str(seen)))
     after = watch.state(clock())
     if after and after.armed and not state.armed:
-        warnings.append("the vehicle was armed by somebody during the upload")
+        warnings.append(Note("armed_during_upload"))
     ended_s = clock() - started
     result = yield from result_of(
         task, channel, settled, ended_s, warnings, watch.texts_since(said_before), values, recheck
@@ -119,7 +120,7 @@ def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
     return replace(result, changed=changed.reason, change=changed.why) if changed else result
 
 
-def _of_link(channel: Channel) -> list[str]:
+def _of_link(channel: Channel) -> list[Note]:
     return [channel.link.note] if channel.link.note else []
 
 
@@ -245,7 +246,7 @@ def clearing(
 
 def _against_clearing(
     options: SessionOptions, same: VehicleState | None, state: VehicleState
-) -> tuple[Reasons, list[str]]:
+) -> tuple[Reasons, list[Note]]:
     against, warnings = _ambiguous(state)
     if state.armed and not options.allow_armed:
         against.append(("armed", "the vehicle is armed: disarm it, or allow it with --allow-armed"))
@@ -257,7 +258,7 @@ def _against_clearing(
     return against, warnings
 
 
-def _ambiguous(state: VehicleState) -> tuple[Reasons, list[str]]:
+def _ambiguous(state: VehicleState) -> tuple[Reasons, list[Note]]:
     return ([("ambiguous", rivals_words(state))] if state.sources > 1 else []), []
 
 
@@ -272,7 +273,7 @@ def result_of(
     channel: Channel,
     settled: Settled,
     seconds: float,
-    warnings: list[str],
+    warnings: list[Note],
     texts: tuple[str, ...],
     values: OnBoard,
     recheck: Recheck,

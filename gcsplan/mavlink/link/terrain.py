@@ -22,6 +22,7 @@ from gcsplan.errors import GcsplanError, VehicleRefused
 from gcsplan.mavlink.link.link import Channel, Heard, Steps
 from gcsplan.mavlink.mission.mission import TERRAIN, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
+from gcsplan.notes.note import Note
 from gcsplan.world.terrain_grid import (
     ALL_PARTS,
     NEAR_ENOUGH_M,
@@ -60,19 +61,15 @@ class Served:
     problems: list[str] = field(default_factory=list)
 
     @property
-    def notes(self) -> list[str]:
+    def notes(self) -> list[Note]:
         """What a user should know."""
-        out = list(self.problems)
+        out = [Note("terrain_not_loaded", why=why) for why in self.problems]
         if self.unknown:
             parts = sum(self.unknown.values())
             first = min(self.unknown)
-            out.append(
-                f"{parts} parts of {len(self.unknown)} blocks that the vehicle asked for are not sent, because the "
-                f"terrain model does not know their ground (the first in {first.cell.name}): it asks for them again "
-                "and again, and does not arm a mission in the terrain frame before it has them; give a larger DEM"
-            )
+            out.append(Note("terrain_parts_not_sent", parts=parts, blocks=len(self.unknown), tile=first.cell.name))
         if self.strange:
-            out.append(f"{self.strange} requests for terrain were for no block of ArduPilot's grid")
+            out.append(Note("terrain_requests_strange", count=self.strange))
         return out
 
 
@@ -319,15 +316,15 @@ def terrain_error_m(values: Mapping[str, float], judged_m: float) -> float:
     return max(judged_m, shift_m) if math.isnan(off_m) else shift_m + off_m
 
 
-def odd_spacing(values: Mapping[str, float]) -> str:
-    """Why the spacing of the terrain posts on board is none that is judged, in words; empty if it is, or not read."""
+def odd_spacing(values: Mapping[str, float]) -> Note | None:
+    """That the spacing of the terrain posts on board is none that is judged; None if it is, or was not read."""
     spacing = values.get("TERRAIN_SPACING", float(SPACING_M))
     if LEAST_SPACING_M <= spacing <= MOST_SPACING_M:
-        return ""
-    return (
-        f"TERRAIN_SPACING is {spacing:g} on board, and {LEAST_SPACING_M} to {MOST_SPACING_M} m are judged: set "
-        f"TERRAIN_SPACING {SPACING_M}"
-    )
+        return None
+    return Note(
+        "terrain_spacing_not_judged", spacing_m=spacing, least_m=LEAST_SPACING_M, most_m=MOST_SPACING_M,
+        set_m=SPACING_M,
+    )  # fmt: skip
 
 
 def places_along(items: Sequence[MissionItem], count: int = PLACES) -> list[tuple[int, int]]:
@@ -353,7 +350,7 @@ def terrain_steps(
     values: Mapping[str, float],
     ground: Ground | None,
     note: Callable[[Heard, float], None],
-) -> Steps[tuple[list[str], dict[str, float]]]:
+) -> Steps[tuple[list[Note], dict[str, float]]]:
     """Serve a vehicle the terrain of a mission and compare what it then reads under it.
 
     Return warnings, and `OFF` if it read anything. Nothing is done without ``ground`` or items in the terrain frame.
@@ -362,7 +359,7 @@ def terrain_steps(
     if ground is None or not places:
         return [], {}
     if values.get("TERRAIN_ENABLE") == 0.0:
-        return ["TERRAIN_ENABLE is 0 on board: it knows no terrain and does not fly the terrain frame"], {}
+        return [Note("terrain_off_on_board")], {}
     if odd := odd_spacing(values):
         raise VehicleRefused(f"not sent: {odd}", where=f"vehicle {to.sysid}", reason="parameters")
     spacing = values.get("TERRAIN_SPACING", float(SPACING_M))
@@ -374,16 +371,10 @@ def terrain_steps(
     )  # fmt: skip
     warnings = list(service.served[channel.sysid].notes)
     if compared.read < len(places):
-        warnings.append(
-            f"the vehicle has no terrain yet at {len(places) - compared.read} of {len(places)} places under the "
-            "mission; it does not arm before it has: gcsplan terrain serve --until-loaded gives it all"
-        )
+        warnings.append(Note("terrain_incomplete_on_board", lacking=len(places) - compared.read, places=len(places)))
     if not compared.read:
         return warnings, {}
     if compared.worst_m > NEAR_ENOUGH_M and compared.worst_at is not None:
         lat, lon = compared.worst_at
-        warnings.append(
-            f"the vehicle reads terrain {compared.worst_m:.1f} m off that of the mission at {lat:.6f}, {lon:.6f}: it "
-            "holds terrain from elsewhere (remove it from its SD card), or shifted it when it was armed (restart it)"
-        )
+        warnings.append(Note("terrain_differs_on_board", off_m=compared.worst_m, lat_deg=lat, lon_deg=lon))
     return warnings, {OFF: compared.worst_m}

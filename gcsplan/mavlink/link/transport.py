@@ -18,6 +18,7 @@ from typing import Any, Protocol, cast
 
 from gcsplan.errors import LinkError
 from gcsplan.mavlink.link.url import Endpoint
+from gcsplan.notes.note import Note
 
 Peer = Hashable
 Heard = tuple[Peer, bytes]
@@ -116,7 +117,7 @@ class Udp:
     """
 
     datagrams = True
-    note = ""
+    note: Note | None = None
 
     def __init__(self, endpoint: Endpoint) -> None:
         family, address = _resolve(endpoint, socket.SOCK_DGRAM)
@@ -146,10 +147,8 @@ class Udp:
                 raise
             self._socket.bind((everywhere, 0))
             own = self._socket.getsockname()[1]
-            self.note = (
-                f"the link sends from port {own}, because a program uses {endpoint.sends_from} already: a PX4 that has "
-                f"heard that program answers it alone; end it, or give a port to send from ({endpoint.place} as "
-                f"udpout:HOST:PORT,LOCAL)"
+            self.note = Note(
+                "sends_from_another_port", port=own, wanted_port=endpoint.sends_from, endpoint=endpoint.place
             )
 
     @property

@@ -448,7 +448,7 @@ def test_a_vehicle_that_keeps_its_first_partner_hears_every_link_from_the_same_p
             link.poll()
             ports.add(peers[0].hear("HEARTBEAT")[1])
             assert link.place.endswith(f":{link.endpoint.sends_from}")
-            assert link.note == ""
+            assert link.note is None
     assert len(ports) == 1
 
 
@@ -459,10 +459,11 @@ def test_a_link_sends_from_the_port_that_was_given_and_from_a_free_one_if_that_i
         url = f"udpout:127.0.0.1:{peers[0].port},{own}"
         with Link(url) as link:
             assert not link.place.endswith(f":{own}")
-            assert f"because a program uses {own} already" in link.note
+            assert link.note is not None
+            assert (link.note.code, link.note.data["wanted_port"]) == ("sends_from_another_port", own)
     with Link(url) as link:
         assert link.place.endswith(f":{own}")
-        assert link.note == ""
+        assert link.note is None
 
 
 def test_a_connection_that_is_refused_is_told_with_the_other_direction() -> None:
