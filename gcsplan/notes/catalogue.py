@@ -11,6 +11,7 @@ from gcsplan.notes import (
     finding_texts,
     flight_texts,
     link_texts,
+    log_texts,
     mission_file_texts,
     return_texts,
     site_texts,
@@ -23,7 +24,7 @@ TEXTS: Mapping[str, str] = MappingProxyType({
     code: text
     for room in (
         battery_texts, site_texts, finding_texts, flight_texts, return_texts, turn_texts, mission_file_texts,
-        file_texts, link_texts, terrain_texts, zone_texts,
+        file_texts, link_texts, log_texts, terrain_texts, zone_texts,
     )
     for code, text in room.TEXTS.items()
 })  # fmt: skip
