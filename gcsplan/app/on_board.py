@@ -82,7 +82,7 @@ def _listed(
 
 def judge_on_board(
     job: UploadJob, *, allow_unjudged: bool, allow_parameters: bool = False, simulated: bool = False
-) -> session.Judge | None:
+) -> session.ReadBackJudge | None:
     """The check of the mission that was read back, since the vehicle will fly what it holds; None without a world.
 
     It is asked before the mission is sent too, with the vehicle's parameters: where it turns, how fast it flies, climbs

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from gcsplan.app.archive import Archive, Form, Shown
     from gcsplan.app.check_sites import Checked, Returns
     from gcsplan.app.checking import Batch
-    from gcsplan.mavlink.mission.return_route import Route
+    from gcsplan.mavlink.mission.return_route import ReturnRoute
     from gcsplan.mission_file.from_options import WorldOptions
     from gcsplan.mission_file.places import Degrees
     from gcsplan.units import Units
@@ -264,7 +264,7 @@ def _options(given: dict[str, object], at: str | None = None) -> WorldOptions:
     )
 
 
-def _route(given: object) -> Route | None:
+def _route(given: object) -> ReturnRoute | None:
     if given in (None, "straight", "mission"):
         return given
     raise UsageError(f"--return-route {given}: straight or mission is wanted")

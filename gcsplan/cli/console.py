@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from gcsplan.app.model import FleetPlan, Plan, VehiclePlan
     from gcsplan.app.upload_job import JobResult
     from gcsplan.check.rtl.verdict import WayHome
-    from gcsplan.mavlink.protocol.machine import Progress as Transfer
+    from gcsplan.mavlink.protocol.machine import TransferProgress as Transfer
     from gcsplan.mission_file import MissionFile
     from gcsplan.notes.note import Said
 

@@ -26,13 +26,13 @@ from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
 from gcsplan.world.cell import Cell
 from gcsplan.world.datum import VerticalDatum
-from gcsplan.world.frame import Frame
+from gcsplan.world.frame import Box, Frame
 from gcsplan.world.height_unit import BY_FORMAT, HeightUnit
 from gcsplan.world.input_files import sha256_of, tell_folder
 from gcsplan.world.mosaic import FIT_ERROR_M, Window
 from gcsplan.world.raster import MAX_CELLS, require_file
 from gcsplan.world.surface import GridMap
-from gcsplan.world.terrain import NO_MORE_VOIDS, Box, Terrain, TerrainSpec, place, require_metres, terrain_of
+from gcsplan.world.terrain import NO_MORE_VOIDS, Terrain, TerrainSpec, place, require_metres, terrain_of
 from gcsplan.world.terrain_grid import DEGREE_E7, METRES_OF_E7, STRIDE, TerrainGrid, cell_at, longitude_scale
 
 WHOLE_METRES = HeightUnit("whole metres", 1.0, BY_FORMAT)

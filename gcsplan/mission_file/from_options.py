@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from gcsplan.arrays import Floats
 from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError, Problem
-from gcsplan.mavlink.mission.return_route import Route
+from gcsplan.mavlink.mission.return_route import ReturnRoute
 from gcsplan.mission_file.airspace.left_out import faults_near, left_out_by_hours, unused_notes, used
 from gcsplan.mission_file.airspace.policy import Policy
 from gcsplan.mission_file.airspace.times import Hours, hours_of
@@ -25,13 +25,13 @@ from gcsplan.mission_file.complaints import read_section
 from gcsplan.mission_file.load import TERRAIN_ERROR_M
 from gcsplan.mission_file.schema import LimitKeys, TerrainKeys, VehicleKeys
 from gcsplan.mission_file.vehicles import make_vehicle
-from gcsplan.mission_file.world import Box, make_spec, settle_zones
+from gcsplan.mission_file.world import make_spec, settle_zones
 from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, one_line, place_zones, zone_notes, zones_sha256
 from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.frame import FARTHEST_M, Frame, centre_of
+from gcsplan.world.frame import FARTHEST_M, Box, Frame, centre_of
 from gcsplan.world.model_words import notes_on
 from gcsplan.world.terrain import OpenTerrain
 from gcsplan.world.world import World
@@ -66,14 +66,14 @@ class WorldOptions:
     vehicle: Mapping[str, object] = field(default_factory=dict)
     home: tuple[float, float] | None = None
     rtl_rel_home_m: float | None = None
-    return_route: Route | None = None
+    return_route: ReturnRoute | None = None
     terrain_error_m: float = TERRAIN_ERROR_M
     notes: tuple[Note, ...] = ()
     at: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Extent:
+class WorldExtent:
     """A part of the world: the middle of its plane (latitude, longitude), and a box in it, in metres."""
 
     centre_deg: tuple[float, float]
@@ -129,7 +129,7 @@ class OpenWorld:
         """The world of the `extent` of ``places``, and the description of its sources. Raises InputError."""
         return self.over(self.extent(places, reach_m))
 
-    def extent(self, places: ArrayLike, reach_m: float = 0.0) -> Extent:
+    def extent(self, places: ArrayLike, reach_m: float = 0.0) -> WorldExtent:
         """The part of the world that holds ``places`` (N, 2), latitude and longitude.
 
         ``reach_m`` is how far beyond them terrain is needed, in metres; `MARGIN_M` or a tenth of their extent, and the
@@ -153,9 +153,9 @@ class OpenWorld:
                 f"the places lie more than {FARTHEST_M / 1000:.0f} km from their middle: too far for one plane",
                 where="--dem",
             )
-        return Extent((frame.lat_deg, frame.lon_deg), self._box(in_plane, reach_m))
+        return WorldExtent((frame.lat_deg, frame.lon_deg), self._box(in_plane, reach_m))
 
-    def over(self, extent: Extent) -> tuple[World, dict[str, object]]:
+    def over(self, extent: WorldExtent) -> tuple[World, dict[str, object]]:
         """The world of an extent, and the description of its sources. Raises InputError."""
         assert self._terrain is not None
         frame, box = Frame(*extent.centre_deg), extent.box

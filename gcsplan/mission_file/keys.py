@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 FAR_M = 1e6
 """Largest number of metres that a key takes, so that slips are found."""
 
-Metres = Annotated[float, Field(ge=-FAR_M, le=FAR_M)]
+FiniteMetres = Annotated[float, Field(ge=-FAR_M, le=FAR_M)]
 Length = Annotated[float, Field(ge=0.0, le=FAR_M)]
 
 

@@ -15,18 +15,18 @@ from functools import partial
 from typing import Any, get_args
 
 from gcsplan.errors import InputError, Problem
+from gcsplan.mavlink.mission.mission import AltitudeFrame
 from gcsplan.mission_file.airspace.left_out import faults_near, left_out_by_hours, unused_notes, used
 from gcsplan.mission_file.airspace.times import Hours, hours_of, texts_of
 from gcsplan.mission_file.complaints import MOST_TOLD, few, read_section, told_once, unknown_keys, with_lines
 from gcsplan.mission_file.content import read_content
-from gcsplan.mission_file.ground import Ground, Site, known_in_plane, opened
+from gcsplan.mission_file.ground import GroundWindow, MissionPlane, known_in_plane, opened
 from gcsplan.mission_file.request import (
-    AltitudeFrame,
     ArrivalRequest,
     Content,
     MissionFile,
     PlannerRequest,
-    ReturnRule,
+    ReturnRequirement,
     VehicleRequest,
 )
 from gcsplan.mission_file.schema import (
@@ -130,16 +130,16 @@ def load_mission(
 
 def load_content(content: Content) -> MissionFile:
     """Read a mission again from what it was read from before. Raises InputError."""
-    return _Reading(content).mission()
+    return _MissionReading(content).mission()
 
 
 def read_no_fly(source: str | os.PathLike[str], at: Sequence[str] | None = None) -> tuple[list[ZoneDraft], list[Note]]:
     """All zones of a mission file, used or not, and the notes on them, whatever else is wrong. Raises InputError."""
     file, where, raw, written = read_content(source, None)
-    return _Reading(Content(file, where, raw, written, at=texts_of(at))).zones_alone()
+    return _MissionReading(Content(file, where, raw, written, at=texts_of(at))).zones_alone()
 
 
-class _Reading:
+class _MissionReading:
     """One pass over one file: the steps in order, and the problems found so far."""
 
     def __init__(self, content: Content) -> None:
@@ -162,7 +162,7 @@ class _Reading:
         name = self._name()
         altitude_frame: AltitudeFrame = self._choice("altitude_frame", get_args(AltitudeFrame), "relative")
         terrain_error_m = self._terrain_error(altitude_frame)
-        way_home: ReturnRule = self._choice("way_home", get_args(ReturnRule), "reported")
+        way_home: ReturnRequirement = self._choice("way_home", get_args(ReturnRequirement), "reported")
         frame_keys = self._section(FrameKeys, "frame")
         terrain_keys = self._section(TerrainKeys, "terrain")
         if frame_keys is not None:
@@ -184,8 +184,8 @@ class _Reading:
         frame: Frame | None = None
         if places and (frame_keys is not None or not self.local):
             frame = make_frame(places, frame_keys, problems, self.where)
-        site: Site | None = None
-        ground: Ground | None = None
+        site: MissionPlane | None = None
+        ground: GroundWindow | None = None
         if frame is not None and terrain is not None:
             placed, far = place_zones(drafts, frame)
             self._far(far, frame)
@@ -196,7 +196,7 @@ class _Reading:
             if here is not None:
                 problems += faults_near(placed, box)
                 self.notes += unused_notes(published, frame, box)
-                site = Site(here, frame, box, placed, terminals, set(places), self.local)
+                site = MissionPlane(here, frame, box, placed, terminals, set(places), self.local)
                 ground = site.load(problems)
         if problems or frame is None or site is None or ground is None:
             raise self._refusal(problems)

@@ -93,11 +93,11 @@ def text_of(draft: Draft, file: str, name: str) -> str:
     return "\n".join(part.rstrip("\n") if part else part for part in parts) + "\n"
 
 
-Row = tuple[type[Keys], str, str, bool]
+KeyRow = tuple[type[Keys], str, str, bool]
 """Section, key, value, and whether the choice is made."""
 
 
-def _terrain(draft: Draft) -> Iterator[Row]:
+def _terrain(draft: Draft) -> Iterator[KeyRow]:
     dem = ", ".join(_word(d) for d in draft.dem)
     if draft.dem:
         yield TerrainKeys, "dem", dem if len(draft.dem) == 1 else f"[{dem}]", True
@@ -111,7 +111,7 @@ def _terrain(draft: Draft) -> Iterator[Row]:
     yield TerrainKeys, "obstacle_height_m", "0", True
 
 
-def _limits(draft: Draft) -> Iterator[Row]:
+def _limits(draft: Draft) -> Iterator[KeyRow]:
     wing = draft.autopilot is Autopilot.ARDUPLANE
     yield LimitKeys, "min_agl_m", f"{draft.min_agl_m:g}", True
     yield LimitKeys, "max_agl_m", f"{2.0 * draft.min_agl_m:g}", False
@@ -122,7 +122,7 @@ def _limits(draft: Draft) -> Iterator[Row]:
     yield LimitKeys, "max_climb_deg", "8" if wing else "15", True
 
 
-def _vehicle(draft: Draft) -> Iterator[Row]:
+def _vehicle(draft: Draft) -> Iterator[KeyRow]:
     wing = draft.autopilot is Autopilot.ARDUPLANE
     yield VehicleKeys, "name", f"uav{draft.sysid}", True
     yield VehicleKeys, "sysid", str(draft.sysid), True
@@ -152,12 +152,12 @@ def _vehicle(draft: Draft) -> Iterator[Row]:
     yield VehicleKeys, "energy", f"{{{values}, battery_wh: 400, reserve: 0.2}}", False
 
 
-def _planner() -> Iterator[Row]:
+def _planner() -> Iterator[KeyRow]:
     for key, value in (("name", "optimal"), ("objective", "length"), ("seed", "1"), ("budget_s", "10")):
         yield PlannerKeys, key, value, True
 
 
-def _section(key: str, rows: Iterator[Row], *, dash: bool = False) -> Iterator[str]:
+def _section(key: str, rows: Iterator[KeyRow], *, dash: bool = False) -> Iterator[str]:
     """A section with its keys; with ``dash`` it is the one entry of a list."""
     yield ""
     yield f"# {describe(MissionKeys, key)}"

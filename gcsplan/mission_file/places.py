@@ -86,8 +86,8 @@ def read_place(text: str) -> Degrees:
         lat_deg, lon_deg = _read_degrees(plain)
         fault = range_fault(lat_deg, lon_deg)
         if fault:
-            raise grids.Refused(fault)
-    except grids.Refused as why:
+            raise grids.NotAPlace(fault)
+    except grids.NotAPlace as why:
         example = grids.EXAMPLES.get(kind, EXAMPLES[2] if "°" in plain or "'" in plain else EXAMPLES[0])
         cure = f"; for example `{example}`" if why.needs_example else ""
         raise ValueError(f"{text!r} is read as {kind}: {why}{cure}") from None
@@ -101,16 +101,16 @@ def read_angle(value: Any, letters: str) -> Any:
     name, example = ("latitude", "47°23'49.5\"N") if letters == LAT_LETTERS else ("longitude", "8°20'38.5\"E")
     try:
         if len(value) > MAX_CHARS:
-            raise grids.Refused(f"it has {len(value)} characters, more than {MAX_CHARS}")
+            raise grids.NotAPlace(f"it has {len(value)} characters, more than {MAX_CHARS}")
         plain = _abbreviated(_plain(value))
         before, after = _ONE_BEFORE.fullmatch(plain), _ONE_AFTER.fullmatch(plain)
         if before is None and after is None:
             return _angle(plain, "").deg
         letter, angle = before.groups() if before is not None else after.groups()[::-1]  # type: ignore[union-attr]
         if letter not in letters:
-            raise grids.Refused(f"{letter} is no letter of a {name} ({letters[0]} or {letters[1]})")
+            raise grids.NotAPlace(f"{letter} is no letter of a {name} ({letters[0]} or {letters[1]})")
         return _angle(angle, letter).deg
-    except grids.Refused as why:
+    except grids.NotAPlace as why:
         raise ValueError(f"{value[:MAX_CHARS]!r} is read as a {name}: {why}; for example `{example}`") from None
 
 
@@ -162,21 +162,23 @@ def _read_degrees(plain: str) -> tuple[float, float]:
     text = _abbreviated(plain)
     other = re.search(r"[^-+0-9NSEW°'\":.,;/ ]+", text)
     if other:
-        raise grids.Refused(f"{other[0][:20]!r} is no part of it")
+        raise grids.NotAPlace(f"{other[0][:20]!r} is no part of it")
     found = re.findall("[NSEW]", text)
     if not found:
         first, second = (_angle(part, "") for part in _halves(text))
         if first.minutes != second.minutes:  # `47,39 8` is meant with a decimal comma
-            raise grids.Refused("one angle has minutes and the other one has not")
+            raise grids.NotAPlace("one angle has minutes and the other one has not")
         return first.deg, second.deg
     before, after = _BEFORE.fullmatch(text), _AFTER.fullmatch(text)
     if len(found) == 1 and (_ONE_BEFORE.fullmatch(text) or _ONE_AFTER.fullmatch(text)) and "," not in text:
         missing, there = ("longitude", "latitude") if found[0] in LAT_LETTERS else ("latitude", "longitude")
-        raise grids.Refused(f"it is a {there} alone; the {missing} is missing")
+        raise grids.NotAPlace(f"it is a {there} alone; the {missing} is missing")
     if len(found) != 2 or (before is None and after is None):
-        raise grids.Refused("both angles have a letter (N or S, E or W), before them or after them, or neither has one")
+        raise grids.NotAPlace(
+            "both angles have a letter (N or S, E or W), before them or after them, or neither has one"
+        )
     if sum(letter in LAT_LETTERS for letter in found) != 1:
-        raise grids.Refused(f"one letter is N or S and the other one E or W, given {found[0]} and {found[1]}")
+        raise grids.NotAPlace(f"one letter is N or S and the other one E or W, given {found[0]} and {found[1]}")
     if before is not None:
         one, angle, two, other_angle = before.groups()
     else:
@@ -186,7 +188,7 @@ def _read_degrees(plain: str) -> tuple[float, float]:
     lat, lon = (one, two) if one in LAT_LETTERS else (two, one)
     for name, letter, most in (("latitude", lat, 90), ("longitude", lon, 180)):
         if abs(degrees[letter]) > most:  # the letters say which is which, so nothing is swapped
-            raise grids.Refused(f"a {name} is at most {most}°, given {abs(degrees[letter]):.10g}° {letter}")
+            raise grids.NotAPlace(f"a {name} is at most {most}°, given {abs(degrees[letter]):.10g}° {letter}")
     return degrees[lat], degrees[lon]
 
 
@@ -198,10 +200,10 @@ def _halves(text: str) -> list[str]:
     if len(parts) == 2:
         return parts
     if "," in text and "." not in text and len(parts) > 1:
-        raise grids.Refused("a comma parts latitude and longitude; the decimals begin with a point")
+        raise grids.NotAPlace("a comma parts latitude and longitude; the decimals begin with a point")
     if len(parts) == 3:
-        raise grids.Refused("it has a third part; a height stands as agl_m beside lat and lon, or beside at")
-    raise grids.Refused("a latitude and a longitude are wanted, with a comma between them")
+        raise grids.NotAPlace("it has a third part; a height stands as agl_m beside lat and lon, or beside at")
+    raise grids.NotAPlace("a latitude and a longitude are wanted, with a comma between them")
 
 
 def _angle(text: str, letter: str) -> _Angle:
@@ -209,16 +211,16 @@ def _angle(text: str, letter: str) -> _Angle:
     match = _ANGLE.fullmatch(text.strip())
     if match is None:
         comma = "; decimals begin with a point" if re.search(r"\d,\d", text) else ""
-        raise grids.Refused(f"{text.strip()[:40]!r} is no angle{comma}")
+        raise grids.NotAPlace(f"{text.strip()[:40]!r} is no angle{comma}")
     sign, whole = match["sign"], match["deg"]
     minutes, seconds = (match[f"{k}1"] or match[f"{k}2"] or match[f"{k}3"] for k in "ms")
     if sign and letter:
-        raise grids.Refused(f"{sign} and {letter} both say the hemisphere; keep one")
+        raise grids.NotAPlace(f"{sign} and {letter} both say the hemisphere; keep one")
     for upper, lower, name in ((whole, minutes, "minutes"), (minutes, seconds, "seconds")):
         if lower is not None and "." in upper:
-            raise grids.Refused(f"{upper} has decimals, and {lower} {name} follow it")
+            raise grids.NotAPlace(f"{upper} has decimals, and {lower} {name} follow it")
         if lower is not None and not Fraction(lower) < 60:
-            raise grids.Refused(f"{name} are below 60, given {lower}")
+            raise grids.NotAPlace(f"{name} are below 60, given {lower}")
     degrees = Fraction(whole) + Fraction(minutes or 0) / 60 + Fraction(seconds or 0) / 3600
     value = float(degrees)
     return _Angle(-value if value and (sign == "-" or letter in ("S", "W")) else value, minutes is not None)

@@ -27,13 +27,11 @@ from gcsplan.mission_file.zone_draft import (
 )
 from gcsplan.notes.note import Note
 from gcsplan.world.degree_shapes import MOST_LON_DEG
-from gcsplan.world.frame import FARTHEST_M, Frame, centre_of
+from gcsplan.world.frame import FARTHEST_M, Box, Frame, centre_of
 from gcsplan.world.peaks import Peak
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import OpenTerrain, TerrainSpec
 from gcsplan.world.zones import Circle, Level, Zone
-
-Box = tuple[float, float, float, float]
 
 MARGIN_M, MARGIN_PART, MARGIN_MOST_M = 3000.0, 1.0, 25_000.0
 """Margin for detours: the first, m, or this part of the points' extent if larger, up to the third, m."""
@@ -47,7 +45,7 @@ _MANY_NODES = 250_000
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class MissionPlace:
     """A point as written: in degrees, or in metres of the local frame with a height above its zero or the ground."""
 
     where: str
@@ -76,18 +74,18 @@ class Place:
 def make_place(
     point: Degrees | LocalPoint, where: str, problems: list[Problem], notes: list[Note], *, local: bool,
     most_lon_deg: float = 180.0,
-) -> Place | None:  # fmt: skip
+) -> MissionPlace | None:  # fmt: skip
     """A point of the file; None, and ``problems``, if it cannot be a place."""
     if isinstance(point, LocalPoint):
         if not local:
             problems.append(Problem(where, "local metres need `frame: {origin: [lat, lon], amsl_m: …}` in the mission"))
             return None
-        return Place(where, None, (point.east_m, point.north_m), point.up_m, point.agl_m)
+        return MissionPlace(where, None, (point.east_m, point.north_m), point.up_m, point.agl_m)
     degrees = (point.lat_deg, point.lon_deg)
     if not check_degrees(degrees, where, problems, most_lon_deg):
         return None
     notes += place_notes(point, where)
-    return Place(where, degrees, agl_m=point.agl_m)
+    return MissionPlace(where, degrees, agl_m=point.agl_m)
 
 
 def place_notes(point: Degrees, where: str) -> list[Note]:
@@ -114,7 +112,7 @@ def make_spec(keys: TerrainKeys, folder: Path) -> TerrainSpec:
     )
 
 
-def covered(places: Sequence[Place], terrain: OpenTerrain, problems: list[Problem]) -> list[Place]:
+def covered(places: Sequence[MissionPlace], terrain: OpenTerrain, problems: list[Problem]) -> list[MissionPlace]:
     """The places that the DEM covers; the others go to ``problems``, with a guess at swapped numbers."""
     good = []
     for place in places:
@@ -132,7 +130,9 @@ def covered(places: Sequence[Place], terrain: OpenTerrain, problems: list[Proble
     return good
 
 
-def make_frame(places: Sequence[Place], keys: FrameKeys | None, problems: list[Problem], where: str) -> Frame | None:
+def make_frame(
+    places: Sequence[MissionPlace], keys: FrameKeys | None, problems: list[Problem], where: str
+) -> Frame | None:
     """The mission's plane; None, and ``problems``, if the points are too far apart for one plane."""
     try:
         if keys is not None:
@@ -154,7 +154,7 @@ def make_frame(places: Sequence[Place], keys: FrameKeys | None, problems: list[P
     return None
 
 
-def _slip(place: Place, places: Sequence[Place]) -> str:
+def _slip(place: MissionPlace, places: Sequence[MissionPlace]) -> str:
     """The slip of the pen that sets one place far from the others, or an empty text."""
     others = [p.degrees for p in places if p is not place and p.degrees is not None]
     if place.degrees is None or not others:

@@ -120,7 +120,7 @@ class Attribute:
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class ZoneStatements:
     """What the attributes of one zone say."""
 
     name: str
@@ -132,7 +132,7 @@ class Said:
     buffer_m: float | None = None
 
 
-def read_attributes(given: Sequence[Attribute], name: str, problems: list[Problem]) -> Said | None:
+def read_attributes(given: Sequence[Attribute], name: str, problems: list[Problem]) -> ZoneStatements | None:
     """What the attributes say; ``name`` is for a zone without one. None, and ``problems``, if they cannot be read."""
     known: list[Attribute] = []
     ignored: list[Attribute] = []
@@ -147,7 +147,7 @@ def read_attributes(given: Sequence[Attribute], name: str, problems: list[Proble
             times.append(a)
         elif meaning.seems_a_limit or _reads_as_level(a.value):
             ignored.append(a)
-    reading = _Reading(_name(known) or name, problems)
+    reading = _ZoneReading(_name(known) or name, problems)
     before = len(problems)
     radius_m, buffer_m = (reading.size_m([a for a in known if a.meaning.lower == size]) for size in SIZES)
     bounds = reading.bounds(known)
@@ -157,7 +157,7 @@ def read_attributes(given: Sequence[Attribute], name: str, problems: list[Proble
             reading.remarks.append((note, (*map(str, some[:MOST_SHOWN]), *more)))
     if len(problems) > before:
         return None
-    return Said(reading.name, radius_m, bounds, tuple(reading.remarks), reading.of_levels, buffer_m)
+    return ZoneStatements(reading.name, radius_m, bounds, tuple(reading.remarks), reading.of_levels, buffer_m)
 
 
 def level_read(given: object, bound: str, level: Level) -> Note:
@@ -200,7 +200,7 @@ def _reads_as_level(value: Any) -> bool:
 
 
 @dataclass
-class _Reading:
+class _ZoneReading:
     """One zone while its attributes are read."""
 
     name: str

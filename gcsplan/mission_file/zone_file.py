@@ -15,16 +15,15 @@ from pathlib import Path
 from typing import Literal
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file.zone_attributes import Said
+from gcsplan.mission_file.zone_attributes import ZoneStatements
 from gcsplan.mission_file.zone_draft import Remark, ZoneDraft, circle, corridor, polygon
 from gcsplan.notes.note import Note
+from gcsplan.world.degree_shapes import Corner
 from gcsplan.world.zones import Level
 
 MAX_ZONES = 20_000
 RADIUS_OF_POLYGON = Note("zone_radius_of_polygon_unread")
 BUFFER_OF_POLYGON = Note("zone_buffer_of_polygon_unread")
-
-Point = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,8 +95,8 @@ class ZoneFile:
         self.unsized = []
 
     def add_ring(
-        self, said: Said, part: str, where: str, ring: list[tuple[float, float]], key: str, drawn: Drawn = NOT_DRAWN,
-        holes: int = 0,
+        self, said: ZoneStatements, part: str, where: str, ring: list[tuple[float, float]], key: str,
+        drawn: Drawn = NOT_DRAWN, holes: int = 0,
     ) -> None:  # fmt: skip
         """Add a polygon called ``part`` by its outline, (latitude, longitude), and the number of its holes."""
         self.holes += holes
@@ -110,13 +109,15 @@ class ZoneFile:
                 remarks.append((note, Note("size_of_zone", size_m=size_m)))
         self.add(polygon(part[:200], where, ring, bounds, self.problems, key=key, holes=holes), remarks)
 
-    def add_circle(self, said: Said, part: str, where: str, centre: Point, remarks: Sequence[Remark] = ()) -> None:
+    def add_circle(
+        self, said: ZoneStatements, part: str, where: str, centre: Corner, remarks: Sequence[Remark] = ()
+    ) -> None:
         """Add a circle called ``part`` by its centre, (latitude, longitude); its radius may come from the mission."""
         make = partial(circle, part[:200], where, centre, bounds=said.bounds, problems=self.problems)
         self._add_sized("point", said.radius_m, lambda size_m: make(radius_m=size_m), where, [*said.remarks, *remarks])
 
     def add_line(
-        self, said: Said, part: str, where: str, line: list[Point], key: str, remarks: Sequence[Remark] = ()
+        self, said: ZoneStatements, part: str, where: str, line: list[Corner], key: str, remarks: Sequence[Remark] = ()
     ) -> None:
         """Add the corridor around a line, (latitude, longitude); its half-width may come from the mission."""
         make = partial(corridor, part[:200], where, line, bounds=said.bounds, problems=self.problems, key=key)

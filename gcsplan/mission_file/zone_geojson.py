@@ -8,7 +8,7 @@ from typing import Any
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.export.geojson import GENERATOR
-from gcsplan.mission_file.zone_attributes import Attribute, Said, is_number, read_attributes, shown
+from gcsplan.mission_file.zone_attributes import Attribute, ZoneStatements, is_number, read_attributes, shown
 from gcsplan.mission_file.zone_draft import SIZES
 from gcsplan.mission_file.zone_file import Drawn, ZoneFile, drawn_unread
 from gcsplan.notes.note import Note
@@ -129,7 +129,7 @@ def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
         )
 
 
-def _parts(found: ZoneFile, coordinates: Any, said: Said, at: str, kind: str) -> list[tuple[Any, str, str]]:
+def _parts(found: ZoneFile, coordinates: Any, said: ZoneStatements, at: str, kind: str) -> list[tuple[Any, str, str]]:
     """The parts of a geometry, each with its name and place; one part unless the kind begins with Multi."""
     several = kind.startswith("Multi")
     parts = coordinates if several else [coordinates]
@@ -154,7 +154,7 @@ def _unread(positions: list[Any]) -> Drawn:
     return drawn_unread([p[2] for p in positions if len(p) > 2 and is_number(p[2]) and p[2] != 0])
 
 
-def _rings(found: ZoneFile, rings: Any, said: Said, part: str, where: str, at: str) -> None:
+def _rings(found: ZoneFile, rings: Any, said: ZoneStatements, part: str, where: str, at: str) -> None:
     if not isinstance(rings, list) or not rings or not isinstance(rings[0], list):
         found.problems.append(Problem(at, f"a polygon is a list of rings, given {shown(rings)}"))
         return
@@ -167,7 +167,7 @@ def _rings(found: ZoneFile, rings: Any, said: Said, part: str, where: str, at: s
                        holes=len(rings) - 1)  # fmt: skip
 
 
-def _line(found: ZoneFile, positions: Any, said: Said, part: str, where: str, at: str) -> None:
+def _line(found: ZoneFile, positions: Any, said: ZoneStatements, part: str, where: str, at: str) -> None:
     if not isinstance(positions, list):
         found.problems.append(Problem(at, f"a line is a list of positions, given {shown(positions)}"))
         return

@@ -18,7 +18,7 @@ from defusedxml.common import DefusedXmlException
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.figures import counted
-from gcsplan.mission_file.zone_attributes import Attribute, Said, as_figure, read_attributes
+from gcsplan.mission_file.zone_attributes import Attribute, ZoneStatements, as_figure, read_attributes
 from gcsplan.mission_file.zone_draft import SIZES
 from gcsplan.mission_file.zone_file import NOT_DRAWN, Drawn, ZoneFile
 from gcsplan.mission_file.zone_levels import LARGEST_M
@@ -33,7 +33,7 @@ MOST_TAGS = 2_000_000
 MODES: dict[str, Literal["agl", "amsl"]] = {"relativeToGround": "agl", "absolute": "amsl"}
 """What altitudes are counted from, by the altitudeModes in which they count at all."""
 
-Corner = tuple[float, float, float]
+DrawnCorner = tuple[float, float, float]
 """Latitude, longitude and altitude of a corner; not a number if it has no altitude."""
 
 _PICTURES = ("PhotoOverlay", "ScreenOverlay", "Tour")
@@ -132,7 +132,7 @@ def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
             _polygon(found, shape, said, part, where)
 
 
-def _polygon(found: ZoneFile, shape: Any, said: Said, part: str, where: str) -> None:
+def _polygon(found: ZoneFile, shape: Any, said: ZoneStatements, part: str, where: str) -> None:
     outer = [e for e in _walk(shape, found.path) if _kind(e) == "outerBoundaryIs"]
     if len(outer) != 1:
         found.problems.append(Problem(where, f"a Polygon has one outerBoundaryIs, given {len(outer)}"))
@@ -148,7 +148,7 @@ def _polygon(found: ZoneFile, shape: Any, said: Said, part: str, where: str) -> 
         found.add_ring(said, part, where, [p[:2] for p in points], "", drawn, len(inner))
 
 
-def _drawn(shape: Any, points: list[Corner]) -> Drawn:
+def _drawn(shape: Any, points: list[DrawnCorner]) -> Drawn:
     """The ceiling of a polygon that is drawn down to the ground: its highest corner, so that it is not made lower.
 
     Altitudes of 0 are what programs write that draw flat outlines, and are no ceiling.
@@ -172,7 +172,7 @@ def _drawn(shape: Any, points: list[Corner]) -> Drawn:
     return Drawn(ceiling, ((Note("zone_ceiling_as_drawn"), height),))
 
 
-def _unread(points: list[Corner], mode: str = "") -> Drawn:
+def _unread(points: list[DrawnCorner], mode: str = "") -> Drawn:
     heights = [p[2] for p in points if math.isfinite(p[2]) and p[2] != 0.0]
     if not heights:
         return NOT_DRAWN
@@ -181,7 +181,7 @@ def _unread(points: list[Corner], mode: str = "") -> Drawn:
     return Drawn(remarks=((Note("zone_drawn_altitudes_unread"), up_to),))
 
 
-def _coordinates(found: ZoneFile, parent: Any, where: str) -> list[Corner] | None:
+def _coordinates(found: ZoneFile, parent: Any, where: str) -> list[DrawnCorner] | None:
     """Each ``lon,lat[,alt]`` below ``parent``; None, and a problem, if one is wrong."""
     text = " ".join(e.text or "" for e in _walk(parent, found.path) if _kind(e) == "coordinates")
     points = []

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file.zone_attributes import Attribute, Said, as_figure, read_attributes
+from gcsplan.mission_file.zone_attributes import Attribute, ZoneStatements, as_figure, read_attributes
 from gcsplan.mission_file.zone_draft import MAX_VERTICES, SIZES
 from gcsplan.mission_file.zone_file import MAX_ZONES, Drawn, ZoneFile, drawn_unread
 from gcsplan.mission_file.zone_zip import unpack
@@ -166,7 +166,9 @@ def _attributes(row: Mapping[str, Any], where: str) -> list[Attribute]:
     return given
 
 
-def _feature(found: ZoneFile, geometry: shapely.Geometry | None, said: Said, where: str, to_degrees: ToDegrees) -> None:
+def _feature(
+    found: ZoneFile, geometry: shapely.Geometry | None, said: ZoneStatements, where: str, to_degrees: ToDegrees
+) -> None:
     """Add every part of a feature's geometry."""
     parts = [] if geometry is None else _parts(geometry)
     if not parts:

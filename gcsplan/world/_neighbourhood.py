@@ -30,7 +30,7 @@ TALL, WIDE, WIDER = 64, 1024, 4
 of the reach around them, in cells."""
 
 
-class Lines:
+class LineBatch:
     """Lines of the plane from ``start`` to ``end`` (N, 2 or more), and the tiles of a surface that they meet: found
     once, whatever the number of reaches for which these are examined."""
 
@@ -83,7 +83,7 @@ class Neighbourhood:
         """Pickle the inputs only: a copy in another process examines its tiles anew."""
         return Neighbourhood, (self._grid, self._field, self._heights, self._reach_m)
 
-    def along(self, lines: Lines) -> Held:
+    def along(self, lines: LineBatch) -> Held:
         """The extrema in the kernels' form, examined along lines."""
         if self._seen.size and not self._seen.all():
             tiles = lines.tiles(self._grid, self._field, self._seen.shape)

@@ -44,7 +44,7 @@ _LIKE_MGRS = re.compile(
 _MGRS = re.compile(r"(?:MGRS:? ?)?(\d{1,2}) ?([A-Z]) ?([A-Z])([A-Z])((?: ?\d+)*)")
 
 
-class Refused(Exception):
+class NotAPlace(Exception):
     """Why a text is no place in its format; ``needs_example`` unless the words show what to write."""
 
     def __init__(self, words: str, *, needs_example: bool = True) -> None:
@@ -52,7 +52,7 @@ class Refused(Exception):
         self.needs_example = needs_example
 
 
-class Found(NamedTuple):
+class GridPlace(NamedTuple):
     """A place in degrees, and a note on how it was read."""
 
     lat_deg: float
@@ -60,7 +60,7 @@ class Found(NamedTuple):
     note: Note | None = None
 
 
-def read_utm(plain: str) -> Found | None:
+def read_utm(plain: str) -> GridPlace | None:
     """The place of ``32T 473123 5249321``; None if the text is not like UTM. Raises Refused.
 
     The letter is a band of latitude; N and the words NORTH and SOUTH are hemispheres, which for N is no difference. S
@@ -70,7 +70,7 @@ def read_utm(plain: str) -> Found | None:
     if not _LIKE_UTM.match(plain):
         return None
     if match is None:
-        raise Refused("zone, band or hemisphere, easting and northing are wanted")
+        raise NotAPlace("zone, band or hemisphere, easting and northing are wanted")
     zone, letter = _zone(match[1]), match[2]
     easting_m, northing_m = float(match[3]), float(match[4])
     _check_metres(easting_m, northing_m)
@@ -79,45 +79,45 @@ def read_utm(plain: str) -> Found | None:
     if letter in ("N", "NORTH", "SOUTH"):
         found = to_degrees(zone, easting_m, northing_m, south=letter == "SOUTH")
         if not -80.0 - EDGE_DEG <= found.lat_deg <= 84.0 + EDGE_DEG:
-            raise Refused(f"UTM reaches from 80° S to 84° N, and this is at {found.lat_deg:.4f}°; write lat, lon")
+            raise NotAPlace(f"UTM reaches from 80° S to 84° N, and this is at {found.lat_deg:.4f}°; write lat, lon")
         return found
     low, high = band_deg(letter)
     found = to_degrees(zone, easting_m, northing_m, south=low < 0.0)
     if not low - EDGE_DEG <= found.lat_deg <= high + EDGE_DEG:
-        raise Refused(
+        raise NotAPlace(
             f"the northing {match[4]} is at {found.lat_deg:.4f}°, outside band {letter} ({low:g}° to {high:g}°)"
         )
     return found
 
 
-def read_mgrs(plain: str) -> Found | None:
+def read_mgrs(plain: str) -> GridPlace | None:
     """The south-west corner of the square ``32TMT7312349321``; None if the text is not like MGRS. Raises Refused."""
     if not _LIKE_MGRS.match(plain) or re.search("[°'\".,]", plain):
         return None
     match = _MGRS.fullmatch(plain)
     if match is None:
         polar = "; squares at the poles are not read, write lat, lon" if plain[:1] in "ABYZ" else ""
-        raise Refused(f"zone, band, two letters of a square and an even number of digits are wanted{polar}")
+        raise NotAPlace(f"zone, band, two letters of a square and an even number of digits are wanted{polar}")
     groups = match[5].split()
     digits = "".join(groups)
     if len(groups) > 2 or len({len(group) for group in groups}) > 1 or len(digits) % 2:
-        raise Refused(f"easting and northing have the same number of digits, given {' and '.join(groups)}")
+        raise NotAPlace(f"easting and northing have the same number of digits, given {' and '.join(groups)}")
     if not digits:
-        raise Refused(f"{plain} is a whole square of 100 km; add the digits of easting and northing")
+        raise NotAPlace(f"{plain} is a whole square of 100 km; add the digits of easting and northing")
     if len(digits) > 10:
-        raise Refused(f"it has at most 5 digits each of easting and northing (1 m), given {len(digits) // 2}")
+        raise NotAPlace(f"it has at most 5 digits each of easting and northing (1 m), given {len(digits) // 2}")
     zone, half = _zone(match[1]), len(digits) // 2
     size_m = 10 ** (5 - half)
     within_m = tuple(int(part) * size_m for part in (digits[:half], digits[half:]))
     found = _square_corner(zone, match[2], match[3], match[4], within_m, size_m)
     note = None if half == 5 else Note("place_is_a_square", given=plain, size=SIZES[half])
-    return Found(found.lat_deg, found.lon_deg, note)
+    return GridPlace(found.lat_deg, found.lon_deg, note)
 
 
 def band_deg(letter: str) -> tuple[float, float]:
     """Lowest and highest latitude of a band. Raises Refused for a letter that is none."""
     if letter not in BANDS:
-        raise Refused(f"{letter} is no band of latitude (C to X without I and O)")
+        raise NotAPlace(f"{letter} is no band of latitude (C to X without I and O)")
     low = -80.0 + 8.0 * BANDS.index(letter)
     return low, 84.0 if letter == "X" else low + 8.0
 
@@ -130,15 +130,15 @@ def zone_deg(zone: int, letter: str) -> tuple[float, float]:
     if letter == "X":
         wide = {31: (0.0, 9.0), 33: (9.0, 21.0), 35: (21.0, 33.0), 37: (33.0, 42.0)}
         if zone in (32, 34, 36):
-            raise Refused(f"there is no zone {zone}X: around Svalbard its neighbours are wider")
+            raise NotAPlace(f"there is no zone {zone}X: around Svalbard its neighbours are wider")
         return wide.get(zone, (west, east))
     return west, east
 
 
-def to_degrees(zone: int, easting_m: float, northing_m: float, *, south: bool) -> Found:
+def to_degrees(zone: int, easting_m: float, northing_m: float, *, south: bool) -> GridPlace:
     """The place of an easting and northing."""
     lon, lat = _projection(zone, south)(easting_m, northing_m, inverse=True)
-    return Found(float(lat), float(lon))
+    return GridPlace(float(lat), float(lon))
 
 
 @cache
@@ -150,43 +150,43 @@ def _projection(zone: int, south: bool) -> Proj:
 
 def _zone(digits: str) -> int:
     if not 1 <= int(digits) <= 60:
-        raise Refused(f"zones are 1 to 60, given {digits}")
+        raise NotAPlace(f"zones are 1 to 60, given {digits}")
     return int(digits)
 
 
 def _check_metres(easting_m: float, northing_m: float) -> None:
     low, high = EASTING_M
     if easting_m > high and low <= northing_m <= high:
-        raise Refused("easting and northing look swapped: the easting is first")
+        raise NotAPlace("easting and northing look swapped: the easting is first")
     if not low <= easting_m <= high:
-        raise Refused(f"an easting is {low:.0f} to {high:.0f}, given {easting_m:.10g}")
+        raise NotAPlace(f"an easting is {low:.0f} to {high:.0f}, given {easting_m:.10g}")
     if not northing_m <= MOST_NORTHING_M:
-        raise Refused(f"a northing is at most {MOST_NORTHING_M:.0f}, given {northing_m:.10g}")
+        raise NotAPlace(f"a northing is at most {MOST_NORTHING_M:.0f}, given {northing_m:.10g}")
 
 
-def _read_s(zone: int, easting: str, northing: str) -> Found:
+def _read_s(zone: int, easting: str, northing: str) -> GridPlace:
     """UTM with the letter S: refused if it may be band S as well as the southern hemisphere."""
     north, south = (to_degrees(zone, float(easting), float(northing), south=s) for s in (False, True))
     low, high = band_deg("S")
     if low - EDGE_DEG <= north.lat_deg <= high + EDGE_DEG:
-        raise Refused(
+        raise NotAPlace(
             f"S is band S or the southern hemisphere: write `{zone} north {easting} {northing}` for "
             f"{north.lat_deg:.5f}, {north.lon_deg:.5f} or `{zone} south {easting} {northing}` for "
             f"{south.lat_deg:.5f}, {south.lon_deg:.5f}",
             needs_example=False,
         )
     if south.lat_deg < -80.0 - EDGE_DEG:
-        raise Refused(f"UTM reaches from 80° S to 84° N, and this is at {south.lat_deg:.4f}°; write lat, lon")
+        raise NotAPlace(f"UTM reaches from 80° S to 84° N, and this is at {south.lat_deg:.4f}°; write lat, lon")
     return south._replace(note=Note("zone_letter_is_the_hemisphere", zone=zone))
 
 
-def _square_corner(zone: int, band: str, column: str, row: str, within_m: tuple[int, ...], size_m: int) -> Found:
+def _square_corner(zone: int, band: str, column: str, row: str, within_m: tuple[int, ...], size_m: int) -> GridPlace:
     """The corner of a square: of the rows with its letter, 2000 km apart, the one in the band."""
     low, high = band_deg(band)
     west, east = zone_deg(zone, band)
     columns, name = COLUMNS[(zone - 1) % 3], f"{zone}{band}{column}{row}"
     if column not in columns or row not in ROWS:
-        raise Refused(
+        raise NotAPlace(
             f"there is no square {column}{row} in zone {zone}: its columns are {columns}, its rows A to V without I "
             "and O"
         )
@@ -203,6 +203,6 @@ def _square_corner(zone: int, band: str, column: str, row: str, within_m: tuple[
         away = [(c.lon_deg - middle + 180.0) % 360.0 - 180.0 for c in corners]
         if min(away) <= (east - west) / 2.0 + EDGE_DEG and max(away) >= -(east - west) / 2.0 - EDGE_DEG:
             return corners[0]
-        raise Refused(f"square {name} with these digits is at {corners[0].lon_deg:.4f}°, outside zone {zone}{band} "
+        raise NotAPlace(f"square {name} with these digits is at {corners[0].lon_deg:.4f}°, outside zone {zone}{band} "
                       f"({west:g}° to {east:g}°)")  # fmt: skip
-    raise Refused(f"square {name} with these digits is not in band {band} ({low:g}° to {high:g}°)")
+    raise NotAPlace(f"square {name} with these digits is not in band {band} ({low:g}° to {high:g}°)")

@@ -15,7 +15,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.world import hulls
 from gcsplan.world._entries import pieces
-from gcsplan.world._neighbourhood import Lines
+from gcsplan.world._neighbourhood import LineBatch
 from gcsplan.world._shapes import grown_edges
 from gcsplan.world._shared import (
     BAND_HIGH,
@@ -189,7 +189,7 @@ def _pieces(
     track[0::2], track[1::2] = np.where(back[:, None], ends, starts), np.where(back[:, None], starts, ends)
     bow = 0.0 if air._field.affine else BOW_M + 2.0 * air._field.error_m
     kinds = zip((False, of_top, of_top), reaches, strict=True)
-    lines = Lines(track[:-1], track[1:])
+    lines = LineBatch(track[:-1], track[1:])
     held = [air._held(top, _few(max(reach, 0.0) + bow, air), lines) for top, reach in kinds]
     surfaces = air._surfaces if of_top else air._grounds
     length = np.hypot(*np.diff(track, axis=0).T)

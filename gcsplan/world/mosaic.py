@@ -15,13 +15,11 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
 from gcsplan.world.datum import plane_to_raster, to_wgs84
-from gcsplan.world.frame import Frame
+from gcsplan.world.frame import Box, Frame
 from gcsplan.world.height_unit import BY_NOBODY, METRE, OF_KEY
-from gcsplan.world.overlap import Placed, read_tiles
+from gcsplan.world.overlap import PlacedTile, read_tiles
 from gcsplan.world.raster import MAX_CELLS, Raster
 from gcsplan.world.surface import NO_SIDES, GridMap, Sides
-
-Box = tuple[float, float, float, float]
 
 FIT_ERROR_M = 0.01
 """The polynomial may misplace a node by this much at most, m."""
@@ -74,7 +72,7 @@ class _Layout:
     y0: float
     dx: float
     dy: float
-    tiles: tuple[Placed, ...]
+    tiles: tuple[PlacedTile, ...]
 
     def grid_of(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
         """Column and row of points in the raster's units."""
@@ -262,7 +260,7 @@ class Mosaic:
                 col = (raster.west + 0.5 * raster.dx + turn - x0) / dx
                 row = (y0 - (raster.north - 0.5 * raster.dy)) / first.dy
                 if max(abs(col - round(col)), abs(row - round(row))) <= ALIGNED_CELLS:
-                    tiles.append(Placed(raster, round(col), round(row), round(ratio * parts)))
+                    tiles.append(PlacedTile(raster, round(col), round(row), round(ratio * parts)))
                 elif turn == nearest:
                     raise InputError(
                         f"the tiles must lie on one grid: {raster.name} is off that of {first.name} by "

@@ -16,12 +16,12 @@ from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
 from gcsplan.world.raster import MAX_CELLS, Raster
 
-Shared = tuple[int, int, int, int]
+SharedNodes = tuple[int, int, int, int]
 """Column, row, columns, rows of the common grid that a tile and a window share."""
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class PlacedTile:
     """A tile with its first node in the common grid; each of its columns is ``step`` common ones wide."""
 
     raster: Raster
@@ -88,7 +88,7 @@ class Heights:
 
 
 def read_tiles(
-    parts: Sequence[tuple[Placed, Shared]], c0: int, r0: int, cols: int, rows: int, where: str = ""
+    parts: Sequence[tuple[PlacedTile, SharedNodes]], c0: int, r0: int, cols: int, rows: int, where: str = ""
 ) -> tuple[Heights, list[Note]]:
     """The heights of a window that begins at column ``c0`` and row ``r0``, and notes on what differs or is unknown.
 
@@ -115,7 +115,7 @@ def read_tiles(
     return heights, notes
 
 
-def _put_wide(heights: Heights, parts: Sequence[tuple[Placed, Shared]], c0: int, r0: int, phase: int) -> None:
+def _put_wide(heights: Heights, parts: Sequence[tuple[PlacedTile, SharedNodes]], c0: int, r0: int, phase: int) -> None:
     """Put tiles whose columns are wider than the common ones into ``heights``, linear between their own nodes."""
     cols = heights.high_m.shape[1]
     step = parts[0][0].step

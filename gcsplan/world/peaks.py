@@ -10,9 +10,8 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
+from gcsplan.world.frame import Box
 from gcsplan.world.surface import GridMap
-
-Box = tuple[float, float, float, float]
 
 WANTED_ERROR_M = 0.01
 """The gridded surface lies at most this far above the true one, m, if `MAX_NODES` permits."""

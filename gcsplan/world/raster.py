@@ -83,7 +83,7 @@ class Raster:
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class RasterStatements:
     """What the user says of a file, and what counts before the file's own statements.
 
     ``crs``: its coordinate system. ``height_unit``: a key of `OF_KEY`. ``datum_unit``: the unit that the vertical datum
@@ -111,7 +111,7 @@ def open_raster(
 ) -> Raster:
     """Header of the raster at ``path`` (GeoTIFF, SRTM .hgt or .hgt.zip, ESRI .asc).
 
-    The keywords are what the user says (`Said`).
+    The keywords are what the user says (`RasterStatements`).
 
     If neither the file nor one beside it has changed since this process opened it, it is not opened again: many
     missions use the same tiles. Raises InputError for anything that is not a readable, georeferenced, north-up raster
@@ -119,7 +119,7 @@ def open_raster(
     """
     tell_raster(path)
     require_file(path, where=where)
-    said = Said(crs, height_unit, datum_unit, nodata)
+    said = RasterStatements(crs, height_unit, datum_unit, nodata)
     key = (path.absolute(), said, neighbours(path))
     try:
         if key not in _headers:
@@ -243,7 +243,7 @@ def require_numbers(dataset: Any, path: Path, *, where: str) -> None:
         )
 
 
-def _header(dataset: Any, path: Path, said: Said, *, where: str) -> tuple[Raster, tuple[float, float]]:
+def _header(dataset: Any, path: Path, said: RasterStatements, *, where: str) -> tuple[Raster, tuple[float, float]]:
     notes: list[Note] = []
     crs = said.crs
     if dataset.count < 1:
@@ -340,7 +340,9 @@ def _require_degrees(t: Any, dataset: Any, path: Path, *, where: str) -> None:
         )
 
 
-def _unit(dataset: Any, system: RasterCRS, said: Said, path: Path, *, where: str) -> tuple[HeightUnit, list[Note]]:
+def _unit(
+    dataset: Any, system: RasterCRS, said: RasterStatements, path: Path, *, where: str
+) -> tuple[HeightUnit, list[Note]]:
     """The unit of the heights, and notes. Raises InputError."""
     stated = [unit for unit in (system.vertical_unit, said.datum_unit) if unit is not None]
     band = str(dataset.units[0] or "").strip()

@@ -21,7 +21,7 @@ from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
 from gcsplan.world.datum import VerticalDatum, stated_datum, vertical_datum
-from gcsplan.world.frame import FARTHEST_M, Frame
+from gcsplan.world.frame import FARTHEST_M, Box, Frame
 from gcsplan.world.geoid import GeoidGrid
 from gcsplan.world.height_unit import METRE
 from gcsplan.world.model_words import heights_read
@@ -34,7 +34,6 @@ from gcsplan.world.surface import Surface
 from gcsplan.world.tiles import Tile, hash_of, tiles_of
 from gcsplan.world.voids import take_out_zeros
 
-Box = tuple[float, float, float, float]
 HeightUnitKey = Literal["m", "ft", "us_ft"]
 NO_MORE_VOIDS: Literal["none"] = "none"
 

@@ -49,7 +49,7 @@ NEAR_ENOUGH_M = 0.5
 MOST_BLOCKS = 4096
 """Blocks that are kept; 30 MB."""
 
-Ground = Callable[[Floats, Floats], Floats]
+GroundHeights = Callable[[Floats, Floats], Floats]
 """Ground, m AMSL, at latitudes and longitudes in degrees; NaN where unknown."""
 
 
@@ -174,7 +174,7 @@ def _in_cell(cell: Cell, lat_e7: Floats, lon_e7: Floats) -> NDArray[np.bool_]:
 class PostHeights:
     """Heights of a grid's posts over some ground: whole metres, upwards, so that no post lies below it."""
 
-    def __init__(self, grid: TerrainGrid, ground: Ground) -> None:
+    def __init__(self, grid: TerrainGrid, ground: GroundHeights) -> None:
         self.grid = grid
         self._ground = ground
         self._blocks: OrderedDict[Block, Floats] = OrderedDict()

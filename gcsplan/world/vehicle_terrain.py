@@ -22,7 +22,7 @@ PARTS = 256
 """Parts of a line in which it is looked at for borders of degree tiles."""
 BISECTIONS = 40
 
-Piece = tuple[float, float, Surface]
+TerrainPiece = tuple[float, float, Surface]
 """A part of a line, from and to (0 to 1), and the vehicle's ground under it."""
 
 
@@ -74,7 +74,7 @@ class VehicleTerrain:
         at = np.rint(surface.grid(east_m, north_m)).astype(int)
         return np.asarray(self._spread[at[..., 1].clip(0, rows - 1), at[..., 0].clip(0, cols - 1)])
 
-    def pieces(self, ends: Floats) -> list[Piece] | None:
+    def pieces(self, ends: Floats) -> list[TerrainPiece] | None:
         """A straight line of the plane (2, 2) in pieces over one surface each; None if it leads over no known posts.
 
         Where it crosses into another degree tile, with posts of its own, the height may step.

@@ -30,11 +30,13 @@ class Patch(NamedTuple):
     beside_m: float
 
 
-Degrees = Callable[[Sequence[int], Sequence[int]], tuple[Floats, Floats]]
+NodeDegrees = Callable[[Sequence[int], Sequence[int]], tuple[Floats, Floats]]
 """Latitudes and longitudes of columns and rows of nodes, as `Mosaic.node_degrees` gives them."""
 
 
-def take_out_zeros(window: Window, degrees: Degrees, wider: Iterable[Window] = (), *, where: str = "") -> list[Note]:
+def take_out_zeros(
+    window: Window, degrees: NodeDegrees, wider: Iterable[Window] = (), *, where: str = ""
+) -> list[Note]:
     """Make the patches of exact zeros that have no shore unknown, in place; returns a note that names them.
 
     ``wider``: larger windows of the same files, from small to large, that are looked at where a patch fills the window

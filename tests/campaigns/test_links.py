@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gcsplan.mavlink.link.link import Heard, Steps
+from gcsplan.mavlink.link.link import Heard, LinkSteps
 from gcsplan.mavlink.link.parameters import GROUPS
 from gcsplan.mavlink.link.recheck import Recheck
 from gcsplan.mavlink.protocol.outcome import Changed
@@ -72,7 +72,7 @@ def test_the_campaign_finds_an_upload_that_does_not_look_after_a_silence(monkeyp
 
 
 def test_the_campaign_finds_an_upload_that_does_not_look_after_the_read_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    def no_look(self: Recheck) -> Steps[None]:
+    def no_look(self: Recheck) -> LinkSteps[None]:
         yield from ()
 
     monkeypatch.setattr(Recheck, "last_look", no_look)

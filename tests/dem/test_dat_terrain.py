@@ -18,7 +18,7 @@ from gcsplan.world.frame import Frame
 from gcsplan.world.model_words import notes_on
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import Box, TerrainSpec
-from gcsplan.world.terrain_grid import Ground, PostHeights, TerrainGrid
+from gcsplan.world.terrain_grid import GroundHeights, PostHeights, TerrainGrid
 from tests.oracles import terrain_grid as oracle
 
 BOX = (-2500.0, -2500.0, 2500.0, 2500.0)
@@ -30,7 +30,7 @@ def hills(lat_deg: Floats, lon_deg: Floats) -> Floats:
 
 def write(
     folder: Path, lat: float, lon: float, *, reach_deg: float = 0.08, grid: TerrainGrid | None = None,
-    ground: Ground = hills,
+    ground: GroundHeights = hills,
 ) -> Path:  # fmt: skip
     """Files with the blocks around a place."""
     grid = grid or TerrainGrid()

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats
-from gcsplan.dem.cache import Cache, MissingTiles, Record, text_of
+from gcsplan.dem.cache import Cache, MissingTiles, TileRecord, text_of
 from gcsplan.dem.cells import cells_in
-from gcsplan.dem.sources import GLO30, SRTM, Source
+from gcsplan.dem.sources import GLO30, SRTM, DemSource
 from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError
 from gcsplan.mission_file import load_mission
@@ -42,7 +42,9 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache"
 
 
-def hold(folder: Path, cell: Cell, source: Source = GLO30, state: str = "tile", heights: Floats | None = None) -> None:
+def hold(
+    folder: Path, cell: Cell, source: DemSource = GLO30, state: str = "tile", heights: Floats | None = None
+) -> None:
     """Put a tile into the cache, or a record that there is none."""
     kept = Cache(source, folder)
     kept.folder.mkdir(parents=True, exist_ok=True)
@@ -50,14 +52,16 @@ def hold(folder: Path, cell: Cell, source: Source = GLO30, state: str = "tile", 
     if state == "tile":
         path.write_bytes(tile(cell, source, heights))
         size, checksum = path.stat().st_size, sha256_of(path)
-    record = Record(
+    record = TileRecord(
         cell.name, source.name, state, source.kind, source.vertical_datum, "2026-01-01T00:00:00Z", bytes=size,  # type: ignore[arg-type]
         sha256=checksum,
     )  # fmt: skip
     kept.record_path(cell).write_text(text_of(record))
 
 
-def surface_at(at: tuple[float, float], source: Source = GLO30, box: Any = BOX, **keys: Any) -> tuple[Surface, Frame]:
+def surface_at(
+    at: tuple[float, float], source: DemSource = GLO30, box: Any = BOX, **keys: Any
+) -> tuple[Surface, Frame]:
     frame = Frame(*at)
     terrain = open_dem(TerrainSpec(dem=(source.name,), **keys), where="terrain")
     return terrain.around(frame, box).load(frame, box), frame
@@ -69,7 +73,7 @@ def refusal(at: tuple[float, float], **keys: Any) -> InputError:
     return caught.value
 
 
-def by_hand(cell: Cell, lat_deg: Floats, lon_deg: Floats, source: Source = GLO30, rows: int = ROWS) -> Floats:
+def by_hand(cell: Cell, lat_deg: Floats, lon_deg: Floats, source: DemSource = GLO30, rows: int = ROWS) -> Floats:
     """Bilinear between the nodes of the grid that a tile is a part of."""
     cols = rows * source.columns_of(cell) // 3600
     r, c = (cell.lat_deg + 1 - lat_deg) * rows, (lon_deg - cell.lon_deg) * cols
@@ -93,7 +97,7 @@ def places(frame: Frame, n: int = 300) -> tuple[Floats, Floats, Floats, Floats]:
 
 @pytest.mark.first_quick
 @pytest.mark.parametrize("source", [GLO30, SRTM], ids=lambda s: s.name)
-def test_ground_is_that_of_the_source_with_its_datum_and_its_kind(cache: Path, source: Source) -> None:
+def test_ground_is_that_of_the_source_with_its_datum_and_its_kind(cache: Path, source: DemSource) -> None:
     hold(cache, Cell(36, -85), source)
     surface, frame = surface_at((36.5, -84.5), source)
     e, n, lat, lon = places(frame)
@@ -211,7 +215,7 @@ def test_sea_is_0_m_and_is_told(cache: Path) -> None:
 
 @pytest.mark.first_quick
 @pytest.mark.parametrize("source", [GLO30, SRTM], ids=lambda s: s.name)
-def test_open_sea_alone_is_ground_too(cache: Path, source: Source) -> None:
+def test_open_sea_alone_is_ground_too(cache: Path, source: DemSource) -> None:
     for cell in (Cell(10, 10), Cell(10, 11)):
         hold(cache, cell, source, state="sea")
     surface, _ = surface_at((10.5, 11.0), source)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 from gcsplan.world import _neighbourhood
 from gcsplan.world._field import Field
-from gcsplan.world._neighbourhood import Lines, Neighbourhood, extrema_around
+from gcsplan.world._neighbourhood import LineBatch, Neighbourhood, extrema_around
 from gcsplan.world._shared import LocalExtrema
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
@@ -92,14 +92,14 @@ def test_lines_find_all_that_they_meet_looked_at_and_little_else(
         ours = Neighbourhood(grid, field, z, reach_m)
         assert not ours.extrema.slope.any()
         start, end = np.stack([rng.uniform(-200.0, 5700.0, (2, 3)), -rng.uniform(-200.0, 3800.0, (2, 3))], axis=-1)
-        ours.along(Lines(start, end))
+        ours.along(LineBatch(start, end))
         t = np.linspace(0.0, 1.0, 20_000)[:, None, None]
         cells = np.floor(grid(*(start + t * (end - start)).reshape(-1, 2).T)).astype(np.intp)
         cells = cells[((cells >= 0) & (cells < [1099, 899])).all(axis=1)]
         assert same_where_seen(ours.extrema, whole, cells[:, 1], cells[:, 0])
         assert not ours._seen.all()
     copy = pickle.loads(pickle.dumps(ours))
-    copy.along(Lines(start, end))
+    copy.along(LineBatch(start, end))
     assert same_where_seen(copy.extrema, whole, cells[:, 1], cells[:, 0])
 
 
@@ -140,7 +140,7 @@ def test_what_is_looked_at_in_part_judges_as_what_is_looked_at_as_a_whole(monkey
 def test_what_was_not_looked_at_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
     """A kernel that reaches a tile that was not examined must not treat it as flat ground."""
     monkeypatch.setattr(_neighbourhood, "LARGE", 100)
-    monkeypatch.setattr(Lines, "tiles", lambda self, grid, field, shape: np.zeros(shape, np.bool_))
+    monkeypatch.setattr(LineBatch, "tiles", lambda self, grid, field, shape: np.zeros(shape, np.bool_))
     z = np.full((50, 50), 100.0)
     blind = Airspace(Surface(z, z, GridMap.affine(0.0, 0.0, 10.0, 10.0), {}))
     limits = Limits(min_agl_m=30.0, max_agl_m=500.0, horizontal_clearance_m=20.0, track_error_m=3.0)

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from gcsplan.arrays import Floats
+from gcsplan.mavlink.mission.mission import AltitudeFrame
+from gcsplan.vehicle import MissionEnd
 from gcsplan.world.world import World
 
-Point = tuple[float, float, float]
-End = Literal["land", "loiter", "rtl", "none"]
-AltitudeFrame = Literal["relative", "amsl", "terrain"]
+PathPoint = tuple[float, float, float]
 
 BOW_M = 0.1
 LONGEST_LEG_M = 5000.0
@@ -61,14 +60,14 @@ class Wing:
     anticlockwise).
     """
 
-    top: Point
-    touch: Point | None = None
+    top: PathPoint
+    touch: PathPoint | None = None
     circle_m: float = 0.0
-    up: Point | None = None
+    up: PathPoint | None = None
     up_m: float = 0.0
 
     @property
-    def leaves(self) -> Point:
+    def leaves(self) -> PathPoint:
         """The point at which the first leg begins."""
         return self.top if self.up is None else self.up
 
@@ -86,7 +85,7 @@ class Order:
     whose altitude the mission file gives: it is the nearest centimetre, even where a leg beside it gets too steep.
     """
 
-    end: End = "land"
+    end: MissionEnd = "land"
     altitude_frame: AltitudeFrame = "relative"
     speed_m_s: float | None = None
     spaced: bool = True

@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Mapping
 
-from gcsplan.mavlink.link.link import Channel, Steps
+from gcsplan.mavlink.link.link import Channel, LinkSteps
 from gcsplan.mavlink.link.options import Task
 from gcsplan.mavlink.link.parameters import (
     FENCE_GROUPS,
@@ -33,7 +33,7 @@ _LOOK_S = 0.02
 
 def reading_parameters(
     channel: Channel, task: Task, state: VehicleState, watch: Watch, recheck: Recheck
-) -> Steps[tuple[list[Note], OnBoard]]:
+) -> LinkSteps[tuple[list[Note], OnBoard]]:
     """Read the parameters on board; return warnings about those that do not fit the list, and the values read.
 
     Those that the judge needs are asked for until the timeout.
@@ -66,7 +66,7 @@ def reading_parameters(
 
 def judging(
     channel: Channel, task: Task, mission: Mission, values: Mapping[str, float], recheck: Recheck
-) -> Steps[str | None]:
+) -> LinkSteps[str | None]:
     """Ask the task's judge, beside the other vehicles' transfers; return its answer, None without a judge.
 
     A judge that has not ended after the timeout has not passed. In simulated time it is asked in line, for there no

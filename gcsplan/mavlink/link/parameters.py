@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,13 +17,11 @@ from gcsplan.mavlink.mission.commands import RTL, TAKEOFF
 from gcsplan.mavlink.mission.fences import CIRCLE, FENCE_DECIDES, FLOOR, POLYGON, SAFETY, TOP, fences_in_force
 from gcsplan.mavlink.mission.mission import GLOBAL, RELATIVE, Mission
 from gcsplan.mavlink.mission.parameter_list import Setting, off
-from gcsplan.mavlink.mission.parameter_names import PARAMETERS
+from gcsplan.mavlink.mission.parameter_names import PARAMETERS, ParameterValues
 from gcsplan.mavlink.mission.return_altitude import on_board, returns_otherwise
-from gcsplan.mavlink.mission.return_route import Route, takes_another_route
+from gcsplan.mavlink.mission.return_route import ReturnRoute, takes_another_route
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import COPTER_RETURN_WAITS_S, DEFAULT_LEAN_DEG, Autopilot, fastest_at_m_s, lean_for_deg
-
-Values = Mapping[str, float]
 
 GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
     autopilot: (
@@ -77,13 +75,13 @@ def parameter_name(message: Any) -> str:
     return name if isinstance(name, str) else bytes(name).split(b"\0")[0].decode(errors="replace")
 
 
-def lean_on_board_deg(values: Values) -> float | None:
+def lean_on_board_deg(values: ParameterValues) -> float | None:
     """Return the largest lean angle of parameters that were read, degrees; None if it was not read."""
     name = next((n for n in _LEAN_ANGLE if math.isfinite(values.get(n, math.nan))), None)
     return None if name is None else values[name] * _LEAN_ANGLE[name]
 
 
-def lean_shortage(values: Values, speed_m_s: float) -> Note | None:
+def lean_shortage(values: ParameterValues, speed_m_s: float) -> Note | None:
     """Return that the lean angle on board is too small for a speed; None if it is not, or was not read."""
     name = next((n for n in _LEAN_ANGLE if math.isfinite(values.get(n, math.nan))), None)
     needs_deg = lean_for_deg(speed_m_s)
@@ -104,13 +102,13 @@ class _Extent:
 
 
 def judge_parameters(
-    values: Values,
+    values: ParameterValues,
     mission: Mission,
     *,
     rtl_rel_home_m: float | None = None,
     advised_rel_home_m: float | None = None,
-    expected: Values | None = None,
-    route: Route | None = None,
+    expected: ParameterValues | None = None,
+    route: ReturnRoute | None = None,
     settings: Sequence[Setting] = (),
 ) -> list[Note]:
     """Return which ``values`` do not fit ``mission``; nothing is changed on board.
@@ -144,7 +142,7 @@ def judge_parameters(
     return [*found, Note("no_failsafe", failsafes=off)] if off else found
 
 
-def judge_fence_parameters(values: Values) -> list[Note]:
+def judge_fence_parameters(values: ParameterValues) -> list[Note]:
     """Return why a fence may not be enforced on board; nothing is changed on board."""
     if not values:
         return [Note("no_fence_parameter_read")]
@@ -164,7 +162,7 @@ def judge_fence_parameters(values: Values) -> list[Note]:
     return found
 
 
-def _other_fences(values: Values) -> list[Note]:
+def _other_fences(values: ParameterValues) -> list[Note]:
     """The fences that FENCE_ENABLE also enables: those of FENCE_TYPE that are no polygons and circles."""
     kinds = values.get("FENCE_TYPE")
     if kinds is None:
@@ -179,17 +177,17 @@ def _other_fences(values: Values) -> list[Note]:
     return found
 
 
-def _at(values: Values, name: str) -> Note:
+def _at(values: ParameterValues, name: str) -> Note:
     """A height or radius on board."""
     return Note("metres_on_board", at_m=values[name]) if name in values else Note("metres_on_board_unread")
 
 
-def settings_words(settings: Sequence[Setting], values: Values, autopilot: Autopilot) -> list[Note]:
+def settings_words(settings: Sequence[Setting], values: ParameterValues, autopilot: Autopilot) -> list[Note]:
     """Which parameters on board are outside of what the mission was judged with; other notes tell of some of them."""
     return [o.note() for o in off(settings, values, autopilot) if o.setting.parameter.key not in _TOLD_ELSEWHERE]
 
 
-def _numbers(values: Values) -> tuple[Values, list[Note]]:
+def _numbers(values: ParameterValues) -> tuple[ParameterValues, list[Note]]:
     """Return the finite ones of ``values``, and a line of text for each other one."""
     good = {name: value for name, value in values.items() if math.isfinite(value)}
     return good, [Note("parameter_is_no_number", name=name) for name in values if name not in good]
@@ -200,7 +198,7 @@ def _bits(value: float) -> int:
     return whole(value, 0, 2**31 - 1) or 0
 
 
-def _return_altitude(values: Values, checked_m: float | None, advised_m: float | None) -> list[Note]:
+def _return_altitude(values: ParameterValues, checked_m: float | None, advised_m: float | None) -> list[Note]:
     parameter = on_board(values)
     if parameter is None:
         return [] if checked_m is None else [Note("return_altitude_unread")]
@@ -220,7 +218,7 @@ def _return_altitude(values: Values, checked_m: float | None, advised_m: float |
     return []
 
 
-def _over_home(values: Values, mission: Mission, route: Route | None) -> list[Note]:
+def _over_home(values: ParameterValues, mission: Mission, route: ReturnRoute | None) -> list[Note]:
     """That a return waits over home for another time than is counted, or does not land; one by the mission does."""
     if route == "mission" and not any(item.command == RTL for item in mission.items):
         return []
@@ -238,7 +236,7 @@ def _over_home(values: Values, mission: Mission, route: Route | None) -> list[No
     return found
 
 
-def _climb_out(values: Values, mission: Mission) -> list[Note]:
+def _climb_out(values: ParameterValues, mission: Mission) -> list[Note]:
     """That a plane may climb out more steeply than those that were flown to judge how far it rises too high."""
     pitch_deg = values.get("TECS_PITCH_MAX", _FLOWN_PITCH_DEG)
     takes_off = any(item.command == TAKEOFF for item in mission.items)
@@ -247,7 +245,7 @@ def _climb_out(values: Values, mission: Mission) -> list[Note]:
     return [Note("pitch_not_flown", value=pitch_deg, flown_deg=_FLOWN_PITCH_DEG)]
 
 
-def _lean(values: Values, mission: Mission) -> list[Note]:
+def _lean(values: ParameterValues, mission: Mission) -> list[Note]:
     speed_m_s = mission.commanded_m_s
     if mission.autopilot is not Autopilot.ARDUCOPTER or lean_for_deg(speed_m_s) <= DEFAULT_LEAN_DEG + _SAME_DEG:
         return []
@@ -258,7 +256,7 @@ def _lean(values: Values, mission: Mission) -> list[Note]:
     return [short] if short else []
 
 
-def _fences(values: Values, autopilot: Autopilot, extent: _Extent) -> list[Note]:
+def _fences(values: ParameterValues, autopilot: Autopilot, extent: _Extent) -> list[Note]:
     """The fences in force that the items leave: what is told of a mission that was not judged in its world."""
     known, on = SAFETY[autopilot], fences_in_force(values, autopilot)
     limits = [("fence_top", extent.top_rel_home_m), ("fence_radius", extent.reach_m)]

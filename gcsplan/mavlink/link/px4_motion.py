@@ -7,20 +7,19 @@ slower than planned keeps the legs, but not the times.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
+from gcsplan.mavlink.mission.parameter_names import ParameterValues
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 
 __all__ = ["slower_words", "speed_shortage"]
 
-Values = Mapping[str, float]
 
 _SAME = 0.01
 """Part by which a parameter may fall short of what was planned with."""
 
 
-def speed_shortage(values: Values, vehicle: Vehicle, commanded_m_s: float) -> Note | None:
+def speed_shortage(values: ParameterValues, vehicle: Vehicle, commanded_m_s: float) -> Note | None:
     """Why a vehicle with these parameters cannot fly the commanded speed, and the cure; None if it can.
 
     None, too, if MPC_XY_VEL_MAX was not read, or bounds nothing in the plan.
@@ -31,7 +30,7 @@ def speed_shortage(values: Values, vehicle: Vehicle, commanded_m_s: float) -> No
     return Note("velocity_too_small", value=most, speed_m_s=commanded_m_s, wanted=math.ceil(commanded_m_s))
 
 
-def slower_words(values: Values, vehicle: Vehicle) -> list[Note]:
+def slower_words(values: ParameterValues, vehicle: Vehicle) -> list[Note]:
     """Which parameters on board make a vehicle slower than it was planned; empty for another autopilot."""
     if vehicle.autopilot is not Autopilot.PX4 or not vehicle.smooths:
         return []

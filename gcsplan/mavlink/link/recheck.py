@@ -21,7 +21,7 @@ from typing import Any
 
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
-from gcsplan.mavlink.link.link import Channel, Heard, Steps
+from gcsplan.mavlink.link.link import Channel, Heard, LinkSteps
 from gcsplan.mavlink.link.preflight import NEAR_START_M, Reasons, apart_m
 from gcsplan.mavlink.link.watch import FRESH_S, VehicleState, Watch
 from gcsplan.mavlink.protocol.machine import Wait
@@ -29,7 +29,7 @@ from gcsplan.mavlink.protocol.messages import MissionMessage, Request
 from gcsplan.mavlink.protocol.outcome import Changed, Outcome, Unknown
 from gcsplan.notes.note import Note
 
-Judge = Callable[[VehicleState], tuple[Reasons, list[Note]]]
+StateJudge = Callable[[VehicleState], tuple[Reasons, list[Note]]]
 
 LOOK_S = 10.0
 """Seconds that a look waits for a vehicle that has fallen silent."""
@@ -54,7 +54,7 @@ class Recheck:
         channel: Channel,
         watch: Watch,
         state: VehicleState,
-        judge: Judge,
+        judge: StateJudge,
         *,
         may_move: bool = False,
         standby_s: float = 0.0,
@@ -144,7 +144,7 @@ class Recheck:
 
     # looks
 
-    def last_look(self) -> Steps[Outcome | None]:
+    def last_look(self) -> LinkSteps[Outcome | None]:
         """Look after the read-back: return `Changed`, None if nothing changed, or `Unknown` after silence."""
         clock = self._channel.link.clock
         self._longest_s, self._began = LOOK_S, None

@@ -19,7 +19,7 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import GcsplanError, VehicleRefused
-from gcsplan.mavlink.link.link import Channel, Heard, Steps
+from gcsplan.mavlink.link.link import Channel, Heard, LinkSteps
 from gcsplan.mavlink.mission.mission import TERRAIN, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.notes.note import Note
@@ -28,7 +28,7 @@ from gcsplan.world.terrain_grid import (
     NEAR_ENOUGH_M,
     SPACING_M,
     Block,
-    Ground,
+    GroundHeights,
     PostHeights,
     TerrainGrid,
     known_parts,
@@ -76,7 +76,7 @@ class Served:
 class TerrainService:
     """The terrain that vehicles are given: heights by the spacing that they ask for, and what was given."""
 
-    def __init__(self, ground: Ground) -> None:
+    def __init__(self, ground: GroundHeights) -> None:
         self._ground = ground
         self._posts: dict[int, PostHeights] = {}
         self.served: dict[int, Served] = {}
@@ -89,7 +89,7 @@ class TerrainService:
             self._posts[spacing_m] = PostHeights(TerrainGrid(spacing_m), self._ground)
         return self._posts[spacing_m]
 
-    def steps(self, channel: Channel) -> Steps[None]:
+    def steps(self, channel: Channel) -> LinkSteps[None]:
         """The endless task that answers one vehicle. See `Link.serve`."""
         return _Answers(channel, self, self.served.setdefault(channel.sysid, Served())).steps()
 
@@ -113,7 +113,7 @@ class _Answers:
         self._at_once = 1 if baud else _AT_ONCE
         self._pause_s = 10.0 * _BYTES_OF_PART / (_SERIAL_SHARE * baud) if baud else _PAUSE_S
 
-    def steps(self) -> Steps[None]:
+    def steps(self) -> LinkSteps[None]:
         clock = self._channel.link.clock
         ask_at, asked, send_at = clock() + _ASK_AFTER_S, 0, -math.inf
         vehicle: Heard | None = None
@@ -188,7 +188,7 @@ def _ask_for_requests(channel: Channel, vehicle: Heard) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Compared:
+class TerrainComparison:
     """What the vehicle reads at places, beside what it was sent.
 
     ``off_m`` (N,): its height less ours, NaN where it has none. ``pending``, ``loaded``: parts, as it last said.
@@ -234,7 +234,7 @@ def compare_steps(
     most_s: float = math.inf,
     progress: Callable[[int, int], None] | None = None,
     note: Callable[[Heard, float], None] | None = None,
-) -> Steps[Compared]:
+) -> LinkSteps[TerrainComparison]:
     """Ask with TERRAIN_CHECK what the vehicle reads at each place, until it has all, or nothing new for so long.
 
     The places are asked block by block, for its cache holds few blocks; a service on the same link sends what it lacks.
@@ -280,7 +280,7 @@ def compare_steps(
             moved_at = clock()
             if progress:
                 progress(len(places_e7) - len(left), len(places_e7))
-    return Compared(tuple(places_e7), theirs - ours, pending, loaded)
+    return TerrainComparison(tuple(places_e7), theirs - ours, pending, loaded)
 
 
 OFF = "terrain_off_m"
@@ -348,9 +348,9 @@ def terrain_steps(
     to: Address,
     items: Sequence[MissionItem],
     values: Mapping[str, float],
-    ground: Ground | None,
+    ground: GroundHeights | None,
     note: Callable[[Heard, float], None],
-) -> Steps[tuple[list[Note], dict[str, float]]]:
+) -> LinkSteps[tuple[list[Note], dict[str, float]]]:
     """Serve a vehicle the terrain of a mission and compare what it then reads under it.
 
     Return warnings, and `OFF` if it read anything. Nothing is done without ``ground`` or items in the terrain frame.

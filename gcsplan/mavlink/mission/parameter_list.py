@@ -32,7 +32,7 @@ from gcsplan.world.atmosphere import true_per_indicated
 
 __all__ = ["Off", "Setting", "commands_speed", "corners_as_it_leans", "off", "parameter_list", "vehicle_on_board"]
 
-Rule = Literal["equal", "at least", "at most"]
+SettingRule = Literal["equal", "at least", "at most"]
 Matters = Literal["time", "pace", "turns", "return", "flight", "told"]
 
 SAME = 0.01
@@ -62,7 +62,7 @@ class Setting:
 
     parameter: Parameter
     value: float
-    rule: Rule
+    rule: SettingRule
     why: str
     matters: Matters
     also: tuple[float, ...] = ()

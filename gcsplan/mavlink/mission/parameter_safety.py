@@ -16,7 +16,7 @@ from gcsplan.mavlink.mission.parameter_names import unanswered
 from gcsplan.mavlink.mission.return_route import AUTO_RTL
 from gcsplan.vehicle import Autopilot
 
-__all__ = ["Extent", "needed_groups", "safety_list"]
+__all__ = ["FlightExtent", "needed_groups", "safety_list"]
 
 _RADIO, _GROUND, _LOW = "loss of radio control", "loss of the ground station", "a low battery"
 _CRITICAL = "a critical battery"
@@ -40,7 +40,7 @@ _LANDS = (3.0,)  # FS_EKF_ACTION beside 1
 
 
 @dataclass(frozen=True, slots=True)
-class Extent:
+class FlightExtent:
     """How far a flight comes, errors counted, m: above and below home, and away from it."""
 
     top_rel_home_m: float
@@ -49,7 +49,7 @@ class Extent:
 
 
 def safety_list(
-    autopilot: Autopilot, extent: Extent, *, rtl_rel_home_m: float | None = None, by_mission: bool = False
+    autopilot: Autopilot, extent: FlightExtent, *, rtl_rel_home_m: float | None = None, by_mission: bool = False
 ) -> tuple[Setting, ...]:
     """The rows of the fences and failsafes for a flight of ``extent``.
 
@@ -70,7 +70,7 @@ def safety_list(
     return tuple(rows)
 
 
-def _fences(autopilot: Autopilot, extent: Extent, returns_m: float | None) -> Iterator[Setting]:
+def _fences(autopilot: Autopilot, extent: FlightExtent, returns_m: float | None) -> Iterator[Setting]:
     known, copter = SAFETY[autopilot], autopilot is Autopilot.ARDUCOPTER
     lowered = copter and returns_m is not None
     top_m, why = extent.top_rel_home_m, "the highest place of the flight above home, errors counted"

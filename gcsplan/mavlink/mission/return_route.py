@@ -18,7 +18,7 @@ from gcsplan.mavlink.mission.parameter_names import unanswered
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 
-Route = Literal["straight", "mission"]
+ReturnRoute = Literal["straight", "mission"]
 
 AUTO_RTL = 6.0
 COPTER_RETURNS: dict[str, tuple[float, ...]] = {
@@ -53,7 +53,7 @@ def route_setting(autopilot: Autopilot, *, path: bool) -> str:
     return f"{', '.join(COPTER_RETURNS)} {AUTO_RTL:g} (Auto RTL)"
 
 
-def takes_another_route(values: Mapping[str, float], mission: Mission, route: Route | None) -> Note | None:
+def takes_another_route(values: Mapping[str, float], mission: Mission, route: ReturnRoute | None) -> Note | None:
     """Why a vehicle with these parameters returns by another route than ``route``; None if it does not.
 
     ``values`` are what was read; a parameter that decides and is not among them counts as wrong.
@@ -84,7 +84,7 @@ def takes_another_route(values: Mapping[str, float], mission: Mission, route: Ro
     return Note("return_joins_no_mission", settings=tuple(other), value=AUTO_RTL, start=held[0])
 
 
-def _plane(value: float | None, held: tuple[str, ...], path: bool, route: Route | None) -> Note | None:
+def _plane(value: float | None, held: tuple[str, ...], path: bool, route: ReturnRoute | None) -> Note | None:
     if value is None:
         return Note("return_route_unread", names=("RTL_AUTOLAND",))
     if value == 0.0:

@@ -8,13 +8,11 @@ commands were also uploaded to an ArduCopter 4.6.0 in SITL and read back.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 from gcsplan.mavlink.mission import commands as cmd
-from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, NO_POSITION, MissionItem, float32
+from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, NO_POSITION, MissionItem, NumberKept, float32
 
-Keep = Callable[[float], float]
 Params = tuple[float, float, float, float]
 FLT_EPSILON = 1.1920929e-07
 _CM_PER_M = 100.0
@@ -112,22 +110,22 @@ def read_back_altitudes(cm: int) -> tuple[float, float]:
 # ── the table ─────────────────────────────────────────────────────────────────────────────────────────────────────
 
 
-class Rule(NamedTuple):
+class StorageRule(NamedTuple):
     """What is stored of param1 … param4; ``located``: latitude, longitude, altitude and frame are stored too."""
 
     located: bool
-    params: tuple[Keep, Keep, Keep, Keep]
+    params: tuple[NumberKept, NumberKept, NumberKept, NumberKept]
 
 
-def _at(p1: Keep = _lost, p2: Keep = _lost, p3: Keep = _lost, p4: Keep = _lost) -> Rule:
-    return Rule(True, (p1, p2, p3, p4))
+def _at(p1: NumberKept = _lost, p2: NumberKept = _lost, p3: NumberKept = _lost, p4: NumberKept = _lost) -> StorageRule:
+    return StorageRule(True, (p1, p2, p3, p4))
 
 
-def _do(p1: Keep = _lost, p2: Keep = _lost, p3: Keep = _lost, p4: Keep = _lost) -> Rule:
-    return Rule(False, (p1, p2, p3, p4))
+def _do(p1: NumberKept = _lost, p2: NumberKept = _lost, p3: NumberKept = _lost, p4: NumberKept = _lost) -> StorageRule:
+    return StorageRule(False, (p1, p2, p3, p4))
 
 
-RULES: dict[int, Rule] = {
+RULES: dict[int, StorageRule] = {
     cmd.WAYPOINT: _at(_u16),  # hold (ArduPlane: `_PLANE_WAYPOINT`)
     cmd.LOITER_UNLIM: _at(p3=_radius_u16),
     cmd.LOITER_TURNS: _at(),  # `_loiter_turns`
@@ -230,7 +228,7 @@ def stored_by_plane(item: MissionItem) -> MissionItem:
     return _stored(item, _PLANE_WAYPOINT if item.command == cmd.WAYPOINT else RULES.get(item.command))
 
 
-def _stored(item: MissionItem, rule: Rule | None) -> MissionItem:
+def _stored(item: MissionItem, rule: StorageRule | None) -> MissionItem:
     frame = FRAME_SYNONYMS.get(item.frame, item.frame)
     if item.command in _FENCE_VERTEX or item.command in _FENCE_CIRCLE or item.command == cmd.FENCE_RETURN_POINT:
         return _stored_fence(item)

@@ -7,12 +7,19 @@ Source: PX4 1.15, ``mavlink_mission.cpp`` (`parse_mavlink_mission_item`, `format
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 from gcsplan.mavlink.mission import commands as cmd
-from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, NO_POSITION, RELATIVE, TERRAIN, MissionItem, float32
+from gcsplan.mavlink.mission.mission import (
+    FRAME_SYNONYMS,
+    GLOBAL,
+    NO_POSITION,
+    RELATIVE,
+    TERRAIN,
+    MissionItem,
+    NumberKept,
+    float32,
+)
 
-Keep = Callable[[float], float]
 _RADIANS_PER_DEGREE = float32(float32(math.pi) / 180.0)
 _DEGREES_PER_RADIAN = float32(180.0 / float32(math.pi))
 _FULL_TURN = float32(2.0 * math.pi)
@@ -54,7 +61,7 @@ def yaw(degrees: float) -> float:
     return float32(radians * _DEGREES_PER_RADIAN)
 
 
-_Rule = tuple[Keep, Keep, Keep, Keep]
+_Rule = tuple[NumberKept, NumberKept, NumberKept, NumberKept]
 _NOTHING: _Rule = (_lost, _lost, _lost, _lost)
 _YAW: _Rule = (_lost, _lost, _lost, yaw)
 

@@ -12,11 +12,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from gcsplan.errors import InputError
-from gcsplan.world.degree_shapes import LARGEST_RADIUS_M
+from gcsplan.world.degree_shapes import LARGEST_RADIUS_M, Corner
 from gcsplan.world.frame import EARTH_RADIUS_M, Frame
-
-Corner = tuple[float, float]
-"""(latitude, longitude), degrees."""
 
 SAGITTA_M = 3.0
 WIDEST_STEP = math.radians(10.0)

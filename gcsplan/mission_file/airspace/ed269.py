@@ -18,7 +18,7 @@ from gcsplan.mission_file.airspace.members import (
 )
 from gcsplan.mission_file.airspace.policy import UNREAD_TIMES, Policy, Published
 from gcsplan.mission_file.airspace.times import read_periods
-from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
+from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, VolumeLimits
 from gcsplan.mission_file.zone_attributes import is_number, shown
 from gcsplan.mission_file.zone_draft import Remark
 from gcsplan.mission_file.zone_file import ZoneFile
@@ -106,7 +106,7 @@ def _volume(file: AirspaceFile, zone: Published, part: str, volume: Any, where: 
     if not isinstance(shape, dict):
         raise MemberError(f"a volume has a horizontalProjection, given {shown(volume)}")
     unit = volume.get("uomDimensions") or ""
-    limits = Limits.read(_limit(volume, "lower", unit), _limit(volume, "upper", unit), where, policy=file.policy)
+    limits = VolumeLimits.read(_limit(volume, "lower", unit), _limit(volume, "upper", unit), where, policy=file.policy)
     kind = shape.get("type")
     limits.remarks += unread(volume, VOLUME, all_of_them=True)
     limits.remarks += unread(shape, SHAPE.get(str(kind), ()), all_of_them=True)

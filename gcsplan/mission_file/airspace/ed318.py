@@ -16,7 +16,7 @@ from gcsplan.mission_file.airspace.members import (
     unread,
 )
 from gcsplan.mission_file.airspace.policy import Policy, Published
-from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
+from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, VolumeLimits
 from gcsplan.mission_file.zone_attributes import is_number, shown
 from gcsplan.mission_file.zone_file import ZoneFile
 
@@ -96,10 +96,10 @@ def _geometry(file: AirspaceFile, zone: Published, part: str, geometry: Any, sha
         raise MemberError(f"the geometry must be a Polygon, a MultiPolygon or a Point with extent, given {shown(kind)}")
 
 
-def _limits(layer: Any, where: str, policy: Policy) -> Limits:
+def _limits(layer: Any, where: str, policy: Policy) -> VolumeLimits:
     """The limits of a layer; without one there are none, and without a unit they are metres, as the standard says."""
     if layer is None:
-        return Limits()
+        return VolumeLimits()
     if not isinstance(layer, dict):
         raise MemberError(f"layer must be an object, given {shown(layer)}")
     unit = layer.get("uom") or "m"
@@ -109,6 +109,6 @@ def _limits(layer: Any, where: str, policy: Policy) -> Limits:
         value = number_or_none(layer.get(side), f"layer.{side}")
         words = (str(unit)[:40], str(layer.get(f"{side}Reference") or "")[:40])
         given.append(None if value is None else Given(value, words, (), side))
-    found = Limits.read(given[0], given[1], where, policy=policy)
+    found = VolumeLimits.read(given[0], given[1], where, policy=policy)
     found.remarks += remarks
     return found

@@ -9,11 +9,8 @@ from pathlib import PurePath
 from gcsplan.errors import Problem
 from gcsplan.mission_file.zone_draft import ZoneDraft, one_line
 from gcsplan.notes.note import Note
-from gcsplan.world.frame import Frame
+from gcsplan.world.frame import Box, Frame
 from gcsplan.world.zones import Zone
-
-Box = tuple[float, float, float, float]
-"""West, south, east, north, m."""
 
 TURNS = (-720.0, -360.0, 0.0, 360.0, 720.0)
 """Whole turns by which a longitude may be written otherwise than the frame's, degrees."""

@@ -8,11 +8,11 @@ from itertools import chain
 from typing import Any
 
 from gcsplan.mission_file.airspace.policy import Published
-from gcsplan.mission_file.airspace.volumes import AirspaceFile, Corner, Limits
+from gcsplan.mission_file.airspace.volumes import AirspaceFile, VolumeLimits
 from gcsplan.mission_file.zone_attributes import ATTRIBUTES_UNREAD, MOST_SHOWN, is_number, meaning_of, shown
 from gcsplan.mission_file.zone_draft import Remark, one_line
 from gcsplan.mission_file.zone_file import ZoneFile
-from gcsplan.world.degree_shapes import beyond_outline
+from gcsplan.world.degree_shapes import Corner, beyond_outline
 
 _NUMBER = re.compile(r"[-+]?\d{1,9}(\.\d{1,9})?", re.ASCII)
 
@@ -122,7 +122,7 @@ def read_features(
 
 
 def add_polygons(
-    file: AirspaceFile, zone: Published, part: str, where: str, geometry: dict[str, Any], limits: Limits
+    file: AirspaceFile, zone: Published, part: str, where: str, geometry: dict[str, Any], limits: VolumeLimits
 ) -> None:
     """Add a Polygon or MultiPolygon of GeoJSON, whose holes count as no-fly. Raises MemberError."""
     kind, coordinates = geometry["type"], geometry.get("coordinates")

@@ -10,7 +10,7 @@ from typing import Any
 from gcsplan.mission_file.airspace.members import MemberError, add_polygons, number_or_none, read_features, text_of
 from gcsplan.mission_file.airspace.policy import Policy, Published
 from gcsplan.mission_file.airspace.times import ALWAYS, Period, TimeError, read_end, read_instant
-from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
+from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, VolumeLimits
 from gcsplan.mission_file.zone_attributes import is_number, shown
 from gcsplan.mission_file.zone_draft import Remark
 from gcsplan.mission_file.zone_file import ZoneFile
@@ -96,7 +96,7 @@ def _named(members: dict[str, Any], key: str, names: dict[int, str], zone: str) 
     return names[value]
 
 
-def _limits(members: dict[str, Any], where: str, policy: Policy) -> Limits:
+def _limits(members: dict[str, Any], where: str, policy: Policy) -> VolumeLimits:
     given: list[Given | None] = []
     floating: list[Remark] = []
     for side, farther in (("lower", "lowerLimitMin"), ("upper", "upperLimitMax")):
@@ -111,7 +111,7 @@ def _limits(members: dict[str, Any], where: str, policy: Policy) -> Limits:
         value = number_or_none(limit.get("value"), f"{side}Limit.value")
         words = tuple(_code(limit, key, names) for key, names in (("unit", UNITS), ("referenceDatum", DATUMS)))
         given.append(None if value is None else Given(value, words, (), f"{side}Limit"))
-    found = Limits.read(given[0], given[1], where, policy=policy)
+    found = VolumeLimits.read(given[0], given[1], where, policy=policy)
     found.remarks += floating
     return found
 

@@ -14,15 +14,15 @@ from pathlib import Path
 
 from gcsplan.errors import Problem
 from gcsplan.figures import counted
-from gcsplan.mission_file.airspace.arcs import Arc, ArcError, Corner, corners_of, outline
+from gcsplan.mission_file.airspace.arcs import Arc, ArcError, corners_of, outline
 from gcsplan.mission_file.airspace.policy import UNREAD_TIMES, Policy, Published
 from gcsplan.mission_file.airspace.times import Period, TimeError, read_end, read_instant
-from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
+from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, VolumeLimits
 from gcsplan.mission_file.zone_draft import MAX_VERTICES, Remark, one_line
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_text import decoded
 from gcsplan.notes.note import Datum, Note
-from gcsplan.world.degree_shapes import MOST_LON_DEG
+from gcsplan.world.degree_shapes import MOST_LON_DEG, Corner
 
 SUFFIXES = (".openair", ".air", ".txt")
 
@@ -95,7 +95,7 @@ class _Block:
 
 def read_openair(path: Path, data: bytes, policy: Policy) -> ZoneFile:
     """The zones of OpenAir text; what is wrong is in their problems and faults."""
-    return _Reading(AirspaceFile(path, policy, KINDS, great_circles=True)).read(_text(data))
+    return _OpenAirReading(AirspaceFile(path, policy, KINDS, great_circles=True)).read(_text(data))
 
 
 def _text(data: bytes) -> str:
@@ -106,7 +106,7 @@ def _text(data: bytes) -> str:
 
 
 @dataclass
-class _Reading:
+class _OpenAirReading:
     """One pass over one file.
 
     A centre holds for the arcs of the next zone too, as in the format's own sample, and a remark says so. A circle
@@ -293,7 +293,7 @@ class _Reading:
             file.add_ring(zone, name if shapes == 1 else f"{name}/{shapes}", where, ring, limits)
 
 
-def _limits(block: _Block, where: str, policy: Policy) -> Limits:
+def _limits(block: _Block, where: str, policy: Policy) -> VolumeLimits:
     said: list[Remark] = []
     given: list[Given | None] = []
     for key, text in (("AL", block.lower), ("AH", block.upper)):
@@ -302,7 +302,7 @@ def _limits(block: _Block, where: str, policy: Policy) -> Limits:
             plain = match[1]
             said.append((Note("zone_text_behind_height_unread"), f"{key} {text[:60]}"))
         given.append(None if plain is None else Given(plain, (), ("FT", "AMSL"), key))
-    limits = Limits.read(given[0], given[1], where, SPARED, policy=policy)
+    limits = VolumeLimits.read(given[0], given[1], where, SPARED, policy=policy)
     limits.remarks += said
     return limits
 

@@ -60,7 +60,7 @@ class Published:
 
 
 @dataclass
-class Judge:
+class PolicyJudge:
     """Applies a policy to the zones of one file; ``vocabulary`` are the kinds that its format has."""
 
     policy: Policy

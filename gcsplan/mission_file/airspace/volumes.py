@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file.airspace.policy import Judge, Policy, Published
+from gcsplan.mission_file.airspace.policy import Policy, PolicyJudge, Published
 from gcsplan.mission_file.zone_attributes import OVER_PRESSURE, UNDER_PRESSURE, level_read
 from gcsplan.mission_file.zone_draft import ACROSS, MAX_VERTICES, Bounds, Remark, ZoneDraft, check_degrees, one_line
 from gcsplan.mission_file.zone_file import ZoneFile
@@ -23,6 +23,7 @@ from gcsplan.notes.note import Note
 from gcsplan.world.degree_shapes import (
     HALF_TURN_DEG,
     LARGEST_RADIUS_M,
+    Corner,
     across,
     along_great_circles,
     latitudes_between,
@@ -32,9 +33,6 @@ from gcsplan.world.degree_shapes import (
 )
 from gcsplan.world.outlines import MOST_CROSSINGS, MOST_PAIRS, crossings, overlapping_pairs
 from gcsplan.world.zones import Level
-
-Corner = tuple[float, float]
-"""(latitude, longitude), degrees."""
 
 ELLIPSOID = "WGS84"
 LEAST_GEOID_M, GREATEST_GEOID_M = -110.0, 90.0
@@ -66,7 +64,7 @@ class Given:
 
 
 @dataclass
-class Limits:
+class VolumeLimits:
     """Floor and ceiling of one volume, what a user has to know of them, and why they cannot be read."""
 
     bounds: Bounds = field(default_factory=Bounds)
@@ -76,7 +74,7 @@ class Limits:
     @classmethod
     def read(
         cls, lower: Given | None, upper: Given | None, where: str, spared: Note | None = None, *, policy: Policy
-    ) -> Limits:
+    ) -> VolumeLimits:
         """The limits; a missing one is no limit. ``spared`` is said of a limit that needs its spare words."""
         found = cls()
         error_m = policy.flight_level_error_m
@@ -148,11 +146,11 @@ class AirspaceFile:
     vocabulary: Sequence[str]
     great_circles: bool = False
     found: ZoneFile = field(init=False)
-    judge: Judge = field(init=False)
+    judge: PolicyJudge = field(init=False)
 
     def __post_init__(self) -> None:
         self.found = ZoneFile(self.path, great_circles=self.great_circles)
-        self.judge = Judge(self.policy, self.vocabulary)
+        self.judge = PolicyJudge(self.policy, self.vocabulary)
 
     def finished(self) -> ZoneFile:
         """The zones, after what the policy names and no zone has is reported."""
@@ -164,7 +162,7 @@ class AirspaceFile:
         self.found.problems.append(Problem(where, message))
 
     def add_circle(
-        self, zone: Published, part: str, where: str, centre: Corner, radius_m: float, limits: Limits
+        self, zone: Published, part: str, where: str, centre: Corner, radius_m: float, limits: VolumeLimits
     ) -> None:
         """Add a cylinder called ``part``."""
         if not check_degrees(centre, where, self.found.problems):
@@ -176,7 +174,7 @@ class AirspaceFile:
             self.fault(where, f"zone {zone.name[:60]!r}: {words}")
 
     def add_ring(
-        self, zone: Published, part: str, where: str, ring: Sequence[Corner], limits: Limits, holes: int = 0
+        self, zone: Published, part: str, where: str, ring: Sequence[Corner], limits: VolumeLimits, holes: int = 0
     ) -> None:
         """Add a prism called ``part`` by its outline and the number of its holes."""
         self.found.holes += holes
@@ -214,7 +212,7 @@ class AirspaceFile:
                 self._add(zone, part, where, self._around(ring), None, limits, [Problem(where, too_many.message)])
                 return
             parts = parts if bent is None else enclosed(outline, bent)
-        limits = Limits(limits.bounds, [*limits.remarks, (Note("zone_outline_crosses"), None)], limits.faults)
+        limits = VolumeLimits(limits.bounds, [*limits.remarks, (Note("zone_outline_crosses"), None)], limits.faults)
         for i, piece in enumerate(parts):
             name = part if len(parts) == 1 else f"{part}/{i + 1}"
             self._add(zone, name, where, tuple(piece), None, limits, [], doubt)
@@ -241,7 +239,7 @@ class AirspaceFile:
 
     def _add(
         self, zone: Published, part: str, where: str, points: tuple[Corner, ...], radius_m: float | None,
-        limits: Limits, faults: list[Problem], doubt: tuple[Corner, ...] = (),
+        limits: VolumeLimits, faults: list[Problem], doubt: tuple[Corner, ...] = (),
     ) -> None:  # fmt: skip
         faults = [Problem(p.where, f"zone {zone.name[:60]!r}: {p.message}") for p in (*limits.faults, *faults)]
         floor, ceiling = (None, None) if faults else limits.bounds.levels(where, [])

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from gcsplan.errors import InputError, LinkError
 from gcsplan.mavlink.link.drive import drive
 from gcsplan.mavlink.link.frames import FrameParser, FrameWriter, Signing, SigningKey, signing_key
-from gcsplan.mavlink.link.link import GCS, Channel, Heard, Link, PumpJob, Steps, pump, run
+from gcsplan.mavlink.link.link import GCS, Channel, Heard, Link, LinkSteps, PumpJob, pump, run
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.mavlink.protocol import wire
 from gcsplan.mavlink.protocol.messages import (
@@ -535,7 +535,7 @@ def test_tasks_run_together_and_errors_stay_with_their_own() -> None:
     link, _ = listening_link(heartbeat_s=None)
     naps_taken: list[tuple[int, int]] = []
 
-    def sleeper(naps: int, fails: bool) -> Steps[int]:
+    def sleeper(naps: int, fails: bool) -> LinkSteps[int]:
         for nap in range(naps):
             naps_taken.append((nap, naps))
             yield time.monotonic() + 0.02
@@ -559,7 +559,7 @@ def test_no_more_tasks_run_at_a_time_than_may(most: int, most_on_link: int) -> N
     begun: list[tuple[int, int]] = []
     peaks: list[tuple[int, int]] = []
 
-    def task(which: int, number: int, channel: Channel) -> Steps[int]:
+    def task(which: int, number: int, channel: Channel) -> LinkSteps[int]:
         begun.append((which, number))
         running.add((which, number))
         # What was heard while it waited says nothing of its vehicle now.
@@ -595,7 +595,7 @@ def test_a_channel_whose_task_waits_for_its_turn_hears_nothing_and_then_hears_ag
     with Link("udpin:127.0.0.1:0", heartbeat_s=None) as link:
         port = int(link.place.rsplit(":", 1)[1])
 
-        def task(number: int, channel: Channel) -> Steps[None]:
+        def task(number: int, channel: Channel) -> LinkSteps[None]:
             heard.append((number, len(channel.inbox)))
             for peer in peers:
                 peer.send(heartbeat(), port)
@@ -617,7 +617,7 @@ def test_an_interrupt_cancels_what_runs() -> None:
         upload = Upload([WAYPOINT], us=GCS, vehicle=VEHICLE)
         channel = link.channel(1)
 
-        def interrupted() -> Steps[None]:
+        def interrupted() -> LinkSteps[None]:
             yield time.monotonic() + 0.05
             raise KeyboardInterrupt
 

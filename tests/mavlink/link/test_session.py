@@ -37,7 +37,7 @@ from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.mavlink.mission.firmware import flies_straight
 from gcsplan.mavlink.mission.mission import ALL, FENCE, RALLY, Home, Mission, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
-from gcsplan.mavlink.protocol.transfer import Progress, Timers
+from gcsplan.mavlink.protocol.transfer import Timers, TransferProgress
 from gcsplan.notes.note import Note
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
@@ -89,7 +89,7 @@ class Verdict:
 @pytest.mark.parametrize("autopilot", list(Autopilot))
 def test_a_checked_mission_is_uploaded_and_verified(autopilot: Autopilot) -> None:
     board, sent = vehicle(autopilot), mission(autopilot)
-    seen: list[tuple[str, Progress]] = []
+    seen: list[tuple[str, TransferProgress]] = []
     judged: list[Mission] = []
 
     def judge(read: Mission, _: Mapping[str, float]) -> None:

@@ -13,12 +13,12 @@ import pytest
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError, VehicleRefused
 from gcsplan.mavlink.link.frames import FrameWriter, Signing
-from gcsplan.mavlink.link.link import Link, PumpJob, Steps, pump
+from gcsplan.mavlink.link.link import Link, LinkSteps, PumpJob, pump
 from gcsplan.mavlink.link.results import UploadResult
 from gcsplan.mavlink.link.session import SessionOptions, upload_mission
 from gcsplan.mavlink.link.terrain import (
     OFF,
-    Compared,
+    TerrainComparison,
     TerrainService,
     compare_steps,
     places_along,
@@ -31,7 +31,7 @@ from gcsplan.notes.note import Note
 from gcsplan.sim.vehicle.hub import Hub
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
-from gcsplan.world.terrain_grid import Ground
+from gcsplan.world.terrain_grid import GroundHeights
 from tests.campaigns.air import Air, Radio
 
 AT = (36.59, -84.25)
@@ -51,7 +51,7 @@ def air_with_vehicle(radio: Radio | None = None, *, seed: int = 1, spacing_m: in
     return air
 
 
-def wait_steps(link: Link, seconds: float) -> Steps[None]:
+def wait_steps(link: Link, seconds: float) -> LinkSteps[None]:
     end = link.clock() + seconds
     while link.clock() < end:
         yield min(end, link.clock() + 1.0)
@@ -64,7 +64,9 @@ def serve_for(link: Link, seconds: float) -> None:
     assert job.error is None
 
 
-def compared(link: Link, service: TerrainService, places: list[tuple[int, int]], spacing_m: int = 100) -> Compared:
+def compared(
+    link: Link, service: TerrainService, places: list[tuple[int, int]], spacing_m: int = 100
+) -> TerrainComparison:
     channel = link.channel(1)
     posts = service.posts(spacing_m)
     job = PumpJob(channel, compare_steps(channel, VEHICLE, places, posts, patience_s=20.0))
@@ -205,7 +207,7 @@ def mission() -> Mission:
     return Mission(Autopilot.ARDUCOPTER, Home.at(*AT, 400.0), tuple(items), "uav1", 1)
 
 
-def uploaded(air: Air, ground: Ground | None, **more: object) -> tuple[UploadResult, dict[str, float]]:
+def uploaded(air: Air, ground: GroundHeights | None, **more: object) -> tuple[UploadResult, dict[str, float]]:
     """The result of an upload, and the values that it was judged with."""
     told: dict[str, float] = {}
 
