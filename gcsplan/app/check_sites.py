@@ -33,7 +33,7 @@ from gcsplan.mavlink.mission.commands import LOITER_TIME, LOITER_TO_ALT, LOITER_
 from gcsplan.mavlink.mission.mission import NO_POSITION, Home, Mission, MissionItem
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.mission_file.airspace.times import Hours
-from gcsplan.mission_file.from_options import OPTIONS, OpenWorld, WorldExtent, WorldOptions
+from gcsplan.mission_file.from_options import KEY_OPTIONS, OpenWorld, WorldExtent, WorldOptions
 from gcsplan.notes.note import Note, Said, Wording
 from gcsplan.units import Units
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -222,7 +222,7 @@ class OptionsSite:
     @property
     def typed(self) -> Mapping[str, str]:
         """See `Site.typed`."""
-        return OPTIONS
+        return KEY_OPTIONS
 
 
 def split_name(argument: str) -> tuple[str | None, Path]:

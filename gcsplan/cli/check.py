@@ -239,10 +239,10 @@ def _archive(
 
 def _options(given: dict[str, object], at: str | None = None) -> WorldOptions:
     from gcsplan.mission_file.airspace.times import texts_of
-    from gcsplan.mission_file.from_options import OPTIONS, WorldOptions
+    from gcsplan.mission_file.from_options import KEY_OPTIONS, WorldOptions
 
     def under(*keys: str) -> dict[str, object]:
-        return {key: given[OPTIONS[key]] for key in keys if OPTIONS[key] in given}
+        return {key: given[KEY_OPTIONS[key]] for key in keys if KEY_OPTIONS[key] in given}
 
     limits = ("min_agl_m", "max_agl_m", "max_amsl_m", "horizontal_clearance_m", "track_error_m", "altitude_error_m",
               "max_climb_deg", "max_descent_deg")  # fmt: skip

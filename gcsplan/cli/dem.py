@@ -153,15 +153,15 @@ def _around(text: str, radius_km: float) -> Sequence[Cell]:
 
 
 def _named(text: str) -> Sequence[Cell]:
-    from gcsplan.dem.cells import MOST_CELLS
+    from gcsplan.dem.cells import MOST_TILES_OF_AREA
     from gcsplan.world.cell import cell_of
 
     names = [name.strip().upper() for name in text.split(",") if name.strip()]
     cells = [cell_of(name) for name in names]
     wrong = [name for name, cell in zip(names, cells, strict=True) if cell is None]
-    if wrong or not cells or len(cells) > MOST_CELLS:
+    if wrong or not cells or len(cells) > MOST_TILES_OF_AREA:
         what = f"given {wrong[0][:32]!r}" if wrong else f"given {len(cells)} of them"
-        raise UsageError(f"--tiles: 1 to {MOST_CELLS} names such as N36W085, with commas, are wanted, {what}")
+        raise UsageError(f"--tiles: 1 to {MOST_TILES_OF_AREA} names such as N36W085, with commas, are wanted, {what}")
     return tuple(dict.fromkeys(cell for cell in cells if cell is not None))
 
 

@@ -210,11 +210,11 @@ def _write_schema(folder: Path, remark: Callable[[str], None]) -> list[Path]:
     import json
 
     from gcsplan.export.durable import write_whole
-    from gcsplan.mission_file.json_schema import FILE_NAME, TITLE, mission_schema
+    from gcsplan.mission_file.json_schema import FILE_NAME, SCHEMA_TITLE, mission_schema
 
     file = folder / FILE_NAME
     try:
-        ours = not file.exists() or TITLE in file.read_text(encoding="utf-8")
+        ours = not file.exists() or SCHEMA_TITLE in file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         ours = False
     if not ours:

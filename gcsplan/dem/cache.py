@@ -22,7 +22,7 @@ from gcsplan.world.input_files import tell_file, tell_setting
 
 CACHE_VARIABLE = "GCSPLAN_DEM_CACHE"
 TileState = Literal["tile", "sea", "absent"]
-FORMAT = 1
+RECORD_FORMAT = 1
 MOST_RECORD_BYTES = 65_536
 
 
@@ -127,7 +127,7 @@ class Cache:
 
 def text_of(record: TileRecord) -> str:
     """The JSON text of a record."""
-    return json.dumps({"format": FORMAT, **asdict(record)}, indent=2, ensure_ascii=False) + "\n"
+    return json.dumps({"format": RECORD_FORMAT, **asdict(record)}, indent=2, ensure_ascii=False) + "\n"
 
 
 def _read(path: Path) -> TileRecord | None:
@@ -135,7 +135,7 @@ def _read(path: Path) -> TileRecord | None:
     try:
         with path.open("rb") as file:
             data = json.loads(file.read(MOST_RECORD_BYTES))
-        if not isinstance(data, dict) or data.pop("format", None) != FORMAT:
+        if not isinstance(data, dict) or data.pop("format", None) != RECORD_FORMAT:
             return None
         record = TileRecord(**data | {"lists": tuple(data.get("lists", ()))})
     except (OSError, ValueError, TypeError):

@@ -22,9 +22,9 @@ from gcsplan.world.cell import Cell, cell_of
 from gcsplan.world.raster import require_file
 from gcsplan.world.terrain_grid import (
     ALL_PARTS,
-    PART,
-    PARTS,
-    POSTS,
+    PART_POSTS,
+    PARTS_OF_BLOCK,
+    POSTS_OF_BLOCK,
     SAME_CORNER_E7,
     Block,
     TerrainGrid,
@@ -32,14 +32,14 @@ from gcsplan.world.terrain_grid import (
 )
 
 RECORD_BYTES = 2048
-SUFFIX = ".DAT"
+DAT_SUFFIX = ".DAT"
 VERSION = 1
-MOST_BYTES = 256 * 2**20
+MOST_DAT_BYTES = 256 * 2**20
 """A tile with posts every 15 m has less."""
 
 RECORD = np.dtype([
     ("bitmap", "<u8"), ("lat", "<i4"), ("lon", "<i4"), ("crc", "<u2"), ("version", "<u2"), ("spacing", "<u2"),
-    ("height", "<i2", POSTS), ("north", "<u2"), ("east", "<u2"), ("lon_degrees", "<i2"), ("lat_degrees", "i1"),
+    ("height", "<i2", POSTS_OF_BLOCK), ("north", "<u2"), ("east", "<u2"), ("lon_degrees", "<i2"), ("lat_degrees", "i1"),
     ("spare", "V227"),
 ])  # fmt: skip
 CRC_BYTES = RECORD_BYTES - 227
@@ -69,7 +69,7 @@ class DatFile:
 
 def file_name(cell: Cell) -> str:
     """Such as ``N36W085.DAT``."""
-    return cell.name + SUFFIX
+    return cell.name + DAT_SUFFIX
 
 
 def cell_of_file(path: Path, *, where: str) -> Cell:
@@ -84,7 +84,7 @@ def cell_of_file(path: Path, *, where: str) -> Cell:
 
 def is_dat(path: Path) -> bool:
     """Whether a name is that of a terrain file of ArduPilot."""
-    return path.suffix.upper() == SUFFIX
+    return path.suffix.upper() == DAT_SUFFIX
 
 
 def packed(grid: TerrainGrid, cell: Cell, blocks: Mapping[Block, Floats]) -> bytes:
@@ -118,10 +118,10 @@ def read_dat(path: Path, *, where: str) -> DatFile:
     require_file(path, where=where)
     size = path.stat().st_size
     cell = cell_of_file(path, where=where)
-    if size > MOST_BYTES or size % RECORD_BYTES:
+    if size > MOST_DAT_BYTES or size % RECORD_BYTES:
         raise InputError(
             f"{path} is no terrain file of ArduPilot: {size} bytes, wanted records of {RECORD_BYTES}, "
-            f"{MOST_BYTES >> 20} MB at most",
+            f"{MOST_DAT_BYTES >> 20} MB at most",
             where=where,
         )
     try:
@@ -167,6 +167,8 @@ def _fault(records: NDArray[np.void], k: int, data: bytes, grid: TerrainGrid, ce
 
 
 def _heights(record: np.void) -> Floats:
-    bits = (int(record["bitmap"]) >> np.arange(PARTS[0] * PARTS[1], dtype=np.uint64).astype(object)) & 1
-    known = np.kron(np.array(bits, bool).reshape(PARTS), np.ones((PART, PART), bool))
+    bits = (
+        int(record["bitmap"]) >> np.arange(PARTS_OF_BLOCK[0] * PARTS_OF_BLOCK[1], dtype=np.uint64).astype(object)
+    ) & 1
+    known = np.kron(np.array(bits, bool).reshape(PARTS_OF_BLOCK), np.ones((PART_POSTS, PART_POSTS), bool))
     return np.where(known, record["height"].astype(float), np.nan)

@@ -38,7 +38,7 @@ from gcsplan.world.terrain import (
     terrain_of,
 )
 
-ROWS = 3600
+TILE_ROWS = 3600
 """Rows of a tile of sea if no tile beside it says another number."""
 
 
@@ -135,8 +135,8 @@ def _tile(cache: Cache, cell: Cell, record: TileRecord, where: str) -> Raster:
 
 def _sea(source: DemSource, cell: Cell, sample: Raster | None) -> Raster:
     """A tile at 0 m on the grid that the source's tiles have, ``sample`` being one of them."""
-    rows = ROWS if sample is None else round(1.0 / sample.dy)
-    cols = round(rows * source.columns_of(cell) / ROWS)
+    rows = TILE_ROWS if sample is None else round(1.0 / sample.dy)
+    cols = round(rows * source.columns_of(cell) / TILE_ROWS)
     dx, dy = 1.0 / cols, 1.0 / rows
     more = 1 if source.shares_edges else 0
 

@@ -11,11 +11,11 @@ from pydantic import ValidationError
 
 from gcsplan.errors import Problem
 from gcsplan.mission_file.keys import Keys
-from gcsplan.mission_file.places import EXAMPLES
+from gcsplan.mission_file.places import PLACE_EXAMPLES
 from gcsplan.mission_file.point_keys import POINT_FORMS
-from gcsplan.mission_file.schema import FORMS, PlannerKeys, TerrainKeys, ZoneKeys, nearest, shown
+from gcsplan.mission_file.schema import POINT_FORM_NAMES, PlannerKeys, TerrainKeys, ZoneKeys, nearest, shown
 from gcsplan.mission_file.strict_yaml import lines_of
-from gcsplan.mission_file.units import UNITS, nearest_keys, other_names, unit_end
+from gcsplan.mission_file.units import UNIT_SYMBOLS, nearest_keys, other_names, unit_end
 from gcsplan.mission_file.yaml_slips import missing_space
 
 Section = TypeVar("Section", bound=Keys)
@@ -29,7 +29,7 @@ SHORT = {TerrainKeys: "dem", PlannerKeys: "name", ZoneKeys: "file"}
 
 MOST_OF_NUMBER = 40
 _RANGE = re.compile(r"\s*(\d+(?:\.\d+)?)\s*(?:-|–|\.\.|to)\s*(\d+(?:\.\d+)?)\s*")
-_NUMBER = re.compile(r"\s*[±+]?(-?\d+(?:[.,]\d+)?)\s*([a-zA-Z/²°%]*)\s*")
+_NUMBER_AND_UNIT = re.compile(r"\s*[±+]?(-?\d+(?:[.,]\d+)?)\s*([a-zA-Z/²°%]*)\s*")
 
 
 def read_section(kind: type[Section], value: Any, where: str, problems: list[Problem]) -> Section | None:
@@ -135,7 +135,7 @@ def key_path(where: str, loc: Iterable[int | str]) -> str:
     for part in loc:
         if isinstance(part, int):
             path += f"[{part}]"
-        elif part not in FORMS:
+        elif part not in POINT_FORM_NAMES:
             path += part[:80] if path.endswith(": ") else f".{part[:80]}"
     return path
 
@@ -189,10 +189,10 @@ def _problem(kind: type[Keys], error: Any, where: str) -> Problem:
             bound = f"at least {least}" if least is not None else f"at most {most}"
             given = context.get("actual_length", given)
             whole = _form_of(loc) and given == 4 and all(type(v) is int for v in error["input"])
-            hint = f"; decimals begin with a point: [{EXAMPLES[0]}]" if whole else ""
+            hint = f"; decimals begin with a point: [{PLACE_EXAMPLES[0]}]" if whole else ""
             return Problem(path, f"must have {bound} values{_form_of(loc)}, given {given}{hint}")
         case "list_type" if _form_of(loc):
-            words = f"must be [lat, lon], {{lat, lon}}, or text such as {EXAMPLES[0]}"
+            words = f"must be [lat, lon], {{lat, lon}}, or text such as {PLACE_EXAMPLES[0]}"
             return Problem(path, f"{words}, or {{east_m, north_m}} in a mission with a frame, given {given}")
         case "list_type":
             return Problem(path, f"must be a list, given {given}")
@@ -207,14 +207,14 @@ def _as_number(loc: tuple[int | str, ...], given: Any) -> str:
         return ""
     if "one" in loc and (several := _RANGE.fullmatch(given)):
         return f"; write [{several[1]}, {several[2]}]"
-    match = _NUMBER.fullmatch(given)
-    key = next((part for part in reversed(loc) if isinstance(part, str) and part not in FORMS), "")
+    match = _NUMBER_AND_UNIT.fullmatch(given)
+    key = next((part for part in reversed(loc) if isinstance(part, str) and part not in POINT_FORM_NAMES), "")
     if match is None or not key:
         return ""
     number, unit, end = match[1].replace(",", "."), match[2], unit_end(key)
     if not unit:  # the key is not named, since it may be written in another unit
         return f"; write the number alone, without quotes: {number}"
-    if unit.lower() == UNITS.get(end, "").lower():
+    if unit.lower() == UNIT_SYMBOLS.get(end, "").lower():
         return f"; write the number alone: `{key}: {number}`"
     other = key.removesuffix(end) + "_" + unit.lower().replace("km/h", "kmh")
     return f"; write `{other}: {number}`" if other in other_names([key]) else ""

@@ -40,7 +40,7 @@ from gcsplan.world.zones import Zone
 MARGIN_M, MARGIN_MOST_M = 500.0, 3000.0
 """Terrain around the mission: at least the first, m, or a tenth of its extent up to the second, m."""
 
-OPTIONS = {
+KEY_OPTIONS = {
     "min_agl_m": "--min-agl", "max_agl_m": "--max-agl", "max_amsl_m": "--max-amsl", "speed_m_s": "--speed",
     "horizontal_clearance_m": "--clearance", "track_error_m": "--track-error", "climb_m_s": "--climb-rate",
     "altitude_error_m": "--altitude-error", "max_climb_deg": "--max-climb", "max_descent_deg": "--max-descent",
@@ -221,5 +221,5 @@ def _drafts(files: Sequence[str], problems: list[Problem], notes: list[Note], ho
 def _renamed(problem: Problem) -> Problem:
     """The problem with its option as the place, in place of a key such as ``.min_agl_m``."""
     key = problem.where.removeprefix(".").split(".")[-1].split("[")[0]
-    option = OPTIONS.get(key)
+    option = KEY_OPTIONS.get(key)
     return replace(problem, where=option) if option is not None else problem

@@ -68,14 +68,14 @@ from gcsplan.world.terrain import OpenTerrain, Terrain, TerrainSpec
 
 __all__ = ["ArrivalRequest", "MissionFile", "PlannerRequest", "VehicleRequest", "load_mission"]
 
-WANTED = {
+WANTED_KEYS = {
     "version": "write `version: 1`",
     "terrain": "write `terrain: {dem: FILE}`, or for flat ground its altitude: `terrain: {flat_m: 300}`",
     "vehicles": "write a list with name, sysid, autopilot, start and goal of each",
 }
 """The keys that every mission has, and what to write where one is absent."""
 
-MOST_VEHICLES = 2000
+MOST_VEHICLES_OF_FILE = 2000
 """Most vehicles of one file: more than are flown together anywhere, and few enough for a table of all pairs."""
 
 TERRAIN_ERROR_M = 30.0
@@ -156,7 +156,7 @@ class _MissionReading:
         problems += unknown_keys(raw, TOP_KEYS, self.where)
         problems += [
             Problem(self.where + key, f"is missing; {cure}", "missing")
-            for key, cure in WANTED.items()
+            for key, cure in WANTED_KEYS.items()
             if raw.get(key) is None
         ]
         name = self._name()
@@ -296,9 +296,9 @@ class _MissionReading:
     def _vehicles(self, terrain: TerrainKeys | None, altitude_frame: AltitudeFrame) -> list[Terminals]:
         where = f"{self.where}vehicles"
         value = self.raw.get("vehicles")
-        if value is not None and (not isinstance(value, list) or not 1 <= len(value) <= MOST_VEHICLES):
+        if value is not None and (not isinstance(value, list) or not 1 <= len(value) <= MOST_VEHICLES_OF_FILE):
             dash = "; begin each vehicle with a dash: `- name: …`" if isinstance(value, dict) else ""
-            words = f"must be a list of 1 to {MOST_VEHICLES} vehicles, given {shown(value)}{dash}"
+            words = f"must be a list of 1 to {MOST_VEHICLES_OF_FILE} vehicles, given {shown(value)}{dash}"
             self.problems.append(Problem(where, words))
             return []
         shared = self._section(LimitKeys, "limits") or LimitKeys()

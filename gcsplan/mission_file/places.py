@@ -17,7 +17,7 @@ from gcsplan.world import grids
 MAX_CHARS = 100
 """Longest text of a place; every known format is shorter than 60."""
 
-EXAMPLES = (
+PLACE_EXAMPLES = (
     "47.39708, 8.34403", "47.39708 N, 8.34403 E", "47°23'49.5\"N 8°20'38.5\"E", grids.UTM_EXAMPLE, grids.MGRS_EXAMPLE,
 )  # fmt: skip
 """One text for each format, for messages and for the reference."""
@@ -42,17 +42,17 @@ class _Angle(NamedTuple):
     minutes: bool
 
 
-_NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)"
+_FIGURE = r"(?:\d+(?:\.\d*)?|\.\d+)"
 _ANGLE = re.compile(
-    rf"""(?P<sign>[-+]?)\s*(?P<deg>{_NUMBER})
-    (?:\s*°\s*(?:(?P<m1>{_NUMBER})\s*(?:'\s*(?:(?P<s1>{_NUMBER})\s*"?)?)?)?  # 47°23'49.5", the last mark may be absent
-      |:(?P<m2>{_NUMBER})(?::(?P<s2>{_NUMBER}))?                             # 47:23:49.5
-      |\s+(?P<m3>{_NUMBER})(?:\s+(?P<s3>{_NUMBER}))?                         # 47 23 49.5
+    rf"""(?P<sign>[-+]?)\s*(?P<deg>{_FIGURE})
+    (?:\s*°\s*(?:(?P<m1>{_FIGURE})\s*(?:'\s*(?:(?P<s1>{_FIGURE})\s*"?)?)?)?  # 47°23'49.5", the last mark may be absent
+      |:(?P<m2>{_FIGURE})(?::(?P<s2>{_FIGURE}))?                             # 47:23:49.5
+      |\s+(?P<m3>{_FIGURE})(?:\s+(?P<s3>{_FIGURE}))?                         # 47 23 49.5
     )?""",
     re.VERBOSE,
 )
-_FLOAT = re.compile(rf"[-+]?{_NUMBER}(?:E[-+]?\d{{1,3}})?")
-_BEFORE = re.compile(r"([NSEW])\s*([^NSEW]+?)\s*[,;/]?\s*([NSEW])\s*([^NSEW]+)")
+_PLACE_FLOAT = re.compile(rf"[-+]?{_FIGURE}(?:E[-+]?\d{{1,3}})?")
+_LETTERS_BEFORE = re.compile(r"([NSEW])\s*([^NSEW]+?)\s*[,;/]?\s*([NSEW])\s*([^NSEW]+)")
 _AFTER = re.compile(r"([^NSEW]+?)\s*([NSEW])\s*[,;/]?\s*([^NSEW]+?)\s*([NSEW])")
 _ONE_BEFORE, _ONE_AFTER = re.compile(r"([NSEW])\s*([^NSEW]+)"), re.compile(r"([^NSEW]+?)\s*([NSEW])")
 
@@ -61,18 +61,20 @@ _MARKS = {
     "\u2006\u2007\u2008\u2009\u200a\u202f\u205f\u3000\t", "": "\u200b\u200e\u200f\u2060\ufeff",
 }  # fmt: skip
 """What programs and typographers write for each mark."""
-_PLAIN = str.maketrans({other: mark for mark, others in _MARKS.items() for other in others})
-_WORDS = {"NORTH": "N", "SOUTH": "S", "EAST": "E", "WEST": "W", "DEGREES": "°", "DEG": "°"}
+_PLAIN_MARKS = str.maketrans({other: mark for mark, others in _MARKS.items() for other in others})
+_WORDS_OF_PLACES = {"NORTH": "N", "SOUTH": "S", "EAST": "E", "WEST": "W", "DEGREES": "°", "DEG": "°"}
 
 
 def read_place(text: str) -> Degrees:
     """The place that ``text`` names. Raises ValueError: the text, the format that it was taken for, and the cure."""
     if len(text) > MAX_CHARS:
-        raise ValueError(f"a place has at most {MAX_CHARS} characters, given {len(text)}; for example `{EXAMPLES[0]}`")
+        raise ValueError(
+            f"a place has at most {MAX_CHARS} characters, given {len(text)}; for example `{PLACE_EXAMPLES[0]}`"
+        )
     plain = _plain(text)
     if not re.search(r"\d", plain):
         raise ValueError(
-            f"{text!r} is no place: write latitude and longitude (`{EXAMPLES[0]}` or `{EXAMPLES[2]}`), UTM "
+            f"{text!r} is no place: write latitude and longitude (`{PLACE_EXAMPLES[0]}` or `{PLACE_EXAMPLES[2]}`), UTM "
             f"(`{grids.UTM_EXAMPLE}`) or MGRS (`{grids.MGRS_EXAMPLE}`)"
         )
     kind = "degrees"
@@ -88,7 +90,9 @@ def read_place(text: str) -> Degrees:
         if fault:
             raise grids.NotAPlace(fault)
     except grids.NotAPlace as why:
-        example = grids.EXAMPLES.get(kind, EXAMPLES[2] if "°" in plain or "'" in plain else EXAMPLES[0])
+        example = grids.GRID_EXAMPLES.get(
+            kind, PLACE_EXAMPLES[2] if "°" in plain or "'" in plain else PLACE_EXAMPLES[0]
+        )
         cure = f"; for example `{example}`" if why.needs_example else ""
         raise ValueError(f"{text!r} is read as {kind}: {why}{cure}") from None
     return Degrees(lat_deg, lon_deg)
@@ -142,7 +146,7 @@ def is_swapped(lat_deg: float, lon_deg: float) -> bool:
 
 def _plain(text: str) -> str:
     """``text`` in capitals with plain marks, without the brackets around it."""
-    plain = " ".join(text.translate(_PLAIN).replace("''", '"').upper().split())
+    plain = " ".join(text.translate(_PLAIN_MARKS).replace("''", '"').upper().split())
     if plain[:1] + plain[-1:] in ("()", "[]"):
         plain = plain[1:-1].strip()
     return plain
@@ -150,14 +154,16 @@ def _plain(text: str) -> str:
 
 def _abbreviated(plain: str) -> str:
     """Words as letters and marks: NORTH is N, DEG and the D of 47D23' are °."""
-    short = re.sub(r"[A-Z]+", lambda word: _WORDS.get(word[0], word[0]), plain)
+    short = re.sub(r"[A-Z]+", lambda word: _WORDS_OF_PLACES.get(word[0], word[0]), plain)
     return re.sub(r"(?<=\d)\s*D(?![A-Z])", "°", short)
 
 
 def _read_degrees(plain: str) -> tuple[float, float]:
     """Latitude and longitude in degrees, not yet checked for their range."""
     parts = plain.split(",")
-    if len(parts) == 2 and all(_FLOAT.fullmatch(part.strip()) for part in parts):  # also 1e-05, as programs print it
+    if len(parts) == 2 and all(
+        _PLACE_FLOAT.fullmatch(part.strip()) for part in parts
+    ):  # also 1e-05, as programs print it
         return float(parts[0]), float(parts[1])
     text = _abbreviated(plain)
     other = re.search(r"[^-+0-9NSEW°'\":.,;/ ]+", text)
@@ -169,7 +175,7 @@ def _read_degrees(plain: str) -> tuple[float, float]:
         if first.minutes != second.minutes:  # `47,39 8` is meant with a decimal comma
             raise grids.NotAPlace("one angle has minutes and the other one has not")
         return first.deg, second.deg
-    before, after = _BEFORE.fullmatch(text), _AFTER.fullmatch(text)
+    before, after = _LETTERS_BEFORE.fullmatch(text), _AFTER.fullmatch(text)
     if len(found) == 1 and (_ONE_BEFORE.fullmatch(text) or _ONE_AFTER.fullmatch(text)) and "," not in text:
         missing, there = ("longitude", "latitude") if found[0] in LAT_LETTERS else ("latitude", "longitude")
         raise grids.NotAPlace(f"it is a {there} alone; the {missing} is missing")
@@ -196,7 +202,7 @@ def _halves(text: str) -> list[str]:
     """The two angles of a text without letters."""
     parts = [part.strip() for part in re.split(r"[,;/]", text)]
     if len(parts) == 1:
-        parts = re.split(rf"\s+(?=[-+]?\s*{_NUMBER}\s*°)", text) if text.count("°") == 2 else text.split()
+        parts = re.split(rf"\s+(?=[-+]?\s*{_FIGURE}\s*°)", text) if text.count("°") == 2 else text.split()
     if len(parts) == 2:
         return parts
     if "," in text and "." not in text and len(parts) > 1:

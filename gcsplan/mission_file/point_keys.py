@@ -22,10 +22,10 @@ from pydantic import (
 
 from gcsplan.mission_file.keys import FiniteMetres, Keys, Length
 from gcsplan.mission_file.places import (
-    EXAMPLES,
     LAT_LETTERS,
     LON_LETTERS,
     MAX_CHARS,
+    PLACE_EXAMPLES,
     Degrees,
     read_angle,
     read_place,
@@ -69,7 +69,7 @@ def _named_places(schema: dict[str, Any]) -> None:
 _ONE_OR_TWO_TEXTS = WithJsonSchema(
     {
         "anyOf": [
-            {"type": "string", "maxLength": MAX_CHARS, "examples": list(EXAMPLES)},
+            {"type": "string", "maxLength": MAX_CHARS, "examples": list(PLACE_EXAMPLES)},
             {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2},
         ]
     }

@@ -19,12 +19,12 @@ from pydantic import (
     Tag,
 )
 
-from gcsplan.mission_file.keys import FAR_M, FiniteMetres, Keys, Length
+from gcsplan.mission_file.keys import LARGEST_KEY_M, FiniteMetres, Keys, Length
 from gcsplan.mission_file.point_keys import POINT_FORMS, LatLon, Point, ViaPoint, in_own_brackets
 
 NAME_PATTERN = r"^[A-Za-z0-9_-]+$"
 
-LEAST = 1e-3
+LEAST_POSITIVE = 1e-3
 """Smallest speed, acceleration, or battery capacity in J: a division by less has no useful bound."""
 
 
@@ -32,13 +32,13 @@ MOST_VOLTS = 10_000.0
 
 
 def _no_trifle(value: float) -> float:
-    if value < LEAST:
-        raise ValueError(f"must be at least {LEAST:g}, given {value:g}")
+    if value < LEAST_POSITIVE:
+        raise ValueError(f"must be at least {LEAST_POSITIVE:g}, given {value:g}")
     return value
 
 
 Points = Annotated[list[Point], BeforeValidator(in_own_brackets)]
-Positive = Annotated[float, Field(gt=0.0, le=FAR_M)]
+Positive = Annotated[float, Field(gt=0.0, le=LARGEST_KEY_M)]
 Angle = Annotated[float, Field(gt=0.0, le=90.0)]
 Speed = Annotated[float, Field(gt=0.0, le=300.0), AfterValidator(_no_trifle)]
 Accel = Annotated[float, Field(gt=0.0, le=100.0), AfterValidator(_no_trifle)]
@@ -65,7 +65,7 @@ else:
         | Annotated[list[Speed], Field(min_length=2, max_length=2), Tag("several")],
         Discriminator(_count),
     ]
-FORMS = ("[lat, lon]", "text", *POINT_FORMS, "one", "several")
+POINT_FORM_NAMES = ("[lat, lon]", "text", *POINT_FORMS, "one", "several")
 """The tags of unions, which are no part of a key's place."""
 
 
@@ -85,7 +85,7 @@ class PeakKeys(Keys):
     """East and north of its top, metres."""
     height_m: FiniteMetres
     """Height of its top above the flat ground."""
-    decay_m: Annotated[list[Annotated[float, Field(ge=1e-3, le=FAR_M)]], Field(min_length=2, max_length=2)]
+    decay_m: Annotated[list[Annotated[float, Field(ge=1e-3, le=LARGEST_KEY_M)]], Field(min_length=2, max_length=2)]
     """East and north distance from the top at which the height has fallen to 37 % (1/e)."""
 
 
@@ -303,7 +303,7 @@ class ArrivalKeys(Keys):
 
 def _plain_values(parameters: dict[str, Any]) -> dict[str, Any]:
     for key, value in parameters.items():
-        if not isinstance(value, int | float | str) or not (isinstance(value, str) or abs(value) <= FAR_M):
+        if not isinstance(value, int | float | str) or not (isinstance(value, str) or abs(value) <= LARGEST_KEY_M):
             raise ValueError(f"{key[:80]} must be a plain number or word, given {shown(value)}")
     return parameters
 

@@ -20,7 +20,7 @@ from gcsplan.mission_file.schema import MOST_VOLTS, MissionKeys, shown
 from gcsplan.notes.note import Note
 from gcsplan.units import FOOT, KM_PER_HOUR, KNOT, MILLIAMPERE_HOUR, MINUTE, NAUTICAL_MILE, WATT_HOUR, Unit
 
-UNITS = {
+UNIT_SYMBOLS = {
     "_j_per_m": "J/m", "_m_s3": "m/s³", "_m_s2": "m/s²", "_m_s": "m/s", "_percent": "%", "_deg": "°", "_mb": "MB",
     "_m": "m", "_s": "s", "_j": "J", "_w": "W", "_v": "V",
 }  # fmt: skip
@@ -40,7 +40,7 @@ OTHERS: Mapping[str, Mapping[str, Unit]] = {
 
 CHARGE = "_mah"
 
-MOST_NOTES = 20
+MOST_CONVERSIONS = 20
 """Most notes on conversions; more are counted."""
 
 
@@ -80,7 +80,7 @@ class Converted:
 
 def unit_end(key: str) -> str:
     """The end of a key that is its unit, such as ``_m``, or an empty text."""
-    return next((end for end in UNITS if key.endswith(end)), "")
+    return next((end for end in UNIT_SYMBOLS if key.endswith(end)), "")
 
 
 def other_names(keys: Iterable[str]) -> dict[str, Written]:
@@ -113,7 +113,7 @@ def nearest_keys(key: str, known: Iterable[str]) -> tuple[tuple[str, ...], str]:
     if not unit or key.endswith(end) or key.rsplit("_", 1)[-1] in canonical.removesuffix(unit).split("_"):
         return (found,), f"; did you mean {found}?"
     more = [name for name, written in others.items() if written.key == canonical]
-    names = [f"{canonical} (in {UNITS[unit]})", *more]
+    names = [f"{canonical} (in {UNIT_SYMBOLS[unit]})", *more]
     words = " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
     return (canonical, *more), f"; did you mean {words}?"
 
@@ -129,8 +129,8 @@ def in_own_units(raw: Mapping[str, Any], where: str) -> Converted:
         (how if len(at) == 1 else Note("and_as_many_more", note=how, count=len(at) - 1)).of(place=at[0])
         for how, at in places.items()
     ]
-    if len(notes) > MOST_NOTES:
-        notes[MOST_NOTES:] = [Note("more_values_converted", count=len(notes) - MOST_NOTES)]
+    if len(notes) > MOST_CONVERSIONS:
+        notes[MOST_CONVERSIONS:] = [Note("more_values_converted", count=len(notes) - MOST_CONVERSIONS)]
     return Converted(plain, tuple(notes), tuple(walk.problems), walk.given)
 
 

@@ -41,7 +41,7 @@ GRAVITY_M_S2 = 9.80665
 
 SEPARATION_M = 30.0
 
-ROUNDING_M = 0.05
+CURE_ROUNDING_M = 0.05
 """At least what planners keep beyond the errors, since altitudes are stored in centimetres; for advice alone."""
 
 MOTION = (
@@ -319,7 +319,7 @@ def _check_heights(keys: VehicleKeys, limits: Limits, where: str, problems: list
                 Problem(
                     f"{where}.max_agl_m",
                     f"leaves no room: {words} is above max_agl_m {limits.max_agl_m:g} - altitude_error_m {error_m:g}; "
-                    f"write {math.ceil(low + error_m + ROUNDING_M)} or more",
+                    f"write {math.ceil(low + error_m + CURE_ROUNDING_M)} or more",
                 )
             )
             return
@@ -333,7 +333,7 @@ def _check_heights(keys: VehicleKeys, limits: Limits, where: str, problems: list
             problems.append(Problem(f"{where}.{key}", f"must be at least {low:g} m AGL ({words}), given {agl_m:g}"))
         elif agl_m > high + 1e-9:
             most = f"must be at most {high:g} m AGL (max_agl_m - altitude_error_m), given {agl_m:g}"
-            most += f"; write {math.floor(high - ROUNDING_M)} or less"
+            most += f"; write {math.floor(high - CURE_ROUNDING_M)} or less"
             problems.append(Problem(f"{where}.{key}", most))
 
 

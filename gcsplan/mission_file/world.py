@@ -16,7 +16,7 @@ from gcsplan.mission_file.places import Degrees
 from gcsplan.mission_file.point_keys import LocalPoint
 from gcsplan.mission_file.schema import FrameKeys, TerrainKeys, ZoneKeys
 from gcsplan.mission_file.zone_draft import (
-    SIZES,
+    SIZE_KEYS,
     Bounds,
     ZoneDraft,
     check_degrees,
@@ -227,10 +227,10 @@ def make_zones(
 def _zones_of_file(
     keys: ZoneKeys, file: str, where: str, folder: Path, problems: list[Problem], notes: list[Note], hours: Hours | None
 ) -> list[ZoneDraft]:
-    others = sorted(keys.given.keys() - {"file", "layer", *SIZES, *OF_FILES})
+    others = sorted(keys.given.keys() - {"file", "layer", *SIZE_KEYS, *OF_FILES})
     words = "stands in the file itself, in a feature's properties; leave it out here"
     problems += [Problem(f"{where}.{k}", words) for k in others]
-    sizes = [(getattr(keys, size), f"{where}.{size}") for size in SIZES if getattr(keys, size) is not None]
+    sizes = [(getattr(keys, size), f"{where}.{size}") for size in SIZE_KEYS if getattr(keys, size) is not None]
     good = [check_size(size_m, at, problems) for size_m, at in sizes]
     if not all(good):
         return []
@@ -268,7 +268,9 @@ def _own_zone(
     ]
     if len(problems) == before and len({isinstance(p, LocalPoint) for p in points}) > 1:
         problems.append(Problem(f"{where}.{kind}", "give all corners in degrees, or all in local metres"))
-    for size, owner, words in zip(SIZES, ("center", "line"), ("the radius", "half the corridor's width"), strict=True):
+    for size, owner, words in zip(
+        SIZE_KEYS, ("center", "line"), ("the radius", "half the corridor's width"), strict=True
+    ):
         if kind == owner and getattr(keys, size) is None:
             problems.append(Problem(f"{where}.{size}", f"is missing: {words}, m", "missing"))
         if kind != owner and getattr(keys, size) is not None:

@@ -14,12 +14,12 @@ from functools import lru_cache
 from typing import Any
 
 from gcsplan.errors import Problem
-from gcsplan.mission_file.zone_draft import SIZES, Bounds, Remark, one_line
+from gcsplan.mission_file.zone_draft import SIZE_KEYS, Bounds, Remark, one_line
 from gcsplan.mission_file.zone_levels import (
-    EXAMPLES,
     LARGEST_M,
+    LEVEL_EXAMPLES,
+    LEVEL_UNITS,
     REFERENCES,
-    UNITS,
     LevelError,
     Limit,
     read_level,
@@ -27,10 +27,10 @@ from gcsplan.mission_file.zone_levels import (
 from gcsplan.notes.note import Note
 from gcsplan.world.zones import Level
 
-MOST_SHOWN = 6
+MOST_ATTRIBUTES_SHOWN = 6
 """Most attributes of one zone that a remark names."""
 
-NAMES = ("name", "title", "label", "designator", "identifier", "ident")
+NAME_ATTRIBUTES = ("name", "title", "label", "designator", "identifier", "ident")
 OWN = ("flooraglm", "flooramslm", "ceilingaglm", "ceilingamslm")
 BOUNDS = {
     "lower": "floor", "floor": "floor", "bottom": "floor", "base": "floor",
@@ -46,7 +46,7 @@ TIMES_UNREAD = Note("zone_times_unread")
 UNDER_PRESSURE = Note("zone_floor_at_flight_level")
 OVER_PRESSURE = Note("zone_ceiling_at_flight_level")
 
-_WORD = "|".join(sorted({w.lower() for w in (*UNITS, *REFERENCES)}, key=len, reverse=True))
+_WORD = "|".join(sorted({w.lower() for w in (*LEVEL_UNITS, *REFERENCES)}, key=len, reverse=True))
 _LIMIT = re.compile(
     rf"(?:distvert)?(?P<bound>{'|'.join(BOUNDS)})(?:ceiling|limit|lim|altitude|alt|height|elevation|elev|level)?"
     rf"(?:(?:value|val)?(?P<first>{_WORD})?(?P<second>{_WORD})?|(?P<unit>{'|'.join(UNIT_NAMES)})"
@@ -95,7 +95,7 @@ def meaning_of(key: str) -> Meaning:
     lower = key.lower()
     plain = re.sub(r"[^a-z0-9]", "", lower)
     limit, shared = _LIMIT.fullmatch(plain), bool(_SHARED.fullmatch(plain))
-    used = limit is not None or shared or lower in (*NAMES, *SIZES)
+    used = limit is not None or shared or lower in (*NAME_ATTRIBUTES, *SIZE_KEYS)
     is_time = not used and bool(_SEEMS_A_TIME.fullmatch(re.sub(r"[^a-z]", "", lower)))
     return Meaning(lower, plain in OWN, limit, shared, used, bool(_SEEMS_A_LIMIT.search(lower)), is_time)
 
@@ -149,12 +149,12 @@ def read_attributes(given: Sequence[Attribute], name: str, problems: list[Proble
             ignored.append(a)
     reading = _ZoneReading(_name(known) or name, problems)
     before = len(problems)
-    radius_m, buffer_m = (reading.size_m([a for a in known if a.meaning.lower == size]) for size in SIZES)
+    radius_m, buffer_m = (reading.size_m([a for a in known if a.meaning.lower == size]) for size in SIZE_KEYS)
     bounds = reading.bounds(known)
     for note, some in ((ATTRIBUTES_UNREAD, ignored), (TIMES_UNREAD, times)):
         if some:
-            more = ("…",) if len(some) > MOST_SHOWN else ()
-            reading.remarks.append((note, (*map(str, some[:MOST_SHOWN]), *more)))
+            more = ("…",) if len(some) > MOST_ATTRIBUTES_SHOWN else ()
+            reading.remarks.append((note, (*map(str, some[:MOST_ATTRIBUTES_SHOWN]), *more)))
     if len(problems) > before:
         return None
     return ZoneStatements(reading.name, radius_m, bounds, tuple(reading.remarks), reading.of_levels, buffer_m)
@@ -187,8 +187,8 @@ def is_number(value: Any) -> bool:
 
 def _name(given: Sequence[Attribute]) -> str:
     """The name: the first in the table's order, and of its spellings the one in lower case."""
-    named = [a for a in given if a.meaning.lower in NAMES]
-    best = min(named, key=lambda a: (NAMES.index(a.meaning.lower), a.key != a.meaning.lower), default=None)
+    named = [a for a in given if a.meaning.lower in NAME_ATTRIBUTES]
+    best = min(named, key=lambda a: (NAME_ATTRIBUTES.index(a.meaning.lower), a.key != a.meaning.lower), default=None)
     return "" if best is None else str(best.value).strip()
 
 
@@ -262,7 +262,7 @@ class _ZoneReading:
         if level is Limit.PRESSURE:
             self.remarks.append((UNDER_PRESSURE if bound == "floor" else OVER_PRESSURE, str(attribute)))
         elif bound == "floor":
-            self._wrong(attribute, f"is a floor without end; write a height such as {EXAMPLES}")
+            self._wrong(attribute, f"is a floor without end; write a height such as {LEVEL_EXAMPLES}")
         return {}
 
     def _level(self, attribute: Attribute, words: Sequence[str], shared: Sequence[str]) -> Level | Limit | None:
@@ -280,7 +280,7 @@ class _ZoneReading:
             beside = f"({', '.join(words)[:60]}) " if words else ""
             self._wrong(
                 attribute,
-                f"{beside}cannot be read as a level: {why}. Write for example {EXAMPLES}; rename "
+                f"{beside}cannot be read as a level: {why}. Write for example {LEVEL_EXAMPLES}; rename "
                 "the attribute if it is no level",
             )
             return None

@@ -29,13 +29,13 @@ from gcsplan.world.frame import Frame
 from gcsplan.world.outlines import fewer_corners
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 
-SIZES = ("radius_m", "buffer_m")
+SIZE_KEYS = ("radius_m", "buffer_m")
 """The keys of a zone's size, in a mission file as in the attributes of other files."""
 
 MAX_VERTICES = 100_000
 """Most vertices of one polygon."""
 
-MOST_CORNERS = 20_000
+MOST_ZONE_CORNERS = 20_000
 """Most corners of one polygon near the mission; more are drawn wider, by at most `WIDEST_M`, with fewer."""
 
 MOST_ALL_CORNERS = 400_000
@@ -45,7 +45,7 @@ and twice as many each mission: they are not even drawn."""
 WIDEST_M, MUCH_WIDER_M = 0.5, (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 """How much wider an outline is drawn without being asked, m, and tolerances that are tried for a cure."""
 
-WIDER = Note("zone_outline_widened", most_corners=MOST_CORNERS, wider_m=WIDEST_M)
+DRAWN_WIDER = Note("zone_outline_widened", most_corners=MOST_ZONE_CORNERS, wider_m=WIDEST_M)
 
 MAX_LINE_POINTS = 20_000
 """Most points of one line: its corridor takes a second for some thousand points."""
@@ -53,7 +53,7 @@ MAX_LINE_POINTS = 20_000
 Remark = tuple[Note, Datum]
 """What a user has to know about how a zone of a file was read: a note for all such zones, and what this one has."""
 
-ACROSS = Note("zone_across_the_antimeridian")
+ACROSS_ANTIMERIDIAN = Note("zone_across_the_antimeridian")
 OTHER_SIDE = (
     "its outline is read as across the 180° meridian, but if it goes around the other side the mission is in it: write "
     "longitudes past 180 where it crosses (181 for -179), or cut it there in two"
@@ -172,7 +172,7 @@ def polygon(
     if fault:
         problems.append(Problem(at, fault))
         return None
-    said = ((ACROSS, None),) if doubt else ()
+    said = ((ACROSS_ANTIMERIDIAN, None),) if doubt else ()
     return ZoneDraft(name, where, tuple(ring), local, None, floor, ceiling, remarks=said, doubt=doubt)
 
 
@@ -279,18 +279,18 @@ def _with_fewer_corners(
     """
     found: list[Circle | Polygon] = []
     for shape in shapes:
-        if isinstance(shape, Circle) or len(shape.vertices) <= MOST_CORNERS:
+        if isinstance(shape, Circle) or len(shape.vertices) <= MOST_ZONE_CORNERS:
             found.append(shape)
             continue
         count, drawn = len(shape.vertices), _wider(shape)
         if drawn is not None:
             fewer = Note("drawn_with_fewer_corners", corners=len(drawn.vertices), given=count)
-            draft = replace(draft, remarks=(*draft.remarks, (WIDER, fewer)))
+            draft = replace(draft, remarks=(*draft.remarks, (DRAWN_WIDER, fewer)))
             found.append(drawn)
             continue
-        tried = ((more_m, fewer_corners(shape.vertices, more_m, most=MOST_CORNERS)) for more_m in MUCH_WIDER_M)
+        tried = ((more_m, fewer_corners(shape.vertices, more_m, most=MOST_ZONE_CORNERS)) for more_m in MUCH_WIDER_M)
         cures = (f"drawn up to {more_m:g} m wider it has {len(ring)}" for more_m, ring in tried if ring is not None)
-        words = f"its outline has {count} corners, more than {MOST_CORNERS}; simplify it: "
+        words = f"its outline has {count} corners, more than {MOST_ZONE_CORNERS}; simplify it: "
         words += next(cures, "draw a simpler one around it")
         fault = Problem(draft.where, f"zone {draft.name[:60]!r}: {words}")
         draft = replace(draft, faults=(*draft.faults, fault))
@@ -301,7 +301,7 @@ def _with_fewer_corners(
 def _wider(shape: Polygon) -> Polygon | None:
     """The polygon drawn wider by at most `WIDEST_M` with few enough corners; None if that fails."""
     for more_m in (0.1 * WIDEST_M, WIDEST_M):
-        ring = fewer_corners(shape.vertices, more_m, most=MOST_CORNERS)
+        ring = fewer_corners(shape.vertices, more_m, most=MOST_ZONE_CORNERS)
         if ring is not None:
             return Polygon(np.ascontiguousarray(ring))
     return None

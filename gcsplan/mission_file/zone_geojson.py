@@ -9,7 +9,7 @@ from typing import Any
 from gcsplan.errors import InputError, Problem
 from gcsplan.export.geojson import GENERATOR
 from gcsplan.mission_file.zone_attributes import Attribute, ZoneStatements, is_number, read_attributes, shown
-from gcsplan.mission_file.zone_draft import SIZES
+from gcsplan.mission_file.zone_draft import SIZE_KEYS
 from gcsplan.mission_file.zone_file import Drawn, ZoneFile, drawn_unread
 from gcsplan.notes.note import Note
 from gcsplan.world.degree_shapes import beyond_outline
@@ -51,7 +51,7 @@ def _is_flown(whole: dict[str, Any], feature: Any) -> bool:
     The collection has `GENERATOR`. Before it did, its tracks and way points had the reference of their heights.
     """
     properties = feature.get("properties") if isinstance(feature, dict) else None
-    if not isinstance(properties, dict) or any(key.lower() in SIZES for key in properties):
+    if not isinstance(properties, dict) or any(key.lower() in SIZE_KEYS for key in properties):
         return False
     before = "heights" in whole and properties.get("third_coordinate") == "amsl_m" and "vehicle" in properties
     geometry = feature.get("geometry")

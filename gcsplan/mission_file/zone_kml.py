@@ -19,14 +19,14 @@ from defusedxml.common import DefusedXmlException
 from gcsplan.errors import InputError, Problem
 from gcsplan.figures import counted
 from gcsplan.mission_file.zone_attributes import Attribute, ZoneStatements, as_figure, read_attributes
-from gcsplan.mission_file.zone_draft import SIZES
+from gcsplan.mission_file.zone_draft import SIZE_KEYS
 from gcsplan.mission_file.zone_file import NOT_DRAWN, Drawn, ZoneFile
 from gcsplan.mission_file.zone_levels import LARGEST_M
 from gcsplan.notes.note import Note
 from gcsplan.world.degree_shapes import beyond_outline
 from gcsplan.world.zones import Level
 
-MAX_DEPTH = 60
+MAX_KML_DEPTH = 60
 MOST_TAGS = 2_000_000
 """Most beginnings and ends of elements, each of which takes some 300 bytes of memory; 20 MB of zones have a third."""
 
@@ -40,7 +40,7 @@ _PICTURES = ("PhotoOverlay", "ScreenOverlay", "Tour")
 """What shows the map and limits nothing."""
 
 _READ_SHAPES = ("Polygon", "Point", "LineString")
-_SHAPES = (*_READ_SHAPES, "LinearRing", "Model", "Track", "MultiTrack")
+_KML_SHAPES = (*_READ_SHAPES, "LinearRing", "Model", "Track", "MultiTrack")
 
 
 def read_kml(path: Path, data: bytes) -> ZoneFile:
@@ -59,9 +59,9 @@ def read_kml(path: Path, data: bytes) -> ZoneFile:
     placemarks = 0
     loose: Counter[str] = Counter()
     pictures: Counter[str] = Counter()
-    for element in _walk(root, path, leaves=("Placemark", *_PICTURES, *_SHAPES)):
+    for element in _walk(root, path, leaves=("Placemark", *_PICTURES, *_KML_SHAPES)):
         kind = _kind(element)
-        if kind in _SHAPES:
+        if kind in _KML_SHAPES:
             loose[kind] += 1
         elif kind in _PICTURES:
             pictures[kind] += 1
@@ -86,8 +86,8 @@ def _walk(root: Any, path: Path, *, leaves: tuple[str, ...] = ()) -> Iterator[An
     stack = [(root, 0)]
     while stack:
         element, depth = stack.pop()
-        if depth > MAX_DEPTH:
-            raise InputError(f"the KML is nested more than {MAX_DEPTH} levels deep", where=str(path))
+        if depth > MAX_KML_DEPTH:
+            raise InputError(f"the KML is nested more than {MAX_KML_DEPTH} levels deep", where=str(path))
         yield element
         if _kind(element) not in leaves:
             stack += [(child, depth + 1) for child in reversed(element)]
@@ -105,7 +105,7 @@ def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
     said = read_attributes(given, f"{found.path.stem}[{number}]", found.problems)
     if said is None:
         return
-    shapes = [e for e in _walk(placemark, found.path, leaves=_READ_SHAPES) if _kind(e) in _SHAPES]
+    shapes = [e for e in _walk(placemark, found.path, leaves=_READ_SHAPES) if _kind(e) in _KML_SHAPES]
     others = [_kind(e) for e in shapes if _kind(e) not in _READ_SHAPES]
     if others or not shapes:
         kind = others[0] if others else "none"
@@ -223,5 +223,5 @@ def _extended_data(placemark: Any, where: str) -> list[Attribute]:
             key = element.get("name", "")
             texts = [element] if _kind(element) == "SimpleData" else [e for e in element if _kind(e) == "value"]
             text = next((e.text or "" for e in texts), "").strip()
-            given.append(Attribute(key, as_figure(text) if key.lower() in SIZES else text, f"{where}.{key[:80]}"))
+            given.append(Attribute(key, as_figure(text) if key.lower() in SIZE_KEYS else text, f"{where}.{key[:80]}"))
     return given

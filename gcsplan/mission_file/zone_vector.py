@@ -14,7 +14,7 @@ import numpy as np
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.zone_attributes import Attribute, ZoneStatements, as_figure, read_attributes
-from gcsplan.mission_file.zone_draft import MAX_VERTICES, SIZES
+from gcsplan.mission_file.zone_draft import MAX_VERTICES, SIZE_KEYS
 from gcsplan.mission_file.zone_file import MAX_ZONES, Drawn, ZoneFile, drawn_unread
 from gcsplan.mission_file.zone_zip import unpack
 from gcsplan.notes.note import Note
@@ -34,7 +34,7 @@ ARC_STEP_DEG = "0.1"
 MOST_WARNINGS = 5
 
 COMPANIONS = (".shx", ".dbf", ".prj", ".cpg")
-NEEDED = (".shx", ".dbf", ".prj")
+NEEDED_COMPANIONS = (".shx", ".dbf", ".prj")
 
 NO_CRS = (
     "has no coordinate system, so that its places are not known; set the true one (in QGIS Layer > Set CRS, then "
@@ -83,7 +83,7 @@ def _on_disk(path: Path, data: bytes, most_bytes: int) -> Iterator[Path]:
         raise InputError(words, where=str(path))
     if not parts[kind].startswith(BEGINNINGS[kind]):
         raise InputError(f"this is not a {kind} file; its content is of another kind", where=str(path))
-    if kind == ".shp" and (missing := [part for part in NEEDED if part not in parts]):
+    if kind == ".shp" and (missing := [part for part in NEEDED_COMPANIONS if part not in parts]):
         names = " and ".join(f"{path.stem}{part}" for part in missing)
         why = " (.prj is its coordinate system)" if ".prj" in missing else ""
         raise InputError(f"{names} must be beside it{why}: copy all files of the Shapefile", where=str(path))
@@ -160,7 +160,7 @@ def _attributes(row: Mapping[str, Any], where: str) -> list[Attribute]:
         plain = value.item() if isinstance(value, np.generic) else value
         if isinstance(plain, float) and math.isnan(plain):
             plain = None
-        if isinstance(plain, str) and key.lower() in SIZES:
+        if isinstance(plain, str) and key.lower() in SIZE_KEYS:
             plain = as_figure(plain)
         given.append(Attribute(key, plain, f"{where}.{key[:80]}"))
     return given

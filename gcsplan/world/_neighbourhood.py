@@ -19,7 +19,7 @@ from gcsplan.world._field import Field
 from gcsplan.world._shared import LocalExtrema
 from gcsplan.world.surface import GridMap
 
-LARGE = 2_000_000
+LARGE_WINDOW = 2_000_000
 """Surfaces with more cells than this are examined tile by tile."""
 TILE, SPACING = 128, 32
 """Columns and rows of a tile, and the largest spacing, in cells, of the places on a line whose tiles are examined."""
@@ -72,7 +72,7 @@ class Neighbourhood:
         self._lock = threading.Lock()
         self._seen = np.ones((0, 0), np.bool_)
         rows, cols = heights.shape[0] - 1, heights.shape[1] - 1
-        if rows * cols > LARGE:
+        if rows * cols > LARGE_WINDOW:
             self.extrema = _empty(field, heights, reach_m)
             self._seen = np.zeros((-(-rows // TILE), -(-cols // TILE)), np.bool_)
         else:

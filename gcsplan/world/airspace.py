@@ -193,7 +193,7 @@ class Airspace:
 
     def deepest(self, legs: Legs, limits: Limits, kind: ViolationKind) -> float:
         """By how much the worst of ``legs`` breaks a limit of height, as in `examine`; 0 if none does."""
-        return float(np.fmax.reduce(self._examined(legs, limits)[1][:, _NUMBERS[kind], 0], initial=0.0))
+        return float(np.fmax.reduce(self._examined(legs, limits)[1][:, _KIND_NUMBERS[kind], 0], initial=0.0))
 
     def _examined(self, legs: Legs, limits: Limits) -> tuple[Floats, Floats, Indices, Indices, Floats]:
         """What the kernel finds: figures (N, 4), the worst of each kind (N, 7, 2), the nearest zone (N,), and the zones
@@ -327,7 +327,7 @@ class Airspace:
         reach = (legs.track_error_m + limits.horizontal_clearance_m) * self.scale
         known_within = np.where(legs.column, legs.track_error_m * self.scale, reach)
         steep = (kind == CLIMB) | (kind == DESCENT)
-        asked = np.zeros(len(_KINDS))
+        asked = np.zeros(len(_VIOLATION_KINDS))
         asked[[MIN_AGL, CLIMB, DESCENT]] = limits.min_agl_m, limits.max_climb_deg, limits.max_descent_deg
         asked[[MAX_AGL, MAX_AMSL]] = limits.max_agl_m or 0.0, limits.max_amsl_m or 0.0
         limit = np.where(kind == COVERAGE, known_within[leg], asked[kind])
@@ -352,7 +352,7 @@ class Airspace:
         )
         rows = zip(*(c[order].tolist() for c in columns), strict=True)
         return tuple(
-            Violation(i, _KINDS[k], t, e, n, h, v, lim, off, "deg" if k in (CLIMB, DESCENT) else "m", zone)
+            Violation(i, _VIOLATION_KINDS[k], t, e, n, h, v, lim, off, "deg" if k in (CLIMB, DESCENT) else "m", zone)
             for i, k, t, e, n, h, v, lim, off, zone in rows
         )
 
@@ -389,13 +389,13 @@ class Airspace:
 
 
 ZONE = 7  # follows the kernel's kinds
-_KINDS: dict[int, ViolationKind] = {
+_VIOLATION_KINDS: dict[int, ViolationKind] = {
     ZONE: "zone", MIN_AGL: "min_agl", TERRAIN: "terrain_clearance", MAX_AGL: "max_agl", MAX_AMSL: "max_amsl",
     COVERAGE: "coverage", CLIMB: "climb", DESCENT: "descent",
 }  # fmt: skip
-_NUMBERS = {kind: number for number, kind in _KINDS.items()}
+_KIND_NUMBERS = {kind: number for number, kind in _VIOLATION_KINDS.items()}
 
-_NOTHING = (
+_NO_ZONES = (
     np.zeros((0, 4)), np.zeros((0, 7, 2)), np.zeros(0, np.intp), np.zeros((0, 2), np.intp), np.zeros((0, 2)),
 )  # fmt: skip
-_HELD_NOTHING = Held(FOUND, *_NOTHING)
+_HELD_NOTHING = Held(FOUND, *_NO_ZONES)

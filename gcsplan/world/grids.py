@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from pyproj import Proj
 
 UTM_EXAMPLE, MGRS_EXAMPLE = "32T 473123 5249321", "32TMT7312349321"
-EXAMPLES = {"UTM": UTM_EXAMPLE, "MGRS": MGRS_EXAMPLE}
+GRID_EXAMPLES = {"UTM": UTM_EXAMPLE, "MGRS": MGRS_EXAMPLE}
 
-BANDS = "CDEFGHJKLMNPQRSTUVWX"
+BAND_LETTERS = "CDEFGHJKLMNPQRSTUVWX"
 """Bands of latitude: 8° each from 80° S, the last one 12°."""
-COLUMNS = ("ABCDEFGH", "JKLMNPQR", "STUVWXYZ")
+COLUMN_LETTERS = ("ABCDEFGH", "JKLMNPQR", "STUVWXYZ")
 """Letters of the columns of squares from 100 km of easting, by the zone modulo 3."""
-ROWS = "ABCDEFGHJKLMNPQRSTUV"
+ROW_LETTERS = "ABCDEFGHJKLMNPQRSTUV"
 """Letters of the rows of squares; in even zones they begin with F at the equator."""
 SQUARE_M = 100_000
 EASTING_M = (100_000.0, 900_000.0)
@@ -30,13 +30,13 @@ MOST_NORTHING_M = 10_000_000.0
 
 EDGE_DEG = 1e-5
 """About 1 m: a text in whole metres may lie so far past the edge of its band or zone."""
-SIZES = {1: "10 km", 2: "1 km", 3: "100 m", 4: "10 m"}
+SQUARE_SIZES = {1: "10 km", 2: "1 km", 3: "100 m", 4: "10 m"}
 
-_NUMBER = r"\d{1,9}(?:\.\d{0,9})?"
+_GRID_NUMBER = r"\d{1,9}(?:\.\d{0,9})?"
 _LIKE_UTM = re.compile(r"(?:UTM|ZONE)\b|\d{1,2} ?(?:[A-Z]|NORTH|SOUTH)[ ,]+E? ?\d{4}")
 _UTM = re.compile(
-    rf"(?:UTM:? ?)?(?:ZONE:? ?)?(\d{{1,2}}) ?(NORTH|SOUTH|[A-Z])[ ,;]+(?:E ?)?({_NUMBER})(?: ?M? ?E)?"
-    rf"[ ,;]+(?:N ?)?({_NUMBER})(?: ?M? ?N)?"
+    rf"(?:UTM:? ?)?(?:ZONE:? ?)?(\d{{1,2}}) ?(NORTH|SOUTH|[A-Z])[ ,;]+(?:E ?)?({_GRID_NUMBER})(?: ?M? ?E)?"
+    rf"[ ,;]+(?:N ?)?({_GRID_NUMBER})(?: ?M? ?N)?"
 )
 _LIKE_MGRS = re.compile(
     r"(?!\d+ ?DEG\b)(?:MGRS\b|\d{1,2} ?[A-Z] ?[A-Z]{2}(?:[ \d]|$)|\d{1,2}[A-Z]$|[ABYZ] ?[A-Z]{2} ?\d*(?: \d+)?$)"
@@ -110,15 +110,15 @@ def read_mgrs(plain: str) -> GridPlace | None:
     size_m = 10 ** (5 - half)
     within_m = tuple(int(part) * size_m for part in (digits[:half], digits[half:]))
     found = _square_corner(zone, match[2], match[3], match[4], within_m, size_m)
-    note = None if half == 5 else Note("place_is_a_square", given=plain, size=SIZES[half])
+    note = None if half == 5 else Note("place_is_a_square", given=plain, size=SQUARE_SIZES[half])
     return GridPlace(found.lat_deg, found.lon_deg, note)
 
 
 def band_deg(letter: str) -> tuple[float, float]:
     """Lowest and highest latitude of a band. Raises Refused for a letter that is none."""
-    if letter not in BANDS:
+    if letter not in BAND_LETTERS:
         raise NotAPlace(f"{letter} is no band of latitude (C to X without I and O)")
-    low = -80.0 + 8.0 * BANDS.index(letter)
+    low = -80.0 + 8.0 * BAND_LETTERS.index(letter)
     return low, 84.0 if letter == "X" else low + 8.0
 
 
@@ -184,15 +184,15 @@ def _square_corner(zone: int, band: str, column: str, row: str, within_m: tuple[
     """The corner of a square: of the rows with its letter, 2000 km apart, the one in the band."""
     low, high = band_deg(band)
     west, east = zone_deg(zone, band)
-    columns, name = COLUMNS[(zone - 1) % 3], f"{zone}{band}{column}{row}"
-    if column not in columns or row not in ROWS:
+    columns, name = COLUMN_LETTERS[(zone - 1) % 3], f"{zone}{band}{column}{row}"
+    if column not in columns or row not in ROW_LETTERS:
         raise NotAPlace(
             f"there is no square {column}{row} in zone {zone}: its columns are {columns}, its rows A to V without I "
             "and O"
         )
     easting_m = (columns.index(column) + 1) * SQUARE_M + within_m[0]
-    first_m = (ROWS.index(row) - (0 if zone % 2 else 5)) % len(ROWS) * SQUARE_M + within_m[1]
-    for northing_m in range(first_m, int(MOST_NORTHING_M), len(ROWS) * SQUARE_M):
+    first_m = (ROW_LETTERS.index(row) - (0 if zone % 2 else 5)) % len(ROW_LETTERS) * SQUARE_M + within_m[1]
+    for northing_m in range(first_m, int(MOST_NORTHING_M), len(ROW_LETTERS) * SQUARE_M):
         corners = [
             to_degrees(zone, easting_m + e, northing_m + n, south=low < 0.0) for e in (0, size_m) for n in (0, size_m)
         ]

@@ -18,7 +18,7 @@ from gcsplan.world.frame import Frame
 from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.terrain_grid import DEGREE_E7, SPACING_M, PostHeights, TerrainGrid, cell_at
 
-PARTS = 256
+TERRAIN_PARTS = 256
 """Parts of a line in which it is looked at for borders of degree tiles."""
 BISECTIONS = 40
 
@@ -79,7 +79,7 @@ class VehicleTerrain:
 
         Where it crosses into another degree tile, with posts of its own, the height may step.
         """
-        f = np.linspace(0.0, 1.0, PARTS + 1)
+        f = np.linspace(0.0, 1.0, TERRAIN_PARTS + 1)
         east, north = (ends[0] + f[:, None] * (ends[1] - ends[0])).T
         tiles = np.floor(self._frame.to_degrees(east, north) * 1e7 / DEGREE_E7)
         cuts = [0.0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gcsplan.mavlink.link.link import Heard, LinkSteps
-from gcsplan.mavlink.link.parameters import GROUPS
+from gcsplan.mavlink.link.parameters import PARAMETER_GROUPS
 from gcsplan.mavlink.link.recheck import Recheck
 from gcsplan.mavlink.protocol.outcome import Changed
 from gcsplan.vehicle import Autopilot
@@ -33,8 +33,8 @@ def test_the_campaign_finds_an_upload_that_does_not_look_again(monkeypatch: pyte
 @pytest.fixture
 def asked_for_less(monkeypatch: pytest.MonkeyPatch) -> None:
     """The seeds below were found when a PX4 was asked for fewer parameters; with more, the events miss each other."""
-    asked = GROUPS[Autopilot.PX4]
-    monkeypatch.setitem(GROUPS, Autopilot.PX4, asked[: asked.index(("NAV_MC_ALT_RAD",)) + 1])
+    asked = PARAMETER_GROUPS[Autopilot.PX4]
+    monkeypatch.setitem(PARAMETER_GROUPS, Autopilot.PX4, asked[: asked.index(("NAV_MC_ALT_RAD",)) + 1])
 
 
 @pytest.mark.usefixtures("asked_for_less")

@@ -18,7 +18,7 @@ from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file import schema
 from gcsplan.mission_file.from_options import OpenWorld
 from gcsplan.mission_file.load import load_mission
-from gcsplan.mission_file.places import EXAMPLES, MAX_CHARS, read_place
+from gcsplan.mission_file.places import MAX_CHARS, PLACE_EXAMPLES, read_place
 from gcsplan.mission_file.request import MissionFile
 from gcsplan.notes.note import Note
 from tests.oracles.grids import band_of, mgrs_of, utm_of
@@ -110,8 +110,8 @@ def test_what_people_paste_is_read(text: str, place: tuple[float, float]) -> Non
 
 
 def test_the_examples_of_messages_are_one_of_each_format() -> None:
-    first = degrees(EXAMPLES[0])
-    assert [apart_m(degrees(text), first) < 25_000.0 for text in EXAMPLES] == [True] * 5
+    first = degrees(PLACE_EXAMPLES[0])
+    assert [apart_m(degrees(text), first) < 25_000.0 for text in PLACE_EXAMPLES] == [True] * 5
 
 
 @settings(max_examples=draws(300))
@@ -393,7 +393,7 @@ def test_the_json_schema_takes_every_form() -> None:
     assert [form.get("type", form.get("$ref")) for form in forms] == [
         "array", None, "#/$defs/LocalPoint", "#/$defs/DegreePoint"
     ]  # fmt: skip
-    assert forms[1]["anyOf"][0]["examples"] == list(EXAMPLES)
+    assert forms[1]["anyOf"][0]["examples"] == list(PLACE_EXAMPLES)
     assert {"lat", "latitude", "lon", "longitude", "lng"} <= told["$defs"]["DegreePoint"]["properties"].keys()
     assert [form["type"] for form in told["properties"]["speed_m_s"]["oneOf"]] == ["number", "array"]
 

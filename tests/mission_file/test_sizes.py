@@ -11,7 +11,7 @@ import pytest
 
 from gcsplan.errors import InputError
 from gcsplan.mission_file import load_mission, zone_draft
-from gcsplan.mission_file.zone_draft import MOST_CORNERS
+from gcsplan.mission_file.zone_draft import MOST_ZONE_CORNERS
 from gcsplan.world._zone_arrays import MOST_LISTED, _lattice
 from gcsplan.world.zones import Polygon
 from tests.campaigns import sizes
@@ -51,7 +51,7 @@ def test_a_coast_of_30_000_corners_is_drawn_wider_with_a_note(within_s: list[flo
     mission = load_mission("m.yaml")
     (zone,) = mission.zones
     assert isinstance(zone.shape, Polygon)
-    assert len(zone.shape.vertices) <= MOST_CORNERS
+    assert len(zone.shape.vertices) <= MOST_ZONE_CORNERS
     assert "zone_outline_widened" in [note.code for note in mission.notes]
 
 

@@ -8,7 +8,7 @@ import pytest
 from gcsplan.errors import InputError
 from gcsplan.mission_file import schema
 from gcsplan.mission_file.load import load_mission
-from gcsplan.mission_file.units import MOST_NOTES, OTHERS, UNITS, in_own_units, other_names, unit_end
+from gcsplan.mission_file.units import MOST_CONVERSIONS, OTHERS, UNIT_SYMBOLS, in_own_units, other_names, unit_end
 from gcsplan.notes.note import Note
 
 SIZES = {
@@ -128,7 +128,7 @@ def test_notes_on_a_fleet_are_few():
     wanted = ("value_converted", "and_as_many_more", "more_values_converted")
     notes = [note for note in load_mission(content).notes if note.code in wanted]
     assert str(notes[0]) == "vehicles[0].min_agl_ft: 164 ft, read as min_agl_m: 49.9872 (and 99 more)"
-    assert len(notes) == MOST_NOTES + 1
+    assert len(notes) == MOST_CONVERSIONS + 1
     assert notes[-1] == Note("more_values_converted", count=81)
 
 
@@ -225,7 +225,7 @@ def test_climb_in_metres_a_minute_is_not_taken_for_minutes():
 
 
 def test_a_longer_unit_counts_before_its_end():
-    ends = list(UNITS)
+    ends = list(UNIT_SYMBOLS)
     assert not any(longer.endswith(end) for i, end in enumerate(ends) for longer in ends[i + 1 :])
     assert [unit_end(key) for key in ("climb_m_s", "horizontal_j_per_m", "accel_m_s2")] == ["_m_s", "_j_per_m", "_m_s2"]
 

@@ -262,12 +262,12 @@ def test_files_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     with zipfile.ZipFile(tmp_path / "z.zip", "w", zipfile.ZIP_DEFLATED) as archive:
         for part in (".shp", ".shx", ".dbf", ".prj"):
             archive.write(file.with_suffix(part), f"z{part}")
-    monkeypatch.setattr(zone_reader, "MAX_BYTES", file.stat().st_size + 10)
+    monkeypatch.setattr(zone_reader, "MAX_ZONE_BYTES", file.stat().st_size + 10)
     assert "the files of this Shapefile are too large" in message(file)
-    monkeypatch.setattr(zone_reader, "MAX_BYTES", (tmp_path / "z.zip").stat().st_size)
+    monkeypatch.setattr(zone_reader, "MAX_ZONE_BYTES", (tmp_path / "z.zip").stat().st_size)
     assert "unpacks to more than" in message(tmp_path / "z.zip")
     monkeypatch.setattr("gcsplan.mission_file.zone_vector.MAX_ZONES", 2)
-    monkeypatch.setattr(zone_reader, "MAX_BYTES", 10**6)
+    monkeypatch.setattr(zone_reader, "MAX_ZONE_BYTES", 10**6)
     assert "more than 2 zones" in message(file)
 
 
@@ -289,7 +289,7 @@ def test_a_kmz_is_the_kml_in_it(tmp_path: Path) -> None:
 
 
 def test_a_bomb_is_refused_before_it_is_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(zone_reader, "MAX_BYTES", 100_000)
+    monkeypatch.setattr(zone_reader, "MAX_ZONE_BYTES", 100_000)
     file = kmz(tmp_path / "z.kmz", doc_kml=b" " * 5_000_000)
     assert file.stat().st_size < 100_000
     assert "unpacks to more than 100000 bytes" in message(file)

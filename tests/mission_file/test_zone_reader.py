@@ -229,7 +229,7 @@ def test_missing_and_oversized_files_are_refused(tmp_path: Path, monkeypatch: py
         with pytest.raises(InputError) as caught:
             read_zones(path, where="m: no_fly[0].file")
         assert caught.value.where == "m: no_fly[0].file"
-    monkeypatch.setattr(zone_reader, "MAX_BYTES", 50)
+    monkeypatch.setattr(zone_reader, "MAX_ZONE_BYTES", 50)
     assert "more than 50" in messages(tmp_path, collection(square()))
 
 

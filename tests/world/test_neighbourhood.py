@@ -87,7 +87,7 @@ def test_lines_find_all_that_they_meet_looked_at_and_little_else(
     grid = GridMap.affine(0.0, 0.0, 5.0, 4.0)
     field = Field.of(grid)
     whole = extrema_around(field, z, reach_m)
-    monkeypatch.setattr(_neighbourhood, "LARGE", 1000)
+    monkeypatch.setattr(_neighbourhood, "LARGE_WINDOW", 1000)
     for _ in range(20):
         ours = Neighbourhood(grid, field, z, reach_m)
         assert not ours.extrema.slope.any()
@@ -120,7 +120,7 @@ def test_what_is_looked_at_in_part_judges_as_what_is_looked_at_as_a_whole(monkey
     clear, report = whole.clear(legs, limits), whole.examine(legs, limits)
     floor, ceiling = whole.floor_amsl(*start[:, :2].T, limits), whole.ceiling_amsl(*start[:, :2].T, limits)
     tubes = [whole.tube(np.stack([a[:2], b[:2]]), limits) for a, b in zip(start, end, strict=True)]
-    monkeypatch.setattr(_neighbourhood, "LARGE", 1000)
+    monkeypatch.setattr(_neighbourhood, "LARGE_WINDOW", 1000)
     assert clear.any()
     assert not clear.all()
     # One leg at a time in a new airspace, so that only its own tiles have been examined.
@@ -139,7 +139,7 @@ def test_what_is_looked_at_in_part_judges_as_what_is_looked_at_as_a_whole(monkey
 
 def test_what_was_not_looked_at_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
     """A kernel that reaches a tile that was not examined must not treat it as flat ground."""
-    monkeypatch.setattr(_neighbourhood, "LARGE", 100)
+    monkeypatch.setattr(_neighbourhood, "LARGE_WINDOW", 100)
     monkeypatch.setattr(LineBatch, "tiles", lambda self, grid, field, shape: np.zeros(shape, np.bool_))
     z = np.full((50, 50), 100.0)
     blind = Airspace(Surface(z, z, GridMap.affine(0.0, 0.0, 10.0, 10.0), {}))

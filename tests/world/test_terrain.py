@@ -817,7 +817,7 @@ MIXED = (Peak(20.0, 70.0, 33.0, 7.0, 11.0), Peak(60.0, 40.0, -25.0, 9.0, 8.0), P
 def test_gridded_peaks_are_never_below_the_true_ones(
     shapes: tuple[Peak, ...], most: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(peaks, "MAX_NODES", most)
+    monkeypatch.setattr(peaks, "MAX_PEAK_NODES", most)
     box = (-50.0, -50.0, 150.0, 160.0)
     surface = load_terrain(TerrainSpec(peaks=shapes, flat_m=2.0), Frame(36.6, -84.3, 10.0), box, where="m")
     assert surface.ground_m.size <= most

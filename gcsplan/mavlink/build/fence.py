@@ -2,8 +2,8 @@
 
 A fence item is a circle or one corner of a polygon and has **no height**, so it cannot express a zone with a floor or a
 ceiling. Such a zone is left out, or on request becomes a fence from the ground to the sky. A circle's radius is rounded
-up to whole centimetres; the polygon of the fence deviates from a zone's outline by at most `STRAIGHT_M`. Items are in
-frame 0: ArduPilot refuses frame 2, and no autopilot stores the altitude.
+up to whole centimetres; the polygon of the fence deviates from a zone's outline by at most `FENCE_STRAIGHT_M`. Items
+are in frame 0: ArduPilot refuses frame 2, and no autopilot stores the altitude.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from gcsplan.world.zones import Circle, Polygon, Zone
 if TYPE_CHECKING:
     from gcsplan.world.frame import Frame
 
-STRAIGHT_M = 0.1
+FENCE_STRAIGHT_M = 0.1
 """Metres: a corner of the outline that lies within this of the line between its kept neighbours is left out."""
 
-MOST_CORNERS = 255  # of one polygon on ArduPilot, which stores the number in a byte (AC_PolyFence_loader.cpp)
+MOST_FENCE_CORNERS = 255  # of one polygon on ArduPilot, which stores the number in a byte (AC_PolyFence_loader.cpp)
 STORAGE_BYTES = {Autopilot.ARDUCOPTER: 560, Autopilot.ARDUPLANE: 672}  # StorageManager.cpp, StorageFence
 HEAD_BYTES, CIRCLE_BYTES, POLYGON_BYTES, CORNER_BYTES = 5, 13, 2, 8  # AC_PolyFence_loader.cpp; 42 circles fit a copter
 
@@ -166,7 +166,7 @@ def _corners(zone: Zone, frame: Frame) -> list[MissionItem]:
 
 
 def _straightened(ring: Floats) -> Floats:
-    """Return the ring without the corners that lie within `STRAIGHT_M` of the line between kept ones."""
+    """Return the ring without the corners that lie within `FENCE_STRAIGHT_M` of the line between kept ones."""
     start = int(np.hypot(*(ring - ring.mean(axis=0)).T).argmax())  # the farthest point is certainly a corner
     points = np.roll(ring, -start, axis=0)
     kept = [0]
@@ -181,7 +181,7 @@ def _straightened(ring: Floats) -> Floats:
                 break
             off = np.abs(between[:, 0] * along[1] - between[:, 1] * along[0]) / length
             part = between @ along / length**2
-            if off.max() > STRAIGHT_M or part.min() < 0.0 or part.max() > 1.0:
+            if off.max() > FENCE_STRAIGHT_M or part.min() < 0.0 or part.max() > 1.0:
                 break
             last = end
         kept.append(last)
@@ -195,8 +195,10 @@ def _require_storage(zones: Sequence[Zone], items: Sequence[MissionItem], autopi
     for zone in zones:
         if isinstance(zone.shape, Polygon) and autopilot.is_ardupilot:
             count = len(_straightened(zone.shape.vertices))
-            if count > MOST_CORNERS:
-                raise InputError(f"the zone {zone.name!r} has {count} corners; {label} keeps {MOST_CORNERS}: {cure}")
+            if count > MOST_FENCE_CORNERS:
+                raise InputError(
+                    f"the zone {zone.name!r} has {count} corners; {label} keeps {MOST_FENCE_CORNERS}: {cure}"
+                )
     circles = sum(isinstance(z.shape, Circle) for z in zones)
     polygons = len(zones) - circles
     corners = len(items) - circles

@@ -13,7 +13,7 @@ from gcsplan.world.world import World
 
 PathPoint = tuple[float, float, float]
 
-BOW_M = 0.1
+LEG_BOW_M = 0.1
 LONGEST_LEG_M = 5000.0
 
 
@@ -28,7 +28,7 @@ class Margins:
 
     altitude_m: float = 0.02
     track_m: float = 0.012
-    bow_m: float = BOW_M
+    bow_m: float = LEG_BOW_M
     slope: float = 0.0
     rounding_m: tuple[float, float] = (0.011, 0.01)
 
@@ -93,11 +93,11 @@ class Order:
     gate_utc: tuple[int, int, int] | None = None
     wing: Wing | None = None
     return_path: bool = False
-    bow_m: float = BOW_M
+    bow_m: float = LEG_BOW_M
     exact: tuple[tuple[float, float], ...] = ()
 
 
-def split_legs(points: Floats, world: World, most_bow_m: float = BOW_M) -> Floats:
+def split_legs(points: Floats, world: World, most_bow_m: float = LEG_BOW_M) -> Floats:
     """(N, 3) points with legs cut to at most `LONGEST_LEG_M` and until the bow of each is at most ``most_bow_m``."""
     places = world.frame.to_degrees(points[:, 0], points[:, 1])
     bow = world.frame.bow_m(places[:-1], places[1:])

@@ -25,7 +25,7 @@ from gcsplan.mavlink.mission.mission import (
 )
 from gcsplan.notes.note import Note, Said
 
-MAX_BYTES = 20_000_000
+MAX_FILE_BYTES = 20_000_000
 """Largest mission file that is read, in bytes."""
 
 MAX_ITEMS = 10_000

@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 from gcsplan.errors import InputError, Problem
 from gcsplan.mavlink.files.file_items import (
     HAS_PLACE,
-    MAX_BYTES,
+    MAX_FILE_BYTES,
     MAX_ITEMS,
     MissionFileRead,
     RawItem,
@@ -42,7 +42,7 @@ from gcsplan.mavlink.files.plan_fence import (
     rally_json,
     unread_keys,
 )
-from gcsplan.mavlink.files.plan_landing import LANDINGS, landing_entries
+from gcsplan.mavlink.files.plan_landing import LANDING_PATTERNS, landing_entries
 from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA, COPTERS, PLANES, PX4
 from gcsplan.mavlink.mission.commands import DO_CHANGE_SPEED, DO_JUMP
 from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, RELATIVE, TERRAIN, Home, Mission, MissionItem
@@ -137,8 +137,8 @@ def parse_plan(text: str, *, autopilot: Autopilot | None, where: str, home_hint:
     ``autopilot`` None means the one that the file names; another one than the file's raises InputError. ``home_hint``
     is the home for a file without one. Raises InputError with the first twenty mistakes, each with its key.
     """
-    if len(text) > MAX_BYTES:
-        raise InputError(f"a mission file of more than {MAX_BYTES // 10**6} MB is not read", where=where)
+    if len(text) > MAX_FILE_BYTES:
+        raise InputError(f"a mission file of more than {MAX_FILE_BYTES // 10**6} MB is not read", where=where)
     plan = _json(text.removeprefix("\ufeff"), where)
     if not isinstance(plan, dict) or plan.get("fileType", "Plan") not in ("Plan", None):
         raise InputError("a .plan file is a JSON object with fileType 'Plan', and this is none", where=where)
@@ -292,7 +292,7 @@ class _Items:
         inner = style.get("Items") if isinstance(style, dict) else None
         name = str(entry.get("complexItemType"))[:40]
         where = f"{key}.TransectStyleComplexItem.Items"
-        if name in LANDINGS:
+        if name in LANDING_PATTERNS:
             inner, where = landing_entries(entry), key
         if not isinstance(inner, list) or not inner:
             self._bad(key, f"a complex item ({name}) without its single items cannot be read; make it of way points")

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.mavlink.files.file_items import (
-    MAX_BYTES,
+    MAX_FILE_BYTES,
     MAX_ITEMS,
     MissionFileRead,
     RawItem,
@@ -43,17 +43,30 @@ from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 
 HEADER = "QGC WPL 110"
-COLUMNS = ("seq", "current", "frame", "command", "param1", "param2", "param3", "param4", "x", "y", "z", "autocontinue")
-FENCE_AND_RALLY = frozenset({FENCE_RETURN_POINT, POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT, RALLY_POINT})
+ROW_COLUMNS = (
+    "seq",
+    "current",
+    "frame",
+    "command",
+    "param1",
+    "param2",
+    "param3",
+    "param4",
+    "x",
+    "y",
+    "z",
+    "autocontinue",
+)
+COMMANDS_OF_OTHER_LISTS = frozenset({FENCE_RETURN_POINT, POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT, RALLY_POINT})
 MAX_LINE = 1000
 MAX_NUMBER = 64
 MAX_PROBLEMS = 20
 HOME_ROW = "0 1 0 16 0 0 0 0 <lat> <lon> <AMSL> 1"
 
 # No two parts of the pattern can match the same digits, so a long run of digits takes only one pass.
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_ROW_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _SPLIT = re.compile(r"[\t ,]+")
-_ROW = re.compile(rf"{_NUMBER.pattern}(?:[\t ,]+{_NUMBER.pattern}){{11}}")
+_ROW = re.compile(rf"{_ROW_NUMBER.pattern}(?:[\t ,]+{_ROW_NUMBER.pattern}){{11}}")
 
 
 def write_waypoints(mission: Mission) -> str:
@@ -93,8 +106,8 @@ def parse_waypoints(text: str, *, autopilot: Autopilot, where: str, home_hint: H
     ``where`` names the file in messages. ``home_hint`` is the home for a file that has none (first seq 1, header 120,
     or a home row of zeros). Raises InputError with the first twenty mistakes, each with its line.
     """
-    if len(text) > MAX_BYTES:
-        raise InputError(f"a mission file of more than {MAX_BYTES // 10**6} MB is not read", where=where)
+    if len(text) > MAX_FILE_BYTES:
+        raise InputError(f"a mission file of more than {MAX_FILE_BYTES // 10**6} MB is not read", where=where)
     lines = io.StringIO(text.removeprefix("\ufeff"), newline=None)
     header = lines.readline(MAX_LINE).split()
     if header not in (["QGC", "WPL", "110"], ["QGC", "WPL", "120"]):
@@ -146,14 +159,14 @@ def _rows(lines: io.StringIO, where: str, problems: list[Problem]) -> Iterator[_
 
 def _row(line: str, number: int, place: str, problems: list[Problem]) -> _Row | None:
     fields = _SPLIT.split(line)
-    if len(fields) != len(COLUMNS):
-        problems.append(Problem(place, f"a row has {len(COLUMNS)} columns, this one has {len(fields)}"))
+    if len(fields) != len(ROW_COLUMNS):
+        problems.append(Problem(place, f"a row has {len(ROW_COLUMNS)} columns, this one has {len(fields)}"))
         return None
     values = _plain(line, fields)
-    for name, field in zip(COLUMNS, fields, strict=True) if not values else ():
+    for name, field in zip(ROW_COLUMNS, fields, strict=True) if not values else ():
         if name.startswith("param") and field.lower() in ("nan", "-nan"):
             values.append(math.nan)
-        elif len(field) <= MAX_NUMBER and _NUMBER.fullmatch(field) and math.isfinite(float(field)):
+        elif len(field) <= MAX_NUMBER and _ROW_NUMBER.fullmatch(field) and math.isfinite(float(field)):
             values.append(float(field))
         else:
             problems.append(Problem(place, f"{name} must be a number, given {field[:40]!r}"))
@@ -218,7 +231,7 @@ def _mission(rows: list[_Row], has_home: bool, autopilot: Autopilot, where: str,
             break
     if problems:
         raise InputError.of(problems, headline=f"{where} is damaged" if len(problems) > 1 else "")
-    lists = {item.command in FENCE_AND_RALLY for item in items}
+    lists = {item.command in COMMANDS_OF_OTHER_LISTS for item in items}
     if lists == {True}:
         what = "rally points" if items[0].command == RALLY_POINT else "a fence"
         raise InputError(

@@ -10,7 +10,7 @@ from gcsplan.mavlink.link.link import Channel, LinkSteps
 from gcsplan.mavlink.link.options import Task
 from gcsplan.mavlink.link.parameters import (
     FENCE_GROUPS,
-    GROUPS,
+    PARAMETER_GROUPS,
     judge_fence_parameters,
     judge_parameters,
     settings_words,
@@ -45,7 +45,7 @@ def reading_parameters(
         terrain = TERRAIN_GROUPS if flies_terrain(task.items) else ()
         needed = (*needed_groups(options.settings, task.autopilot), *terrain, *deciding(mission))
         values = yield from parameter_steps(
-            channel, state, GROUPS[task.autopilot] + terrain, watch, recheck,
+            channel, state, PARAMETER_GROUPS[task.autopilot] + terrain, watch, recheck,
             needed=needed if task.judge is not None else (), most_s=options.timeout_s,
         )  # fmt: skip
         warnings += judge_parameters(

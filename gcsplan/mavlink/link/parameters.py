@@ -23,7 +23,7 @@ from gcsplan.mavlink.mission.return_route import ReturnRoute, takes_another_rout
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import COPTER_RETURN_WAITS_S, DEFAULT_LEAN_DEG, Autopilot, fastest_at_m_s, lean_for_deg
 
-GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
+PARAMETER_GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
     autopilot: (
         *(parameter.group() for parameter in (*PARAMETERS[autopilot].values(), *SAFETY[autopilot].values())),
         *(group for group in FENCE_DECIDES[autopilot] if group not in {p.group() for p in SAFETY[autopilot].values()}),
@@ -43,7 +43,7 @@ _LEAN_ANGLE = {"ANGLE_MAX": 0.01, "ATC_ANGLE_MAX": 1.0}
 _RETURN_ENDS = {"RTL_ALT_FINAL": 100.0, "RTL_ALT_FINAL_M": 1.0}
 _SAME_DEG = 0.05
 _FLOWN_PITCH_DEG = 15.0  # TECS_PITCH_MAX, default
-_FAILSAFES = {
+_FAILSAFE_NAMES = {
     "FS_THR_ENABLE": "loss of radio control", "THR_FAILSAFE": "loss of radio control",
     "NAV_RCL_ACT": "loss of radio control", "FS_GCS_ENABLE": "loss of the ground station",
     "FS_GCS_ENABL": "loss of the ground station", "NAV_DLL_ACT": "loss of the ground station",
@@ -138,7 +138,7 @@ def judge_parameters(
         found += _fences(values, mission.autopilot, _extent(mission))
     found += _lean(values, mission)
     found += _climb_out(values, mission)
-    off = tuple(f"{_FAILSAFES[name]} ({name})" for name in _FAILSAFES if values.get(name) == 0)
+    off = tuple(f"{_FAILSAFE_NAMES[name]} ({name})" for name in _FAILSAFE_NAMES if values.get(name) == 0)
     return [*found, Note("no_failsafe", failsafes=off)] if off else found
 
 

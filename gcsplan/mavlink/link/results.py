@@ -13,7 +13,7 @@ from gcsplan.mavlink.protocol.outcome import Accepted, Changed, Outcome, Refused
 from gcsplan.notes.note import Note
 
 OutcomeWord = Literal["accepted", "refused", "unknown"]
-_SHOWN = 8
+_DIFFERENCES_SHOWN = 8
 _LISTS = {MISSION: "mission", FENCE: "fence", RALLY: "list of rally points"}
 
 
@@ -104,8 +104,8 @@ class UploadResult:
         if self.outcome == "refused":
             return VehicleRefused(f"the vehicle {self.reason}{tail}", where=where)
         if self.faults:
-            shown = "; ".join(str(d) for d in self.faults[:_SHOWN])
-            rest = len(self.faults) - _SHOWN
+            shown = "; ".join(str(d) for d in self.faults[:_DIFFERENCES_SHOWN])
+            rest = len(self.faults) - _DIFFERENCES_SHOWN
             more = f"; and {rest} more" if rest > 0 else ""
             asked = "the file has" if self.faults[0].unsent else "was sent"
             return ReadBackDiffers(f"what is on board is not what {asked}: {shown}{more}{tail}", where=where)

@@ -17,7 +17,7 @@ from typing import Protocol, TypeVar
 from gcsplan.errors import CheckFailed, GcsplanError, InputError
 from gcsplan.mavlink.link.link import Channel, Link, LinkSteps, PumpJob, pump, run
 from gcsplan.mavlink.link.options import ReadBackJudge, SessionOptions, Task, TransferReport
-from gcsplan.mavlink.link.parameters import GROUPS
+from gcsplan.mavlink.link.parameters import PARAMETER_GROUPS
 from gcsplan.mavlink.link.results import UploadResult
 from gcsplan.mavlink.link.steps import SLOW_ANSWER_S, discover_steps, parameter_steps
 from gcsplan.mavlink.link.tasks import (
@@ -114,7 +114,7 @@ def read_vehicle(
         autopilot = autopilot_of(state.mav_autopilot, state.mav_type)
         values: dict[str, float] = {}
         if autopilot is not None:
-            groups = GROUPS[autopilot]
+            groups = PARAMETER_GROUPS[autopilot]
             values = yield from parameter_steps(
                 channel, state, groups, recheck.watch, recheck, needed=groups, most_s=SLOW_ANSWER_S
             )

@@ -41,7 +41,7 @@ MOST_WAITING = 64
 """Blocks that wait to be sent; the vehicle asks again for those that are dropped. Its cache holds 12."""
 
 _PAUSE_S = 0.01
-_AT_ONCE = 4
+_PARTS_AT_ONCE = 4
 _SERIAL_SHARE = 0.25
 _BYTES_OF_PART = 43 + 12 + 13  # payload, frame, signature
 _ASK_AFTER_S, _ASK_EVERY_S, _ASKED_TIMES = 3.0, 5.0, 3
@@ -110,7 +110,7 @@ class _Answers:
         self._queue: OrderedDict[tuple[int, int, int], _Waiting] = OrderedDict()
         endpoint = channel.link.endpoint
         baud = endpoint.baud if endpoint.kind == "serial" else 0
-        self._at_once = 1 if baud else _AT_ONCE
+        self._at_once = 1 if baud else _PARTS_AT_ONCE
         self._pause_s = 10.0 * _BYTES_OF_PART / (_SERIAL_SHARE * baud) if baud else _PAUSE_S
 
     def steps(self) -> LinkSteps[None]:
@@ -292,7 +292,7 @@ TERRAIN_GROUPS = (("TERRAIN_ENABLE",), ("TERRAIN_SPACING",), ("TERRAIN_OFS_MAX",
 TERRAIN_DECIDES = (("TERRAIN_SPACING",), ("TERRAIN_OFS_MAX",))
 """Those of them that such a mission is judged with: no answer is not their default."""
 
-PLACES = 40
+PLACES_COMPARED = 40
 """Places that are compared before a mission is sent."""
 _UPLOAD_PATIENCE_S, _UPLOAD_MOST_S = 10.0, 45.0
 
@@ -327,7 +327,7 @@ def odd_spacing(values: Mapping[str, float]) -> Note | None:
     )  # fmt: skip
 
 
-def places_along(items: Sequence[MissionItem], count: int = PLACES) -> list[tuple[int, int]]:
+def places_along(items: Sequence[MissionItem], count: int = PLACES_COMPARED) -> list[tuple[int, int]]:
     """Places, 1e-7°, on the legs to the items in the terrain frame, evenly on each."""
     placed = [item for item in items if item.x or item.y]
     legs = [(a, b) for a, b in pairwise(placed) if b.frame in _TERRAIN_FRAMES]

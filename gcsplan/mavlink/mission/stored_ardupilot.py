@@ -125,7 +125,7 @@ def _do(p1: NumberKept = _lost, p2: NumberKept = _lost, p3: NumberKept = _lost, 
     return StorageRule(False, (p1, p2, p3, p4))
 
 
-RULES: dict[int, StorageRule] = {
+STORAGE_RULES: dict[int, StorageRule] = {
     cmd.WAYPOINT: _at(_u16),  # hold (ArduPlane: `_PLANE_WAYPOINT`)
     cmd.LOITER_UNLIM: _at(p3=_radius_u16),
     cmd.LOITER_TURNS: _at(),  # `_loiter_turns`
@@ -195,7 +195,7 @@ NAN_TAKEN = {
 }  # fmt: skip
 """Indices of the params that may be NaN, by command (`mavlink_int_to_mission_cmd`, `sanity_check_params`)."""
 
-_FRAMES = (0, 2, 3, 5, 6, 10, 11)
+_FRAMES_KEPT = (0, 2, 3, 5, 6, 10, 11)
 
 
 def refused_by_copter(item: MissionItem) -> str:
@@ -203,10 +203,10 @@ def refused_by_copter(item: MissionItem) -> str:
     for index, value in enumerate(item.params):
         if math.isinf(value) or (math.isnan(value) and index not in NAN_TAKEN.get(item.command, ())):
             return f"ArduPilot refuses param{index + 1} of command {item.command}, which is {value}"
-    rule = RULES.get(item.command)
+    rule = STORAGE_RULES.get(item.command)
     if rule is None or not rule.located:
         return ""
-    if item.frame not in _FRAMES:
+    if item.frame not in _FRAMES_KEPT:
         return f"ArduPilot takes no item in frame {item.frame}"
     return f"ArduPilot refuses an altitude of {item.z}" if math.isnan(item.z) else ""
 
@@ -220,12 +220,12 @@ def refused_by_plane(item: MissionItem) -> str:
 
 def stored_by_copter(item: MissionItem) -> MissionItem:
     """Return ``item`` as it reads back from ArduCopter."""
-    return _stored(item, RULES.get(item.command))
+    return _stored(item, STORAGE_RULES.get(item.command))
 
 
 def stored_by_plane(item: MissionItem) -> MissionItem:
     """Return ``item`` as it reads back from ArduPlane."""
-    return _stored(item, _PLANE_WAYPOINT if item.command == cmd.WAYPOINT else RULES.get(item.command))
+    return _stored(item, _PLANE_WAYPOINT if item.command == cmd.WAYPOINT else STORAGE_RULES.get(item.command))
 
 
 def _stored(item: MissionItem, rule: StorageRule | None) -> MissionItem:

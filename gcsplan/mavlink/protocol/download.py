@@ -55,7 +55,7 @@ from gcsplan.mavlink.protocol.outcome import (
     ERROR,
     INVALID,
     INVALID_SEQUENCE,
-    OURS,
+    OUR_REFUSAL,
     UNSUPPORTED,
     Accepted,
     Outcome,
@@ -209,7 +209,7 @@ class Download(Machine):
             self._count = message.count
             if message.count > self._most:
                 words = f"it announces {counted(message.count, 'item')}, and can hold at most {self._most}"
-                self._end(E.REFUSED, Refused(OURS, None, words))
+                self._end(E.REFUSED, Refused(OUR_REFUSAL, None, words))
                 return []
             if message.count == 0:
                 return self._finish(E.EMPTY)

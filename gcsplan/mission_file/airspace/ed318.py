@@ -20,9 +20,9 @@ from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, VolumeLim
 from gcsplan.mission_file.zone_attributes import is_number, shown
 from gcsplan.mission_file.zone_file import ZoneFile
 
-KINDS = ("USPACE", "PROHIBITED", "REQ_AUTHORIZATION", "CONDITIONAL", "NO_RESTRICTION")
+ZONE_TYPES = ("USPACE", "PROHIBITED", "REQ_AUTHORIZATION", "CONDITIONAL", "NO_RESTRICTION")
 REQUIRED = frozenset({"identifier", "country", "type", "variant"})
-SHAPE = frozenset({"type", "coordinates", "layer", "bbox"})
+GEOMETRY_MEMBERS = frozenset({"type", "coordinates", "layer", "bbox"})
 LAYER_MEMBERS = frozenset({"lower", "lowerReference", "upper", "upperReference", "uom"})
 MOST_GEOMETRIES = 1000
 
@@ -49,7 +49,7 @@ def _required(feature: Any) -> bool:
 
 def read_ed318(path: Path, whole: Any, policy: Policy) -> ZoneFile:
     """The zones of an ED-318 collection; what is wrong is in their problems and faults."""
-    return read_features(AirspaceFile(path, policy, KINDS), _features(whole), "features", _feature)
+    return read_features(AirspaceFile(path, policy, ZONE_TYPES), _features(whole), "features", _feature)
 
 
 def _feature(file: AirspaceFile, feature: Any, where: str, fallback: str) -> None:
@@ -81,7 +81,7 @@ def _geometry(file: AirspaceFile, zone: Published, part: str, geometry: Any, sha
         raise MemberError(f"the zone has no geometry, given {shown(geometry)}")
     limits = _limits(geometry.get("layer", shared), where, file.policy)
     kind = geometry.get("type")
-    limits.remarks += unread(geometry, SHAPE | ({"extent"} if kind == "Point" else set()), all_of_them=True)
+    limits.remarks += unread(geometry, GEOMETRY_MEMBERS | ({"extent"} if kind == "Point" else set()), all_of_them=True)
     if kind == "Point":
         extent = geometry.get("extent")
         radius: Any = None

@@ -15,7 +15,7 @@ from gcsplan.world.zones import Zone
 TURNS = (-720.0, -360.0, 0.0, 360.0, 720.0)
 """Whole turns by which a longitude may be written otherwise than the frame's, degrees."""
 
-NEAR_M = 5000.0
+NAMED_WITHIN_M = 5000.0
 """Zones this near to the mission's surroundings are named at least, m."""
 
 
@@ -41,12 +41,13 @@ def left_out_by_hours(drafts: Sequence[ZoneDraft]) -> bool:
 def unused_notes(drafts: Sequence[ZoneDraft], frame: Frame, box: Box) -> list[Note]:
     """A note for each reason, with the name of every zone near the mission that is not used for it.
 
-    Near is as far around the mission's surroundings as they extend, and at least `NEAR_M`; zones beyond are counted.
+    Near is as far around the mission's surroundings as they extend, and at least `NAMED_WITHIN_M`; zones beyond are
+    counted.
     """
     unused = [d for d in drafts if d.unused]
     if not unused:
         return []
-    reach_m = max(box[2] - box[0], box[3] - box[1], NEAR_M)
+    reach_m = max(box[2] - box[0], box[3] - box[1], NAMED_WITHIN_M)
     wider = (box[0] - reach_m, box[1] - reach_m, box[2] + reach_m, box[3] + reach_m)
     edges = frame.to_degrees(*zip(*_border(wider), strict=True))
     turned = (edges[:, 1] - frame.lon_deg + 180.0) % 360.0 - 180.0

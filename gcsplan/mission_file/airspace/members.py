@@ -9,12 +9,12 @@ from typing import Any
 
 from gcsplan.mission_file.airspace.policy import Published
 from gcsplan.mission_file.airspace.volumes import AirspaceFile, VolumeLimits
-from gcsplan.mission_file.zone_attributes import ATTRIBUTES_UNREAD, MOST_SHOWN, is_number, meaning_of, shown
+from gcsplan.mission_file.zone_attributes import ATTRIBUTES_UNREAD, MOST_ATTRIBUTES_SHOWN, is_number, meaning_of, shown
 from gcsplan.mission_file.zone_draft import Remark, one_line
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.world.degree_shapes import Corner, beyond_outline
 
-_NUMBER = re.compile(r"[-+]?\d{1,9}(\.\d{1,9})?", re.ASCII)
+_MEMBER_NUMBER = re.compile(r"[-+]?\d{1,9}(\.\d{1,9})?", re.ASCII)
 
 
 class MemberError(ValueError):
@@ -53,7 +53,7 @@ def unread(given: dict[str, Any], known: Collection[str], *, all_of_them: bool =
         seems = all_of_them or meaning.limit is not None or meaning.seems_a_limit or meaning.seems_a_time
         if key not in known and seems and value not in (None, "", [], {}):
             found.append(one_line(f"{key[:40]} {shown(value)}"))
-    return [(ATTRIBUTES_UNREAD, tuple(found[:MOST_SHOWN]))] if found else []
+    return [(ATTRIBUTES_UNREAD, tuple(found[:MOST_ATTRIBUTES_SHOWN]))] if found else []
 
 
 def position(given: Any) -> Corner:
@@ -90,7 +90,7 @@ def number_or_none(given: Any, name: str) -> float | int | None:
     """A finite number, also as text, or None. Raises MemberError."""
     if given is None or is_number(given):
         return given  # type: ignore[no-any-return]
-    if isinstance(given, str) and _NUMBER.fullmatch(given.strip()):
+    if isinstance(given, str) and _MEMBER_NUMBER.fullmatch(given.strip()):
         return float(given)
     raise MemberError(f"{name} must be a number, given {shown(given)}")
 

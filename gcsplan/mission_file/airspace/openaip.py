@@ -27,7 +27,7 @@ TYPES = (
 CLASSES = {0: "A", 1: "B", 2: "C", 3: "D", 4: "E", 5: "F", 6: "G", 8: "SUA"}
 """The ICAO classes by openAIP's numbers; 8 is an airspace without a class."""
 
-UNITS = {0: "M", 1: "FT", 6: "FL"}
+OPENAIP_UNITS = {0: "M", 1: "FT", 6: "FL"}
 DATUMS = {0: "GND", 1: "MSL", 2: "STD"}
 
 FREE_TYPES = frozenset({"OTHER", "FIR", "UIR", "ACC_SECTOR", "VFR_SECTOR", "FIS_SECTOR", "TRP"})
@@ -109,7 +109,7 @@ def _limits(members: dict[str, Any], where: str, policy: Policy) -> VolumeLimits
         if not isinstance(limit, dict):
             raise MemberError(f"{side}Limit must be an object, given {shown(limit)}")
         value = number_or_none(limit.get("value"), f"{side}Limit.value")
-        words = tuple(_code(limit, key, names) for key, names in (("unit", UNITS), ("referenceDatum", DATUMS)))
+        words = tuple(_code(limit, key, names) for key, names in (("unit", OPENAIP_UNITS), ("referenceDatum", DATUMS)))
         given.append(None if value is None else Given(value, words, (), f"{side}Limit"))
     found = VolumeLimits.read(given[0], given[1], where, policy=policy)
     found.remarks += floating

@@ -24,17 +24,17 @@ from gcsplan.mission_file.zone_text import decoded
 from gcsplan.notes.note import Datum, Note
 from gcsplan.world.degree_shapes import MOST_LON_DEG, Corner
 
-SUFFIXES = (".openair", ".air", ".txt")
+OPENAIR_SUFFIXES = (".openair", ".air", ".txt")
 
 NAUTICAL_MILE_M = 1852.0
 
-SILENT = frozenset({"UNC", "NONE"})
+SILENT_CLASSES = frozenset({"UNC", "NONE"})
 """A class and a type that say nothing; a zone with nothing else is no-fly."""
 
-FREE = frozenset({"G", "FIR", "UIR", "FIS", "ACCSEC", "VFRSEC", "TRZ"})
+FREE_CLASSES_AND_TYPES = frozenset({"G", "FIR", "UIR", "FIS", "ACCSEC", "VFRSEC", "TRZ"})
 """Classes and types in which no rule keeps anybody out: class G, regions of information, hints."""
 
-KINDS = (
+OPENAIR_CLASSES_AND_TYPES = (
     "A", "B", "C", "D", "E", "F", "G", "UNC", "R", "Q", "P", "GP", "CTR", "W", "ADIZ", "ALERT", "ASRA", "ATZ", "AWY",
     "CTA", "CUSTOM", "FIR", "FIS", "ACCSEC", "GSEC", "HTZ", "LTA", "MATZ", "MTA", "MTR", "MTMA", "N", "NONE", "OFR",
     "RMZ", "TFR", "TIA", "TIZ", "TMA", "TMZ", "TRA", "TRAFR", "TRZ", "TSA", "UIR", "UTA", "VFRR", "VFRSEC", "WARNING",
@@ -44,13 +44,13 @@ KINDS = (
 IGNORED = frozenset({"AF", "AG", "AX", "AI", "AT", "SP", "SB"})
 """Frequency, station, transponder code, number, place of a label, pen and brush: they limit nothing."""
 
-DRAWN = frozenset({"DP", "DA", "DB", "DC", "DY"})
+DRAWING_RECORDS = frozenset({"DP", "DA", "DB", "DC", "DY"})
 
-SPARED = Note("zone_limits_in_feet_above_sea")
+UNSTATED_LIMITS = Note("zone_limits_in_feet_above_sea")
 
 _RECORD = re.compile(r"(V|[A-Z]{2})\s+(\S.*)", re.IGNORECASE)
 _VARIABLE = re.compile(r"([A-Z])\s*=\s*(.*)", re.IGNORECASE)
-_PLACE = re.compile(
+_OPENAIR_PLACE = re.compile(
     r"\s*(\d{1,3}(?:\.\d{1,20})?)(?:\s*:\s*(\d{1,2}(?:\.\d{1,20})?))?(?:\s*:\s*(\d{1,2}(?:\.\d{1,20})?))?\s*([NS])[\s,]*"
     r"(\d{1,3}(?:\.\d{1,20})?)(?:\s*:\s*(\d{1,2}(?:\.\d{1,20})?))?(?:\s*:\s*(\d{1,2}(?:\.\d{1,20})?))?\s*([EW])",
     re.ASCII | re.IGNORECASE,
@@ -95,7 +95,7 @@ class _Block:
 
 def read_openair(path: Path, data: bytes, policy: Policy) -> ZoneFile:
     """The zones of OpenAir text; what is wrong is in their problems and faults."""
-    return _OpenAirReading(AirspaceFile(path, policy, KINDS, great_circles=True)).read(_text(data))
+    return _OpenAirReading(AirspaceFile(path, policy, OPENAIR_CLASSES_AND_TYPES, great_circles=True)).read(_text(data))
 
 
 def _text(data: bytes) -> str:
@@ -180,7 +180,7 @@ class _OpenAirReading:
             self._variable(value)
         elif self.block is None:
             raise _RecordError("stands before the first AC, with which a zone begins")
-        elif code in DRAWN:
+        elif code in DRAWING_RECORDS:
             self._draw(self.block, code, value)
         elif code == "AN":
             self.block.name = value
@@ -268,7 +268,9 @@ class _OpenAirReading:
         remarks = (*dict(reversed(block.remarks)).items(), *([(UNREAD_TIMES, unread)] if unread else []))
         name = block.name or f"{file.path.stem}[{self.zones - 1}]"
         kinds = tuple(dict.fromkeys(block.kinds))
-        restricts = any(k not in FREE | SILENT for k in kinds) or not any(k in FREE for k in kinds)
+        restricts = any(k not in FREE_CLASSES_AND_TYPES | SILENT_CLASSES for k in kinds) or not any(
+            k in FREE_CLASSES_AND_TYPES for k in kinds
+        )
         zone = Published(name, kinds, restricts, "", periods, remarks)
         limits = _limits(block, where, file.policy)
         limits.faults += [
@@ -302,7 +304,7 @@ def _limits(block: _Block, where: str, policy: Policy) -> VolumeLimits:
             plain = match[1]
             said.append((Note("zone_text_behind_height_unread"), f"{key} {text[:60]}"))
         given.append(None if plain is None else Given(plain, (), ("FT", "AMSL"), key))
-    limits = VolumeLimits.read(given[0], given[1], where, SPARED, policy=policy)
+    limits = VolumeLimits.read(given[0], given[1], where, UNSTATED_LIMITS, policy=policy)
     limits.remarks += said
     return limits
 
@@ -351,7 +353,7 @@ def _places(text: str, count: int) -> tuple[list[Corner], str]:
 
 
 def _matches(text: str) -> Iterator[re.Match[str]]:
-    return _PLACE.finditer(text)
+    return _OPENAIR_PLACE.finditer(text)
 
 
 def _degrees(parts: tuple[str | None, ...], side: str) -> float:

@@ -16,7 +16,7 @@ from gcsplan.notes.note import Note
 
 UNREAD_TIMES = Note("zone_times_not_understood")
 
-_SHOWN = 12
+_KINDS_SHOWN = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ class PolicyJudge:
         self.entered |= own
         wanted = self.policy.kinds
         if wanted is not None and not {_plain(k) for k in wanted} & {_plain(k) for k in zone.kinds}:
-            return Note("zones_of_other_kinds", kinds=wanted[:_SHOWN])
+            return Note("zones_of_other_kinds", kinds=wanted[:_KINDS_SHOWN])
         if wanted is None and not zone.restricts:
             return Note("zones_restrict_nothing")
         if own:

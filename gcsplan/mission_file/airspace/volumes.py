@@ -16,9 +16,17 @@ import numpy as np
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.airspace.policy import Policy, PolicyJudge, Published
 from gcsplan.mission_file.zone_attributes import OVER_PRESSURE, UNDER_PRESSURE, level_read
-from gcsplan.mission_file.zone_draft import ACROSS, MAX_VERTICES, Bounds, Remark, ZoneDraft, check_degrees, one_line
+from gcsplan.mission_file.zone_draft import (
+    ACROSS_ANTIMERIDIAN,
+    MAX_VERTICES,
+    Bounds,
+    Remark,
+    ZoneDraft,
+    check_degrees,
+    one_line,
+)
 from gcsplan.mission_file.zone_file import ZoneFile
-from gcsplan.mission_file.zone_levels import EXAMPLES, LevelError, Limit, read_level
+from gcsplan.mission_file.zone_levels import LEVEL_EXAMPLES, LevelError, Limit, read_level
 from gcsplan.notes.note import Note
 from gcsplan.world.degree_shapes import (
     HALF_TURN_DEG,
@@ -31,7 +39,7 @@ from gcsplan.world.degree_shapes import (
     unwrapped,
     wide_fault,
 )
-from gcsplan.world.outlines import MOST_CROSSINGS, MOST_PAIRS, crossings, overlapping_pairs
+from gcsplan.world.outlines import MOST_CROSSINGS, MOST_EDGE_PAIRS, crossings, overlapping_pairs
 from gcsplan.world.zones import Level
 
 ELLIPSOID = "WGS84"
@@ -46,7 +54,7 @@ NO_CEILING_M = 30_000.0
 AROUND_DEG = 0.01
 """Degrees by which a zone without an outline is taken to reach beyond its points."""
 
-CURE = "complete its outline, or delete it from the file if it is no zone"
+OUTLINE_CURE = "complete its outline, or delete it from the file if it is no zone"
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +93,7 @@ class VolumeLimits:
             try:
                 level = found._level(bound, given, spared, error_m)
             except LevelError as why:
-                cure = f"{given} cannot be read as a level: {why}. Write for example {EXAMPLES}"
+                cure = f"{given} cannot be read as a level: {why}. Write for example {LEVEL_EXAMPLES}"
                 found.faults.append(Problem(where, cure))
                 continue
             if level is not None:
@@ -195,13 +203,15 @@ class AirspaceFile:
             self._add(zone, part, where, tuple(outline), None, limits, [], doubt)
             return
         at = np.asarray(outline, float)
-        tangled = overlapping_pairs(at) > MOST_PAIRS or crossings(at) > MOST_CROSSINGS
+        tangled = overlapping_pairs(at) > MOST_EDGE_PAIRS or crossings(at) > MOST_CROSSINGS
         if tangled:
             why = f"its outline of {len(outline)} corners is too tangled to tell what it encloses"
         parts = enclosed(outline) if len(set(outline)) > 2 and not tangled else []
         if not parts:
             if ring:
-                self._add(zone, part, where, self._around(ring), None, limits, [Problem(where, f"{why}; {CURE}")])
+                self._add(
+                    zone, part, where, self._around(ring), None, limits, [Problem(where, f"{why}; {OUTLINE_CURE}")]
+                )
             else:
                 self.fault(where, "the polygon has no points")
             return
@@ -247,7 +257,7 @@ class AirspaceFile:
         if faults:
             remarks.append((Note("zone_limits_not_understood"), None))
         if doubt:
-            remarks.append((ACROSS, None))
+            remarks.append((ACROSS_ANTIMERIDIAN, None))
         draft = ZoneDraft(
             part[:200], where, points, False, radius_m, floor, ceiling,
             unused=self.judge.reason(zone), faults=tuple(faults),

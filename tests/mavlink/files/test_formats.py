@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
-from gcsplan.mavlink.files.file_items import MAX_BYTES, PLAIN_XY, degrees_e7_of, degrees_text, float32_text
+from gcsplan.mavlink.files.file_items import MAX_FILE_BYTES, PLAIN_XY, degrees_e7_of, degrees_text, float32_text
 from gcsplan.mavlink.files.formats import read_mission_file, read_plan, read_waypoints, write_plan, write_waypoints
 from gcsplan.mavlink.files.plan_file import parse_plan
 from gcsplan.mavlink.files.waypoints_file import parse_waypoints
@@ -721,7 +721,7 @@ def test_a_file_that_is_none_is_refused_by_name(tmp_path: Path) -> None:
     cases: list[tuple[bytes, str]] = [
         (b"\xff\xfe\x00", "UTF-8"),
         (b"", "first line"),
-        (b" " * (MAX_BYTES + 1), "20 MB"),
+        (b" " * (MAX_FILE_BYTES + 1), "20 MB"),
     ]
     for content, said in cases:
         file.write_bytes(content)
