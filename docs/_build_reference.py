@@ -120,7 +120,7 @@ def _value(key: str, told: Mapping[str, Any], named: Mapping[str, Any]) -> str:
         "boolean": "`true`, `false`",
     }
     kind = names[told["type"]]
-    unit = units.UNITS.get(units.unit_end(key), "")
+    unit = units.UNIT_SYMBOLS.get(units.unit_end(key), "")
     return ", ".join(word for word in (unit or kind, _bounds(told)) if word)
 
 
@@ -141,7 +141,7 @@ def other_units() -> str:
     lines = ["| keys that end in | may end in | with the value in |", "| --- | --- | --- |"]
     for own, others in units.OTHERS.items():
         ends = ", ".join(f"`{end}`" for end in others)
-        sizes = [f"{o.symbol} ({o.size:.7g} {units.UNITS[own]}{' for 1 V' if end == units.CHARGE else ''})"
+        sizes = [f"{o.symbol} ({o.size:.7g} {units.UNIT_SYMBOLS[own]}{' for 1 V' if end == units.CHARGE else ''})"
                  for end, o in others.items()]  # fmt: skip
         lines.append(f"| `{own}` | {ends} | {', '.join(sizes)} |")
     return "\n".join(lines)

@@ -28,19 +28,29 @@ WORST = (70, 7, 6, 5, 4, 3, 2, 0)
 NoMissionReason = Literal["infeasible", "not_found", "time", "separation", "battery", "too_many_items"]
 
 
+ProblemCode = Literal["", "unknown_key", "missing", "missing_limit", "swapped"]
+
+
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One mistake in the input: its place (``file: key.path``) and what to do about it."""
+    """One mistake in the input: its place (``file: key.path``) and what to do about it.
+
+    ``code`` is its kind, where programs tell kinds apart, ``meant`` are the names that may have been meant, and
+    ``line`` is the end of the message that says the line, if one is known.
+    """
 
     where: str
     message: str
+    code: ProblemCode = ""
+    meant: tuple[str, ...] = ()
+    line: str = ""
 
     def __str__(self) -> str:
         return f"{self.where}: {self.message}" if self.where else self.message
 
     def as_dict(self) -> dict[str, str]:
         """What ``--json`` says of it."""
-        return {"where": self.where, "message": self.message}
+        return {"where": self.where, "message": self.message} | ({"code": self.code} if self.code else {})
 
 
 def worst_of(codes: Collection[int]) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 from gcsplan.arrays import Floats
 from gcsplan.notes.note import Note
@@ -60,6 +60,9 @@ def lean_words(lean_deg: float) -> Note:
 
 
 Amount = TypeVar("Amount", float, Floats)
+
+MissionEnd = Literal["land", "loiter", "rtl", "none"]
+"""What a mission ends with."""
 
 
 class Autopilot(StrEnum):

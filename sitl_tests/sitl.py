@@ -18,7 +18,7 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 import pytest
 
 from gcsplan.errors import LinkError
-from gcsplan.mavlink.link.link import Link, Steps, run
+from gcsplan.mavlink.link.link import Link, LinkSteps, run
 from gcsplan.mavlink.link.session import discover
 from gcsplan.mavlink.link.watch import VehicleState
 from gcsplan.mavlink.mission.autopilots import autopilot_of
@@ -128,7 +128,7 @@ def firmware(link: Link, state: VehicleState) -> Firmware:
     return max((f for f in KNOWN_FIRMWARE[ARDUPILOT_FAMILY] if f.version <= version), key=lambda f: f.version)
 
 
-def _flight_sw_version(link: Link, state: VehicleState) -> Steps[int]:
+def _flight_sw_version(link: Link, state: VehicleState) -> LinkSteps[int]:
     channel = link.channel(state.address.sysid)
     ask = dialect.MAVLink_command_long_message(
         *state.address, dialect.MAV_CMD_REQUEST_MESSAGE, 0, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION, *[0.0] * 6

@@ -15,7 +15,7 @@ import pytest
 
 from gcsplan.app.terrain_link import compare, serve
 from gcsplan.dem.dat_file import read_dat
-from gcsplan.mavlink.link.terrain import Compared
+from gcsplan.mavlink.link.terrain import TerrainComparison
 from gcsplan.mission_file import load_mission
 from gcsplan.vehicle import Autopilot
 from sitl_tests import sitl
@@ -74,7 +74,7 @@ def copter(tmp_path: Path) -> Iterator[str]:
 def test_a_real_arducopter_reads_the_terrain_that_it_was_sent(copter: str, tmp_path: Path) -> None:
     source = load_mission(MISSION)
     result = compare(source, [f"uav1={copter}"], points=200, seed=2)["uav1"]
-    assert isinstance(result, Compared), result
+    assert isinstance(result, TerrainComparison), result
     assert result.read == 200
     assert result.worst_m < 0.05
     # What it kept on its card are our blocks.

@@ -21,7 +21,7 @@ from gcsplan.export.summary import ORDER
 from gcsplan.mission_file import schema
 from gcsplan.planners import registry
 from gcsplan.sim.vehicle.firmware import FIRMWARE_CHANGES, KNOWN_FIRMWARE
-from gcsplan.world.airspace import Kind
+from gcsplan.world.airspace import ViolationKind
 from tests.support.paths import REPOSITORY
 
 TOP = REPOSITORY
@@ -152,7 +152,7 @@ def test_the_contract_names_every_key_of_the_summary_and_every_kind_of_violation
     text = (DOCS / "reference" / "contract.md").read_text(encoding="utf-8")
     for key in {key for keys in ORDER.values() for key in keys}:
         assert f'"{key}"' in text, key
-    for kind in (*get_args(Kind), "battery", "refused", "unreachable", "too_many_items"):
+    for kind in (*get_args(ViolationKind), "battery", "refused", "unreachable", "too_many_items"):
         assert f"`{kind}`" in text, kind
 
 

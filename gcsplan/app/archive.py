@@ -24,7 +24,7 @@ from gcsplan.arrays import Floats
 from gcsplan.errors import GcsplanError, InputError, UsageError
 from gcsplan.mavlink.files.file_items import MissionFileRead
 from gcsplan.mission_file import MissionFile
-from gcsplan.mission_file.from_options import Extent, WorldOptions
+from gcsplan.mission_file.from_options import WorldExtent, WorldOptions
 from gcsplan.mission_file.load import load_content
 from gcsplan.mission_file.request import Content
 from gcsplan.notes.note import Said
@@ -71,7 +71,7 @@ class Asked:
     autopilot: Autopilot | None
     returns: Returns
     shown: Shown
-    extent: Extent | None = None
+    extent: WorldExtent | None = None
     inputs: Mapping[str, object] | None = None
     key: str = ""
 

@@ -29,7 +29,7 @@ from gcsplan.errors import GcsplanError, InputError, NoMission, UsageError, wors
 from gcsplan.export.durable import locked
 from gcsplan.export.outdir import retire_outputs, settle_outputs, write_outputs
 from gcsplan.mission_file.samples import file_of, is_sample
-from gcsplan.world.input_files import Reading, reading
+from gcsplan.world.input_files import FileReading, reading
 
 __all__ = ["BatchOptions", "MissionBatch", "Record", "exit_code", "missions_of"]
 
@@ -140,7 +140,7 @@ class MissionBatch:
         What cannot be written is that mission's failure, and its earlier outputs leave if they can.
         """
         out = self.directory / record.mission
-        changed = Reading.changed(record.inputs or {})
+        changed = FileReading.changed(record.inputs or {})
         if changed:
             words = (
                 f"{changed} is not what was read here: it changed while the mission was planned, or a worker of the "
@@ -192,7 +192,7 @@ def record_of(options: BatchOptions, item: tuple[str, str]) -> Record:
     return Record(name, asked, code, rows, tuple(_tracks(planned)), files, read.marks)
 
 
-def _failed(name: str, asked: str, why: GcsplanError, read: Reading | None = None) -> Record:
+def _failed(name: str, asked: str, why: GcsplanError, read: FileReading | None = None) -> Record:
     """The record of a mission without a plan; without ``read`` it is tried again next time."""
     row = _refusal(name, why.exit_code, why.reason, str(why))
     return Record(name, asked, why.exit_code, (row,), inputs=None if read is None else read.marks)

@@ -33,7 +33,7 @@ from gcsplan.mavlink.mission.commands import LOITER_TIME, LOITER_TO_ALT, LOITER_
 from gcsplan.mavlink.mission.mission import NO_POSITION, Home, Mission, MissionItem
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.mission_file.airspace.times import Hours
-from gcsplan.mission_file.from_options import OPTIONS, Extent, OpenWorld, WorldOptions
+from gcsplan.mission_file.from_options import KEY_OPTIONS, OpenWorld, WorldExtent, WorldOptions
 from gcsplan.notes.note import Note, Said, Wording
 from gcsplan.units import Units
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -172,7 +172,7 @@ class OptionsSite:
         self.options, self.autopilot = options, autopilot
         self.opened = OpenWorld(options)
         self._hint = None if options.home is None else Home.at(*options.home, 0.0)
-        self.extent: Extent | None = None
+        self.extent: WorldExtent | None = None
         self._world: World | None = None
         self._said: tuple[Mapping[str, object], tuple[Said, ...]] = {}, ()
 
@@ -192,7 +192,7 @@ class OptionsSite:
                 raise
             self.extent = None
 
-    def settle_in(self, extent: Extent) -> None:
+    def settle_in(self, extent: WorldExtent) -> None:
         """Load the world of an extent that another process found. Raises InputError."""
         self._world = self._tell(*self.opened.over(extent))
         self.extent = extent
@@ -222,7 +222,7 @@ class OptionsSite:
     @property
     def typed(self) -> Mapping[str, str]:
         """See `Site.typed`."""
-        return OPTIONS
+        return KEY_OPTIONS
 
 
 def split_name(argument: str) -> tuple[str | None, Path]:

@@ -20,7 +20,7 @@ class MissionGround:
     source: MissionFile
 
     def __call__(self, lat_deg: Floats, lon_deg: Floats) -> Floats:
-        """See `terrain_grid.Ground`. Raises InputError if the terrain cannot be read."""
+        """See `terrain_grid.GroundHeights`. Raises InputError if the terrain cannot be read."""
         while True:
             plane = self.source.frame.to_plane(lat_deg, lon_deg)
             heights = self.source.surface.high_at(plane[..., 0], plane[..., 1])

@@ -11,6 +11,7 @@ from gcsplan.errors import InputError, Problem, VehicleRefused
 from gcsplan.mavlink.mission.return_altitude import return_on_board_m
 from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.new_file import Draft, text_of
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ class Seen:
     start: str | None
     rtl_rel_home_m: float | None
     lean_deg: float | None
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
 
     def onto(self, draft: Draft) -> Draft:
         """``draft`` with the vehicle's link and settings."""
@@ -69,7 +70,7 @@ def seen_at(url: str, sysid: int, autopilot: Autopilot | None) -> Seen:
     height_m = return_on_board_m(values)
     lean_deg = lean_on_board_deg(values) if kind is Autopilot.ARDUCOPTER else None
     if not values:
-        notes.append("no parameters could be read: the return altitude is left open")
+        notes.append(Note("parameters_not_read"))
     return Seen(
         place, kind, start,
         None if height_m is None or height_m <= 0.0 else round(height_m, 2),
@@ -78,7 +79,7 @@ def seen_at(url: str, sysid: int, autopilot: Autopilot | None) -> Seen:
     )  # fmt: skip
 
 
-def _start(state: VehicleState) -> tuple[str | None, list[str]]:
+def _start(state: VehicleState) -> tuple[str | None, list[Note]]:
     """Where the vehicle is, else its home, and what a user has to know about that."""
     from gcsplan.mavlink.link.preflight import distance_m
 
@@ -86,14 +87,14 @@ def _start(state: VehicleState) -> tuple[str | None, list[str]]:
     if state.lat_deg is None or state.lon_deg is None:
         if home is None:
             return None, []
-        return f"{home[0]:.7f}, {home[1]:.7f}", ["the vehicle reports no position: its home is the start"]
-    notes = [] if not state.armed else ["the vehicle is armed: its position may not be on the ground"]
+        return f"{home[0]:.7f}, {home[1]:.7f}", [Note("start_at_home")]
+    notes = [] if not state.armed else [Note("position_of_armed_vehicle")]
     if home is not None and (away_m := distance_m(state.lat_deg, state.lon_deg, *home)) > NEAR_M:
-        notes.append(f"the start is where the vehicle is, {away_m:.0f} m from its home")
+        notes.append(Note("start_at_vehicle", away_m=away_m))
     return f"{state.lat_deg:.7f}, {state.lon_deg:.7f}", notes
 
 
-def checked_text(draft: Draft, file: Path) -> tuple[str, tuple[str, ...]]:
+def checked_text(draft: Draft, file: Path) -> tuple[str, tuple[Note, ...]]:
     """The mission file's text, and the notes of its reader. Raises InputError with the option of each mistake."""
     text = text_of(draft, file.name, file.stem)
     try:
@@ -105,4 +106,4 @@ def checked_text(draft: Draft, file: Path) -> tuple[str, tuple[str, ...]]:
 def _renamed(problem: Problem, where: str) -> Problem:
     """The problem at its option, without the line of a file that is not written."""
     place = problem.where.removeprefix(where)
-    return Problem(OPTIONS.get(place, problem.where), problem.message.split(" (line ")[0])
+    return replace(problem, where=OPTIONS.get(place, problem.where), message=problem.message.removesuffix(problem.line))

@@ -82,7 +82,7 @@ def _listed(
 
 def judge_on_board(
     job: UploadJob, *, allow_unjudged: bool, allow_parameters: bool = False, simulated: bool = False
-) -> session.Judge | None:
+) -> session.ReadBackJudge | None:
     """The check of the mission that was read back, since the vehicle will fly what it holds; None without a world.
 
     It is asked before the mission is sent too, with the vehicle's parameters: where it turns, how fast it flies, climbs
@@ -110,11 +110,11 @@ def judge_on_board(
         if silent := _silent(settings, values, vehicle.autopilot, terrain):
             return silent
         if vehicle.lean_angle_deg is not None and (short := lean_shortage(values, planned_m_s)):
-            return short
+            return str(short)
         if short := speed_shortage(values, vehicle, planned_m_s):
-            return short
+            return str(short)
         if flies_terrain(read_back.wire_items()) and (odd := odd_spacing(values)):
-            return odd
+            return str(odd)
         found = off(settings, values, vehicle.autopilot)
         decide = {"flight", "return"} | ({"turns"} if straight else set())
         if not allow_parameters or (job.fleet is not None and job.fleet.keeps_apart):

@@ -13,7 +13,7 @@ from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mavlink.build.multirotor import build_mission, corner_m, cuts_corners
-from gcsplan.mavlink.build.order import BOW_M, FLOWN_SLOPE, LONGEST_LEG_M, MARGINS, Margins, Order, slope_margin
+from gcsplan.mavlink.build.order import FLOWN_SLOPE, LEG_BOW_M, LONGEST_LEG_M, MARGINS, Margins, Order, slope_margin
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import Home, Mission
@@ -299,9 +299,9 @@ def bow_margin_m(request: VehicleRequest, world: World, margins: Margins = MARGI
     longest_m = max(math.dist(a, b) for a, b in pairwise(places))
     own_m = LEAST_BOW_M
     if request.vehicle.turn_radius_m > 0.0:
-        own_m = BOW_M  # arcs, climb-outs and approaches have legs of their own
+        own_m = LEG_BOW_M  # arcs, climb-outs and approaches have legs of their own
     straight_m = world.bow_m(min(longest_m, LONGEST_LEG_M))
-    wanted_m = min(max(own_m, straight_m), BOW_M) * margins.bow_m / BOW_M
+    wanted_m = min(max(own_m, straight_m), LEG_BOW_M) * margins.bow_m / LEG_BOW_M
     return wanted_m if wanted_m <= straight_m else min(wanted_m, world.bow_m(LONGEST_LEG_M))
 
 

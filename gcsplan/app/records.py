@@ -16,7 +16,7 @@ from typing import Any
 
 from gcsplan.export.durable import write_whole
 from gcsplan.export.outdir import has_outputs, is_output
-from gcsplan.world.input_files import SPECIAL, Reading
+from gcsplan.world.input_files import SPECIAL, FileReading
 
 __all__ = ["FOLDER", "TABLES", "Record", "digests_of", "fault_of_name", "kept_record", "write_record"]
 
@@ -83,7 +83,7 @@ def kept_record(directory: Path, mission: str, asked: str) -> Record | None:
             return None
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
-    if not has_outputs(directory / mission, outputs) or SPECIAL in inputs.values() or Reading.changed(inputs):
+    if not has_outputs(directory / mission, outputs) or SPECIAL in inputs.values() or FileReading.changed(inputs):
         return None
     return record
 

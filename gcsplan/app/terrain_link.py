@@ -18,8 +18,8 @@ from gcsplan.notes.note import Said, in_json
 from gcsplan.world.terrain_grid import PostHeights
 
 if TYPE_CHECKING:
-    from gcsplan.mavlink.link.link import Channel, PumpJob, Steps
-    from gcsplan.mavlink.link.terrain import Compared, TerrainService
+    from gcsplan.mavlink.link.link import Channel, LinkSteps, PumpJob
+    from gcsplan.mavlink.link.terrain import TerrainComparison, TerrainService
 
 QUIET_S = 5.0
 """A vehicle that reports nothing pending for so long has all that it asks for."""
@@ -76,7 +76,7 @@ def serve(
     service = TerrainService(MissionGround(source))
     seen: dict[str, _Seen] = {name: _Seen() for name in urls}
 
-    def watched(channel: Channel, name: str) -> Steps[None]:
+    def watched(channel: Channel, name: str) -> LinkSteps[None]:
         return _watched(channel, name, seen[name], seconds, until_loaded, report)
 
     with _jobs(source, urls, service, watched) as jobs:
@@ -99,7 +99,7 @@ def serve(
 
 @contextmanager
 def _jobs(
-    source: MissionFile, urls: Mapping[str, str], service: TerrainService, steps: Callable[[Channel, str], Steps[T]]
+    source: MissionFile, urls: Mapping[str, str], service: TerrainService, steps: Callable[[Channel, str], LinkSteps[T]]
 ) -> Iterator[list[PumpJob[T]]]:
     """A task for each vehicle, over links that answer its terrain requests beside it."""
     from gcsplan.mavlink.link.link import PumpJob
@@ -124,7 +124,7 @@ class _Seen:
 
 def _watched(
     channel: Channel, name: str, seen: _Seen, seconds: float, until_loaded: bool, report: Report | None
-) -> Steps[None]:
+) -> LinkSteps[None]:
     from gcsplan.mavlink.link.steps import discover_steps
     from gcsplan.mavlink.link.watch import Watch
 
@@ -153,7 +153,7 @@ def compare(
     seed: int = 1,
     spacing_m: int = 100,
     report: Report | None = None,
-) -> Mapping[str, Compared | GcsplanError]:
+) -> Mapping[str, TerrainComparison | GcsplanError]:
     """Ask every vehicle what terrain it reads at random places of the mission's ground, and serve what it lacks."""
     from gcsplan.mavlink.link.link import pump
     from gcsplan.mavlink.link.terrain import TerrainService
@@ -164,12 +164,12 @@ def compare(
     posts = service.posts(spacing_m)
     places = random_places(ground, posts, points, seed)
 
-    def compared(channel: Channel, name: str) -> Steps[Compared]:
+    def compared(channel: Channel, name: str) -> LinkSteps[TerrainComparison]:
         return _compared(channel, name, places, posts, report)
 
     with _jobs(source, urls, service, compared) as jobs:
         pump(jobs)
-    found: dict[str, Compared | GcsplanError] = {}
+    found: dict[str, TerrainComparison | GcsplanError] = {}
     for name, job in zip(urls, jobs, strict=True):
         outcome = job.error or job.result
         assert outcome is not None
@@ -179,13 +179,13 @@ def compare(
 
 def _compared(
     channel: Channel, name: str, places: Sequence[tuple[int, int]], posts: PostHeights, report: Report | None
-) -> Steps[Compared]:
+) -> LinkSteps[TerrainComparison]:
     from gcsplan.mavlink.link.steps import discover_steps
     from gcsplan.mavlink.link.terrain import compare_steps
     from gcsplan.mavlink.link.watch import Watch
 
     state = yield from discover_steps(channel, Watch(channel.sysid), timeout_s=10.0, listen_s=LISTEN_S)
-    compared: Compared = yield from compare_steps(
+    compared: TerrainComparison = yield from compare_steps(
         channel, state.address, places, posts, patience_s=COMPARE_PATIENCE_S,
         progress=None if report is None else lambda done, of: report(name, done, of),
     )  # fmt: skip

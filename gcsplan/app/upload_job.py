@@ -11,15 +11,15 @@ from gcsplan.check.rtl.verdict import WayHome
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.build.fence import Fence
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.mavlink.protocol.machine import Progress
+from gcsplan.mavlink.protocol.machine import TransferProgress
 from gcsplan.mission_file.airspace.times import Hours
 from gcsplan.notes.note import Said, in_json
 from gcsplan.vehicle import Vehicle
-from gcsplan.world.terrain_grid import Ground
+from gcsplan.world.terrain_grid import GroundHeights
 from gcsplan.world.world import World
 
 SIM, LINK = "sim", "link"
-ProgressCall = Callable[[str, Progress], None]
+ProgressCall = Callable[[str, TransferProgress], None]
 """Called with a vehicle's name and the progress of its upload. In the last call, the phase is the outcome in a word."""
 
 
@@ -60,7 +60,7 @@ class UploadJob:
     fence: Fence | None = None
     way_home: WayHome | None = None
     home_required: bool = False
-    ground: Ground | None = None
+    ground: GroundHeights | None = None
     hours: Hours | None = None
     fleet: FleetOnBoard | None = None
 

@@ -19,7 +19,7 @@ def report_end(progress: ProgressCall | None) -> session.EndCall | None:
     """A call that reports the outcome of each order, in a word, to ``progress``."""
     if progress is None:
         return None
-    from gcsplan.mavlink.protocol.machine import Progress
+    from gcsplan.mavlink.protocol.machine import TransferProgress
 
     def report(order: session.UploadOrder, ended: UploadResult | GcsplanError) -> None:
         count = len(order.mission.wire_items())
@@ -29,7 +29,7 @@ def report_end(progress: ProgressCall | None) -> session.EndCall | None:
         if not isinstance(ended, GcsplanError) and ended.changed:
             word = f"verified, {ended.changed}" if verified else f"stopped, {ended.changed}"
         phase = "verified" if verified and word == "accepted" else f"{word}!"
-        progress(order.mission.name, Progress(phase, count if verified else 0, count))
+        progress(order.mission.name, TransferProgress(phase, count if verified else 0, count))
 
     return report
 
@@ -70,7 +70,9 @@ def order_of(
     return session.UploadOrder(link, job.mission, job.verdict, settings, again, progress)
 
 
-def _judge_again(job: UploadJob, simulated: bool = False, *, allow_parameters: bool = False) -> session.Judge | None:
+def _judge_again(
+    job: UploadJob, simulated: bool = False, *, allow_parameters: bool = False
+) -> session.ReadBackJudge | None:
     if job.verdict is None:
         return None
     return judge_on_board(

@@ -157,7 +157,7 @@ def unchecked_job(argument: str, url: str, sysid: int) -> tuple[UploadJob, list[
             autopilot = _autopilot_of(link, sysid)
     read = read_mission_file(file, autopilot=autopilot)
     job = UploadJob(name or file.stem, endpoint.url, replace(read.mission, name=name or file.stem, sysid=sysid))
-    return job, [*read.notes, *([read.unread_fence] if read.unread_fence else [])]
+    return job, [note for note in (*read.notes, read.unread_fence) if note]
 
 
 def open_link(url: str) -> Link:
@@ -352,7 +352,7 @@ def verify_file(
             autopilot = None if file.suffix.lower() == ".plan" else _autopilot_of(link, sysid)
             read = read_mission_file(file, autopilot=autopilot)
             job = UploadJob(file.stem, link.url, replace(read.mission, sysid=sysid))
-            notes = (*read.notes, *([read.unread_fence] if read.unread_fence else []))
+            notes = tuple(note for note in (*read.notes, read.unread_fence) if note)
         options = session.SessionOptions(
             listen_s=LISTEN_S, timeout_s=timeout_s, rtl_rel_home_m=job.rtl_rel_home_m,
             read_parameters=checked is not None, settings=settings_of(job), vehicle=job.vehicle,

@@ -17,6 +17,7 @@ from gcsplan.mission_file.airspace.times import hours_of, texts_of
 from gcsplan.mission_file.load import read_no_fly
 from gcsplan.mission_file.zone_draft import ZoneDraft, zone_notes
 from gcsplan.mission_file.zone_reader import read_zones
+from gcsplan.notes.note import Note
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Level
 
@@ -56,14 +57,14 @@ class ListedZone:
                 "source": self.source}  # fmt: skip
 
 
-def list_zones(files: Sequence[Path], at: str | None = None) -> tuple[list[ListedZone], list[str]]:
+def list_zones(files: Sequence[Path], at: str | None = None) -> tuple[list[ListedZone], list[Note]]:
     """The no-fly zones of mission files (.yaml) and of zone files, and the notes on them and others. Raises InputError.
 
     ``at``: zones that do not apply then are not listed, but named.
     Zones that are too far from a mission to matter are listed, too: a mission's places are not read.
     """
     drafts: list[ZoneDraft] = []
-    notes: list[str] = []
+    notes: list[Note] = []
     wrong: list[Problem] = []
     texts = texts_of(at)
     policy = Policy(hours=hours_of(None, None, "--at", wrong, instead=texts))

@@ -85,7 +85,7 @@ def why_lost(item: MissionItem, mission: Mission) -> Note:
         return Note("take_off_unknown", name=name)
     if item.command in WHY_LOST:
         return Note(WHY_LOST[item.command], name=name)
-    return Note("motion_unknown", name=name) if item.command in cmd.WORDS else Note("command_unknown")
+    return Note("motion_unknown", name=name) if item.command in cmd.COMMAND_WORDS else Note("command_unknown")
 
 
 def flown_otherwise(seq: int, item: MissionItem, mission: Mission) -> Note | None:

@@ -9,7 +9,7 @@ import numpy as np
 from gcsplan.check.geodesy import degree_m
 from gcsplan.check.stretch import Stretch
 from gcsplan.mavlink.mission.mission import Home
-from gcsplan.mavlink.mission.parameter_safety import Extent
+from gcsplan.mavlink.mission.parameter_safety import FlightExtent
 from gcsplan.world.airspace import Legs
 from gcsplan.world.limits import Limits
 
@@ -18,7 +18,7 @@ __all__ = ["extent_of"]
 
 def extent_of(
     stretches: Sequence[Stretch], legs: Sequence[Legs], home: Home, limits: Limits, home_error_m: float = 0.0
-) -> Extent:
+) -> FlightExtent:
     """The extent of ``stretches``, at least one, with the errors of ``limits`` and what widens each of them.
 
     ``legs``: the same in the plane, where those of the terrain frame follow the ground; their errors of height count,
@@ -36,4 +36,4 @@ def extent_of(
         error_m = part.altitude_error_m - home_error_m
         top_m = max(top_m, float((np.maximum(part.start[:, 2], part.end[:, 2]) + error_m).max()))
         bottom_m = min(bottom_m, float((np.minimum(part.start[:, 2], part.end[:, 2]) - error_m).min()))
-    return Extent(top_m - home.amsl_m, bottom_m - home.amsl_m, reach_m)
+    return FlightExtent(top_m - home.amsl_m, bottom_m - home.amsl_m, reach_m)

@@ -14,7 +14,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats, Indices
 from gcsplan.check.stretch import Stretch
-from gcsplan.world.airspace import Kind, LegReport, Legs, Violation
+from gcsplan.world.airspace import LegReport, Legs, Violation, ViolationKind
 from gcsplan.world.limits import Limits
 from gcsplan.world.surface import Surface
 from gcsplan.world.vehicle_terrain import VehicleTerrain
@@ -185,7 +185,7 @@ def steep_report(plane: PlaneLegs, report: LegReport, limits: Limits) -> LegRepo
     climb[mine] = np.where(angles[:, 0] >= -angles[:, 1], angles[:, 0], angles[:, 1])
     own = set(mine.tolist())
     violations = [v for v in report.violations if v.leg not in own or v.kind not in ("climb", "descent")]
-    tried: tuple[tuple[Kind, float, Floats], ...] = (
+    tried: tuple[tuple[ViolationKind, float, Floats], ...] = (
         ("climb", limits.max_climb_deg, angles[:, 0]), ("descent", limits.max_descent_deg, -angles[:, 1]),
     )  # fmt: skip
     for kind, limit, found in tried:

@@ -12,7 +12,7 @@ from gcsplan.check.misses import Miss
 from gcsplan.check.stretch import Place, StretchKind
 from gcsplan.check.zone_heights import ZonePass
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.mavlink.mission.parameter_safety import Extent
+from gcsplan.mavlink.mission.parameter_safety import FlightExtent
 from gcsplan.notes.note import IN_FILES, Note, Said, Wording, told
 
 if TYPE_CHECKING:
@@ -152,7 +152,7 @@ class Verdict:
     zone_pass: ZonePass | None = None
     energy_stated: bool = True
     paper_energy: bool = False
-    extent: Extent | None = None
+    extent: FlightExtent | None = None
 
     def told_j(self, joules: float) -> float | None:
         """An energy of this flight for people and files: None unless the vehicle's energy was given."""

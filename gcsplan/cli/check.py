@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from gcsplan.app.archive import Archive, Form, Shown
     from gcsplan.app.check_sites import Checked, Returns
     from gcsplan.app.checking import Batch
-    from gcsplan.mavlink.mission.return_route import Route
+    from gcsplan.mavlink.mission.return_route import ReturnRoute
     from gcsplan.mission_file.from_options import WorldOptions
     from gcsplan.mission_file.places import Degrees
     from gcsplan.units import Units
@@ -239,10 +239,10 @@ def _archive(
 
 def world_options(given: dict[str, object], at: str | None = None) -> WorldOptions:
     from gcsplan.mission_file.airspace.times import texts_of
-    from gcsplan.mission_file.from_options import OPTIONS, WorldOptions
+    from gcsplan.mission_file.from_options import KEY_OPTIONS, WorldOptions
 
     def under(*keys: str) -> dict[str, object]:
-        return {key: given[OPTIONS[key]] for key in keys if OPTIONS[key] in given}
+        return {key: given[KEY_OPTIONS[key]] for key in keys if KEY_OPTIONS[key] in given}
 
     limits = ("min_agl_m", "max_agl_m", "max_amsl_m", "horizontal_clearance_m", "track_error_m", "altitude_error_m",
               "max_climb_deg", "max_descent_deg")  # fmt: skip
@@ -260,11 +260,11 @@ def world_options(given: dict[str, object], at: str | None = None) -> WorldOptio
         rtl_rel_home_m=rtl if isinstance(rtl, float) else None,
         return_route=_route(route),
         at=texts_of(at),
-        notes=() if home is None or not home.note else (f"--home: {home.note}",),
+        notes=() if home is None or not home.note else (home.note.of(place="--home"),),
     )
 
 
-def _route(given: object) -> Route | None:
+def _route(given: object) -> ReturnRoute | None:
     if given in (None, "straight", "mission"):
         return given
     raise UsageError(f"--return-route {given}: straight or mission is wanted")

@@ -35,9 +35,9 @@ def planners(incomplete: str) -> list[str]:
 
 def encodings(incomplete: str) -> list[str]:
     """A swarm's encodings."""
-    from gcsplan.mission_file.schema import Encoding
+    from gcsplan.mission_file.schema import EncodingName
 
-    return _beginning(incomplete, get_args(Encoding))
+    return _beginning(incomplete, get_args(EncodingName))
 
 
 def costs(incomplete: str) -> list[str]:

@@ -16,14 +16,14 @@ from gcsplan.cli.screens import RESULTS, aside, console
 from gcsplan.figures import floored, raised, steepened
 from gcsplan.notes.note import IN_FILES, Wording, told
 from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Unit, Units, charge, duration, in_units
-from gcsplan.world.model_words import heights_line, what_is_not_in
+from gcsplan.world.model_words import heights_line, notes_on, what_is_not_in
 
 if TYPE_CHECKING:
     from gcsplan.app.gate import GateTime
     from gcsplan.app.model import FleetPlan, Plan, VehiclePlan
     from gcsplan.app.upload_job import JobResult
     from gcsplan.check.rtl.verdict import WayHome
-    from gcsplan.mavlink.protocol.machine import Progress as Transfer
+    from gcsplan.mavlink.protocol.machine import TransferProgress as Transfer
     from gcsplan.mission_file import MissionFile
     from gcsplan.notes.note import Said
 
@@ -133,8 +133,7 @@ def say_heights(inputs: Mapping[str, object]) -> None:
 def say_terrain(source: MissionFile) -> None:
     """Print what a mission's terrain has to note, if anything, and how its heights were read: it may explain why there
     is no mission."""
-    notes = source.surface.info.get("notes", ())
-    if isinstance(notes, tuple) and notes:
+    if notes := notes_on(source.surface.info):
         say_notes(notes)
         say_heights(source.inputs)
 

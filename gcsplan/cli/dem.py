@@ -14,8 +14,8 @@ from gcsplan.cli.options import JsonOption
 from gcsplan.errors import InputError, UsageError
 
 if TYPE_CHECKING:
-    from gcsplan.dem.fetch import Fetched, Progress
-    from gcsplan.dem.sources import Source
+    from gcsplan.dem.fetch import Fetched, FetchProgress
+    from gcsplan.dem.sources import DemSource
     from gcsplan.world.cell import Cell
 
 dem_app = typer.Typer(help="Terrain from published sources.", no_args_is_help=True)
@@ -97,7 +97,7 @@ def fetch(
     _tell(chosen, cache.root, done, as_json)
 
 
-def _source(name: str | None) -> Source:
+def _source(name: str | None) -> DemSource:
     from gcsplan.dem.sources import SOURCES
     from gcsplan.errors import unknown_name
 
@@ -106,7 +106,7 @@ def _source(name: str | None) -> Source:
     return SOURCES[name or DEFAULT_SOURCE]
 
 
-def _of_mission(path: Path, wanted: str | None) -> tuple[Source, Sequence[Cell]]:
+def _of_mission(path: Path, wanted: str | None) -> tuple[DemSource, Sequence[Cell]]:
     """The source that a mission names, and the tiles that it needs: all of them, or those that are missing."""
     from gcsplan.dem.cache import MissingTiles
     from gcsplan.dem.sources import SOURCES
@@ -153,20 +153,20 @@ def _around(text: str, radius_km: float) -> Sequence[Cell]:
 
 
 def _named(text: str) -> Sequence[Cell]:
-    from gcsplan.dem.cells import MOST_CELLS
+    from gcsplan.dem.cells import MOST_TILES_OF_AREA
     from gcsplan.world.cell import cell_of
 
     names = [name.strip().upper() for name in text.split(",") if name.strip()]
     cells = [cell_of(name) for name in names]
     wrong = [name for name, cell in zip(names, cells, strict=True) if cell is None]
-    if wrong or not cells or len(cells) > MOST_CELLS:
+    if wrong or not cells or len(cells) > MOST_TILES_OF_AREA:
         what = f"given {wrong[0][:32]!r}" if wrong else f"given {len(cells)} of them"
-        raise UsageError(f"--tiles: 1 to {MOST_CELLS} names such as N36W085, with commas, are wanted, {what}")
+        raise UsageError(f"--tiles: 1 to {MOST_TILES_OF_AREA} names such as N36W085, with commas, are wanted, {what}")
     return tuple(dict.fromkeys(cell for cell in cells if cell is not None))
 
 
 @contextmanager
-def _progress() -> Iterator[Progress | None]:
+def _progress() -> Iterator[FetchProgress | None]:
     """Bars of what is being brought, on a terminal only."""
     from gcsplan.cli.screens import aside
 
@@ -187,7 +187,7 @@ def _progress() -> Iterator[Progress | None]:
         yield update
 
 
-def _tell(source: Source, root: Path, done: Sequence[Fetched], as_json: bool) -> None:
+def _tell(source: DemSource, root: Path, done: Sequence[Fetched], as_json: bool) -> None:
     from gcsplan.cli.console import remark, say
 
     if as_json:

@@ -38,6 +38,7 @@ def fit_energy(
     from gcsplan.cli.console import remark
     from gcsplan.logs.fit import fit_energy as fit
     from gcsplan.logs.reader import read_log
+    from gcsplan.notes.note import Note
 
     columns = _columns(csv_columns)
     found = fit(read_log(file, columns=columns, sysid=sysid) for file in logs)
@@ -63,9 +64,7 @@ def fit_energy(
             if c.value is None:
                 remark(f"{c.name}: {c.why}")
         if found.base.value is None and found.speed_m_s > 0.0:
-            remark(
-                f"note: this fit holds at {found.speed_m_s:.1f} m/s through the air, and says nothing of other speeds"
-            )
+            remark(f"note: {Note('fit_holds_at_one_speed', speed_m_s=found.speed_m_s)}")
         put(found.yaml())
     raise typer.Exit(CheckFailed.exit_code if error else 0)
 

@@ -90,6 +90,7 @@ def new(
     from gcsplan.cli.console import remark, say, say_notes
     from gcsplan.export.durable import write_whole
     from gcsplan.mission_file.new_file import Draft
+    from gcsplan.notes.note import Note
     from gcsplan.vehicle import Autopilot
 
     _require_file(out, force)
@@ -125,12 +126,13 @@ def new(
     text, notes = checked_text(draft, out)
     notes = (*(seen.notes if seen is not None else ()), *notes)
     if flat is not None:
-        notes = (*notes, f"the ground is flat at {flat:g} m above sea level in this mission: no hill is seen")
+        notes = (*notes, Note("ground_is_flat", flat_m=flat))
     _require_file(out, force)  # a question may have taken its time
     write_whole(out, text)
     files = [out, *_write_schema(out.parent, remark)]
     if as_json:
-        emit({"files": [str(file) for file in files], "start": begin, "goal": end, "notes": list(notes)})
+        emit({"files": [str(file) for file in files], "start": begin, "goal": end,
+              "notes": [str(note) for note in notes], "notes_data": [note.as_dict() for note in notes]})  # fmt: skip
         return
     say_notes(notes)
     say(f"written: {', '.join(map(str, files))}")
@@ -208,11 +210,11 @@ def _write_schema(folder: Path, remark: Callable[[str], None]) -> list[Path]:
     import json
 
     from gcsplan.export.durable import write_whole
-    from gcsplan.mission_file.json_schema import FILE_NAME, TITLE, mission_schema
+    from gcsplan.mission_file.json_schema import FILE_NAME, SCHEMA_TITLE, mission_schema
 
     file = folder / FILE_NAME
     try:
-        ours = not file.exists() or TITLE in file.read_text(encoding="utf-8")
+        ours = not file.exists() or SCHEMA_TITLE in file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
         ours = False
     if not ours:

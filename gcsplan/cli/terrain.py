@@ -17,7 +17,7 @@ from gcsplan.figures import counted
 
 if TYPE_CHECKING:
     from gcsplan.app.terrain_link import Report
-    from gcsplan.mavlink.link.terrain import Compared
+    from gcsplan.mavlink.link.terrain import TerrainComparison
 
 terrain_app = typer.Typer(help="Terrain for the vehicle, out of the mission's own.", no_args_is_help=True)
 
@@ -170,7 +170,7 @@ def check(
         raise worst
 
 
-def _row(name: str, outcome: Compared | GcsplanError) -> dict[str, object]:
+def _row(name: str, outcome: TerrainComparison | GcsplanError) -> dict[str, object]:
     if isinstance(outcome, GcsplanError):
         return {"name": name, "message": outcome.message}
     worst = None if math.isnan(outcome.worst_m) else outcome.worst_m
@@ -179,7 +179,7 @@ def _row(name: str, outcome: Compared | GcsplanError) -> dict[str, object]:
             "loaded": outcome.loaded, "pending": outcome.pending}  # fmt: skip
 
 
-def _against(name: str, compared: Compared) -> GcsplanError | None:
+def _against(name: str, compared: TerrainComparison) -> GcsplanError | None:
     from gcsplan.world.terrain_grid import NEAR_ENOUGH_M
 
     if compared.worst_m > NEAR_ENOUGH_M and compared.worst_at is not None:

@@ -25,7 +25,8 @@ def show_zones(files: Sequence[Path], units: Units, *, as_json: bool, at: str | 
 
     zones, notes = list_zones(files, at)
     if as_json:
-        emit({"zones": [zone.as_dict() for zone in zones], "notes": notes})
+        emit({"zones": [zone.as_dict() for zone in zones], "notes": [str(note) for note in notes],
+              "notes_data": [note.as_dict() for note in notes]})  # fmt: skip
         return
     table = new_table("", [])
     for name in ("name", "shape", "size", "floor", "ceiling", "source"):

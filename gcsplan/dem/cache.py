@@ -15,18 +15,18 @@ from pathlib import Path
 from typing import Literal
 
 from gcsplan.dem.cells import names_of
-from gcsplan.dem.sources import Source
+from gcsplan.dem.sources import DemSource
 from gcsplan.errors import InputError, Problem
 from gcsplan.world.cell import Cell
 from gcsplan.world.input_files import tell_file, tell_setting
 
 CACHE_VARIABLE = "GCSPLAN_DEM_CACHE"
-State = Literal["tile", "sea", "absent"]
-FORMAT = 1
+TileState = Literal["tile", "sea", "absent"]
+RECORD_FORMAT = 1
 MOST_RECORD_BYTES = 65_536
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MissingTiles(Problem):
     """Tiles that are needed and not in the cache."""
 
@@ -35,7 +35,7 @@ class MissingTiles(Problem):
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
+class TileRecord:
     """What the cache knows of a tile.
 
     ``state``: ``tile`` (the file is there), ``sea`` (neither the source nor GLO-90 lists it), ``absent`` (the source
@@ -45,7 +45,7 @@ class Record:
 
     tile: str
     source: str
-    state: State
+    state: TileState
     kind: str
     vertical_datum: str
     fetched_utc: str
@@ -79,7 +79,7 @@ def cache_folder() -> Path:
 class Cache:
     """The tiles of one source in one folder."""
 
-    def __init__(self, source: Source, folder: Path | None = None) -> None:
+    def __init__(self, source: DemSource, folder: Path | None = None) -> None:
         self.source = source
         self.root = cache_folder() if folder is None else folder
         self.folder = self.root / source.name
@@ -92,7 +92,7 @@ class Cache:
         """Where the record lies."""
         return self.folder / f"{cell.name}.json"
 
-    def find(self, cell: Cell) -> Record | None:
+    def find(self, cell: Cell) -> TileRecord | None:
         """What the cache holds of a tile; None if nothing, or nothing that can be relied on."""
         tell_file(self.record_path(cell))
         tell_file(self.tile_path(cell))
@@ -107,7 +107,7 @@ class Cache:
             return None
         return record if whole else None
 
-    def need(self, cells: Iterable[Cell], *, where: str) -> dict[Cell, Record]:
+    def need(self, cells: Iterable[Cell], *, where: str) -> dict[Cell, TileRecord]:
         """The records of all ``cells``. Raises InputError, with the command to run, if any is missing."""
         found = {cell: self.find(cell) for cell in cells}
         missing = tuple(cell for cell, record in found.items() if record is None)
@@ -122,22 +122,22 @@ class Cache:
             f"{len(cells)} {self.source.name} {tiles} {why} ({self.root}); run "
             f"`gcsplan dem fetch --source {self.source.name} --tiles {names_of(cells)}`"
         )
-        return MissingTiles(where, words, self.source.name, cells)
+        return MissingTiles(where, words, source=self.source.name, cells=cells)
 
 
-def text_of(record: Record) -> str:
+def text_of(record: TileRecord) -> str:
     """The JSON text of a record."""
-    return json.dumps({"format": FORMAT, **asdict(record)}, indent=2, ensure_ascii=False) + "\n"
+    return json.dumps({"format": RECORD_FORMAT, **asdict(record)}, indent=2, ensure_ascii=False) + "\n"
 
 
-def _read(path: Path) -> Record | None:
+def _read(path: Path) -> TileRecord | None:
     """A record of this format; None for anything else, which then counts as not cached."""
     try:
         with path.open("rb") as file:
             data = json.loads(file.read(MOST_RECORD_BYTES))
-        if not isinstance(data, dict) or data.pop("format", None) != FORMAT:
+        if not isinstance(data, dict) or data.pop("format", None) != RECORD_FORMAT:
             return None
-        record = Record(**data | {"lists": tuple(data.get("lists", ()))})
+        record = TileRecord(**data | {"lists": tuple(data.get("lists", ()))})
     except (OSError, ValueError, TypeError):
         return None
     texts = (record.tile, record.source, record.kind, record.vertical_datum, record.url, record.etag, record.sha256)

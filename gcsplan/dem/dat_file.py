@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
-from gcsplan.figures import counted
+from gcsplan.notes.note import Note
 from gcsplan.world.cell import Cell, cell_of
 from gcsplan.world.raster import require_file
 from gcsplan.world.terrain_grid import (
     ALL_PARTS,
-    PART,
-    PARTS,
-    POSTS,
+    PART_POSTS,
+    PARTS_OF_BLOCK,
+    POSTS_OF_BLOCK,
     SAME_CORNER_E7,
     Block,
     TerrainGrid,
@@ -32,14 +32,14 @@ from gcsplan.world.terrain_grid import (
 )
 
 RECORD_BYTES = 2048
-SUFFIX = ".DAT"
+DAT_SUFFIX = ".DAT"
 VERSION = 1
-MOST_BYTES = 256 * 2**20
+MOST_DAT_BYTES = 256 * 2**20
 """A tile with posts every 15 m has less."""
 
 RECORD = np.dtype([
     ("bitmap", "<u8"), ("lat", "<i4"), ("lon", "<i4"), ("crc", "<u2"), ("version", "<u2"), ("spacing", "<u2"),
-    ("height", "<i2", POSTS), ("north", "<u2"), ("east", "<u2"), ("lon_degrees", "<i2"), ("lat_degrees", "i1"),
+    ("height", "<i2", POSTS_OF_BLOCK), ("north", "<u2"), ("east", "<u2"), ("lon_degrees", "<i2"), ("lat_degrees", "i1"),
     ("spare", "V227"),
 ])  # fmt: skip
 CRC_BYTES = RECORD_BYTES - 227
@@ -50,27 +50,26 @@ _CRC_AT = slice(16, 18)
 class DatFile:
     """One file: its tile, its spacing, and the heights of its good blocks (NaN for parts that are not known).
 
-    ``left_out``: how many blocks are not used, by the reason.
+    ``left_out``: how many blocks are not used, by what is wrong with them.
     """
 
     name: str
     cell: Cell
     grid: TerrainGrid
     blocks: Mapping[Block, Floats]
-    left_out: Mapping[str, int]
+    left_out: Mapping[Note, int]
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[Note, ...]:
         """What a user should know of it."""
         return tuple(
-            f"{self.name}: {counted(n, 'block')} not used: {why}; the ground there is unknown"
-            for why, n in self.left_out.items()
+            Note("terrain_blocks_unused", file=self.name, count=n, why=why) for why, n in self.left_out.items()
         )
 
 
 def file_name(cell: Cell) -> str:
     """Such as ``N36W085.DAT``."""
-    return cell.name + SUFFIX
+    return cell.name + DAT_SUFFIX
 
 
 def cell_of_file(path: Path, *, where: str) -> Cell:
@@ -85,7 +84,7 @@ def cell_of_file(path: Path, *, where: str) -> Cell:
 
 def is_dat(path: Path) -> bool:
     """Whether a name is that of a terrain file of ArduPilot."""
-    return path.suffix.upper() == SUFFIX
+    return path.suffix.upper() == DAT_SUFFIX
 
 
 def packed(grid: TerrainGrid, cell: Cell, blocks: Mapping[Block, Floats]) -> bytes:
@@ -119,10 +118,10 @@ def read_dat(path: Path, *, where: str) -> DatFile:
     require_file(path, where=where)
     size = path.stat().st_size
     cell = cell_of_file(path, where=where)
-    if size > MOST_BYTES or size % RECORD_BYTES:
+    if size > MOST_DAT_BYTES or size % RECORD_BYTES:
         raise InputError(
             f"{path} is no terrain file of ArduPilot: {size} bytes, wanted records of {RECORD_BYTES}, "
-            f"{MOST_BYTES >> 20} MB at most",
+            f"{MOST_DAT_BYTES >> 20} MB at most",
             where=where,
         )
     try:
@@ -132,13 +131,13 @@ def read_dat(path: Path, *, where: str) -> DatFile:
     records = np.frombuffer(data, RECORD)
     used = [int(k) for k in np.flatnonzero(records["bitmap"] & np.uint64(ALL_PARTS))]
     spacings = Counter(int(records["spacing"][k]) for k in used)
-    left_out: Counter[str] = Counter()
+    left_out: Counter[Note] = Counter()
     if not used:
         raise InputError(f"{path} holds no block of terrain: copy it after the autopilot has filled it", where=where)
     grid = TerrainGrid(max(spacings, key=lambda s: (spacings[s], -s)))
     blocks: dict[Block, Floats] = {}
     for k in used:
-        fault = _fault(records, k, data, grid, cell) if grid.spacing_m > 0 else "its spacing is 0"
+        fault = _fault(records, k, data, grid, cell) if grid.spacing_m > 0 else Note("spacing_is_zero")
         if fault:
             left_out[fault] += 1
             continue
@@ -149,25 +148,27 @@ def read_dat(path: Path, *, where: str) -> DatFile:
     return DatFile(path.name, cell, grid, blocks, dict(left_out))
 
 
-def _fault(records: NDArray[np.void], k: int, data: bytes, grid: TerrainGrid, cell: Cell) -> str:
-    """Why the autopilot does not take a record; empty if it does."""
+def _fault(records: NDArray[np.void], k: int, data: bytes, grid: TerrainGrid, cell: Cell) -> Note | None:
+    """Why the autopilot does not take a record; None if it does."""
     record = records[k]
     if int(record["crc"]) != crc_of(data[k * RECORD_BYTES : (k + 1) * RECORD_BYTES]):
-        return "its checksum is wrong"
+        return Note("checksum_wrong")
     if int(record["version"]) != VERSION:
-        return f"its format is version {int(record['version'])}, wanted {VERSION}"
+        return Note("format_of_other_version", version=int(record["version"]), wanted=VERSION)
     if int(record["spacing"]) != grid.spacing_m:
-        return f"its spacing is {int(record['spacing'])} m, that of most is {grid.spacing_m} m"
+        return Note("spacing_differs", spacing_m=int(record["spacing"]), most_m=grid.spacing_m)
     block = Block(cell, int(record["north"]), int(record["east"]))
     lat, lon = grid.corner_e7(block)
     stated = (int(record["lat_degrees"]), int(record["lon_degrees"]))
     misplaced = max(abs(lat - int(record["lat"])), abs(lon - int(record["lon"]))) > SAME_CORNER_E7
     if stated != cell or misplaced or k != block.north * grid.blocks_a_row(cell) + block.east:
-        return "it lies elsewhere than its corner says (older tools placed blocks otherwise)"
-    return ""
+        return Note("block_lies_elsewhere")
+    return None
 
 
 def _heights(record: np.void) -> Floats:
-    bits = (int(record["bitmap"]) >> np.arange(PARTS[0] * PARTS[1], dtype=np.uint64).astype(object)) & 1
-    known = np.kron(np.array(bits, bool).reshape(PARTS), np.ones((PART, PART), bool))
+    bits = (
+        int(record["bitmap"]) >> np.arange(PARTS_OF_BLOCK[0] * PARTS_OF_BLOCK[1], dtype=np.uint64).astype(object)
+    ) & 1
+    known = np.kron(np.array(bits, bool).reshape(PARTS_OF_BLOCK), np.ones((PART_POSTS, PART_POSTS), bool))
     return np.where(known, record["height"].astype(float), np.nan)

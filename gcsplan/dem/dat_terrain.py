@@ -23,23 +23,19 @@ from gcsplan.dem.cells import cells_in
 from gcsplan.dem.dat_bounds import bounds
 from gcsplan.dem.dat_file import DatFile, cell_of_file, is_dat, read_dat
 from gcsplan.errors import InputError
+from gcsplan.notes.note import Note
 from gcsplan.world.cell import Cell
 from gcsplan.world.datum import VerticalDatum
-from gcsplan.world.frame import Frame
+from gcsplan.world.frame import Box, Frame
 from gcsplan.world.height_unit import BY_FORMAT, HeightUnit
 from gcsplan.world.input_files import sha256_of, tell_folder
 from gcsplan.world.mosaic import FIT_ERROR_M, Window
 from gcsplan.world.raster import MAX_CELLS, require_file
 from gcsplan.world.surface import GridMap
-from gcsplan.world.terrain import NO_MORE_VOIDS, Box, Terrain, TerrainSpec, place, require_metres, terrain_of
+from gcsplan.world.terrain import NO_MORE_VOIDS, Terrain, TerrainSpec, place, require_metres, terrain_of
 from gcsplan.world.terrain_grid import DEGREE_E7, METRES_OF_E7, STRIDE, TerrainGrid, cell_at, longitude_scale
 
 WHOLE_METRES = HeightUnit("whole metres", 1.0, BY_FORMAT)
-
-NOTE = (
-    "terrain of ArduPilot's .DAT files is in whole metres and may have been cut down to them: up to 1 m lower than its "
-    "source; altitude_error_m should hold it"
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +44,7 @@ class DatTile:
 
     name: str
     path: Path
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
     vertical: VerticalDatum | None = None
     unit: HeightUnit = WHOLE_METRES
 
@@ -118,7 +114,7 @@ class DatTerrain:
             )
         anchor = cell_at(frame.lat_deg * 1e7, frame.lon_deg * 1e7)
         mosaic = DatMosaic([(self._file(c), self._paths[c]) for c in cells], anchor, where=self._at)
-        return terrain_of(mosaic, self._spec, where=self._where, notes=(NOTE,))
+        return terrain_of(mosaic, self._spec, where=self._where, notes=(Note("terrain_in_whole_metres"),))
 
     def _file(self, cell: Cell) -> DatFile:
         if cell not in self._files:
@@ -223,11 +219,11 @@ class DatMosaic:
             raise InputError("the mission is too wide for the posts of one tile; plan a smaller one", where=self.where)
         heights, low = self._heights(anchor, x, y)
         unknown = int(np.count_nonzero(np.isnan(heights)))
-        notes = [f"{unknown} of {heights.size} DEM nodes around the mission are unknown (no block)"] if unknown else []
+        notes = (Note("posts_unknown", unknown=unknown, nodes=heights.size),) if unknown else ()
         (left, south), (right, top) = ([float(getattr(h, side)()) for h in held] for side in ("min", "max"))
         goes_on = (first[0] > left, last[1] < top, last[0] < right, first[1] > south)
         one = np.array_equal(low, heights, equal_nan=True)
-        return Window(heights, grid, x, y, tuple(notes), goes_on, None if one else low)
+        return Window(heights, grid, x, y, notes, goes_on, None if one else low)
 
     def _heights(self, anchor: Cell, x: Floats, y: Floats) -> tuple[Floats, Floats]:
         """(rows, cols) greatest and least heights of nodes with these numbers of columns and rows, rows going south."""

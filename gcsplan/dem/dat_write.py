@@ -12,7 +12,7 @@ from gcsplan.dem.dat_file import file_name, packed, read_dat
 from gcsplan.errors import InputError
 from gcsplan.world.terrain_grid import ALL_PARTS, Block, PostHeights, TerrainGrid, known_parts
 
-MOST_BLOCKS = 20_000
+MOST_BLOCKS_WRITTEN = 20_000
 """Blocks that are written at once, 40 MB: 250 × 250 km with posts every 100 m."""
 
 KM_A_DEGREE = 111.2
@@ -44,16 +44,16 @@ class DatContents:
 def blocks_around(
     grid: TerrainGrid, box_deg: tuple[float, float, float, float], margin_km: float, *, where: str
 ) -> list[Block]:
-    """The blocks of a box (south, west, north, east) and a margin. Raises InputError beyond `MOST_BLOCKS`."""
+    """The blocks of a box (south, west, north, east) and a margin. Raises InputError beyond `MOST_BLOCKS_WRITTEN`."""
     south, west, north, east = box_deg
     more = margin_km / KM_A_DEGREE
     wide = more / max(0.01, math.cos(math.radians(max(abs(south), abs(north)))))
     edges = (max(south - more, -90.0), west - wide, min(north + more, 90.0), east + wide)
-    blocks = list(islice(grid.blocks_within(*(x * 1e7 for x in edges)), MOST_BLOCKS + 1))
-    if len(blocks) > MOST_BLOCKS:
+    blocks = list(islice(grid.blocks_within(*(x * 1e7 for x in edges)), MOST_BLOCKS_WRITTEN + 1))
+    if len(blocks) > MOST_BLOCKS_WRITTEN:
         raise InputError(
-            f"the mission and {margin_km:g} km around it are more than {MOST_BLOCKS} blocks of {grid.spacing_m} m: "
-            "give a smaller --margin-km or a larger --spacing",
+            f"the mission and {margin_km:g} km around it are more than {MOST_BLOCKS_WRITTEN} blocks of "
+            f"{grid.spacing_m} m: give a smaller --margin-km or a larger --spacing",
             where=where,
         )
     return sorted(blocks)

@@ -24,7 +24,7 @@ from typing import IO, Any
 from gcsplan import __version__
 from gcsplan.errors import LinkError
 
-Report = Callable[[int, int | None], None]
+DownloadReport = Callable[[int, int | None], None]
 """Called with the bytes that are there and those of the whole, if known."""
 
 BLOCK_BYTES = 65_536
@@ -40,7 +40,7 @@ _PASSING = frozenset({408, 425, 429, 500, 502, 503, 504})
 
 
 @dataclass(frozen=True, slots=True)
-class Patience:
+class DownloadPatience:
     """How long to try: seconds without a byte, seconds for one object, tries in a row that bring nothing new.
 
     ``pause_s`` is the first pause between tries; it doubles up to `LONGEST_PAUSE_S`.
@@ -62,7 +62,7 @@ class Arrived:
     agrees: bool
 
 
-class Unreachable(LinkError):
+class ServerUnreachable(LinkError):
     """No server answered at all, so that other objects of it need not be tried."""
 
 
@@ -71,7 +71,7 @@ class _Again(Exception):
 
 
 @dataclass
-class _Part:
+class _PartFile:
     """The part of an object that is there, with what says of which version it is."""
 
     file: Path
@@ -141,16 +141,21 @@ def is_address(text: str) -> bool:
 
 
 def download(
-    url: str, file: Path, *, most_bytes: int, patience: Patience | None = None, report: Report | None = None
+    url: str,
+    file: Path,
+    *,
+    most_bytes: int,
+    patience: DownloadPatience | None = None,
+    report: DownloadReport | None = None,
 ) -> Arrived:
     """Bring ``url`` whole into ``file``; a part of it that an earlier call left there is continued.
 
     Raises LinkError if it cannot be had; what came so far then stays, unless it is known to be wrong. Raises OSError if
     the disk does not take it.
     """
-    patience = patience or Patience()
+    patience = patience or DownloadPatience()
     until = time.monotonic() + patience.whole_s
-    part = _Part(file, url)
+    part = _PartFile(file, url)
     part.look()
     most_had, answered, failures, pause_s = part.have, False, 0, patience.pause_s
     while True:
@@ -165,14 +170,16 @@ def download(
             most_had = max(most_had, part.have)
             left_s = until - time.monotonic()
             if failures >= patience.tries or left_s <= 0.0:
-                kind = LinkError if answered else Unreachable
+                kind = LinkError if answered else ServerUnreachable
                 tried = f"{failures} tries brought nothing new" if left_s > 0.0 else f"{patience.whole_s:g} s are over"
                 raise kind(f"{why}; {tried}, {part.have} bytes are kept", where=url, reason="download") from None
         time.sleep(max(0.0, min(pause_s, left_s)))
         pause_s = min(2.0 * pause_s, LONGEST_PAUSE_S)
 
 
-def _try(part: _Part, most_bytes: int, patience: Patience, until: float, report: Report | None) -> int:
+def _try(
+    part: _PartFile, most_bytes: int, patience: DownloadPatience, until: float, report: DownloadReport | None
+) -> int:
     """One request; returns the length of the whole once all of it is there."""
     headers = {"User-Agent": f"gcsplan/{__version__}", "Accept-Encoding": "identity"}
     if part.have and part.etag:
@@ -211,7 +218,7 @@ def _opener() -> urllib.request.OpenerDirector:
     return opener
 
 
-def _begin(part: _Part, answer: Any, most_bytes: int) -> int | None:
+def _begin(part: _PartFile, answer: Any, most_bytes: int) -> int | None:
     """Read an answer's headers; returns the length of the whole, None if the answer comes in chunks."""
     if answer.headers.get("Content-Encoding", "identity").lower() != "identity":
         raise LinkError("the server packs what it sends, though it was asked not to", where=part.url)
@@ -236,7 +243,9 @@ def _begin(part: _Part, answer: Any, most_bytes: int) -> int | None:
     return length
 
 
-def _take(part: _Part, answer: Any, length: int | None, most_bytes: int, until: float, report: Report | None) -> None:
+def _take(
+    part: _PartFile, answer: Any, length: int | None, most_bytes: int, until: float, report: DownloadReport | None
+) -> None:
     with part.file.open("ab") as into:
         while block := _block(answer):
             part.have += len(block)
@@ -258,7 +267,7 @@ def _block(answer: Any) -> bytes:
         raise _Again(f"the connection broke: {_words(why)}") from why
 
 
-def _refused(part: _Part, why: urllib.error.HTTPError) -> None:
+def _refused(part: _PartFile, why: urllib.error.HTTPError) -> None:
     """Turn an HTTP error into one of ours."""
     with why:
         if why.code in _PASSING:
@@ -269,7 +278,7 @@ def _refused(part: _Part, why: urllib.error.HTTPError) -> None:
         raise LinkError(f"the server answers {why.code} {_words(why.reason)}", where=part.url, reason="download")
 
 
-def _checked(part: _Part, length: int) -> Arrived:
+def _checked(part: _PartFile, length: int) -> Arrived:
     """Compare what came with its length and, where the server's ETag is an MD5 as S3 makes them, with that.
 
     Of a file that was uploaded in parts the size of these is not known: if one of `PART_MB` agrees, it is right; if

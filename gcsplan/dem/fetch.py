@@ -16,9 +16,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from gcsplan.dem.cache import Cache, Record, State, text_of
-from gcsplan.dem.download import Patience, Unreachable, download, is_address
-from gcsplan.dem.sources import MOST_LIST_BYTES, WITNESS, Source
+from gcsplan.dem.cache import Cache, TileRecord, TileState, text_of
+from gcsplan.dem.download import DownloadPatience, ServerUnreachable, download, is_address
+from gcsplan.dem.sources import MOST_LIST_BYTES, WITNESS, DemSource
 from gcsplan.errors import GcsplanError, InputError, LinkError
 from gcsplan.world.cell import Cell
 from gcsplan.world.input_files import sha256_of
@@ -35,7 +35,7 @@ MIRROR_VARIABLE = "GCSPLAN_DEM_MIRROR"
 LIST_DAYS = 30.0
 """A list is asked for anew after this many days."""
 
-Progress = Callable[[str, int, int | None], None]
+FetchProgress = Callable[[str, int, int | None], None]
 """Called with the name of a tile or list, bytes that are there, and those of the whole, if known."""
 
 
@@ -44,7 +44,7 @@ class Fetched:
     """One tile after a fetch; ``cached`` if it was there before."""
 
     cell: Cell
-    record: Record
+    record: TileRecord
     cached: bool
 
 
@@ -56,8 +56,8 @@ class Fetch:
         cache: Cache,
         *,
         mirror: str = "",
-        patience: Patience | None = None,
-        progress: Progress | None = None,
+        patience: DownloadPatience | None = None,
+        progress: FetchProgress | None = None,
     ) -> None:
         if mirror and not is_address(mirror):
             raise InputError(
@@ -65,7 +65,7 @@ class Fetch:
             )
         self.cache, self.source = cache, cache.source
         self._mirror = mirror.rstrip("/")
-        self._patience = patience or Patience()
+        self._patience = patience or DownloadPatience()
         self._progress = progress
         self._lists: dict[str, tuple[frozenset[str], str] | LinkError] = {}
 
@@ -78,7 +78,7 @@ class Fetch:
                 done.append(self._one(cell))
             except (LinkError, InputError) as why:
                 failed.append((cell, why))
-                if isinstance(why, Unreachable):
+                if isinstance(why, ServerUnreachable):
                     failed += [(c, LinkError("not tried")) for c in cells[i + 1 :] if not self._is_good(c)]
                     break
         if failed:
@@ -127,7 +127,7 @@ class Fetch:
         """Whether a record is so new that the lists need not be asked again."""
         return _age_days(self.cache.record_path(cell)) < LIST_DAYS
 
-    def _bring(self, cell: Cell) -> Record:
+    def _bring(self, cell: Cell) -> TileRecord:
         published, told = self._list(self.source)
         if cell.name in published:
             return self._tile(cell)
@@ -136,7 +136,7 @@ class Fetch:
 
     # -- one tile ------------------------------------------------------------------------------------------------
 
-    def _tile(self, cell: Cell) -> Record:
+    def _tile(self, cell: Cell) -> TileRecord:
         url = self._address(self.source, self.source.object_of(cell))
         part = self._part(self.cache.folder / cell.name)
         arrived = download(
@@ -149,7 +149,7 @@ class Fetch:
             raise LinkError(
                 f"what the server gave is not this tile, and was removed: {why.message}", where=url
             ) from None
-        record = Record(
+        record = TileRecord(
             cell.name, self.source.name, "tile", self.source.kind, self.source.vertical_datum, _now(), url,
             arrived.etag, arrived.agrees, arrived.bytes, arrived.sha256,
         )  # fmt: skip
@@ -161,15 +161,15 @@ class Fetch:
         _drop(part)
         return record
 
-    def _none(self, cell: Cell, state: State, lists: tuple[str, ...]) -> Record:
+    def _none(self, cell: Cell, state: TileState, lists: tuple[str, ...]) -> TileRecord:
         source = self.source
-        record = Record(cell.name, source.name, state, source.kind, source.vertical_datum, _now(), lists=lists)
+        record = TileRecord(cell.name, source.name, state, source.kind, source.vertical_datum, _now(), lists=lists)
         self._write(self.cache.record_path(cell), text_of(record).encode())
         return record
 
     # -- lists ---------------------------------------------------------------------------------------------------
 
-    def _list(self, source: Source) -> tuple[frozenset[str], str]:
+    def _list(self, source: DemSource) -> tuple[frozenset[str], str]:
         """The tiles that a source publishes, and a line that says by which list."""
         found = self._lists.get(source.bucket)
         if found is None:
@@ -183,7 +183,7 @@ class Fetch:
             raise found
         return found
 
-    def _read_list(self, source: Source) -> tuple[frozenset[str], str]:
+    def _read_list(self, source: DemSource) -> tuple[frozenset[str], str]:
         url = self._address(source, source.listing)
         folder = self.cache.root / "lists"
         folder.mkdir(parents=True, exist_ok=True)
@@ -213,7 +213,7 @@ class Fetch:
 
     # -- files ---------------------------------------------------------------------------------------------------
 
-    def _address(self, source: Source, name: str) -> str:
+    def _address(self, source: DemSource, name: str) -> str:
         return f"{self._mirror}/{source.bucket}/{name}" if self._mirror else f"{source.address}/{name}"
 
     def _report(self, name: str) -> Callable[[int, int | None], None] | None:
@@ -253,7 +253,7 @@ class Fetch:
             yield
 
 
-def verify(path: Path, cell: Cell, source: Source) -> Raster:
+def verify(path: Path, cell: Cell, source: DemSource) -> Raster:
     """The raster in ``path``. Raises InputError unless it is this tile of this source, and every cell can be read."""
     import numpy as np
 
@@ -284,7 +284,7 @@ def verify(path: Path, cell: Cell, source: Source) -> Raster:
     return raster
 
 
-def _tiles_in(source: Source, path: Path) -> frozenset[str] | None:
+def _tiles_in(source: DemSource, path: Path) -> frozenset[str] | None:
     try:
         return source.tiles_in(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError):

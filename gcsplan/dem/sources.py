@@ -15,11 +15,11 @@ from typing import Literal
 from gcsplan.world.cell import Cell
 from gcsplan.world.input_files import tell_file
 
-Kind = Literal["surface", "bare"]
+ModelKind = Literal["surface", "bare"]
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class DemSource:
     """One source.
 
     ``kind``: a surface model holds trees and buildings, a bare one only the earth. ``address`` is that of the public
@@ -31,7 +31,7 @@ class Source:
 
     name: str
     title: str
-    kind: Kind
+    kind: ModelKind
     vertical_datum: str
     bucket: str
     address: str
@@ -66,7 +66,7 @@ def _copernicus_columns(cell: Cell) -> int:
     return next((columns for below, columns in steps if nearer < below), 360)
 
 
-GLO30 = Source(
+GLO30 = DemSource(
     name="copernicus-glo30",
     title="Copernicus DEM GLO-30",
     kind="surface",
@@ -97,7 +97,7 @@ GLO90 = replace(
 )
 """It holds every tile of land, so its list tells the sea from tiles that another source merely lacks."""
 
-SRTM = Source(
+SRTM = DemSource(
     name="srtm",
     title="SRTM GL1 (NASA SRTMGL1 v3)",
     kind="surface",
@@ -116,7 +116,7 @@ SRTM = Source(
     "https://doi.org/10.5069/G9445JDF",
 )
 
-SOURCES: dict[str, Source] = {source.name: source for source in (GLO30, SRTM)}
+SOURCES: dict[str, DemSource] = {source.name: source for source in (GLO30, SRTM)}
 """The sources that a mission may name."""
 
 WITNESS = GLO90

@@ -14,21 +14,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.dem.cache import Cache, Record
+from gcsplan.dem.cache import Cache, TileRecord
 from gcsplan.dem.cells import cells_in, names_of
 from gcsplan.dem.dat_terrain import DatTerrain, dat_files
-from gcsplan.dem.sources import SOURCES, Source
+from gcsplan.dem.sources import SOURCES, DemSource
 from gcsplan.errors import InputError
+from gcsplan.notes.note import Note
 from gcsplan.world.cell import Cell
 from gcsplan.world.datum import VerticalDatum, take_apart
-from gcsplan.world.frame import Frame
+from gcsplan.world.frame import Box, Frame
 from gcsplan.world.height_unit import METRE
 from gcsplan.world.input_files import sha256_of, sha256_of_all
 from gcsplan.world.mosaic import Mosaic
 from gcsplan.world.raster import Raster, open_raster
 from gcsplan.world.terrain import (
     NO_MORE_VOIDS,
-    Box,
     OpenTerrain,
     Terrain,
     TerrainSpec,
@@ -38,7 +38,7 @@ from gcsplan.world.terrain import (
     terrain_of,
 )
 
-ROWS = 3600
+TILE_ROWS = 3600
 """Rows of a tile of sea if no tile beside it says another number."""
 
 
@@ -65,7 +65,7 @@ def open_dem(spec: TerrainSpec, *, where: str) -> OpenTerrain:
 class _SourceTerrain:
     """A source, all over the globe; which tiles are needed is known with a mission's area."""
 
-    def __init__(self, source: Source, spec: TerrainSpec, where: str) -> None:
+    def __init__(self, source: DemSource, spec: TerrainSpec, where: str) -> None:
         self._source, self._spec, self._where = source, spec, where
 
     def covers(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
@@ -89,8 +89,8 @@ class _SourceTerrain:
 
 
 def _told(
-    source: Source, records: Mapping[Cell, Record], sea: list[Cell], absent: list[Cell]
-) -> tuple[dict[str, object], tuple[str, ...]]:
+    source: DemSource, records: Mapping[Cell, TileRecord], sea: list[Cell], absent: list[Cell]
+) -> tuple[dict[str, object], tuple[Note, ...]]:
     """What reports say of the terrain, and notes."""
     info: dict[str, object] = {
         "dem_source": source.name,
@@ -102,31 +102,25 @@ def _told(
     notes = []
     if source.kind == "surface":
         info["bare_dem"] = False
-        notes.append(
-            f"{source.name} is a surface model: where trees or buildings stand at the start, its ground is too high, "
-            "and altitudes relative to home are flown lower by that; start in the open, or let altitude_error_m hold it"
-        )
+        notes.append(Note("terrain_is_a_surface", source=source.name))
     if sea:
         info["sea_tiles"] = names_of(sea)
         said = [c for c in sea if records[c].state == "absent"]
         listed = [c for c in sea if c not in said]
         if listed:
-            notes.append(f"sea, 0 m: {names_of(listed)}, which neither {source.name} nor GLO-90 has a tile of")
+            notes.append(Note("tiles_are_sea", tiles=names_of(listed), source=source.name))
         if said:
-            notes.append(f"sea, 0 m, because the mission says so: {names_of(said)}; GLO-90 shows land there")
+            notes.append(Note("tiles_are_sea_by_mission", tiles=names_of(said)))
     if absent:
         notes.append(_not_published(source, absent))
     return info, tuple(notes)
 
 
-def _not_published(source: Source, cells: list[Cell]) -> str:
-    return (
-        f"{source.name} does not publish {names_of(cells)}, and GLO-90 shows land there: the ground is unknown and "
-        "cannot be flown over"
-    )
+def _not_published(source: DemSource, cells: list[Cell]) -> Note:
+    return Note("tiles_not_published", source=source.name, tiles=names_of(cells))
 
 
-def _tile(cache: Cache, cell: Cell, record: Record, where: str) -> Raster:
+def _tile(cache: Cache, cell: Cell, record: TileRecord, where: str) -> Raster:
     """A cached tile with its source's datum, if it is still what its record says."""
     path = cache.tile_path(cell)
     if sha256_of(path) != record.sha256:
@@ -139,10 +133,10 @@ def _tile(cache: Cache, cell: Cell, record: Record, where: str) -> Raster:
     )  # fmt: skip
 
 
-def _sea(source: Source, cell: Cell, sample: Raster | None) -> Raster:
+def _sea(source: DemSource, cell: Cell, sample: Raster | None) -> Raster:
     """A tile at 0 m on the grid that the source's tiles have, ``sample`` being one of them."""
-    rows = ROWS if sample is None else round(1.0 / sample.dy)
-    cols = round(rows * source.columns_of(cell) / ROWS)
+    rows = TILE_ROWS if sample is None else round(1.0 / sample.dy)
+    cols = round(rows * source.columns_of(cell) / TILE_ROWS)
     dx, dy = 1.0 / cols, 1.0 / rows
     more = 1 if source.shares_edges else 0
 

@@ -12,7 +12,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 
@@ -20,14 +19,13 @@ from gcsplan.arrays import Floats, Indices
 from gcsplan.fleet.legs import Motion, at_own_speed, legs
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.speeds import POSITION_ERROR_M, column
-from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.vehicle import Autopilot, MissionEnd, Vehicle
 from gcsplan.world.atmosphere import true_per_indicated
 
 __all__ = [
-    "POSITION_ERROR_M", "Course", "End", "Route", "flown_corners", "motion_error_m", "speed_for", "upright",
+    "POSITION_ERROR_M", "Course", "Route", "flown_corners", "motion_error_m", "speed_for", "upright",
 ]  # fmt: skip
 
-End = Literal["land", "loiter", "rtl", "none"]
 
 LAND_SLOWLY_M = 10.0
 """Height above ground, m, below which a landing is slow (ArduCopter's LAND_ALT_LOW)."""
@@ -64,7 +62,7 @@ class Route:
     points: Floats
     start_ground_amsl_m: float | None = None
     goal_ground_amsl_m: float | None = None
-    end: End = "land"
+    end: MissionEnd = "land"
     rtl_amsl_m: float | None = None
     holds_s: Floats | None = None
     items: Indices | None = None

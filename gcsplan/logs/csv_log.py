@@ -13,6 +13,7 @@ from typing import TextIO
 from gcsplan.errors import InputError
 from gcsplan.figures import counted
 from gcsplan.logs.flight_log import FlightLog, Readings, watts_of
+from gcsplan.notes.note import Note
 
 COLUMN_NAMES: dict[str, tuple[str, ...]] = {
     "time_s": ("time_s", "time", "t", "seconds", "timestamp_s"),
@@ -78,7 +79,7 @@ def read_csv(file: Path, columns: Mapping[str, str]) -> FlightLog:
             first_bad = first_bad or number
     if bad > MOST_BAD * max(number - 1, 1):
         raise InputError(f"{counted(bad, 'line')} without numbers, the first is line {first_bad}", where=str(file))
-    notes = (f"{file.name}: passed over {counted(bad, 'line')} without numbers",) if bad else ()
+    notes = (Note("lines_passed_over", file=file.name, count=bad),) if bad else ()
     power = read["power"] if "power_w" in at else watts_of(read["charge"], str(file))
     return FlightLog.of(str(file), read["places"], power, notes, degrees=not flat, wind=read["wind"])
 

@@ -19,6 +19,7 @@ from typing import Any
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.logs.flight_log import MOST_READINGS, FlightLog, Readings, together, too_long, watts_of
+from gcsplan.notes.note import Note
 
 HEAD = b"\xa3\x95"
 FIX_3D = 3
@@ -67,11 +68,11 @@ def read_dataflash(file: Path) -> FlightLog:
                 log.close()
     notes = []
     if said():
-        notes.append(f"{file.name} is damaged in places, which were passed over")
+        notes.append(Note("log_damaged", log=file.name))
     places = read["places"]
     if not len(places) and len(read["gps"]):
         places = read["gps"]
-        notes.append(f"{file.name}: no POS messages, so the GPS's own places were taken")
+        notes.append(Note("places_of_gps", file=file.name))
     batteries = {k: read[kind] for k, kind in enumerate(own) if len(read[kind])}
     if not batteries and len(read["old"]):
         batteries = {0: read["old"]}

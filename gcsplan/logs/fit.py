@@ -21,6 +21,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import InputError
 from gcsplan.logs.flight_log import FlightLog, require_power
+from gcsplan.notes.note import Note
 
 LOG_STEP_S = 5.0
 """Length of a step: long enough that height noise is small beside the climb, short enough to be of one kind."""
@@ -90,7 +91,7 @@ class EnergyFit:
     energy_j: float
     speed_m_s: float
     off_percent: float
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
 
     @property
     def told(self) -> bool:
@@ -118,7 +119,8 @@ class EnergyFit:
         } | {
             "steps": self.steps, "energy_j": self.energy_j, "speed_m_s": self.speed_m_s,
             "fitted_speed_m_s": list(self.fitted_m_s),
-            "off_percent": self.off_percent, "told": self.told, "notes": list(self.notes),
+            "off_percent": self.off_percent, "told": self.told, "notes": [str(note) for note in self.notes],
+            "notes_data": [note.as_dict() for note in self.notes],
         }  # fmt: skip
 
 
@@ -126,7 +128,7 @@ def fit_energy(logs: Iterable[FlightLog]) -> EnergyFit:
     """The model that fits all ``logs`` together, of which one is held at a time. Raises InputError if they hold no
     flight."""
     parts, names, winds = [], [], []
-    log_notes: list[str] = []
+    log_notes: list[Note] = []
     for log in logs:
         parts.append(_steps_of(log))
         names.append(log.name)
@@ -254,14 +256,13 @@ def _with_base(
     return model, ""
 
 
-def _of_wind(winds_m_s: Sequence[float | None]) -> list[str]:
+def _of_wind(winds_m_s: Sequence[float | None]) -> list[Note]:
     """Whether metres are those through the air; ``winds_m_s``: the mean wind of each log, None if it tells none."""
     told = [wind for wind in winds_m_s if wind is not None]
     if not told:
-        return ["no log tells the wind: metres over ground are taken for those through the air"]
-    words = f"metres are those through the air, in a wind of {max(told):.1f} m/s as the log tells it"
-    none, every = len(winds_m_s) - len(told), len(winds_m_s)
-    return [f"{words}; {none} of {every} logs tell none" if none else words]
+        return [Note("wind_unknown")]
+    silent, logs = len(winds_m_s) - len(told), len(winds_m_s)
+    return [Note("wind_counted_of_some" if silent else "wind_counted", wind_m_s=max(told), silent=silent, logs=logs)]
 
 
 def _robust(x: Floats, y: Floats) -> tuple[Floats, Floats]:
@@ -315,21 +316,17 @@ def _shadow(k: int, columns: Sequence[int], x: Floats) -> str:
     return f"cannot be told apart from {others}"
 
 
-def _up_and_down(x: Floats, y: Floats, rise: Floats, made: Sequence[Coefficient], base: Coefficient) -> list[str]:
+def _up_and_down(x: Floats, y: Floats, rise: Floats, made: Sequence[Coefficient], base: Coefficient) -> list[Note]:
     """A note on the separate costs of a metre up and a metre down, for which the model has one number."""
     if made[0].value is None or made[1].value is None:
         return []
     up, down = np.where(rise > 0.0, x[:, 0], 0.0), np.where(rise < 0.0, x[:, 0], 0.0)
     rest = y - x[:, 1] * made[1].value - x[:, 2] * (made[2].value or 0.0) - x[:, BASE] * (base.value or 0.0)
     if up.sum() < LEAST_MOTION[0] or down.sum() < LEAST_MOTION[0]:
-        flown = "climbs" if up.sum() >= down.sum() else "descents"
-        return [f"the vertical metres are nearly all {flown}: R1 is theirs alone"]
+        return [Note("nearly_all_climbs" if up.sum() >= down.sum() else "nearly_all_descents")]
     each = [float(side @ rest / (side @ side)) for side in (up, down)]
     if abs(each[0] - each[1]) > 0.3 * max(made[0].value, 1.0):
-        return [
-            f"a metre up costs about {each[0]:.0f} J and a metre down {each[1]:.0f} J; R1 is one number for both, good "
-            f"for missions that climb as much as they descend"
-        ]
+        return [Note("up_and_down_differ", up_j_per_m=each[0], down_j_per_m=each[1])]
     return []
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.figures import counted
+from gcsplan.notes.note import Note
 
 EQUATOR_M, ECCENTRICITY_2 = 6_378_137.0, 6.694379990141e-3  # WGS84
 LEAST_POINTS = 20
@@ -77,12 +78,12 @@ class FlightLog:
     amsl_m: Floats
     power_s: Floats
     power_w: Floats
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     wind: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
     @classmethod
     def of(
-        cls, name: str, places: NumberRows, power: NumberRows, notes: tuple[str, ...] = (), *, degrees: bool = True,
+        cls, name: str, places: NumberRows, power: NumberRows, notes: tuple[Note, ...] = (), *, degrees: bool = True,
         wind: NumberRows = (),
     ) -> FlightLog:  # fmt: skip
         """A log from (seconds, latitude, longitude, AMSL) and (seconds, watts), in any order, without rows with NaN.

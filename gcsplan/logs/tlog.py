@@ -16,6 +16,7 @@ import numpy as np
 
 from gcsplan.errors import InputError
 from gcsplan.logs.flight_log import FlightLog, Readings, together
+from gcsplan.notes.note import Note
 
 UNKNOWN_MV = 65535
 MOST_MESSAGES = 2_000_000
@@ -59,7 +60,7 @@ def read_telemetry(file: Path, sysid: int | None) -> FlightLog:
     own = read[who]
     batteries = {k: own[BATTERY][own[BATTERY][:, 0] == k, 1:] for k in np.unique(own[BATTERY][:, 0]).tolist()}
     power = together(batteries) if batteries else own[STATUS]
-    notes = () if batteries else (f"{file.name}: no BATTERY_STATUS, so SYS_STATUS was taken",)
+    notes = () if batteries else (Note("power_of_system_status", file=file.name),)
     if not (power[:, 1] > 0.0).any():
         raise InputError(
             "holds no battery current (BATTERY_STATUS or SYS_STATUS with voltage and current): a power module must "

@@ -11,17 +11,15 @@ from pydantic import ValidationError
 
 from gcsplan.errors import Problem
 from gcsplan.mission_file.keys import Keys
-from gcsplan.mission_file.places import EXAMPLES
+from gcsplan.mission_file.places import PLACE_EXAMPLES
 from gcsplan.mission_file.point_keys import POINT_FORMS
-from gcsplan.mission_file.schema import FORMS, PlannerKeys, TerrainKeys, ZoneKeys, nearest, shown
+from gcsplan.mission_file.schema import POINT_FORM_NAMES, PlannerKeys, TerrainKeys, ZoneKeys, nearest, shown
 from gcsplan.mission_file.strict_yaml import lines_of
-from gcsplan.mission_file.units import UNITS, nearest_key, other_names, unit_end
+from gcsplan.mission_file.units import UNIT_SYMBOLS, nearest_keys, other_names, unit_end
 from gcsplan.mission_file.yaml_slips import missing_space
 
 Section = TypeVar("Section", bound=Keys)
 
-UNKNOWN = "unknown key"
-SWAPPED = "latitude and longitude look swapped"
 MOST_SWAPPED = 6
 MOST_TOLD = 100
 """Most mistakes of one section that are told, and ten times as many of a mission."""
@@ -31,7 +29,7 @@ SHORT = {TerrainKeys: "dem", PlannerKeys: "name", ZoneKeys: "file"}
 
 MOST_OF_NUMBER = 40
 _RANGE = re.compile(r"\s*(\d+(?:\.\d+)?)\s*(?:-|–|\.\.|to)\s*(\d+(?:\.\d+)?)\s*")
-_NUMBER = re.compile(r"\s*[±+]?(-?\d+(?:[.,]\d+)?)\s*([a-zA-Z/²°%]*)\s*")
+_NUMBER_AND_UNIT = re.compile(r"\s*[±+]?(-?\d+(?:[.,]\d+)?)\s*([a-zA-Z/²°%]*)\s*")
 
 
 def read_section(kind: type[Section], value: Any, where: str, problems: list[Problem]) -> Section | None:
@@ -65,8 +63,8 @@ def read_section(kind: type[Section], value: Any, where: str, problems: list[Pro
 def with_lines(problems: Sequence[Problem], text: str, where: str) -> list[Problem]:
     """The problems with their lines in a mission's ``text``, whose keys begin with ``where``; others unchanged."""
     lines = lines_of(text, [p.where.removeprefix(where) if p.where.startswith(where) else "" for p in problems])
-    return [p if n is None else replace(p, message=f"{p.message} (line {n})")
-            for p, n in zip(problems, lines, strict=True)]  # fmt: skip
+    ends = ["" if n is None else f" (line {n})" for n in lines]
+    return [replace(p, message=p.message + end, line=end) for p, end in zip(problems, ends, strict=True)]
 
 
 def few(problems: Sequence[Problem], where: str, most: int, count: int | None = None) -> list[Problem]:
@@ -85,33 +83,33 @@ def told_once(problems: Iterable[Problem]) -> list[Problem]:
     swapped.
     """
     found = list(problems)
-    unknown = [p for p in found if p.message.startswith(UNKNOWN)]
-    missing = [p for p in found if p.message.startswith("is missing")]
+    unknown = [p for p in found if p.code == "unknown_key"]
+    missing = [p for p in found if p.code in ("missing", "missing_limit")]
     meant: dict[int, Problem] = {}  # the unknown key that stands for a missing one, by the id of that one's problem
     for gap in missing:
         section, key = _section_and_key(gap.where)
         beside = [u for u in unknown if _section_and_key(u.where)[0] == section]
-        named = [u for u in beside if re.search(rf"did you mean .*\b{re.escape(key)}\b", u.message)]
-        if "or in limits" in gap.message:
-            named += [u for u in unknown if u.message.endswith("did you mean limits?")]
+        named = [u for u in beside if key in u.meant]
+        if gap.code == "missing_limit":
+            named += [u for u in unknown if u.meant == ("limits",)]
         alone = [g for g in missing if _section_and_key(g.where)[0] == section] == [gap]
-        if not named and len(beside) == 1 and alone and "did you mean" not in beside[0].message:
+        if not named and len(beside) == 1 and alone and not beside[0].meant:
             named = beside
         if named:
             meant[id(gap)] = named[0]
     instead = {}
     for gap in missing:
         u = meant.get(id(gap))
-        if u is not None and "did you mean" not in u.message:
+        if u is not None and not u.meant:
             key = _section_and_key(gap.where)[1]
-            instead[id(u)] = Problem(u.where, f"{UNKNOWN}; did you mean {key}, which is missing?")
+            instead[id(u)] = _unknown(u.where, (key,), f"; did you mean {key}, which is missing?")
     told = [instead.get(id(p), p) for p in found if id(p) not in meant]
-    swapped = [p for p in told if p.message.startswith(SWAPPED)]
+    swapped = [p for p in told if p.code == "swapped"]
     if len(swapped) < 2:
         return told
     others = ", ".join(p.where.rpartition(": ")[2] for p in swapped[1:MOST_SWAPPED])
     more = f" and {len(swapped) - MOST_SWAPPED} more" if len(swapped) > MOST_SWAPPED else ""
-    first = Problem(swapped[0].where, f"{swapped[0].message} (the same at {others}{more})")
+    first = replace(swapped[0], message=f"{swapped[0].message} (the same at {others}{more})")
     return [first if p is swapped[0] else p for p in told if p is swapped[0] or p not in swapped]
 
 
@@ -127,7 +125,7 @@ def unknown_keys(given: Iterable[str], known: Iterable[str], where: str) -> list
     names = list(known)
     prefix = where if where.endswith(": ") else where + "."
     wrong = [key for key in given if key not in names]
-    told = [Problem(f"{prefix}{key[:80]}", _unknown(key, names)) for key in wrong[:MOST_TOLD]]
+    told = [_unknown_of(f"{prefix}{key[:80]}", key, names) for key in wrong[:MOST_TOLD]]
     return few(told, where.removesuffix(": "), MOST_TOLD, len(wrong))
 
 
@@ -137,14 +135,19 @@ def key_path(where: str, loc: Iterable[int | str]) -> str:
     for part in loc:
         if isinstance(part, int):
             path += f"[{part}]"
-        elif part not in FORMS:
+        elif part not in POINT_FORM_NAMES:
             path += part[:80] if path.endswith(": ") else f".{part[:80]}"
     return path
 
 
-def _unknown(key: str, known: list[str]) -> str:
-    near = nearest_key(key, known)
-    return UNKNOWN + (near or f"; known are {', '.join(known)}")
+def _unknown_of(where: str, key: str, known: list[str]) -> Problem:
+    """The problem of an unknown ``key``, with the nearest of the known ones."""
+    meant, words = nearest_keys(key, known)
+    return _unknown(where, meant, words or f"; known are {', '.join(known)}")
+
+
+def _unknown(where: str, meant: tuple[str, ...], words: str) -> Problem:
+    return Problem(where, f"unknown key{words}", "unknown_key", meant)
 
 
 def _problem(kind: type[Keys], error: Any, where: str) -> Problem:
@@ -155,9 +158,10 @@ def _problem(kind: type[Keys], error: Any, where: str) -> Problem:
         case "missing":
             field = _model_at(kind, loc[:-1]).model_fields.get(str(loc[-1]))
             choices = [] if field is None or get_origin(field.annotation) is not Literal else get_args(field.annotation)
-            return Problem(path, "is missing" + (f"; it is one of {', '.join(choices)}" if choices else ""))
+            words = f"; it is one of {', '.join(choices)}" if choices else ""
+            return Problem(path, f"is missing{words}", "missing")
         case "extra_forbidden":
-            return Problem(path, _unknown(str(loc[-1]), list(_model_at(kind, loc[:-1]).model_fields)))
+            return _unknown_of(path, str(loc[-1]), list(_model_at(kind, loc[:-1]).model_fields))
         case "value_error":
             return Problem(path, str(context["error"]))
         case "literal_error":
@@ -185,10 +189,10 @@ def _problem(kind: type[Keys], error: Any, where: str) -> Problem:
             bound = f"at least {least}" if least is not None else f"at most {most}"
             given = context.get("actual_length", given)
             whole = _form_of(loc) and given == 4 and all(type(v) is int for v in error["input"])
-            hint = f"; decimals begin with a point: [{EXAMPLES[0]}]" if whole else ""
+            hint = f"; decimals begin with a point: [{PLACE_EXAMPLES[0]}]" if whole else ""
             return Problem(path, f"must have {bound} values{_form_of(loc)}, given {given}{hint}")
         case "list_type" if _form_of(loc):
-            words = f"must be [lat, lon], {{lat, lon}}, or text such as {EXAMPLES[0]}"
+            words = f"must be [lat, lon], {{lat, lon}}, or text such as {PLACE_EXAMPLES[0]}"
             return Problem(path, f"{words}, or {{east_m, north_m}} in a mission with a frame, given {given}")
         case "list_type":
             return Problem(path, f"must be a list, given {given}")
@@ -203,14 +207,14 @@ def _as_number(loc: tuple[int | str, ...], given: Any) -> str:
         return ""
     if "one" in loc and (several := _RANGE.fullmatch(given)):
         return f"; write [{several[1]}, {several[2]}]"
-    match = _NUMBER.fullmatch(given)
-    key = next((part for part in reversed(loc) if isinstance(part, str) and part not in FORMS), "")
+    match = _NUMBER_AND_UNIT.fullmatch(given)
+    key = next((part for part in reversed(loc) if isinstance(part, str) and part not in POINT_FORM_NAMES), "")
     if match is None or not key:
         return ""
     number, unit, end = match[1].replace(",", "."), match[2], unit_end(key)
     if not unit:  # the key is not named, since it may be written in another unit
         return f"; write the number alone, without quotes: {number}"
-    if unit.lower() == UNITS.get(end, "").lower():
+    if unit.lower() == UNIT_SYMBOLS.get(end, "").lower():
         return f"; write the number alone: `{key}: {number}`"
     other = key.removesuffix(end) + "_" + unit.lower().replace("km/h", "kmh")
     return f"; write `{other}: {number}`" if other in other_names([key]) else ""

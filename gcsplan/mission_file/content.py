@@ -12,7 +12,7 @@ from gcsplan.errors import InputError
 from gcsplan.mission_file import samples
 from gcsplan.mission_file.other_files import what_else
 from gcsplan.mission_file.schema import shown
-from gcsplan.mission_file.strict_yaml import MAX_BYTES, MAX_DEPTH, MAX_NODES, read_yaml
+from gcsplan.mission_file.strict_yaml import MAX_YAML_BYTES, MAX_YAML_DEPTH, MAX_YAML_NODES, read_yaml
 from gcsplan.mission_file.yaml_slips import missing_space
 from gcsplan.world.input_files import tell_file
 
@@ -82,9 +82,9 @@ def _text(file: Path, where: str) -> str:
         if file.is_dir():
             raise InputError("this is a folder; give a mission file (.yaml)", where=where)
         with file.open("rb") as opened:  # the size is not asked for, since a pipe or a device has none
-            data = opened.read(MAX_BYTES + 1)
-        if len(data) > MAX_BYTES:
-            raise InputError(f"a mission file has at most {MAX_BYTES} bytes, this one has more", where=where)
+            data = opened.read(MAX_YAML_BYTES + 1)
+        if len(data) > MAX_YAML_BYTES:
+            raise InputError(f"a mission file has at most {MAX_YAML_BYTES} bytes, this one has more", where=where)
         return data.decode("utf-8-sig")
     except InputError:
         raise
@@ -105,8 +105,8 @@ class _Plain:
     def of(self, value: Any, where: str, depth: int) -> Any:
         """``value`` at ``where``, which is ``depth`` levels deep."""
         self._values += 1
-        if depth > MAX_DEPTH or self._values > MAX_NODES:
-            most = f"{MAX_DEPTH} levels deep" if depth > MAX_DEPTH else f"{MAX_NODES} values"
+        if depth > MAX_YAML_DEPTH or self._values > MAX_YAML_NODES:
+            most = f"{MAX_YAML_DEPTH} levels deep" if depth > MAX_YAML_DEPTH else f"{MAX_YAML_NODES} values"
             raise InputError(f"the mission has more than {most}", where=where)
         if value is None or isinstance(value, datetime.date):
             return value

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from gcsplan.errors import Problem
 from gcsplan.mission_file.schema import EnergyKeys, VehicleKeys
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Energy
 
 __all__ = ["make_energy"]
@@ -12,7 +13,7 @@ WAYS = (("base_w", "horizontal_j_per_m"), ("cruise_w",), ("endurance_s",))
 """Keys that say what cruising takes: those of one way alone may be given."""
 
 
-def make_energy(keys: VehicleKeys, where: str, problems: list[Problem], notes: list[str]) -> Energy:
+def make_energy(keys: VehicleKeys, where: str, problems: list[Problem], notes: list[Note]) -> Energy:
     """The energy model of a vehicle; ``problems`` if its keys contradict each other.
 
     Without any key under ``energy:`` it is the paper's, marked as not stated; with a battery alone, as the paper's.
@@ -44,18 +45,18 @@ def make_energy(keys: VehicleKeys, where: str, problems: list[Problem], notes: l
     if (cruise_w := _cruise_w(given)) is not None:
         base_w, along = cruise_w, 0.0
         key = "cruise_w" if given.cruise_w is not None else "endurance_s"
+        climbs = "vertical_j_per_m" in given.model_fields_set
         notes.append(
-            f"{keys.name}: {key} {getattr(given, key):g} is read as base_w {base_w:.4g}, the power for as long as it "
-            f"flies, and horizontal_j_per_m 0" + _paper(given)
-        )
+            Note(
+                "cruise_is_base_power" if climbs else "cruise_is_base_power_climb_of_paper", given_key=key,
+                given=getattr(given, key), base_w=base_w, vertical_j_per_m=given.vertical_j_per_m,
+            )
+        )  # fmt: skip
     elif given.model_fields_set and not papers and (unsaid := _unsaid(given)):
-        words = " and ".join(f"{key} {getattr(given, key):g}" for key in unsaid)
-        notes.append(f"{keys.name}: {words} are the paper's, not this aircraft's, for `energy:` says nothing of them")
+        costs = tuple(Note("key_and_value", name=key, value=getattr(given, key)) for key in unsaid)
+        notes.append(Note("energy_in_part_of_paper", costs=costs))
     if given.hover_w and given.hover_w < base_w:
-        notes.append(
-            f"{keys.name}: hover_w {given.hover_w:g} is less than base_w {base_w:.4g}, the power of flying at any "
-            f"speed: a hold counts {base_w:.4g} W"
-        )
+        notes.append(Note("hover_below_base_power", hover_w=given.hover_w, base_w=base_w))
     return Energy(
         vertical_j_per_m=given.vertical_j_per_m, horizontal_j_per_m=along, hover_w=given.hover_w,
         battery_j=given.battery_j, reserve=given.reserve, battery_v=given.battery_v, base_w=base_w,
@@ -76,10 +77,3 @@ def _cruise_w(given: EnergyKeys) -> float | None:
     if given.endurance_s is not None and given.battery_j is not None:
         return given.battery_j / given.endurance_s
     return None
-
-
-def _paper(given: EnergyKeys) -> str:
-    """What is said where climbing is not the aircraft's own."""
-    if "vertical_j_per_m" in given.model_fields_set:
-        return ""
-    return f"; a metre up or down takes {given.vertical_j_per_m:g} J, as in the paper, unless vertical_j_per_m is given"

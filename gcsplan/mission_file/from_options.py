@@ -17,8 +17,7 @@ from numpy.typing import ArrayLike
 from gcsplan.arrays import Floats
 from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError, Problem
-from gcsplan.figures import counted
-from gcsplan.mavlink.mission.return_route import Route
+from gcsplan.mavlink.mission.return_route import ReturnRoute
 from gcsplan.mission_file.airspace.left_out import faults_near, left_out_by_hours, unused_notes, used
 from gcsplan.mission_file.airspace.policy import Policy
 from gcsplan.mission_file.airspace.times import Hours, hours_of
@@ -26,12 +25,14 @@ from gcsplan.mission_file.complaints import read_section
 from gcsplan.mission_file.load import TERRAIN_ERROR_M
 from gcsplan.mission_file.schema import LimitKeys, TerrainKeys, VehicleKeys
 from gcsplan.mission_file.vehicles import make_vehicle
-from gcsplan.mission_file.world import Box, make_spec, settle_zones
+from gcsplan.mission_file.world import make_spec, settle_zones
 from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, one_line, place_zones, zone_notes, zones_sha256
 from gcsplan.mission_file.zone_reader import read_zones
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.frame import FARTHEST_M, Frame, centre_of
+from gcsplan.world.frame import FARTHEST_M, Box, Frame, centre_of
+from gcsplan.world.model_words import notes_on
 from gcsplan.world.terrain import OpenTerrain
 from gcsplan.world.world import World
 from gcsplan.world.zones import Zone
@@ -39,7 +40,7 @@ from gcsplan.world.zones import Zone
 MARGIN_M, MARGIN_MOST_M = 500.0, 3000.0
 """Terrain around the mission: at least the first, m, or a tenth of its extent up to the second, m."""
 
-OPTIONS = {
+KEY_OPTIONS = {
     "min_agl_m": "--min-agl", "max_agl_m": "--max-agl", "max_amsl_m": "--max-amsl", "speed_m_s": "--speed",
     "horizontal_clearance_m": "--clearance", "track_error_m": "--track-error", "climb_m_s": "--climb-rate",
     "altitude_error_m": "--altitude-error", "max_climb_deg": "--max-climb", "max_descent_deg": "--max-descent",
@@ -65,14 +66,14 @@ class WorldOptions:
     vehicle: Mapping[str, object] = field(default_factory=dict)
     home: tuple[float, float] | None = None
     rtl_rel_home_m: float | None = None
-    return_route: Route | None = None
+    return_route: ReturnRoute | None = None
     terrain_error_m: float = TERRAIN_ERROR_M
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     at: tuple[str, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Extent:
+class WorldExtent:
     """A part of the world: the middle of its plane (latitude, longitude), and a box in it, in metres."""
 
     centre_deg: tuple[float, float]
@@ -85,7 +86,7 @@ class OpenWorld:
     def __init__(self, options: WorldOptions) -> None:
         problems: list[Problem] = []
         self.options = options
-        self.notes: list[str] = [*options.notes]
+        self.notes: list[Note] = [*options.notes]
         hours = hours_of(None, None, "--at", problems, instead=options.at)
         self._drafts = _drafts(options.zones, problems, self.notes, hours)
         self.hours = hours if left_out_by_hours(self._drafts) else None
@@ -113,7 +114,7 @@ class OpenWorld:
     def _make(self, autopilot: str) -> Vehicle:
         """See `vehicle`."""
         problems: list[Problem] = []
-        notes: list[str] = []
+        notes: list[Note] = []
         given = {"name": "file", "sysid": 1, "autopilot": autopilot, "start": [0.0, 0.0], "goal": [0.0, 0.0]}
         keys = read_section(VehicleKeys, given | dict(self.options.vehicle), "", problems)
         made = None
@@ -121,14 +122,14 @@ class OpenWorld:
             made = make_vehicle(keys, self._limits, "", problems, notes, local=False, obstacle_m=self._obstacle_m)
         if made is None:
             raise InputError.of([_renamed(p) for p in problems])
-        self.notes += [n.removeprefix("file: ") for n in notes if n.removeprefix("file: ") not in self.notes]
+        self.notes += [note for note in notes if note not in self.notes]
         return made
 
     def around(self, places: ArrayLike, reach_m: float = 0.0) -> tuple[World, dict[str, object]]:
         """The world of the `extent` of ``places``, and the description of its sources. Raises InputError."""
         return self.over(self.extent(places, reach_m))
 
-    def extent(self, places: ArrayLike, reach_m: float = 0.0) -> Extent:
+    def extent(self, places: ArrayLike, reach_m: float = 0.0) -> WorldExtent:
         """The part of the world that holds ``places`` (N, 2), latitude and longitude.
 
         ``reach_m`` is how far beyond them terrain is needed, in metres; `MARGIN_M` or a tenth of their extent, and the
@@ -152,9 +153,9 @@ class OpenWorld:
                 f"the places lie more than {FARTHEST_M / 1000:.0f} km from their middle: too far for one plane",
                 where="--dem",
             )
-        return Extent((frame.lat_deg, frame.lon_deg), self._box(in_plane, reach_m))
+        return WorldExtent((frame.lat_deg, frame.lon_deg), self._box(in_plane, reach_m))
 
-    def over(self, extent: Extent) -> tuple[World, dict[str, object]]:
+    def over(self, extent: WorldExtent) -> tuple[World, dict[str, object]]:
         """The world of an extent, and the description of its sources. Raises InputError."""
         assert self._terrain is not None
         frame, box = Frame(*extent.centre_deg), extent.box
@@ -180,11 +181,9 @@ class OpenWorld:
             problems += own
         if problems:
             raise InputError.of([_renamed(p) for p in problems])
-        notes = surface.info.get("notes", ())
-        said = [*self.notes, *(str(n) for n in (notes if isinstance(notes, tuple) else ()))]
-        said += [*zone_notes(placed), *unused_notes(self._drafts, frame, box)]
+        said = [*self.notes, *notes_on(surface.info), *zone_notes(placed), *unused_notes(self._drafts, frame, box)]
         if far:
-            said.append(f"left out: {counted(len(far), 'zone')} of files, too far away to matter")
+            said.append(Note("zones_left_out", count=len(far)))
         inputs = {k: v for k, v in surface.info.items() if k not in ("notes", "source")}
         inputs["zones_sha256"] = zones_sha256(drafts)
         inputs["notes"] = tuple(dict.fromkeys(said))
@@ -199,7 +198,7 @@ class OpenWorld:
         return low[0] - margin, low[1] - margin, high[0] + margin, high[1] + margin
 
 
-def _drafts(files: Sequence[str], problems: list[Problem], notes: list[str], hours: Hours | None) -> list[ZoneDraft]:
+def _drafts(files: Sequence[str], problems: list[Problem], notes: list[Note], hours: Hours | None) -> list[ZoneDraft]:
     """The zones of all files, each with a unique name; those are not used that do not apply in the hours."""
     drafts: list[ZoneDraft] = []
     for file in files:
@@ -222,5 +221,5 @@ def _drafts(files: Sequence[str], problems: list[Problem], notes: list[str], hou
 def _renamed(problem: Problem) -> Problem:
     """The problem with its option as the place, in place of a key such as ``.min_agl_m``."""
     key = problem.where.removeprefix(".").split(".")[-1].split("[")[0]
-    option = OPTIONS.get(key)
-    return Problem(option, problem.message) if option is not None else problem
+    option = KEY_OPTIONS.get(key)
+    return replace(problem, where=option) if option is not None else problem

@@ -17,14 +17,15 @@ import numpy as np
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.request import MissionFile, VehicleRequest
 from gcsplan.mission_file.terminals import Terminals, make_request
-from gcsplan.mission_file.world import LOCAL_MARGIN_M, MARGIN_M, Box, Place, settle_zones
+from gcsplan.mission_file.world import LOCAL_MARGIN_M, MARGIN_M, MissionPlace, settle_zones
 from gcsplan.mission_file.zone_draft import ZoneDraft
-from gcsplan.world.frame import FARTHEST_M, Frame
+from gcsplan.world.frame import FARTHEST_M, Box, Frame
+from gcsplan.world.model_words import notes_on
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import RASTER_SPARE_M, OpenTerrain, Terrain, TerrainSpec, open_terrain
 from gcsplan.world.zones import Zone
 
-Placed = Sequence[tuple[ZoneDraft, Zone]]
+PlacedZones = Sequence[tuple[ZoneDraft, Zone]]
 
 MOST_LEVELS = 24
 """Most windows of one mission; the last would be much wider than the frame."""
@@ -47,7 +48,7 @@ def opened(spec: TerrainSpec, *, where: str) -> OpenTerrain:
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class GroundWindow:
     """One window: its surface, and the zones and terminals as the ground in it decides."""
 
     surface: Surface
@@ -57,7 +58,7 @@ class Ground:
 
 
 @dataclass(eq=False)
-class Site:
+class MissionPlane:
     """A mission's places in its plane.
 
     ``box`` (west, south, east, north) is the first window. ``good`` are the places of ``terminals`` on the terrain.
@@ -66,14 +67,14 @@ class Site:
     terrain: Terrain
     frame: Frame
     box: Box
-    placed: Placed
+    placed: PlacedZones
     terminals: Sequence[Terminals]
-    good: Collection[Place]
+    good: Collection[MissionPlace]
     local: bool
     _extent: Box | None = None
     _loaded: WeakValueDictionary[int, MissionFile] = field(default_factory=WeakValueDictionary)
 
-    def load(self, problems: list[Problem]) -> Ground | None:
+    def load(self, problems: list[Problem]) -> GroundWindow | None:
         """The first window; None, and ``problems``, if there is no terrain."""
         return self._ground(self.box, None, problems, spare_m=0.0)
 
@@ -114,7 +115,7 @@ class Site:
         self._loaded[level] = wide
         return wide
 
-    def _ground(self, box: Box, most_cells: int | None, problems: list[Problem], spare_m: float) -> Ground | None:
+    def _ground(self, box: Box, most_cells: int | None, problems: list[Problem], spare_m: float) -> GroundWindow | None:
         corner_m = max(math.hypot(e, n) for e in (box[0], box[2]) for n in (box[1], box[3]))
         scale = self.frame.scale_at(corner_m + spare_m)
         try:
@@ -124,7 +125,7 @@ class Site:
             return None
         zones = settle_zones(self.placed, surface, problems)
         requests = [make_request(s, self.frame, surface, zones, self.good, problems) for s in self.terminals]
-        return Ground(surface, tuple(zones), scale, tuple(r for r in requests if r is not None))
+        return GroundWindow(surface, tuple(zones), scale, tuple(r for r in requests if r is not None))
 
     def _level_for(self, margin_m: float, level: int) -> int:
         """The first level after ``level`` that extends ``margin_m`` beyond all terminals, or as far as the terrain."""
@@ -165,7 +166,7 @@ class Site:
         )  # fmt: skip
 
 
-def _past_zones(box: Box, placed: Placed, spare_m: float) -> Box:
+def _past_zones(box: Box, placed: PlacedZones, spare_m: float) -> Box:
     """``box`` grown past all zones that cross its border, with ``spare_m`` beyond them."""
     grown = True
     while grown:
@@ -194,13 +195,10 @@ def _is_larger(wide: Surface, surface: Surface) -> bool:
     return bool(spans[0] > spans[1] + 1.0)
 
 
-def _moved(source: MissionFile, ground: Ground, level: int) -> MissionFile:
+def _moved(source: MissionFile, ground: GroundWindow, level: int) -> MissionFile:
     """``source`` with another window."""
-    before, now = source.surface.info, ground.surface.info
-    old, new = (info.get("notes", ()) for info in (before, now))
-    assert isinstance(old, tuple)
-    assert isinstance(new, tuple)
-    inputs = {k: v for k, v in now.items() if k not in ("notes", "source")}
+    old, new = notes_on(source.surface.info), notes_on(ground.surface.info)
+    inputs = {k: v for k, v in ground.surface.info.items() if k not in ("notes", "source")}
     return replace(
         source,
         surface=ground.surface,
@@ -208,7 +206,7 @@ def _moved(source: MissionFile, ground: Ground, level: int) -> MissionFile:
         airspace_scale=ground.scale,
         vehicles=ground.vehicles,
         inputs={**source.inputs, **inputs},
-        notes=(*(n for n in source.notes if n not in old), *(str(n) for n in new)),
+        notes=(*(n for n in source.notes if n not in old), *new),
         level=level,
     )
 

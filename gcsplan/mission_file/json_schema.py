@@ -25,7 +25,7 @@ MODELINE = f"# yaml-language-server: $schema={FILE_NAME}"
 """The line by which an editor finds the schema."""
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-TITLE = "gcsplan mission file, version 1"
+SCHEMA_TITLE = "gcsplan mission file, version 1"
 
 LATE_DEFAULTS: Mapping[str, float] = {
     **vehicles.ERRORS,
@@ -70,7 +70,7 @@ def mission_schema() -> dict[str, Any]:
         if key not in whole["required"] and not _takes_null(told):  # the reader takes a key without a value for absent
             words = {word: told.pop(word) for word in ("description", "default") if word in told}
             whole["properties"][key] = {"anyOf": [told, {"type": "null"}], **words}
-    return {"$schema": DIALECT, **whole, "title": TITLE, "$defs": parts}
+    return {"$schema": DIALECT, **whole, "title": SCHEMA_TITLE, "$defs": parts}
 
 
 def _kinds(kind: type[Keys]) -> list[type[Keys]]:

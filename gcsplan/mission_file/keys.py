@@ -6,11 +6,11 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-FAR_M = 1e6
+LARGEST_KEY_M = 1e6
 """Largest number of metres that a key takes, so that slips are found."""
 
-Metres = Annotated[float, Field(ge=-FAR_M, le=FAR_M)]
-Length = Annotated[float, Field(ge=0.0, le=FAR_M)]
+FiniteMetres = Annotated[float, Field(ge=-LARGEST_KEY_M, le=LARGEST_KEY_M)]
+Length = Annotated[float, Field(ge=0.0, le=LARGEST_KEY_M)]
 
 
 class Keys(BaseModel):

@@ -15,19 +15,18 @@ from functools import partial
 from typing import Any, get_args
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.figures import counted
+from gcsplan.mavlink.mission.mission import AltitudeFrame
 from gcsplan.mission_file.airspace.left_out import faults_near, left_out_by_hours, unused_notes, used
 from gcsplan.mission_file.airspace.times import Hours, hours_of, texts_of
 from gcsplan.mission_file.complaints import MOST_TOLD, few, read_section, told_once, unknown_keys, with_lines
 from gcsplan.mission_file.content import read_content
-from gcsplan.mission_file.ground import Ground, Site, known_in_plane, opened
+from gcsplan.mission_file.ground import GroundWindow, MissionPlane, known_in_plane, opened
 from gcsplan.mission_file.request import (
-    AltitudeFrame,
     ArrivalRequest,
     Content,
     MissionFile,
     PlannerRequest,
-    ReturnRule,
+    ReturnRequirement,
     VehicleRequest,
 )
 from gcsplan.mission_file.schema import (
@@ -44,7 +43,14 @@ from gcsplan.mission_file.schema import (
 )  # fmt: skip
 from gcsplan.mission_file.terminals import Terminals
 from gcsplan.mission_file.units import in_own_units
-from gcsplan.mission_file.vehicles import check_unique, make_arrival, make_vehicle, within_lean, within_vel_max
+from gcsplan.mission_file.vehicles import (
+    check_unique,
+    make_arrival,
+    make_vehicle,
+    unbounded_motion,
+    within_lean,
+    within_vel_max,
+)
 from gcsplan.mission_file.world import (
     covered,
     make_box,
@@ -55,19 +61,21 @@ from gcsplan.mission_file.world import (
     place_notes,
 )  # fmt: skip
 from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, one_line, place_zones, zone_notes, zones_sha256
+from gcsplan.notes.note import Note
 from gcsplan.world.frame import Frame
+from gcsplan.world.model_words import notes_on
 from gcsplan.world.terrain import OpenTerrain, Terrain, TerrainSpec
 
 __all__ = ["ArrivalRequest", "MissionFile", "PlannerRequest", "VehicleRequest", "load_mission"]
 
-WANTED = {
+WANTED_KEYS = {
     "version": "write `version: 1`",
     "terrain": "write `terrain: {dem: FILE}`, or for flat ground its altitude: `terrain: {flat_m: 300}`",
     "vehicles": "write a list with name, sysid, autopilot, start and goal of each",
 }
 """The keys that every mission has, and what to write where one is absent."""
 
-MOST_VEHICLES = 2000
+MOST_VEHICLES_OF_FILE = 2000
 """Most vehicles of one file: more than are flown together anywhere, and few enough for a table of all pairs."""
 
 TERRAIN_ERROR_M = 30.0
@@ -122,16 +130,16 @@ def load_mission(
 
 def load_content(content: Content) -> MissionFile:
     """Read a mission again from what it was read from before. Raises InputError."""
-    return _Reading(content).mission()
+    return _MissionReading(content).mission()
 
 
-def read_no_fly(source: str | os.PathLike[str], at: Sequence[str] | None = None) -> tuple[list[ZoneDraft], list[str]]:
+def read_no_fly(source: str | os.PathLike[str], at: Sequence[str] | None = None) -> tuple[list[ZoneDraft], list[Note]]:
     """All zones of a mission file, used or not, and the notes on them, whatever else is wrong. Raises InputError."""
     file, where, raw, written = read_content(source, None)
-    return _Reading(Content(file, where, raw, written, at=texts_of(at))).zones_alone()
+    return _MissionReading(Content(file, where, raw, written, at=texts_of(at))).zones_alone()
 
 
-class _Reading:
+class _MissionReading:
     """One pass over one file: the steps in order, and the problems found so far."""
 
     def __init__(self, content: Content) -> None:
@@ -140,19 +148,21 @@ class _Reading:
         self.units = in_own_units(content.given, self.where)
         self.raw = self.units.raw
         self.problems: list[Problem] = [*self.units.problems]
-        self.notes: list[str] = [*self.units.notes]
+        self.notes: list[Note] = [*self.units.notes]
         self.local = content.given.get("frame") is not None
 
     def mission(self) -> MissionFile:
         raw, problems = self.raw, self.problems
         problems += unknown_keys(raw, TOP_KEYS, self.where)
         problems += [
-            Problem(self.where + key, f"is missing; {cure}") for key, cure in WANTED.items() if raw.get(key) is None
+            Problem(self.where + key, f"is missing; {cure}", "missing")
+            for key, cure in WANTED_KEYS.items()
+            if raw.get(key) is None
         ]
         name = self._name()
         altitude_frame: AltitudeFrame = self._choice("altitude_frame", get_args(AltitudeFrame), "relative")
         terrain_error_m = self._terrain_error(altitude_frame)
-        way_home: ReturnRule = self._choice("way_home", get_args(ReturnRule), "reported")
+        way_home: ReturnRequirement = self._choice("way_home", get_args(ReturnRequirement), "reported")
         frame_keys = self._section(FrameKeys, "frame")
         terrain_keys = self._section(TerrainKeys, "terrain")
         if frame_keys is not None:
@@ -174,8 +184,8 @@ class _Reading:
         frame: Frame | None = None
         if places and (frame_keys is not None or not self.local):
             frame = make_frame(places, frame_keys, problems, self.where)
-        site: Site | None = None
-        ground: Ground | None = None
+        site: MissionPlane | None = None
+        ground: GroundWindow | None = None
         if frame is not None and terrain is not None:
             placed, far = place_zones(drafts, frame)
             self._far(far, frame)
@@ -186,13 +196,12 @@ class _Reading:
             if here is not None:
                 problems += faults_near(placed, box)
                 self.notes += unused_notes(published, frame, box)
-                site = Site(here, frame, box, placed, terminals, set(places), self.local)
+                site = MissionPlane(here, frame, box, placed, terminals, set(places), self.local)
                 ground = site.load(problems)
         if problems or frame is None or site is None or ground is None:
             raise self._refusal(problems)
         info = ground.surface.info
-        notes = info.get("notes", ())
-        self.notes += [str(n) for n in notes] if isinstance(notes, tuple) else []
+        self.notes += notes_on(info)
         inputs = {k: v for k, v in info.items() if k not in ("notes", "source")}
         inputs["zones_sha256"] = zones_sha256(drafts)
         source = MissionFile(
@@ -205,7 +214,7 @@ class _Reading:
         )  # fmt: skip
         return replace(source, wider=partial(site.wider, source), at_level=partial(site.at_level, source))
 
-    def zones_alone(self) -> tuple[list[ZoneDraft], list[str]]:
+    def zones_alone(self) -> tuple[list[ZoneDraft], list[Note]]:
         """All zones, far ones and those that are not used too, and the notes on them. Raises InputError."""
         self.problems = [p for p in self.problems if p.where.startswith(f"{self.where}no_fly")]
         self.notes = []
@@ -254,7 +263,7 @@ class _Reading:
             )
             return TERRAIN_ERROR_M
         if altitude_frame != "terrain":
-            self.notes.append("terrain_error_m counts with altitude_frame: terrain only")
+            self.notes.append(Note("terrain_error_without_frame"))
             return 0.0
         return float(value)
 
@@ -287,9 +296,9 @@ class _Reading:
     def _vehicles(self, terrain: TerrainKeys | None, altitude_frame: AltitudeFrame) -> list[Terminals]:
         where = f"{self.where}vehicles"
         value = self.raw.get("vehicles")
-        if value is not None and (not isinstance(value, list) or not 1 <= len(value) <= MOST_VEHICLES):
+        if value is not None and (not isinstance(value, list) or not 1 <= len(value) <= MOST_VEHICLES_OF_FILE):
             dash = "; begin each vehicle with a dash: `- name: …`" if isinstance(value, dict) else ""
-            words = f"must be a list of 1 to {MOST_VEHICLES} vehicles, given {shown(value)}{dash}"
+            words = f"must be a list of 1 to {MOST_VEHICLES_OF_FILE} vehicles, given {shown(value)}{dash}"
             self.problems.append(Problem(where, words))
             return []
         shared = self._section(LimitKeys, "limits") or LimitKeys()
@@ -304,10 +313,13 @@ class _Reading:
             if keys is None:
                 continue
             obstacle_m = 0.0 if terrain is None else terrain.obstacle_height_m
-            vehicle = make_vehicle(keys, shared, at, self.problems, self.notes, local=self.local, obstacle_m=obstacle_m)
+            own: list[Note] = []
+            vehicle = make_vehicle(keys, shared, at, self.problems, own, local=self.local, obstacle_m=obstacle_m)
+            if free := unbounded_motion(keys, local=self.local):
+                self.notes.append(Note("motion_unbounded", keys=free))
             if vehicle is not None:
                 for within in (within_lean, within_vel_max):
-                    vehicle = within(vehicle, keys, at, self.problems, self.notes, local=self.local)
+                    vehicle = within(vehicle, keys, at, self.problems, own, local=self.local)
             if altitude_frame == "terrain" and keys.autopilot == "px4":
                 self.problems.append(
                     Problem(f"{at}.autopilot", "px4 flies no terrain frame; use altitude_frame: relative or amsl")
@@ -321,7 +333,7 @@ class _Reading:
                 make_place(p, f"{at}.via[{j}]", self.problems, self.notes, local=self.local)
                 for j, p in enumerate(keys.via)
             ]
-            self.notes += _one_speed(one, keys)
+            self.notes += [note.of(vehicle=keys.name) for note in (*own, *_one_speed(one, keys))]
             terminals.append(Terminals(keys, vehicle, start, goal, tuple(via)))
         return terminals
 
@@ -371,7 +383,7 @@ class _Reading:
             else:
                 left_out += 1
         if left_out:
-            self.notes.append(f"left out: {counted(left_out, 'zone')} of files, too far away to matter")
+            self.notes.append(Note("zones_left_out", count=left_out))
 
     def _open(self, spec: TerrainSpec) -> OpenTerrain | None:
         where = f"{self.where}terrain"
@@ -394,9 +406,9 @@ class _Reading:
             return None
 
 
-def _one_speed(given: Mapping[str, Any], keys: VehicleKeys) -> list[str]:
+def _one_speed(given: Mapping[str, Any], keys: VehicleKeys) -> list[Note]:
     """A note if one number stands for the slowest and the fastest speed."""
     if isinstance(given.get("speed_m_s"), list | None):
         return []
     slow, fast = keys.speed_m_s
-    return [f"{keys.name}: speed_m_s is one number, read as [{slow:g}, {fast:g}]: always this speed"]
+    return [Note("one_speed", slow_m_s=slow, fast_m_s=fast)]

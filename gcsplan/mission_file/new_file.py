@@ -21,17 +21,17 @@ from gcsplan.mission_file.schema import (
     TerrainKeys,
     VehicleKeys,
 )  # fmt: skip
-from gcsplan.mission_file.units import UNITS, unit_end
+from gcsplan.mission_file.units import UNIT_SYMBOLS, unit_end
 from gcsplan.mission_file.zone_draft import one_line
 from gcsplan.vehicle import PX4_VEL_MAX_M_S, Autopilot
 
-WIDTH = 100
-MIN_AGL_M = 60.0
+COMMENT_WIDTH = 100
+NEW_MIN_AGL_M = 60.0
 WING_RADIUS_M = 100.0
 
 _DECIMAL_PAIR = re.compile(r"\s*([-+]?\d+(?:\.\d+)?)\s*,\s*([-+]?\d+(?:\.\d+)?)\s*")
-_RESERVED = {"yes", "no", "on", "off", "true", "false", "null"}
-_HEAD = """{modeline}
+_RESERVED_WORDS = {"yes", "no", "on", "off", "true", "false", "null"}
+_FILE_HEAD = """{modeline}
 # A mission of gcsplan. Plan it:  gcsplan plan {file}
 # Keys carry their unit in the name. A line such as `#max_agl_m: 120` is a choice that is not made: remove its #.
 # Places are [latitude, longitude] in degrees, or text in quotes: degrees with minutes and seconds, UTM, MGRS.
@@ -64,7 +64,7 @@ class Draft:
     flat_m: float | None = None
     autopilot: Autopilot = Autopilot.ARDUCOPTER
     sysid: int = 1
-    min_agl_m: float = MIN_AGL_M
+    min_agl_m: float = NEW_MIN_AGL_M
     rtl_rel_home_m: float | None = None
     lean_deg: float | None = None
     link: str | None = None
@@ -80,7 +80,9 @@ def place_text(text: str) -> str:
 def text_of(draft: Draft, file: str, name: str) -> str:
     """The commented mission file of ``draft``; ``file`` is the name that it will have."""
     parts = [
-        _HEAD.format(modeline=MODELINE, file=one_line(shlex.quote(file)), name=json.dumps(name, ensure_ascii=False))
+        _FILE_HEAD.format(
+            modeline=MODELINE, file=one_line(shlex.quote(file)), name=json.dumps(name, ensure_ascii=False)
+        )
     ]
     parts += _section("terrain", _terrain(draft))
     parts += _section("limits", _limits(draft))
@@ -93,11 +95,11 @@ def text_of(draft: Draft, file: str, name: str) -> str:
     return "\n".join(part.rstrip("\n") if part else part for part in parts) + "\n"
 
 
-Row = tuple[type[Keys], str, str, bool]
+KeyRow = tuple[type[Keys], str, str, bool]
 """Section, key, value, and whether the choice is made."""
 
 
-def _terrain(draft: Draft) -> Iterator[Row]:
+def _terrain(draft: Draft) -> Iterator[KeyRow]:
     dem = ", ".join(_word(d) for d in draft.dem)
     if draft.dem:
         yield TerrainKeys, "dem", dem if len(draft.dem) == 1 else f"[{dem}]", True
@@ -111,7 +113,7 @@ def _terrain(draft: Draft) -> Iterator[Row]:
     yield TerrainKeys, "obstacle_height_m", "0", True
 
 
-def _limits(draft: Draft) -> Iterator[Row]:
+def _limits(draft: Draft) -> Iterator[KeyRow]:
     wing = draft.autopilot is Autopilot.ARDUPLANE
     yield LimitKeys, "min_agl_m", f"{draft.min_agl_m:g}", True
     yield LimitKeys, "max_agl_m", f"{2.0 * draft.min_agl_m:g}", False
@@ -122,7 +124,7 @@ def _limits(draft: Draft) -> Iterator[Row]:
     yield LimitKeys, "max_climb_deg", "8" if wing else "15", True
 
 
-def _vehicle(draft: Draft) -> Iterator[Row]:
+def _vehicle(draft: Draft) -> Iterator[KeyRow]:
     wing = draft.autopilot is Autopilot.ARDUPLANE
     yield VehicleKeys, "name", f"uav{draft.sysid}", True
     yield VehicleKeys, "sysid", str(draft.sysid), True
@@ -152,12 +154,12 @@ def _vehicle(draft: Draft) -> Iterator[Row]:
     yield VehicleKeys, "energy", f"{{{values}, battery_wh: 400, reserve: 0.2}}", False
 
 
-def _planner() -> Iterator[Row]:
+def _planner() -> Iterator[KeyRow]:
     for key, value in (("name", "optimal"), ("objective", "length"), ("seed", "1"), ("budget_s", "10")):
         yield PlannerKeys, key, value, True
 
 
-def _section(key: str, rows: Iterator[Row], *, dash: bool = False) -> Iterator[str]:
+def _section(key: str, rows: Iterator[KeyRow], *, dash: bool = False) -> Iterator[str]:
     """A section with its keys; with ``dash`` it is the one entry of a list."""
     yield ""
     yield f"# {describe(MissionKeys, key)}"
@@ -173,7 +175,7 @@ def _section(key: str, rows: Iterator[Row], *, dash: bool = False) -> Iterator[s
 def _key(kind: type[Keys], key: str, value: str, indent: str, *, made: bool = True) -> Iterator[str]:
     """The comment of a key and its line."""
     field = kind.model_fields[key]
-    unit = UNITS.get(unit_end(key), "")
+    unit = UNIT_SYMBOLS.get(unit_end(key), "")
     default = LATE_DEFAULTS.get(key, field.default)
     words = [describe(kind, key)]
     if get_origin(field.annotation) is Literal:
@@ -187,12 +189,16 @@ def _key(kind: type[Keys], key: str, value: str, indent: str, *, made: bool = Tr
     elif isinstance(default, list):
         words.append(f"Default: [{', '.join(f'{x:g}' for x in default)}].")
     yield from textwrap.wrap(
-        " ".join(words), WIDTH, initial_indent=f"{indent}# ", subsequent_indent=f"{indent}# ", break_on_hyphens=False
+        " ".join(words),
+        COMMENT_WIDTH,
+        initial_indent=f"{indent}# ",
+        subsequent_indent=f"{indent}# ",
+        break_on_hyphens=False,
     )
     yield f"{indent}{'' if made else '#'}{key}: {value}"
 
 
 def _word(text: str) -> str:
     """A text as a YAML value, in quotes unless it cannot be taken for anything else."""
-    plain = re.fullmatch(r"[A-Za-z/][A-Za-z0-9_./:-]*[A-Za-z0-9_]", text) and text.lower() not in _RESERVED
+    plain = re.fullmatch(r"[A-Za-z/][A-Za-z0-9_./:-]*[A-Za-z0-9_]", text) and text.lower() not in _RESERVED_WORDS
     return text if plain else json.dumps(text, ensure_ascii=False)

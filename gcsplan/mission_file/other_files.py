@@ -9,7 +9,7 @@ __all__ = ["what_else"]
 
 VEHICLES, ZONES, TERRAIN, LOG = "vehicles", "zones", "terrain", "log"
 
-SUFFIXES = {
+SUFFIXES_BY_KIND = {
     VEHICLES: (".waypoints", ".plan"),
     ZONES: (".kml", ".kmz", ".geojson", ".gpkg", ".shp", ".fgb", ".csv", ".zip"),
     TERRAIN: (".tif", ".tiff", ".hgt", ".asc", ".dat"),
@@ -21,7 +21,7 @@ FIRST_BYTES = {
     b"SQLite format 3": ZONES, b"\xa3\x95": LOG,
 }  # fmt: skip
 
-MEMBERS = (("fileType", VEHICLES), ("features", ZONES), ("geometry", ZONES))
+MEMBERS_BY_KIND = (("fileType", VEHICLES), ("features", ZONES), ("geometry", ZONES))
 """Members of JSON by which other files are known; a mission file has none of them."""
 
 
@@ -32,7 +32,7 @@ def what_else(file: Path, raw: object = None) -> str:
     """
     kind = ""
     if isinstance(raw, dict):
-        kind = next((kind for member, kind in MEMBERS if member in raw), "")
+        kind = next((kind for member, kind in MEMBERS_BY_KIND if member in raw), "")
     else:
         try:
             with file.open("rb") as opened:
@@ -40,7 +40,7 @@ def what_else(file: Path, raw: object = None) -> str:
         except (OSError, ValueError):
             return ""
         kind = next((kind for begins, kind in FIRST_BYTES.items() if first.startswith(begins)), "")
-        kind = kind or next((kind for kind, ends in SUFFIXES.items() if file.suffix.lower() in ends), "")
+        kind = kind or next((kind for kind, ends in SUFFIXES_BY_KIND.items() if file.suffix.lower() in ends), "")
     name = shlex.quote(str(file))
     return {
         VEHICLES: f"this is a mission for vehicles, not a mission file: use check (gcsplan check MISSION.yaml {name})",

@@ -20,12 +20,12 @@ from pydantic import (
     model_validator,
 )
 
-from gcsplan.mission_file.keys import Keys, Length, Metres
+from gcsplan.mission_file.keys import FiniteMetres, Keys, Length
 from gcsplan.mission_file.places import (
-    EXAMPLES,
     LAT_LETTERS,
     LON_LETTERS,
     MAX_CHARS,
+    PLACE_EXAMPLES,
     Degrees,
     read_angle,
     read_place,
@@ -35,11 +35,11 @@ from gcsplan.mission_file.places import (
 class LocalPoint(Keys):
     """A point of a local frame, on the ground unless it has ``up_m`` or ``agl_m``."""
 
-    east_m: Metres
+    east_m: FiniteMetres
     """East of the frame's origin."""
-    north_m: Metres
+    north_m: FiniteMetres
     """North of the frame's origin."""
-    up_m: Metres | None = None
+    up_m: FiniteMetres | None = None
     """Height above the frame's zero."""
     agl_m: Length | None = None
     """Height above ground."""
@@ -69,7 +69,7 @@ def _named_places(schema: dict[str, Any]) -> None:
 _ONE_OR_TWO_TEXTS = WithJsonSchema(
     {
         "anyOf": [
-            {"type": "string", "maxLength": MAX_CHARS, "examples": list(EXAMPLES)},
+            {"type": "string", "maxLength": MAX_CHARS, "examples": list(PLACE_EXAMPLES)},
             {"type": "array", "items": {"type": "string"}, "minItems": 2, "maxItems": 2},
         ]
     }

@@ -8,17 +8,17 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
-from gcsplan.mavlink.mission.return_route import Route
+from gcsplan.mavlink.mission.mission import AltitudeFrame
+from gcsplan.mavlink.mission.return_route import ReturnRoute
 from gcsplan.mission_file.airspace.times import Hours
-from gcsplan.vehicle import Vehicle
+from gcsplan.notes.note import Note
+from gcsplan.vehicle import MissionEnd, Vehicle
 from gcsplan.world.frame import Frame
 from gcsplan.world.geoid import GeoidGrid
 from gcsplan.world.surface import Surface
 from gcsplan.world.zones import Zone
 
-AltitudeFrame = Literal["relative", "amsl", "terrain"]
-End = Literal["land", "loiter", "rtl", "none"]
-ReturnRule = Literal["required", "reported"]
+ReturnRequirement = Literal["required", "reported"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,9 +64,9 @@ class VehicleRequest:
     takeoff_agl_m: float | None = None
     approach_agl_m: float | None = None
     via: tuple[tuple[float, float, float | None], ...] = ()
-    end: End = "land"
+    end: MissionEnd = "land"
     rtl_rel_home_m: float | None = None
-    return_route: Route | None = None
+    return_route: ReturnRoute | None = None
     takeoff_heading_deg: float | None = None
     start_amsl_m: float | None = None
     goal_amsl_m: float | None = None
@@ -132,10 +132,10 @@ class MissionFile:
     terrain_error_m: float
     local: bool
     inputs: dict[str, object]
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
     wider: Callable[[float, int], MissionFile | None] | None = None
     level: int = 0
-    way_home: ReturnRule = "reported"
+    way_home: ReturnRequirement = "reported"
     reaching: Callable[[Sequence[tuple[float, float]]], MissionFile] | None = None
     geoid: GeoidGrid | None = None
     hours: Hours | None = None

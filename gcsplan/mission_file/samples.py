@@ -14,7 +14,7 @@ from gcsplan.mission_file.schema import nearest
 from gcsplan.world.input_files import tell_file
 
 PREFIX = "sample:"
-FOLDERS = (Path(__file__).parents[1] / "missions", Path(__file__).parents[2] / "missions")
+SAMPLE_FOLDERS = (Path(__file__).parents[1] / "missions", Path(__file__).parents[2] / "missions")
 """Where the files are: within an installed package, or beside the sources."""
 
 
@@ -50,4 +50,4 @@ def hint(file: Path) -> str:
 
 
 def _folder() -> Path:
-    return next((folder for folder in FOLDERS if folder.is_dir()), FOLDERS[0])
+    return next((folder for folder in SAMPLE_FOLDERS if folder.is_dir()), SAMPLE_FOLDERS[0])

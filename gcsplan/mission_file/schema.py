@@ -19,12 +19,12 @@ from pydantic import (
     Tag,
 )
 
-from gcsplan.mission_file.keys import FAR_M, Keys, Length, Metres
+from gcsplan.mission_file.keys import LARGEST_KEY_M, FiniteMetres, Keys, Length
 from gcsplan.mission_file.point_keys import POINT_FORMS, LatLon, Point, ViaPoint, in_own_brackets
 
 NAME_PATTERN = r"^[A-Za-z0-9_-]+$"
 
-LEAST = 1e-3
+LEAST_POSITIVE = 1e-3
 """Smallest speed, acceleration, or battery capacity in J: a division by less has no useful bound."""
 
 
@@ -32,19 +32,19 @@ MOST_VOLTS = 10_000.0
 
 
 def _no_trifle(value: float) -> float:
-    if value < LEAST:
-        raise ValueError(f"must be at least {LEAST:g}, given {value:g}")
+    if value < LEAST_POSITIVE:
+        raise ValueError(f"must be at least {LEAST_POSITIVE:g}, given {value:g}")
     return value
 
 
 Points = Annotated[list[Point], BeforeValidator(in_own_brackets)]
-Positive = Annotated[float, Field(gt=0.0, le=FAR_M)]
+Positive = Annotated[float, Field(gt=0.0, le=LARGEST_KEY_M)]
 Angle = Annotated[float, Field(gt=0.0, le=90.0)]
 Speed = Annotated[float, Field(gt=0.0, le=300.0), AfterValidator(_no_trifle)]
 Accel = Annotated[float, Field(gt=0.0, le=100.0), AfterValidator(_no_trifle)]
-Seconds = Annotated[float, Field(ge=0.0, le=86400.0)]
+DaySeconds = Annotated[float, Field(ge=0.0, le=86400.0)]
 Text = Annotated[str, Field(min_length=1, max_length=300)]
-Encoding = Literal["paper", "box", "sections", "sections-whole", "polar", "polar-signed", "bspline", "offsets"]
+EncodingName = Literal["paper", "box", "sections", "sections-whole", "polar", "polar-signed", "bspline", "offsets"]
 SwarmCost = Literal["krill", "ssgwo", "msfoa", "abo", "ib-abc"]
 
 
@@ -56,7 +56,7 @@ def _same(speed_m_s: float) -> list[float]:
     return [speed_m_s, speed_m_s]
 
 
-Pair = Annotated[list[Metres], Field(min_length=2, max_length=2)]
+MetrePair = Annotated[list[FiniteMetres], Field(min_length=2, max_length=2)]
 if TYPE_CHECKING:  # one speed becomes two
     SpeedRange = list[float]
 else:
@@ -65,7 +65,7 @@ else:
         | Annotated[list[Speed], Field(min_length=2, max_length=2), Tag("several")],
         Discriminator(_count),
     ]
-FORMS = ("[lat, lon]", "text", *POINT_FORMS, "one", "several")
+POINT_FORM_NAMES = ("[lat, lon]", "text", *POINT_FORMS, "one", "several")
 """The tags of unions, which are no part of a key's place."""
 
 
@@ -74,18 +74,18 @@ class FrameKeys(Keys):
 
     origin: LatLon
     """Latitude and longitude of the point 0, 0."""
-    amsl_m: Metres = 0.0
+    amsl_m: FiniteMetres = 0.0
     """Altitude of `up_m: 0` above sea level."""
 
 
 class PeakKeys(Keys):
     """One peak, metres of the local frame."""
 
-    center: Pair
+    center: MetrePair
     """East and north of its top, metres."""
-    height_m: Metres
+    height_m: FiniteMetres
     """Height of its top above the flat ground."""
-    decay_m: Annotated[list[Annotated[float, Field(ge=1e-3, le=FAR_M)]], Field(min_length=2, max_length=2)]
+    decay_m: Annotated[list[Annotated[float, Field(ge=1e-3, le=LARGEST_KEY_M)]], Field(min_length=2, max_length=2)]
     """East and north distance from the top at which the height has fallen to 37 % (1/e)."""
 
 
@@ -111,7 +111,7 @@ class TerrainKeys(Keys):
     """Unit of heights in a raster; it counts before the unit that the file or the datum states."""
     nodata: Annotated[float, Field(allow_inf_nan=False)] | Literal["none"] | None = None
     """A number of the raster that stands for no height, such as `0`; `none`: exact zeros are ground or sea."""
-    flat_m: Metres | None = None
+    flat_m: FiniteMetres | None = None
     """No raster: flat ground at this altitude; in a mission with a frame it counts above the frame's zero."""
     peaks: Annotated[list[PeakKeys], Field(min_length=1, max_length=1000)] | None = None
     """No raster: hills on flat ground, in a mission with a frame."""
@@ -132,7 +132,7 @@ class LimitKeys(Keys):
     """Lowest height above the ground and what stands on it; required here or in every vehicle."""
     max_agl_m: Positive | None = None
     """Greatest height above ground."""
-    max_amsl_m: Metres | None = None
+    max_amsl_m: FiniteMetres | None = None
     """Greatest altitude above sea level."""
     horizontal_clearance_m: Length | None = None
     """Least distance to every zone, and to ground that reaches flight level."""
@@ -171,13 +171,13 @@ class ZoneKeys(Keys):
     """Of an authority's file: the identifiers or names of zones that the mission is authorised to enter."""
     flight_level_error_m: Length | None = None
     """Of an authority's file: how far flight levels may be from heights above sea level; else they limit nothing."""
-    floor_agl_m: Metres | None = None
+    floor_agl_m: FiniteMetres | None = None
     """Floor of the zone above ground, point by point; if absent or 0, nothing passes below."""
-    ceiling_agl_m: Metres | None = None
+    ceiling_agl_m: FiniteMetres | None = None
     """Ceiling of the zone above ground, point by point; without a ceiling, nothing passes above."""
-    floor_amsl_m: Metres | None = None
+    floor_amsl_m: FiniteMetres | None = None
     """Floor of the zone above sea level."""
-    ceiling_amsl_m: Metres | None = None
+    ceiling_amsl_m: FiniteMetres | None = None
     """Ceiling of the zone above sea level."""
 
 
@@ -283,7 +283,7 @@ class ArrivalKeys(Keys):
     """One after the other, all at the same time, or without a rule."""
     order: Annotated[_Order | None, BeforeValidator(_order_form)] = None
     """Every vehicle's name once, or `best`; if absent, the order of the file."""
-    interval_s: Seconds | None = None
+    interval_s: DaySeconds | None = None
     """Time between one arrival and the next; required for a sequence."""
     arrive_s: Annotated[float, Field(gt=0.0, le=86400.0)] | None = None
     """Arrival time of the first of a sequence, or of all together."""
@@ -291,9 +291,9 @@ class ArrivalKeys(Keys):
     """Whose fastest flight sets the time of a sequence: the first vehicle's, or the whole fleet's."""
     hold: Literal["ground", "gate", "none"] = "ground"
     """Where a vehicle waits that would arrive too early."""
-    window_s: Seconds = 0.0
+    window_s: DaySeconds = 0.0
     """Each vehicle may arrive this much earlier or later."""
-    pad_clear_s: Seconds | None = None
+    pad_clear_s: DaySeconds | None = None
     """Time after a landing at which the pad is free again; if absent, never."""
     separation_m: Length | None = None
     """Least distance between any two vehicles, from take-off to landing."""
@@ -303,7 +303,7 @@ class ArrivalKeys(Keys):
 
 def _plain_values(parameters: dict[str, Any]) -> dict[str, Any]:
     for key, value in parameters.items():
-        if not isinstance(value, int | float | str) or not (isinstance(value, str) or abs(value) <= FAR_M):
+        if not isinstance(value, int | float | str) or not (isinstance(value, str) or abs(value) <= LARGEST_KEY_M):
             raise ValueError(f"{key[:80]} must be a plain number or word, given {shown(value)}")
     return parameters
 
@@ -323,7 +323,7 @@ class PlannerKeys(Keys):
     """Time for the search after the first path; a first path may take three times as long."""
     budget_mb: Annotated[float, Field(ge=64.0, le=1e6)] = 1024.0
     """Memory for the searches, in addition to the terrain itself."""
-    encoding: Encoding | None = None
+    encoding: EncodingName | None = None
     """How the numbers of a swarm become a path; `paper` is the encoding of the planner's own paper."""
     cost: SwarmCost | None = None
     """The paper whose cost a swarm minimises."""

@@ -14,23 +14,23 @@ from typing import Any
 import yaml
 
 from gcsplan.errors import InputError
-from gcsplan.mission_file.places import EXAMPLES
+from gcsplan.mission_file.places import PLACE_EXAMPLES
 from gcsplan.mission_file.yaml_slips import cure, missing_space
 
-MAX_BYTES = 5_000_000
-MAX_DEPTH = 40
+MAX_YAML_BYTES = 5_000_000
+MAX_YAML_DEPTH = 40
 MAX_ALIASES = 200
-MAX_NODES = 500_000
+MAX_YAML_NODES = 500_000
 """Most values, with every alias expanded."""
 
-_TOO_DEEP = f"the file is nested more than {MAX_DEPTH} levels deep"
+_TOO_DEEP = f"the file is nested more than {MAX_YAML_DEPTH} levels deep"
 
 _TAG = "tag:yaml.org,2002:"
-_PLAIN = "plain"
+_PLAIN_STYLE = "plain"
 _NULL = re.compile(r"(?:~|null|Null|NULL|)\Z")
 _BOOL = re.compile(r"(?:true|True|TRUE|false|False|FALSE)\Z")
 _INT = re.compile(r"(?:[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+)\Z")
-_FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?\Z")
+_YAML_FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?\Z")
 _SPECIAL = re.compile(r"(?:[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))\Z")
 
 _Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -41,7 +41,7 @@ class Loader(_Base):  # type: ignore[misc]
 
     def resolve(self, kind: type[yaml.Node], value: str, implicit: Any) -> str:
         if kind is yaml.ScalarNode:
-            return _PLAIN if implicit[0] else _TAG + "str"
+            return _PLAIN_STYLE if implicit[0] else _TAG + "str"
         return _TAG + ("seq" if kind is yaml.SequenceNode else "map")
 
 
@@ -51,8 +51,10 @@ def read_yaml(text: str, *, where: str) -> Any:
     Raises InputError, with line and column, for text that is not YAML, for tags, duplicate keys, and for text beyond
     the bounds of this module.
     """
-    if len(text) > MAX_BYTES:
-        raise InputError(f"the file has {len(text)} characters, more than {MAX_BYTES // 10**6} million", where=where)
+    if len(text) > MAX_YAML_BYTES:
+        raise InputError(
+            f"the file has {len(text)} characters, more than {MAX_YAML_BYTES // 10**6} million", where=where
+        )
     try:
         _measure(text, where)
         node = yaml.compose(text, Loader=Loader)
@@ -116,15 +118,15 @@ def _measure(text: str, where: str) -> None:
             depth += 1
         elif isinstance(event, yaml.CollectionEndEvent):
             depth -= 1
-        if depth > MAX_DEPTH:
+        if depth > MAX_YAML_DEPTH:
             raise InputError(_TOO_DEEP, where=_place(where, event.start_mark))
-        for what, count, most in (("aliases", aliases, MAX_ALIASES), ("values", nodes, MAX_NODES)):
+        for what, count, most in (("aliases", aliases, MAX_ALIASES), ("values", nodes, MAX_YAML_NODES)):
             if count > most:
                 raise InputError(f"the file has more than {most} {what}", where=_place(where, event.start_mark))
 
 
 def _count(node: yaml.Node, sizes: dict[int, int], where: str) -> int:
-    """The number of values below ``node`` with every alias expanded; refuses loops and more than `MAX_NODES`."""
+    """The number of values below ``node`` with every alias expanded; refuses loops and more than `MAX_YAML_NODES`."""
     if isinstance(node, yaml.ScalarNode):
         return 1
     known = sizes.get(id(node))
@@ -135,8 +137,8 @@ def _count(node: yaml.Node, sizes: dict[int, int], where: str) -> int:
     sizes[id(node)] = -1
     children = node.value if isinstance(node, yaml.SequenceNode) else [x for pair in node.value for x in pair]
     total = 1 + sum(_count(child, sizes, where) for child in children)
-    if total > MAX_NODES:
-        raise InputError(f"with its aliases followed the file has more than {MAX_NODES} values", where=where)
+    if total > MAX_YAML_NODES:
+        raise InputError(f"with its aliases followed the file has more than {MAX_YAML_NODES} values", where=where)
     sizes[id(node)] = total
     return total
 
@@ -159,14 +161,14 @@ def _mapping(node: yaml.MappingNode, where: str) -> dict[str, Any]:
         if not isinstance(key, str):
             number = isinstance(key, int | float) and not isinstance(key, bool)
             hint = (
-                f"; decimals begin with a point, and a place within braces has brackets: `[{EXAMPLES[0]}]`"
+                f"; decimals begin with a point, and a place within braces has brackets: `[{PLACE_EXAMPLES[0]}]`"
                 if number
                 else ""
             )
             raise InputError(
                 f"a key must be a word, given {_shown(key_node)}{hint}", where=_place(where, key_node.start_mark)
             )
-        if key == "<<" and key_node.tag == _PLAIN:
+        if key == "<<" and key_node.tag == _PLAIN_STYLE:
             for part in value_node.value if isinstance(value_node, yaml.SequenceNode) else [value_node]:
                 if not isinstance(part, yaml.MappingNode):
                     raise InputError("`<<` merges mappings only", where=_place(where, part.start_mark))
@@ -175,7 +177,7 @@ def _mapping(node: yaml.MappingNode, where: str) -> dict[str, Any]:
             continue
         if key in found:
             raise InputError(f"the key `{key}` stands twice; keep one", where=_place(where, key_node.start_mark))
-        tight = missing_space(key) if value_node.tag == _PLAIN and not value_node.value else ""
+        tight = missing_space(key) if value_node.tag == _PLAIN_STYLE and not value_node.value else ""
         if tight:  # `{sysid:1}` is a mapping with the key `sysid:1`
             raise InputError(tight, where=_place(where, key_node.start_mark))
         found[key] = _value(value_node, where)
@@ -184,7 +186,7 @@ def _mapping(node: yaml.MappingNode, where: str) -> dict[str, Any]:
 
 def _scalar(node: yaml.Node, where: str) -> Any:
     text = node.value
-    if node.tag != _PLAIN:  # quoted, a block of text, or with an explicit tag
+    if node.tag != _PLAIN_STYLE:  # quoted, a block of text, or with an explicit tag
         _require_tag(node, "str", where)
         return text
     if _NULL.match(text):
@@ -196,7 +198,7 @@ def _scalar(node: yaml.Node, where: str) -> Any:
             raise InputError(f"a number of {len(text)} digits", where=_place(where, node.start_mark))
         base = {"0o": 8, "0x": 16}.get(text[:2], 10)
         return int(text, base)
-    if _FLOAT.match(text):
+    if _YAML_FLOAT.match(text):
         return float(text)
     if _SPECIAL.match(text):
         return math.nan if "n" in text.lower().replace("inf", "") else math.copysign(math.inf, -1 if "-" in text else 1)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from gcsplan.errors import Problem
 from gcsplan.mission_file.request import VehicleRequest
 from gcsplan.mission_file.schema import VehicleKeys
-from gcsplan.mission_file.world import Place, zone_around
+from gcsplan.mission_file.world import MissionPlace, zone_around
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.frame import Frame
 from gcsplan.world.surface import Surface
@@ -27,12 +27,12 @@ class Terminals:
 
     keys: VehicleKeys
     vehicle: Vehicle | None
-    start: Place | None
-    goal: Place | None
-    via: tuple[Place | None, ...]
+    start: MissionPlace | None
+    goal: MissionPlace | None
+    via: tuple[MissionPlace | None, ...]
 
     @property
-    def all(self) -> list[Place]:
+    def all(self) -> list[MissionPlace]:
         """The places that are right so far."""
         return [p for p in (self.start, self.goal, *self.via) if p is not None]
 
@@ -50,7 +50,7 @@ def make_request(
     frame: Frame,
     surface: Surface,
     zones: Sequence[Zone],
-    good: Collection[Place],
+    good: Collection[MissionPlace],
     problems: list[Problem],
 ) -> VehicleRequest | None:
     """A vehicle's request over the ground; None, and ``problems``, if a place is on unknown ground or in a zone.
@@ -86,7 +86,9 @@ def make_request(
     )
 
 
-def _ground(place: Place, frame: Frame, surface: Surface, problems: list[Problem]) -> tuple[float, float, float] | None:
+def _ground(
+    place: MissionPlace, frame: Frame, surface: Surface, problems: list[Problem]
+) -> tuple[float, float, float] | None:
     """East, north and ground; None, and a problem, if the ground is unknown."""
     east, north = place.in_plane(frame)
     ground_m = float(surface.ground_at(east, north))
@@ -99,7 +101,7 @@ def _ground(place: Place, frame: Frame, surface: Surface, problems: list[Problem
 
 def _end(
     what: str,
-    place: Place,
+    place: MissionPlace,
     frame: Frame,
     surface: Surface,
     zones: Sequence[Zone],
@@ -128,7 +130,7 @@ def _end(
 
 
 def _via(
-    place: Place, frame: Frame, surface: Surface, zones: Sequence[Zone], problems: list[Problem]
+    place: MissionPlace, frame: Frame, surface: Surface, zones: Sequence[Zone], problems: list[Problem]
 ) -> tuple[float, float, float | None] | None:
     at = _ground(place, frame, surface, problems)
     if at is None:

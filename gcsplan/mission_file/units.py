@@ -17,9 +17,10 @@ from typing import Any, NamedTuple, TypeGuard, get_args
 from gcsplan.errors import Problem
 from gcsplan.mission_file.keys import Keys
 from gcsplan.mission_file.schema import MOST_VOLTS, MissionKeys, shown
+from gcsplan.notes.note import Note
 from gcsplan.units import FOOT, KM_PER_HOUR, KNOT, MILLIAMPERE_HOUR, MINUTE, NAUTICAL_MILE, WATT_HOUR, Unit
 
-UNITS = {
+UNIT_SYMBOLS = {
     "_j_per_m": "J/m", "_m_s3": "m/s³", "_m_s2": "m/s²", "_m_s": "m/s", "_percent": "%", "_deg": "°", "_mb": "MB",
     "_m": "m", "_s": "s", "_j": "J", "_w": "W", "_v": "V",
 }  # fmt: skip
@@ -39,7 +40,7 @@ OTHERS: Mapping[str, Mapping[str, Unit]] = {
 
 CHARGE = "_mah"
 
-MOST_NOTES = 20
+MOST_CONVERSIONS = 20
 """Most notes on conversions; more are counted."""
 
 
@@ -60,26 +61,26 @@ class Written(NamedTuple):
 class Converted:
     """A mission in its own units: the mapping, what was converted, and the mistakes.
 
-    ``given`` maps the place of each converted key to its place in the file and both values in words.
+    ``given`` maps the place of each converted key to its place in the file and how it was converted.
     """
 
     raw: dict[str, Any]
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
     problems: tuple[Problem, ...]
-    given: Mapping[str, tuple[str, str]]
+    given: Mapping[str, tuple[str, Note]]
 
     def as_written(self, problem: Problem) -> Problem:
         """The problem at the key that is in the file, if it is about a converted one."""
-        for place, (written, words) in self.given.items():
+        for place, (written, how) in self.given.items():
             rest = problem.where.removeprefix(place)
             if rest != problem.where and rest[:1] in ("", "[", "."):
-                return replace(problem, where=written + rest, message=f"{problem.message} ({words})")
+                return replace(problem, where=written + rest, message=f"{problem.message} ({how})")
         return problem
 
 
 def unit_end(key: str) -> str:
     """The end of a key that is its unit, such as ``_m``, or an empty text."""
-    return next((end for end in UNITS if key.endswith(end)), "")
+    return next((end for end in UNIT_SYMBOLS if key.endswith(end)), "")
 
 
 def other_names(keys: Iterable[str]) -> dict[str, Written]:
@@ -92,8 +93,8 @@ def other_names(keys: Iterable[str]) -> dict[str, Written]:
     }
 
 
-def nearest_key(key: str, known: Iterable[str]) -> str:
-    """``; did you mean …?`` with the nearest key, or an empty text.
+def nearest_keys(key: str, known: Iterable[str]) -> tuple[tuple[str, ...], str]:
+    """The nearest key under all the names that may be meant, and ``; did you mean …?``; both empty if none is near.
 
     For a key that ends in another unit the suggestion says the units that it may have, since the value differs too.
     """
@@ -101,7 +102,7 @@ def nearest_key(key: str, known: Iterable[str]) -> str:
     others = other_names(own)
     close = difflib.get_close_matches(key[:80], [*own, *others], n=1, cutoff=0.6)
     if not close:
-        return ""
+        return (), ""
     found = close[0]
     canonical = others[found].key if found in others else found
     unit = unit_end(canonical)
@@ -110,24 +111,26 @@ def nearest_key(key: str, known: Iterable[str]) -> str:
         end = unit
         found = canonical
     if not unit or key.endswith(end) or key.rsplit("_", 1)[-1] in canonical.removesuffix(unit).split("_"):
-        return f"; did you mean {found}?"
-    names = [f"{canonical} (in {UNITS[unit]})", *(name for name, written in others.items() if written.key == canonical)]
-    return f"; did you mean {' or '.join([', '.join(names[:-1]), names[-1]] if len(names) > 1 else names)}?"
+        return (found,), f"; did you mean {found}?"
+    more = [name for name, written in others.items() if written.key == canonical]
+    names = [f"{canonical} (in {UNIT_SYMBOLS[unit]})", *more]
+    words = " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    return (canonical, *more), f"; did you mean {words}?"
 
 
 def in_own_units(raw: Mapping[str, Any], where: str) -> Converted:
     """The mission ``raw`` with every key under its own name; ``where`` precedes the places (``FILE: ``)."""
     walk = _Walk()
     plain = walk.section(MissionKeys, raw, where)
-    said: dict[str, list[str]] = {}
-    for written, words in walk.given.values():
-        said.setdefault(words, []).append(written.removeprefix(where))
+    places: dict[Note, list[str]] = {}
+    for written, how in walk.given.values():
+        places.setdefault(how, []).append(written.removeprefix(where))
     notes = [
-        f"{places[0]}: {words}" + (f" (and {len(places) - 1} more)" if len(places) > 1 else "")
-        for words, places in said.items()
+        (how if len(at) == 1 else Note("and_as_many_more", note=how, count=len(at) - 1)).of(place=at[0])
+        for how, at in places.items()
     ]
-    if len(notes) > MOST_NOTES:
-        notes[MOST_NOTES:] = [f"{len(notes) - MOST_NOTES} more values are converted from other units"]
+    if len(notes) > MOST_CONVERSIONS:
+        notes[MOST_CONVERSIONS:] = [Note("more_values_converted", count=len(notes) - MOST_CONVERSIONS)]
     return Converted(plain, tuple(notes), tuple(walk.problems), walk.given)
 
 
@@ -136,7 +139,7 @@ class _Walk:
 
     def __init__(self) -> None:
         self.problems: list[Problem] = []
-        self.given: dict[str, tuple[str, str]] = {}
+        self.given: dict[str, tuple[str, Note]] = {}
 
     def section(self, kind: type[Keys], raw: Mapping[str, Any], where: str) -> dict[str, Any]:
         """A section in its own units; ``where`` precedes its keys."""
@@ -178,7 +181,7 @@ class _Walk:
         twice = [name for name in raw if name == written.key or (name != key and name in _siblings(written))]
         if twice:
             self.problems.append(Problem(place, f"stands as {' and '.join(twice)} too; keep one"))
-        size, volts = written.other.size, ""
+        size, volts = written.other.size, 0.0
         if written.end == CHARGE:
             beside = _volts_of(written)
             volt = raw.get(beside)
@@ -187,13 +190,16 @@ class _Walk:
                 words = f"needs {beside}, the nominal voltage: a number above 0 and at most {MOST_VOLTS:g}{given}"
                 self.problems.append(Problem(place, words))
                 return
-            size, volts = size * float(volt), f" at {volt:g} V"
+            volts = float(volt)
+            size *= volts
         plain[written.key] = own = _times(value, size)
-        words = f"{_figures(value)} {written.other.symbol}{volts}, read as " if own is not value else "read as "
-        self.given[where + written.key] = (
-            place,
-            words + written.key + (f": {_figures(own)}" if own is not value else ""),
-        )
+        how = Note("key_read_as_another", own_key=written.key)
+        if own is not value:
+            how = Note(
+                "charge_converted" if volts else "value_converted", given=_figures(value), symbol=written.other.symbol,
+                volts=volts, own_key=written.key, value=_figures(own),
+            )  # fmt: skip
+        self.given[where + written.key] = (place, how)
 
 
 @cache

@@ -12,6 +12,7 @@ from gcsplan.fleet.lean import lean_needed_deg
 from gcsplan.mission_file.energy import make_energy
 from gcsplan.mission_file.request import ArrivalRequest
 from gcsplan.mission_file.schema import ArrivalKeys, LimitKeys, VehicleKeys, nearest
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import (
     DEFAULT_LEAN_DEG,
     LARGEST_LEAN_DEG,
@@ -40,7 +41,7 @@ GRAVITY_M_S2 = 9.80665
 
 SEPARATION_M = 30.0
 
-ROUNDING_M = 0.05
+CURE_ROUNDING_M = 0.05
 """At least what planners keep beyond the errors, since altitudes are stored in centimetres; for advice alone."""
 
 MOTION = (
@@ -84,10 +85,12 @@ def check_unique(vehicles: Sequence[Any], where: str, problems: list[Problem]) -
 
 
 def make_vehicle(
-    keys: VehicleKeys, shared: LimitKeys, where: str, problems: list[Problem], notes: list[str],
+    keys: VehicleKeys, shared: LimitKeys, where: str, problems: list[Problem], notes: list[Note],
     *, local: bool, obstacle_m: float,
 ) -> Vehicle | None:  # fmt: skip
     """A vehicle with its limits merged: the file's, overridden by its own. None, and ``problems``, if it is wrong.
+
+    ``notes`` get what is said of how its keys were read, without its name.
 
     ``obstacle_m`` is the obstacle height that applies everywhere; it is added to min AGL in the least take-off height.
     """
@@ -104,6 +107,7 @@ def make_vehicle(
             Problem(
                 f"{where}.rtl_rel_home_m",
                 "is missing: end: rtl needs the height above home that the vehicle returns at (its own parameter)",
+                "missing",
             )
         )
     if limits is not None:
@@ -116,12 +120,12 @@ def make_vehicle(
         name=keys.name, sysid=keys.sysid, autopilot=Autopilot(keys.autopilot), limits=limits,
         speed_min_m_s=slow, speed_max_m_s=fast, turn_radius_m=keys.turn_radius_m,
         energy=energy, link=keys.link, climb_out=climb_out,
-        **(_wing_motion(keys, limits) if keys.turn_radius_m > 0.0 else _motion(keys, notes, local=local)),
+        **(_wing_motion(keys, limits) if keys.turn_radius_m > 0.0 else _motion(keys, local=local)),
     )  # fmt: skip
 
 
 def within_lean(
-    vehicle: Vehicle, keys: VehicleKeys, where: str, problems: list[Problem], notes: list[str], *, local: bool
+    vehicle: Vehicle, keys: VehicleKeys, where: str, problems: list[Problem], notes: list[Note], *, local: bool
 ) -> Vehicle:
     """``vehicle`` with the speeds that its lean angle allows, and a note if that is less than its keys want.
 
@@ -137,16 +141,18 @@ def within_lean(
     most, wanted = fastest_at_m_s(leans_deg), vehicle.speed_max_m_s
     if wanted > most:
         needs_deg = max(math.ceil(lean_for_deg(wanted) - 1e-6), round(lean_needed_deg(wanted)))
-        angle = f"a lean of {leans_deg:g}°" + (", ArduCopter's default," if lean_deg is None else " (lean_angle_deg)")
-        cure = "" if needs_deg > LARGEST_LEAN_DEG else (
-            f"; for {wanted:g} m/s write lean_angle_deg: {needs_deg}, and set {lean_words(needs_deg)}"
+        curable = needs_deg <= LARGEST_LEAN_DEG
+        notes.append(
+            Note(
+                "lean_bounds_speed_curably" if curable else "lean_bounds_speed", most_m_s=most, wanted_m_s=wanted,
+                lean_deg=leans_deg, by_default=lean_deg is None, needs_deg=needs_deg, setting=lean_words(needs_deg),
+            )
         )  # fmt: skip
-        notes.append(f"{vehicle.name}: planned with {most:g} m/s, not {wanted:g}: {angle} allows about that{cure}")
     return _no_faster(replace(vehicle, lean_angle_deg=leans_deg), most)
 
 
 def within_vel_max(
-    vehicle: Vehicle, keys: VehicleKeys, where: str, problems: list[Problem], notes: list[str], *, local: bool
+    vehicle: Vehicle, keys: VehicleKeys, where: str, problems: list[Problem], notes: list[Note], *, local: bool
 ) -> Vehicle:
     """``vehicle`` with the speeds that PX4's MPC_XY_VEL_MAX allows, and a note if that is less than its keys want.
 
@@ -161,11 +167,7 @@ def within_vel_max(
     own = PX4_VEL_MAX_M_S if most is None else most
     wanted = vehicle.speed_max_m_s
     if wanted > own:
-        why = f"MPC_XY_VEL_MAX {own:g} m/s" + (", PX4's default," if most is None else " (mpc_xy_vel_max_m_s)")
-        notes.append(
-            f"{vehicle.name}: planned with {own:g} m/s, not {wanted:g}: {why} allows no more; for {wanted:g} m/s write "
-            f"mpc_xy_vel_max_m_s: {wanted:g}, and set MPC_XY_VEL_MAX {wanted:g}"
-        )
+        notes.append(Note("velocity_bounds_speed", most_m_s=own, wanted_m_s=wanted, by_default=most is None))
     return _no_faster(replace(vehicle, vel_max_m_s=own), own)
 
 
@@ -219,7 +221,9 @@ def _climb_out(keys: VehicleKeys, limits: Limits | None, where: str, problems: l
     if rate is None:
         if speed is not None:
             problems.append(
-                Problem(f"{where}.climb_out_m_s", "is missing; climb_out_speed_m_s is the speed of its climb")
+                Problem(
+                    f"{where}.climb_out_m_s", "is missing; climb_out_speed_m_s is the speed of its climb", "missing"
+                )
             )
         return None
     if keys.turn_radius_m <= 0.0:
@@ -256,19 +260,21 @@ def _wing_motion(keys: VehicleKeys, limits: Limits) -> dict[str, float]:
     return {key: math.inf for key in MOTION if key.endswith(("_m_s2", "_m_s3"))} | {"land_m_s": math.inf} | rates | own
 
 
-def _motion(keys: VehicleKeys, notes: list[str], *, local: bool) -> dict[str, float]:
-    free = [key for key in MOTION if local and key not in keys.model_fields_set]
-    if free:
-        notes.append(
-            f"in local metres {', '.join(free)} bound nothing unless they are given: flight times are the ideal ones "
-            "of the papers"
-        )
+def unbounded_motion(keys: VehicleKeys, *, local: bool) -> tuple[str, ...]:
+    """The keys of a copter's motion that bound nothing: in local metres those that are not given."""
+    if not local or keys.turn_radius_m > 0.0:
+        return ()
+    return tuple(key for key in MOTION if key not in keys.model_fields_set)
+
+
+def _motion(keys: VehicleKeys, *, local: bool) -> dict[str, float]:
+    free = unbounded_motion(keys, local=local)
     own = {k: v for k, v in PX4_MOTION.items() if keys.autopilot == "px4" and k not in keys.model_fields_set}
     return {key: math.inf if key in free else own.get(key, getattr(keys, key)) for key in MOTION}
 
 
 def _limits(
-    keys: VehicleKeys, shared: LimitKeys, where: str, problems: list[Problem], notes: list[str], *, local: bool
+    keys: VehicleKeys, shared: LimitKeys, where: str, problems: list[Problem], notes: list[Note], *, local: bool
 ) -> Limits | None:
     names = tuple(LimitKeys.model_fields)
     own = {k: v for k, v in keys.given.items() if k in names}
@@ -277,18 +283,18 @@ def _limits(
         problems.append(Problem(f"{where}.{key}", f"stands in limits.{key} too; keep one"))
     merged: dict[str, Any] = shared.given | nested | own
     if merged.get("min_agl_m") is None:
-        problems.append(Problem(f"{where}.min_agl_m", "is missing; give it here or in limits"))
+        problems.append(Problem(f"{where}.min_agl_m", "is missing; give it here or in limits", "missing_limit"))
         return None
     for key, default in ERRORS.items():
         if merged.get(key) is None:
             merged[key] = 0.0 if local else default
             if not local:
-                notes.append(f"{keys.name}: {key} is not given, {default:g} is taken")
+                notes.append(Note("limit_assumed", limit=key, value=default))
     if merged.get("max_climb_deg") is None:
         merged["max_climb_deg"] = 90.0
         if keys.autopilot == "arduplane":
             merged["max_climb_deg"] = PLANE_CLIMB_DEG
-            notes.append(f"{keys.name}: max_climb_deg is not given, {PLANE_CLIMB_DEG:g} is taken for a plane")
+            notes.append(Note("plane_climb_assumed", climb_deg=PLANE_CLIMB_DEG))
     if merged.get("max_descent_deg") is None:
         merged["max_descent_deg"] = merged["max_climb_deg"]
     return Limits(**{f.name: merged.get(f.name) for f in fields(Limits)})  # type: ignore[arg-type]
@@ -313,7 +319,7 @@ def _check_heights(keys: VehicleKeys, limits: Limits, where: str, problems: list
                 Problem(
                     f"{where}.max_agl_m",
                     f"leaves no room: {words} is above max_agl_m {limits.max_agl_m:g} - altitude_error_m {error_m:g}; "
-                    f"write {math.ceil(low + error_m + ROUNDING_M)} or more",
+                    f"write {math.ceil(low + error_m + CURE_ROUNDING_M)} or more",
                 )
             )
             return
@@ -327,7 +333,7 @@ def _check_heights(keys: VehicleKeys, limits: Limits, where: str, problems: list
             problems.append(Problem(f"{where}.{key}", f"must be at least {low:g} m AGL ({words}), given {agl_m:g}"))
         elif agl_m > high + 1e-9:
             most = f"must be at most {high:g} m AGL (max_agl_m - altitude_error_m), given {agl_m:g}"
-            most += f"; write {math.floor(high - ROUNDING_M)} or less"
+            most += f"; write {math.floor(high - CURE_ROUNDING_M)} or less"
             problems.append(Problem(f"{where}.{key}", most))
 
 
@@ -347,7 +353,8 @@ def make_arrival(
     if missing and all(name in names for name in order):  # a name that is wrong stands for one that is missing
         problems.append(Problem(f"{where}.order", f"must name every vehicle, missing: {', '.join(missing)[:200]}"))
     if keys.mode == "sequence" and keys.interval_s is None:
-        problems.append(Problem(f"{where}.interval_s", "is missing: seconds between one arrival and the next"))
+        words = "is missing: seconds between one arrival and the next"
+        problems.append(Problem(f"{where}.interval_s", words, "missing"))
     if keys.mode == "none":
         unused = [k for k in ("arrive_s", "clock", "hold") if getattr(keys, k) is not None and k in keys.given]
         problems += [Problem(f"{where}.{k}", "counts with mode: sequence or together only") for k in unused]

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from gcsplan.dem.sources import source_or_path
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Problem, ProblemCode
 from gcsplan.mission_file.airspace.times import Hours
 from gcsplan.mission_file.places import Degrees
 from gcsplan.mission_file.point_keys import LocalPoint
 from gcsplan.mission_file.schema import FrameKeys, TerrainKeys, ZoneKeys
 from gcsplan.mission_file.zone_draft import (
-    SIZES,
+    SIZE_KEYS,
     Bounds,
     ZoneDraft,
     check_degrees,
@@ -25,14 +25,13 @@ from gcsplan.mission_file.zone_draft import (
     corridor,
     polygon,
 )
+from gcsplan.notes.note import Note
 from gcsplan.world.degree_shapes import MOST_LON_DEG
-from gcsplan.world.frame import FARTHEST_M, Frame, centre_of
+from gcsplan.world.frame import FARTHEST_M, Box, Frame, centre_of
 from gcsplan.world.peaks import Peak
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import OpenTerrain, TerrainSpec
 from gcsplan.world.zones import Circle, Level, Zone
-
-Box = tuple[float, float, float, float]
 
 MARGIN_M, MARGIN_PART, MARGIN_MOST_M = 3000.0, 1.0, 25_000.0
 """Margin for detours: the first, m, or this part of the points' extent if larger, up to the third, m."""
@@ -46,7 +45,7 @@ _MANY_NODES = 250_000
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class MissionPlace:
     """A point as written: in degrees, or in metres of the local frame with a height above its zero or the ground."""
 
     where: str
@@ -73,25 +72,25 @@ class Place:
 
 
 def make_place(
-    point: Degrees | LocalPoint, where: str, problems: list[Problem], notes: list[str], *, local: bool,
+    point: Degrees | LocalPoint, where: str, problems: list[Problem], notes: list[Note], *, local: bool,
     most_lon_deg: float = 180.0,
-) -> Place | None:  # fmt: skip
+) -> MissionPlace | None:  # fmt: skip
     """A point of the file; None, and ``problems``, if it cannot be a place."""
     if isinstance(point, LocalPoint):
         if not local:
             problems.append(Problem(where, "local metres need `frame: {origin: [lat, lon], amsl_m: …}` in the mission"))
             return None
-        return Place(where, None, (point.east_m, point.north_m), point.up_m, point.agl_m)
+        return MissionPlace(where, None, (point.east_m, point.north_m), point.up_m, point.agl_m)
     degrees = (point.lat_deg, point.lon_deg)
     if not check_degrees(degrees, where, problems, most_lon_deg):
         return None
     notes += place_notes(point, where)
-    return Place(where, degrees, agl_m=point.agl_m)
+    return MissionPlace(where, degrees, agl_m=point.agl_m)
 
 
-def place_notes(point: Degrees, where: str) -> list[str]:
+def place_notes(point: Degrees, where: str) -> list[Note]:
     """What a user has to know about how a place was read; ``where`` is its key behind the name of the file."""
-    return [f"{where.split(': ', 1)[-1]}: {point.note}"] if point.note else []
+    return [point.note.of(place=where.split(": ", 1)[-1])] if point.note else []
 
 
 def make_spec(keys: TerrainKeys, folder: Path) -> TerrainSpec:
@@ -113,23 +112,27 @@ def make_spec(keys: TerrainKeys, folder: Path) -> TerrainSpec:
     )
 
 
-def covered(places: Sequence[Place], terrain: OpenTerrain, problems: list[Problem]) -> list[Place]:
+def covered(places: Sequence[MissionPlace], terrain: OpenTerrain, problems: list[Problem]) -> list[MissionPlace]:
     """The places that the DEM covers; the others go to ``problems``, with a guess at swapped numbers."""
     good = []
     for place in places:
+        code: ProblemCode = ""
         if place.degrees is None or terrain.covers(*place.degrees):
             good.append(place)
             continue
         lat, lon = place.degrees
         if abs(lon) <= 90.0 and terrain.covers(lon, lat):
+            code = "swapped"
             message = f"latitude and longitude look swapped: the DEM holds [{lon:g}, {lat:g}], not [{lat:g}, {lon:g}]"
         else:
             message = f"{lat:g}, {lon:g} lies outside the DEM, where the ground is unknown; add the tile of this place"
-        problems.append(Problem(place.where, message))
+        problems.append(Problem(place.where, message, code))
     return good
 
 
-def make_frame(places: Sequence[Place], keys: FrameKeys | None, problems: list[Problem], where: str) -> Frame | None:
+def make_frame(
+    places: Sequence[MissionPlace], keys: FrameKeys | None, problems: list[Problem], where: str
+) -> Frame | None:
     """The mission's plane; None, and ``problems``, if the points are too far apart for one plane."""
     try:
         if keys is not None:
@@ -151,7 +154,7 @@ def make_frame(places: Sequence[Place], keys: FrameKeys | None, problems: list[P
     return None
 
 
-def _slip(place: Place, places: Sequence[Place]) -> str:
+def _slip(place: MissionPlace, places: Sequence[MissionPlace]) -> str:
     """The slip of the pen that sets one place far from the others, or an empty text."""
     others = [p.degrees for p in places if p is not place and p.degrees is not None]
     if place.degrees is None or not others:
@@ -204,7 +207,7 @@ def make_box(points: Sequence[tuple[float, float]], zones: Sequence[Zone], *, lo
 
 
 def make_zones(
-    keys: ZoneKeys, where: str, folder: Path, fallback: str, problems: list[Problem], notes: list[str], *, local: bool,
+    keys: ZoneKeys, where: str, folder: Path, fallback: str, problems: list[Problem], notes: list[Note], *, local: bool,
     hours: Hours | None = None,
 ) -> list[ZoneDraft]:  # fmt: skip
     """The zones of one entry of ``no_fly``: a single zone, or all zones of a file, at the mission's ``hours``."""
@@ -222,12 +225,12 @@ def make_zones(
 
 
 def _zones_of_file(
-    keys: ZoneKeys, file: str, where: str, folder: Path, problems: list[Problem], notes: list[str], hours: Hours | None
+    keys: ZoneKeys, file: str, where: str, folder: Path, problems: list[Problem], notes: list[Note], hours: Hours | None
 ) -> list[ZoneDraft]:
-    others = sorted(keys.given.keys() - {"file", "layer", *SIZES, *OF_FILES})
+    others = sorted(keys.given.keys() - {"file", "layer", *SIZE_KEYS, *OF_FILES})
     words = "stands in the file itself, in a feature's properties; leave it out here"
     problems += [Problem(f"{where}.{k}", words) for k in others]
-    sizes = [(getattr(keys, size), f"{where}.{size}") for size in SIZES if getattr(keys, size) is not None]
+    sizes = [(getattr(keys, size), f"{where}.{size}") for size in SIZE_KEYS if getattr(keys, size) is not None]
     good = [check_size(size_m, at, problems) for size_m, at in sizes]
     if not all(good):
         return []
@@ -250,7 +253,7 @@ def _zones_of_file(
 
 
 def _own_zone(
-    keys: ZoneKeys, where: str, fallback: str, problems: list[Problem], notes: list[str], *, local: bool
+    keys: ZoneKeys, where: str, fallback: str, problems: list[Problem], notes: list[Note], *, local: bool
 ) -> list[ZoneDraft]:
     """The zone whose shape stands in the mission file."""
     name = keys.name or fallback
@@ -265,9 +268,11 @@ def _own_zone(
     ]
     if len(problems) == before and len({isinstance(p, LocalPoint) for p in points}) > 1:
         problems.append(Problem(f"{where}.{kind}", "give all corners in degrees, or all in local metres"))
-    for size, owner, words in zip(SIZES, ("center", "line"), ("the radius", "half the corridor's width"), strict=True):
+    for size, owner, words in zip(
+        SIZE_KEYS, ("center", "line"), ("the radius", "half the corridor's width"), strict=True
+    ):
         if kind == owner and getattr(keys, size) is None:
-            problems.append(Problem(f"{where}.{size}", f"is missing: {words}, m"))
+            problems.append(Problem(f"{where}.{size}", f"is missing: {words}, m", "missing"))
         if kind != owner and getattr(keys, size) is not None:
             problems.append(Problem(f"{where}.{size}", f"belongs to a {owner}, not to a {kind}"))
     if keys.layer is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-MOST_SHOWN = 60
+MOST_CHARACTERS_SHOWN = 60
 """Characters of a line that a cure repeats."""
 
 _TIGHT = re.compile(r"(\s*(?:-\s+)?)([A-Za-z_]\w*):(?![\s/])(.+)")
@@ -13,8 +13,8 @@ _COLON_IN_VALUE = re.compile(r"\s*(?:-\s+)?([A-Za-z_]\w*):\s+([^\"'\[{|>#&*!].*:
 _QUOTED = re.compile(r"""\s*(?:-\s+)?([A-Za-z_]\w*):\s+(["'])(.*)""")
 _JOINED = re.compile(r"[^\s,]\s+([A-Za-z_]\w*):\s")
 _NO_COLON = re.compile(r"\s*(?:-\s+)?([A-Za-z_]\w*)\s+([^\s:#][^:#]*)")
-_KEY = re.compile(r"(\s*(?:-\s+)?)([A-Za-z_]\w*):(?:\s.*)?")
-_RESERVED = re.compile(r"\s*(?:-\s+)?([A-Za-z_]\w*):\s+([@`%].*)")
+_KEY_LINE = re.compile(r"(\s*(?:-\s+)?)([A-Za-z_]\w*):(?:\s.*)?")
+_RESERVED_BEGINNING = re.compile(r"\s*(?:-\s+)?([A-Za-z_]\w*):\s+([@`%].*)")
 
 
 def cure(text: str, line: int, begun: int | None) -> str:
@@ -30,7 +30,7 @@ def cure(text: str, line: int, begun: int | None) -> str:
             found = _of_line(lines[number], own=number == line)
             if found:
                 return f"; line {number + 1}: {found}"
-    stopped = line >= len(lines) or _KEY.fullmatch(lines[line])
+    stopped = line >= len(lines) or _KEY_LINE.fullmatch(lines[line])
     if begun is not None and stopped and (found := _not_closed(lines[begun : begun + 1])):
         return f"; line {begun + 1}: {found}"
     if begun is not None and line > begun and begun < len(lines) and (match := _NO_COLON.fullmatch(lines[begun])):
@@ -58,7 +58,7 @@ def _not_closed(lines: list[str]) -> str:
 
 def _indented(before: str, line: str) -> str:
     """What is wrong with the indent of a key after another key, or an empty text."""
-    above, own = _KEY.fullmatch(before), _KEY.fullmatch(line)
+    above, own = _KEY_LINE.fullmatch(before), _KEY_LINE.fullmatch(line)
     if above is None or own is None or len(above[1]) == len(own[1]) or "-" in own[1]:
         return ""
     columns = f"in column {len(own[1]) + 1}, the key above it in column {len(above[1]) + 1}"
@@ -77,7 +77,7 @@ def _of_line(line: str, *, own: bool) -> str:
         return f"a colon within a text needs quotes: `{match[1]}: {_in_quotes(match[2])}`{other}"
     if own and (match := _QUOTED.fullmatch(line)) and (inner := _inner_quotes(match[2], match[3])):
         return f"a text that has quotes in it is written without quotes around it: `{match[1]}: {_short(inner)}`"
-    if own and (match := _RESERVED.fullmatch(line)):
+    if own and (match := _RESERVED_BEGINNING.fullmatch(line)):
         return f"a text that begins with {match[2][0]} needs quotes: `{match[1]}: {_in_quotes(match[2])}`"
     if match := _TIGHT_DASH.fullmatch(line):
         return f"a space is missing after the dash: `- {_short(match[2])}`"
@@ -102,4 +102,4 @@ def _in_quotes(text: str) -> str:
 
 
 def _short(text: str) -> str:
-    return text if len(text) <= MOST_SHOWN else text[:MOST_SHOWN] + "…"
+    return text if len(text) <= MOST_CHARACTERS_SHOWN else text[:MOST_CHARACTERS_SHOWN] + "…"

@@ -14,22 +14,23 @@ from functools import lru_cache
 from typing import Any
 
 from gcsplan.errors import Problem
-from gcsplan.mission_file.zone_draft import SIZES, Bounds, Remark
+from gcsplan.mission_file.zone_draft import SIZE_KEYS, Bounds, Remark, one_line
 from gcsplan.mission_file.zone_levels import (
-    EXAMPLES,
     LARGEST_M,
+    LEVEL_EXAMPLES,
+    LEVEL_UNITS,
     REFERENCES,
-    UNITS,
     LevelError,
     Limit,
     read_level,
 )
+from gcsplan.notes.note import Note
 from gcsplan.world.zones import Level
 
-MOST_SHOWN = 6
+MOST_ATTRIBUTES_SHOWN = 6
 """Most attributes of one zone that a remark names."""
 
-NAMES = ("name", "title", "label", "designator", "identifier", "ident")
+NAME_ATTRIBUTES = ("name", "title", "label", "designator", "identifier", "ident")
 OWN = ("flooraglm", "flooramslm", "ceilingaglm", "ceilingamslm")
 BOUNDS = {
     "lower": "floor", "floor": "floor", "bottom": "floor", "base": "floor",
@@ -40,14 +41,12 @@ BOUNDS = {
 UNIT_NAMES = ("unit", "units", "uom")
 REFERENCE_NAMES = ("reference", "ref", "datum", "code")
 
-READ = "floors and ceilings are read from other attributes than gcsplan's own"
-NOT_READ = "these attributes are not read, and limit nothing"
-TIMES_NOT_READ = "these attributes of times are not read: the zones count as always"
-_PRESSURE = "flight levels are pressure altitudes, which move with the weather"
-UNDER_PRESSURE = f"{_PRESSURE}: these zones count from the ground up, and no mission passes under them"
-OVER_PRESSURE = f"{_PRESSURE}: these zones have no upper end, and no mission passes over them"
+ATTRIBUTES_UNREAD = Note("zone_attributes_unread")
+TIMES_UNREAD = Note("zone_times_unread")
+UNDER_PRESSURE = Note("zone_floor_at_flight_level")
+OVER_PRESSURE = Note("zone_ceiling_at_flight_level")
 
-_WORD = "|".join(sorted({w.lower() for w in (*UNITS, *REFERENCES)}, key=len, reverse=True))
+_WORD = "|".join(sorted({w.lower() for w in (*LEVEL_UNITS, *REFERENCES)}, key=len, reverse=True))
 _LIMIT = re.compile(
     rf"(?:distvert)?(?P<bound>{'|'.join(BOUNDS)})(?:ceiling|limit|lim|altitude|alt|height|elevation|elev|level)?"
     rf"(?:(?:value|val)?(?P<first>{_WORD})?(?P<second>{_WORD})?|(?P<unit>{'|'.join(UNIT_NAMES)})"
@@ -96,7 +95,7 @@ def meaning_of(key: str) -> Meaning:
     lower = key.lower()
     plain = re.sub(r"[^a-z0-9]", "", lower)
     limit, shared = _LIMIT.fullmatch(plain), bool(_SHARED.fullmatch(plain))
-    used = limit is not None or shared or lower in (*NAMES, *SIZES)
+    used = limit is not None or shared or lower in (*NAME_ATTRIBUTES, *SIZE_KEYS)
     is_time = not used and bool(_SEEMS_A_TIME.fullmatch(re.sub(r"[^a-z]", "", lower)))
     return Meaning(lower, plain in OWN, limit, shared, used, bool(_SEEMS_A_LIMIT.search(lower)), is_time)
 
@@ -117,11 +116,11 @@ class Attribute:
         return meaning_of(self.stands_for or self.key)
 
     def __str__(self) -> str:
-        return f"{self.key[:40]} {repr(self.value)[:60]}"
+        return one_line(f"{self.key[:40]} {repr(self.value)[:60]}")
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class ZoneStatements:
     """What the attributes of one zone say."""
 
     name: str
@@ -133,7 +132,7 @@ class Said:
     buffer_m: float | None = None
 
 
-def read_attributes(given: Sequence[Attribute], name: str, problems: list[Problem]) -> Said | None:
+def read_attributes(given: Sequence[Attribute], name: str, problems: list[Problem]) -> ZoneStatements | None:
     """What the attributes say; ``name`` is for a zone without one. None, and ``problems``, if they cannot be read."""
     known: list[Attribute] = []
     ignored: list[Attribute] = []
@@ -148,17 +147,22 @@ def read_attributes(given: Sequence[Attribute], name: str, problems: list[Proble
             times.append(a)
         elif meaning.seems_a_limit or _reads_as_level(a.value):
             ignored.append(a)
-    reading = _Reading(_name(known) or name, problems)
+    reading = _ZoneReading(_name(known) or name, problems)
     before = len(problems)
-    radius_m, buffer_m = (reading.size_m([a for a in known if a.meaning.lower == size]) for size in SIZES)
+    radius_m, buffer_m = (reading.size_m([a for a in known if a.meaning.lower == size]) for size in SIZE_KEYS)
     bounds = reading.bounds(known)
-    for sentence, some in ((NOT_READ, ignored), (TIMES_NOT_READ, times)):
+    for note, some in ((ATTRIBUTES_UNREAD, ignored), (TIMES_UNREAD, times)):
         if some:
-            more = ", …" if len(some) > MOST_SHOWN else ""
-            reading.remarks.append((sentence, ", ".join(str(a) for a in some[:MOST_SHOWN]) + more))
+            more = ("…",) if len(some) > MOST_ATTRIBUTES_SHOWN else ()
+            reading.remarks.append((note, (*map(str, some[:MOST_ATTRIBUTES_SHOWN]), *more)))
     if len(problems) > before:
         return None
-    return Said(reading.name, radius_m, bounds, tuple(reading.remarks), reading.of_levels, buffer_m)
+    return ZoneStatements(reading.name, radius_m, bounds, tuple(reading.remarks), reading.of_levels, buffer_m)
+
+
+def level_read(given: object, bound: str, level: Level) -> Note:
+    """How a limit as it is written was understood: ``bound`` is floor or ceiling."""
+    return Note("level_of_attribute", given=str(given), bound=bound, level_m=level.value_m, datum=level.datum.upper())
 
 
 def shown(value: Any) -> str:
@@ -183,8 +187,8 @@ def is_number(value: Any) -> bool:
 
 def _name(given: Sequence[Attribute]) -> str:
     """The name: the first in the table's order, and of its spellings the one in lower case."""
-    named = [a for a in given if a.meaning.lower in NAMES]
-    best = min(named, key=lambda a: (NAMES.index(a.meaning.lower), a.key != a.meaning.lower), default=None)
+    named = [a for a in given if a.meaning.lower in NAME_ATTRIBUTES]
+    best = min(named, key=lambda a: (NAME_ATTRIBUTES.index(a.meaning.lower), a.key != a.meaning.lower), default=None)
     return "" if best is None else str(best.value).strip()
 
 
@@ -196,14 +200,14 @@ def _reads_as_level(value: Any) -> bool:
 
 
 @dataclass
-class _Reading:
+class _ZoneReading:
     """One zone while its attributes are read."""
 
     name: str
     problems: list[Problem]
     remarks: list[Remark] = field(default_factory=list)
     of_levels: bool = False
-    read_as: list[str] = field(default_factory=list)
+    read_as: list[Note] = field(default_factory=list)
 
     def size_m(self, given: Sequence[Attribute]) -> float | None:
         found = {self._metres(a): a for a in given}
@@ -236,7 +240,7 @@ class _Reading:
                     read.setdefault(level, a)
             levels |= self._settled(bound, read)
         if self.read_as:
-            self.remarks.append((READ, ", ".join(self.read_as)))
+            self.remarks.append((Note("zone_limits_read"), tuple(self.read_as)))
         return Bounds(**levels)
 
     def _settled(self, bound: str, read: dict[Level | Limit, Attribute]) -> dict[str, float]:
@@ -253,12 +257,12 @@ class _Reading:
                 self._wrong(attribute, "is a ceiling at the ground, and the zone would lie wholly under ground")
                 return {}
             if not attribute.meaning.own and level != Level(0.0, "agl"):
-                self.read_as.append(f"{attribute}: {bound} at {level}")
+                self.read_as.append(level_read(attribute, bound, level))
             return {f"{bound}_{level.datum}_m": level.value_m}
         if level is Limit.PRESSURE:
             self.remarks.append((UNDER_PRESSURE if bound == "floor" else OVER_PRESSURE, str(attribute)))
         elif bound == "floor":
-            self._wrong(attribute, f"is a floor without end; write a height such as {EXAMPLES}")
+            self._wrong(attribute, f"is a floor without end; write a height such as {LEVEL_EXAMPLES}")
         return {}
 
     def _level(self, attribute: Attribute, words: Sequence[str], shared: Sequence[str]) -> Level | Limit | None:
@@ -276,7 +280,7 @@ class _Reading:
             beside = f"({', '.join(words)[:60]}) " if words else ""
             self._wrong(
                 attribute,
-                f"{beside}cannot be read as a level: {why}. Write for example {EXAMPLES}; rename "
+                f"{beside}cannot be read as a level: {why}. Write for example {LEVEL_EXAMPLES}; rename "
                 "the attribute if it is no level",
             )
             return None

@@ -11,7 +11,7 @@ from pathlib import Path
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.places import read_place
 from gcsplan.mission_file.zone_attributes import Attribute, as_figure, read_attributes
-from gcsplan.mission_file.zone_draft import SIZES
+from gcsplan.mission_file.zone_draft import SIZE_KEYS
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_text import decoded
 
@@ -130,7 +130,7 @@ def _place(found: ZoneFile, columns: _Columns, cells: list[str], where: str) -> 
         found.problems.append(Problem(where, str(why)))
         return None
     if place.note:
-        found.said.append(f"{where.rpartition(': ')[2]}: {place.note}")
+        found.said.append(place.note.of(place=where.rpartition(": ")[2]))
     return place.lat_deg, place.lon_deg
 
 
@@ -139,7 +139,7 @@ def _attribute(columns: _Columns, i: int, cell: str, where: str) -> Attribute:
     at, plain = f"{where}.{key[:80]}", _plain(key)
     if match := _SIZE.fullmatch(plain):
         size = f"{match[1]}_m"
-        assert size in SIZES
+        assert size in SIZE_KEYS
         # Three digits after a comma may be thousands, and are left to be refused.
         return Attribute(key, as_figure(_pointed(cell) if columns.comma and cell[-4:-3] != "," else cell), at, size)
     if match := _HEIGHT.fullmatch(plain):

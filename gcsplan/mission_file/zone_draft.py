@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file.places import range_fault
+from gcsplan.mission_file.places import is_swapped, range_fault
+from gcsplan.notes.note import Datum, Note
 from gcsplan.world.degree_shapes import (
     LARGEST_BUFFER_M,
     LARGEST_RADIUS_M,
@@ -28,13 +29,13 @@ from gcsplan.world.frame import Frame
 from gcsplan.world.outlines import fewer_corners
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 
-SIZES = ("radius_m", "buffer_m")
+SIZE_KEYS = ("radius_m", "buffer_m")
 """The keys of a zone's size, in a mission file as in the attributes of other files."""
 
 MAX_VERTICES = 100_000
 """Most vertices of one polygon."""
 
-MOST_CORNERS = 20_000
+MOST_ZONE_CORNERS = 20_000
 """Most corners of one polygon near the mission; more are drawn wider, by at most `WIDEST_M`, with fewer."""
 
 MOST_ALL_CORNERS = 400_000
@@ -44,18 +45,15 @@ and twice as many each mission: they are not even drawn."""
 WIDEST_M, MUCH_WIDER_M = 0.5, (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 """How much wider an outline is drawn without being asked, m, and tolerances that are tried for a cure."""
 
-WIDER = (
-    f"an outline of more than {MOST_CORNERS} corners is drawn wider with fewer, by at most {WIDEST_M:g} m, and so are "
-    "these zones"
-)
+DRAWN_WIDER = Note("zone_outline_widened", most_corners=MOST_ZONE_CORNERS, wider_m=WIDEST_M)
 
 MAX_LINE_POINTS = 20_000
 """Most points of one line: its corridor takes a second for some thousand points."""
 
-Remark = tuple[str, str]
-"""What a user has to know about how a zone of a file was read: a sentence for all such zones, and what this one has."""
+Remark = tuple[Note, Datum]
+"""What a user has to know about how a zone of a file was read: a note for all such zones, and what this one has."""
 
-ACROSS = "outlines with edges such as from 179.9 to -179.9 are read as across the 180° meridian"
+ACROSS_ANTIMERIDIAN = Note("zone_across_the_antimeridian")
 OTHER_SIDE = (
     "its outline is read as across the 180° meridian, but if it goes around the other side the mission is in it: write "
     "longitudes past 180 where it crosses (181 for -179), or cut it there in two"
@@ -71,7 +69,7 @@ class ZoneDraft:
 
     ``points`` is the centre alone (with ``radius_m``), a line (with ``buffer_m``, the half-width of its corridor), or a
     polygon's vertices, not closed: (latitude, longitude) in degrees, or (east_m, north_m) if ``local``. ``where`` is
-    its place in the user's file. ``unused`` is why a zone of an authority's file is not used; ``faults`` are what is
+    its place in the user's file. ``unused`` says why a zone of an authority's file is not used; ``faults`` are what is
     not understood of it, which refuses a mission near it. ``great_circles``: its format does not say that edges are
     straight in degrees, so that what they enclose along great circles belongs to the zone, too. ``doubt`` is where a
     polygon that is read as across the antimeridian lies if it goes around the other side: a mission there is refused.
@@ -86,7 +84,7 @@ class ZoneDraft:
     ceiling: Level | None = None
     remarks: tuple[Remark, ...] = ()
     buffer_m: float | None = None
-    unused: str = ""
+    unused: Note | None = None
     faults: tuple[Problem, ...] = ()
     great_circles: bool = False
     doubt: tuple[tuple[float, float], ...] = ()
@@ -174,7 +172,7 @@ def polygon(
     if fault:
         problems.append(Problem(at, fault))
         return None
-    said = ((ACROSS, ""),) if doubt else ()
+    said = ((ACROSS_ANTIMERIDIAN, None),) if doubt else ()
     return ZoneDraft(name, where, tuple(ring), local, None, floor, ceiling, remarks=said, doubt=doubt)
 
 
@@ -228,7 +226,7 @@ def check_degrees(
     """
     fault = range_fault(*point, most_lon_deg=most_lon_deg)
     if fault:
-        problems.append(Problem(where, fault))
+        problems.append(Problem(where, fault, "swapped" if is_swapped(*point) else ""))
     return not fault
 
 
@@ -281,17 +279,18 @@ def _with_fewer_corners(
     """
     found: list[Circle | Polygon] = []
     for shape in shapes:
-        if isinstance(shape, Circle) or len(shape.vertices) <= MOST_CORNERS:
+        if isinstance(shape, Circle) or len(shape.vertices) <= MOST_ZONE_CORNERS:
             found.append(shape)
             continue
         count, drawn = len(shape.vertices), _wider(shape)
         if drawn is not None:
-            draft = replace(draft, remarks=(*draft.remarks, (WIDER, f"{len(drawn.vertices)} for {count}")))
+            fewer = Note("drawn_with_fewer_corners", corners=len(drawn.vertices), given=count)
+            draft = replace(draft, remarks=(*draft.remarks, (DRAWN_WIDER, fewer)))
             found.append(drawn)
             continue
-        tried = ((more_m, fewer_corners(shape.vertices, more_m, most=MOST_CORNERS)) for more_m in MUCH_WIDER_M)
+        tried = ((more_m, fewer_corners(shape.vertices, more_m, most=MOST_ZONE_CORNERS)) for more_m in MUCH_WIDER_M)
         cures = (f"drawn up to {more_m:g} m wider it has {len(ring)}" for more_m, ring in tried if ring is not None)
-        words = f"its outline has {count} corners, more than {MOST_CORNERS}; simplify it: "
+        words = f"its outline has {count} corners, more than {MOST_ZONE_CORNERS}; simplify it: "
         words += next(cures, "draw a simpler one around it")
         fault = Problem(draft.where, f"zone {draft.name[:60]!r}: {words}")
         draft = replace(draft, faults=(*draft.faults, fault))
@@ -302,23 +301,27 @@ def _with_fewer_corners(
 def _wider(shape: Polygon) -> Polygon | None:
     """The polygon drawn wider by at most `WIDEST_M` with few enough corners; None if that fails."""
     for more_m in (0.1 * WIDEST_M, WIDEST_M):
-        ring = fewer_corners(shape.vertices, more_m, most=MOST_CORNERS)
+        ring = fewer_corners(shape.vertices, more_m, most=MOST_ZONE_CORNERS)
         if ring is not None:
             return Polygon(np.ascontiguousarray(ring))
     return None
 
 
-def zone_notes(placed: Sequence[tuple[ZoneDraft, object]]) -> list[str]:
-    """The remarks of the zones, beside their drafts, with one note for all zones that share a sentence."""
-    about: dict[str, list[str]] = {}
+def zone_notes(placed: Sequence[tuple[ZoneDraft, object]]) -> list[Note]:
+    """The remarks of the zones, beside their drafts, with one note for all zones of which the same is said."""
+    about: dict[Note, list[Datum]] = {}
     for draft in {id(draft): draft for draft, _ in placed}.values():  # a polygon may be cut into several zones
-        for sentence, detail in draft.remarks:
-            about.setdefault(sentence, []).append(f"{draft.name}{f' ({one_line(detail)})' if detail else ''}")
-    return [
-        f"{sentence}: {', '.join(zones[:SHOWN_ZONES])}"
-        + (f", and {len(zones) - SHOWN_ZONES} more" if len(zones) > SHOWN_ZONES else "")
-        for sentence, zones in about.items()
-    ]
+        for note, given in draft.remarks:
+            detail = one_line(given) if isinstance(given, str) else given
+            named = Note("zone_and_detail", zone=draft.name, detail=detail) if detail else draft.name
+            about.setdefault(note, []).append(named)
+    return [note.of(zones=_first(zones)) for note, zones in about.items()]
+
+
+def _first(zones: list[Datum]) -> tuple[Datum, ...]:
+    """The zones that a note names, and how many more there are."""
+    more = len(zones) - SHOWN_ZONES
+    return (*zones[:SHOWN_ZONES], *([Note("further_zones", count=more)] if more > 0 else []))
 
 
 def looks_swapped(draft: ZoneDraft, frame: Frame) -> bool:

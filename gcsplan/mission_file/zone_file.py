@@ -15,17 +15,15 @@ from pathlib import Path
 from typing import Literal
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.figures import counted
-from gcsplan.mission_file.zone_attributes import Said
+from gcsplan.mission_file.zone_attributes import ZoneStatements
 from gcsplan.mission_file.zone_draft import Remark, ZoneDraft, circle, corridor, polygon
+from gcsplan.notes.note import Note
+from gcsplan.world.degree_shapes import Corner
 from gcsplan.world.zones import Level
 
 MAX_ZONES = 20_000
-SIZE_OF_OTHER = "the {} of a {} is not read, so that nothing beyond its {} is kept clear"
-RADIUS_OF_POLYGON = SIZE_OF_OTHER.format("radius", "polygon", "outline")
-BUFFER_OF_POLYGON = SIZE_OF_OTHER.format("buffer", "polygon", "outline")
-
-Point = tuple[float, float]
+RADIUS_OF_POLYGON = Note("zone_radius_of_polygon_unread")
+BUFFER_OF_POLYGON = Note("zone_buffer_of_polygon_unread")
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +35,13 @@ class Drawn:
 
 
 NOT_DRAWN = Drawn()
+
+
+def drawn_unread(altitudes_m: Sequence[float]) -> Drawn:
+    """What is said of the altitudes of corners, which limit nothing."""
+    if not altitudes_m:
+        return NOT_DRAWN
+    return Drawn(remarks=((Note("zone_corner_altitudes_unread"), Note("drawn_up_to", top_m=max(altitudes_m))),))
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,17 +63,17 @@ class ZoneFile:
     zones: list[ZoneDraft] = field(default_factory=list)
     problems: list[Problem] = field(default_factory=list)
     holes: int = 0
-    said: list[str] = field(default_factory=list)
+    said: list[Note] = field(default_factory=list)
     columns: tuple[str, ...] = ()
     unsized: list[Unsized] = field(default_factory=list)
     great_circles: bool = False
     """Whether the format leaves it open that edges are great circles."""
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """Notes for the user."""
-        holes = [f"{counted(self.holes, 'hole')} in polygons counted as no-fly"] if self.holes else []
-        return tuple(f"{self.path.name}: {note}" for note in [*self.said, *holes])
+    def notes(self) -> tuple[Note, ...]:
+        """What a user has to know about how the file was read."""
+        holes = [Note("holes_are_no_fly", count=self.holes)] if self.holes else []
+        return tuple(note.of(file=self.path.name) for note in [*self.said, *holes])
 
     def give_sizes(self, radius_m: float | None, buffer_m: float | None) -> None:
         """Give the points and lines without a size of their own that of the mission; without one they are a problem."""
@@ -90,8 +95,8 @@ class ZoneFile:
         self.unsized = []
 
     def add_ring(
-        self, said: Said, part: str, where: str, ring: list[tuple[float, float]], key: str, drawn: Drawn = NOT_DRAWN,
-        holes: int = 0,
+        self, said: ZoneStatements, part: str, where: str, ring: list[tuple[float, float]], key: str,
+        drawn: Drawn = NOT_DRAWN, holes: int = 0,
     ) -> None:  # fmt: skip
         """Add a polygon called ``part`` by its outline, (latitude, longitude), and the number of its holes."""
         self.holes += holes
@@ -99,18 +104,20 @@ class ZoneFile:
         remarks = [*said.remarks, *drawn.remarks]
         if drawn.ceiling is not None:
             bounds = replace(bounds, **{f"ceiling_{drawn.ceiling.datum}_m": drawn.ceiling.value_m})
-        for size_m, words in ((said.radius_m, RADIUS_OF_POLYGON), (said.buffer_m, BUFFER_OF_POLYGON)):
+        for size_m, note in ((said.radius_m, RADIUS_OF_POLYGON), (said.buffer_m, BUFFER_OF_POLYGON)):
             if size_m is not None:
-                remarks.append((words, f"{size_m:g} m"))
+                remarks.append((note, Note("size_of_zone", size_m=size_m)))
         self.add(polygon(part[:200], where, ring, bounds, self.problems, key=key, holes=holes), remarks)
 
-    def add_circle(self, said: Said, part: str, where: str, centre: Point, remarks: Sequence[Remark] = ()) -> None:
+    def add_circle(
+        self, said: ZoneStatements, part: str, where: str, centre: Corner, remarks: Sequence[Remark] = ()
+    ) -> None:
         """Add a circle called ``part`` by its centre, (latitude, longitude); its radius may come from the mission."""
         make = partial(circle, part[:200], where, centre, bounds=said.bounds, problems=self.problems)
         self._add_sized("point", said.radius_m, lambda size_m: make(radius_m=size_m), where, [*said.remarks, *remarks])
 
     def add_line(
-        self, said: Said, part: str, where: str, line: list[Point], key: str, remarks: Sequence[Remark] = ()
+        self, said: ZoneStatements, part: str, where: str, line: list[Corner], key: str, remarks: Sequence[Remark] = ()
     ) -> None:
         """Add the corridor around a line, (latitude, longitude); its half-width may come from the mission."""
         make = partial(corridor, part[:200], where, line, bounds=said.bounds, problems=self.problems, key=key)
@@ -137,5 +144,5 @@ class ZoneFile:
             raise InputError(f"the file has more than {MAX_ZONES} zones", where=where)
 
     def _remarked(self, draft: ZoneDraft, remarks: Sequence[Remark]) -> ZoneDraft:
-        of_file = tuple((f"{self.path.name}: {sentence}", detail) for sentence, detail in [*remarks, *draft.remarks])
+        of_file = tuple((note.of(file=self.path.name), detail) for note, detail in [*remarks, *draft.remarks])
         return replace(draft, remarks=of_file, great_circles=self.great_circles)

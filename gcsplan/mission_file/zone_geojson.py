@@ -8,14 +8,11 @@ from typing import Any
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.export.geojson import GENERATOR
-from gcsplan.figures import counted
-from gcsplan.mission_file.zone_attributes import Attribute, Said, is_number, read_attributes, shown
-from gcsplan.mission_file.zone_draft import SIZES
-from gcsplan.mission_file.zone_file import Drawn, ZoneFile
+from gcsplan.mission_file.zone_attributes import Attribute, ZoneStatements, is_number, read_attributes, shown
+from gcsplan.mission_file.zone_draft import SIZE_KEYS
+from gcsplan.mission_file.zone_file import Drawn, ZoneFile, drawn_unread
+from gcsplan.notes.note import Note
 from gcsplan.world.degree_shapes import beyond_outline
-
-ALTITUDES = "the altitudes of corners are not read as limits"
-
 
 MOST_MISTAKES = 1000
 """Most mistakes of a file that are looked for."""
@@ -44,9 +41,7 @@ def read_geojson(path: Path, whole: Any) -> ZoneFile:
         if not flown[i]:
             _feature(found, feature, where, f"{path.stem}[{i}]")
     if any(flown):
-        found.said.append(
-            f"not used: {counted(sum(flown), 'track or way point', 'tracks and way points')} of a mission"
-        )
+        found.said.append(Note("tracks_unused", count=sum(flown)))
     return found
 
 
@@ -56,7 +51,7 @@ def _is_flown(whole: dict[str, Any], feature: Any) -> bool:
     The collection has `GENERATOR`. Before it did, its tracks and way points had the reference of their heights.
     """
     properties = feature.get("properties") if isinstance(feature, dict) else None
-    if not isinstance(properties, dict) or any(key.lower() in SIZES for key in properties):
+    if not isinstance(properties, dict) or any(key.lower() in SIZE_KEYS for key in properties):
         return False
     before = "heights" in whole and properties.get("third_coordinate") == "amsl_m" and "vehicle" in properties
     geometry = feature.get("geometry")
@@ -134,7 +129,7 @@ def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
         )
 
 
-def _parts(found: ZoneFile, coordinates: Any, said: Said, at: str, kind: str) -> list[tuple[Any, str, str]]:
+def _parts(found: ZoneFile, coordinates: Any, said: ZoneStatements, at: str, kind: str) -> list[tuple[Any, str, str]]:
     """The parts of a geometry, each with its name and place; one part unless the kind begins with Multi."""
     several = kind.startswith("Multi")
     parts = coordinates if several else [coordinates]
@@ -156,11 +151,10 @@ def _attributes(properties: dict[str, Any], geometry: dict[str, Any], where: str
 
 def _unread(positions: list[Any]) -> Drawn:
     """What is said of altitudes in positions; GeoJSON does not tell whether they are a floor, a ceiling or ground."""
-    heights = [p[2] for p in positions if len(p) > 2 and is_number(p[2]) and p[2] != 0]
-    return Drawn(remarks=((ALTITUDES, f"up to {max(heights):g} m"),)) if heights else Drawn()
+    return drawn_unread([p[2] for p in positions if len(p) > 2 and is_number(p[2]) and p[2] != 0])
 
 
-def _rings(found: ZoneFile, rings: Any, said: Said, part: str, where: str, at: str) -> None:
+def _rings(found: ZoneFile, rings: Any, said: ZoneStatements, part: str, where: str, at: str) -> None:
     if not isinstance(rings, list) or not rings or not isinstance(rings[0], list):
         found.problems.append(Problem(at, f"a polygon is a list of rings, given {shown(rings)}"))
         return
@@ -173,7 +167,7 @@ def _rings(found: ZoneFile, rings: Any, said: Said, part: str, where: str, at: s
                        holes=len(rings) - 1)  # fmt: skip
 
 
-def _line(found: ZoneFile, positions: Any, said: Said, part: str, where: str, at: str) -> None:
+def _line(found: ZoneFile, positions: Any, said: ZoneStatements, part: str, where: str, at: str) -> None:
     if not isinstance(positions, list):
         found.problems.append(Problem(at, f"a line is a list of positions, given {shown(positions)}"))
         return

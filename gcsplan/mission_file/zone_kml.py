@@ -18,30 +18,29 @@ from defusedxml.common import DefusedXmlException
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.figures import counted
-from gcsplan.mission_file.zone_attributes import Attribute, Said, as_figure, read_attributes
-from gcsplan.mission_file.zone_draft import SIZES
+from gcsplan.mission_file.zone_attributes import Attribute, ZoneStatements, as_figure, read_attributes
+from gcsplan.mission_file.zone_draft import SIZE_KEYS
 from gcsplan.mission_file.zone_file import NOT_DRAWN, Drawn, ZoneFile
 from gcsplan.mission_file.zone_levels import LARGEST_M
+from gcsplan.notes.note import Note
 from gcsplan.world.degree_shapes import beyond_outline
 from gcsplan.world.zones import Level
 
-MAX_DEPTH = 60
+MAX_KML_DEPTH = 60
 MOST_TAGS = 2_000_000
 """Most beginnings and ends of elements, each of which takes some 300 bytes of memory; 20 MB of zones have a third."""
 
 MODES: dict[str, Literal["agl", "amsl"]] = {"relativeToGround": "agl", "absolute": "amsl"}
 """What altitudes are counted from, by the altitudeModes in which they count at all."""
 
-Corner = tuple[float, float, float]
+DrawnCorner = tuple[float, float, float]
 """Latitude, longitude and altitude of a corner; not a number if it has no altitude."""
 
-READ = "the ceiling is the height to which the zone is drawn; one over the ground follows it point by point"
-NOT_READ = "the drawn altitudes are not read as limits"
 _PICTURES = ("PhotoOverlay", "ScreenOverlay", "Tour")
 """What shows the map and limits nothing."""
 
 _READ_SHAPES = ("Polygon", "Point", "LineString")
-_SHAPES = (*_READ_SHAPES, "LinearRing", "Model", "Track", "MultiTrack")
+_KML_SHAPES = (*_READ_SHAPES, "LinearRing", "Model", "Track", "MultiTrack")
 
 
 def read_kml(path: Path, data: bytes) -> ZoneFile:
@@ -60,9 +59,9 @@ def read_kml(path: Path, data: bytes) -> ZoneFile:
     placemarks = 0
     loose: Counter[str] = Counter()
     pictures: Counter[str] = Counter()
-    for element in _walk(root, path, leaves=("Placemark", *_PICTURES, *_SHAPES)):
+    for element in _walk(root, path, leaves=("Placemark", *_PICTURES, *_KML_SHAPES)):
         kind = _kind(element)
-        if kind in _SHAPES:
+        if kind in _KML_SHAPES:
             loose[kind] += 1
         elif kind in _PICTURES:
             pictures[kind] += 1
@@ -72,7 +71,8 @@ def read_kml(path: Path, data: bytes) -> ZoneFile:
         elif kind in ("NetworkLink", "NetworkLinkControl", "GroundOverlay"):
             found.problems.append(Problem(f"{path}: {kind}", f"a {kind} cannot be read as a zone; remove it"))
     if pictures:
-        found.said.append(f"not used: {', '.join(counted(count, kind) for kind, count in pictures.items())}")
+        kinds = tuple(counted(count, kind) for kind, count in pictures.items())
+        found.said.append(Note("pictures_unused", kinds=kinds))
     for kind, count in loose.items():
         words = f"{counted(count, kind)} outside of a Placemark cannot be read as a zone; put each into a Placemark"
         found.problems.append(Problem(f"{path}: {kind}", words))
@@ -86,8 +86,8 @@ def _walk(root: Any, path: Path, *, leaves: tuple[str, ...] = ()) -> Iterator[An
     stack = [(root, 0)]
     while stack:
         element, depth = stack.pop()
-        if depth > MAX_DEPTH:
-            raise InputError(f"the KML is nested more than {MAX_DEPTH} levels deep", where=str(path))
+        if depth > MAX_KML_DEPTH:
+            raise InputError(f"the KML is nested more than {MAX_KML_DEPTH} levels deep", where=str(path))
         yield element
         if _kind(element) not in leaves:
             stack += [(child, depth + 1) for child in reversed(element)]
@@ -105,7 +105,7 @@ def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
     said = read_attributes(given, f"{found.path.stem}[{number}]", found.problems)
     if said is None:
         return
-    shapes = [e for e in _walk(placemark, found.path, leaves=_READ_SHAPES) if _kind(e) in _SHAPES]
+    shapes = [e for e in _walk(placemark, found.path, leaves=_READ_SHAPES) if _kind(e) in _KML_SHAPES]
     others = [_kind(e) for e in shapes if _kind(e) not in _READ_SHAPES]
     if others or not shapes:
         kind = others[0] if others else "none"
@@ -132,7 +132,7 @@ def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
             _polygon(found, shape, said, part, where)
 
 
-def _polygon(found: ZoneFile, shape: Any, said: Said, part: str, where: str) -> None:
+def _polygon(found: ZoneFile, shape: Any, said: ZoneStatements, part: str, where: str) -> None:
     outer = [e for e in _walk(shape, found.path) if _kind(e) == "outerBoundaryIs"]
     if len(outer) != 1:
         found.problems.append(Problem(where, f"a Polygon has one outerBoundaryIs, given {len(outer)}"))
@@ -148,7 +148,7 @@ def _polygon(found: ZoneFile, shape: Any, said: Said, part: str, where: str) -> 
         found.add_ring(said, part, where, [p[:2] for p in points], "", drawn, len(inner))
 
 
-def _drawn(shape: Any, points: list[Corner]) -> Drawn:
+def _drawn(shape: Any, points: list[DrawnCorner]) -> Drawn:
     """The ceiling of a polygon that is drawn down to the ground: its highest corner, so that it is not made lower.
 
     Altitudes of 0 are what programs write that draw flat outlines, and are no ceiling.
@@ -165,18 +165,23 @@ def _drawn(shape: Any, points: list[Corner]) -> Drawn:
     if not any(heights) or (mode == "relativeToGround" and top_m <= 0.0):
         return _unread(points, mode)
     ceiling = Level(top_m, MODES[mode])
-    uneven = "" if min(heights) == top_m else ", the highest corner's"
-    return Drawn(ceiling, ((READ, f"{ceiling}{uneven}"),))
+    height = Note(
+        "drawn_height" if min(heights) == top_m else "drawn_height_of_highest_corner",
+        top_m=top_m, datum=ceiling.datum.upper(),
+    )  # fmt: skip
+    return Drawn(ceiling, ((Note("zone_ceiling_as_drawn"), height),))
 
 
-def _unread(points: list[Corner], mode: str = "") -> Drawn:
+def _unread(points: list[DrawnCorner], mode: str = "") -> Drawn:
     heights = [p[2] for p in points if math.isfinite(p[2]) and p[2] != 0.0]
     if not heights:
         return NOT_DRAWN
-    return Drawn(remarks=((NOT_READ, " ".join(filter(None, [f"up to {max(heights):g} m", mode[:40]]))),))
+    top_m = max(heights)
+    up_to = Note("drawn_up_to_in_mode", top_m=top_m, mode=mode[:40]) if mode else Note("drawn_up_to", top_m=top_m)
+    return Drawn(remarks=((Note("zone_drawn_altitudes_unread"), up_to),))
 
 
-def _coordinates(found: ZoneFile, parent: Any, where: str) -> list[Corner] | None:
+def _coordinates(found: ZoneFile, parent: Any, where: str) -> list[DrawnCorner] | None:
     """Each ``lon,lat[,alt]`` below ``parent``; None, and a problem, if one is wrong."""
     text = " ".join(e.text or "" for e in _walk(parent, found.path) if _kind(e) == "coordinates")
     points = []
@@ -218,5 +223,5 @@ def _extended_data(placemark: Any, where: str) -> list[Attribute]:
             key = element.get("name", "")
             texts = [element] if _kind(element) == "SimpleData" else [e for e in element if _kind(e) == "value"]
             text = next((e.text or "" for e in texts), "").strip()
-            given.append(Attribute(key, as_figure(text) if key.lower() in SIZES else text, f"{where}.{key[:80]}"))
+            given.append(Attribute(key, as_figure(text) if key.lower() in SIZE_KEYS else text, f"{where}.{key[:80]}"))
     return given

@@ -21,7 +21,7 @@ LARGEST_M = 1e6
 FOOT_M = Decimal(str(FOOT.size))
 PRESSURE = "STD"
 
-UNITS = (
+LEVEL_UNITS = (
     dict.fromkeys(("M", "METER", "METERS", "METRE", "METRES"), Decimal(1))
     | dict.fromkeys(("FT", "FOOT", "FEET"), FOOT_M)
     | {"FL": 100 * FOOT_M}
@@ -38,9 +38,9 @@ REFERENCES = (
 GROUND_WORDS = frozenset({"GND", "SFC", "GROUND", "SURFACE"})
 UNLIMITED_WORDS = frozenset({"UNL", "UNLIM", "UNLTD", "UNLIMITED"})
 
-EXAMPLES = "1500 FT AMSL, 450 M AGL, FL 65, GND or UNL"
+LEVEL_EXAMPLES = "1500 FT AMSL, 450 M AGL, FL 65, GND or UNL"
 
-_MOST_CHARACTERS = 60
+_MOST_LEVEL_CHARACTERS = 60
 _TOKEN = re.compile(
     r"\s+|(?P<number>[+-]?(?:(?:\d+(?:,\d{3})+(?![\d,])|\d+)(?:\.\d*)?|\.\d+)(?:E[+-]?\d{1,2}(?!\d))?)|(?P<word>[A-Z]+)",
     re.ASCII,
@@ -71,9 +71,9 @@ def read_level(value: str | int | float, words: Iterable[str] = (), spare: Seque
         further, names = _tokens(more)
         numbers += further
         said |= names
-    units = {UNITS[w] for w in said if w in UNITS}
+    units = {LEVEL_UNITS[w] for w in said if w in LEVEL_UNITS}
     references = {REFERENCES[w] for w in said if w in REFERENCES}
-    if unknown := sorted(said - UNITS.keys() - REFERENCES.keys() - UNLIMITED_WORDS):
+    if unknown := sorted(said - LEVEL_UNITS.keys() - REFERENCES.keys() - UNLIMITED_WORDS):
         raise LevelError(f"{unknown[0]!r} is not known")
     if len(numbers) > 1:
         raise LevelError("it holds several numbers")
@@ -86,8 +86,8 @@ def read_level(value: str | int | float, words: Iterable[str] = (), spare: Seque
             return Level(0.0, "agl")
         raise LevelError("it holds no number")
     for word in (text.strip().upper() for text in spare):
-        if not units and word in UNITS:
-            units = {UNITS[word]}
+        if not units and word in LEVEL_UNITS:
+            units = {LEVEL_UNITS[word]}
         elif not references and word in REFERENCES:
             references = {REFERENCES[word]}
     if isinstance(value, str):
@@ -97,7 +97,7 @@ def read_level(value: str | int | float, words: Iterable[str] = (), spare: Seque
 
 def _tokens(text: str) -> tuple[list[str], set[str]]:
     """The numbers and the words of a text."""
-    if len(text) > _MOST_CHARACTERS:
+    if len(text) > _MOST_LEVEL_CHARACTERS:
         raise LevelError("it is too long")
     text = text.upper()
     numbers, words, at = [], set(), 0
@@ -126,7 +126,7 @@ def _require_plain(number: str, units: set[Decimal]) -> None:
 def _level(number: Decimal, units: set[Decimal], references: set[str]) -> Level | Limit:
     if len(units) > 1 or len(references) > 1:
         raise LevelError(f"it has two {'units' if len(units) > 1 else 'references'}")
-    is_flight_level = units == {UNITS["FL"]}
+    is_flight_level = units == {LEVEL_UNITS["FL"]}
     if is_flight_level and references - {PRESSURE}:
         raise LevelError("a flight level is a pressure altitude, not one above ground or sea")
     if is_flight_level or references == {PRESSURE}:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from gcsplan.errors import InputError, absent
 from gcsplan.mission_file.airspace.formats import read_published
-from gcsplan.mission_file.airspace.openair import SUFFIXES
+from gcsplan.mission_file.airspace.openair import OPENAIR_SUFFIXES
 from gcsplan.mission_file.airspace.policy import Policy
 from gcsplan.mission_file.zone_csv import read_csv
 from gcsplan.mission_file.zone_file import ZoneFile
@@ -16,12 +16,12 @@ from gcsplan.mission_file.zone_kml import read_kml
 from gcsplan.mission_file.zone_zip import unpack
 from gcsplan.world.input_files import tell_file
 
-MAX_BYTES = 20_000_000
+MAX_ZONE_BYTES = 20_000_000
 """Most bytes of a file, and of what is unpacked from one."""
 
 JSON = (".geojson", ".json")
 VECTOR = (".gpkg", ".shp", ".fgb", ".zip")
-KINDS = (*JSON, ".kml", ".kmz", ".csv", *VECTOR)
+ZONE_SUFFIXES = (*JSON, ".kml", ".kmz", ".csv", *VECTOR)
 
 
 def read_zones(
@@ -42,8 +42,8 @@ def read_zones(
     Mistakes in single features are collected in ``problems``; a file that cannot be read at all raises InputError.
     """
     kind = path.suffix.lower()
-    if kind not in (*KINDS, *SUFFIXES):
-        known = f"{', '.join(KINDS)} and OpenAir ({', '.join(SUFFIXES)}) files"
+    if kind not in (*ZONE_SUFFIXES, *OPENAIR_SUFFIXES):
+        known = f"{', '.join(ZONE_SUFFIXES)} and OpenAir ({', '.join(OPENAIR_SUFFIXES)}) files"
         raise InputError(f"zones are read from {known}, given {path.name}", where=where)
     if layer is not None and kind not in VECTOR:
         raise InputError(f"a {kind} file has no layers; leave `layer` out", where=where)
@@ -63,13 +63,13 @@ def read_zones(
 
 def _read(path: Path, kind: str, data: bytes, layer: str | None) -> ZoneFile:
     if kind == ".kmz":
-        return read_kml(path, unpack(path, data, [".kml"], MAX_BYTES)[".kml"])
+        return read_kml(path, unpack(path, data, [".kml"], MAX_ZONE_BYTES)[".kml"])
     if kind == ".csv":
         return read_csv(path, data)
     if kind in VECTOR:
         from gcsplan.mission_file.zone_vector import read_vector  # most missions need neither it nor PROJ's database
 
-        return read_vector(path, data, layer=layer, most_bytes=MAX_BYTES)
+        return read_vector(path, data, layer=layer, most_bytes=MAX_ZONE_BYTES)
     return read_kml(path, data)
 
 
@@ -79,8 +79,8 @@ def _bytes(path: Path, where: str) -> bytes:
         if not path.is_file():
             raise InputError(absent(path), where=where)
         size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise InputError(f"{path} has {size} bytes, more than {MAX_BYTES}; simplify or split it", where=where)
+        if size > MAX_ZONE_BYTES:
+            raise InputError(f"{path} has {size} bytes, more than {MAX_ZONE_BYTES}; simplify or split it", where=where)
         return path.read_bytes()
     except (OSError, ValueError) as why:
         if isinstance(why, InputError):

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file.zone_attributes import Attribute, Said, as_figure, read_attributes
-from gcsplan.mission_file.zone_draft import MAX_VERTICES, SIZES
-from gcsplan.mission_file.zone_file import MAX_ZONES, Drawn, ZoneFile
-from gcsplan.mission_file.zone_geojson import ALTITUDES
+from gcsplan.mission_file.zone_attributes import Attribute, ZoneStatements, as_figure, read_attributes
+from gcsplan.mission_file.zone_draft import MAX_VERTICES, SIZE_KEYS
+from gcsplan.mission_file.zone_file import MAX_ZONES, Drawn, ZoneFile, drawn_unread
 from gcsplan.mission_file.zone_zip import unpack
+from gcsplan.notes.note import Note
 from gcsplan.world.degree_shapes import beyond_outline
 from gcsplan.world.input_files import tell_file
 from gcsplan.world.reprojection import ToDegrees
@@ -34,7 +34,7 @@ ARC_STEP_DEG = "0.1"
 MOST_WARNINGS = 5
 
 COMPANIONS = (".shx", ".dbf", ".prj", ".cpg")
-NEEDED = (".shx", ".dbf", ".prj")
+NEEDED_COMPANIONS = (".shx", ".dbf", ".prj")
 
 NO_CRS = (
     "has no coordinate system, so that its places are not known; set the true one (in QGIS Layer > Set CRS, then "
@@ -62,7 +62,7 @@ def read_vector(path: Path, data: bytes, *, layer: str | None, most_bytes: int) 
                 raise
             reason = str(why).replace(str(source), path.name)[:200]
             raise InputError(f"GDAL cannot read it: {reason}", where=str(path)) from None
-    found.said += dict.fromkeys(f"GDAL warns: {str(w.message)[:200]}" for w in heard[:MOST_WARNINGS])
+    found.said += dict.fromkeys(Note("gdal_warns", warning=str(w.message)[:200]) for w in heard[:MOST_WARNINGS])
     return found
 
 
@@ -83,7 +83,7 @@ def _on_disk(path: Path, data: bytes, most_bytes: int) -> Iterator[Path]:
         raise InputError(words, where=str(path))
     if not parts[kind].startswith(BEGINNINGS[kind]):
         raise InputError(f"this is not a {kind} file; its content is of another kind", where=str(path))
-    if kind == ".shp" and (missing := [part for part in NEEDED if part not in parts]):
+    if kind == ".shp" and (missing := [part for part in NEEDED_COMPANIONS if part not in parts]):
         names = " and ".join(f"{path.stem}{part}" for part in missing)
         why = " (.prj is its coordinate system)" if ".prj" in missing else ""
         raise InputError(f"{names} must be beside it{why}: copy all files of the Shapefile", where=str(path))
@@ -160,13 +160,15 @@ def _attributes(row: Mapping[str, Any], where: str) -> list[Attribute]:
         plain = value.item() if isinstance(value, np.generic) else value
         if isinstance(plain, float) and math.isnan(plain):
             plain = None
-        if isinstance(plain, str) and key.lower() in SIZES:
+        if isinstance(plain, str) and key.lower() in SIZE_KEYS:
             plain = as_figure(plain)
         given.append(Attribute(key, plain, f"{where}.{key[:80]}"))
     return given
 
 
-def _feature(found: ZoneFile, geometry: shapely.Geometry | None, said: Said, where: str, to_degrees: ToDegrees) -> None:
+def _feature(
+    found: ZoneFile, geometry: shapely.Geometry | None, said: ZoneStatements, where: str, to_degrees: ToDegrees
+) -> None:
     """Add every part of a feature's geometry."""
     parts = [] if geometry is None else _parts(geometry)
     if not parts:
@@ -213,4 +215,4 @@ def _parts(geometry: shapely.Geometry) -> list[Any]:
 def _unread(line: Any) -> Drawn:
     """What is said of altitudes in corners, which limit nothing."""
     heights = [p[2] for p in line.coords if len(p) > 2 and math.isfinite(p[2]) and p[2] != 0.0] if line.has_z else []
-    return Drawn(remarks=((ALTITUDES, f"up to {max(heights):g} m"),)) if heights else Drawn()
+    return drawn_unread(heights)

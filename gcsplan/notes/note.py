@@ -14,10 +14,11 @@ A sentence of the catalogue names the data by fields of ``str.format``, each wit
     {conflicts:lines}           a list, each of it in a line of its own below the sentence
     {unit:height}               the symbol of a kind's unit alone
     {key:max_agl_m}             what the reader types for a key of the mission file: the key, or an option
+    {limit:key}                 the same for a datum that is the name of a key
 
-The place stands around the sentence by itself, unless the sentence names it: a note on an item begins with
-``item 5: ``, with ``way`` among its data, what is flown for the item, with ``item 5 (cruise): ``; one whose data have a
-``file``, a ``place`` in it or a ``vehicle`` with that, and one with ``zones`` ends with them.
+Where it belongs stands around the sentence by itself, unless the sentence names it: a note on an item begins with
+``item 5: `` (with ``way`` among its data, what is flown for the item, with ``item 5 (cruise): ``), one whose data have
+a ``file``, a ``place`` in it or a ``vehicle`` with that, and one with ``zones`` ends with them.
 """
 
 from __future__ import annotations
@@ -86,7 +87,7 @@ class Note:
             before += f"item {self.item} {shown}: " if shown else f"item {self.item}: "
         elif not placed and isinstance(way, Note):
             before += f"{shown}: "
-        zones = "" if "zones" in named or not self.data.get("zones") else _shown(self.data["zones"], "", wording)
+        zones = "" if "zones" in named else _shown(self.data.get("zones"), "", wording)
         behind = f": {zones}" if zones else ""
         return before + sentence(template, {"item": self.item, **self.data}, wording) + behind
 
@@ -197,6 +198,8 @@ def _shown(value: Any, spec: str, wording: Wording) -> str:
         rounding, places = _rounding(how), int(decimals or 0)
         degrees = floored(value, places) if rounding == "down" else raised(value, places) if rounding == "up" else value
         return f"{degrees:.{places}f} °"
+    if name == "key":
+        return wording.options.get(value, value)
     if name == "reach":
         return Reach(value).text(wording.units)
     if name == "seconds":

@@ -21,7 +21,7 @@ from gcsplan.world._field import Field
 from gcsplan.world._shared import STRIP, LocalExtrema
 from gcsplan.world.surface import GridMap
 
-LARGE = 2_000_000
+LARGE_WINDOW = 2_000_000
 """Surfaces with more cells than this are examined tile by tile."""
 TILE, SPACING = STRIP, 32
 """Columns and rows of a tile, and the largest spacing, in cells, of the places on a line whose tiles are examined."""
@@ -38,7 +38,7 @@ TALL, WIDE, WIDER = 64, 1024, 4
 of the reach around them, in cells."""
 
 
-class Lines:
+class LineBatch:
     """Lines of the plane from ``start`` to ``end`` (N, 2 or more), and the tiles of a surface that they meet: found
     once, whatever the number of reaches for which these are examined."""
 
@@ -80,7 +80,7 @@ class Neighbourhood:
         self._lock = threading.Lock()
         self.seen = np.ones((0, 0), np.bool_)
         rows, cols = heights.shape[0] - 1, heights.shape[1] - 1
-        if rows * cols > LARGE:
+        if rows * cols > LARGE_WINDOW:
             self.extrema = _empty(field, heights, reach_m)
             self.seen = np.zeros((-(-rows // TILE), -(-cols // TILE)), np.bool_)
         else:
@@ -93,7 +93,7 @@ class Neighbourhood:
         """Pickle the inputs only: a copy in another process examines its tiles anew."""
         return Neighbourhood, (self._grid, self._field, self._heights, self._reach_m)
 
-    def along(self, lines: Lines) -> Held:
+    def along(self, lines: LineBatch) -> Held:
         """The extrema in the kernels' form, examined along lines."""
         if self.seen.size and not self.seen.all():
             tiles = lines.tiles(self._grid, self._field, self.seen.shape)
@@ -122,7 +122,7 @@ class Neighbourhoods:
         """Pickle none of the extrema: a copy in another process examines its own."""
         return Neighbourhoods, (self._grid, self._field)
 
-    def along(self, of_top: bool, heights: Floats, reach_m: float, lines: Lines) -> Held:
+    def along(self, of_top: bool, heights: Floats, reach_m: float, lines: LineBatch) -> Held:
         """The extrema of ``heights`` along lines, in the kernels' form; one for each size of the reach in cells."""
         key = of_top, math.ceil(reach_m / self._field.step_x), math.ceil(reach_m / self._field.step_y)
         with self._lock:

@@ -24,7 +24,7 @@ from gcsplan.native.signature import Held
 from gcsplan.world._compiled import FOUND, ONE_SURFACE, SURFACE, ZONES
 from gcsplan.world._entries import around, judge
 from gcsplan.world._field import Field
-from gcsplan.world._neighbourhood import Lines, Neighbourhoods
+from gcsplan.world._neighbourhood import LineBatch, Neighbourhoods
 from gcsplan.world._shapes import deepest_in_circle, deepest_inside
 from gcsplan.world._shared import (
     ANGLE_DEG,
@@ -52,13 +52,13 @@ from gcsplan.world.surface import Surface
 from gcsplan.world.tube import ZONE_ROOM_M, Band, Reaches, Tube, make_tube
 from gcsplan.world.zones import Polygon, Zone
 
-__all__ = ["Airspace", "Band", "Kind", "LegReport", "Legs", "Tube", "Violation"]
+__all__ = ["Airspace", "Band", "LegReport", "Legs", "Tube", "Violation", "ViolationKind"]
 
 NEAR_M, NEAR_PART = 0.01, 0.01
 """The kernel finds the nearest place of a zone over ground to this many metres, or this part of the distance
 (`_sweep_zones.nearest_conflict`)."""
 
-Kind = Literal["min_agl", "max_agl", "max_amsl", "terrain_clearance", "zone", "climb", "descent", "coverage"]
+ViolationKind = Literal["min_agl", "max_agl", "max_amsl", "terrain_clearance", "zone", "climb", "descent", "coverage"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +126,7 @@ class Violation:
     """
 
     leg: int
-    kind: Kind
+    kind: ViolationKind
     fraction: float
     east_m: float
     north_m: float
@@ -191,9 +191,9 @@ class Airspace:
         violations = self._violations(legs, limits, climb_deg, worst, hit, hit_at)
         return LegReport(found[:, 0], found[:, 1], found[:, 2], climb_deg, found[:, 3], nearest, violations)
 
-    def deepest(self, legs: Legs, limits: Limits, kind: Kind) -> float:
+    def deepest(self, legs: Legs, limits: Limits, kind: ViolationKind) -> float:
         """By how much the worst of ``legs`` breaks a limit of height, as in `examine`; 0 if none does."""
-        return float(np.fmax.reduce(self._examined(legs, limits)[1][:, _NUMBERS[kind], 0], initial=0.0))
+        return float(np.fmax.reduce(self._examined(legs, limits)[1][:, _KIND_NUMBERS[kind], 0], initial=0.0))
 
     def _examined(self, legs: Legs, limits: Limits) -> tuple[Floats, Floats, Indices, Indices, Floats]:
         """What the kernel finds: figures (N, 4), the worst of each kind (N, 7, 2), the nearest zone (N,), and the zones
@@ -247,7 +247,7 @@ class Airspace:
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not np.isfinite(points).all():
             raise ValueError(f"a track is (N, 2) finite metres with N >= 2, given shape {points.shape}")
 
-        lines = Lines(points[:-1], points[1:])
+        lines = LineBatch(points[:-1], points[1:])
 
         def extrema(of_top: bool, reach_m: float) -> Held:
             return self._held(of_top, reach_m, lines)
@@ -266,11 +266,11 @@ class Airspace:
         e, n = np.broadcast_arrays(np.asarray(east_m, dtype=np.float64), np.asarray(north_m, dtype=np.float64))
         out = np.empty(e.size)
         points = np.stack([e.ravel(), n.ravel()], axis=-1)
-        held = self._held(sign > 0.0, reach_m, Lines(points, points))
+        held = self._held(sign > 0.0, reach_m, LineBatch(points, points))
         around(self._tops if sign > 0.0 else self._bare, held, sign, points, reach_m, out)
         return out.reshape(e.shape)
 
-    def _held(self, of_top: bool, reach_m: float, lines: Lines) -> Held:
+    def _held(self, of_top: bool, reach_m: float, lines: LineBatch) -> Held:
         """The kernels' extrema of top or ground for a reach, along lines."""
         of_top = of_top and self.surface.top_m is not self.surface.ground_m
         return self._neighbourhoods.along(of_top, self._heights[of_top], reach_m, lines)
@@ -286,7 +286,7 @@ class Airspace:
         f = self._field
         spare = 0.0 if f.affine else BOW_M + f.error_m
         near_m = float(legs.track_error_m.max(initial=0.0)) * self.scale + spare
-        lines = Lines(legs.start, legs.end)
+        lines = LineBatch(legs.start, legs.end)
         near = self._held(True, near_m, lines)
         far = self._held(True, near_m + limits.horizontal_clearance_m * self.scale, lines)
         return int(
@@ -322,7 +322,7 @@ class Airspace:
         reach = (legs.track_error_m + limits.horizontal_clearance_m) * self.scale
         known_within = np.where(legs.column, legs.track_error_m * self.scale, reach)
         steep = (kind == CLIMB) | (kind == DESCENT)
-        asked = np.zeros(len(_KINDS))
+        asked = np.zeros(len(_VIOLATION_KINDS))
         asked[[MIN_AGL, CLIMB, DESCENT]] = limits.min_agl_m, limits.max_climb_deg, limits.max_descent_deg
         asked[[MAX_AGL, MAX_AMSL]] = limits.max_agl_m or 0.0, limits.max_amsl_m or 0.0
         limit = np.where(kind == COVERAGE, known_within[leg], asked[kind])
@@ -347,7 +347,7 @@ class Airspace:
         )
         rows = zip(*(c[order].tolist() for c in columns), strict=True)
         return tuple(
-            Violation(i, _KINDS[k], t, e, n, h, v, lim, off, "deg" if k in (CLIMB, DESCENT) else "m", zone)
+            Violation(i, _VIOLATION_KINDS[k], t, e, n, h, v, lim, off, "deg" if k in (CLIMB, DESCENT) else "m", zone)
             for i, k, t, e, n, h, v, lim, off, zone in rows
         )
 
@@ -384,13 +384,13 @@ class Airspace:
 
 
 ZONE = 7  # follows the kernel's kinds
-_KINDS: dict[int, Kind] = {
+_VIOLATION_KINDS: dict[int, ViolationKind] = {
     ZONE: "zone", MIN_AGL: "min_agl", TERRAIN: "terrain_clearance", MAX_AGL: "max_agl", MAX_AMSL: "max_amsl",
     COVERAGE: "coverage", CLIMB: "climb", DESCENT: "descent",
 }  # fmt: skip
-_NUMBERS = {kind: number for number, kind in _KINDS.items()}
+_KIND_NUMBERS = {kind: number for number, kind in _VIOLATION_KINDS.items()}
 
-_NOTHING = (
+_NO_ZONES = (
     np.zeros((0, 4)), np.zeros((0, 7, 2)), np.zeros(0, np.intp), np.zeros((0, 2), np.intp), np.zeros((0, 2)),
 )  # fmt: skip
-_HELD_NOTHING = Held(FOUND, *_NOTHING)
+_HELD_NOTHING = Held(FOUND, *_NO_ZONES)

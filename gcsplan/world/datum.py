@@ -17,6 +17,7 @@ from pyproj.crs.datum import Datum  # type: ignore[attr-defined]
 from pyproj.exceptions import ProjError
 
 from gcsplan.errors import InputError
+from gcsplan.notes.note import Note
 from gcsplan.world.frame import Frame
 from gcsplan.world.height_unit import BY_FILE, METRE, HeightUnit, unit_of_length
 
@@ -60,11 +61,11 @@ _NAMED_CRS = re.compile(r"(?i)(EPSG|ESRI):\d{4,6}(\+\d{4,6})?|urn:ogc:def:crs:\w
 
 @dataclass(frozen=True, slots=True)
 class VerticalDatum:
-    """``name`` for the outputs; ``ellipsoidal`` heights must be converted; ``note`` is shown to the user, or ""."""
+    """``name`` for the outputs; ``ellipsoidal`` heights must be converted; ``note`` is for the user."""
 
     name: str
     ellipsoidal: bool = False
-    note: str = ""
+    note: Note | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -342,7 +343,7 @@ def _named_by_raster(name: str) -> VerticalDatum:
 
 
 def _national(name: str) -> VerticalDatum:
-    return VerticalDatum(name, note=f"heights in {name} are taken as AMSL; it may differ from EGM96 by a metre or two")
+    return VerticalDatum(name, note=Note("heights_taken_as_amsl", datum=name))
 
 
 def _first_line(why: Exception) -> str:

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import InputError
 from gcsplan.world.frame import FARTHEST_M, Frame
-from gcsplan.world.outlines import MOST_CROSSINGS, MOST_PAIRS, crossings, overlapping_pairs
+from gcsplan.world.outlines import MOST_CROSSINGS, MOST_EDGE_PAIRS, crossings, overlapping_pairs
 from gcsplan.world.zones import Circle, Polygon
 
 if TYPE_CHECKING:
@@ -49,14 +49,14 @@ WIDER_PART, MOST_WIDENINGS = 0.005, 8
 METRES_OF_DEGREE = 111_700.0
 """A degree of a meridian or of the equator is shorter, m."""
 
-MOST_POINTS = 1000
+MOST_EDGE_POINTS = 1000
 """A longer line becomes several corridors, since the time for one grows faster than its points."""
 
 UNTANGLED, MOST_OF_POINT = 32, 4
 """A line of more points than the first that crosses itself more often than this for each point becomes several
 corridors at once: what it surrounds would be found, at great length, and then cut into parts of its own."""
 
-FAR_M = 1.6 * FARTHEST_M
+ZONE_FAR_M = 1.6 * FARTHEST_M
 """No mission goes farther than this from the frame's origin, m."""
 
 MOST_LON_DEG = 360.0
@@ -95,12 +95,12 @@ def near_circle(centre: Corner, radius_m: float, frame: Frame, *, local: bool = 
     """
     east, north = centre if local else (float(x) for x in frame.to_plane(*centre))
     distance = math.hypot(east, north)
-    near = math.isfinite(distance) and distance <= FAR_M + radius_m
+    near = math.isfinite(distance) and distance <= ZONE_FAR_M + radius_m
     return Circle(float(east), float(north), radius_m) if near else None
 
 
 def near_polygons(ring: Sequence[Corner], frame: Frame, *, great_circles: bool = False) -> list[Polygon]:
-    """The parts of a polygon (latitude, longitude; simple, not closed) within `FAR_M`; none if it is too far away.
+    """The parts of a polygon (latitude, longitude; simple, not closed) within `ZONE_FAR_M`; none if it is too far away.
 
     Its edges are cut to keep `EDGE_BOW_M`. With ``great_circles`` each edge may be the great circle as well as the line
     that is straight in degrees, and all that either encloses belongs to the polygon.
@@ -168,8 +168,8 @@ def rings_around(points: Floats, buffer_m: float) -> list[Floats]:
 
     half = len(points) // 2
     most = MOST_OF_POINT * len(points)
-    tangled = UNTANGLED < len(points) <= MOST_POINTS and crossings(points, most, closed=False) > most
-    if len(points) > MOST_POINTS or tangled:
+    tangled = UNTANGLED < len(points) <= MOST_EDGE_POINTS and crossings(points, most, closed=False) > most
+    if len(points) > MOST_EDGE_POINTS or tangled:
         return rings_around(points[: half + 1], buffer_m) + rings_around(points[half:], buffer_m)
     line, begin = shapely.LineString(points), shapely.Point(points[0])
     shapely.prepare(line)  # distances from all corners to all legs would take minutes
@@ -192,7 +192,7 @@ def rings_around(points: Floats, buffer_m: float) -> list[Floats]:
 
 
 def _near_parts(points: Floats, frame: Frame, *, spare_m: float = 0.0, is_line: bool = False) -> list[Floats]:
-    """The parts of a polygon or line (N, 2) longitude, latitude within `FAR_M` and ``spare_m``, not closed."""
+    """The parts of a polygon or line (N, 2) longitude, latitude within `ZONE_FAR_M` and ``spare_m``, not closed."""
     window = _window(frame, spare_m)
     found: list[Floats] = []
     (west_most, south_most), (east_most, north_most) = points.min(axis=0), points.max(axis=0)
@@ -214,8 +214,8 @@ def _near_parts(points: Floats, frame: Frame, *, spare_m: float = 0.0, is_line: 
 
 
 def _window(frame: Frame, spare_m: float = 0.0) -> tuple[float, float, float, float]:
-    """West, south, east, north (degrees) of all within `FAR_M` and ``spare_m``."""
-    tall = math.degrees((FAR_M + spare_m) / 6_350_000.0)
+    """West, south, east, north (degrees) of all within `ZONE_FAR_M` and ``spare_m``."""
+    tall = math.degrees((ZONE_FAR_M + spare_m) / 6_350_000.0)
     wide = min(tall / math.cos(math.radians(min(abs(frame.lat_deg) + tall, 89.0))), 80.0)
     return frame.lon_deg - wide, frame.lat_deg - tall, frame.lon_deg + wide, frame.lat_deg + tall
 
@@ -240,7 +240,7 @@ def outline_of(points: Sequence[Corner], *, local: bool = False) -> tuple[list[C
     import shapely  # many missions have no polygons
 
     shape = shapely.Polygon(np.asarray(ring, float) if local else np.asarray(ring, float)[:, ::-1])
-    if overlapping_pairs(shapely.get_coordinates(shape)[:-1]) > MOST_PAIRS:
+    if overlapping_pairs(shapely.get_coordinates(shape)[:-1]) > MOST_EDGE_PAIRS:
         return ring, (
             f"the outline has {len(ring)} corners, and its edges lie beside each other in such numbers that it would "
             "take minutes to examine; simplify it, or draw what is around it"
@@ -325,7 +325,7 @@ def across(points: Sequence[Corner], holes: int = 0) -> tuple[Sequence[Corner], 
     if is_strip or not (long.any() and (np.abs(short[long]) <= ACROSS_DEG).all() and abs(short.sum()) < 1.0):
         return points, ()
     highest = min(max(abs(south), abs(north)) + 2.0, 89.0)
-    spare = math.degrees(1.1 * FAR_M / 6.35e6) / math.cos(math.radians(highest))
+    spare = math.degrees(1.1 * ZONE_FAR_M / 6.35e6) / math.cos(math.radians(highest))
     low, high = float(east) + spare, float(west) + 360.0 - spare
     ring = [(float(lat), float(lon)) for lon, lat in turned]
     other = ((float(south), low), (float(south), high), (float(north), high), (float(north), low))
@@ -366,7 +366,7 @@ def _with_great_circles(ring: Floats, frame: Frame) -> list[Floats]:
 
     both = np.concatenate([ring, bent])  # one line along both, for they begin at the same corner
     most = MOST_CROSSINGS + 8 * len(ring)  # at a corner two edges touch two others, which counts for each
-    if len(ring) > FEW_EDGES and (overlapping_pairs(both) > MOST_PAIRS or crossings(both, most) > most):
+    if len(ring) > FEW_EDGES and (overlapping_pairs(both) > MOST_EDGE_PAIRS or crossings(both, most) > most):
         raise InputError(
             f"of its outline of {len(ring)} corners so many long edges lie beside each other that it would take "
             "minutes to tell what they enclose along great circles; simplify it"

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from gcsplan.errors import InputError
+from gcsplan.notes.note import Note
 from gcsplan.units import FOOT
 
 US_FOOT_M = 1200 / 3937
@@ -78,27 +79,28 @@ def unit_of_length(metres: float, name: str) -> HeightUnit:
 
 def unit_that_counts(
     stated: Sequence[HeightUnit], wanted: str | None, horizontal: HeightUnit, file: str, *, where: str
-) -> tuple[HeightUnit, list[str]]:
+) -> tuple[HeightUnit, list[Note]]:
     """The unit of a file's heights, and notes.
 
     ``stated`` are the units that the file and the vertical datum state, ``wanted`` is ``height_unit`` (`OF_KEY`), which
     counts before all of them; ``horizontal`` is the unit of the grid. Where nothing is stated, metres count over a grid
     in metres or degrees. Raises InputError where two units are stated, and over a grid in feet where none is.
     """
-    named = ", ".join(dict.fromkeys(f"{unit.name} ({unit.by})" for unit in stated))
+    names = tuple(dict.fromkeys(f"{unit.name} ({unit.by})" for unit in stated))
     if wanted is not None:
         unit = replace(OF_KEY[wanted], by=BY_KEY)
         other = [s for s in stated if not s.is_same(unit)]
-        return unit, [f"{file}: heights are {unit.name} by height_unit, in place of {named}"] if other else []
+        return unit, [Note("heights_in_unit_of_key", file=file, height_unit=unit.name, stated=names)] if other else []
     if any(not s.is_same(stated[0]) for s in stated[1:]):
         raise InputError(
-            f"{file} states two units of height: {named}; say with `height_unit: us_ft` (or m, ft) which one is right",
+            f"{file} states two units of height: {', '.join(names)}; say with `height_unit: us_ft` (or m, ft) which "
+            "one is right",
             where=where,
         )
     if stated:
         unit = stated[0]
         plain = unit.is_same(METRE)
-        return unit, [] if plain else [f"{file}: heights are {unit.name}, {unit.by}"]
+        return unit, [] if plain else [Note("heights_in_unit", file=file, height_unit=unit.name, by=unit.by)]
     if not horizontal.is_same(METRE):
         likely = next((key for key, unit in OF_KEY.items() if unit.is_same(horizontal)), "m")
         raise InputError(

@@ -14,7 +14,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 
-AT_ONCE = 1_000_000
+POINTS_AT_ONCE = 1_000_000
 MEETS = -1.0
 """Overlap; not 0, which is touching: touching is legal if no clearance is required."""
 
@@ -38,7 +38,7 @@ def to_polygon(regions: Floats, corners: Floats, within: Floats | float = math.i
 
     A region that is farther away than ``within`` (each its own, or one for all) may count as still farther.
     """
-    at_once = max(AT_ONCE // (len(corners) * max(math.comb(regions.shape[1], 3), 1)), 1)
+    at_once = max(POINTS_AT_ONCE // (len(corners) * max(math.comb(regions.shape[1], 3), 1)), 1)
     within = np.broadcast_to(within, len(regions))
     parts = [
         _to_polygon(regions[i : i + at_once], corners, float(within[i : i + at_once].max()))

@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 __all__ = [
-    "Reading", "beside", "files_of", "neighbours", "path_of", "reading", "sha256_of", "sha256_of_all", "tell_file",
+    "FileReading", "beside", "files_of", "neighbours", "path_of", "reading", "sha256_of", "sha256_of_all", "tell_file",
     "tell_folder", "tell_raster", "tell_setting",
 ]  # fmt: skip
 
@@ -46,10 +46,10 @@ _MOST_KEPT, _MOST_FOLDERS = 100_000, 1_000
 
 known_hashes: dict[tuple[int, ...], str] = {}
 known_names: dict[tuple[object, ...], tuple[tuple[str, str], ...]] = {}
-_now: ContextVar[Reading | None] = ContextVar("reading", default=None)
+_now: ContextVar[FileReading | None] = ContextVar("reading", default=None)
 
 
-class Reading:
+class FileReading:
     """What was reported since `reading` began: ``marks``, in this order."""
 
     def __init__(self) -> None:
@@ -94,7 +94,7 @@ class Reading:
     @staticmethod
     def changed(marks: Mapping[str, str]) -> str:
         """The first path of ``marks`` that is not what it was; empty if all are."""
-        now = Reading()
+        now = FileReading()
         for key, mark in marks.items():
             now.tell(key)
             if now.marks[key] != mark:
@@ -109,9 +109,9 @@ def path_of(key: str) -> str:
 
 
 @contextmanager
-def reading() -> Iterator[Reading]:
+def reading() -> Iterator[FileReading]:
     """Keep what is reported in the body, by this thread."""
-    found = Reading()
+    found = FileReading()
     token = _now.set(found)
     try:
         yield found

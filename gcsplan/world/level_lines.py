@@ -15,7 +15,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.world import hulls
 from gcsplan.world._entries import pieces
-from gcsplan.world._neighbourhood import Lines
+from gcsplan.world._neighbourhood import LineBatch
 from gcsplan.world._shapes import grown_edges
 from gcsplan.world._shared import (
     BAND_HIGH,
@@ -38,13 +38,13 @@ from gcsplan.world._shared import (
 )
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.limits import Limits
-from gcsplan.world.tube import MARGIN_M, ZONE_ROOM_M, Reaches
+from gcsplan.world.tube import TUBE_MARGIN_M, ZONE_ROOM_M, Reaches
 
 BOX_LOW, BOX_HIGH = [WEST_E, SOUTH_N], [EAST_E, NORTH_N]
-WIDER = 1.6
+WIDER_REACH = 1.6
 UNUSED = -1e9
 """A reach for which the kernel need not look for anything."""
-MOST_ROWS = 200_000
+MOST_LEVEL_ROWS = 200_000
 """Most pieces of the lines that are looked at together: the kernel's rows take 11 MB, which a cache holds, so returns
 of 240 km are judged in two thirds of the time that all at once take."""
 
@@ -134,9 +134,9 @@ def over(
     reach = Reaches.of(limits, air._field, air.scale)
     near, far = reach.near_m + wide_m, reach.far_m + wide_m
     error = limits.altitude_error_m
-    margin = reach.near_margin_m if wide_m == 0.0 else MARGIN_M
+    margin = reach.near_margin_m if wide_m == 0.0 else TUBE_MARGIN_M
     found: list[tuple[Indices, Floats, Floats, Floats, Floats]] = []
-    for first, last in pairwise(batches(air, starts, ends, MOST_ROWS)):
+    for first, last in pairwise(batches(air, starts, ends, MOST_LEVEL_ROWS)):
         line, s0, rows = _pieces(
             air, starts[first:last], ends[first:last],
             (near if limits.max_agl_m is not None else UNUSED, near, far), of_top=True,
@@ -189,7 +189,7 @@ def _pieces(
     track[0::2], track[1::2] = np.where(back[:, None], ends, starts), np.where(back[:, None], starts, ends)
     bow = 0.0 if air._field.affine else BOW_M + 2.0 * air._field.error_m
     kinds = zip((False, of_top, of_top), reaches, strict=True)
-    lines = Lines(track[:-1], track[1:])
+    lines = LineBatch(track[:-1], track[1:])
     held = [air._held(top, _few(max(reach, 0.0) + bow, air), lines) for top, reach in kinds]
     surfaces = air._surfaces if of_top else air._grounds
     length = np.hypot(*np.diff(track, axis=0).T)
@@ -217,7 +217,7 @@ def _few(reach_m: float, air: Airspace) -> float:
     cell = min(air._field.step_x, air._field.step_y)
     if reach_m <= cell:
         return reach_m
-    return float(cell * WIDER ** math.ceil(math.log(reach_m / cell) / math.log(WIDER)))
+    return float(cell * WIDER_REACH ** math.ceil(math.log(reach_m / cell) / math.log(WIDER_REACH)))
 
 
 def _crossings(
@@ -275,8 +275,8 @@ def _crossings(
             np.minimum.at(low, part, np.where(unknown, -np.inf, rows[:, 1:3].min(axis=1)))
             np.maximum.at(high, part, np.where(unknown, np.inf, rows[:, 3:5].max(axis=1)))
             known = np.isfinite(low) & np.isfinite(high)
-            floor = np.fmax(low + (bottom[follow] - MARGIN_M), row[:, BAND_LOW])
-            ceiling = np.fmin(high + (top[follow] + MARGIN_M), row[:, BAND_HIGH])
+            floor = np.fmax(low + (bottom[follow] - TUBE_MARGIN_M), row[:, BAND_LOW])
+            ceiling = np.fmin(high + (top[follow] + TUBE_MARGIN_M), row[:, BAND_HIGH])
         agl = row[:, FLOOR_AGL] != 0.0
         bottom[follow[agl]] = np.where(known, floor, -np.inf)[agl]
         agl = row[:, CEILING_AGL] != 0.0
@@ -303,7 +303,7 @@ def _in_circle(away: Floats, unit: Floats, radius: float, length: Floats) -> tup
 
 def _in_polygon(corners: Floats, starts: Floats, unit: Floats, reach: float, length: Floats) -> tuple[Floats, Floats]:
     """The same for a polygon grown by ``reach``: the hull of all parts."""
-    at_once = max(hulls.AT_ONCE // len(corners), 1)
+    at_once = max(hulls.POINTS_AT_ONCE // len(corners), 1)
     if len(starts) > at_once:
         parts = [slice(k, k + at_once) for k in range(0, len(starts), at_once)]
         found = [_in_polygon(corners, starts[s], unit[s], reach, length[s]) for s in parts]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from gcsplan.figures import floored, raised
+from gcsplan.notes.note import Note
 from gcsplan.world.height_unit import HeightUnit
 
 BARE_DEM = "bare DEM: trees, masts and wires are not in it"
@@ -16,6 +17,13 @@ def what_is_not_in(inputs: Mapping[str, object]) -> str:
     if inputs.get("dem_kind") == "surface":
         return SURFACE_DEM
     return BARE_DEM if inputs.get("bare_dem", True) else ""
+
+
+def notes_on(info: Mapping[str, object]) -> tuple[Note, ...]:
+    """What a user has to know of the terrain, of a surface's ``info``."""
+    notes = info.get("notes", ())
+    assert isinstance(notes, tuple)
+    return notes
 
 
 def heights_read(units: Iterable[HeightUnit], datum: str, low_m: float, high_m: float) -> str:

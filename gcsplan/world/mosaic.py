@@ -13,14 +13,13 @@ from numpy.typing import ArrayLike
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import InputError
+from gcsplan.notes.note import Note
 from gcsplan.world.datum import plane_to_raster, to_wgs84
-from gcsplan.world.frame import Frame
+from gcsplan.world.frame import Box, Frame
 from gcsplan.world.height_unit import BY_NOBODY, METRE, OF_KEY
-from gcsplan.world.overlap import Placed, read_tiles
+from gcsplan.world.overlap import PlacedTile, read_tiles
 from gcsplan.world.raster import MAX_CELLS, Raster
 from gcsplan.world.surface import NO_SIDES, GridMap, Sides
-
-Box = tuple[float, float, float, float]
 
 FIT_ERROR_M = 0.01
 """The polynomial may misplace a node by this much at most, m."""
@@ -50,7 +49,7 @@ class Window:
     grid: GridMap
     x: Floats
     y: Floats
-    notes: tuple[str, ...]
+    notes: tuple[Note, ...]
     goes_on: Sides = NO_SIDES
     low_m: Floats | None = None
 
@@ -73,7 +72,7 @@ class _Layout:
     y0: float
     dx: float
     dy: float
-    tiles: tuple[Placed, ...]
+    tiles: tuple[PlacedTile, ...]
 
     def grid_of(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
         """Column and row of points in the raster's units."""
@@ -218,12 +217,10 @@ class Mosaic:
                 where=self.where,
             )
         heights, notes = read_tiles(parts, c0, r0, c1 - c0, r1 - r0, self.where)
-        if accuracy_m < 0.0 or accuracy_m > 1.0:
-            good = "unknown" if accuracy_m < 0.0 else f"{accuracy_m:g} m"
-            notes.append(
-                f"the accuracy of the datum shift between WGS84 and {self.crs.horizontal.name} is {good}; "
-                "track_error_m should hold it"
-            )
+        if accuracy_m < 0.0:
+            notes.append(Note("datum_shift_of_unknown_accuracy", crs=self.crs.horizontal.name))
+        elif accuracy_m > 1.0:
+            notes.append(Note("datum_shift_inaccurate", crs=self.crs.horizontal.name, accuracy_m=accuracy_m))
         goes_on = (c0 > first_col, r0 > first_row, c1 < last_col, r1 < last_row)
         return Window(heights.high_m, grid, x, y, tuple(notes), goes_on, heights.low_m)
 
@@ -263,7 +260,7 @@ class Mosaic:
                 col = (raster.west + 0.5 * raster.dx + turn - x0) / dx
                 row = (y0 - (raster.north - 0.5 * raster.dy)) / first.dy
                 if max(abs(col - round(col)), abs(row - round(row))) <= ALIGNED_CELLS:
-                    tiles.append(Placed(raster, round(col), round(row), round(ratio * parts)))
+                    tiles.append(PlacedTile(raster, round(col), round(row), round(ratio * parts)))
                 elif turn == nearest:
                     raise InputError(
                         f"the tiles must lie on one grid: {raster.name} is off that of {first.name} by "

@@ -15,13 +15,13 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 
-MOST_PAIRS = 12e6
+MOST_EDGE_PAIRS = 12e6
 """Pairs of edges with overlapping boxes, of an outline that is examined: GEOS takes half a second for them."""
 
 MOST_CROSSINGS = 30_000
 """Crossings of an outline with itself, of which what it encloses is found: GEOS takes two seconds for them."""
 
-FEW = 2000
+FEW_CORNERS = 2000
 """Outlines with so many corners are examined without an estimate."""
 
 SAMPLED, AT_ONCE = 64, 32
@@ -30,13 +30,13 @@ SAMPLED, AT_ONCE = 64, 32
 WIDER_M = (0.05, 0.2, 1.0, 5.0, 20.0, 100.0)
 """Tolerances that `few_corners` tries, m."""
 
-ROUNDS = 200
+MOST_OUTLINE_ROUNDS = 200
 """Rounds of steps at most; each takes a fifth of what can be left out, or more."""
 
 
 def overlapping_pairs(ring: Floats) -> float:
-    """About how many pairs of an outline's (N, 2) edges have boxes that overlap; 0 for `FEW` corners."""
-    if len(ring) <= FEW:
+    """About how many pairs of an outline's (N, 2) edges have boxes that overlap; 0 for `FEW_CORNERS` corners."""
+    if len(ring) <= FEW_CORNERS:
         return 0.0
     import shapely
 
@@ -78,7 +78,7 @@ def fewer_corners(
 
     ring = np.asarray(vertices, float)
     error = np.zeros(len(ring))  # of the edge from each corner to the next
-    for _ in range(ROUNDS):
+    for _ in range(MOST_OUTLINE_ROUNDS):
         if len(ring) <= 4:
             break
         ring, error, done = _round(ring, error, tolerance_m, 1.0 if outward else -1.0)
@@ -87,7 +87,7 @@ def fewer_corners(
     if most is not None and len(ring) > most:
         return None
     shape = shapely.Polygon(ring)
-    fine = len(ring) >= 3 and overlapping_pairs(ring) <= MOST_PAIRS and bool(shapely.is_valid(shape))
+    fine = len(ring) >= 3 and overlapping_pairs(ring) <= MOST_EDGE_PAIRS and bool(shapely.is_valid(shape))
     return ring if fine and shape.area > 0.0 else None
 
 

@@ -13,14 +13,15 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
+from gcsplan.notes.note import Note
 from gcsplan.world.raster import MAX_CELLS, Raster
 
-Shared = tuple[int, int, int, int]
+SharedNodes = tuple[int, int, int, int]
 """Column, row, columns, rows of the common grid that a tile and a window share."""
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class PlacedTile:
     """A tile with its first node in the common grid; each of its columns is ``step`` common ones wide."""
 
     raster: Raster
@@ -87,8 +88,8 @@ class Heights:
 
 
 def read_tiles(
-    parts: Sequence[tuple[Placed, Shared]], c0: int, r0: int, cols: int, rows: int, where: str = ""
-) -> tuple[Heights, list[str]]:
+    parts: Sequence[tuple[PlacedTile, SharedNodes]], c0: int, r0: int, cols: int, rows: int, where: str = ""
+) -> tuple[Heights, list[Note]]:
     """The heights of a window that begins at column ``c0`` and row ``r0``, and notes on what differs or is unknown.
 
     ``where`` names the files in messages. Raises InputError.
@@ -107,17 +108,14 @@ def read_tiles(
     notes = []
     if heights.nodes:
         worst_m = max(heights.worst_m, 0.001)  # what single precision makes of one height in two units is less
-        notes.append(
-            f"tiles differ where they overlap ({heights.nodes} nodes, {worst_m:g} m at most); each limit "
-            "counts the unfavourable height"
-        )
+        notes.append(Note("tiles_differ", nodes=heights.nodes, worst_m=worst_m))
     unknown = int(np.count_nonzero(np.isnan(heights.high_m)))
     if unknown:
-        notes.append(f"{unknown} of {rows * cols} DEM nodes around the mission are unknown (void or no tile)")
+        notes.append(Note("nodes_unknown", unknown=unknown, nodes=rows * cols))
     return heights, notes
 
 
-def _put_wide(heights: Heights, parts: Sequence[tuple[Placed, Shared]], c0: int, r0: int, phase: int) -> None:
+def _put_wide(heights: Heights, parts: Sequence[tuple[PlacedTile, SharedNodes]], c0: int, r0: int, phase: int) -> None:
     """Put tiles whose columns are wider than the common ones into ``heights``, linear between their own nodes."""
     cols = heights.high_m.shape[1]
     step = parts[0][0].step

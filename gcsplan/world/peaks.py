@@ -10,14 +10,13 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
+from gcsplan.world.frame import Box
 from gcsplan.world.surface import GridMap
 
-Box = tuple[float, float, float, float]
-
 WANTED_ERROR_M = 0.01
-"""The gridded surface lies at most this far above the true one, m, if `MAX_NODES` permits."""
+"""The gridded surface lies at most this far above the true one, m, if `MAX_PEAK_NODES` permits."""
 
-MAX_NODES = 4_000_000
+MAX_PEAK_NODES = 4_000_000
 _COARSEST = 32  # least number of cells along the shorter side
 
 
@@ -43,7 +42,7 @@ def peaks_grid(base_m: float, peaks: Sequence[Peak], box: Box, most_nodes: int |
 
     Between the nodes the bilinear surface is never below the true one: a chord lies below a concave curve by at most
     ``h²/8`` times its curvature, so each node is raised by that bound over the cells around it. If that needs more than
-    `MAX_NODES` nodes, the grid is coarser. With ``most_nodes`` InputError is raised instead, if that many do not
+    `MAX_PEAK_NODES` nodes, the grid is coarser. With ``most_nodes`` InputError is raised instead, if that many do not
     suffice.
     """
     west, south, east, north = box
@@ -58,10 +57,10 @@ def peaks_grid(base_m: float, peaks: Sequence[Peak], box: Box, most_nodes: int |
     spacing = math.sqrt(8.0 * WANTED_ERROR_M / sharpest) if sharpest > 0.0 else math.inf
     spacing = min(spacing, min(width, height) / _COARSEST)
     cols, rows = math.ceil(width / spacing), math.ceil(height / spacing)
-    if most_nodes is not None and (cols + 1) * (rows + 1) > min(most_nodes, MAX_NODES):
-        raise InputError(f"the peaks need {cols + 1} × {rows + 1} nodes, more than {min(most_nodes, MAX_NODES)}")
-    if (cols + 1) * (rows + 1) > MAX_NODES:
-        shrink = math.sqrt(MAX_NODES / ((cols + 1) * (rows + 1)))
+    if most_nodes is not None and (cols + 1) * (rows + 1) > min(most_nodes, MAX_PEAK_NODES):
+        raise InputError(f"the peaks need {cols + 1} × {rows + 1} nodes, more than {min(most_nodes, MAX_PEAK_NODES)}")
+    if (cols + 1) * (rows + 1) > MAX_PEAK_NODES:
+        shrink = math.sqrt(MAX_PEAK_NODES / ((cols + 1) * (rows + 1)))
         cols, rows = max(1, math.floor((cols + 1) * shrink) - 1), max(1, math.floor((rows + 1) * shrink) - 1)
     dx, dy = width / cols, height / rows
     xs = np.asarray(west + dx * np.arange(cols + 1), dtype=np.float64)

@@ -19,6 +19,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError, absent
+from gcsplan.notes.note import Note
 from gcsplan.world.datum import RasterCRS, VerticalDatum, require_unshifted, take_apart
 from gcsplan.world.height_unit import BY_FILE, BY_FORMAT, METRE, HeightUnit, unit_named, unit_that_counts
 from gcsplan.world.input_files import files_of, neighbours, sha256_of_all, tell_file, tell_raster
@@ -76,13 +77,13 @@ class Raster:
     read: Reader
     stored_bytes: int
     sha256: Callable[[], str]
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
     unit: HeightUnit = METRE
     files: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class RasterStatements:
     """What the user says of a file, and what counts before the file's own statements.
 
     ``crs``: its coordinate system. ``height_unit``: a key of `OF_KEY`. ``datum_unit``: the unit that the vertical datum
@@ -110,7 +111,7 @@ def open_raster(
 ) -> Raster:
     """Header of the raster at ``path`` (GeoTIFF, SRTM .hgt or .hgt.zip, ESRI .asc).
 
-    The keywords are what the user says (`Said`).
+    The keywords are what the user says (`RasterStatements`).
 
     If neither the file nor one beside it has changed since this process opened it, it is not opened again: many
     missions use the same tiles. Raises InputError for anything that is not a readable, georeferenced, north-up raster
@@ -118,7 +119,7 @@ def open_raster(
     """
     tell_raster(path)
     require_file(path, where=where)
-    said = Said(crs, height_unit, datum_unit, nodata)
+    said = RasterStatements(crs, height_unit, datum_unit, nodata)
     key = (path.absolute(), said, neighbours(path))
     try:
         if key not in remembered_headers:
@@ -242,12 +243,13 @@ def require_numbers(dataset: Any, path: Path, *, where: str) -> None:
         )
 
 
-def _header(dataset: Any, path: Path, said: Said, *, where: str) -> tuple[Raster, tuple[float, float]]:
-    notes, crs = [], said.crs
+def _header(dataset: Any, path: Path, said: RasterStatements, *, where: str) -> tuple[Raster, tuple[float, float]]:
+    notes: list[Note] = []
+    crs = said.crs
     if dataset.count < 1:
         raise InputError(f"{path} holds no raster band", where=where)
     if dataset.count > 1:
-        notes.append(f"{path.name} has {dataset.count} bands; the first is taken as the heights")
+        notes.append(Note("several_bands", raster=path.name, bands=int(dataset.count)))
     require_numbers(dataset, path, where=where)
     t = dataset.transform
     geometry = (t.a, t.b, t.c, t.d, t.e, t.f)
@@ -272,7 +274,7 @@ def _header(dataset: Any, path: Path, said: Said, *, where: str) -> tuple[Raster
             where=where,
         )
     if crs is not None and dataset.crs:
-        notes.append(f"{path.name}: `crs: {crs}` is used instead of the file's own coordinate system")
+        notes.append(Note("crs_replaced", file=path.name, crs=crs))
     if crs is None and dataset.driver == "AAIGrid":
         require_unshifted(_prj_beside(path), where=where)
     system = take_apart(text, where=where)
@@ -338,7 +340,9 @@ def _require_degrees(t: Any, dataset: Any, path: Path, *, where: str) -> None:
         )
 
 
-def _unit(dataset: Any, system: RasterCRS, said: Said, path: Path, *, where: str) -> tuple[HeightUnit, list[str]]:
+def _unit(
+    dataset: Any, system: RasterCRS, said: RasterStatements, path: Path, *, where: str
+) -> tuple[HeightUnit, list[Note]]:
     """The unit of the heights, and notes. Raises InputError."""
     stated = [unit for unit in (system.vertical_unit, said.datum_unit) if unit is not None]
     band = str(dataset.units[0] or "").strip()

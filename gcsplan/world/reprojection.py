@@ -14,6 +14,7 @@ from pyproj.exceptions import ProjError
 
 from gcsplan.arrays import Floats, Indices
 from gcsplan.errors import InputError
+from gcsplan.notes.note import Note
 from gcsplan.world.datum import WORST_SHIFT_M
 from gcsplan.world.degree_shapes import EDGE_BOW_M, HALF_TURN_DEG, unwrapped
 
@@ -29,14 +30,14 @@ class ToDegrees:
     """From one coordinate system to WGS 84, by one operation for all of a layer, never a ballpark one.
 
     ``crs`` is WKT, a PROJ string or ``EPSG:code``; ``middle`` (x, y) lies among the shapes. ``note`` says what was
-    done, and is empty for degrees on WGS 84. Raises InputError.
+    done, and is None for degrees on WGS 84. Raises InputError.
     """
 
     def __init__(self, crs: str, middle: tuple[float, float], *, where: str) -> None:
         self._where = where
         self._operation: Transformer | None = None
         self._degrees: tuple[float, float] | None = None
-        self.note = ""
+        self.note: Note | None = None
         try:
             horizontal = _horizontal(crs, where)
             self.name = str(horizontal.name)
@@ -56,8 +57,10 @@ class ToDegrees:
         accuracy_m = self._operation.accuracy
         if accuracy_m is not None and accuracy_m > WORST_SHIFT_M:
             raise self._refused(f"PROJ's best way from {self.name!r} to WGS 84 is good to {accuracy_m:g} m only")
-        good_to = f"good to {accuracy_m:g} m" if accuracy_m is not None and accuracy_m >= 0.0 else "accuracy unknown"
-        self.note = f"converted from {self.name} to WGS 84 ({good_to})"
+        if accuracy_m is not None and accuracy_m >= 0.0:
+            self.note = Note("converted_to_wgs84", crs=self.name, accuracy_m=accuracy_m)
+        else:
+            self.note = Note("converted_to_wgs84_somehow", crs=self.name)
 
     def points(self, xy: Floats) -> Floats:
         """(N, 2) latitude, longitude of points (N, 2) x, y."""

@@ -19,8 +19,9 @@ from numpy.typing import ArrayLike
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.errors import InputError
+from gcsplan.notes.note import Note
 from gcsplan.world.datum import VerticalDatum, stated_datum, vertical_datum
-from gcsplan.world.frame import FARTHEST_M, Frame
+from gcsplan.world.frame import FARTHEST_M, Box, Frame
 from gcsplan.world.geoid import GeoidGrid
 from gcsplan.world.height_unit import METRE
 from gcsplan.world.model_words import heights_read
@@ -33,7 +34,6 @@ from gcsplan.world.surface import Surface
 from gcsplan.world.tiles import Tile, hash_of, tiles_of
 from gcsplan.world.voids import take_out_zeros
 
-Box = tuple[float, float, float, float]
 HeightUnitKey = Literal["m", "ft", "us_ft"]
 NO_MORE_VOIDS: Literal["none"] = "none"
 
@@ -154,7 +154,7 @@ def terrain_of(
     *,
     where: str,
     info: Mapping[str, object] | None = None,
-    notes: Sequence[str] = (),
+    notes: Sequence[Note] = (),
 ) -> Terrain:
     """Terrain of tiles on one grid; ``spec`` says the rest, ``info`` and ``notes`` go with its surfaces too.
 
@@ -175,7 +175,7 @@ class _RasterTerrain:
         spec: TerrainSpec,
         where: str,
         info: Mapping[str, object],
-        notes: Sequence[str],
+        notes: Sequence[Note],
     ) -> None:
         self._spec, self._where = spec, where
         self._info, self._notes = info, notes
@@ -252,13 +252,10 @@ class _RasterTerrain:
             unknown_m = np.nan if spec.canopy_nodata_m is None else spec.canopy_nodata_m
             canopy = self._canopy.window(frame, window.plane_box, most_cells=MAX_CELLS // CANOPY)
             trees = canopy_on(window, canopy, unknown_m=unknown_m)
-            notes += [n for n in (*self._canopy.rasters[0].notes, *canopy.notes) if "DEM nodes" not in n]
+            notes += [n for n in (*self._canopy.rasters[0].notes, *canopy.notes) if n.code != "nodes_unknown"]
             blind = int(np.count_nonzero(np.isnan(trees) & ~np.isnan(ground)))
             if blind:
-                notes.append(
-                    f"the canopy is unknown at {blind} of {rows * cols} DEM nodes, which cannot be flown over; "
-                    "canopy_nodata_m gives them a height"
-                )
+                notes.append(Note("canopy_unknown", unknown=blind, nodes=rows * cols))
             top = np.maximum(trees, spec.obstacle_height_m, out=trees)  # in place: these are the largest arrays
             top += high
             info["canopy_sha256"] = self._canopy.rasters[0].sha256()
@@ -325,7 +322,7 @@ class _LocalTerrain:
             "resolution_m": _rounded(float(grid.metres_per_cell(0.0, 0.0).max())) if spec.peaks else 0,
             "bare_dem": spec.obstacle_height_m == 0.0,
             "source": f"{len(spec.peaks)} peaks" if spec.peaks else "flat",
-            "notes": (self._datum.note,) if self._datum.note else (),
+            "notes": () if self._datum.note is None else (self._datum.note,),
         }
         top = heights + spec.obstacle_height_m if spec.obstacle_height_m > 0.0 else heights
         west, south, east, north = box

@@ -25,13 +25,13 @@ from gcsplan.world.cell import Cell
 SPACING_M = 100
 """TERRAIN_SPACING, default."""
 
-PART = 4
-POSTS = (28, 32)
+PART_POSTS = 4
+POSTS_OF_BLOCK = (28, 32)
 """Posts of a block, north and east."""
 STRIDE = (24, 28)
 """Posts from a block's first to that of the next, north and east."""
-PARTS = (POSTS[0] // PART, POSTS[1] // PART)
-ALL_PARTS = (1 << (PARTS[0] * PARTS[1])) - 1
+PARTS_OF_BLOCK = (POSTS_OF_BLOCK[0] // PART_POSTS, POSTS_OF_BLOCK[1] // PART_POSTS)
+ALL_PARTS = (1 << (PARTS_OF_BLOCK[0] * PARTS_OF_BLOCK[1])) - 1
 
 DEGREE_E7 = 10_000_000
 METRES_OF_E7 = float(np.float32(0.011131884502145034))
@@ -46,10 +46,10 @@ RAISED_LESS_M = 1e-6
 NEAR_ENOUGH_M = 0.5
 """A vehicle that holds the grid that was sent reads it within this; more is other terrain."""
 
-MOST_BLOCKS = 4096
+MOST_BLOCKS_KEPT = 4096
 """Blocks that are kept; 30 MB."""
 
-Ground = Callable[[Floats, Floats], Floats]
+GroundHeights = Callable[[Floats, Floats], Floats]
 """Ground, m AMSL, at latitudes and longitudes in degrees; NaN where unknown."""
 
 
@@ -110,7 +110,7 @@ class TerrainGrid:
     def blocks_a_row(self, cell: Cell) -> int:
         """Blocks in a row of a tile's file, which has some to spare in the east (AP_Terrain, `east_blocks`)."""
         lat, lon = cell.lat_deg * DEGREE_E7, (cell.lon_deg + 1) * DEGREE_E7
-        more = math.trunc(2 * self.spacing_m * POSTS[1] * E7_OF_METRE / float(longitude_scale(lat)))
+        more = math.trunc(2 * self.spacing_m * POSTS_OF_BLOCK[1] * E7_OF_METRE / float(longitude_scale(lat)))
         width_m = (lon + more - cell.lon_deg * DEGREE_E7) * METRES_OF_E7 * float(longitude_scale(lat))
         return int(width_m / (self.spacing_m * STRIDE[1]))
 
@@ -174,7 +174,7 @@ def _in_cell(cell: Cell, lat_e7: Floats, lon_e7: Floats) -> NDArray[np.bool_]:
 class PostHeights:
     """Heights of a grid's posts over some ground: whole metres, upwards, so that no post lies below it."""
 
-    def __init__(self, grid: TerrainGrid, ground: Ground) -> None:
+    def __init__(self, grid: TerrainGrid, ground: GroundHeights) -> None:
         self.grid = grid
         self._ground = ground
         self._blocks: OrderedDict[Block, Floats] = OrderedDict()
@@ -185,13 +185,13 @@ class PostHeights:
         if known is not None:
             self._blocks.move_to_end(block)
             return known
-        north = block.north * STRIDE[0] + np.arange(POSTS[0])[:, None]
-        east = block.east * STRIDE[1] + np.arange(POSTS[1])
+        north = block.north * STRIDE[0] + np.arange(POSTS_OF_BLOCK[0])[:, None]
+        east = block.east * STRIDE[1] + np.arange(POSTS_OF_BLOCK[1])
         lat, lon = self.grid.post_e7(block.cell, *np.broadcast_arrays(north, east))
         ground = np.asarray(self._ground(lat * 1e-7, lon * 1e-7), float)
         heights = whole_parts(np.ceil(ground - RAISED_LESS_M))
         heights.setflags(write=False)
-        while len(self._blocks) >= MOST_BLOCKS:
+        while len(self._blocks) >= MOST_BLOCKS_KEPT:
             self._blocks.popitem(last=False)
         self._blocks[block] = heights
         return heights
@@ -231,18 +231,18 @@ class PostHeights:
 
 def whole_parts(heights: Floats) -> Floats:
     """A copy of a block's heights in which a part with an unknown post is unknown as a whole."""
-    parts = heights.reshape(PARTS[0], PART, PARTS[1], PART)
+    parts = heights.reshape(PARTS_OF_BLOCK[0], PART_POSTS, PARTS_OF_BLOCK[1], PART_POSTS)
     unknown = np.isnan(parts).any(axis=(1, 3), keepdims=True)
-    return np.where(unknown, np.nan, parts).reshape(POSTS)
+    return np.where(unknown, np.nan, parts).reshape(POSTS_OF_BLOCK)
 
 
 def known_parts(heights: Floats) -> int:
     """The bitmap of a block's known parts: bit ``8 · north + east``."""
-    known = ~np.isnan(heights.reshape(PARTS[0], PART, PARTS[1], PART)).any(axis=(1, 3))
+    known = ~np.isnan(heights.reshape(PARTS_OF_BLOCK[0], PART_POSTS, PARTS_OF_BLOCK[1], PART_POSTS)).any(axis=(1, 3))
     return sum(1 << bit for bit, there in enumerate(known.ravel()) if there)
 
 
 def part_of(heights: Floats, bit: int) -> Floats:
     """(16,) heights of one part, the first four going east, as they are sent."""
-    north, east = divmod(bit, PARTS[1])
-    return heights[north * PART : (north + 1) * PART, east * PART : (east + 1) * PART].ravel()
+    north, east = divmod(bit, PARTS_OF_BLOCK[1])
+    return heights[north * PART_POSTS : (north + 1) * PART_POSTS, east * PART_POSTS : (east + 1) * PART_POSTS].ravel()

@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from gcsplan.errors import InputError
+from gcsplan.notes.note import Note
 from gcsplan.world.datum import VerticalDatum
 from gcsplan.world.height_unit import HeightUnit
 from gcsplan.world.input_files import tell_folder
@@ -42,7 +43,7 @@ class Tile(Protocol):
         """What its heights are above; None if it does not say."""
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[Note, ...]:
         """What a user should know of it."""
 
     @property

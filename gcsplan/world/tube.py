@@ -57,7 +57,7 @@ FINE_ROOM_M = 0.002
 ZONE_ROOM_M = 0.05
 """The same beside a zone whose levels follow the ground."""
 
-MARGIN_M = 0.01
+TUBE_MARGIN_M = 0.01
 """Extra height, m: twice what the check's branch and bound resolves."""
 
 
@@ -85,7 +85,7 @@ class Reaches:
             rooms = [FINE_ROOM_M if r > 0.0 else 0.0 for r in (near, far)]
         else:
             rooms = [ROOM_M + 2.0 * field.error_m] * 2
-        margins = [MARGIN_M if room > 0.0 else 0.0 for room in rooms]
+        margins = [TUBE_MARGIN_M if room > 0.0 else 0.0 for room in rooms]
         return cls(near + rooms[0], far + rooms[1], margins[0], margins[1], far)
 
 
@@ -163,12 +163,12 @@ def _bands(
         # Bounds over all the ground under the zone hold too; where ground is unknown, the zone can be neither overflown
         # nor underflown.
         if agl[0]:
-            low = np.fmax(low + (bottom - MARGIN_M), numbers[BAND_LOW])
+            low = np.fmax(low + (bottom - TUBE_MARGIN_M), numbers[BAND_LOW])
             low = np.where(np.isnan(ground[:, 1:3]), -np.inf, low)
         else:
             low = np.full_like(low, bottom)
         if agl[1]:
-            high = np.fmin(high + (top + MARGIN_M), numbers[BAND_HIGH])
+            high = np.fmin(high + (top + TUBE_MARGIN_M), numbers[BAND_HIGH])
             high = np.where(np.isnan(ground[:, 3:5]), np.inf, high)
         else:
             high = np.full_like(high, top)

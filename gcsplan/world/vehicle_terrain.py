@@ -18,11 +18,11 @@ from gcsplan.world.frame import Frame
 from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.terrain_grid import DEGREE_E7, SPACING_M, PostHeights, TerrainGrid, cell_at
 
-PARTS = 256
+TERRAIN_PARTS = 256
 """Parts of a line in which it is looked at for borders of degree tiles."""
 BISECTIONS = 40
 
-Piece = tuple[float, float, Surface]
+TerrainPiece = tuple[float, float, Surface]
 """A part of a line, from and to (0 to 1), and the vehicle's ground under it."""
 
 
@@ -74,12 +74,12 @@ class VehicleTerrain:
         at = np.rint(surface.grid(east_m, north_m)).astype(int)
         return np.asarray(self._spread[at[..., 1].clip(0, rows - 1), at[..., 0].clip(0, cols - 1)])
 
-    def pieces(self, ends: Floats) -> list[Piece] | None:
+    def pieces(self, ends: Floats) -> list[TerrainPiece] | None:
         """A straight line of the plane (2, 2) in pieces over one surface each; None if it leads over no known posts.
 
         Where it crosses into another degree tile, with posts of its own, the height may step.
         """
-        f = np.linspace(0.0, 1.0, PARTS + 1)
+        f = np.linspace(0.0, 1.0, TERRAIN_PARTS + 1)
         east, north = (ends[0] + f[:, None] * (ends[1] - ends[0])).T
         tiles = np.floor(self._frame.to_degrees(east, north) * 1e7 / DEGREE_E7)
         cuts = [0.0]

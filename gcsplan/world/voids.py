@@ -13,7 +13,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import InputError
-from gcsplan.figures import counted
+from gcsplan.notes.note import Note
 from gcsplan.world.mosaic import Window
 from gcsplan.world.raster import MAX_CELLS
 
@@ -30,11 +30,13 @@ class Patch(NamedTuple):
     beside_m: float
 
 
-Degrees = Callable[[Sequence[int], Sequence[int]], tuple[Floats, Floats]]
+NodeDegrees = Callable[[Sequence[int], Sequence[int]], tuple[Floats, Floats]]
 """Latitudes and longitudes of columns and rows of nodes, as `Mosaic.node_degrees` gives them."""
 
 
-def take_out_zeros(window: Window, degrees: Degrees, wider: Iterable[Window] = (), *, where: str = "") -> list[str]:
+def take_out_zeros(
+    window: Window, degrees: NodeDegrees, wider: Iterable[Window] = (), *, where: str = ""
+) -> list[Note]:
     """Make the patches of exact zeros that have no shore unknown, in place; returns a note that names them.
 
     ``wider``: larger windows of the same files, from small to large, that are looked at where a patch fills the window
@@ -53,7 +55,7 @@ def take_out_zeros(window: Window, degrees: Degrees, wider: Iterable[Window] = (
         )
     found = [zero_voids(z) for z in surfaces]
     blind = found[0].blind
-    notes: list[str] = []
+    notes: list[Note] = []
     if blind.any():
         beyond, notes = _looked_beyond(window, blind, wider)
         found += beyond
@@ -64,19 +66,15 @@ def take_out_zeros(window: Window, degrees: Degrees, wider: Iterable[Window] = (
     if patches is None:
         return notes
     lat, lon = (float(a[0, 0]) for a in degrees([patches[0].col], [patches[0].row]))
-    more = f" and {len(patches) - 1} more" if len(patches) > 1 else ""
-    nodes = sum(patch.nodes for patch in patches)
-    verb = "stands" if nodes == 1 else "stand"
-    return [
-        *notes,
-        f"{counted(nodes, 'DEM node')} of exactly 0 m "
-        f"({counted(patches[0].nodes, 'node')} around {lat:.5f}, {lon:.5f}{more}) {verb} beside ground of "
-        f"{min(patch.beside_m for patch in patches):.0f} m and more without a shore: an undeclared void, whose ground "
-        "is unknown; if it is ground or sea, say `nodata: none`, and if every 0 is a void `nodata: 0`",
-    ]
+    hidden = Note(
+        "zeros_are_voids" if len(patches) == 1 else "zeros_are_voids_in_several_places",
+        nodes=sum(patch.nodes for patch in patches), largest=patches[0].nodes, lat_deg=lat, lon_deg=lon,
+        more=len(patches) - 1, beside_m=min(patch.beside_m for patch in patches),
+    )  # fmt: skip
+    return [*notes, hidden]
 
 
-def _looked_beyond(window: Window, blind: Bools, wider: Iterable[Window]) -> tuple[list[Voids], list[str]]:
+def _looked_beyond(window: Window, blind: Bools, wider: Iterable[Window]) -> tuple[list[Voids], list[Note]]:
     """The nodes of ``blind`` patches, which fill the window to its border, that larger windows show to be voids."""
     rows, cols = blind.shape
     for large in wider:
@@ -94,10 +92,7 @@ def _looked_beyond(window: Window, blind: Bools, wider: Iterable[Window]) -> tup
         nodes = int(np.count_nonzero(void))
         patch = Patch(nodes, row, col, min(p.beside_m for p in seen.patches))
         return [Voids(void, [patch], np.zeros_like(void))], []
-    return [], [
-        f"{counted(int(np.count_nonzero(blind)), 'DEM node')} of exactly 0 m, around which nothing else is known, "
-        "count as sea or ground; if they are voids, say `nodata: 0`"
-    ]
+    return [], [Note("zeros_without_neighbours", nodes=int(np.count_nonzero(blind)))]
 
 
 class Voids(NamedTuple):

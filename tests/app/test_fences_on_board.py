@@ -151,7 +151,7 @@ def test_a_failsafe_that_ends_elsewhere_is_told(autopilot: str, parameters: dict
     done = planned(keys(**(WING if autopilot == "arduplane" else {"autopilot": autopilot})))
     result = sent(done, board(autopilot, **parameters))
     assert result.verified
-    assert words in " / ".join(result.warnings)
+    assert words in " / ".join(map(str, result.warnings))
 
 
 def test_the_list_has_fences_and_failsafes() -> None:
@@ -198,7 +198,7 @@ def test_every_kind_of_fence_is_in_force_by_its_bit() -> None:
 def test_a_fence_that_enables_itself_is_told() -> None:
     values: dict[str, Any] = {"FENCE_ENABLE": 0.0, "FENCE_AUTOENABLE": 3.0, "FENCE_TYPE": 6.0, "FENCE_RADIUS": 300.0}
     [told] = judge_fence_parameters(values)
-    assert told == (
+    assert str(told) == (
         "FENCE_AUTOENABLE is 3 on board: the fence is enforced from arming on; enabling it also puts into force the "
         "circle of 300 m around home (FENCE_RADIUS; FENCE_TYPE 6)"
     )

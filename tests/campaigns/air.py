@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 from gcsplan.mavlink.link.frames import Signing
 from gcsplan.mavlink.link.link import Link
-from gcsplan.mavlink.link.transport import Heard, Peer
+from gcsplan.mavlink.link.transport import HeardBytes, Peer
 
 STATION = "ground station"
 EPOCH_S = 1_800_000_000.0
@@ -108,7 +108,7 @@ class Air:
 
     # the transport
 
-    def read(self) -> list[Heard]:
+    def read(self) -> list[HeardBytes]:
         heard, self._inbox = self._inbox, []
         self.senders = [by for *_, by in heard]
         return [(address, data) for address, data, _ in heard]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from gcsplan.mavlink.link.link import Heard, Steps
-from gcsplan.mavlink.link.parameters import GROUPS
+from gcsplan.mavlink.link.link import Heard, LinkSteps
+from gcsplan.mavlink.link.parameters import PARAMETER_GROUPS
 from gcsplan.mavlink.link.recheck import Recheck
 from gcsplan.mavlink.protocol.outcome import Changed
 from gcsplan.vehicle import Autopilot
@@ -33,8 +33,8 @@ def test_the_campaign_finds_an_upload_that_does_not_look_again(monkeypatch: pyte
 @pytest.fixture
 def asked_for_less(monkeypatch: pytest.MonkeyPatch) -> None:
     """The seeds below were found when a PX4 was asked for fewer parameters; with more, the events miss each other."""
-    asked = GROUPS[Autopilot.PX4]
-    monkeypatch.setitem(GROUPS, Autopilot.PX4, asked[: asked.index(("NAV_MC_ALT_RAD",)) + 1])
+    asked = PARAMETER_GROUPS[Autopilot.PX4]
+    monkeypatch.setitem(PARAMETER_GROUPS, Autopilot.PX4, asked[: asked.index(("NAV_MC_ALT_RAD",)) + 1])
 
 
 @pytest.mark.usefixtures("asked_for_less")
@@ -72,7 +72,7 @@ def test_the_campaign_finds_an_upload_that_does_not_look_after_a_silence(monkeyp
 
 
 def test_the_campaign_finds_an_upload_that_does_not_look_after_the_read_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    def no_look(self: Recheck) -> Steps[None]:
+    def no_look(self: Recheck) -> LinkSteps[None]:
         yield from ()
 
     monkeypatch.setattr(Recheck, "last_look", no_look)

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from gcsplan.app.pipeline import plan
 from gcsplan.cli import console
-from gcsplan.mavlink.protocol.machine import Progress
+from gcsplan.mavlink.protocol.machine import TransferProgress
 
 
 def fleet(count: int) -> dict[str, Any]:
@@ -64,9 +64,9 @@ def test_transfers_of_many_share_one_bar(monkeypatch: pytest.MonkeyPatch) -> Non
     names = [f"uav{k}" for k in range(40)]
     with console.transfer_progress(names) as moved_on:
         for name in names[:7]:
-            moved_on(name, Progress("sending", 1, 5))
-            moved_on(name, Progress("verified", 5, 5))
-        moved_on("uav9", Progress("refused!", 0, 5))
+            moved_on(name, TransferProgress("sending", 1, 5))
+            moved_on(name, TransferProgress("verified", 5, 5))
+        moved_on("uav9", TransferProgress("refused!", 0, 5))
     text = screen.file.getvalue()
     assert "40 vehicles" in text
     assert "8/40" in text

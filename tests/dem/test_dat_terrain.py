@@ -15,9 +15,10 @@ from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError
 from gcsplan.world.cell import Cell
 from gcsplan.world.frame import Frame
+from gcsplan.world.model_words import notes_on
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import Box, TerrainSpec
-from gcsplan.world.terrain_grid import Ground, PostHeights, TerrainGrid
+from gcsplan.world.terrain_grid import GroundHeights, PostHeights, TerrainGrid
 from tests.oracles import terrain_grid as oracle
 
 BOX = (-2500.0, -2500.0, 2500.0, 2500.0)
@@ -29,7 +30,7 @@ def hills(lat_deg: Floats, lon_deg: Floats) -> Floats:
 
 def write(
     folder: Path, lat: float, lon: float, *, reach_deg: float = 0.08, grid: TerrainGrid | None = None,
-    ground: Ground = hills,
+    ground: GroundHeights = hills,
 ) -> Path:  # fmt: skip
     """Files with the blocks around a place."""
     grid = grid or TerrainGrid()
@@ -167,9 +168,9 @@ def test_a_block_that_the_autopilot_does_not_take_is_left_out_and_told(tmp_path:
     file = read_dat(path, where="")
     assert len(file.blocks) == count - 1
     [note] = file.notes
-    assert words in note
+    assert words in str(note)
     _, surface = surface_of(tmp_path, 36.55, -84.40)
-    assert any(words in str(n) for n in surface.info["notes"])  # type: ignore[attr-defined]
+    assert any(words in str(n) for n in notes_on(surface.info))
 
 
 @pytest.mark.parametrize(

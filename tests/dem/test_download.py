@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gcsplan.dem.download import Arrived, Patience, Unreachable, download, is_address
+from gcsplan.dem.download import Arrived, DownloadPatience, ServerUnreachable, download, is_address
 from gcsplan.errors import LinkError
 from tests.support.tiles import Served, send, serving
 
-QUICK = Patience(stall_s=10.0, whole_s=60.0, tries=3, pause_s=0.001)
+QUICK = DownloadPatience(stall_s=10.0, whole_s=60.0, tries=3, pause_s=0.001)
 DATA = np.random.default_rng(1).bytes(400_000)
 PATH = "/bucket/object.tif"
 MOST = 2**20
@@ -28,11 +28,11 @@ def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
         yield server
 
 
-def bring(served: Served, folder: Path, *, most: int = MOST, patience: Patience = QUICK) -> Arrived:
+def bring(served: Served, folder: Path, *, most: int = MOST, patience: DownloadPatience = QUICK) -> Arrived:
     return download(served.url + PATH, folder / "object.part", most_bytes=most, patience=patience)
 
 
-def refusal(served: Served, folder: Path, *, most: int = MOST, patience: Patience = QUICK) -> LinkError:
+def refusal(served: Served, folder: Path, *, most: int = MOST, patience: DownloadPatience = QUICK) -> LinkError:
     with pytest.raises(LinkError) as caught:
         bring(served, folder, most=most, patience=patience)
     assert caught.value.exit_code == 6
@@ -170,9 +170,9 @@ def test_a_server_that_is_busy_is_asked_again(served: Served, tmp_path: Path, co
 def test_a_silent_server_is_left(served: Served, tmp_path: Path) -> None:
     served.trouble = lambda request, path, number: time.sleep(0.3) is None
     begun = time.monotonic()
-    error = refusal(served, tmp_path, patience=Patience(stall_s=0.1, whole_s=60.0, tries=2, pause_s=0.0))
+    error = refusal(served, tmp_path, patience=DownloadPatience(stall_s=0.1, whole_s=60.0, tries=2, pause_s=0.0))
     assert time.monotonic() - begun < 20.0
-    assert isinstance(error, Unreachable)
+    assert isinstance(error, ServerUnreachable)
 
 
 def test_a_slow_server_is_left_when_the_time_is_over(served: Served, tmp_path: Path) -> None:
@@ -188,7 +188,7 @@ def test_a_slow_server_is_left_when_the_time_is_over(served: Served, tmp_path: P
 
     served.trouble = trouble
     begun = time.monotonic()
-    error = refusal(served, tmp_path, patience=Patience(stall_s=10.0, whole_s=0.3, tries=3, pause_s=0.0))
+    error = refusal(served, tmp_path, patience=DownloadPatience(stall_s=10.0, whole_s=0.3, tries=3, pause_s=0.0))
     assert "0.3 s are over" in str(error)
     assert time.monotonic() - begun < 20.0
 
@@ -197,7 +197,7 @@ def test_nobody_there_is_told_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setenv("no_proxy", "127.0.0.1")
     with serving(Served()) as gone:
         pass
-    with pytest.raises(Unreachable, match=r"no answer: .*refused; 3 tries"):
+    with pytest.raises(ServerUnreachable, match=r"no answer: .*refused; 3 tries"):
         download(gone.url + PATH, tmp_path / "part", most_bytes=MOST, patience=QUICK)
 
 

@@ -19,15 +19,15 @@ import pytest
 
 from gcsplan.dem.cache import Cache, cache_folder
 from gcsplan.dem.cells import cells_in
-from gcsplan.dem.download import Patience
+from gcsplan.dem.download import DownloadPatience
 from gcsplan.dem.fetch import Fetch, Fetched
-from gcsplan.dem.sources import GLO30, GLO90, SRTM, Source
+from gcsplan.dem.sources import GLO30, GLO90, SRTM, DemSource
 from gcsplan.errors import InputError, LinkError
 from gcsplan.world.cell import Cell, cell_of
 from gcsplan.world.frame import Frame
 from tests.support.tiles import Served, heights_of, send, serving, tile
 
-QUICK = Patience(stall_s=10.0, whole_s=60.0, tries=4, pause_s=0.001)
+QUICK = DownloadPatience(stall_s=10.0, whole_s=60.0, tries=4, pause_s=0.001)
 FOUR = (Cell(36, -85), Cell(36, -84), Cell(35, -85), Cell(35, -84))
 SEA = Cell(10, 10)
 LACKING = Cell(40, 45)
@@ -43,17 +43,17 @@ def served(monkeypatch: pytest.MonkeyPatch) -> Iterator[Served]:
         yield server
 
 
-def fetch(served: Served, folder: Path, *cells: Cell, source: Source = GLO30) -> list[Fetched]:
+def fetch(served: Served, folder: Path, *cells: Cell, source: DemSource = GLO30) -> list[Fetched]:
     return Fetch(Cache(source, folder), mirror=served.url, patience=QUICK).run(cells)
 
 
-def refusal(served: Served, folder: Path, *cells: Cell, source: Source = GLO30) -> str:
+def refusal(served: Served, folder: Path, *cells: Cell, source: DemSource = GLO30) -> str:
     with pytest.raises(LinkError) as caught:
         fetch(served, folder, *cells, source=source)
     return str(caught.value)
 
 
-def is_in_order(folder: Path, source: Source = GLO30) -> set[str]:
+def is_in_order(folder: Path, source: DemSource = GLO30) -> set[str]:
     """Names of the tiles in a cache, each as its record says; nothing else counts as one."""
     cache = Cache(source, folder)
     found = set()
@@ -192,7 +192,7 @@ def test_a_record_of_another_kind_of_heights_does_not_count(served: Served, tmp_
 # -- sea ---------------------------------------------------------------------------------------------------------------
 
 
-def state(served: Served, folder: Path, cell: Cell, source: Source = GLO30) -> str:
+def state(served: Served, folder: Path, cell: Cell, source: DemSource = GLO30) -> str:
     return fetch(served, folder, cell, source=source)[0].record.state
 
 
@@ -220,7 +220,7 @@ def test_srtm_has_a_list_and_a_datum_of_its_own(served: Served, tmp_path: Path) 
 @pytest.mark.first_quick
 @pytest.mark.parametrize("which", [GLO90, GLO30], ids=lambda s: s.name)
 @pytest.mark.parametrize("how", ["short", "gone", "cut off", "cut in its last line", "another page", "silent"])
-def test_without_both_whole_lists_nothing_is_sea(served: Served, tmp_path: Path, which: Source, how: str) -> None:
+def test_without_both_whole_lists_nothing_is_sea(served: Served, tmp_path: Path, which: DemSource, how: str) -> None:
     path = f"/{which.bucket}/{which.listing}"
     data = served.objects[path]
 

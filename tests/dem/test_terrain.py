@@ -10,16 +10,18 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats
-from gcsplan.dem.cache import Cache, MissingTiles, Record, text_of
+from gcsplan.dem.cache import Cache, MissingTiles, TileRecord, text_of
 from gcsplan.dem.cells import cells_in
-from gcsplan.dem.sources import GLO30, SRTM, Source
+from gcsplan.dem.sources import GLO30, SRTM, DemSource
 from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError
 from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.from_options import OpenWorld, WorldOptions
+from gcsplan.notes.note import Note
 from gcsplan.world.cell import Cell
 from gcsplan.world.frame import Frame
 from gcsplan.world.input_files import sha256_of
+from gcsplan.world.model_words import notes_on
 from gcsplan.world.surface import Surface
 from gcsplan.world.terrain import TerrainSpec
 from tests.support.tiles import ROWS, height_at, heights_of, tile
@@ -40,7 +42,9 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache"
 
 
-def hold(folder: Path, cell: Cell, source: Source = GLO30, state: str = "tile", heights: Floats | None = None) -> None:
+def hold(
+    folder: Path, cell: Cell, source: DemSource = GLO30, state: str = "tile", heights: Floats | None = None
+) -> None:
     """Put a tile into the cache, or a record that there is none."""
     kept = Cache(source, folder)
     kept.folder.mkdir(parents=True, exist_ok=True)
@@ -48,14 +52,16 @@ def hold(folder: Path, cell: Cell, source: Source = GLO30, state: str = "tile", 
     if state == "tile":
         path.write_bytes(tile(cell, source, heights))
         size, checksum = path.stat().st_size, sha256_of(path)
-    record = Record(
+    record = TileRecord(
         cell.name, source.name, state, source.kind, source.vertical_datum, "2026-01-01T00:00:00Z", bytes=size,  # type: ignore[arg-type]
         sha256=checksum,
     )  # fmt: skip
     kept.record_path(cell).write_text(text_of(record))
 
 
-def surface_at(at: tuple[float, float], source: Source = GLO30, box: Any = BOX, **keys: Any) -> tuple[Surface, Frame]:
+def surface_at(
+    at: tuple[float, float], source: DemSource = GLO30, box: Any = BOX, **keys: Any
+) -> tuple[Surface, Frame]:
     frame = Frame(*at)
     terrain = open_dem(TerrainSpec(dem=(source.name,), **keys), where="terrain")
     return terrain.around(frame, box).load(frame, box), frame
@@ -67,7 +73,7 @@ def refusal(at: tuple[float, float], **keys: Any) -> InputError:
     return caught.value
 
 
-def by_hand(cell: Cell, lat_deg: Floats, lon_deg: Floats, source: Source = GLO30, rows: int = ROWS) -> Floats:
+def by_hand(cell: Cell, lat_deg: Floats, lon_deg: Floats, source: DemSource = GLO30, rows: int = ROWS) -> Floats:
     """Bilinear between the nodes of the grid that a tile is a part of."""
     cols = rows * source.columns_of(cell) // 3600
     r, c = (cell.lat_deg + 1 - lat_deg) * rows, (lon_deg - cell.lon_deg) * cols
@@ -91,7 +97,7 @@ def places(frame: Frame, n: int = 300) -> tuple[Floats, Floats, Floats, Floats]:
 
 @pytest.mark.first_quick
 @pytest.mark.parametrize("source", [GLO30, SRTM], ids=lambda s: s.name)
-def test_ground_is_that_of_the_source_with_its_datum_and_its_kind(cache: Path, source: Source) -> None:
+def test_ground_is_that_of_the_source_with_its_datum_and_its_kind(cache: Path, source: DemSource) -> None:
     hold(cache, Cell(36, -85), source)
     surface, frame = surface_at((36.5, -84.5), source)
     e, n, lat, lon = places(frame)
@@ -100,7 +106,7 @@ def test_ground_is_that_of_the_source_with_its_datum_and_its_kind(cache: Path, s
     assert info["vertical_datum"] == {"copernicus-glo30": "EGM2008", "srtm": "EGM96"}[source.name]
     assert (info["dem_source"], info["dem_kind"], info["bare_dem"]) == (source.name, "surface", False)
     assert info["dem_tiles"] == "N36W085"
-    assert any("altitudes relative to home are flown lower" in str(n) for n in info["notes"])  # type: ignore[attr-defined]
+    assert any(n.code == "terrain_is_a_surface" for n in notes_on(surface.info))
     assert info["dem_sha256"] == sha256_of(Cache(source, cache).tile_path(Cell(36, -85)))
 
 
@@ -128,7 +134,7 @@ def test_tiles_with_columns_of_different_widths_join(cache: Path, south: int) ->
     for cell in (Cell(lat, lon) for lat in (south, south + 1) for lon in (9, 10, 11)):
         hold(cache, cell, heights=heights_of(cell, rows=rows))
     surface, frame = surface_at((south + 1.0, 10.5))
-    assert not any("unknown" in str(n) for n in surface.info["notes"])  # type: ignore[attr-defined]
+    assert not any(n.code == "nodes_unknown" for n in notes_on(surface.info))
     for cell, offset_m in ((north, 1500.0), (below, -1500.0)):  # beyond the row of cells that both share
         e = np.random.default_rng(3).uniform(-2500.0, 2500.0, 100)
         n = offset_m + np.linspace(-300.0, 300.0, 100)
@@ -204,12 +210,12 @@ def test_sea_is_0_m_and_is_told(cache: Path) -> None:
     assert surface.ground_at(2000.0, 0.0) == 0.0
     assert surface.ground_at(-2900.0, 0.0) > 1.0
     assert surface.info["sea_tiles"] == "N10E011"
-    assert "sea, 0 m: N10E011, which neither copernicus-glo30 nor GLO-90 has a tile of" in surface.info["notes"]
+    assert Note("tiles_are_sea", tiles="N10E011", source="copernicus-glo30") in notes_on(surface.info)
 
 
 @pytest.mark.first_quick
 @pytest.mark.parametrize("source", [GLO30, SRTM], ids=lambda s: s.name)
-def test_open_sea_alone_is_ground_too(cache: Path, source: Source) -> None:
+def test_open_sea_alone_is_ground_too(cache: Path, source: DemSource) -> None:
     for cell in (Cell(10, 10), Cell(10, 11)):
         hold(cache, cell, source, state="sea")
     surface, _ = surface_at((10.5, 11.0), source)
@@ -221,7 +227,7 @@ def test_a_tile_that_the_source_lacks_is_unknown_ground_and_never_0_m(cache: Pat
     hold(cache, Cell(40, 46), state="absent")
     surface, _ = surface_at((40.5, 46.0))
     assert np.isnan(surface.ground_at(2000.0, 0.0))
-    assert any("does not publish N40E046, and GLO-90 shows land there" in str(n) for n in surface.info["notes"])  # type: ignore[attr-defined]
+    assert any("does not publish N40E046, and GLO-90 shows land there" in str(n) for n in notes_on(surface.info))
     hold(cache, Cell(40, 45), state="absent")
     assert "does not publish N40E045,N40E046" in refusal((40.5, 46.0)).message
 
@@ -231,7 +237,7 @@ def test_a_mission_may_say_that_it_is_sea(cache: Path) -> None:
     hold(cache, Cell(40, 46), state="absent")
     surface, _ = surface_at((40.5, 46.0), sea=True)
     assert surface.ground_at(2000.0, 0.0) == 0.0
-    assert "sea, 0 m, because the mission says so: N40E046; GLO-90 shows land there" in surface.info["notes"]
+    assert Note("tiles_are_sea_by_mission", tiles="N40E046") in notes_on(surface.info)
     assert "not in the cache" in refusal((41.5, 46.0), sea=True).message  # nobody knows that it is not published
 
 

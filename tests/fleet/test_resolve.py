@@ -20,7 +20,7 @@ from gcsplan.fleet.goals import least_interval_s
 from gcsplan.fleet.motion import TimedPath
 from gcsplan.fleet.resolve import Change, NotSeparated, Resolved, resolve
 from gcsplan.fleet.separation import Conflict, Rules, separation
-from gcsplan.fleet.timing import End, Route
+from gcsplan.fleet.timing import MissionEnd, Route
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.limits import Limits
@@ -36,7 +36,7 @@ Point = tuple[float, float]
 def crew(
     name: str,
     *places: Point,
-    end: End = "land",
+    end: MissionEnd = "land",
     height_m: float = 60.0,
     slowest: float = 3.0,
     hover_w: float = 400.0,
@@ -302,7 +302,7 @@ def test_when_no_path_is_left_the_refusal_names_the_two_the_place_and_the_time()
 # -- goals nearer than the separation -----------------------------------------------------------------------------
 
 
-def fan(count: int, apart_m: float, end: End = "land", slowest: float = 3.0) -> list[Crew]:
+def fan(count: int, apart_m: float, end: MissionEnd = "land", slowest: float = 3.0) -> list[Crew]:
     """Vehicles from all around whose goals stand in a circle, each on its own side, so far apart."""
     out = []
     for i in range(count):
@@ -337,7 +337,7 @@ def test_landing_on_one_pad_has_no_interval_that_works_while_nobody_clears_it() 
 
 @pytest.mark.first_quick
 @pytest.mark.parametrize(("end", "clear_s"), [("land", 20.0), ("none", math.inf)])
-def test_the_smallest_interval_at_one_goal_works_and_a_tenth_less_does_not(end: End, clear_s: float) -> None:
+def test_the_smallest_interval_at_one_goal_works_and_a_tenth_less_does_not(end: MissionEnd, clear_s: float) -> None:
     crews = fan(2, 0.0, end)
     rules = replace(RULES, pad_clear_s=clear_s)
     with pytest.raises(NotSeparated, match="interval_s") as refused:

@@ -8,10 +8,11 @@ import pytest
 
 from gcsplan.errors import InputError
 from gcsplan.mission_file import load_mission
+from gcsplan.notes.note import Note
 from tests.check.test_energy import mission
 
 
-def energy_of(keys: dict[str, Any]) -> tuple[Any, tuple[str, ...]]:
+def energy_of(keys: dict[str, Any]) -> tuple[Any, tuple[Note, ...]]:
     source = load_mission(mission(keys))
     return source.vehicles[0].vehicle.energy, source.notes
 
@@ -19,11 +20,14 @@ def energy_of(keys: dict[str, Any]) -> tuple[Any, tuple[str, ...]]:
 def test_power_in_cruise_and_endurance_become_a_base_power_with_a_note() -> None:
     energy, notes = energy_of({"cruise_w": 320})
     assert (energy.base_w, energy.horizontal_j_per_m, energy.hold_w()) == (320.0, 0.0, 320.0)
-    assert any("cruise_w 320 is read as base_w 320" in n and "120 J" in n for n in notes)
+    assert Note("cruise_is_base_power_climb_of_paper", vehicle="uav1", given_key="cruise_w", given=320.0, base_w=320.0,
+                vertical_j_per_m=120.0) in notes  # fmt: skip
     energy, notes = energy_of({"battery_wh": 100, "endurance_min": 30, "vertical_j_per_m": 40})
     assert energy.base_w == pytest.approx(200.0)
-    assert any("endurance_min: 30 min" in n for n in notes)
-    assert not any("as in the paper" in n for n in notes)
+    codes = {n.code: n.data for n in notes}
+    assert codes["value_converted"]["place"] == "vehicles[0].energy.endurance_min"
+    assert "cruise_is_base_power" in codes
+    assert "cruise_is_base_power_climb_of_paper" not in codes
 
 
 @pytest.mark.parametrize(
@@ -52,24 +56,25 @@ def test_without_a_key_the_energy_is_not_stated() -> None:
 def test_a_hover_that_takes_less_than_flying_is_told() -> None:
     energy, notes = energy_of({"base_w": 300, "horizontal_j_per_m": 10, "vertical_j_per_m": 40, "hover_w": 200})
     assert energy.hold_w() == 300.0
-    assert [n for n in notes if "hover_w 200 is less than base_w 300" in n and "a hold counts 300 W" in n]
-    assert not any("hover_w" in n for n in energy_of({"base_w": 300, "hover_w": 350})[1])
-    assert not any("hover_w" in n for n in energy_of({"base_w": 300})[1])
+    assert Note("hover_below_base_power", vehicle="uav1", hover_w=200.0, base_w=300.0) in notes
+    assert not any(n.code == "hover_below_base_power" for n in energy_of({"base_w": 300, "hover_w": 350})[1])
+    assert not any(n.code == "hover_below_base_power" for n in energy_of({"base_w": 300})[1])
 
 
 @pytest.mark.parametrize(
     ("keys", "papers", "noted"),
     [
-        ({"battery_wh": 90}, True, ""),
-        ({"battery_wh": 90, "hover_w": 300, "reserve": 0.3}, True, ""),
-        ({"battery_wh": 90, "horizontal_j_per_m": 50}, False, "vertical_j_per_m 120 are the paper's"),
-        ({"base_w": 200}, False, "vertical_j_per_m 120 and horizontal_j_per_m 100 are the paper's"),
-        ({"cruise_w": 200}, False, ""),
-        ({"horizontal_j_per_m": 50, "vertical_j_per_m": 40}, False, ""),
+        ({"battery_wh": 90}, True, {}),
+        ({"battery_wh": 90, "hover_w": 300, "reserve": 0.3}, True, {}),
+        ({"battery_wh": 90, "horizontal_j_per_m": 50}, False, {"vertical_j_per_m": 120.0}),
+        ({"base_w": 200}, False, {"vertical_j_per_m": 120.0, "horizontal_j_per_m": 100.0}),
+        ({"cruise_w": 200}, False, {}),
+        ({"horizontal_j_per_m": 50, "vertical_j_per_m": 40}, False, {}),
     ],
 )
-def test_what_counts_as_in_the_paper_is_marked(keys: dict[str, Any], papers: bool, noted: str) -> None:
+def test_what_counts_as_in_the_paper_is_marked(keys: dict[str, Any], papers: bool, noted: dict[str, float]) -> None:
     energy, notes = energy_of(keys)
     assert energy.papers is papers
-    assert any("are the paper's, not this aircraft's" in n for n in notes) is bool(noted)
-    assert not noted or any(noted in n for n in notes)
+    costs = tuple(Note("key_and_value", name=key, value=value) for key, value in noted.items())
+    told = [n for n in notes if n.code == "energy_in_part_of_paper"]
+    assert told == ([Note("energy_in_part_of_paper", vehicle="uav1", costs=costs)] if noted else [])

@@ -113,6 +113,6 @@ def test_a_plan_with_places_in_coordinate_says_how_to_save_it_again() -> None:
     ],
 )
 def test_an_altitude_that_contradicts_what_is_sent_is_told(item: dict[str, Any], told: str) -> None:
-    notes = "\n".join(parse_plan(plan(**item), autopilot=None, where="a").notes)
+    notes = "\n".join(map(str, parse_plan(plan(**item), autopilot=None, where="a").notes))
     assert told in notes
     assert bool(told) == ("Altitude" in notes)

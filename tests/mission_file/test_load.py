@@ -18,6 +18,7 @@ from rasterio.transform import Affine
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file import MissionFile, load_mission
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Energy
 from gcsplan.world.frame import Frame
 from gcsplan.world.limits import Limits
@@ -167,14 +168,14 @@ def test_errors_that_are_not_given_are_not_zero_on_the_real_earth_and_are_told()
     mission = load(base(limits={"min_agl_m": 60}))
     limits = mission.vehicles[0].vehicle.limits
     assert (limits.horizontal_clearance_m, limits.track_error_m, limits.altitude_error_m) == (30, 3, 5)
-    assert sum("is not given" in n for n in mission.notes) == 3
+    assert sum(n.code == "limit_assumed" for n in mission.notes) == 3
 
 
 def test_a_plane_is_not_taken_to_climb_at_any_angle() -> None:
     mission = load(base(vehicles=[vehicle(autopilot="arduplane")]))
     limits = mission.vehicles[0].vehicle.limits
     assert (limits.max_climb_deg, limits.max_descent_deg) == (15, 15)
-    assert any("max_climb_deg" in n for n in mission.notes)
+    assert "plane_climb_assumed" in [n.code for n in mission.notes]
 
 
 def test_min_agl_must_be_said_somewhere() -> None:
@@ -380,7 +381,7 @@ def test_zones_from_files_are_found_beside_the_mission_and_keep_their_names_apar
     (tmp_path / "sub" / "z.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
     mission = load(base(no_fly=[{"file": "sub/z.geojson"}]), tmp_path)
     assert [z.name for z in mission.zones] == ["R", "R #2"]
-    assert any("1 zone of" in n for n in mission.notes)
+    assert Note("zones_left_out", count=1) in mission.notes
     features[1]["properties"]["radius_m"] = "60"
     features[2]["geometry"]["coordinates"] = [36.6, -84.3]
     (tmp_path / "sub" / "z.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))

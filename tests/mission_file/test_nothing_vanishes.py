@@ -12,6 +12,7 @@ from gcsplan.errors import InputError
 from gcsplan.mavlink.files.plan_file import parse_plan
 from gcsplan.mission_file.zone_draft import zone_notes
 from gcsplan.mission_file.zone_reader import read_zones
+from gcsplan.notes.note import Note
 from tests.support import zone_files
 
 SQUARE = [(14.48, 46.03), (14.52, 46.03), (14.52, 46.06), (14.48, 46.06)]
@@ -29,8 +30,8 @@ def told(file: Path, text: Any) -> str:
     except InputError as why:
         return "\n".join(map(str, why.problems))
     faults = [fault for draft in found.zones for fault in draft.faults]
-    return "\n".join([*map(str, found.problems), *found.notes, *zone_notes([(d, None) for d in found.zones]),
-                      *map(str, faults)])  # fmt: skip
+    notes = [*found.notes, *zone_notes([(d, None) for d in found.zones])]
+    return "\n".join(map(str, [*found.problems, *notes, *faults]))
 
 
 def feature(geometry: Any, **properties: Any) -> dict[str, Any]:
@@ -158,7 +159,7 @@ PLAN: dict[str, Any] = {
 def test_a_plans_fence_that_is_not_read_is_told(fence: Any, words: str) -> None:
     read = parse_plan(json.dumps(PLAN | {"geoFence": fence}), autopilot=None, where="a.plan")
     assert read.fence == ()
-    assert read.unread_fence.startswith(f"the file's {words}") if words else read.unread_fence == ""
+    assert str(read.unread_fence).startswith(f"the file's {words}") if words else read.unread_fence is None
 
 
 CORNERS = [[46.0, 14.0], [46.1, 14.0], [46.1, 14.1]]
@@ -183,13 +184,13 @@ def test_what_a_shape_of_a_plans_fence_has_besides_is_told(fence: Any, words: st
     whole = {"circles": [], "polygons": [], "version": 2} | fence
     read = parse_plan(json.dumps(PLAN | {"geoFence": whole}), autopilot=None, where="a.plan")
     assert read.fence
-    assert read.unread_fence.startswith(f"the file's {words}") if words else read.unread_fence == ""
+    assert str(read.unread_fence).startswith(f"the file's {words}") if words else read.unread_fence is None
 
 
 def test_a_plans_other_keys_and_rally_points_are_told() -> None:
     rally = {"points": [[46.0, 14.0, 50]], "version": 1}
     read = parse_plan(json.dumps(PLAN | {"rallyPoints": rally, "corridor": [1]}), autopilot=None, where="a.plan")
     assert read.rally == ()
-    assert "the file's rallyPoints of version 1 (points) was not read; open the file in" in read.notes[0]
-    assert read.notes[1] == "these keys of the file were not read: corridor"
+    assert "the file's rallyPoints of version 1 (points) was not read; open the file in" in str(read.notes[0])
+    assert read.notes[1] == Note("plan_keys_unread", keys=("corridor",))
     assert parse_plan(json.dumps(PLAN), autopilot=None, where="a.plan").notes == ()

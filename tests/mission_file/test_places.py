@@ -18,8 +18,9 @@ from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file import schema
 from gcsplan.mission_file.from_options import OpenWorld
 from gcsplan.mission_file.load import load_mission
-from gcsplan.mission_file.places import EXAMPLES, MAX_CHARS, read_place
+from gcsplan.mission_file.places import MAX_CHARS, PLACE_EXAMPLES, read_place
 from gcsplan.mission_file.request import MissionFile
+from gcsplan.notes.note import Note
 from tests.oracles.grids import band_of, mgrs_of, utm_of
 from tests.support.effort import draws
 from tests.support.paths import DATA, REPOSITORY
@@ -105,12 +106,12 @@ def refusal(text: str) -> str:
 )  # fmt: skip
 def test_what_people_paste_is_read(text: str, place: tuple[float, float]) -> None:
     assert degrees(text) == pytest.approx(place, abs=1e-9)
-    assert read_place(text).note == ""
+    assert read_place(text).note is None
 
 
 def test_the_examples_of_messages_are_one_of_each_format() -> None:
-    first = degrees(EXAMPLES[0])
-    assert [apart_m(degrees(text), first) < 25_000.0 for text in EXAMPLES] == [True] * 5
+    first = degrees(PLACE_EXAMPLES[0])
+    assert [apart_m(degrees(text), first) < 25_000.0 for text in PLACE_EXAMPLES] == [True] * 5
 
 
 @settings(max_examples=draws(300))
@@ -163,8 +164,8 @@ def test_mgrs_is_the_square_of_a_second_implementation(lat: float, lon: float, d
     )
     size = f"{size_m} m" if size_m < 1000 else f"{size_m // 1000} km"
     assert apart_m((place.lat_deg, place.lon_deg), degrees(corner)) < 1e-6
-    assert (f"square of {size} in MGRS; its south-west corner" in place.note) == (digits < 5)
-    assert bool(place.note) == (digits < 5)
+    told = place.note is not None and place.note.code == "place_is_a_square" and place.note.data["size"] == size
+    assert told == (digits < 5) == (place.note is not None)
 
 
 def test_mgrs_is_that_of_other_programs() -> None:
@@ -185,7 +186,7 @@ def test_the_letter_s_is_a_band_or_a_hemisphere_and_never_guessed() -> None:
     assert all(f"{x:.5f}" in words for x in (*degrees(north), *degrees(south)))
     sydney = read_place("56S 334873 6252266")  # not a northing of band S
     assert (sydney.lat_deg, sydney.lon_deg) == pytest.approx((-33.857, 151.215), abs=1e-5)
-    assert "southern hemisphere" in sydney.note
+    assert sydney.note == Note("zone_letter_is_the_hemisphere", zone=56)
 
 
 REFUSED = [
@@ -321,8 +322,11 @@ def test_a_via_point_has_its_height_beside_any_form() -> None:
 
 def test_a_coarse_square_and_a_hemisphere_are_told() -> None:
     notes = load(mission(start="32TMT 4941 4983", goal="32TMT 50000 49000")).notes
-    told = [note for note in notes if "MGRS" in note]
-    assert told == ["vehicles[0].start: '32TMT 4941 4983' is a square of 10 m in MGRS; its south-west corner is taken"]
+    told = [note for note in notes if note.code == "place_is_a_square"]
+    assert told == [Note("place_is_a_square", place="vehicles[0].start", given="32TMT 4941 4983", size="10 m")]
+    assert str(told[0]) == (
+        "vehicles[0].start: '32TMT 4941 4983' is a square of 10 m in MGRS; its south-west corner is taken"
+    )
 
 
 @pytest.mark.parametrize(
@@ -376,8 +380,8 @@ def test_one_speed_is_both_and_told() -> None:
         read = load(mission(**one))
         vehicle = read.vehicles[0].vehicle
         assert [vehicle.speed_min_m_s, vehicle.speed_max_m_s] == plain
-        assert f"a: speed_m_s is one number, read as [{plain[0]:g}, {plain[0]:g}]: always this speed" in read.notes
-    assert not any("one number" in note for note in load(mission(speed_m_s=[8, 8])).notes)
+        assert Note("one_speed", vehicle="a", slow_m_s=plain[0], fast_m_s=plain[0]) in read.notes
+    assert not any(note.code == "one_speed" for note in load(mission(speed_m_s=[8, 8])).notes)
     (found,) = problems(mission(speed_m_s=0))
     assert found.where == "mission: vehicles[0].speed_m_s"
     assert "above 0" in found.message
@@ -389,7 +393,7 @@ def test_the_json_schema_takes_every_form() -> None:
     assert [form.get("type", form.get("$ref")) for form in forms] == [
         "array", None, "#/$defs/LocalPoint", "#/$defs/DegreePoint"
     ]  # fmt: skip
-    assert forms[1]["anyOf"][0]["examples"] == list(EXAMPLES)
+    assert forms[1]["anyOf"][0]["examples"] == list(PLACE_EXAMPLES)
     assert {"lat", "latitude", "lon", "longitude", "lng"} <= told["$defs"]["DegreePoint"]["properties"].keys()
     assert [form["type"] for form in told["properties"]["speed_m_s"]["oneOf"]] == ["number", "array"]
 
@@ -409,7 +413,8 @@ def test_the_home_of_check_is_a_place_in_any_form() -> None:
     assert world_options({"--home": "36.6 N, 84.38 W"}) == plain
     coarse = world_options({"--home": "32TMT 7312 4932", "--dem": "sample:jacksboro", "--min-agl": 60})
     assert apart_m(coarse.home, GRID) < 10.0
-    assert any(note.startswith("--home: ") and "square of 10 m" in note for note in OpenWorld(coarse).notes)
+    [note] = [note for note in OpenWorld(coarse).notes if note.code == "place_is_a_square"]
+    assert (note.data["place"], note.data["size"]) == ("--home", "10 m")
     with pytest.raises(InputError, match=r"--home 136.6, 84.38: .*look swapped"):
         world_options({"--home": "136.6, 84.38"})
 

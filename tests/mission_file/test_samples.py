@@ -38,7 +38,7 @@ def test_the_files_within_the_package_count_before_a_folder_beside_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     inside, beside = tmp_path / "gcsplan" / "missions", tmp_path / "missions"
-    monkeypatch.setattr(samples, "FOLDERS", (inside, beside))
+    monkeypatch.setattr(samples, "SAMPLE_FOLDERS", (inside, beside))
     assert samples.names() == []
     for folder, name in ((beside, "other"), (inside, "own")):
         folder.mkdir(parents=True)

@@ -79,9 +79,9 @@ def test_deep_nesting_is_refused_before_it_is_built(text: str) -> None:
 
 
 def test_too_much_of_anything_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(strict_yaml, "MAX_NODES", 100)
+    monkeypatch.setattr(strict_yaml, "MAX_YAML_NODES", 100)
     assert "more than 100 values" in refusal("[" + "1," * 200 + "]")
-    monkeypatch.setattr(strict_yaml, "MAX_BYTES", 1_000_000)
+    monkeypatch.setattr(strict_yaml, "MAX_YAML_BYTES", 1_000_000)
     assert "1 million" in refusal("a" * 1_000_001)
 
 

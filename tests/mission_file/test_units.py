@@ -8,7 +8,8 @@ import pytest
 from gcsplan.errors import InputError
 from gcsplan.mission_file import schema
 from gcsplan.mission_file.load import load_mission
-from gcsplan.mission_file.units import MOST_NOTES, OTHERS, UNITS, in_own_units, other_names, unit_end
+from gcsplan.mission_file.units import MOST_CONVERSIONS, OTHERS, UNIT_SYMBOLS, in_own_units, other_names, unit_end
+from gcsplan.notes.note import Note
 
 SIZES = {
     "_ft": lambda v: v * 12 * 0.0254,
@@ -111,7 +112,7 @@ def test_a_mission_in_other_units_is_the_mission_in_its_own():
 def test_one_note_says_each_value_in_the_keys_own_unit():
     loaded = load_mission(mission({"min_agl_ft": 164}, {"battery_mah": 5000, "battery_v": 22.2}, speed_kt=[6, 29]))
     assert loaded.vehicles[0].vehicle.energy.battery_j == pytest.approx(399_600)
-    assert loaded.notes[:3] == (
+    assert tuple(map(str, loaded.notes[:3])) == (
         "limits.min_agl_ft: 164 ft, read as min_agl_m: 49.9872",
         "vehicles[0].energy.battery_mah: 5000 mAh at 22.2 V, read as battery_j: 399600",
         "vehicles[0].speed_kt: [6, 29] kt, read as speed_m_s: [3.086666667, 14.91888889]",
@@ -124,10 +125,11 @@ def test_notes_on_a_fleet_are_few():
     content["vehicles"] = [
         {**first, "name": f"uav{i}", "sysid": i, "min_agl_ft": 164, "track_error_ft": i / 10} for i in range(1, 101)
     ]
-    notes = [note for note in load_mission(content).notes if "read as" in note or "converted" in note]
-    assert notes[0] == "vehicles[0].min_agl_ft: 164 ft, read as min_agl_m: 49.9872 (and 99 more)"
-    assert len(notes) == MOST_NOTES + 1
-    assert notes[-1] == "81 more values are converted from other units"
+    wanted = ("value_converted", "and_as_many_more", "more_values_converted")
+    notes = [note for note in load_mission(content).notes if note.code in wanted]
+    assert str(notes[0]) == "vehicles[0].min_agl_ft: 164 ft, read as min_agl_m: 49.9872 (and 99 more)"
+    assert len(notes) == MOST_CONVERSIONS + 1
+    assert notes[-1] == Note("more_values_converted", count=81)
 
 
 def test_wider_terrain_keeps_units_and_notes():
@@ -223,7 +225,7 @@ def test_climb_in_metres_a_minute_is_not_taken_for_minutes():
 
 
 def test_a_longer_unit_counts_before_its_end():
-    ends = list(UNITS)
+    ends = list(UNIT_SYMBOLS)
     assert not any(longer.endswith(end) for i, end in enumerate(ends) for longer in ends[i + 1 :])
     assert [unit_end(key) for key in ("climb_m_s", "horizontal_j_per_m", "accel_m_s2")] == ["_m_s", "_j_per_m", "_m_s2"]
 

@@ -22,6 +22,7 @@ from gcsplan.mission_file import zone_reader
 from gcsplan.mission_file.zone_draft import place_zones, zone_notes
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_reader import read_zones
+from gcsplan.notes.note import Note
 from gcsplan.world.frame import Frame
 from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.support.effort import draws
@@ -115,8 +116,8 @@ def test_polygons_of_every_format_and_crs_are_those_of_a_second_implementation(
     outline = shapely.LinearRing(zone.shape.vertices)
     assert shapely.distance(outline, shapely.points(FRAME.to_plane(lat, lon))).max() < 0.15
     assert area_m2(zone.shape) == pytest.approx(abs(GEOD.polygon_area_perimeter(lon, lat)[0]), rel=1e-5)
-    assert [n.split(" to WGS")[0] for n in found.notes] == (
-        [] if crs == "EPSG:4326" else [f"z{suffix}: converted from {CRS(crs).name}"]
+    assert [(n.code, n.data["file"], n.data["crs"]) for n in found.notes] == (
+        [] if crs == "EPSG:4326" else [("converted_to_wgs84", f"z{suffix}", CRS(crs).name)]
     )
 
 
@@ -145,9 +146,9 @@ def test_holes_heights_and_collections_are_as_in_geojson(tmp_path: Path) -> None
     assert [z.name for z in zones] == ["a/1", "a/2"]
     assert area_m2(zones[0].shape) == area_m2(zones[1].shape)
     assert [z.ceiling for z in zones] == [None, None]
-    assert found.notes == ("z.gpkg: 1 hole in polygons counted as no-fly",)
+    assert found.notes == (Note("holes_are_no_fly", file="z.gpkg", count=1),)
     (note,) = zone_notes([(draft, None) for draft in found.zones])
-    assert note == "z.gpkg: the altitudes of corners are not read as limits: a/2 (up to 500 m)"
+    assert str(note) == "z.gpkg: the altitudes of corners are not read as limits: a/2 (up to 500 m)"
 
 
 def test_an_arc_is_drawn_so_finely_that_its_chords_are_the_arc(tmp_path: Path) -> None:
@@ -261,12 +262,12 @@ def test_files_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     with zipfile.ZipFile(tmp_path / "z.zip", "w", zipfile.ZIP_DEFLATED) as archive:
         for part in (".shp", ".shx", ".dbf", ".prj"):
             archive.write(file.with_suffix(part), f"z{part}")
-    monkeypatch.setattr(zone_reader, "MAX_BYTES", file.stat().st_size + 10)
+    monkeypatch.setattr(zone_reader, "MAX_ZONE_BYTES", file.stat().st_size + 10)
     assert "the files of this Shapefile are too large" in message(file)
-    monkeypatch.setattr(zone_reader, "MAX_BYTES", (tmp_path / "z.zip").stat().st_size)
+    monkeypatch.setattr(zone_reader, "MAX_ZONE_BYTES", (tmp_path / "z.zip").stat().st_size)
     assert "unpacks to more than" in message(tmp_path / "z.zip")
     monkeypatch.setattr("gcsplan.mission_file.zone_vector.MAX_ZONES", 2)
-    monkeypatch.setattr(zone_reader, "MAX_BYTES", 10**6)
+    monkeypatch.setattr(zone_reader, "MAX_ZONE_BYTES", 10**6)
     assert "more than 2 zones" in message(file)
 
 
@@ -288,7 +289,7 @@ def test_a_kmz_is_the_kml_in_it(tmp_path: Path) -> None:
 
 
 def test_a_bomb_is_refused_before_it_is_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(zone_reader, "MAX_BYTES", 100_000)
+    monkeypatch.setattr(zone_reader, "MAX_ZONE_BYTES", 100_000)
     file = kmz(tmp_path / "z.kmz", doc_kml=b" " * 5_000_000)
     assert file.stat().st_size < 100_000
     assert "unpacks to more than 100000 bytes" in message(file)
@@ -343,7 +344,7 @@ def test_masts_become_circles_with_their_heights_as_ceilings(tmp_path: Path) -> 
         assert isinstance(zone.shape, Circle)
         assert (zone.shape.east_m, zone.shape.north_m) == pytest.approx((float(east), float(north)), abs=1e-6)
     (note,) = zone_notes([(draft, None) for draft in found.zones])
-    assert "Üetli (Height (ft) '300': ceiling at 91.44 m AGL)" in note
+    assert "Üetli (Height (ft) '300': ceiling at 91.44 m AGL)" in str(note)
 
 
 def test_tables_of_every_spelling_are_the_same(tmp_path: Path) -> None:
@@ -370,7 +371,8 @@ def test_a_height_without_a_unit_limits_nothing_and_is_told(tmp_path: Path) -> N
     found = read(table(tmp_path, "name,lat,lon,height,amsl\nm,46.5,8.0,30,700\n"), radius_m=50)
     assert [z.ceiling for z in found.zones] == [None]
     (note,) = zone_notes([(draft, None) for draft in found.zones])
-    assert "not read, and limit nothing: m (height '30'" in note
+    assert note.code == "zone_attributes_unread"
+    assert "m (height '30'" in str(note)
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
 from gcsplan.export.kml import write_kml
-from gcsplan.mission_file.zone_attributes import BOUNDS, NAMES, REFERENCE_NAMES, UNIT_NAMES
+from gcsplan.mission_file.zone_attributes import BOUNDS, NAME_ATTRIBUTES, REFERENCE_NAMES, UNIT_NAMES
 from gcsplan.mission_file.zone_draft import SHOWN_ZONES, ZoneDraft, place_zones, zone_notes
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_levels import LevelError, Limit, read_level
@@ -73,7 +73,7 @@ def limits(draft: ZoneDraft) -> tuple[str, str]:
 
 def notes(found: ZoneFile) -> str:
     assert found.problems == []
-    return "\n".join(zone_notes(place_zones(found.zones, FRAME)[0]))
+    return "\n".join(map(str, zone_notes(place_zones(found.zones, FRAME)[0])))
 
 
 # -- one level ----------------------------------------------------------------------------------------------------
@@ -497,5 +497,5 @@ def test_three_decimals_are_no_thousands_where_the_name_says_metres(tmp_path: Pa
 
 def test_the_page_about_zones_names_every_attribute() -> None:
     page = (REPOSITORY / "docs/how-to/zones.md").read_text(encoding="utf-8")
-    for word in (*NAMES, *BOUNDS, *UNIT_NAMES, *REFERENCE_NAMES):
+    for word in (*NAME_ATTRIBUTES, *BOUNDS, *UNIT_NAMES, *REFERENCE_NAMES):
         assert f"`{word}`" in page

@@ -106,7 +106,7 @@ def test_a_multipolygon_becomes_several_zones_with_numbered_names(tmp_path: Path
 
 def test_a_hole_counts_as_no_fly_and_is_told(tmp_path: Path) -> None:
     found = read(tmp_path, feature({"type": "Polygon", "coordinates": [SQUARE, HOLE]}))
-    assert "1 hole" in found.notes[0]
+    assert [note.code for note in found.notes] == ["holes_are_no_fly"]
     plain = read(tmp_path, square())
     assert area_m2(placed(found)[0].shape) == area_m2(placed(plain)[0].shape)
     assert plain.notes == ()
@@ -231,7 +231,7 @@ def test_missing_and_oversized_files_are_refused(tmp_path: Path, monkeypatch: py
         with pytest.raises(InputError) as caught:
             read_zones(path, where="m: no_fly[0].file")
         assert caught.value.where == "m: no_fly[0].file"
-    monkeypatch.setattr(zone_reader, "MAX_BYTES", 50)
+    monkeypatch.setattr(zone_reader, "MAX_ZONE_BYTES", 50)
     assert "more than 50" in messages(tmp_path, collection(square()))
 
 
@@ -271,7 +271,7 @@ def test_kml_polygons_and_points_become_zones(tmp_path: Path) -> None:
     assert area_m2(prism.shape) == pytest.approx(0.02 * 110_956 * 0.02 * 89_518, rel=1e-3)
     assert isinstance(cylinder.shape, Circle)
     assert cylinder.shape.radius_m == 60.0
-    assert "1 hole" in found.notes[0]
+    assert [note.code for note in found.notes] == ["holes_are_no_fly"]
 
 
 @pytest.mark.parametrize("head", ['<kml xmlns="http://earth.google.com/kml/2.1">', "<kml>", '<kml xmlns="urn:x">'])

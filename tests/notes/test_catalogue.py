@@ -14,7 +14,7 @@ from gcsplan.notes.catalogue import TEXTS
 from gcsplan.notes.note import KINDS, fields_of, parts_of
 
 ROOT = Path(gcsplan.__file__).parent
-FORMS = {*KINDS, "angle", "reach", "seconds", "joules", "lines", "g"}
+FORMS = {*KINDS, "angle", "key", "reach", "seconds", "joules", "lines", "g"}
 
 
 def made() -> Iterator[tuple[str, ast.Call, dict[str, list[str]]]]:

@@ -22,7 +22,7 @@ from rasterio.errors import NotGeoreferencedWarning
 from rasterio.transform import Affine
 
 from gcsplan.arrays import Floats
-from gcsplan.dem.cache import Cache, Record, text_of
+from gcsplan.dem.cache import Cache, TileRecord, text_of
 from gcsplan.dem.dat_file import file_name, packed
 from gcsplan.dem.sources import GLO30
 from gcsplan.world.cell import Cell
@@ -219,7 +219,7 @@ def published(case: Case) -> None:
     kept, cell = Cache(GLO30, case.folder / "cache"), Cell(47, 8)
     kept.folder.mkdir(parents=True)
     path = case.file(f"cache/{GLO30.name}/{cell.name}.tif", tile(cell))
-    record = Record(
+    record = TileRecord(
         cell.name, GLO30.name, "tile", GLO30.kind, GLO30.vertical_datum, "2026-01-01T00:00:00Z",
         bytes=path.stat().st_size, sha256=sha256_of(path),
     )  # fmt: skip

@@ -16,14 +16,14 @@ import rasterio
 from rasterio.transform import Affine
 
 from gcsplan.arrays import Floats
-from gcsplan.dem.sources import GLO30, GLO90, SRTM, Source
+from gcsplan.dem.sources import GLO30, GLO90, SRTM, DemSource
 from gcsplan.world.cell import Cell
 
 ROWS = 36
 """Rows of a tile here: a hundredth of a real one's."""
 
 
-def heights_of(cell: Cell, source: Source = GLO30, rows: int = ROWS) -> Floats:
+def heights_of(cell: Cell, source: DemSource = GLO30, rows: int = ROWS) -> Floats:
     """Heights at the nodes of a tile: a smooth function of the place alone, so that neighbours fit together."""
     cols = rows * source.columns_of(cell) // 3600
     more = 1 if source.shares_edges else 0
@@ -38,7 +38,7 @@ def height_at(lat_deg: Floats, lon_deg: Floats) -> Floats:
     return np.asarray(300.0 + 40.0 * np.sin(3.0 * lat_deg) + 30.0 * np.cos(5.0 * lon_deg))
 
 
-def tile(cell: Cell, source: Source = GLO30, heights: Floats | None = None, **more: object) -> bytes:
+def tile(cell: Cell, source: DemSource = GLO30, heights: Floats | None = None, **more: object) -> bytes:
     """The bytes of a GeoTIFF as the source has it: the first node on the north-west corner of the degree."""
     values = heights_of(cell, source) if heights is None else heights
     rows, cols = values.shape
@@ -53,18 +53,18 @@ def tile(cell: Cell, source: Source = GLO30, heights: Floats | None = None, **mo
         return bytes(memory.read())
 
 
-def listing(source: Source, cells: Iterable[Cell]) -> bytes:
+def listing(source: DemSource, cells: Iterable[Cell]) -> bytes:
     """A list of tiles in the source's form, and as many as a list has at least, around the south pole."""
     return (_far_away(source) + _lines(source, cells) + ("</VRTDataset>\n" if source is SRTM else "")).encode()
 
 
 @cache
-def _far_away(source: Source) -> str:
+def _far_away(source: DemSource) -> str:
     cells = [Cell(lat, lon) for lat in range(-90, -32) for lon in range(-180, 180)]
     return ("<VRTDataset>\n" if source is SRTM else "") + _lines(source, cells)
 
 
-def _lines(source: Source, cells: Iterable[Cell]) -> str:
+def _lines(source: DemSource, cells: Iterable[Cell]) -> str:
     if source is SRTM:
         return "".join(
             f'<SourceFilename relativeToVRT="1">SRTM_GL1_srtm/{c.name}.tif</SourceFilename>\n' for c in cells
@@ -82,17 +82,17 @@ class Served:
     asked: list[tuple[str, str]] = field(default_factory=list)
     url: str = ""
 
-    def put(self, source: Source, name: str, data: bytes) -> None:
+    def put(self, source: DemSource, name: str, data: bytes) -> None:
         """Add an object of a source."""
         self.objects[f"/{source.bucket}/{name}"] = data
 
-    def put_tile(self, cell: Cell, source: Source = GLO30, **more: object) -> bytes:
+    def put_tile(self, cell: Cell, source: DemSource = GLO30, **more: object) -> bytes:
         """Add a tile."""
         data = tile(cell, source, **more)  # type: ignore[arg-type]
         self.put(source, source.object_of(cell), data)
         return data
 
-    def put_lists(self, *, land: Iterable[Cell] = (), lacking: Iterable[Cell] = (), source: Source = GLO30) -> None:
+    def put_lists(self, *, land: Iterable[Cell] = (), lacking: Iterable[Cell] = (), source: DemSource = GLO30) -> None:
         """Add the lists: ``source`` and GLO-90 have ``land``, GLO-90 also what is ``lacking``; the rest is sea."""
         self.put(source, source.listing, listing(source, land))
         self.put(GLO90, GLO90.listing, listing(GLO90, [*land, *lacking]))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 from gcsplan.world import _neighbourhood
 from gcsplan.world._field import Field
-from gcsplan.world._neighbourhood import Lines, Neighbourhood, Neighbourhoods, extrema_around
+from gcsplan.world._neighbourhood import LineBatch, Neighbourhood, Neighbourhoods, extrema_around
 from gcsplan.world._shared import MASK, SHIFT, LocalExtrema
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.limits import Limits
@@ -94,19 +94,19 @@ def test_lines_find_all_that_they_meet_looked_at_and_little_else(
     grid = GridMap.affine(0.0, 0.0, 5.0, 4.0)
     field = Field.of(grid)
     whole = extrema_around(field, z, reach_m)
-    monkeypatch.setattr(_neighbourhood, "LARGE", 1000)
+    monkeypatch.setattr(_neighbourhood, "LARGE_WINDOW", 1000)
     for _ in range(20):
         ours = Neighbourhood(grid, field, z, reach_m)
         assert not ours.extrema.slope.any()
         start, end = np.stack([rng.uniform(-200.0, 5700.0, (2, 3)), -rng.uniform(-200.0, 3800.0, (2, 3))], axis=-1)
-        ours.along(Lines(start, end))
+        ours.along(LineBatch(start, end))
         t = np.linspace(0.0, 1.0, 20_000)[:, None, None]
         cells = np.floor(grid(*(start + t * (end - start)).reshape(-1, 2).T)).astype(np.intp)
         cells = cells[((cells >= 0) & (cells < [1099, 899])).all(axis=1)]
         assert same_where_seen(ours.extrema, whole, cells[:, 1], cells[:, 0])
         assert not ours.seen.all()
     copy = pickle.loads(pickle.dumps(ours))
-    copy.along(Lines(start, end))
+    copy.along(LineBatch(start, end))
     assert same_where_seen(copy.extrema, whole, cells[:, 1], cells[:, 0])
 
 
@@ -127,7 +127,7 @@ def test_what_is_looked_at_in_part_judges_as_what_is_looked_at_as_a_whole(monkey
     clear, report = whole.clear(legs, limits), whole.examine(legs, limits)
     floor, ceiling = whole.floor_amsl(*start[:, :2].T, limits), whole.ceiling_amsl(*start[:, :2].T, limits)
     tubes = [whole.tube(np.stack([a[:2], b[:2]]), limits) for a, b in zip(start, end, strict=True)]
-    monkeypatch.setattr(_neighbourhood, "LARGE", 1000)
+    monkeypatch.setattr(_neighbourhood, "LARGE_WINDOW", 1000)
     assert clear.any()
     assert not clear.all()
     # One leg at a time in a new airspace, so that only its own tiles have been examined.
@@ -146,8 +146,8 @@ def test_what_is_looked_at_in_part_judges_as_what_is_looked_at_as_a_whole(monkey
 
 def test_what_was_not_looked_at_is_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
     """A kernel that reaches a tile that was not examined must not treat it as flat ground."""
-    monkeypatch.setattr(_neighbourhood, "LARGE", 100)
-    monkeypatch.setattr(Lines, "tiles", lambda self, grid, field, shape: np.zeros(shape, np.bool_))
+    monkeypatch.setattr(_neighbourhood, "LARGE_WINDOW", 100)
+    monkeypatch.setattr(LineBatch, "tiles", lambda self, grid, field, shape: np.zeros(shape, np.bool_))
     z = np.full((50, 50), 100.0)
     blind = Airspace(Surface(z, z, GridMap.affine(0.0, 0.0, 10.0, 10.0), {}))
     limits = Limits(min_agl_m=30.0, max_agl_m=500.0, horizontal_clearance_m=20.0, track_error_m=3.0)
@@ -173,7 +173,7 @@ def test_neighbourhoods_forget_those_asked_for_least_lately_and_judge_alike(monk
     for _ in range(60):
         reach_m = float(rng.choice(reaches))
         start, end = np.stack([rng.uniform(0.0, 4490.0, (2, 2)), -rng.uniform(0.0, 2490.0, (2, 2))], axis=-1)
-        kept.along(False, z, reach_m, Lines(start, end))
+        kept.along(False, z, reach_m, LineBatch(start, end))
         extrema = next(reversed(kept._kept.values())).extrema
         t = np.linspace(0.0, 1.0, 2000)[:, None, None]
         cells = np.floor(grid(*(start + t * (end - start)).reshape(-1, 2).T)).astype(np.intp)
@@ -195,7 +195,7 @@ def test_a_line_across_a_large_surface_takes_memory_for_its_tiles_alone() -> Non
     z = np.full((6000, 6000), 100.0)
     grid = GridMap.affine(0.0, 0.0, 5.0, 5.0)
     field = Field.of(grid)
-    line = Lines(np.array([[2500.0, 0.0]]), np.array([[27_000.0, -29_990.0]]))
+    line = LineBatch(np.array([[2500.0, 0.0]]), np.array([[27_000.0, -29_990.0]]))
     before = held_bytes()
     ours = Neighbourhood(grid, field, z, 5.0)
     ours.along(line)

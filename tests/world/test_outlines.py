@@ -12,7 +12,7 @@ import shapely
 
 from gcsplan.arrays import Floats
 from gcsplan.world.degree_shapes import outline_of, rings_around
-from gcsplan.world.outlines import MOST_CROSSINGS, MOST_PAIRS, crossings, fewer_corners, overlapping_pairs
+from gcsplan.world.outlines import MOST_CROSSINGS, MOST_EDGE_PAIRS, crossings, fewer_corners, overlapping_pairs
 from tests.campaigns.large_inputs import smooth, spiky
 
 
@@ -70,7 +70,7 @@ def test_an_outline_that_would_take_minutes_is_refused_at_once() -> None:
     assert len(ring) == 99_000
     assert "99000 corners" in why
     assert time.process_time() - begun < 3.0  # 13 s in GEOS, twice
-    assert overlapping_pairs(ring_of("smooth", 99_000, 1)) < MOST_PAIRS
+    assert overlapping_pairs(ring_of("smooth", 99_000, 1)) < MOST_EDGE_PAIRS
 
 
 @pytest.mark.slow

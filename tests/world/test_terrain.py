@@ -33,6 +33,7 @@ from gcsplan.errors import InputError
 from gcsplan.world import mosaic, peaks, raster
 from gcsplan.world.frame import Frame
 from gcsplan.world.geoid import GeoidGrid
+from gcsplan.world.model_words import notes_on
 from gcsplan.world.peaks import Peak
 from gcsplan.world.raster import open_raster
 from gcsplan.world.surface import Surface
@@ -204,7 +205,7 @@ def test_srtm_posts_lie_on_whole_degrees_and_neighbouring_tiles_join(tmp_path: P
     lat, lon = frame.to_degrees(e, n).T
     wanted = by_hand(both, (lon + 85.0) * 1200, (37.0 - lat) * 1200)
     assert np.abs(surface.ground_at(e, n) - wanted).max() < 1e-5
-    assert surface.info["notes"] == ()
+    assert notes_on(surface.info) == ()
     hashes = [hashlib.sha256(t.read_bytes()).hexdigest() for t in tiles]
     assert surface.info["dem_sha256"] == hashlib.sha256("\n".join(hashes).encode()).hexdigest()
 
@@ -249,7 +250,7 @@ def test_a_gap_between_tiles_is_unknown(tmp_path: Path) -> None:
     lon = np.array([-84.6 + 30 * 0.002, -84.5, -84.6 + 70 * 0.002])
     ground = surface.ground_at(*FRAME.to_plane(np.full(3, 36.5), lon).T)
     assert np.isfinite(ground).tolist() == [True, False, True]
-    assert any("unknown" in str(n) for n in surface.info["notes"])  # type: ignore[attr-defined]
+    assert any(n.code == "nodes_unknown" for n in notes_on(surface.info))
 
 
 @pytest.mark.parametrize(("upper", "lower"), [(0.003, 0.002), (0.002, 0.003), (0.005, 0.003), (0.004, 0.002)])
@@ -297,7 +298,7 @@ def test_where_tiles_differ_both_heights_are_kept_and_told(tmp_path: Path) -> No
     assert surface.high_at(*at) == surface.top_at(*at) == pytest.approx(raised[50, 50], abs=1e-3)
     assert surface.ground_at(*at) == pytest.approx(heights[50, 50], abs=1e-3)
     assert not load(degrees_tif(tmp_path / "c.tif", heights)).differs
-    assert any("1 nodes, 7 m" in str(n) for n in surface.info["notes"])  # type: ignore[attr-defined]
+    assert any("1 nodes, 7 m" in str(n) for n in notes_on(surface.info))
 
 
 def test_an_ascii_grid_needs_its_coordinate_system(tmp_path: Path) -> None:
@@ -363,7 +364,7 @@ def test_voids_declared_or_not_are_unknown_and_never_ground(
     assert np.count_nonzero(np.isnan(surface.ground_m)) == 1
     near = FRAME.to_plane(36.6 - 50.2 * 0.002, -84.6 + 50.2 * 0.002)
     assert np.isnan(surface.ground_at(*near))
-    assert any("1 of" in str(n) for n in surface.info["notes"])  # type: ignore[attr-defined]
+    assert any("1 of" in str(n) for n in notes_on(surface.info))
 
 
 def test_a_mask_beside_the_heights_is_honoured(tmp_path: Path) -> None:
@@ -456,7 +457,7 @@ def test_a_raster_that_does_not_say_its_datum_needs_the_key(tmp_path: Path) -> N
 def test_a_geoid_datum_is_taken_as_amsl(tmp_path: Path, crs: str, said: str | None, name: str) -> None:
     surface = load(degrees_tif(tmp_path / "a.tif", crs=crs), vertical_datum=said)
     assert surface.info["vertical_datum"] == name
-    told = any("taken as AMSL" in str(n) for n in surface.info["notes"])  # type: ignore[attr-defined]
+    told = any(n.code == "heights_taken_as_amsl" for n in notes_on(surface.info))
     assert told == (name == "NAVD88")
 
 
@@ -678,7 +679,7 @@ def test_a_picture_is_no_dem(tmp_path: Path) -> None:
 
 def test_a_second_band_is_told(tmp_path: Path) -> None:
     two = np.stack([hills(100, 100), hills(100, 100, seed=5)]).astype("int16")
-    assert any("2 bands" in str(n) for n in load(degrees_tif(tmp_path / "a.tif", two)).info["notes"])  # type: ignore[attr-defined]
+    assert any("2 bands" in str(n) for n in notes_on(load(degrees_tif(tmp_path / "a.tif", two)).info))
 
 
 def test_tiles_that_do_not_fit_together_are_refused(tmp_path: Path) -> None:
@@ -697,7 +698,7 @@ def test_tiles_that_do_not_fit_together_are_refused(tmp_path: Path) -> None:
 def test_a_system_without_a_known_datum_is_refused_with_the_cure(tmp_path: Path) -> None:
     path = degrees_tif(tmp_path / "a.tif", crs="+proj=longlat +ellps=GRS80 +no_defs")
     assert "`crs:`" in str(refusal(path))
-    assert any("is used instead" in str(n) for n in load(path, crs="EPSG:4326").info["notes"])  # type: ignore[attr-defined]
+    assert any(n.code == "crs_replaced" for n in notes_on(load(path, crs="EPSG:4326").info))
 
 
 def test_metres_taken_for_degrees_are_refused(tmp_path: Path) -> None:
@@ -824,7 +825,7 @@ MIXED = (Peak(20.0, 70.0, 33.0, 7.0, 11.0), Peak(60.0, 40.0, -25.0, 9.0, 8.0), P
 def test_gridded_peaks_are_never_below_the_true_ones(
     shapes: tuple[Peak, ...], most: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(peaks, "MAX_NODES", most)
+    monkeypatch.setattr(peaks, "MAX_PEAK_NODES", most)
     box = (-50.0, -50.0, 150.0, 160.0)
     surface = load_terrain(TerrainSpec(peaks=shapes, flat_m=2.0), Frame(36.6, -84.3, 10.0), box, where="m")
     assert surface.ground_m.size <= most
@@ -938,7 +939,7 @@ def test_unknown_canopy_is_unknown_unless_its_height_is_given(tmp_path: Path) ->
     for at in (inner, outer):
         assert np.isnan(surface.top_at(*at))
         assert np.isfinite(surface.ground_at(*at))
-    assert any("canopy_nodata_m" in str(n) for n in surface.info["notes"])  # type: ignore[attr-defined]
+    assert any(n.code == "canopy_unknown" for n in notes_on(surface.info))
     given_m = load(dem, canopy=canopy, box=box, canopy_nodata_m=20.0, obstacle_height_m=3.0)
     for at in (inner, outer):
         assert given_m.top_at(*at) - given_m.ground_at(*at) == pytest.approx(20.0, abs=1e-6)

@@ -13,6 +13,7 @@ from affine import Affine
 from gcsplan.errors import InputError
 from gcsplan.world.datum import stated_datum, take_apart
 from gcsplan.world.height_unit import unit_named
+from gcsplan.world.model_words import notes_on
 from gcsplan.world.surface import Surface
 from gcsplan.world.voids import zero_voids
 from tests.world.test_terrain import FRAME, degrees_tif, hills, load, refusal, tif
@@ -31,7 +32,7 @@ DEPTHS, OTHER_ZEROS = (
 
 
 def notes_of(surface: Surface) -> str:
-    return "\n".join(map(str, surface.info["notes"]))  # type: ignore[call-overload]
+    return "\n".join(map(str, notes_on(surface.info)))
 
 
 def is_times(surface: Surface, heights: Any, metres: float) -> bool:

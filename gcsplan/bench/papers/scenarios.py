@@ -20,7 +20,7 @@ from gcsplan.planners.registry import get as get_planner
 from gcsplan.planners.swarm.settings import Settings
 from gcsplan.world.world import World
 
-MISSION_FOLDERS = (Path("missions", "papers"), *(folder / "papers" for folder in samples.FOLDERS))
+MISSION_FOLDERS = (Path("missions", "papers"), *(folder / "papers" for folder in samples.SAMPLE_FOLDERS))
 """Folders in which the mission files are searched: here, then those of the samples."""
 
 

@@ -10,7 +10,7 @@ from gcsplan.check.battery import BatteryHome
 from gcsplan.check.rtl.words import Row, listed, together_m, verdict_words
 from gcsplan.check.stretch import Place
 from gcsplan.mavlink.mission.return_altitude import setting, settings
-from gcsplan.mavlink.mission.return_route import Route, route_setting
+from gcsplan.mavlink.mission.return_route import ReturnRoute, route_setting
 from gcsplan.notes.note import IN_FILES, Note, Wording, in_json
 from gcsplan.vehicle import Autopilot
 
@@ -194,7 +194,7 @@ class WayHome:
     lowest: LowestAgl | None
     not_judged: tuple[Note, ...]
     notes: tuple[Note, ...]
-    route: Route = "straight"
+    route: ReturnRoute = "straight"
     starts: tuple[int, ...] = ()
     along_path: bool = False
     path_back: Note | None = None

@@ -39,7 +39,7 @@ from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.commands import command_name
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.mavlink.mission.return_route import Route
+from gcsplan.mavlink.mission.return_route import ReturnRoute
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.world import World
@@ -62,7 +62,7 @@ def way_home(
     rtl_rel_home_m: float | None = None,
     terrain_error_m: float = TERRAIN_ERROR_M,
     rally: bool = True,
-    route: Route | None = None,
+    route: ReturnRoute | None = None,
 ) -> WayHome:
     """Judge the return home from every point of the mission of ``verdict``.
 

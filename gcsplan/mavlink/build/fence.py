@@ -2,8 +2,8 @@
 
 A fence item is a circle or one corner of a polygon and has **no height**, so it cannot express a zone with a floor or a
 ceiling. Such a zone is left out, or on request becomes a fence from the ground to the sky. A circle's radius is rounded
-up to whole centimetres; the polygon of the fence deviates from a zone's outline by at most `STRAIGHT_M`. Items are in
-frame 0: ArduPilot refuses frame 2, and no autopilot stores the altitude.
+up to whole centimetres; the polygon of the fence deviates from a zone's outline by at most `FENCE_STRAIGHT_M`. Items
+are in frame 0: ArduPilot refuses frame 2, and no autopilot stores the altitude.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from gcsplan.figures import counted
 from gcsplan.mavlink.mission.autopilots import max_items, profile_of
 from gcsplan.mavlink.mission.commands import CIRCLE_IN, CIRCLE_OUT, FENCE_RETURN_POINT, POLYGON_IN, POLYGON_OUT
 from gcsplan.mavlink.mission.mission import FENCE, GLOBAL, MissionItem, degrees_e7
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.degree_shapes import LARGEST_RADIUS_M, near_circle, near_polygons, outline_of, unwrapped
 from gcsplan.world.zones import Circle, Polygon, Zone
@@ -28,10 +29,10 @@ from gcsplan.world.zones import Circle, Polygon, Zone
 if TYPE_CHECKING:
     from gcsplan.world.frame import Frame
 
-STRAIGHT_M = 0.1
+FENCE_STRAIGHT_M = 0.1
 """Metres: a corner of the outline that lies within this of the line between its kept neighbours is left out."""
 
-MOST_CORNERS = 255  # of one polygon on ArduPilot, which stores the number in a byte (AC_PolyFence_loader.cpp)
+MOST_FENCE_CORNERS = 255  # of one polygon on ArduPilot, which stores the number in a byte (AC_PolyFence_loader.cpp)
 STORAGE_BYTES = {Autopilot.ARDUCOPTER: 560, Autopilot.ARDUPLANE: 672}  # StorageManager.cpp, StorageFence
 HEAD_BYTES, CIRCLE_BYTES, POLYGON_BYTES, CORNER_BYTES = 5, 13, 2, 8  # AC_PolyFence_loader.cpp; 42 circles fit a copter
 
@@ -50,7 +51,7 @@ class Area:
 
 @dataclass(frozen=True, slots=True)
 class Fence:
-    """A fence for one autopilot: its items in wire order, the zones in it, and remarks for the user (``notes``).
+    """A fence for one autopilot: its items in wire order, the zones in it, and ``notes`` for the user.
 
     ``left_out`` names the zones that a fence cannot express.
     """
@@ -58,7 +59,7 @@ class Fence:
     items: tuple[MissionItem, ...]
     zones: tuple[Zone, ...]
     left_out: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
 
 
 def fence_of(zones: Sequence[Zone], frame: Frame, autopilot: Autopilot, *, infinite: bool = False) -> Fence:
@@ -67,19 +68,16 @@ def fence_of(zones: Sequence[Zone], frame: Frame, autopilot: Autopilot, *, infin
     Zones with a floor or a ceiling are left out and named; with ``infinite`` they are included without floor and
     ceiling. A circle inside another one is dropped. Raises InputError if the autopilot cannot store the fence.
     """
-    notes: list[str] = []
+    notes: list[Note] = []
     bounded = [z for z in zones if z.floor is not None or z.ceiling is not None]
     taken = list(zones) if infinite else [z for z in zones if z.floor is None and z.ceiling is None]
     if bounded and infinite:
-        notes.append(f"a fence has no height: {_names(bounded)} would be forbidden from the ground to the sky on board")
+        notes.append(Note("fence_without_heights", names=_names(bounded)))
     elif bounded:
-        notes.append(
-            f"a fence has no height: {_names(bounded)} {'is' if len(bounded) == 1 else 'are'} left out of it, having a "
-            f"floor or a ceiling"
-        )
+        notes.append(Note("fence_leaves_out", names=_names(bounded)))
     inside = [z for k, z in enumerate(taken) if any(_holds(o, z, j < k) for j, o in enumerate(taken) if j != k)]
     if inside:
-        notes.append(f"{_names(inside)} {'lies' if len(inside) == 1 else 'lie'} inside another circle of the fence")
+        notes.append(Note("fence_circles_inside", names=_names(inside)))
     taken = [z for z in taken if z not in inside]
     items: list[MissionItem] = []
     for zone in taken:
@@ -168,7 +166,7 @@ def _corners(zone: Zone, frame: Frame) -> list[MissionItem]:
 
 
 def _straightened(ring: Floats) -> Floats:
-    """Return the ring without the corners that lie within `STRAIGHT_M` of the line between kept ones."""
+    """Return the ring without the corners that lie within `FENCE_STRAIGHT_M` of the line between kept ones."""
     start = int(np.hypot(*(ring - ring.mean(axis=0)).T).argmax())  # the farthest point is certainly a corner
     points = np.roll(ring, -start, axis=0)
     kept = [0]
@@ -183,7 +181,7 @@ def _straightened(ring: Floats) -> Floats:
                 break
             off = np.abs(between[:, 0] * along[1] - between[:, 1] * along[0]) / length
             part = between @ along / length**2
-            if off.max() > STRAIGHT_M or part.min() < 0.0 or part.max() > 1.0:
+            if off.max() > FENCE_STRAIGHT_M or part.min() < 0.0 or part.max() > 1.0:
                 break
             last = end
         kept.append(last)
@@ -197,8 +195,10 @@ def _require_storage(zones: Sequence[Zone], items: Sequence[MissionItem], autopi
     for zone in zones:
         if isinstance(zone.shape, Polygon) and autopilot.is_ardupilot:
             count = len(_straightened(zone.shape.vertices))
-            if count > MOST_CORNERS:
-                raise InputError(f"the zone {zone.name!r} has {count} corners; {label} keeps {MOST_CORNERS}: {cure}")
+            if count > MOST_FENCE_CORNERS:
+                raise InputError(
+                    f"the zone {zone.name!r} has {count} corners; {label} keeps {MOST_FENCE_CORNERS}: {cure}"
+                )
     circles = sum(isinstance(z.shape, Circle) for z in zones)
     polygons = len(zones) - circles
     corners = len(items) - circles
@@ -222,5 +222,5 @@ def _holds(outer: Zone, inner: Zone, first: bool) -> bool:
     return slack >= 0.0 and (a.radius_m > b.radius_m or first)
 
 
-def _names(zones: Sequence[Zone]) -> str:
-    return ", ".join(repr(z.name) for z in zones)
+def _names(zones: Sequence[Zone]) -> tuple[str, ...]:
+    return tuple(repr(z.name) for z in zones)

@@ -33,7 +33,7 @@ __all__ = ["accepted_m", "build_wing", "flown_m", "parted", "pitch_deg", "tangen
 FARTHEST_ACCEPTED_M = 255.0
 """Largest acceptance radius that ArduPlane stores, in metres (one byte)."""
 
-ROUNDED_M = 1e-3
+RADIUS_ROUNDED_M = 1e-3
 """Metres: a tangent that exceeds whole metres by less is not rounded up."""
 
 LEAST_ACCEPTED_M = 1.0
@@ -114,7 +114,7 @@ def accepted_m(tangent_m: float, run_m: float) -> float:
 
     So a turn begins less than a metre early, or, where its arc begins with the leg, less than a metre late.
     """
-    accepted = math.ceil(tangent_m - ROUNDED_M)
+    accepted = math.ceil(tangent_m - RADIUS_ROUNDED_M)
     if accepted > run_m:
         accepted = math.floor(run_m)
     return min(max(LEAST_ACCEPTED_M, accepted), FARTHEST_ACCEPTED_M)

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from gcsplan.arrays import Floats
+from gcsplan.mavlink.mission.mission import AltitudeFrame
+from gcsplan.vehicle import MissionEnd
 from gcsplan.world.world import World
 
-Point = tuple[float, float, float]
-End = Literal["land", "loiter", "rtl", "none"]
-AltitudeFrame = Literal["relative", "amsl", "terrain"]
+PathPoint = tuple[float, float, float]
 
-BOW_M = 0.1
+LEG_BOW_M = 0.1
 LONGEST_LEG_M = 5000.0
 
 
@@ -29,7 +28,7 @@ class Margins:
 
     altitude_m: float = 0.02
     track_m: float = 0.012
-    bow_m: float = BOW_M
+    bow_m: float = LEG_BOW_M
     slope: float = 0.0
     rounding_m: tuple[float, float] = (0.011, 0.01)
 
@@ -61,14 +60,14 @@ class Wing:
     anticlockwise).
     """
 
-    top: Point
-    touch: Point | None = None
+    top: PathPoint
+    touch: PathPoint | None = None
     circle_m: float = 0.0
-    up: Point | None = None
+    up: PathPoint | None = None
     up_m: float = 0.0
 
     @property
-    def leaves(self) -> Point:
+    def leaves(self) -> PathPoint:
         """The point at which the first leg begins."""
         return self.top if self.up is None else self.up
 
@@ -86,7 +85,7 @@ class Order:
     whose altitude the mission file gives: it is the nearest centimetre, even where a leg beside it gets too steep.
     """
 
-    end: End = "land"
+    end: MissionEnd = "land"
     altitude_frame: AltitudeFrame = "relative"
     speed_m_s: float | None = None
     spaced: bool = True
@@ -94,11 +93,11 @@ class Order:
     gate_utc: tuple[int, int, int] | None = None
     wing: Wing | None = None
     return_path: bool = False
-    bow_m: float = BOW_M
+    bow_m: float = LEG_BOW_M
     exact: tuple[tuple[float, float], ...] = ()
 
 
-def split_legs(points: Floats, world: World, most_bow_m: float = BOW_M) -> Floats:
+def split_legs(points: Floats, world: World, most_bow_m: float = LEG_BOW_M) -> Floats:
     """(N, 3) points with legs cut to at most `LONGEST_LEG_M` and until the bow of each is at most ``most_bow_m``."""
     places = world.frame.to_degrees(points[:, 0], points[:, 1])
     bow = world.frame.bow_m(places[:-1], places[1:])

@@ -23,9 +23,9 @@ from gcsplan.mavlink.mission.mission import (
     MissionItem,
     float32,
 )
-from gcsplan.notes.note import Said
+from gcsplan.notes.note import Note, Said
 
-MAX_BYTES = 20_000_000
+MAX_FILE_BYTES = 20_000_000
 """Largest mission file that is read, in bytes."""
 
 MAX_ITEMS = 10_000
@@ -68,7 +68,7 @@ PLACE_IS_A_HINT = (cmd.DO_RETURN_PATH_START, cmd.DO_LAND_START)
 
 @dataclass(frozen=True, slots=True)
 class MissionFileRead:
-    """A mission from a file, with remarks for the user (``notes``, whole sentences).
+    """A mission from a file, with ``notes`` for the user.
 
     ``fence`` and ``rally`` are the wire items of the file's other two lists, empty if it has none; ``unread_fence``
     says what of its fence could not be read.
@@ -78,7 +78,7 @@ class MissionFileRead:
     notes: tuple[Said, ...] = ()
     fence: tuple[MissionItem, ...] = ()
     rally: tuple[MissionItem, ...] = ()
-    unread_fence: str = ""
+    unread_fence: Note | None = None
 
 
 def in_degrees(command: int, frame: int) -> bool:

@@ -10,7 +10,7 @@ from os import PathLike
 from pathlib import Path
 
 from gcsplan.errors import InputError
-from gcsplan.mavlink.files.file_items import MAX_BYTES, MissionFileRead
+from gcsplan.mavlink.files.file_items import MAX_FILE_BYTES, MissionFileRead
 from gcsplan.mavlink.files.plan_file import parse_plan, read_plan, write_plan
 from gcsplan.mavlink.files.waypoints_file import parse_waypoints, read_waypoints, write_waypoints
 from gcsplan.mavlink.mission.mission import Home
@@ -75,7 +75,7 @@ def _text(file: Path, where: str) -> str:
     try:
         regular = stat.S_ISREG(file.stat().st_mode)
         with open(file if regular else os.devnull, "rb") as stream:
-            data = stream.read(MAX_BYTES + 1)
+            data = stream.read(MAX_FILE_BYTES + 1)
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror or error}", where=where) from None
     except ValueError:
@@ -83,8 +83,8 @@ def _text(file: Path, where: str) -> str:
     # A pipe or a device could block its reader for ever.
     if not regular:
         raise InputError("a mission file is wanted, and this is not a regular file", where=where)
-    if len(data) > MAX_BYTES:
-        raise InputError(f"a mission file of more than {MAX_BYTES // 10**6} MB is not read", where=where)
+    if len(data) > MAX_FILE_BYTES:
+        raise InputError(f"a mission file of more than {MAX_FILE_BYTES // 10**6} MB is not read", where=where)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -15,6 +15,7 @@ from gcsplan.errors import InputError, Problem
 from gcsplan.mavlink.files.file_items import MAX_ITEMS, degrees_e7_of, float32_text, whole
 from gcsplan.mavlink.mission.commands import CIRCLE_IN, CIRCLE_OUT, POLYGON_IN, POLYGON_OUT, RALLY_POINT
 from gcsplan.mavlink.mission.mission import GLOBAL, RELATIVE, MissionItem
+from gcsplan.notes.note import Note
 
 MAX_PROBLEMS = 20
 
@@ -72,7 +73,7 @@ def rally_json(rally: Sequence[MissionItem]) -> dict[str, Any]:
     return {"points": [[r.lat_deg, r.lon_deg, json_number(r.z)] for r in rally], "version": 2}
 
 
-def fence_items(fence: object, where: str, notes: list[str]) -> tuple[MissionItem, ...]:
+def fence_items(fence: object, where: str, notes: list[Note]) -> tuple[MissionItem, ...]:
     """Return the wire items of a ``geoFence``, none if it is missing. Raises InputError with every mistake found.
 
     At most `MAX_PROBLEMS` mistakes are collected.
@@ -96,7 +97,7 @@ def fence_items(fence: object, where: str, notes: list[str]) -> tuple[MissionIte
     if problems:
         raise InputError.of(problems)
     if fence.get("breachReturn") is not None:
-        notes.append("the file's fence has a breach return point, which was not read")
+        notes.append(Note("plan_breach_return_unread"))
     return tuple(items)
 
 

@@ -14,10 +14,9 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.figures import counted
 from gcsplan.mavlink.files.file_items import (
     HAS_PLACE,
-    MAX_BYTES,
+    MAX_FILE_BYTES,
     MAX_ITEMS,
     MissionFileRead,
     RawItem,
@@ -43,10 +42,11 @@ from gcsplan.mavlink.files.plan_fence import (
     rally_json,
     unread_keys,
 )
-from gcsplan.mavlink.files.plan_landing import LANDINGS, landing_entries
+from gcsplan.mavlink.files.plan_landing import LANDING_PATTERNS, landing_entries
 from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA, COPTERS, PLANES, PX4
 from gcsplan.mavlink.mission.commands import DO_CHANGE_SPEED, DO_JUMP
 from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, RELATIVE, TERRAIN, Home, Mission, MissionItem
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 
 FIXED_WING, QUADROTOR = 1, 2  # MAV_TYPE
@@ -137,8 +137,8 @@ def parse_plan(text: str, *, autopilot: Autopilot | None, where: str, home_hint:
     ``autopilot`` None means the one that the file names; another one than the file's raises InputError. ``home_hint``
     is the home for a file without one. Raises InputError with the first twenty mistakes, each with its key.
     """
-    if len(text) > MAX_BYTES:
-        raise InputError(f"a mission file of more than {MAX_BYTES // 10**6} MB is not read", where=where)
+    if len(text) > MAX_FILE_BYTES:
+        raise InputError(f"a mission file of more than {MAX_FILE_BYTES // 10**6} MB is not read", where=where)
     plan = _json(text.removeprefix("\ufeff"), where)
     if not isinstance(plan, dict) or plan.get("fileType", "Plan") not in ("Plan", None):
         raise InputError("a .plan file is a JSON object with fileType 'Plan', and this is none", where=where)
@@ -153,7 +153,7 @@ def parse_plan(text: str, *, autopilot: Autopilot | None, where: str, home_hint:
                 f"must be {want}, given {str(found)[:40]}; open the file in QGroundControl and save it again",
                 where=f"{where}: {key}",
             )
-    notes: list[str] = []
+    notes: list[Note] = []
     pilot = _autopilot(mission, autopilot, where, notes)
     home = _home(mission.get("plannedHomePosition"), home_hint, f"{where}: mission.plannedHomePosition", notes)
     found = _Items(pilot, where, notes, typeless=theirs)
@@ -165,16 +165,14 @@ def parse_plan(text: str, *, autopilot: Autopilot | None, where: str, home_hint:
     unread_fence = unread_keys(plan.get("geoFence"), FENCE_KEYS, FENCE_VERSION, "geoFence")
     unread_rally = unread_keys(plan.get("rallyPoints"), RALLY_KEYS, RALLY_VERSION, "rallyPoints")
     if unread_rally:
-        notes.append(f"the file's {unread_rally} was not read; {RESAVE}")
+        notes.append(Note("plan_rally_points_unread", keys=unread_rally, cure=RESAVE))
     others = [*(k for k in plan if k not in KEYS), *(f"mission.{k}" for k in mission if k not in MISSION_KEYS)]
     if others and not theirs:
-        notes.append(f"these keys of the file were not read: {', '.join(k[:40] for k in others[:8])}")
+        notes.append(Note("plan_keys_unread", keys=tuple(k[:40] for k in others[:8])))
     for key, own in (("geoFence", fence), ("rallyPoints", rally)):
         if own:
-            notes.append(
-                f"the file's {key} ({counted(len(own), 'item')}) is no part of the mission and is not sent with it"
-            )
-    unread = f"the file's {unread_fence} is not read: {RESAVE}" if unread_fence else ""
+            notes.append(Note("plan_list_not_sent", key_of_list=key, count=len(own)))
+    unread = Note("plan_fence_unread", keys=unread_fence, cure=RESAVE) if unread_fence else None
     return MissionFileRead(Mission(pilot, home, items), tuple(notes), fence, rally, unread)
 
 
@@ -200,7 +198,7 @@ def _json(text: str, where: str) -> Any:
         raise InputError("not JSON that a mission can have: a number is too long", where=where) from None
 
 
-def _autopilot(mission: dict[str, Any], requested: Autopilot | None, where: str, notes: list[str]) -> Autopilot:
+def _autopilot(mission: dict[str, Any], requested: Autopilot | None, where: str, notes: list[Note]) -> Autopilot:
     firmware, kind = mission.get("firmwareType"), mission.get("vehicleType")
     if firmware == PX4:
         stated: Autopilot | None = Autopilot.PX4
@@ -221,7 +219,7 @@ def _autopilot(mission: dict[str, Any], requested: Autopilot | None, where: str,
     if stated is None and requested is None:
         raise InputError("the file does not say for which autopilot it is", where=f"{where}: mission.firmwareType")
     if stated is None:
-        notes.append(f"the file does not say for which autopilot it is: it was read for {requested}")
+        notes.append(Note("plan_without_autopilot", autopilot=str(requested)))
     elif requested is not None and requested is not stated:
         raise InputError(
             f"the file is for {stated}, and {requested} was wanted; use the file made for it, or change the vehicle",
@@ -230,13 +228,13 @@ def _autopilot(mission: dict[str, Any], requested: Autopilot | None, where: str,
     return requested or stated  # type: ignore[return-value]  # one of them is there
 
 
-def _home(value: object, hint: Home | None, place: str, notes: list[str]) -> Home:
+def _home(value: object, hint: Home | None, place: str, notes: list[Note]) -> Home:
     numbers = [json_float(v) for v in value] if isinstance(value, list) and len(value) == 3 else None
     good = numbers is not None and all(n is not None and math.isfinite(n) for n in numbers)
     if value is None or (numbers is not None and any(n is not None and math.isnan(n) for n in numbers)):
         if hint is None:
             raise InputError("home must be given as [latitude, longitude, AMSL]", where=place)
-        notes.append("the file has no home: the mission's own home was taken")
+        notes.append(Note("plan_home_missing"))
         return hint
     if not good or numbers is None:
         raise InputError(f"home must be [latitude, longitude, AMSL], given {str(value)[:60]}", where=place)
@@ -244,7 +242,7 @@ def _home(value: object, hint: Home | None, place: str, notes: list[str]) -> Hom
     if abs(lat) > 90.0 or abs(lon) > 180.0:
         raise InputError(f"home must lie within ±90°, ±180°, given {lat:g}, {lon:g}", where=place)
     if lat == lon == 0.0 and hint is not None:
-        notes.append("the file's home holds no place (0, 0): the mission's own home was taken")
+        notes.append(Note("plan_home_without_place"))
         return hint
     return Home(degrees_e7_of(lat), degrees_e7_of(lon), amsl)
 
@@ -252,7 +250,7 @@ def _home(value: object, hint: Home | None, place: str, notes: list[str]) -> Hom
 class _Items:
     """Collects the simple items of a plan and their mistakes."""
 
-    def __init__(self, autopilot: Autopilot, where: str, notes: list[str], *, typeless: bool) -> None:
+    def __init__(self, autopilot: Autopilot, where: str, notes: list[Note], *, typeless: bool) -> None:
         self.autopilot, self.where, self.notes, self.typeless = autopilot, where, notes, typeless
         self.items: list[MissionItem] = []
         self.index_of: dict[int, int] = {}
@@ -294,13 +292,12 @@ class _Items:
         inner = style.get("Items") if isinstance(style, dict) else None
         name = str(entry.get("complexItemType"))[:40]
         where = f"{key}.TransectStyleComplexItem.Items"
-        if name in LANDINGS:
+        if name in LANDING_PATTERNS:
             inner, where = landing_entries(entry), key
         if not isinstance(inner, list) or not inner:
             self._bad(key, f"a complex item ({name}) without its single items cannot be read; make it of way points")
             return
-        how = "stands for" if where == key else "holds"
-        self.notes.append(f"{key} is a {name}: it was read as the {counted(len(inner), 'item')} that it {how}")
+        self.notes.append(Note("complex_item_read", entry=key, kind=name, count=len(inner), landing=where == key))
         for index, part in enumerate(inner):
             place = f"{where}[{index}]"
             if not isinstance(part, dict) or part.get("type") != "SimpleItem":
@@ -344,7 +341,7 @@ class _Items:
         if mode == CALCULATED_ABOVE_TERRAIN:
             shown = json_float(entry.get("AMSLAltAboveTerrain"))
         if mode in (*ALTITUDE_MODE.values(), CALCULATED_ABOVE_TERRAIN) and shown is not None and abs(shown - z) > 0.05:
-            self.notes.append(f"{key}: its Altitude of {shown:g} m is not the one that is sent, params[6] {z:g} m")
+            self.notes.append(Note("altitude_shown_is_not_sent", place=key, shown_m=shown, sent_m=z))
 
     def _number(self, jump_id: object) -> None:
         number = whole(json_float(jump_id) or math.nan, 1, 2**31) if jump_id is not None else None
@@ -362,5 +359,5 @@ class _Items:
             self._bad(f"{key}.params", f"command {command:g} needs a latitude and a longitude, and they are null")
             return 0.0, 0.0
         if placed:
-            self.notes.append(f"{key} has no place: it was read as 0, 0, which ArduPilot takes for 'here'")
+            self.notes.append(Note("item_without_place", entry=key))
         return (0.0 if math.isnan(x) else x), (0.0 if math.isnan(y) else y)

@@ -21,7 +21,7 @@ from gcsplan.mavlink.mission.commands import (
 )
 from gcsplan.mavlink.mission.mission import GLOBAL, NO_POSITION, RELATIVE
 
-LANDINGS = {"fwLandingPattern": LAND, "vtolLandingPattern": VTOL_LAND}
+LANDING_PATTERNS = {"fwLandingPattern": LAND, "vtolLandingPattern": VTOL_LAND}
 
 
 def landing_entries(entry: dict[str, Any]) -> list[dict[str, Any]] | None:
@@ -48,7 +48,7 @@ def landing_entries(entry: dict[str, Any]) -> list[dict[str, Any]] | None:
         items.append(_entry(LOITER_TO_ALT, frames[0], 1, turn, 0, 1, at=approach))
     else:
         items.append(_entry(WAYPOINT, frames[0], at=approach))
-    items.append(_entry(LANDINGS[str(entry.get("complexItemType"))], frames[1], at=land))
+    items.append(_entry(LANDING_PATTERNS[str(entry.get("complexItemType"))], frames[1], at=land))
     return items
 
 

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.mavlink.files.file_items import (
-    MAX_BYTES,
+    MAX_FILE_BYTES,
     MAX_ITEMS,
     MissionFileRead,
     RawItem,
@@ -39,20 +39,34 @@ from gcsplan.mavlink.mission.commands import (
     WAYPOINT,
 )
 from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, Home, Mission, MissionItem
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 
 HEADER = "QGC WPL 110"
-COLUMNS = ("seq", "current", "frame", "command", "param1", "param2", "param3", "param4", "x", "y", "z", "autocontinue")
-FENCE_AND_RALLY = frozenset({FENCE_RETURN_POINT, POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT, RALLY_POINT})
+ROW_COLUMNS = (
+    "seq",
+    "current",
+    "frame",
+    "command",
+    "param1",
+    "param2",
+    "param3",
+    "param4",
+    "x",
+    "y",
+    "z",
+    "autocontinue",
+)
+COMMANDS_OF_OTHER_LISTS = frozenset({FENCE_RETURN_POINT, POLYGON_IN, POLYGON_OUT, CIRCLE_IN, CIRCLE_OUT, RALLY_POINT})
 MAX_LINE = 1000
 MAX_NUMBER = 64
 MAX_PROBLEMS = 20
 HOME_ROW = "0 1 0 16 0 0 0 0 <lat> <lon> <AMSL> 1"
 
 # No two parts of the pattern can match the same digits, so a long run of digits takes only one pass.
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_ROW_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _SPLIT = re.compile(r"[\t ,]+")
-_ROW = re.compile(rf"{_NUMBER.pattern}(?:[\t ,]+{_NUMBER.pattern}){{11}}")
+_ROW = re.compile(rf"{_ROW_NUMBER.pattern}(?:[\t ,]+{_ROW_NUMBER.pattern}){{11}}")
 
 
 def write_waypoints(mission: Mission) -> str:
@@ -92,8 +106,8 @@ def parse_waypoints(text: str, *, autopilot: Autopilot, where: str, home_hint: H
     ``where`` names the file in messages. ``home_hint`` is the home for a file that has none (first seq 1, header 120,
     or a home row of zeros). Raises InputError with the first twenty mistakes, each with its line.
     """
-    if len(text) > MAX_BYTES:
-        raise InputError(f"a mission file of more than {MAX_BYTES // 10**6} MB is not read", where=where)
+    if len(text) > MAX_FILE_BYTES:
+        raise InputError(f"a mission file of more than {MAX_FILE_BYTES // 10**6} MB is not read", where=where)
     lines = io.StringIO(text.removeprefix("\ufeff"), newline=None)
     header = lines.readline(MAX_LINE).split()
     if header not in (["QGC", "WPL", "110"], ["QGC", "WPL", "120"]):
@@ -145,14 +159,14 @@ def _rows(lines: io.StringIO, where: str, problems: list[Problem]) -> Iterator[_
 
 def _row(line: str, number: int, place: str, problems: list[Problem]) -> _Row | None:
     fields = _SPLIT.split(line)
-    if len(fields) != len(COLUMNS):
-        problems.append(Problem(place, f"a row has {len(COLUMNS)} columns, this one has {len(fields)}"))
+    if len(fields) != len(ROW_COLUMNS):
+        problems.append(Problem(place, f"a row has {len(ROW_COLUMNS)} columns, this one has {len(fields)}"))
         return None
     values = numbers_at_once(line, fields)
-    for name, field in zip(COLUMNS, fields, strict=True) if not values else ():
+    for name, field in zip(ROW_COLUMNS, fields, strict=True) if not values else ():
         if name.startswith("param") and field.lower() in ("nan", "-nan"):
             values.append(math.nan)
-        elif len(field) <= MAX_NUMBER and _NUMBER.fullmatch(field) and math.isfinite(float(field)):
+        elif len(field) <= MAX_NUMBER and _ROW_NUMBER.fullmatch(field) and math.isfinite(float(field)):
             values.append(float(field))
         else:
             problems.append(Problem(place, f"{name} must be a number, given {field[:40]!r}"))
@@ -181,18 +195,18 @@ def _decimals(field: str) -> int:
 
 
 def _mission(rows: list[_Row], has_home: bool, autopilot: Autopilot, where: str, hint: Home | None) -> MissionFileRead:
-    notes: list[str] = []
+    notes: list[Note] = []
     home: Home | None = None
     if has_home and rows and rows[0].seq == 0:
         home = _home(rows[0], where)
         rows = rows[1:]
         if home.lat_e7 == home.lon_e7 == 0 and hint is not None:
-            notes.append("the home row holds no place (0, 0): the mission's own home was taken")
+            notes.append(Note("home_row_without_place"))
             home = hint
         elif home.lat_e7 == home.lon_e7 == 0:
-            notes.append("the home row holds the place 0, 0, which is what a vehicle without a position writes")
+            notes.append(Note("home_row_at_zero"))
     elif hint is not None:
-        notes.append("the file has no home row: the mission's own home was taken")
+        notes.append(Note("home_row_missing"))
         home = hint
     if home is None and not has_home:
         raise InputError(
@@ -217,7 +231,7 @@ def _mission(rows: list[_Row], has_home: bool, autopilot: Autopilot, where: str,
             break
     if problems:
         raise InputError.of(problems, headline=f"{where} is damaged" if len(problems) > 1 else "")
-    lists = {item.command in FENCE_AND_RALLY for item in items}
+    lists = {item.command in COMMANDS_OF_OTHER_LISTS for item in items}
     if lists == {True}:
         what = "rally points" if items[0].command == RALLY_POINT else "a fence"
         raise InputError(
@@ -230,10 +244,7 @@ def _mission(rows: list[_Row], has_home: bool, autopilot: Autopilot, where: str,
     items_tuple = jumps_from_file(items, index_of, first_seq, where)
     placed = [r for r in rows if r.raw.x != 0.0 or r.raw.y != 0.0]
     if placed and all(row.decimals == (6, 6) for row in placed):
-        notes.append(
-            "the coordinates have six decimals (0.11 m), as MAVProxy and pymavlink save them: coarser than the wire, "
-            "so this file cannot verify exactly what is on board"
-        )
+        notes.append(Note("six_decimals"))
     return MissionFileRead(Mission(autopilot, home, items_tuple), tuple(notes))
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol
 
-from gcsplan.mavlink.link.link import Channel, Heard, Steps
+from gcsplan.mavlink.link.link import Channel, Heard, LinkSteps
 from gcsplan.mavlink.link.prompt import Prepared
 from gcsplan.mavlink.link.recheck import Recheck
 from gcsplan.mavlink.protocol import wire
-from gcsplan.mavlink.protocol.machine import CANCELLED_BY_US, Progress
+from gcsplan.mavlink.protocol.machine import CANCELLED_BY_US, TransferProgress
 from gcsplan.mavlink.protocol.messages import Address, Item, Packet, Request
 from gcsplan.mavlink.protocol.outcome import Outcome, Unknown
 from gcsplan.mavlink.protocol.patience import Patience
@@ -52,7 +52,7 @@ class Driven(Protocol):
         ...
 
     @property
-    def progress(self) -> Progress:
+    def progress(self) -> TransferProgress:
         """Items transferred so far."""
         ...
 
@@ -72,7 +72,7 @@ def drive(
     recheck: Recheck | None = None,
     patience: Patience | None = None,
     progress: Callable[[], None] | None = None,
-) -> Steps[None]:
+) -> LinkSteps[None]:
     """Run ``machine`` to its end, as a task; if the task is closed before (Ctrl-C), cancel the machine.
 
     ``recheck`` decides which messages count and whether the vehicle is still the right one; ``patience`` decides when

@@ -20,14 +20,15 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 from gcsplan.errors import GcsplanError
 from gcsplan.mavlink.link.frames import FrameParser, FrameWriter, Signing, SigningKey
 from gcsplan.mavlink.link.prompt import Prepared, PromptAnswers
-from gcsplan.mavlink.link.transport import Clock, Peer, Transport, Udp, open_transport, wait_readable
+from gcsplan.mavlink.link.transport import LinkClock, Peer, Transport, Udp, open_transport, wait_readable
 from gcsplan.mavlink.link.url import Endpoint, parse_url
 from gcsplan.mavlink.protocol import wire
 from gcsplan.mavlink.protocol.messages import Address, Packet
+from gcsplan.notes.note import Note
 
 _log = logging.getLogger(__name__)
 T = TypeVar("T")
-Steps = Generator[float, None, T]
+LinkSteps = Generator[float, None, T]
 
 GCS = Address(255, 190)
 """System and component id that ground stations use (MAV_COMP_ID_MISSIONPLANNER)."""
@@ -104,7 +105,7 @@ class Link:
         us: Address = GCS,
         key: SigningKey | None = None,
         heartbeat_s: float | None = 1.0,
-        clock: Clock = time.monotonic,
+        clock: LinkClock = time.monotonic,
         transport: Transport | None = None,
         wait: Callable[[Sequence[Transport], float], None] = wait_readable,
         signing: Signing | None = None,
@@ -151,9 +152,9 @@ class Link:
         return self.transport.place
 
     @property
-    def note(self) -> str:
-        """What a user should know of how the link was opened; mostly empty."""
-        return self.transport.note if isinstance(self.transport, Udp) else ""
+    def note(self) -> Note | None:
+        """What a user should know of how the link was opened, if anything."""
+        return self.transport.note if isinstance(self.transport, Udp) else None
 
     @property
     def garbage(self) -> int:
@@ -181,7 +182,7 @@ class Link:
         if channel in mine:
             mine.remove(channel)
 
-    def serve(self, sysid: int, steps: Callable[[Channel], Steps[None]]) -> None:
+    def serve(self, sysid: int, steps: Callable[[Channel], LinkSteps[None]]) -> None:
         """Run a task for a system beside all others of this link, whenever `pump` runs, until the link is closed."""
         channel = self.channel(sysid)
         self.background.append(PumpJob(channel, steps(channel)))
@@ -281,7 +282,7 @@ class Link:
 class PumpJob(Generic[T]):
     """One task for `pump`, with its result or error."""
 
-    def __init__(self, channel: Channel, steps: Steps[T]) -> None:
+    def __init__(self, channel: Channel, steps: LinkSteps[T]) -> None:
         self.channel = channel
         self.result: T | None = None
         self.error: GcsplanError | None = None
@@ -318,7 +319,7 @@ def pump(jobs: Sequence[PumpJob[T]], *, most: int | None = None, most_on_link: i
         return
     links = list({id(job.channel.link): job.channel.link for job in jobs}.values())
     clock = links[0].clock
-    turns = _Turns(jobs, most or len(jobs), most_on_link or len(jobs))
+    turns = _LinkTurns(jobs, most or len(jobs), most_on_link or len(jobs))
     try:
         while True:
             now = clock()
@@ -346,7 +347,7 @@ def pump(jobs: Sequence[PumpJob[T]], *, most: int | None = None, most_on_link: i
             job.close()
 
 
-class _Turns:
+class _LinkTurns:
     """The jobs that run, and those that wait for their turn."""
 
     def __init__(self, jobs: Sequence[PumpJob[Any]], most: int, most_on_link: int) -> None:
@@ -389,7 +390,7 @@ class _Turns:
         return bool(over)
 
 
-def run(channel: Channel, steps: Steps[T]) -> T:
+def run(channel: Channel, steps: LinkSteps[T]) -> T:
     """Run one task to its end and return its result; raise its error if it fails."""
     job = PumpJob(channel, steps)
     pump([job])

@@ -12,7 +12,7 @@ from typing import NamedTuple
 _MOST_HEIGHT_M = 100_000.0
 
 
-class Place(NamedTuple):
+class VehiclePosition(NamedTuple):
     """A position in degrees and metres above mean sea level."""
 
     lat_deg: float
@@ -37,11 +37,11 @@ def whole(value: object, low: int, high: int) -> int | None:
     return int(number) if number is not None and number == int(number) and low <= number <= high else None
 
 
-def place(lat_e7: object, lon_e7: object, alt_mm: object) -> Place | None:
+def place(lat_e7: object, lon_e7: object, alt_mm: object) -> VehiclePosition | None:
     """Return the place for 1e-7 degrees and millimetres; None if out of range, or at 0, 0, which means no fix."""
     lat, lon = whole(lat_e7, -900_000_000, 900_000_000), whole(lon_e7, -1_800_000_000, 1_800_000_000)
     height_mm = finite(alt_mm)
     if lat is None or lon is None or height_mm is None or (lat, lon) == (0, 0):
         return None
     amsl_m = height_mm / 1e3
-    return Place(lat / 1e7, lon / 1e7, amsl_m) if abs(amsl_m) <= _MOST_HEIGHT_M else None
+    return VehiclePosition(lat / 1e7, lon / 1e7, amsl_m) if abs(amsl_m) <= _MOST_HEIGHT_M else None

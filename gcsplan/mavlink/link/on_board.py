@@ -6,11 +6,11 @@ import threading
 import time
 from collections.abc import Mapping
 
-from gcsplan.mavlink.link.link import Channel, Steps
+from gcsplan.mavlink.link.link import Channel, LinkSteps
 from gcsplan.mavlink.link.options import Task
 from gcsplan.mavlink.link.parameters import (
     FENCE_GROUPS,
-    GROUPS,
+    PARAMETER_GROUPS,
     judge_fence_parameters,
     judge_parameters,
     settings_words,
@@ -24,6 +24,7 @@ from gcsplan.mavlink.mission.mission import FENCE, Mission
 from gcsplan.mavlink.mission.parameter_names import OnBoard
 from gcsplan.mavlink.mission.parameter_safety import needed_groups
 from gcsplan.mavlink.mission.return_route import deciding
+from gcsplan.notes.note import Note
 
 __all__ = ["judging", "reading_parameters"]
 
@@ -32,19 +33,19 @@ _LOOK_S = 0.02
 
 def reading_parameters(
     channel: Channel, task: Task, state: VehicleState, watch: Watch, recheck: Recheck
-) -> Steps[tuple[list[str], OnBoard]]:
+) -> LinkSteps[tuple[list[Note], OnBoard]]:
     """Read the parameters on board; return warnings about those that do not fit the list, and the values read.
 
     Those that the judge needs are asked for until the timeout.
     """
     options, mission = task.options, task.mission
-    warnings: list[str] = []
+    warnings: list[Note] = []
     values = OnBoard()
     if mission and options.read_parameters:
         terrain = TERRAIN_GROUPS if flies_terrain(task.items) else ()
         needed = (*needed_groups(options.settings, task.autopilot), *terrain, *deciding(mission))
         values = yield from parameter_steps(
-            channel, state, GROUPS[task.autopilot] + terrain, watch, recheck,
+            channel, state, PARAMETER_GROUPS[task.autopilot] + terrain, watch, recheck,
             needed=needed if task.judge is not None else (), most_s=options.timeout_s,
         )  # fmt: skip
         warnings += judge_parameters(
@@ -65,7 +66,7 @@ def reading_parameters(
 
 def judging(
     channel: Channel, task: Task, mission: Mission, values: Mapping[str, float], recheck: Recheck
-) -> Steps[str | None]:
+) -> LinkSteps[str | None]:
     """Ask the task's judge, beside the other vehicles' transfers; return its answer, None without a judge.
 
     A judge that has not ended after the timeout has not passed. In simulated time it is asked in line, for there no

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 
 from gcsplan.mavlink.mission.mission import MISSION, Mission, MissionItem
 from gcsplan.mavlink.mission.parameter_list import Setting
-from gcsplan.mavlink.mission.return_route import Route
+from gcsplan.mavlink.mission.return_route import ReturnRoute
 from gcsplan.mavlink.protocol.patience import TIMEOUT_S, checked_timeout_s
-from gcsplan.mavlink.protocol.transfer import Progress, Timers
+from gcsplan.mavlink.protocol.transfer import Timers, TransferProgress
 from gcsplan.vehicle import Autopilot, Vehicle
-from gcsplan.world.terrain_grid import Ground
+from gcsplan.world.terrain_grid import GroundHeights
 
-ProgressCall = Callable[[str, Progress], None]
-Judge = Callable[[Mission, Mapping[str, float]], str | None]
+TransferReport = Callable[[str, TransferProgress], None]
+ReadBackJudge = Callable[[Mission, Mapping[str, float]], str | None]
 """Repeats the caller's check with the parameters that were read: None if it passes, else the reason."""
 
 
@@ -37,10 +37,10 @@ class SessionOptions:
     ignore_position: bool = False
     ground_amsl_m: float | None = None
     rtl_rel_home_m: float | None = None
-    route: Route | None = None
+    route: ReturnRoute | None = None
     advised_rel_home_m: float | None = None
     expected_parameters: Mapping[str, float] = field(default_factory=dict)
-    terrain: Ground | None = None
+    terrain: GroundHeights | None = None
     read_parameters: bool = True
     discover_s: float = 10.0
     listen_s: float = 1.5
@@ -67,12 +67,16 @@ class Task:
     mission_type: int
     options: SessionOptions
     mission: Mission | None = None
-    judge: Judge | None = None
-    progress: ProgressCall | None = None
+    judge: ReadBackJudge | None = None
+    progress: TransferReport | None = None
 
     @classmethod
     def of(
-        cls, mission: Mission, options: SessionOptions, judge: Judge | None, progress: ProgressCall | None = None
+        cls,
+        mission: Mission,
+        options: SessionOptions,
+        judge: ReadBackJudge | None,
+        progress: TransferReport | None = None,
     ) -> Task:
         """Return the task of sending ``mission``."""
         return cls(

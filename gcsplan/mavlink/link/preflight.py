@@ -22,6 +22,7 @@ from gcsplan.mavlink.link.watch import (
 from gcsplan.mavlink.mission.autopilots import is_generic, max_items, profile_of, type_name
 from gcsplan.mavlink.mission.firmware import STRAIGHT_UNTIL, flies_straight, needs_straight, version_words
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, RELATIVE, TERRAIN, Home, Mission, MissionItem
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 
 NEAR_START_M = 30.0
@@ -42,7 +43,7 @@ def preflight(
     allow_armed: bool = False,
     ignore_position: bool = False,
     judged: bool = False,
-) -> list[str]:
+) -> list[Note]:
     """Return the warnings about sending ``items`` (wire order) to a vehicle in ``state``.
 
     ``start``: where the mission begins. ``ground_amsl_m``: the ground altitude there, by default that of ``start``.
@@ -70,10 +71,10 @@ def objections(
     allow_armed: bool = False,
     ignore_position: bool = False,
     judged: bool = False,
-) -> tuple[Reasons, list[str]]:
+) -> tuple[Reasons, list[Note]]:
     """Return the reasons against sending, each a word and a text, and the warnings; arguments as in `preflight`."""
     against: list[tuple[str, str]] = []
-    warnings: list[str] = []
+    warnings: list[Note] = []
     identity(state, autopilot, against, warnings)
     _readiness(state, allow_armed, against, warnings)
     _abilities(state, items, autopilot, mission_type, against, warnings)
@@ -85,15 +86,13 @@ def objections(
     return against, warnings
 
 
-def identity(state: VehicleState, autopilot: Autopilot, against: Reasons, warnings: list[str]) -> None:
+def identity(state: VehicleState, autopilot: Autopilot, against: Reasons, warnings: list[Note]) -> None:
     """Add to ``against`` and ``warnings`` what speaks against its being the one vehicle with that autopilot."""
     if state.sources > 1:
         against.append(("ambiguous", rivals_words(state)))
     row = profile_of(autopilot)
     if is_generic(state.mav_autopilot):
-        warnings.append(
-            f"the vehicle calls itself {state.what}; the mission is written for {row.label}, which could not be checked"
-        )
+        warnings.append(Note("autopilot_not_checked", what=state.what, autopilot=row.label))
         return
     if state.mav_autopilot != row.mav_autopilot:
         against.append(
@@ -104,7 +103,7 @@ def identity(state: VehicleState, autopilot: Autopilot, against: Reasons, warnin
         )
     elif state.mav_type not in row.mav_types:
         if state.mav_type == 0:
-            warnings.append(f"the vehicle does not say whether it is what {row.label} flies")
+            warnings.append(Note("vehicle_type_not_told", autopilot=row.label))
         else:
             against.append(
                 (
@@ -122,20 +121,20 @@ def rivals_words(state: VehicleState) -> str:
     )
 
 
-def _readiness(state: VehicleState, allow_armed: bool, against: Reasons, warnings: list[str]) -> None:
+def _readiness(state: VehicleState, allow_armed: bool, against: Reasons, warnings: list[Note]) -> None:
     status = state.system_status
     words = STATE_WORDS.get(status, f"in state {status}")
     if status == UNINIT and is_generic(state.mav_autopilot):
-        warnings.append("the vehicle does not report its state: whether it is ready could not be checked")
+        warnings.append(Note("vehicle_state_not_told"))
     elif status < STANDBY:
         against.append(("not_ready", f"the vehicle is {words}: wait until it reports standby"))
     elif status in (CRITICAL, EMERGENCY):
-        warnings.append(f"the vehicle reports that it is {words}")
+        warnings.append(Note("vehicle_in_trouble", state=words))
     elif status >= POWEROFF:
         against.append(("not_ready", f"the vehicle is {words}"))
     if state.armed:
         if allow_armed:
-            warnings.append("the vehicle is armed, which was allowed")
+            warnings.append(Note("armed_as_allowed"))
         else:
             against.append(("armed", "the vehicle is armed: disarm it, or allow it with --allow-armed"))
 
@@ -146,7 +145,7 @@ def _abilities(
     autopilot: Autopilot,
     mission_type: int,
     against: Reasons,
-    warnings: list[str],
+    warnings: list[Note],
 ) -> None:
     most = max_items(autopilot, mission_type)
     if len(items) > most:
@@ -155,35 +154,32 @@ def _abilities(
     if needed and state.can(needed[0]) is False:
         against.append(("unsupported", f"the vehicle says that it keeps no {needed[1]}"))
     if state.capabilities is None:
-        warnings.append("the vehicle does not report its capabilities")
+        warnings.append(Note("capabilities_not_told"))
     elif not state.can(CAN_MISSION_INT) and not is_generic(state.mav_autopilot):
-        warnings.append("the vehicle does not say that it takes MISSION_ITEM_INT")
+        warnings.append(Note("item_int_not_told"))
     if any(item.frame in (TERRAIN, 11) for item in items) and state.can(CAN_TERRAIN) is False:
-        warnings.append("the mission has altitudes above terrain, and the vehicle does not say that it knows terrain")
+        warnings.append(Note("terrain_ability_not_told"))
 
 
-def _straightness(state: VehicleState, against: Reasons, warnings: list[str], *, judged: bool) -> None:
+def _straightness(state: VehicleState, against: Reasons, warnings: list[Note], *, judged: bool) -> None:
     if flies_straight(state.flight_sw_version):
         return
     last = ".".join(map(str, STRAIGHT_UNTIL))
-    words = (
-        f"the vehicle is PX4 {version_words(state.flight_sw_version)}, which may change its altitude at the beginning "
-        f"of a leg, miss the way point and fly on (upstream issue 28507)"
-    )
+    found = Note("px4_may_miss_way_points", version=version_words(state.flight_sw_version))
     if judged:
-        words += f": the straight legs that were judged hold until PX4 {last} alone; fly that, or at one altitude"
-        against.append(("firmware", words))
+        cure = f"the straight legs that were judged hold until PX4 {last} alone; fly that, or at one altitude"
+        against.append(("firmware", f"{found}: {cure}"))
     else:
-        warnings.append(words)
+        warnings.append(found)
 
 
-def _position(state: VehicleState, start: Home, ground_m: float, against: Reasons, warnings: list[str]) -> None:
+def _position(state: VehicleState, start: Home, ground_m: float, against: Reasons, warnings: list[Note]) -> None:
     if state.lat_deg is None or state.lon_deg is None or state.amsl_m is None:
-        words = "the vehicle reports no position: whether it stands at the start could not be checked"
+        found = Note("position_not_told")
         if is_generic(state.mav_autopilot):
-            warnings.append(words)
+            warnings.append(found)
         else:
-            against.append(("no_position", f"{words}: wait until it has a position, or --ignore-position"))
+            against.append(("no_position", f"{found}: wait until it has a position, or --ignore-position"))
         return
     away_m = distance_m(state.lat_deg, state.lon_deg, start.lat_e7 / 1e7, start.lon_e7 / 1e7)
     if state.just_at is not None and away_m <= NEAR_START_M:
@@ -225,7 +221,7 @@ def distance_m(lat_a: float, lon_a: float, lat_b: float, lon_b: float) -> float:
     return 2 * _EARTH_RADIUS_M * math.asin(min(1.0, math.sqrt(h)))
 
 
-def other_home(mission: Mission, read: tuple[MissionItem, ...]) -> list[str]:
+def other_home(mission: Mission, read: tuple[MissionItem, ...]) -> list[Note]:
     """Warn if ArduPilot's item 0 is away from the mission's start: relative altitudes count from it until arming."""
     if not mission.autopilot.is_ardupilot or (read[0].x, read[0].y) == (0, 0):
         return []
@@ -235,5 +231,9 @@ def other_home(mission: Mission, read: tuple[MissionItem, ...]) -> list[str]:
     if away_m <= NEAR_START_M and abs(higher_m) <= NEAR_GROUND_M:
         return []
     relative = any(item.frame in (RELATIVE, 6) for item in mission.items)
-    counts = "; its relative altitudes count from there if it is not armed at the start" if relative else ""
-    return [f"the vehicle's home is {away_m:.0f} m from the mission's start and {higher_m:+.1f} m in height{counts}"]
+    return [
+        Note(
+            "home_on_board_elsewhere_counts" if relative else "home_on_board_elsewhere", away_m=away_m,
+            higher_m=higher_m,
+        )
+    ]  # fmt: skip

@@ -25,11 +25,11 @@ from gcsplan.mavlink.protocol.messages import Address, Item
 
 # MAVLink 2, unsigned: marker, payload length, two bytes of flags, sequence number | system, component, message id
 # (3 bytes), payload | checksum over everything but the marker, and over one more byte that depends on the message id.
-_HEAD = Struct("<BBBBB")
+_HEAD_BYTES = Struct("<BBBBB")
 _BEFORE_PAYLOAD = Struct("<BBHB")
 _CHECKSUM = Struct("<H")
 _MARKER, _NO_FLAGS = 0xFD, 0
-_AROUND = _HEAD.size + _BEFORE_PAYLOAD.size + _CHECKSUM.size
+_AROUND = _HEAD_BYTES.size + _BEFORE_PAYLOAD.size + _CHECKSUM.size
 _SEQ_AND_TARGET = 3  # least payload of a request, bytes: in a shorter one, trimmed zeros may belong to the seq
 
 _ITEM = dialect.MAVLink_mission_item_int_message
@@ -93,7 +93,7 @@ class PromptAnswers:
             return None
         prepared.asked.append(seq)
         tail = prepared.frames[seq]
-        head = _HEAD.pack(_MARKER, len(tail) - _BEFORE_PAYLOAD.size - 1, _NO_FLAGS, 0, self._writer.number())
+        head = _HEAD_BYTES.pack(_MARKER, len(tail) - _BEFORE_PAYLOAD.size - 1, _NO_FLAGS, 0, self._writer.number())
         return head + tail[:-1] + _CHECKSUM.pack(checksum(head[1:] + tail))
 
 

@@ -7,34 +7,31 @@ slower than planned keeps the legs, but not the times.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
+from gcsplan.mavlink.mission.parameter_names import ParameterValues
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 
 __all__ = ["slower_words", "speed_shortage"]
 
-Values = Mapping[str, float]
 
 _SAME = 0.01
 """Part by which a parameter may fall short of what was planned with."""
 
 
-def speed_shortage(values: Values, vehicle: Vehicle, commanded_m_s: float) -> str:
-    """Why a vehicle with these parameters cannot fly the commanded speed, and the cure; empty if it can.
+def speed_shortage(values: ParameterValues, vehicle: Vehicle, commanded_m_s: float) -> Note | None:
+    """Why a vehicle with these parameters cannot fly the commanded speed, and the cure; None if it can.
 
-    Empty, too, if MPC_XY_VEL_MAX was not read, or bounds nothing in the plan.
+    None, too, if MPC_XY_VEL_MAX was not read, or bounds nothing in the plan.
     """
     most = values.get("MPC_XY_VEL_MAX", math.nan)
     if vehicle.vel_max_m_s is None or not most < commanded_m_s * (1.0 - _SAME):
-        return ""
-    return (
-        f"MPC_XY_VEL_MAX is {most:g} on board: it flies no faster, and {commanded_m_s:.3g} m/s are commanded: set "
-        f"MPC_XY_VEL_MAX {math.ceil(commanded_m_s)}, or plan with speed_m_s up to {most:g}"
-    )
+        return None
+    return Note("velocity_too_small", value=most, speed_m_s=commanded_m_s, wanted=math.ceil(commanded_m_s))
 
 
-def slower_words(values: Values, vehicle: Vehicle) -> list[str]:
-    """Which parameters on board make a vehicle slower than it was planned, in words; empty for another autopilot."""
+def slower_words(values: ParameterValues, vehicle: Vehicle) -> list[Note]:
+    """Which parameters on board make a vehicle slower than it was planned; empty for another autopilot."""
     if vehicle.autopilot is not Autopilot.PX4 or not vehicle.smooths:
         return []
     corner = values.get("MPC_XY_TRAJ_P", math.nan) * values.get("MPC_ACC_HOR", math.nan)
@@ -46,13 +43,11 @@ def slower_words(values: Values, vehicle: Vehicle) -> list[str]:
         ("MPC_Z_V_AUTO_DN", values.get("MPC_Z_V_AUTO_DN", math.nan), vehicle.descent_m_s, "descent_m_s"),
     ]
     found = [
-        f"{name} is {value:g} on board, and {wanted:g} was planned with ({key})"
+        Note("slower_than_planned", name=name, value=value, wanted=wanted, planned_key=key)
         for name, value, wanted, key in planned
         if value < wanted * (1.0 - _SAME)
     ]
     returns = values.get("MPC_XY_CRUISE", math.nan)
     if vehicle.return_speed_m_s is not None and returns < vehicle.return_speed_m_s * (1.0 - _SAME):
-        found.append(
-            f"MPC_XY_CRUISE is {returns:g} on board, and a return at {vehicle.return_speed_m_s:g} m/s was planned with"
-        )
-    return [f"it arrives later than planned: {'; '.join(found)}"] if found else []
+        found.append(Note("returns_slower_than_planned", value=returns, speed_m_s=vehicle.return_speed_m_s))
+    return [Note("arrives_later", reasons=tuple(found))] if found else []

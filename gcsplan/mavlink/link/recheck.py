@@ -21,16 +21,17 @@ from typing import Any
 
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
-from gcsplan.mavlink.link.link import Channel, Heard, Steps
+from gcsplan.mavlink.link.link import Channel, Heard, LinkSteps
 from gcsplan.mavlink.link.preflight import NEAR_START_M, Reasons, apart_m
 from gcsplan.mavlink.link.watch import FRESH_S, VehicleState, Watch
 from gcsplan.mavlink.protocol.machine import Wait
 from gcsplan.mavlink.protocol.messages import MissionMessage, Request
 from gcsplan.mavlink.protocol.outcome import Changed, Outcome, Unknown
+from gcsplan.notes.note import Note
 
-Judge = Callable[[VehicleState], tuple[Reasons, list[str]]]
+StateJudge = Callable[[VehicleState], tuple[Reasons, list[Note]]]
 
-LOOK_S = 10.0
+RECHECK_LOOK_S = 10.0
 """Seconds that a look waits for a vehicle that has fallen silent."""
 _TELLING = frozenset({"HEARTBEAT", "GLOBAL_POSITION_INT", "GPS_RAW_INT", "ATTITUDE", "SYSTEM_TIME"})
 _RECENT_S = 1.5
@@ -38,7 +39,7 @@ _ASK_AGAIN_S = 0.5
 _AGAIN_S = 0.1
 _REQUEST_MESSAGE, _HEARTBEAT, _GLOBAL_POSITION_INT = 512, 0, 33
 _MOVED = frozenset({"wrong_place", "wrong_height"})
-_AT_ONCE = frozenset({"wrong_place", "wrong_autopilot"})
+_ENDS_AT_ONCE = frozenset({"wrong_place", "wrong_autopilot"})
 """Reasons that end a running transfer: it may be another vehicle. One that was only armed still gets its whole list."""
 
 
@@ -53,7 +54,7 @@ class Recheck:
         channel: Channel,
         watch: Watch,
         state: VehicleState,
-        judge: Judge,
+        judge: StateJudge,
         *,
         may_move: bool = False,
         standby_s: float = 0.0,
@@ -65,7 +66,7 @@ class Recheck:
         self._address = state.address
         self._first = state
         self._may_move = may_move
-        self._longest_s = max(LOOK_S, standby_s)
+        self._longest_s = max(RECHECK_LOOK_S, standby_s)
         self._contact = now
         self._shut = False
         self._silent_until = -math.inf
@@ -143,10 +144,10 @@ class Recheck:
 
     # looks
 
-    def last_look(self) -> Steps[Outcome | None]:
+    def last_look(self) -> LinkSteps[Outcome | None]:
         """Look after the read-back: return `Changed`, None if nothing changed, or `Unknown` after silence."""
         clock = self._channel.link.clock
-        self._longest_s, self._began = LOOK_S, None
+        self._longest_s, self._began = RECHECK_LOOK_S, None
         self._begin(clock(), clock())
         while isinstance(seen := self._look(clock(), boots=True), Wait):
             self._ask(clock())
@@ -207,7 +208,7 @@ class Recheck:
         state = self._watch.state(now)
         if state is None:
             return None
-        found = [(word, text) for word, text in self._objections(state) if word in _AT_ONCE]
+        found = [(word, text) for word, text in self._objections(state) if word in _ENDS_AT_ONCE]
         if not self._watch.alike():
             words = f"two vehicles speak as system {self._address.sysid} from the same address"
             found.append(("ambiguous", words))

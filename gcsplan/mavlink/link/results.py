@@ -10,9 +10,10 @@ from gcsplan.mavlink.link.watch import VehicleState
 from gcsplan.mavlink.mission.compare import Difference, faults
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, Mission, MissionItem
 from gcsplan.mavlink.protocol.outcome import Accepted, Changed, Outcome, Refused
+from gcsplan.notes.note import Note
 
 OutcomeWord = Literal["accepted", "refused", "unknown"]
-_SHOWN = 8
+_DIFFERENCES_SHOWN = 8
 _LISTS = {MISSION: "mission", FENCE: "fence", RALLY: "list of rally points"}
 
 
@@ -51,7 +52,7 @@ class UploadResult:
     on_board: str = ""
     failed_check: str | None = None
     differences: tuple[Difference, ...] = ()
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Note, ...] = ()
     texts: tuple[str, ...] = ()
     read_back: tuple[MissionItem, ...] | None = None
     mission: Mission | None = None
@@ -82,7 +83,7 @@ class UploadResult:
             "on_board": self.on_board,
             "failed_check": self.failed_check,
             "differences": [str(d) for d in self.differences],
-            "warnings": list(self.warnings),
+            "warnings": [str(note) for note in self.warnings],
             "texts": list(self.texts) if not self.verified else None,
         }
         return fixed | {key: value for key, value in more.items() if value}
@@ -103,8 +104,8 @@ class UploadResult:
         if self.outcome == "refused":
             return VehicleRefused(f"the vehicle {self.reason}{tail}", where=where)
         if self.faults:
-            shown = "; ".join(str(d) for d in self.faults[:_SHOWN])
-            rest = len(self.faults) - _SHOWN
+            shown = "; ".join(str(d) for d in self.faults[:_DIFFERENCES_SHOWN])
+            rest = len(self.faults) - _DIFFERENCES_SHOWN
             more = f"; and {rest} more" if rest > 0 else ""
             asked = "the file has" if self.faults[0].unsent else "was sent"
             return ReadBackDiffers(f"what is on board is not what {asked}: {shown}{more}{tail}", where=where)

@@ -15,9 +15,9 @@ from dataclasses import dataclass, field
 from typing import Protocol, TypeVar
 
 from gcsplan.errors import CheckFailed, GcsplanError, InputError
-from gcsplan.mavlink.link.link import Channel, Link, PumpJob, Steps, pump, run
-from gcsplan.mavlink.link.options import Judge, ProgressCall, SessionOptions, Task
-from gcsplan.mavlink.link.parameters import GROUPS
+from gcsplan.mavlink.link.link import Channel, Link, LinkSteps, PumpJob, pump, run
+from gcsplan.mavlink.link.options import ReadBackJudge, SessionOptions, Task, TransferReport
+from gcsplan.mavlink.link.parameters import PARAMETER_GROUPS
 from gcsplan.mavlink.link.results import UploadResult
 from gcsplan.mavlink.link.steps import SLOW_ANSWER_S, discover_steps, parameter_steps
 from gcsplan.mavlink.link.tasks import (
@@ -33,12 +33,12 @@ from gcsplan.mavlink.mission.mission import ALL, FENCE, MISSION, RALLY, Home, Mi
 from gcsplan.vehicle import Autopilot
 
 __all__ = [
-    "Checked",
+    "CheckedMission",
     "EndCall",
-    "Judge",
-    "ProgressCall",
+    "ReadBackJudge",
     "SessionOptions",
     "Task",
+    "TransferReport",
     "UploadOrder",
     "UploadResult",
     "clear_fleet",
@@ -61,7 +61,7 @@ MOST_AT_ONCE, MOST_ON_LINK = 50, 25
 """Most vehicles of a fleet that are talked to at a time, on all links and on one."""
 
 
-class Checked(Protocol):
+class CheckedMission(Protocol):
     """The part of a verdict that an upload needs."""
 
     @property
@@ -81,10 +81,10 @@ class UploadOrder:
 
     link: Link
     mission: Mission
-    verdict: Checked | None = None
+    verdict: CheckedMission | None = None
     options: SessionOptions = field(default_factory=SessionOptions)
-    judge: Judge | None = None
-    progress: ProgressCall | None = None
+    judge: ReadBackJudge | None = None
+    progress: TransferReport | None = None
 
 
 EndCall = Callable[[UploadOrder, UploadResult | GcsplanError], None]
@@ -109,12 +109,12 @@ def read_vehicle(
     """
     settings = options or SessionOptions()
 
-    def steps(channel: Channel) -> Steps[tuple[VehicleState, Autopilot | None, dict[str, float]]]:
+    def steps(channel: Channel) -> LinkSteps[tuple[VehicleState, Autopilot | None, dict[str, float]]]:
         state, recheck = yield from looking_at(channel, settings)
         autopilot = autopilot_of(state.mav_autopilot, state.mav_type)
         values: dict[str, float] = {}
         if autopilot is not None:
-            groups = GROUPS[autopilot]
+            groups = PARAMETER_GROUPS[autopilot]
             values = yield from parameter_steps(
                 channel, state, groups, recheck.watch, recheck, needed=groups, most_s=SLOW_ANSWER_S
             )
@@ -127,10 +127,10 @@ def upload_mission(
     link: Link,
     mission: Mission,
     *,
-    verdict: Checked | None = None,
+    verdict: CheckedMission | None = None,
     options: SessionOptions | None = None,
-    judge: Judge | None = None,
-    progress: ProgressCall | None = None,
+    judge: ReadBackJudge | None = None,
+    progress: TransferReport | None = None,
 ) -> UploadResult:
     """Upload ``mission`` to the vehicle with its system id, and verify it by reading back.
 
@@ -157,7 +157,7 @@ def upload_fleet(orders: Sequence[UploadOrder], *, ended: EndCall | None = None)
     if len(set(seats)) < len(seats):
         raise InputError("two missions of one fleet are meant for the same system id on the same link")
 
-    def starting(order: UploadOrder) -> Callable[[Channel], Steps[UploadResult]]:
+    def starting(order: UploadOrder) -> Callable[[Channel], LinkSteps[UploadResult]]:
         task = Task.of(order.mission, order.options, order.judge, order.progress)
         return lambda channel: _telling(uploading(channel, task), order, ended)
 
@@ -167,7 +167,7 @@ def upload_fleet(orders: Sequence[UploadOrder], *, ended: EndCall | None = None)
 def upload_lists(orders: Sequence[tuple[Link, Task]]) -> list[UploadResult | GcsplanError]:
     """Upload fences or rally points of several vehicles at once and verify each; results as `upload_fleet`."""
 
-    def starting(task: Task) -> Callable[[Channel], Steps[UploadResult]]:
+    def starting(task: Task) -> Callable[[Channel], LinkSteps[UploadResult]]:
         _require_list(task.mission_type)
         return lambda channel: uploading(channel, task)
 
@@ -183,7 +183,7 @@ def clear_fleet(
     or errors in the order of ``orders``: a vehicle that is armed or does not answer keeps its mission.
     """
 
-    def starting(order: UploadOrder) -> Callable[[Channel], Steps[UploadResult]]:
+    def starting(order: UploadOrder) -> Callable[[Channel], LinkSteps[UploadResult]]:
         same = seen.get(order.mission.name)
         return lambda channel: clearing(channel, order.mission.name, (MISSION,), order.options, same)
 
@@ -191,7 +191,7 @@ def clear_fleet(
 
 
 def _together(
-    starts: Sequence[tuple[Link, int, Callable[[Channel], Steps[UploadResult]]]],
+    starts: Sequence[tuple[Link, int, Callable[[Channel], LinkSteps[UploadResult]]]],
 ) -> list[UploadResult | GcsplanError]:
     jobs: list[PumpJob[UploadResult]] = []
     try:
@@ -210,7 +210,7 @@ def _together(
     return outcomes
 
 
-def _telling(steps: Steps[UploadResult], order: UploadOrder, ended: EndCall | None) -> Steps[UploadResult]:
+def _telling(steps: LinkSteps[UploadResult], order: UploadOrder, ended: EndCall | None) -> LinkSteps[UploadResult]:
     """Run ``steps`` and report their end to the caller at once, because the rest of the fleet may take much longer."""
     try:
         result = yield from steps
@@ -223,7 +223,7 @@ def _telling(steps: Steps[UploadResult], order: UploadOrder, ended: EndCall | No
     return result
 
 
-def require_verdict(mission: Mission, verdict: Checked | None, *, unchecked: bool = False) -> None:
+def require_verdict(mission: Mission, verdict: CheckedMission | None, *, unchecked: bool = False) -> None:
     """Raise CheckFailed unless ``verdict`` is a passing verdict of ``mission``, or ``unchecked`` is set."""
     if unchecked:
         return
@@ -265,7 +265,7 @@ def download_items(
     """Return the list on board in wire order. Raises LinkError or VehicleRefused if it cannot be read."""
     settings = options or SessionOptions()
 
-    def steps(channel: Channel) -> Steps[tuple[MissionItem, ...]]:
+    def steps(channel: Channel) -> LinkSteps[tuple[MissionItem, ...]]:
         state, recheck = yield from looking_at(channel, settings)
         read = yield from reading(channel, state, mission_type, settings, recheck)
         return read.items
@@ -289,7 +289,7 @@ def download_mission(
     """
     settings = options or SessionOptions()
 
-    def steps(channel: Channel) -> Steps[Mission]:
+    def steps(channel: Channel) -> LinkSteps[Mission]:
         state, recheck = yield from looking_at(channel, settings)
         read = yield from reading(channel, state, MISSION, settings, recheck)
         start = home
@@ -303,7 +303,7 @@ def download_mission(
 
 
 def verify_mission(
-    link: Link, mission: Mission, *, options: SessionOptions | None = None, judge: Judge | None = None
+    link: Link, mission: Mission, *, options: SessionOptions | None = None, judge: ReadBackJudge | None = None
 ) -> UploadResult:
     """Read the mission on board and compare it with ``mission``; nothing is written.
 
@@ -330,7 +330,7 @@ def _same_mission(a: Mission, b: Mission) -> bool:
     return same and [item.wire for item in a.items] == [item.wire for item in b.items]
 
 
-def _run(link: Link, sysid: int, steps: Callable[[Channel], Steps[T]]) -> T:
+def _run(link: Link, sysid: int, steps: Callable[[Channel], LinkSteps[T]]) -> T:
     channel = link.channel(sysid)
     try:
         return run(channel, steps(channel))

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.errors import LinkError
-from gcsplan.mavlink.link.link import Channel, Link, Steps
+from gcsplan.mavlink.link.link import Channel, Link, LinkSteps
 from gcsplan.mavlink.link.parameters import decode_value, parameter_name
 from gcsplan.mavlink.link.recheck import Recheck, request_message
 from gcsplan.mavlink.link.watch import STANDBY, UNINIT, VehicleState, Watch
@@ -29,7 +29,7 @@ SLOW_ANSWER_S = 6.0
 
 def discover_steps(
     channel: Channel, watch: Watch, *, timeout_s: float, listen_s: float, standby_s: float = 0.0
-) -> Steps[VehicleState]:
+) -> LinkSteps[VehicleState]:
     """Wait for an autopilot's heartbeat, request its capabilities and position, and listen for rivals.
 
     ``listen_s``: seconds to listen after the first heartbeat (heartbeats come once a second). ``standby_s``: seconds to
@@ -71,7 +71,7 @@ def parameter_steps(
     *,
     needed: Collection[tuple[str, ...]] = (),
     most_s: float = 0.0,
-) -> Steps[OnBoard]:
+) -> LinkSteps[OnBoard]:
     """Return the values of those parameters that the vehicle has, and the names that it says it does not have.
 
     A value that is not a number is NaN. Of each of ``groups`` it has one name. It takes at most 2 s after the last
@@ -149,7 +149,7 @@ def dead_link(link: Link, sysid: int, timeout_s: float) -> LinkError:
             "restart the vehicle, or send from that program's port (udpout:HOST:PORT,LOCAL)"
         )
     if link.note:
-        hints.append(link.note)
+        hints.append(str(link.note))
     how = link.endpoint.understood() + (f" from port {link.place.rsplit(':', 1)[-1]}" if sends else "")
     return LinkError(
         f"no heartbeat of system {sysid} within {timeout_s:g} s ({how}); {'; '.join(hints)}",

@@ -8,7 +8,7 @@ from typing import Any
 
 from gcsplan.errors import LinkError, VehicleRefused
 from gcsplan.mavlink.link.drive import drive
-from gcsplan.mavlink.link.link import Channel, Steps
+from gcsplan.mavlink.link.link import Channel, LinkSteps
 from gcsplan.mavlink.link.on_board import judging, reading_parameters
 from gcsplan.mavlink.link.options import SessionOptions, Task
 from gcsplan.mavlink.link.preflight import (
@@ -21,8 +21,8 @@ from gcsplan.mavlink.link.preflight import (
     preflight,
     rivals_words,
 )
-from gcsplan.mavlink.link.recheck import Judge as JudgeState
 from gcsplan.mavlink.link.recheck import Recheck
+from gcsplan.mavlink.link.recheck import StateJudge as JudgeState
 from gcsplan.mavlink.link.results import UploadResult, outcome_word
 from gcsplan.mavlink.link.steps import discover_steps
 from gcsplan.mavlink.link.terrain import terrain_steps
@@ -42,13 +42,14 @@ from gcsplan.mavlink.protocol.transfer import (
     Settled,
     VerifiedUpload,
 )
+from gcsplan.notes.note import Note
 
 # Longest list that is read. ArduPilot: 64 KB of missions on an SD card (BRD_SD_MISSION) at 15 bytes per item.
 _MOST_HELD = {ARDUPILOTMEGA: 4369, MAV_PX4: 2000}
 _MOST_HELD_BY_ANY = 4369
 
 
-def finding(channel: Channel, watch: Watch, options: SessionOptions) -> Steps[VehicleState]:
+def finding(channel: Channel, watch: Watch, options: SessionOptions) -> LinkSteps[VehicleState]:
     """Find the vehicle and wait while it boots."""
     return discover_steps(
         channel, watch, timeout_s=min(options.discover_s, options.timeout_s), listen_s=options.listen_s,
@@ -56,7 +57,7 @@ def finding(channel: Channel, watch: Watch, options: SessionOptions) -> Steps[Ve
     )  # fmt: skip
 
 
-def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
+def uploading(channel: Channel, task: Task) -> LinkSteps[UploadResult]:
     """Find the vehicle, run preflight, read parameters, upload and verify. Raises VehicleRefused, LinkError."""
     clock, options = channel.link.clock, task.options
     watch = Watch(task.sysid)
@@ -107,10 +108,10 @@ def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
         seen = yield from recheck.last_look()
         changed = seen if isinstance(seen, Changed) else None
         if seen is not None and changed is None:
-            warnings.append(f"after the read-back: {seen}")
+            warnings.append(Note("changed_after_read_back", outcome=str(seen)))
     after = watch.state(clock())
     if after and after.armed and not state.armed:
-        warnings.append("the vehicle was armed by somebody during the upload")
+        warnings.append(Note("armed_during_upload"))
     ended_s = clock() - started
     result = yield from result_of(
         task, channel, settled, ended_s, warnings, watch.texts_since(said_before), values, recheck
@@ -119,7 +120,7 @@ def uploading(channel: Channel, task: Task) -> Steps[UploadResult]:
     return replace(result, changed=changed.reason, change=changed.why) if changed else result
 
 
-def _of_link(channel: Channel) -> list[str]:
+def _of_link(channel: Channel) -> list[Note]:
     return [channel.link.note] if channel.link.note else []
 
 
@@ -141,7 +142,7 @@ def _holding(
 
 def reading(
     channel: Channel, state: VehicleState, mission_type: int, options: SessionOptions, recheck: Recheck | None = None
-) -> Steps[Download]:
+) -> LinkSteps[Download]:
     """Read one whole list from the address at which ``state`` was heard. Raises VehicleRefused, LinkError."""
     channel.pin(state.peer)
     machine = Download(
@@ -162,7 +163,7 @@ def reading(
     return machine
 
 
-def looking_at(channel: Channel, options: SessionOptions) -> Steps[tuple[VehicleState, Recheck]]:
+def looking_at(channel: Channel, options: SessionOptions) -> LinkSteps[tuple[VehicleState, Recheck]]:
     """Find a vehicle to read from and pin its address. Raises VehicleRefused if two vehicles have its system id."""
     watch = Watch(channel.sysid)
     state = yield from finding(channel, watch, options)
@@ -170,7 +171,7 @@ def looking_at(channel: Channel, options: SessionOptions) -> Steps[tuple[Vehicle
     return state, _holding(channel, watch, state, replace(options, ignore_position=True), _ambiguous)
 
 
-def verifying(channel: Channel, task: Task) -> Steps[UploadResult]:
+def verifying(channel: Channel, task: Task) -> LinkSteps[UploadResult]:
     """Read the list and compare it with the task's; nothing is written.
 
     With a judge the parameters are read too, since they decide where the vehicle turns.
@@ -197,7 +198,7 @@ def verifying(channel: Channel, task: Task) -> Steps[UploadResult]:
 
 def clearing(
     channel: Channel, name: str, kinds: tuple[int, ...], options: SessionOptions, same: VehicleState | None = None
-) -> Steps[UploadResult]:
+) -> LinkSteps[UploadResult]:
     """Clear each of ``kinds`` and verify by reading back that nothing is left. Raises VehicleRefused, LinkError.
 
     ``same``: the intended vehicle as it was seen before; another one is not touched.
@@ -245,7 +246,7 @@ def clearing(
 
 def _against_clearing(
     options: SessionOptions, same: VehicleState | None, state: VehicleState
-) -> tuple[Reasons, list[str]]:
+) -> tuple[Reasons, list[Note]]:
     against, warnings = _ambiguous(state)
     if state.armed and not options.allow_armed:
         against.append(("armed", "the vehicle is armed: disarm it, or allow it with --allow-armed"))
@@ -257,7 +258,7 @@ def _against_clearing(
     return against, warnings
 
 
-def _ambiguous(state: VehicleState) -> tuple[Reasons, list[str]]:
+def _ambiguous(state: VehicleState) -> tuple[Reasons, list[Note]]:
     return ([("ambiguous", rivals_words(state))] if state.sources > 1 else []), []
 
 
@@ -272,11 +273,11 @@ def result_of(
     channel: Channel,
     settled: Settled,
     seconds: float,
-    warnings: list[str],
+    warnings: list[Note],
     texts: tuple[str, ...],
     values: OnBoard,
     recheck: Recheck,
-) -> Steps[UploadResult]:
+) -> LinkSteps[UploadResult]:
     """Return the result of ``task``; the caller's check is repeated on the read-back with the parameters read."""
     mission: Mission | None = None
     failed: str | None = None

@@ -19,15 +19,16 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import GcsplanError, VehicleRefused
-from gcsplan.mavlink.link.link import Channel, Heard, Steps
+from gcsplan.mavlink.link.link import Channel, Heard, LinkSteps
 from gcsplan.mavlink.mission.mission import TERRAIN, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
+from gcsplan.notes.note import Note
 from gcsplan.world.terrain_grid import (
     ALL_PARTS,
     NEAR_ENOUGH_M,
     SPACING_M,
     Block,
-    Ground,
+    GroundHeights,
     PostHeights,
     TerrainGrid,
     known_parts,
@@ -40,7 +41,7 @@ MOST_WAITING = 64
 """Blocks that wait to be sent; the vehicle asks again for those that are dropped. Its cache holds 12."""
 
 _PAUSE_S = 0.01
-_AT_ONCE = 4
+_PARTS_AT_ONCE = 4
 _SERIAL_SHARE = 0.25
 _BYTES_OF_PART = 43 + 12 + 13  # payload, frame, signature
 ASK_AFTER_S, _ASK_EVERY_S, _ASKED_TIMES = 3.0, 5.0, 3
@@ -60,26 +61,22 @@ class Served:
     problems: list[str] = field(default_factory=list)
 
     @property
-    def notes(self) -> list[str]:
+    def notes(self) -> list[Note]:
         """What a user should know."""
-        out = list(self.problems)
+        out = [Note("terrain_not_loaded", why=why) for why in self.problems]
         if self.unknown:
             parts = sum(self.unknown.values())
             first = min(self.unknown)
-            out.append(
-                f"{parts} parts of {len(self.unknown)} blocks that the vehicle asked for are not sent, because the "
-                f"terrain model does not know their ground (the first in {first.cell.name}): it asks for them again "
-                "and again, and does not arm a mission in the terrain frame before it has them; give a larger DEM"
-            )
+            out.append(Note("terrain_parts_not_sent", parts=parts, blocks=len(self.unknown), tile=first.cell.name))
         if self.strange:
-            out.append(f"{self.strange} requests for terrain were for no block of ArduPilot's grid")
+            out.append(Note("terrain_requests_strange", count=self.strange))
         return out
 
 
 class TerrainService:
     """The terrain that vehicles are given: heights by the spacing that they ask for, and what was given."""
 
-    def __init__(self, ground: Ground) -> None:
+    def __init__(self, ground: GroundHeights) -> None:
         self._ground = ground
         self._posts: dict[int, PostHeights] = {}
         self.served: dict[int, Served] = {}
@@ -92,7 +89,7 @@ class TerrainService:
             self._posts[spacing_m] = PostHeights(TerrainGrid(spacing_m), self._ground)
         return self._posts[spacing_m]
 
-    def steps(self, channel: Channel) -> Steps[None]:
+    def steps(self, channel: Channel) -> LinkSteps[None]:
         """The endless task that answers one vehicle. See `Link.serve`."""
         return _Answers(channel, self, self.served.setdefault(channel.sysid, Served())).steps()
 
@@ -113,10 +110,10 @@ class _Answers:
         self._queue: OrderedDict[tuple[int, int, int], _Waiting] = OrderedDict()
         endpoint = channel.link.endpoint
         baud = endpoint.baud if endpoint.kind == "serial" else 0
-        self._at_once = 1 if baud else _AT_ONCE
+        self._at_once = 1 if baud else _PARTS_AT_ONCE
         self._pause_s = 10.0 * _BYTES_OF_PART / (_SERIAL_SHARE * baud) if baud else _PAUSE_S
 
-    def steps(self) -> Steps[None]:
+    def steps(self) -> LinkSteps[None]:
         clock = self._channel.link.clock
         ask_at, asked, send_at = clock() + ASK_AFTER_S, 0, -math.inf
         vehicle: Heard | None = None
@@ -191,7 +188,7 @@ def _ask_for_requests(channel: Channel, vehicle: Heard) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Compared:
+class TerrainComparison:
     """What the vehicle reads at places, beside what it was sent.
 
     ``off_m`` (N,): its height less ours, NaN where it has none. ``pending``, ``loaded``: parts, as it last said.
@@ -237,7 +234,7 @@ def compare_steps(
     most_s: float = math.inf,
     progress: Callable[[int, int], None] | None = None,
     note: Callable[[Heard, float], None] | None = None,
-) -> Steps[Compared]:
+) -> LinkSteps[TerrainComparison]:
     """Ask with TERRAIN_CHECK what the vehicle reads at each place, until it has all, or nothing new for so long.
 
     The places are asked block by block, for its cache holds few blocks; a service on the same link sends what it lacks.
@@ -283,7 +280,7 @@ def compare_steps(
             moved_at = clock()
             if progress:
                 progress(len(places_e7) - len(left), len(places_e7))
-    return Compared(tuple(places_e7), theirs - ours, pending, loaded)
+    return TerrainComparison(tuple(places_e7), theirs - ours, pending, loaded)
 
 
 OFF = "terrain_off_m"
@@ -295,7 +292,7 @@ TERRAIN_GROUPS = (("TERRAIN_ENABLE",), ("TERRAIN_SPACING",), ("TERRAIN_OFS_MAX",
 TERRAIN_DECIDES = (("TERRAIN_SPACING",), ("TERRAIN_OFS_MAX",))
 """Those of them that such a mission is judged with: no answer is not their default."""
 
-PLACES = 40
+PLACES_COMPARED = 40
 """Places that are compared before a mission is sent."""
 _UPLOAD_PATIENCE_S, _UPLOAD_MOST_S = 10.0, 45.0
 
@@ -319,18 +316,18 @@ def terrain_error_m(values: Mapping[str, float], judged_m: float) -> float:
     return max(judged_m, shift_m) if math.isnan(off_m) else shift_m + off_m
 
 
-def odd_spacing(values: Mapping[str, float]) -> str:
-    """Why the spacing of the terrain posts on board is none that is judged, in words; empty if it is, or not read."""
+def odd_spacing(values: Mapping[str, float]) -> Note | None:
+    """That the spacing of the terrain posts on board is none that is judged; None if it is, or was not read."""
     spacing = values.get("TERRAIN_SPACING", float(SPACING_M))
     if LEAST_SPACING_M <= spacing <= MOST_SPACING_M:
-        return ""
-    return (
-        f"TERRAIN_SPACING is {spacing:g} on board, and {LEAST_SPACING_M} to {MOST_SPACING_M} m are judged: set "
-        f"TERRAIN_SPACING {SPACING_M}"
-    )
+        return None
+    return Note(
+        "terrain_spacing_not_judged", spacing_m=spacing, least_m=LEAST_SPACING_M, most_m=MOST_SPACING_M,
+        set_m=SPACING_M,
+    )  # fmt: skip
 
 
-def places_along(items: Sequence[MissionItem], count: int = PLACES) -> list[tuple[int, int]]:
+def places_along(items: Sequence[MissionItem], count: int = PLACES_COMPARED) -> list[tuple[int, int]]:
     """Places, 1e-7°, on the legs to the items in the terrain frame, evenly on each."""
     placed = [item for item in items if item.x or item.y]
     legs = [(a, b) for a, b in pairwise(placed) if b.frame in _TERRAIN_FRAMES]
@@ -351,9 +348,9 @@ def terrain_steps(
     to: Address,
     items: Sequence[MissionItem],
     values: Mapping[str, float],
-    ground: Ground | None,
+    ground: GroundHeights | None,
     note: Callable[[Heard, float], None],
-) -> Steps[tuple[list[str], dict[str, float]]]:
+) -> LinkSteps[tuple[list[Note], dict[str, float]]]:
     """Serve a vehicle the terrain of a mission and compare what it then reads under it.
 
     Return warnings, and `OFF` if it read anything. Nothing is done without ``ground`` or items in the terrain frame.
@@ -362,7 +359,7 @@ def terrain_steps(
     if ground is None or not places:
         return [], {}
     if values.get("TERRAIN_ENABLE") == 0.0:
-        return ["TERRAIN_ENABLE is 0 on board: it knows no terrain and does not fly the terrain frame"], {}
+        return [Note("terrain_off_on_board")], {}
     if odd := odd_spacing(values):
         raise VehicleRefused(f"not sent: {odd}", where=f"vehicle {to.sysid}", reason="parameters")
     spacing = values.get("TERRAIN_SPACING", float(SPACING_M))
@@ -374,16 +371,10 @@ def terrain_steps(
     )  # fmt: skip
     warnings = list(service.served[channel.sysid].notes)
     if compared.read < len(places):
-        warnings.append(
-            f"the vehicle has no terrain yet at {len(places) - compared.read} of {len(places)} places under the "
-            "mission; it does not arm before it has: gcsplan terrain serve --until-loaded gives it all"
-        )
+        warnings.append(Note("terrain_incomplete_on_board", lacking=len(places) - compared.read, places=len(places)))
     if not compared.read:
         return warnings, {}
     if compared.worst_m > NEAR_ENOUGH_M and compared.worst_at is not None:
         lat, lon = compared.worst_at
-        warnings.append(
-            f"the vehicle reads terrain {compared.worst_m:.1f} m off that of the mission at {lat:.6f}, {lon:.6f}: it "
-            "holds terrain from elsewhere (remove it from its SD card), or shifted it when it was armed (restart it)"
-        )
+        warnings.append(Note("terrain_differs_on_board", off_m=compared.worst_m, lat_deg=lat, lon_deg=lon))
     return warnings, {OFF: compared.worst_m}

@@ -18,10 +18,11 @@ from typing import Any, Protocol, cast
 
 from gcsplan.errors import LinkError
 from gcsplan.mavlink.link.url import Endpoint
+from gcsplan.notes.note import Note
 
 Peer = Hashable
-Heard = tuple[Peer, bytes]
-Clock = Callable[[], float]
+HeardBytes = tuple[Peer, bytes]
+LinkClock = Callable[[], float]
 
 _DATAGRAM = 65535
 _BURST = 256  # most datagrams per read, so that a flood cannot starve the timers
@@ -48,7 +49,7 @@ class Transport(Protocol):
         """The address that is actually used."""
         ...
 
-    def read(self) -> list[Heard]:
+    def read(self) -> list[HeardBytes]:
         """Return what was received, without waiting."""
         ...
 
@@ -116,7 +117,7 @@ class Udp:
     """
 
     datagrams = True
-    note = ""
+    note: Note | None = None
 
     def __init__(self, endpoint: Endpoint) -> None:
         family, address = _resolve(endpoint, socket.SOCK_DGRAM)
@@ -146,10 +147,8 @@ class Udp:
                 raise
             self._socket.bind((everywhere, 0))
             own = self._socket.getsockname()[1]
-            self.note = (
-                f"the link sends from port {own}, because a program uses {endpoint.sends_from} already: a PX4 that has "
-                f"heard that program answers it alone; end it, or give a port to send from ({endpoint.place} as "
-                f"udpout:HOST:PORT,LOCAL)"
+            self.note = Note(
+                "sends_from_another_port", port=own, wanted_port=endpoint.sends_from, endpoint=endpoint.place
             )
 
     @property
@@ -162,8 +161,8 @@ class Udp:
         host, port = self._socket.getsockname()[:2]
         return f"{host}:{port}"
 
-    def read(self) -> list[Heard]:
-        heard: list[Heard] = []
+    def read(self) -> list[HeardBytes]:
+        heard: list[HeardBytes] = []
         for _ in range(_BURST):
             try:
                 data, peer = self._socket.recvfrom(_DATAGRAM)
@@ -174,7 +173,9 @@ class Udp:
             heard.append((peer, data))
         return heard
 
-    def exchange(self, answer: Callable[[Peer, bytes], bytes | None], until: float, clock: Clock) -> list[Heard]:
+    def exchange(
+        self, answer: Callable[[Peer, bytes], bytes | None], until: float, clock: LinkClock
+    ) -> list[HeardBytes]:
         """Answer datagrams until one has no answer (it is returned), or until a short silence, or until ``until``.
 
         The socket itself waits, which saves two system calls per datagram compared with `wait_readable` and `read`.
@@ -280,7 +281,7 @@ class TcpClient:
         host, port = self._address[:2]
         return f"{host}:{port}"
 
-    def read(self) -> list[Heard]:
+    def read(self) -> list[HeardBytes]:
         if not self._stream.open and time.monotonic() >= self._again_at:
             try:
                 self._stream = _Stream(self._connect(0.2))
@@ -325,7 +326,7 @@ class TcpServer:
         host, port = self._socket.getsockname()[:2]
         return f"{host}:{port}"
 
-    def read(self) -> list[Heard]:
+    def read(self) -> list[HeardBytes]:
         while len(self.clients) < _MOST_CLIENTS:
             try:
                 sock, peer = self._socket.accept()
@@ -366,7 +367,7 @@ class Serial:
         except (AttributeError, OSError):  # Windows, or unplugged
             return ()
 
-    def read(self) -> list[Heard]:
+    def read(self) -> list[HeardBytes]:
         try:
             data = self._port.read(4096)
         except OSError:

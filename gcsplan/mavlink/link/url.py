@@ -23,7 +23,7 @@ from typing import Literal
 from gcsplan.errors import InputError
 
 DEFAULT_BAUD = 57600
-FORMS = (
+URL_FORMS = (
     "udpin:HOST:PORT (listens; udp: is the same), udpout:HOST:PORT (sends; ,LOCAL after it is the port to send from), "
     "tcp:HOST:PORT (connects), tcpin:HOST:PORT (waits), /dev/ttyUSB0,57600 or COM3,57600 or serial:DEVICE:BAUD; also "
     "with ://"
@@ -183,4 +183,4 @@ def _serial(given: str, device: str, baud: str | None) -> Endpoint:
 
 def _wrong(given: str, why: str) -> InputError:
     shown = given if len(given) <= 80 else given[:77] + "…"
-    return InputError(f"link {shown!r} {why}. Known forms: {FORMS}", where="link")
+    return InputError(f"link {shown!r} {why}. Known forms: {URL_FORMS}", where="link")

@@ -13,7 +13,7 @@ from typing import Any
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.mavlink.link.link import Heard
-from gcsplan.mavlink.link.numbers import Place, place
+from gcsplan.mavlink.link.numbers import VehiclePosition, place
 from gcsplan.mavlink.link.transport import Peer
 from gcsplan.mavlink.mission.autopilots import GENERIC, INVALID, autopilot_name, type_name
 from gcsplan.mavlink.mission.mission import Home
@@ -70,7 +70,7 @@ class VehicleState:
     peer: Peer | None = None
     beat_at: float = -math.inf
     placed_at: float = -math.inf
-    just_at: Place | None = None
+    just_at: VehiclePosition | None = None
     flight_sw_version: int | None = None
 
     @property
@@ -136,11 +136,11 @@ class _Told:
     """The reports of one component at one address, without its heartbeats."""
 
     clocks: dict[str, _Clock] = field(default_factory=dict)
-    place: Place | None = None
+    place: VehiclePosition | None = None
     from_fix: bool = False
     placed_at: float = -math.inf
     leaps: int = 0  # position changes faster than any vehicle moves
-    leapt_from: Place | None = None
+    leapt_from: VehiclePosition | None = None
     leapt_at: float = -math.inf
     capabilities: int | None = None
     version: int | None = None
@@ -322,13 +322,13 @@ def _position(told: _Told, m: Any, now: float) -> None:
         _put(told, found, now, from_fix=False)
 
 
-def _put(told: _Told, found: Place, now: float, *, from_fix: bool) -> None:
+def _put(told: _Told, found: VehiclePosition, now: float, *, from_fix: bool) -> None:
     if told.place is not None and now - told.placed_at <= FRESH_S and _leap(told.place, found):
         told.leaps, told.leapt_from, told.leapt_at = told.leaps + 1, told.place, now
     told.place, told.from_fix, told.placed_at = found, from_fix, now
 
 
-def _leap(a: Place, b: Place) -> bool:
+def _leap(a: VehiclePosition, b: VehiclePosition) -> bool:
     """Whether two positions reported within `FRESH_S` are farther apart than any vehicle flies in that time."""
     north_m = (a.lat_deg - b.lat_deg) * _METRES_A_DEGREE
     turn_deg = (a.lon_deg - b.lon_deg + 180.0) % 360.0 - 180.0

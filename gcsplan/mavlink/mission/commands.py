@@ -104,7 +104,7 @@ DO_WINCH = 42600
 SCRIPT_TIME = 42702
 ATTITUDE_TIME = 42703
 
-WORDS = {
+COMMAND_WORDS = {
     WAYPOINT: "waypoint",
     LOITER_UNLIM: "loiter",
     LOITER_TURNS: "loiter turns",
@@ -154,7 +154,7 @@ WORDS = {
 
 def command_name(command: int) -> str:
     """Return a MAV_CMD in words."""
-    return WORDS.get(command, f"command {command}")
+    return COMMAND_WORDS.get(command, f"command {command}")
 
 
 def is_nav(command: int) -> bool:

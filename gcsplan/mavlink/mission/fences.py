@@ -16,8 +16,8 @@ from gcsplan.vehicle import Autopilot
 __all__ = [
     "CIRCLE",
     "FENCE_DECIDES",
+    "FENCE_MARGIN_M",
     "FLOOR",
-    "MARGIN_M",
     "POLYGON",
     "SAFETY",
     "TOP",
@@ -26,7 +26,7 @@ __all__ = [
     "is_fence",
 ]
 
-MARGIN_M = 2.0
+FENCE_MARGIN_M = 2.0
 """FENCE_MARGIN, default."""
 
 TOP, CIRCLE, POLYGON, FLOOR = 1, 2, 4, 8
@@ -50,7 +50,7 @@ def _p(key: str, name: str, default: float, unit: str = "") -> Parameter:
 
 _FENCES = (
     _p("fence_top", "FENCE_ALT_MAX", 100.0, "m"), _p("fence_floor", "FENCE_ALT_MIN", -10.0, "m"),
-    _p("fence_radius", "FENCE_RADIUS", 300.0, "m"), _p("fence_margin", "FENCE_MARGIN", MARGIN_M, "m"),
+    _p("fence_radius", "FENCE_RADIUS", 300.0, "m"), _p("fence_margin", "FENCE_MARGIN", FENCE_MARGIN_M, "m"),
     _p("fence_action", "FENCE_ACTION", 1.0),
 )  # fmt: skip
 SAFETY: dict[Autopilot, dict[str, Parameter]] = {

@@ -20,7 +20,7 @@ STRAIGHT_UNTIL = (1, 17)
 """The last version (major, minor) of PX4 that is known to fly straight legs."""
 
 _BETA = 128
-_KINDS = ((255, ""), (192, " release candidate"), (_BETA, " beta"), (64, " alpha"), (0, " development"))
+_RELEASE_KINDS = ((255, ""), (192, " release candidate"), (_BETA, " beta"), (64, " alpha"), (0, " development"))
 """FIRMWARE_VERSION_TYPE, from this number on."""
 
 _FLOWN_TO = frozenset({
@@ -35,7 +35,7 @@ def version_words(flight_sw_version: int | None) -> str:
     if not flight_sw_version:
         return "of a version that it does not tell"
     major, minor, patch, kind = flight_sw_version.to_bytes(4, "big")
-    return f"{major}.{minor}.{patch}" + next(words for least, words in _KINDS if kind >= least)
+    return f"{major}.{minor}.{patch}" + next(words for least, words in _RELEASE_KINDS if kind >= least)
 
 
 def version_of(flight_sw_version: int | None) -> tuple[int, int] | None:

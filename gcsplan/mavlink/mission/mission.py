@@ -10,6 +10,7 @@ import math
 import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission.commands import DO_CHANGE_SPEED, WAYPOINT
@@ -18,6 +19,12 @@ from gcsplan.vehicle import Autopilot
 # Frames (MAV_FRAME). The _INT frames 5, 6, 11 mean the same as 0, 3, 10: both are read, 0, 3, 10 are written.
 GLOBAL, NO_POSITION, RELATIVE, TERRAIN = 0, 2, 3, 10
 FRAME_SYNONYMS = {5: GLOBAL, 6: RELATIVE, 11: TERRAIN}
+
+AltitudeFrame = Literal["relative", "amsl", "terrain"]
+"""What the altitudes of a mission count from: home, sea level or the terrain."""
+
+NumberKept = Callable[[float], float]
+"""What an autopilot keeps of a number that it is sent."""
 
 # Types of lists (MAV_MISSION_TYPE).
 MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255

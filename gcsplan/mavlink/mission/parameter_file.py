@@ -21,7 +21,7 @@ __all__ = ["PARAM_ENDING", "param_file", "read_param_file"]
 PARAM_ENDING = {Autopilot.ARDUCOPTER: "param", Autopilot.ARDUPLANE: "param", Autopilot.PX4: "params"}
 """Mission Planner looks for .param, QGroundControl for .params."""
 
-_WHOLE = {"RTL_TYPE", "RTL_CONE_ANG", "GF_ACTION", "NAV_RCL_ACT", "NAV_DLL_ACT", "COM_LOW_BAT_ACT"}
+_WHOLE_NUMBERS = {"RTL_TYPE", "RTL_CONE_ANG", "GF_ACTION", "NAV_RCL_ACT", "NAV_DLL_ACT", "COM_LOW_BAT_ACT"}
 _INT32, _REAL32 = 6, 9  # MAV_PARAM_TYPE
 _MOST_BYTES, _MOST_LETTERS = 4_000_000, 16
 """Largest file that is read, and the longest name that MAVLink has."""
@@ -41,7 +41,7 @@ def param_file(name: str, autopilot: Autopilot, sysid: int, settings: Sequence[S
         lines.append(f"# {versions}: {rule}{s.why}")
         for n in s.parameter.names:
             value = f"{n.value(s.value):.10g}"
-            kind = _INT32 if n.name in _WHOLE else _REAL32
+            kind = _INT32 if n.name in _WHOLE_NUMBERS else _REAL32
             px4 = autopilot is Autopilot.PX4
             lines.append(f"{sysid}\t1\t{n.name}\t{value}\t{kind}" if px4 else f"{n.name},{value}")
     return "\n".join(lines) + "\n"

@@ -26,12 +26,13 @@ from gcsplan.mavlink.mission.commands import (
 from gcsplan.mavlink.mission.fences import acts, fences_in_force, is_fence
 from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, TERRAIN, Mission
 from gcsplan.mavlink.mission.parameter_names import PARAMETERS, Name, OnBoard, Parameter
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, Autopilot, Vehicle
 from gcsplan.world.atmosphere import true_per_indicated
 
 __all__ = ["Off", "Setting", "commands_speed", "corners_as_it_leans", "off", "parameter_list", "vehicle_on_board"]
 
-Rule = Literal["equal", "at least", "at most"]
+SettingRule = Literal["equal", "at least", "at most"]
 Matters = Literal["time", "pace", "turns", "return", "flight", "told"]
 
 SAME = 0.01
@@ -61,7 +62,7 @@ class Setting:
 
     parameter: Parameter
     value: float
-    rule: Rule
+    rule: SettingRule
     why: str
     matters: Matters
     also: tuple[float, ...] = ()
@@ -108,14 +109,18 @@ class Off:
     raw: float
 
     def describe(self) -> str:
+        """What it is, what was assumed and why, and what to set, as a sentence."""
+        return str(self.note())
+
+    def note(self) -> Note:
         """What it is, what was assumed and why, and what to set."""
         wanted, rule = self.name.value(self.setting.value), self.setting.rule
         least = "" if rule == "equal" else f"{rule} "
         assumed = f"{least}{wanted:.6g}" + "".join(f" or {self.name.value(amount):g}" for amount in self.setting.also)
-        return (
-            f"{self.name.name} is {self.raw:.6g} on board, and {assumed} is assumed ({self.setting.why}): "
-            f"set {self.name.name} {wanted:.10g}"
-        )
+        return Note(
+            "parameter_not_assumed", name=self.name.name, value=self.raw, assumed=assumed, why=self.setting.why,
+            wanted=wanted,
+        )  # fmt: skip
 
 
 def commands_speed(mission: Mission) -> bool:

@@ -15,7 +15,10 @@ from dataclasses import dataclass
 
 from gcsplan.vehicle import Autopilot
 
-__all__ = ["PARAMETERS", "Name", "OnBoard", "Parameter", "unanswered"]
+__all__ = ["PARAMETERS", "Name", "OnBoard", "Parameter", "ParameterValues", "unanswered"]
+
+ParameterValues = Mapping[str, float]
+"""What was read from a vehicle, by the names of its parameters."""
 
 
 @dataclass(frozen=True, slots=True)

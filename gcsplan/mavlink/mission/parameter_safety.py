@@ -10,17 +10,17 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from gcsplan.mavlink.mission.fences import FENCE_DECIDES, MARGIN_M, SAFETY, fences_in_force, is_fence
+from gcsplan.mavlink.mission.fences import FENCE_DECIDES, FENCE_MARGIN_M, SAFETY, fences_in_force, is_fence
 from gcsplan.mavlink.mission.parameter_list import Matters, Setting
 from gcsplan.mavlink.mission.parameter_names import unanswered
 from gcsplan.mavlink.mission.return_route import AUTO_RTL
 from gcsplan.vehicle import Autopilot
 
-__all__ = ["Extent", "needed_groups", "safety_list"]
+__all__ = ["FlightExtent", "needed_groups", "safety_list"]
 
 _RADIO, _GROUND, _LOW = "loss of radio control", "loss of the ground station", "a low battery"
 _CRITICAL = "a critical battery"
-_FAILSAFES: dict[Autopilot, dict[str, tuple[float, tuple[float, ...], str]]] = {
+_FAILSAFE_VALUES: dict[Autopilot, dict[str, tuple[float, tuple[float, ...], str]]] = {
     Autopilot.ARDUCOPTER: {
         "fs_radio": (1.0, (0.0, 2.0), _RADIO), "fs_ground": (1.0, (0.0, 2.0), _GROUND),
         "fs_battery": (2.0, (0.0,), _LOW), "fs_battery_critical": (2.0, (0.0,), _CRITICAL),
@@ -40,7 +40,7 @@ _LANDS = (3.0,)  # FS_EKF_ACTION beside 1
 
 
 @dataclass(frozen=True, slots=True)
-class Extent:
+class FlightExtent:
     """How far a flight comes, errors counted, m: above and below home, and away from it."""
 
     top_rel_home_m: float
@@ -49,7 +49,7 @@ class Extent:
 
 
 def safety_list(
-    autopilot: Autopilot, extent: Extent, *, rtl_rel_home_m: float | None = None, by_mission: bool = False
+    autopilot: Autopilot, extent: FlightExtent, *, rtl_rel_home_m: float | None = None, by_mission: bool = False
 ) -> tuple[Setting, ...]:
     """The rows of the fences and failsafes for a flight of ``extent``.
 
@@ -59,7 +59,7 @@ def safety_list(
     known = SAFETY[autopilot]
     rows = [*_fences(autopilot, extent, rtl_rel_home_m)]
     copter = autopilot is Autopilot.ARDUCOPTER
-    for key, (value, also, after) in _FAILSAFES[autopilot].items():
+    for key, (value, also, after) in _FAILSAFE_VALUES[autopilot].items():
         if by_mission and copter:
             value, also = AUTO_RTL, (0.0,)
         why = f"{after} makes it return{' along the mission' if by_mission else ''}; 0 does nothing"
@@ -70,17 +70,17 @@ def safety_list(
     return tuple(rows)
 
 
-def _fences(autopilot: Autopilot, extent: Extent, returns_m: float | None) -> Iterator[Setting]:
+def _fences(autopilot: Autopilot, extent: FlightExtent, returns_m: float | None) -> Iterator[Setting]:
     known, copter = SAFETY[autopilot], autopilot is Autopilot.ARDUCOPTER
     lowered = copter and returns_m is not None
     top_m, why = extent.top_rel_home_m, "the highest place of the flight above home, errors counted"
-    if lowered and returns_m is not None and returns_m + MARGIN_M > top_m:
-        top_m, why = returns_m + MARGIN_M, f"a return at {returns_m:g} m keeps FENCE_MARGIN below this"
+    if lowered and returns_m is not None and returns_m + FENCE_MARGIN_M > top_m:
+        top_m, why = returns_m + FENCE_MARGIN_M, f"a return at {returns_m:g} m keeps FENCE_MARGIN below this"
     matters: Matters = "return" if lowered else "flight"
     yield Setting(known["fence_top"], float(math.ceil(top_m)), "at least", why, matters)
     if lowered:
         yield Setting(
-            known["fence_margin"], MARGIN_M, "at most", "how far below FENCE_ALT_MAX a return keeps", "return"
+            known["fence_margin"], FENCE_MARGIN_M, "at most", "how far below FENCE_ALT_MAX a return keeps", "return"
         )
     if autopilot is not Autopilot.PX4:
         why = "the lowest place of the flight, from home, errors counted"

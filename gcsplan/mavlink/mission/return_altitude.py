@@ -10,6 +10,7 @@ import math
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
 
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 
 
@@ -67,24 +68,18 @@ def return_on_board_m(values: Mapping[str, float]) -> float | None:
     return height_m if math.isfinite(height_m) and height_m >= 0.0 else None
 
 
-def returns_otherwise(values: Mapping[str, float]) -> str:
-    """Why a vehicle with these parameters returns otherwise than straight home, in words; empty if it does not.
+def returns_otherwise(values: Mapping[str, float]) -> Note | None:
+    """Why a vehicle with these parameters returns otherwise than straight home; None if it does not.
 
     Only PX4 has such parameters: RTL_TYPE above 0 returns along the mission, to its landing or to rally points alone,
     and RTL_CONE_ANG above 45° returns lower near home than is judged.
     """
     kind, cone_deg = values.get("RTL_TYPE", 0.0), values.get("RTL_CONE_ANG", 0.0)
     if kind != 0.0:
-        return (
-            f"RTL_TYPE is {kind:g} on board: the return is not straight home (or to the nearest rally point), as it is "
-            f"judged: set RTL_TYPE 0"
-        )
+        return Note("return_type_not_judged", value=kind)
     if cone_deg > PX4_CONE_DEG:
-        return (
-            f"RTL_CONE_ANG is {cone_deg:g} on board: within RTL_MIN_DIST of home the return may be lower than with "
-            f"{PX4_CONE_DEG:g}°, as it is judged: set RTL_CONE_ANG {PX4_CONE_DEG:g}"
-        )
-    return ""
+        return Note("return_cone_not_judged", value=cone_deg, judged_deg=PX4_CONE_DEG)
+    return None
 
 
 def setting(autopilot: Autopilot, rel_home_m: float) -> str:

@@ -15,9 +15,10 @@ from typing import Literal
 from gcsplan.mavlink.mission.commands import DO_LAND_START, DO_RETURN_PATH_START
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.parameter_names import unanswered
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 
-Route = Literal["straight", "mission"]
+ReturnRoute = Literal["straight", "mission"]
 
 AUTO_RTL = 6.0
 COPTER_RETURNS: dict[str, tuple[float, ...]] = {
@@ -52,57 +53,46 @@ def route_setting(autopilot: Autopilot, *, path: bool) -> str:
     return f"{', '.join(COPTER_RETURNS)} {AUTO_RTL:g} (Auto RTL)"
 
 
-def takes_another_route(values: Mapping[str, float], mission: Mission, route: Route | None) -> str:
-    """Why a vehicle with these parameters returns by another route than ``route``, in words; empty if it does not.
+def takes_another_route(values: Mapping[str, float], mission: Mission, route: ReturnRoute | None) -> Note | None:
+    """Why a vehicle with these parameters returns by another route than ``route``; None if it does not.
 
     ``values`` are what was read; a parameter that decides and is not among them counts as wrong.
     """
     held = starts(mission)
     if not held or mission.autopilot is Autopilot.PX4:
-        return ""
+        return None
     path = "DO_RETURN_PATH_START" in held
     if mission.autopilot is Autopilot.ARDUPLANE:
         return _plane(values.get("RTL_AUTOLAND"), held, path, route)
     silent = [group[0] for group in unanswered(values, deciding(mission))]
     if silent and len(silent) < len(COPTER_RETURNS):
-        return f"{', '.join(silent)} could not be read: whether the return joins the mission is not known"
+        return Note("return_route_unread", names=tuple(silent))
     if route != "mission":
         on = [name for name in COPTER_RETURNS if values.get(name) == AUTO_RTL]
         if not on:
-            return ""
-        return (
-            f"{', '.join(on)} is {AUTO_RTL:g} on board: the return joins the mission at {held[0]}, and was judged "
-            f"straight home: set 1 or 2 (RTL), or judge it with return_route: mission"
-        )
-    other = [f"{name} {values[name]:g}" for name, wrong in COPTER_RETURNS.items() if values.get(name) in wrong]
+            return None
+        return Note("return_joins_mission", names=tuple(on), value=AUTO_RTL, start=held[0])
+    other = [
+        Note("key_and_value", name=name, value=values[name])
+        for name, wrong in COPTER_RETURNS.items()
+        if values.get(name) in wrong
+    ]
     if len(silent) == len(COPTER_RETURNS):
-        return f"none of {', '.join(silent)} could be read: whether the return joins the mission is not known"
+        return Note("return_route_all_unread", names=tuple(silent))
     if not other:
-        return ""
-    return (
-        f"{', '.join(other)} on board: such a return does not join the mission at {held[0]}, as it was judged: set "
-        f"{AUTO_RTL:g} (Auto RTL)"
-    )
+        return None
+    return Note("return_joins_no_mission", settings=tuple(other), value=AUTO_RTL, start=held[0])
 
 
-def _plane(value: float | None, held: tuple[str, ...], path: bool, route: Route | None) -> str:
+def _plane(value: float | None, held: tuple[str, ...], path: bool, route: ReturnRoute | None) -> Note | None:
     if value is None:
-        return "RTL_AUTOLAND could not be read: whether the return joins the mission is not known"
+        return Note("return_route_unread", names=("RTL_AUTOLAND",))
     if value == 0.0:
-        wanted = "3" if route != "mission" else f"{AUTOLAND_PATH if path else AUTOLAND_LANDING:g}"
-        return (
-            f"RTL_AUTOLAND is 0 on board: with {held[0]} in its mission ArduPlane does not arm: set RTL_AUTOLAND "
-            f"{wanted}"
-        )
+        wanted = 3.0 if route != "mission" else AUTOLAND_PATH if path else AUTOLAND_LANDING
+        return Note("plane_does_not_arm", start=held[0], wanted=wanted)
     wanted_value = AUTOLAND_PATH if path else AUTOLAND_LANDING
     if route == "mission" and value != wanted_value:
-        return (
-            f"RTL_AUTOLAND is {value:g} on board, and the return was judged as with {wanted_value:g}: set "
-            f"RTL_AUTOLAND {wanted_value:g}"
-        )
+        return Note("plane_returns_otherwise", value=value, wanted=wanted_value)
     if route != "mission" and value not in STRAIGHT_AUTOLAND:
-        return (
-            f"RTL_AUTOLAND is {value:g} on board: the return leads on to {held[0]}, and was judged straight home: set "
-            f"RTL_AUTOLAND 3, or judge it with return_route: mission"
-        )
-    return ""
+        return Note("plane_return_leads_on", value=value, start=held[0])
+    return None

@@ -8,13 +8,11 @@ commands were also uploaded to an ArduCopter 4.6.0 in SITL and read back.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 from gcsplan.mavlink.mission import commands as cmd
-from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, NO_POSITION, MissionItem, float32
+from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, NO_POSITION, MissionItem, NumberKept, float32
 
-Keep = Callable[[float], float]
 Params = tuple[float, float, float, float]
 FLT_EPSILON = 1.1920929e-07
 _CM_PER_M = 100.0
@@ -112,22 +110,22 @@ def read_back_altitudes(cm: int) -> tuple[float, float]:
 # ── the table ─────────────────────────────────────────────────────────────────────────────────────────────────────
 
 
-class Rule(NamedTuple):
+class StorageRule(NamedTuple):
     """What is stored of param1 … param4; ``located``: latitude, longitude, altitude and frame are stored too."""
 
     located: bool
-    params: tuple[Keep, Keep, Keep, Keep]
+    params: tuple[NumberKept, NumberKept, NumberKept, NumberKept]
 
 
-def _at(p1: Keep = _lost, p2: Keep = _lost, p3: Keep = _lost, p4: Keep = _lost) -> Rule:
-    return Rule(True, (p1, p2, p3, p4))
+def _at(p1: NumberKept = _lost, p2: NumberKept = _lost, p3: NumberKept = _lost, p4: NumberKept = _lost) -> StorageRule:
+    return StorageRule(True, (p1, p2, p3, p4))
 
 
-def _do(p1: Keep = _lost, p2: Keep = _lost, p3: Keep = _lost, p4: Keep = _lost) -> Rule:
-    return Rule(False, (p1, p2, p3, p4))
+def _do(p1: NumberKept = _lost, p2: NumberKept = _lost, p3: NumberKept = _lost, p4: NumberKept = _lost) -> StorageRule:
+    return StorageRule(False, (p1, p2, p3, p4))
 
 
-RULES: dict[int, Rule] = {
+STORAGE_RULES: dict[int, StorageRule] = {
     cmd.WAYPOINT: _at(_u16),  # hold (ArduPlane: `_PLANE_WAYPOINT`)
     cmd.LOITER_UNLIM: _at(p3=_radius_u16),
     cmd.LOITER_TURNS: _at(),  # `_loiter_turns`
@@ -197,7 +195,7 @@ NAN_TAKEN = {
 }  # fmt: skip
 """Indices of the params that may be NaN, by command (`mavlink_int_to_mission_cmd`, `sanity_check_params`)."""
 
-_FRAMES = (0, 2, 3, 5, 6, 10, 11)
+_FRAMES_KEPT = (0, 2, 3, 5, 6, 10, 11)
 
 
 def refused_by_copter(item: MissionItem) -> str:
@@ -205,10 +203,10 @@ def refused_by_copter(item: MissionItem) -> str:
     for index, value in enumerate(item.params):
         if math.isinf(value) or (math.isnan(value) and index not in NAN_TAKEN.get(item.command, ())):
             return f"ArduPilot refuses param{index + 1} of command {item.command}, which is {value}"
-    rule = RULES.get(item.command)
+    rule = STORAGE_RULES.get(item.command)
     if rule is None or not rule.located:
         return ""
-    if item.frame not in _FRAMES:
+    if item.frame not in _FRAMES_KEPT:
         return f"ArduPilot takes no item in frame {item.frame}"
     return f"ArduPilot refuses an altitude of {item.z}" if math.isnan(item.z) else ""
 
@@ -222,15 +220,15 @@ def refused_by_plane(item: MissionItem) -> str:
 
 def stored_by_copter(item: MissionItem) -> MissionItem:
     """Return ``item`` as it reads back from ArduCopter."""
-    return _stored(item, RULES.get(item.command))
+    return _stored(item, STORAGE_RULES.get(item.command))
 
 
 def stored_by_plane(item: MissionItem) -> MissionItem:
     """Return ``item`` as it reads back from ArduPlane."""
-    return _stored(item, _PLANE_WAYPOINT if item.command == cmd.WAYPOINT else RULES.get(item.command))
+    return _stored(item, _PLANE_WAYPOINT if item.command == cmd.WAYPOINT else STORAGE_RULES.get(item.command))
 
 
-def _stored(item: MissionItem, rule: Rule | None) -> MissionItem:
+def _stored(item: MissionItem, rule: StorageRule | None) -> MissionItem:
     frame = FRAME_SYNONYMS.get(item.frame, item.frame)
     if item.command in _FENCE_VERTEX or item.command in _FENCE_CIRCLE or item.command == cmd.FENCE_RETURN_POINT:
         return _stored_fence(item)

@@ -7,12 +7,19 @@ Source: PX4 1.15, ``mavlink_mission.cpp`` (`parse_mavlink_mission_item`, `format
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 from gcsplan.mavlink.mission import commands as cmd
-from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, GLOBAL, NO_POSITION, RELATIVE, TERRAIN, MissionItem, float32
+from gcsplan.mavlink.mission.mission import (
+    FRAME_SYNONYMS,
+    GLOBAL,
+    NO_POSITION,
+    RELATIVE,
+    TERRAIN,
+    MissionItem,
+    NumberKept,
+    float32,
+)
 
-Keep = Callable[[float], float]
 _RADIANS_PER_DEGREE = float32(float32(math.pi) / 180.0)
 _DEGREES_PER_RADIAN = float32(180.0 / float32(math.pi))
 _FULL_TURN = float32(2.0 * math.pi)
@@ -54,8 +61,8 @@ def yaw(degrees: float) -> float:
     return float32(radians * _DEGREES_PER_RADIAN)
 
 
-_Rule = tuple[Keep, Keep, Keep, Keep]
-_NOTHING: _Rule = (_lost, _lost, _lost, _lost)
+_Rule = tuple[NumberKept, NumberKept, NumberKept, NumberKept]
+_NOTHING_KEPT: _Rule = (_lost, _lost, _lost, _lost)
 _YAW: _Rule = (_lost, _lost, _lost, yaw)
 
 LOCATED: dict[int, _Rule] = {
@@ -65,20 +72,20 @@ LOCATED: dict[int, _Rule] = {
     cmd.LAND: (_lost, _u16, _lost, yaw),  # precision
     cmd.TAKEOFF: _YAW,
     cmd.LOITER_TO_ALT: (_flag, _f32, _lost, _flag),
-    cmd.ROI: _NOTHING,
+    cmd.ROI: _NOTHING_KEPT,
     cmd.VTOL_TAKEOFF: _YAW,
     cmd.VTOL_LAND: _YAW,
-    cmd.DO_SET_ROI_LOCATION: _NOTHING,
-    cmd.DO_SET_ROI: _NOTHING,  # with a location
-    cmd.DO_AUTOTUNE_ENABLE: _NOTHING,
-    cmd.COMPONENT_ARM_DISARM: _NOTHING,
-    cmd.CONDITION_GATE: _NOTHING,
-    cmd.FENCE_RETURN_POINT: _NOTHING,
+    cmd.DO_SET_ROI_LOCATION: _NOTHING_KEPT,
+    cmd.DO_SET_ROI: _NOTHING_KEPT,  # with a location
+    cmd.DO_AUTOTUNE_ENABLE: _NOTHING_KEPT,
+    cmd.COMPONENT_ARM_DISARM: _NOTHING_KEPT,
+    cmd.CONDITION_GATE: _NOTHING_KEPT,
+    cmd.FENCE_RETURN_POINT: _NOTHING_KEPT,
     cmd.POLYGON_IN: (_vertices, _lost, _lost, _lost),
     cmd.POLYGON_OUT: (_vertices, _lost, _lost, _lost),
     cmd.CIRCLE_IN: (_f32, _lost, _lost, _lost),
     cmd.CIRCLE_OUT: (_f32, _lost, _lost, _lost),
-    cmd.RALLY_POINT: _NOTHING,
+    cmd.RALLY_POINT: _NOTHING_KEPT,
 }
 """What is stored of param1 … param4 of commands with a location (frames 0 and 3, also as 5 and 6)."""
 
@@ -97,7 +104,7 @@ PLACELESS = frozenset(
 )  # fmt: skip
 """Commands that PX4 accepts in MAV_FRAME_MISSION (2); those that are not in `LOCATED`, in no other frame."""
 
-FENCE_AND_RALLY = frozenset({cmd.POLYGON_IN, cmd.POLYGON_OUT, cmd.CIRCLE_IN, cmd.CIRCLE_OUT, cmd.RALLY_POINT})
+KEPT_WHOLE = frozenset({cmd.POLYGON_IN, cmd.POLYGON_OUT, cmd.CIRCLE_IN, cmd.CIRCLE_OUT, cmd.RALLY_POINT})
 _FENCE = range(cmd.FENCE_RETURN_POINT, cmd.CIRCLE_OUT + 1)
 
 YAW_COMMANDS = frozenset(command for command, rule in LOCATED.items() if rule[3] is yaw)
@@ -109,7 +116,7 @@ def refused_by_px4(item: MissionItem) -> str:
     frame = FRAME_SYNONYMS.get(item.frame, item.frame)
     if frame not in (GLOBAL, RELATIVE, NO_POSITION):
         return f"PX4 takes no item in frame {item.frame}" + (" (above terrain)" if frame == TERRAIN else "")
-    if item.command in FENCE_AND_RALLY:
+    if item.command in KEPT_WHOLE:
         return f"PX4 takes command {item.command} in a fence or among rally points alone"
     known = PLACELESS if frame == NO_POSITION else LOCATED
     if item.command in known:

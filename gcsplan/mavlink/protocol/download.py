@@ -29,7 +29,14 @@ from typing import Any, ClassVar
 
 from gcsplan.figures import counted
 from gcsplan.mavlink.mission.mission import MISSION, MissionItem
-from gcsplan.mavlink.protocol.machine import CANCELLED_BY_US, Label, Machine, Progress, Timers, checked_type
+from gcsplan.mavlink.protocol.machine import (
+    CANCELLED_BY_US,
+    Machine,
+    StateLabel,
+    Timers,
+    TransferProgress,
+    checked_type,
+)
 from gcsplan.mavlink.protocol.messages import (
     Ack,
     Address,
@@ -48,7 +55,7 @@ from gcsplan.mavlink.protocol.outcome import (
     ERROR,
     INVALID,
     INVALID_SEQUENCE,
-    OURS,
+    OUR_REFUSAL,
     UNSUPPORTED,
     Accepted,
     Outcome,
@@ -62,7 +69,7 @@ _MOST_ITEMS = 65535
 _RESTARTS = 16  # × pauses of 1.5 s: much longer than the 8 s for which ArduPilot denies after a broken upload
 
 
-class State(Label):
+class DownloadState(StateLabel):
     """The states of a download."""
 
     IDLE = auto()
@@ -72,7 +79,7 @@ class State(Label):
     ENDED = auto()
 
 
-class Event(Label):
+class DownloadEvent(StateLabel):
     """The events of a download."""
 
     START = auto()
@@ -87,7 +94,7 @@ class Event(Label):
     CANCEL = auto()
 
 
-S, E = State, Event
+S, E = DownloadState, DownloadEvent
 
 
 class Download(Machine):
@@ -145,9 +152,9 @@ class Download(Machine):
         return tuple(self._items)
 
     @property
-    def progress(self) -> Progress:
+    def progress(self) -> TransferProgress:
         """Items read so far."""
-        return Progress("read back", len(self._items), self._count or 0)
+        return TransferProgress("read back", len(self._items), self._count or 0)
 
     def start(self, now: float) -> list[Packet]:
         """Send REQUEST_LIST."""
@@ -202,7 +209,7 @@ class Download(Machine):
             self._count = message.count
             if message.count > self._most:
                 words = f"it announces {counted(message.count, 'item')}, and can hold at most {self._most}"
-                self._end(E.REFUSED, Refused(OURS, None, words))
+                self._end(E.REFUSED, Refused(OUR_REFUSAL, None, words))
                 return []
             if message.count == 0:
                 return self._finish(E.EMPTY)
@@ -232,7 +239,7 @@ class Download(Machine):
             return []
         return self._ask_item(now)
 
-    def _finish(self, event: Event) -> list[Packet]:
+    def _finish(self, event: DownloadEvent) -> list[Packet]:
         self._end(event, Accepted(self.opaque_id))
         return [self._to_vehicle(Ack(ACCEPTED, self.mission_type))]
 

@@ -46,7 +46,7 @@ class Timers:
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
+class TransferProgress:
     """``done`` of ``total`` items are transferred; ``phase`` is one of: upload, read back, clear."""
 
     phase: str
@@ -72,7 +72,7 @@ def always(now: float) -> None:
 CANCELLED_BY_US = "cancelled by us"
 
 
-class Label(Enum):
+class StateLabel(Enum):
     """A state or an event. Each member exists once, so its identity serves as its hash, which is fast."""
 
     __hash__ = object.__hash__
@@ -89,7 +89,14 @@ class Machine:
     TABLE: ClassVar[Mapping[tuple[Any, Any], Any]]
 
     def __init__(
-        self, *, us: Address, vehicle: Address, mission_type: int, timers: Timers, state: Label, gate: Gate = always
+        self,
+        *,
+        us: Address,
+        vehicle: Address,
+        mission_type: int,
+        timers: Timers,
+        state: StateLabel,
+        gate: Gate = always,
     ) -> None:
         self.us = us
         self.vehicle = vehicle
@@ -143,7 +150,7 @@ class Machine:
         return (self.progress.done,)
 
     @property
-    def progress(self) -> Progress:
+    def progress(self) -> TransferProgress:
         """Items transferred so far."""
         raise NotImplementedError
 
@@ -151,7 +158,7 @@ class Machine:
         """End with ``outcome`` and send nothing, because the link may lead to another vehicle by now."""
         raise NotImplementedError
 
-    def _step(self, event: Label) -> None:
+    def _step(self, event: StateLabel) -> None:
         try:
             self._state = self.TABLE[self._state, event]
         except KeyError:
@@ -159,7 +166,7 @@ class Machine:
                 f"{self.ROLE}: {event.name} is impossible in state {self._state.name}", where=f"vehicle {self.vehicle}"
             ) from None
 
-    def _end(self, event: Label, outcome: Outcome) -> None:
+    def _end(self, event: StateLabel, outcome: Outcome) -> None:
         self._step(event)
         self.outcome, self._deadline = outcome, None
 

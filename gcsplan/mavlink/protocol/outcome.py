@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, NO_SPACE, INVALID = 0, 1, 2, 3, 4, 5
 INVALID_SEQUENCE, DENIED, CANCELLED = 13, 14, 15
-OURS = -1
+OUR_REFUSAL = -1
 """Not a MAV_MISSION_RESULT: we refuse what the vehicle announces."""
 
 _CODES: dict[int, tuple[str, str]] = {
@@ -59,7 +59,7 @@ class Accepted:
 class Refused:
     """The vehicle refused: MAV_MISSION_RESULT ``code``, and ``seq`` of the item at fault where it is known.
 
-    ``what`` replaces the standard words for the code. ``code`` is `OURS` where we refused.
+    ``what`` replaces the standard words for the code. ``code`` is `OUR_REFUSAL` where we refused.
     """
 
     code: int
@@ -73,7 +73,7 @@ class Refused:
         return words if self.seq is None else f"item {self.seq}: {words}"
 
     def __str__(self) -> str:
-        if self.code == OURS:
+        if self.code == OUR_REFUSAL:
             return f"refused: {self.reason}"
         cure = code_cure(self.code)
         return f"refused: {self.reason} (MAV_MISSION_RESULT {self.code})" + (f"; {cure}" if cure else "")

@@ -27,8 +27,8 @@ from gcsplan.mavlink.protocol.machine import (
     Gate,
     ImpossibleTransition,
     Machine,
-    Progress,
     Timers,
+    TransferProgress,
     always,
 )
 from gcsplan.mavlink.protocol.messages import Address, Item, Packet
@@ -44,10 +44,10 @@ __all__ = [
     "ImpossibleTransition",
     "Machine",
     "Outcome",
-    "Progress",
     "Refused",
     "Settled",
     "Timers",
+    "TransferProgress",
     "Unknown",
     "Upload",
     "VerifiedUpload",
@@ -135,7 +135,7 @@ class VerifiedUpload:
         return child.deadline if child else None
 
     @property
-    def progress(self) -> Progress:
+    def progress(self) -> TransferProgress:
         """Progress of the machine that runs now."""
         child = self._child or self._download or self._upload
         return child.progress

@@ -31,10 +31,10 @@ from gcsplan.mavlink.mission.mission import ALL, MISSION, MissionItem
 from gcsplan.mavlink.protocol.machine import (
     CANCELLED_BY_US,
     Gate,
-    Label,
     Machine,
-    Progress,
+    StateLabel,
     Timers,
+    TransferProgress,
     Wait,
     always,
     checked_type,
@@ -56,7 +56,7 @@ from gcsplan.mavlink.protocol.outcome import (
 _MOST_ITEMS = 65535
 
 
-class State(Label):
+class UploadState(StateLabel):
     """The states of an upload or a clearing."""
 
     IDLE = auto()
@@ -67,7 +67,7 @@ class State(Label):
     ENDED = auto()
 
 
-class Event(Label):
+class UploadEvent(StateLabel):
     """The events of an upload or a clearing."""
 
     START = auto()
@@ -80,7 +80,7 @@ class Event(Label):
     CANCEL = auto()
 
 
-S, E = State, Event
+S, E = UploadState, UploadEvent
 
 
 class Upload(Machine):
@@ -145,9 +145,9 @@ class Upload(Machine):
         self.barred = False  # whether the gate ended the upload
 
     @property
-    def progress(self) -> Progress:
+    def progress(self) -> TransferProgress:
         """Items that the vehicle has requested so far."""
-        return Progress("upload", len(self._asked), len(self.items))
+        return TransferProgress("upload", len(self._asked), len(self.items))
 
     @property
     def began(self) -> bool:
@@ -296,9 +296,9 @@ class Clear(Machine):
         self._asked = 0
 
     @property
-    def progress(self) -> Progress:
+    def progress(self) -> TransferProgress:
         """0 of 1 until the end, then 1 of 1."""
-        return Progress("clear", int(self.outcome is not None), 1)
+        return TransferProgress("clear", int(self.outcome is not None), 1)
 
     def start(self, now: float) -> list[Packet]:
         """Send CLEAR_ALL as soon as the gate permits."""

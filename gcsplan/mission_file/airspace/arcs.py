@@ -12,13 +12,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from gcsplan.errors import InputError
-from gcsplan.world.degree_shapes import LARGEST_RADIUS_M
+from gcsplan.world.degree_shapes import LARGEST_RADIUS_M, Corner
 from gcsplan.world.frame import EARTH_RADIUS_M, Frame
 
-Corner = tuple[float, float]
-"""(latitude, longitude), degrees."""
-
-SAGITTA_M = 3.0
+ARC_SAGITTA_M = 3.0
 WIDEST_STEP = math.radians(10.0)
 
 UNEVEN_M, UNEVEN_PART = 1000.0, 0.1
@@ -70,7 +67,7 @@ class Arc:
     @property
     def pieces(self) -> int:
         """How many straight pieces the arc is drawn with; it has up to four corners more."""
-        step = min(WIDEST_STEP, 2.0 * math.acos(1.0 - min(SAGITTA_M / max(self.radii_m), 0.5)))
+        step = min(WIDEST_STEP, 2.0 * math.acos(1.0 - min(ARC_SAGITTA_M / max(self.radii_m), 0.5)))
         return max(1, math.ceil(abs(self.sweep) / step))
 
     def corners(self, outward: bool | None) -> list[Corner]:

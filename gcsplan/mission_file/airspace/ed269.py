@@ -16,16 +16,17 @@ from gcsplan.mission_file.airspace.members import (
     unread,
     word,
 )
-from gcsplan.mission_file.airspace.policy import ASKED, UNREAD_TIMES, Policy, Published
+from gcsplan.mission_file.airspace.policy import UNREAD_TIMES, Policy, Published
 from gcsplan.mission_file.airspace.times import read_periods
-from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
+from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, VolumeLimits
 from gcsplan.mission_file.zone_attributes import is_number, shown
 from gcsplan.mission_file.zone_draft import Remark
 from gcsplan.mission_file.zone_file import ZoneFile
+from gcsplan.notes.note import Note
 
-KINDS = ("PROHIBITED", "REQ_AUTHORISATION", "CONDITIONAL", "NO_RESTRICTION")
-FREE = frozenset({"NO_RESTRICTION"})
-MEMBERS = frozenset({
+RESTRICTIONS = ("PROHIBITED", "REQ_AUTHORISATION", "CONDITIONAL", "NO_RESTRICTION")
+FREE_RESTRICTIONS = frozenset({"NO_RESTRICTION"})
+ZONE_MEMBERS = frozenset({
     "identifier", "country", "name", "type", "restriction", "restrictionConditions", "region", "reason",
     "otherReasonInfo", "regulationExemption", "uSpaceClass", "message", "applicability", "zoneAuthority", "geometry",
     "extendedProperties", "limitedApplicability", "variant", "uspaceClass", "dataSource",
@@ -36,9 +37,7 @@ VOLUME = frozenset({
     "uomDimensions", "lowerLimit", "lowerVerticalReference", "upperLimit", "upperVerticalReference",
     "horizontalProjection",
 })  # fmt: skip
-SHAPE = {"Circle": frozenset({"type", "center", "radius"}), "Polygon": frozenset({"type", "coordinates"})}
-
-CONDITIONS = "these zones may be entered under conditions, which are not judged: they are no-fly"
+SHAPE_MEMBERS = {"Circle": frozenset({"type", "center", "radius"}), "Polygon": frozenset({"type", "coordinates"})}
 
 
 def is_ed269(whole: Any) -> bool:
@@ -63,7 +62,7 @@ def _volumes_of(feature: Any) -> bool:
 def read_ed269(path: Path, whole: Any, policy: Policy) -> ZoneFile:
     """The zones of an ED-269 document; what is wrong is in their problems and faults."""
     key, features = _list_of(whole)
-    file = AirspaceFile(path, policy, KINDS, great_circles=True)
+    file = AirspaceFile(path, policy, RESTRICTIONS, great_circles=True)
     if isinstance(whole, dict) and key == "features" and whole.get("UASZoneList"):
         file.fault(f"{path}: UASZoneList", "the file has a list of features, too; write the zones of both into one")
     return read_features(file, features, key, _feature)
@@ -92,14 +91,14 @@ def published(feature: dict[str, Any], kind: Any, key: str, times: Any, fallback
     restriction = word(kind, f"zone {name[:60]!r}: {key}").upper()
     periods, why = read_periods(times)
     remarks: list[Remark] = [(UNREAD_TIMES, why)] if why else []
-    remarks += unread(feature, MEMBERS)
+    remarks += unread(feature, ZONE_MEMBERS)
     if restriction in ("REQ_AUTHORISATION", "REQ_AUTHORIZATION"):
-        remarks.append((ASKED, authority_of(feature.get("zoneAuthority"))))
+        remarks.append((Note("zone_needs_authorisation"), authority_of(feature.get("zoneAuthority"))))
     elif restriction == "CONDITIONAL":
         conditions = feature.get("restrictionConditions")
         joined = ", ".join(str(c) for c in conditions) if isinstance(conditions, list) else text_of(conditions)
-        remarks.append((CONDITIONS, joined[:60]))
-    return Published(name, (restriction,), restriction not in FREE, identifier, periods, tuple(remarks))
+        remarks.append((Note("zone_conditions_not_judged"), joined[:60]))
+    return Published(name, (restriction,), restriction not in FREE_RESTRICTIONS, identifier, periods, tuple(remarks))
 
 
 def _volume(file: AirspaceFile, zone: Published, part: str, volume: Any, where: str) -> None:
@@ -107,10 +106,10 @@ def _volume(file: AirspaceFile, zone: Published, part: str, volume: Any, where: 
     if not isinstance(shape, dict):
         raise MemberError(f"a volume has a horizontalProjection, given {shown(volume)}")
     unit = volume.get("uomDimensions") or ""
-    limits = Limits.read(_limit(volume, "lower", unit), _limit(volume, "upper", unit), where, policy=file.policy)
+    limits = VolumeLimits.read(_limit(volume, "lower", unit), _limit(volume, "upper", unit), where, policy=file.policy)
     kind = shape.get("type")
     limits.remarks += unread(volume, VOLUME, all_of_them=True)
-    limits.remarks += unread(shape, SHAPE.get(str(kind), ()), all_of_them=True)
+    limits.remarks += unread(shape, SHAPE_MEMBERS.get(str(kind), ()), all_of_them=True)
     if kind == "Circle":
         radius: Any = shape.get("radius")
         if not is_number(radius):

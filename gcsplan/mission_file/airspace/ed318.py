@@ -16,13 +16,13 @@ from gcsplan.mission_file.airspace.members import (
     unread,
 )
 from gcsplan.mission_file.airspace.policy import Policy, Published
-from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
+from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, VolumeLimits
 from gcsplan.mission_file.zone_attributes import is_number, shown
 from gcsplan.mission_file.zone_file import ZoneFile
 
-KINDS = ("USPACE", "PROHIBITED", "REQ_AUTHORIZATION", "CONDITIONAL", "NO_RESTRICTION")
+ZONE_TYPES = ("USPACE", "PROHIBITED", "REQ_AUTHORIZATION", "CONDITIONAL", "NO_RESTRICTION")
 REQUIRED = frozenset({"identifier", "country", "type", "variant"})
-SHAPE = frozenset({"type", "coordinates", "layer", "bbox"})
+GEOMETRY_MEMBERS = frozenset({"type", "coordinates", "layer", "bbox"})
 LAYER_MEMBERS = frozenset({"lower", "lowerReference", "upper", "upperReference", "uom"})
 MOST_GEOMETRIES = 1000
 
@@ -49,7 +49,7 @@ def _required(feature: Any) -> bool:
 
 def read_ed318(path: Path, whole: Any, policy: Policy) -> ZoneFile:
     """The zones of an ED-318 collection; what is wrong is in their problems and faults."""
-    return read_features(AirspaceFile(path, policy, KINDS), _features(whole), "features", _feature)
+    return read_features(AirspaceFile(path, policy, ZONE_TYPES), _features(whole), "features", _feature)
 
 
 def _feature(file: AirspaceFile, feature: Any, where: str, fallback: str) -> None:
@@ -81,7 +81,7 @@ def _geometry(file: AirspaceFile, zone: Published, part: str, geometry: Any, sha
         raise MemberError(f"the zone has no geometry, given {shown(geometry)}")
     limits = _limits(geometry.get("layer", shared), where, file.policy)
     kind = geometry.get("type")
-    limits.remarks += unread(geometry, SHAPE | ({"extent"} if kind == "Point" else set()), all_of_them=True)
+    limits.remarks += unread(geometry, GEOMETRY_MEMBERS | ({"extent"} if kind == "Point" else set()), all_of_them=True)
     if kind == "Point":
         extent = geometry.get("extent")
         radius: Any = None
@@ -96,10 +96,10 @@ def _geometry(file: AirspaceFile, zone: Published, part: str, geometry: Any, sha
         raise MemberError(f"the geometry must be a Polygon, a MultiPolygon or a Point with extent, given {shown(kind)}")
 
 
-def _limits(layer: Any, where: str, policy: Policy) -> Limits:
+def _limits(layer: Any, where: str, policy: Policy) -> VolumeLimits:
     """The limits of a layer; without one there are none, and without a unit they are metres, as the standard says."""
     if layer is None:
-        return Limits()
+        return VolumeLimits()
     if not isinstance(layer, dict):
         raise MemberError(f"layer must be an object, given {shown(layer)}")
     unit = layer.get("uom") or "m"
@@ -109,6 +109,6 @@ def _limits(layer: Any, where: str, policy: Policy) -> Limits:
         value = number_or_none(layer.get(side), f"layer.{side}")
         words = (str(unit)[:40], str(layer.get(f"{side}Reference") or "")[:40])
         given.append(None if value is None else Given(value, words, (), side))
-    found = Limits.read(given[0], given[1], where, policy=policy)
+    found = VolumeLimits.read(given[0], given[1], where, policy=policy)
     found.remarks += remarks
     return found

@@ -7,19 +7,15 @@ from collections.abc import Sequence
 from pathlib import PurePath
 
 from gcsplan.errors import Problem
-from gcsplan.figures import counted
-from gcsplan.mission_file.airspace.times import OUT_OF_HOURS
 from gcsplan.mission_file.zone_draft import ZoneDraft, one_line
-from gcsplan.world.frame import Frame
+from gcsplan.notes.note import Note
+from gcsplan.world.frame import Box, Frame
 from gcsplan.world.zones import Zone
-
-Box = tuple[float, float, float, float]
-"""West, south, east, north, m."""
 
 TURNS = (-720.0, -360.0, 0.0, 360.0, 720.0)
 """Whole turns by which a longitude may be written otherwise than the frame's, degrees."""
 
-NEAR_M = 5000.0
+NAMED_WITHIN_M = 5000.0
 """Zones this near to the mission's surroundings are named at least, m."""
 
 
@@ -39,18 +35,19 @@ def used(drafts: Sequence[ZoneDraft]) -> list[ZoneDraft]:
 
 def left_out_by_hours(drafts: Sequence[ZoneDraft]) -> bool:
     """Whether a zone is not used because it does not apply in the hours of the mission."""
-    return any(d.unused.startswith(OUT_OF_HOURS) for d in drafts)
+    return any(d.unused is not None and d.unused.code == "zones_out_of_hours" for d in drafts)
 
 
-def unused_notes(drafts: Sequence[ZoneDraft], frame: Frame, box: Box) -> list[str]:
+def unused_notes(drafts: Sequence[ZoneDraft], frame: Frame, box: Box) -> list[Note]:
     """A note for each reason, with the name of every zone near the mission that is not used for it.
 
-    Near is as far around the mission's surroundings as they extend, and at least `NEAR_M`; zones beyond are counted.
+    Near is as far around the mission's surroundings as they extend, and at least `NAMED_WITHIN_M`; zones beyond are
+    counted.
     """
     unused = [d for d in drafts if d.unused]
     if not unused:
         return []
-    reach_m = max(box[2] - box[0], box[3] - box[1], NEAR_M)
+    reach_m = max(box[2] - box[0], box[3] - box[1], NAMED_WITHIN_M)
     wider = (box[0] - reach_m, box[1] - reach_m, box[2] + reach_m, box[3] + reach_m)
     edges = frame.to_degrees(*zip(*_border(wider), strict=True))
     turned = (edges[:, 1] - frame.lon_deg + 180.0) % 360.0 - 180.0
@@ -58,23 +55,24 @@ def unused_notes(drafts: Sequence[ZoneDraft], frame: Frame, box: Box) -> list[st
     near = [draft for draft in unused if _is_near(draft, frame, window)]
     notes = _reasons(near)
     if len(near) < len(unused):
-        notes.append(f"not used: {counted(len(unused) - len(near), 'further zone')} far from the mission")
+        notes.append(Note("zones_unused_far_away", count=len(unused) - len(near)))
     return notes
 
 
-def listed(drafts: Sequence[ZoneDraft]) -> tuple[list[ZoneDraft], list[str]]:
+def listed(drafts: Sequence[ZoneDraft]) -> tuple[list[ZoneDraft], list[Note]]:
     """The zones that are no-fly, and notes on all others and on what is not understood, wherever they lie."""
-    faults = [f"{fault.where}: {fault.message}" for draft in drafts for fault in draft.faults]
+    faults = [Note("zone_not_understood", where=p.where, why=p.message) for draft in drafts for p in draft.faults]
     return used(drafts), [*_reasons([d for d in drafts if d.unused]), *dict.fromkeys(faults)]
 
 
-def _reasons(unused: Sequence[ZoneDraft]) -> list[str]:
+def _reasons(unused: Sequence[ZoneDraft]) -> list[Note]:
     """A note for each file and reason, with the names of all zones that are not used for it."""
-    about: dict[tuple[str, str], list[str]] = {}
+    about: dict[Note, list[str]] = {}
     for draft in unused:
-        file = PurePath(draft.where.split(": ", 1)[0]).name
-        about.setdefault((file, draft.unused), []).append(one_line(draft.name))
-    return [f"{file}: not used, because {why}: {', '.join(names)}" for (file, why), names in about.items()]
+        if draft.unused is not None:
+            why = draft.unused.of(file=PurePath(draft.where.split(": ", 1)[0]).name)
+            about.setdefault(why, []).append(one_line(draft.name))
+    return [why.of(zones=tuple(names)) for why, names in about.items()]
 
 
 def _border(box: Box) -> list[tuple[float, float]]:

@@ -8,13 +8,13 @@ from itertools import chain
 from typing import Any
 
 from gcsplan.mission_file.airspace.policy import Published
-from gcsplan.mission_file.airspace.volumes import AirspaceFile, Corner, Limits
-from gcsplan.mission_file.zone_attributes import MOST_SHOWN, NOT_READ, is_number, meaning_of, shown
-from gcsplan.mission_file.zone_draft import Remark
+from gcsplan.mission_file.airspace.volumes import AirspaceFile, VolumeLimits
+from gcsplan.mission_file.zone_attributes import ATTRIBUTES_UNREAD, MOST_ATTRIBUTES_SHOWN, is_number, meaning_of, shown
+from gcsplan.mission_file.zone_draft import Remark, one_line
 from gcsplan.mission_file.zone_file import ZoneFile
-from gcsplan.world.degree_shapes import beyond_outline
+from gcsplan.world.degree_shapes import Corner, beyond_outline
 
-_NUMBER = re.compile(r"[-+]?\d{1,9}(\.\d{1,9})?", re.ASCII)
+_MEMBER_NUMBER = re.compile(r"[-+]?\d{1,9}(\.\d{1,9})?", re.ASCII)
 
 
 class MemberError(ValueError):
@@ -52,8 +52,8 @@ def unread(given: dict[str, Any], known: Collection[str], *, all_of_them: bool =
         meaning = meaning_of(key)
         seems = all_of_them or meaning.limit is not None or meaning.seems_a_limit or meaning.seems_a_time
         if key not in known and seems and value not in (None, "", [], {}):
-            found.append(f"{key[:40]} {shown(value)}")
-    return [(NOT_READ, ", ".join(found[:MOST_SHOWN]))] if found else []
+            found.append(one_line(f"{key[:40]} {shown(value)}"))
+    return [(ATTRIBUTES_UNREAD, tuple(found[:MOST_ATTRIBUTES_SHOWN]))] if found else []
 
 
 def position(given: Any) -> Corner:
@@ -90,7 +90,7 @@ def number_or_none(given: Any, name: str) -> float | int | None:
     """A finite number, also as text, or None. Raises MemberError."""
     if given is None or is_number(given):
         return given  # type: ignore[no-any-return]
-    if isinstance(given, str) and _NUMBER.fullmatch(given.strip()):
+    if isinstance(given, str) and _MEMBER_NUMBER.fullmatch(given.strip()):
         return float(given)
     raise MemberError(f"{name} must be a number, given {shown(given)}")
 
@@ -122,7 +122,7 @@ def read_features(
 
 
 def add_polygons(
-    file: AirspaceFile, zone: Published, part: str, where: str, geometry: dict[str, Any], limits: Limits
+    file: AirspaceFile, zone: Published, part: str, where: str, geometry: dict[str, Any], limits: VolumeLimits
 ) -> None:
     """Add a Polygon or MultiPolygon of GeoJSON, whose holes count as no-fly. Raises MemberError."""
     kind, coordinates = geometry["type"], geometry.get("coordinates")

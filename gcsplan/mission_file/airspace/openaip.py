@@ -10,10 +10,11 @@ from typing import Any
 from gcsplan.mission_file.airspace.members import MemberError, add_polygons, number_or_none, read_features, text_of
 from gcsplan.mission_file.airspace.policy import Policy, Published
 from gcsplan.mission_file.airspace.times import ALWAYS, Period, TimeError, read_end, read_instant
-from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
+from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, VolumeLimits
 from gcsplan.mission_file.zone_attributes import is_number, shown
 from gcsplan.mission_file.zone_draft import Remark
 from gcsplan.mission_file.zone_file import ZoneFile
+from gcsplan.notes.note import Note
 
 TYPES = (
     "OTHER", "RESTRICTED", "DANGER", "PROHIBITED", "CTR", "TMZ", "RMZ", "TMA", "TRA", "TSA", "FIR", "UIR", "ADIZ",
@@ -26,15 +27,11 @@ TYPES = (
 CLASSES = {0: "A", 1: "B", 2: "C", 3: "D", 4: "E", 5: "F", 6: "G", 8: "SUA"}
 """The ICAO classes by openAIP's numbers; 8 is an airspace without a class."""
 
-UNITS = {0: "M", 1: "FT", 6: "FL"}
+OPENAIP_UNITS = {0: "M", 1: "FT", 6: "FL"}
 DATUMS = {0: "GND", 1: "MSL", 2: "STD"}
 
 FREE_TYPES = frozenset({"OTHER", "FIR", "UIR", "ACC_SECTOR", "VFR_SECTOR", "FIS_SECTOR", "TRP"})
 FREE_CLASSES = frozenset({"G"})
-
-NOT_CLAIMED = "openAIP's hours of operation are not read: these zones count as always"
-FLOATING = "the limits of these zones move: at that end they count from the ground up, or without end"
-UNREAD_SPAN = "the time of activation is not understood: these zones count as always"
 
 
 def is_openaip(whole: Any) -> bool:
@@ -99,22 +96,22 @@ def _named(members: dict[str, Any], key: str, names: dict[int, str], zone: str) 
     return names[value]
 
 
-def _limits(members: dict[str, Any], where: str, policy: Policy) -> Limits:
+def _limits(members: dict[str, Any], where: str, policy: Policy) -> VolumeLimits:
     given: list[Given | None] = []
     floating: list[Remark] = []
     for side, farther in (("lower", "lowerLimitMin"), ("upper", "upperLimitMax")):
         limit = members.get(f"{side}Limit")
         if members.get(farther) is not None:
-            floating.append((FLOATING, farther))
+            floating.append((Note("zone_limits_move"), farther))
         if limit is None or members.get(farther) is not None:
             given.append(None)
             continue
         if not isinstance(limit, dict):
             raise MemberError(f"{side}Limit must be an object, given {shown(limit)}")
         value = number_or_none(limit.get("value"), f"{side}Limit.value")
-        words = tuple(_code(limit, key, names) for key, names in (("unit", UNITS), ("referenceDatum", DATUMS)))
+        words = tuple(_code(limit, key, names) for key, names in (("unit", OPENAIP_UNITS), ("referenceDatum", DATUMS)))
         given.append(None if value is None else Given(value, words, (), f"{side}Limit"))
-    found = Limits.read(given[0], given[1], where, policy=policy)
+    found = VolumeLimits.read(given[0], given[1], where, policy=policy)
     found.remarks += floating
     return found
 
@@ -131,10 +128,10 @@ def _times(members: dict[str, Any]) -> tuple[tuple[Period, ...], tuple[Remark, .
     try:
         span = Period(_moment(members.get("activeFrom"), read_instant), _moment(members.get("activeUntil"), read_end))
     except TimeError as why:
-        return (), ((UNREAD_SPAN, str(why)),)
+        return (), ((Note("zone_activation_not_understood"), str(why)),)
     hours = members.get("hoursOfOperation")
     unread = any(_is_limited(h) for h in _hours(hours))
-    remarks: tuple[Remark, ...] = ((NOT_CLAIMED, ""),) if unread else ()
+    remarks: tuple[Remark, ...] = ((Note("zone_hours_of_operation_unread"), None),) if unread else ()
     return (() if span == ALWAYS else (span,)), remarks
 
 

@@ -14,26 +14,27 @@ from pathlib import Path
 
 from gcsplan.errors import Problem
 from gcsplan.figures import counted
-from gcsplan.mission_file.airspace.arcs import Arc, ArcError, Corner, corners_of, outline
+from gcsplan.mission_file.airspace.arcs import Arc, ArcError, corners_of, outline
 from gcsplan.mission_file.airspace.policy import UNREAD_TIMES, Policy, Published
 from gcsplan.mission_file.airspace.times import Period, TimeError, read_end, read_instant
-from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, Limits
-from gcsplan.mission_file.zone_draft import MAX_VERTICES, Remark
+from gcsplan.mission_file.airspace.volumes import AirspaceFile, Given, VolumeLimits
+from gcsplan.mission_file.zone_draft import MAX_VERTICES, Remark, one_line
 from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_text import decoded
-from gcsplan.world.degree_shapes import MOST_LON_DEG
+from gcsplan.notes.note import Datum, Note
+from gcsplan.world.degree_shapes import MOST_LON_DEG, Corner
 
-SUFFIXES = (".openair", ".air", ".txt")
+OPENAIR_SUFFIXES = (".openair", ".air", ".txt")
 
 NAUTICAL_MILE_M = 1852.0
 
-SILENT = frozenset({"UNC", "NONE"})
+SILENT_CLASSES = frozenset({"UNC", "NONE"})
 """A class and a type that say nothing; a zone with nothing else is no-fly."""
 
-FREE = frozenset({"G", "FIR", "UIR", "FIS", "ACCSEC", "VFRSEC", "TRZ"})
+FREE_CLASSES_AND_TYPES = frozenset({"G", "FIR", "UIR", "FIS", "ACCSEC", "VFRSEC", "TRZ"})
 """Classes and types in which no rule keeps anybody out: class G, regions of information, hints."""
 
-KINDS = (
+OPENAIR_CLASSES_AND_TYPES = (
     "A", "B", "C", "D", "E", "F", "G", "UNC", "R", "Q", "P", "GP", "CTR", "W", "ADIZ", "ALERT", "ASRA", "ATZ", "AWY",
     "CTA", "CUSTOM", "FIR", "FIS", "ACCSEC", "GSEC", "HTZ", "LTA", "MATZ", "MTA", "MTR", "MTMA", "N", "NONE", "OFR",
     "RMZ", "TFR", "TIA", "TIZ", "TMA", "TMZ", "TRA", "TRAFR", "TRZ", "TSA", "UIR", "UTA", "VFRR", "VFRSEC", "WARNING",
@@ -43,16 +44,13 @@ KINDS = (
 IGNORED = frozenset({"AF", "AG", "AX", "AI", "AT", "SP", "SB"})
 """Frequency, station, transponder code, number, place of a label, pen and brush: they limit nothing."""
 
-DRAWN = frozenset({"DP", "DA", "DB", "DC", "DY"})
+DRAWING_RECORDS = frozenset({"DP", "DA", "DB", "DC", "DY"})
 
-SPARED = "limits without a unit or a reference are read as OpenAir's programs do, in feet above sea level"
-CARRIED = "arcs without a centre (V X=…) in their own zone are drawn around that of the zone before"
-BEHIND = "text behind a place is not read"
-UNPLACED = "text behind the height is not read"
+UNSTATED_LIMITS = Note("zone_limits_in_feet_above_sea")
 
 _RECORD = re.compile(r"(V|[A-Z]{2})\s+(\S.*)", re.IGNORECASE)
 _VARIABLE = re.compile(r"([A-Z])\s*=\s*(.*)", re.IGNORECASE)
-_PLACE = re.compile(
+_OPENAIR_PLACE = re.compile(
     r"\s*(\d{1,3}(?:\.\d{1,20})?)(?:\s*:\s*(\d{1,2}(?:\.\d{1,20})?))?(?:\s*:\s*(\d{1,2}(?:\.\d{1,20})?))?\s*([NS])[\s,]*"
     r"(\d{1,3}(?:\.\d{1,20})?)(?:\s*:\s*(\d{1,2}(?:\.\d{1,20})?))?(?:\s*:\s*(\d{1,2}(?:\.\d{1,20})?))?\s*([EW])",
     re.ASCII | re.IGNORECASE,
@@ -97,7 +95,7 @@ class _Block:
 
 def read_openair(path: Path, data: bytes, policy: Policy) -> ZoneFile:
     """The zones of OpenAir text; what is wrong is in their problems and faults."""
-    return _Reading(AirspaceFile(path, policy, KINDS, great_circles=True)).read(_text(data))
+    return _OpenAirReading(AirspaceFile(path, policy, OPENAIR_CLASSES_AND_TYPES, great_circles=True)).read(_text(data))
 
 
 def _text(data: bytes) -> str:
@@ -108,7 +106,7 @@ def _text(data: bytes) -> str:
 
 
 @dataclass
-class _Reading:
+class _OpenAirReading:
     """One pass over one file.
 
     A centre holds for the arcs of the next zone too, as in the format's own sample, and a remark says so. A circle
@@ -148,9 +146,10 @@ class _Reading:
                     (self.block.mistakes if of_limits else self.block.lost).append((number, words))
         self._end()
         if self.terrain:
-            more = f", and {len(self.terrain) - MOST_MISTAKES} more" if len(self.terrain) > MOST_MISTAKES else ""
-            shown = ", ".join(self.terrain[:MOST_MISTAKES])
-            self.file.found.said.append(f"not used, because they draw terrain: {shown}{more}")
+            more = len(self.terrain) - MOST_MISTAKES
+            records: list[Datum] = [*self.terrain[:MOST_MISTAKES]]
+            records += [Note("further_zones", count=more)] if more > 0 else []
+            self.file.found.said.append(Note("terrain_records_unused", records=tuple(records)))
         if not self.zones and not self.file.found.problems:
             self._fault(1, "the file holds no zone: an OpenAir zone begins with a line such as `AC R`")
         return self.file.finished()
@@ -181,7 +180,7 @@ class _Reading:
             self._variable(value)
         elif self.block is None:
             raise _RecordError("stands before the first AC, with which a zone begins")
-        elif code in DRAWN:
+        elif code in DRAWING_RECORDS:
             self._draw(self.block, code, value)
         elif code == "AN":
             self.block.name = value
@@ -235,7 +234,7 @@ class _Reading:
                 raise _RecordError(
                     "has no centre of its own (V X=… in this zone); the centre of the zone before does not count"
                 )
-            block.remarks.append((CARRIED, f"line {self.number}: {code} {value[:40]}"))
+            block.remarks.append((Note("zone_centre_carried_over"), self._line(f"{code} {value[:40]}")))
         if code == "DC":
             block.circles.append((self.centre, _numbers(value, 1)[0] * NAUTICAL_MILE_M))
         elif code == "DA":
@@ -250,8 +249,12 @@ class _Reading:
         """The first places of a text, after which none stands; a remark says what follows them."""
         places, rest = _places(text, count)
         if rest and self.block is not None:
-            self.block.remarks.append((BEHIND, f"line {self.number}: {rest[:40]}"))
+            self.block.remarks.append((Note("zone_text_behind_place_unread"), self._line(rest[:40])))
         return places
+
+    def _line(self, text: str) -> Note:
+        """What stands on the line that is read."""
+        return Note("line_of_file", line=self.number, text=one_line(text))
 
     def _end(self) -> None:
         """Add the zone that ends here."""
@@ -265,7 +268,9 @@ class _Reading:
         remarks = (*dict(reversed(block.remarks)).items(), *([(UNREAD_TIMES, unread)] if unread else []))
         name = block.name or f"{file.path.stem}[{self.zones - 1}]"
         kinds = tuple(dict.fromkeys(block.kinds))
-        restricts = any(k not in FREE | SILENT for k in kinds) or not any(k in FREE for k in kinds)
+        restricts = any(k not in FREE_CLASSES_AND_TYPES | SILENT_CLASSES for k in kinds) or not any(
+            k in FREE_CLASSES_AND_TYPES for k in kinds
+        )
         zone = Published(name, kinds, restricts, "", periods, remarks)
         limits = _limits(block, where, file.policy)
         limits.faults += [
@@ -290,16 +295,16 @@ class _Reading:
             file.add_ring(zone, name if shapes == 1 else f"{name}/{shapes}", where, ring, limits)
 
 
-def _limits(block: _Block, where: str, policy: Policy) -> Limits:
+def _limits(block: _Block, where: str, policy: Policy) -> VolumeLimits:
     said: list[Remark] = []
     given: list[Given | None] = []
     for key, text in (("AL", block.lower), ("AH", block.upper)):
         plain = text
         if text is not None and (match := re.fullmatch(r"([^()]*\S)\s*\([^()]*\)", text)):
             plain = match[1]
-            said.append((UNPLACED, f"{key} {text[:60]}"))
+            said.append((Note("zone_text_behind_height_unread"), f"{key} {text[:60]}"))
         given.append(None if plain is None else Given(plain, (), ("FT", "AMSL"), key))
-    limits = Limits.read(given[0], given[1], where, SPARED, policy=policy)
+    limits = VolumeLimits.read(given[0], given[1], where, UNSTATED_LIMITS, policy=policy)
     limits.remarks += said
     return limits
 
@@ -348,7 +353,7 @@ def _places(text: str, count: int) -> tuple[list[Corner], str]:
 
 
 def _matches(text: str) -> Iterator[re.Match[str]]:
-    return _PLACE.finditer(text)
+    return _OPENAIR_PLACE.finditer(text)
 
 
 def _degrees(parts: tuple[str | None, ...], side: str) -> float:

@@ -9,15 +9,14 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 
 from gcsplan.errors import Problem
-from gcsplan.mission_file.airspace.times import OUT_OF_HOURS, Hours, Period, apply_in
+from gcsplan.mission_file.airspace.times import Hours, Period, apply_in
 from gcsplan.mission_file.schema import nearest
 from gcsplan.mission_file.zone_draft import Remark
+from gcsplan.notes.note import Note
 
-ASKED = "these zones may be entered with an authorisation, and are no-fly without one"
-UNREAD_TIMES = "the times of these zones are not understood: they count as always"
+UNREAD_TIMES = Note("zone_times_not_understood")
 
-
-_SHOWN = 12
+_KINDS_SHOWN = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +60,7 @@ class Published:
 
 
 @dataclass
-class Judge:
+class PolicyJudge:
     """Applies a policy to the zones of one file; ``vocabulary`` are the kinds that its format has."""
 
     policy: Policy
@@ -69,21 +68,21 @@ class Judge:
     kinds: set[str] = field(default_factory=set)
     entered: set[str] = field(default_factory=set)
 
-    def reason(self, zone: Published) -> str:
-        """Why the zone is not used; empty if it is."""
+    def reason(self, zone: Published) -> Note | None:
+        """Why the zone is not used; None if it is."""
         self.kinds |= set(zone.kinds)
         own = {name for name in self.policy.authorised if name in (zone.identifier, zone.name)}
         self.entered |= own
         wanted = self.policy.kinds
         if wanted is not None and not {_plain(k) for k in wanted} & {_plain(k) for k in zone.kinds}:
-            return f"their kinds are not among those of the mission ({', '.join(wanted[:_SHOWN])})"
+            return Note("zones_of_other_kinds", kinds=wanted[:_KINDS_SHOWN])
         if wanted is None and not zone.restricts:
-            return "they restrict nothing"
+            return Note("zones_restrict_nothing")
         if own:
-            return "the mission says that it is authorised to enter them"
+            return Note("zones_authorised")
         if not apply_in(zone.periods, self.policy.hours):
-            return f"{OUT_OF_HOURS} ({self.policy.hours})"
-        return ""
+            return Note("zones_out_of_hours", hours=str(self.policy.hours))
+        return None
 
     def slips(self) -> list[Problem]:
         """Names of the policy that fit nothing: a slip would leave zones out, or not let a zone be entered."""

@@ -17,22 +17,19 @@ from gcsplan.errors import Problem
 ALONE = timedelta(hours=2)
 """How long the hours last if their beginning alone is stated."""
 
-BEFORE = timedelta(minutes=30)
+EARLIEST_LIFT_OFF = timedelta(minutes=30)
 """How long before a common start vehicles may leave the ground: they wait for it in the air."""
 
-LONGEST = timedelta(days=31)
+LONGEST_HOURS = timedelta(days=31)
 _DAY = timedelta(days=1)
 _DATE = re.compile(r"\d{4}-\d{2}-\d{2}", re.ASCII)
-_MOST_CHARACTERS = 40
+_MOST_TIME_CHARACTERS = 40
 
 _OF_PERIOD = ("permanent", "startDateTime", "endDateTime", "schedule")
 _OF_LINE = ("day", "startTime", "endTime", "startEvent", "endEvent")
 
 WEEK = ("MON", "TUE", "WED", "THU", "FRI", "SAT", "SUN")
-OUT_OF_HOURS = "they do not apply in the hours of the mission"
-"""Why such zones are not used."""
-
-WANTED = "2026-11-23T10:00Z, a day such as 2026-11-23 (UTC), or [from, to]"
+WANTED_HOURS = "2026-11-23T10:00Z, a day such as 2026-11-23 (UTC), or [from, to]"
 
 
 class TimeError(ValueError):
@@ -55,19 +52,21 @@ class Hours:
         """The hours of a mission's ``at``. Raises TimeError."""
         texts = given if isinstance(given, list) else [given]
         if not 1 <= len(texts) <= 2 or not all(isinstance(t, str) for t in texts):
-            raise TimeError(f"must be {WANTED}")
+            raise TimeError(f"must be {WANTED_HOURS}")
         start, end = read_instant(texts[0]), read_end(texts[-1])
         if len(texts) == 1 and not _DATE.fullmatch(texts[-1].strip()):
             end += ALONE
-        if not timedelta(0) < end - start <= LONGEST:
-            words = "the end must lie behind the start" if end <= start else f"{LONGEST.days} days at most are wanted"
-            raise TimeError(f"{words}, given {' to '.join(t.strip()[:_MOST_CHARACTERS] for t in texts)}")
+        if not timedelta(0) < end - start <= LONGEST_HOURS:
+            words = (
+                "the end must lie behind the start" if end <= start else f"{LONGEST_HOURS.days} days at most are wanted"
+            )
+            raise TimeError(f"{words}, given {' to '.join(t.strip()[:_MOST_TIME_CHARACTERS] for t in texts)}")
         return cls(start, end)
 
     @classmethod
     def around(cls, departure: datetime) -> Hours:
         """The hours of a mission with a common start at ``departure``."""
-        return cls(departure - BEFORE, departure + ALONE)
+        return cls(departure - EARLIEST_LIFT_OFF, departure + ALONE)
 
 
 def texts_of(at: str | Sequence[str] | None) -> tuple[str, ...] | None:
@@ -85,8 +84,8 @@ def read_end(text: str) -> datetime:
 def read_instant(text: str) -> datetime:
     """A moment in UTC: a day (its first moment), or a day and a time with ``Z`` or an offset. Raises TimeError."""
     plain = text.strip()
-    shown = repr(plain[:_MOST_CHARACTERS])
-    if len(plain) > _MOST_CHARACTERS:
+    shown = repr(plain[:_MOST_TIME_CHARACTERS])
+    if len(plain) > _MOST_TIME_CHARACTERS:
         raise TimeError(f"{shown}… is no time")
     last = re.fullmatch(r"(\d{4}-\d{2}-\d{2})T24:00(?::00(?:\.0+)?)?(Z|[+-]\d{2}:?\d{2})", plain, re.ASCII)
     try:
@@ -101,7 +100,7 @@ def read_instant(text: str) -> datetime:
     except TimeError:
         raise
     except (ValueError, OverflowError):
-        raise TimeError(f"{shown} is no time; write {WANTED}") from None
+        raise TimeError(f"{shown} is no time; write {WANTED_HOURS}") from None
     if not 1900 <= moment.year <= 2999:  # far from where a day more or less does not exist
         raise TimeError(f"{shown} lies outside the years 1900 to 2999")
     return moment
@@ -236,7 +235,7 @@ def _of_day(given: Any) -> tuple[timedelta, timedelta] | None:
     """The time since midnight, and the offset from UTC, of ``06:00Z``, ``00:00:00.00Z`` or ``08:00+02:00``."""
     if given is None or given == "":
         return None
-    if not isinstance(given, str) or len(given) > _MOST_CHARACTERS:
+    if not isinstance(given, str) or len(given) > _MOST_TIME_CHARACTERS:
         raise TimeError(f"{str(given)[:40]!r} is no time of day")
     text = given.strip()
     last = re.fullmatch(r"24:00(?::00(?:\.0+)?)?(Z|[+-]\d{2}:?\d{2})", text, re.ASCII)

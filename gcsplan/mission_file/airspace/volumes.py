@@ -14,14 +14,24 @@ from pathlib import Path
 import numpy as np
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file.airspace.policy import Judge, Policy, Published
-from gcsplan.mission_file.zone_attributes import OVER_PRESSURE, UNDER_PRESSURE
-from gcsplan.mission_file.zone_draft import ACROSS, MAX_VERTICES, Bounds, Remark, ZoneDraft, check_degrees
+from gcsplan.mission_file.airspace.policy import Policy, PolicyJudge, Published
+from gcsplan.mission_file.zone_attributes import OVER_PRESSURE, UNDER_PRESSURE, level_read
+from gcsplan.mission_file.zone_draft import (
+    ACROSS_ANTIMERIDIAN,
+    MAX_VERTICES,
+    Bounds,
+    Remark,
+    ZoneDraft,
+    check_degrees,
+    one_line,
+)
 from gcsplan.mission_file.zone_file import ZoneFile
-from gcsplan.mission_file.zone_levels import EXAMPLES, LevelError, Limit, read_level
+from gcsplan.mission_file.zone_levels import LEVEL_EXAMPLES, LevelError, Limit, read_level
+from gcsplan.notes.note import Note
 from gcsplan.world.degree_shapes import (
     HALF_TURN_DEG,
     LARGEST_RADIUS_M,
+    Corner,
     across,
     along_great_circles,
     latitudes_between,
@@ -29,11 +39,8 @@ from gcsplan.world.degree_shapes import (
     unwrapped,
     wide_fault,
 )
-from gcsplan.world.outlines import MOST_CROSSINGS, MOST_PAIRS, crossings, overlapping_pairs
+from gcsplan.world.outlines import MOST_CROSSINGS, MOST_EDGE_PAIRS, crossings, overlapping_pairs
 from gcsplan.world.zones import Level
-
-Corner = tuple[float, float]
-"""(latitude, longitude), degrees."""
 
 ELLIPSOID = "WGS84"
 LEAST_GEOID_M, GREATEST_GEOID_M = -110.0, 90.0
@@ -47,15 +54,7 @@ NO_CEILING_M = 30_000.0
 AROUND_DEG = 0.01
 """Degrees by which a zone without an outline is taken to reach beyond its points."""
 
-CURE = "complete its outline, or delete it from the file if it is no zone"
-
-WIDENED = (
-    "limits above the ellipsoid are no heights above sea level: these zones are larger by the most that the two differ "
-    "anywhere"
-)
-OFF_LEVEL = "flight levels lie as far from their heights above sea level as the mission says (flight_level_error_m)"
-CROSSES = "the outlines of these zones cross or touch themselves: all that they enclose is no-fly"
-FAULTY = "the limits of these zones are not understood: they count from the ground up without end"
+OUTLINE_CURE = "complete its outline, or delete it from the file if it is no zone"
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,11 +68,11 @@ class Given:
 
     def __str__(self) -> str:
         words = " ".join(w for w in self.words if w)
-        return f"{self.key} {str(self.value)[:60]}{f' {words[:40]}' if words else ''}".strip()
+        return one_line(f"{self.key} {str(self.value)[:60]}{f' {words[:40]}' if words else ''}")
 
 
 @dataclass
-class Limits:
+class VolumeLimits:
     """Floor and ceiling of one volume, what a user has to know of them, and why they cannot be read."""
 
     bounds: Bounds = field(default_factory=Bounds)
@@ -81,8 +80,10 @@ class Limits:
     faults: list[Problem] = field(default_factory=list)
 
     @classmethod
-    def read(cls, lower: Given | None, upper: Given | None, where: str, spared: str = "", *, policy: Policy) -> Limits:
-        """The limits; a missing one is no limit. ``spared`` is the remark on a limit that needs its spare words."""
+    def read(
+        cls, lower: Given | None, upper: Given | None, where: str, spared: Note | None = None, *, policy: Policy
+    ) -> VolumeLimits:
+        """The limits; a missing one is no limit. ``spared`` is said of a limit that needs its spare words."""
         found = cls()
         error_m = policy.flight_level_error_m
         levels: dict[str, float] = {}
@@ -92,7 +93,7 @@ class Limits:
             try:
                 level = found._level(bound, given, spared, error_m)
             except LevelError as why:
-                cure = f"{given} cannot be read as a level: {why}. Write for example {EXAMPLES}"
+                cure = f"{given} cannot be read as a level: {why}. Write for example {LEVEL_EXAMPLES}"
                 found.faults.append(Problem(where, cure))
                 continue
             if level is not None:
@@ -102,7 +103,7 @@ class Limits:
             found.bounds.levels(where, found.faults)
         return found
 
-    def _level(self, bound: str, given: Given, spared: str, error_m: float | None) -> Level | None:
+    def _level(self, bound: str, given: Given, spared: Note | None, error_m: float | None) -> Level | None:
         words = tuple("AMSL" if w.upper() == ELLIPSOID else w for w in given.words)
         try:
             level = _read(given.value, words)
@@ -110,9 +111,9 @@ class Limits:
             if not given.spare:
                 raise
             level = read_level(given.value, words, given.spare)
-            self.remarks.append((spared, str(given)))
+            self.remarks += [(spared, str(given))] if spared else []
         if level is Limit.PRESSURE and error_m is not None:
-            return self._off(bound, given, _of_flight_level(given), error_m, OFF_LEVEL)
+            return self._off(bound, given, _of_flight_level(given), error_m, Note("zone_flight_levels_uncertain"))
         if level is Limit.PRESSURE:
             self.remarks.append((UNDER_PRESSURE if bound == "floor" else OVER_PRESSURE, str(given)))
             return None
@@ -125,13 +126,13 @@ class Limits:
             return None
         if words != given.words:
             error_m = GREATEST_GEOID_M if bound == "floor" else -LEAST_GEOID_M
-            return self._off(bound, given, level.value_m, error_m, WIDENED)
+            return self._off(bound, given, level.value_m, error_m, Note("zone_limits_above_ellipsoid"))
         return level
 
-    def _off(self, bound: str, given: Given, amsl_m: float, error_m: float, sentence: str) -> Level:
+    def _off(self, bound: str, given: Given, amsl_m: float, error_m: float, note: Note) -> Level:
         """A level that may lie ``error_m`` lower or higher: the one with which the zone is larger."""
         level = Level(amsl_m - error_m if bound == "floor" else amsl_m + error_m, "amsl")
-        self.remarks.append((sentence, f"{given}: {bound} at {level}"))
+        self.remarks.append((note, level_read(given, bound, level)))
         return level
 
 
@@ -153,11 +154,11 @@ class AirspaceFile:
     vocabulary: Sequence[str]
     great_circles: bool = False
     found: ZoneFile = field(init=False)
-    judge: Judge = field(init=False)
+    judge: PolicyJudge = field(init=False)
 
     def __post_init__(self) -> None:
         self.found = ZoneFile(self.path, great_circles=self.great_circles)
-        self.judge = Judge(self.policy, self.vocabulary)
+        self.judge = PolicyJudge(self.policy, self.vocabulary)
 
     def finished(self) -> ZoneFile:
         """The zones, after what the policy names and no zone has is reported."""
@@ -169,7 +170,7 @@ class AirspaceFile:
         self.found.problems.append(Problem(where, message))
 
     def add_circle(
-        self, zone: Published, part: str, where: str, centre: Corner, radius_m: float, limits: Limits
+        self, zone: Published, part: str, where: str, centre: Corner, radius_m: float, limits: VolumeLimits
     ) -> None:
         """Add a cylinder called ``part``."""
         if not check_degrees(centre, where, self.found.problems):
@@ -181,7 +182,7 @@ class AirspaceFile:
             self.fault(where, f"zone {zone.name[:60]!r}: {words}")
 
     def add_ring(
-        self, zone: Published, part: str, where: str, ring: Sequence[Corner], limits: Limits, holes: int = 0
+        self, zone: Published, part: str, where: str, ring: Sequence[Corner], limits: VolumeLimits, holes: int = 0
     ) -> None:
         """Add a prism called ``part`` by its outline and the number of its holes."""
         self.found.holes += holes
@@ -202,13 +203,15 @@ class AirspaceFile:
             self._add(zone, part, where, tuple(outline), None, limits, [], doubt)
             return
         at = np.asarray(outline, float)
-        tangled = overlapping_pairs(at) > MOST_PAIRS or crossings(at) > MOST_CROSSINGS
+        tangled = overlapping_pairs(at) > MOST_EDGE_PAIRS or crossings(at) > MOST_CROSSINGS
         if tangled:
             why = f"its outline of {len(outline)} corners is too tangled to tell what it encloses"
         parts = enclosed(outline) if len(set(outline)) > 2 and not tangled else []
         if not parts:
             if ring:
-                self._add(zone, part, where, self._around(ring), None, limits, [Problem(where, f"{why}; {CURE}")])
+                self._add(
+                    zone, part, where, self._around(ring), None, limits, [Problem(where, f"{why}; {OUTLINE_CURE}")]
+                )
             else:
                 self.fault(where, "the polygon has no points")
             return
@@ -219,7 +222,7 @@ class AirspaceFile:
                 self._add(zone, part, where, self._around(ring), None, limits, [Problem(where, too_many.message)])
                 return
             parts = parts if bent is None else enclosed(outline, bent)
-        limits = Limits(limits.bounds, [*limits.remarks, (CROSSES, "")], limits.faults)
+        limits = VolumeLimits(limits.bounds, [*limits.remarks, (Note("zone_outline_crosses"), None)], limits.faults)
         for i, piece in enumerate(parts):
             name = part if len(parts) == 1 else f"{part}/{i + 1}"
             self._add(zone, name, where, tuple(piece), None, limits, [], doubt)
@@ -246,15 +249,15 @@ class AirspaceFile:
 
     def _add(
         self, zone: Published, part: str, where: str, points: tuple[Corner, ...], radius_m: float | None,
-        limits: Limits, faults: list[Problem], doubt: tuple[Corner, ...] = (),
+        limits: VolumeLimits, faults: list[Problem], doubt: tuple[Corner, ...] = (),
     ) -> None:  # fmt: skip
         faults = [Problem(p.where, f"zone {zone.name[:60]!r}: {p.message}") for p in (*limits.faults, *faults)]
         floor, ceiling = (None, None) if faults else limits.bounds.levels(where, [])
         remarks = [*zone.remarks, *limits.remarks]
         if faults:
-            remarks.append((FAULTY, ""))
+            remarks.append((Note("zone_limits_not_understood"), None))
         if doubt:
-            remarks.append((ACROSS, ""))
+            remarks.append((ACROSS_ANTIMERIDIAN, None))
         draft = ZoneDraft(
             part[:200], where, points, False, radius_m, floor, ceiling,
             unused=self.judge.reason(zone), faults=tuple(faults),

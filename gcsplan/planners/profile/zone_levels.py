@@ -17,7 +17,7 @@ from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.taut_string import Profile
 from gcsplan.planners.profile.track import Obstruction, Track, denser, distances, make_track, values_at
 from gcsplan.world.airspace import Band
-from gcsplan.world.own_ground import POINTS, own_ground
+from gcsplan.world.own_ground import RING_POINTS, own_ground
 
 SAMPLE_M = 12.0
 """Metres between samples along a track, at most."""
@@ -54,7 +54,7 @@ class ZoneLevels:
             return cls(band, np.stack([band.bottom_m, band.top_m]), np.full(len(band.bottom_m), math.inf))
         parts = max(1, math.ceil((band.s1_m - band.s0_m) / SAMPLE_M))
         s = np.unique(np.concatenate([band.s_m, np.linspace(band.s0_m, band.s1_m, parts + 1)]))
-        problem.budget.spend("place", len(s) * POINTS)
+        problem.budget.spend("place", len(s) * RING_POINTS)
         places = np.stack([np.interp(s, track.s_m, track.points[:, k]) for k in range(2)], axis=-1)
         ground = own_ground(air.surface, zone, places, air.beside_m(problem.limits))
         most, found = [], []

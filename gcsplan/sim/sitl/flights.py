@@ -27,7 +27,7 @@ from gcsplan.check.geodesy import flat_m, offset_m
 from gcsplan.check.stretch import Place
 from gcsplan.errors import LinkError, UsageError, VehicleRefused
 from gcsplan.mavlink.link.frames import signing_key
-from gcsplan.mavlink.link.link import Channel, Link, PumpJob, Steps, pump
+from gcsplan.mavlink.link.link import Channel, Link, LinkSteps, PumpJob, pump
 from gcsplan.mavlink.link.parameters import settings_words
 from gcsplan.mavlink.link.steps import discover_steps, parameter_steps
 from gcsplan.mavlink.link.url import parse_url
@@ -182,7 +182,7 @@ def _all(jobs: list[PumpJob[Any]]) -> list[Any]:
 
 def _ready(
     channel: Channel, part: RehearsalPart, report: Callable[[str, str], None], *, i_know: bool
-) -> Steps[tuple[VehicleState, list[Said]]]:
+) -> LinkSteps[tuple[VehicleState, list[Said]]]:
     """Wait until the vehicle has a position and a home, and make sure that it is a simulator and not armed.
 
     Return its state, and which of its parameters are not those that the mission was judged with.
@@ -216,7 +216,7 @@ def _ready(
 
 def _fly(
     channel: Channel, part: RehearsalPart, state: VehicleState, world: World, report: Callable[[str, str], None]
-) -> Steps[_Log]:
+) -> LinkSteps[_Log]:
     """Arm, start, and record until the vehicle is down, or at its goal if it stays in the air."""
     to, name, log = state.address, part.vehicle.name, _Log(FlightWatch(part.mission))
     pilot = _SitlPilot(channel, to, log)
@@ -266,7 +266,7 @@ def _fly(
 
 
 class _SitlPilot:
-    """Sends commands to one vehicle and records its messages; its methods are generators of `link.Steps`."""
+    """Sends commands to one vehicle and records its messages; its methods are generators of `link.LinkSteps`."""
 
     def __init__(self, channel: Channel, to: Address, log: _Log) -> None:
         self._channel, self._to, self._log = channel, to, log
@@ -276,7 +276,7 @@ class _SitlPilot:
         self._was_armed = False
         self.boot_ms, self.item = 0, 0
 
-    def listen(self, within_s: float) -> Steps[None]:
+    def listen(self, within_s: float) -> LinkSteps[None]:
         """Record messages; return as soon as one came, or after ``within_s``. Raises LinkError after `SILENT_S`."""
         clock = self._channel.link.clock
         if not self._channel.waits:
@@ -318,7 +318,7 @@ class _SitlPilot:
         if log.released_ms:
             log.watch.note(message, self.item)
 
-    def command(self, command: int, *params: float) -> Steps[int | None]:
+    def command(self, command: int, *params: float) -> LinkSteps[int | None]:
         """Send a command once; return its MAV_RESULT, None without an answer."""
         clock = self._channel.link.clock
         self._results.pop(command, None)
@@ -329,7 +329,7 @@ class _SitlPilot:
             yield from self.listen(end - clock())
         return self._results.get(command)
 
-    def insist(self, command: int, *params: float) -> Steps[None]:
+    def insist(self, command: int, *params: float) -> LinkSteps[None]:
         """Send a command until it is accepted; an autopilot that has just got its position does not arm at once.
 
         Raises VehicleRefused after `ARM_S`.

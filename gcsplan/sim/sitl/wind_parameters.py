@@ -10,7 +10,7 @@ import numpy as np
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.errors import LinkError
-from gcsplan.mavlink.link.link import Channel, Steps
+from gcsplan.mavlink.link.link import Channel, LinkSteps
 from gcsplan.mavlink.link.parameters import decode_value, parameter_name
 from gcsplan.mavlink.link.watch import VehicleState
 from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA
@@ -46,7 +46,7 @@ def wind_vector(weather: Weather, seed: int) -> tuple[float, float]:
     return -weather.wind_m_s * math.sin(come_from), -weather.wind_m_s * math.cos(come_from)
 
 
-def change_steps(channel: Channel, state: VehicleState, values: Mapping[str, float]) -> Steps[dict[str, float]]:
+def change_steps(channel: Channel, state: VehicleState, values: Mapping[str, float]) -> LinkSteps[dict[str, float]]:
     """Set parameters of a simulator, each until it tells the new value; return what they were.
 
     Raises LinkError if it does not take one.
@@ -62,7 +62,7 @@ def change_steps(channel: Channel, state: VehicleState, values: Mapping[str, flo
     return were
 
 
-def _until(channel: Channel, state: VehicleState, message: Any, name: str, value: float | None) -> Steps[float]:
+def _until(channel: Channel, state: VehicleState, message: Any, name: str, value: float | None) -> LinkSteps[float]:
     """Send a message until the parameter has ``value`` (None: any), and return what it has."""
     clock = channel.link.clock
     for _ in range(PARAMETER_TRIES):

@@ -20,9 +20,9 @@ from gcsplan.mavlink.mission.mission import Home, MissionItem
 from gcsplan.world.terrain_grid import (
     ALL_PARTS,
     E7_OF_METRE,
-    PART,
-    PARTS,
-    POSTS,
+    PART_POSTS,
+    PARTS_OF_BLOCK,
+    POSTS_OF_BLOCK,
     STRIDE,
     Block,
     TerrainGrid,
@@ -52,7 +52,7 @@ class TerrainMemory:
         u, v = north - i, east - j
         a, b = i - block.north * STRIDE[0], j - block.east * STRIDE[1]
         for row, column in ((a, b), (a, b + 1), (a + 1, b), (a + 1, b + 1)):
-            if not bits >> (row // PART * PARTS[1] + column // PART) & 1:
+            if not bits >> (row // PART_POSTS * PARTS_OF_BLOCK[1] + column // PART_POSTS) & 1:
                 return None
         west = (1.0 - u) * heights[a, b] + u * heights[a + 1, b]
         return float((1.0 - v) * west + v * ((1.0 - u) * heights[a, b + 1] + u * heights[a + 1, b + 1]))
@@ -61,7 +61,10 @@ class TerrainMemory:
         """Want the blocks around the vehicle; and those around its way points, one after another, as there is room."""
         for north in (-1, 0, 1):
             for east in (-1, 0, 1):
-                away = (m * AROUND_BLOCKS * self.grid.spacing_m for m in (north * POSTS[0], east * POSTS[1]))
+                away = (
+                    m * AROUND_BLOCKS * self.grid.spacing_m
+                    for m in (north * POSTS_OF_BLOCK[0], east * POSTS_OF_BLOCK[1])
+                )
                 self.read(*_moved(home.lat_e7, home.lon_e7, *away))
         if self.pending:
             return
@@ -90,9 +93,9 @@ class TerrainMemory:
             return
         assert block is not None
         bits, heights = self._cache[block]
-        row, column = divmod(message.gridbit, PARTS[1])
-        part = np.array(message.data, float).reshape(PART, PART)
-        heights[row * PART : (row + 1) * PART, column * PART : (column + 1) * PART] = part
+        row, column = divmod(message.gridbit, PARTS_OF_BLOCK[1])
+        part = np.array(message.data, float).reshape(PART_POSTS, PART_POSTS)
+        heights[row * PART_POSTS : (row + 1) * PART_POSTS, column * PART_POSTS : (column + 1) * PART_POSTS] = part
         self._cache[block] = bits | 1 << message.gridbit, heights
 
     @property
@@ -117,7 +120,7 @@ class TerrainMemory:
         if block not in self._cache:
             while len(self._cache) >= CACHE_BLOCKS:
                 self._cache.popitem(last=False)
-            self._cache[block] = 0, np.zeros(POSTS)
+            self._cache[block] = 0, np.zeros(POSTS_OF_BLOCK)
         self._cache.move_to_end(block)
         return self._cache[block]
 

@@ -32,6 +32,7 @@ from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.mavlink.mission.mission import FENCE, Mission, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.mavlink.protocol.transfer import VerifiedUpload
+from gcsplan.notes.note import Note
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
 from gcsplan.sim.vehicle.server import SimServer, loopback_fleet
@@ -131,11 +132,11 @@ def test_zones_with_a_floor_or_a_ceiling_are_left_out_and_named_or_taken_to_the_
     fence = fence_of([mast, shelf, yard], FRAME, COPTER)
     assert [z.name for z in fence.zones] == ["yard"]
     assert fence.left_out == ("mast", "shelf")
-    assert any("mast" in words and "shelf" in words and "left out" in words for words in fence.notes)
+    assert Note("fence_leaves_out", names=("'mast'", "'shelf'")) in fence.notes
     whole = fence_of([mast, shelf, yard], FRAME, COPTER, infinite=True)
     assert len(whole.items) == 1 + 4 + 1
     assert whole.left_out == ()
-    assert any("to the sky" in words for words in whole.notes)
+    assert [note.code for note in whole.notes] == ["fence_without_heights"]
 
 
 def circles(count: int) -> list[Zone]:
@@ -152,7 +153,7 @@ def test_circles_in_circles_are_joined_and_more_than_arducopter_keeps_are_refuse
     inside = [Zone("big", Circle(0, 0, 9000)), *circles(60), Zone("big too", Circle(0, 0, 9000))]
     fence = fence_of(inside, FRAME, COPTER)
     assert [z.name for z in fence.zones] == ["big"]
-    assert "inside another circle" in fence.notes[0]
+    assert fence.notes[0].code == "fence_circles_inside"
     ring = np.array([[1000 * math.cos(a), 1000 * math.sin(a)] for a in np.linspace(0, 2 * math.pi, 71)[:-1]])
     with pytest.raises(InputError, match="70 corners"):
         fence_of([Zone("round", Polygon(ring))], FRAME, COPTER)

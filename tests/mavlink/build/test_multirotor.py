@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.mavlink.build.multirotor import build_mission
-from gcsplan.mavlink.build.order import BOW_M, LONGEST_LEG_M, MARGINS, Order, slope_margin, split_legs
+from gcsplan.mavlink.build.order import LEG_BOW_M, LONGEST_LEG_M, MARGINS, Order, slope_margin, split_legs
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.autopilots import stored
@@ -92,7 +92,7 @@ def test_what_is_stored_lies_within_the_planners_margins(
 def test_legs_are_split_until_the_bow_is_small() -> None:
     there = split_legs(np.array([[-11_000.0, 0, 400], [11_000, 100, 500]]), WORLD)
     places = WORLD.frame.to_degrees(there[:, 0], there[:, 1])
-    assert WORLD.frame.bow_m(places[:-1], places[1:]).max() <= BOW_M
+    assert WORLD.frame.bow_m(places[:-1], places[1:]).max() <= LEG_BOW_M
     assert np.hypot(*np.diff(there[:, :2], axis=0).T).max() <= LONGEST_LEG_M
     assert there[0] == pytest.approx([-11_000, 0, 400])
     assert there[-1] == pytest.approx([11_000, 100, 500])

@@ -17,12 +17,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
-from gcsplan.mavlink.files.file_items import MAX_BYTES, PLAIN_XY, degrees_e7_of, degrees_text, float32_text
+from gcsplan.mavlink.files.file_items import MAX_FILE_BYTES, PLAIN_XY, degrees_e7_of, degrees_text, float32_text
 from gcsplan.mavlink.files.formats import read_mission_file, read_plan, read_waypoints, write_plan, write_waypoints
 from gcsplan.mavlink.files.plan_file import parse_plan
 from gcsplan.mavlink.files.waypoints_file import parse_waypoints
 from gcsplan.mavlink.mission.commands import DO_CHANGE_SPEED, DO_JUMP, LAND, RTL, TAKEOFF, WAYPOINT
 from gcsplan.mavlink.mission.mission import GLOBAL, NO_POSITION, RELATIVE, TERRAIN, Home, Mission, MissionItem, float32
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
 from tests.support.effort import draws
@@ -258,7 +259,7 @@ def test_header_120_has_no_home_row_and_counts_jumps_from_its_first_item() -> No
         assert read.mission.home == HOME
         assert len(read.mission.items) == 3
         assert read.mission.items[2].params[0] == target
-        assert "no home row" in read.notes[0]
+        assert read.notes[0] == Note("home_row_missing")
 
 
 # -- other writers' manners ---------------------------------------------------------------------------------------
@@ -300,7 +301,7 @@ def test_pymavlink_reads_what_we_write_and_we_read_what_it_saves(tmp_path: Path)
     loader.save(str(file))
     gc.collect()  # it leaves its files open
     read = read_mission_file(file, autopilot=COPTER)
-    assert any("six decimals" in note for note in read.notes)
+    assert Note("six_decimals") in read.notes
     assert read.mission.items[1] == mission.items[1]
     assert read.mission.items[2].x == 366_123_460  # 36.6123457 with six decimals
 
@@ -319,8 +320,8 @@ def test_mission_planners_unknown_home_takes_the_missions_own() -> None:
     read = parse_waypoints(text, autopilot=COPTER, where="f", home_hint=HOME)
     assert read.mission.home == HOME
     assert len(read.mission.items) == 1
-    assert any("no place" in note for note in read.notes)
-    assert any("without a position" in n for n in parse_waypoints(text, autopilot=COPTER, where="f").notes)
+    assert Note("home_row_without_place") in read.notes
+    assert Note("home_row_at_zero") in parse_waypoints(text, autopilot=COPTER, where="f").notes
 
 
 def test_a_missing_home_row_needs_the_missions_home() -> None:
@@ -503,7 +504,7 @@ def test_fence_and_rally_points_are_written_from_their_wire_items() -> None:
     assert plan["rallyPoints"]["points"] == [[7, 8, 90.5]]
     read = parse_plan(json.dumps(plan), autopilot=COPTER, where="")
     assert len(read.notes) == 2
-    assert all("is not sent with it" in n for n in read.notes)
+    assert all("is not sent with it" in str(n) for n in read.notes)
     assert read.fence == (fence[3], *fence[:3], *fence[4:])  # circles come first in a plan
     assert [(r.x, r.y, r.z) for r in read.rally] == [(7 * 10**7, 8 * 10**7, 90.5)]
     for broken in (fence[:2], [vertex(5100, 0, 1, 1)], [vertex(5001, math.nan, 1, 1)]):
@@ -535,7 +536,7 @@ def test_a_plan_that_names_no_autopilot_is_read_for_the_one_given() -> None:
         read_plan(text, autopilot=None, where="f")
     read = parse_plan(text, autopilot=PX4, where="f")
     assert read.mission.autopilot is PX4
-    assert "read for px4" in read.notes[0]
+    assert read.notes[0] == Note("plan_without_autopilot", autopilot="px4")
     with pytest.raises(InputError, match="firmwareType 3 with vehicleType 11"):
         read_plan(json.dumps(plan_of(vehicleType=11)), autopilot=COPTER, where="f")
 
@@ -548,7 +549,7 @@ def test_a_survey_is_read_as_the_items_that_it_holds() -> None:
     plan["mission"]["items"] = [*items[:2], survey, items[4]]
     read = parse_plan(json.dumps(plan), autopilot=PX4, where="f")
     assert wire(read.mission) == wire(short_mission(PX4))
-    assert "survey" in read.notes[0]
+    assert "survey" in str(read.notes[0])
     plan["mission"]["items"][2] = {"type": "ComplexItem", "complexItemType": "fwLandingPattern", "landCoordinate": []}
     with pytest.raises(InputError, match=r"f: mission.items\[2\]: a complex item \(fwLandingPattern\)"):
         read_plan(json.dumps(plan), autopilot=PX4, where="f")
@@ -572,7 +573,7 @@ def test_a_landing_pattern_is_read_as_the_items_that_are_sent_for_it(kind: str, 
     assert approach.params[1] == (-75.0 if circle else 0.0)
     assert (approach.lat_deg, approach.z, approach.frame) == (36.61, 40.0, RELATIVE)
     assert (down.lat_deg, down.z, down.frame) == (36.6, 0.0, RELATIVE)
-    assert any(kind in n and "stands for" in n for n in read.notes)
+    assert any(kind in str(n) and "stands for" in str(n) for n in read.notes)
     del pattern["landCoordinate"]
     with pytest.raises(InputError, match="without its single items"):
         parse_plan(json.dumps(plan), autopilot=PLANE, where="x.plan")
@@ -589,7 +590,7 @@ def test_a_place_that_is_not_given_is_here_for_ardupilot_and_refused_for_px4() -
         else:
             read = parse_plan(json.dumps(plan), autopilot=autopilot, where="f")
             assert (read.mission.items[0].x, read.mission.items[0].y) == (0, 0)
-            assert "'here'" in read.notes[0]
+            assert read.notes[0] == Note("item_without_place", entry="mission.items[0]")
 
 
 def test_mission_planners_json_is_read() -> None:
@@ -608,7 +609,7 @@ def test_a_plan_without_home_takes_the_missions_own() -> None:
         text = json.dumps(plan_of(plannedHomePosition=value))
         read = parse_plan(text, autopilot=COPTER, where="f", home_hint=other)
         assert read.mission.home == other
-        assert "home" in read.notes[0]
+        assert "home" in str(read.notes[0])
     with pytest.raises(InputError, match="plannedHomePosition: home must be given"):
         read_plan(json.dumps(plan_of(plannedHomePosition=None)), autopilot=COPTER, where="f")
 
@@ -721,7 +722,7 @@ def test_a_file_that_is_none_is_refused_by_name(tmp_path: Path) -> None:
     cases: list[tuple[bytes, str]] = [
         (b"\xff\xfe\x00", "UTF-8"),
         (b"", "first line"),
-        (b" " * (MAX_BYTES + 1), "20 MB"),
+        (b" " * (MAX_FILE_BYTES + 1), "20 MB"),
     ]
     for content, said in cases:
         file.write_bytes(content)

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from gcsplan.errors import InputError, LinkError
 from gcsplan.mavlink.link.drive import drive
 from gcsplan.mavlink.link.frames import FrameParser, FrameWriter, Signing, SigningKey, signing_key
-from gcsplan.mavlink.link.link import GCS, Channel, Heard, Link, PumpJob, Steps, pump, run
+from gcsplan.mavlink.link.link import GCS, Channel, Heard, Link, LinkSteps, PumpJob, pump, run
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.mavlink.protocol import wire
 from gcsplan.mavlink.protocol.messages import (
@@ -457,7 +457,7 @@ def test_a_vehicle_that_keeps_its_first_partner_hears_every_link_from_the_same_p
             link.poll()
             ports.add(peers[0].hear("HEARTBEAT")[1])
             assert link.place.endswith(f":{link.endpoint.sends_from}")
-            assert link.note == ""
+            assert link.note is None
     assert len(ports) == 1
 
 
@@ -468,10 +468,11 @@ def test_a_link_sends_from_the_given_port_or_from_a_free_one_if_that_is_taken(pe
         url = f"udpout:127.0.0.1:{peers[0].port},{own}"
         with Link(url) as link:
             assert not link.place.endswith(f":{own}")
-            assert f"because a program uses {own} already" in link.note
+            assert link.note is not None
+            assert (link.note.code, link.note.data["wanted_port"]) == ("sends_from_another_port", own)
     with Link(url) as link:
         assert link.place.endswith(f":{own}")
-        assert link.note == ""
+        assert link.note is None
 
 
 def test_a_connection_that_is_refused_is_told_with_the_other_direction() -> None:
@@ -543,7 +544,7 @@ def test_tasks_run_together_and_errors_stay_with_their_own() -> None:
     link, _ = listening_link(heartbeat_s=None)
     naps_taken: list[tuple[int, int]] = []
 
-    def sleeper(naps: int, fails: bool) -> Steps[int]:
+    def sleeper(naps: int, fails: bool) -> LinkSteps[int]:
         for nap in range(naps):
             naps_taken.append((nap, naps))
             yield time.monotonic() + 0.02
@@ -567,7 +568,7 @@ def test_no_more_tasks_run_at_a_time_than_may(most: int, most_on_link: int) -> N
     begun: list[tuple[int, int]] = []
     peaks: list[tuple[int, int]] = []
 
-    def task(which: int, number: int, channel: Channel) -> Steps[int]:
+    def task(which: int, number: int, channel: Channel) -> LinkSteps[int]:
         begun.append((which, number))
         running.add((which, number))
         # What was heard while it waited says nothing of its vehicle now.
@@ -603,7 +604,7 @@ def test_a_channel_whose_task_waits_for_its_turn_hears_nothing_and_then_hears_ag
     with Link("udpin:127.0.0.1:0", heartbeat_s=None) as link:
         port = int(link.place.rsplit(":", 1)[1])
 
-        def task(number: int, channel: Channel) -> Steps[None]:
+        def task(number: int, channel: Channel) -> LinkSteps[None]:
             heard.append((number, len(channel.inbox)))
             for peer in peers:
                 peer.send(heartbeat(), port)
@@ -625,7 +626,7 @@ def test_an_interrupt_cancels_what_runs() -> None:
         upload = Upload([WAYPOINT], us=GCS, vehicle=VEHICLE)
         channel = link.channel(1)
 
-        def interrupted() -> Steps[None]:
+        def interrupted() -> LinkSteps[None]:
             yield time.monotonic() + 0.05
             raise KeyboardInterrupt
 

@@ -394,8 +394,8 @@ def fleet(*boards: LoopbackVehicle, judge: Callable[[Mission], str | None] | Non
 def test_parameters_that_are_no_numbers_are_said_and_end_nothing() -> None:
     results = fleet(vehicle(), vehicle(sysid=2), read_parameters=True)
     assert [getattr(r, "verified", r) for r in results] == [True, True]
-    assert any("is no number" in w for w in results[0].warnings)
-    assert not any("is no number" in w for w in results[1].warnings)
+    assert "parameter_is_no_number" in [w.code for w in results[0].warnings]
+    assert "parameter_is_no_number" not in [w.code for w in results[1].warnings]
 
 
 def test_a_bug_in_one_vehicles_job_leaves_the_others_standing() -> None:

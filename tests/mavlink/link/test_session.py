@@ -37,7 +37,8 @@ from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.mavlink.mission.firmware import flies_straight
 from gcsplan.mavlink.mission.mission import ALL, FENCE, RALLY, Home, Mission, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
-from gcsplan.mavlink.protocol.transfer import Progress, Timers
+from gcsplan.mavlink.protocol.transfer import Timers, TransferProgress
+from gcsplan.notes.note import Note
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
 from gcsplan.sim.vehicle.server import SimServer
@@ -88,7 +89,7 @@ class Verdict:
 @pytest.mark.parametrize("autopilot", list(Autopilot))
 def test_a_checked_mission_is_uploaded_and_verified(autopilot: Autopilot) -> None:
     board, sent = vehicle(autopilot), mission(autopilot)
-    seen: list[tuple[str, Progress]] = []
+    seen: list[tuple[str, TransferProgress]] = []
     judged: list[Mission] = []
 
     def judge(read: Mission, _: Mapping[str, float]) -> None:
@@ -215,8 +216,8 @@ def test_what_may_be_overridden_is_taken_with_a_warning() -> None:
     with air(board) as link:
         result = upload_mission(link, sent, options=replace(OPTIONS, allow_armed=True, ignore_position=True))
     assert result.verified
-    assert any("armed" in w for w in result.warnings)
-    assert any("home is" in w for w in result.warnings)
+    assert Note("armed_as_allowed") in result.warnings
+    assert any(w.code.startswith("home_on_board_elsewhere") for w in result.warnings)
 
 
 def test_the_ground_that_the_caller_gives_counts() -> None:
@@ -336,7 +337,7 @@ READY = VehicleState(Address(1, 1), 3, 2, False, STANDBY, 36.6, -84.38, 371.0, 4
 
 
 def warnings_of(state: VehicleState, **more: Any) -> str:
-    return " / ".join(preflight(state, mission().wire_items(), COPTER, start=HOME, **more))
+    return " / ".join(map(str, preflight(state, mission().wire_items(), COPTER, start=HOME, **more)))
 
 
 def test_a_vehicle_that_fits_draws_no_warning() -> None:
@@ -360,12 +361,12 @@ def test_what_else_a_fence_puts_into_force_is_told() -> None:
         "FENCE_ACTION": 1.0,
     }
     [told] = judge_fence_parameters(values)
-    assert "also puts into force the circle of 150 m around home (FENCE_RADIUS; FENCE_TYPE 7)" in told
-    assert "the ceiling at 100 m above home (FENCE_ALT_MAX; FENCE_TYPE 7)" in told
+    assert "also puts into force the circle of 150 m around home (FENCE_RADIUS; FENCE_TYPE 7)" in str(told)
+    assert "the ceiling at 100 m above home (FENCE_ALT_MAX; FENCE_TYPE 7)" in str(told)
     [alone] = judge_fence_parameters(values | {"FENCE_TYPE": 4.0})
-    assert "puts into force" not in alone
+    assert alone == Note("fence_not_enforced")
     [unread] = judge_fence_parameters({"FENCE_ENABLE": 0.0})
-    assert "could not be read" in unread
+    assert unread.data["others"] == (Note("fence_type_unread"),)
 
 
 @pytest.mark.parametrize(
@@ -417,7 +418,7 @@ def test_a_judged_mission_goes_to_no_px4_that_may_not_fly_straight_legs(version:
     with pytest.raises(VehicleRefused, match="may change its altitude at the beginning of a leg") as refused:
         preflight(state, items, PX4, judged=True)
     assert (refused.value.reason, refused.value.exit_code) == ("firmware", 5)
-    assert "fly on (upstream issue 28507)" in " / ".join(preflight(state, items, PX4))  # unchecked: a warning
+    assert "fly on (upstream issue 28507)" in " / ".join(map(str, preflight(state, items, PX4)))  # unchecked: a warning
     assert preflight(replace(state, flight_sw_version=PX4_17), items, PX4, judged=True) == []
     level = [replace(item, z=65.0) for item in items]
     assert preflight(state, level, PX4, judged=True) == []
@@ -467,7 +468,7 @@ def test_return_and_failsafe_parameters_are_read_and_their_difference_reported(
         options = replace(OPTIONS, read_parameters=True, rtl_rel_home_m=333.0, expected_parameters={"NO_SUCH": 1.0})
         result = upload_mission(link, mission(autopilot), options=options)
     assert result.verified
-    words = " / ".join(result.warnings)
+    words = " / ".join(map(str, result.warnings))
     assert "was checked at 333 m" in words
     assert "NO_SUCH could not be read" in words
 
@@ -516,7 +517,7 @@ def test_a_return_along_the_mission_does_not_wait_over_home() -> None:
 )
 def test_parameters_that_do_not_fit_are_told_in_words(values: dict[str, float], words: str) -> None:
     autopilot = Autopilot.PX4 if "RTL_RETURN_ALT" in values else Autopilot.ARDUCOPTER
-    assert words in " / ".join(judge_parameters(values, mission(autopilot), rtl_rel_home_m=60.0))
+    assert words in " / ".join(map(str, judge_parameters(values, mission(autopilot), rtl_rel_home_m=60.0)))
 
 
 def test_a_plane_that_climbs_out_more_steeply_than_was_judged_is_told() -> None:
@@ -524,7 +525,7 @@ def test_a_plane_that_climbs_out_more_steeply_than_was_judged_is_told() -> None:
     assert judge_parameters({"TECS_PITCH_MAX": 15.0}, climbs) == []
     for pitch_deg in (25.0, 0.0):
         [told] = judge_parameters({"TECS_PITCH_MAX": pitch_deg}, climbs)
-        assert told.startswith(f"TECS_PITCH_MAX is {pitch_deg:g} on board")
+        assert told == Note("pitch_not_flown", value=pitch_deg, flown_deg=15.0)
         assert judge_parameters({"TECS_PITCH_MAX": pitch_deg}, mission(PLANE)) == []
 
 
@@ -538,11 +539,11 @@ def test_a_plane_that_climbs_out_more_steeply_than_was_judged_is_told() -> None:
 )
 def test_a_better_return_altitude_is_told_by_the_vehicles_own_name(values: dict[str, float], words: str) -> None:
     [told] = judge_parameters(values, mission(), rtl_rel_home_m=60.0, advised_rel_home_m=353.0)
-    assert told.endswith(words)
+    assert str(told).endswith(words)
 
 
 def test_a_return_that_nobody_checked_is_told() -> None:
-    assert "was not checked" in judge_parameters({"RTL_ALT": 1500.0}, mission())[0]
+    assert judge_parameters({"RTL_ALT": 1500.0}, mission())[0].code == "return_not_checked"
 
 
 # -- fleets -------------------------------------------------------------------------------------------------------

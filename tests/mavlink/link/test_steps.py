@@ -8,7 +8,7 @@ from typing import Any, TypeVar, cast
 import pymavlink.dialects.v20.ardupilotmega as dialect
 import pytest
 
-from gcsplan.mavlink.link.link import Channel, Heard, Link, Steps
+from gcsplan.mavlink.link.link import Channel, Heard, Link, LinkSteps
 from gcsplan.mavlink.link.steps import discover_steps, parameter_steps
 from gcsplan.mavlink.link.watch import STANDBY, UNINIT, VehicleState, Watch
 from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA, GENERIC
@@ -42,7 +42,7 @@ class Air:
     def say(self, message: Any, source: Address = VEHICLE) -> None:
         self.channel.inbox.append(Heard(source, "peer", message))
 
-    def run(self, steps: Steps[T]) -> T:
+    def run(self, steps: LinkSteps[T]) -> T:
         """To the end of ``steps``, with a heartbeat each second."""
         try:
             for _ in range(1000):

@@ -13,12 +13,12 @@ import pytest
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError, VehicleRefused
 from gcsplan.mavlink.link.frames import FrameWriter, Signing
-from gcsplan.mavlink.link.link import Link, PumpJob, Steps, pump
+from gcsplan.mavlink.link.link import Link, LinkSteps, PumpJob, pump
 from gcsplan.mavlink.link.results import UploadResult
 from gcsplan.mavlink.link.session import SessionOptions, upload_mission
 from gcsplan.mavlink.link.terrain import (
     OFF,
-    Compared,
+    TerrainComparison,
     TerrainService,
     compare_steps,
     places_along,
@@ -27,10 +27,11 @@ from gcsplan.mavlink.link.terrain import (
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import RELATIVE, TERRAIN, Home, Mission, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
+from gcsplan.notes.note import Note
 from gcsplan.sim.vehicle.hub import Hub
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
-from gcsplan.world.terrain_grid import Ground
+from gcsplan.world.terrain_grid import GroundHeights
 from tests.campaigns.air import Air, Radio
 
 AT = (36.59, -84.25)
@@ -50,7 +51,7 @@ def air_with_vehicle(radio: Radio | None = None, *, seed: int = 1, spacing_m: in
     return air
 
 
-def wait_steps(link: Link, seconds: float) -> Steps[None]:
+def wait_steps(link: Link, seconds: float) -> LinkSteps[None]:
     end = link.clock() + seconds
     while link.clock() < end:
         yield min(end, link.clock() + 1.0)
@@ -63,7 +64,9 @@ def serve_for(link: Link, seconds: float) -> None:
     assert job.error is None
 
 
-def compared(link: Link, service: TerrainService, places: list[tuple[int, int]], spacing_m: int = 100) -> Compared:
+def compared(
+    link: Link, service: TerrainService, places: list[tuple[int, int]], spacing_m: int = 100
+) -> TerrainComparison:
     channel = link.channel(1)
     posts = service.posts(spacing_m)
     job = PumpJob(channel, compare_steps(channel, VEHICLE, places, posts, patience_s=20.0))
@@ -135,7 +138,7 @@ def test_unknown_ground_is_not_sent_and_told() -> None:
     assert 1 <= result.read < 8
     assert result.worst_m < 0.001
     [note] = service.served[1].notes
-    assert "does not know their ground" in note
+    assert note.code == "terrain_parts_not_sent"
     assert result.pending > 0
 
 
@@ -149,7 +152,7 @@ def test_terrain_that_cannot_be_loaded_is_told_and_the_link_goes_on() -> None:
         link.serve(1, service.steps)
         serve_for(link, 20.0)
     assert service.served[1].parts == 0
-    assert service.served[1].notes == ["the tile is damaged"]
+    assert service.served[1].notes == [Note("terrain_not_loaded", why="the tile is damaged")]
 
 
 @pytest.mark.slow
@@ -204,7 +207,7 @@ def mission() -> Mission:
     return Mission(Autopilot.ARDUCOPTER, Home.at(*AT, 400.0), tuple(items), "uav1", 1)
 
 
-def uploaded(air: Air, ground: Ground | None, **more: object) -> tuple[UploadResult, dict[str, float]]:
+def uploaded(air: Air, ground: GroundHeights | None, **more: object) -> tuple[UploadResult, dict[str, float]]:
     """The result of an upload, and the values that it was judged with."""
     told: dict[str, float] = {}
 
@@ -221,7 +224,7 @@ def test_an_upload_serves_the_terrain_and_measures_what_the_vehicle_reads() -> N
     assert result.outcome == "accepted"
     assert values["TERRAIN_OFS_MAX"] == 30.0
     assert values[OFF] < 0.001
-    assert not any("terrain" in warning for warning in result.warnings)
+    assert not any("terrain" in warning.code for warning in result.warnings)
     assert terrain_error_m(values, 30.0) == pytest.approx(30.0, abs=0.001)
 
 
@@ -229,7 +232,7 @@ def test_an_upload_goes_on_without_terrain_and_says_so() -> None:
     result, values = uploaded(air_with_vehicle(), lambda a, o: np.full(np.shape(a), np.nan))
     assert result.outcome == "accepted"
     assert OFF not in values
-    assert any("no terrain yet at 40 of 40 places" in warning for warning in result.warnings)
+    assert Note("terrain_incomplete_on_board", lacking=40, places=40) in result.warnings
 
 
 def test_a_vehicle_without_terrain_is_told() -> None:
@@ -239,7 +242,7 @@ def test_a_vehicle_without_terrain_is_told() -> None:
     )
     air.put("vehicle", Hub([one], always="ground station"))
     result, values = uploaded(air, hills)
-    assert any("TERRAIN_ENABLE is 0" in warning for warning in result.warnings)
+    assert Note("terrain_off_on_board") in result.warnings
     assert OFF not in values
 
 

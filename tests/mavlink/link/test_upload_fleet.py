@@ -21,7 +21,7 @@ from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fle
 from gcsplan.mavlink.mission.autopilots import altitude_of_cm
 from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
-from gcsplan.mavlink.protocol.machine import Progress
+from gcsplan.mavlink.protocol.machine import TransferProgress
 from gcsplan.mavlink.protocol.transfer import Timers
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
@@ -103,14 +103,14 @@ def test_three_failing_vehicles_are_named_and_the_other_seventeen_verified() -> 
 
 def delivered(
     trouble: Mapping[int, Mapping[str, Any]], monkeypatch: pytest.MonkeyPatch, *, atomic: bool = True, count: int = 4
-) -> tuple[dict[str, JobResult], dict[str, int], list[tuple[str, Progress]]]:
+) -> tuple[dict[str, JobResult], dict[str, int], list[tuple[str, TransferProgress]]]:
     """What became of a small fleet: deliveries, items on board without home, and what was told on the way."""
     monkeypatch.setattr(uploads, "LISTEN_S", 0.0)
     order = uploads.order_of
     monkeypatch.setattr(
         uploads, "order_of", lambda *a, **k: replace(o := order(*a, **k), options=replace(o.options, timers=QUICK))
     )
-    told: list[tuple[str, Progress]] = []
+    told: list[tuple[str, TransferProgress]] = []
     with fleet(range(1, count + 1), trouble, drop=0.0) as server:
         jobs = [UploadJob(f"uav{n}", server.url_for_gcs, mission(n, 12)) for n in range(1, count + 1)]
         options = uploads.UploadOptions(unchecked=True, atomic=atomic)
@@ -191,13 +191,13 @@ def test_the_live_table_is_for_terminals_and_shows_where_each_vehicle_is(monkeyp
     screen = io.StringIO()
     monkeypatch.setattr(console, "aside", Console(file=screen, force_terminal=True, width=100, color_system=None))
     with console.transfer_progress(["uav1", "[/]odd"]) as tell:
-        tell("uav1", Progress("upload", 3, 12))
-        tell("uav1", Progress("verified", 12, 12))
-        tell("[/]odd", Progress("refused!", 0, 12))
+        tell("uav1", TransferProgress("upload", 3, 12))
+        tell("uav1", TransferProgress("verified", 12, 12))
+        tell("[/]odd", TransferProgress("refused!", 0, 12))
     shown = screen.getvalue()
     assert all(word in shown for word in ("uav1", "[/]odd", "verified", "refused", "12/12"))
     plain = io.StringIO()
     monkeypatch.setattr(console, "aside", Console(file=plain, width=100))
     with console.transfer_progress(["uav1"]) as tell:
-        tell("uav1", Progress("upload", 3, 12))
+        tell("uav1", TransferProgress("upload", 3, 12))
     assert plain.getvalue() == ""

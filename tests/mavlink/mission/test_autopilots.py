@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission.autopilots import altitude_of_cm, autopilot_of, max_items, profile_of, stored
 from gcsplan.mavlink.mission.mission import FENCE, FRAME_SYNONYMS, GLOBAL, RALLY, MissionItem, float32
-from gcsplan.mavlink.mission.stored_ardupilot import RULES, read_back_altitudes, stored_cm
+from gcsplan.mavlink.mission.stored_ardupilot import STORAGE_RULES, read_back_altitudes, stored_cm
 from gcsplan.mavlink.mission.stored_px4 import LOCATED, yaw
 from gcsplan.mavlink.mission.stored_px4 import LOCATED as PX4_LOCATED
 from gcsplan.mavlink.mission.stored_px4 import PLACELESS as PX4_PLACELESS
@@ -132,7 +132,7 @@ def test_frames_come_back_as_their_synonyms(sent: int, kept: int) -> None:
     assert stored(item(16, frame=sent), COPTER).frame == kept
 
 
-@pytest.mark.parametrize("command", [c for c, rule in RULES.items() if not rule.located])
+@pytest.mark.parametrize("command", [c for c, rule in STORAGE_RULES.items() if not rule.located])
 def test_commands_without_a_place_come_back_in_frame_0_at_nowhere(command: int) -> None:
     back = stored(item(command, 1.0, frame=2), COPTER)
     assert (back.frame, back.x, back.y, back.z) == (GLOBAL, 0, 0, 0.0)
@@ -154,7 +154,7 @@ def test_an_unknown_command_keeps_its_numbers_but_for_the_altitude() -> None:
 
 ITEMS = st.builds(
     MissionItem,
-    st.sampled_from([*RULES, *range(5000, 5005), 5100, 31999]),
+    st.sampled_from([*STORAGE_RULES, *range(5000, 5005), 5100, 31999]),
     st.sampled_from([0, 2, 3, 5, 6, 10, 11]),
     st.tuples(WIRE_FLOATS, WIRE_FLOATS, WIRE_FLOATS, WIRE_FLOATS),
     st.integers(-900_000_000, 900_000_000),
@@ -265,7 +265,7 @@ def test_what_is_refused_is_just_what_the_simulated_vehicle_refuses(autopilot: A
             return True
         return False
 
-    known = set(PX4_LOCATED) | set(PX4_PLACELESS) if autopilot is PX4 else set(RULES)
+    known = set(PX4_LOCATED) | set(PX4_PLACELESS) if autopilot is PX4 else set(STORAGE_RULES)
     seen = set()
     for command in [*sorted(known - set(range(5000, 5101))), 9, 31000]:
         for frame in (0, 1, 2, 3, 4, 5, 6, 7, 10, 11):

@@ -32,7 +32,7 @@ def test_a_number_is_that_of_its_name(name: str) -> None:
 
 def test_each_number_has_one_name() -> None:
     assert len(set(TABLE.values())) == len(TABLE)
-    assert set(commands.WORDS) <= set(TABLE.values())
+    assert set(commands.COMMAND_WORDS) <= set(TABLE.values())
 
 
 def test_the_numbers_up_to_the_last_nav_command_are_nav_commands() -> None:

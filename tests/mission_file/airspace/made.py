@@ -51,7 +51,7 @@ def limits(zone: ZoneDraft) -> tuple[str, str]:
 
 
 def remarks(found: ZoneFile) -> str:
-    return "\n".join(f"{sentence}: {detail}" for z in found.zones for sentence, detail in z.remarks)
+    return "\n".join(str(note.of(zones=(detail,))) for z in found.zones for note, detail in z.remarks)
 
 
 def volume(**changes: Any) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import strategies as st
 
 from gcsplan.mission_file.airspace.times import Hours
+from gcsplan.notes.note import Note
 from tests.mission_file.airspace.made import (
     HOLE,
     RING,
@@ -50,7 +51,7 @@ def test_ed269_volumes_circles_and_holes(tmp_path: Path) -> None:
     assert [z.name for z in found.zones] == ["Made zone/1", "Made zone/2"]
     assert (first.points, first.radius_m, limits(first)) == (((47.2, 8.2),), 1500.0, ("152.4 m AMSL", "unlimited"))
     assert limits(second) == ("ground", "120 m AGL")
-    assert found.notes == ("zones.json: 1 hole in polygons counted as no-fly",)
+    assert found.notes == (Note("holes_are_no_fly", file="zones.json", count=1),)
 
 
 def test_heights_above_the_ellipsoid_make_a_zone_larger_never_smaller(tmp_path: Path) -> None:

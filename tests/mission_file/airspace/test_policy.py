@@ -16,6 +16,7 @@ from gcsplan.app.pipeline import plan
 from gcsplan.errors import InputError
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.mission_file.from_options import OpenWorld, WorldOptions
+from gcsplan.notes.note import Note
 from tests.mission_file.airspace.made import ed269, volume
 
 MONDAYS = [{"permanent": "NO", "schedule": [{"day": ["MON"], "startTime": "06:00Z", "endTime": "18:00Z"}]}]
@@ -45,7 +46,7 @@ def names(found: MissionFile) -> set[str]:
 
 
 def notes(found: MissionFile) -> str:
-    return "\n".join(found.notes)
+    return "\n".join(map(str, found.notes))
 
 
 FREE = ed269(box(8.02, 47.0), restriction="NO_RESTRICTION", name="free", identifier="F1")
@@ -58,8 +59,8 @@ FAR = ed269(box(12.0, 47.0), restriction="NO_RESTRICTION", name="far")
 def test_all_that_restricts_is_no_fly_and_the_rest_is_named(tmp_path: Path) -> None:
     found = mission(tmp_path, FREE, ASK, SHUT, WEEKLY, FAR)
     assert names(found) == {"ask", "shut", "weekly"}
-    assert "zones.json: not used, because they restrict nothing: free" in found.notes
-    assert "not used: 1 further zone far from the mission" in found.notes
+    assert Note("zones_restrict_nothing", file="zones.json", zones=("free",)) in found.notes
+    assert Note("zones_unused_far_away", count=1) in found.notes
     assert found.hours is None
 
 
@@ -107,8 +108,8 @@ def test_a_zone_with_times_is_left_out_by_name_and_only_outside_them(tmp_path: P
     found = mission(tmp_path, WEEKLY, SHUT, at="2026-11-24T17:00Z")
     assert names(found) == {"shut"}
     assert found.hours is not None
-    words = "they do not apply in the hours of the mission (2026-11-24 17:00Z to 19:00Z): weekly"
-    assert f"zones.json: not used, because {words}" in found.notes
+    hours = "2026-11-24 17:00Z to 19:00Z"
+    assert Note("zones_out_of_hours", file="zones.json", hours=hours, zones=("weekly",)) in found.notes
     monday = datetime(2026, 11, 23, 18, 20, tzinfo=UTC)
     assert "weekly" in names(mission(tmp_path, WEEKLY, SHUT, departure=monday))  # vehicles rise before the common start
     assert "weekly" not in names(mission(tmp_path, WEEKLY, SHUT, departure=monday + timedelta(hours=1)))
@@ -147,7 +148,8 @@ def test_the_options_of_check_judge_as_a_mission_file_does(tmp_path: Path) -> No
     options = WorldOptions(terrain={"flat_m": 400}, zones=(str(tmp_path / "zones.json"),), limits={"min_agl_m": 40})
     world, inputs = OpenWorld(options).around([(47.0, 8.0), (47.02, 8.0)])
     assert [z.name for z in world.airspace.zones] == ["shut"]
-    assert "zones.json: not used, because they restrict nothing: free" in inputs["notes"]  # type: ignore[operator]
+    free = Note("zones_restrict_nothing", file="zones.json", zones=("free",))
+    assert free in inputs["notes"]  # type: ignore[operator]
     mission(tmp_path, FREE, ed269(box(9.5, 47.0, upperVerticalReference="QNE")))
     OpenWorld(options).around([(47.0, 8.0), (47.02, 8.0)])
     (tmp_path / "zones.json").write_text(json.dumps([ed269(box(8.0, 47.0, upperVerticalReference="QNE"))]))

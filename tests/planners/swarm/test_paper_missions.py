@@ -13,7 +13,7 @@ from gcsplan.app.pipeline import world_of
 from gcsplan.app.problems import make_problem
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mission_file import MissionFile, load_mission
-from gcsplan.mission_file.schema import Encoding, SwarmCost
+from gcsplan.mission_file.schema import EncodingName, SwarmCost
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.registry import PAPER, get
 from gcsplan.planners.swarm.encodings import ENCODINGS
@@ -173,5 +173,5 @@ def test_a_mission_file_hands_swarm_keys_on_and_refuses_unknown_ones() -> None:
 
 
 def test_the_schema_knows_every_encoding_and_cost() -> None:
-    assert get_args(Encoding) == (PAPER, *ENCODINGS)
+    assert get_args(EncodingName) == (PAPER, *ENCODINGS)
     assert get_args(SwarmCost) == tuple(OBJECTIVES)

@@ -1,0 +1,155 @@
+"""Sentences on a vehicle that a list is sent to: its state, its parameters, its terrain, and the link to it."""
+
+TEXTS = {
+    # -- the link, and the vehicle's state --
+    "sends_from_another_port": (
+        "the link sends from port {port}, because a program uses {wanted_port} already: a PX4 that has heard that "
+        "program answers it alone; end it, or give a port to send from ({endpoint} as udpout:HOST:PORT,LOCAL)"
+    ),
+    "autopilot_not_checked": (
+        "the vehicle calls itself {what}; the mission is written for {autopilot}, which could not be checked"
+    ),
+    "vehicle_type_not_told": "the vehicle does not say whether it is what {autopilot} flies",
+    "vehicle_state_not_told": "the vehicle does not report its state: whether it is ready could not be checked",
+    "vehicle_in_trouble": "the vehicle reports that it is {state}",
+    "armed_as_allowed": "the vehicle is armed, which was allowed",
+    "capabilities_not_told": "the vehicle does not report its capabilities",
+    "item_int_not_told": "the vehicle does not say that it takes MISSION_ITEM_INT",
+    "terrain_ability_not_told": (
+        "the mission has altitudes above terrain, and the vehicle does not say that it knows terrain"
+    ),
+    "px4_may_miss_way_points": (
+        "the vehicle is PX4 {version}, which may change its altitude at the beginning of a leg, miss the way point and "
+        "fly on (upstream issue 28507)"
+    ),
+    "position_not_told": "the vehicle reports no position: whether it stands at the start could not be checked",
+    "home_on_board_elsewhere": (
+        "the vehicle's home is {away_m:distance.0} from the mission's start and {higher_m:+.1f} m in height"
+    ),
+    "home_on_board_elsewhere_counts": (
+        "the vehicle's home is {away_m:distance.0} from the mission's start and {higher_m:+.1f} m in height; its "
+        "relative altitudes count from there if it is not armed at the start"
+    ),
+    "changed_after_read_back": "after the read-back: {outcome}",
+    "armed_during_upload": "the vehicle was armed by somebody during the upload",
+    # -- terrain on board --
+    "terrain_parts_not_sent": (
+        "{parts} parts of {blocks} blocks that the vehicle asked for are not sent, because the terrain model does not "
+        "know their ground (the first in {tile}): it asks for them again and again, and does not arm a mission in the "
+        "terrain frame before it has them; give a larger DEM"
+    ),
+    "terrain_requests_strange": "{count} requests for terrain were for no block of ArduPilot's grid",
+    "terrain_not_loaded": "{why}",
+    "terrain_off_on_board": ("TERRAIN_ENABLE is 0 on board: it knows no terrain and does not fly the terrain frame"),
+    "terrain_spacing_not_judged": (
+        "TERRAIN_SPACING is {spacing_m:g} on board, and {least_m} to {most_m} m are judged: set TERRAIN_SPACING {set_m}"
+    ),
+    "terrain_incomplete_on_board": (
+        "the vehicle has no terrain yet at {lacking} of {places} places under the mission; it does not arm before it "
+        "has: gcsplan terrain serve --until-loaded gives it all"
+    ),
+    "terrain_differs_on_board": (
+        "the vehicle reads terrain {off_m:height.1} off that of the mission at {lat_deg:.6f}, {lon_deg:.6f}: it holds "
+        "terrain from elsewhere (remove it from its SD card), or shifted it when it was armed (restart it)"
+    ),
+    # -- parameters on board --
+    "no_parameter_read": (
+        "no parameters could be read: failsafe, return and fence settings of {autopilot} were not compared"
+    ),
+    "parameter_not_expected": "{name} is {value:g} on board, {wanted:g} is expected",
+    "expected_parameter_unread": "{name} could not be read, {wanted:g} is expected",
+    "parameter_is_no_number": "{name} on board is no number: it was not compared",
+    "parameter_not_assumed": (
+        "{name} is {value:.6g} on board, and {assumed} is assumed ({why}): set {name} {wanted:.10g}"
+    ),
+    "no_failsafe": "no failsafe action on board for {failsafes}",
+    "no_fence_parameter_read": "no parameters could be read: whether the fence is enforced is not known",
+    "fence_not_enforced": "FENCE_ENABLE is 0 on board: the fence is kept and not enforced until it is enabled",
+    "fence_enforced_by_itself": "FENCE_AUTOENABLE is {value:g} on board: the fence is enforced from {moment} on",
+    "fence_enables_others": "{fence}; enabling it also puts into force {others}",
+    "fence_type_unread": ("what FENCE_TYPE says, which could not be read (a circle around home, a highest altitude)"),
+    "circle_around_home": "the circle of {at} around home (FENCE_RADIUS; FENCE_TYPE {kinds:g})",
+    "ceiling_above_home": "the ceiling at {at} above home (FENCE_ALT_MAX; FENCE_TYPE {kinds:g})",
+    "floor_above_home": "the floor at {at} above home (FENCE_ALT_MIN; FENCE_TYPE {kinds:g})",
+    "metres_on_board": "{at_m:height}",
+    "metres_on_board_unread": "a height or radius that could not be read",
+    "fence_type_without_polygons": (
+        "FENCE_TYPE is {kinds:g} on board: polygons and circles (4) are not among the fences in force"
+    ),
+    "fence_breach_only_reported": "the fence's action on board is none: a breach is only reported",
+    "mission_above_fence": (
+        "the mission goes {reach_m:height.0 up} high and the fence on board ends at {end_m:height} ({name})"
+    ),
+    "mission_beyond_fence": (
+        "the mission goes {reach_m:distance.0 up} far and the fence on board ends at {end_m:distance} ({name})"
+    ),
+    "return_altitude_unread": "the return altitude on board could not be read",
+    "return_not_checked": (
+        "after a failsafe the return is at {rel_home_m:height} above home ({name}); that return was not checked"
+    ),
+    "return_at_another_altitude": (
+        "the return is at {rel_home_m:height} above home ({name}), but was checked at {checked_m:height}: set {setting}"
+    ),
+    "return_altitude_advised": ("the return is at {rel_home_m:height} above home ({name}), as judged: set {setting}"),
+    "return_waits_otherwise": (
+        "RTL_LOIT_TIME is {value:g} on board: a return waits {waits_s:g} s over home before it descends, and times and "
+        "battery count {counted_s:g} s"
+    ),
+    "hovers_at_descend_altitude": (
+        "RTL_LAND_DELAY is {value:g} on board: a return ends in a hover at RTL_DESCEND_ALT, until the battery is empty "
+        "or it is landed by hand; it was judged as a landing, which RTL_LAND_DELAY 0 makes"
+    ),
+    "hovers_over_home": (
+        "{name} is {value:g} on board: a return ends in a hover {rel_home_m:height} above home, until the battery is "
+        "empty or it is landed by hand; it was judged as a landing, which {name} 0 makes"
+    ),
+    "return_type_not_judged": (
+        "RTL_TYPE is {value:g} on board: the return is not straight home (or to the nearest rally point), as it is "
+        "judged: set RTL_TYPE 0"
+    ),
+    "return_cone_not_judged": (
+        "RTL_CONE_ANG is {value:g} on board: within RTL_MIN_DIST of home the return may be lower than with "
+        "{judged_deg:g}°, as it is judged: set RTL_CONE_ANG {judged_deg:g}"
+    ),
+    "return_route_unread": "{names} could not be read: whether the return joins the mission is not known",
+    "return_route_all_unread": "none of {names} could be read: whether the return joins the mission is not known",
+    "return_joins_mission": (
+        "{names} is {value:g} on board: the return joins the mission at {start}, and was judged straight home: set 1 "
+        "or 2 (RTL), or judge it with return_route: mission"
+    ),
+    "return_joins_no_mission": (
+        "{settings} on board: such a return does not join the mission at {start}, as it was judged: set {value:g} "
+        "(Auto RTL)"
+    ),
+    "plane_does_not_arm": (
+        "RTL_AUTOLAND is 0 on board: with {start} in its mission ArduPlane does not arm: set RTL_AUTOLAND {wanted:g}"
+    ),
+    "plane_returns_otherwise": (
+        "RTL_AUTOLAND is {value:g} on board, and the return was judged as with {wanted:g}: set RTL_AUTOLAND {wanted:g}"
+    ),
+    "plane_return_leads_on": (
+        "RTL_AUTOLAND is {value:g} on board: the return leads on to {start}, and was judged straight home: set "
+        "RTL_AUTOLAND 3, or judge it with return_route: mission"
+    ),
+    "pitch_not_flown": (
+        "TECS_PITCH_MAX is {value:g} on board: with more than {flown_deg:g}° (0: with PTCH_LIM_MAX_DEG) an aircraft "
+        "with power to spare rises further above its take-off's altitude than the 16 m that are judged unless "
+        "climb_out_m_s tells its climb: set {flown_deg:g}, or give climb_out_m_s"
+    ),
+    "lean_angle_unread": (
+        "the largest lean angle on board could not be read: {speed_m_s:.3g} m/s need about {needs_deg}°"
+    ),
+    "lean_angle_too_small": (
+        "{name} is {value:g} on board: it leans by {lean_deg:g}° at most, which allows about {most_m_s:.3g} m/s, and "
+        "{speed_m_s:.3g} m/s are commanded: set {name} {wanted:g}, or plan with lean_angle_deg: {lean_deg:g}"
+    ),
+    "velocity_too_small": (
+        "MPC_XY_VEL_MAX is {value:g} on board: it flies no faster, and {speed_m_s:.3g} m/s are commanded: set "
+        "MPC_XY_VEL_MAX {wanted}, or plan with speed_m_s up to {value:g}"
+    ),
+    "arrives_later": "it arrives later than planned: {reasons}",
+    "slower_than_planned": "{name} is {value:g} on board, and {wanted:g} was planned with ({planned_key})",
+    "returns_slower_than_planned": (
+        "MPC_XY_CRUISE is {value:g} on board, and a return at {speed_m_s:speed} was planned with"
+    ),
+}
