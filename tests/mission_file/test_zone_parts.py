@@ -12,7 +12,7 @@ import pytest
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.complaints import few, key_path, unknown_keys
-from gcsplan.mission_file.other_files import FIRST_BYTES, SUFFIXES, what_else
+from gcsplan.mission_file.other_files import FIRST_BYTES, SUFFIXES_BY_KIND, what_else
 from gcsplan.mission_file.zone_csv import read_csv
 from gcsplan.mission_file.zone_geojson import read_geojson
 from gcsplan.mission_file.zone_json import load_json
@@ -104,7 +104,7 @@ def test_a_mast_is_the_same_zone_in_each_format_and_alone_or_by_its_name(
 # -- another file where a mission belongs
 
 
-@pytest.mark.parametrize("kind", list(SUFFIXES))
+@pytest.mark.parametrize("kind", list(SUFFIXES_BY_KIND))
 def test_a_file_of_another_kind_is_known_by_its_name_or_its_first_bytes(tmp_path: Path, kind: str) -> None:
     command = {
         "vehicles": "gcsplan check",
@@ -112,7 +112,7 @@ def test_a_file_of_another_kind_is_known_by_its_name_or_its_first_bytes(tmp_path
         "terrain": "gcsplan new --dem",
         "log": "fit-energy",
     }
-    for suffix in SUFFIXES[kind]:
+    for suffix in SUFFIXES_BY_KIND[kind]:
         (tmp_path / f"a b{suffix}").write_bytes(b"anything")
         told = what_else(tmp_path / f"a b{suffix}")
         assert command[kind] in told

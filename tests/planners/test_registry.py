@@ -9,7 +9,7 @@ from typing import get_args
 import pytest
 
 from gcsplan.errors import InputError
-from gcsplan.mission_file.schema import Encoding
+from gcsplan.mission_file.schema import EncodingName
 from gcsplan.optimisers import registry as optimisers
 from gcsplan.planners import registry
 
@@ -32,7 +32,7 @@ def test_a_row_names_a_planner_that_takes_what_it_is_called_with(name: str) -> N
 def test_a_swarm_has_its_optimiser_and_encodings_that_a_mission_may_ask_for(name: str) -> None:
     entry = registry.get(name)
     assert name in ("aco", "cmaes") or entry.optimiser in optimisers.TABLE  # ants on a grid, and a package
-    assert {entry.space["encoding"], entry.defaults["encoding"]} <= set(get_args(Encoding))
+    assert {entry.space["encoding"], entry.defaults["encoding"]} <= set(get_args(EncodingName))
 
 
 def test_an_unknown_name_is_refused_with_the_nearest() -> None:

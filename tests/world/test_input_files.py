@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gcsplan.world.input_files import Reading, beside, path_of, reading, tell_file, tell_folder, tell_setting
+from gcsplan.world.input_files import FileReading, beside, path_of, reading, tell_file, tell_folder, tell_setting
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def test_what_stays_as_it_is_has_not_changed(tmp_path: Path, marks: dict[str, st
     assert len(marks) == 3
     (tmp_path / "other.txt").write_text("nobody reads it")
     os.utime(tmp_path / "a.yaml", (1, 1))  # the content counts, not the time
-    assert Reading.changed(marks) == ""
+    assert FileReading.changed(marks) == ""
 
 
 @pytest.mark.parametrize("change", ["content", "appears", "gone", "another in the folder"])
@@ -37,7 +37,7 @@ def test_a_change_is_told_by_its_path(tmp_path: Path, marks: dict[str, str], cha
     else:
         (tmp_path / name).write_text("two")
     wanted = tmp_path if change == "another in the folder" else tmp_path / name
-    assert Reading.changed(marks) == str(wanted)
+    assert FileReading.changed(marks) == str(wanted)
 
 
 def test_outside_of_reading_nothing_is_kept_and_inner_ones_are_their_own(tmp_path: Path) -> None:
@@ -55,9 +55,9 @@ def test_a_setting_that_changes_is_seen(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.delenv("GCSPLAN_TEST", raising=False)
     with reading() as found:
         tell_setting("GCSPLAN_TEST")
-    assert Reading.changed(found.marks) == ""
+    assert FileReading.changed(found.marks) == ""
     monkeypatch.setenv("GCSPLAN_TEST", "elsewhere")
-    assert Reading.changed(found.marks) == "GCSPLAN_TEST"
+    assert FileReading.changed(found.marks) == "GCSPLAN_TEST"
 
 
 def test_the_files_beside_a_raster_begin_with_its_name_in_any_case(tmp_path: Path) -> None:

@@ -164,7 +164,7 @@ def test_neighbourhoods_forget_those_asked_for_least_lately_and_judge_alike(monk
     z = rough(rng, (500, 900), 1e-5)
     grid = GridMap.affine(0.0, 0.0, 5.0, 5.0)
     field = Field.of(grid)
-    monkeypatch.setattr(_neighbourhood, "LARGE", 1000)
+    monkeypatch.setattr(_neighbourhood, "LARGE_WINDOW", 1000)
     tile = _neighbourhood.TILE**2 * _neighbourhood.CELL_BYTES
     monkeypatch.setattr(_neighbourhood, "MOST_BYTES", 30 * tile)
     kept = Neighbourhoods(grid, field)

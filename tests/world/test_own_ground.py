@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from gcsplan.world.own_ground import POINTS, own_ground
+from gcsplan.world.own_ground import RING_POINTS, own_ground
 from gcsplan.world.surface import GridMap, Surface
 from gcsplan.world.zones import Circle, Polygon, Zone
 
@@ -60,4 +60,4 @@ def test_so_many_points_are_read_as_it_says() -> None:
     plain = surface()
     counting = Counting(plain.ground_m, plain.top_m, plain.grid)
     own_ground(counting, Zone("z", Circle(0.0, 0.0, 9e9), None, None), np.zeros((7, 2)), 10.0)
-    assert asked == [7 * POINTS]
+    assert asked == [7 * RING_POINTS]

@@ -14,7 +14,7 @@ from gcsplan.mavlink.mission.mission import Home, Mission
 from gcsplan.mavlink.mission.parameter_file import PARAM_ENDING, param_file, read_param_file
 from gcsplan.mavlink.mission.parameter_list import Setting, off, parameter_list
 from gcsplan.mavlink.mission.parameter_names import PARAMETERS, Name, OnBoard, Parameter, unanswered
-from gcsplan.mavlink.mission.parameter_safety import Extent, needed_groups, safety_list
+from gcsplan.mavlink.mission.parameter_safety import FlightExtent, needed_groups, safety_list
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
 
@@ -106,7 +106,7 @@ def test_a_rule_allows_its_side_of_the_value_and_what_else_it_names(
 
 @pytest.mark.parametrize("autopilot", list(Autopilot))
 def test_fences_must_hold_the_whole_flight_in_whole_metres(autopilot: Autopilot) -> None:
-    rows = {s.parameter.key: s for s in safety_list(autopilot, Extent(80.2, -3.4, 900.1))}
+    rows = {s.parameter.key: s for s in safety_list(autopilot, FlightExtent(80.2, -3.4, 900.1))}
     assert (rows["fence_top"].rule, rows["fence_top"].value) == ("at least", 81.0)
     assert (rows["fence_radius"].rule, rows["fence_radius"].value) == ("at least", 901.0)
     assert set(rows) <= set(SAFETY[autopilot])
@@ -115,13 +115,13 @@ def test_fences_must_hold_the_whole_flight_in_whole_metres(autopilot: Autopilot)
 
 
 def test_a_return_above_the_flight_lifts_the_fence_of_an_arducopter_alone() -> None:
-    lists = {a: safety_list(a, Extent(80.2, 0.0, 9.0), rtl_rel_home_m=100.0) for a in Autopilot}
+    lists = {a: safety_list(a, FlightExtent(80.2, 0.0, 9.0), rtl_rel_home_m=100.0) for a in Autopilot}
     tops = {a: next(s.value for s in rows if s.parameter.key == "fence_top") for a, rows in lists.items()}
     assert tops == {COPTER: 102.0, PLANE: 81.0, PX4: 81.0}
 
 
 def test_a_fence_counts_only_where_it_is_in_force() -> None:
-    settings = safety_list(COPTER, Extent(80.0, 0.0, 900.0))
+    settings = safety_list(COPTER, FlightExtent(80.0, 0.0, 900.0))
     low = {"FENCE_ALT_MAX": 50.0, "FENCE_RADIUS": 300.0, "FENCE_TYPE": float(TOP), "FENCE_ACTION": 1.0}
     assert [o.name.name for o in off(settings, {**low, "FENCE_ENABLE": 1.0}, COPTER)] == ["FENCE_ALT_MAX"]
     assert off(settings, {**low, "FENCE_ENABLE": 0.0}, COPTER) == []
@@ -132,7 +132,7 @@ def test_a_fence_counts_only_where_it_is_in_force() -> None:
 
 
 def test_of_fences_that_are_off_no_answer_is_needed() -> None:
-    settings = safety_list(COPTER, Extent(80.0, 0.0, 900.0))
+    settings = safety_list(COPTER, FlightExtent(80.0, 0.0, 900.0))
     assert needed_groups(settings, COPTER, {"FENCE_ENABLE": 0.0, "FENCE_AUTOENABLE": 0.0}) == ()
     needed = needed_groups(settings, COPTER)
     assert {("FENCE_ENABLE",), ("FENCE_ALT_MAX",), ("FENCE_RADIUS",)} <= set(needed)
@@ -144,7 +144,7 @@ def test_of_fences_that_are_off_no_answer_is_needed() -> None:
 
 @pytest.mark.parametrize("autopilot", list(Autopilot))
 def test_a_file_of_parameters_is_read_as_it_was_written(tmp_path: Path, autopilot: Autopilot) -> None:
-    settings = safety_list(autopilot, Extent(80.2, -3.4, 900.1))
+    settings = safety_list(autopilot, FlightExtent(80.2, -3.4, 900.1))
     file = tmp_path / f"uav1.{PARAM_ENDING[autopilot]}"
     file.write_text(param_file("uav1", autopilot, 3, settings), encoding="utf-8")
     assert read_param_file(file) == {n.name: n.value(s.value) for s in settings for n in s.parameter.names}

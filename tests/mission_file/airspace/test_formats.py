@@ -13,7 +13,7 @@ from gcsplan.mission_file.airspace.ed318 import is_ed318
 from gcsplan.mission_file.airspace.formats import read_published
 from gcsplan.mission_file.airspace.members import MemberError, number_or_none, outer_ring, position, text_of, unread
 from gcsplan.mission_file.airspace.openaip import is_openaip
-from gcsplan.mission_file.airspace.openair import SUFFIXES, read_openair
+from gcsplan.mission_file.airspace.openair import OPENAIR_SUFFIXES, read_openair
 from gcsplan.mission_file.airspace.policy import Policy
 from tests.mission_file.airspace.made import HOLE, RING, collection, ed269, ed318, openaip, volume
 
@@ -49,7 +49,7 @@ def test_a_file_of_none_of_these_formats_is_left_to_others() -> None:
     assert read_published(Path("z.geojson"), b"", PLAIN, POLICY) is None
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("suffix", OPENAIR_SUFFIXES)
 def test_openair_is_taken_by_its_ending(suffix: str) -> None:
     found = read_published(Path(f"z{suffix}"), OPENAIR, None, POLICY)
     assert found is not None
