@@ -15,7 +15,7 @@ from pymavlink import mavutil
 
 from gcsplan.arrays import Floats
 from gcsplan.mavlink.mission.mission import MissionItem
-from gcsplan.sim.sitl.instances import FRAME
+from gcsplan.sim.sitl.instances import COPTER
 from gcsplan.vehicle import Autopilot
 from tests.campaigns.returns import HOME_AMSL_M, Found, Scene, compare, scene
 
@@ -51,7 +51,7 @@ def fly_in_sitl(seed: int, autopilot: Autopilot, binary: str, instance: int, def
 def _start(one: Scene, binary: str, instance: int, defaults: str | None, own: Path) -> subprocess.Popen[bytes]:
     plane = one.vehicle.autopilot is Autopilot.ARDUPLANE
     rtl = one.rtl_rel_home_m
-    given: dict[str, float] = {"RTL_ALTITUDE": rtl, "TERRAIN_ENABLE": 0, "ARMING_CHECK": 0} if plane else dict(FRAME)
+    given: dict[str, float] = {"RTL_ALTITUDE": rtl, "TERRAIN_ENABLE": 0, "ARMING_CHECK": 0} if plane else dict(COPTER)
     if not plane:
         given |= {"RTL_ALT": 100.0 * rtl, "ANGLE_MAX": 4500, "RTL_LOIT_TIME": 1000}
     (own / "own.parm").write_text("".join(f"{k} {v:g}\n" for k, v in given.items()), encoding="ascii")

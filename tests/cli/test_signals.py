@@ -176,7 +176,7 @@ def command(**_):
     watched = weakref.ref(thing, gone)
     del thing
     for k in range(200): time.sleep(0.05)
-cli._commands = lambda called: command
+cli.command_of = lambda called: command
 cli.entry()
 """
     ended = ended_by(words, "plan")

@@ -20,6 +20,7 @@ from gcsplan.mavlink.files.plan_fence import (
 )
 from gcsplan.mavlink.files.plan_landing import landing_entries
 from gcsplan.mavlink.mission.mission import MissionItem
+from gcsplan.notes.note import Note
 from tests.support.effort import draws
 
 LANDING: dict[str, Any] = {
@@ -124,9 +125,9 @@ def test_every_mistake_of_a_fence_is_told_with_its_key_and_only_so_many() -> Non
 
 
 def test_a_breach_return_point_is_told_as_not_read() -> None:
-    notes: list[str] = []
+    notes: list[Note] = []
     assert fence_items({"breachReturn": [36.6, -84.3, 50]}, "geoFence", notes) == ()
-    assert notes == ["the file's fence has a breach return point, which was not read"]
+    assert [str(note) for note in notes] == ["the file's fence has a breach return point, which was not read"]
 
 
 def test_rally_points_are_read_as_they_were_written() -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from gcsplan.mavlink.link.px4_motion import slower_words, speed_shortage
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.limits import Limits
 
@@ -18,15 +19,16 @@ AS_PLANNED = {
 
 
 def test_a_speed_above_the_vehicles_most_is_a_shortage_with_its_cure() -> None:
-    assert speed_shortage({"MPC_XY_VEL_MAX": 12.0}, PX4, 12.0) == ""
-    words = speed_shortage({"MPC_XY_VEL_MAX": 8.0}, PX4, 11.2)
-    assert words.startswith("MPC_XY_VEL_MAX is 8 on board")
-    assert words.endswith("set MPC_XY_VEL_MAX 12, or plan with speed_m_s up to 8")
+    assert speed_shortage({"MPC_XY_VEL_MAX": 12.0}, PX4, 12.0) is None
+    found = speed_shortage({"MPC_XY_VEL_MAX": 8.0}, PX4, 11.2)
+    assert found == Note("velocity_too_small", value=8.0, speed_m_s=11.2, wanted=12)
+    assert str(found).startswith("MPC_XY_VEL_MAX is 8 on board")
+    assert str(found).endswith("set MPC_XY_VEL_MAX 12, or plan with speed_m_s up to 8")
 
 
 def test_what_was_not_read_or_bounds_nothing_is_no_shortage() -> None:
-    assert speed_shortage({}, PX4, 12.0) == ""
-    assert speed_shortage({"MPC_XY_VEL_MAX": 1.0}, replace(PX4, vel_max_m_s=None), 12.0) == ""
+    assert speed_shortage({}, PX4, 12.0) is None
+    assert speed_shortage({"MPC_XY_VEL_MAX": 1.0}, replace(PX4, vel_max_m_s=None), 12.0) is None
 
 
 def test_a_vehicle_as_planned_or_faster_or_silent_is_not_later() -> None:
@@ -37,9 +39,9 @@ def test_a_vehicle_as_planned_or_faster_or_silent_is_not_later() -> None:
 
 @pytest.mark.parametrize("name", AS_PLANNED)
 def test_each_parameter_that_is_slower_is_told(name: str) -> None:
-    (words,) = slower_words(AS_PLANNED | {name: 0.5 * AS_PLANNED[name]}, PX4)
-    assert words.startswith("it arrives later than planned: ")
-    assert name in words
+    (found,) = slower_words(AS_PLANNED | {name: 0.5 * AS_PLANNED[name]}, PX4)
+    assert found.code == "arrives_later"
+    assert name in str(found)
 
 
 def test_another_autopilot_is_not_asked() -> None:
