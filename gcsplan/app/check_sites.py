@@ -17,7 +17,7 @@ from typing import Protocol
 
 import numpy as np
 
-from gcsplan.app.fencing import own_fence
+from gcsplan.app.fence_breaches import own_fence
 from gcsplan.app.flight_hours import beyond_hours
 from gcsplan.app.pipeline import world_of
 from gcsplan.app.way_home import home_of

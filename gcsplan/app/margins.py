@@ -6,10 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from gcsplan.check.verdict import Finding, Verdict
+from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.build.order import Margins
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.notes.finding import Finding
 
 __all__ = ["larger", "on_path"]
 

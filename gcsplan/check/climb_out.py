@@ -28,9 +28,9 @@ from gcsplan.check.circles import circle_growth
 from gcsplan.check.geodesy import degree_m, flat_m, offset_m
 from gcsplan.check.spline import towards
 from gcsplan.check.stretch import Place, Stretch
-from gcsplan.check.verdict import Finding
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import MissionItem
+from gcsplan.notes.finding import Finding
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace, Legs

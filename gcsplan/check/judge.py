@@ -25,11 +25,12 @@ from gcsplan.check.misses import nearest_misses
 from gcsplan.check.plane_legs import PlaneLegs, legs_in_plane, steep_report
 from gcsplan.check.stretch import Flight, Stretch
 from gcsplan.check.tuning import DEFAULTS, Tuning
-from gcsplan.check.verdict import Finding, LegFigures, Verdict
+from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.check.zone_heights import nearest_pass
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.firmware import needs_straight
 from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.notes.finding import Finding
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import LegReport, Violation

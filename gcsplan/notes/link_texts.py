@@ -1,6 +1,7 @@
-"""Sentences on a vehicle that a list is sent to: its state, its parameters, its terrain, and the link to it."""
+"""Sentences on vehicles on their links: what is on board, what was sent."""
 
 TEXTS = {
+    # -- a vehicle that a list is sent to: its state, its parameters, its terrain, and the link to it --
     # -- the link, and the vehicle's state --
     "sends_from_another_port": (
         "the link sends from port {port}, because a program uses {wanted_port} already: a PX4 that has heard that "
@@ -151,5 +152,15 @@ TEXTS = {
     "slower_than_planned": "{name} is {value:g} on board, and {wanted:g} was planned with ({planned_key})",
     "returns_slower_than_planned": (
         "MPC_XY_CRUISE is {value:g} on board, and a return at {speed_m_s:speed} was planned with"
+    ),
+    # -- an upload or a comparison, by what was done before and after it --
+    "fence_on_board": "a fence of {items} {items:item|items} is on board too, read back and compared",
+    "judged_again_safe": "what is on board is judged again: safe",
+    "positions_shifted": (
+        "{items} {items:item differs by|items differ by up to} {most_m:distance.3}; judged again: {safe:safe|not safe}"
+    ),
+    "positions_cut": (
+        "{items} {items:item differs by|items differ by up to} {most_m:distance.3}, as {sender} write positions; "
+        "judged again: {safe:safe|not safe}"
     ),
 }

@@ -1,6 +1,7 @@
-"""Sentences on a plan: its bound, its search, and what of the request had to be changed."""
+"""Sentences on plans, fleets and rehearsals."""
 
 TEXTS = {
+    # -- a plan: its bound, its search, and what of the request had to be changed --
     # -- the bound and the search
     "bound_of_farther_paths": (
         "the terrain was looked at within {within_m:far.1} of the straight track: the lower bound is that of paths "
@@ -54,4 +55,109 @@ TEXTS = {
         "above the goal"
     ),
     "paper_energy_minimised": "the energy that is minimised is the paper's: a vehicle has no `energy:`",
+    # -- a fleet: departures, holds and speeds of its vehicles, and the distance between them --
+    # -- one vehicle's part
+    "waits_on_ground": "waits {wait_s:.1f} s on the ground",
+    "holds_at_gate": "holds {hold_s:.0f} s at the gate ({energy_j:.0f} J)",
+    "holds_and_waits": (
+        "holds {hold_s:.0f} s at the gate ({energy_j:.0f} J); a hold is whole seconds: the rest, {wait_s:.2f} s, it "
+        "waits on the ground"
+    ),
+    "flies_longer": "flies {more_m:distance.0} more, to arrive so late",
+    "keeps_clear": "{changes}: to keep clear of {other} ({time_s:seconds.1}, {amsl_m:amsl.0})",
+    "leaves_later": "leaves {by_s:.1f} s later",
+    "leaves_earlier": "leaves {by_s:.1f} s earlier",
+    "flies_at": "flies at {speed_m_s:speed.2 bare} instead of {was_m_s:speed.2}",
+    "holds_longer": "holds {by_s:g} s at the gate",
+    "takes_another_path": "takes another path",
+    "needs_more_energy": "needs {more_j:+.0f} J",
+    "first_waits_for": (
+        "the first arrives at {arrive_s:seconds.1} instead of {alone_s:seconds.1}, so that {last}, which needs "
+        "{needs_s:seconds.1} at its fastest, can follow"
+    ),
+    "lean_beyond_largest": (
+        "{speed_m_s:speed.2} needs a lean of more than {largest_deg:g}°, which is ArduCopter's largest: a vehicle that "
+        "flies this mission arrives late"
+    ),
+    "lean_to_set": "{speed_m_s:speed.2} needs a lean of about {lean_deg:g}°: set {parameter} before it flies",
+    "lean_parameter": (
+        "ATC_ANGLE_MAX {lean_deg:g} (degrees, since ArduPilot 4.7) or ANGLE_MAX {lean_cdeg:g} (hundredths of a degree, "
+        "before)"
+    ),
+    "lean_counted_with": (
+        "times, and forecasts in wind, count with {key:lean_angle_deg}: {lean_deg:g}: they hold with {parameter}"
+    ),
+    # -- the whole fleet
+    "starts_within_separation": (
+        "{pairs} {pairs:pair|pairs} of start places {pairs:is|are} nearer than {needed_m:distance} (nearest: {first}, "
+        "{second}: {apart_m:distance.1}): vehicles that wait on the ground are not judged against each other"
+    ),
+    "no_arrival_asked": "the file asks for no `arrival`: the separation between vehicles is not judged",
+    "nothing_keeps_apart": (
+        "the file asks for no `arrival`, so nothing keeps the vehicles apart; released together, {met}"
+    ),
+    "too_near": "the vehicles come too near to each other:{conflicts:lines}",
+    "more_conflicts": "and {count} more",
+    "come_near": (
+        "{first} and {second} come as near as {distance_m:distance.1 down}, needed {needed_m:distance}, at "
+        "{time_s:seconds.1} ({place})"
+    ),
+    "takes_off_beside": (
+        "{first} takes off from a place {distance_m:distance.1 down}, needed {needed_m:distance} from where {second} "
+        "stands, at {time_s:seconds.1} ({place})"
+    ),
+    "lands_beside": (
+        "{first} lands at a place {distance_m:distance.1 down}, needed {needed_m:distance} from where {second} stands, "
+        "at {time_s:seconds.1} ({place})"
+    ),
+    "place_in_plane": "east {east_m:distance.0}, north {north_m:distance.0}, {amsl_m:height.0} above sea level",
+    "place_on_map": "{lat_deg:.6f}, {lon_deg:.6f}, {amsl_m:amsl.0}",
+    "gates_open": (
+        "the gates open from T+0 = {start_utc} UTC on: a vehicle that comes to its gate after its second waits there "
+        "for nearly a day; release each by its time, {spare_s:g} s are to spare"
+    ),
+    "clock_of_fleet": (
+        "{first}, the first, arrives at {arrive_s:seconds.1} instead of {alone_s:seconds.1}, so that the others can "
+        "follow {interval_s:g} s apart (clock: fleet)"
+    ),
+    # -- a rehearsal: what was not kept, what was not flown, and how it was flown --
+    # -- what was not kept
+    "never_arrived": "{name} never arrived at its goal",
+    "never_arrived_for": "{name} never arrived at its goal: {why}",
+    "hit_ground": "it hit the ground at {speed_m_s:speed.1} on its way to item {item}",
+    "left_auto": "it left AUTO for {mode} at item {item}",
+    "time_was_up": "it still flew to item {item} when the time was up",
+    "other_ground": (
+        "that is {height_m:height.0} above the mission's ground: without terrain an SITL's ground is flat at the "
+        "altitude of home, and --sitl-binary starts one with the mission's terrain"
+    ),
+    "vehicle_said": "it said: {texts}",
+    "arrived_late": "{name} arrived {late_s:seconds} late, after {took_s:seconds} instead of {told_s:seconds}",
+    "down_late": "{name} was down {late_s:seconds} late, after {took_s:seconds} instead of {told_s:seconds}",
+    "battery_used_up": (
+        "{name} used {used_percent:.0f} % of its battery{paper: (paper's figures)|}, of which {reserve_percent:g} % "
+        "must stay"
+    ),
+    "order_lost": "the order of arrival was {came}; planned was {planned}",
+    "came_too_near": (
+        "{first} and {second} came as near as {distance_m:distance.1 down}, needed are {needed_m:distance}, at "
+        "{time_s:seconds.1}"
+    ),
+    "landed_too_near": (
+        "{first} landed beside {second}, which stood there: {distance_m:distance.1 down}, needed are "
+        "{needed_m:distance}, at {time_s:seconds.1}"
+    ),
+    "in_some_runs": "{what} (in {runs} of {of_runs} runs)",
+    # -- what was not flown
+    "circle_not_flown": "its circle is not flown, the simulated vehicle waits at the middle",
+    "jump_flown_once": "a jump flies it again and again, the simulated vehicle once",
+    "turns_flown_as_corners": "its turns of {radius_m:distance} are flown as corners",
+    # -- how it was flown
+    "energy_fitted_to_other_air": (
+        "its energy is fitted to flights at {slow_m_s:speed bare} to {fast_m_s:speed} through the air, and it flew at "
+        "{speed_m_s:speed.0} in this wind: what it used may be far off"
+    ),
+    "runs_alike": "without wind, gusts and noise every run is the same: one was flown",
+    "released_early": ("every vehicle was released {before_s:g} s before its departure, for its motors to spin up"),
+    "left_ground_off_time": "{vehicle} left the ground {off_s:+.1f} s from its departure",
 }

@@ -14,12 +14,13 @@ from gcsplan.app.flying import require_passing
 from gcsplan.app.model import Plan
 from gcsplan.app.outputs import outputs_of, summary_of
 from gcsplan.app.pipeline import plan
-from gcsplan.check.verdict import Finding, Verdict
+from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed, InputError, NoMission
 from gcsplan.mavlink.files.formats import read_plan, read_waypoints
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mission_file import load_mission
+from gcsplan.notes.finding import Finding
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 from tests.support.noted import codes, one

@@ -10,12 +10,12 @@ import pytest
 from gcsplan.app.margins import MOST_SLOPE, larger
 from gcsplan.check.judge import judge
 from gcsplan.check.plane_legs import follow_ground
-from gcsplan.check.verdict import Finding
 from gcsplan.mavlink.build.multirotor import build_mission
 from gcsplan.mavlink.build.order import MARGINS, Order
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
+from gcsplan.notes.finding import Finding
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.airspace import Airspace

@@ -15,7 +15,7 @@ import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from gcsplan.app import fencing, uploads
+from gcsplan.app import fence_breaches, fencing, uploads
 from gcsplan.app.upload_orders import judge_on_board
 from gcsplan.check.judge import judge
 from gcsplan.cli import main as cli
@@ -234,10 +234,10 @@ def test_a_fence_that_the_mission_flies_over_is_refused_by_name() -> None:
     mast = Zone("mast", Circle(1500, 10, 60), None, Level(50, "agl"))
     where, craft = world(zones=[mast, Zone("yard", Circle(1500, 300, 100))]), vehicle(horizontal_clearance_m=30)
     mission = mission_in(where, craft)
-    fence = fencing.fence_for(mission, craft, where)
+    fence = fence_breaches.fence_for(mission, craft, where)
     assert [z.name for z in fence.zones] == ["yard"]
     with pytest.raises(CheckFailed, match=r"mast(.|\n)*fence-infinite") as refused:
-        fencing.fence_for(mission, craft, where, infinite=True)
+        fence_breaches.fence_for(mission, craft, where, infinite=True)
     assert refused.value.reason == "fence"
     assert "yard" not in str(refused.value)
 
@@ -251,7 +251,7 @@ def test_a_vehicle_whose_parameters_cut_a_corner_into_the_fence_is_refused() -> 
     mission = build_mission(path, where, craft, (36.6, -84.3), Order())
     job = replace(
         job_of("uav1", 1, "udpout:127.0.0.1:9", mission, craft, where),
-        fence=fencing.fence_for(mission, craft, where, infinite=True),
+        fence=fence_breaches.fence_for(mission, craft, where, infinite=True),
     )
     again = judge_on_board(job, allow_unjudged=False)
     assert again is not None
@@ -270,13 +270,13 @@ def test_start_and_goal_keep_their_clearance_from_the_fence_too(east: float, nor
     low = Zone("low", Circle(east, north, 80), None, Level(1, "agl"))
     where, craft = world(zones=[low]), vehicle(horizontal_clearance_m=30)
     with pytest.raises(CheckFailed, match="low"):
-        fencing.fence_for(mission_in(where, craft), craft, where, infinite=True)
+        fence_breaches.fence_for(mission_in(where, craft), craft, where, infinite=True)
 
 
 def test_a_mission_that_touches_its_clearance_passes_the_rounded_fence() -> None:
     zone = Zone("near", Circle(1500, 133.025, 100.0))
     where, craft = world(zones=[zone]), vehicle(horizontal_clearance_m=30)
-    assert len(fencing.fence_for(mission_in(where, craft), craft, where).items) == 1
+    assert len(fence_breaches.fence_for(mission_in(where, craft), craft, where).items) == 1
 
 
 def test_inclusion_areas_must_hold_the_whole_flight() -> None:
@@ -287,7 +287,7 @@ def test_inclusion_areas_must_hold_the_whole_flight() -> None:
     def found(shape: Circle | Polygon) -> list[str]:
         (item_zone,) = fence_of([Zone("z", shape)], FRAME, Autopilot.PX4).zones
         items = [replace(i, command=i.command - 1) for i in fence_of([item_zone], FRAME, Autopilot.PX4).items]
-        return [f.message for f in fencing.breaches(areas_of(items, FRAME), mission, craft, where)]
+        return [f.message for f in fence_breaches.breaches(areas_of(items, FRAME), mission, craft, where)]
 
     assert found(Polygon(ring)) == []
     assert found(Circle(3000, 0, 4000)) == []
@@ -305,7 +305,7 @@ def own(items: list[MissionItem], path: list[list[float]] = OVER, half_m: float 
         mission = replace(mission, items=(*mission.items[:2], *mission.items[-2:]))
     verdict = judge(mission, craft, where)
     assert verdict.safe is True
-    return fencing.own_fence(items, verdict, craft, where)[0]
+    return fence_breaches.own_fence(items, verdict, craft, where)[0]
 
 
 def ring_of(command: int, *metres: tuple[float, float]) -> list[MissionItem]:
@@ -351,7 +351,7 @@ def test_an_inclusion_area_holds_corners_as_they_are_cut() -> None:
         cut = replace(mission, items=tuple(items))
         verdict = judge(cut, craft, where)
         assert verdict.safe is True
-        assert fencing.own_fence(ring, verdict, craft, where)[0].safe is safe, radius_m
+        assert fence_breaches.own_fence(ring, verdict, craft, where)[0].safe is safe, radius_m
 
 
 def test_a_fence_that_crosses_itself_is_not_judged() -> None:
@@ -363,7 +363,7 @@ def test_a_fence_that_crosses_itself_is_not_judged() -> None:
 def test_a_zone_too_thin_for_a_fence_is_refused_with_the_cure() -> None:
     where, craft = world(zones=[Zone("hair", Polygon(np.array([[0, 900], [900, 900], [900, 900.004]])))]), vehicle()
     with pytest.raises(InputError, match="too thin"):
-        fencing.fence_for(mission_in(where, craft), craft, where)
+        fence_breaches.fence_for(mission_in(where, craft), craft, where)
 
 
 def test_a_plan_files_own_fence_is_read_and_judged(tmp_path: Path) -> None:
@@ -375,7 +375,7 @@ def test_a_plan_files_own_fence_is_read_and_judged(tmp_path: Path) -> None:
         file.write_text(write_plan(mission, fence=fence.items))
         read = read_mission_file(file, autopilot=COPTER)
         assert read.fence == fence.items
-        verdict, told = fencing.own_fence(read.fence, judge(mission, craft, where), craft, where)
+        verdict, told = fence_breaches.own_fence(read.fence, judge(mission, craft, where), craft, where)
         assert "1 area to stay out of" in str(told[0])
         assert verdict.safe is safe
 
