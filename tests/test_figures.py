@@ -17,7 +17,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from gcsplan.app import outputs, pipeline
+from gcsplan.app import outputs, pipeline, verdict_json
 from gcsplan.check.misses import Miss
 from gcsplan.cli import console
 from gcsplan.cli import main as cli
@@ -96,7 +96,7 @@ def test_the_highest_and_the_steepest_are_the_same_everywhere_and_not_flattered(
     assert console.plan_row(changed, None)["steepest, °"].split(" of ")[0] == "4.9"
     rows = csv.DictReader(io.StringIO(write_profile(outputs.item_rows("uav1", verdict))))
     assert "4.811" in {row["climb_deg"] for row in rows}
-    assert json.loads(write_summary(outputs.verdict_of("file", verdict)))["max_climb_deg"] == 4.811
+    assert json.loads(write_summary(verdict_json.verdict_of("file", verdict)))["max_climb_deg"] == 4.811
     subject = Subject(
         "uav1", verdict, replace(v.request.vehicle, limits=replace(v.request.vehicle.limits, max_agl_m=700))
     )
@@ -121,7 +121,7 @@ def test_a_height_that_the_nearest_number_flatters_is_the_same_everywhere() -> N
     assert markup.least(verdict.lowest.min_agl_m, 1) == "33.4"
     rows = csv.DictReader(io.StringIO(write_profile(outputs.item_rows("uav1", verdict))))
     assert "33.460" in [row["min_agl_on_leg_m"] for row in rows]
-    assert json.loads(write_summary(outputs.verdict_of("file", verdict)))["min_agl_m"] == 33.46
+    assert json.loads(write_summary(verdict_json.verdict_of("file", verdict)))["min_agl_m"] == 33.46
     flown = Performance("uav1", 0.0, None, (1.0,), (2.0,), 33.46, (0.0, 0.0), None)
     assert flown.row(1)["lowest AGL, m"] == "33.4"
 
@@ -133,7 +133,7 @@ def test_csv_and_json_have_the_same_least_height() -> None:
         legs = tuple(leg if leg.column else replace(leg, min_agl_m=metres) for leg in verdict.legs)
         changed = replace(verdict, legs=legs)
         rows = list(csv.DictReader(io.StringIO(write_profile(outputs.item_rows("uav1", changed)))))
-        told = json.loads(write_summary(outputs.verdict_of("file", changed)))["min_agl_m"]
+        told = json.loads(write_summary(verdict_json.verdict_of("file", changed)))["min_agl_m"]
         assert {float(row["min_agl_on_leg_m"]) for row in rows if row["min_agl_on_leg_m"]} == {told}
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from gcsplan.app.check_sites import Checked
 from gcsplan.app.checking import Batch, Failing, failing_of, failing_to_read, finding_lines, more_of
-from gcsplan.app.outputs import verdict_of
+from gcsplan.app.verdict_json import verdict_of
 from gcsplan.errors import GcsplanError, InputError, worst_of
 from gcsplan.export.summary import json_of
 from gcsplan.figures import counted

@@ -21,7 +21,7 @@ from gcsplan.app.check_sites import (
     match,
     places_of,
 )
-from gcsplan.app.outputs import flat
+from gcsplan.app.verdict_json import flat
 from gcsplan.app.way_home import is_required, lets_fly
 from gcsplan.errors import CheckFailed, GcsplanError, InputError, Problem, worst_of
 from gcsplan.figures import counted

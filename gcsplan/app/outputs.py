@@ -14,6 +14,7 @@ import numpy as np
 from gcsplan import __version__
 from gcsplan.app.model import FleetPlan, Plan, VehiclePlan
 from gcsplan.app.on_board import settings_of_plan
+from gcsplan.app.verdict_json import extremes
 from gcsplan.arrays import Floats
 from gcsplan.check.rtl.words import verdict_words
 from gcsplan.check.verdict import LegFigures, Verdict
@@ -28,7 +29,7 @@ from gcsplan.mavlink.files.formats import write_plan, write_waypoints
 from gcsplan.mavlink.mission.commands import command_name
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.mavlink.mission.parameter_file import PARAM_ENDING, param_file
-from gcsplan.notes.note import IN_FILES, Wording, in_json
+from gcsplan.notes.note import in_json
 from gcsplan.units import METRIC, Units
 
 if TYPE_CHECKING:
@@ -169,7 +170,7 @@ def _vehicle(
         "battery_used_percent": verdict.battery_used_percent,
         "min_agl_m": lowest.min_agl_m if lowest else None,
         "min_agl_at": {"leg": lowest.seq, "lat": lowest.min_agl_at[0], "lon": lowest.min_agl_at[1]} if lowest else None,
-        **_extremes(verdict),
+        **extremes(verdict),
         "speed_m_s": v.speed_m_s,
         "depart_s": slot.depart_s if slot else 0.0,
         "arrive_s": slot.arrive_s if slot else verdict.arrive_s,
@@ -186,51 +187,11 @@ def _vehicle(
     } | _of_search(v) | ({} if home is None else {"way_home": home.as_dict()})  # fmt: skip
 
 
-def _extremes(verdict: Verdict) -> dict[str, Any]:
-    """The greatest height above ground, the nearest zone beside, over or under, and the steepest angle."""
-    highest, nearest, passed = verdict.highest, verdict.nearest, verdict.zone_pass
-    return {
-        "max_agl_m": highest.max_agl_m if highest else None,
-        "min_zone_clearance_m": nearest.zone_clearance_m if nearest else None,
-        "nearest_zone": nearest.nearest_zone if nearest else None,
-        "min_zone_height_m": passed.height_m if passed else None,
-        "zone_passed": {"zone": passed.zone, "side": passed.side, "leg": passed.seq} if passed else None,
-        "max_climb_deg": verdict.max_climb_deg,
-    }
-
-
 def _of_search(v: VehiclePlan) -> dict[str, Any]:
     """The result of a sampling search before its repair; empty for other planners."""
     if v.solution.raw_violations is None:
         return {}
     return {"raw_violations": v.solution.raw_violations, "repaired": v.solution.repaired}
-
-
-def flat(figures: Any) -> dict[str, Any]:
-    """The fields of a dataclass with slots, by name; unlike `asdict` it copies nothing."""
-    return {name: getattr(figures, name) for name in figures.__slots__}
-
-
-def verdict_of(name: str, verdict: Verdict, home: WayHome | None = None, wording: Wording = IN_FILES) -> dict[str, Any]:
-    """A verdict as plain values, for ``check --json``; ``home``: the way home, if it was judged."""
-    lowest, words = verdict.lowest, verdict_words(verdict.safe, home)
-    return {
-        "file": name,
-        "vehicle": verdict.mission.name,
-        "safe": verdict.safe,
-        "verdict": words.text(wording),
-        "items": len(verdict.mission.wire_items()),
-        "length_m": verdict.length_m,
-        "energy_j": verdict.told_j(verdict.path_energy_j),
-        "flight_energy_j": verdict.told_j(verdict.energy_j),
-        "energy_figures": verdict.energy_figures,
-        "battery_used_percent": verdict.battery_used_percent,
-        "min_agl_m": lowest.min_agl_m if lowest else None,
-        **_extremes(verdict),
-        "violations": [f.as_dict(wording) for f in verdict.findings],
-        **in_json("not_judged", verdict.not_judged, wording),
-        **in_json("notes", verdict.notes, wording),
-    }
 
 
 def item_rows(vehicle: str, verdict: Verdict, slot: Slot | None = None) -> list[ItemRow]:

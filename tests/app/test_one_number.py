@@ -14,9 +14,10 @@ import pytest
 
 from gcsplan.app.checking import check_files
 from gcsplan.app.model import Plan, VehiclePlan
-from gcsplan.app.outputs import outputs_of, report_of, summary_of, verdict_of
+from gcsplan.app.outputs import outputs_of, report_of, summary_of
 from gcsplan.app.rehearsing import rehearse
 from gcsplan.app.report_page import render_rehearsal
+from gcsplan.app.verdict_json import verdict_of
 from gcsplan.check.verdict import Verdict, by_item
 from gcsplan.cli.console import plan_row
 from gcsplan.cli.verdict_table import verdict_table
