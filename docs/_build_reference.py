@@ -17,8 +17,9 @@ from typing import Any, NamedTuple, get_args
 
 import gcsplan
 from gcsplan import errors
-from gcsplan.cli import ending
-from gcsplan.mission_file import json_schema, schema, units
+from gcsplan.cli.process import exit as ending
+from gcsplan.mission_file import json_schema
+from gcsplan.mission_file.values import schema, units
 from gcsplan.notes.catalogue import TEXTS
 from gcsplan.planners import registry
 from gcsplan.sim.vehicle.firmware import FIRMWARE_CHANGES
@@ -154,7 +155,7 @@ def commands() -> list[tuple[str, Any]]:
     """Every command with its full name, groups before what is in them."""
     import typer.main
 
-    from gcsplan.cli.commands import app
+    from gcsplan.cli.command_table import app
 
     found: list[tuple[str, Any]] = []
 

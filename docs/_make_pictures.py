@@ -8,10 +8,10 @@ from __future__ import annotations
 import io
 from pathlib import Path
 
-from gcsplan.app.outputs import figures_of, picture_of
-from gcsplan.app.pipeline import load_mission, plan, world_of
-from gcsplan.app.problems import make_problem
-from gcsplan.report import idea
+from gcsplan.app.fleet.pipeline import load_mission, plan, world_of
+from gcsplan.app.output.files import figures_of, picture_of
+from gcsplan.app.plan.problem import make_problem
+from gcsplan.report.views import proof_picture as idea
 
 MISSIONS = Path(__file__).parents[1] / "missions"
 

@@ -20,20 +20,20 @@ from types import ModuleType
 
 TYPE_CHECKING = False  # as typing has it, whose import takes as long as all else before a command hears signals
 if TYPE_CHECKING:
-    from gcsplan.app.pipeline import load_mission, plan
-    from gcsplan.app.scripting import check, rehearse, report, upload, write
+    from gcsplan.app.api import check, rehearse, report, upload, write
+    from gcsplan.app.fleet.pipeline import load_mission, plan
 
 __all__ = ["__version__", "check", "load_mission", "plan", "rehearse", "report", "upload", "write"]
 __version__ = "0.1.0"
 
 _MODULE_OF = {
-    "load_mission": "gcsplan.app.pipeline",
-    "plan": "gcsplan.app.pipeline",
-    "check": "gcsplan.app.scripting",
-    "rehearse": "gcsplan.app.scripting",
-    "report": "gcsplan.app.scripting",
-    "upload": "gcsplan.app.scripting",
-    "write": "gcsplan.app.scripting",
+    "load_mission": "gcsplan.app.fleet.pipeline",
+    "plan": "gcsplan.app.fleet.pipeline",
+    "check": "gcsplan.app.api",
+    "rehearse": "gcsplan.app.api",
+    "report": "gcsplan.app.api",
+    "upload": "gcsplan.app.api",
+    "write": "gcsplan.app.api",
 }
 """The module of each function, which is imported at its first use, so that the command line starts fast."""
 

@@ -9,8 +9,8 @@ from typing import Literal, TypeVar
 
 from gcsplan.arrays import Floats
 from gcsplan.notes.note import Note
-from gcsplan.world.atmosphere import true_per_indicated
-from gcsplan.world.limits import Limits
+from gcsplan.world.geodesy.atmosphere import true_per_indicated
+from gcsplan.world.geometry.limits import Limits
 
 DEFAULT_LEAN_DEG, LARGEST_LEAN_DEG = 30.0, 80.0
 """ArduCopter's largest lean angle: its default, and the most that it accepts."""

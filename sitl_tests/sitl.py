@@ -19,7 +19,7 @@ import pytest
 
 from gcsplan.errors import LinkError
 from gcsplan.mavlink.link.link import Link, LinkSteps, run
-from gcsplan.mavlink.link.session import discover
+from gcsplan.mavlink.link.session.session import discover
 from gcsplan.mavlink.link.watch import VehicleState
 from gcsplan.mavlink.mission.autopilots import autopilot_of
 from gcsplan.sim.vehicle.firmware import ARDUPILOT_FAMILY, KNOWN_FIRMWARE, Firmware

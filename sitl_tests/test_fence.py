@@ -9,15 +9,15 @@ import pytest
 
 from gcsplan.mavlink.build.fence import Fence, areas_of, fence_of
 from gcsplan.mavlink.files.formats import write_plan
-from gcsplan.mavlink.link import steps
 from gcsplan.mavlink.link.link import Link
-from gcsplan.mavlink.link.session import SessionOptions, clear_mission, download_items, upload_items
+from gcsplan.mavlink.link.session import steps
+from gcsplan.mavlink.link.session.session import SessionOptions, clear_mission, download_items, upload_items
 from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.mavlink.mission.mission import FENCE, Mission
 from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
-from gcsplan.world.frame import Frame
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from sitl_tests import sitl
 from sitl_tests.missions import a_mission, a_vehicle
 from sitl_tests.peers import MavsdkVehicle, item_of, mavsdk_station

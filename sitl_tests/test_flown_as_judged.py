@@ -16,7 +16,7 @@ from gcsplan.sim.part import RehearsalPart
 from gcsplan.sim.sitl.flights import rehearse_sitl
 from gcsplan.sim.sitl.instances import sitl_instances
 from gcsplan.vehicle import Autopilot, Vehicle
-from gcsplan.world.limits import Limits
+from gcsplan.world.geometry.limits import Limits
 from sitl_tests import sitl
 from tests.support.worlds import world
 

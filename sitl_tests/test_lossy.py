@@ -8,7 +8,7 @@ from __future__ import annotations
 import pytest
 
 from gcsplan.mavlink.link.link import Link
-from gcsplan.mavlink.link.session import (
+from gcsplan.mavlink.link.session.session import (
     SessionOptions,
     UploadOrder,
     download_mission,

@@ -6,7 +6,7 @@ import pytest
 
 from gcsplan.errors import GcsplanError
 from gcsplan.mavlink.link.link import Link
-from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet, verify_mission
+from gcsplan.mavlink.link.session.session import SessionOptions, UploadOrder, upload_fleet, verify_mission
 from gcsplan.mavlink.mission.mission import MISSION
 from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot

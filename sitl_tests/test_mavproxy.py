@@ -13,11 +13,11 @@ from pathlib import Path
 
 import pytest
 
-from gcsplan.app.shifts import CUTTING, shift_of
+from gcsplan.app.upload.position_tolerance import CUTTING, shift_of
 from gcsplan.errors import GcsplanError
 from gcsplan.mavlink.files.formats import write_waypoints
 from gcsplan.mavlink.link.link import Link
-from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet
+from gcsplan.mavlink.link.session.session import SessionOptions, UploadOrder, upload_fleet
 from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from gcsplan.mavlink.files.formats import write_plan, write_waypoints
-from gcsplan.mavlink.link import steps
 from gcsplan.mavlink.link.link import Link
-from gcsplan.mavlink.link.session import (
+from gcsplan.mavlink.link.session import steps
+from gcsplan.mavlink.link.session.session import (
     SessionOptions,
     clear_mission,
     upload_items,

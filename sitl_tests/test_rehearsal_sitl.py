@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gcsplan.app.model import Plan
-from gcsplan.app.pipeline import plan
-from gcsplan.app.rehearsing import parts_of, rehearse, rehearse_in_sitl
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.plan.model import Plan
+from gcsplan.app.rehearse import parts_of, rehearse, rehearse_in_sitl
 from gcsplan.errors import LinkError, UsageError
 from gcsplan.mavlink.mission.commands import WAYPOINT
 from gcsplan.mission_file import load_mission

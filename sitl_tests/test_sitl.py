@@ -17,7 +17,7 @@ import pytest
 
 from gcsplan.mavlink.link.frames import FrameParser, FrameWriter
 from gcsplan.mavlink.link.link import GCS, Link
-from gcsplan.mavlink.link.session import (
+from gcsplan.mavlink.link.session.session import (
     SessionOptions,
     clear_mission,
     download_items,

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from gcsplan.app.terrain_link import compare, serve
+from gcsplan.app.upload.terrain_service import compare, serve
 from gcsplan.dem.dat_file import read_dat
 from gcsplan.mavlink.link.terrain import TerrainComparison
 from gcsplan.mission_file import load_mission

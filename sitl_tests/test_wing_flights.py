@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gcsplan.app.model import Plan, VehiclePlan
-from gcsplan.app.pipeline import plan
-from gcsplan.app.rehearsing import rehearse_in_sitl
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.plan.model import Plan, VehiclePlan
+from gcsplan.app.rehearse import rehearse_in_sitl
 from gcsplan.arrays import Floats
 from gcsplan.check.verdict import LegFigures
 from gcsplan.mission_file import load_mission

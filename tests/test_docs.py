@@ -18,7 +18,7 @@ from PIL import Image
 import gcsplan
 from gcsplan import errors
 from gcsplan.export.summary import ORDER
-from gcsplan.mission_file import schema
+from gcsplan.mission_file.values import schema
 from gcsplan.planners import registry
 from gcsplan.sim.vehicle.firmware import FIRMWARE_CHANGES, KNOWN_FIRMWARE
 from gcsplan.world.airspace import ViolationKind
@@ -85,7 +85,7 @@ def test_units_and_defaults_are_those_of_the_code(made: ModuleType) -> None:
 def test_the_command_line_s_reference_names_every_command_and_option(made: ModuleType) -> None:
     import typer.main
 
-    from gcsplan.cli.commands import app
+    from gcsplan.cli.command_table import app
 
     text = made.command_line()
     parts = {part.split("`")[1]: part for part in re.split(r"^## ", text, flags=re.MULTILINE)[1:]}
@@ -142,7 +142,7 @@ def test_the_python_reference_names_all_that_the_package_offers() -> None:
     for name in set(gcsplan.__all__) - {"__version__"}:
         # mkdocstrings reads the sources: a name that a package has too is the package there, and not the function.
         is_package = (Path(gcsplan.__file__).parent / name).is_dir()
-        assert f"\n::: gcsplan.{f'app.scripting.{name}' if is_package else name}\n" in text, name
+        assert f"\n::: gcsplan.{f'app.api.{name}' if is_package else name}\n" in text, name
 
 
 # -- pages by hand -----------------------------------------------------------------------------------------------------

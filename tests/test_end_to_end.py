@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 import yaml
 
-from gcsplan.app.checking import check_files
-from gcsplan.app.model import Plan
-from gcsplan.app.outputs import outputs_of
-from gcsplan.app.pipeline import plan
+from gcsplan.app.check.files import check_files
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.output.files import outputs_of
+from gcsplan.app.plan.model import Plan
 from gcsplan.check.judge import judge
 from gcsplan.mavlink.files.formats import write_waypoints
 from gcsplan.mavlink.mission import commands as cmd

@@ -17,15 +17,18 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from gcsplan.app import outputs, pipeline, verdict_json
-from gcsplan.check.misses import Miss
-from gcsplan.cli import console
+from gcsplan.app.check import verdict_json
+from gcsplan.app.fleet import pipeline
+from gcsplan.app.output import files as outputs
+from gcsplan.check.margins import Miss
 from gcsplan.cli import main as cli
+from gcsplan.cli.output import console
 from gcsplan.export.profile import write_profile
 from gcsplan.export.summary import write_summary
 from gcsplan.figures import counted, floored, raised, steepened
-from gcsplan.report import markup, tables
-from gcsplan.report.subject import Subject
+from gcsplan.report.parts import html as markup
+from gcsplan.report.parts.page_data import Subject
+from gcsplan.report.views import tables
 from gcsplan.sim.outcome import Performance
 from gcsplan.units import METRIC
 from tests.support.paths import DATA

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from gcsplan import load_mission, plan
-from gcsplan.app.outputs import outputs_of
-from gcsplan.app.way_home import homes_of
+from gcsplan.app.output.files import outputs_of
+from gcsplan.app.plan.way_home import homes_of
 from gcsplan.mavlink.files.formats import read_mission_file
 from gcsplan.mavlink.mission.compare import compare, faults
 from tests.support.paths import MISSIONS

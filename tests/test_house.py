@@ -64,7 +64,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "__main__": {"cli"},
 }
 
-PROJECTION = {"world/frame.py", "world/datum.py", "world/grids.py", "world/reprojection.py", "world/terrain.py"}
+PROJECTION = {
+    "world/geodesy/frame.py",
+    "world/geodesy/datum.py",
+    "world/geodesy/grids.py",
+    "world/geodesy/reprojection.py",
+    "world/terrain/terrain.py",
+}
 SOCKETS = {
     "dem/download.py",
     "mavlink/link/link.py",
@@ -78,14 +84,14 @@ MOST_LINES = 600  # of a module
 MOST_LINES_OF_FUNCTION = 80
 
 TABLES = {
-    "cli/plan.py",
-    "cli/check.py",
-    "cli/rehearse.py",
-    "cli/links.py",
-    "cli/fly.py",
-    "cli/bench.py",
-    "cli/new.py",
-    "cli/terrain.py",
+    "cli/commands/plan.py",
+    "cli/commands/check.py",
+    "cli/commands/rehearse.py",
+    "cli/commands/vehicles.py",
+    "cli/commands/sim.py",
+    "cli/commands/bench.py",
+    "cli/commands/new.py",
+    "cli/commands/terrain.py",
 }
 """A command's arguments are the table of its options, and its docstring is its help: its body alone counts."""
 
@@ -94,9 +100,9 @@ LONG = {
     "planners/optimal/navmesh/mesh_kernels.py": {"make_portals"},
     "planners/lattice/search_kernels.py": {"reach"},
     "planners/lattice/pull_kernels.py": {"pull"},
-    "world/_sweep_terrain.py": {"sweep"},
-    "world/_sweep_zones.py": {"nearest_conflict"},
-    "world/_envelope.py": {"pieces"},
+    "world/kernels/sweep_terrain.py": {"sweep"},
+    "world/kernels/sweep_zones.py": {"nearest_conflict"},
+    "world/kernels/envelope.py": {"pieces"},
 }
 """Kernels whose one loop keeps its numbers in registers: a call in it would cost time, or carry all of them along."""
 
@@ -124,7 +130,7 @@ def knows_metres_alone(path: Path) -> bool:
     """The packages that may know no latitude: planners, optimisers, fleet, and the airspace with all its parts."""
     parts = path.relative_to(ROOT).parts
     if parts[0] == "world":
-        return path.stem.startswith(("airspace", "_", "tube")) and path.stem != "__init__"
+        return parts[1] == "kernels" or path.stem in ("airspace", "tube")
     return parts[0] in ("planners", "optimisers", "fleet")
 
 
@@ -250,10 +256,10 @@ def test_sockets_are_opened_by_the_link_and_the_simulated_vehicles_server_alone(
 def test_terrain_is_fetched_by_its_own_command_alone() -> None:
     network = {"gcsplan.dem.download", "gcsplan.dem.fetch"}
     users = {name_of(p) for p in MODULES if own_imports(p) & network}
-    assert users == {"dem/fetch.py", "cli/dem.py"}
+    assert users == {"dem/fetch.py", "cli/commands/dem.py"}
     outside = [
         n
-        for n in ast.parse((ROOT / "cli/dem.py").read_text(encoding="utf-8")).body
+        for n in ast.parse((ROOT / "cli/commands/dem.py").read_text(encoding="utf-8")).body
         if isinstance(n, ast.Import | ast.ImportFrom)
     ]
     assert not {own(name) for name in imported(outside, ("gcsplan", "cli"))} & network, "other commands import it too"
@@ -437,7 +443,7 @@ def test_the_house_is_described() -> None:
         ("from gcsplan import cli as c", {"gcsplan.cli"}),
         ("from .mission import Mission", {"gcsplan.mavlink.mission.Mission"}),
         ("from . import link", {"gcsplan.mavlink.link"}),
-        ("from ..world.frame import Frame", {"gcsplan.world.frame.Frame"}),
+        ("from ..world.geodesy.frame import Frame", {"gcsplan.world.geodesy.frame.Frame"}),
         ("def f():\n    import socket", {"socket"}),
         ("if TYPE_CHECKING:\n    import a\nelse:\n    import b\nimport c", {"a", "b", "c"}),
     ],
@@ -452,7 +458,7 @@ def test_own_modules_are_told_from_names_and_from_others() -> None:
     assert own("gcsplan.__version__") is None
     assert own("numpy.typing") is None
     assert package_of("gcsplan.mavlink.link.url") == "mavlink.link"
-    assert package_of("gcsplan.check.rtl.model") == "check"
+    assert package_of("gcsplan.check.motion.return_rules") == "check"
 
 
 def test_degrees_are_seen_in_every_kind_of_name() -> None:

@@ -22,23 +22,23 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from gcsplan import report
-from gcsplan.app.model import Plan
-from gcsplan.app.outputs import outputs_of, report_of
-from gcsplan.app.pipeline import plan
-from gcsplan.app.rehearsing import rehearse
-from gcsplan.app.report_page import page_of_plan
-from gcsplan.app.way_home import homes_of
-from gcsplan.check.rtl.verdict import WayHome
-from gcsplan.cli import console, verdict_table
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.output.files import outputs_of, report_of
+from gcsplan.app.output.report import page_of_plan
+from gcsplan.app.plan.model import Plan
+from gcsplan.app.plan.way_home import homes_of
+from gcsplan.app.rehearse import rehearse
+from gcsplan.check.returns.verdict import WayHome
 from gcsplan.cli import main as cli
-from gcsplan.cli.home_words import say_homes
+from gcsplan.cli.output import console, verdict_table
+from gcsplan.cli.output.return_table import say_homes
 from gcsplan.errors import UsageError
 from gcsplan.figures import floored, raised
 from gcsplan.mission_file import load_mission
-from gcsplan.mission_file.units import OTHERS
+from gcsplan.mission_file.values.units import OTHERS
 from gcsplan.notes.note import Wording
-from gcsplan.report import markup
 from gcsplan.report.page import render_page
+from gcsplan.report.parts import html as markup
 from gcsplan.units import (
     AVIATION,
     IMPERIAL,

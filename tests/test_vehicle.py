@@ -22,7 +22,7 @@ from gcsplan.vehicle import (
     lean_for_deg,
     lean_words,
 )
-from gcsplan.world.limits import Limits
+from gcsplan.world.geometry.limits import Limits
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
 

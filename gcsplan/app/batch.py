@@ -1,7 +1,7 @@
 """Plan many mission files: each is a piece of work of its own, and a bad one never stops the others.
 
-What is done is kept (`gcsplan.app.records`): a mission is not planned again if no file that it reads, no option and no
-output of it has changed. Only this process writes; workers send the files' texts.
+What is done is kept (`gcsplan.app.output.records`): a mission is not planned again if no file that it reads, no option
+and no output of it has changed. Only this process writes; workers send the files' texts.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from typing import Any
 import numpy as np
 
 from gcsplan import __version__
-from gcsplan.app import outputs
-from gcsplan.app.executor import Executor
-from gcsplan.app.flying import flyable
-from gcsplan.app.model import Plan
+from gcsplan.app.fleet.may_fly import flyable
+from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.named_files import named_files
-from gcsplan.app.pipeline import plan
-from gcsplan.app.records import Record, fault_of_name, kept_record, write_record
+from gcsplan.app.output import files as outputs
+from gcsplan.app.output.records import Record, fault_of_name, kept_record, write_record
+from gcsplan.app.parallel.executor import Executor
+from gcsplan.app.plan.model import Plan
 from gcsplan.errors import GcsplanError, InputError, NoMission, UsageError, worst_of
 from gcsplan.export.durable import locked
 from gcsplan.export.outdir import retire_outputs, settle_outputs, write_outputs
 from gcsplan.mission_file.samples import file_of, is_sample
-from gcsplan.world.input_files import FileReading, reading
+from gcsplan.world.terrain.input_files import FileReading, reading
 
 __all__ = ["BatchOptions", "MissionBatch", "Record", "exit_code", "missions_of"]
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gcsplan.app import uploads
+from gcsplan.app.upload import run as uploads
 from gcsplan.errors import InputError, Problem, VehicleRefused
 from gcsplan.mavlink.mission.return_altitude import return_on_board_m
 from gcsplan.mission_file import load_mission
@@ -51,8 +51,8 @@ def seen_at(url: str, sysid: int, autopilot: Autopilot | None) -> Seen:
     ``autopilot`` is what the user expects. Raises LinkError if nobody answers, VehicleRefused for another autopilot,
     or for one that gcsplan does not know where none is expected.
     """
-    from gcsplan.mavlink.link import session
-    from gcsplan.mavlink.link.parameters import lean_on_board_deg
+    from gcsplan.mavlink.link.session import session
+    from gcsplan.mavlink.link.session.parameters import lean_on_board_deg
 
     with uploads.open_link(url) as link:
         options = session.SessionOptions(listen_s=uploads.LISTEN_S)
@@ -81,7 +81,7 @@ def seen_at(url: str, sysid: int, autopilot: Autopilot | None) -> Seen:
 
 def _start(state: VehicleState) -> tuple[str | None, list[Note]]:
     """Where the vehicle is, else its home, and what a user has to know about that."""
-    from gcsplan.mavlink.link.preflight import distance_m
+    from gcsplan.mavlink.link.session.preflight import distance_m
 
     home = None if state.home is None else (state.home.lat_e7 / 1e7, state.home.lon_e7 / 1e7)
     if state.lat_deg is None or state.lon_deg is None:

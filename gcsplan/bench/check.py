@@ -12,11 +12,11 @@ import numpy as np
 from gcsplan.arrays import Indices
 from gcsplan.bench.sample import SAMPLE_HALF_M, SAMPLE_MIDDLE_DEG, sample_spec
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.frame import Frame
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import Surface
-from gcsplan.world.terrain import load_terrain
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.terrain.terrain import load_terrain
 
 LEG_M = 1000.0
 AGL_M = (70.0, 200.0)  # range of the random heights of both ends of a leg

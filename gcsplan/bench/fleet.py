@@ -23,17 +23,18 @@ from typing import Any, TypeVar
 import numpy as np
 import yaml
 
-from gcsplan.app import outputs, uploads
-from gcsplan.app.flying import require_passing
-from gcsplan.app.pipeline import plan
-from gcsplan.app.upload_job import SIM, UploadOptions
-from gcsplan.app.way_home import homes_of
+from gcsplan.app.fleet.may_fly import require_passing
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.output import files as outputs
+from gcsplan.app.plan.way_home import homes_of
+from gcsplan.app.upload import run as uploads
+from gcsplan.app.upload.job import SIM, UploadOptions
 from gcsplan.arrays import Floats
 from gcsplan.bench.measure import peak_mb
 from gcsplan.bench.sample import ROUND_DEGREE_M, SAMPLE_TERRAIN
 from gcsplan.errors import InputError
 from gcsplan.export.outdir import write_outputs, write_whole
-from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.motion.timed_path import TimedPath
 from gcsplan.mission_file import load_mission
 from gcsplan.sim.vehicle.server import loopback_fleet
 

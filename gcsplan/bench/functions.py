@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from gcsplan.app.executor import executor
+from gcsplan.app.parallel.executor import executor
 from gcsplan.arrays import Floats
 from gcsplan.bench.files import write_all
 from gcsplan.bench.measure import LEAST_RUNS_TO_JUDGE, MOST_RUNS, SIGNIFICANCE, holm

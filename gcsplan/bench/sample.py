@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from gcsplan.world.sample import SAMPLE
-from gcsplan.world.terrain import TerrainSpec
+from gcsplan.world.terrain.sample import SAMPLE
+from gcsplan.world.terrain.terrain import TerrainSpec
 
 SAMPLE_TERRAIN = {"dem": SAMPLE, "vertical_datum": "EGM96"}
 """The sample DEM as a mission file names it."""

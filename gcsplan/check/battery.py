@@ -16,11 +16,11 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-from gcsplan.check.geodesy import flat_m
-from gcsplan.check.rtl.model import RULES
-from gcsplan.check.rtl.return_time import return_s
-from gcsplan.check.rtl.run_on import more_m
-from gcsplan.check.stretch import Place
+from gcsplan.check.motion.geodesy import flat_m
+from gcsplan.check.motion.return_rules import RULES
+from gcsplan.check.motion.return_time import return_s
+from gcsplan.check.motion.stopping import more_m
+from gcsplan.check.motion.stretch import Place
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.figures import raised
 from gcsplan.notes.note import Note

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gcsplan.check.geodesy import degree_m
-from gcsplan.check.stretch import Stretch
+from gcsplan.check.motion.geodesy import degree_m
+from gcsplan.check.motion.stretch import Stretch
 from gcsplan.mavlink.mission.mission import Home
 from gcsplan.mavlink.mission.parameter_safety import FlightExtent
 from gcsplan.world.airspace import Legs
-from gcsplan.world.limits import Limits
+from gcsplan.world.geometry.limits import Limits
 
 __all__ = ["extent_of"]
 

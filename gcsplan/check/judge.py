@@ -14,17 +14,17 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices
-from gcsplan.check.climb_out import slant_findings
-from gcsplan.check.clock import seconds_of
-from gcsplan.check.corners import round_corners
-from gcsplan.check.enough import enough
 from gcsplan.check.extent import extent_of
-from gcsplan.check.flight import follow
-from gcsplan.check.home_height import why_unknown, with_error_of_home
-from gcsplan.check.misses import nearest_misses
-from gcsplan.check.plane_legs import PlaneLegs, legs_in_plane, steep_report
-from gcsplan.check.stretch import Flight, Stretch
-from gcsplan.check.tuning import DEFAULTS, Tuning
+from gcsplan.check.fixed_wing.climb_out import slant_findings
+from gcsplan.check.flight.corners import round_corners
+from gcsplan.check.flight.follow import follow
+from gcsplan.check.flight.times import seconds_of
+from gcsplan.check.margins import nearest_misses
+from gcsplan.check.motion.home_height import why_unknown, with_error_of_home
+from gcsplan.check.motion.project import PlaneLegs, legs_in_plane, steep_report
+from gcsplan.check.motion.stretch import Flight, Stretch
+from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
+from gcsplan.check.motion.violation_depth import enough
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.check.zone_heights import nearest_pass
 from gcsplan.mavlink.mission.autopilots import profile_of
@@ -34,8 +34,8 @@ from gcsplan.notes.finding import Finding
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import LegReport, Violation
-from gcsplan.world.frame import EARTH_RADIUS_M, FARTHEST_M
-from gcsplan.world.limits import Limits
+from gcsplan.world.geodesy.frame import EARTH_RADIUS_M, FARTHEST_M
+from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.world import World
 
 TERRAIN_ERROR_M = 30.0

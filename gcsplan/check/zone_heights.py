@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.check.stretch import Stretch
+from gcsplan.check.motion.stretch import Stretch
 from gcsplan.world.airspace import Legs, Violation
-from gcsplan.world.limits import Limits
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.zones import Level
 from gcsplan.world.world import World
-from gcsplan.world.zones import Level
 
 __all__ = ["ZonePass", "nearest_pass"]
 

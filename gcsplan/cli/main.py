@@ -18,7 +18,7 @@ import sys  # noqa: E402
 from contextlib import suppress  # noqa: E402
 from typing import Any, NoReturn  # noqa: E402
 
-from gcsplan.cli.ending import (  # noqa: E402
+from gcsplan.cli.process.exit import (  # noqa: E402
     ENDED,
     Interrupted,
     end_in_good_order,
@@ -29,8 +29,8 @@ from gcsplan.cli.ending import (  # noqa: E402
     put,
     speak_plainly,
 )
-from gcsplan.cli.memory import settle_memory  # noqa: E402
-from gcsplan.cli.signals import ENDING  # noqa: E402
+from gcsplan.cli.process.memory import settle_memory  # noqa: E402
+from gcsplan.cli.process.signals import ENDING  # noqa: E402
 from gcsplan.errors import GcsplanError, InputError  # noqa: E402
 
 if _hears:
@@ -39,7 +39,7 @@ if _hears:
 
 def command_of(called: str) -> Any:
     """The command ``called``; its imports, the most of the time until it begins, are made here."""
-    from gcsplan.cli.commands import commands
+    from gcsplan.cli.command_table import commands
 
     return commands(called)
 
@@ -97,7 +97,7 @@ def _end_now(code: int) -> NoReturn:
     Ctrl-C, whatever the exit code, if a KeyboardInterrupt passed through a text that it executed (as it does to make
     dataclasses; run_eval_code_obj).
     """
-    executor = sys.modules.get("gcsplan.app.executor")
+    executor = sys.modules.get("gcsplan.app.parallel.executor")
     if executor is not None:
         executor.end_processes()
     with suppress(OSError, ValueError, AttributeError):

@@ -17,8 +17,8 @@ from typing import Literal
 from gcsplan.dem.cells import names_of
 from gcsplan.dem.sources import DemSource
 from gcsplan.errors import InputError, Problem
-from gcsplan.world.cell import Cell
-from gcsplan.world.input_files import tell_file, tell_setting
+from gcsplan.world.terrain.cell import Cell
+from gcsplan.world.terrain.input_files import tell_file, tell_setting
 
 CACHE_VARIABLE = "GCSPLAN_DEM_CACHE"
 TileState = Literal["tile", "sea", "absent"]

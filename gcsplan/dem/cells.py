@@ -8,9 +8,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from gcsplan.errors import InputError
-from gcsplan.world.cell import Cell
-from gcsplan.world.frame import Box, Frame
-from gcsplan.world.terrain import RASTER_SPARE_M
+from gcsplan.world.geodesy.frame import Box, Frame
+from gcsplan.world.terrain.cell import Cell
+from gcsplan.world.terrain.terrain import RASTER_SPARE_M
 
 CELL_SPARE_M = RASTER_SPARE_M + 200.0
 """Around a box, m: what is read around it, and three cells of the coarsest source."""

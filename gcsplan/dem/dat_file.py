@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
-from gcsplan.world.cell import Cell, cell_of
-from gcsplan.world.raster import require_file
-from gcsplan.world.terrain_grid import (
+from gcsplan.world.terrain.cell import Cell, cell_of
+from gcsplan.world.terrain.grid import (
     ALL_PARTS,
     PART_POSTS,
     PARTS_OF_BLOCK,
@@ -30,6 +29,7 @@ from gcsplan.world.terrain_grid import (
     TerrainGrid,
     known_parts,
 )
+from gcsplan.world.terrain.raster import require_file
 
 RECORD_BYTES = 2048
 DAT_SUFFIX = ".DAT"

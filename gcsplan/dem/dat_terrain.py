@@ -24,16 +24,16 @@ from gcsplan.dem.dat_bounds import bounds
 from gcsplan.dem.dat_file import DatFile, cell_of_file, is_dat, read_dat
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
-from gcsplan.world.cell import Cell
-from gcsplan.world.datum import VerticalDatum
-from gcsplan.world.frame import Box, Frame
-from gcsplan.world.height_unit import BY_FORMAT, HeightUnit
-from gcsplan.world.input_files import sha256_of, tell_folder
-from gcsplan.world.mosaic import FIT_ERROR_M, Window
-from gcsplan.world.raster import MAX_CELLS, require_file
-from gcsplan.world.surface import GridMap
-from gcsplan.world.terrain import NO_MORE_VOIDS, Terrain, TerrainSpec, place, require_metres, terrain_of
-from gcsplan.world.terrain_grid import DEGREE_E7, METRES_OF_E7, STRIDE, TerrainGrid, cell_at, longitude_scale
+from gcsplan.world.geodesy.datum import VerticalDatum
+from gcsplan.world.geodesy.frame import Box, Frame
+from gcsplan.world.geodesy.height_unit import BY_FORMAT, HeightUnit
+from gcsplan.world.geometry.surface import GridMap
+from gcsplan.world.terrain.cell import Cell
+from gcsplan.world.terrain.grid import DEGREE_E7, METRES_OF_E7, STRIDE, TerrainGrid, cell_at, longitude_scale
+from gcsplan.world.terrain.input_files import sha256_of, tell_folder
+from gcsplan.world.terrain.mosaic import FIT_ERROR_M, Window
+from gcsplan.world.terrain.raster import MAX_CELLS, require_file
+from gcsplan.world.terrain.terrain import NO_MORE_VOIDS, Terrain, TerrainSpec, place, require_metres, terrain_of
 
 WHOLE_METRES = HeightUnit("whole metres", 1.0, BY_FORMAT)
 

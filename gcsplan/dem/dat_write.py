@@ -10,7 +10,7 @@ from pathlib import Path
 
 from gcsplan.dem.dat_file import file_name, packed, read_dat
 from gcsplan.errors import InputError
-from gcsplan.world.terrain_grid import ALL_PARTS, Block, PostHeights, TerrainGrid, known_parts
+from gcsplan.world.terrain.grid import ALL_PARTS, Block, PostHeights, TerrainGrid, known_parts
 
 MOST_BLOCKS_WRITTEN = 20_000
 """Blocks that are written at once, 40 MB: 250 × 250 km with posts every 100 m."""

@@ -20,9 +20,9 @@ from gcsplan.dem.cache import Cache, TileRecord, TileState, text_of
 from gcsplan.dem.download import DownloadPatience, ServerUnreachable, download, is_address
 from gcsplan.dem.sources import MOST_LIST_BYTES, WITNESS, DemSource
 from gcsplan.errors import GcsplanError, InputError, LinkError
-from gcsplan.world.cell import Cell
-from gcsplan.world.input_files import sha256_of
-from gcsplan.world.raster import Raster, open_raster
+from gcsplan.world.terrain.cell import Cell
+from gcsplan.world.terrain.input_files import sha256_of
+from gcsplan.world.terrain.raster import Raster, open_raster
 
 try:
     import fcntl

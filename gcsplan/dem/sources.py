@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from gcsplan.world.cell import Cell
-from gcsplan.world.input_files import tell_file
+from gcsplan.world.terrain.cell import Cell
+from gcsplan.world.terrain.input_files import tell_file
 
 ModelKind = Literal["surface", "bare"]
 

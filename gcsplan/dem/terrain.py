@@ -20,14 +20,14 @@ from gcsplan.dem.dat_terrain import DatTerrain, dat_files
 from gcsplan.dem.sources import SOURCES, DemSource
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
-from gcsplan.world.cell import Cell
-from gcsplan.world.datum import VerticalDatum, take_apart
-from gcsplan.world.frame import Box, Frame
-from gcsplan.world.height_unit import METRE
-from gcsplan.world.input_files import sha256_of, sha256_of_all
-from gcsplan.world.mosaic import Mosaic
-from gcsplan.world.raster import Raster, open_raster
-from gcsplan.world.terrain import (
+from gcsplan.world.geodesy.datum import VerticalDatum, take_apart
+from gcsplan.world.geodesy.frame import Box, Frame
+from gcsplan.world.geodesy.height_unit import METRE
+from gcsplan.world.terrain.cell import Cell
+from gcsplan.world.terrain.input_files import sha256_of, sha256_of_all
+from gcsplan.world.terrain.mosaic import Mosaic
+from gcsplan.world.terrain.raster import Raster, open_raster
+from gcsplan.world.terrain.terrain import (
     NO_MORE_VOIDS,
     OpenTerrain,
     Terrain,

@@ -17,8 +17,8 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.export.rows import HEIGHT_DECIMALS, Track, WayPoint, outlines_deg
 from gcsplan.figures import floored
-from gcsplan.world.frame import Frame
-from gcsplan.world.zones import Level, Zone
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.zones import Level, Zone
 
 Position = list[float]
 

@@ -17,8 +17,8 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.export.rows import HEIGHT_DECIMALS, Track, WayPoint, extent_words, outlines_deg
 from gcsplan.figures import floored
-from gcsplan.world.frame import Frame
-from gcsplan.world.zones import Level, Zone
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.zones import Level, Zone
 
 TRACK_COLOURS = ("ff0099ff", "ffff9900", "ff66cc00", "ffcc00cc", "ff00cccc", "ff3333ff")  # aabbggrr
 MOST_WHOLE = 100

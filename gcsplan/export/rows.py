@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.world.frame import Frame
-from gcsplan.world.zones import Circle, Level, Zone
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.zones import Circle, Level, Zone
 
 HEIGHT_DECIMALS = 2
 """Of heights on a map, metres."""

@@ -14,8 +14,8 @@ import numpy as np
 
 from gcsplan.fleet._taken import Spans, Taken
 from gcsplan.fleet.arrival import WITHIN_S, Craft, Crew, Hold, Mode, Slot
-from gcsplan.fleet.motion import TimedPath
-from gcsplan.fleet.timing import Route, speed_for
+from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.fleet.motion.timing import Route, speed_for
 from gcsplan.vehicle import Vehicle
 
 How = Literal["as scheduled", "departure", "speed", "hold", "path"]

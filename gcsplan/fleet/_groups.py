@@ -13,8 +13,8 @@ import numpy as np
 
 from gcsplan.fleet._settle import Ask, Settlement, moved, settle
 from gcsplan.fleet.arrival import Schedule
+from gcsplan.fleet.motion.timing import flown_corners
 from gcsplan.fleet.separation import Rules, Separation, separation
-from gcsplan.fleet.timing import flown_corners
 
 CUT_M = 60.0
 """Metres by which two flights together may leave the lines between their corners, about."""

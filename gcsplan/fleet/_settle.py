@@ -10,9 +10,9 @@ import numpy as np
 from gcsplan.fleet._changes import Chooser, Freedom, Option
 from gcsplan.fleet._taken import Taken
 from gcsplan.fleet.arrival import Craft, Crew, Hold, Schedule, Slot, schedule
-from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.fleet.motion.timing import Route
 from gcsplan.fleet.separation import TOLERANCE_M, Conflict, Rules, separation
-from gcsplan.fleet.timing import Route
 from gcsplan.notes.note import Note
 
 Replan = Callable[[str, Sequence[Conflict], int], Route | None]

@@ -13,7 +13,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.fleet._nearest import Pieces, nearest
-from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.motion.timed_path import TimedPath
 
 FOREVER_S = 1e9
 """End time of the last piece of a vehicle that ends in the air, s."""

@@ -16,7 +16,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.fleet._nearest import Pieces, shifts
 from gcsplan.fleet._sweep import pieces_of
-from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.motion.timed_path import TimedPath
 from gcsplan.fleet.separation import TOLERANCE_M, Rules
 
 GROUP, LEVELS = 6, 3

@@ -13,9 +13,9 @@ from typing import Literal
 
 import numpy as np
 
-from gcsplan.fleet.lean import lean_needed_deg
+from gcsplan.fleet.motion.lean import lean_needed_deg
+from gcsplan.fleet.motion.timing import Course, Route, speed_for
 from gcsplan.fleet.order import WITHIN_S
-from gcsplan.fleet.timing import Course, Route, speed_for
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import DEFAULT_LEAN_DEG, LARGEST_LEAN_DEG, Autopilot, Vehicle, lean_for_deg, lean_words
 

@@ -13,8 +13,8 @@ from gcsplan.errors import NoMission
 from gcsplan.fleet._settle import LATER_S, Again, Ask, maker, motion_of, settle, with_leaving
 from gcsplan.fleet._taken import Taken
 from gcsplan.fleet.arrival import Crew, Hold, Schedule
+from gcsplan.fleet.motion.timing import Route
 from gcsplan.fleet.separation import Rules
-from gcsplan.fleet.timing import Route
 
 MANY = 12
 """Most vehicles for which the smallest interval is searched with the whole fleet."""

@@ -30,7 +30,7 @@ from gcsplan.fleet._settle import (
 )
 from gcsplan.fleet.arrival import EXPLAINED, Crew, Hold, Schedule
 from gcsplan.fleet.goals import MANY, least_goals_m, least_interval_s, rounded_up
-from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.motion.timed_path import TimedPath
 from gcsplan.fleet.separation import TOLERANCE_M, Conflict, Place, Rules, Separation, Where, in_metres, separation
 
 __all__ = ["Again", "Change", "NotSeparated", "Replan", "Resolved", "resolve"]

@@ -18,7 +18,7 @@ from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.errors import InputError
 from gcsplan.fleet._nearest import below, nearest
 from gcsplan.fleet._sweep import Fleet, Least
-from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.motion.timed_path import TimedPath
 from gcsplan.notes.note import Note
 
 Place = tuple[float, float, float]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gcsplan.errors import Problem
-from gcsplan.mission_file.schema import EnergyKeys, VehicleKeys
+from gcsplan.mission_file.values.schema import EnergyKeys, VehicleKeys
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Energy
 

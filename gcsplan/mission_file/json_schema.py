@@ -13,10 +13,11 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-from gcsplan.mission_file import point_keys, schema, vehicles
-from gcsplan.mission_file.keys import Keys
+from gcsplan.mission_file import vehicles
 from gcsplan.mission_file.load import TERRAIN_ERROR_M
-from gcsplan.mission_file.units import other_names
+from gcsplan.mission_file.values import point_keys, schema
+from gcsplan.mission_file.values.keys import Keys
+from gcsplan.mission_file.values.units import other_names
 
 FILE_NAME = "gcsplan.schema.json"
 """The file beside a mission that its first line names."""

@@ -16,11 +16,8 @@ from typing import Any, get_args
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.mavlink.mission.mission import AltitudeFrame
-from gcsplan.mission_file.airspace.left_out import faults_near, left_out_by_hours, unused_notes, used
-from gcsplan.mission_file.airspace.times import Hours, hours_of, texts_of
-from gcsplan.mission_file.complaints import MOST_TOLD, few, read_section, told_once, unknown_keys, with_lines
-from gcsplan.mission_file.content import read_content
-from gcsplan.mission_file.ground import GroundWindow, MissionPlane, known_in_plane, opened
+from gcsplan.mission_file.published.times import Hours, hours_of, texts_of
+from gcsplan.mission_file.published.unused import faults_near, left_out_by_hours, unused_notes, used
 from gcsplan.mission_file.request import (
     ArrivalRequest,
     Content,
@@ -29,7 +26,19 @@ from gcsplan.mission_file.request import (
     ReturnRequirement,
     VehicleRequest,
 )
-from gcsplan.mission_file.schema import (
+from gcsplan.mission_file.scene import (
+    covered,
+    make_box,
+    make_frame,
+    make_place,
+    make_spec,
+    make_zones,
+    place_notes,
+)  # fmt: skip
+from gcsplan.mission_file.source import read_content
+from gcsplan.mission_file.terminals import Terminals
+from gcsplan.mission_file.values.errors import MOST_TOLD, few, read_section, told_once, unknown_keys, with_lines
+from gcsplan.mission_file.values.schema import (
     TOP_KEYS,
     ArrivalKeys,
     FrameKeys,
@@ -41,8 +50,7 @@ from gcsplan.mission_file.schema import (
     nearest,
     shown,
 )  # fmt: skip
-from gcsplan.mission_file.terminals import Terminals
-from gcsplan.mission_file.units import in_own_units
+from gcsplan.mission_file.values.units import in_own_units
 from gcsplan.mission_file.vehicles import (
     check_unique,
     make_arrival,
@@ -51,20 +59,12 @@ from gcsplan.mission_file.vehicles import (
     within_lean,
     within_vel_max,
 )
-from gcsplan.mission_file.world import (
-    covered,
-    make_box,
-    make_frame,
-    make_place,
-    make_spec,
-    make_zones,
-    place_notes,
-)  # fmt: skip
-from gcsplan.mission_file.zone_draft import ZoneDraft, looks_swapped, one_line, place_zones, zone_notes, zones_sha256
+from gcsplan.mission_file.window import GroundWindow, MissionPlane, known_in_plane, opened
+from gcsplan.mission_file.zones.draft import ZoneDraft, looks_swapped, one_line, place_zones, zone_notes, zones_sha256
 from gcsplan.notes.note import Note
-from gcsplan.world.frame import Frame
-from gcsplan.world.model_words import notes_on
-from gcsplan.world.terrain import OpenTerrain, Terrain, TerrainSpec
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.terrain.model_words import notes_on
+from gcsplan.world.terrain.terrain import OpenTerrain, Terrain, TerrainSpec
 
 __all__ = ["ArrivalRequest", "MissionFile", "PlannerRequest", "VehicleRequest", "load_mission"]
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Literal, get_args, get_origin
 
 from gcsplan.mission_file.json_schema import LATE_DEFAULTS, MODELINE, describe
-from gcsplan.mission_file.keys import Keys
-from gcsplan.mission_file.places import read_place
-from gcsplan.mission_file.schema import (
+from gcsplan.mission_file.values.keys import Keys
+from gcsplan.mission_file.values.places import read_place
+from gcsplan.mission_file.values.schema import (
     EnergyKeys,
     LimitKeys,
     MissionKeys,
@@ -21,8 +21,8 @@ from gcsplan.mission_file.schema import (
     TerrainKeys,
     VehicleKeys,
 )  # fmt: skip
-from gcsplan.mission_file.units import UNIT_SYMBOLS, unit_end
-from gcsplan.mission_file.zone_draft import one_line
+from gcsplan.mission_file.values.units import UNIT_SYMBOLS, unit_end
+from gcsplan.mission_file.zones.draft import one_line
 from gcsplan.vehicle import PX4_VEL_MAX_M_S, Autopilot
 
 COMMENT_WIDTH = 100

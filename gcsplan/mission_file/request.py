@@ -10,13 +10,13 @@ from typing import Any, Literal
 
 from gcsplan.mavlink.mission.mission import AltitudeFrame
 from gcsplan.mavlink.mission.return_route import ReturnRoute
-from gcsplan.mission_file.airspace.times import Hours
+from gcsplan.mission_file.published.times import Hours
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import MissionEnd, Vehicle
-from gcsplan.world.frame import Frame
-from gcsplan.world.geoid import GeoidGrid
-from gcsplan.world.surface import Surface
-from gcsplan.world.zones import Zone
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.geometry.zones import Zone
+from gcsplan.world.terrain.geoid import GeoidGrid
 
 ReturnRequirement = Literal["required", "reported"]
 

@@ -10,8 +10,8 @@ import os
 from pathlib import Path
 
 from gcsplan.errors import InputError
-from gcsplan.mission_file.schema import nearest
-from gcsplan.world.input_files import tell_file
+from gcsplan.mission_file.values.schema import nearest
+from gcsplan.world.terrain.input_files import tell_file
 
 PREFIX = "sample:"
 SAMPLE_FOLDERS = (Path(__file__).parents[1] / "missions", Path(__file__).parents[2] / "missions")

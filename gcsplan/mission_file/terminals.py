@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 from gcsplan.errors import Problem
 from gcsplan.mission_file.request import VehicleRequest
-from gcsplan.mission_file.schema import VehicleKeys
-from gcsplan.mission_file.world import MissionPlace, zone_around
+from gcsplan.mission_file.scene import MissionPlace, zone_around
+from gcsplan.mission_file.values.schema import VehicleKeys
 from gcsplan.vehicle import Vehicle
-from gcsplan.world.frame import Frame
-from gcsplan.world.surface import Surface
-from gcsplan.world.zones import Zone
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.geometry.zones import Zone
 
 ON_GROUND_M = 0.5
 """An ``up_m`` within this distance of the ground, m, counts as on the ground."""

@@ -8,10 +8,10 @@ from dataclasses import fields, replace
 from typing import Any
 
 from gcsplan.errors import Problem
-from gcsplan.fleet.lean import lean_needed_deg
+from gcsplan.fleet.motion.lean import lean_needed_deg
 from gcsplan.mission_file.energy import make_energy
 from gcsplan.mission_file.request import ArrivalRequest
-from gcsplan.mission_file.schema import ArrivalKeys, LimitKeys, VehicleKeys, nearest
+from gcsplan.mission_file.values.schema import ArrivalKeys, LimitKeys, VehicleKeys, nearest
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import (
     DEFAULT_LEAN_DEG,
@@ -24,7 +24,7 @@ from gcsplan.vehicle import (
     lean_for_deg,
     lean_words,
 )
-from gcsplan.world.limits import Limits
+from gcsplan.world.geometry.limits import Limits
 
 ERRORS = {"horizontal_clearance_m": 30.0, "track_error_m": 3.0, "altitude_error_m": 5.0}
 """Defaults in metres for a mission on the real Earth; in local metres the defaults are 0."""

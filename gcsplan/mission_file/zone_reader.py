@@ -5,16 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 from gcsplan.errors import InputError, absent
-from gcsplan.mission_file.airspace.formats import read_published
-from gcsplan.mission_file.airspace.openair import OPENAIR_SUFFIXES
-from gcsplan.mission_file.airspace.policy import Policy
-from gcsplan.mission_file.zone_csv import read_csv
-from gcsplan.mission_file.zone_file import ZoneFile
-from gcsplan.mission_file.zone_geojson import read_geojson
-from gcsplan.mission_file.zone_json import load_json
-from gcsplan.mission_file.zone_kml import read_kml
-from gcsplan.mission_file.zone_zip import unpack
-from gcsplan.world.input_files import tell_file
+from gcsplan.mission_file.published.formats import read_published
+from gcsplan.mission_file.published.openair import OPENAIR_SUFFIXES
+from gcsplan.mission_file.published.policy import Policy
+from gcsplan.mission_file.zones.csv import read_csv
+from gcsplan.mission_file.zones.file import ZoneFile
+from gcsplan.mission_file.zones.geojson import read_geojson
+from gcsplan.mission_file.zones.json import load_json
+from gcsplan.mission_file.zones.kml import read_kml
+from gcsplan.mission_file.zones.zip import unpack
+from gcsplan.world.terrain.input_files import tell_file
 
 MAX_ZONE_BYTES = 20_000_000
 """Most bytes of a file, and of what is unpacked from one."""
@@ -67,7 +67,7 @@ def _read(path: Path, kind: str, data: bytes, layer: str | None) -> ZoneFile:
     if kind == ".csv":
         return read_csv(path, data)
     if kind in VECTOR:
-        from gcsplan.mission_file.zone_vector import read_vector  # most missions need neither it nor PROJ's database
+        from gcsplan.mission_file.zones.vector import read_vector  # most missions need neither it nor PROJ's database
 
         return read_vector(path, data, layer=layer, most_bytes=MAX_ZONE_BYTES)
     return read_kml(path, data)

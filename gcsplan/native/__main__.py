@@ -15,7 +15,7 @@ from gcsplan.native.kernel_unit import KernelUnit
 from gcsplan.native.llvm import llvm_version
 
 KERNEL_UNITS = {
-    "world": "gcsplan.world._compiled",
+    "world": "gcsplan.world.kernels.compiled",
     "planners": "gcsplan.planners.compiled",
     "swarm": "gcsplan.planners.swarm.compiled",
     "turns": "gcsplan.planners.turns.compiled",

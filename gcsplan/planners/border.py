@@ -15,10 +15,10 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
-from gcsplan.world.outlines import few_corners
-from gcsplan.world.surface import Surface
-from gcsplan.world.zones import Circle, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.outlines import few_corners
+from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.geometry.zones import Circle, Zone
 
 PIECES = 8
 """Straight pieces that approximate one side of a window; in the plane a side is curved."""

@@ -16,8 +16,8 @@ from gcsplan.errors import NoMission, NoMissionReason
 from gcsplan.notes.note import Note
 from gcsplan.planners.budget import Budget
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.limits import Limits
-from gcsplan.world.path import Path
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import Path
 
 Objective = Literal["length", "energy"]
 

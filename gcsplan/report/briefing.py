@@ -13,14 +13,14 @@ from gcsplan import __version__
 from gcsplan.figures import counted
 from gcsplan.mavlink.mission.return_altitude import setting
 from gcsplan.notes.note import told
-from gcsplan.report.fleet_view import motions_of, separation_words
-from gcsplan.report.marks import Mark, marks_html
-from gcsplan.report.markup import energy, esc, greatest, least, num, place, plain, stated, steepest, table
-from gcsplan.report.plan_view import COLOURS
-from gcsplan.report.relief import Relief
-from gcsplan.report.subject import Page, Subject
+from gcsplan.report.parts.html import energy, esc, greatest, least, num, place, plain, stated, steepest, table
+from gcsplan.report.parts.map_labels import Mark, marks_html
+from gcsplan.report.parts.page_data import Page, Subject
+from gcsplan.report.views.fleet import motions_of, separation_words
+from gcsplan.report.views.plan import COLOURS
+from gcsplan.report.views.shaded_terrain import Relief
 from gcsplan.units import Units, duration, in_units
-from gcsplan.world.model_words import what_is_not_in
+from gcsplan.world.terrain.model_words import what_is_not_in
 
 MOST_VEHICLES = 4
 MOST_FINDINGS, MOST_RALLY, MOST_NOTES = 2, 4, 1

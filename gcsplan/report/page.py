@@ -13,26 +13,26 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from gcsplan import __version__
-from gcsplan.check.rtl.verdict import WayHome
+from gcsplan.check.returns.verdict import WayHome
 from gcsplan.figures import steepened
 from gcsplan.notes.note import Said, Wording, told
-from gcsplan.report import tables
 from gcsplan.report.briefing import briefing_html
-from gcsplan.report.document import document
-from gcsplan.report.fleet_view import fleet_html, motions_of
-from gcsplan.report.home_view import home_html, home_lines
-from gcsplan.report.markup import data_block, energy, esc, greatest, least, num, place, stated, steepest, tools
-from gcsplan.report.plan_view import COLOURS, map_html, map_marks
-from gcsplan.report.profile_view import profile_html, profile_legend
-from gcsplan.report.rehearsal_view import headline, rehearsal_html
-from gcsplan.report.relief import Relief, extent_of, relief_of
-from gcsplan.report.replay import replay_data, replay_html, replay_of
-from gcsplan.report.samples import Line, Passage, line_of, passages
-from gcsplan.report.scene_data import exaggeration, zone_meshes
-from gcsplan.report.shown import in_full, left_out_html, only_some, samples_of
-from gcsplan.report.subject import CheckedFile, Page, Subject, page_of_check
+from gcsplan.report.parts.detail import in_full, left_out_html, only_some, samples_of
+from gcsplan.report.parts.html import data_block, energy, esc, greatest, least, num, place, stated, steepest, tools
+from gcsplan.report.parts.html_document import document
+from gcsplan.report.parts.page_data import CheckedFile, Page, Subject, page_of_check
+from gcsplan.report.parts.track_samples import Line, Passage, line_of, passages
+from gcsplan.report.views import tables
+from gcsplan.report.views.fleet import fleet_html, motions_of
+from gcsplan.report.views.home import home_html, home_lines
+from gcsplan.report.views.plan import COLOURS, map_html, map_marks
+from gcsplan.report.views.profile import profile_html, profile_legend
+from gcsplan.report.views.rehearsal import headline, rehearsal_html
+from gcsplan.report.views.replay import replay_data, replay_html, replay_of
+from gcsplan.report.views.scene_data import exaggeration, zone_meshes
+from gcsplan.report.views.shaded_terrain import Relief, extent_of, relief_of
 from gcsplan.units import KILOJOULE, METRIC, Unit, Units, duration, in_units
-from gcsplan.world.model_words import what_is_not_in
+from gcsplan.world.terrain.model_words import what_is_not_in
 from gcsplan.world.world import World
 
 __all__ = ["render_check", "render_page"]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from gcsplan.errors import GcsplanError, InputError
 from gcsplan.mavlink.link.link import Link
-from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet
+from gcsplan.mavlink.link.session.session import SessionOptions, UploadOrder, upload_fleet
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.notes.note import Note
 from gcsplan.sim.flight.kinematics import Kinematics

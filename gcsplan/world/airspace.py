@@ -2,7 +2,7 @@
 
 The leg is tested in the DEM's own grid: its ends are mapped there, and it is cut into straight parts short enough that
 the bow against the line straight in the plane stays within centimetres; that bow widens the leg. Legs, limits and zones
-are in metres of the plane; `gcsplan.world.frame` converts to and from degrees.
+are in metres of the plane; `gcsplan.world.geodesy.frame` converts to and from degrees.
 
 Exact are: the ground under the line, zones with levels above mean sea level, ceilings, angles. Conservative, by a few
 centimetres at most, are: what lies beside the line within its errors and clearance, and zones over ground. Touching a
@@ -21,12 +21,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.native.signature import Held
-from gcsplan.world._compiled import FOUND, ONE_SURFACE, SURFACE, ZONES
-from gcsplan.world._entries import around, judge
-from gcsplan.world._field import Field
-from gcsplan.world._neighbourhood import LineBatch, Neighbourhoods
-from gcsplan.world._shapes import deepest_in_circle, deepest_inside
-from gcsplan.world._shared import (
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.geometry.zones import Polygon, Zone
+from gcsplan.world.kernels.compiled import FOUND, ONE_SURFACE, SURFACE, ZONES
+from gcsplan.world.kernels.entries import around, judge
+from gcsplan.world.kernels.field import Field
+from gcsplan.world.kernels.neighbourhood import LineBatch, Neighbourhoods
+from gcsplan.world.kernels.shared import (
     ANGLE_DEG,
     BAND_HIGH,
     BAND_LOW,
@@ -45,12 +47,10 @@ from gcsplan.world._shared import (
     TOUCH_M,
     Demands,
 )
-from gcsplan.world._work_arrays import work_arrays
-from gcsplan.world._zone_arrays import BOX, over_both_grounds, zones_as_arrays
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import Surface
+from gcsplan.world.kernels.work_arrays import work_arrays
+from gcsplan.world.kernels.zone_arrays import BOX, over_both_grounds, zones_as_arrays
+from gcsplan.world.kernels.zone_tests import deepest_in_circle, deepest_inside
 from gcsplan.world.tube import ZONE_ROOM_M, Band, Reaches, Tube, make_tube
-from gcsplan.world.zones import Polygon, Zone
 
 __all__ = ["Airspace", "Band", "LegReport", "Legs", "Tube", "Violation", "ViolationKind"]
 

@@ -13,11 +13,12 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.world import hulls
-from gcsplan.world._entries import pieces
-from gcsplan.world._neighbourhood import LineBatch
-from gcsplan.world._shapes import grown_edges
-from gcsplan.world._shared import (
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.geometry import hulls
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.kernels.entries import pieces
+from gcsplan.world.kernels.neighbourhood import LineBatch
+from gcsplan.world.kernels.shared import (
     BAND_HIGH,
     BAND_LOW,
     BOW_M,
@@ -36,8 +37,7 @@ from gcsplan.world._shared import (
     TOUCH_M,
     WEST_E,
 )
-from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
+from gcsplan.world.kernels.zone_tests import grown_edges
 from gcsplan.world.tube import TUBE_MARGIN_M, ZONE_ROOM_M, Reaches
 
 BOX_LOW, BOX_HIGH = [WEST_E, SOUTH_N], [EAST_E, NORTH_N]

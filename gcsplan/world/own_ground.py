@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.world.surface import Surface
-from gcsplan.world.zones import Polygon, Zone
+from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.geometry.zones import Polygon, Zone
 
 GROUND_RINGS = ((0.0, 1), (1.0 / 3.0, 8), (2.0 / 3.0, 16), (0.9, 32), (1.0, 64))
 """Circles of points at which ground is read: their radius, as a part of the reach, and how many."""

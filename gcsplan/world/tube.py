@@ -9,11 +9,11 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.native.signature import Held
-from gcsplan.world._entries import pieces
-from gcsplan.world._field import Field
-from gcsplan.world._shapes import spans
-from gcsplan.world._shared import BAND_HIGH, BAND_LOW, BOW_M, CEILING, CEILING_AGL, FLOOR, FLOOR_AGL, Zones
-from gcsplan.world.limits import Limits
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.kernels.entries import pieces
+from gcsplan.world.kernels.field import Field
+from gcsplan.world.kernels.shared import BAND_HIGH, BAND_LOW, BOW_M, CEILING, CEILING_AGL, FLOOR, FLOOR_AGL, Zones
+from gcsplan.world.kernels.zone_tests import spans
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.frame import Frame
-from gcsplan.world.terrain_grid import SPACING_M
-from gcsplan.world.vehicle_terrain import VehicleTerrain
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.terrain.grid import SPACING_M
+from gcsplan.world.terrain.vehicle_terrain import VehicleTerrain
 
 WORLDS_KEPT = 64
 """Most places whose ground is kept."""

@@ -14,9 +14,9 @@ from typer import testing as runner
 
 from gcsplan.app import batch as module
 from gcsplan.app.batch import BatchOptions, MissionBatch, exit_code, missions_of
-from gcsplan.app.executor import Dask, Inline, executor
-from gcsplan.app.records import Record
-from gcsplan.cli.commands import app
+from gcsplan.app.output.records import Record
+from gcsplan.app.parallel.executor import Dask, Inline, executor
+from gcsplan.cli.command_table import app
 from gcsplan.errors import GcsplanError, UsageError
 from gcsplan.export.table import csv_text, parquet_bytes
 from gcsplan.report.index_page import render_index

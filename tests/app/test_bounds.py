@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gcsplan.app.model import VehiclePlan
-from gcsplan.app.pipeline import plan
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.plan.model import VehiclePlan
 from gcsplan.arrays import Floats
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict

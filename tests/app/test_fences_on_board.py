@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from gcsplan.app.on_board import settings_of_plan
-from gcsplan.app.outputs import outputs_of
-from gcsplan.app.rehearsing import rehearse
-from gcsplan.check.geodesy import flat_m
-from gcsplan.mavlink.link.parameters import judge_fence_parameters
+from gcsplan.app.output.files import outputs_of
+from gcsplan.app.rehearse import rehearse
+from gcsplan.app.upload.on_board import settings_of_plan
+from gcsplan.check.motion.geodesy import flat_m
+from gcsplan.mavlink.link.session.parameters import judge_fence_parameters
 from gcsplan.mavlink.mission.fences import fences_in_force
 from gcsplan.mavlink.mission.parameter_names import OnBoard, unanswered
 from gcsplan.mavlink.mission.parameter_safety import needed_groups

@@ -13,13 +13,13 @@ import pytest
 import yaml
 
 from gcsplan import upload
-from gcsplan.app.model import Plan
-from gcsplan.app.outputs import outputs_of, report_of
-from gcsplan.app.pipeline import plan
-from gcsplan.app.upload_job import JobResult, UploadJob
-from gcsplan.app.upload_orders import _judge_again
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.output.files import outputs_of, report_of
+from gcsplan.app.plan.model import Plan
+from gcsplan.app.upload.job import JobResult, UploadJob
+from gcsplan.app.upload.orders import _judge_again
 from gcsplan.errors import InputError
-from gcsplan.mavlink.link.parameters import judge_parameters, lean_shortage
+from gcsplan.mavlink.link.session.parameters import judge_parameters, lean_shortage
 from gcsplan.mission_file import load_mission
 from gcsplan.sim.sitl.instances import parameters_of
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import yaml
 
-from gcsplan.app.corners import moved, sharpened
-from gcsplan.app.pipeline import plan
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.plan.corners import moved, sharpened
 from gcsplan.bench.everyday.missions import draw
 from gcsplan.mavlink.build.multirotor import SHORT_LEG_M
 from gcsplan.mission_file import load_mission

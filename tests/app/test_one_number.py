@@ -12,15 +12,15 @@ from typing import Any
 
 import pytest
 
-from gcsplan.app.checking import check_files
-from gcsplan.app.model import Plan, VehiclePlan
-from gcsplan.app.outputs import outputs_of, report_of, summary_of
-from gcsplan.app.rehearsing import rehearse
-from gcsplan.app.report_page import render_rehearsal
-from gcsplan.app.verdict_json import verdict_of
+from gcsplan.app.check.files import check_files
+from gcsplan.app.check.verdict_json import verdict_of
+from gcsplan.app.output.files import outputs_of, report_of, summary_of
+from gcsplan.app.output.report import render_rehearsal
+from gcsplan.app.plan.model import Plan, VehiclePlan
+from gcsplan.app.rehearse import rehearse
 from gcsplan.check.verdict import Verdict, by_item
-from gcsplan.cli.console import plan_row
-from gcsplan.cli.verdict_table import verdict_table
+from gcsplan.cli.output.console import plan_row
+from gcsplan.cli.output.verdict_table import verdict_table
 from gcsplan.export.summary import write_summary
 from gcsplan.figures import floored, steepened
 from tests.support.plans import CASES, SLOW, cases, planned, text_rows

@@ -11,14 +11,14 @@ from typing import Any
 import pytest
 
 from gcsplan.app.batch import COLUMNS, BatchOptions, MissionBatch
-from gcsplan.app.executor import Inline
-from gcsplan.app.outputs import outputs_of, report_of, summary_of
-from gcsplan.app.pipeline import plan
-from gcsplan.app.rehearsing import rehearse
-from gcsplan.app.way_home import homes_of
-from gcsplan.check.rtl.words import verdict_words
-from gcsplan.cli.console import plan_table
-from gcsplan.cli.verdict_table import verdict_table
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.output.files import outputs_of, report_of, summary_of
+from gcsplan.app.parallel.executor import Inline
+from gcsplan.app.plan.way_home import homes_of
+from gcsplan.app.rehearse import rehearse
+from gcsplan.check.returns.words import verdict_words
+from gcsplan.cli.output.console import plan_table
+from gcsplan.cli.output.verdict_table import verdict_table
 from gcsplan.export.table import csv_text
 from gcsplan.mission_file import load_mission
 from gcsplan.notes.note import Note

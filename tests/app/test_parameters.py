@@ -14,17 +14,17 @@ import pytest
 import yaml
 
 from gcsplan import upload
-from gcsplan.app.fleet_on_board import FleetOnBoard
-from gcsplan.app.model import Plan
-from gcsplan.app.outputs import outputs_of, report_of
-from gcsplan.app.pipeline import plan
-from gcsplan.app.rehearsing import parameters_of, parts_of, terms_of
-from gcsplan.app.rehearsing import rehearse as fly_plan
-from gcsplan.app.upload_job import JobResult
-from gcsplan.app.uploads import verify_file
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.output.files import outputs_of, report_of
+from gcsplan.app.plan.model import Plan
+from gcsplan.app.rehearse import parameters_of, parts_of, terms_of
+from gcsplan.app.rehearse import rehearse as fly_plan
+from gcsplan.app.upload.fleet_on_board import FleetOnBoard
+from gcsplan.app.upload.job import JobResult
+from gcsplan.app.upload.run import verify_file
 from gcsplan.check.judge import judge
 from gcsplan.errors import InputError, UsageError
-from gcsplan.fleet.lean import lean_needed_deg
+from gcsplan.fleet.motion.lean import lean_needed_deg
 from gcsplan.mission_file import load_mission
 from gcsplan.sim.rehearsal import rehearse
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle

@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 import yaml
 
-from gcsplan.app.model import Plan
-from gcsplan.app.pipeline import load_mission, plan
-from gcsplan.app.rehearsing import Rehearsal, rehearse
-from gcsplan.app.report_page import page_of_plan, render_rehearsal
-from gcsplan.report.rehearsal_view import rehearsal_html
-from gcsplan.report.subject import Compared, Rehearsed
+from gcsplan.app.fleet.pipeline import load_mission, plan
+from gcsplan.app.output.report import page_of_plan, render_rehearsal
+from gcsplan.app.plan.model import Plan
+from gcsplan.app.rehearse import Rehearsal, rehearse
+from gcsplan.report.parts.page_data import Compared, Rehearsed
+from gcsplan.report.views.rehearsal import rehearsal_html
 from gcsplan.sim.flight.wind import Weather
 from gcsplan.units import METRIC, duration, in_units
-from tests.app.test_fleet_planning import CROSS
+from tests.app.fleet.test_fleet import CROSS
 from tests.cli.conftest import run
 from tests.cli.test_fleet import ARRIVAL, LIMITS, write
 from tests.report.test_page import Reader

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 import yaml
 
-from gcsplan.app.model import Plan
-from gcsplan.app.outputs import outputs_of
-from gcsplan.app.pipeline import plan
-from gcsplan.app.way_home import against_on_board, homes_of, warnings
-from gcsplan.check.commands import flown_in_order
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.output.files import outputs_of
+from gcsplan.app.plan.model import Plan
+from gcsplan.app.plan.way_home import against_on_board, homes_of, warnings
+from gcsplan.check.motion.commands import flown_in_order
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.return_route import COPTER_RETURNS

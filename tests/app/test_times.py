@@ -13,15 +13,15 @@ from pathlib import Path
 import pytest
 import yaml
 
-from gcsplan.app.checking import check_files, more_of
-from gcsplan.app.model import Plan, VehiclePlan
-from gcsplan.app.outputs import outputs_of, report_of, summary_of
-from gcsplan.app.pipeline import plan
-from gcsplan.app.rehearsing import rehearse
+from gcsplan.app.check.files import check_files, more_of
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.output.files import outputs_of, report_of, summary_of
+from gcsplan.app.plan.model import Plan, VehiclePlan
+from gcsplan.app.rehearse import rehearse
 from gcsplan.check.verdict import by_item
-from gcsplan.cli.console import plan_row
+from gcsplan.cli.output.console import plan_row
 from gcsplan.fleet.arrival import Slot
-from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.motion.timed_path import TimedPath
 from gcsplan.mission_file import load_mission
 from gcsplan.units import duration
 from tests.support.plans import CASES, cases, planned, text_rows

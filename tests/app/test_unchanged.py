@@ -15,13 +15,13 @@ from typer import testing as runner
 
 from gcsplan import load_mission
 from gcsplan.app.batch import BatchOptions, MissionBatch, missions_of
-from gcsplan.app.executor import Inline
-from gcsplan.app.records import Record
-from gcsplan.cli.commands import app
+from gcsplan.app.output.records import Record
+from gcsplan.app.parallel.executor import Inline
+from gcsplan.cli.command_table import app
 from gcsplan.errors import InputError
 from gcsplan.export.durable import locked
 from gcsplan.export.outdir import write_outputs
-from gcsplan.world.input_files import reading, tell_file
+from gcsplan.world.terrain.input_files import reading, tell_file
 from tests.app.test_batch import mission
 from tests.support.mission_inputs import CASES, SCALED, Case, geotiff, made, published, tif
 

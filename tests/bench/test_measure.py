@@ -15,7 +15,7 @@ from gcsplan.bench.measure import Memory, compare, flown, holm, passes
 from gcsplan.bench.terrain.problems import NamedProblem
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.zones import Circle
+from gcsplan.world.geometry.zones import Circle
 from tests.bench.terrain.made import easy, straight
 from tests.support.effort import draws
 

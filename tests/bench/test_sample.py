@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gcsplan.bench.sample import ROUND_DEGREE_M, SAMPLE_HALF_M, SAMPLE_MIDDLE_DEG, SAMPLE_TERRAIN, sample_spec
-from gcsplan.world.frame import Frame
-from gcsplan.world.terrain import load_terrain
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.terrain.terrain import load_terrain
 
 
 def test_the_box_around_its_middle_has_ground_all_over() -> None:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gcsplan import check
-from gcsplan.app.model import Plan, VehiclePlan
+from gcsplan.app.plan.model import Plan, VehiclePlan
 from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.mission import commands as cmd

@@ -36,7 +36,7 @@ from pathlib import Path
 import numpy as np
 
 from gcsplan import load_mission, plan
-from gcsplan.app.model import Plan, VehiclePlan
+from gcsplan.app.plan.model import Plan, VehiclePlan
 from gcsplan.errors import GcsplanError, InputError, NoMission
 from gcsplan.mavlink.files.waypoints_file import write_waypoints
 from tests.campaigns.bound_witnesses import Budget, Route, Witness, draw

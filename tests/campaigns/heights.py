@@ -32,9 +32,9 @@ from gcsplan.arrays import Floats
 from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.frame import Frame
-from gcsplan.world.surface import Surface
-from gcsplan.world.terrain import TerrainSpec
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.terrain.terrain import TerrainSpec
 from gcsplan.world.world import World
 from tests.dem.test_dat_terrain import interpolated
 from tests.dem.test_dat_terrain import write as write_dat

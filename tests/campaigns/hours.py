@@ -30,7 +30,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from gcsplan.app.checking import check_mission
+from gcsplan.app.check.files import check_mission
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import RELATIVE, Home, Mission, MissionItem

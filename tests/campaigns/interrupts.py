@@ -29,7 +29,7 @@ from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler
 from pathlib import Path
 
-from gcsplan.world.cell import Cell
+from gcsplan.world.terrain.cell import Cell
 from tests.campaigns import large_inputs
 from tests.campaigns.disk import workshop
 from tests.export.test_generation import heed_signals

@@ -17,11 +17,11 @@ from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.frame import Frame
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import GridMap, Surface
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from gcsplan.world.world import World
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.support.random_worlds import Ground, random_zones
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4

@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 import yaml
 
-from gcsplan.app.model import Plan
-from gcsplan.app.pipeline import plan
-from gcsplan.app.rehearsing import parts_of, terms_of
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.plan.model import Plan
+from gcsplan.app.rehearse import parts_of, terms_of
 from gcsplan.errors import NoMission
 from gcsplan.mission_file import load_mission
 from gcsplan.sim.rehearsal import rehearse

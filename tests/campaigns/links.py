@@ -28,7 +28,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from gcsplan.app import uploads
+from gcsplan.app.upload import run as uploads
 from gcsplan.errors import GcsplanError
 from gcsplan.mavlink.link.frames import FrameParser, Signing, SigningKey
 from gcsplan.mavlink.link.link import Link

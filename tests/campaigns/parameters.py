@@ -24,14 +24,14 @@ from typing import Any
 import numpy as np
 import yaml
 
-from gcsplan.app import way_home as returns
-from gcsplan.app.model import Plan
-from gcsplan.app.on_board import judge_on_board
-from gcsplan.app.pipeline import plan
-from gcsplan.app.rehearsing import parts_of
-from gcsplan.app.upload_job import UploadJob
-from gcsplan.app.uploads import jobs_of
-from gcsplan.check.rtl.run_on import run_on_m
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.plan import way_home as returns
+from gcsplan.app.plan.model import Plan
+from gcsplan.app.rehearse import parts_of
+from gcsplan.app.upload.job import UploadJob
+from gcsplan.app.upload.on_board import judge_on_board
+from gcsplan.app.upload.run import jobs_of
+from gcsplan.check.motion.stopping import run_on_m
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.parameter_names import OnBoard

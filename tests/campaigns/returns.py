@@ -16,22 +16,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.check.corners import round_corners
-from gcsplan.check.flight import follow
-from gcsplan.check.rtl.lowest import heights_agl
-from gcsplan.check.rtl.model import RULES
-from gcsplan.check.rtl.places import ReturnPlaces, Target, places_of_returns
-from gcsplan.check.rtl.run_on import circle_home_m
-from gcsplan.check.rtl.sweep import CIRCLE_ABOVE_M
-from gcsplan.check.rtl.trace import MissionTrace, TraceParts, trace_of
+from gcsplan.check.flight.corners import round_corners
+from gcsplan.check.flight.follow import follow
+from gcsplan.check.motion.return_rules import RULES
+from gcsplan.check.motion.stopping import circle_home_m
+from gcsplan.check.returns.footprint import ReturnPlaces, Target, places_of_returns
+from gcsplan.check.returns.lowest_height import heights_agl
+from gcsplan.check.returns.obstacles_met import CIRCLE_ABOVE_M
+from gcsplan.check.returns.trace import MissionTrace, TraceParts, trace_of
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.commands import DO_CHANGE_SPEED, TAKEOFF, WAYPOINT
 from gcsplan.mavlink.mission.mission import NO_POSITION, RELATIVE, Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
-from gcsplan.world import hulls
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.frame import Frame
-from gcsplan.world.limits import Limits
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry import hulls
+from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.world import World
 from tests.oracles.returning import Begin, copter, plane
 from tests.support.worlds import surface

@@ -27,11 +27,11 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.app.batch import BatchOptions, MissionBatch, missions_of
-from gcsplan.app.executor import Inline
-from gcsplan.app.records import Record
+from gcsplan.app.output.records import Record
+from gcsplan.app.parallel.executor import Inline
 from gcsplan.errors import GcsplanError
 from gcsplan.export.outdir import write_outputs
-from gcsplan.world import input_files, raster
+from gcsplan.world.terrain import input_files, raster
 from tests.campaigns.disk import workshop
 from tests.support.mission_inputs import CASES, Case, made, published
 

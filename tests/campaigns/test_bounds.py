@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gcsplan import load_mission, plan
-from gcsplan.app.model import Plan, VehiclePlan
+from gcsplan.app.plan.model import Plan, VehiclePlan
 from gcsplan.errors import NoMission
 from tests.campaigns.bound_paths import Ground, shortest_track, taut
 from tests.campaigns.bound_worlds import Barrier, Case, Terrain, make, wall

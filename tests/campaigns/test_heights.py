@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from gcsplan.world.frame import Frame
-from gcsplan.world.surface import Surface
-from gcsplan.world.terrain import TerrainSpec
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.terrain.terrain import TerrainSpec
 from tests.campaigns.heights import Load, Tally, attempt, load, run
 
 FOREVER_S = 1e9

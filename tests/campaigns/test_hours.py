@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from gcsplan.app import check_sites
-from gcsplan.mission_file.airspace import times
+from gcsplan.app.check import worlds as check_sites
+from gcsplan.mission_file.published import times
 from tests.campaigns import hours
 
 

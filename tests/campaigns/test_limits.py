@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from gcsplan.check import judge as judging
-from gcsplan.check.plane_legs import PlaneLegs, legs_in_plane
+from gcsplan.check.motion.project import PlaneLegs, legs_in_plane
 from tests.campaigns.limit_cases import FAMILIES
 from tests.campaigns.limits import run
 

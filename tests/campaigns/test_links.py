@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from gcsplan.mavlink.link.link import Heard, LinkSteps
-from gcsplan.mavlink.link.parameters import PARAMETER_GROUPS
-from gcsplan.mavlink.link.recheck import Recheck
+from gcsplan.mavlink.link.session.parameters import PARAMETER_GROUPS
+from gcsplan.mavlink.link.session.recheck import Recheck
 from gcsplan.mavlink.protocol.outcome import Changed
 from gcsplan.vehicle import Autopilot
 from tests.campaigns.links import Run, campaign, main
@@ -67,7 +67,7 @@ def silent_for_four_seconds() -> list[str]:
 
 def test_the_campaign_finds_an_upload_that_does_not_look_after_a_silence(monkeypatch: pytest.MonkeyPatch) -> None:
     assert silent_for_four_seconds() == []
-    monkeypatch.setattr("gcsplan.mavlink.link.recheck.FRESH_S", 1e9)
+    monkeypatch.setattr("gcsplan.mavlink.link.session.recheck.FRESH_S", 1e9)
     assert any("came after a silence and was not looked at" in words for words in silent_for_four_seconds())
 
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from gcsplan.mission_file import zone_draft
-from gcsplan.mission_file.airspace import volumes
-from gcsplan.world import degree_shapes
+from gcsplan.mission_file.published import volumes
+from gcsplan.mission_file.zones import draft as zone_draft
+from gcsplan.world.geodesy import degree_shapes
 from tests.campaigns import zone_shapes, zones
 
 

@@ -26,16 +26,16 @@ import yaml
 from pyproj import Transformer
 from scipy.ndimage import binary_erosion, gaussian_filter, maximum_filter
 
-from gcsplan.app.pipeline import world_of
-from gcsplan.app.problems import make_problem
+from gcsplan.app.fleet.pipeline import world_of
+from gcsplan.app.plan.problem import make_problem
 from gcsplan.arrays import Bools, Floats
 from gcsplan.bench.everyday.oracle import EnclosedPlace, VisibilityGraph
 from gcsplan.errors import NoMission
 from gcsplan.mission_file import load_mission
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Progress, Solution
-from gcsplan.world.frame import Frame, centre_of
-from gcsplan.world.path import Path as Track
+from gcsplan.world.geodesy.frame import Frame, centre_of
+from gcsplan.world.geometry.path import Path as Track
 from tests.campaigns import sizes
 
 CAP_M, HIGH_M, LOW_M = 300.0, 600.0, 100.0

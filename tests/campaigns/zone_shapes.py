@@ -15,10 +15,10 @@ import shapely
 from pyproj import Geod, Transformer
 
 from gcsplan.errors import InputError
-from gcsplan.mission_file.zone_draft import ZoneDraft, place_zones
 from gcsplan.mission_file.zone_reader import read_zones
-from gcsplan.world.frame import Frame
-from gcsplan.world.zones import Circle
+from gcsplan.mission_file.zones.draft import ZoneDraft, place_zones
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.zones import Circle
 
 GEOD = Geod(ellps="WGS84")
 PLACES = 16

@@ -30,11 +30,11 @@ from pathlib import Path
 import numpy as np
 
 from gcsplan.errors import InputError
-from gcsplan.mission_file.airspace.left_out import used
-from gcsplan.mission_file.zone_draft import place_zones
+from gcsplan.mission_file.published.unused import used
 from gcsplan.mission_file.zone_reader import read_zones
-from gcsplan.world.frame import Frame
-from gcsplan.world.zones import Polygon
+from gcsplan.mission_file.zones.draft import place_zones
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.zones import Polygon
 from tests.campaigns import zone_shapes
 from tests.support.zone_files import EITHER_EDGE, WRITERS, Part, Ring
 

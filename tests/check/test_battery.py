@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from gcsplan.check.battery import BatteryHome, battery_home, flown
 from gcsplan.check.judge import judge
-from gcsplan.check.rtl.run_on import more_m
+from gcsplan.check.motion.stopping import more_m
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.mavlink.mission.commands import LAND, LOITER_TIME, RTL, TAKEOFF, WAYPOINT
 from gcsplan.mavlink.mission.mission import RELATIVE, Home, Mission, MissionItem

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gcsplan.app.model import Plan
-from gcsplan.app.pipeline import plan
-from gcsplan.app.problems import least_horizontal_j_per_m
-from gcsplan.app.way_home import homes_of
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.plan.model import Plan
+from gcsplan.app.plan.problem import least_horizontal_j_per_m
+from gcsplan.app.plan.way_home import homes_of
 from gcsplan.arrays import Floats
-from gcsplan.check.rtl.return_time import return_s
-from gcsplan.fleet.timing import Course, Route
+from gcsplan.check.motion.return_time import return_s
+from gcsplan.fleet.motion.timing import Course, Route
 from gcsplan.mission_file import load_mission
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot

@@ -18,11 +18,11 @@ from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.frame import Frame
-from gcsplan.world.path import Path
-from gcsplan.world.surface import GridMap, Surface
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.geometry.zones import Circle, Level, Zone
 from gcsplan.world.world import World
-from gcsplan.world.zones import Circle, Level, Zone
 from tests.support.noted import coded
 from tests.support.worlds import vehicle, world
 

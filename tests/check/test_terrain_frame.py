@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from gcsplan.app.margins import MOST_SLOPE, larger
+from gcsplan.app.plan.margins import MOST_SLOPE, larger
 from gcsplan.check.judge import judge
-from gcsplan.check.plane_legs import follow_ground
+from gcsplan.check.motion.project import follow_ground
 from gcsplan.mavlink.build.multirotor import build_mission
 from gcsplan.mavlink.build.order import MARGINS, Order
 from gcsplan.mavlink.mission import commands as cmd
@@ -19,10 +19,10 @@ from gcsplan.notes.finding import Finding
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.frame import Frame
-from gcsplan.world.path import Path
-from gcsplan.world.surface import GridMap, Surface
-from gcsplan.world.terrain_grid import TerrainGrid
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.terrain.grid import TerrainGrid
 from gcsplan.world.world import World
 from tests.oracles import terrain_grid as oracle
 from tests.support.noted import coded

@@ -9,20 +9,20 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats
-from gcsplan.check.climb_out import slant_shortage
+from gcsplan.check.fixed_wing.climb_out import slant_shortage
 from gcsplan.check.judge import judge
-from gcsplan.check.rtl.way_home import way_home
+from gcsplan.check.returns.way_home import way_home
 from gcsplan.mavlink.build.multirotor import build_mission
 from gcsplan.mavlink.build.order import Order
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.frame import Frame
-from gcsplan.world.limits import Limits
-from gcsplan.world.path import Path
-from gcsplan.world.surface import GridMap, Surface
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.geometry.zones import Circle, Level, Zone
 from gcsplan.world.world import World
-from gcsplan.world.zones import Circle, Level, Zone
 from tests.support.noted import coded
 from tests.support.worlds import vehicle
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gcsplan.app.outputs import outputs_of, summary_of
-from gcsplan.app.pipeline import plan
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.output.files import outputs_of, summary_of
 from gcsplan.mission_file import load_mission
 from tests.support.noted import codes
 

@@ -13,7 +13,7 @@ from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
 from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
-from tests.app.test_fleet_planning import CROSS
+from tests.app.fleet.test_fleet import CROSS
 
 LIMITS = CROSS["limits"] | {"track_error_m": 3, "altitude_error_m": 3}
 ARRIVAL = {"mode": "sequence", "order": ["west", "south"], "interval_s": 20, "separation_m": 30}

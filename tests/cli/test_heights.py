@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.dem.test_dat_terrain import write as write_dat
-from tests.world.test_terrain import degrees_tif
+from tests.world.terrain.test_terrain import degrees_tif
 
 MISSION = """version: 1
 terrain: {{dem: {dem}, {keys}}}

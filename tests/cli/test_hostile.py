@@ -22,10 +22,12 @@ import numpy as np
 import pytest
 import yaml
 
-from gcsplan.app import outputs, pipeline, uploads
-from gcsplan.cli.options import MISBEHAVIOURS
+from gcsplan.app.fleet import pipeline
+from gcsplan.app.output import files as outputs
+from gcsplan.app.upload import run as uploads
+from gcsplan.cli.arguments.options import MISBEHAVIOURS
 from gcsplan.mavlink.files.formats import read_mission_file, write_plan
-from gcsplan.mavlink.link import session
+from gcsplan.mavlink.link.session import session
 from gcsplan.mavlink.protocol.messages import Packet, Request
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.misbehaviour import Misbehaviour

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from gcsplan.app.pipeline import plan
-from gcsplan.cli import console
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.cli.output import console
 from gcsplan.mavlink.protocol.machine import TransferProgress
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from tests.app.test_leaving_out import GOOD, SHUT, WEAK, mission
+from tests.app.plan.test_left_out import GOOD, SHUT, WEAK, mission
 
 
 def test_the_command_names_them_writes_the_others_and_ends_with_three(run: Any, tmp_path: Path) -> None:

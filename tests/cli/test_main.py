@@ -229,7 +229,7 @@ def test_help_and_version(run: Any) -> None:
 
 
 def test_a_bug_of_ours_is_exit_70_with_one_message(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    from gcsplan.app import pipeline
+    from gcsplan.app.fleet import pipeline
 
     def broken(*_: object) -> None:
         raise ZeroDivisionError("boom")
@@ -243,7 +243,7 @@ def test_a_bug_of_ours_is_exit_70_with_one_message(run: Any, monkeypatch: pytest
 
 
 def test_ctrl_c_is_exit_130(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    from gcsplan.app import pipeline
+    from gcsplan.app.fleet import pipeline
 
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt

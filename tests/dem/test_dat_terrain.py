@@ -13,12 +13,12 @@ from gcsplan.arrays import Floats
 from gcsplan.dem.dat_file import RECORD_BYTES, crc_of, file_name, packed, read_dat
 from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError
-from gcsplan.world.cell import Cell
-from gcsplan.world.frame import Frame
-from gcsplan.world.model_words import notes_on
-from gcsplan.world.surface import Surface
-from gcsplan.world.terrain import Box, TerrainSpec
-from gcsplan.world.terrain_grid import GroundHeights, PostHeights, TerrainGrid
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.terrain.cell import Cell
+from gcsplan.world.terrain.grid import GroundHeights, PostHeights, TerrainGrid
+from gcsplan.world.terrain.model_words import notes_on
+from gcsplan.world.terrain.terrain import Box, TerrainSpec
 from tests.oracles import terrain_grid as oracle
 
 BOX = (-2500.0, -2500.0, 2500.0, 2500.0)

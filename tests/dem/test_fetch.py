@@ -23,8 +23,8 @@ from gcsplan.dem.download import DownloadPatience
 from gcsplan.dem.fetch import Fetch, Fetched
 from gcsplan.dem.sources import GLO30, GLO90, SRTM, DemSource
 from gcsplan.errors import InputError, LinkError
-from gcsplan.world.cell import Cell, cell_of
-from gcsplan.world.frame import Frame
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.terrain.cell import Cell, cell_of
 from tests.support.tiles import Served, heights_of, send, serving, tile
 
 QUICK = DownloadPatience(stall_s=10.0, whole_s=60.0, tries=4, pause_s=0.001)

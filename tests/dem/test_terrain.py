@@ -16,14 +16,14 @@ from gcsplan.dem.sources import GLO30, SRTM, DemSource
 from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError
 from gcsplan.mission_file import load_mission
-from gcsplan.mission_file.from_options import OpenWorld, WorldOptions
+from gcsplan.mission_file.options_world import OpenWorld, WorldOptions
 from gcsplan.notes.note import Note
-from gcsplan.world.cell import Cell
-from gcsplan.world.frame import Frame
-from gcsplan.world.input_files import sha256_of
-from gcsplan.world.model_words import notes_on
-from gcsplan.world.surface import Surface
-from gcsplan.world.terrain import TerrainSpec
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.terrain.cell import Cell
+from gcsplan.world.terrain.input_files import sha256_of
+from gcsplan.world.terrain.model_words import notes_on
+from gcsplan.world.terrain.terrain import TerrainSpec
 from tests.support.tiles import ROWS, height_at, heights_of, tile
 
 BOX = (-3000.0, -3000.0, 3000.0, 3000.0)

@@ -26,11 +26,11 @@ from gcsplan.export.profile import write_profile
 from gcsplan.export.rows import ItemRow, Track, WayPoint, outlines_deg
 from gcsplan.export.summary import ORDER, SCHEMA, json_of, write_summary
 from gcsplan.export.table import csv_of
-from gcsplan.mission_file.zone_draft import place_zones
 from gcsplan.mission_file.zone_reader import read_zones
+from gcsplan.mission_file.zones.draft import place_zones
 from gcsplan.vehicle import Autopilot
-from gcsplan.world.frame import Frame
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from tests.support.effort import draws
 from tests.support.paths import REPOSITORY
 

@@ -191,7 +191,7 @@ def test_a_signal_ends_a_command_with_a_message_and_its_code(tmp_path: Path, num
 
 TERMINATED = """
 import os, signal, sys
-from gcsplan.cli.ending import end_in_good_order
+from gcsplan.cli.process.exit import end_in_good_order
 from gcsplan.export import outdir
 from tests.export.test_outdir import SECOND
 end_in_good_order()

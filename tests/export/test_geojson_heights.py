@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gcsplan.app import outputs, pipeline
+from gcsplan.app.fleet import pipeline
+from gcsplan.app.output import files as outputs
 from gcsplan.mission_file import load_mission
 from tests.support.paths import DATA, MISSIONS
 

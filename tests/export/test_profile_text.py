@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gcsplan.app import pipeline
+from gcsplan.app.fleet import pipeline
 from gcsplan.check.verdict import Verdict
 from gcsplan.export.profile_text import BOTH, GROUND, TRACK, UNKNOWN, profile_lines
 from gcsplan.units import AVIATION, METRIC

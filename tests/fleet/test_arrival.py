@@ -16,12 +16,12 @@ from hypothesis import strategies as st
 from gcsplan.errors import InputError
 from gcsplan.fleet.arrival import NoSchedule, Schedule, schedule
 from gcsplan.fleet.craft import Craft, Crew
+from gcsplan.fleet.motion.timing import Route
 from gcsplan.fleet.order import best_order, interval_range
-from gcsplan.fleet.timing import Route
 from gcsplan.mission_file.request import ArrivalRequest
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
-from gcsplan.world.limits import Limits
+from gcsplan.world.geometry.limits import Limits
 from tests.mission_file.test_load import base, load, local, the_problem
 from tests.mission_file.test_load import vehicle as keys
 from tests.support.effort import draws

@@ -17,13 +17,13 @@ from gcsplan.fleet._taken import Taken
 from gcsplan.fleet.arrival import Schedule, schedule
 from gcsplan.fleet.craft import Craft, Crew, Slot
 from gcsplan.fleet.goals import least_interval_s
-from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.fleet.motion.timing import MissionEnd, Route
 from gcsplan.fleet.resolve import Change, NotSeparated, Resolved, resolve
 from gcsplan.fleet.separation import Conflict, Rules, separation
-from gcsplan.fleet.timing import MissionEnd, Route
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
-from gcsplan.world.limits import Limits
+from gcsplan.world.geometry.limits import Limits
 from tests.fleet.test_separation import random_fleet
 from tests.support.effort import draws
 from tests.support.flights import motions

@@ -15,7 +15,7 @@ import yaml
 from typer.testing import CliRunner
 
 from gcsplan.arrays import Floats
-from gcsplan.cli.energy import fit_energy as command
+from gcsplan.cli.commands.fit_energy import fit_energy as command
 from gcsplan.errors import UsageError
 from gcsplan.logs.fit import fit_energy
 from gcsplan.logs.flight_log import FlightLog

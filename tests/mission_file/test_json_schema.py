@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
-from gcsplan.mission_file import load_mission, units
+from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.json_schema import FILE_NAME, MODELINE, mission_schema
-from gcsplan.mission_file.schema import MissionKeys
-from gcsplan.mission_file.strict_yaml import read_yaml
+from gcsplan.mission_file.values import units
+from gcsplan.mission_file.values.schema import MissionKeys
+from gcsplan.mission_file.values.yaml import read_yaml
 from gcsplan.planners import registry
 from tests.support.paths import DATA, MISSIONS, REPOSITORY
 

@@ -20,9 +20,9 @@ from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Energy
-from gcsplan.world.frame import Frame
-from gcsplan.world.limits import Limits
-from gcsplan.world.zones import Circle, Level, Polygon
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.zones import Circle, Level, Polygon
 from tests.support.attacks import draw_attacks, require_told
 from tests.support.effort import draws
 from tests.support.paths import DATA

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import pytest
 
-from gcsplan.app import pipeline
-from gcsplan.app.flying import require_passing
+from gcsplan.app.fleet import pipeline
+from gcsplan.app.fleet.may_fly import require_passing
 from gcsplan.cli.main import main
 from tests.support.paths import DATA
 

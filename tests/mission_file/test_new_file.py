@@ -12,7 +12,7 @@ from jsonschema import Draft202012Validator
 from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.json_schema import MODELINE, mission_schema
 from gcsplan.mission_file.new_file import Draft, place_text, text_of
-from gcsplan.mission_file.strict_yaml import read_yaml
+from gcsplan.mission_file.values.yaml import read_yaml
 from gcsplan.vehicle import Autopilot
 
 START, GOAL = "[36.6175, -84.3892]", "[36.6133, -84.1667]"

@@ -10,8 +10,8 @@ import pytest
 
 from gcsplan.errors import InputError
 from gcsplan.mavlink.files.plan_file import parse_plan
-from gcsplan.mission_file.zone_draft import zone_notes
 from gcsplan.mission_file.zone_reader import read_zones
+from gcsplan.mission_file.zones.draft import zone_notes
 from gcsplan.notes.note import Note
 from tests.support import zone_files
 

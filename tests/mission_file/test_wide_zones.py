@@ -11,11 +11,11 @@ import pytest
 
 from gcsplan.errors import InputError
 from gcsplan.mission_file import load_mission
-from gcsplan.mission_file.airspace.left_out import used
-from gcsplan.mission_file.zone_draft import zone_notes
+from gcsplan.mission_file.published.unused import used
 from gcsplan.mission_file.zone_reader import read_zones
+from gcsplan.mission_file.zones.draft import zone_notes
 from gcsplan.notes.note import Note
-from gcsplan.world.frame import Frame
+from gcsplan.world.geodesy.frame import Frame
 from tests.campaigns.zones import answered
 from tests.support.zone_files import WRITERS, Ring
 

@@ -19,12 +19,12 @@ from pyproj import CRS, Geod, Transformer
 
 from gcsplan.errors import InputError
 from gcsplan.mission_file import zone_reader
-from gcsplan.mission_file.zone_draft import place_zones, zone_notes
-from gcsplan.mission_file.zone_file import ZoneFile
 from gcsplan.mission_file.zone_reader import read_zones
+from gcsplan.mission_file.zones.draft import place_zones, zone_notes
+from gcsplan.mission_file.zones.file import ZoneFile
 from gcsplan.notes.note import Note
-from gcsplan.world.frame import Frame
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from tests.support.effort import draws
 
 FRAME = Frame(46.5, 8.0)
@@ -266,7 +266,7 @@ def test_files_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert "the files of this Shapefile are too large" in message(file)
     monkeypatch.setattr(zone_reader, "MAX_ZONE_BYTES", (tmp_path / "z.zip").stat().st_size)
     assert "unpacks to more than" in message(tmp_path / "z.zip")
-    monkeypatch.setattr("gcsplan.mission_file.zone_vector.MAX_ZONES", 2)
+    monkeypatch.setattr("gcsplan.mission_file.zones.vector.MAX_ZONES", 2)
     monkeypatch.setattr(zone_reader, "MAX_ZONE_BYTES", 10**6)
     assert "more than 2 zones" in message(file)
 

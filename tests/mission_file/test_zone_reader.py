@@ -16,12 +16,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file import zone_file, zone_reader
-from gcsplan.mission_file.zone_draft import Bounds, ZoneDraft, circle, looks_swapped, place_zones, polygon, zones_sha256
-from gcsplan.mission_file.zone_file import ZoneFile
+from gcsplan.mission_file import zone_reader
 from gcsplan.mission_file.zone_reader import read_zones
-from gcsplan.world.frame import Frame
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from gcsplan.mission_file.zones import file as zone_file
+from gcsplan.mission_file.zones.draft import (
+    Bounds,
+    ZoneDraft,
+    circle,
+    looks_swapped,
+    place_zones,
+    polygon,
+    zones_sha256,
+)
+from gcsplan.mission_file.zones.file import ZoneFile
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from tests.support.attacks import draw_attacks, require_told
 from tests.support.effort import draws
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE, compilation_told
-from gcsplan.world._compiled import UNIT as WORLD
+from gcsplan.world.kernels.compiled import UNIT as WORLD
 from tests.support.toy_kernels import imported_anew, kernels, notices, ship, value, write
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from gcsplan.native import cache
 from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE
 from gcsplan.native.llvm import HostMachine
-from gcsplan.world._compiled import UNIT as WORLD
+from gcsplan.world.kernels.compiled import UNIT as WORLD
 from tests.support.toy_kernels import kernels, notices
 
 

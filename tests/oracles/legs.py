@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.world.limits import Limits
-from gcsplan.world.zones import Circle, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.zones import Circle, Zone
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from gcsplan.errors import NoMission
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Progress, Solution
 from gcsplan.world.airspace import Legs
-from gcsplan.world.path import Path
+from gcsplan.world.geometry.path import Path
 from tests.oracles.optima import shortest_past_discs
 from tests.oracles.optima_polish import PATIENT, QUICK, Effort, cost_of, polish
 from tests.oracles.optima_search import best_path

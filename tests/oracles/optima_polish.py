@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Legs
-from gcsplan.world.path import Path
+from gcsplan.world.geometry.path import Path
 
 
 @dataclass(frozen=True, slots=True)

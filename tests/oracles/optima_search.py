@@ -19,9 +19,9 @@ from scipy.spatial import KDTree
 from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Legs
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import Surface
-from gcsplan.world.zones import Circle
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.geometry.zones import Circle
 from tests.oracles.optima_polish import QUICK, Effort, cost_of, is_feasible, leg_costs, polish, pull
 
 NEAR = 1e-3

@@ -20,9 +20,9 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import GridMap, Surface
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from tests.oracles.legs import Oracle
 from tests.support.random_worlds import Ground, geographic, turned
 

@@ -1,4 +1,4 @@
-"""A PX4 multicopter on level legs, step by step: the rules of `gcsplan.fleet.smoothed`, integrated in time.
+"""A PX4 multicopter on level legs, step by step: the rules of `gcsplan.fleet.motion.px4`, integrated in time.
 
 In each step the speed that is wanted follows from the place alone: towards the way point, or while it turns towards a
 point on the leg; the speed then changes with a bounded acceleration and a bounded jerk.

@@ -1,4 +1,4 @@
-"""Returns as they are flown, step by step: a second implementation of what `gcsplan.check.rtl` bounds.
+"""Returns as they are flown, step by step: a second implementation of what `gcsplan.check.returns` bounds.
 
 A multicopter brakes to ArduCopter's stopping point, climbs there, flies home level and descends (AC_PosControl,
 mode_rtl.cpp); a plane flies ArduPlane's `update_loiter` law with a bank that comes late (AP_L1_Control.cpp).

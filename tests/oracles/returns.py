@@ -12,11 +12,11 @@ from gcsplan.mavlink.mission.commands import LAND, TAKEOFF, VTOL_LAND, VTOL_TAKE
 from gcsplan.mavlink.mission.mission import RELATIVE, Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.frame import Frame
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import GridMap
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import GridMap
+from gcsplan.world.geometry.zones import Circle, Zone
 from gcsplan.world.world import World
-from gcsplan.world.zones import Circle, Zone
 from tests.oracles.legs import Oracle
 from tests.support.random_worlds import Ground, in_plane, oracle_of, random_limits, random_zones, surface_of, turned
 

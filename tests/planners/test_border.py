@@ -11,8 +11,8 @@ import pytest
 from gcsplan.planners.border import border, exit_cost, goes_on, margin_for, within_m
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import GridMap, Surface
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import GridMap, Surface
 
 START, GOAL = (500.0, 600.0, 100.0), (1500.0, 600.0, 100.0)
 EVERY, NONE = (True, True, True, True), (False, False, False, False)

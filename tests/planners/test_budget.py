@@ -15,8 +15,8 @@ from gcsplan.errors import InputError
 from gcsplan.planners.budget import COUNTED, FIRST, FIRST_S, Budget
 from gcsplan.planners.optimal import planner
 from gcsplan.planners.optimal.governor import Search, govern
-from gcsplan.planners.optimal.incumbent import Incumbent
-from gcsplan.planners.optimal.searches import NAMES, Searches
+from gcsplan.planners.optimal.plane.incumbent import Incumbent
+from gcsplan.planners.optimal.table import NAMES, Searches
 from gcsplan.planners.problem import Problem, Refusal, Solution
 
 
@@ -165,9 +165,9 @@ import resource
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import GridMap, Surface
-from gcsplan.world.zones import Circle, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.geometry.zones import Circle, Zone
 import numpy as np
 level = np.zeros((2, 2))
 surface = Surface(level, level, GridMap.affine(-3.4e3, 3.4e3, 6.8e3, 6.8e3), {})

@@ -9,7 +9,7 @@ from typing import get_args
 import pytest
 
 from gcsplan.errors import InputError
-from gcsplan.mission_file.schema import EncodingName
+from gcsplan.mission_file.values.schema import EncodingName
 from gcsplan.optimisers import registry as optimisers
 from gcsplan.planners import registry
 

@@ -15,9 +15,9 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.problem import Objective, Problem
 from gcsplan.planners.simplify import fewer, polished, thinned
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.limits import Limits
-from gcsplan.world.path import Path
-from gcsplan.world.zones import Circle, Level, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.zones import Circle, Level, Zone
 from tests.support.effort import draws
 from tests.support.planner_worlds import faults, ground
 

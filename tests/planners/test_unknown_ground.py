@@ -8,14 +8,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gcsplan.planners.cures import with_cures
 from gcsplan.planners.optimal.navmesh.terrain_nodes import nodes
 from gcsplan.planners.optimal.planner import plan
-from gcsplan.planners.optimal.sources import bound_corridor
+from gcsplan.planners.optimal.searches import bound_corridor
 from gcsplan.planners.problem import Problem, Refusal, Solution
+from gcsplan.planners.refusal.suggestions import with_cures
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import Surface
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import Surface
 from tests.support.planner_worlds import Floats, ground
 
 BAND = Limits(min_agl_m=30.0, max_agl_m=90.0)

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from gcsplan.check.rtl.verdict import RallyPoint
-from gcsplan.check.rtl.way_home import way_home
+from gcsplan.check.returns.verdict import RallyPoint
+from gcsplan.check.returns.way_home import way_home
 from gcsplan.notes.note import Note
-from gcsplan.report import markup
 from gcsplan.report.page import render_page
-from gcsplan.report.subject import Page, Rehearsed
+from gcsplan.report.parts import html as markup
+from gcsplan.report.parts.page_data import Page, Rehearsed
 from tests.report.test_page import HOSTILE, Reader, fleet_page, small_page
 from tests.support import browser as chromium
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from gcsplan.check.rtl.way_home import way_home
+from gcsplan.check.returns.way_home import way_home
 from gcsplan.report.page import render_page
-from gcsplan.report.subject import Subject
+from gcsplan.report.parts.page_data import Subject
 from gcsplan.units import AVIATION, IMPERIAL, METRIC, Units
 from tests.report.test_page import HOSTILE, fleet_page, many_page, small_page, verdict_over
 from tests.support import browser as chromium

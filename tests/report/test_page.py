@@ -20,31 +20,33 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from gcsplan.app.model import Plan
-from gcsplan.app.pipeline import load_mission, plan
-from gcsplan.app.report_page import page_of_plan, render
+from gcsplan.app.fleet.pipeline import load_mission, plan
+from gcsplan.app.output.report import page_of_plan, render
+from gcsplan.app.plan.model import Plan
 from gcsplan.check.judge import judge
-from gcsplan.check.rtl.way_home import way_home
+from gcsplan.check.returns.way_home import way_home
 from gcsplan.check.verdict import Verdict
-from gcsplan.fleet.motion import TimedPath
+from gcsplan.fleet.motion.timed_path import TimedPath
 from gcsplan.fleet.separation import Rules, separation
 from gcsplan.mavlink.build.multirotor import build_mission
 from gcsplan.mavlink.build.order import Order
 from gcsplan.notes.note import Note
-from gcsplan.report import fleet_view, markup, tables
-from gcsplan.report.chart import Axes, ticks
 from gcsplan.report.page import render_check, render_page
-from gcsplan.report.picture import draw, figures
-from gcsplan.report.relief import UNKNOWN, extent_of, relief_of
-from gcsplan.report.samples import distance_m, line_of, passages
-from gcsplan.report.scene_data import triangles, zone_meshes
-from gcsplan.report.subject import Page, Subject
+from gcsplan.report.parts import html as markup
+from gcsplan.report.parts.page_data import Page, Subject
+from gcsplan.report.parts.track_samples import distance_m, line_of, passages
+from gcsplan.report.views import fleet as fleet_view
+from gcsplan.report.views import tables
+from gcsplan.report.views.chart import Axes, ticks
+from gcsplan.report.views.picture import draw, figures
+from gcsplan.report.views.scene_data import triangles, zone_meshes
+from gcsplan.report.views.shaded_terrain import UNKNOWN, extent_of, relief_of
 from gcsplan.units import AVIATION, METRE, METRIC, duration
 from gcsplan.vehicle import Energy, Vehicle
-from gcsplan.world.model_words import BARE_DEM, SURFACE_DEM
-from gcsplan.world.path import Path
+from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.terrain.model_words import BARE_DEM, SURFACE_DEM
 from gcsplan.world.world import World
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.fleet.test_separation import random_fleet
 from tests.support.effort import draws
 from tests.support.worlds import vehicle, world

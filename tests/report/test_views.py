@@ -7,11 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcsplan.report.plan_view import scale_bar, zone_heights
-from gcsplan.report.shown import LIGHT_SAMPLES, MOST_FULL, MOST_WHOLE, in_full, left_out_html, only_some, samples_of
-from gcsplan.report.subject import Subject
+from gcsplan.report.parts.detail import (
+    LIGHT_SAMPLES,
+    MOST_FULL,
+    MOST_WHOLE,
+    in_full,
+    left_out_html,
+    only_some,
+    samples_of,
+)
+from gcsplan.report.parts.page_data import Subject
+from gcsplan.report.views.plan import scale_bar, zone_heights
 from gcsplan.units import AVIATION, METRIC
-from gcsplan.world.zones import Circle, Level, Zone
+from gcsplan.world.geometry.zones import Circle, Level, Zone
 from tests.report.test_page import many_page, small_page
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from gcsplan.app.rehearsing import rehearse
+from gcsplan.app.rehearse import rehearse
 from gcsplan.sim.flight.wind import Weather
 from gcsplan.sim.outcome import Rehearsal
 from tests.check.test_energy import ENERGY, integral_j, planned

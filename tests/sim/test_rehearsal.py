@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcsplan.app.pipeline import plan
-from gcsplan.app.rehearsing import parts_of, terms_of
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.rehearse import parts_of, terms_of
 from gcsplan.check.judge import judge
 from gcsplan.errors import CheckFailed, InputError
 from gcsplan.mavlink.mission import commands as cmd
@@ -21,7 +21,7 @@ from gcsplan.sim.flight.wind import Weather
 from gcsplan.sim.outcome import Terms
 from gcsplan.sim.rehearsal import on_board, rehearse
 from gcsplan.vehicle import Autopilot
-from gcsplan.world.zones import Circle, Zone
+from gcsplan.world.geometry.zones import Circle, Zone
 from tests.support import worlds
 from tests.support.rehearsal_parts import FLAT, GROUND_M, a_part, kinds, reached_s
 

@@ -6,8 +6,8 @@ from functools import partial
 
 import pytest
 
-from gcsplan.app import uploads
-from gcsplan.mavlink.link import session, steps
+from gcsplan.app.upload import run as uploads
+from gcsplan.mavlink.link.session import session, steps
 from gcsplan.mavlink.protocol.transfer import Timers
 
 _OPTIONS = session.SessionOptions

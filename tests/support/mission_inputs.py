@@ -25,9 +25,9 @@ from gcsplan.arrays import Floats
 from gcsplan.dem.cache import Cache, TileRecord, text_of
 from gcsplan.dem.dat_file import file_name, packed
 from gcsplan.dem.sources import GLO30
-from gcsplan.world.cell import Cell
-from gcsplan.world.input_files import sha256_of
-from gcsplan.world.terrain_grid import PostHeights, TerrainGrid
+from gcsplan.world.terrain.cell import Cell
+from gcsplan.world.terrain.grid import PostHeights, TerrainGrid
+from gcsplan.world.terrain.input_files import sha256_of
 from tests.support.tiles import tile
 
 START, GOAL = [47.4, 8.4], [47.4, 8.412]

@@ -12,11 +12,11 @@ from matplotlib.cbook import get_sample_data
 from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.frame import Frame
-from gcsplan.world.limits import Limits
-from gcsplan.world.path import Path
-from gcsplan.world.surface import GridMap, Surface
-from gcsplan.world.zones import Circle, Level, Zone
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.geometry.zones import Circle, Level, Zone
 
 
 def ground(

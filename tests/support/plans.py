@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 import yaml
 
-from gcsplan.app.model import Plan
-from gcsplan.app.pipeline import plan
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.plan.model import Plan
 from gcsplan.mission_file import load_mission
 from tests.support.paths import MISSIONS
 

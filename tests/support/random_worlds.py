@@ -11,10 +11,10 @@ import numpy as np
 from matplotlib.cbook import get_sample_data
 
 from gcsplan.arrays import Floats
-from gcsplan.world.frame import Frame
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import GridMap, Surface
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from tests.oracles.legs import Oracle
 
 ToGrid = Callable[[Floats, Floats], tuple[Floats, Floats]]

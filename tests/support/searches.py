@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.governor import govern
-from gcsplan.planners.optimal.incumbent import Incumbent
-from gcsplan.planners.optimal.plane_search import PlaneSearch
-from gcsplan.planners.optimal.searches import Searches
+from gcsplan.planners.optimal.plane.incumbent import Incumbent
+from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
+from gcsplan.planners.optimal.table import Searches
 from gcsplan.planners.problem import Problem
 
 

@@ -10,7 +10,7 @@ from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.sim.part import RehearsalPart
 from gcsplan.vehicle import Autopilot, Vehicle
-from gcsplan.world.limits import Limits
+from gcsplan.world.geometry.limits import Limits
 from tests.support.worlds import world
 
 COPTER, PLANE = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE

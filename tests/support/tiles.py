@@ -17,7 +17,7 @@ from rasterio.transform import Affine
 
 from gcsplan.arrays import Floats
 from gcsplan.dem.sources import GLO30, GLO90, SRTM, DemSource
-from gcsplan.world.cell import Cell
+from gcsplan.world.terrain.cell import Cell
 
 ROWS = 36
 """Rows of a tile here: a hundredth of a real one's."""

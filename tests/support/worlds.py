@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from gcsplan.vehicle import Autopilot, Energy, Vehicle
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.frame import Frame
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import GridMap, Surface
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.geometry.zones import Zone
 from gcsplan.world.world import World
-from gcsplan.world.zones import Zone
 
 Height = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from gcsplan.arrays import Floats
 from gcsplan.world.airspace import Airspace, LegReport, Legs, Violation
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import GridMap, Surface
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from tests.support.random_worlds import jacksboro, random_zones
 
 

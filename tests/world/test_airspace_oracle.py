@@ -10,8 +10,8 @@ import pytest
 
 from gcsplan.arrays import Floats
 from gcsplan.world.airspace import Airspace, LegReport, Legs, Violation
-from gcsplan.world.frame import Frame
-from gcsplan.world.limits import Limits
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.limits import Limits
 from tests.oracles.legs import Oracle, deepest
 from tests.support.random_worlds import (
     Ground,

@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcsplan.world import hulls, level_lines
+from gcsplan.world import level_lines
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import GridMap, Surface
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.geometry import hulls
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from tests.support.random_worlds import (
     in_degrees,
     in_plane,

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gcsplan.world import mosaic, overlap, terrain, voids
-from gcsplan.world.raster import MAX_CELLS
+from gcsplan.world.terrain import mosaic, overlap, terrain, voids
+from gcsplan.world.terrain.raster import MAX_CELLS
 from tests.campaigns import sizes
 from tests.support.paths import REPOSITORY
-from tests.world.test_terrain import degrees_tif, hills, load, refusal
+from tests.world.terrain.test_terrain import degrees_tif, hills, load, refusal
 
 HELD = {"obstacle_height_m": 2, "canopy": 4}
 """Arrays of the window that are held at once."""

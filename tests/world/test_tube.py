@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from gcsplan.arrays import Floats
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import GridMap, Surface
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from gcsplan.world.tube import Tube
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.oracles.legs import deepest
 from tests.support.effort import draws
 from tests.support.random_worlds import (

@@ -11,12 +11,12 @@ import pytest
 from affine import Affine
 
 from gcsplan.errors import InputError
-from gcsplan.world.datum import stated_datum, take_apart
-from gcsplan.world.height_unit import unit_named
-from gcsplan.world.model_words import notes_on
-from gcsplan.world.surface import Surface
-from gcsplan.world.voids import zero_voids
-from tests.world.test_terrain import FRAME, degrees_tif, hills, load, refusal, tif
+from gcsplan.world.geodesy.datum import stated_datum, take_apart
+from gcsplan.world.geodesy.height_unit import unit_named
+from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.terrain.model_words import notes_on
+from gcsplan.world.terrain.voids import zero_voids
+from tests.world.terrain.test_terrain import FRAME, degrees_tif, hills, load, refusal, tif
 
 FOOT, US_FOOT = 0.3048, 1200 / 3937
 UPWARDS = {  # code: metres of its unit, name
@@ -179,7 +179,7 @@ def test_a_grid_in_feet_needs_the_unit_of_its_heights(tmp_path: Path) -> None:
     heights = np.round(hills(400, 400))
     # North Carolina's grid in US survey feet, around the frame's place.
     path = tif(tmp_path / "a.tif", heights, Affine(300.0, 0.0, 880_000.0, 0.0, -300.0, 710_000.0), crs="EPSG:2264")
-    from gcsplan.world.frame import Frame
+    from gcsplan.world.geodesy.frame import Frame
 
     frame = Frame(35.6, -82.5)
     error = refusal(path, frame=frame, box=(-500.0, -500.0, 500.0, 500.0), vertical_datum="NAVD88")

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.frame import Frame
-from gcsplan.world.height_unit import METRE
-from gcsplan.world.model_words import BARE_DEM, SURFACE_DEM, heights_line, heights_read, what_is_not_in
-from gcsplan.world.surface import GridMap, Surface
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geodesy.height_unit import METRE
+from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.terrain.model_words import BARE_DEM, SURFACE_DEM, heights_line, heights_read, what_is_not_in
 from gcsplan.world.world import WORLDS_KEPT, World
 
 FRAME = Frame(36.6, -84.3)

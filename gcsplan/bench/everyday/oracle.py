@@ -17,7 +17,7 @@ import numpy as np
 import shapely
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.world.zones import Circle, Zone
+from gcsplan.world.geometry.zones import Circle, Zone
 
 SEGMENTS = 24
 """Chords per quarter circle."""

@@ -18,8 +18,8 @@ from typing import Any
 
 import yaml
 
-from gcsplan.app.pipeline import world_of
-from gcsplan.app.problems import make_problem
+from gcsplan.app.fleet.pipeline import world_of
+from gcsplan.app.plan.problem import make_problem
 from gcsplan.bench.everyday.missions import EVERYDAY_KINDS, Everyday, draw
 from gcsplan.bench.everyday.oracle import EnclosedPlace, VisibilityGraph
 from gcsplan.bench.files import write_all
@@ -27,7 +27,7 @@ from gcsplan.bench.measure import Memory, passes, percentile
 from gcsplan.errors import InputError, NoMission
 from gcsplan.export.table import csv_of
 from gcsplan.mission_file import load_mission
-from gcsplan.planners.optimal.searches import require_names
+from gcsplan.planners.optimal.table import require_names
 from gcsplan.planners.problem import Problem, Solution
 from gcsplan.planners.registry import get as get_planner
 

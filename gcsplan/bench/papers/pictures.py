@@ -23,7 +23,7 @@ from gcsplan.bench.measure import length_m
 from gcsplan.bench.papers.runs import RunRecord
 from gcsplan.bench.papers.scenarios import ReadyScenario
 from gcsplan.bench.papers.statistics import legal, schedule
-from gcsplan.world.zones import Circle
+from gcsplan.world.geometry.zones import Circle
 
 ALGORITHM_COLOURS = ("#d62728", "#1f77b4", "#2ca02c", "#9467bd", "#ff7f0e", "#17becf", "#8c564b", "#e377c2")
 MAP_ZONE_COLOUR = "#ffbf00"

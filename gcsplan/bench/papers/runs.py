@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from gcsplan.app.executor import executor
+from gcsplan.app.parallel.executor import executor
 from gcsplan.arrays import Floats
 from gcsplan.bench.files import kept_rows
 from gcsplan.bench.papers.scenarios import SCENARIOS, Contender, ReadyScenario, prepare, settings_of
@@ -34,8 +34,8 @@ from gcsplan.planners.swarm import aco
 from gcsplan.planners.swarm.planner import Found, scene_of, search
 from gcsplan.planners.swarm.scene import Scene
 from gcsplan.planners.swarm.settings import Settings
-from gcsplan.world.path import Path as FlownPath
-from gcsplan.world.zones import Circle
+from gcsplan.world.geometry.path import Path as FlownPath
+from gcsplan.world.geometry.zones import Circle
 
 RunRecord = dict[str, Any]
 Key = tuple[str, str, int, int, str]
@@ -52,10 +52,10 @@ CONVERGED_PART = 0.01
 """A run has converged when its cost is within this part of its final cost."""
 
 CODE = (
-    "*.py", "app/pipeline.py", "app/problems.py", "app/sites.py", "bench/papers/readings.py", "bench/papers/runs.py",
-    "bench/papers/scenarios.py",
-    "mavlink/build/*.py", "mavlink/mission/mission.py", "mission_file/*.py", "native/*.py", "optimisers/*.py",
-    "planners/**/*.py", "world/*.py",
+    "*.py", "app/fleet/pipeline.py", "app/plan/problem.py", "app/parallel/sites.py", "bench/papers/readings.py",
+    "bench/papers/runs.py", "bench/papers/scenarios.py",
+    "mavlink/build/*.py", "mavlink/mission/mission.py", "mission_file/**/*.py", "native/*.py", "optimisers/*.py",
+    "planners/**/*.py", "world/**/*.py",
 )  # fmt: skip
 """Source files within the package that decide a run's result; a superfluous file is better than a missing one."""
 

@@ -189,8 +189,8 @@ class ReadyScenario:
 @lru_cache(maxsize=20)
 def prepare(name: str, text: str) -> ReadyScenario:
     """The mission ``text`` of scenario ``name``, without margins for the wire, since nothing is sent."""
-    from gcsplan.app.pipeline import load_mission, world_of
-    from gcsplan.app.problems import make_problem
+    from gcsplan.app.fleet.pipeline import load_mission, world_of
+    from gcsplan.app.plan.problem import make_problem
 
     source = load_mission(f"{name}.yaml", text=text)
     world = world_of(source)

@@ -20,8 +20,8 @@ from typing import Any
 import yaml
 
 from gcsplan.app.batch import BatchOptions, MissionBatch, Record, missions_of, record_of
-from gcsplan.app.executor import Dask, Executor, Inline, executor
-from gcsplan.app.pipeline import plan
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.parallel.executor import Dask, Executor, Inline, executor
 from gcsplan.bench.measure import peak_mb
 from gcsplan.bench.scale.missions import mission
 from gcsplan.errors import GcsplanError

@@ -15,7 +15,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from gcsplan.app.executor import executor
+from gcsplan.app.parallel.executor import executor
 from gcsplan.bench.files import kept_rows
 from gcsplan.bench.measure import length_m, passes
 from gcsplan.bench.papers.runs import code_digest

@@ -27,14 +27,14 @@ import numpy as np
 from gcsplan.bench.measure import length_m
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem
-from gcsplan.world._compiled import UNIT
-from gcsplan.world._entries import judge
-from gcsplan.world._field import Field
-from gcsplan.world._neighbourhood import extrema_around
-from gcsplan.world._shared import BOW_M, Demands
-from gcsplan.world._zone_arrays import zones_as_arrays
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.limits import Limits
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.kernels.compiled import UNIT
+from gcsplan.world.kernels.entries import judge
+from gcsplan.world.kernels.field import Field
+from gcsplan.world.kernels.neighbourhood import extrema_around
+from gcsplan.world.kernels.shared import BOW_M, Demands
+from gcsplan.world.kernels.zone_arrays import zones_as_arrays
 
 PLANNERS = {"RRT*": "RRTstar", "InformedRRT*": "InformedRRTstar", "BIT*": "BITstar"}
 CROSSINGS = 2000

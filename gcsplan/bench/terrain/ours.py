@@ -15,7 +15,7 @@ from gcsplan.errors import NoMission
 from gcsplan.planners.problem import Problem, Solution
 from gcsplan.planners.registry import get as get_planner
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.surface import Surface
+from gcsplan.world.geometry.surface import Surface
 
 SWEEP_LEGS = 100_000
 LONG_RUN_S = 60.0

@@ -17,13 +17,13 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.bench.sample import SAMPLE_HALF_M, SAMPLE_MIDDLE_DEG, sample_spec
-from gcsplan.mission_file.world import make_box
+from gcsplan.mission_file.scene import make_box
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.frame import Frame, centre_of
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import NO_SIDES, Surface
-from gcsplan.world.terrain import Terrain, open_terrain
-from gcsplan.world.zones import Circle, Level, Zone
+from gcsplan.world.geodesy.frame import Frame, centre_of
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import NO_SIDES, Surface
+from gcsplan.world.geometry.zones import Circle, Level, Zone
+from gcsplan.world.terrain.terrain import Terrain, open_terrain
 
 WAY_M = (5_000.0, 25_000.0)  # straight distance from start to goal: from the shortest to the longest stratum
 PAIRS = 20

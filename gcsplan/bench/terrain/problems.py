@@ -47,9 +47,9 @@ from gcsplan.bench.terrain.room import draw_with_room
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Objective, Problem
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import GridMap, Surface
-from gcsplan.world.zones import Circle, Polygon
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.geometry.zones import Circle, Polygon
 
 MAIN_ZONES, ROOM_ZONES = (0, 10, 40), (0, 10, 20)
 BAND_M, BAND_DEG = (60.0, 120.0), (10.0, 15.0)

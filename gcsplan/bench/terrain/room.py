@@ -27,8 +27,8 @@ from gcsplan.bench.terrain.pairs import (
     stratum,
 )
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
-from gcsplan.world.zones import Circle, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.zones import Circle, Zone
 
 CORRIDOR_STEP_M = 50.0
 CORRIDOR_WIDE_M, CORRIDOR_NARROW_M, CORRIDOR_NEAR_M = 600.0, 200.0, 1_000.0

@@ -19,7 +19,7 @@ from gcsplan.bench.terrain import rivals as others
 from gcsplan.bench.terrain.outcome import OUR_LONG_METHOD, OUR_METHOD, MethodOutcome
 from gcsplan.bench.terrain.problems import MOUNTAINS, PROBLEM_KINDS, NamedProblem, problems
 from gcsplan.errors import InputError
-from gcsplan.planners.optimal.searches import require_names
+from gcsplan.planners.optimal.table import require_names
 
 ANSWERS = "rivals.jsonl"
 GAP_PERCENT = 0.1

@@ -21,7 +21,7 @@ from gcsplan.bench.measure import length_m, passes
 from gcsplan.bench.terrain.ompl import RivalAnswer, box_of, rival_module
 from gcsplan.optimisers.driver import History, Result
 from gcsplan.planners.problem import Problem
-from gcsplan.world.zones import Circle, Level
+from gcsplan.world.geometry.zones import Circle, Level
 
 SWARMS = {"GWO": "OriginalGWO", "PSO": "OriginalPSO", "DE": "OriginalDE", "ABC": "OriginalABC", "FOA": "OriginalFOA"}
 BASELINES = {"DE": SWARMS["DE"], "GWO": SWARMS["GWO"]}

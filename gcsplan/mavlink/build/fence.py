@@ -23,11 +23,11 @@ from gcsplan.mavlink.mission.commands import CIRCLE_IN, CIRCLE_OUT, FENCE_RETURN
 from gcsplan.mavlink.mission.mission import FENCE, GLOBAL, MissionItem, degrees_e7
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
-from gcsplan.world.degree_shapes import LARGEST_RADIUS_M, near_circle, near_polygons, outline_of, unwrapped
-from gcsplan.world.zones import Circle, Polygon, Zone
+from gcsplan.world.geodesy.degree_shapes import LARGEST_RADIUS_M, near_circle, near_polygons, outline_of, unwrapped
+from gcsplan.world.geometry.zones import Circle, Polygon, Zone
 
 if TYPE_CHECKING:
-    from gcsplan.world.frame import Frame
+    from gcsplan.world.geodesy.frame import Frame
 
 FENCE_STRAIGHT_M = 0.1
 """Metres: a corner of the outline that lies within this of the line between its kept neighbours is left out."""

@@ -24,7 +24,7 @@ from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.autopilots import altitude_of_cm
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.vehicle import Vehicle
-from gcsplan.world.path import Path
+from gcsplan.world.geometry.path import Path
 from gcsplan.world.world import World
 
 __all__ = ["accepted_m", "build_wing", "flown_m", "parted", "pitch_deg", "tangents_m", "thinned"]

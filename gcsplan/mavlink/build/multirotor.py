@@ -22,7 +22,7 @@ from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.autopilots import altitude_of_cm
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.vehicle import Autopilot, Vehicle
-from gcsplan.world.path import Path
+from gcsplan.world.geometry.path import Path
 from gcsplan.world.world import World
 
 COPTER_ACCEPTANCE_M = 2.0  # ArduCopter WPNAV_RADIUS, default

@@ -19,7 +19,7 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.errors import GcsplanError
 from gcsplan.mavlink.link.frames import FrameParser, FrameWriter, Signing, SigningKey
-from gcsplan.mavlink.link.prompt import Prepared, PromptAnswers
+from gcsplan.mavlink.link.prepared_answers import Prepared, PromptAnswers
 from gcsplan.mavlink.link.transport import LinkClock, Peer, Transport, Udp, open_transport, wait_readable
 from gcsplan.mavlink.link.url import Endpoint, parse_url
 from gcsplan.mavlink.protocol import wire

@@ -11,7 +11,7 @@ from gcsplan.mavlink.mission.return_route import ReturnRoute
 from gcsplan.mavlink.protocol.patience import TIMEOUT_S, checked_timeout_s
 from gcsplan.mavlink.protocol.transfer import Timers, TransferProgress
 from gcsplan.vehicle import Autopilot, Vehicle
-from gcsplan.world.terrain_grid import GroundHeights
+from gcsplan.world.terrain.grid import GroundHeights
 
 TransferReport = Callable[[str, TransferProgress], None]
 ReadBackJudge = Callable[[Mission, Mapping[str, float]], str | None]

@@ -23,7 +23,7 @@ from gcsplan.mavlink.link.link import Channel, Heard, LinkSteps
 from gcsplan.mavlink.mission.mission import TERRAIN, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.notes.note import Note
-from gcsplan.world.terrain_grid import (
+from gcsplan.world.terrain.grid import (
     ALL_PARTS,
     NEAR_ENOUGH_M,
     SPACING_M,

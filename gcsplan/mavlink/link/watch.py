@@ -13,8 +13,8 @@ from typing import Any
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.mavlink.link.link import Heard
-from gcsplan.mavlink.link.numbers import VehiclePosition, place
 from gcsplan.mavlink.link.transport import Peer
+from gcsplan.mavlink.link.validate import VehiclePosition, place
 from gcsplan.mavlink.mission.autopilots import GENERIC, INVALID, autopilot_name, type_name
 from gcsplan.mavlink.mission.mission import Home
 from gcsplan.mavlink.protocol.messages import Address

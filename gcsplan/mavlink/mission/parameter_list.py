@@ -28,7 +28,7 @@ from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, TERRAIN, Mission
 from gcsplan.mavlink.mission.parameter_names import PARAMETERS, Name, OnBoard, Parameter
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, Autopilot, Vehicle
-from gcsplan.world.atmosphere import true_per_indicated
+from gcsplan.world.geodesy.atmosphere import true_per_indicated
 
 __all__ = ["Off", "Setting", "commands_speed", "corners_as_it_leans", "off", "parameter_list", "vehicle_on_board"]
 

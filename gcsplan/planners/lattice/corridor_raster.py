@@ -17,8 +17,8 @@ from gcsplan.planners.lattice import pull_kernels
 from gcsplan.planners.lattice.lattice import near_zone
 from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.planners.profile.track import denser
-from gcsplan.world.limits import Limits
-from gcsplan.world.zones import Circle, Level, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.zones import Circle, Level, Zone
 
 SHUT_M = 1e5
 """Floor, in metres, where no altitude is free; finite, so that kernels need not handle infinities."""

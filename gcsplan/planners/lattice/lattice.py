@@ -16,8 +16,8 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Int64s
 from gcsplan.planners.problem import ENDS_M, Problem, terminals_of
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
-from gcsplan.world.zones import Circle, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.zones import Circle, Zone
 
 STEPS = np.array([(1, 0), (0, 1), (1, 1), (-1, 1), (2, 1), (1, 2), (-1, 2), (-2, 1)], dtype=np.int64)
 """Half of the 16 directions, in nodes (east, north); edge ``node * 8 + k`` goes from ``node`` by ``STEPS[k]``."""

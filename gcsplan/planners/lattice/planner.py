@@ -22,7 +22,7 @@ from gcsplan.planners.profile.climb_laps import pins_of, with_climbs
 from gcsplan.planners.profile.exact import Judge, Unsettled, settle
 from gcsplan.planners.profile.track import Obstruction, distances, make_track
 from gcsplan.planners.simplify import fewer
-from gcsplan.world.path import Path
+from gcsplan.world.geometry.path import Path
 
 Tell = Callable[[str, float | None], None]
 

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 
-from gcsplan.planners.optimal.incumbent import Incumbent
+from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.problem import Step
 
 Size = tuple[float, float]

@@ -31,14 +31,14 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import NoMission
 from gcsplan.notes.note import Note
 from gcsplan.planners.optimal.governor import govern
-from gcsplan.planners.optimal.incumbent import Incumbent
-from gcsplan.planners.optimal.searches import Searches, left_out
+from gcsplan.planners.optimal.plane.incumbent import Incumbent
+from gcsplan.planners.optimal.table import Searches, left_out
 from gcsplan.planners.optimal.window import plan_over
 from gcsplan.planners.problem import Problem, Refusal, Solution, terminals_of
 from gcsplan.planners.profile.climb_laps import on_the_spot
-from gcsplan.planners.refusal import check_ends, explain
-from gcsplan.world.limits import Limits
-from gcsplan.world.path import Path
+from gcsplan.planners.refusal.explain import check_ends, explain
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import Path
 
 
 def plan(problem: Problem) -> Solution:

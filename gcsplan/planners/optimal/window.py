@@ -18,7 +18,7 @@ import numpy as np
 from gcsplan.notes.note import Note
 from gcsplan.planners.border import enclosed, exit_cost, goes_on, margin_for, within_m
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
-from gcsplan.planners.refusal import NoPath, check_ends
+from gcsplan.planners.refusal.explain import NoPath, check_ends
 from gcsplan.world.airspace import Legs
 
 Window = Callable[[Problem], Solution]

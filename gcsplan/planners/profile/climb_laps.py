@@ -20,7 +20,7 @@ from gcsplan.planners.problem import ENDS_M, Problem, Refusal
 from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
 from gcsplan.planners.profile.track import Closed, Flown, Lacking, Track, distances, fly, lacking
 from gcsplan.planners.simplify import fewer
-from gcsplan.world.path import Path
+from gcsplan.world.geometry.path import Path
 
 DIRECTIONS = 12
 SHORTEST_M = 20.0

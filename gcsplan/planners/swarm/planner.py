@@ -21,7 +21,7 @@ from gcsplan.optimisers.driver import Result, State, minimise
 from gcsplan.optimisers.registry import Entry as Row
 from gcsplan.optimisers.registry import get as get_optimiser
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
-from gcsplan.planners.refusal import check_ends
+from gcsplan.planners.refusal.explain import check_ends
 from gcsplan.planners.registry import Entry
 from gcsplan.planners.simplify import thinned
 from gcsplan.planners.swarm import cmaes, warm_start
@@ -31,7 +31,7 @@ from gcsplan.planners.swarm.repair import repair, violations
 from gcsplan.planners.swarm.scene import Scene
 from gcsplan.planners.swarm.settings import Settings
 from gcsplan.world.airspace import Violation
-from gcsplan.world.path import Path
+from gcsplan.world.geometry.path import Path
 
 CORRIDORS = (2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 0.0)
 """Corridors of the way points about the curve, as parts of the straight path, tried in turn; 0 keeps every sample."""

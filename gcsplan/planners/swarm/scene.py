@@ -16,9 +16,9 @@ from gcsplan.planners.problem import Problem
 from gcsplan.planners.registry import VOLUME_KEYS
 from gcsplan.planners.swarm import scene_kernels as k
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import Surface
-from gcsplan.world.zones import Level, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.geometry.zones import Level, Zone
 
 GROWN = 0.1
 """Margin of the flight volume around the terminals, on every side, as a part of their box's longer side. The box is

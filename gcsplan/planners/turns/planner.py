@@ -27,7 +27,7 @@ from gcsplan.planners.simplify import thinned
 from gcsplan.planners.turns.arc_path import ArcPath, through, unlooped
 from gcsplan.planners.turns.loop_discs import with_loops
 from gcsplan.planners.turns.repair import Patience, Tried, cost_of, mended, polished
-from gcsplan.world.path import Path
+from gcsplan.world.geometry.path import Path
 
 Replan = Callable[[float], tuple[Floats, Bools] | None]
 """Plans a path with additional track error, its argument in metres (`with_more_clearance`); returns the points and

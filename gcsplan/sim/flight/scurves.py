@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices
-from gcsplan.check.stretch import Stretch
+from gcsplan.check.motion.stretch import Stretch
 from gcsplan.sim.flight.kinematics import Kinematics
 
 __all__ = ["leg_limits", "step_legs"]

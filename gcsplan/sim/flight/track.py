@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.check.arcs import bend
-from gcsplan.check.flight import follow
-from gcsplan.check.stretch import Flight, Stretch
+from gcsplan.check.fixed_wing.arcs import bend
+from gcsplan.check.flight.follow import follow
+from gcsplan.check.motion.stretch import Flight, Stretch
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.notes.note import Note, Said

@@ -22,14 +22,14 @@ import numpy as np
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.check.commands import flown_in_order
-from gcsplan.check.geodesy import flat_m, offset_m
-from gcsplan.check.stretch import Place
+from gcsplan.check.motion.commands import flown_in_order
+from gcsplan.check.motion.geodesy import flat_m, offset_m
+from gcsplan.check.motion.stretch import Place
 from gcsplan.errors import LinkError, UsageError, VehicleRefused
 from gcsplan.mavlink.link.frames import signing_key
 from gcsplan.mavlink.link.link import Channel, Link, LinkSteps, PumpJob, pump
-from gcsplan.mavlink.link.parameters import settings_words
-from gcsplan.mavlink.link.steps import discover_steps, parameter_steps
+from gcsplan.mavlink.link.session.parameters import settings_words
+from gcsplan.mavlink.link.session.steps import discover_steps, parameter_steps
 from gcsplan.mavlink.link.url import parse_url
 from gcsplan.mavlink.link.watch import VehicleState, Watch
 from gcsplan.mavlink.mission import commands as cmd

@@ -16,7 +16,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from gcsplan.check.geodesy import offset_m
+from gcsplan.check.motion.geodesy import offset_m
 from gcsplan.errors import LinkError, UsageError
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.parameter_list import parameter_list

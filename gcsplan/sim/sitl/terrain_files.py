@@ -19,7 +19,7 @@ from gcsplan.dem.dat_file import file_name, packed
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission.mission import TERRAIN
 from gcsplan.sim.part import RehearsalPart
-from gcsplan.world.terrain_grid import SPACING_M, Block, PostHeights, TerrainGrid, known_parts
+from gcsplan.world.terrain.grid import SPACING_M, Block, PostHeights, TerrainGrid, known_parts
 from gcsplan.world.world import World
 
 FINE_SPACING_M = 30

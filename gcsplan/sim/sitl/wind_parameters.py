@@ -11,7 +11,7 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.errors import LinkError
 from gcsplan.mavlink.link.link import Channel, LinkSteps
-from gcsplan.mavlink.link.parameters import decode_value, parameter_name
+from gcsplan.mavlink.link.session.parameters import decode_value, parameter_name
 from gcsplan.mavlink.link.watch import VehicleState
 from gcsplan.mavlink.mission.autopilots import ARDUPILOTMEGA
 from gcsplan.sim.flight.wind import Weather

@@ -17,7 +17,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mav
 from gcsplan.arrays import Floats
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Home, MissionItem
-from gcsplan.world.terrain_grid import (
+from gcsplan.world.terrain.grid import (
     ALL_PARTS,
     E7_OF_METRE,
     PART_POSTS,

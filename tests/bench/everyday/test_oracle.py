@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gcsplan.bench.everyday.oracle import EnclosedPlace, VisibilityGraph
-from gcsplan.world.zones import Circle, Polygon, Zone
+from gcsplan.world.geometry.zones import Circle, Polygon, Zone
 
 
 def disc(east: float, north: float, radius: float) -> Zone:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gcsplan.app import executor
+from gcsplan.app.parallel import executor
 from gcsplan.bench.papers import runs as papers_runs
 from gcsplan.bench.papers.judge import TOO_FEW_RUNS
 from gcsplan.bench.papers.run import PAPER_RUNS_FILE, run

@@ -8,8 +8,8 @@ import numpy as np
 import yaml
 
 from gcsplan.bench.scale.missions import EQUATOR_DEGREE_M, make_missions, make_mosaic, mission
-from gcsplan.world.frame import Frame
-from gcsplan.world.terrain import TerrainSpec, load_terrain
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.terrain.terrain import TerrainSpec, load_terrain
 
 
 def test_missions_are_those_of_their_seed_and_5_to_40_km_long(tmp_path: Path) -> None:

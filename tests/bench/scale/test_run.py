@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from gcsplan.app import executor
+from gcsplan.app.parallel import executor
 from gcsplan.bench.scale import run as scale
 from gcsplan.errors import UsageError
 

@@ -10,7 +10,7 @@ import numpy as np
 from gcsplan.bench.terrain.outcome import OUR_METHOD, MethodOutcome
 from gcsplan.bench.terrain.problems import NamedProblem
 from gcsplan.planners.problem import Problem, Solution
-from gcsplan.world.path import Path as Flight
+from gcsplan.world.geometry.path import Path as Flight
 
 
 def straight(problem: Problem) -> np.ndarray:

@@ -9,7 +9,7 @@ import pytest
 from scipy.ndimage import label
 
 from gcsplan.bench.terrain.problems import NamedProblem
-from gcsplan.world.zones import Circle
+from gcsplan.world.geometry.zones import Circle
 
 pytestmark = pytest.mark.slow
 

@@ -19,7 +19,7 @@ from gcsplan.bench.terrain.room import (
     Corridors,
 )
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.zones import Circle
+from gcsplan.world.geometry.zones import Circle
 
 
 def has_corridor(pair: TerrainPair, ceiling_m: float) -> bool:

@@ -15,8 +15,10 @@ import shapely
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from gcsplan.app import fence_breaches, fencing, uploads
-from gcsplan.app.upload_orders import judge_on_board
+from gcsplan.app.check import fence_breaches
+from gcsplan.app.upload import fence as fencing
+from gcsplan.app.upload import run as uploads
+from gcsplan.app.upload.orders import judge_on_board
 from gcsplan.check.judge import judge
 from gcsplan.cli import main as cli
 from gcsplan.errors import CheckFailed, InputError
@@ -24,8 +26,8 @@ from gcsplan.mavlink.build.fence import areas_of, fence_of
 from gcsplan.mavlink.build.multirotor import build_mission
 from gcsplan.mavlink.build.order import Order
 from gcsplan.mavlink.files.formats import read_mission_file, write_plan
-from gcsplan.mavlink.link import session
 from gcsplan.mavlink.link.link import Link
+from gcsplan.mavlink.link.session import session
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.autopilots import stored
 from gcsplan.mavlink.mission.compare import compare, faults
@@ -37,10 +39,10 @@ from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
 from gcsplan.sim.vehicle.server import SimServer, loopback_fleet
 from gcsplan.vehicle import Autopilot, Vehicle
-from gcsplan.world.frame import Frame
-from gcsplan.world.path import Path as FlightPath
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.path import Path as FlightPath
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from gcsplan.world.world import World
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.support import lossy
 from tests.support.effort import draws
 from tests.support.impatient import be_impatient

@@ -19,7 +19,7 @@ from gcsplan.mavlink.build.fixed_wing import (
     turns_of,
 )
 from gcsplan.vehicle import Autopilot, Vehicle
-from gcsplan.world.limits import Limits
+from gcsplan.world.geometry.limits import Limits
 
 
 def corner(turn_deg: float, run_m: float = 1000.0) -> np.ndarray:

@@ -13,7 +13,7 @@ from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.autopilots import stored
 from gcsplan.vehicle import Autopilot
-from gcsplan.world.path import Path
+from gcsplan.world.geometry.path import Path
 from tests.support.effort import draws
 from tests.support.worlds import vehicle, world
 

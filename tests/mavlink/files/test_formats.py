@@ -25,7 +25,7 @@ from gcsplan.mavlink.mission.commands import DO_CHANGE_SPEED, DO_JUMP, LAND, RTL
 from gcsplan.mavlink.mission.mission import GLOBAL, NO_POSITION, RELATIVE, TERRAIN, Home, Mission, MissionItem, float32
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
-from gcsplan.world.limits import Limits
+from gcsplan.world.geometry.limits import Limits
 from tests.support.effort import draws
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4

@@ -14,8 +14,8 @@ from gcsplan.arrays import Floats
 from gcsplan.errors import InputError, VehicleRefused
 from gcsplan.mavlink.link.frames import FrameWriter, Signing
 from gcsplan.mavlink.link.link import Link, LinkSteps, PumpJob, pump
-from gcsplan.mavlink.link.results import UploadResult
-from gcsplan.mavlink.link.session import SessionOptions, upload_mission
+from gcsplan.mavlink.link.session.results import UploadResult
+from gcsplan.mavlink.link.session.session import SessionOptions, upload_mission
 from gcsplan.mavlink.link.terrain import (
     OFF,
     TerrainComparison,
@@ -31,7 +31,7 @@ from gcsplan.notes.note import Note
 from gcsplan.sim.vehicle.hub import Hub
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.vehicle import Autopilot
-from gcsplan.world.terrain_grid import GroundHeights
+from gcsplan.world.terrain.grid import GroundHeights
 from tests.campaigns.air import Air, Radio
 
 AT = (36.59, -84.25)

@@ -11,13 +11,13 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from gcsplan.app import uploads
-from gcsplan.app.upload_job import JobResult, UploadJob
-from gcsplan.cli import console
+from gcsplan.app.upload import run as uploads
+from gcsplan.app.upload.job import JobResult, UploadJob
+from gcsplan.cli.output import console
 from gcsplan.errors import GcsplanError, LinkError, ReadBackDiffers, VehicleRefused
-from gcsplan.mavlink.link import session
 from gcsplan.mavlink.link.link import Link
-from gcsplan.mavlink.link.session import SessionOptions, UploadOrder, upload_fleet
+from gcsplan.mavlink.link.session import session
+from gcsplan.mavlink.link.session.session import SessionOptions, UploadOrder, upload_fleet
 from gcsplan.mavlink.mission.autopilots import altitude_of_cm
 from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem

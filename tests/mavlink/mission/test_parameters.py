@@ -16,7 +16,7 @@ from gcsplan.mavlink.mission.parameter_list import Setting, off, parameter_list
 from gcsplan.mavlink.mission.parameter_names import PARAMETERS, Name, OnBoard, Parameter, unanswered
 from gcsplan.mavlink.mission.parameter_safety import FlightExtent, needed_groups, safety_list
 from gcsplan.vehicle import Autopilot, Vehicle
-from gcsplan.world.limits import Limits
+from gcsplan.world.geometry.limits import Limits
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
 RADIUS = Parameter("radius", (Name("WPNAV_RADIUS", 100.0, "to 4.6"), Name("WP_RADIUS_M", 1.0, "4.7")), 2.0, "m")

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.errors import InputError
-from gcsplan.mission_file.airspace.policy import Policy
-from gcsplan.mission_file.zone_draft import ZoneDraft
-from gcsplan.mission_file.zone_file import ZoneFile
+from gcsplan.mission_file.published.policy import Policy
 from gcsplan.mission_file.zone_reader import read_zones
+from gcsplan.mission_file.zones.draft import ZoneDraft
+from gcsplan.mission_file.zones.file import ZoneFile
 from tests.support.attacks import require_told
 
 RING = [[8.0, 47.0], [8.1, 47.0], [8.1, 47.1], [8.0, 47.1], [8.0, 47.0]]

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import strategies as st
 
-from gcsplan.mission_file.airspace.times import Hours
+from gcsplan.mission_file.published.times import Hours
 from gcsplan.notes.note import Note
 from tests.mission_file.airspace.made import (
     HOLE,

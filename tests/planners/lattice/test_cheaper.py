@@ -10,10 +10,10 @@ from gcsplan.planners.lattice.corridor_raster import make_guide
 from gcsplan.planners.lattice.planner import cheaper, sides_to_pass
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
-from gcsplan.world.path import Path
-from gcsplan.world.zones import Circle, Level, Zone
-from tests.planners.optimal.sources.test_contour import under_a_lid
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.zones import Circle, Level, Zone
+from tests.planners.optimal.searches.test_contour import under_a_lid
 from tests.support.planner_worlds import faults, ground
 from tests.support.searches import looked
 

@@ -7,8 +7,8 @@ import pytest
 import shapely
 
 from gcsplan.planners.lattice.lattice import near_zone
-from gcsplan.world.degree_shapes import counter_clockwise
-from gcsplan.world.zones import Zone
+from gcsplan.world.geodesy.degree_shapes import counter_clockwise
+from gcsplan.world.geometry.zones import Zone
 
 
 @pytest.mark.draws

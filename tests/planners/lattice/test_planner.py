@@ -17,9 +17,9 @@ from gcsplan.planners.problem import Problem, Progress, Via, straight_bound
 from gcsplan.planners.profile.climb_laps import climb_tracks, extend, laps, pins_of
 from gcsplan.planners.profile.exact import Judge, Unsettled, settle
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.limits import Limits
-from gcsplan.world.path import Path
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from tests.support.planner_worlds import FIELD, Floats, faults, ground, jacksboro
 
 BAND = replace(FIELD, max_agl_m=120.0)

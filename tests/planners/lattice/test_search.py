@@ -13,7 +13,7 @@ from gcsplan.planners.lattice.search import Label, search
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.taut_string import Profile, taut_string
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
+from gcsplan.world.geometry.limits import Limits
 from tests.support.planner_worlds import Floats, ground
 
 STEP_M = 10.0

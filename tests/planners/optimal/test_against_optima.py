@@ -20,9 +20,9 @@ from gcsplan.errors import NoMission
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import GridMap, Surface
-from gcsplan.world.zones import Polygon, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.geometry.zones import Polygon, Zone
 from tests.oracles.optima import profile_by_programme, shortest_past_discs
 from tests.oracles.optima_campaign import TOUCH_M, exact_past_discs, judge, reverse, summary
 from tests.oracles.optima_polish import PATIENT, Effort, cost_of, is_feasible

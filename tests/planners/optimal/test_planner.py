@@ -8,19 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcsplan.app.pipeline import load_mission, world_of
-from gcsplan.app.pipeline import plan as plan_mission
-from gcsplan.app.problems import make_problem
+from gcsplan.app.fleet.pipeline import load_mission, world_of
+from gcsplan.app.fleet.pipeline import plan as plan_mission
+from gcsplan.app.plan.problem import make_problem
 from gcsplan.errors import InputError
-from gcsplan.planners.optimal.incumbent import Incumbent
+from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Progress, Solution, Via
 from gcsplan.planners.registry import get, names
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.limits import Limits
-from gcsplan.world.path import Path
-from gcsplan.world.surface import Surface
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from tests.support.paths import MISSIONS
 from tests.support.planner_worlds import FIELD, Floats, faults, ground, random_mission
 

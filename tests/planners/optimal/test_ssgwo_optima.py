@@ -17,8 +17,8 @@ import pytest
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Solution
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.limits import Limits
-from gcsplan.world.zones import Circle, Level, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.zones import Circle, Level, Zone
 from tests.oracles.optima import shortest_past_discs
 from tests.oracles.optima_polish import PATIENT, cost_of, is_feasible
 from tests.oracles.optima_search import best_path

@@ -11,8 +11,8 @@ import pytest
 import shapely
 import yaml
 
-from gcsplan.app.pipeline import plan, world_of
-from gcsplan.app.problems import make_problem
+from gcsplan.app.fleet.pipeline import plan, world_of
+from gcsplan.app.plan.problem import make_problem
 from gcsplan.bench.everyday.oracle import EnclosedPlace, VisibilityGraph
 from gcsplan.errors import NoMission
 from gcsplan.mission_file import MissionFile, load_mission
@@ -20,12 +20,12 @@ from gcsplan.planners.border import border, enclosed, exit_cost, goes_on, margin
 from gcsplan.planners.optimal import planner
 from gcsplan.planners.optimal.window import plan_over
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
-from gcsplan.planners.refusal import NoPath
+from gcsplan.planners.refusal.explain import NoPath
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
-from gcsplan.world.path import Path as Track
-from gcsplan.world.surface import NO_SIDES, GridMap, Surface
-from gcsplan.world.zones import Circle, Polygon, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import Path as Track
+from gcsplan.world.geometry.surface import NO_SIDES, GridMap, Surface
+from gcsplan.world.geometry.zones import Circle, Polygon, Zone
 from tests.campaigns import worlds
 
 ALL_SIDES = (True, True, True, True)

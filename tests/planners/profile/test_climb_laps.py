@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats
-from gcsplan.planners.optimal.incumbent import Incumbent
+from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Via, passes_vias
 from gcsplan.planners.profile.climb_laps import MOST_LAPS, laps, wound
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import GridMap, Surface
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import GridMap, Surface
 
 
 def problem_of(start: tuple[float, float, float], goal: tuple[float, float, float], *via: Via) -> Problem:

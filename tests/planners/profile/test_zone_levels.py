@@ -14,11 +14,11 @@ from gcsplan.planners.profile.taut_string import Profile
 from gcsplan.planners.profile.track import Flown, fly, make_track
 from gcsplan.planners.profile.zone_levels import ZoneLevels, widest_free
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from gcsplan.world.own_ground import own_ground
-from gcsplan.world.path import Path
-from gcsplan.world.surface import GridMap, Surface
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
 from tests.support.planner_worlds import faults
 
 STEP_M, SIZE_M, SLOPE = 30.0, 1200.0, 0.3

@@ -15,8 +15,8 @@ from gcsplan.planners.swarm.repair import violations
 from gcsplan.planners.swarm.scene import Scene
 from gcsplan.planners.swarm.settings import Settings
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
-from gcsplan.world.zones import Circle, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.zones import Circle, Zone
 from tests.support.planner_worlds import ground
 
 

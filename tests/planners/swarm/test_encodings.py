@@ -17,7 +17,7 @@ from gcsplan.planners.swarm.bspline import curve
 from gcsplan.planners.swarm.encodings import ENCODINGS, LATERAL, OFFSET, Code, get_encoding, shares
 from gcsplan.planners.swarm.scene import GROWN, Scene
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
+from gcsplan.world.geometry.limits import Limits
 from tests.support.effort import draws
 from tests.support.planner_worlds import FIELD, ground, jacksboro, random_mission
 

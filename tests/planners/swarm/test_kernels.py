@@ -32,8 +32,8 @@ from gcsplan.planners.swarm.encodings import Code
 from gcsplan.planners.swarm.objectives import OBJECTIVES, Cost
 from gcsplan.planners.swarm.scene import Scene
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from tests.support.effort import draws
 from tests.support.planner_worlds import ground
 

@@ -20,8 +20,8 @@ from gcsplan.planners.swarm.encodings import Code
 from gcsplan.planners.swarm.objectives import OBJECTIVES, Cost, Earlier, get_objective
 from gcsplan.planners.swarm.scene import FAR, KEEP_M, KEEP_SLOPE, Scene
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from tests.support.planner_worlds import ground
 
 LIMITS = Limits(
@@ -282,7 +282,7 @@ def test_a_population_costs_what_its_members_cost() -> None:
 def test_unknown_ground_is_charged_and_never_makes_a_cost_unknown() -> None:
     z = np.full((41, 41), 50.0)
     z[:, 20:23] = np.nan
-    from gcsplan.world.surface import GridMap, Surface
+    from gcsplan.world.geometry.surface import GridMap, Surface
 
     air = Airspace(Surface(z, z, GridMap.affine(0.0, 2000.0, 50.0, 50.0)))
     p = Problem(air, Limits(10.0), (300.0, 1000.0, 80.0), (1700.0, 1000.0, 80.0))

@@ -9,17 +9,17 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from gcsplan.app.pipeline import world_of
-from gcsplan.app.problems import make_problem
+from gcsplan.app.fleet.pipeline import world_of
+from gcsplan.app.plan.problem import make_problem
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mission_file import MissionFile, load_mission
-from gcsplan.mission_file.schema import EncodingName, SwarmCost
+from gcsplan.mission_file.values.schema import EncodingName, SwarmCost
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.registry import PAPER, get
 from gcsplan.planners.swarm.encodings import ENCODINGS
 from gcsplan.planners.swarm.objectives import OBJECTIVES
 from gcsplan.planners.swarm.repair import violations
-from gcsplan.world.zones import Circle
+from gcsplan.world.geometry.zones import Circle
 from tests.support.paths import MISSIONS
 
 FOLDER = MISSIONS / "papers"

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcsplan.app.pipeline import plan
+from gcsplan.app.fleet.pipeline import plan
 from gcsplan.errors import InputError, NoMission
 from gcsplan.notes.note import Note
 from gcsplan.planners.problem import Problem, Via
@@ -20,8 +20,8 @@ from gcsplan.planners.swarm.repair import repair, violations
 from gcsplan.planners.swarm.scene import Scene
 from gcsplan.planners.swarm.settings import Settings
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
-from gcsplan.world.zones import Circle, Level, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.zones import Circle, Level, Zone
 from tests.support.paths import MISSIONS
 from tests.support.planner_worlds import FIELD, faults, ground, jacksboro, random_mission
 
@@ -257,7 +257,7 @@ def test_every_swarms_row_names_its_source_and_a_known_optimiser() -> None:
 def test_the_scene_of_a_mission_over_unknown_ground_is_made() -> None:
     z = np.full((21, 21), 50.0)
     z[:3] = np.nan
-    from gcsplan.world.surface import GridMap, Surface
+    from gcsplan.world.geometry.surface import GridMap, Surface
 
     air = Airspace(Surface(z, z, GridMap.affine(0.0, 2000.0, 100.0, 100.0)))
     problem = Problem(air, Limits(10.0), (300.0, 300.0, 80.0), (1700.0, 1000.0, 80.0), options={"iterations": 10})

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gcsplan.app.pipeline import plan
+from gcsplan.app.fleet.pipeline import plan
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.planners.registry import get
@@ -18,7 +18,7 @@ from gcsplan.planners.swarm.planner import cost_of, search
 from gcsplan.planners.swarm.repair import violations
 from gcsplan.planners.swarm.settings import Settings
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
+from gcsplan.world.geometry.limits import Limits
 from tests.support.planner_worlds import ground
 
 FLAT = Limits(min_agl_m=30.0, max_amsl_m=400.0)

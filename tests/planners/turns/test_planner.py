@@ -19,9 +19,9 @@ from gcsplan.planners.turns.kernels import CHORD_M
 from gcsplan.planners.turns.planner import LEVELS, Rounded, arc_path_of, rounded, with_more_clearance
 from gcsplan.planners.turns.repair import tried
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.limits import Limits
-from gcsplan.world.path import Path
-from gcsplan.world.zones import Circle, Polygon, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.zones import Circle, Polygon, Zone
 from tests.support.planner_worlds import faults, ground
 
 LIMITS = Limits(min_agl_m=60.0, max_climb_deg=12.0, max_descent_deg=12.0)

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.sim.flight.trace import Trace, examine, meetings
-from gcsplan.world.zones import Circle, Zone
+from gcsplan.world.geometry.zones import Circle, Zone
 from tests.support import worlds
 from tests.support.effort import draws
 from tests.support.rehearsal_parts import GROUND_M

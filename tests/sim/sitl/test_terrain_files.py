@@ -13,8 +13,8 @@ from gcsplan.errors import InputError
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.sim.sitl import terrain_files
 from gcsplan.sim.sitl.terrain_files import write_ground
-from gcsplan.world.cell import Cell
-from gcsplan.world.terrain_grid import Block
+from gcsplan.world.terrain.cell import Cell
+from gcsplan.world.terrain.grid import Block
 from tests.oracles import terrain_grid as oracle
 from tests.support.sitl_parts import a_part, ramp
 from tests.support.worlds import world

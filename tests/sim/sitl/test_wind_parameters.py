@@ -9,7 +9,7 @@ import pytest
 
 from gcsplan.errors import LinkError
 from gcsplan.mavlink.link.link import Link, run
-from gcsplan.mavlink.link.session import discover
+from gcsplan.mavlink.link.session.session import discover
 from gcsplan.sim.flight.wind import Weather
 from gcsplan.sim.sitl.wind_parameters import WIND_PARAMETERS, change_steps, wind_parameters
 from gcsplan.sim.vehicle import telemetry

@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.planners.optimal.leg import Leg
 from gcsplan.planners.optimal.navmesh.interval_kernels import range_along
+from gcsplan.planners.optimal.plane.leg import Leg
 from gcsplan.planners.profile.taut_string import Blocked, Profile, taut_string
 
 STEPS = 400

@@ -16,12 +16,12 @@ import numpy as np
 import shapely
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.planners.optimal.corridor import joined
-from gcsplan.planners.optimal.incumbent import Incumbent
 from gcsplan.planners.optimal.navmesh.crossing import Climb, Crossing, crossing
 from gcsplan.planners.optimal.navmesh.outlines import Outline
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
-from gcsplan.planners.optimal.sources.outline_tracks import OutlineTracks
+from gcsplan.planners.optimal.plane.corridor import joined
+from gcsplan.planners.optimal.plane.incumbent import Incumbent
+from gcsplan.planners.optimal.searches.outline_tracks import OutlineTracks
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import distances
 

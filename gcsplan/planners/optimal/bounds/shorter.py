@@ -11,9 +11,9 @@ import math
 from collections.abc import Iterator
 
 from gcsplan.planners.optimal.bounds.climb_bound import climb_bound, rise_bound
-from gcsplan.planners.optimal.cap_search import Layer, search_caps
-from gcsplan.planners.optimal.leg import Leg
-from gcsplan.planners.optimal.plane_search import PlaneSearch
+from gcsplan.planners.optimal.plane.cap_search import Layer, search_caps
+from gcsplan.planners.optimal.plane.leg import Leg
+from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
 
 CLOSER, LEFT, FLAT = 8, 0.05, 0.2
 """Most cuts of the interval between bound and best path; the part of the gap below which neither an interval is cut nor

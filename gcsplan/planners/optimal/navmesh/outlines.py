@@ -21,8 +21,8 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.navmesh.mesh_kernels import sort_portals
 from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundTrack, Place, Portals
-from gcsplan.world.outlines import few_corners
-from gcsplan.world.zones import Circle, Zone
+from gcsplan.world.geometry.outlines import few_corners
+from gcsplan.world.geometry.zones import Circle, Zone
 
 COARSE = 4
 """Chords per quarter circle of every arc, at first."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.navmesh.clearance_kernels import lay, pool
-from gcsplan.world.surface import GridMap
+from gcsplan.world.geometry.surface import GridMap
 
 Extent = tuple[int, int, int, int]
 """First and last columns and rows (col0, row0, col1, row1) of a terrain model's nodes."""

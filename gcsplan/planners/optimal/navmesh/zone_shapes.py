@@ -34,8 +34,8 @@ from gcsplan.planners.optimal.navmesh.zone_kernels import (
     UNDER_2,
 )
 from gcsplan.planners.problem import Problem
-from gcsplan.world.limits import Limits
-from gcsplan.world.zones import Circle, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.zones import Circle, Zone
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,10 +11,10 @@ import pytest
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
-from gcsplan.world.peaks import flat_grid
-from gcsplan.world.surface import Surface
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.terrain.peaks import flat_grid
 
 GRID, FRAME = flat_grid(0.0, (-3000.0, -3000.0, 3000.0, 3000.0))
 FLAT = Surface(GRID, GRID, FRAME)

@@ -10,12 +10,12 @@ import pytest
 from gcsplan.bench.terrain.problems import problems
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.bounds.shorter import bound_cheaper, longest_track
-from gcsplan.planners.optimal.plane_search import PlaneSearch
+from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
 from gcsplan.planners.optimal.planner import search
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import GridMap, Surface
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import GridMap, Surface
 from tests.support.planner_worlds import Floats, ground
 
 

@@ -20,9 +20,9 @@ from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.zone_shapes import convex_parts
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import TERMS, GridMap, Surface
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import TERMS, GridMap, Surface
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from tests.support.effort import draws, worlds
 
 SIZE_M, STEP_M = 600.0, 30.0

@@ -15,8 +15,8 @@ from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.necks import Necks
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import GridMap, Surface
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import GridMap, Surface
 from tests.planners.optimal.navmesh.test_mesh import EVERYWHERE, LIMITS, WORLDS, inner, world_of
 from tests.support import effort
 from tests.support.effort import worlds

@@ -18,10 +18,10 @@ from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Refusal, Via
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.limits import Limits
-from gcsplan.world.peaks import flat_grid
-from gcsplan.world.surface import Surface
-from gcsplan.world.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.terrain.peaks import flat_grid
 
 FLAT = Surface(*flat_grid(0.0, (-6000.0, -6000.0, 6000.0, 6000.0))[:1] * 2, flat_grid(0.0, (-6e3, -6e3, 6e3, 6e3))[1])
 

@@ -16,9 +16,9 @@ from gcsplan.planners.optimal.navmesh.grid import make_plane
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace, Legs
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import GridMap, Surface
-from gcsplan.world.zones import Circle, Level, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.geometry.zones import Circle, Level, Zone
 from tests.planners.optimal.navmesh.test_mesh import EVERYWHERE, SIZE_M, STEP_M, free, polygon, terrain, turned_grid
 from tests.support.effort import worlds
 

@@ -11,8 +11,8 @@ from gcsplan.planners.optimal.navmesh.walls_beside import walls_beside
 from gcsplan.planners.optimal.navmesh.zone_shapes import CLOSE
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
-from gcsplan.world.surface import GridMap, Surface
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import GridMap, Surface
 
 
 def rough(seed: int) -> Problem:

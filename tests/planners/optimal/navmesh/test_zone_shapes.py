@@ -11,8 +11,8 @@ from gcsplan.planners.optimal.navmesh.zone_kernels import FIRST, LAST
 from gcsplan.planners.optimal.navmesh.zone_shapes import CLOSE, LOOSE, Fit, make_shapes
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
-from gcsplan.world.zones import Level, Polygon, Zone
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.zones import Level, Polygon, Zone
 from tests.support.planner_worlds import ground
 
 RING = [(300, 300), (900, 250), (950, 800), (500, 900), (520, 880), (930, 790), (885, 265), (310, 318)]

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from gcsplan.planners.optimal import planner as optimal
-from gcsplan.planners.optimal.plane_search import PlaneSearch
-from gcsplan.planners.optimal.sources import bound_corridor
+from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
+from gcsplan.planners.optimal.searches import bound_corridor
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.limits import Limits
+from gcsplan.world.geometry.limits import Limits
 from tests.support.planner_worlds import Floats, faults, ground
 
 SIZE_M = 1800.0

@@ -1,0 +1,279 @@
+"""The functions for scripts beside `load_mission` and `plan`, without a command line or asyncio.
+
+    from gcsplan import check, load_mission, plan, rehearse, report, upload, write
+
+    mission = load_mission("fleet.yaml")
+    planned = plan(mission)
+    write(planned, "fleet", report=True)
+    print(check("somebody.plan", mission, vehicle="uav1").describe())
+    flown = rehearse(planned, wind_m_s=5.0, noise_m=1.0, runs=50)
+    print(flown.safe, flown.p95_s, flown.order_kept_runs)
+    for result in upload(planned, to="link", atomic=True):
+        print(result.vehicle, result.outcome, result.verified, result.message)
+
+Every function blocks until it is done. Errors are those of `gcsplan.errors`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, overload
+
+from gcsplan.app.check.files import check_files, check_mission
+from gcsplan.app.fleet.may_fly import flyable, require_passing
+from gcsplan.app.output import files as outputs
+from gcsplan.app.plan import way_home as returns
+from gcsplan.app.plan.arguments import require
+from gcsplan.app.plan.model import Plan
+from gcsplan.app.upload import run as uploads
+from gcsplan.app.upload.job import LINK, JobResult, ProgressCall, UploadOptions
+from gcsplan.check.judge import judge
+from gcsplan.check.verdict import Verdict
+from gcsplan.errors import CheckFailed, NoMission, UsageError
+from gcsplan.export.outdir import retire_outputs, settle_outputs, steady, write_outputs, write_whole
+from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mission_file import MissionFile, load_mission
+from gcsplan.units import units_of
+
+if TYPE_CHECKING:
+    from gcsplan.sim.outcome import Rehearsal
+
+__all__ = ["check", "rehearse", "report", "upload", "write"]
+
+UnitsName = Literal["metric", "imperial", "aviation"]
+
+Source = MissionFile | str | os.PathLike[str] | Mapping[str, Any]
+"""A mission of `load_mission`, or anything that `load_mission` accepts."""
+
+
+@overload
+def check(what: Plan) -> dict[str, Verdict]: ...
+@overload
+def check(what: Mission | str | os.PathLike[str], within: Plan | Source, *, vehicle: str | None = None) -> Verdict: ...
+def check(
+    what: Plan | Mission | str | os.PathLike[str],
+    within: Plan | Source | None = None,
+    *,
+    vehicle: str | None = None,
+) -> Verdict | dict[str, Verdict]:
+    """Judge mission items along every leg as the autopilot flies them; nothing is planned, written or sent.
+
+    ``what`` is one of three. A plan: every vehicle's items are judged again, and the result is a verdict by vehicle
+    name. A `Mission` (such as ``planned.vehicles[0].mission`` or a downloaded one), or the path of any `.waypoints` or
+    `.plan` file: the result is one verdict. The last two need ``within``: a plan or a mission (or anything that
+    `load_mission` accepts) with the terrain, zones and limits. ``vehicle`` names the vehicle of ``within`` that flies,
+    if neither the file's stem nor the mission's name does.
+
+    In a `Verdict`, ``safe`` is True, False or None (something could not be judged: ``not_judged``). ``findings`` state
+    which limit is broken on which item. ``legs`` hold heights in m, angles in degrees, times in s and energies in J.
+    Each vehicle is judged alone; a plan's separation in the air is ``planned.fleet.separation``.
+
+    Raises InputError for a file that cannot be read, UsageError if it is not clear what is to be judged.
+
+    Examples:
+        >>> from gcsplan import check, load_mission, plan
+        >>> mission = load_mission({
+        ...     "version": 1, "terrain": {"flat_m": 100},
+        ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
+        ...     "limits": {"min_agl_m": 30},
+        ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
+        ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
+        ... })
+        >>> planned = plan(mission)
+        >>> check(planned)["uav1"].safe
+        True
+        >>> check(planned.vehicles[0].mission, mission).safe
+        True
+    """
+    require("check", vehicle=vehicle, **({} if isinstance(what, Plan | Mission) else {"what": what}))
+    if isinstance(what, Plan):
+        if within is not None or vehicle is not None:
+            raise UsageError("a plan is judged whole, in its own world: give nothing else to check")
+        return {
+            v.name: judge(
+                v.mission, v.request.vehicle, what.world, rtl_rel_home_m=v.request.rtl_rel_home_m,
+                terrain_error_m=what.source.terrain_error_m,
+            )
+            for v in what.vehicles
+        }  # fmt: skip
+    if within is None:
+        raise UsageError("in which world? Give check a plan or a mission file as its second argument")
+    if isinstance(within, Plan):
+        source = within.source
+    else:
+        source = within if isinstance(within, MissionFile) else load_mission(within)
+    if isinstance(what, Mission):
+        return check_mission(source, what, vehicle).verdict
+    file = os.fspath(what)
+    with steady([file]):
+        [checked] = check_files(source, [file if vehicle is None else f"{vehicle}={file}"])
+    return checked.verdict
+
+
+def write(
+    planned: Plan,
+    folder: str | os.PathLike[str],
+    *,
+    report: bool = False,
+    way_home: bool = False,
+    allow_unjudged: bool = False,
+    units: UnitsName = "metric",
+) -> list[Path]:
+    """Write what ``gcsplan plan -o FOLDER`` writes, the same bytes, whole or not at all; returns the files' paths.
+
+    The files are `.waypoints`, `.plan` and `.param` for each vehicle, `mission.kml`, `mission.geojson`, `profile.csv`
+    and `summary.json`; with ``report`` also `report.html`. ``way_home``, and ``report`` too, adds to the summary how
+    each vehicle returns from every point, which takes about a second for 20 km. ``units`` are those of the report; all
+    other files are in SI.
+
+    Outputs of an earlier plan in ``folder`` are removed; any other file in the way is moved to its ``previous/``.
+    Raises CheckFailed if a verdict does not pass (with ``allow_unjudged``, what could not be judged passes), or if the
+    mission file says ``way_home: required`` and a return is unsafe or not judged. Where the plan may leave vehicles
+    out, such a vehicle is left out; NoMission is raised if none is left. With either error the earlier outputs are
+    moved to ``previous/``, so that no old mission is flown by mistake. Raises InputError if ``folder`` cannot be
+    written; nothing has changed then.
+
+    Examples:
+        >>> import tempfile
+        >>> from gcsplan import plan, write
+        >>> planned = plan({
+        ...     "version": 1, "terrain": {"flat_m": 100},
+        ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
+        ...     "limits": {"min_agl_m": 30},
+        ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
+        ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
+        ... })
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     [file.name for file in write(planned, folder)]
+        ['uav1.waypoints', 'uav1.plan', 'uav1.param', 'mission.kml', 'mission.geojson', 'profile.csv', 'summary.json']
+    """
+    require("write", planned=planned, folder=folder)
+    system = units_of(units)
+    settle_outputs(folder)
+    try:
+        planned, homes = flyable(planned, allow_unjudged=allow_unjudged, asked=report or way_home)
+    except (CheckFailed, NoMission):
+        retire_outputs(folder)
+        raise
+    files = outputs.outputs_of(planned, homes)
+    if report:
+        files["report.html"] = outputs.report_of(planned, (), homes, system)
+    write_outputs(folder, files)
+    return [Path(folder) / name for name in files]
+
+
+def report(
+    planned: Plan,
+    file: str | os.PathLike[str] | None = None,
+    *,
+    results: Sequence[JobResult] = (),
+    way_home: bool = True,
+    units: UnitsName = "metric",
+) -> str:
+    """The report of a plan as HTML text: map, profiles and tables on one page that needs no network.
+
+    With ``file`` the report is also written there, whole or not at all (UTF-8). ``results`` of `upload` are shown on
+    the page. ``way_home``: the return of each vehicle from every point is judged and shown, which takes about a second
+    for 20 km. ``units`` are those of its numbers. Raises InputError if ``file`` cannot be written, UsageError for units
+    that are not known.
+
+    Examples:
+        >>> from gcsplan import plan, report
+        >>> planned = plan({
+        ...     "version": 1, "terrain": {"flat_m": 100},
+        ...     "frame": {"origin": [36.6, -84.3], "amsl_m": 0},
+        ...     "limits": {"min_agl_m": 30},
+        ...     "vehicles": [{"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 15],
+        ...                   "start": {"east_m": 0, "north_m": 0}, "goal": {"east_m": 900, "north_m": 0}}],
+        ... })
+        >>> report(planned, way_home=False).startswith("<!DOCTYPE html>")
+        True
+    """
+    require("report", planned=planned, file=file)
+    system = units_of(units)
+    text = outputs.report_of(planned, results, returns.homes_of(planned) if way_home else {}, system)
+    if file is not None:
+        write_whole(Path(file), text)
+    return text
+
+
+def upload(
+    planned: Plan,
+    to: str | Sequence[str] | Mapping[str, str] = LINK,
+    *,
+    atomic: bool = False,
+    allow_unjudged: bool = False,
+    allow_armed: bool = False,
+    ignore_position: bool = False,
+    allow_parameters: bool = False,
+    timeout_s: float = 60.0,
+    progress: ProgressCall | None = None,
+) -> list[JobResult]:
+    """Upload every mission of a plan, all at once, read each back, compare, and check what was read back.
+
+    ``to`` is a URL for all vehicles (distinguished by system id), ``"link"`` (the mission file's links), ``"sim"`` (a
+    simulated vehicle for each), ``"NAME=URL"``, a list of these, or a mapping from name to URL. Vehicles without a
+    target are left out. With ``atomic``, if one upload fails, the missions that the others took are cleared again.
+    ``timeout_s`` is the longest time without progress. With ``allow_parameters`` a vehicle whose parameters are outside
+    of the mission's list is judged with them instead of refused. ``progress(name, progress)`` is called during the
+    uploads.
+
+    Returns one `JobResult` per vehicle, in the plan's order: ``verified`` is True only if the mission was read back and
+    equals what was sent; ``message`` says what went wrong. A failure of one vehicle does not affect the others and
+    raises nothing; `gcsplan.app.upload.run.exit_code` sums them up. Raises UsageError for bad targets, and, before
+    anything is sent, CheckFailed if a verdict does not pass, or a return with ``way_home: required``.
+    """
+    require("upload", planned=planned, to=to, timeout_s=timeout_s, progress=progress)
+    if isinstance(to, Mapping):
+        words = [f"{name}={url}" for name, url in to.items()]
+    else:
+        words = [to] if isinstance(to, str) else list(to)
+    targets = uploads.targets(words, [v.request.vehicle for v in planned.vehicles])
+    require_passing({v.name: v.verdict for v in planned.vehicles if v.name in targets}, allow_unjudged=allow_unjudged)
+    homes = returns.judged(planned, asked=False)
+    from gcsplan.sim.vehicle.server import loopback_fleet
+
+    options = UploadOptions(
+        allow_armed=allow_armed, ignore_position=ignore_position, allow_parameters=allow_parameters, atomic=atomic,
+        timeout_s=timeout_s,
+    )  # fmt: skip
+    return uploads.run_jobs(
+        uploads.jobs_of(planned, targets, homes, bool(homes)), options, progress, simulator=loopback_fleet
+    )
+
+
+def rehearse(
+    planned: Plan,
+    *,
+    wind_m_s: float = 0.0,
+    from_deg: float | None = None,
+    gusts_m_s: float = 0.0,
+    noise_m: float = 0.0,
+    runs: int = 1,
+    seed: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+    jobs: int | None = 1,
+    cluster: Any = None,
+) -> Rehearsal:
+    """Upload a plan to simulated vehicles, fly what they store in simulated time, and judge that; all on this machine.
+
+    Wind, gusts and position noise (`gcsplan.sim.flight.wind.Weather`) are drawn from ``seed``, anew for each of
+    ``runs``. ``progress(done, runs)`` is called from time to time. ``jobs`` processes or the workers of ``cluster``
+    share the runs, as in `plan`, with the same result. The result's ``safe`` is True if the arrivals were in order, and
+    the separation and every limit were kept on the flown tracks; ``error()`` states what was not kept. Raises what
+    an upload raises, CheckFailed as `upload` does for a return that is required, and InputError for invalid weather.
+    """
+    from gcsplan.app import rehearse as rehearsing
+    from gcsplan.sim.flight.wind import Weather
+
+    require(
+        "rehearse", planned=planned, wind_m_s=wind_m_s, from_deg=from_deg, gusts_m_s=gusts_m_s, noise_m=noise_m,
+        runs=runs, seed=seed, progress=progress, jobs=jobs,
+    )  # fmt: skip
+    returns.judged(planned, asked=False)
+    weather = Weather(wind_m_s, from_deg, gusts_m_s, noise_m)
+    return rehearsing.rehearse(
+        planned, weather=weather, runs=runs, seed=seed, progress=progress, jobs=jobs, cluster=cluster
+    )

@@ -1,0 +1,1 @@
+"""From files to verdicts: the world that they are judged in, one file or many."""

@@ -1,0 +1,261 @@
+"""Check an archive: any number of files in one world, whose results come one by one, in the order of the files.
+
+Files are read first, for the world that they share must hold all of them; then they are judged, in pieces, by whatever
+executor. What was read is kept in `KEPT_BYTES` at most; the rest is read again. A result holds texts and counts, and
+neither mission nor terrain, so memory does not grow with what was judged.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Literal, TypeVar
+
+import numpy as np
+
+from gcsplan.app.check.archive_words import Told, told_of, told_of_error
+from gcsplan.app.check.worlds import MissionSite, OptionsSite, Returns, Site, Wanted, beyond_m, match, places_of
+from gcsplan.app.parallel.executor import Executor, in_order, require_same_inputs
+from gcsplan.app.plan.way_home import is_required
+from gcsplan.arrays import Floats
+from gcsplan.errors import GcsplanError, InputError, UsageError
+from gcsplan.mavlink.files.file_items import MissionFileRead
+from gcsplan.mission_file import MissionFile
+from gcsplan.mission_file.load import load_content
+from gcsplan.mission_file.options_world import WorldExtent, WorldOptions
+from gcsplan.mission_file.request import Content
+from gcsplan.notes.note import Said
+from gcsplan.units import METRIC, Units
+from gcsplan.vehicle import Autopilot
+
+__all__ = ["Archive", "Form", "Shown"]
+
+MOST_FILES = 100_000
+KEPT_BYTES = 64_000_000
+"""Most bytes of what was read that are kept until it is judged: some 20,000 files of 50 items."""
+
+PIECE, PIECE_HOME = 32, 2
+"""Files of a piece of work, and with the way home, which takes a second or so for each."""
+
+FILE_S, FILE_HOME_S = 0.006, 1.0
+"""Seconds that a file of 50 items takes, about."""
+
+Result = TypeVar("Result")
+Form = Literal["lines", "row", "whole"]
+"""What is told of a file: its findings alone, a row of JSON too, or its whole JSON document."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """How results are told; with ``several`` files a bug of ours in one of them does not end the others."""
+
+    form: Form = "lines"
+    allow_unjudged: bool = False
+    units: Units = METRIC
+    several: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What all files share, in the form in which another process can make it: a mission's content, or options.
+
+    ``extent``: of the world that options describe, if all share one; ``inputs`` are what it must be made of. ``key`` is
+    a digest of what a site is made of.
+    """
+
+    content: Content | None
+    options: WorldOptions | None
+    autopilot: Autopilot | None
+    returns: Returns
+    shown: Shown
+    extent: WorldExtent | None = None
+    inputs: Mapping[str, object] | None = None
+    key: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """A file that was read: what is kept of it (nothing if it is too much), and where it flies."""
+
+    packed: bytes
+    places: Floats
+    reach_m: float
+
+
+_sites: dict[str, Site] = {}
+"""The site that this process has made for others; the last one only, for terrain is large."""
+
+
+class Archive:
+    """Files that are checked in one call, at one site."""
+
+    def __init__(self, name: str, asked: Asked, site: Site, arguments: Sequence[str]) -> None:
+        if len(arguments) > MOST_FILES:
+            raise UsageError(f"at most {MOST_FILES} files are checked in one call, given {len(arguments)}")
+        self.name, self.asked, self.site, self.arguments = name, _keep(asked, site), site, arguments
+        self._packed: dict[int, bytes] = {}
+        self._unread: dict[int, Told] = {}
+
+    @classmethod
+    def in_mission(cls, source: MissionFile, arguments: Sequence[str], returns: Returns, shown: Shown) -> Archive:
+        """Files FILE or NAME=FILE in the world of a mission. Raises UsageError if a file's vehicle is not clear."""
+        for argument in arguments:
+            match(source, argument)
+        returns = Returns(returns.judged, is_required(source, returns.required))
+        return cls(source.name, Asked(source.content, None, None, returns, shown), MissionSite(source), arguments)
+
+    @classmethod
+    def with_options(
+        cls, options: WorldOptions, autopilot: Autopilot | None, arguments: Sequence[str], returns: Returns,
+        shown: Shown,
+    ) -> Archive:  # fmt: skip
+        """Files in the world that options describe. Raises InputError if they are wrong."""
+        asked = Asked(None, options, autopilot, returns, shown)
+        return cls("check", asked, OptionsSite(options, autopilot), arguments)
+
+    @property
+    def work(self) -> tuple[int, float]:
+        """How many pieces of work there are, and the seconds that one takes, about."""
+        size = self._size
+        return -(-len(self.arguments) // size), size * (FILE_S if size == PIECE else FILE_HOME_S)
+
+    @property
+    def _size(self) -> int:
+        return PIECE_HOME if self.asked.returns.judged or self.asked.returns.required else PIECE
+
+    def read(self, workers: Executor, told: Callable[[int], None] = lambda _: None) -> None:
+        """Read all files and load the world that they need; ``told(count)`` says how many are read.
+
+        Raises InputError if there is no world for any of them.
+        """
+        pieces = [self.arguments[k : k + PIECE] for k in range(0, len(self.arguments), PIECE)]
+        places: list[Floats] = []
+        reach_m, kept = 0.0, 0
+        for number, found in in_order(workers.each(read_piece, self.asked, pieces)):
+            for k, one in enumerate(found, number * PIECE):
+                if isinstance(one, Told):
+                    self._unread[k] = one
+                    continue
+                places.append(one.places)
+                reach_m = max(reach_m, one.reach_m)
+                if (kept := kept + len(one.packed)) <= KEPT_BYTES:
+                    self._packed[k] = one.packed
+            told(min((number + 1) * PIECE, len(self.arguments)))
+        if places:
+            self.site.settle(np.concatenate(places), reach_m, several=len(places) > 1)
+        self._settled()
+
+    def _settled(self) -> None:
+        """Ask from now on for the world that was found."""
+        asked = self.asked
+        if isinstance(self.site, OptionsSite):
+            extent = self.site.extent
+            asked = replace(asked, extent=extent, inputs=self.site.said[0] if extent is not None else None)
+        elif isinstance(self.site, MissionSite):
+            asked = replace(asked, content=self.site.source.content, inputs=self.site.said[0])
+        self.asked = _keep(asked, self.site)
+
+    @property
+    def said(self) -> tuple[Mapping[str, object], tuple[Said, ...]]:
+        """What describes the sources of the world, and notes; of the first file's, if each has a world of its own."""
+        site = self.site
+        for k in range(len(self.arguments) if isinstance(site, OptionsSite) and not site.said[0] else 0):
+            if k in self._unread:
+                continue
+            try:
+                read = _unpacked(site, self.arguments[k], self._packed.get(k))
+                site.judged(self.arguments[k], read, Wanted(misses=False, times=False))
+            except InputError:
+                continue
+            break
+        return site.said
+
+    def judged(self, workers: Executor) -> Iterator[Told]:
+        """The result of every file, in their order. Raises GcsplanError where `Executor.each` does."""
+        numbers = [k for k in range(len(self.arguments)) if k not in self._unread]
+        size = self._size
+        pieces = [
+            [(self.arguments[k], self._packed.get(k)) for k in numbers[i : i + size]]
+            for i in range(0, len(numbers), size)
+        ]
+        found = (one for _, piece in in_order(workers.each(judge_piece, self.asked, pieces)) for one in piece)
+        for k in range(len(self.arguments)):
+            yield self._unread[k] if k in self._unread else next(found)
+
+
+def read_piece(asked: Asked, arguments: Sequence[str]) -> list[Read | Told]:
+    """Read some files, in whatever process; why one cannot be read is told."""
+    site = _site_of(asked)
+    return [_told_unless(asked, argument, partial(_read, site, argument)) for argument in arguments]
+
+
+def judge_piece(asked: Asked, items: Sequence[tuple[str, bytes | None]]) -> list[Told]:
+    """Judge some files that were read, in whatever process."""
+    site = _site_of(asked)
+    shown = asked.shown
+    whole = shown.form == "whole"
+    wanted = Wanted(asked.returns, misses=whole, times=whole)
+
+    def judged(argument: str, packed: bytes | None) -> Told:
+        checked = site.judged(argument, _unpacked(site, argument, packed), wanted)
+        return told_of(checked, shown.form, allow_unjudged=shown.allow_unjudged, units=shown.units)
+
+    return [_told_unless(asked, argument, partial(judged, argument, packed)) for argument, packed in items]
+
+
+def _told_unless(asked: Asked, argument: str, done: Callable[[], Result]) -> Result | Told:
+    """The result, or what is told of the error: in one file of several it must not cost the others."""
+    try:
+        return done()
+    except InputError as why:
+        return told_of_error(argument, why, asked.shown.form)
+    except (MemoryError, UsageError):
+        raise
+    except Exception as why:
+        if not asked.shown.several:
+            raise
+        words = f"internal error, a bug in gcsplan: {type(why).__name__}: {why}"
+        return told_of_error(argument, GcsplanError(words, where=argument), asked.shown.form)
+
+
+def _read(site: Site, argument: str) -> Read:
+    read = site.read(argument)
+    places = np.array(places_of(read.mission), float)
+    return Read(pickle.dumps(read, pickle.HIGHEST_PROTOCOL), places, beyond_m(read.mission))
+
+
+def _unpacked(site: Site, argument: str, packed: bytes | None) -> MissionFileRead:
+    """What was read of a file, from this process or one that it asks; read again if it was not kept."""
+    if packed is None:
+        return site.read(argument)
+    read: MissionFileRead = pickle.loads(packed)
+    return read
+
+
+def _keep(asked: Asked, site: Site) -> Asked:
+    """``asked`` with its key, by which `_site_of` then finds ``site`` in this process."""
+    made_of = asked.content, asked.options, asked.autopilot
+    asked = replace(asked, key=hashlib.sha256(pickle.dumps(made_of)).hexdigest())
+    _sites.clear()
+    _sites[asked.key] = site
+    return asked
+
+
+def _site_of(asked: Asked) -> Site:
+    """The site of what is asked, with its world if that is known; made once in each process."""
+    site = _sites.get(asked.key)
+    if site is None:
+        if asked.content is not None:
+            site = MissionSite(load_content(asked.content))
+        else:
+            assert asked.options is not None
+            site = OptionsSite(asked.options, asked.autopilot)
+        _keep(asked, site)
+    if isinstance(site, OptionsSite) and asked.extent is not None and asked.extent != site.extent:
+        site.settle_in(asked.extent)
+    if asked.inputs is not None:
+        require_same_inputs(site.said[0], asked.inputs, "--dem" if asked.content is None else asked.content.where)
+    return site

@@ -1,0 +1,287 @@
+"""Plan all vehicles together: departures and speeds, so that they arrive as requested and keep apart.
+
+The routes are those of the missions as the autopilots store them. A schedule sets departures, holds and speeds. Each
+mission is rebuilt with its own and judged again. Then the separation of every pair is judged, and conflicts are
+resolved or refused.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from gcsplan.app.fleet.climb_out import circling_m, climb_out_and_glide, climb_out_m_s
+from gcsplan.app.fleet.reroute import Detours
+from gcsplan.app.fleet.start_time import SLACK_S, GateTime, gated
+from gcsplan.app.plan.left_out import LeavingOut, least_to_leave
+from gcsplan.app.plan.model import Brief, FleetPlan, VehiclePlan
+from gcsplan.app.plan.vehicle import rebuilt
+from gcsplan.check.flight.times import over_ground, pace_over_ground
+from gcsplan.errors import NoMission
+from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, schedule
+from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.fleet.motion.timing import Course, Route, motion_error_m
+from gcsplan.mission_file import ArrivalRequest
+from gcsplan.notes.note import Note
+from gcsplan.world.world import World
+
+if TYPE_CHECKING:
+    from gcsplan.fleet.separation import Conflict, Place, Rules, Separation, Where
+
+LATER_S = 600.0
+"""Seconds by which all arrivals may be delayed to keep a fleet apart, if the mission file sets no arrival time."""
+SEPARATION_M = 30.0
+"""Separation that is judged if the file has no `arrival`, m."""
+MOST_CONFLICTS = 8
+"""Most conflicts that a refusal or a note names."""
+
+__all__ = ["crew_of", "fleet_of", "motion_of", "route_of", "rules_of", "too_near", "without"]
+
+
+def fleet_of(
+    vehicles: Sequence[VehiclePlan], brief: Brief, gate: GateTime | None = None, leaving: LeavingOut | None = None
+) -> tuple[tuple[VehiclePlan, ...], FleetPlan]:
+    """The vehicles' missions with their speeds and gates, and the fleet's time table.
+
+    With ``gate`` every vehicle waits in the air until its own second of the day. Raises NoMission: ``time`` if they
+    cannot arrive as requested, ``separation`` if they cannot keep apart; with ``leaving`` such vehicles may be left
+    out, and the results are those of the others.
+    """
+    world, arrival = brief.world, brief.source.arrival
+    leaving = leaving or LeavingOut(allowed=False)
+    crews = [crew_of(v, world) for v in vehicles]
+    notes: list[Note] = []
+    if arrival is None:
+        plan = schedule(crews, "none")
+    else:
+        detours = Detours(vehicles, brief, rules_of(arrival, vehicles), lambda v: route_of(v, world))
+        plan, notes = _scheduled(crews, arrival, detours, leaving)
+        if len(plan.slots) > 1:
+            plan = _kept_apart(plan, vehicles, crews, brief, arrival, detours, leaving)
+        placed = {slot.name: slot for slot in plan.slots}
+        vehicles = [detours.plan_of(v.name, placed[v.name].route) for v in vehicles if v.name in placed]
+        crews = [crew_of(v, world) for v in vehicles]
+    flown, slots = _timed(vehicles, crews, plan, brief, gate, leaving)
+    leaving.require_some(flown)
+    motions = [motion_of(v, slot, world) for v, slot in zip(flown, slots, strict=True)]
+    found = _separation(motions, flown, arrival)
+    if found is not None and not found.safe and arrival is not None:
+        # The missions as built are what is flown, so this check decides.
+        if not leaving.allowed:
+            raise NoMission(str(too_near(found.conflicts, world)), reason="separation")
+        leave = least_to_leave(found.conflicts)
+        for name, conflict in leave.items():
+            leaving.leave(name, NoMission(str(too_near([conflict], world)), reason="separation"))
+        rows = [k for k, v in enumerate(flown) if v.name not in leave]
+        flown, slots, motions = [flown[k] for k in rows], [slots[k] for k in rows], [motions[k] for k in rows]
+        found = _separation(motions, flown, arrival)
+    if found is not None:
+        notes += found.notes
+        if not found.safe:
+            notes.append(Note("nothing_keeps_apart", met=too_near(found.conflicts, world)))
+    if gate is not None:
+        notes.append(Note("gates_open", start_utc=f"{gate.start:%Y-%m-%d %H:%M:%S}", spare_s=SLACK_S))
+    names = {v.name for v in flown}
+    order = tuple(name for name in plan.order if name in names)
+    return tuple(flown), FleetPlan(
+        plan.mode, order, plan.interval_s, tuple(slots), tuple(motions), found, tuple(notes),
+        None if gate is None else gate.start,
+    )  # fmt: skip
+
+
+def without(fleet: FleetPlan, kept: Sequence[VehiclePlan], arrival: ArrivalRequest | None) -> FleetPlan:
+    """The time table of the vehicles that are ``kept``; the turns of the others stay empty."""
+    names = [v.name for v in kept]
+    motions = tuple(fleet.motion(name) for name in names)
+    return replace(
+        fleet, order=tuple(name for name in fleet.order if name in names),
+        slots=tuple(fleet.slot(name) for name in names), motions=motions,
+        separation=_separation(motions, kept, arrival),
+    )  # fmt: skip
+
+
+def _separation(
+    motions: Sequence[TimedPath], flown: Sequence[VehiclePlan], arrival: ArrivalRequest | None
+) -> Separation | None:
+    if len(flown) < 2:
+        return None
+    from gcsplan.fleet.separation import separation  # imported here because most plans have one vehicle
+
+    return separation(motions, rules_of(arrival, flown))
+
+
+def _timed(
+    vehicles: Sequence[VehiclePlan],
+    crews: Sequence[Crew],
+    plan: Schedule,
+    brief: Brief,
+    gate: GateTime | None,
+    leaving: LeavingOut,
+) -> tuple[list[VehiclePlan], list[Slot]]:
+    """Every vehicle's mission with its speed and gate, and its slot."""
+    placed = {slot.name: slot for slot in plan.slots}
+    slots = [placed[v.name] for v in vehicles]
+    opens: list[int | None] = [None] * len(slots)
+    if gate is not None:
+        with_gates = gated(crews, slots)
+        slots, opens = [slot for slot, _ in with_gates], [opens_s for _, opens_s in with_gates]
+    flown, kept = [], []
+    for v, slot, opens_s in zip(vehicles, slots, opens, strict=True):
+        at = None if gate is None or opens_s is None else gate.of_day(opens_s)
+        try:
+            flown.append(rebuilt(v, brief, speed_m_s=slot.speed_m_s, hold_s=slot.hold_s, gate_utc=at))
+        except NoMission as why:
+            leaving.leave(v.name, why)
+        else:
+            kept.append(slot)
+    return flown, kept
+
+
+def crew_of(v: VehiclePlan, world: World) -> Crew:
+    """A vehicle and its route, in the form that the fleet package takes."""
+    return Crew(v.request.vehicle, route_of(v, world))
+
+
+def route_of(v: VehiclePlan, world: World) -> Route:
+    """The judged flight of the mission in metres, from the top of take-off to the approach, and how it ends.
+
+    A mission of a paper that begins in the air and ends at its goal has no columns. Terrain-frame legs are cut every
+    `check.clock.TERRAIN_STEP_M`: between way points they rise and sink with the ground.
+    """
+    request, legs = v.request, v.verdict.legs
+    flown = [leg for leg in legs if leg.on_path]
+    ends = np.array([flown[0].start, *(leg.end for leg in flown)])
+    points = np.column_stack([world.frame.to_plane(ends[:, 0], ends[:, 1]), ends[:, 2]])
+    first = legs.index(flown[0])
+    holds = np.array([v.verdict.gate_s, *(leg.hold_s for leg in flown)])
+    ideal = request.end == "none" and request.start_amsl_m is not None
+    ground = legs[0].start[2]
+    ends_with = [leg for leg in legs[first:] if not leg.on_path]
+    last = ends_with[-1] if ends_with else flown[-1]
+    numbers = np.array([leg.seq for leg in flown], dtype=np.intp)
+    if v.order.altitude_frame == "terrain":
+        points, holds, numbers = over_ground(points, holds, numbers, world.vehicle_terrain)
+    items = np.array([legs[0].seq, *numbers, last.seq], dtype=np.intp)
+    pace = pace_over_ground(points, legs[0].start[:2], world.frame) if request.vehicle.lays_curves else None
+    climb_out, glide = climb_out_and_glide(v, world)
+    return Route(
+        v.name, points,
+        start_ground_amsl_m=None if ideal else ground,
+        goal_ground_amsl_m=last.end[2] if request.end == "land" else None,
+        end=request.end,
+        rtl_amsl_m=None if request.rtl_rel_home_m is None else ground + request.rtl_rel_home_m,
+        holds_s=holds,
+        items=items,
+        climb_out=climb_out,
+        climb_out_m_s=climb_out_m_s(v),
+        glide=glide,
+        pace=pace,
+        follows=v.order.altitude_frame == "terrain",
+    )  # fmt: skip
+
+
+def rules_of(arrival: ArrivalRequest | None, vehicles: Sequence[VehiclePlan]) -> Rules:
+    """The requested separation, with the error of the modelled motions."""
+    from gcsplan.fleet.separation import Rules
+
+    error_m = max(motion_error_m(v.request.vehicle) + circling_m(v) for v in vehicles)
+    leaving = frozenset(v.name for v in vehicles if v.request.end == "none")
+    if arrival is None:
+        return Rules(SEPARATION_M, error_m=error_m, leaving=leaving)
+    return Rules(
+        arrival.separation_m,
+        error_m=error_m,
+        window_s=arrival.window_s,
+        pad_clear_s=math.inf if arrival.pad_clear_s is None else arrival.pad_clear_s,
+        leaving=leaving,
+    )
+
+
+def _scheduled(
+    crews: Sequence[Crew], arrival: ArrivalRequest, detours: Detours, leaving: LeavingOut
+) -> tuple[Schedule, list[Note]]:
+    """The requested schedule, and notes on it.
+
+    If the file does not set `clock`, the first vehicle's clock is tried, then that of the whole fleet.
+    """
+    names = {c.name for c in crews}
+
+    def by_clock(clock: Literal["first", "fleet"], *, leave_out: bool) -> Schedule:
+        plan = schedule(
+            crews, arrival.mode,
+            order="best" if arrival.best_order else [name for name in arrival.order if name in names],
+            interval_s=arrival.interval_s, hold=arrival.hold, clock=clock, arrive_s=arrival.arrive_s,
+            longer=detours.longer, leave_out=leave_out,
+        )  # fmt: skip
+        for why in plan.left_out:
+            leaving.leave(why.vehicle, why)
+        return plan
+
+    open_clock = arrival.clock is None and arrival.arrive_s is None and arrival.mode == "sequence"
+    try:
+        return by_clock(arrival.clock or "first", leave_out=leaving.allowed and not open_clock), []
+    except NoSchedule:
+        if not open_clock:
+            raise
+    plan = by_clock("fleet", leave_out=leaving.allowed)
+    first = plan.slots[0]
+    alone_s = min(Craft(c).fast_s for c in crews if c.name == first.name)
+    note = Note(
+        "clock_of_fleet", first=first.name, arrive_s=first.arrive_s, alone_s=alone_s, interval_s=plan.interval_s
+    )  # fmt: skip
+    return plan, [note]
+
+
+def _kept_apart(
+    plan: Schedule,
+    vehicles: Sequence[VehiclePlan],
+    crews: Sequence[Crew],
+    brief: Brief,
+    arrival: ArrivalRequest,
+    detours: Detours,
+    leaving: LeavingOut,
+) -> Schedule:
+    """The schedule with its conflicts resolved by departures, speeds, holds or other paths."""
+    from gcsplan.fleet.resolve import resolve  # imported here because most plans have one vehicle
+
+    settled = resolve(
+        plan, crews, rules_of(arrival, vehicles),
+        priority=[name for name in arrival.order if name in plan.order] if brief.by_priority else None,
+        hold=arrival.hold,
+        later_s=0.0 if arrival.arrive_s is not None else LATER_S,
+        replan=detours,
+        where=on_map(brief.world),
+        leave_out=leaving.allowed,
+    )  # fmt: skip
+    for why in settled.left_out:
+        leaving.leave(why.vehicle, why)
+    return settled.schedule
+
+
+def motion_of(v: VehiclePlan, slot: Slot, world: World) -> TimedPath:
+    """The motion of the mission as built. Its items contain the hold already, unless a time of day ends it."""
+    course = Course(route_of(v, world), v.request.vehicle)
+    return course.fly(slot.speed_m_s, slot.depart_s, slot.hold_s if v.order.gate_utc else 0.0)
+
+
+def on_map(world: World) -> Where:
+    """A function that names a place so that a person can find it on a map."""
+
+    def named(place: Place) -> Note:
+        lat_deg, lon_deg = (float(x) for x in world.frame.to_degrees(place[0], place[1]))
+        return Note("place_on_map", lat_deg=lat_deg, lon_deg=lon_deg, amsl_m=place[2])
+
+    return named
+
+
+def too_near(conflicts: Sequence[Conflict], world: World) -> Note:
+    """Which vehicles come too near to each other, when and where; the first `MOST_CONFLICTS` of all."""
+    where = on_map(world)
+    told = [c.note(where) for c in conflicts[:MOST_CONFLICTS]]
+    if len(conflicts) > MOST_CONFLICTS:
+        told.append(Note("more_conflicts", count=len(conflicts) - MOST_CONFLICTS))
+    return Note("too_near", conflicts=tuple(told))

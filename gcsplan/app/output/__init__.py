@@ -1,0 +1,1 @@
+"""What a plan or a check leaves: files, records, reports, lists."""

@@ -1,0 +1,1 @@
+"""Work shared by processes or a cluster."""

@@ -1,0 +1,51 @@
+"""Arguments of the functions for scripts: a wrong type is a mistake with its place and its cure, and no bug."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from datetime import datetime
+from numbers import Integral, Real
+from os import PathLike
+from typing import Any
+
+from gcsplan.app.plan.model import Plan
+from gcsplan.errors import UsageError
+
+__all__ = ["require"]
+
+WANTED: dict[str, tuple[Any, str]] = {
+    "planner": (str, "the name of a planner (`gcsplan planners` lists them; docs/extending.md says how to add one)"),
+    "objective": (str, "'length' or 'energy'"),
+    "seed": (Integral, "a whole number"),
+    "options": (Mapping, "a mapping of a planner's keys"),
+    "gate_utc": (datetime, "a datetime"),
+    "progress": (Callable, "a function"),
+    "jobs": (Integral, "a number of processes"),
+    "leave_out": (bool, "True or False"),
+    "planned": (Plan, "a plan, as gcsplan.plan returns it"),
+    "folder": ((str, PathLike), "the path of a folder"),
+    "file": ((str, PathLike), "the path of a file"),
+    "what": ((str, PathLike), "a plan, a mission, or the path of a .waypoints or .plan file"),
+    "vehicle": (str, "the name of a vehicle"),
+    "runs": (Integral, "a whole number"),
+    "wind_m_s": (Real, "a number"),
+    "gusts_m_s": (Real, "a number"),
+    "noise_m": (Real, "a number"),
+    "from_deg": (Real, "a number"),
+    "timeout_s": (Real, "a number of seconds"),
+    "to": ((str, list, tuple, Mapping), "a URL, a list of NAME=URL, or a mapping from name to URL"),
+}
+"""The type of each argument by its name, and what it is in words."""
+
+NEEDED = {"planned", "folder", "what", "runs", "wind_m_s", "gusts_m_s", "noise_m", "timeout_s", "to"}
+"""Arguments that cannot be None."""
+
+
+def require(function: str, **given: object) -> None:
+    """Raise UsageError unless each argument is of its type, or None where it may be; True and False are no numbers."""
+    for name, value in given.items():
+        kind, wanted = WANTED[name]
+        wrong = not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool)
+        if wrong and (value is not None or name in NEEDED):
+            shown = getattr(value, "__name__", None) or repr(value)
+            raise UsageError(f"{name} is {wanted}; given {type(value).__name__} {shown[:60]}", where=f"{function}()")

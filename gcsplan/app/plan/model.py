@@ -1,0 +1,164 @@
+"""The result of planning: a `Plan` of a mission file, with a `VehiclePlan` per vehicle and the `FleetPlan`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+from gcsplan.app.plan.left_out import LeftOut
+from gcsplan.check.verdict import Verdict
+from gcsplan.errors import GcsplanError
+from gcsplan.fleet.arrival import Slot
+from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.mavlink.build.order import Order
+from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mission_file import MissionFile, VehicleRequest
+from gcsplan.notes.note import Note, Said
+from gcsplan.planners.problem import Problem, Solution
+from gcsplan.planners.registry import get as get_planner
+from gcsplan.world.world import World
+
+if TYPE_CHECKING:
+    from gcsplan.fleet.separation import Encounter, Separation
+
+
+TOUCH_M, TOUCH = 1e-3, 1e-7
+"""Metres, and part of the bound, by which rounding may put the cost of a plan below its bound."""
+
+
+@dataclass(frozen=True, eq=False)
+class Brief:
+    """How all vehicles of a mission file are planned: by which planner, with ``options`` that only it knows.
+
+    ``by_priority``: each vehicle is planned with knowledge of those before it, and gives way to them.
+    """
+
+    source: MissionFile
+    world: World
+    planner: str
+    objective: str
+    seed: int
+    options: Mapping[str, object]
+    by_priority: bool = False
+
+    @property
+    def run(self) -> Callable[[Problem], Solution]:
+        """The planner."""
+        return get_planner(self.planner).plan
+
+    def packed(self) -> Brief:
+        """The brief without mission and world, for another process, which has read both: `over` puts them in again."""
+        return replace(self, source=None, world=None)  # type: ignore[arg-type]
+
+    def over(self, source: MissionFile, world: World) -> Brief:
+        """The same for a mission over other terrain."""
+        return replace(self, source=source, world=world)
+
+
+@dataclass(frozen=True, eq=False)
+class VehiclePlan:
+    """One vehicle's request and all results for it. ``brief`` holds the terrain that it was planned over."""
+
+    request: VehicleRequest
+    problem: Problem
+    solution: Solution
+    mission: Mission
+    verdict: Verdict
+    speed_m_s: float
+    notes: tuple[Note, ...] = ()
+    order: Order = field(default_factory=Order)
+    brief: Brief | None = None
+
+    def __post_init__(self) -> None:
+        """Raise GcsplanError where a mission that passes costs less than its lower bound: then one of both is wrong."""
+        bound = self.solution.lower_bound
+        if bound is None or self.verdict.findings:
+            return
+        per_m = max(1.0, self.problem.horizontal_j_per_m) if self.problem.objective == "energy" else 1.0
+        if self.cost < bound - TOUCH_M * per_m - TOUCH * bound:
+            raise GcsplanError(
+                f"{self.name}: a bug of gcsplan: the plan costs {self.cost:.3f}, less than its own lower bound of "
+                f"{bound:.3f}; nothing is written"
+            )
+
+    @property
+    def name(self) -> str:
+        """The vehicle's name."""
+        return str(self.request.vehicle.name)
+
+    @property
+    def cost(self) -> float:
+        """Cost of the path as it is flown: metres, or joules if the objective is energy."""
+        return self.verdict.path_energy_j if self.problem.objective == "energy" else self.verdict.length_m
+
+    @property
+    def gap_percent(self) -> float | None:
+        """How far the flown path may be above the best one, in percent of the lower bound; None without a bound."""
+        bound = self.solution.lower_bound
+        return None if not bound else max(0.0, 100.0 * (self.cost / bound - 1.0))  # below by rounding alone, see above
+
+    def packed(self) -> VehiclePlan:
+        """The plan without its terrain, for another process; `restored` is the way back."""
+        problem = replace(self.problem, airspace=None, widen=None, progress=None)  # type: ignore[arg-type]
+        return replace(self, problem=problem, solution=replace(self.solution, problem=None), brief=None)
+
+    def restored(self, over: Brief) -> VehiclePlan:
+        """A `packed` plan over the terrain of ``over``, under which it was made."""
+        return replace(self, problem=replace(self.problem, airspace=over.world.airspace), brief=over)
+
+    def all_notes(self, fleet: FleetPlan | None) -> tuple[Said, ...]:
+        """What is said of this vehicle: of its request, its search, its mission, and its part of the time table."""
+        slot = () if fleet is None else fleet.slot(self.name).notes
+        return tuple(dict.fromkeys((*self.notes, *self.solution.notes, *self.verdict.notes, *slot)))
+
+
+@dataclass(frozen=True, eq=False)
+class FleetPlan:
+    """The time table of all vehicles. ``slots`` and ``motions`` are in the order of the plan's vehicles.
+
+    ``order`` is the order of arrival. ``separation`` is None for a single vehicle. ``start_utc``: the common start, if
+    it is a time of day.
+    """
+
+    mode: str
+    order: tuple[str, ...]
+    interval_s: float
+    slots: tuple[Slot, ...]
+    motions: tuple[TimedPath, ...]
+    separation: Separation | None = None
+    notes: tuple[Note, ...] = ()
+    start_utc: datetime | None = None
+
+    def slot(self, name: str) -> Slot:
+        """The slot of a vehicle."""
+        return next(s for s in self.slots if s.name == name)
+
+    def motion(self, name: str) -> TimedPath:
+        """The motion of a vehicle."""
+        return next(m for m in self.motions if m.name == name)
+
+    @property
+    def closest(self) -> Encounter | None:
+        """The pair that comes nearest to each other in the air; None if no two ever fly at the same time."""
+        return None if self.separation is None else self.separation.least
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A planned mission file.
+
+    ``planner`` is the one that was used, ``left_out`` are vehicles without a mission; ``leaves_out``: they are allowed.
+    """
+
+    source: MissionFile
+    world: World
+    planner: str
+    objective: str
+    seed: int
+    vehicles: tuple[VehiclePlan, ...]
+    notes: tuple[Said, ...] = ()
+    fleet: FleetPlan | None = None
+    left_out: tuple[LeftOut, ...] = ()
+    leaves_out: bool = False

@@ -1,0 +1,201 @@
+"""Planning of one vehicle: request to path, path to mission, and the verdict on the mission as it is stored."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from gcsplan.app.plan.attempts import of_all, within_budget
+from gcsplan.app.plan.corners import cut, moved, sharpened
+from gcsplan.app.plan.left_out import LeavingOut
+from gcsplan.app.plan.margins import larger, on_path
+from gcsplan.app.plan.model import Brief, VehiclePlan
+from gcsplan.app.plan.problem import bow_margin_m, built, looked_over, make_problem, run_planner, unsafe
+from gcsplan.arrays import Floats
+from gcsplan.check.verdict import Verdict
+from gcsplan.errors import InputError, NoMission
+from gcsplan.mavlink.build.multirotor import acceptance_radius_m, cuts_corners, spaced_out
+from gcsplan.mavlink.build.order import MARGINS, Order
+from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mission_file import VehicleRequest
+from gcsplan.planners.problem import PASSED_M, Problem, Progress, Solution, passes_vias
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import Path
+from gcsplan.world.world import World
+
+__all__ = ["over_one_terrain", "plan_vehicle", "rebuilt"]
+
+ATTEMPTS = 4
+"""Most plans for one vehicle, each with larger margins than the one before, until the decoded mission passes."""
+
+
+def plan_vehicle(
+    brief: Brief,
+    request: VehicleRequest,
+    progress: Callable[[Progress], None] | None = None,
+    *,
+    searched: World | None = None,
+    limits: Limits | None = None,
+    options: Mapping[str, object] | None = None,
+) -> VehiclePlan:
+    """One vehicle's path, mission and verdict. Raises InputError, NoMission.
+
+    ``searched`` is a world with more zones, ``limits`` are tighter limits: another path is searched under them, and
+    judged in the mission file's own world and limits. ``options`` are for the planner, on top of the brief's.
+    """
+    source, vehicle = brief.source, request.vehicle
+    limited = request if limits is None else replace(request, vehicle=replace(vehicle, limits=limits))
+    if request.return_route == "mission":
+        limited = _both_ways(limited, source.altitude_frame)
+    world = brief.world if searched is None else searched
+    merged = {**brief.options, **(options or {})}
+    if vehicle.turn_radius_m > 0.0:
+        from gcsplan.app.plan.wings import plan_wing  # imported here because most vehicles are multicopters
+
+        return plan_wing(brief, request, limited, world, merged, progress)
+    margins, failed = MARGINS, None
+    tried: list[Solution] = []
+    begun_s = time.perf_counter()
+    for _ in range(ATTEMPTS):
+        try:
+            problem, notes = make_problem(
+                source, limited, world, brief.objective, brief.seed, margins, progress, merged
+            )
+            problem = within_budget(problem, tried, begun_s)
+            solution = run_planner(brief.run, problem, vehicle, world)
+        except NoMission:
+            if failed is None:
+                raise
+            break  # there is no path with margins this large: report what the last mission broke
+        tried.append(solution)
+        over = looked_over(brief, solution)
+        order = Order(
+            request.end, source.altitude_frame, return_path=request.return_route == "mission",
+            bow_m=bow_margin_m(limited, world),
+            exact=tuple((v.east_m, v.north_m) for v in problem.via if v.amsl_m is not None),
+        )  # fmt: skip
+        solution, order, mission, verdict = _built(over, request, problem, solution, order)
+        if not verdict.findings:
+            solution = of_all([*tried[:-1], solution], problem)
+            return VehiclePlan(request, problem, solution, mission, verdict, vehicle.speed_max_m_s, notes, order, over)
+        failed = verdict
+        findings = on_path(mission, verdict)
+        if not findings:
+            break  # larger margins cannot cure a battery, a take-off column or a return
+        margins = larger(margins, findings, acceptance_radius_m(vehicle))
+    assert failed is not None
+    raise unsafe(failed, vehicle)
+
+
+def _built(
+    over: Brief, request: VehicleRequest, problem: Problem, solution: Solution, order: Order
+) -> tuple[Solution, Order, Mission, Verdict]:
+    """The mission of a solution, its verdict, and both as they were built: without way points nearer than the
+    acceptance radii, if that is legal; else with all, and with corners mended that are cut too near."""
+    vehicle, points = request.vehicle, solution.path.points
+    spaced = spaced_out(points, vehicle)
+    if passes_vias(problem, spaced):
+        mission, verdict = built(over, request, solution, order)
+        if not verdict.findings:
+            return solution, order, mission, verdict
+        if vehicle.autopilot is not Autopilot.ARDUCOPTER and cuts_corners(vehicle):
+            points = spaced  # corners that are turned before at once are cut by more than one
+            solution = replace(solution, path=Path(points))
+    order = replace(order, spaced=False)
+    corners: set[int] = set()
+    while True:
+        mission, verdict = built(over, request, solution, order)
+        more: set[int] = set()
+        if cuts_corners(vehicle):
+            more = cut(mission, on_path(mission, verdict), points, over.world) - corners
+        if not more:
+            return solution, order, mission, verdict
+        corners |= more
+        solution = replace(solution, path=Path(_mended(problem, vehicle, points, corners)))
+
+
+def _mended(problem: Problem, vehicle: Vehicle, points: Floats, corners: set[int]) -> Floats:
+    """The path (N, 3) with ``corners`` that are cut less; vias stay."""
+    if vehicle.autopilot is Autopilot.ARDUCOPTER:
+        return sharpened(points, corners)
+    for via in problem.via:
+        corners = corners - set(np.flatnonzero(np.hypot(*(points[:, :2] - (via.east_m, via.north_m)).T) < PASSED_M))
+    return moved(points, corners, acceptance_radius_m(vehicle))
+
+
+def _both_ways(request: VehicleRequest, altitude_frame: str) -> VehicleRequest:
+    """``request`` with limits under which its path may be flown back, too, where a climb is a descent.
+
+    Raises InputError if no path back is written for it.
+    """
+    vehicle, limits = request.vehicle, request.vehicle.limits
+    why = ""
+    if vehicle.autopilot is not Autopilot.ARDUCOPTER:
+        why = f"return paths are written for ArduCopter alone, and it is {vehicle.autopilot}"
+    elif altitude_frame == "terrain":
+        why = "a return path in the terrain frame is not judged: altitude_frame relative or amsl is wanted"
+    elif request.end == "none":
+        why = "with end: none the mission would go on along its return path: end: land, loiter or rtl is wanted"
+    if why:
+        raise InputError(f"{vehicle.name}: return_route: mission: {why}")
+    steepest = min(limits.max_climb_deg, limits.max_descent_deg)
+    return replace(
+        request,
+        vehicle=replace(vehicle, limits=replace(limits, max_climb_deg=steepest, max_descent_deg=steepest)),
+    )
+
+
+def over_one_terrain(
+    brief: Brief,
+    vehicles: Sequence[VehiclePlan],
+    progress: Callable[[str, Progress], None] | None = None,
+    leaving: LeavingOut | None = None,
+) -> tuple[Brief, list[VehiclePlan]]:
+    """Judge all vehicles over the widest terrain that any of them needed; replan those that fail there."""
+    leaving = leaving or LeavingOut(allowed=False)
+    wide = widest(brief, vehicles)
+    out = []
+    for v in vehicles:
+        if v.brief is None or v.brief.source is wide.source:
+            out.append(v)
+            continue
+        mission, verdict = built(wide, v.request, v.solution, v.order)
+        if not verdict.findings:
+            out.append(replace(v, mission=mission, verdict=verdict, brief=wide))
+            continue
+        report = None if progress is None else lambda what, who=v.name: progress(who, what)
+        try:
+            out.append(plan_vehicle(wide, v.request, report))
+        except NoMission as why:
+            leaving.leave(v.name, why)
+    return wide, out
+
+
+def rebuilt(
+    v: VehiclePlan,
+    brief: Brief,
+    *,
+    speed_m_s: float,
+    hold_s: float = 0.0,
+    gate_utc: tuple[int, int, int] | None = None,
+) -> VehiclePlan:
+    """The same path at another speed, after ``hold_s`` (whole seconds) at the gate: the mission is rebuilt and judged.
+
+    Raises NoMission if the mission then breaks a limit: a hold costs energy and an item.
+    """
+    order = replace(v.order, speed_m_s=speed_m_s, hold_s=0 if gate_utc else round(hold_s), gate_utc=gate_utc)
+    if order == v.order:
+        return v
+    mission, verdict = built(widest(brief, [v]), v.request, v.solution, order)
+    if verdict.findings:
+        raise unsafe(verdict, v.request.vehicle)
+    return replace(v, mission=mission, verdict=verdict, speed_m_s=speed_m_s, order=order)
+
+
+def widest(brief: Brief, plans: Sequence[VehiclePlan]) -> Brief:
+    """The brief with the most terrain, of ``brief`` and those that the vehicles were planned under."""
+    return max([brief, *(v.brief for v in plans if v.brief is not None)], key=lambda b: b.source.level)

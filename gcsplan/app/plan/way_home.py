@@ -1,0 +1,158 @@
+"""The way home in every command: it is judged here, and here is decided whether it lets a mission fly.
+
+`way_home: required` in the mission file, or `--require-way-home`, refuses a mission whose return is unsafe or not
+judged. Otherwise the return is judged where that is asked for, and reported as a warning. `plan`, `check`, `upload` and
+`rehearse` all ask `lets_fly`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from gcsplan.app.plan.model import Plan, VehiclePlan
+from gcsplan.check.verdict import Verdict
+from gcsplan.errors import CheckFailed, NoMission
+from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mavlink.mission.return_altitude import on_board, return_on_board_m, returns_otherwise
+from gcsplan.mavlink.mission.return_route import route_setting, takes_another_route
+from gcsplan.mission_file import MissionFile, VehicleRequest
+from gcsplan.notes.note import IN_FILES, Note, Wording
+from gcsplan.vehicle import Autopilot
+from gcsplan.world.world import World
+
+if TYPE_CHECKING:
+    from gcsplan.check.returns.verdict import WayHome
+
+MOST_SHOWN = 5
+"""Vehicles that a warning or a refusal names one by one."""
+
+SAME_M = 0.5
+"""Return altitudes that differ by no more than this, m, count as the same."""
+
+
+def is_required(source: MissionFile | None, option: bool) -> bool:
+    """Whether the mission file or ``--require-way-home`` requires a safe return."""
+    return option or (source is not None and source.way_home == "required")
+
+
+def lets_fly(home: WayHome | None, *, required: bool) -> bool:
+    """Whether the way home lets a mission fly: always if it is only reported, else only if it was judged and is safe.
+
+    ``--allow-unjudged`` does not count here: who requires a safe return wants to know of one.
+    """
+    return not required or (home is not None and home.safe is True)
+
+
+def home_of(verdict: Verdict, request: VehicleRequest, world: World, terrain_error_m: float) -> WayHome:
+    """The way home of one mission, from every point of it; takes about a second for 20 km."""
+    from gcsplan.check.returns.way_home import way_home
+
+    return way_home(
+        verdict, request.vehicle, world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=terrain_error_m,
+        route=request.return_route,
+    )  # fmt: skip
+
+
+def homes_of(plan: Plan) -> dict[str, WayHome]:
+    """The way home of every vehicle of a plan."""
+    error_m = plan.source.terrain_error_m
+    return {v.name: _with_path_back(v, home_of(v.verdict, v.request, plan.world, error_m)) for v in plan.vehicles}
+
+
+def _with_path_back(v: VehiclePlan, home: WayHome) -> WayHome:
+    """``home``, and what a return path back along the track would do if no return altitude makes all returns safe."""
+    enough = home.safe is not False or (home.set_rel_home_m is not None and not home.set_leaves_m)
+    request, brief = v.request, v.brief
+    if enough or brief is None or home.route == "mission" or not writes_path_back(request, brief.source.altitude_frame):
+        return home
+    from gcsplan.app.plan.problem import built
+
+    try:
+        _, verdict = built(brief, request, v.solution, replace(v.order, return_path=True))
+    except NoMission:  # too many items
+        return home
+    if verdict.findings:
+        return home
+    error_m = brief.source.terrain_error_m
+    path = home_of(verdict, replace(request, return_route="mission"), brief.world, error_m)
+    if path.not_judged or path.no_return_m >= (
+        home.set_leaves_m if home.set_leaves_m is not None else home.no_return_m
+    ):
+        return home
+    route = route_setting(request.vehicle.autopilot, path=True)
+    if path.safe:
+        return replace(home, path_back=Note("path_back_makes_safe", setting=route))
+    return replace(home, path_back=Note("path_back_helps", left_m=path.no_return_m, setting=route))
+
+
+def writes_path_back(request: VehicleRequest, altitude_frame: str) -> bool:
+    """Whether a return path can be written: for ArduCopter, behind an end, in a frame in which it is judged."""
+    copter = request.vehicle.autopilot is Autopilot.ARDUCOPTER
+    return copter and request.end != "none" and altitude_frame != "terrain"
+
+
+def judged(plan: Plan, *, asked: bool, option: bool = False) -> dict[str, WayHome]:
+    """The ways home of a plan where they are asked for or required, else none.
+
+    ``option``: ``--require-way-home``. Raises CheckFailed if safe ones are required and one does not pass.
+    """
+    required = is_required(plan.source, option)
+    homes = homes_of(plan) if asked or required else {}
+    require(homes, required=required)
+    return homes
+
+
+def require(homes: Mapping[str, WayHome | None], *, required: bool) -> None:
+    """Raise CheckFailed if the way home of a vehicle does not let it fly; the message says why and what to set."""
+    bad = {name: home for name, home in homes.items() if not lets_fly(home, required=required)}
+    if not bad:
+        return
+    broken = any(home is not None and home.safe is False for home in bad.values())
+    what = (
+        "a safe return is required, and there is none" if broken else "a safe return is required, and it is not judged"
+    )
+    lines = [line for name, home in list(bad.items())[:MOST_SHOWN] for line in _lines(name, home)]
+    if len(bad) > MOST_SHOWN:
+        lines.append(f"… and {len(bad) - MOST_SHOWN} more")
+    raise CheckFailed("\n".join([what, *lines]), reason="violation" if broken else "not_judged")
+
+
+def _lines(name: str, home: WayHome | None, wording: Wording = IN_FILES) -> list[str]:
+    """The headline, what to set, and what a return path would do."""
+    if home is None:
+        return [f"{name}: the return was not judged"]
+    notes = (home.headline, home.advice, home.path_back)
+    return [f"{name}: {note.text(wording)}" for note in notes if note is not None]
+
+
+def against_on_board(home: WayHome, values: Mapping[str, float], mission: Mission) -> str | None:
+    """Why a required return is not the one that a vehicle with these parameters would fly; None if it is."""
+    if otherwise := takes_another_route(values, mission, home.route):
+        return f"a safe return is required, and {otherwise}"
+    if home.route == "mission":
+        return None
+    height_m = return_on_board_m(values)
+    parameter = on_board(values)
+    if height_m is None or parameter is None:
+        return "a safe return is required, and the return altitude on board could not be read"
+    if otherwise := returns_otherwise(values):
+        return f"a safe return is required, and {otherwise}"
+    if abs(height_m - home.rtl_rel_home_m) <= SAME_M:
+        return None
+    return (
+        f"a safe return is required; it was judged at {home.rtl_rel_home_m:g} m above home, and this vehicle returns "
+        f"at {height_m:g} m: set {parameter.setting(home.rtl_rel_home_m)}"
+    )
+
+
+def warnings(homes: Mapping[str, WayHome | None], wording: Wording = IN_FILES) -> list[str]:
+    """A headline for each vehicle whose return is not safe, with what to set; one line for all others of a fleet."""
+    bad = [(name, home) for name, home in homes.items() if home is not None and home.safe is not True]
+    lines: list[str] = []
+    for name, home in bad[:MOST_SHOWN]:
+        lines += _lines(name, home, wording)
+    if len(bad) > MOST_SHOWN:
+        lines.append(f"… and {len(bad) - MOST_SHOWN} more of {len(homes)} vehicles: no safe return, or not judged")
+    return lines

@@ -1,0 +1,299 @@
+"""A fixed wing's plan: a climb-out, a path of arcs, and an approach, joined end to end.
+
+A path of arcs (`planners.turns`) has no heading at its ends, but a fixed wing has one at both. So the ends are made
+first. The climb-out goes straight from the start as far as it must climb, on the requested heading or the first legal
+one near the direction of the path; then a straight piece to begin the first turn from, and further turns if the heading
+is far off. If the vehicle lands, the approach to the goal is made likewise, backwards. The planner joins the ends; the
+turns at the joints are corners like any other. Then the mission is built, and judged as flown.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from itertools import count, islice
+
+import numpy as np
+
+from gcsplan.app.plan.attempts import of_all, with_bound, within_budget
+from gcsplan.app.plan.margins import larger, on_path
+from gcsplan.app.plan.model import Brief, VehiclePlan
+from gcsplan.app.plan.problem import built, looked_over, make_problem, run_planner, unsafe
+from gcsplan.app.plan.wing_ends import FlightEnd, circle_m, goals, starts
+from gcsplan.arrays import Floats, Indices
+from gcsplan.check.motion.circles import circle_growth
+from gcsplan.errors import NoMission
+from gcsplan.mavlink.build.fixed_wing import flown_m, tangents_m, thinned
+from gcsplan.mavlink.build.order import MARGINS, Order, Wing
+from gcsplan.mission_file import VehicleRequest
+from gcsplan.notes.note import Note
+from gcsplan.planners.problem import Problem, Progress, Solution, straight_bound
+from gcsplan.planners.refusal.suggestions import FILLED
+from gcsplan.vehicle import Vehicle
+from gcsplan.world.geometry.path import Path
+from gcsplan.world.world import World
+
+__all__ = ["plan_wing"]
+
+
+ATTEMPTS = 5
+
+MOST_JOINTS = 8
+"""Most pairs of climb-out and approach for which a path is searched."""
+
+MOST_REFUSED = 3
+"""Most pairs without a path: it may be that another climb-out leaves room for the first turn."""
+
+JOINTS = "none that joins the climb-out and the approach: give another takeoff_heading_deg, or move start or goal"
+UNFITTING = ("arcs_too_long", "turn_too_early")
+"""Notes on arcs that do not fit."""
+
+APART = "none whose turns all fit between its way points: put vias farther apart, or allow tighter turns"
+
+PART_OF_SLOPE = 0.9993
+"""Factor on the slope limits: arcs are judged by their chords, which are shorter, and so steeper."""
+
+ACCEPTED_M, CHORDS_M = 1.0, 0.2
+"""Metres by which a turn begins early or late (acceptance radii are whole metres), and by which arcs are judged
+wider."""
+
+
+def plan_wing(
+    brief: Brief,
+    request: VehicleRequest,
+    limited: VehicleRequest,
+    world: World,
+    options: Mapping[str, object],
+    progress: Callable[[Progress], None] | None = None,
+) -> VehiclePlan:
+    """One fixed wing's path, mission and verdict, as `planning.plan_vehicle`. Raises InputError, NoMission.
+
+    ``limited``, ``world`` and ``options`` are those of the search: the request with its limits, the world, the
+    planner's options.
+    """
+    source, vehicle = brief.source, request.vehicle
+    margins = replace(MARGINS, track_m=MARGINS.track_m + ACCEPTED_M + CHORDS_M)
+    sharp: Floats | None = None
+    failed: VehiclePlan | None = None
+    tried: list[Solution] = []
+    begun_s = time.perf_counter()
+    for _ in range(ATTEMPTS):
+        problem, notes = make_problem(source, limited, world, brief.objective, brief.seed, margins, progress, options)
+        try:
+            problem = _with_goal_circle(within_budget(problem, tried, begun_s), limited)
+            if sharp is None:
+                straight = replace(problem, turn_radius_m=0.0, progress=None)
+                sharp = run_planner(brief.run, straight, vehicle, world).path.points
+            plan = _joined(brief, request, limited, problem, sharp, world)
+        except NoMission:
+            if failed is None:
+                raise
+            break  # there is no path with margins this large: report what the last mission broke
+        tried.append(plan.solution)
+        if not plan.verdict.findings:
+            solution = of_all(tried, problem)
+            return replace(plan, solution=solution, notes=(*notes, *plan.notes))
+        failed = plan
+        findings = on_path(plan.mission, plan.verdict)
+        if not findings:
+            break  # larger margins cannot cure a battery or the ends
+        margins = larger(margins, findings)
+    assert failed is not None
+    raise unsafe(failed.verdict, vehicle)
+
+
+def _joined(
+    brief: Brief, request: VehicleRequest, limited: VehicleRequest, problem: Problem, sharp: Floats, world: World
+) -> VehiclePlan:  # fmt: skip
+    """The mission with the first pair of ends that a path can be joined to; it may still break limits, and has no bound
+    then."""
+    vehicle = request.vehicle
+    refused: list[NoMission] = []
+    why = ""
+    for tried, (start, goal) in enumerate(_pairs(problem, limited, sharp)):
+        if tried == MOST_JOINTS:
+            break
+        inner = _inner(problem, start, goal)
+        try:
+            found = _between(brief, inner, vehicle, world)
+        except NoMission as refusal:
+            refused.append(refusal)
+            if refusal.reason != "not_found" or len(refused) == MOST_REFUSED:
+                raise refused[0] from refused[0].__cause__
+            continue
+        solution = _whole(problem, found, start, goal)
+        order = _order(brief, limited, start, goal)
+        unfit = _unfitting(solution.path.points, order, vehicle.turn_radius_m)
+        if len(unfit):
+            last = len(solution.path.points) - (0 if goal is None else len(goal.chain))
+            inside = (unfit > len(start.chain)) & (unfit < last)
+            why = APART if inside.any() else JOINTS
+            continue
+        over = looked_over(brief, solution)
+        mission, verdict = built(over, request, solution, order)
+        crowded = [note for note in verdict.not_judged if isinstance(note, Note) and note.code in UNFITTING]
+        if crowded:
+            why = f"{APART}\n  {crowded[0]}"
+            continue
+        if not verdict.findings and found.lower_bound is not None:
+            bound = _bound_between(brief, inner, solution.path.points, start, goal, vehicle, world)
+            solution = with_bound(solution, bound, problem)
+        speed = vehicle.speed_max_m_s
+        return VehiclePlan(request, inner, solution, mission, verdict, speed, tuple(_notes(start, goal)), order, over)
+    if refused and not why:
+        raise refused[0] from refused[0].__cause__
+    raise NoMission(
+        f"{vehicle.name}: paths with turns of turn_radius_m {vehicle.turn_radius_m:g} were found, but {why or JOINTS}",
+        reason="not_found",
+    )
+
+
+def _pairs(problem: Problem, limited: VehicleRequest, sharp: Floats) -> Iterator[tuple[FlightEnd, FlightEnd | None]]:
+    """All pairs of ends, the most natural ones first; neither end stays the same while all others are gone through."""
+    left, right = starts(problem, limited, sharp), goals(problem, limited, sharp)
+    begins: list[FlightEnd] = []
+    finishes: list[FlightEnd | None] = []
+    for total in count():
+        begins += islice(left, 1)
+        finishes += islice(right, 1)
+        if total > len(begins) + len(finishes) - 2:
+            return
+        for k in range(total + 1):
+            if k < len(begins) and total - k < len(finishes):
+                yield begins[k], finishes[total - k]
+
+
+def _with_goal_circle(problem: Problem, request: VehicleRequest) -> Problem:
+    """Raise the goal as high as the flight around it needs: the circle of a loiter, or the turn for home."""
+    east, north, amsl = problem.goal
+    around = {"loiter": circle_m(problem) * circle_growth(amsl + 100.0), "rtl": 2.0 * problem.turn_radius_m}
+    reach_m = around.get(request.end)
+    if reach_m is None:
+        return problem
+    wide = replace(problem.limits, track_error_m=problem.limits.track_error_m + reach_m)
+    low = float(problem.airspace.floor_amsl(east, north, wide))
+    if math.isinf(low):
+        raise NoMission(
+            f"{request.vehicle.name}: the ground within {reach_m:.0f} m of the goal is unknown to the terrain model: "
+            f"{FILLED}",
+            reason="not_found",
+        )
+    datum = request.start[2]
+    raised = max(amsl, datum + math.ceil((low - datum) * 100.0 - 1e-6) / 100.0)
+    return replace(problem, goal=(east, north, raised))
+
+
+# -- joining -------------------------------------------------------------------------------------------------------
+
+
+def _inner(problem: Problem, start: FlightEnd, goal: FlightEnd | None) -> Problem:
+    """The planner's part: from the end of the climb-out and its turns to the beginning of the approach."""
+    first = tuple(float(x) for x in start.chain[-1])
+    last = problem.goal if goal is None else tuple(float(x) for x in goal.chain[-1])
+    return replace(problem, start=first, goal=last)  # type: ignore[arg-type]
+
+
+def _whole(problem: Problem, solution: Solution, start: FlightEnd, goal: FlightEnd | None) -> Solution:
+    """The solution with both ends added, yet without a lower bound."""
+    inner = solution.path.points
+    before = np.vstack([start.leaves, start.chain[:-1]])
+    behind = np.empty((0, 3)) if goal is None else np.vstack([goal.chain[-2::-1], goal.top])
+    points = thinned(np.vstack([before[1:], inner, behind]), problem.turn_radius_m)
+    points = _slowed(points, start.leaves, problem)
+    notes = solution.notes
+    if solution.lower_bound is not None:
+        notes = (*notes, Note("bound_with_climb_out", approach=goal is not None))
+    return replace(solution, path=Path(points), flown=None, lower_bound=None, notes=notes)
+
+
+def _between(brief: Brief, inner: Problem, vehicle: Vehicle, world: World) -> Solution:
+    """The planner's part. Its bound only ends the search, and assumes the margins, which are metres here: against one
+    without them the gap would stay open whatever is tried. A refusal is that of the limits of the check."""
+    try:
+        return run_planner(brief.run, replace(inner, checked=None, rounding_m=(0.0, 0.0)), vehicle, world)
+    except NoMission as refusal:
+        if refusal.reason != "infeasible" or inner.checked is None:
+            raise
+    return run_planner(brief.run, inner, vehicle, world)
+
+
+def _bound_between(
+    brief: Brief, inner: Problem, points: Floats, start: FlightEnd, goal: FlightEnd | None, vehicle: Vehicle,
+    world: World,
+) -> float:  # fmt: skip
+    """A lower bound of all paths from the end of the climb-out to the approach, under the limits of the check.
+
+    Neither the turns that this plan makes there nor its turn radius count. What its arcs cut off at both joints, where
+    it does not pass the ends themselves, is subtracted: its ``points`` (N, 3) begin behind the first joint.
+    """
+    first, last = start.leaves, np.array(inner.goal) if goal is None else goal.top
+    outer = replace(
+        inner, start=_three(first), goal=_three(last), limits=inner.checked or inner.limits, checked=None,
+        turn_radius_m=0.0, progress=None, widen=None, budget_s=0.5 * inner.budget_s,
+    )  # fmt: skip
+    try:
+        bound = run_planner(brief.run, outer, vehicle, world).lower_bound
+    except NoMission:  # an end of a climb-out may lie lower than paths may
+        bound = None
+    if bound is None:
+        bound = straight_bound(outer, outer.rounding_m)
+    whole = np.vstack([start.ground, first, points, *([] if goal is None else [goal.ground])])
+    tangent = tangents_m(whole, vehicle.turn_radius_m)
+    cut_m = 2.0 * (tangent - vehicle.turn_radius_m * np.arctan(tangent / vehicle.turn_radius_m))
+    ends_m = float(cut_m[1] + cut_m[-2]) + abs(start.circle_m)
+    return max(bound - ends_m * (inner.horizontal_j_per_m if inner.objective == "energy" else 1.0), 0.0)
+
+
+def _three(point: Floats) -> tuple[float, float, float]:
+    east, north, amsl = point.tolist()
+    return east, north, amsl
+
+
+def _slowed(points: Floats, leaves: Floats, problem: Problem) -> Floats:
+    """Lower ``points`` where they are too steep: arcs at the joints, unknown to the planner, shorten legs."""
+    flown = flown_m(np.vstack([leaves, points]), problem.turn_radius_m)[1:]
+    up, down = (PART_OF_SLOPE * s for s in (problem.limits.max_climb_slope, problem.limits.max_descent_slope))
+    z = points[:, 2].copy()
+    for i in range(1, len(z) - 1):
+        z[i] = min(z[i], z[i - 1] + up * flown[i - 1])
+    for i in range(len(z) - 2, 0, -1):
+        z[i] = min(z[i], z[i + 1] + down * flown[i])
+    return np.column_stack([points[:, :2], z])
+
+
+def _order(brief: Brief, request: VehicleRequest, start: FlightEnd, goal: FlightEnd | None) -> Order:
+    top = tuple(float(x) for x in start.top)
+    touch = None if goal is None else tuple(float(x) for x in goal.ground)
+    circle = float(math.ceil(request.vehicle.turn_radius_m)) if request.end == "loiter" else 0.0
+    up = None if start.circle is None else tuple(float(x) for x in start.circle)
+    wing = Wing(top, touch, circle, up, start.circle_m)  # type: ignore[arg-type]
+    return Order(request.end, brief.source.altitude_frame, wing=wing)
+
+
+def _unfitting(points: Floats, order: Order, radius: float) -> Indices:
+    """The legs between whose corners, joints included, the arcs do not fit; leg 0 leaves the climb-out."""
+    assert order.wing is not None
+    whole = np.array([order.wing.leaves, *points, *([] if order.wing.touch is None else [order.wing.touch])])
+    tangent = tangents_m(whole, radius)
+    run = np.hypot(*np.diff(whole[:, :2], axis=0).T)
+    return np.flatnonzero(tangent[:-1] + tangent[1:] > run + 0.05)
+
+
+def _notes(start: FlightEnd, goal: FlightEnd | None) -> Iterator[Note]:
+    """How to launch it, and how it lands."""
+    heading_deg = (90.0 - math.degrees(start.heading)) % 360.0
+    far_m, up_m = math.dist(start.top[:2], start.ground[:2]), float(start.top[2] - start.ground[2])
+    if start.circle is None:
+        yield Note("climb_out", heading_deg=heading_deg, far_m=far_m, up_m=up_m)
+    else:
+        yield Note(
+            "climb_out_in_circles", heading_deg=heading_deg, far_m=far_m, up_m=up_m, circle_m=abs(start.circle_m),
+            circled_m=float(start.circle[2] - start.ground[2]),
+        )  # fmt: skip
+    if goal is not None:
+        yield Note(
+            "approach", heading_deg=(270.0 - math.degrees(goal.heading)) % 360.0,
+            far_m=math.dist(goal.top[:2], goal.ground[:2]), up_m=float(goal.top[2] - goal.ground[2]),
+        )  # fmt: skip

@@ -1,0 +1,1 @@
+"""From a plan or files to vehicles: orders, fences, terrain, reading back."""

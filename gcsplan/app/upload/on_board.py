@@ -1,0 +1,221 @@
+"""What a vehicle's parameters make of a mission: it is judged again with them, before it is sent and once on board.
+
+Within the list that the mission was judged with (`parameter_list`) the vehicle flies what was told. Outside of it the
+mission is refused, or, if the user allows that, judged with what is on board; what cannot be judged stays refused.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from gcsplan.app.plan.flight_hours import beyond_hours
+from gcsplan.app.plan.way_home import against_on_board
+from gcsplan.app.upload.fence import against_fence
+from gcsplan.check.judge import judge
+from gcsplan.check.motion.stopping import run_on_m, run_past_m
+from gcsplan.check.motion.turn_parameters import Tuning
+from gcsplan.check.verdict import Verdict
+from gcsplan.mavlink.mission.commands import RTL
+from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mavlink.mission.parameter_list import (
+    Off,
+    Setting,
+    corners_as_it_leans,
+    off,
+    parameter_list,
+    vehicle_on_board,
+)
+from gcsplan.mavlink.mission.parameter_names import OnBoard, unanswered
+from gcsplan.mavlink.mission.parameter_safety import needed_groups, safety_list
+from gcsplan.mavlink.mission.return_altitude import return_on_board_m
+from gcsplan.vehicle import Autopilot, Vehicle, fastest_at_m_s
+
+if TYPE_CHECKING:
+    from gcsplan.app.plan.model import VehiclePlan
+    from gcsplan.app.upload.job import UploadJob
+    from gcsplan.check.returns.verdict import WayHome
+    from gcsplan.mavlink.link.session import session
+
+__all__ = ["judge_on_board", "settings_of", "settings_of_plan"]
+
+RIGHT_ANGLE_RAD = 0.5 * math.pi
+LEANS = ", for ArduCopter before 4.5 takes corners with all that its lean allows"
+SAME_S, SAME_PART = 1.0, 0.005
+"""A flight that takes as long as told within this, s, or within this part of it, is the one that was told."""
+
+
+def settings_of(job: UploadJob) -> tuple[Setting, ...]:
+    """The list of parameters that a job's mission was judged with; empty without a world."""
+    if job.vehicle is None or job.world is None:
+        return ()
+    home = job.way_home
+    returns = job.home_required and (home is None or home.route != "mission")
+    return _listed(job.mission, job.vehicle, job.rtl_rel_home_m, home, job.verdict, returns=returns)
+
+
+def settings_of_plan(v: VehiclePlan, home: WayHome | None) -> tuple[Setting, ...]:
+    """The list of parameters that a planned mission was judged with; ``home``: its way home, if that was judged."""
+    returns = home is not None and home.route != "mission"
+    return _listed(v.mission, v.request.vehicle, v.request.rtl_rel_home_m, home, v.verdict, returns=returns)
+
+
+def _listed(
+    mission: Mission,
+    vehicle: Vehicle,
+    rtl_rel_home_m: float | None,
+    home: WayHome | None,
+    verdict: Verdict | None,
+    *,
+    returns: bool,
+) -> tuple[Setting, ...]:
+    by_mission = home is not None and home.route == "mission"
+    height_m = rtl_rel_home_m if home is None or by_mission else home.rtl_rel_home_m
+    rows = parameter_list(mission, vehicle, rtl_rel_home_m=height_m, returns=returns)
+    if verdict is None or verdict.extent is None:
+        return rows
+    straight_m = height_m if returns or any(item.command == RTL for item in mission.items) else None
+    return rows + safety_list(vehicle.autopilot, verdict.extent, rtl_rel_home_m=straight_m, by_mission=by_mission)
+
+
+def judge_on_board(
+    job: UploadJob, *, allow_unjudged: bool, allow_parameters: bool = False, simulated: bool = False
+) -> session.ReadBackJudge | None:
+    """The check of the mission that was read back, since the vehicle will fly what it holds; None without a world.
+
+    It is asked before the mission is sent too, with the vehicle's parameters: where it turns, how fast it flies, climbs
+    and returns, and how high it returns. ``allow_parameters``: those outside of the list are judged as they are. A
+    simulated vehicle's parameters are nobody's, so the mission file's count there.
+    """
+    if job.world is None or job.vehicle is None:
+        return None
+    from gcsplan.mavlink.link.session.parameters import lean_shortage
+    from gcsplan.mavlink.link.session.px4_motion import speed_shortage
+    from gcsplan.mavlink.link.terrain import TERRAIN_DECIDES, flies_terrain, odd_spacing, terrain_error_m
+
+    world, vehicle, settings = job.world, job.vehicle, () if simulated else settings_of(job)
+    straight = job.home_required and job.way_home is not None and job.way_home.route != "mission"
+    planned_m_s = job.mission.commanded_m_s
+    if vehicle.lean_angle_deg is not None:
+        planned_m_s = min(planned_m_s, fastest_at_m_s(vehicle.lean_angle_deg))
+
+    def again(read_back: Mission, values: Mapping[str, float]) -> str | None:
+        if job.home_required and job.way_home is not None and not simulated:
+            against = against_on_board(job.way_home, values, job.mission)
+            if against is not None:
+                return against
+        terrain = TERRAIN_DECIDES if not simulated and flies_terrain(read_back.wire_items()) else ()
+        if silent := _silent(settings, values, vehicle.autopilot, terrain):
+            return silent
+        if vehicle.lean_angle_deg is not None and (short := lean_shortage(values, planned_m_s)):
+            return str(short)
+        if short := speed_shortage(values, vehicle, planned_m_s):
+            return str(short)
+        if flies_terrain(read_back.wire_items()) and (odd := odd_spacing(values)):
+            return str(odd)
+        found = off(settings, values, vehicle.autopilot)
+        decide = {"flight", "return"} | ({"turns"} if straight else set())
+        if not allow_parameters or (job.fleet is not None and job.fleet.keeps_apart):
+            decide.add("pace")
+        if unlike := [o for o in found if o.setting.matters in decide]:
+            allowed = "; --allow-parameters takes that" if {o.setting.matters for o in unlike} == {"pace"} else ""
+            return _lines(f"this is not what was judged, and cannot be judged{allowed}", unlike)
+        # Home on board is where the vehicle is now, but the altitudes count from the planned start.
+        flown, tuning = replace(read_back, home=job.mission.home), Tuning.of(values)
+        flies = vehicle if simulated else vehicle_on_board(vehicle, flown, values)
+        returns_m = None if simulated else return_on_board_m(values)
+        rtl_rel_home_m = job.rtl_rel_home_m if returns_m is None else returns_m
+        spacing = values.get("TERRAIN_SPACING", math.nan)
+        spaced = world.with_posts(int(spacing)) if spacing >= 1.0 else world
+        error_m = terrain_error_m(values, job.terrain_error_m)
+        verdict = judge(flown, flies, spaced, rtl_rel_home_m=rtl_rel_home_m, terrain_error_m=error_m, tuning=tuning)
+        if not (verdict.safe is True or (verdict.safe is None and allow_unjudged)):
+            return verdict.describe()
+        if not allow_unjudged and (beyond := beyond_hours(verdict, job.hours)):
+            return f"not judged: {beyond}"
+        if flies != vehicle:
+            against = _against_motion(job, flies, verdict, found, values, allow_parameters=allow_parameters)
+            if against is not None:
+                return against
+        return against_fence(job, flown, rtl_rel_home_m, tuning)
+
+    return again
+
+
+def _silent(
+    settings: Sequence[Setting], values: Mapping[str, float], autopilot: Autopilot, others: tuple[tuple[str, ...], ...]
+) -> str:
+    """Which parameters that the proof hangs on, or ``others``, gave no answer, in words; empty if all did.
+
+    A peer that does not say what autopilot it is has no known parameters, and values that no vehicle was asked for say
+    nothing of the others.
+    """
+    if not isinstance(values, OnBoard) or values.generic:
+        return ""
+    silent = unanswered(values, [*needed_groups(settings, autopilot, values), *others])
+    if not silent:
+        return ""
+    names = ", ".join(" or ".join(group) for group in silent)
+    return (
+        f"{names} could not be read from the vehicle, and no answer is not the default: try again, nearer or with a "
+        f"longer --timeout"
+    )
+
+
+def _against_motion(
+    job: UploadJob,
+    flies: Vehicle,
+    verdict: Verdict,
+    found: Sequence[Off],
+    values: Mapping[str, float],
+    *,
+    allow_parameters: bool,
+) -> str | None:
+    """Why a vehicle that moves otherwise than planned is refused: its return, its times, or its separation.
+
+    A return that runs on farther from corners because the firmware has no other rule is judged with that.
+    """
+    leans = corners_as_it_leans(values)
+    timed = [o for o in found if o.setting.matters == "time"]
+    if job.home_required and job.way_home is not None and job.way_home.route != "mission":
+        if not allow_parameters and job.vehicle is not None:
+            turning = replace(flies, corner_accel_m_s2=job.vehicle.corner_accel_m_s2) if leans else flies
+            if _runs_farther(job.vehicle, turning, job.mission):
+                return _lines("a safe return is required, and it runs on farther than was judged", timed)
+        if (allow_parameters or leans) and (against := _against_return(job, flies, verdict)):
+            return against
+    if job.verdict is not None and not allow_parameters:
+        told_s, takes_s = job.verdict.time_s, verdict.time_s
+        late_s = takes_s - told_s
+        if math.isfinite(late_s) and abs(late_s) > max(SAME_S, SAME_PART * told_s):
+            words = f"the flight takes {takes_s:.1f} s instead of {told_s:.1f} s ({late_s:+.1f} s)"
+            return _lines(f"{words}{LEANS if leans else ''}; --allow-parameters takes that", timed)
+    if job.fleet is not None and (near := job.fleet.against(job.name, flies, verdict)):
+        return _lines(f"with these parameters {near}", timed)
+    return None
+
+
+def _runs_farther(judged: Vehicle, flies: Vehicle, mission: Mission) -> bool:
+    """Whether a return runs on farther than was judged, from a leg or from a corner."""
+    speed_m_s, more = max(mission.commanded_m_s, judged.speed_max_m_s), 1.0 + SAME_PART
+    past_m = [run_past_m(v, speed_m_s, RIGHT_ANGLE_RAD) for v in (judged, flies)]
+    return run_on_m(flies, speed_m_s) > more * run_on_m(judged, speed_m_s) or past_m[1] > more * past_m[0]
+
+
+def _against_return(job: UploadJob, flies: Vehicle, verdict: Verdict) -> str:
+    """Why the return of a vehicle with these parameters is not safe; empty if it is."""
+    from gcsplan.check.returns.way_home import way_home
+
+    assert job.world is not None
+    assert job.way_home is not None
+    home = way_home(
+        verdict, flies, job.world, rtl_rel_home_m=job.way_home.rtl_rel_home_m, terrain_error_m=job.terrain_error_m,
+        rally=False, route=job.way_home.route,
+    )  # fmt: skip
+    return "" if home.safe is True else f"a safe return is required: {home.headline}"
+
+
+def _lines(what: str, found: Sequence[Off]) -> str:
+    return "\n".join([what, *(f"  {o.describe()}" for o in found)])

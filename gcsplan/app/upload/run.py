@@ -1,0 +1,396 @@
+"""Uploads of plans and files to vehicles: which vehicle gets what, over which link, and the results.
+
+There is one link per URL; vehicles on the same URL differ by system id. For ``sim`` the caller passes a function that
+starts one loopback vehicle per UAV, where its mission starts; the results then say *simulated*.
+
+Links and transfers are imported only where a link is opened: most plans are not uploaded, and the MAVLink dialect is
+slow to import.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from gcsplan.app.check.files import check_files
+from gcsplan.app.check.worlds import Checked, split_name
+from gcsplan.app.plan.flight_hours import hours_left
+from gcsplan.app.plan.model import Plan
+from gcsplan.app.upload.fence import not_fenced, upload_fences
+from gcsplan.app.upload.fleet_on_board import FleetOnBoard
+from gcsplan.app.upload.ground import MissionGround
+from gcsplan.app.upload.job import LINK, SIM, JobResult, ProgressCall, UploadJob, UploadOptions
+from gcsplan.app.upload.on_board import judge_on_board, settings_of
+from gcsplan.app.upload.orders import order_of, report_end
+from gcsplan.app.upload.rollback import rolled_back
+from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, UsageError, VehicleRefused
+from gcsplan.export.outdir import write_whole
+from gcsplan.mavlink.files.formats import read_mission_file, write_plan, write_waypoints
+from gcsplan.mavlink.link.url import parse_url
+from gcsplan.mavlink.mission.autopilots import autopilot_of
+from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, Mission
+from gcsplan.mission_file import MissionFile
+from gcsplan.notes.note import Note, Said
+from gcsplan.vehicle import Autopilot, Vehicle
+
+if TYPE_CHECKING:
+    from gcsplan.check.returns.verdict import WayHome
+    from gcsplan.mavlink.link.link import Link
+    from gcsplan.mavlink.link.session.results import UploadResult
+
+LISTEN_S = 1.5
+"""Seconds to listen for a second source of a system id's heartbeats, which come once a second."""
+KINDS = {"mission": MISSION, "fence": FENCE, "rally": RALLY}
+Simulator = Callable[[Sequence[Mission]], AbstractContextManager[str]]
+"""Starts a vehicle for each mission; the context value is the URL where all of them answer."""
+
+
+def targets(where: Sequence[str], vehicles: Sequence[Vehicle]) -> dict[str, str]:
+    """Vehicle name to URL (or `SIM`) from all ``--upload`` words; empty without words. Raises UsageError."""
+    by_name = {v.name: v for v in vehicles}
+    chosen: dict[str, str] = {}
+    single: dict[str, str] = {}
+    for word in where:
+        name, equals, url = word.partition("=")
+        if equals and re.fullmatch(r"[A-Za-z0-9_-]+", name):
+            if name not in by_name:
+                known = ", ".join(by_name)
+                raise UsageError(f"--upload {word}: the mission file has no vehicle {name!r}; it has {known}")
+            single[name] = url if url == SIM else _url(url, word)
+        elif word == LINK:
+            missing = [v.name for v in vehicles if not v.link]
+            if missing:
+                raise UsageError(f"--upload link: {', '.join(missing)} has no `link` in the mission file")
+            chosen |= {v.name: _url(v.link or "", f"link of {v.name}") for v in vehicles}
+        else:
+            url = SIM if word == SIM else _url(word, word)
+            chosen |= dict.fromkeys(by_name, url)
+    to = chosen | single
+    _require_apart(to, by_name)
+    return to
+
+
+def _require_apart(to: Mapping[str, str], by_name: Mapping[str, Vehicle]) -> None:
+    """Raise UsageError for two vehicles of one system id on one link, where nobody could tell them apart."""
+    seats: dict[tuple[object, int], str] = {}
+    for name, url in to.items():
+        if url == SIM:
+            continue  # simulated vehicles of one system id get links of their own
+        other = seats.setdefault((parse_url(url).far_end, by_name[name].sysid), name)
+        if other != name:
+            raise UsageError(
+                f"{other} and {name} both have system id {by_name[name].sysid}, and both would be reached over {url}: "
+                f"give each a link of its own (--upload link takes those of the mission file)"
+            )
+
+
+def _url(text: str, word: str) -> str:
+    """``text`` as a URL in normal form; ``word`` is what the user wrote, for the error. Raises UsageError."""
+    try:
+        return parse_url(text).url
+    except InputError as error:
+        near = [w for w in (SIM, LINK) if w == word.strip().lower()]
+        hint = f"; did you mean {near[0]}?" if near else f". Besides URLs there are {SIM}, {LINK} and NAME=URL"
+        raise UsageError(f"{error.message}{hint}", where=f"upload to {word!r}") from None
+
+
+def jobs_of(
+    plan: Plan,
+    where: Mapping[str, str],
+    homes: Mapping[str, WayHome] = MappingProxyType({}),
+    home_required: bool = False,
+) -> list[UploadJob]:
+    """The upload jobs of a plan; vehicles without a target are left out.
+
+    ``homes``: ways home that were judged; ``home_required``: they must be safe.
+    """
+    source = plan.source
+    ground, fleet = MissionGround(source), FleetOnBoard(plan)
+    return [
+        UploadJob(
+            v.name, where[v.name], v.mission, v.verdict, v.request.vehicle, plan.world, v.request.rtl_rel_home_m,
+            source.terrain_error_m, way_home=homes.get(v.name), home_required=home_required, ground=ground,
+            hours=hours_left(source, v, plan.fleet), fleet=fleet,
+        )
+        for v in plan.vehicles if v.name in where
+    ]  # fmt: skip
+
+
+def jobs_of_files(source: MissionFile, checked: Sequence[Checked], word: str) -> list[UploadJob]:
+    """The upload jobs of checked files; ``word`` as in ``--upload``. Raises UsageError for two files of one vehicle."""
+    seen: dict[str, Path] = {}
+    for c in checked:
+        if seen.setdefault(c.vehicle.name, c.file) is not c.file:
+            raise UsageError(f"{seen[c.vehicle.name]} and {c.file} are both for {c.vehicle.name}: give one of them")
+    to = targets([word], [r.vehicle for r in source.vehicles])
+    missing = [c.vehicle.name for c in checked if c.vehicle.name not in to]
+    if missing:
+        raise UsageError(f"--to {word} says nothing of {', '.join(missing)}")
+    ground = MissionGround(source)
+    return [replace(_job(c, to[c.vehicle.name]), ground=ground) for c in checked]
+
+
+def _job(c: Checked, url: str) -> UploadJob:
+    return UploadJob(
+        c.vehicle.name, url, c.mission, c.verdict, c.vehicle, c.world, c.request.rtl_rel_home_m, c.terrain_error_m,
+        way_home=c.way_home, home_required=c.home_required, hours=c.hours,
+    )  # fmt: skip
+
+
+def unchecked_job(argument: str, url: str, sysid: int) -> tuple[UploadJob, list[Said]]:
+    """The job of a file for ``--unchecked``, and what of the file is not sent with it or was not read.
+
+    The vehicle is asked for its autopilot if the file does not name one.
+    """
+    name, file = split_name(argument)
+    endpoint = parse_url(url)
+    require_file(file)
+    autopilot = None
+    if file.suffix.lower() != ".plan":
+        with open_link(url) as link:
+            autopilot = _autopilot_of(link, sysid)
+    read = read_mission_file(file, autopilot=autopilot)
+    job = UploadJob(name or file.stem, endpoint.url, replace(read.mission, name=name or file.stem, sysid=sysid))
+    return job, [note for note in (*read.notes, read.unread_fence) if note]
+
+
+def open_link(url: str) -> Link:
+    """The link at ``url``, signed if the environment holds a key."""
+    from gcsplan.mavlink.link.frames import signing_key
+    from gcsplan.mavlink.link.link import Link
+
+    return Link(url, key=signing_key())
+
+
+def _autopilot_of(link: Link, sysid: int) -> Autopilot:
+    from gcsplan.mavlink.link.session import session
+
+    state = session.discover(link, sysid, listen_s=LISTEN_S)
+    autopilot = autopilot_of(state.mav_autopilot, state.mav_type)
+    if autopilot is not None:
+        return autopilot
+    raise VehicleRefused(
+        f"vehicle {sysid} calls itself {state.what}, and gcsplan knows {', '.join(Autopilot)}: give a .plan file, "
+        f"which names its autopilot"
+    )
+
+
+def run_jobs(
+    jobs: Sequence[UploadJob],
+    options: UploadOptions,
+    progress: ProgressCall | None = None,
+    *,
+    simulator: Simulator | None = None,
+) -> list[JobResult]:
+    """Upload all jobs at once, read back, compare, and check what was read back; results in the order of ``jobs``."""
+    from gcsplan.mavlink.link.link import Link
+    from gcsplan.mavlink.link.session import session
+
+    with ExitStack() as stack:
+        links: dict[str, Link] = {}  # by job
+        for group in _apart([job for job in jobs if job.url == SIM]):
+            if simulator is None:
+                raise UsageError("nothing here can simulate a vehicle")
+            url = stack.enter_context(simulator([job.mission for job in group]))
+            links |= dict.fromkeys((j.name for j in group), stack.enter_context(Link(url)))  # unsigned: it stays here
+        failed: dict[str, LinkError] = {}
+        for url in dict.fromkeys(job.url for job in jobs if job.url != SIM):
+            try:
+                link = stack.enter_context(open_link(url))
+                links |= dict.fromkeys((j.name for j in jobs if j.url == url), link)
+            except LinkError as error:  # the other vehicles' links may work
+                failed[url] = error
+        if failed and options.atomic:  # nothing has been sent yet, so every vehicle can keep its old mission
+            where = ", ".join(failed)
+            held = LinkError(f"nothing was sent, all or nothing: the link {where} did not open")
+            return [_result(job, failed.get(job.url) or held) for job in jobs]
+        fenced = _fenced(jobs, links, options)
+        barred = not_fenced(fenced)
+        if barred and options.atomic:
+            held = LinkError("nothing was sent but fences, all or nothing: another vehicle's fence is not on board")
+            return [_result(job, barred.get(job.name) or held) for job in jobs]
+        orders = {
+            job.name: order_of(
+                job,
+                links[job.name],
+                options,
+                progress,
+                simulated=job.url == SIM,
+                listen_s=0.0 if job.url == SIM else LISTEN_S,
+            )
+            for job in jobs
+            if job.name in links and job.name not in barred
+        }
+        results = session.upload_fleet(list(orders.values()), ended=report_end(progress))
+        ended = dict(zip(orders, results, strict=True))
+        done = [
+            _with_fence(
+                _result(
+                    job,
+                    ended.get(job.name) or barred.get(job.name) or failed.get(job.url)
+                    or LinkError("the link did not open"),
+                ),
+                fenced.get(job.name),
+            )
+            for job in jobs
+        ]  # fmt: skip
+        return rolled_back(done, orders, ended) if options.atomic else done
+
+
+def _apart(jobs: Sequence[UploadJob]) -> list[list[UploadJob]]:
+    """The jobs in groups, in none of which two have one system id."""
+    groups: list[list[UploadJob]] = []
+    seen: dict[int, int] = {}
+    for job in jobs:
+        group = seen.get(job.mission.sysid, 0)
+        seen[job.mission.sysid] = group + 1
+        if group == len(groups):
+            groups.append([])
+        groups[group].append(job)
+    return groups
+
+
+def _fenced(
+    jobs: Sequence[UploadJob], links: Mapping[str, Link], options: UploadOptions
+) -> dict[str, UploadResult | GcsplanError]:
+    if not any(job.fence is not None for job in jobs):
+        return {}
+    from gcsplan.mavlink.link.session import session
+
+    settings = session.SessionOptions(
+        allow_armed=options.allow_armed, ignore_position=options.ignore_position, listen_s=LISTEN_S,
+        timeout_s=options.timeout_s,
+    )  # fmt: skip
+    return upload_fences(jobs, links, settings)
+
+
+def _with_fence(result: JobResult, fence: UploadResult | GcsplanError | None) -> JobResult:
+    if fence is None or isinstance(fence, GcsplanError):
+        return result
+    fence_result = {
+        "outcome": fence.outcome,
+        "verified": fence.verified,
+        "items": fence.items,
+        "seconds": fence.seconds,
+    }
+    note = Note("fence_on_board", items=fence.items)
+    return replace(
+        result,
+        warnings=tuple(dict.fromkeys((note, *result.warnings, *fence.warnings))),
+        details=dict(result.details or {}) | {"fence": fence_result},
+    )
+
+
+def _result(job: UploadJob, ended: UploadResult | GcsplanError) -> JobResult:
+    if isinstance(ended, GcsplanError):
+        outcome = "refused" if isinstance(ended, VehicleRefused) else "unknown"
+        return JobResult(
+            job.name, job.url, outcome, False, len(job.mission.wire_items()), 0.0, simulated=job.url == SIM,
+            message=str(ended), code=ended.exit_code, reason=ended.reason,
+        )  # fmt: skip
+    error = ended.error()
+    return JobResult(
+        job.name, job.url if job.url == SIM else ended.url, ended.outcome, ended.verified, ended.items, ended.seconds,
+        ended.retries, ended.simulated, str(error) if error else "", ended.warnings,
+        error.exit_code if error else 0, error.reason if error else "", ended.as_dict(),
+    )  # fmt: skip
+
+
+def exit_code(results: Sequence[JobResult]) -> int:
+    """The exit code of a fleet: the worst of 70 (our bug), 7, 6, 5 (then 4); 0 if all are verified."""
+    codes = {d.code for d in results}
+    order = (GcsplanError.exit_code, ReadBackDiffers.exit_code, LinkError.exit_code, VehicleRefused.exit_code)
+    return next((c for c in order if c in codes), max(codes, default=0))
+
+
+def failure(results: Sequence[JobResult]) -> dict[str, Any] | None:
+    """The ``error`` of ``--json``, made of the results with the worst exit code; None if all are verified."""
+    code = exit_code(results)
+    if code == 0:
+        return None
+    worst = [d for d in results if d.code == code]
+    return {
+        "code": code,
+        "reason": worst[0].reason,
+        "message": "\n".join(f"{d.vehicle}: {d.message}" for d in worst),
+        "where": ", ".join(dict.fromkeys(d.url for d in worst)),
+    }
+
+
+def require_file(file: Path) -> None:
+    """Raise InputError if there is no such file, before a vehicle is searched for."""
+    if not os.path.exists(file):
+        raise InputError("there is no such file", where=str(file))
+
+
+def verify_file(
+    argument: str, url: str, sysid: int = 1, *, source: MissionFile | None = None, tolerance_m: float | None = None,
+    timeout_s: float = 60.0, allow_parameters: bool = False,
+) -> JobResult:  # fmt: skip
+    """Compare a file with the mission on board; nothing is written to the vehicle.
+
+    With ``source`` the argument may be NAME=FILE, and what is on board is judged in its world, for its vehicle (whose
+    number holds in place of ``sysid``). ``tolerance_m``: positions that are at most so far away are no difference.
+    """
+    from gcsplan.app.upload import position_tolerance as shifts
+    from gcsplan.mavlink.link.session import session
+
+    shifts.require_tolerance(tolerance_m, judged=source is not None)
+    file = Path(argument) if source is None else split_name(argument)[1]
+    require_file(file)
+    checked = None if source is None else check_files(source, [argument])[0]
+    with open_link(url) as link:
+        if checked is not None:
+            job, notes = _job(checked, link.url), checked.notes
+        else:
+            autopilot = None if file.suffix.lower() == ".plan" else _autopilot_of(link, sysid)
+            read = read_mission_file(file, autopilot=autopilot)
+            job = UploadJob(file.stem, link.url, replace(read.mission, sysid=sysid))
+            notes = tuple(note for note in (*read.notes, read.unread_fence) if note)
+        options = session.SessionOptions(
+            listen_s=LISTEN_S, timeout_s=timeout_s, rtl_rel_home_m=job.rtl_rel_home_m,
+            read_parameters=checked is not None, settings=settings_of(job), vehicle=job.vehicle,
+        )  # fmt: skip
+        judge = judge_on_board(job, allow_unjudged=False, allow_parameters=allow_parameters)
+        result = session.verify_mission(link, job.mission, options=options, judge=judge)
+        result, shifted, cure = shifts.within(result, job.mission, tolerance_m)
+        done = _result(job, result)
+    if checked is not None and done.verified and shifted is None:
+        shifted = Note("judged_again_safe")
+    warnings = (*([] if shifted is None else [shifted]), *notes, *done.warnings)
+    return replace(done, message=done.message + cure if done.message else "", warnings=warnings)
+
+
+def download_to(url: str, sysid: int, file: Path, *, timeout_s: float = 60.0) -> int:
+    """Write the mission on board to a `.waypoints` or `.plan` file; returns the number of its wire items."""
+    if file.suffix.lower() not in (".waypoints", ".plan"):
+        raise UsageError(f"-o {file}: a name that ends in .waypoints or .plan is wanted")
+    if file.is_dir() or not file.parent.is_dir():
+        raise UsageError(f"-o {file}: a file in a directory that is there is wanted")
+    from gcsplan.mavlink.link.session import session
+
+    with open_link(url) as link:
+        autopilot = _autopilot_of(link, sysid)
+        mission = session.download_mission(
+            link, sysid, autopilot, name=file.stem, options=session.SessionOptions(listen_s=0.0, timeout_s=timeout_s)
+        )
+    text = write_plan(mission) if file.suffix.lower() == ".plan" else write_waypoints(mission)
+    write_whole(file, text)
+    return len(mission.wire_items())
+
+
+def clear(url: str, sysid: int, kind: str, *, allow_armed: bool = False, timeout_s: float = 60.0) -> None:
+    """Clear one list on board and read back that it is empty."""
+    from gcsplan.mavlink.link.session import session
+
+    if kind not in KINDS:
+        raise UsageError(f"--type {kind}: mission, fence or rally is wanted")
+    with open_link(url) as link:
+        options = session.SessionOptions(listen_s=LISTEN_S, allow_armed=allow_armed, timeout_s=timeout_s)
+        session.clear_mission(link, sysid, KINDS[kind], options=options).raise_for_outcome()

@@ -1,0 +1,303 @@
+"""A fixed wing's climb-out: straight and slanting, where a multicopter has a column; and what lines up and down keep.
+
+What ArduPlane does (commands_logic.cpp, `do_takeoff`, `verify_takeoff`; takeoff.cpp): once it is fast, it records the
+course over ground on which it was launched and holds its nose on that heading, so a cross wind carries it aside. It
+climbs with the pitch of param1 (4° if that is 0). With an airspeed sensor that is the least pitch: with power to spare
+it climbs at up to TECS_PITCH_MAX (15°; its path is steeper still: 23° flown), so the space between the slant and the
+item's altitude is judged too. At the item's altitude, wherever that is, it turns and flies straight to the next item,
+not along the leg from the item's place (`early_turn`). The mission holds no heading, so the climb-out is judged towards
+the item's place, as maps draw it; if the item has no place, towards the next item.
+
+Climb-outs and glides (`glide`) are exempt from min AGL, climb angle and terrain clearance, as columns are; never from
+zones, their clearance and ceilings. They must keep a clearance over the ground and what stands on it: the altitude
+error. Near the ends, where that is more than half of the height above the touch point, the aircraft is over the landing
+strip: there it keeps that half, over bare ground.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from gcsplan.arrays import Floats
+from gcsplan.check.motion.circles import circle_growth
+from gcsplan.check.motion.flight_state import Aboard
+from gcsplan.check.motion.geodesy import degree_m, flat_m, offset_m
+from gcsplan.check.motion.spline import towards
+from gcsplan.check.motion.stretch import Place, Stretch
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import MissionItem
+from gcsplan.notes.finding import Finding
+from gcsplan.notes.note import Note
+from gcsplan.vehicle import Vehicle
+from gcsplan.world.airspace import Airspace, Legs
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.world import World
+
+LEAST_PITCH_DEG = 4.0
+"""ArduPlane's pitch if the item has none."""
+
+NEAR_M = 1.0
+"""An item this near to home, m, does not define the direction of a climb-out."""
+
+SAME_M = 0.02
+
+SPARED = 0.5
+"""The part of its height that the aircraft needs as clearance while it is too low for the full altitude error."""
+
+
+OVER_M, OVER_S, OVER_FROM = 16.0, 2.0, 0.15
+"""How far above the altitude of its take-off an aircraft with much power gets, for it levels off late: flown were 11 to
+18 m, 1.4 to 1.8 s of its mean climb rate. Metres if that rate is not known, otherwise its seconds; and from which part
+of its climb-out on."""
+
+MOST_PARTS = 24
+"""Most level bands into which the space above a climb-out is divided."""
+
+REACHED_M = 5.0
+"""LOITER_TO_ALT counts an altitude as reached within this, m (navigation.cpp, `loiter_angle_update`)."""
+
+CHORD_M = 2.0
+"""How far the chords of a climbing circle may lie inside it, m."""
+
+BOUND_M = 0.05
+"""Violations up to this, m, are ignored: the exact check bounds the ground beside a line, at times a few centimetres
+too high, and the aircraft stands on it."""
+
+
+def is_wing(vehicle: Vehicle) -> bool:
+    """Return whether the vehicle cannot stand still in the air."""
+    return vehicle.turn_radius_m > 0.0
+
+
+def climb_out(pilot: Aboard, seq: int, item: MissionItem, after: MissionItem | None) -> None:
+    """NAV_TAKEOFF: straight ahead until the item's altitude is reached; ``after``: the next item that is flown to."""
+    lat, lon, ground = pilot.home
+    top = pilot.altitude(item, (lat, lon, ground))
+    ahead = place_of(pilot, item)
+    if ahead is None and after is not None:
+        ahead = place_of(pilot, after)
+        pilot.note(Note("climb_out_towards_next", seq))
+    pilot.airborne = True
+    frame = m.FRAME_SYNONYMS.get(item.frame, item.frame)
+    if ahead is None or top is None or top <= ground or frame == m.TERRAIN:
+        pilot.flight.not_judged.append(Note("climb_out_unclear", seq))
+        pilot.known = False
+        return
+    pitch = item.params[0] if item.params[0] > 0.0 else LEAST_PITCH_DEG
+    climb_deg = min(pitch, pilot.vehicle.limits.max_climb_deg)
+    run_m = (top - ground) / math.tan(math.radians(climb_deg))
+    end = ahead
+    for _ in range(2):  # metres per degree change with the latitude, so the first end is millimetres off
+        part = run_m / flat_m((lat, lon, 0.0), end)
+        end = (lat + part * (end[0] - lat), lon + part * (end[1] - lon), top)
+    known = pilot.vehicle.climb_out
+    counted = Note("climb_as_judged") if known is None else Note("climb_as_given", climb_m_s=known.climb_m_s)
+    heading_deg = _bearing(pilot.home, ahead)
+    pilot.note(
+        Note("climb_out_straight", seq, climb_deg=climb_deg, heading_deg=heading_deg, run_m=run_m, counted=counted)
+    )
+    pilot.note(Note("climb_out_drifts", seq, drift_m=run_m / max(pilot.pace.speed_m_s, 1.0)))
+    pilot.add(seq, "takeoff", pilot.home, end, column=True)
+    for low, high, band_m in above_slant(pilot.home, end, pilot.vehicle.limits, over_m(pilot.vehicle)):
+        pilot.instead(seq, "takeoff", low, high, column=True, band_m=band_m)
+    pilot.at, pilot.direction = end, towards(pilot.home, end)
+
+
+def above_slant(ground: Place, top: Place, limits: Limits, over_m: float) -> list[tuple[Place, Place, float]]:
+    """The space between a climb-out and the altitude of its end, as level lines and half the heights of their bands.
+
+    A place may be any three numbers. The altitude errors cover the gaps between the bands and the slant. ``over_m``:
+    how far above its end the space reaches, from the altitude error on (`over_m`).
+    """
+    rise = top[2] - ground[2]
+    parts = min(max(1, math.ceil(0.5 * rise / max(limits.altitude_error_m, 0.1))), MOST_PARTS)
+    found = []
+    for i in range(parts - 1):
+        a, b, half = i / parts, (i + 1) / parts, 0.5 * rise * (1.0 - (i + 1) / parts)
+        low, high = (
+            (ground[0] + f * (top[0] - ground[0]), ground[1] + f * (top[1] - ground[1]), top[2] - half) for f in (a, b)
+        )
+        found.append((low, high, half))
+    if (half := over_m / 2.0) > 0.0:
+        found.append(((*between(ground, top, OVER_FROM), top[2] + half), (*top[:2], top[2] + half), half))
+    return found
+
+
+def over_m(vehicle: Vehicle) -> float:
+    """How far above its take-off's altitude, and beyond the altitude error, an aircraft may get."""
+    over = OVER_M if vehicle.climb_out is None else OVER_S * vehicle.climb_out.climb_m_s
+    return max(0.0, over - vehicle.limits.altitude_error_m)
+
+
+def between(a: Place, b: Place, part: float) -> tuple[float, float]:
+    return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])
+
+
+def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bool:
+    """Continue the take-off in circles: LOITER_TO_ALT right after a climb-out that ends on its circle.
+
+    Return False and change nothing otherwise. The aircraft may be anywhere within the circle, as low as the
+    climb-out ended.
+    """
+    before = pilot.flight.stretches[-1] if pilot.flight.stretches else None
+    target = pilot.target(item) if pilot.has_place(item) else None
+    if before is None or target is None or not slants([before]) or before.kind != "takeoff":
+        return False
+    reach_m = radius_m * circle_growth(target[2])
+    if target[2] <= pilot.at[2] or flat_m(pilot.at, target) > reach_m:
+        return False
+    low = (*target[:2], pilot.at[2])
+    turns = -1.0 if item.params[1] < 0.0 else 1.0
+    for a, b in pairwise(_helix(pilot.at, target, radius_m, turns, pilot.vehicle.limits.max_climb_slope)):
+        pilot.add(seq, "takeoff", a, b, column=True, reach_m=reach_m - radius_m + CHORD_M)
+    pilot.add(seq, "takeoff", target, target, reach_m=reach_m)
+    pilot.instead(seq, "takeoff", low, target, column=True, reach_m=reach_m)
+    # A climb that is steeper than judged reaches these altitudes before the circle.
+    middle, half = 0.5 * (low[2] + target[2]), 0.5 * (target[2] - low[2])
+    start, end = ((*place[:2], middle) for place in (pilot.home, pilot.at))
+    pilot.instead(seq, "takeoff", start, end, column=True, band_m=half)
+    pilot.note(Note("climb_out_circles", seq, reach_m=reach_m))
+    pilot.low_m, pilot.around_m = min(REACHED_M, target[2] - low[2]), reach_m
+    pilot.at, pilot.direction = target, None
+    return True
+
+
+def _helix(begin: Place, top: Place, radius_m: float, turns: float, slope: float) -> list[Place]:
+    """A climb from ``begin`` to the altitude of ``top`` on a circle around it; ``turns`` 1: clockwise."""
+    east_m, north_m = degree_m(top[0])
+    east, north = offset_m(top, begin)
+    angle = math.atan2(north, east)
+    whole = (top[2] - begin[2]) / slope / radius_m
+    parts = max(1, math.ceil(whole / (2.0 * math.acos(max(0.0, 1.0 - CHORD_M / radius_m)))))
+    places = [begin]
+    for i in range(1, parts + 1):
+        now, z = angle - turns * whole * i / parts, begin[2] + (top[2] - begin[2]) * i / parts
+        flat = radius_m * math.sin(now) / north_m, radius_m * math.cos(now) / east_m
+        places.append((top[0] + flat[0], top[1] + flat[1], z))
+    return places
+
+
+def slants(stretches: Sequence[Stretch]) -> list[Stretch]:
+    """The stretches that leave the ground or come down to it on a slant."""
+    return [s for s in stretches if s.column and s.kind in ("takeoff", "land") and flat_m(s.start, s.end) > SAME_M]
+
+
+def slant_findings(stretches: Sequence[Stretch], vehicle: Vehicle, world: World) -> list[Finding]:
+    """Findings where a climb-out or a glide is too near to the ground or too steep."""
+    found = []
+    for s in stretches:
+        if s.column and s.kind == "takeoff" and s.reach_m > 0.0 and flat_m(s.start, s.end) <= SAME_M:
+            east, north, amsl = (float(x) for x in _one(s.start, world))
+            by = circle_missing_m(np.array([east, north, amsl]), s.reach_m, vehicle.limits, world.airspace)
+            if by > BOUND_M:
+                found.append(_low(s, east, north, amsl, by, world))
+    home = {"takeoff": 0, "land": -1}
+    for kind in ("takeoff", "land"):
+        mine = [s for s in slants(stretches) if s.kind == kind]
+        if not mine:
+            continue
+        touch = mine[home[kind]]
+        point = touch.start if kind == "takeoff" else touch.end
+        for s in mine:
+            worst = slant_shortage(_in_plane(s, world), _one(point, world), s.reach_m, vehicle.limits, world.airspace)
+            if worst is not None:
+                found.append(_low(s, *worst, world))
+            steep = math.degrees(math.atan2(s.start[2] - s.end[2], max(flat_m(s.start, s.end), 1e-9)))
+            limit = vehicle.limits.max_descent_deg
+            if kind == "land" and s is mine[0] and steep > limit * 1.01 + 0.01:
+                note = Note("glides_too_steeply", s.seq, way="land", value_deg=steep, limit_deg=limit)
+                found.append(Finding(s.seq, "descent", note, *s.start, steep, limit, steep - limit, "deg"))
+    return found
+
+
+def slant_shortage(
+    line: Floats, touch: Floats, reach_m: float, limits: Limits, air: Airspace
+) -> tuple[float, float, float, float] | None:
+    """The worst place where ``line`` (2, 3), rising from ``touch`` (3,) or falling to it, is too near to the ground.
+
+    Return (east, north, amsl, metres missing), or None if the line is high enough everywhere. The required clearance
+    rises linearly from 0 at ``touch`` to the altitude error and then stays, so each of the two parts of the line,
+    lowered by its clearance, is straight. Over the strip, the lower part, bare ground counts; beyond it obstacles too.
+    """
+    a, b = (line[0], line[1]) if line[0, 2] <= line[1, 2] else (line[1], line[0])
+    rise = float(b[2] - a[2])
+    if rise <= 0.0:
+        return None
+    error = limits.altitude_error_m
+    begun = float(a[2] - touch[2])
+
+    def clearance(z: float) -> float:
+        return min(error, SPARED * max(z - float(touch[2]), 0.0))
+
+    split = min(max((error / SPARED - begun) / rise, 0.0), 1.0)
+    middle = a + split * (b - a)
+    plain, bad = Limits(min_agl_m=0.0), []
+    for p, q in ((a, middle), (middle, b)):
+        if float(np.linalg.norm(q - p)) <= 1e-6:
+            continue
+        start, end = p - [0.0, 0.0, clearance(p[2])], q - [0.0, 0.0, clearance(q[2])]
+        low = p[2] - touch[2] < error / SPARED - 1e-9
+        # So near to the touch point the aircraft is over the landing strip: no track error.
+        track = np.array([reach_m if low else limits.track_error_m + reach_m])
+        leg = Legs(start[None], end[None], np.zeros(1, bool), track, np.zeros(1))
+        found = (bare(air) if low else air).examine(leg, plain).violations
+        bad += [v for v in found if v.kind in ("min_agl", "coverage") and v.by > BOUND_M]
+    if not bad:
+        return None
+    worst = max(bad, key=lambda v: v.by)
+    return worst.east_m, worst.north_m, worst.amsl_m, worst.by
+
+
+def circle_missing_m(low: Floats, reach_m: float, limits: Limits, air: Airspace) -> float:
+    """By how much a circle around ``low`` (3,) is too near to ground and what stands on it, m; inf where unknown."""
+    plain = Limits(
+        min_agl_m=0.0, track_error_m=limits.track_error_m + reach_m, altitude_error_m=limits.altitude_error_m
+    )
+    return float(air.floor_amsl(low[0], low[1], plain)) - float(low[2])
+
+
+def bare(air: Airspace) -> Airspace:
+    """The airspace over the greatest bare ground: what stands beside the landing strip does not count."""
+    surface = air.surface
+    if surface.top_m is surface.high_m:
+        return air
+    return Airspace(Surface(surface.ground_m, surface.high, surface.grid, high_m=surface.high), (), scale=air.scale)
+
+
+def beside_strip(air: Airspace) -> Note | None:
+    """What a refused climb-out or glide has to do with obstacles, and what to do; None over bare ground."""
+    return None if air.surface.top_m is air.surface.high_m else Note("obstacles_beside_strip")
+
+
+def _low(s: Stretch, east: float, north: float, amsl: float, by: float, world: World) -> Finding:
+    lat, lon = (float(x) for x in world.frame.to_degrees(east, north))
+    note = Note(
+        "near_ground_on_slant", s.seq, way=s.kind, glide=s.kind != "takeoff", by_m=by, lat=lat, lon=lon, amsl_m=amsl,
+        obstacles=beside_strip(world.airspace),
+    )  # fmt: skip
+    return Finding(s.seq, "min_agl", note, lat, lon, amsl, -by, 0.0, by, "m")
+
+
+def place_of(pilot: Aboard, item: MissionItem) -> Place | None:
+    if not pilot.has_place(item):
+        return None
+    place = (item.lat_deg, item.lon_deg, 0.0)
+    return place if flat_m(pilot.home, place) > NEAR_M else None
+
+
+def _bearing(a: Place, b: Place) -> float:
+    east = (b[1] - a[1]) * math.cos(math.radians(a[0]))
+    return math.degrees(math.atan2(east, b[0] - a[0])) % 360.0
+
+
+def _one(p: Place, world: World) -> Floats:
+    return np.array([*world.frame.to_plane(p[0], p[1]), p[2]])
+
+
+def _in_plane(s: Stretch, world: World) -> Floats:
+    return np.array([_one(s.start, world), _one(s.end, world)])

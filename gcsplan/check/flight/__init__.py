@@ -1,0 +1,1 @@
+"""A mission followed item by item: its route, corners, arcs and times."""

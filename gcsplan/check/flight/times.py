@@ -1,0 +1,155 @@
+"""How long each stretch of a flight takes: the fleet's model of motion (`fleet.legs`), with the mission's own speeds.
+
+The same model makes a fleet's time table (`fleet.timing.Course`), so all times of a mission are of one kind: a vehicle
+accelerates, brakes, rounds its corners, and stops where it holds and where a take-off or a landing begins or ends. A
+corner's halves count for their own legs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+
+import numpy as np
+
+from gcsplan.arrays import Floats, Indices
+from gcsplan.check.motion.stretch import Stretch
+from gcsplan.fleet.motion.legs import legs
+from gcsplan.fleet.motion.timing import upright
+from gcsplan.vehicle import Vehicle
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.terrain.vehicle_terrain import VehicleTerrain
+from gcsplan.world.world import World
+
+__all__ = ["over_ground", "pace_over_ground", "seconds_of"]
+
+TERRAIN_STEP_M = 25.0
+"""Longest piece, m, into which a leg that follows the ground is cut."""
+
+ARDUPILOT_DEGREE_M = 111318.84502145034
+"""Metres per degree, Location.h, `LOCATION_SCALING_FACTOR`. An ArduCopter flew 0.2 % faster than commanded east and
+west at 37° N."""
+
+SAME_M = 1.0
+"""A stretch that begins within this of the end of the one before it is flown without a stop: halves of arcs that
+overlap end this near to each other."""
+
+SLANTS_M = 0.01
+
+
+def seconds_of(
+    stretches: Sequence[Stretch], vehicle: Vehicle, world: World, home_deg: tuple[float, float],
+    radius_m: Mapping[int, float] = MappingProxyType({}),
+) -> Floats:  # fmt: skip
+    """(N,) seconds of each stretch, without the hold at its end; ``home_deg``: home's latitude and longitude.
+
+    ``radius_m``: acceptance radii of items, by seq, that are not the vehicle's own.
+    """
+    places = np.array([(s.start, s.end) for s in stretches])
+    ends = np.empty_like(places)
+    ends[..., :2] = world.frame.to_plane(places[..., 0], places[..., 1])
+    ends[..., 2] = places[..., 2]
+    seconds = np.zeros(len(stretches))
+    home_m = world.ground_amsl(*home_deg)
+    home_amsl_m = None if math.isnan(home_m) else home_m
+    for first, last in _runs(stretches, ends):
+        if _upright(stretches[first], ends[first]):
+            seconds[first] = _column_s(stretches[first], ends[first], vehicle, home_amsl_m)
+        else:
+            seconds[first:last] = _legs_s(stretches[first:last], ends[first:last], vehicle, world, home_deg, radius_m)
+    return seconds
+
+
+def _column_s(s: Stretch, ends: Floats, vehicle: Vehicle, home_amsl_m: float | None) -> float:
+    if s.rates_m_s is not None:
+        vehicle = replace(vehicle, climb_m_s=s.rates_m_s[0], descent_m_s=s.rates_m_s[1])
+    parts = upright(ends[0, :2], float(ends[0, 2]), float(ends[1, 2]), vehicle, 0, home_amsl_m)
+    return math.fsum(part.time_s(s.speed_m_s) for part in parts)
+
+
+def _legs_s(
+    run: Sequence[Stretch], ends: Floats, vehicle: Vehicle, world: World, home_deg: tuple[float, float],
+    radius_m: Mapping[int, float],
+) -> Floats:  # fmt: skip
+    """(N,) seconds of each of N stretches that are flown from one standstill to the next."""
+    points, owner = np.concatenate([ends[:1, 0], ends[:, 1]]), np.arange(len(run), dtype=np.intp)
+    follows = np.array([s.terrain for s in run])
+    if follows.any():
+        points, _, owner = over_ground(points, np.zeros(len(points)), owner, world.vehicle_terrain, follows)
+    speed = np.array([s.speed_m_s for s in run])[owner]
+    if vehicle.lays_curves:
+        speed = speed * pace_over_ground(points, home_deg, world.frame)[:-1]
+    own = (vehicle.climb_m_s, vehicle.descent_m_s)
+    stretch = legs(
+        points, vehicle, owner, np.array([s.seq for s in run], dtype=np.intp)[owner],
+        pace=speed, rates_m_s=np.array([s.rates_m_s or own for s in run])[owner],
+        radius_m=np.array([radius_m.get(s.seq, vehicle.acceptance_m) for s in run])[owner], follows=follows[owner],
+    )  # fmt: skip
+    return np.zeros(len(run)) if stretch is None else stretch.shares_s(1.0, len(run))
+
+
+def _runs(stretches: Sequence[Stretch], ends: Floats) -> Iterator[tuple[int, int]]:
+    """Index ranges of stretches that are flown without a stop; a column is a range of its own."""
+    first = 0
+    for i in range(1, len(stretches) + 1):
+        if i == len(stretches) or _stops(stretches[i - 1], stretches[i], ends[i - 1], ends[i]):
+            yield first, i
+            first = i
+
+
+def _stops(s: Stretch, after: Stretch, ends: Floats, ends_after: Floats) -> bool:
+    if s.hold_s > 0.0 or s.kind != after.kind or _upright(s, ends) or _upright(after, ends_after):
+        return True
+    # Between stretches that do not meet something is flown that is not known; but from its circles a climb-out flies to
+    # the point over their middle, which is a stretch without a length.
+    return math.dist(ends[1], ends_after[0]) > SAME_M and (math.dist(*ends_after) > 0.0 or after.hold_s > 0.0)
+
+
+def _upright(s: Stretch, ends: Floats) -> bool:
+    return s.column and math.dist(ends[0, :2], ends[1, :2]) <= SLANTS_M
+
+
+def pace_over_ground(points: Floats, home_deg: tuple[float, float], frame: Frame) -> Floats:
+    """(N,) metres over ground per ArduPilot metre on each leg of ``points`` (N, 3), and last on the line to the first.
+
+    ArduPilot takes a degree of latitude as equally long everywhere, and a degree of longitude as that times the cosine
+    of the latitude halfway between home and the way point (Location.cpp, `get_vector_xy_from_origin_NE`).
+    """
+    lat, lon = frame.to_degrees(points[:, 0], points[:, 1]).T
+    north = (lat - home_deg[0]) * ARDUPILOT_DEGREE_M
+    span = (lon - home_deg[1] + 180.0) % 360.0 - 180.0
+    east = span * ARDUPILOT_DEGREE_M * np.cos(np.radians(0.5 * (lat + home_deg[0])))
+    own = np.hypot(np.roll(east, -1) - east, np.roll(north, -1) - north)
+    true = np.linalg.norm(np.roll(points[:, :2], -1, axis=0) - points[:, :2], axis=1)
+    return np.where(own > 0.01, true / np.maximum(own, 0.01), 1.0)
+
+
+def over_ground(
+    points: Floats, holds: Floats, numbers: Indices, terrain: VehicleTerrain, follows: np.ndarray | None = None
+) -> tuple[Floats, Floats, Indices]:
+    """Points (N, 3), holds (N,) and legs' numbers (N - 1,) with legs cut so that each keeps its height above ground.
+
+    That is interpolated between a leg's ends, over the ground that the vehicle reads.
+
+    ``follows`` (N - 1,): the legs that do so; None: all.
+    """
+    ground_at = terrain.ground_at
+    agl = points[:, 2] - ground_at(points[:, 0], points[:, 1])
+    out, waits, owners = [points[:1]], [holds[:1]], []
+    for i in range(1, len(points)):
+        a, b = points[i - 1], points[i]
+        if follows is not None and not follows[i - 1]:
+            out.append(points[i : i + 1])
+            waits.append(holds[i : i + 1])
+            owners.append(numbers[i - 1 : i])
+            continue
+        parts = max(1, math.ceil(math.hypot(*(b - a)[:2]) / TERRAIN_STEP_M))
+        t = np.arange(1, parts + 1) / parts
+        flat = a[:2] + t[:, None] * (b - a)[:2]
+        amsl = ground_at(flat[:, 0], flat[:, 1]) + agl[i - 1] + t * (agl[i] - agl[i - 1])
+        out.append(np.column_stack([flat, np.where(np.isnan(amsl), a[2] + t * (b[2] - a[2]), amsl)]))
+        waits.append(np.append(np.zeros(parts - 1), holds[i]))
+        owners.append(np.full(parts, numbers[i - 1]))
+    return np.concatenate(out), np.concatenate(waits), np.concatenate(owners)

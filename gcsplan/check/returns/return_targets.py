@@ -1,0 +1,225 @@
+"""Where a return joins the mission: ArduPilot's jump to a return path or to a landing sequence.
+
+- ArduCopter's Auto RTL (mode 27; a failsafe set to 6), and ArduPlane's RTL with RTL_AUTOLAND 4, look for the nearest
+  leg of all return paths and fly to the item at that leg's end (AP_Mission.cpp, `jump_to_closest_mission_leg`). A
+  return path begins at a DO_RETURN_PATH_START and ends at the next landing or DO_LAND_START. Nearness is in space; the
+  first place counts as a point. ArduCopter measures from where it will have stopped, ArduPlane from where it is.
+  ArduCopter 4.6.0 and ArduPlane 4.6.2 are the first to know the command; older ones refuse it on upload.
+- Without a return path ArduCopter's Auto RTL, and ArduPlane's RTL with RTL_AUTOLAND 2, go to the first place behind the
+  nearest DO_LAND_START. How near each is depends on the version, so every one of them is judged.
+- An ArduCopter that lands, or is past such a start in the order of its items, just continues.
+- The way there is the leg of an ordinary item: straight in space for ArduCopter. To a landing ArduCopter flies level
+  since 4.6.
+
+Not judged: jumps behind a start or over it, return paths that hold more than way points and a landing, places in the
+terrain frame.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from gcsplan.arrays import Floats
+from gcsplan.check.flight.times import seconds_of
+from gcsplan.check.motion.commands import LAND_STARTS
+from gcsplan.check.motion.geodesy import flat_m
+from gcsplan.check.motion.stretch import Flight, Stretch
+from gcsplan.mavlink.mission import commands as cmd
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Mission, MissionItem
+from gcsplan.notes.note import Note
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.world import World
+
+LANDS = (cmd.LAND, cmd.VTOL_LAND)
+WITHOUT_PLACE = frozenset({cmd.DO_CHANGE_SPEED, cmd.CONDITION_YAW, cmd.DO_SET_CAM_TRIGG_DIST, cmd.DO_SET_SERVO})
+"""Commands besides way points and landings that a judged return path may hold."""
+
+
+@dataclass(frozen=True, eq=False)
+class Join:
+    """One item to which a return may fly first.
+
+    ``at`` (3,): east_m, north_m, amsl_m of its place; ``lands``: it is a landing, to which a multicopter flies level.
+    ``legs`` (L, 2, 3): the return goes there if one of them is the nearest; empty: it may always. ``rest_j``: energy
+    from there to the ground. ``after``: what is flown next. ``unknown``: how it is flown to is not known, so no return
+    to it counts as safe.
+    """
+
+    seq: int
+    at: Floats
+    lands: bool
+    legs: Floats
+    rest_j: float
+    after: tuple[Stretch, ...]
+    unknown: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Joins:
+    """All items to which returns may fly first. ``path``: along a return path, else to a landing sequence.
+
+    ``why_not``: why they cannot be judged. ``starts``: the wire items of the starts. ``past_seq``: from behind this
+    item on the vehicle just continues; None: from nowhere.
+    """
+
+    path: bool
+    starts: tuple[int, ...]
+    joins: tuple[Join, ...] = ()
+    why_not: tuple[Note, ...] = ()
+    past_seq: int | None = None
+
+    @property
+    def command(self) -> int:
+        """The command that begins what the returns join."""
+        return cmd.DO_RETURN_PATH_START if self.path else cmd.DO_LAND_START
+
+
+def land_starts(mission: Mission, command: int) -> list[int]:
+    """The indices of the items with ``command``."""
+    return [k for k, item in enumerate(mission.items) if item.command == command]
+
+
+def joins_of(mission: Mission, flight: Flight, vehicle: Vehicle, world: World) -> Joins:
+    """The items of ``mission`` (as stored; ``flight`` is what `follow` makes of it) that a return may fly to first."""
+    paths, landings = (land_starts(mission, c) for c in LAND_STARTS)
+    starts = tuple(mission.first_seq + k for k in (paths or landings))
+    if not starts:
+        one, other = (cmd.command_name(c) for c in LAND_STARTS)
+        return Joins(False, (), why_not=(Note("nothing_to_join", one=one, other=other),))
+    finder = _Finder(mission, flight, vehicle, world)
+    if (jump := _jump_at_starts(mission, min(*paths, *landings, len(mission.items)))) is not None:
+        finder.why_not.append(Note("jump_decides_join", jump))
+    for k in paths:
+        finder.path(k)
+    for k in () if paths else landings:
+        finder.join(k, ())
+    joins = finder.found()
+    in_order = [k for k in (*paths, *landings) if flight.apart_from is None or k < flight.apart_from]
+    past = min(in_order, default=None) if mission.autopilot is Autopilot.ARDUCOPTER else None
+    return Joins(
+        bool(paths), starts, joins, tuple(dict.fromkeys(finder.why_not)),
+        None if past is None else mission.first_seq + past,
+    )  # fmt: skip
+
+
+def _jump_at_starts(mission: Mission, first: int) -> int | None:
+    """The wire item of a jump behind the first start, at index ``first``, or from before it to behind it; or None."""
+    seq = mission.first_seq
+    for k, item in enumerate(mission.items):
+        tagged = item.command == cmd.DO_JUMP_TAG
+        if item.command == cmd.DO_JUMP or tagged:
+            target = item.params[0] - seq
+            if k > first or tagged or not target <= first:
+                return seq + k
+    return None
+
+
+@dataclass(eq=False)
+class _Finder:
+    """Collects joins; ``legs`` by index of the item that is flown to."""
+
+    mission: Mission
+    flight: Flight
+    vehicle: Vehicle
+    world: World
+    why_not: list[Note] = field(default_factory=list)
+    legs: dict[int, list[tuple[Floats, Floats]]] = field(default_factory=dict)
+
+    def path(self, start: int) -> None:
+        """Add the legs of the return path that begins at the index ``start``."""
+        before: Floats | None = None
+        for k in range(start, len(self.mission.items)):
+            item = self.mission.items[k]
+            if k > start and item.command not in (cmd.WAYPOINT, *LANDS, cmd.DO_LAND_START, *WITHOUT_PLACE):
+                self.why_not.append(Note("join_unknown_on_path", self._seq(k), way=self._name(k)))
+                return
+            if item.command not in WITHOUT_PLACE and (item.x, item.y, item.z) != (0, 0, 0.0):
+                place = self._place(item)
+                if place is None:
+                    self.why_not.append(Note("join_distance_unknown", self._seq(k), way=self._name(k)))
+                    return
+                if before is None:
+                    self.join(k, ((place, place),))
+                    before = place
+                elif (place != before).any():
+                    self.join(k, ((before, place),))
+                    before = place
+            if item.command in (*LANDS, cmd.DO_LAND_START):
+                return
+
+    def join(self, index: int, legs: Sequence[tuple[Floats, Floats]]) -> None:
+        """A return may continue at the item with this index; it flies to the first item from there on that moves it."""
+        items = self.mission.items
+        first = next((k for k in range(index, len(items)) if cmd.is_nav(items[k].command)), None)
+        if first is None:
+            self.why_not.append(Note("join_leads_nowhere", self._seq(index), way=self._name(index)))
+            return
+        self.legs.setdefault(first, []).extend(legs)
+
+    def found(self) -> tuple[Join, ...]:
+        """The joins; empty if one of them is not known."""
+        joins = [j for k, legs in sorted(self.legs.items()) if (j := self._join(k, legs)) is not None]
+        if not joins:
+            self.why_not.append(Note("join_without_item"))
+        return () if self.why_not else tuple(joins)
+
+    @property
+    def along_path(self) -> bool:
+        """Whether there is a return path; then the autopilot is one that holds its altitude to a landing place."""
+        return any(item.command == cmd.DO_RETURN_PATH_START for item in self.mission.items)
+
+    def _join(self, index: int, legs: Sequence[tuple[Floats, Floats]]) -> Join | None:
+        item, seq = self.mission.items[index], self.mission.first_seq + index
+        copter = self.mission.autopilot is Autopilot.ARDUCOPTER
+        lands = item.command == cmd.LAND and copter and self.along_path
+        if item.command in LANDS and not lands and (place := self._place(item)) is not None:
+            return Join(seq, place, False, np.array(legs).reshape(-1, 2, 3), 0.0, (), unknown=True)
+        if (item.command != cmd.WAYPOINT and not lands) or item.frame in (m.TERRAIN, 11) or not (item.x or item.y):
+            self.why_not.append(Note("join_not_way_point", self._seq(index), way=self._name(index)))
+            return None
+        for part in (self.flight, *self.flight.apart):
+            mine = [k for k, s in enumerate(part.stretches) if s.seq == seq and (lands or s.kind == "cruise")]
+            if not mine:
+                continue
+            rest = part.stretches[mine[-1] + (0 if lands else 1) :]
+            if part.stretches[-1].kind not in ("land", "rtl") or any(math.isinf(s.hold_s) for s in rest):
+                self.why_not.append(Note("join_without_landing", self._seq(index), way=self._name(index)))
+                return None
+            lat, lon, amsl = part.stretches[mine[-1]].end
+            east, north = (float(x) for x in self.world.frame.to_plane(lat, lon))
+            pairs = np.array(legs).reshape(-1, 2, 3)
+            return Join(seq, np.array([east, north, amsl]), lands, pairs, self._energy_j(rest), tuple(rest))
+        self.why_not.append(Note("join_not_followed", self._seq(index), way=self._name(index)))
+        return None
+
+    def _energy_j(self, stretches: Sequence[Stretch]) -> float:
+        energy, times = self.vehicle.energy, [math.nan] * len(stretches)
+        if energy.base_w and stretches:
+            home = self.mission.home.lat_e7 / 1e7, self.mission.home.lon_e7 / 1e7
+            times = seconds_of(stretches, self.vehicle, self.world, home).tolist()
+        return math.fsum(
+            energy.under_way_j(abs(s.end[2] - s.start[2]), flat_m(s.start, s.end), time_s) + energy.hold_w() * s.hold_s
+            for s, time_s in zip(stretches, times, strict=True)
+        )
+
+    def _place(self, item: MissionItem) -> Floats | None:
+        """(3,) the place of an item as ArduPilot measures to it; None if that cannot be told."""
+        frame = m.FRAME_SYNONYMS.get(item.frame, item.frame)
+        if frame not in (m.RELATIVE, m.GLOBAL) or not (item.x or item.y) or not math.isfinite(item.z):
+            return None
+        home = self.mission.home
+        ground = self.world.ground_amsl(home.lat_e7 / 1e7, home.lon_e7 / 1e7)
+        base = ground if frame == m.RELATIVE else 0.0
+        east, north = (float(x) for x in self.world.frame.to_plane(item.lat_deg, item.lon_deg))
+        return np.array([east, north, base + item.z])
+
+    def _seq(self, index: int) -> int:
+        return self.mission.first_seq + index
+
+    def _name(self, index: int) -> str:
+        return cmd.command_name(self.mission.items[index].command)

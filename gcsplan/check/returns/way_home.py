@@ -1,0 +1,279 @@
+"""The way home: the autopilot's own return, judged from every point of every leg of a mission.
+
+Each point of a mission has its own straight line home. Parts of the mission are judged as a whole: every return from a
+part lies within half its length of the return from its middle. The ground is bounded over that line widened by so much,
+with the kernels and margins of the exact check (`gcsplan.world.level_lines`), and zones are compared with the region
+that the returns sweep. Nothing is sampled, so a point reported as safe is safe. A point reported as unsafe is unsafe,
+except: at the ends of a stretch (`refinement.SMALLEST_M`), in safe gaps within a stretch that are shorter than
+`COARSE_M` (`COARSEST_M` on long missions), and for what the bounds of the ground beside a line cost: the widening times
+the slope there. Apart from that the lowest altitude is at most `LEVEL_M` too high.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from gcsplan.check.battery import battery_home
+from gcsplan.check.flight.corners import round_corners
+from gcsplan.check.flight.follow import follow
+from gcsplan.check.judge import TERRAIN_ERROR_M
+from gcsplan.check.motion.commands import LAND_STARTS
+from gcsplan.check.motion.home_height import why_unknown, with_error_of_home
+from gcsplan.check.motion.return_rules import RULES
+from gcsplan.check.motion.stretch import Flight, Place
+from gcsplan.check.returns.along_mission import return_by_mission
+from gcsplan.check.returns.footprint import Target
+from gcsplan.check.returns.lowest_height import lowest_agl
+from gcsplan.check.returns.obstacles_met import GradedObstacles, obstacles_of_returns
+from gcsplan.check.returns.rally import Proposal, propose
+from gcsplan.check.returns.refinement import CLEAR, LEGAL, Refinement, sizes_m
+from gcsplan.check.returns.return_targets import LANDS, joins_of
+from gcsplan.check.returns.stretches import rel_home, stretches_of
+from gcsplan.check.returns.trace import MissionTrace, TraceParts, trace_of
+from gcsplan.check.returns.verdict import ProfilePoint, RallyPoint, UnsafeStretch, WayHome
+from gcsplan.check.returns.words import together_m
+from gcsplan.check.verdict import Verdict
+from gcsplan.mavlink.mission.autopilots import profile_of
+from gcsplan.mavlink.mission.commands import command_name
+from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mavlink.mission.return_route import ReturnRoute
+from gcsplan.notes.note import Note
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.world import World
+
+__all__ = ["RallyPoint", "UnsafeStretch", "WayHome", "way_home"]
+
+PROFILE_POINTS = 400
+NOISE_M = 1e-3
+"""Subtracted from the highest altitude, so that it does not touch what is above it, m."""
+
+MOST_UNKNOWN = 5
+"""Stretches from which a return that joins the mission is not known, that are told."""
+
+
+def way_home(
+    verdict: Verdict,
+    vehicle: Vehicle,
+    world: World,
+    *,
+    rtl_rel_home_m: float | None = None,
+    terrain_error_m: float = TERRAIN_ERROR_M,
+    rally: bool = True,
+    route: ReturnRoute | None = None,
+) -> WayHome:
+    """Judge the return home from every point of the mission of ``verdict``.
+
+    ``rtl_rel_home_m`` is the vehicle's return altitude above home; None: the autopilot's default. ``rally``: propose
+    rally points if no altitude is clear from every point. ``route``: straight home, or to where the return joins the
+    mission (`joins`); None: not said, which counts as straight home. Never raises for a mission that is merely unsafe.
+    """
+    mission, rule = verdict.mission, RULES[vehicle.autopilot]
+    stored = replace(mission, items=tuple(profile_of(mission.autopilot).stored(item) for item in mission.items))
+    lat, lon = mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7
+    ground, unsure = world.ground_amsl(lat, lon), why_unknown(mission.home, vehicle, world)
+    vehicle = with_error_of_home(vehicle, mission.home, world)
+    judged_m = rule.default_rel_home_m if rtl_rel_home_m is None else rtl_rel_home_m
+    flight = follow(stored, vehicle, world.ground_amsl, world.read_amsl, rtl_rel_home_m=judged_m)
+    if verdict.legs:
+        round_corners(flight, stored, vehicle, world.frame)
+    trace = trace_of(flight, vehicle, world, terrain_error_m) if verdict.legs else None
+    if trace is None or math.isnan(ground) or unsure is not None:
+        why = unsure or Note("mission_not_followed" if trace is None else "home_not_on_ground")
+        return _not_judged(verdict, vehicle, judged_m, rtl_rel_home_m is None, (why,))
+    if route == "mission":
+        return _along_mission(verdict, vehicle, stored, flight, trace, judged_m)
+    home = (lat, lon, ground)
+    east, north = (float(x) for x in world.frame.to_plane(lat, lon))
+    target = Target(east, north, ground, ground)
+    level = ground + judged_m
+    refinement = refinement_of(trace, target, vehicle, level)
+    lowest, highest = _lowest(refinement, CLEAR, ground)
+    lowest_legal, highest_legal = _lowest(refinement, LEGAL, ground)
+    unsafe = stretches_of(trace, refinement, CLEAR, level, target)
+    irregular = stretches_of(trace, refinement, LEGAL, level, target, but=CLEAR)
+    proposal = propose(trace, refinement, target, vehicle, judged_m) if rally and lowest is None else None
+    unsafe_m = together_m((s.from_m, s.to_m) for s in unsafe)
+    if proposal is not None and not proposal.points and _left_m(proposal) >= unsafe_m:
+        # The proposal was looked at less closely than the altitude that was judged, which is as good.
+        proposal = replace(proposal, rel_home_m=judged_m, left=tuple(unsafe))
+    best_m = judged_m if not unsafe and not irregular else _whole(lowest_legal, highest_legal)
+    if best_m is None:
+        best_m = judged_m if not unsafe else _whole(lowest, highest)
+    notes = _notes(vehicle, judged_m, rtl_rel_home_m is None)
+    notes += _warnings(refinement, vehicle, ground, lowest)
+    return WayHome(
+        vehicle=vehicle.name,
+        autopilot=vehicle.autopilot,
+        path_safe=verdict.safe,
+        max_agl_m=vehicle.limits.max_agl_m,
+        parameter=rule.parameter,
+        rtl_rel_home_m=judged_m,
+        assumed=rtl_rel_home_m is None,
+        home=home,
+        lowest_rel_home_m=lowest,
+        highest_rel_home_m=highest,
+        lowest_legal_rel_home_m=lowest_legal,
+        unsafe=unsafe,
+        irregular=irregular,
+        battery=battery_home(verdict, vehicle, home, level),
+        advised_rel_home_m=proposal.rel_home_m if proposal else lowest,
+        set_rel_home_m=proposal.rel_home_m if best_m is None and proposal else best_m,
+        set_leaves_m=_left_m(proposal) if best_m is None else _short_m(verdict, vehicle, home, best_m),
+        rally=proposal.points if proposal else (),
+        left=proposal.left if proposal else (),
+        profile=_profile(trace, refinement),
+        lowest=lowest_agl(trace, trace.cut(refinement.first_m), target, vehicle, level),
+        not_judged=(
+            *_but_the_return(flight),
+            *(() if route == "straight" else _landing_sequence(mission)),
+        ),
+        notes=tuple(notes + list(proposal.notes if proposal else ())),
+    )
+
+
+def _along_mission(
+    verdict: Verdict, vehicle: Vehicle, stored: Mission, flight: Flight, trace: MissionTrace, judged_m: float
+) -> WayHome:
+    """The way home if returns join the mission, at a return path or a landing sequence."""
+    home = _not_judged(verdict, vehicle, judged_m, False, ())
+    if vehicle.autopilot is Autopilot.PX4:
+        return replace(home, route="mission", not_judged=(Note("px4_joins_unread"),))
+    joins = joins_of(stored, flight, vehicle, trace.world)
+    known = _but_the_return(flight)
+    if joins.why_not:
+        return replace(home, route="mission", starts=joins.starts, along_path=joins.path,
+                       not_judged=(*joins.why_not, *known))  # fmt: skip
+    landing = frozenset(k for k, item in enumerate(stored.items, stored.first_seq) if item.command in LANDS)
+    found = return_by_mission(trace, joins, landing, verdict, vehicle)
+    notes = list(home.notes)
+    if joins.path:
+        notes.append(Note("return_path_by_version"))
+    if vehicle.autopilot is Autopilot.ARDUCOPTER:
+        notes.append(Note("fence_returns_straight"))
+    if found.stopped_early:
+        notes.append(Note("mission_too_long"))
+    return replace(
+        home, route="mission", starts=joins.starts, along_path=joins.path, unsafe=found.unsafe,
+        irregular=found.irregular, battery=found.battery, notes=tuple(notes),
+        not_judged=(*(Note("from_stretch", stretch=s.place_and_why) for s in found.unknown[:MOST_UNKNOWN]), *known),
+    )  # fmt: skip
+
+
+def _but_the_return(flight: Flight) -> list[Note]:
+    """What was not judged of a flight, without the return that ArduPlane flies by itself: that is judged here."""
+    return [note for note in flight.not_judged if note.code != "returns_by_itself"]
+
+
+def refinement_of(trace: MissionTrace, target: Target, vehicle: Vehicle, level: float) -> Refinement:
+    """The returns from all of ``trace`` to ``target``, refined for ``level``."""
+
+    def judged(parts: TraceParts, whole: bool) -> GradedObstacles:
+        return obstacles_of_returns(trace, parts, target, vehicle, whole=whole)
+
+    field = trace.world.airspace._field
+    away_m = float(np.hypot(trace.east - target.east_m, trace.north - target.north_m).mean())
+    sizes = sizes_m(trace, away_m, min(field.step_x, field.step_y))
+    return Refinement(trace, judged, target.ground_amsl_m, (level,), *sizes)
+
+
+def _lowest(refinement: Refinement, grade: int, home_amsl_m: float) -> tuple[float | None, float | None]:
+    """The lowest altitude that is safe from every point, and the highest up to which it stays so, above home."""
+    obstacles = refinement.strict[grade]
+    level = obstacles.together(refinement.start)
+    top = obstacles.highest(level) if math.isfinite(level) else math.inf
+    return rel_home(obstacles, level, home_amsl_m), None if math.isinf(top) else top - home_amsl_m - NOISE_M
+
+
+def _whole(lowest_m: float | None, highest_m: float | None) -> float | None:
+    """An altitude to set: the lowest in whole metres, rounded up, or exactly if that is above the highest."""
+    if lowest_m is None:
+        return None
+    whole = float(max(math.ceil(lowest_m - 1e-6), 1))
+    return whole if highest_m is None or whole <= highest_m else lowest_m
+
+
+def _short_m(verdict: Verdict, vehicle: Vehicle, home: Place, rel_home_m: float) -> float:
+    """Metres of the mission from which the battery is not enough for a return at that altitude."""
+    battery = battery_home(verdict, vehicle, home, home[2] + rel_home_m)
+    return 0.0 if battery is None else together_m(battery.short)
+
+
+def _left_m(proposal: Proposal | None) -> float:
+    return math.inf if proposal is None else together_m((s.from_m, s.to_m) for s in proposal.left)
+
+
+def _profile(trace: MissionTrace, refinement: Refinement) -> tuple[ProfilePoint, ...]:
+    """The levels that each part of the mission needs; parts are joined into at most `PROFILE_POINTS` groups."""
+    parts, mains = refinement.parts, trace.mains
+    own = np.flatnonzero(parts.stretch < mains)
+    if not len(own):
+        return ()
+    a, b = (np.interp(u[own], trace.u, trace.along) for u in (parts.start, parts.end))
+    low, high = trace.heights(parts)
+    needs = [refinement.strict[g].lowest(refinement.start)[own] for g in (CLEAR, LEGAL)]
+    bins = np.minimum((a / max(float(b.max()), 1e-9) * PROFILE_POINTS).astype(int), PROFILE_POINTS - 1)
+    at = np.flatnonzero(np.diff(bins, prepend=-1))
+    columns = [
+        np.minimum.reduceat(a, at), np.maximum.reduceat(b, at),
+        np.minimum.reduceat(low[own], at), np.maximum.reduceat(high[own], at),
+        *(np.maximum.reduceat(need, at) for need in needs),
+    ]  # fmt: skip
+    return tuple(
+        ProfilePoint(*row[:4], *(x if math.isfinite(x) else None for x in row[4:]))
+        for row in zip(*(c.tolist() for c in columns), strict=True)
+    )
+
+
+def _notes(vehicle: Vehicle, judged_m: float, assumed: bool) -> list[Note]:
+    rule = RULES[vehicle.autopilot]
+    notes = []
+    if assumed:
+        notes.append(Note("return_altitude_assumed", rel_home_m=judged_m, parameter=rule.parameter))
+    if not rule.climbs_first:
+        notes.append(Note("return_from_flight"))
+    return notes
+
+
+def _landing_sequence(mission: Mission) -> list[Note]:
+    """That ArduPlane's return may lead to a landing sequence of the mission; empty if there is none.
+
+    With DO_LAND_START or DO_RETURN_PATH_START in its mission ArduPlane arms only with RTL_AUTOLAND set, and RTL then
+    leads there: at once (2), after home (1), or to the nearest leg of the return path (4) (mode_rtl.cpp, `navigate`);
+    with 3 it does not.
+    """
+    starts = [k for k, item in enumerate(mission.items, start=mission.first_seq) if item.command in LAND_STARTS]
+    if mission.autopilot is not Autopilot.ARDUPLANE or not starts:
+        return []
+    name = command_name(mission.items[starts[0] - mission.first_seq].command)
+    return [Note("return_leads_on", starts[0], command=name)]
+
+
+def _warnings(refinement: Refinement, vehicle: Vehicle, ground: float, lowest: float | None) -> list[Note]:
+    """What the user must know of the altitudes that were found."""
+    notes = []
+    most_amsl = vehicle.limits.max_amsl_m
+    if most_amsl is not None and lowest is not None and ground + lowest > most_amsl - vehicle.limits.altitude_error_m:
+        most_m = most_amsl - vehicle.limits.altitude_error_m - ground
+        notes.append(
+            Note("clear_above_ceiling", lowest_m=lowest, most_m=most_m)
+            if most_m > 0.0
+            else Note("clear_above_low_ceiling", lowest_m=lowest)
+        )
+    if refinement.stopped_early:
+        notes.append(Note("terrain_too_fine"))
+    return notes
+
+
+def _not_judged(verdict: Verdict, vehicle: Vehicle, judged_m: float, assumed: bool, why: tuple[Note, ...]) -> WayHome:
+    home = verdict.mission.home
+    return WayHome(
+        vehicle=vehicle.name, autopilot=vehicle.autopilot, path_safe=verdict.safe,
+        parameter=RULES[vehicle.autopilot].parameter, rtl_rel_home_m=judged_m, assumed=assumed,
+        home=(home.lat_e7 / 1e7, home.lon_e7 / 1e7, home.amsl_m), lowest_rel_home_m=None, highest_rel_home_m=None,
+        lowest_legal_rel_home_m=None, unsafe=(), irregular=(), battery=None, advised_rel_home_m=None,
+        set_rel_home_m=None, set_leaves_m=None, rally=(), left=(), profile=(), lowest=None, not_judged=why,
+        notes=tuple(_notes(vehicle, judged_m, assumed)),
+    )  # fmt: skip

@@ -1,0 +1,318 @@
+"""``gcsplan bench …``: all measurements; each command is one call into `gcsplan.bench`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from gcsplan.cli.arguments.options import ClusterOption, JobsOption, JsonOption
+from gcsplan.cli.process.exit import emit, put
+from gcsplan.errors import UsageError
+
+bench_app = typer.Typer(
+    help="Measurements: planners on real terrain, the papers' tables, legs checked, uploads.", no_args_is_help=True
+)
+
+
+WithoutOption = Annotated[
+    list[str] | None,
+    typer.Option("--without", metavar="NAME", help="A search that the default planner does without; repeatable."),
+]
+
+
+def _tell(result: dict[str, Any], report: Callable[[Any], str], as_json: bool) -> None:
+    if as_json:
+        emit(result)
+    else:
+        put(report(result) + "\n")
+
+
+@bench_app.command("check", short_help="Legs checked a second.")
+def bench_check(
+    legs: Annotated[int, typer.Option(metavar="N", help="Random one-kilometre legs.")] = 200_000,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the legs.")] = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure how many one-kilometre legs are checked per second, on the sample terrain."""
+    from gcsplan.bench import check as bench
+
+    result = bench.run(legs=legs, seed=seed)
+    _tell(result, bench.report, as_json)
+
+
+@bench_app.command("upload", short_help="Upload beside MAVSDK's; a fleet beside its slowest.")
+def bench_upload(
+    items: Annotated[
+        int | None, typer.Option(metavar="N", help="Items of each mission [default: 600; of a fleet 50]")
+    ] = None,
+    runs: Annotated[int, typer.Option(metavar="N", help="Runs of each, in turn.")] = 15,
+    fleet: Annotated[
+        int | None, typer.Option(metavar="N", help="Instead: N vehicles at once, beside the slowest of them alone.")
+    ] = None,
+    drop: Annotated[float, typer.Option(metavar="P", help="With --fleet: part of the packets that is lost.")] = 0.05,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure uploads to the loopback vehicle, side by side with MAVSDK's upload to the same vehicle (extra `test`)."""
+    from gcsplan.bench import upload as bench
+
+    if fleet is not None:
+        measured = bench.run_fleet(fleet=fleet, items=50 if items is None else items, drop=drop)
+        _tell(measured, bench.report_fleet, as_json)
+        return
+    items = 600 if items is None else items
+    result = bench.run(items=items, runs=runs)
+    _tell(result, bench.report, as_json)
+
+
+@bench_app.command("fleet", short_help="A large fleet, from mission file to upload.")
+def bench_fleet(
+    vehicles: Annotated[int, typer.Option(metavar="N", help="Vehicles, 2 to 2000.")] = 1000,
+    interval: Annotated[float, typer.Option(metavar="S", help="Time between one arrival and the next.")] = 4.0,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of depots, places and zones.")] = 1,
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Mission file and outputs go there.")] = Path(
+        "bench-fleet"
+    ),
+    upload: Annotated[bool, typer.Option("--upload", help="Also upload to simulated vehicles.")] = False,
+    jobs: JobsOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Make the mission of a large fleet over the sample terrain, plan and export it, and sample all distances."""
+    from gcsplan.bench import fleet as bench
+
+    result = bench.run(vehicles, out, seed=seed, interval_s=interval, jobs=jobs, upload=upload)
+    _tell(result, bench.report, as_json)
+
+
+@bench_app.command("functions", short_help="SSGWO's nine functions.")
+def bench_functions(
+    runs: Annotated[int, typer.Option(metavar="N", help="Runs of each (paper: 50).")] = 50,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of all runs.")] = 1,
+    jobs: JobsOption = None,
+    out: Annotated[Path | None, typer.Option("-o", "--out", metavar="DIR", help="CSV and Markdown go there.")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Run SSGWO's tables 1 and 2 again, beside the printed numbers, with optima in the middle and moved."""
+    from gcsplan.bench import functions as bench
+    from gcsplan.bench.files import ready
+
+    if out is not None:
+        ready(out)  # find a bad directory before the long run
+    result = bench.run(runs=runs, seed=seed, jobs=jobs)
+    if out is not None:
+        bench.write(result, out)
+    _tell(result, bench.report, as_json)
+
+
+@bench_app.command("terrain", short_help="Planners over real terrain, beside OMPL and mealpy.")
+def bench_terrain(
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Tables and figure go there.")] = Path(
+        "bench-terrain"
+    ),
+    kinds: Annotated[
+        str, typer.Option(metavar="LIST", help="Of problems; everyday, too.")
+    ] = "main,energy,band,large,many,turn",
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the problems.")] = 1,
+    runs: Annotated[int, typer.Option(metavar="N", help="Runs of ours; medians are reported.")] = 9,
+    seconds: Annotated[str, typer.Option(metavar="LIST", help="OMPL's seconds.")] = "1,10",
+    rivals: Annotated[bool, typer.Option("--rivals/--no-rivals", help="Run OMPL too (extra `bench`).")] = True,
+    swarms: Annotated[bool, typer.Option("--swarms/--no-swarms", help="Run mealpy too (extra `bench`).")] = True,
+    kept: Annotated[bool, typer.Option("--kept", help="Rivals' answers already in DIR only.")] = False,
+    minute: Annotated[bool, typer.Option("--minute", help="Ours once more with 60 s.")] = False,
+    errors: Annotated[bool, typer.Option("--errors", help="With the clearance and errors of a real mission.")] = False,
+    gap: Annotated[float, typer.Option("--gap", metavar="PERCENT", help="Certified gap at which ours may stop.")] = 0.1,
+    count: Annotated[int | None, typer.Option(metavar="N", help="Problems of each group [default: all]")] = None,
+    without: WithoutOption = None,
+) -> None:
+    """Plan a set of problems made from a seed with every planner; the same exact check judges all."""
+    from rich.console import Console
+
+    from gcsplan.bench.terrain import report as terrain_report
+    from gcsplan.bench.terrain import run as terrain
+    from gcsplan.cli.output.console import remark
+    from gcsplan.cli.output.screens import RESULTS
+
+    try:
+        budgets = [float(s) for s in seconds.split(",")]
+    except ValueError:
+        raise UsageError(f"--seconds takes numbers such as 1,10, given {seconds!r}") from None
+    result = terrain.run(
+        out, seed=seed, kinds=kinds.split(","), runs=runs, seconds=budgets, rivals=rivals, swarms=swarms,
+        kept_only=kept, long=minute, errors=errors, count=count, tell=remark, gap_percent=gap,
+        without=without or (),
+    )  # fmt: skip
+    Console(file=RESULTS, width=200).print(terrain_report.table(result.lines, f"terrain, seed {seed}"))
+
+
+@bench_app.command("swarms", short_help="Swarms over real terrain, beside optimal.")
+def bench_swarms(
+    out: Annotated[
+        Path, typer.Option("-o", "--out", metavar="DIR", help="Tables go there; the same command goes on there.")
+    ] = Path("bench-swarms"),
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the missions.")] = 1,
+    count: Annotated[int | None, typer.Option(metavar="N", help="Missions of each group [default: all 20]")] = None,
+    evaluations: Annotated[int, typer.Option(metavar="N", help="Paths that each search may try.")] = 10_000,
+    method: Annotated[
+        list[str] | None,
+        typer.Option("--method", metavar="NAME", help="krill, cmaes, 'mealpy DE', …; repeatable [all]."),
+    ] = None,
+    encodings: Annotated[bool, typer.Option("--encodings", help="Compare encodings instead.")] = False,
+    warm: Annotated[bool, typer.Option("--warm", help="Searches around the path of `optimal`, too.")] = False,
+    jobs: JobsOption = None,
+) -> None:
+    """Search 60 missions with room by every swarm: raw legal, repaired or refused, and the length over `optimal`."""
+    from rich.console import Console
+
+    from gcsplan.bench.swarms import run as swarms
+    from gcsplan.cli.output.console import remark
+    from gcsplan.cli.output.screens import RESULTS
+
+    result = swarms.run(
+        out,
+        seed=seed,
+        count=count,
+        evaluations=evaluations,
+        names=method,
+        encodings=encodings,
+        warm=warm,
+        jobs=jobs,
+        tell=remark,
+    )
+    Console(file=RESULTS, width=200).print(result.table())
+
+
+@bench_app.command("everyday", short_help="A working day's missions, beside a visibility graph.")
+def bench_everyday(
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Tables go there.")] = Path("bench-everyday"),
+    seeds: Annotated[str, typer.Option(metavar="LIST", help="Seeds of the missions.")] = "1",
+    count: Annotated[int, typer.Option(metavar="N", help="Missions of each seed.")] = 100,
+    kinds: Annotated[str | None, typer.Option(metavar="LIST", help="Kinds of missions [default: all]")] = None,
+    without: WithoutOption = None,
+) -> None:
+    """Plan short legs, walls, hooks, combs, rings, circles, polygons, vias, levels: flat, hills, the sample DEM."""
+    from gcsplan.bench.everyday import run as everyday
+    from gcsplan.bench.everyday.missions import EVERYDAY_KINDS
+    from gcsplan.cli.output.console import remark
+
+    try:
+        numbers = [int(s) for s in seeds.split(",")]
+    except ValueError:
+        raise UsageError(f"--seeds takes whole numbers such as 1,2,3, given {seeds!r}") from None
+    asked = EVERYDAY_KINDS if kinds is None else kinds.split(",")
+    outcomes = everyday.run(out, seeds=numbers, count=count, kinds=asked, without=without or (), tell=remark)
+    put(everyday.report(outcomes))
+
+
+@bench_app.command("papers", short_help="The five papers' tables run again.")
+def bench_papers(
+    out: Annotated[
+        Path, typer.Option("-o", "--out", metavar="DIR", help="Runs and report; the same command goes on there.")
+    ] = Path("papers"),
+    scenario: Annotated[
+        list[str] | None, typer.Option("--scenario", metavar="NAME", help="Of missions/papers; repeatable [all].")
+    ] = None,
+    algorithm: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--algorithm", metavar="NAME", help="Of the papers or a reading, `ssgwo:leaders-all`; repeatable [all]."
+        ),
+    ] = None,
+    runs: Annotated[int | None, typer.Option(metavar="N", help="Of each [the paper's number, 30 where none].")] = None,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of all runs.")] = 1,
+    jobs: JobsOption = None,
+    cluster: ClusterOption = None,
+    missions: Annotated[Path | None, typer.Option(metavar="DIR", help="Where the mission files are.")] = None,
+    readings: Annotated[
+        bool, typer.Option("--readings/--no-readings", help="Run other readings of the papers too.")
+    ] = True,
+    speed: Annotated[
+        bool, typer.Option("--speed", help="Measure speed instead, beside mealpy's (extra `bench`).")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Run every scenario and algorithm of the five papers, beside their printed numbers, straight line and optimum."""
+    if speed:
+        from gcsplan.bench.papers import speed as papers_speed
+
+        measured = papers_speed.run(missions=missions)
+        if as_json:
+            emit(measured)
+        else:
+            put(papers_speed.report(measured))
+        return
+    from gcsplan.bench.papers import report as papers_report
+    from gcsplan.bench.papers import run as papers
+
+    result = papers.run(
+        scenario or None, algorithm or None, runs, seed, jobs, out, cluster, None, missions=missions, readings=readings
+    )
+    files = papers_report.write(result, out)
+    if as_json:
+        emit(papers.plain(result) | {"files": [str(file) for file in files]})
+    else:
+        put(papers_report.report(result))
+
+
+@bench_app.command("metabox", short_help="Our optimisers beside MetaEvoBox's, on its UAV family.")
+def bench_metabox(
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Instances and tables go there.")] = Path(
+        "bench-metabox"
+    ),
+    python: Annotated[
+        Path | None, typer.Option("--python", metavar="FILE", help="Of MetaEvoBox's environment [default: this one].")
+    ] = None,
+    instances: Annotated[int, typer.Option(metavar="N", help="Generated instances, 15 and 30 threats in turn.")] = 2,
+    runs: Annotated[int, typer.Option(metavar="N", help="Of each optimiser on each instance.")] = 5,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of instances and runs.")] = 1,
+    evaluations: Annotated[int, typer.Option(metavar="N", help="Of each run; MetaEvoBox's own number.")] = 2500,
+    algorithm: Annotated[
+        list[str] | None, typer.Option("--algorithm", metavar="NAME", help="Of ours or theirs; repeatable [all].")
+    ] = None,
+    jobs: Annotated[int, typer.Option(metavar="N", help="Processes of MetaEvoBox.")] = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Run our optimisers beside MetaEvoBox's own on generated instances of its UAV family (extra `metabox`)."""
+    from gcsplan.bench.metabox import report as metabox_report
+    from gcsplan.bench.metabox import run as metabox
+    from gcsplan.cli.output.console import remark
+
+    def tell(done: int, of: int) -> None:
+        if done % 50 == 0 or done == of:
+            remark(f"{done} of {of} runs")
+
+    result = metabox.run(
+        out, python, instances=instances, runs=runs, seed=seed, evaluations=evaluations,
+        algorithms=algorithm or None, jobs=jobs, done=tell,
+    )  # fmt: skip
+    files = metabox_report.write(result, out)
+    if as_json:
+        emit(result | {"rows": metabox_report.rows(result), "files": [str(file) for file in files]})
+    else:
+        put(metabox_report.report(result))
+
+
+@bench_app.command("scale", short_help="Cost against size, and what a cluster would do.")
+def bench_scale(
+    out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Tables and picture go there.")] = Path(
+        "bench-scale"
+    ),
+    axes: Annotated[
+        str, typer.Option(metavar="LIST", help="Of missions,vehicles,zones,cells,workers.")
+    ] = "missions,vehicles,zones,cells,workers",
+    missions: Annotated[int, typer.Option(metavar="N", help="Missions of the longest batch.")] = 40,
+    workers: Annotated[int, typer.Option(metavar="N", help="Processes that share a batch, at most.")] = 2,
+    kill: Annotated[bool, typer.Option("--kill", help="Also kill a worker in the middle of a batch.")] = False,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of missions and hills.")] = 1,
+    as_json: JsonOption = False,
+) -> None:
+    """Measure time and memory against missions, vehicles, zones, cells of the DEM and workers (extra `cluster`)."""
+    from gcsplan.bench.files import ready
+    from gcsplan.bench.scale import run as bench
+    from gcsplan.cli.output.console import remark
+
+    ready(out)  # find a bad directory before the long run
+    result = bench.run(axes.split(","), missions, workers, seed, kill=kill, tell=remark)
+    bench.write(result, out)
+    _tell(result, bench.report, as_json)

@@ -1,0 +1,383 @@
+"""`gcsplan plan` and `gcsplan planners`."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gcsplan.cli.arguments import completion
+from gcsplan.cli.arguments.options import (
+    LINKS,
+    ArmedOption,
+    AtomicOption,
+    AtOption,
+    ClusterOption,
+    DatumOption,
+    HeightUnitOption,
+    JobsOption,
+    JsonOption,
+    LeaveOutOption,
+    ListZonesOption,
+    MissionArgument,
+    NodataOption,
+    ObjectiveOption,
+    ParametersOption,
+    PlaceOption,
+    PlannerOption,
+    RequireWayHomeOption,
+    SeedOption,
+    TimeoutOption,
+    UnitsName,
+    UnitsOption,
+    UnjudgedOption,
+    WayHomeOption,
+    terrain_keys,
+)
+from gcsplan.cli.process.exit import complain, emit, talking
+from gcsplan.errors import CheckFailed, InputError, NoMission, UsageError
+
+if TYPE_CHECKING:
+    from gcsplan.app.fleet.start_time import GateTime
+    from gcsplan.app.plan.model import Plan
+    from gcsplan.app.upload.job import JobResult, UploadJob, UploadOptions
+    from gcsplan.check.returns.verdict import WayHome
+    from gcsplan.mission_file import MissionFile
+    from gcsplan.notes.note import Said
+    from gcsplan.units import Units
+
+SHOWN = 15
+"""Names of written files that are printed at most; a fleet has hundreds of files."""
+
+
+EncodingOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME",
+        autocompletion=completion.encodings,
+        help="A swarm's encoding: paper (its paper's), box, sections, sections-whole, polar, polar-signed, "
+        "bspline, offsets.",
+    ),
+]
+CostOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME", autocompletion=completion.costs, help="A swarm's cost: krill, ssgwo, msfoa, abo, ib-abc."
+    ),
+]
+WarmStartOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME", help="A swarm begins around this path: `optimal`, the default planner's, or a vehicle's."
+    ),
+]
+
+
+def plan(
+    mission: MissionArgument,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", metavar="DIR", help="Output directory [default: ./<mission stem>]")
+    ] = None,
+    planner: PlannerOption = None,
+    objective: ObjectiveOption = None,
+    seed: SeedOption = None,
+    encoding: EncodingOption = None,
+    cost: CostOption = None,
+    warm_start: WarmStartOption = None,
+    upload: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="WHERE",
+            autocompletion=completion.words("sim", "link"),
+            help="A URL for all vehicles, NAME=URL for one, `link` (the mission file's links) or `sim` (simulated "
+            f"vehicles). May be repeated. URLs: {LINKS}",
+        ),
+    ] = None,
+    gate_utc: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME",
+            help="The common start as a time of day, UTC (18:30:00): every vehicle waits in the air for its own "
+            "second. ArduCopter alone; needs --allow-unjudged, for nobody knows how long it will wait.",
+        ),
+    ] = None,
+    at: AtOption = None,
+    report: Annotated[
+        bool, typer.Option("--report", help="Also write report.html: map, profiles, way home, fleet; one page.")
+    ] = False,
+    way_home: WayHomeOption = False,
+    require_way_home: RequireWayHomeOption = False,
+    rally: Annotated[
+        bool,
+        typer.Option("--rally", help="Write the rally points that the way home proposes into each .plan."),
+    ] = False,
+    fence: Annotated[
+        bool,
+        typer.Option("--fence", help="Zones without floor and ceiling as a fence: in the .plan, and sent first."),
+    ] = False,
+    fence_infinite: Annotated[
+        bool, typer.Option("--fence-infinite", help="As --fence, with zones that have a height as if they had none.")
+    ] = False,
+    png: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.png|DIR",
+            help="Also draw map and profiles to this picture; into a directory: each figure as a picture of its own.",
+        ),
+    ] = None,
+    units: UnitsOption = UnitsName.METRIC,
+    allow_unjudged: UnjudgedOption = False,
+    allow_armed: ArmedOption = False,
+    ignore_position: PlaceOption = False,
+    allow_parameters: ParametersOption = False,
+    atomic: AtomicOption = False,
+    timeout: TimeoutOption = 60.0,
+    vertical_datum: DatumOption = None,
+    height_unit: HeightUnitOption = None,
+    nodata: NodataOption = None,
+    list_zones: ListZonesOption = False,
+    leave_out: LeaveOutOption = False,
+    jobs: JobsOption = None,
+    cluster: ClusterOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Plan a mission file, write its outputs, and upload and verify them on request.
+
+    Without --upload nothing is sent. The outputs are written whole or not at all. If no safe mission exists, earlier
+    outputs are moved to DIR/previous, so that no old mission is flown by mistake. One vehicle without a mission refuses
+    a whole fleet, unless it may be left out.
+    """
+    from gcsplan.app.fleet import pipeline
+    from gcsplan.app.fleet.may_fly import flyable
+    from gcsplan.app.fleet.start_time import GateTime
+    from gcsplan.app.output import files as outputs
+    from gcsplan.app.plan.way_home import is_required
+    from gcsplan.cli.output.console import plan_table, release_table, remark, upload_table
+    from gcsplan.cli.output.planning_display import planning_display
+    from gcsplan.cli.output.return_table import say_homes
+    from gcsplan.export.outdir import settle_outputs
+    from gcsplan.mission_file.samples import file_of
+    from gcsplan.units import units_of
+
+    system = units_of(units)
+    if list_zones:
+        return _list_zones(mission, system, upload, as_json, at)
+    directory = Path(file_of(mission).stem) if out is None else out
+    gate = None if gate_utc is None else GateTime.parse(gate_utc, datetime.now(UTC))
+    each = _require_options(planner, objective, png, directory)
+    if settle_outputs(directory):
+        remark(f"an earlier run was cut off while it wrote to {directory}: the outputs before it were put back")
+    source: MissionFile | None = None
+    try:
+        read = terrain_keys(vertical_datum, height_unit, nodata)
+        depart = None if gate is None else gate.start
+        source = pipeline.load_mission(mission, departure=depart, at=at, terrain=read)
+        targets: dict[str, str] = {}
+        if upload or fence or fence_infinite:  # otherwise the upload modules need not be imported
+            from gcsplan.app.upload import fence as fencing
+            from gcsplan.app.upload import run as uploads
+            from gcsplan.app.upload.job import UploadOptions
+
+            targets = uploads.targets(upload or [], [r.vehicle for r in source.vehicles])
+        names = [r.vehicle.name for r in source.vehicles]
+        with planning_display(names, objective or source.planner.objective) as progress:
+            planned = pipeline.plan(
+                source, planner=planner, objective=objective, seed=seed,
+                options=_given(encoding=encoding, cost=cost, warm_start=warm_start),
+                progress=progress, gate_utc=depart, jobs=jobs, cluster=cluster, leave_out=leave_out or None,
+            )  # fmt: skip
+        planned, homes = flyable(
+            planned, allow_unjudged=allow_unjudged, asked=report or way_home or rally, require_way_home=require_way_home
+        )
+        orders: list[UploadJob] = []
+        if upload or fence or fence_infinite:
+            where = targets or dict.fromkeys((v.name for v in planned.vehicles), "")
+            orders = uploads.jobs_of(planned, where, homes, is_required(source, require_way_home))
+        fence_notes: Sequence[tuple[str, Said]] = ()
+        if fence or fence_infinite:  # a fence that the mission would breach is refused before anything is written
+            orders, fence_notes = fencing.with_fences(orders, infinite=fence_infinite)
+        fences = {job.name: job.fence.items for job in orders if job.fence is not None}
+        files = outputs.outputs_of(planned, homes, fences, rally=rally)
+        if report:
+            files["report.html"] = outputs.report_of(planned, (), homes, system)
+    except UsageError:
+        raise  # a mistake on the command line does not invalidate an earlier mission
+    except (InputError, NoMission, CheckFailed):
+        _retire(directory, None if as_json else source)
+        raise
+    pictures = {} if png is None else _pictures(planned, png, each)
+    _write(directory, files, pictures, later=["upload.json"] if targets else [])
+    if not as_json:
+        plan_table(planned, homes, system)
+        say_homes(homes, system)
+        _say_written(directory, list(files), fence_notes, system)
+    results: list[JobResult] = []
+    if targets:
+        options = UploadOptions(
+            allow_armed=allow_armed, ignore_position=ignore_position, allow_parameters=allow_parameters, atomic=atomic,
+            timeout_s=timeout,
+        )  # fmt: skip
+        results = _upload(orders, options, gate)
+        _add_results(directory, planned, results, homes, system if report else None)
+        if not as_json:
+            upload_table(results, units=system)
+            release_table(planned, results, gate)
+    left_out = _left_out(planned, mission)
+    failure = (uploads.failure(results) if targets else None) or left_out
+    if as_json:
+        emit(outputs.summary_of(planned, results, homes), failure)
+    raise typer.Exit(failure["code"] if failure is not None else 0)
+
+
+def _add_results(
+    directory: Path, planned: Plan, results: list[JobResult], homes: Mapping[str, WayHome], report: Units | None
+) -> None:
+    """Add what an upload came to; ``report``: the units of a report that tells it too, None without one."""
+    from gcsplan.app.output import files as outputs
+
+    told = {"upload.json": lambda: outputs.upload_text(planned, results, homes)}
+    if report is not None:
+        told["report.html"] = lambda: outputs.report_of(planned, results, homes, report)
+    _add(directory, told)
+
+
+def _left_out(planned: Plan, mission: Path) -> dict[str, Any] | None:
+    """Name the vehicles that are left out on standard error; returns the ``error`` of ``--json``, None without one."""
+    from gcsplan.app.plan.left_out import refusal_of
+
+    if not planned.left_out:
+        return None
+    refusal = refusal_of(planned.left_out)
+    complain(refusal)
+    return refusal.as_dict() | {"where": str(mission)}
+
+
+def _given(**options: object) -> dict[str, object]:
+    """The options that are given."""
+    return {key: value for key, value in options.items() if value is not None}
+
+
+def _list_zones(mission: Path, units: Units, upload: list[str] | None, as_json: bool, at: str | None) -> None:
+    from gcsplan.cli.commands.zones import show_zones
+
+    if upload:
+        raise UsageError("--list-zones plans nothing, so that nothing can be sent; leave --upload out")
+    show_zones([mission], units, as_json=as_json, at=at)
+
+
+def _require_options(planner: str | None, objective: str | None, png: Path | None, directory: Path) -> bool:
+    """Whether ``png`` is a directory of separate figures. Raises UsageError for wrong options."""
+    from gcsplan.planners import registry
+
+    if planner is not None:
+        try:
+            registry.get(planner)
+        except InputError as error:
+            raise UsageError(f"--planner: {error}") from None
+    if objective not in (None, "length", "energy"):
+        raise UsageError(f"--objective {objective}: length or energy is wanted")
+    each = png is not None and (png.is_dir() or png == directory)
+    named = png is not None and png.suffix.lower() == ".png" and (png.parent.is_dir() or png.parent == directory)
+    if png is not None and not (each or named):
+        raise UsageError(f"--png {png}: a directory, or a name that ends in .png in one that is there, is wanted")
+    return each
+
+
+def _retire(directory: Path, source: MissionFile | None) -> None:
+    """Move the outputs of an earlier plan out of the way, since there is no mission now, and say what its
+    terrain has to note."""
+    from gcsplan.cli.output.console import remark, say_terrain
+    from gcsplan.export.outdir import retire_outputs
+
+    try:
+        if retire_outputs(directory):
+            remark(f"earlier outputs in {directory} were moved to {directory / 'previous'}")
+    except InputError as error:  # the reason why there is no mission matters more
+        remark(f"note: earlier outputs are still in {directory} and are of no use now: {error}")
+    if source is not None:
+        say_terrain(source)
+
+
+def _write(directory: Path, files: Mapping[str, str], pictures: dict[Path, bytes], later: Sequence[str]) -> None:
+    """Write the outputs and the pictures; those inside the directory are written and removed with its outputs.
+
+    ``later``: outputs that are written afterwards.
+    """
+    from gcsplan.cli.output.console import remark
+    from gcsplan.export.outdir import can_hold, outputs_in, write_outputs, write_whole
+
+    beside = [file for file in pictures if can_hold(directory, file)]
+    earlier = outputs_in(directory)
+    in_the_way = write_outputs(directory, {**files, **{file.name: pictures.pop(file) for file in beside}})
+    gone = [name for name in earlier if name not in later and not os.path.lexists(directory / name)]
+    for file, content in pictures.items():
+        write_whole(file, content)
+    if gone:
+        shown = ", ".join([*gone[:SHOWN], *([f"{len(gone) - SHOWN} more"] if len(gone) > SHOWN else [])])
+        cure = "; --report writes one of this plan" if "report.html" in gone else ""
+        remark(f"note: gone from {directory}, because this plan has no such output: {shown}{cure}")
+    if in_the_way:
+        remark(f"{', '.join(in_the_way)} in {directory} were not gcsplan's, and were moved to {directory / 'previous'}")
+
+
+def _add(directory: Path, files: Mapping[str, Callable[[], str]]) -> None:
+    """Write what became of the upload beside the other outputs; the outcome itself matters more than a failure here."""
+    from gcsplan.cli.output.console import remark
+    from gcsplan.export.outdir import add_output
+
+    try:
+        for name, content in files.items():
+            add_output(directory, name, content())
+    except InputError as error:
+        remark(f"note: what became of the upload is not written: {error}")
+
+
+def _say_written(directory: Path, files: list[str], notes: Sequence[tuple[str, Said]], units: Units) -> None:
+    """Print the notes on the fences, and what was written; a fleet has hundreds of files."""
+    from gcsplan.cli.output.console import say, say_notes_of
+    from gcsplan.notes.note import Wording
+
+    say_notes_of(notes, Wording(units))
+    shown = [*files[:SHOWN], f"… and {len(files) - SHOWN} more"] if len(files) > SHOWN + 1 else files
+    say(f"written to {directory}{os.sep}: {', '.join(shown)}")
+
+
+def _pictures(planned: Plan, png: Path, each: bool) -> dict[Path, bytes]:
+    """One picture of everything, or one for each figure in the directory ``png``."""
+    from gcsplan.app.output import files as outputs
+
+    if each:
+        return {png / name: content for name, content in outputs.figures_of(planned).items()}
+    return {png: outputs.picture_of(planned)}
+
+
+def _upload(jobs: list[UploadJob], options: UploadOptions, gate: GateTime | None) -> list[JobResult]:
+    """Upload all jobs with their progress shown."""
+    from gcsplan.app.upload import run as uploads
+    from gcsplan.cli.output.console import transfer_progress
+    from gcsplan.sim.vehicle.server import loopback_fleet
+
+    if gate is not None:
+        gate.require_ahead(datetime.now(UTC))  # planning took time, so check again
+    names = [job.name for job in jobs]
+    with talking(names), transfer_progress(names) as moved_on:
+        return uploads.run_jobs(jobs, options, moved_on, simulator=loopback_fleet)
+
+
+def planners(as_json: JsonOption = False) -> None:
+    """List the planners, with paper and default parameters."""
+    from gcsplan.cli.output.console import planners_table
+    from gcsplan.planners import registry
+
+    rows = [
+        {"name": e.name, "summary": e.summary, "paper": e.paper, "defaults": dict(e.defaults)}
+        for e in registry.TABLE.values()
+    ]
+    if as_json:
+        emit({"planners": rows})
+    else:
+        planners_table(rows)

@@ -1,0 +1,1 @@
+"""How each autopilot flies a path in time."""

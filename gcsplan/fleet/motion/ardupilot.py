@@ -1,0 +1,356 @@
+"""The motion of ArduPilot through way points: each leg an S-curve of its own, the next begun while this one ends.
+
+ArduPilot flies each leg as if it stopped at its end, and begins the next leg while this one slows down, adding both
+motions (SCurve.cpp, `advance_target_along_track`). It begins as early as the middle of the turn then lies within
+WPNAV_RADIUS of the way point, is no faster than either leg allows, and turns with no more than WPNAV_ACCEL_C and
+WPNAV_ACCEL_Z (parameters' defaults). So a flight takes the seconds of its legs less those in which two of them overlap.
+
+It waits for a vehicle that lags behind (`advance_wp_target_along_track`), which it does where it speeds up from a low
+speed: `LAG_S` is what that was measured to cost.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gcsplan.arrays import Bools, Floats, Indices
+from gcsplan.fleet.motion.lean import leaning_m_s
+from gcsplan.fleet.motion.scurve import Begun, Curves, along_slope, curves
+from gcsplan.fleet.motion.speeds import POSITION_ERROR_M, bounds
+from gcsplan.fleet.motion.trailing import trailing_s
+from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, Autopilot, Vehicle
+
+__all__ = ["CORNER_M", "Curved", "curved"]
+
+CORNER_M = 2.0
+"""WPNAV_RADIUS, default: the middle of a turn lies this near to its way point."""
+
+FULL_ACCEL, CORNER_ACCEL = COPTER_PEAK_ACCEL, COPTER_CORNER_ACCEL
+"""A curve's peak acceleration and the one across a turn, per `Vehicle.accel_m_s2` and `Vehicle.corner_accel_m_s2`."""
+
+LAG_S, LAG_FROM, REST_M_S = 0.36, 0.6, 0.96
+"""Speeding up by a factor f costs LAG_S·(ln f - LAG_FROM) seconds more than its curve, if that is above 0; a standstill
+counts as REST_M_S. Measured on ArduCopter 4.7 at 5 to 15 m/s, from rest and out of turns of 4 to 135 degrees."""
+
+_TRIED, _ROUNDS = 16, 3
+_STEPS, _WITHIN = 30, 1e-6
+_HALVINGS = 60
+_LEAST_LENGTH_M = 1e-3
+_SAME_S = 1e-9
+_LEVEL = np.array([1.0, 1.0, 0.0])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Curved:
+    """Legs between two standstills, L of them, each of one or more straight parts, P in all.
+
+    ``knots`` (P + 1, 3) are the ends of the parts in metres, ``at`` (P + 1,) where these are: number of the leg plus
+    part of the leg. ``way`` (L, 3) are the legs as the autopilot counts them, in metres: a leg that follows the ground
+    is level. ``begins``, ``ends`` (L, 3) are the directions in which each leg begins and ends; of a curve they differ.
+    ``part_m`` (P,) are the parts' lengths so counted. The speed along a part is at most ``most_m_s`` (P,) and
+    at most the cruise speed times ``per_cruise`` (P,). ``owner`` (P,) is the caller's number of each part. Parts that
+    ``follows`` (P,) follow the ground, with ``rates_m_s`` (P, 2) of climb and descent (`trailing`).
+    """
+
+    knots: Floats
+    at: Floats
+    way: Floats
+    begins: Floats
+    ends: Floats
+    part_m: Floats
+    most_m_s: Floats
+    per_cruise: Floats
+    owner: Indices
+    vehicle: Vehicle
+    follows: Bools
+    rates_m_s: Floats
+
+    @property
+    def start(self) -> Floats:
+        """(P, 3) where each part begins."""
+        return self.knots[:-1]
+
+    def time_s(self, cruise_m_s: float) -> float:
+        """Seconds for the stretch at a cruise speed."""
+        flown, overlap, lag = self._legs(cruise_m_s)
+        return float(flown.time_s.sum() - overlap.sum() + lag.sum())
+
+    def shares_s(self, cruise_m_s: float, legs: int) -> Floats:
+        """(``legs``,) the seconds of each leg, 0 to ``legs`` - 1 in ``owner``; together they are `time_s`.
+
+        A leg ends in the middle of the turn, where ArduPilot counts its way point as reached.
+        """
+        flown, overlap, lag = self._legs(cruise_m_s)
+        seconds = flown.time_s + lag
+        seconds[1:] -= 0.5 * overlap
+        seconds[:-1] -= 0.5 * overlap
+        part_s, leg = self._part_s(cruise_m_s), self._leg
+        share = part_s / np.bincount(leg, weights=part_s)[leg]
+        return np.bincount(self.owner, weights=seconds[leg] * share, minlength=legs).astype(np.float64)
+
+    def motion(self, cruise_m_s: float, error_m: float = POSITION_ERROR_M) -> tuple[Floats, Floats, Indices]:
+        """Times (M,) since the stretch began, places (M, 3) and legs (M,) at the end of each of M straight pieces.
+
+        Straight motion at constant speed between them is at most ``error_m`` away from the true motion: with
+        accelerations up to A, a piece of t seconds differs by A·t²/8.
+        """
+        flown, overlap, lag = self._legs(cruise_m_s)
+        seconds, ramp = flown.time_s, flown.start_s
+        begin = np.append(0.0, np.cumsum(seconds[:-1] - overlap))
+        end = begin + seconds
+        turned = end[:-1] - 0.5 * overlap
+        step = np.sqrt(8.0 * error_m / (2.0 * flown.accel_m_s2))  # two legs may accelerate at once
+        pieces = np.ceil(ramp / step).astype(np.intp)
+        times = np.unique(np.concatenate([
+            turned, _spread(begin, ramp, pieces), _spread(end - ramp, ramp, pieces), self._parts_s(flown, begin),
+        ]))  # fmt: skip
+        times = times[np.append(np.diff(times) > _SAME_S, True)]
+        times = times[times > _SAME_S]
+        places, part = self._places(flown, begin, times), self._parts_at(flown, begin, turned, times)
+        since = np.append(0.0, turned)
+        late = np.interp(times, np.column_stack([since, since + 0.5 * ramp]).ravel(), _steps(lag))
+        return times + late, places, self.owner[part]
+
+    @property
+    def _leg(self) -> Indices:
+        """(P,) the leg of each part."""
+        return np.floor(0.5 * (self.at[1:] + self.at[:-1])).astype(np.intp)
+
+    def _part_s(self, cruise_m_s: float) -> Floats:
+        """(P,) seconds of each part at its highest speed."""
+        speed = np.minimum(self.most_m_s, cruise_m_s * self.per_cruise)
+        if not self.follows.any():
+            return np.asarray(self.part_m / speed)
+        return trailing_s(
+            self.part_m, np.diff(self.knots[:, 2]), self.rates_m_s, speed, self.follows,
+            FULL_ACCEL * self.vehicle.accel_m_s2, self.vehicle.vertical_accel_m_s2,
+        )  # fmt: skip
+
+    def _legs(self, cruise_m_s: float) -> tuple[Curves, Floats, Floats]:
+        """The legs' curves at a cruise speed; the seconds (L - 1,) for which each overlaps with the next; and the
+        seconds (L,) by which the vehicle lags behind while it speeds up on each."""
+        run, rise = np.hypot(self.way[:, 0], self.way[:, 1]), self.way[:, 2]
+        length = np.hypot(run, rise)
+        speed = length / np.bincount(self._leg, weights=self._part_s(cruise_m_s))
+        upward = np.full(len(length), self.vehicle.vertical_accel_m_s2)
+        accel = along_slope(run, rise, np.full(len(length), FULL_ACCEL * self.vehicle.accel_m_s2), upward, upward)
+        flown = curves(length, speed, accel, self.vehicle.leg_jerk_m_s3)
+        turns = _Turns.between(flown, (self.ends, self.begins), speed, self.vehicle)
+        overlap = _overlaps(turns)
+        slow = np.append(REST_M_S, np.maximum(turns.speed_m_s(overlap), REST_M_S))
+        lag = LAG_S * np.maximum(np.log(np.maximum(flown.peak_m_s / slow, 1.0)) - LAG_FROM, 0.0)
+        return flown, overlap, lag
+
+    def _parts_s(self, flown: Curves, begin: Floats) -> Floats:
+        """(K,) the times at which the ends of parts within a leg are passed."""
+        inner = np.flatnonzero(self.at != np.floor(self.at))
+        leg = np.floor(self.at[inner]).astype(np.intp)
+        one = flown.of(leg)
+        low, high = np.zeros(len(leg)), one.time_s
+        for _ in range(_HALVINGS if len(leg) else 0):
+            middle = 0.5 * (low + high)
+            short = one.gone_m(middle) < (self.at[inner] - leg) * one.length_m
+            low, high = np.where(short, middle, low), np.where(short, high, middle)
+        return begin[leg] + high
+
+    def _parts_at(self, flown: Curves, begin: Floats, turned: Floats, times: Floats) -> Indices:
+        """(M,) the parts that end at ``times`` (M,) or are flown then; a leg ends in the middle of its turn."""
+        leg = np.searchsorted(turned, times - 0.5 * _SAME_S)
+        one = flown.of(leg)
+        here = np.clip(one.gone_m(times - begin[leg]) / one.length_m, 1e-6, 1.0)
+        return np.searchsorted(self.at, leg + here * (1.0 - 1e-9)) - 1
+
+    def _places(self, flown: Curves, begin: Floats, times: Floats) -> Floats:
+        """(M, 3) where it is at ``times`` (M,): the motions of two legs added, of which one may have ended."""
+        leg = np.searchsorted(begin, times, side="right") - 1
+        before = np.maximum(leg - 1, 0)
+        places = self._on(leg, flown, begin, times)
+        return np.where((leg > 0)[:, None], places + self._on(before, flown, begin, times) - self._along(leg), places)
+
+    def _on(self, leg: Indices, flown: Curves, begin: Floats, times: Floats) -> Floats:
+        one = flown.of(leg)
+        return self._along(leg + np.minimum(one.gone_m(times - begin[leg]) / one.length_m, 1.0))
+
+    def _along(self, at: Floats | Indices) -> Floats:
+        return np.column_stack([np.interp(at, self.at, self.knots[:, k]) for k in range(3)])
+
+
+def curved(
+    points: Floats, vehicle: Vehicle, owner: Indices, leg: Indices, pace: Floats | None, rates_m_s: Floats | None,
+    follows: Bools | None = None,
+) -> Curved | None:  # fmt: skip
+    """The stretch through ``points`` (N, 3) without a stop; None if nothing moves.
+
+    ``owner`` (N - 1,) are the caller's numbers of the parts, ``leg`` (N - 1,) numbers of the legs that they belong to;
+    for the others see `legs.legs`.
+    """
+    keep = np.append(True, np.linalg.norm(np.diff(points, axis=0), axis=1) > _LEAST_LENGTH_M)
+    p, owner, leg = points[keep], owner[keep[1:]], leg[keep[1:]]
+    if len(p) < 2:
+        return None
+    d = np.diff(p, axis=0)
+    new = np.append(True, leg[1:] != leg[:-1])
+    number = np.cumsum(new) - 1
+    first = np.flatnonzero(new)
+    last = np.append(first[1:], len(d))
+    run, length = np.hypot(d[:, 0], d[:, 1]), np.linalg.norm(d, axis=1)
+    rates = np.array([[vehicle.climb_m_s, vehicle.descent_m_s]]) if rates_m_s is None else rates_m_s[keep[1:]]
+    rates = np.broadcast_to(rates, (len(d), 2))
+    most, per_cruise = bounds(length, run, d[:, 2], rates)
+    several = last - first > 1
+    cut = several[number] & (run > 0.0)  # parts of a leg that follows the ground or a curve
+    trails = np.zeros(len(d), dtype=np.bool_)
+    if follows is not None:
+        trails = follows[keep[1:]] & cut
+        most = np.where(trails, math.inf, most)  # `trailing` keeps the rates
+    if vehicle.autopilot is Autopilot.ARDUCOPTER and vehicle.lean_angle_deg is not None:
+        slope = np.arctan2(d[:, 2], np.maximum(run, 1e-12))
+        lean = leaning_m_s(vehicle.lean_angle_deg, slope, 0.5 * (p[1:, 2] + p[:-1, 2]))
+        most = np.minimum(most, lean)
+    if pace is not None:
+        per_cruise = per_cruise * pace[keep[1:]]
+    way = p[last] - p[first]
+    level = np.where(cut, run / length, 1.0)
+    way[several, 2] = 0.0
+    part_m = length * level
+    whole = np.bincount(number, weights=part_m)
+    straight = np.linalg.norm(way, axis=1)
+    way = np.where((straight > 0.0)[:, None], way, d[last - 1])
+    way *= (whole / np.linalg.norm(way, axis=1))[:, None]
+    begins, ends = (_unit(np.where(several[:, None], d[k] * _LEVEL, d[k]), way) for k in (first, last - 1))
+    done = np.cumsum(part_m) - np.concatenate([[0.0], np.cumsum(whole)])[number]
+    at = np.append(0.0, number + np.minimum(done / whole[number], 1.0))
+    at[last] = number[last - 1] + 1.0
+    return Curved(p, at, way, begins, ends, part_m, most * level, per_cruise * level, owner, vehicle, trails, rates)
+
+
+def _unit(way: Floats, instead: Floats) -> Floats:
+    """(L, 3) the directions of ``way``; those of ``instead`` where it has no length."""
+    known = np.linalg.norm(way, axis=1) > _LEAST_LENGTH_M
+    course = np.where(known[:, None], way, instead)
+    return np.asarray(course / np.linalg.norm(course, axis=1)[:, None])
+
+
+def _spread(begin: Floats, seconds: Floats, pieces: Indices) -> Floats:
+    """The ends of ``pieces`` (N,) equal pieces of each of N spans, and their beginnings."""
+    count = pieces + 1
+    span = np.repeat(np.arange(len(begin)), count)
+    step = np.arange(len(span)) - np.repeat(np.cumsum(count) - count, count)
+    return begin[span] + seconds[span] * step / pieces[span]
+
+
+def _steps(lag: Floats) -> Floats:
+    """(2L,) the delay before and after each of L rises of it."""
+    after = np.cumsum(lag)
+    return np.column_stack([after - lag, after]).ravel()
+
+
+def _overlaps(turns: _Turns) -> Floats:
+    """(T,) for how many seconds the leg before each turn is still flown when the next begins."""
+    found = turns.most_s.copy()
+    excess = turns.excess(found)
+    left = np.flatnonzero(excess > 0.0)
+    if len(left):
+        found[left] = _zero(turns.of(left).excess, found[left], excess[left])
+    # Accelerations rise and fall again. The vehicle waits until all is right: the latest is the earliest in time.
+    if turns.gentle(found[None]).all():
+        return found
+    low, high = np.zeros_like(found), found
+    for _ in range(_ROUNDS):
+        low, high = _latest(low, high, turns.gentle)
+    return low
+
+
+def _zero(excess: Callable[[Floats], Floats], high: Floats, above: Floats) -> Floats:
+    """(T,) where an excess that rises from -1 at 0 to ``above`` at ``high`` is 0: regula falsi (Illinois)."""
+    low, below = np.zeros_like(high), np.full_like(high, -1.0)
+    before = np.zeros_like(high)
+    for _ in range(_STEPS):
+        tried = high - (high - low) * above / (above - below)
+        now = excess(tried)
+        if (np.abs(now) < _WITHIN).all():
+            break
+        over = now > 0.0
+        kept_low, kept_high = np.where(before > 0.0, 0.5, 1.0), np.where(before < 0.0, 0.5, 1.0)
+        low, below = np.where(over, low, tried), np.where(over, kept_low * below, np.minimum(now, -1e-12))
+        high, above = np.where(over, tried, high), np.where(over, now, kept_high * above)
+        before = np.where(over, 1.0, -1.0)
+    return np.asarray(tried)
+
+
+def _latest(low: Floats, high: Floats, allowed: Callable[[Floats], Bools]) -> tuple[Floats, Floats]:
+    """(T,) the largest allowed of some values from ``low``, which is, to ``high``; and the next larger one."""
+    tried = low + (high - low) * np.linspace(1.0, 0.0, _TRIED + 1)[:, None]
+    first = allowed(tried).argmax(axis=0)
+    turn = np.arange(len(low))
+    return tried[first, turn], tried[np.maximum(first - 1, 0), turn]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Turns:
+    """T turns between two legs each: the curves of the legs before and of those after (2T,), the legs' directions
+    (T, 3), and the lower speed limit of both (T,)."""
+
+    pairs: Curves
+    into: Floats
+    out: Floats
+    slower_m_s: Floats
+    vehicle: Vehicle
+
+    @classmethod
+    def between(cls, flown: Curves, courses: tuple[Floats, Floats], speed_m_s: Floats, vehicle: Vehicle) -> _Turns:
+        """The turns between legs ``flown``, which may be as fast as ``speed_m_s`` (L,).
+
+        ``courses``: the directions in which each leg ends and begins, (L, 3) each.
+        """
+        ends, begins = courses
+        leg = np.arange(len(ends) - 1)
+        slower = np.minimum(speed_m_s[:-1], speed_m_s[1:])
+        return cls(flown.of(np.concatenate([leg, leg + 1])), ends[:-1], begins[1:], slower, vehicle)
+
+    def of(self, turns: Indices) -> _Turns:
+        """The turns with these indices."""
+        pairs = self.pairs.of(np.concatenate([turns, turns + len(self.slower_m_s)]))
+        return _Turns(pairs, self.into[turns], self.out[turns], self.slower_m_s[turns], self.vehicle)
+
+    @property
+    def most_s(self) -> Floats:
+        """(T,) the longest overlap: one leg brakes and the other speeds up all the time."""
+        n = len(self.slower_m_s)
+        return np.minimum(self.pairs.start_s[:n], self.pairs.start_s[n:])
+
+    @property
+    def _cosine(self) -> Floats:
+        return np.asarray((self.into * self.out).sum(axis=1))
+
+    def excess(self, overlap: Floats) -> Floats:
+        """(T,) above 0 where the middle of a turn is too far from the way point, or too fast; it rises with the
+        overlap, nearly evenly, because distances rise as its cube and speeds as its square."""
+        (_, v, s), (_, w, r) = self._middle(overlap)
+        far = np.sqrt(np.maximum(s * s + r * r - 2.0 * s * r * self._cosine, 0.0)) / CORNER_M
+        fast = np.sqrt(np.maximum(v * v + w * w + 2.0 * v * w * self._cosine, 0.0)) / (self.slower_m_s * (1.0 + 1e-6))
+        return np.asarray(np.maximum(np.cbrt(far), np.sqrt(fast)) - 1.0)
+
+    def speed_m_s(self, overlap: Floats) -> Floats:
+        """(..., T) the speed in the middle of each turn."""
+        (_, v, _), (_, w, _) = self._middle(overlap)
+        return np.asarray(np.sqrt(np.maximum(v * v + w * w + 2.0 * v * w * self._cosine, 0.0)))
+
+    def gentle(self, overlap: Floats) -> Bools:
+        """(K, T) whether the accelerations in the middle of each turn are small enough."""
+        (a, _, _), (b, _, _) = self._middle(overlap)
+        bend = b[..., None] * self.out - a[..., None] * self.into
+        across = np.hypot(bend[..., 0], bend[..., 1]) < CORNER_ACCEL * self.vehicle.corner_accel_m_s2 * (1.0 + 1e-6)
+        return np.asarray(across & (np.abs(bend[..., 2]) < self.vehicle.vertical_accel_m_s2 * (1.0 + 1e-6)))
+
+    def _middle(self, overlap: Floats) -> tuple[Begun, Begun]:
+        """Acceleration, speed and metres of both legs, from the end of one and the start of the other, in the middle
+        of overlaps (K, T)."""
+        half = 0.5 * overlap
+        a, v, s = self.pairs.begun(np.concatenate([half, half], axis=-1))
+        n = len(self.slower_m_s)
+        return (a[..., :n], v[..., :n], s[..., :n]), (a[..., n:], v[..., n:], s[..., n:])

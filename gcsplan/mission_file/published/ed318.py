@@ -1,0 +1,114 @@
+"""Zones from ED-318 JSON (EUROCAE, 2023): GeoJSON whose geometries have a ``layer`` of limits, and Points an extent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from gcsplan.mission_file.published.ed269 import published
+from gcsplan.mission_file.published.layouts import ZONE, standard_properties
+from gcsplan.mission_file.published.members import (
+    MemberError,
+    add_polygons,
+    number_or_none,
+    position,
+    read_features,
+    unread,
+)
+from gcsplan.mission_file.published.policy import Policy, Published
+from gcsplan.mission_file.published.volumes import AirspaceFile, Given, VolumeLimits
+from gcsplan.mission_file.zones.attributes import is_number, shown
+from gcsplan.mission_file.zones.file import ZoneFile
+
+ZONE_TYPES = ("USPACE", "PROHIBITED", "REQ_AUTHORIZATION", "CONDITIONAL", "NO_RESTRICTION")
+REQUIRED = frozenset({"identifier", "country", "type", "variant"})
+GEOMETRY_MEMBERS = frozenset({"type", "coordinates", "layer", "bbox"})
+LAYER_MEMBERS = frozenset({"lower", "lowerReference", "upper", "upperReference", "uom"})
+MOST_GEOMETRIES = 1000
+
+
+def is_ed318(whole: Any) -> bool:
+    """Whether the value is an ED-318 collection, or one feature: with the members that the standard requires."""
+    return any(_required(f) for f in _features(whole))
+
+
+def _features(whole: Any) -> list[Any]:
+    if not isinstance(whole, dict):
+        return []
+    features = [whole] if whole.get("type") == "Feature" else whole.get("features")
+    return features if isinstance(features, list) and whole.get("type") in ("Feature", "FeatureCollection") else []
+
+
+def _required(feature: Any) -> bool:
+    properties = feature.get("properties") if isinstance(feature, dict) else None
+    if not isinstance(properties, dict):
+        return False
+    zone = properties.get(ZONE)
+    return (zone if isinstance(zone, dict) else properties).keys() >= REQUIRED
+
+
+def read_ed318(path: Path, whole: Any, policy: Policy) -> ZoneFile:
+    """The zones of an ED-318 collection; what is wrong is in their problems and faults."""
+    return read_features(AirspaceFile(path, policy, ZONE_TYPES), _features(whole), "features", _feature)
+
+
+def _feature(file: AirspaceFile, feature: Any, where: str, fallback: str) -> None:
+    properties = feature.get("properties") if isinstance(feature, dict) else None
+    if not isinstance(properties, dict):
+        raise MemberError(f"must be a Feature with properties, given {shown(feature)}")
+    properties, own = standard_properties(properties)
+    times = properties.get("limitedApplicability")
+    zone = published(properties, properties.get("type"), "type", times, fallback)
+    geometry = feature.get("geometry")
+    whole: Any = [geometry]
+    if isinstance(geometry, dict) and geometry.get("type") == "GeometryCollection":
+        whole = geometry.get("geometries")
+        if not isinstance(whole, list) or not 0 < len(whole) <= MOST_GEOMETRIES:
+            raise MemberError(f"zone {zone.name[:60]!r}: a GeometryCollection has geometries, given {shown(whole)}")
+    for i, one in enumerate(whole):
+        part = zone.name if len(whole) == 1 else f"{zone.name}/{i + 1}"
+        at = f"{where}.geometry" if one is geometry else f"{where}.geometry.geometries[{i}]"
+        # The layer of a collection, or else of the feature, holds for those of its geometries that have none.
+        layer = geometry.get("layer", own) if isinstance(geometry, dict) else None
+        try:
+            _geometry(file, zone, part, one, layer, at)
+        except MemberError as why:
+            file.fault(at, f"zone {zone.name[:60]!r}: {why}")
+
+
+def _geometry(file: AirspaceFile, zone: Published, part: str, geometry: Any, shared: Any, where: str) -> None:
+    if not isinstance(geometry, dict):
+        raise MemberError(f"the zone has no geometry, given {shown(geometry)}")
+    limits = _limits(geometry.get("layer", shared), where, file.policy)
+    kind = geometry.get("type")
+    limits.remarks += unread(geometry, GEOMETRY_MEMBERS | ({"extent"} if kind == "Point" else set()), all_of_them=True)
+    if kind == "Point":
+        extent = geometry.get("extent")
+        radius: Any = None
+        if isinstance(extent, dict) and extent.get("subType") == "Circle":
+            radius = extent.get("radius")
+        if not is_number(radius):
+            raise MemberError(f"a Point has an extent with subType Circle and radius, given {shown(extent)}")
+        file.add_circle(zone, part, where, position(geometry.get("coordinates")), float(radius), limits)
+    elif kind in ("Polygon", "MultiPolygon"):
+        add_polygons(file, zone, part, where, geometry, limits)
+    else:
+        raise MemberError(f"the geometry must be a Polygon, a MultiPolygon or a Point with extent, given {shown(kind)}")
+
+
+def _limits(layer: Any, where: str, policy: Policy) -> VolumeLimits:
+    """The limits of a layer; without one there are none, and without a unit they are metres, as the standard says."""
+    if layer is None:
+        return VolumeLimits()
+    if not isinstance(layer, dict):
+        raise MemberError(f"layer must be an object, given {shown(layer)}")
+    unit = layer.get("uom") or "m"
+    remarks = unread(layer, LAYER_MEMBERS, all_of_them=True)
+    given: list[Given | None] = []
+    for side in ("lower", "upper"):
+        value = number_or_none(layer.get(side), f"layer.{side}")
+        words = (str(unit)[:40], str(layer.get(f"{side}Reference") or "")[:40])
+        given.append(None if value is None else Given(value, words, (), side))
+    found = VolumeLimits.read(given[0], given[1], where, policy=policy)
+    found.remarks += remarks
+    return found

@@ -1,0 +1,131 @@
+"""The source of a mission: a file, a sample, its text, or a mapping made by a script; all become the same mapping."""
+
+from __future__ import annotations
+
+import datetime
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from gcsplan.errors import InputError
+from gcsplan.mission_file import samples
+from gcsplan.mission_file.read_files import what_else
+from gcsplan.mission_file.values.schema import shown
+from gcsplan.mission_file.values.yaml import MAX_YAML_BYTES, MAX_YAML_DEPTH, MAX_YAML_NODES, read_yaml
+from gcsplan.mission_file.values.yaml_slips import missing_space
+from gcsplan.world.terrain.input_files import tell_file
+
+UNNAMED = Path("mission.yaml")
+"""Path of a mission that has no file; files that the mission names are then found from the current folder."""
+
+
+def read_content(
+    source: str | os.PathLike[str] | Mapping[str, Any] | None,
+    text: str | None,
+    terrain: Mapping[str, object] | None = None,
+) -> tuple[Path, str, dict[str, Any], str | None]:
+    """The file, its name in messages, the mapping of keys, and its text if it has one.
+
+    ``terrain``: keys that count before those of its ``terrain:``.
+    Raises InputError and TypeError as `load_mission`.
+    """
+    if isinstance(source, str) and ("\n" in source or "\r" in source):
+        if text is not None:
+            raise TypeError("load_mission takes one text: the first argument is the file's path where text= is given")
+        source, text = None, source
+    if isinstance(source, Mapping):
+        if text is not None:
+            raise TypeError("load_mission takes a mapping or a text, not both")
+        file, where, raw = UNNAMED, "mission", _Plain().of(source, "mission", 0)
+    elif isinstance(source, str | os.PathLike):
+        file, where = Path(source), str(source)
+        if text is None:
+            file = samples.file_of(source)
+            text, raw = _read(file, where)
+        else:
+            raw = read_yaml(text, where=where)
+    elif source is None and text is not None:
+        file, where, raw = UNNAMED, "mission", read_yaml(text, where="mission")
+    else:
+        raise TypeError(
+            f"load_mission takes a path, the text of a mission file, or a mapping, given {type(source).__name__}"
+        )
+    if not isinstance(raw, dict):
+        tight = missing_space(raw) if isinstance(raw, str) else ""
+        words = f"a mission file is a mapping of keys (version, terrain, …), given {shown(raw)}"
+        raise InputError(f"{words}; {tight}" if tight else words, where=where)
+    if terrain and isinstance(raw.get("terrain"), dict):
+        raw = {**raw, "terrain": {**raw["terrain"], **terrain}}
+    return file, where, raw, text
+
+
+def _read(file: Path, where: str) -> tuple[str, Any]:
+    """The text of a file and what it says. Raises InputError; of a file of another kind one that says what takes it."""
+    try:
+        text = _text(file, where)
+        raw = read_yaml(text, where=where)
+    except InputError:
+        other = what_else(file)
+        if other:
+            raise InputError(other, where=where) from None
+        raise
+    other = what_else(file, raw)
+    if other:
+        raise InputError(other, where=where)
+    return text, raw
+
+
+def _text(file: Path, where: str) -> str:
+    tell_file(file)
+    try:
+        if file.is_dir():
+            raise InputError("this is a folder; give a mission file (.yaml)", where=where)
+        with file.open("rb") as opened:  # the size is not asked for, since a pipe or a device has none
+            data = opened.read(MAX_YAML_BYTES + 1)
+        if len(data) > MAX_YAML_BYTES:
+            raise InputError(f"a mission file has at most {MAX_YAML_BYTES} bytes, this one has more", where=where)
+        return data.decode("utf-8-sig")
+    except InputError:
+        raise
+    except UnicodeDecodeError as why:
+        raise InputError(f"the file must be UTF-8 text, byte {why.start} is not", where=where) from None
+    except FileNotFoundError:
+        raise InputError(f"there is no such file{samples.hint(file)}", where=where) from None
+    except (OSError, ValueError) as why:
+        raise InputError(f"the file cannot be read: {why}", where=where) from None
+
+
+class _Plain:
+    """Copies a script's mapping into YAML's types: tuples become lists, numpy's numbers become Python's."""
+
+    def __init__(self) -> None:
+        self._values = 0
+
+    def of(self, value: Any, where: str, depth: int) -> Any:
+        """``value`` at ``where``, which is ``depth`` levels deep."""
+        self._values += 1
+        if depth > MAX_YAML_DEPTH or self._values > MAX_YAML_NODES:
+            most = f"{MAX_YAML_DEPTH} levels deep" if depth > MAX_YAML_DEPTH else f"{MAX_YAML_NODES} values"
+            raise InputError(f"the mission has more than {most}", where=where)
+        if value is None or isinstance(value, datetime.date):
+            return value
+        for kind in (bool, int, float, str):
+            if isinstance(value, kind):
+                return kind(value)
+        if isinstance(value, os.PathLike):
+            return os.fspath(value)
+        if isinstance(value, Mapping):
+            for key in value:
+                if not isinstance(key, str):
+                    raise InputError(f"a key is text, given {key!r}", where=where)
+            # Within the file a place is a key path; before it are the name of the file and ": ".
+            return {str(k): self.of(v, f"{where}: {k}" if not depth else f"{where}.{k}", depth + 1)
+                    for k, v in value.items()}  # fmt: skip
+        if isinstance(value, list | tuple):
+            return [self.of(v, f"{where}[{k}]", depth + 1) for k, v in enumerate(value)]
+        if hasattr(value, "tolist"):  # numpy's arrays and numbers
+            return self.of(value.tolist(), where, depth + 1)
+        raise InputError(
+            f"a value is text, a number, true, false, a list or a mapping, given {type(value).__name__}", where=where
+        )

@@ -1,0 +1,1 @@
+"""Keys and values of a mission file: YAML, units, places, the schema, and mistakes."""

@@ -1,0 +1,219 @@
+"""YAML as its authors mean it: the core schema of YAML 1.2, no tags, no duplicate keys, everything bounded.
+
+PyYAML alone reads ``5.0e6`` as text, ``no`` as False and ``12:30`` as 750, silently lets a key overwrite its duplicate,
+and can be made to use all memory by a few lines of aliases.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from typing import Any
+
+import yaml
+
+from gcsplan.errors import InputError
+from gcsplan.mission_file.values.places import PLACE_EXAMPLES
+from gcsplan.mission_file.values.yaml_slips import cure, missing_space
+
+MAX_YAML_BYTES = 5_000_000
+MAX_YAML_DEPTH = 40
+MAX_ALIASES = 200
+MAX_YAML_NODES = 500_000
+"""Most values, with every alias expanded."""
+
+_TOO_DEEP = f"the file is nested more than {MAX_YAML_DEPTH} levels deep"
+
+_TAG = "tag:yaml.org,2002:"
+_PLAIN_STYLE = "plain"
+_NULL = re.compile(r"(?:~|null|Null|NULL|)\Z")
+_BOOL = re.compile(r"(?:true|True|TRUE|false|False|FALSE)\Z")
+_INT = re.compile(r"(?:[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+)\Z")
+_YAML_FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?\Z")
+_SPECIAL = re.compile(r"(?:[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN))\Z")
+
+_Base: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+class Loader(_Base):  # type: ignore[misc]
+    """Marks plain scalars with a tag of their own, so that `_scalar` decides their type."""
+
+    def resolve(self, kind: type[yaml.Node], value: str, implicit: Any) -> str:
+        if kind is yaml.ScalarNode:
+            return _PLAIN_STYLE if implicit[0] else _TAG + "str"
+        return _TAG + ("seq" if kind is yaml.SequenceNode else "map")
+
+
+def read_yaml(text: str, *, where: str) -> Any:
+    """The single document in ``text``: dicts with text keys, lists, str, int, float, bool, None.
+
+    Raises InputError, with line and column, for text that is not YAML, for tags, duplicate keys, and for text beyond
+    the bounds of this module.
+    """
+    if len(text) > MAX_YAML_BYTES:
+        raise InputError(
+            f"the file has {len(text)} characters, more than {MAX_YAML_BYTES // 10**6} million", where=where
+        )
+    try:
+        _measure(text, where)
+        node = yaml.compose(text, Loader=Loader)
+        if node is None:
+            raise InputError(
+                "the file is empty: a mission has at least version, terrain, limits, vehicles", where=where
+            )
+        _count(node, {}, where)
+        return _value(node, where)
+    except yaml.MarkedYAMLError as why:
+        mark = why.problem_mark or why.context_mark
+        context = why.context
+        if context and why.context_mark is not None and mark is not why.context_mark:
+            context += f" (begun in line {why.context_mark.line + 1})"
+        problem = " ".join(x for x in (context, why.problem) if x)
+        if "nesting depth" in problem:  # since PyYAML 6.0.4 its scanner, which reads ahead, has a limit of its own
+            raise InputError(_TOO_DEEP, where=_place(where, mark)) from None
+        begun = None if why.context_mark is None else why.context_mark.line
+        hint = "" if mark is None else cure(text, mark.line, begun)
+        raise InputError(f"this is not YAML: {problem}{hint}", where=_place(where, mark)) from None
+    except (yaml.YAMLError, UnicodeError) as why:
+        raise InputError(f"this is not YAML: {str(why).splitlines()[0][:200]}", where=where) from None
+
+
+def lines_of(text: str, paths: Iterable[str]) -> list[int | None]:
+    """The line, from 1, of each key such as ``vehicles[0].start`` in a document that `read_yaml` has read.
+
+    That of the nearest section around it if the key is not there; None if not even its first key is.
+    """
+    root = yaml.compose(text, Loader=Loader)
+    known: dict[int, dict[str, tuple[yaml.Node, yaml.Node]]] = {}
+    return [_line_of(root, path, known) for path in paths]
+
+
+def _line_of(node: yaml.Node | None, path: str, known: dict[int, dict[str, tuple[yaml.Node, yaml.Node]]]) -> int | None:
+    """``known``: the keys of the mappings that were looked into, by their ids."""
+    line = None
+    for key, index in re.findall(r"([^.\[\]]+)|\[(\d+)\]", path):
+        if isinstance(node, yaml.MappingNode) and key:
+            if id(node) not in known:
+                known[id(node)] = {k.value: (k, v) for k, v in reversed(node.value) if isinstance(k, yaml.ScalarNode)}
+            inner = known[id(node)].get(key)
+            if inner is None:
+                return line
+            line, node = inner[0].start_mark.line + 1, inner[1]
+        elif isinstance(node, yaml.SequenceNode) and index and int(index) < len(node.value):
+            node = node.value[int(index)]
+            line = node.start_mark.line + 1
+        else:
+            return line
+    return line
+
+
+def _measure(text: str, where: str) -> None:
+    """Refuse oversized text by its stream of events, since composing it first could recurse without end."""
+    depth = nodes = aliases = 0
+    for event in yaml.parse(text, Loader=Loader):
+        nodes += isinstance(event, yaml.NodeEvent)
+        aliases += isinstance(event, yaml.AliasEvent)
+        if isinstance(event, yaml.CollectionStartEvent):
+            depth += 1
+        elif isinstance(event, yaml.CollectionEndEvent):
+            depth -= 1
+        if depth > MAX_YAML_DEPTH:
+            raise InputError(_TOO_DEEP, where=_place(where, event.start_mark))
+        for what, count, most in (("aliases", aliases, MAX_ALIASES), ("values", nodes, MAX_YAML_NODES)):
+            if count > most:
+                raise InputError(f"the file has more than {most} {what}", where=_place(where, event.start_mark))
+
+
+def _count(node: yaml.Node, sizes: dict[int, int], where: str) -> int:
+    """The number of values below ``node`` with every alias expanded; refuses loops and more than `MAX_YAML_NODES`."""
+    if isinstance(node, yaml.ScalarNode):
+        return 1
+    known = sizes.get(id(node))
+    if known is not None:
+        if known < 0:
+            raise InputError("an alias holds itself", where=_place(where, node.start_mark))
+        return known
+    sizes[id(node)] = -1
+    children = node.value if isinstance(node, yaml.SequenceNode) else [x for pair in node.value for x in pair]
+    total = 1 + sum(_count(child, sizes, where) for child in children)
+    if total > MAX_YAML_NODES:
+        raise InputError(f"with its aliases followed the file has more than {MAX_YAML_NODES} values", where=where)
+    sizes[id(node)] = total
+    return total
+
+
+def _value(node: yaml.Node, where: str) -> Any:
+    if isinstance(node, yaml.SequenceNode):
+        _require_tag(node, "seq", where)
+        return [_value(child, where) for child in node.value]
+    if isinstance(node, yaml.MappingNode):
+        _require_tag(node, "map", where)
+        return _mapping(node, where)
+    return _scalar(node, where)
+
+
+def _mapping(node: yaml.MappingNode, where: str) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    merged: dict[str, Any] = {}
+    for key_node, value_node in node.value:
+        key = _scalar(key_node, where) if isinstance(key_node, yaml.ScalarNode) else None
+        if not isinstance(key, str):
+            number = isinstance(key, int | float) and not isinstance(key, bool)
+            hint = (
+                f"; decimals begin with a point, and a place within braces has brackets: `[{PLACE_EXAMPLES[0]}]`"
+                if number
+                else ""
+            )
+            raise InputError(
+                f"a key must be a word, given {_shown(key_node)}{hint}", where=_place(where, key_node.start_mark)
+            )
+        if key == "<<" and key_node.tag == _PLAIN_STYLE:
+            for part in value_node.value if isinstance(value_node, yaml.SequenceNode) else [value_node]:
+                if not isinstance(part, yaml.MappingNode):
+                    raise InputError("`<<` merges mappings only", where=_place(where, part.start_mark))
+                for k, v in _mapping(part, where).items():
+                    merged.setdefault(k, v)
+            continue
+        if key in found:
+            raise InputError(f"the key `{key}` stands twice; keep one", where=_place(where, key_node.start_mark))
+        tight = missing_space(key) if value_node.tag == _PLAIN_STYLE and not value_node.value else ""
+        if tight:  # `{sysid:1}` is a mapping with the key `sysid:1`
+            raise InputError(tight, where=_place(where, key_node.start_mark))
+        found[key] = _value(value_node, where)
+    return merged | found
+
+
+def _scalar(node: yaml.Node, where: str) -> Any:
+    text = node.value
+    if node.tag != _PLAIN_STYLE:  # quoted, a block of text, or with an explicit tag
+        _require_tag(node, "str", where)
+        return text
+    if _NULL.match(text):
+        return None
+    if _BOOL.match(text):
+        return text[0] in "tT"
+    if _INT.match(text):
+        if len(text) > 4000:  # Python's int() has a limit slightly above
+            raise InputError(f"a number of {len(text)} digits", where=_place(where, node.start_mark))
+        base = {"0o": 8, "0x": 16}.get(text[:2], 10)
+        return int(text, base)
+    if _YAML_FLOAT.match(text):
+        return float(text)
+    if _SPECIAL.match(text):
+        return math.nan if "n" in text.lower().replace("inf", "") else math.copysign(math.inf, -1 if "-" in text else 1)
+    return text
+
+
+def _require_tag(node: yaml.Node, kind: str, where: str) -> None:
+    if node.tag not in (_TAG + kind, "!"):
+        raise InputError(f"the tag {node.tag[:80]!r} is not allowed here; write the plain value",
+                         where=_place(where, node.start_mark))  # fmt: skip
+
+
+def _place(where: str, mark: Any) -> str:
+    return where if mark is None else f"{where}: line {mark.line + 1}, column {mark.column + 1}"
+
+
+def _shown(node: yaml.Node) -> str:
+    return repr(node.value)[:60] if isinstance(node, yaml.ScalarNode) else "a list or a mapping"

@@ -1,0 +1,1 @@
+"""Zones in files: a reader for each format, and the drafts that they make."""

@@ -1,0 +1,201 @@
+"""Zones from GeoJSON (RFC 7946): Polygons, Points and lines, whose sizes are in their properties or in the mission."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from gcsplan.errors import InputError, Problem
+from gcsplan.export.geojson import GENERATOR
+from gcsplan.mission_file.zones.attributes import Attribute, ZoneStatements, is_number, read_attributes, shown
+from gcsplan.mission_file.zones.draft import SIZE_KEYS
+from gcsplan.mission_file.zones.file import Drawn, ZoneFile, drawn_unread
+from gcsplan.notes.note import Note
+from gcsplan.world.geodesy.degree_shapes import beyond_outline
+
+MOST_MISTAKES = 1000
+"""Most mistakes of a file that are looked for."""
+
+
+def read_geojson(path: Path, whole: Any) -> ZoneFile:
+    """The zones of GeoJSON, as `zone_json.load_json` returns it. Raises InputError if it is not GeoJSON."""
+    found = ZoneFile(path)
+    if not isinstance(whole, dict):
+        raise InputError("a GeoJSON file holds one object, for example a FeatureCollection", where=str(path))
+    if str(whole.get("geometryType", "")).startswith("esri") or "rings" in whole:
+        raise InputError(
+            "this is Esri's JSON, not GeoJSON: ask the server for f=geojson, or convert it (ogr2ogr a.geojson FILE)",
+            where=str(path),
+        )
+    _require_wgs84(whole, path)
+    _require_whole(found, whole)
+    features = whole.get("features") if whole.get("type") == "FeatureCollection" else [whole]
+    if not isinstance(features, list) or not features:
+        raise InputError("a FeatureCollection needs a list `features` that is not empty", where=str(path))
+    flown = [_is_flown(whole, feature) for feature in features]
+    for i, feature in enumerate(features):
+        if len(found.problems) > MOST_MISTAKES:
+            break  # they refuse the file
+        where = f"{path}: features[{i}]" if whole.get("type") == "FeatureCollection" else f"{path}: feature"
+        if not flown[i]:
+            _feature(found, feature, where, f"{path.stem}[{i}]")
+    if any(flown):
+        found.said.append(Note("tracks_unused", count=sum(flown)))
+    return found
+
+
+def _is_flown(whole: dict[str, Any], feature: Any) -> bool:
+    """Whether a feature is a track or way point that gcsplan wrote beside the zones of its own mission.geojson.
+
+    The collection has `GENERATOR`. Before it did, its tracks and way points had the reference of their heights.
+    """
+    properties = feature.get("properties") if isinstance(feature, dict) else None
+    if not isinstance(properties, dict) or any(key.lower() in SIZE_KEYS for key in properties):
+        return False
+    before = "heights" in whole and properties.get("third_coordinate") == "amsl_m" and "vehicle" in properties
+    geometry = feature.get("geometry")
+    drawn = {"track": ("LineString", "MultiLineString"), "waypoint": ("Point",)}.get(str(properties.get("kind")), ())
+    is_drawn = isinstance(geometry, dict) and geometry.get("type") in drawn
+    return is_drawn and (whole.get("generator") == GENERATOR or before)
+
+
+def _require_whole(found: ZoneFile, whole: dict[str, Any]) -> None:
+    """Refuse what a server sent in part: the zones of the rest would be missing."""
+    inner = whole.get("properties")
+    given = {**inner, **whole} if isinstance(inner, dict) else whole
+    matched: Any = given.get("numberMatched")
+    returned: Any = given.get("numberReturned")
+    if given.get("exceededTransferLimit") is True:
+        words = "the server sent a part of the features alone (exceededTransferLimit); ask for all, page by page"
+        found.problems.append(Problem(f"{found.path}: exceededTransferLimit", words))
+    elif is_number(matched) and is_number(returned) and matched > returned:
+        words = f"the server sent {returned} of {matched} features; ask for all, page by page"
+        found.problems.append(Problem(f"{found.path}: numberMatched", words))
+
+
+def _require_wgs84(whole: dict[str, Any], path: Path) -> None:
+    """Refuse other coordinate systems in `crs`: RFC 7946 removed this member of the 2008 draft, but files use it."""
+    crs = whole.get("crs")
+    if crs is None:
+        return
+    text = json.dumps(crs)
+    if "CRS84" not in text and "4326" not in text:
+        raise InputError(
+            f"GeoJSON is in WGS84 degrees (RFC 7946), this file says {text[:100]}; convert it with "
+            "ogr2ogr -t_srs EPSG:4326",
+            where=f"{path}: crs",
+        )
+
+
+def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
+    if not isinstance(feature, dict):
+        found.problems.append(Problem(where, f"must be a Feature or a geometry, given {shown(feature)}"))
+        return
+    geometry: Any = feature
+    properties: Any = {}
+    if feature.get("type") == "Feature":
+        geometry = feature.get("geometry")
+        properties = feature.get("properties") or {}
+    if not isinstance(properties, dict) or not isinstance(geometry, dict):
+        what = "properties must be an object" if not isinstance(properties, dict) else "the feature has no geometry"
+        found.problems.append(Problem(where, what))
+        return
+    said = read_attributes(_attributes(properties, geometry, where), fallback, found.problems)
+    if said is None:
+        return
+    kind, coordinates = geometry.get("type"), geometry.get("coordinates")
+    at = f"{where}.geometry.coordinates" if geometry is not feature else f"{where}.coordinates"
+    if kind == "Point":
+        centre = _position(found, coordinates, at)
+        if centre is not None:
+            found.add_circle(said, said.name, where, centre, _unread([coordinates]).remarks)
+    elif kind in ("Polygon", "MultiPolygon"):
+        for rings, part, place in _parts(found, coordinates, said, at, kind):
+            _rings(found, rings, said, part, where, place)
+    elif kind in ("LineString", "MultiLineString", "MultiPoint"):
+        for one, part, place in _parts(found, coordinates, said, at, kind):
+            if kind == "MultiPoint":
+                centre = _position(found, one, place)
+                if centre is not None:
+                    found.add_circle(said, part, where, centre, _unread([one]).remarks)
+            else:
+                _line(found, one, said, part, where, place)
+    else:
+        found.problems.append(
+            Problem(
+                where, f"must be a Polygon, a Point with radius_m or a LineString with buffer_m, given {shown(kind)}"
+            )
+        )
+
+
+def _parts(found: ZoneFile, coordinates: Any, said: ZoneStatements, at: str, kind: str) -> list[tuple[Any, str, str]]:
+    """The parts of a geometry, each with its name and place; one part unless the kind begins with Multi."""
+    several = kind.startswith("Multi")
+    parts = coordinates if several else [coordinates]
+    if not isinstance(parts, list) or not parts:
+        found.problems.append(Problem(at, f"a {kind} needs a list of coordinates, given {shown(parts)}"))
+        return []
+    return [(part, f"{said.name}/{i + 1}" if several else said.name, f"{at}[{i}]" if several else at)
+            for i, part in enumerate(parts)]  # fmt: skip
+
+
+def _attributes(properties: dict[str, Any], geometry: dict[str, Any], where: str) -> list[Attribute]:
+    """Those of the feature, and those of its ``layer``, where ED-318 has the limits of a zone."""
+    given = [Attribute(key, value, f"{where}.properties.{key[:80]}") for key, value in properties.items()]
+    layer = geometry.get("layer")
+    if isinstance(layer, dict):
+        given += [Attribute(key, value, f"{where}.geometry.layer.{key[:80]}") for key, value in layer.items()]
+    return given
+
+
+def _unread(positions: list[Any]) -> Drawn:
+    """What is said of altitudes in positions; GeoJSON does not tell whether they are a floor, a ceiling or ground."""
+    return drawn_unread([p[2] for p in positions if len(p) > 2 and is_number(p[2]) and p[2] != 0])
+
+
+def _rings(found: ZoneFile, rings: Any, said: ZoneStatements, part: str, where: str, at: str) -> None:
+    if not isinstance(rings, list) or not rings or not isinstance(rings[0], list):
+        found.problems.append(Problem(at, f"a polygon is a list of rings, given {shown(rings)}"))
+        return
+    outline = _positions(found, rings[0], f"{at}[0]")
+    holes = [_positions(found, ring, f"{at}[{k}]") for k, ring in enumerate(rings[1:], 1) if isinstance(ring, list)]
+    if outline is not None and (odd := beyond_outline(outline, [hole for hole in holes if hole])):
+        found.problems.append(Problem(at, f"zone {part[:60]!r}: {odd}"))
+    elif outline is not None:
+        found.add_ring(said, part, where, outline, at.removeprefix(where).removeprefix("."), _unread(rings[0]),
+                       holes=len(rings) - 1)  # fmt: skip
+
+
+def _line(found: ZoneFile, positions: Any, said: ZoneStatements, part: str, where: str, at: str) -> None:
+    if not isinstance(positions, list):
+        found.problems.append(Problem(at, f"a line is a list of positions, given {shown(positions)}"))
+        return
+    line = _positions(found, positions, at)
+    if line is not None:
+        found.add_line(said, part, where, line, at.removeprefix(where).removeprefix("."), _unread(positions).remarks)
+
+
+def _positions(found: ZoneFile, positions: list[Any], at: str) -> list[tuple[float, float]] | None:
+    """Every position as (latitude, longitude); None, and a problem, if one is none."""
+    points = []
+    for i, position in enumerate(positions):
+        point = _position(found, position, f"{at}[{i}]")
+        if point is None:
+            return None
+        points.append(point)
+    return points
+
+
+def _position(found: ZoneFile, position: Any, where: str) -> tuple[float, float] | None:
+    """(latitude, longitude) of GeoJSON's [lon, lat]; None, and a problem, if it is not a position."""
+    if not isinstance(position, list) or len(position) < 2 or not all(is_number(x) for x in position[:2]):
+        found.problems.append(Problem(where, f"a position is [longitude, latitude], given {shown(position)}"))
+        return None
+    lon, lat = float(position[0]), float(position[1])
+    if abs(lat) > 90.0 and abs(lon) <= 90.0 and abs(lat) <= 180.0:
+        found.problems.append(
+            Problem(where, f"longitude and latitude look swapped: GeoJSON is [lon, lat], given [{lon:g}, {lat:g}]")
+        )
+        return None
+    return lat, lon

@@ -1,0 +1,240 @@
+"""Tracks over the lattices of a problem's legs, and the lower bounds that follow from them; see `planner`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from gcsplan.planners.optimal.plane.cap_search import above_all
+from gcsplan.planners.optimal.plane.corridor import End, Narrow, PinnedTrack, joined
+from gcsplan.planners.optimal.plane.detours import Choice, DetourSearch
+from gcsplan.planners.optimal.plane.incumbent import Incumbent
+from gcsplan.planners.optimal.plane.leg import Leg
+from gcsplan.planners.problem import Problem, terminals_of
+from gcsplan.planners.profile.track import Flown, fly, make_track
+from gcsplan.planners.profile.zone_levels import may_pass
+
+SLACKS = (0.008, 0.15, 0.6)
+"""While no path is known, tracks longer than the shortest by these parts of it are searched, in turn."""
+ZONES_SHUT = 8
+"""Most tracks that are tried below a cap if a zone can be passed neither over nor under on the first."""
+PAST = 12
+"""Most tracks past obstacles that are tried on the first-look lattice."""
+DARED_M, PINCHED_M = (0.05, 0.1, 0.2, 0.4, 0.8), 1.0
+"""Metres by which the nodes beside a track through a slit are raised, in turn, beyond the altitude that it lacked, or
+that later tracks keep from zones over ground; and the most it may be pinched for another track to be searched."""
+PROVED = 1e-8
+"""A gap, as a part, that is smaller is due to rounding: the best path is proved optimal."""
+NODE_S, NODE_MB = 0.8e-6, 3e-4
+"""Counted seconds and megabytes of a searched node, with what a search keeps of it."""
+SMALL = 50.0
+"""A world is small if the straight line of each leg is at most this many cells of the terrain model long."""
+
+
+class PlaneSearch:
+    """The legs of one problem in the plane; paths and bounds go to the incumbent.
+
+    ``problem``: the incumbent's own (None), or the same problem over other cells.
+    """
+
+    def __init__(self, incumbent: Incumbent, problem: Problem | None = None) -> None:
+        self.incumbent = incumbent
+        self.problem = problem = incumbent.problem if problem is None else problem
+        most_m = above_all(problem)
+        paths_m, bounds_m = (
+            most_m if limits.max_amsl_m is None else limits.max_amsl_m - limits.altitude_error_m
+            for limits in (problem.limits, problem.bound_limits)
+        )
+        self.top_m = incumbent.highest(bounds_m)
+        """Highest altitude AMSL that bounds assume: the ceiling, or what better paths can climb to."""
+        self.path_top_m = min(self.top_m, paths_m)
+        """Highest altitude AMSL of the paths that are searched."""
+        places = terminals_of(problem)
+        heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
+        ends = [End(*place, z) for place, z in zip(places, heights, strict=True)]
+        self.legs = [Leg(problem, a, b, self.top_m) for a, b in pairwise(ends) if math.dist(a.place, b.place) > 1e-3]
+        self.by_intervals = False
+        """Whether bounds of length use altitude intervals: what a track can climb and descend to on its way."""
+        zones = len(problem.airspace.zones)
+        self._open = Choice(np.ones(zones, np.bool_), np.ones(zones, np.bool_))
+        self.choice = self._open
+        """The choice of open zone sides with which the last path past obstacles was found."""
+
+    def terminals(self, choice: Choice, cap_m: float, fine: bool, narrow: Narrow | None = None) -> PinnedTrack | None:
+        """The shortest track below a cap with a choice of zone sides, through all terminals; None if a leg has none.
+
+        ``fine``: on the finer lattice; ``narrow``: see `Leg.track`.
+        """
+        ways = []
+        for leg in self.legs:
+            if not self.incumbent.budget.goes_on():
+                return None
+            limit = self.limit(leg)
+            wanted = leg.corridor(limit) if fine and leg.cells_of.has_fine else None
+            spare_m = choice.most_m
+            way = leg.track(cap_m - choice.lower_m, wanted, limit, choice.under, spare_m, choice.over, narrow)
+            if way is None:
+                return None
+            ways.append(way.points)
+        return joined(ways, [leg.goal.amsl_m for leg in self.legs[:-1]])
+
+    # -------------------------------------------------------------------- paths
+
+    def first_looks(self, slacks: tuple[float, ...] = SLACKS) -> Iterator[None]:
+        """Look for a first path over tracks that are longer than the shortest by at most each of ``slacks`` in turn;
+        the legs are flooded that far. Ends when a path is found, or when it is proved that there is none."""
+        for slack in slacks:
+            if not self.flood(slack):
+                return
+            self.raise_tracks()
+            # Tracks that only the finer lattice shows are nearly the shortest; in the last round nothing else is left.
+            patient = slack in (slacks[0], slacks[-1])
+            if self.try_below(self.path_top_m, fine=False) or (patient and self.try_below(self.path_top_m, fine=True)):
+                return
+            if self.past(PAST, fine=False, first=True):
+                return
+            yield
+
+    def flood(self, slack: float) -> bool:
+        """Flood all legs, for tracks longer than the shortest by at most the part ``slack``. Returns False if it is
+        proved that a leg has no track."""
+        for leg in self.legs:
+            leg.flood(slack)
+            if math.isinf(leg.length_m):
+                self._prove_nothing_better()
+                return False
+        return True
+
+    def _prove_nothing_better(self) -> None:
+        """Note that there is no better path, or no path at all."""
+        if self.incumbent.best is None:
+            self.incumbent.proved_infeasible = True
+        else:
+            self.incumbent.raise_bound(math.inf)
+
+    def reach_longest(self) -> bool:
+        """Flood the legs as far as tracks lead that are no longer than the best path, if there is one. Returns False if
+        that proves it optimal, or if there is no path and that is proved."""
+        incumbent = self.incumbent
+        if incumbent.best is None:
+            return all(leg.seen for leg in self.legs) or self.flood(SLACKS[-1])
+        for leg in self.legs:
+            limit = self.limit(leg)
+            if not leg.seen:
+                leg.flood(SLACKS[0], limit)
+                self.raise_tracks()
+                limit = self.limit(leg)
+            if limit > leg.reach_m:
+                leg.flood((limit / leg.length_m - 1.0) * (1.0 + 1e-9), limit)
+        return incumbent.gap > PROVED
+
+    def try_below(self, cap_m: float, *, fine: bool, narrow: Narrow | None = None) -> bool:
+        """Look for a path below a cap; return whether it is the best so far. ``narrow``: see `Leg.track`."""
+        incumbent = self.incumbent
+        incumbent.unsettled = None
+        terminals = self.terminals(self.choice, cap_m, fine, narrow)
+        if terminals is None:
+            return False
+        track = make_track(incumbent.problem, *terminals)
+        flown = fly(incumbent.problem, track)
+        if isinstance(flown, Flown):
+            found = incumbent.exact(track, flown)
+            return found is not None and incumbent.take_simpler(*found, fine=fine, longer=False)
+        if narrow is not None or may_pass(incumbent.problem, track, flown):
+            found = incumbent.exact(track, flown)
+            if found is not None:
+                return incumbent.take_simpler(*found, fine=fine, longer=False)
+        past = flown.kind == "zone" or incumbent.best is None
+        return past and self.past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=terminals)
+
+    def look_finely(self) -> bool:
+        """Look for a path on the finer lattice; return whether it is the best so far."""
+        # With a track error, that lattice keeps metres from the terrain that the exact check leaves open.
+        near = self.incumbent.sharp and self.problem.limits.track_error_m > 0.0
+        return (near and self.narrow_passage()) or self.try_below(self.path_top_m, fine=True)
+
+    def narrow_passage(self) -> bool:
+        """Look for a path over nodes that are only as high as in the exact check: through slits that are shut in the
+        other lattices, because these reserve what the ground may rise beside a track, and nearer to terrain. Returns
+        whether the path is the best so far."""
+        narrow, before_m = Narrow(), math.nan
+        for more_m in DARED_M:
+            if self.try_below(self.path_top_m, fine=True, narrow=narrow):
+                return True
+            lacks = self.incumbent.unsettled
+            # Where the last change did not matter, the next one will not.
+            if lacks is None or math.isclose(lacks.by, before_m, rel_tol=1e-3) or not self.incumbent.goes_on():
+                break
+            before_m = lacks.by
+            if lacks.kind == "zone":
+                narrow.zones_m = more_m
+            elif lacks.kind == "pinched" and lacks.by < PINCHED_M:
+                narrow.pinched.append((lacks.place, lacks.by + more_m))
+            else:
+                break
+        return False
+
+    def past(
+        self,
+        most: int,
+        *,
+        fine: bool,
+        first: bool = False,
+        cap_m: float | None = None,
+        given: PinnedTrack | None = None,
+    ) -> bool:
+        """Try at most ``most`` tracks past obstacles; return whether a path over one of them is the best so far.
+
+        With ``cap_m``: search below that cap, begin with the track ``given`` if there is one, stop at the first better
+        path, and use no laps if a path is known. Without: spare metres for laps near the ends are allowed, and the
+        search stops at the first better path only if ``first``.
+        """
+        incumbent = self.incumbent
+        laps = incumbent.climbs and (incumbent.best is None or (incumbent.sharp and cap_m is None))
+        spare_m = self.longest() - sum(leg.length_m for leg in self.legs) if laps else 0.0
+        below_m = self.path_top_m if cap_m is None else cap_m
+        search = DetourSearch(incumbent, lambda choice: self.terminals(choice, below_m, fine), fine)
+        roots = [self.choice]
+        if cap_m is None:
+            roots = [replace(c, most_m=(spare_m, spare_m)) for c in dict.fromkeys([self._open, self.choice])]
+            if laps:
+                roots.append(self.choice)  # a climb far from the ends needs laps there, not near the ends
+        found = search.run(roots, most, first=first or cap_m is not None, laps=laps, given=given)
+        if found is not None:
+            self.choice = replace(found, least_m=(0.0, 0.0), most_m=(0.0, 0.0))
+        return found is not None
+
+    # -------------------------------------------------------------------- bounds
+
+    def size(self, looks: float) -> tuple[float, float]:
+        """Counted seconds of ``looks`` searches over the lattices of all legs, and megabytes of those."""
+        nodes = sum(leg.cells_of.nodes for leg in self.legs)
+        return looks * nodes * NODE_S, nodes * NODE_MB
+
+    def size_nearby(self, cell_s: float) -> tuple[float, float]:
+        """As `size`, of a search over the cells of the finer lattices that short enough tracks may meet: ``cell_s``
+        counted seconds for each."""
+        return sum(leg.nearby_cells for leg in self.legs) * cell_s, self.size(1.0)[1]
+
+    def longest(self) -> float:
+        """An upper bound, metres, of the track length of every path better than the best."""
+        return self.incumbent.longest(sum(leg.reach_m for leg in self.legs))
+
+    def limit(self, leg: Leg) -> float:
+        """`longest` for one leg: what remains if the other legs are as short as possible."""
+        return self.longest() - sum(other.lower_m for other in self.legs if other is not leg)
+
+    def raise_tracks(self) -> None:
+        """Raise the lower bound of the cost to that of the shortest tracks."""
+        self.incumbent.raise_track_bound(sum(leg.lower_m for leg in self.legs))
+
+    @property
+    def is_small(self) -> bool:
+        """Whether every leg is so short (`SMALL`) that a search among few places costs little."""
+        cell_m = float(self.problem.airspace.surface.grid.metres_per_cell(*self.problem.start[:2]).max())
+        short = [leg for leg in self.legs if leg.straight_m <= SMALL * cell_m]
+        return len(short) == len(self.problem.via) + 1  # legs from a place to itself are not among the legs

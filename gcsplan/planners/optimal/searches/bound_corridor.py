@@ -1,0 +1,298 @@
+"""Paths along the tracks of the lower bounds, past the stretches where the exact check shuts these.
+
+The track of a bound is as short as a track can be. Where the exact check shuts it, the stretch is a few hundred metres
+long at most, and metres or centimetres are missing. Beside it there may be an open slit that the cells are too large to
+show. Each such stretch is planned as a problem of its own, so small that its cells are a metre or two wide. If that
+finds nothing and the gap is large, the piece between the places where the track leaves and meets the path is searched
+as a leg of its own, whose cells are finer than those of the whole leg.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from gcsplan.arrays import Bools, Floats
+from gcsplan.planners.optimal.plane.corridor import joined
+from gcsplan.planners.optimal.plane.incumbent import Incumbent
+from gcsplan.planners.optimal.plane.leg import Leg
+from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
+from gcsplan.planners.optimal.searches.pass_line import over_pass
+from gcsplan.planners.problem import Problem
+from gcsplan.planners.profile.track import distances
+from gcsplan.planners.profile.zone_levels import free_below
+from gcsplan.world.geometry.path import Path
+
+Point = tuple[float, float, float]
+
+STEP_M = 8.0
+"""Metres between the places of a track at which the exact check's floor is read."""
+OPEN_M = 8.0
+"""Metres that are free below the cap at both ends of a stretch: where there are as many, the slit has ended."""
+UNDER_M = 0.5
+"""Metres below the highest free altitude at which stretches begin and end, if there is room."""
+REACHED = 0.95
+"""Part of the climb limit at which the track from or to a terminal is taken to climb."""
+ASIDE_M = 0.3
+"""Metres by which places are moved away from zones."""
+APART_M = 1e-3
+"""Metres; places nearer to each other count as one."""
+SLACKS = (0.008, 0.15)
+"""Parts by which tracks of a stretch may be longer than its shortest; tracks that are longer pass through no slit."""
+FARTHEST = 1.5
+"""Most times as long as the straight track that tracks of a stretch may be."""
+BESIDE_M, WORTH = 10.0, 0.03
+"""Metres from the path beyond which a track has left it; and the least that a stretch must gain to be planned, as a
+part of what the longest useful track is longer than the bound's."""
+FAR, CLOSE_BY = 5e-3, (3e-3, 3e-2, math.inf)
+"""The gap, as a part, from which cells are looked at through which the bound's track is shut, and
+pieces on finer cells; and the parts by which tracks may be longer than the bound for the former, in turn."""
+SHORTER = 0.7
+"""Most of a leg's straight track for a piece to be searched on finer cells."""
+MOST = 24
+"""Most stretches of a track; a track with more is not tried."""
+AT_ONCE = 512
+"""Places whose distance from a track is computed in one batch."""
+
+
+def follow(plane: PlaneSearch) -> bool:
+    """Look for a path along the tracks of the last bounds, where they leave the best path; all along them if no path is
+    known. Returns whether one is the best so far."""
+    incumbent = plane.incumbent
+    if incumbent.best is None:
+        return _first(plane)
+    terminals = [0, len(incumbent.best) - 1] if incumbent.pinned is None else np.flatnonzero(incumbent.pinned).tolist()
+    if len(terminals) != len(plane.legs) + 1:
+        return False
+    if incumbent.gap > FAR and plane.problem.objective == "length":
+        for leg in plane.legs:
+            _look_closely(plane, leg)
+    parts = [incumbent.best[a : b + 1] for a, b in pairwise(terminals)]
+    found = [_nearer(plane, leg, part) for leg, part in zip(plane.legs, parts, strict=True)]
+    if all(new is None for new in found):
+        return False
+    paths = [part if new is None else new for part, new in zip(parts, found, strict=True)]
+    points, pinned, _ = joined(paths, [None] * (len(paths) - 1))
+    return not incumbent.judge.violations(points) and incumbent.take_simpler(points, pinned, fine=True, longer=False)
+
+
+def _first(plane: PlaneSearch) -> bool:
+    """Look for a first path along the bounds' tracks of all legs; return whether one was found and is the best."""
+    incumbent, parts = plane.incumbent, []
+    before: Floats | None = None
+    for leg in plane.legs:
+        _look_closely(plane, leg)
+        at, s, places = _sampled(leg.last_track)
+        start, goal = (_end(plane, leg, end, at[-1]) for end in (0.0, at[-1]))
+        part = _along(plane, leg, [start if before is None else before, goal], places, s, at[-1], math.inf)
+        if part is None:
+            return False
+        parts.append(part)
+        before = part[-1]
+    points, pinned, _ = joined(parts, [None] * (len(parts) - 1))
+    return not incumbent.judge.violations(points) and incumbent.take_simpler(points, pinned, fine=True, longer=False)
+
+
+def _look_closely(plane: PlaneSearch, leg: Leg) -> None:
+    """Compute a leg's bound once more, with the cells split through which its track is shut (`necks`): the track that
+    is left is nearer to open slits."""
+    most_m = min(plane.limit(leg), leg.reach_m)
+    for more in CLOSE_BY:
+        limit = min(most_m, leg.lower_m * (1.0 + more))
+        found = leg.bound(plane.top_m, leg.corridor(limit), limit, True, closely=True)
+        plane.raise_tracks()
+        if found < limit or limit == most_m or not plane.incumbent.budget.goes_on():
+            break
+
+
+def _end(plane: PlaneSearch, leg: Leg, along_m: float, whole_m: float) -> Floats:
+    """(3,) an end of a leg, its start if ``along_m`` is 0; where its altitude is free, that of `_height`."""
+    end = leg.start if along_m <= 0.0 else leg.goal
+    if end.amsl_m is not None:
+        return np.array([*end.place, end.amsl_m])
+    low_m = float(plane.problem.floors(*np.array([end.place]).T)[0])
+    return np.array([*end.place, _height(plane, leg, along_m, whole_m - along_m, low_m, plane.path_top_m)])
+
+
+def _sampled(way: Floats) -> tuple[Floats, Floats, Floats]:
+    """Metres along a track of its vertices, metres along it (N,) of places at most `STEP_M` apart, and those places
+    (N, 2)."""
+    at = distances(way)
+    s = np.linspace(0.0, at[-1], math.ceil(at[-1] / STEP_M) + 1)
+    return at, s, np.stack([np.interp(s, at, way[:, k]) for k in range(2)], axis=-1)
+
+
+def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
+    """(N, 3) a path of a leg that is cheaper than the known ``path``, which it leaves where the track of the last bound
+    does; None if none was found."""
+    on_path = distances(path[:, :2])
+    at, s, places = _sampled(leg.last_track)
+    away, nearest = nearest_on(places, path[:, :2])
+    better: list[tuple[float, float, Floats]] = []
+    for first, last in _runs(away > BESIDE_M):
+        low, high = max(first - 1, 0), min(last + 1, len(s) - 1)
+        a, b = nearest[low], nearest[high]
+        begun = better[-1][1] if better else 0.0
+        if a < begun or (b - a) - (s[high] - s[low]) < WORTH * (plane.longest() - at[-1]):
+            continue
+        ends = [np.array([np.interp(x, on_path, path[:, k]) for k in range(3)]) for x in (a, b)]
+        known = np.vstack([ends[0], path[(on_path > a) & (on_path < b)], ends[1]])
+        cost = plane.problem.cost(Path(known))
+        part = _along(plane, leg, ends, places[low : high + 1], s[low : high + 1], at[-1], cost)
+        if part is None and plane.incumbent.gap > FAR:
+            part = _finer(plane, leg, ends, known)
+        if part is not None:
+            better.append((a, b, part))
+    out, begin = [], -math.inf
+    for a, b, part in better:
+        out += [path[(on_path > begin + APART_M) & (on_path < a - APART_M)], part]
+        begin = b
+    return np.vstack([*out, path[on_path > begin + APART_M]]) if out else None
+
+
+def _part(plane: PlaneSearch, problem: Problem, start: Floats, goal: Floats) -> PlaneSearch:
+    """Lattices of a problem like the plane's, but between two points (3,) on a path."""
+    part = replace(problem, start=_point(start), goal=_point(goal), via=(), progress=None)
+    sub = Incumbent(part, plane.incumbent.sharp)
+    sub.first_s = 0.0  # a path of a piece is not the mission's first path, which would start the next budget
+    return PlaneSearch(sub)
+
+
+def _finer(plane: PlaneSearch, leg: Leg, ends: list[Floats], known: Floats) -> Floats | None:
+    """(N, 3) way points from one of ``ends`` to the other that cost less than the ``known`` ones, found on the finer
+    cells of a shorter leg; None if there are none or the leg is hardly shorter."""
+    if math.dist(ends[0][:2], ends[1][:2]) > SHORTER * leg.straight_m:
+        return None
+    found = _part(plane, plane.problem, ends[0], ends[1])
+    found.incumbent.take(known, np.isin(np.arange(len(known)), (0, len(known) - 1)))
+    return found.incumbent.best if found.reach_longest() and found.look_finely() else None
+
+
+def _along(
+    plane: PlaneSearch, leg: Leg, ends: list[Floats], places: Floats, s: Floats, whole_m: float, cost: float
+) -> Floats | None:
+    """(N, 3) way points from one of ``ends`` to the other along a track, past the stretches that are shut; None if that
+    fails or does not cost less than ``cost``.
+
+    ``places`` (N, 2) of the track, ``s`` (N,) metres along it; ``whole_m``: its whole length. If zones shut any, those
+    that terrain and zones shut are tried before those that terrain shuts.
+    """
+    floor = plane.problem.floors(*places.T)
+    free = [(places, floor, np.full_like(floor, plane.path_top_m))]
+    moved, low, high = _freer(plane, places)
+    if (moved != places).any() or ((low > high) & (floor <= plane.path_top_m)).any():
+        free.insert(0, (moved, low, high))
+    for at, lowest, highest in free:
+        found = _past(plane, leg, ends, at, s, whole_m, lowest, highest)
+        if found is not None and plane.problem.cost(Path(found)) < cost:
+            return found
+        if not plane.incumbent.budget.goes_on():
+            break
+    return None
+
+
+def _past(
+    plane: PlaneSearch, leg: Leg, ends: list[Floats], places: Floats, s: Floats, whole_m: float, low: Floats,
+    high: Floats,
+) -> Floats | None:  # fmt: skip
+    """`_along` past the stretches that are shut; ``low``, ``high`` (N,): what is free at the places."""
+    # An infinite floor is shut (unknown ground), or given (an end), whatever is free below the cap.
+    stretches = shut_stretches(np.subtract(low, high, out=low.copy(), where=np.isfinite(low)))
+    if len(stretches) > MOST:
+        return None
+    cuts = sorted({0, len(s) - 1, *(k for stretch in stretches for k in stretch)})
+    out: list[Floats] = []
+    start = ends[0]
+    for first, last in pairwise(cuts):
+        goal = ends[1]
+        if last < len(s) - 1:
+            height = _height(plane, leg, *map(float, (s[last], whole_m - s[last], low[last], high[last])))
+            goal = np.array([*places[last], height])
+        found = _part(plane, replace(plane.problem, objective="length"), start, goal)
+        sub = found.incumbent
+        for piece in found.legs:
+            piece.farthest = FARTHEST
+        if (first, last) not in stretches:
+            sub.take_along(joined([np.vstack([start[:2], places[first + 1 : last], goal[:2]])], []))
+        if sub.best is None:
+            for _ in found.first_looks(SLACKS):
+                pass
+        if sub.best is None and not sub.proved_infeasible and found.legs:
+            lowest = over_pass(
+                plane.problem, plane.path_top_m, np.vstack([start[:2], places[first + 1 : last], goal[:2]])
+            )
+            if not sub.take_along(joined([lowest], [])):
+                found.narrow_passage()
+        if sub.best is None or not plane.incumbent.budget.goes_on():
+            return None
+        out.append(sub.best if not out else sub.best[1:])
+        start = goal
+    return np.vstack(out)
+
+
+def nearest_on(places: Floats, track: Floats) -> tuple[Floats, Floats]:
+    """(N,) distances of places from a track, and metres along the track (N,) of the points nearest to them."""
+    a, d, s = track[:-1], np.diff(track, axis=0), distances(track)
+    away, where = np.empty(len(places)), np.empty(len(places))
+    for first in range(0, len(places), AT_ONCE):
+        part = slice(first, first + AT_ONCE)
+        t = ((places[part, None] - a) * d).sum(axis=-1) / np.maximum((d * d).sum(axis=-1), 1e-12)
+        t = t.clip(0.0, 1.0)
+        off = np.hypot(*(places[part, None] - a - t[..., None] * d).transpose(2, 0, 1))
+        k = off.argmin(axis=1)
+        rows = np.arange(len(k))
+        away[part], where[part] = off[rows, k], s[k] + t[rows, k] * (s[k + 1] - s[k])
+    return away, where
+
+
+def _runs(some: Bools) -> list[tuple[int, int]]:
+    """First and last index of each run of true values."""
+    change = np.flatnonzero(np.diff(np.concatenate([[False], some, [False]]).astype(np.int8)))
+    return [(int(a), int(b) - 1) for a, b in zip(change[::2], change[1::2], strict=True)]
+
+
+def _point(place: Floats) -> Point:
+    east, north, z = place.tolist()
+    return east, north, z
+
+
+def shut_stretches(over: Floats) -> list[tuple[int, int]]:
+    """First and last index of each stretch with less than `OPEN_M` of free altitudes, and somewhere none; ``over``: the
+    lowest minus the highest free altitude (N,), inf over unknown ground."""
+    runs = [run for run in _runs(over > -OPEN_M) if (over[run[0] : run[1] + 1] > 0.0).any()]
+    return [(max(first - 1, 0), min(last + 1, len(over) - 1)) for first, last in runs]
+
+
+def _freer(plane: PlaneSearch, places: Floats) -> tuple[Floats, Floats, Floats]:
+    """The places (N, 2) of a track, moved by `ASIDE_M` where one side of it is shut and the other is free, and what
+    `free_below` tells of all but its ends: a bound's track touches zones, and where it does no stretch can begin or
+    end."""
+    ahead = np.gradient(places, axis=0)
+    aside = np.stack([-ahead[:, 1], ahead[:, 0]], axis=-1) / np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
+    tried = [places + off * aside for off in (0.0, ASIDE_M, -ASIDE_M)]
+    free = [free_below(plane.problem, at, plane.path_top_m, OPEN_M) for at in tried]
+    shut = [low > high for low, high in free]
+    side = np.where(shut[1] & ~shut[2], 2, np.where(shut[2] & ~shut[1], 1, 0))
+    side[[0, -1]] = 0
+    rows = np.arange(len(places))
+    low, high = (np.stack([of[k] for of in free])[side, rows] for k in range(2))
+    low[[0, -1]] = -math.inf  # the ends of the track give way to those of the path
+    return np.stack(tried)[side, rows], low, high
+
+
+def _height(plane: PlaneSearch, leg: Leg, from_start_m: float, to_goal_m: float, low_m: float, high_m: float) -> float:
+    """The altitude AMSL at which a path passes a place between two stretches: below the highest free altitude by
+    `UNDER_M`, or by half the height from the lowest if that is less; no higher than can be reached from start and goal;
+    at a terminal, the terminal's."""
+    limits = plane.problem.limits
+    z = high_m - min(UNDER_M, max(0.5 * (high_m - low_m), 0.0))
+    for terminal, way_m, slope in (
+        (leg.start, from_start_m, limits.max_climb_slope),
+        (leg.goal, to_goal_m, limits.max_descent_slope),
+    ):
+        if terminal.amsl_m is not None:
+            z = terminal.amsl_m if way_m < APART_M else min(z, terminal.amsl_m + REACHED * slope * way_m)
+    return z

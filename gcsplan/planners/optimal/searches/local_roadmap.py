@@ -1,0 +1,273 @@
+"""Paths through small worlds of a few dozen cells of the terrain model, over a roadmap of places that matter.
+
+There the lattices of the plane miss what is narrower than their cells: a pass exactly as high as the ceiling, a slit
+between two cylinders, a climb that must wind along a wall. The roadmap has few places: the terrain model's own nodes
+and its saddles, the rims of zones, slits between them, and a regular lattice in between. Each has a column of altitudes
+from its floor up; legs between neighbours pass the exact check, and the best path over them is drawn together.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gcsplan.arrays import Bools, Floats, Indices
+from gcsplan.planners.optimal.navmesh.grid import extent
+from gcsplan.planners.optimal.navmesh.terrain_nodes import Extent
+from gcsplan.planners.optimal.searches.roadmap import Roadmap, path_over, terminals_by_leg
+from gcsplan.planners.optimal.searches.section_dp import cost_of
+from gcsplan.planners.problem import Problem, terminals_of
+from gcsplan.world.geometry.zones import Circle
+
+NODES, PLACES, LEVELS = 8000, (200, 1000), (7, 30)
+"""About how many nodes a roadmap has; fewest and most places; fewest and most altitudes at each place."""
+NEIGHBOURS = 16
+"""Each place is linked to that many nearest places."""
+SPOKES = 12
+"""Places around a circle."""
+MOST_RIMS, MOST_SLITS = 600, 60
+"""Most places on rims of zones, and most slits."""
+WIDEST, WIDEST_CELLS = 2.0, 30.0
+"""Widest margin around two terminals: times their distance, or cells of the terrain model if that is more."""
+HAIR_M = 1e-3
+"""How far outside a zone places lie, beyond the clearance and the track error."""
+SLIT = 0.5
+"""Slits between circles matter up to that part of the roadmap's spacing in width."""
+WORTH = 0.03
+"""Part of the cost that a first search must gain for a second one, nearer to the path that it found."""
+
+
+def small_path(problem: Problem, known: Floats | None) -> tuple[Floats, Bools] | None:
+    """(N, 3) a path whose legs the exact check passes, and (N,) its terminals; None if no cheaper one was found.
+
+    ``known`` (M, 3): the best path so far, None without one.
+    """
+
+    def between(starts: Floats, goals: Floats, limit: float) -> Roadmap:
+        return _roadmap(problem, starts, goals, limit)
+
+    found: tuple[Floats, Bools] | None = None
+    best = math.inf if known is None else cost_of(problem, known)
+    for _ in range(2):
+        terminals = terminals_by_leg(problem, _straight(problem) if known is None else known)
+        better = path_over(problem, terminals, best, known, between)
+        if better is None:
+            break
+        before, found, known = best, better, better[0]
+        best = cost_of(problem, known)
+        if best > before * (1.0 - WORTH):
+            break
+    return found
+
+
+def _straight(problem: Problem) -> Floats:
+    """(K, 3) the terminals, heights that are free in between those that are not, but not below the floor."""
+    flat = np.array(terminals_of(problem))
+    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(flat, axis=0).T))])
+    heights = np.array([problem.start[2], *(math.nan if v.amsl_m is None else v.amsl_m for v in problem.via),
+                        problem.goal[2]])  # fmt: skip
+    known = np.isfinite(heights)
+    floor = problem.airspace.floor_amsl(flat[:, 0], flat[:, 1], problem.limits)
+    free = np.fmax(np.interp(s, s[known], heights[known]), np.where(np.isfinite(floor), floor, -math.inf))
+    return np.column_stack([flat, np.where(known, heights, free)])
+
+
+def _roadmap(problem: Problem, starts: Floats, goals: Floats, limit: float) -> Roadmap:
+    """The roadmap for paths from one of ``starts`` (K, 3) to one of ``goals`` that cost ``limit`` at most."""
+    air, limits = problem.airspace, problem.limits
+    ends = np.vstack([starts, goals])
+    low, high = _box(problem, ends, limit)
+    area = float(np.prod(np.maximum(high - low, 1.0)))
+    bottom_m, top_m, marks = _heights(problem, ends, low, high)
+    slope = min(limits.max_climb_slope, limits.max_descent_slope)
+    count = PLACES[1]
+    if math.isfinite(slope) and top_m > bottom_m:
+        # As many altitudes as a leg between neighbours needs to climb by one of them.
+        count = round((NODES * slope * math.sqrt(area) / (top_m - bottom_m)) ** (2.0 / 3.0))
+    count = min(max(count, PLACES[0]), PLACES[1])
+    spacing_m = math.sqrt(area / count)
+    places, links = _places(problem, low, high, count, spacing_m)
+    floor, ceiling = (f(places[:, 0], places[:, 1], limits) for f in (air.floor_amsl, air.ceiling_amsl))
+    there = np.isfinite(floor) & (floor <= ceiling + 1e-6)
+    number = np.full(len(places), -1)
+    number[there] = np.arange(int(there.sum()))
+    links = number[links[:, there[links].all(axis=0)]]
+    places, floor, ceiling = places[there], floor[there], ceiling[there]
+    levels = np.unique(
+        [*marks, *np.linspace(bottom_m, top_m, _levels(slope, spacing_m, top_m - bottom_m, len(places)))]
+    )
+    z = np.clip(levels, floor[:, None], np.maximum(ceiling, floor)[:, None])
+    nodes = np.dstack([*(np.broadcast_to(places[:, k, None], z.shape) for k in range(2)), z])
+    cost = np.min([problem.leg_costs(a, nodes) for a in starts], axis=0)
+    cost += np.min([problem.leg_costs(nodes, b) for b in goals], axis=0)
+    # Altitudes below the floor are the floor, once.
+    new = np.diff(z, axis=1, prepend=-math.inf) > 0.0
+    inside = (cost <= limit) & new
+    index = np.full(z.shape, -1)
+    index[inside] = len(ends) + np.arange(int(inside.sum()))
+    index = np.take_along_axis(index, np.maximum.accumulate(np.where(new, np.arange(z.shape[1]), 0), axis=1), axis=1)
+    flat = nodes[inside]
+    pairs = [np.stack([index[:, :-1].ravel(), index[:, 1:].ravel()])]
+    links = np.hstack([links, _near(places)])
+    for up in (-1, 0, 1):
+        k = np.arange(max(0, -up), z.shape[1] - max(0, up))
+        pairs.append(np.stack([index[links[0]][:, k].ravel(), index[links[1]][:, k + up].ravel()]))
+    pairs += [_links_of_end(problem, k, end, flat, spacing_m, len(ends)) for k, end in enumerate(ends)]
+    pairs.append(np.indices((len(starts), len(goals))).reshape(2, -1) + np.array([[0], [len(starts)]]))
+    both = np.sort(np.concatenate(pairs, axis=1), axis=0)
+    both = both[:, (both[0] >= 0) & (both[0] < both[1])]
+    count = len(ends) + len(flat)
+    once = np.stack(np.divmod(np.unique(both[0] * count + both[1]), count))
+    return Roadmap.of(problem, np.vstack([ends, flat]), once, (len(starts), len(goals)), spacing_m)
+
+
+def _near(places: Floats) -> Indices:
+    """(2, E) each place and its nearest others."""
+    n = len(places)
+    apart = ((places[:, None] - places[None]) ** 2).sum(axis=2)
+    apart[np.arange(n), np.arange(n)] = math.inf
+    count = min(NEIGHBOURS, n - 1)
+    nearest = np.argpartition(apart, count - 1, axis=1)[:, :count] if count > 0 else np.zeros((n, 0), np.intp)
+    return np.stack([np.repeat(np.arange(n), max(count, 0)), nearest.ravel()])
+
+
+def _links_of_end(problem: Problem, k: int, end: Floats, nodes: Floats, spacing_m: float, first: int) -> Indices:
+    """(2, E) an end and the nodes about it, as far as they can be climbed to."""
+    apart = np.hypot(*(nodes[:, :2] - end[:2]).T)
+    near = np.flatnonzero(apart < max(2.5 * spacing_m, float(np.sort(apart)[: 4 * NEIGHBOURS].max(initial=0.0))))
+    rise = nodes[near, 2] - end[2]
+    slope = max(problem.limits.max_climb_slope, problem.limits.max_descent_slope)
+    near = near[np.abs(rise) <= slope * apart[near] + 1e-9] if math.isfinite(slope) else near
+    return np.stack([np.full(len(near), k), near + first])
+
+
+def _levels(slope: float, spacing_m: float, range_m: float, places: int) -> int:
+    """How many altitudes there are over each of so many places."""
+    wanted = math.ceil(range_m / (slope * spacing_m)) + 1 if math.isfinite(slope) else LEVELS[0]
+    return max(min(wanted, LEVELS[1], 2 * NODES // max(places, 1)), 2)
+
+
+def _box(problem: Problem, ends: Floats, limit: float) -> tuple[Floats, Floats]:
+    """South-western and north-eastern corner of where ways may lead, within the terrain model."""
+    grid = problem.airspace.surface.grid
+    rows, cols = problem.airspace.surface.ground_m.shape
+    c, r = np.meshgrid(np.linspace(0.0, cols - 1.0, 5), np.linspace(0.0, rows - 1.0, 5))
+    corners = grid.to_plane(c.ravel(), r.ravel())
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    metres = limit
+    if problem.objective == "energy":
+        metres = limit / problem.horizontal_j_per_m if problem.horizontal_j_per_m > 0.0 else math.inf
+    width_m = math.dist(ends[0, :2], ends[-1, :2])
+    cell_m = float(grid.metres_per_cell(*ends[0, :2].tolist()).max())
+    # The minor axis of the ellipse of such ways, or its major axis beyond the ends.
+    margin_m = max(0.5 * math.sqrt(max(metres**2 - width_m**2, 0.0)), 0.5 * (metres - width_m)) + 0.02 * width_m
+    margin_m = min(margin_m, max(WIDEST * width_m, WIDEST_CELLS * cell_m))
+    low = np.maximum(low, ends[:, :2].min(axis=0) - margin_m)
+    high = np.minimum(high, ends[:, :2].max(axis=0) + margin_m)
+    return low, high
+
+
+def _heights(problem: Problem, ends: Floats, low: Floats, high: Floats) -> tuple[float, float, list[float]]:
+    """The lowest and the highest altitude worth a look, and those that zones and ends begin and end at."""
+    limits, surface = problem.limits, problem.airspace.surface
+    error = limits.altitude_error_m + HAIR_M
+    east, north = (a.ravel() for a in np.meshgrid(*(np.linspace(low[k], high[k], 40) for k in range(2))))
+    floor = problem.floors(east, north)
+    floor = floor[np.isfinite(floor)]
+    bottom_m = min(float(floor.min(initial=math.inf)), float(ends[:, 2].min()))
+    top_m = max(float(floor.max(initial=-math.inf)), float(ends[:, 2].max()))
+    marks: list[float] = []
+    for zone in problem.airspace.zones:
+        for level, side in ((zone.ceiling, 1.0), (zone.floor, -1.0)):
+            if level is None:
+                continue
+            ground = 0.0 if level.datum == "amsl" else float(np.nanmax(surface.top_m))
+            mark = level.value_m + ground + side * error
+            marks += [mark] if level.datum == "amsl" else []
+            top_m = max(top_m, mark) if side > 0.0 else top_m
+    if limits.max_amsl_m is not None:
+        top_m = min(top_m, limits.max_amsl_m - limits.altitude_error_m)
+    marks = sorted({round(m, 3) for m in marks if bottom_m <= m <= top_m})
+    most = LEVELS[0]
+    if len(marks) > most:
+        marks = [marks[k] for k in np.linspace(0, len(marks) - 1, most).round().astype(int).tolist()]
+    return bottom_m, top_m, [*marks, *ends[:1, 2].tolist(), float(ends[-1, 2])]
+
+
+def _places(problem: Problem, low: Floats, high: Floats, count: int, spacing_m: float) -> tuple[Floats, Indices]:
+    """(N, 2) places in a box, about ``count``, and (2, E) pairs of them to be linked however far apart."""
+    part = extent(problem, (low[0], low[1], high[0], high[1]))
+    c0, r0, c1, r1 = part
+    c, r = (a.ravel() for a in np.meshgrid(np.arange(c0, c1 + 1.0), np.arange(r0, r1 + 1.0)))
+    model = _within(problem.airspace.surface.grid.to_plane(c, r), low, high)
+    parts = [_within(_saddles(problem, part), low, high)[: count // 4]]
+    if len(model) <= 1.3 * count:
+        parts.append(model)
+    if len(model) < 0.6 * count or len(model) > 1.3 * count:
+        axes = [np.arange(low[k] + 0.5 * spacing_m, high[k], spacing_m) for k in range(2)]
+        parts.append(np.stack([a.ravel() for a in np.meshgrid(*axes)], axis=-1))
+    rims = _within(np.vstack([np.zeros((0, 2)), *_rims(problem)]), low, high)
+    parts.append(rims[np.linspace(0, len(rims) - 1, MOST_RIMS).astype(np.intp)] if len(rims) > MOST_RIMS else rims)
+    before = sum(map(len, parts))
+    slits = _slits(problem, SLIT * spacing_m)
+    slits = slits[((slits >= low) & (slits <= high)).all(axis=(1, 2))][:MOST_SLITS]
+    first = before + 5 * np.arange(len(slits))
+    links = np.concatenate([np.stack([first + k, first + k + 1]) for k in range(4)], axis=1)
+    return np.vstack([*parts, slits.reshape(-1, 2)]), links.astype(np.intp)
+
+
+def _within(places: Floats, low: Floats, high: Floats) -> Floats:
+    return places[((places >= low) & (places <= high)).all(axis=1)]
+
+
+def _saddles(problem: Problem, part: Extent) -> Floats:
+    """(N, 2) saddles of the surface inside cells, the sharpest first: passes that nodes alone do not show."""
+    c0, r0, c1, r1 = part
+    z = problem.airspace.surface.top_m[r0 : r1 + 1, c0 : c1 + 1]
+    a, b, c, d = z[:-1, :-1], z[:-1, 1:], z[1:, :-1], z[1:, 1:]
+    twist = a + d - b - c
+    with np.errstate(divide="ignore", invalid="ignore"):
+        u, v = (a - c) / twist, (a - b) / twist
+    row, col = np.nonzero((u > 0.0) & (u < 1.0) & (v > 0.0) & (v < 1.0))
+    row, col = (k[np.argsort(-np.abs(twist[row, col]), kind="stable")] for k in (row, col))
+    grid = problem.airspace.surface.grid
+    return grid.to_plane(c0 + col + u[row, col], r0 + row + v[row, col]).reshape(-1, 2)
+
+
+def _rims(problem: Problem) -> list[Floats]:
+    """(N, 2) places just outside of each zone: around circles, at the corners of polygons."""
+    more, out = problem.airspace.beside_m(problem.limits) + HAIR_M, []
+    turn = np.arange(SPOKES) * (2.0 * math.pi / SPOKES)
+    around = np.stack([np.cos(turn), np.sin(turn)], axis=-1) / math.cos(math.pi / SPOKES)
+    for zone in problem.airspace.zones:
+        shape = zone.shape
+        if isinstance(shape, Circle):
+            middle = np.array([shape.east_m, shape.north_m])
+            out.append(middle + (shape.radius_m * problem.airspace.scale + more) * around)
+        else:
+            p = shape.vertices
+            back, on = np.roll(p, 1, axis=0) - p, np.roll(p, -1, axis=0) - p
+            outward = -(back / np.hypot(*back.T)[:, None] + on / np.hypot(*on.T)[:, None])
+            outward /= np.maximum(np.hypot(*outward.T), 1e-9)[:, None]
+            out += [p + side * 1.5 * more * outward for side in (1.0, -1.0)]
+    return out
+
+
+def _slits(problem: Problem, widest_m: float) -> Floats:
+    """(N, 5, 2) five places on the line through each slit between two circles, the third in its middle; the narrowest
+    come first, for they are what nothing else finds."""
+    circles = [z.shape for z in problem.airspace.zones if isinstance(z.shape, Circle)]
+    middles = np.array([(c.east_m, c.north_m) for c in circles]).reshape(-1, 2)
+    radii = np.array([c.radius_m for c in circles]) * problem.airspace.scale + problem.airspace.beside_m(problem.limits)
+    i, j = np.triu_indices(len(circles), 1)
+    apart = np.hypot(*(middles[j] - middles[i]).T)
+    gap = apart - radii[i] - radii[j]
+    order = np.argsort(gap, kind="stable")
+    order = order[(gap[order] > 0.0) & (gap[order] <= widest_m)]
+    i, j, apart, gap = i[order], j[order], apart[order], gap[order]
+    along = (middles[j] - middles[i]) / apart[:, None]
+    inside = middles[i] + (radii[i] + 0.5 * gap)[:, None] * along
+    across = np.stack([-along[:, 1], along[:, 0]], axis=-1)
+    steps = np.minimum(radii[i], radii[j])[:, None] * np.array([-1.2, -0.5, 0.0, 0.5, 1.2])
+    return np.asarray(inside[:, None] + steps[:, :, None] * across[:, None])

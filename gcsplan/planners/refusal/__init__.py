@@ -1,0 +1,1 @@
+"""Why there is no path, and what would help."""

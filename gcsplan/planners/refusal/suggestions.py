@@ -1,0 +1,325 @@
+"""What would help where there is no path: change one limit at a time and plan the changed problem.
+
+A limit's value is reported to do only if a whole plan with it has a mission: with the budget and the wanted gap of the
+problem, and with all that refuses a plan, such as the battery. Elsewhere a path that was found quickly is enough to say
+that there is one. `Trials` bounds the number and time of the plans.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gcsplan.arrays import Floats
+from gcsplan.planners.lattice.routes import Level, Router
+from gcsplan.planners.problem import Problem, Refusal
+from gcsplan.planners.profile.track import denser
+from gcsplan.planners.refusal.trials import DEGREES, LEAST_DEG, Plan, Trials, metres_from, two_digits
+from gcsplan.world.airspace import Airspace, Legs
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.zones import Circle, Zone
+
+Place = tuple[float, float]
+
+FILLED = "give a terrain model that knows it (`gcsplan dem fetch` gets one), or fill its voids (nodata)"
+"""What fills unknown ground."""
+NAMES, SINGLES = 5, 8
+"""Most no-fly zones that are named in a message, and that are removed one at a time."""
+STEEPEST_DEG, STEEPEST_TURNING_DEG = 90.0, 45.0
+"""Climb angle that means no limit; and the largest that the mission file allows a fixed wing."""
+ROUNDED_M = 0.05
+"""Metres that rounding way points to whole centimetres may cost below a ceiling; generous."""
+LEVEL = Level(math.inf, 40_000)
+"""Lattice on which the altitude of the lowest pass is estimated."""
+
+
+def with_cures(problem: Problem, bare: Refusal, plan: Plan, whole: Plan | None = None, but: str = "") -> Refusal:
+    """The refusal ``bare`` of ``problem``, extended by what would help; every cure is planned before it is reported.
+
+    ``plan`` returns a solution of a changed problem or raises NoMission; ``whole`` (None: the same) also refuses
+    whatever else refuses a plan, and ``but`` says what that leaves out. The clock is read between two plans and
+    whenever a plan reports progress, so the whole stays short if the planner keeps ``budget_s``.
+    """
+    if not bare.untried:
+        return bare
+    trials = Trials(problem, plan, whole)
+    # The searches in the plane can prove that ceilings and zones shut every path; they know little of climb limits.
+    order = LIFTS if bare.reason == "infeasible" else LIFTS[::-1]
+    lifts = [lift for lift in order if lift.binds(problem)]
+    cures: list[Cure] = []
+    in_vain: list[Lift] = []
+    for lift in lifts:
+        if trials.spent:
+            break
+        path = trials.path(lift.lifted(problem), f"without {lift.name}")
+        if path is not None:
+            cures.append(lift.cure(trials, path))
+        elif not trials.stopped:
+            in_vain.append(lift)
+    untried = lifts[len(cures) + len(in_vain) :]
+    words = [bare.message, *(cure.words for cure in cures), *([but] if but and any(c.whole for c in cures) else [])]
+    if not cures and not untried:
+        cures = [_together(trials, lifts)]
+        words.append(cures[0].words)
+    elif in_vain:
+        words.append(f"without {_list([lift.name for lift in in_vain], 'or')} alone none is found")
+    if untried:
+        words.append(f"not tried in {trials.share_s:.0f} s: without {_list([lift.name for lift in untried], 'or')}")
+    shown = next((cure for cure in cures if cure.place is not None), None)
+    if bare.east_m is not None and bare.north_m is not None:  # the place that stopped the search itself comes first
+        shown = Cure("", (bare.east_m, bare.north_m), bare.place_of)
+    return Refusal(
+        "; ".join(words),
+        reason="infeasible" if bare.reason == "infeasible" else "not_found",
+        place=None if shown is None else shown.place,
+        place_of="" if shown is None else shown.place_of,
+    )
+
+
+# -- limits that may be lifted --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Cure:
+    """A change that helps, in words for the message, and its place; ``whole``: a whole plan was made with it."""
+
+    words: str
+    place: Place | None = None
+    place_of: str = ""
+    whole: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Lift:
+    """A limit, or all zones: whether it ``binds`` in a problem at all, the problem without it, the cure to report."""
+
+    name: str
+    binds: Callable[[Problem], bool]
+    lifted: Callable[[Problem], Problem]
+    cure: Callable[[Trials, Floats], Cure]
+    """From a path (N, 3) without the limit: finds the least change of it that suffices."""
+
+
+def _limited(problem: Problem, **changed: float | None) -> Problem:
+    return replace(problem, limits=replace(problem.limits, **changed))  # type: ignore[arg-type]
+
+
+def _zoned(problem: Problem, zones: Sequence[Zone]) -> Problem:
+    air = problem.airspace
+    return replace(problem, airspace=Airspace(air.surface, zones, scale=air.scale))
+
+
+def _ceiling(trials: Trials, path: Floats) -> Cure:
+    problem, limits = trials.problem, trials.problem.limits
+    given = limits.max_amsl_m
+    assert given is not None
+    enough = _metres_over(given, float(path[:, 2].max()) + limits.altitude_error_m)
+    values = metres_from(_lowest_pass(problem, enough))
+    found = trials.least("max_amsl_m", lambda m: _limited(problem, max_amsl_m=m), given, enough, values)
+    if found.path is None:
+        return Cure(f"without max_amsl_m there is a path{found.no_value}")
+    amsl_m, place = _over_highest_ground(problem, found.path)
+    return Cure(
+        f"max_amsl_m {found.value:g} would do {found.words(f'{given:g} is given')}: the path crosses its highest "
+        f"ground at {amsl_m:.1f} m AMSL ({floor_words(limits)})",
+        place,
+        "that ground",
+        whole=True,
+    )
+
+
+def _lowest_pass(problem: Problem, enough: float) -> float:
+    """Estimate the lowest max_amsl_m that would do, in whole metres and at most about ``enough``: the lowest one under
+    which a coarse lattice without climb limits has a route."""
+    free = _limited(problem, max_amsl_m=None, max_climb_deg=STEEPEST_DEG, max_descent_deg=STEEPEST_DEG)
+    router = Router.at(free, LEVEL)
+    low = max(float(problem.limits.max_amsl_m or 0.0) - problem.limits.altitude_error_m, 0.0)
+    high = enough
+    while high - low > 0.5:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if router.way(middle) is not None else (middle, high)
+    return float(math.ceil(high + problem.limits.altitude_error_m + ROUNDED_M))
+
+
+def _climbing(trials: Trials, path: Floats) -> Cure:
+    problem, limits = trials.problem, trials.problem.limits
+    up, down = limits.max_climb_deg, limits.max_descent_deg
+
+    def at(angle: float) -> Problem:
+        return _limited(problem, max_climb_deg=max(up, angle), max_descent_deg=max(down, angle))
+
+    run = np.hypot(*np.diff(path[:, :2], axis=0).T)
+    steep = float(np.degrees(np.arctan2(np.abs(np.diff(path[:, 2])), run)).max())
+    given = min(up, down)
+    values = replace(DEGREES, most=min(DEGREES.most, _steepest_deg(problem)))
+    enough = min(two_digits(max(steep, 1.1 * given, LEAST_DEG)), values.most)
+    found = trials.least("max_climb_deg", at, given, enough, values)
+    if found.path is None:
+        return Cure(f"without max_climb_deg and max_descent_deg there is a path{found.no_value}")
+    raised = [(key, was) for key, was in (("max_climb_deg", up), ("max_descent_deg", down)) if was < found.value]
+    would = " and ".join(f"{key} {found.value:g}" for key, _ in raised)
+    was = " and ".join(f"{was:g}" for was in dict.fromkeys(was for _, was in raised))
+    return Cure(f"{would} would do {found.words(f'{was} is given')}", whole=True)
+
+
+def _steepest_deg(problem: Problem) -> float:
+    return STEEPEST_TURNING_DEG if problem.turn_radius_m > 0.0 else STEEPEST_DEG
+
+
+def _metres_over(given: float, needed_m: float) -> float:
+    """The least whole metres that are at least ``needed_m`` (plus `ROUNDED_M`) and more than ``given``."""
+    return float(max(math.ceil(needed_m + ROUNDED_M), math.floor(given) + 1))
+
+
+def _above_ground(trials: Trials, path: Floats) -> Cure:
+    problem, limits = trials.problem, trials.problem.limits
+    given = limits.max_agl_m
+    assert given is not None
+    report = problem.airspace.examine(Legs.of_path(path, limits), limits)
+    enough = _metres_over(given, float(np.nanmax(report.max_agl_m)) + limits.altitude_error_m)
+    values = metres_from(0.0)
+    found = trials.least("max_agl_m", lambda m: _limited(problem, max_agl_m=m), given, enough, values)
+    if found.path is None:
+        return Cure(f"without max_agl_m there is a path{found.no_value}")
+    return Cure(f"max_agl_m {found.value:g} would do {found.words(f'{given:g} is given')}", whole=True)
+
+
+def _fewer_zones(trials: Trials, path: Floats) -> Cure:
+    """Find which zones must go, among those that a path planned without zones enters: one of them alone, or else all of
+    them."""
+    problem, zones = trials.problem, trials.problem.airspace.zones
+    broken = problem.airspace.examine(Legs.of_path(path, problem.limits), problem.limits).violations
+    crossed = sorted({v.zone for v in broken if v.zone >= 0})
+    alone = []
+    for k in crossed[:SINGLES]:
+        if trials.spent:
+            break
+        if trials.path(_zoned(problem, zones[:k] + zones[k + 1 :]), f"without zone {zones[k].name}") is not None:
+            alone.append(k)
+    first = zones[(alone or crossed or [0])[0]]
+    at = _middle(first), repr(first.name)
+    if len(alone) == 1:
+        return Cure(f"without no-fly zone {zones[alone[0]].name!r} there is a path", *at)
+    if alone:
+        words = _list([repr(zones[k].name) for k in alone], "or")
+        return Cure(f"without any one of the no-fly zones {words} there is a path", *at)
+    kept = [zone for k, zone in enumerate(zones) if k not in crossed]
+    if crossed and kept and not trials.spent and trials.path(_zoned(problem, kept), "without several zones") is None:
+        crossed = []
+    if not crossed:
+        return Cure("without the no-fly zones there is a path")
+    words = _list([repr(zones[k].name) for k in crossed])
+    return Cure(f"without the no-fly zones {words} together there is a path", *at)
+
+
+def _known(problem: Problem) -> Problem:
+    """The problem with unknown ground filled: each unknown node is as high as the nearest known one."""
+    air, surface = problem.airspace, problem.airspace.surface
+    ground = _filled(surface.ground_m)
+    top = ground if surface.top_m is surface.ground_m else _filled(surface.top_m)
+    return replace(problem, airspace=Airspace(replace(surface, ground_m=ground, top_m=top), air.zones, scale=air.scale))
+
+
+def _filled(z: Floats) -> Floats:
+    from scipy.ndimage import distance_transform_edt  # only where no path was found over ground with voids
+
+    unknown = np.isnan(z)
+    if unknown.all() or not unknown.any():
+        return z
+    nearest = distance_transform_edt(unknown, return_distances=False, return_indices=True)
+    return np.asarray(z[tuple(nearest)])
+
+
+def _over_unknown(trials: Trials, path: Floats) -> Cure:
+    """Name the unknown ground that a path leads over which was found with that ground filled."""
+    problem = trials.problem
+    found = problem.airspace.examine(Legs.of_path(path, problem.limits), problem.limits).violations
+    void = min((v for v in found if v.kind == "coverage"), key=lambda v: (v.leg, v.fraction), default=None)
+    if void is None:  # the path that was found avoids it: another search may find it without help
+        return Cure("with the unknown ground of the terrain model filled there is a path")
+    return Cure(
+        f"unknown ground is in the way: with it as high as the ground around it there is a path over it. {FILLED}",
+        (void.east_m, void.north_m),
+        "that ground",
+    )
+
+
+def _together(trials: Trials, lifts: Sequence[Lift]) -> Cure:
+    """Find which limits must be lifted together where lifting any one of them alone does not help."""
+    names = _list([lift.name for lift in lifts], "or")
+    if not lifts:
+        return Cure("no limit and no zone is in the way: unknown ground, or the edge of the known terrain, is")
+    if len(lifts) == 1:
+        return Cure(f"without {names} none is found either")
+
+    def opens(some: Sequence[Lift]) -> bool:
+        problem = trials.problem
+        for lift in some:
+            problem = lift.lifted(problem)
+        return trials.path(problem, f"without {_list([lift.name for lift in some])}") is not None
+
+    alone = f"without {names} alone none is found"
+    if trials.spent:
+        return Cure(alone)
+    if not opens(lifts):
+        return Cure(alone if trials.stopped else f"{alone}, nor without all of them together")
+    needed = list(lifts)
+    for lift in lifts:
+        fewer = [other for other in needed if other is not lift]
+        if len(fewer) > 1 and not trials.spent and opens(fewer):
+            needed = fewer
+    return Cure(f"{alone}; without {_list([lift.name for lift in needed])} together there is a path")
+
+
+LIFTS = (
+    Lift("unknown ground", lambda p: p.airspace.surface.has_unknown, _known, _over_unknown),
+    Lift("max_amsl_m", lambda p: p.limits.max_amsl_m is not None, lambda p: _limited(p, max_amsl_m=None), _ceiling),
+    Lift("the no-fly zones", lambda p: len(p.airspace.zones) > 0, lambda p: _zoned(p, ()), _fewer_zones),
+    Lift("max_agl_m", lambda p: p.limits.max_agl_m is not None, lambda p: _limited(p, max_agl_m=None), _above_ground),
+    Lift(
+        "max_climb_deg and max_descent_deg",
+        lambda p: min(p.limits.max_climb_deg, p.limits.max_descent_deg) < _steepest_deg(p),
+        lambda p: _limited(p, max_climb_deg=_steepest_deg(p), max_descent_deg=_steepest_deg(p)),
+        _climbing,
+    ),
+)
+"""The limits that are lifted: in this order where it is proved that there is no path, else from last to first."""
+
+
+# -- words ---------------------------------------------------------------------------------------------------------
+
+
+def floor_words(limits: Limits) -> str:
+    words = f"ground + min_agl_m {limits.min_agl_m:g}"
+    if limits.horizontal_clearance_m:
+        words += f", terrain clearance {limits.horizontal_clearance_m:g} m"
+    return words + (f", altitude error {limits.altitude_error_m:g} m" if limits.altitude_error_m else "")
+
+
+def rounded_up(metres: float) -> float:
+    """``metres`` rounded up to a tenth, never down: a limit that is set to the reported value must do."""
+    return float(np.ceil(metres * 10.0 - 1e-6)) / 10.0
+
+
+def _list(names: Sequence[str], last: str = "and") -> str:
+    """The names as ``a, b and c``; if they are many, the first `NAMES` and how many more."""
+    shown = [*names[:NAMES], f"{len(names) - NAMES} more"] if len(names) > NAMES + 1 else list(names)
+    return f" {last} ".join([", ".join(shown[:-1]), shown[-1]] if len(shown) > 1 else shown)
+
+
+def _over_highest_ground(problem: Problem, path: Floats) -> tuple[float, Place]:
+    """The path's altitude AMSL over the highest ground under it, and that place (east_m, north_m)."""
+    step_m = 0.25 * float(problem.airspace.surface.grid.metres_per_cell(*problem.start[:2]).min())
+    at = denser(path, step_m)
+    k = int(np.nanargmax(problem.airspace.surface.ground_at(at[:, 0], at[:, 1])))
+    return float(at[k, 2]), (float(at[k, 0]), float(at[k, 1]))
+
+
+def _middle(zone: Zone) -> Place:
+    if isinstance(zone.shape, Circle):
+        return zone.shape.east_m, zone.shape.north_m
+    west, south, east, north = zone.bounds
+    return 0.5 * (west + east), 0.5 * (south + north)

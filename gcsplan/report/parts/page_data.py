@@ -1,0 +1,186 @@
+"""The data of a report: one `Page` with a `Subject` for each vehicle; made here from checked files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+from gcsplan.check.returns.verdict import WayHome
+from gcsplan.check.returns.words import verdict_words
+from gcsplan.check.verdict import Verdict
+from gcsplan.fleet.arrival import Slot
+from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.fleet.separation import Separation
+from gcsplan.mavlink.mission.parameter_list import Setting
+from gcsplan.notes.note import Note, Said, Wording
+from gcsplan.units import METRIC, Units
+from gcsplan.vehicle import Vehicle
+from gcsplan.world.world import World
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """The quality of the path: ``bound`` and ``cost`` in ``unit`` (m or J), and why the search stopped."""
+
+    objective: str
+    unit: str
+    cost: float
+    bound: float | None
+    gap_percent: float | None
+    stopped_by: str
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """One vehicle, or one checked file: its verdict, and other data on it.
+
+    ``slot`` is its part of the time table, None for a checked file, and so is ``motion``, the whole flight over time.
+    ``flown`` is what it flew in a rehearsal, from that track alone. ``leaves``: it is gone where its motion ends.
+    ``home`` is the way home from every point, if it was judged. ``upload`` holds the keys of ``upload.json``, None if
+    nothing was sent, ``warnings`` what was said of it. ``settings``: the parameters that its mission was judged with.
+    ``typed``: the options that the reader types, by their keys in a mission file; empty if he has one.
+    """
+
+    name: str
+    verdict: Verdict
+    vehicle: Vehicle
+    certificate: Certificate | None = None
+    notes: tuple[Said, ...] = ()
+    motion: TimedPath | None = None
+    slot: Slot | None = None
+    home: WayHome | None = None
+    upload: Mapping[str, object] | None = None
+    warnings: tuple[Said, ...] = ()
+    flown: TimedPath | None = None
+    leaves: bool = False
+    settings: tuple[Setting, ...] = ()
+    typed: Mapping[str, str] = field(default_factory=dict)
+
+    def wording(self, units: Units | None = None) -> Wording:
+        """How the reader is spoken to, in ``units``, or in SI."""
+        return Wording(units, self.typed)
+
+    @property
+    def depart_s(self) -> float:
+        """Seconds from the start until it leaves the ground."""
+        return self.slot.depart_s if self.slot is not None else 0.0
+
+    @property
+    def arrive_s(self) -> float:
+        """Seconds to the goal: from the start of the time table, or from the mission's beginning without one."""
+        return self.slot.arrive_s if self.slot is not None else self.verdict.arrive_s
+
+    @property
+    def homeless(self) -> bool:
+        """Whether the return is not safe, or not judged."""
+        return self.home is None or self.home.safe is not True
+
+    @property
+    def words(self) -> Note:
+        """The verdict in a sentence."""
+        return verdict_words(self.verdict.safe, self.home)
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """One figure in SI, planned and flown; None if there is none, infinite: never.
+
+    ``subject``: the vehicle's number on the page, None for the fleet. Heights and distances are least values.
+    """
+
+    subject: int | None
+    vehicle: str
+    what: str
+    planned: float | None
+    flown: float | None
+    kind: Literal["time", "percent", "height", "distance"]
+
+
+@dataclass(frozen=True, slots=True)
+class Rehearsed:
+    """What a rehearsal found. ``how``: who flew, how often and in which weather, in a sentence."""
+
+    safe: bool | None
+    how: str
+    compared: tuple[Compared, ...]
+    violations: tuple[Said, ...] = ()
+    not_flown: tuple[Said, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Page:
+    """Everything that one report shows. ``facts`` are names and values of what was requested, in the order shown.
+
+    ``left_out`` are names of vehicles without a mission, and why. ``units`` are those of all numbers on the page.
+    """
+
+    title: str
+    world: World
+    subjects: tuple[Subject, ...]
+    inputs: Mapping[str, object]
+    facts: tuple[tuple[str, str], ...] = ()
+    notes: tuple[Said, ...] = ()
+    separation: Separation | None = None
+    order: tuple[str, ...] = ()
+    units: Units = METRIC
+    rehearsed: Rehearsed | None = None
+    left_out: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def time_decimals(self) -> int:
+        """Decimals of the arrivals: tenths in a fleet, whose order may hang on them."""
+        return 1 if sum(s.slot is not None for s in self.subjects) > 1 else 0
+
+    @property
+    def homeless(self) -> bool:
+        """Whether the return of any subject is not safe, or not judged."""
+        return any(s.homeless for s in self.subjects)
+
+    @property
+    def safe(self) -> bool | None:
+        """False if any subject breaks a limit, None if something could not be judged (or there is no subject)."""
+        verdicts = [s.verdict.safe for s in self.subjects]
+        return False if False in verdicts else None if None in verdicts or not verdicts else True
+
+
+class CheckedFile(Protocol):
+    """The result of a check of one file (`gcsplan.app.check.files.Checked`)."""
+
+    @property
+    def file(self) -> object: ...
+    @property
+    def vehicle(self) -> Vehicle: ...
+    @property
+    def verdict(self) -> Verdict: ...
+    @property
+    def notes(self) -> tuple[Said, ...]: ...
+    @property
+    def typed(self) -> Mapping[str, str]: ...
+
+
+def page_of_check(
+    title: str,
+    world: World,
+    checked: Sequence[CheckedFile],
+    *,
+    inputs: Mapping[str, object],
+    notes: Sequence[Said] = (),
+    homes: Sequence[WayHome | None] = (),
+    units: Units = METRIC,
+) -> Page:
+    """The page of checked files; subjects are named by file if one vehicle has several files.
+
+    ``homes`` are the ways home of ``checked``, in the same order, if they were judged.
+    """
+    names = [c.vehicle.name for c in checked]
+    subjects = tuple(
+        Subject(
+            c.vehicle.name if names.count(c.vehicle.name) == 1 else str(c.file),
+            c.verdict, c.vehicle, None, tuple(dict.fromkeys((*c.notes, *c.verdict.notes))),
+            home=homes[i] if i < len(homes) else None, typed=c.typed,
+        )
+        for i, c in enumerate(checked)
+    )  # fmt: skip
+    facts = tuple((f"file of {s.name}", str(c.file)) for s, c in zip(subjects, checked, strict=True))
+    return Page(title, world, subjects, dict(inputs), facts, tuple(dict.fromkeys(notes)), units=units)

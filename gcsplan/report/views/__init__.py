@@ -1,0 +1,1 @@
+"""The views of a page: map, profiles, fleet, way home, rehearsal, tables."""

@@ -1,0 +1,1 @@
+"""Surfaces, zones, limits and paths in metres."""

@@ -1,0 +1,313 @@
+"""Several tiles as one grid, and the window of it that a mission needs, with a polynomial map from plane to grid."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gcsplan.arrays import Bools, Floats
+from gcsplan.errors import InputError
+from gcsplan.notes.note import Note
+from gcsplan.world.geodesy.datum import plane_to_raster, to_wgs84
+from gcsplan.world.geodesy.frame import Box, Frame
+from gcsplan.world.geodesy.height_unit import BY_NOBODY, METRE, OF_KEY
+from gcsplan.world.geometry.surface import NO_SIDES, GridMap, Sides
+from gcsplan.world.terrain.overlap import PlacedTile, read_tiles
+from gcsplan.world.terrain.raster import MAX_CELLS, Raster
+
+FIT_ERROR_M = 0.01
+"""The polynomial may misplace a node by this much at most, m."""
+
+FEW_CELLS, CELLS_IN_BYTE = 5_000_000, 100
+"""Most cells of a window, or cells per byte of its files if that is more: no terrain is packed more closely."""
+
+ALIGNED_CELLS = 1e-3
+"""Tiles whose nodes are off a common grid by more than this part of a cell are refused."""
+
+WIDEST_COLUMNS = 10
+"""Columns of tiles may differ by a ratio of numbers up to this."""
+
+_SPARE_CELLS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """A rectangle of nodes: ``heights_m`` (rows, cols), NaN unknown; ``grid`` maps the plane to them.
+
+    ``x``, ``y``: coordinates of the columns and rows in the raster's own units. ``goes_on``: beyond which sides (first
+    column, first row, last column, last row) the tiles hold more. ``low_m``: where files differ ``heights_m`` are the
+    greatest heights and these the least; None if no files differ here.
+    """
+
+    heights_m: Floats
+    grid: GridMap
+    x: Floats
+    y: Floats
+    notes: tuple[Note, ...]
+    goes_on: Sides = NO_SIDES
+    low_m: Floats | None = None
+
+    @property
+    def plane_box(self) -> Box:
+        """West, south, east, north of all nodes in the plane, m."""
+        rows, cols = self.heights_m.shape
+        c, r = np.linspace(0, cols - 1, 33), np.linspace(0, rows - 1, 33)
+        border = np.concatenate([self.grid.to_plane(c, 0), self.grid.to_plane(c, rows - 1),
+                                 self.grid.to_plane(0, r), self.grid.to_plane(cols - 1, r)])  # fmt: skip
+        low, high = border.min(axis=0), border.max(axis=0)
+        return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+@dataclass(frozen=True, slots=True)
+class _Layout:
+    """The common grid and the tiles on it; its node (0, 0) is the first node of the first tile, at (x0, y0)."""
+
+    x0: float
+    y0: float
+    dx: float
+    dy: float
+    tiles: tuple[PlacedTile, ...]
+
+    def grid_of(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        """Column and row of points in the raster's units."""
+        return np.asarray((x - self.x0) / self.dx), np.asarray((self.y0 - y) / self.dy)
+
+
+class Mosaic:
+    """Tiles with one coordinate system and one grid. Raises InputError if they differ.
+
+    Columns of tiles may differ in width by a simple ratio, as published models widen them towards the poles: then the
+    common grid is the finest that holds the nodes of all, and nodes between two of a tile are linear between them.
+    """
+
+    def __init__(self, rasters: Sequence[Raster], *, where: str) -> None:
+        self.rasters = tuple(rasters)
+        self.where = where
+        first = self.rasters[0]
+        self.crs = first.crs
+        for other in self.rasters[1:]:
+            if other.crs.horizontal != first.crs.horizontal:
+                raise InputError(
+                    f"the tiles must share one coordinate system: {first.name} is in "
+                    f"{first.crs.horizontal.name!r}, {other.name} in {other.crs.horizontal.name!r}; gdalwarp one of "
+                    "them",
+                    where=where,
+                )
+            span = max(first.cols, first.rows, other.cols, other.rows)
+            off = abs(other.dx / first.dx / _ratio(other, first) - 1.0)
+            if max(off, abs(other.dy / first.dy - 1.0)) * span > ALIGNED_CELLS:
+                raise InputError(
+                    f"the tiles must share one resolution: {first.name} has cells of {first.dx:g} × {first.dy:g}, "
+                    f"{other.name} of {other.dx:g} × {other.dy:g}; bring them together with gdalwarp -tr",
+                    where=where,
+                )
+            if other.vertical != first.vertical:
+                raise InputError(
+                    f"the tiles must share one vertical datum: {first.name} says {_datum(first)}, {other.name} "
+                    f"{_datum(other)}; correct the one that is wrong (gdal_edit.py -a_srs)",
+                    where=where,
+                )
+        _require_known_units(self.rasters, where)
+        self._degrees = to_wgs84(first.crs.horizontal, where=where)
+        self._layout(0.0)  # finds tiles off the common grid before anything is read
+
+    def covers(self, lat_deg: ArrayLike, lon_deg: ArrayLike) -> Bools:
+        """True where a place lies on some tile (which may still be void there); accurate to a few metres."""
+        lat, lon = np.broadcast_arrays(np.asarray(lat_deg, float), np.asarray(lon_deg, float))
+        if not lon.size:
+            return np.zeros(lon.shape, np.bool_)
+        west, east = float(lon.min()), float(lon.max())
+        if any(self._turn(r, west) != self._turn(r, east) for r in self.rasters):  # not one layout for all of them
+            each = [self.covers(*place) for place in zip(lat.ravel().tolist(), lon.ravel().tolist(), strict=True)]
+            return np.array(each, np.bool_).reshape(lon.shape)
+        x, y = (np.asarray(a, float) for a in self._degrees.transform(lon, lat, direction="INVERSE"))
+        known = np.isfinite(x) & np.isfinite(y)
+        layout = self._layout(west)
+        col, row = layout.grid_of(self._near(np.where(known, x, 0.0), lon), np.where(known, y, 0.0))
+        on = np.zeros(lon.shape, np.bool_)
+        for p in layout.tiles:
+            on |= (
+                (p.col - 0.5 * p.step <= col) & (col <= p.col + p.cols - 1 + 0.5 * p.step)
+                & (p.row - 0.5 <= row) & (row <= p.row + p.raster.rows - 0.5)
+            )  # fmt: skip
+        return np.asarray(known & on)
+
+    def node_degrees(self, window: Window, cols: ArrayLike, rows: ArrayLike) -> tuple[Floats, Floats]:
+        """Latitude and longitude of the nodes ``rows`` × ``cols`` of a window, (len(rows), len(cols)) each.
+
+        Accurate to a few metres (whatever datum shift PROJ has available): enough to look up a geoid, not to place a
+        node.
+        """
+        x, y = np.meshgrid(window.x[np.asarray(cols)], window.y[np.asarray(rows)])
+        lon, lat = self._degrees.transform(x, y)
+        return np.asarray(lat, float), np.asarray(lon, float)
+
+    def window(self, frame: Frame, box: Box, *, spare_m: float = 0.0, most_cells: int | None = None) -> Window:
+        """The nodes that cover ``box`` (west, south, east, north, plane metres) and ``spare_m`` around it.
+
+        The window is clipped to the tiles; gaps between them are NaN, and where two tiles hold the same node with two
+        heights both are kept (`Window.low_m`). Raises InputError if no tile meets the box, beyond ``most_cells``
+        (`MAX_CELLS`), and if the plane cannot be fitted to `FIT_ERROR_M`.
+        """
+        middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
+        there, accuracy_m = plane_to_raster(frame, self.crs.horizontal, box, where=self.where)
+        reference = float(frame.to_degrees(*middle)[1])
+
+        layout = self._layout(reference)
+        tiles = layout.tiles
+
+        def exact(east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
+            x, y = (np.asarray(a, float) for a in there.transform(east_m, north_m))
+            if not (np.isfinite(x).all() and np.isfinite(y).all()):
+                raise InputError(
+                    "the mission reaches beyond what the DEM's coordinate system can hold; gdalwarp the DEM to a "
+                    "system made for this place",
+                    where=self.where,
+                )
+            return layout.grid_of(self._near(x, reference), y)
+
+        wide = (box[0] - spare_m, box[1] - spare_m, box[2] + spare_m, box[3] + spare_m)
+        col, row = exact(*_lattice(wide))
+        first_col, last_col = min(p.col for p in tiles), max(p.col + p.cols for p in tiles)
+        first_row, last_row = min(p.row for p in tiles), max(p.row + p.raster.rows for p in tiles)
+        c0, c1 = max(math.floor(col.min()) - _SPARE_CELLS, first_col), math.ceil(col.max()) + _SPARE_CELLS + 1
+        r0, r1 = max(math.floor(row.min()) - _SPARE_CELLS, first_row), math.ceil(row.max()) + _SPARE_CELLS + 1
+        c1, r1 = min(c1, last_col), min(r1, last_row)
+        parts = [(p, o) for p in tiles if c1 - c0 > 1 and r1 - r0 > 1 and (o := p.overlap(c0, r0, c1 - c0, r1 - r0))]
+        if not parts or max(o[2] for _, o in parts) < 2 or max(o[3] for _, o in parts) < 2:
+            raise InputError(
+                f"the DEM ({', '.join(r.name for r in self.rasters[:4])}{', …' if len(self.rasters) > 4 else ''}) does "
+                f"not cover the mission, which lies around {frame.to_degrees(*middle)[0]:.4f}, {reference:.4f}; give "
+                "the tiles of this place",
+                where=self.where,
+            )
+        most_cells = min(MAX_CELLS, MAX_CELLS if most_cells is None else most_cells)
+        if (c1 - c0) * (r1 - r0) > most_cells:
+            raise InputError(
+                f"the mission needs {c1 - c0} × {r1 - r0} cells of the DEM, more than {most_cells / 1e6:.3g} million; "
+                "use a coarser DEM (gdalwarp -tr) or a smaller mission",
+                where=self.where,
+            )
+        held = sum(p.raster.stored_bytes for p, _ in parts)
+        if (c1 - c0) * (r1 - r0) > max(FEW_CELLS, CELLS_IN_BYTE * held):
+            raise InputError(
+                f"the DEM claims {c1 - c0} × {r1 - r0} cells around the mission in a file of {held} bytes, more than "
+                "any terrain can be packed: it is damaged or empty; if it is not, use a coarser one (gdalwarp -tr)",
+                where=self.where,
+            )
+        x = layout.x0 + np.arange(c0, c1) * layout.dx
+        y = layout.y0 - np.arange(r0, r1) * layout.dy
+
+        def in_window(east_m: Floats, north_m: Floats) -> tuple[Floats, Floats]:
+            c, r = exact(east_m, north_m)
+            return c - c0, r - r0
+
+        grid = GridMap.fit(in_window, _union(wide, _plane_box(there, x, y)))
+        if not grid.error_m <= FIT_ERROR_M:
+            raise InputError(
+                f"the mission is too wide for the DEM's coordinate system: its grid can be placed to "
+                f"{grid.error_m:.3g} m only, wanted {FIT_ERROR_M:g} m; gdalwarp the DEM to UTM, or plan a smaller "
+                "mission",
+                where=self.where,
+            )
+        heights, notes = read_tiles(parts, c0, r0, c1 - c0, r1 - r0, self.where)
+        if accuracy_m < 0.0:
+            notes.append(Note("datum_shift_of_unknown_accuracy", crs=self.crs.horizontal.name))
+        elif accuracy_m > 1.0:
+            notes.append(Note("datum_shift_inaccurate", crs=self.crs.horizontal.name, accuracy_m=accuracy_m))
+        goes_on = (c0 > first_col, r0 > first_row, c1 < last_col, r1 < last_row)
+        return Window(heights.high_m, grid, x, y, tuple(notes), goes_on, heights.low_m)
+
+    def extent(self, frame: Frame, box: Box) -> Box:
+        """West, south, east, north of all tiles in the plane, as far as the plane reaches; ``box`` is the mission's."""
+        there, _ = plane_to_raster(frame, self.crs.horizontal, box, where=self.where)
+        layout = self._layout(float(frame.to_degrees(0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))[1]))
+        cols = [c for p in layout.tiles for c in (p.col, p.col + p.cols - 1)]
+        rows = [r for p in layout.tiles for r in (p.row, p.row + p.raster.rows - 1)]
+        x = layout.x0 + layout.dx * np.linspace(min(cols), max(cols), 33)
+        y = layout.y0 - layout.dy * np.linspace(min(rows), max(rows), 33)
+        return _plane_box(there, x, y)
+
+    def _near(self, x: Floats, lon_deg: Floats | float) -> Floats:
+        """Longitudes within half a turn of ``lon_deg``, so that the antimeridian is no edge; projected x unchanged."""
+        return np.asarray(lon_deg + (x - lon_deg + 180.0) % 360.0 - 180.0) if self.crs.geographic else x
+
+    def _turn(self, raster: Raster, lon_deg: float) -> float:
+        """Degrees of the whole turns that bring a tile's middle nearest to ``lon_deg``."""
+        middle = raster.west + 0.5 * raster.cols * raster.dx
+        return 360.0 * round((lon_deg - middle) / 360.0) if self.crs.geographic else 0.0
+
+    def _layout(self, lon_deg: float) -> _Layout:
+        """Every tile on the grid of the first one, all turned to the longitude ``lon_deg``."""
+        first = self.rasters[0]
+        x0 = first.west + 0.5 * first.dx + self._turn(first, lon_deg)
+        y0 = first.north - 0.5 * first.dy
+        ratios = [_ratio(raster, first) for raster in self.rasters]
+        parts = math.lcm(*(ratio.denominator for ratio in ratios))
+        dx = first.dx / parts
+        tiles = []
+        for raster, ratio in zip(self.rasters, ratios, strict=True):
+            nearest = self._turn(raster, lon_deg)
+            # A tile wider than half the globe may meet the mission on both of its sides.
+            wide = self.crs.geographic and raster.cols * raster.dx > 180.0
+            for turn in (nearest, nearest - 360.0, nearest + 360.0) if wide else (nearest,):
+                col = (raster.west + 0.5 * raster.dx + turn - x0) / dx
+                row = (y0 - (raster.north - 0.5 * raster.dy)) / first.dy
+                if max(abs(col - round(col)), abs(row - round(row))) <= ALIGNED_CELLS:
+                    tiles.append(PlacedTile(raster, round(col), round(row), round(ratio * parts)))
+                elif turn == nearest:
+                    raise InputError(
+                        f"the tiles must lie on one grid: {raster.name} is off that of {first.name} by "
+                        f"{col - round(col):.3f} columns and {row - round(row):.3f} rows; gdalwarp them together",
+                        where=self.where,
+                    )
+        return _Layout(x0, y0, dx, first.dy, tuple(tiles))
+
+
+def _require_known_units(rasters: Sequence[Raster], where: str) -> None:
+    """Raise InputError if a tile's heights are in another unit than metres, and another's in one that nobody states."""
+    silent = next((r for r in rasters if r.unit.by == BY_NOBODY), None)
+    other = next((r for r in rasters if not r.unit.is_same(METRE)), None)
+    if silent is not None and other is not None:
+        likely = next((key for key, unit in OF_KEY.items() if unit.is_same(other.unit)), "m")
+        raise InputError(
+            f"the heights of {other.name} are {other.unit.told()}, and nothing says the unit of those of {silent.name} "
+            f"beside it; if all tiles have one, say it with `height_unit: {likely}`, else write it into the file "
+            "(gdal_edit.py -units metre)",
+            where=where,
+        )
+
+
+def _datum(raster: Raster) -> str:
+    return raster.vertical.name if raster.vertical is not None else "nothing"
+
+
+def _lattice(box: Box) -> tuple[Floats, Floats]:
+    f = np.linspace(0.0, 1.0, 33)
+    e, n = np.meshgrid(box[0] + f * (box[2] - box[0]), box[1] + f * (box[3] - box[1]))
+    return e.ravel(), n.ravel()
+
+
+def _plane_box(there: Any, x: Floats, y: Floats) -> Box:
+    """The plane's box around a window with these coordinates of columns and rows."""
+    xs, ys = np.meshgrid(x[np.linspace(0, len(x) - 1, 33).astype(int)], y[np.linspace(0, len(y) - 1, 33).astype(int)])
+    back = there.transform(xs.ravel(), ys.ravel(), direction="INVERSE")
+    e, n = (np.asarray(a, float) for a in back)
+    good = np.isfinite(e) & np.isfinite(n)
+    return float(e[good].min()), float(n[good].min()), float(e[good].max()), float(n[good].max())
+
+
+def _union(a: Box, b: Box) -> Box:
+    return min(a[0], b[0]), min(a[1], b[1]), max(a[2], b[2]), max(a[3], b[3])
+
+
+def _ratio(raster: Raster, first: Raster) -> Fraction:
+    """The width of a raster's columns in columns of the first one, as a ratio of small numbers; 1 if it is none."""
+    ratio = Fraction(raster.dx / first.dx).limit_denominator(WIDEST_COLUMNS)
+    return ratio if 0 < ratio <= WIDEST_COLUMNS else Fraction(1)

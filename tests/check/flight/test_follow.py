@@ -1,0 +1,425 @@
+"""The flight that an autopilot makes of a mission, item by item."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from gcsplan.check.flight.follow import Flight, follow
+from gcsplan.mavlink.mission import commands as cmd
+from gcsplan.mavlink.mission import mission as m
+from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
+from gcsplan.notes.note import Note
+from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.geometry.limits import Limits
+from tests.support.noted import codes
+
+GROUND_M = 300.0
+HOME = Home.at(36.6, -84.3, GROUND_M)
+
+
+def vehicle(autopilot: Autopilot = Autopilot.ARDUCOPTER) -> Vehicle:
+    return Vehicle("uav1", 1, autopilot, Limits(min_agl_m=60))
+
+
+def fly(
+    *items: MissionItem,
+    autopilot: Autopilot = Autopilot.ARDUCOPTER,
+    home: Home = HOME,
+    ground_m: float = GROUND_M,
+    rtl_rel_home_m: float | None = None,
+) -> Flight:
+    mission = Mission(autopilot, home, items)
+    return follow(mission, vehicle(autopilot), lambda lat, lon: ground_m, rtl_rel_home_m=rtl_rel_home_m)
+
+
+def at(command: int, north: float, east: float, z: float, frame: int = m.RELATIVE, p1: float = 0.0) -> MissionItem:
+    return MissionItem(command, frame, (p1, 0, 0, 0), m.degrees_e7(36.6 + north), m.degrees_e7(-84.3 + east), z)
+
+
+TAKEOFF = at(cmd.TAKEOFF, 0, 0, 65)
+
+
+def test_a_whole_mission_is_followed_from_the_ground_to_the_ground() -> None:
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), at(cmd.WAYPOINT, 0.02, 0, 70), at(cmd.LAND, 0.02, 0, 0))
+    assert flight.not_judged == []
+    assert [(s.kind, s.column, s.on_path) for s in flight.stretches] == [
+        ("takeoff", True, False), ("cruise", False, True), ("cruise", False, True), ("land", True, False),
+    ]  # fmt: skip
+    for before, after in zip(flight.stretches, flight.stretches[1:], strict=False):
+        assert before.end == after.start
+    assert flight.stretches[0].start[2] == GROUND_M
+    assert flight.stretches[0].end[2] == GROUND_M + 65
+    assert flight.stretches[-1].end[2] == GROUND_M
+
+
+def test_relative_altitudes_count_from_the_ground_where_the_vehicle_arms_not_from_the_files_home_row() -> None:
+    flight = fly(TAKEOFF, home=Home.at(36.6, -84.3, 0.0))
+    assert flight.stretches[0].end[2] == GROUND_M + 65
+    assert codes(flight.notes) == ["home_height_differs"]
+
+
+@pytest.mark.parametrize(
+    ("frame", "z", "amsl"), [(m.GLOBAL, 500, 500), (m.RELATIVE, 80, 380), (m.TERRAIN, 90, 390), (6, 80, 380)]
+)
+def test_each_frame_gives_its_altitude(frame: int, z: float, amsl: float) -> None:
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, z, frame))
+    assert flight.stretches[-1].end[2] == amsl
+    assert flight.stretches[-1].terrain == (frame == m.TERRAIN)
+
+
+def test_copter_keeps_its_altitude_at_zero_and_its_place_at_zero_zero() -> None:
+    stay = MissionItem(cmd.WAYPOINT, m.RELATIVE, z=90.0)
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), at(cmd.WAYPOINT, 0.02, 0, 0), stay)
+    assert flight.stretches[2].end[2] == GROUND_M + 80
+    assert flight.stretches[3].end == (*flight.stretches[2].end[:2], GROUND_M + 90)
+
+
+def test_px4_flies_to_altitude_zero() -> None:
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 0), autopilot=Autopilot.PX4)
+    assert flight.stretches[1].end[2] == GROUND_M
+
+
+def test_speed_changes_hold_from_there_on() -> None:
+    slow = MissionItem(cmd.DO_CHANGE_SPEED, m.NO_POSITION, (1, 4.5, -1, 0))
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), slow, at(cmd.WAYPOINT, 0.02, 0, 80))
+    assert [s.speed_m_s for s in flight.stretches] == [15, 15, 4.5]
+
+
+def test_a_landing_elsewhere_flies_there_level_first() -> None:
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), at(cmd.LAND, 0.02, 0, 0))
+    level, down = flight.stretches[-2:]
+    assert not level.column
+    assert level.end[2] == GROUND_M + 80
+    assert down.column
+
+
+def test_rtl_climbs_returns_straight_and_lands_at_home() -> None:
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), MissionItem(cmd.RTL, 2), rtl_rel_home_m=120)
+    up, back, waits, down = flight.stretches[-4:]
+    assert (up.column, back.column, down.column) == (True, False, True)
+    assert (waits.start, waits.hold_s) == (back.end, 5.0)  # RTL_LOIT_TIME
+    assert up.end[2] == GROUND_M + 120 == back.end[2]
+    assert down.end == (36.6, -84.3, GROUND_M)
+
+
+def test_every_autopilot_returns_at_a_speed_of_its_own_not_the_missions() -> None:
+    items = TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), MissionItem(cmd.RTL, 2)
+    assert fly(*items, rtl_rel_home_m=120, autopilot=Autopilot.PX4).stretches[-2].speed_m_s == 5.0
+    assert fly(*items, rtl_rel_home_m=120).stretches[-2].speed_m_s == 10.0  # WPNAV_SPEED, as RTL_SPEED is 0
+
+
+@pytest.mark.parametrize(("above_m", "told"), [(4.0, False), (30.0, True), (-30.0, False)])
+def test_a_px4_that_lands_far_above_home_does_not_slow_down_and_that_is_told(above_m: float, told: bool) -> None:
+    items = TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), at(cmd.LAND, 0.01, 0, 0)
+    for autopilot in (Autopilot.PX4, Autopilot.ARDUCOPTER):
+        mission = Mission(autopilot, HOME, items)
+        flight = follow(mission, vehicle(autopilot), lambda lat, lon: GROUND_M + (above_m if lat > 36.605 else 0.0))
+        assert flight.stretches[-1].end[2] == GROUND_M + above_m
+        said = "lands_fast" in codes(flight.notes)
+        assert said is (told and autopilot is Autopilot.PX4)
+
+
+def test_rtl_does_not_descend_before_it_is_home() -> None:
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 200), MissionItem(cmd.RTL, 2), rtl_rel_home_m=120)
+    assert flight.stretches[-2].end[2] == GROUND_M + 200
+
+
+def test_an_arduplane_return_is_judged_over_the_whole_band_of_altitudes() -> None:
+    flight = fly(
+        at(cmd.VTOL_TAKEOFF, 0, 0, 65), at(cmd.WAYPOINT, 0.01, 0, 80), MissionItem(cmd.RTL, 2),
+        autopilot=Autopilot.ARDUPLANE, rtl_rel_home_m=120,
+    )  # fmt: skip
+    back, circle = flight.stretches[-2:]
+    assert (back.start[2], back.end[2], back.band_m) == (400, 400, 20)
+    assert 60 < circle.reach_m < 75  # the circle grows with altitude
+    assert math.isinf(circle.hold_s)
+
+
+def test_rtl_at_an_unknown_altitude_is_not_judged() -> None:
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), MissionItem(cmd.RTL, 2))
+    assert flight.not_judged == [Note("return_altitude_not_given", 3)]
+
+
+@pytest.mark.parametrize(
+    "item",
+    [
+        MissionItem(cmd.DO_SET_HOME, 0, (0, 0, 0, 0), 366000000, -843000000, 10),
+        at(31000, 0.02, 0, 80),
+    ],
+)
+def test_a_command_whose_motion_is_unknown_is_named(item: MissionItem) -> None:
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), item, at(cmd.WAYPOINT, 0.03, 0, 80))
+    assert [(n.code, n.item, n.data["command"]) for n in flight.not_judged[:1]] == [("flown_unknown", 3, item.command)]
+
+
+def test_servo_and_camera_commands_move_nothing() -> None:
+    flight = fly(TAKEOFF, MissionItem(206, 2, (25, 0, 1, 0)), MissionItem(183, 2, (9, 1500, 0, 0)))
+    assert flight.not_judged == []
+    assert len(flight.stretches) == 1
+
+
+def test_a_mission_without_take_off_is_not_judged_up_to_its_first_way_point() -> None:
+    flight = fly(at(cmd.WAYPOINT, 0.01, 0, 80), at(cmd.WAYPOINT, 0.02, 0, 80))
+    assert flight.not_judged == [Note("no_take_off", 1)]
+
+
+def test_items_after_the_landing_are_named() -> None:
+    flight = fly(TAKEOFF, at(cmd.LAND, 0, 0, 0), at(cmd.WAYPOINT, 0.01, 0, 80))
+    assert flight.not_judged == [Note("comes_after_landing", 3)]
+
+
+def test_a_fixed_wings_loiter_is_a_circle_and_a_copters_is_a_point() -> None:
+    plane = fly(at(cmd.VTOL_TAKEOFF, 0, 0, 65), at(cmd.LOITER_UNLIM, 0.01, 0, 80), autopilot=Autopilot.ARDUPLANE)
+    assert 60 < plane.stretches[-1].reach_m < 75
+    assert fly(TAKEOFF, at(cmd.LOITER_UNLIM, 0.01, 0, 80)).stretches[-1].reach_m == 0
+    turns = MissionItem(cmd.LOITER_TURNS, m.RELATIVE, (3, 0, -40, 0), m.degrees_e7(36.61), m.degrees_e7(-84.3), 80)
+    circle = fly(TAKEOFF, turns).stretches[-1]
+    assert circle.reach_m == 40
+    assert circle.hold_s == pytest.approx(3 * 2 * math.pi * 40 / 15)
+
+
+def test_an_arduplane_mission_that_ends_in_the_air_goes_home_unjudged() -> None:
+    flight = fly(at(cmd.VTOL_TAKEOFF, 0, 0, 65), at(cmd.WAYPOINT, 0.01, 0, 80), autopilot=Autopilot.ARDUPLANE)
+    assert flight.not_judged == [Note("returns_by_itself")]
+
+
+def test_unknown_ground_at_home_is_named() -> None:
+    assert codes(fly(TAKEOFF, ground_m=math.nan).not_judged)[0] == "home_ground_unknown"
+
+
+def test_a_hold_counts_on_copter_and_not_on_plane() -> None:
+    hold = at(cmd.WAYPOINT, 0.01, 0, 80, p1=12)
+    assert fly(TAKEOFF, hold).stretches[-1].hold_s == 12
+    plane = fly(at(cmd.VTOL_TAKEOFF, 0, 0, 65), hold, autopilot=Autopilot.ARDUPLANE)
+    assert plane.stretches[-1].hold_s == 0
+
+
+SLOPE = 20_000.0  # metres that the ground rises per degree of latitude
+
+
+def fly_over_a_slope(
+    *items: MissionItem, autopilot: Autopilot = Autopilot.ARDUCOPTER, rtl_rel_home_m: float | None = None
+) -> Flight:
+    mission = Mission(autopilot, HOME, items)
+    craft = vehicle(autopilot)
+    return follow(
+        mission, craft, lambda lat, lon: GROUND_M + SLOPE * (lat - 36.6), rtl_rel_home_m=rtl_rel_home_m
+    )  # fmt: skip
+
+
+VTOL_TAKEOFF = at(cmd.VTOL_TAKEOFF, 0, 0, 65)
+
+
+@pytest.mark.parametrize(("z", "at_once"), [(79.9, True), (51, True), (80.1, False), (49, False)])
+def test_arduplane_changes_height_by_less_than_its_glide_slope_minimum_at_once(z: float, at_once: bool) -> None:
+    flight = fly(VTOL_TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, z), autopilot=Autopilot.ARDUPLANE)
+    assert bool(flight.instead) == at_once
+    for band in flight.instead:
+        assert band.start[2] == band.end[2] == pytest.approx(GROUND_M + 0.5 * (65 + z))
+        assert band.band_m == pytest.approx(abs(z - 65) / 2)
+
+
+def test_arduplane_climbs_at_once_from_below_twenty_metres() -> None:
+    low = at(cmd.WAYPOINT, 0.01, 0, 15)
+    flight = fly(VTOL_TAKEOFF, low, at(cmd.WAYPOINT, 0.02, 0, 200), autopilot=Autopilot.ARDUPLANE)
+    assert [s.seq for s in flight.instead] == [3]
+    assert flight.instead[0].band_m == pytest.approx(92.5)
+
+
+def test_copter_and_px4_change_height_along_the_leg() -> None:
+    assert fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 70)).instead == []
+    assert fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 70), autopilot=Autopilot.PX4).instead == []
+
+
+def test_arduplanes_glide_slope_minimum_counts_above_ground_in_terrain_frame() -> None:
+    level = at(cmd.WAYPOINT, 0.01, 0, 65, m.TERRAIN)  # 200 m higher in AMSL, the same height above ground
+    flight = fly_over_a_slope(VTOL_TAKEOFF, level, autopilot=Autopilot.ARDUPLANE)
+    (band,) = flight.instead
+    assert band.terrain
+    assert band.band_m == pytest.approx(0, abs=1e-6)
+
+
+@pytest.mark.parametrize("frame", [m.GLOBAL, m.TERRAIN])
+def test_arduplanes_vtol_take_off_in_another_frame_is_not_judged(frame: int) -> None:
+    flight = fly(
+        at(cmd.VTOL_TAKEOFF, 0, 0, 400, frame), at(cmd.LOITER_UNLIM, 0.01, 0, 80), autopilot=Autopilot.ARDUPLANE
+    )
+    assert Note("vtol_climbs_by_altitude", 1) in flight.not_judged
+    assert flight.stretches[0].end[2] == GROUND_M + 400  # by its altitude
+
+
+def test_a_vtol_take_off_of_px4_is_not_judged() -> None:
+    assert unknown(fly(VTOL_TAKEOFF, autopilot=Autopilot.PX4)) == [84]
+
+
+def test_a_take_off_to_less_than_the_least_climb_ends_there() -> None:
+    assert fly(at(cmd.TAKEOFF, 0, 0, -20)).stretches[0].end[2] == GROUND_M + 1.0
+    assert fly(at(cmd.TAKEOFF, 0, 0, 0), autopilot=Autopilot.PX4).stretches[0].end[2] == GROUND_M + 2.5
+
+
+def test_copter_keeps_its_height_in_the_frame_of_the_item() -> None:
+    flight = fly_over_a_slope(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 0, m.TERRAIN))
+    assert flight.stretches[-1].end[2] == pytest.approx(GROUND_M + 200 + 65)
+    flight = fly_over_a_slope(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 0, m.GLOBAL))
+    assert flight.stretches[-1].end[2] == pytest.approx(GROUND_M + 65)
+
+
+def test_arduplane_keeps_its_altitude_only_where_there_is_no_place_either() -> None:
+    flight = fly(VTOL_TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 0), autopilot=Autopilot.ARDUPLANE)
+    assert flight.stretches[-1].end[2] == GROUND_M
+    flight = fly(VTOL_TAKEOFF, MissionItem(cmd.LOITER_TIME, m.RELATIVE, (10, 0, 0, 0)), autopilot=Autopilot.ARDUPLANE)
+    assert flight.stretches[-1].end[2] == GROUND_M + 65
+
+
+def unknown(flight: Flight) -> list[int]:
+    """The commands whose flight is not judged."""
+    return [n.data["command"] for n in flight.not_judged if n.code == "flown_unknown"]  # type: ignore[misc]
+
+
+def test_px4_knows_no_here() -> None:
+    flight = fly(TAKEOFF, MissionItem(cmd.WAYPOINT, m.RELATIVE, z=90.0), autopilot=Autopilot.PX4)
+    assert unknown(flight) == [16]
+
+
+def test_a_landing_elsewhere_in_terrain_frame_keeps_its_height_above_ground() -> None:
+    flight = fly_over_a_slope(TAKEOFF, at(cmd.LAND, 0.01, 0, 0, m.TERRAIN))
+    over, down = flight.stretches[-2:]
+    assert over.terrain
+    assert over.end[2] == pytest.approx(GROUND_M + 200 + 65)
+    assert down.end[2] == pytest.approx(GROUND_M + 200)
+
+
+def test_a_landing_elsewhere_is_judged_both_level_and_along_the_ground() -> None:
+    flight = fly_over_a_slope(TAKEOFF, at(cmd.LAND, -0.01, 0, 0))
+    over, down = flight.instead  # ArduCopter before 4.6 with terrain data
+    assert over.terrain
+    assert over.end[2] == pytest.approx(GROUND_M - 200 + 65)
+    assert down.column
+    assert flight.stretches[-2].end[2] == GROUND_M + 65
+    assert fly_over_a_slope(TAKEOFF, at(cmd.LAND, -0.01, 0, 0), autopilot=Autopilot.PX4).instead == []
+
+
+def test_rtl_from_near_home_climbs_less_than_its_altitude() -> None:
+    near = at(cmd.WAYPOINT, 0.0002, 0, 40)  # 22.194 m from home
+    copter = fly(TAKEOFF, near, MissionItem(cmd.RTL, 2), rtl_rel_home_m=120)
+    (band,) = copter.instead
+    assert band.start[2] - band.band_m == pytest.approx(GROUND_M + 3 * 22.194, abs=0.05)  # RTL_CONE_SLOPE 3
+    assert band.start[2] + band.band_m == pytest.approx(GROUND_M + 120)
+    px4 = fly(TAKEOFF, near, MissionItem(cmd.RTL, 2), rtl_rel_home_m=120, autopilot=Autopilot.PX4)
+    assert px4.instead[0].start[2] - px4.instead[0].band_m == pytest.approx(GROUND_M + 40)
+    assert fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 40), MissionItem(cmd.RTL, 2), rtl_rel_home_m=120).instead == []
+
+
+def test_copter_reaches_a_circles_altitude_at_its_edge() -> None:
+    turns = MissionItem(cmd.LOITER_TURNS, m.RELATIVE, (1, 0, 200, 0), m.degrees_e7(36.61), m.degrees_e7(-84.3), 165)
+    edge = fly(TAKEOFF, turns).stretches[1]
+    assert edge.end[2] == GROUND_M + 165
+    assert (36.61 - edge.end[0]) * 110_971 == pytest.approx(200, rel=1e-4)  # metres per degree at 36.6° N
+
+
+def test_a_circles_radius_holds_for_the_next_one_without() -> None:
+    def circle(radius: float) -> MissionItem:
+        place = m.degrees_e7(36.61), m.degrees_e7(-84.3)
+        return MissionItem(cmd.LOITER_TURNS, m.RELATIVE, (1, 0, radius, 0), *place, 65)
+
+    assert fly(TAKEOFF, circle(0)).stretches[-1].reach_m == 10
+    assert fly(TAKEOFF, circle(80), circle(0)).stretches[-1].reach_m == 80
+
+
+def test_an_arduplanes_endless_loiter_takes_the_items_radius_and_a_timed_one_its_own() -> None:
+    place = m.degrees_e7(36.61), m.degrees_e7(-84.3)
+    wide = MissionItem(cmd.LOITER_UNLIM, m.RELATIVE, (0, 0, -200, 0), *place, 65)
+    timed = MissionItem(cmd.LOITER_TIME, m.RELATIVE, (30, 0, 200, 0), *place, 65)
+    assert 200 < fly(VTOL_TAKEOFF, wide, autopilot=Autopilot.ARDUPLANE).stretches[-1].reach_m < 250
+    assert 60 < fly(VTOL_TAKEOFF, timed, autopilot=Autopilot.ARDUPLANE).stretches[-1].reach_m < 75
+
+
+def test_a_loiter_to_an_altitude_circles_through_the_whole_band_on_arduplane_and_climbs_on_copter() -> None:
+    place = m.degrees_e7(36.61), m.degrees_e7(-84.3)
+    up = MissionItem(31, m.RELATIVE, (0, 100, 0, 0), *place, 165)
+    circle = fly(VTOL_TAKEOFF, up, autopilot=Autopilot.ARDUPLANE).stretches[-1]
+    assert circle.reach_m > 100
+    assert (circle.start[2] - circle.band_m, circle.start[2] + circle.band_m) == (GROUND_M + 65, GROUND_M + 165)
+    copter = fly(TAKEOFF, up)
+    assert copter.not_judged == []
+    assert copter.stretches[-1].end[2] == GROUND_M + 165
+    px4 = fly(TAKEOFF, up, autopilot=Autopilot.PX4)
+    assert [s.end[2] for s in px4.instead] == [GROUND_M + 65, GROUND_M + 165]
+
+
+def test_rates_of_climb_and_descent_hold_from_there_on() -> None:
+    rates = [MissionItem(cmd.DO_CHANGE_SPEED, m.NO_POSITION, (kind, value, -1, 0)) for kind, value in ((2, 5), (3, 4))]
+    flight = fly(TAKEOFF, *rates, at(cmd.WAYPOINT, 0.01, 0, 80))
+    assert [s.rates_m_s for s in flight.stretches] == [(2.5, 1.5), (5, 4)]
+
+
+def test_a_spline_is_flown_as_a_curve_and_judged_from_a_standstill_too() -> None:
+    spline, after = at(cmd.SPLINE_WAYPOINT, 0.01, 0.01, 80), at(cmd.WAYPOINT, 0.0, 0.02, 80)
+    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), spline, after)
+    assert flight.not_judged == []
+    curve = [s for s in flight.stretches if s.seq == 3]
+    assert curve[0].start == flight.stretches[1].end
+    assert curve[-1].end[:2] == (spline.lat_deg, spline.lon_deg)
+    assert max(s.end[0] for s in curve) > 36.6105  # the curve leaves northward
+    assert max(s.end[0] for s in flight.instead) < 36.612
+    assert all(0 < s.reach_m == s.band_m < 0.3 for s in curve)
+
+
+@pytest.mark.parametrize("autopilot", [Autopilot.PX4, Autopilot.ARDUPLANE])
+def test_a_spline_of_anything_but_arducopter_is_not_judged(autopilot: Autopilot) -> None:
+    up = VTOL_TAKEOFF if autopilot is Autopilot.ARDUPLANE else TAKEOFF
+    flight = fly(up, at(cmd.WAYPOINT, 0.01, 0, 80), at(cmd.SPLINE_WAYPOINT, 0.01, 0.01, 80), autopilot=autopilot)
+    assert unknown(flight) == [82]
+
+
+def test_a_take_off_written_elsewhere_is_remarked_on_copter() -> None:
+    assert codes(fly(at(cmd.TAKEOFF, 0.01, 0, 65)).notes) == ["takes_off_where_it_stands"]
+
+
+def test_px4_takes_no_turns() -> None:
+    flight = fly(TAKEOFF, at(cmd.LOITER_TURNS, 0.01, 0, 80), autopilot=Autopilot.PX4)
+    assert unknown(flight) == [18]
+
+
+def test_a_ground_speed_is_no_target_on_arduplane() -> None:
+    ground, air = (MissionItem(cmd.DO_CHANGE_SPEED, m.NO_POSITION, (kind, 9, -1, 0)) for kind in (1, 0))
+    to = at(cmd.WAYPOINT, 0.01, 0, 80)
+    flight = fly(VTOL_TAKEOFF, ground, to, air, to, autopilot=Autopilot.ARDUPLANE)
+    assert [s.speed_m_s for s in flight.stretches] == [15, 15, 9]
+
+
+def test_arduplane_does_not_wait_in_the_air() -> None:
+    wait = MissionItem(cmd.DELAY, m.NO_POSITION, (60, 0, 0, 0))
+    assert fly(VTOL_TAKEOFF, wait, autopilot=Autopilot.ARDUPLANE).stretches[-1].hold_s == 0
+    assert fly(TAKEOFF, wait).stretches[-1].hold_s == 60
+
+
+@pytest.mark.parametrize(("command", "first"), [(180, 0), (208, 2), (212, 1), (218, 4), (222, 5), (223, 0)])
+def test_commands_that_may_change_the_flight_are_named(command: int, first: float) -> None:
+    flight = fly(TAKEOFF, MissionItem(command, 2, (first, 0, 0, 0)))
+    assert unknown(flight) == [command]
+
+
+def test_an_armed_parachute_moves_nothing() -> None:
+    assert fly(TAKEOFF, MissionItem(208, 2, (1, 0, 0, 0))).not_judged == []
+
+
+def test_a_command_that_is_not_judged_is_named_with_the_reason() -> None:
+    for command, why in (
+        (cmd.PAYLOAD_PLACE, Note("descends_until_ground", name="payload place")),
+        (cmd.DO_AUX_FUNCTION, Note("switches_mode", name="auxiliary function")),
+    ):
+        flight = fly(TAKEOFF, MissionItem(command, 3, (1.0, 0.0, 0.0, 0.0), TAKEOFF.x + 9000, TAKEOFF.y, 80.0))
+        assert flight.not_judged == [Note("flown_unknown", 2, autopilot="arducopter", command=command, why=why)]
+        said = f"item 2: what arducopter flies for command {command} is not judged: {why}"
+        assert str(flight.not_judged[0]) == f"{said}; leave it out to have the rest judged"
+
+
+def test_a_copter_flies_the_vtol_commands_as_its_own() -> None:
+    up, down = replace(TAKEOFF, command=cmd.VTOL_TAKEOFF), MissionItem(cmd.VTOL_LAND, 3, x=TAKEOFF.x, y=TAKEOFF.y)
+    flight, own = fly(up, down), fly(TAKEOFF, replace(down, command=cmd.LAND))
+    assert flight.not_judged == []
+    assert [(s.kind, s.start, s.end) for s in flight.stretches] == [(s.kind, s.start, s.end) for s in own.stretches]
