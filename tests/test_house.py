@@ -288,13 +288,13 @@ def test_a_function_fits_on_a_screen() -> None:
 MOST_IN_A_FOLDER = 15
 
 MOST = {
-    "modules": 540,
-    "statements": 61_500,
-    "type names with two meanings": 100,
-    "constants with two values": 199,
-    "folders with more than 15 modules": 12,
-    "folders in a circle": 10,
-    "names of another module that begin with _": 17,
+    "modules": 523,
+    "statements": 60_927,
+    "type names with two meanings": 35,
+    "constants with two values": 93,
+    "folders with more than 15 modules": 1,
+    "folders in a circle": 0,
+    "names of another module that begin with _": 0,
 }
 """What is left to do, at most: a figure that falls is written down here, and none may rise."""
 
@@ -352,6 +352,10 @@ def arrows_between_folders() -> dict[str, set[str]]:
     return arrows
 
 
+OTHERS = {"_replace", "_exit", "_timestamp", "_getvalue"}
+"""Names of other libraries that begin with _, and of named tuples."""
+
+
 def reached_through() -> list[str]:
     """Names that begin with _ and are not the module's own: imported, or looked up in something of another's."""
     found = []
@@ -363,7 +367,7 @@ def reached_through() -> list[str]:
         for node in nodes:
             if isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.startswith("__"):
                 mine = isinstance(node.value, ast.Name) and node.value.id in ("self", "cls")
-                if not mine and node.attr not in (own_names | {"_replace", "_exit"}):
+                if not mine and node.attr not in own_names | OTHERS:
                     found.append(f"{name}:{node.lineno}: {ast.unparse(node)}")
             elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("gcsplan"):
                 found += [

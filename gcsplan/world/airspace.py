@@ -164,7 +164,8 @@ class Airspace:
 
     ``scale`` >= 1: largest scale of the plane over the mission; real metres times it are at most metres of the plane,
     so every horizontal clearance is multiplied by it. ``zones`` are those given, with higher ceilings above ground
-    where the ground has two heights (`over_both_grounds`).
+    where the ground has two heights (`over_both_grounds`). ``field``, ``zone_arrays``, ``surfaces`` and ``grounds`` are
+    the same as the kernels read it.
     """
 
     def __init__(self, surface: Surface, zones: Sequence[Zone] = (), *, scale: float = 1.0) -> None:
@@ -172,16 +173,16 @@ class Airspace:
             raise ValueError(f"scale must be 1 or a little more, given {scale:g}")
         self.surface = surface
         self.scale = scale
-        self._field = Field.of(surface.grid)
-        self.zones = over_both_grounds(zones, surface, self._field, scale)
-        self._zones = zones_as_arrays(self.zones, surface, self._field, scale)
-        self._neighbourhoods = Neighbourhoods(surface.grid, self._field)
+        self.field = Field.of(surface.grid)
+        self.zones = over_both_grounds(zones, surface, self.field, scale)
+        self.zone_arrays = zones_as_arrays(self.zones, surface, self.field, scale)
+        self._neighbourhoods = Neighbourhoods(surface.grid, self.field)
         ground, top = (np.ascontiguousarray(a, dtype=np.float64) for a in (surface.ground_m, surface.top_m))
         self._heights = ground, top
-        self._surfaces = Held(SURFACE, self._field.packed, ground, top)
-        self._grounds = Held(SURFACE, self._field.packed, ground, ground)
-        self._tops, self._bare = (Held(ONE_SURFACE, self._field.packed, z) for z in (top, ground))
-        self._held_zones = Held(ZONES, *self._zones)
+        self.surfaces = Held(SURFACE, self.field.packed, ground, top)
+        self.grounds = Held(SURFACE, self.field.packed, ground, ground)
+        self._tops, self._bare = (Held(ONE_SURFACE, self.field.packed, z) for z in (top, ground))
+        self._held_zones = Held(ZONES, *self.zone_arrays)
 
     def examine(self, legs: Legs, limits: Limits) -> LegReport:
         """Every violation along the whole of every leg. ``limits``' own errors are not used: the legs carry them."""
@@ -225,7 +226,7 @@ class Airspace:
 
         It includes min AGL, the clearance and the errors of ``limits``; it does not include zones.
         """
-        reach = Reaches.of(limits, self._field, self.scale)
+        reach = Reaches.of(limits, self.field, self.scale)
         floor = self._around(1.0, east_m, north_m, reach.near_m) + (limits.min_agl_m + reach.near_margin_m)
         if limits.horizontal_clearance_m > 0.0:
             floor = np.maximum(floor, self._around(1.0, east_m, north_m, reach.far_m) + reach.far_margin_m)
@@ -234,7 +235,7 @@ class Airspace:
 
     def ceiling_amsl(self, east_m: ArrayLike, north_m: ArrayLike, limits: Limits) -> Floats:
         """Highest legal altitude over points (max AGL, max AMSL; less the errors); conservative; -inf where unknown."""
-        reach = Reaches.of(limits, self._field, self.scale)
+        reach = Reaches.of(limits, self.field, self.scale)
         ground = -self._around(-1.0, east_m, north_m, reach.near_m) - reach.near_margin_m
         ceiling = ground + ((math.inf if limits.max_agl_m is None else limits.max_agl_m) - limits.altitude_error_m)
         if limits.max_amsl_m is not None:
@@ -250,13 +251,13 @@ class Airspace:
         lines = LineBatch(points[:-1], points[1:])
 
         def extrema(of_top: bool, reach_m: float) -> Held:
-            return self._held(of_top, reach_m, lines)
+            return self.extrema_along(of_top, reach_m, lines)
 
-        return make_tube(points, limits, self._field, self._zones, extrema, self._surfaces, self._grounds, self.scale)
+        return make_tube(points, limits, self.field, self.zone_arrays, extrema, self.surfaces, self.grounds, self.scale)
 
     def straight_cells(self, bow_m: float) -> int:
         """How many cells of the terrain model in a row have lines that are straight in the plane within ``bow_m``."""
-        f = self._field
+        f = self.field
         if f.affine:
             return int(max(self.surface.ground_m.shape))
         return max(int(math.sqrt(4.0 * bow_m / f.bend) / max(f.step_x, f.step_y)), 1)
@@ -266,11 +267,11 @@ class Airspace:
         e, n = np.broadcast_arrays(np.asarray(east_m, dtype=np.float64), np.asarray(north_m, dtype=np.float64))
         out = np.empty(e.size)
         points = np.stack([e.ravel(), n.ravel()], axis=-1)
-        held = self._held(sign > 0.0, reach_m, LineBatch(points, points))
+        held = self.extrema_along(sign > 0.0, reach_m, LineBatch(points, points))
         around(self._tops if sign > 0.0 else self._bare, held, sign, points, reach_m, out)
         return out.reshape(e.shape)
 
-    def _held(self, of_top: bool, reach_m: float, lines: LineBatch) -> Held:
+    def extrema_along(self, of_top: bool, reach_m: float, lines: LineBatch) -> Held:
         """The kernels' extrema of top or ground for a reach, along lines."""
         of_top = of_top and self.surface.top_m is not self.surface.ground_m
         return self._neighbourhoods.along(of_top, self._heights[of_top], reach_m, lines)
@@ -283,25 +284,25 @@ class Airspace:
         ok: Bools,
         found: Held,
     ) -> int:
-        f = self._field
+        f = self.field
         spare = 0.0 if f.affine else BOW_M + f.error_m
         near_m = float(legs.track_error_m.max(initial=0.0)) * self.scale + spare
         lines = LineBatch(legs.start, legs.end)
-        near = self._held(True, near_m, lines)
-        far = self._held(True, near_m + limits.horizontal_clearance_m * self.scale, lines)
+        near = self.extrema_along(True, near_m, lines)
+        far = self.extrema_along(True, near_m + limits.horizontal_clearance_m * self.scale, lines)
         return int(
             judge(
-                self._surfaces, near, far, self._held(False, near_m, lines), self._held_zones,
+                self.surfaces, near, far, self.extrema_along(False, near_m, lines), self._held_zones,
                 legs.start, legs.end, legs.column, legs.track_error_m, legs.altitude_error_m,
                 *Demands.of(limits, self.scale), full, ok, found,
-                work_arrays(self._zones.most_corners, len(self.zones)),
+                work_arrays(self.zone_arrays.most_corners, len(self.zones)),
             )
         )  # fmt: skip
 
     @property
     def zone_boxes(self) -> Floats:
         """(Z, 4) west, south, east and north of each zone's shape, metres of the plane."""
-        return self._zones.table[:, BOX]
+        return self.zone_arrays.table[:, BOX]
 
     def beside_m(self, limits: Limits) -> float:
         """Horizontal distance to keep from zones on every side, metres of the plane: clearance plus track error."""
@@ -309,7 +310,7 @@ class Airspace:
 
     def beside_over_ground_m(self, limits: Limits) -> float:
         """The same for zones with a level above ground, as far as a `Tube` counts them: never less."""
-        return Reaches.of(limits, self._field, self.scale).far_m + ZONE_ROOM_M
+        return Reaches.of(limits, self.field, self.scale).far_m + ZONE_ROOM_M
 
     def _violations(
         self, legs: Legs, limits: Limits, climb_deg: Floats, worst: Floats, hit: Indices, hit_at: Floats
@@ -360,7 +361,7 @@ class Airspace:
         value, at = hit_at[:, 0].copy(), hit_at[:, 1].copy()
         for row in range(len(hit)):
             leg, k = hit[row].tolist()
-            numbers, shape = self._zones.table[k], self.zones[k].shape
+            numbers, shape = self.zone_arrays.table[k], self.zones[k].shape
             over_ground = bool(numbers[FLOOR_AGL] or numbers[CEILING_AGL])
             if over_ground and value[row] > 0.0:  # the kernel's distance is accurate to NEAR_M or NEAR_PART of it
                 value[row] = max(0.0, value[row] - max(NEAR_M, NEAR_PART * value[row]))

@@ -131,7 +131,7 @@ def over(
     that the lines represent, which lie within ``wide_m`` of them: zones that do not meet these regions are left out.
     """
     starts, ends = (np.ascontiguousarray(a, dtype=np.float64) for a in (starts, ends))
-    reach = Reaches.of(limits, air._field, air.scale)
+    reach = Reaches.of(limits, air.field, air.scale)
     near, far = reach.near_m + wide_m, reach.far_m + wide_m
     error = limits.altitude_error_m
     margin = reach.near_margin_m if wide_m == 0.0 else TUBE_MARGIN_M
@@ -167,7 +167,7 @@ def batches(air: Airspace, starts: Floats, ends: Floats, most: int) -> list[int]
 
     Batches begin with an even line: `_pieces` follows every other one backwards.
     """
-    cells = 16.0 + 3.0 * np.hypot(*(ends - starts).T) / min(air._field.step_x, air._field.step_y)
+    cells = 16.0 + 3.0 * np.hypot(*(ends - starts).T) / min(air.field.step_x, air.field.step_y)
     batch = np.floor(np.cumsum(cells) / most)[::2]
     return [0, *(2 * (1 + np.flatnonzero(np.diff(batch)))).tolist(), len(starts)]
 
@@ -187,13 +187,13 @@ def _pieces(
     track = np.empty((2 * n, 2))
     back = np.arange(n) % 2 == 1
     track[0::2], track[1::2] = np.where(back[:, None], ends, starts), np.where(back[:, None], starts, ends)
-    bow = 0.0 if air._field.affine else BOW_M + 2.0 * air._field.error_m
+    bow = 0.0 if air.field.affine else BOW_M + 2.0 * air.field.error_m
     kinds = zip((False, of_top, of_top), reaches, strict=True)
     lines = LineBatch(track[:-1], track[1:])
-    held = [air._held(top, _few(max(reach, 0.0) + bow, air), lines) for top, reach in kinds]
-    surfaces = air._surfaces if of_top else air._grounds
+    held = [air.extrema_along(top, _few(max(reach, 0.0) + bow, air), lines) for top, reach in kinds]
+    surfaces = air.surfaces if of_top else air.grounds
     length = np.hypot(*np.diff(track, axis=0).T)
-    room = 4096 + 16 * n + int(3.0 * float(length.sum()) / min(air._field.step_x, air._field.step_y))
+    room = 4096 + 16 * n + int(3.0 * float(length.sum()) / min(air.field.step_x, air.field.step_y))
     while True:
         rows = np.empty((room, 7))
         count = pieces(surfaces, *held, track, *reaches, rows)
@@ -214,7 +214,7 @@ def _pieces(
 
 def _few(reach_m: float, air: Airspace) -> float:
     """A reach that is no less, rounded up to one of few: local extrema are computed once for each."""
-    cell = min(air._field.step_x, air._field.step_y)
+    cell = min(air.field.step_x, air.field.step_y)
     if reach_m <= cell:
         return reach_m
     return float(cell * WIDER_REACH ** math.ceil(math.log(reach_m / cell) / math.log(WIDER_REACH)))
@@ -224,7 +224,7 @@ def _crossings(
     air: Airspace, starts: Floats, ends: Floats, reach: Reaches, wide_m: float, error_m: float, swept: Swept | None,
     clearance_m: float,
 ) -> Crossings:  # fmt: skip
-    table, vertex = air._zones.table, air._zones.vertex
+    table, vertex = air.zone_arrays.table, air.zone_arrays.vertex
     step = ends - starts
     length = np.hypot(*step.T)
     unit = np.divide(step, length[:, None], out=np.tile([1.0, 0.0], (len(starts), 1)), where=length[:, None] > 0.0)

@@ -173,7 +173,7 @@ def refinement_of(trace: MissionTrace, target: Target, vehicle: Vehicle, level: 
     def judged(parts: TraceParts, whole: bool) -> GradedObstacles:
         return obstacles_of_returns(trace, parts, target, vehicle, whole=whole)
 
-    field = trace.world.airspace._field
+    field = trace.world.airspace.field
     away_m = float(np.hypot(trace.east - target.east_m, trace.north - target.north_m).mean())
     sizes = sizes_m(trace, away_m, min(field.step_x, field.step_y))
     return Refinement(trace, judged, target.ground_amsl_m, (level,), *sizes)
