@@ -37,7 +37,7 @@ from gcsplan.vehicle import Autopilot
 class Batch:
     """Several files: those that were judged, and the errors of the others.
 
-    ``inputs`` describes the world; ``typed``: as in `check_sites.Checked`.
+    ``inputs`` describes the world; ``typed``: as in `worlds.Checked`.
     """
 
     name: str

@@ -18,7 +18,7 @@ nothing is lost silently. Facts about the autopilots come from ArduPilot's and P
   LOITER_TIME uses WP_LOITER_RAD whatever the item says, and so does a radius of 1 m or less (commands_logic.cpp).
 - LAND with a place flies there level (in terrain frame at its height above ground), then descends. ArduCopter before
   4.6 holds its height above ground wherever it has terrain data: that is judged too.
-- RTL: `rtl.model`. Jumps: `route`. Splines: `spline`. Arcs: `arc_waypoint`.
+- RTL: `return_rules`. Jumps: `route`. Splines: `spline`. Arcs: `arc_waypoint`.
 """
 
 from __future__ import annotations
