@@ -225,7 +225,7 @@ class Refusal(NoMission):
     """There is no mission: why, and ``east_m``, ``north_m`` of the binding place, None if there is no single place.
 
     ``place_of``: what is at that place, if the message does not say so.
-    ``untried``: another limit, or fewer zones, may help, and none has been tried yet (`suggestions.with_cures` does so).
+    ``untried``: another limit, or fewer zones, may help, and none has been tried yet (`with_cures` does so).
     """
 
     def __init__(

@@ -1,7 +1,7 @@
 """Why there is no path: terminals that break a limit by themselves, and the refusal after a search without success.
 
-A planner's own refusal says only whether it is proved that there is no path, or that none was found; `suggestions` then tries
-out what would help.
+A planner's own refusal says only whether it is proved that there is no path, or that none was found; `suggestions` then
+tries out what would help.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def explain(problem: Problem, *, proved: bool | None = None) -> Refusal:
     """The refusal for a problem whose terminals are legal and for which no path was found.
 
     ``proved``: whether it is proved that there is none; where the terrain goes on beyond the surface, `enclosed`
-    decides that instead. The caller may add what would help, see `suggestions.with_cures`.
+    decides that instead. The caller may add what would help, see `with_cures`.
     """
     words = "no path was found"
     if goes_on(problem):
