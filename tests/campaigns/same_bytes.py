@@ -12,6 +12,7 @@ with 1 if anything does.
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import os
 import random
@@ -108,23 +109,23 @@ def changed(text: str, rng: random.Random) -> str:
 
 
 def checks(names: Sequence[str], files: Path, count: int) -> Iterator[Command]:
-    """A check of each mission's files as they were planned, and of changed ones, until there are ``count`` files."""
+    """Checks of ``count`` files, a third of them as they were planned, the others with one row changed."""
     rng, seen = random.Random(SEED), 0
     planned = [name for name in names if any((files / name).glob("*.waypoints"))]
-    for turn in range(count):
-        for name in planned:
-            if seen >= count:
-                return
-            given = []
-            for file in sorted((files / name).glob("*.waypoints"))[:4]:
-                made = files / f"changed-{turn}" / name / file.name
-                made.parent.mkdir(parents=True, exist_ok=True)
-                text = file.read_text(encoding="utf-8")
-                made.write_text(changed(text, rng) if turn else text, encoding="utf-8")
-                given.append(f"{made.stem}={made}")
-            seen += len(given)
-            how = ["--way-home"] if rng.random() < 0.7 else []
-            yield f"check-{turn}-{name}", ["check", f"missions/{name}.yaml", *given, "--json", *how]
+    rng.shuffle(planned)
+    for turn, name in enumerate(itertools.cycle(planned)):
+        if seen >= count:
+            return
+        given = []
+        for file in sorted((files / name).glob("*.waypoints"))[:4]:
+            made = files / f"checked-{turn}" / name / file.name
+            made.parent.mkdir(parents=True, exist_ok=True)
+            text = file.read_text(encoding="utf-8")
+            made.write_text(changed(text, rng) if turn % 3 else text, encoding="utf-8")
+            given.append(f"{made.stem}={made}")
+        seen += len(given)
+        how = ["--way-home"] if rng.random() < 0.7 else []
+        yield f"check-{turn}-{name}", ["check", f"missions/{name}.yaml", *given, "--json", *how]
 
 
 def run(tree: Path, folder: Path, out: str, commands: Sequence[Command]) -> dict[str, str]:
