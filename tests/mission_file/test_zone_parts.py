@@ -70,6 +70,7 @@ def test_of_an_archive_the_one_file_of_its_kind_and_those_beside_it_are_unpacked
      (archive(a_txt=b"1"), "given a.txt"), (archive(), "given nothing"),
      (archive(a_kml=bytes(1000)), "unpacks to more than 100 bytes"), (archive(a_kml=b"1")[:-9], "not a sound zip"),
      (b"PK\x03\x04 and no more", "not a sound zip")],
+    ids=["two", "another kind", "empty", "large", "cut off", "a beginning"],
 )  # fmt: skip
 def test_an_archive_that_is_not_one_file_of_its_size_is_refused(data: bytes, words: str) -> None:
     with pytest.raises(InputError, match=words):
