@@ -3,7 +3,9 @@
 TEXTS = {
     # -- what an autopilot does with a mission's items, and on what of it is not judged --
     # -- home --------------------------------------------------------------------------------------------------------
-    "home_ground_unknown": "the ground at home ({lat:.7f}, {lon:.7f}) is unknown",
+    "home_ground_unknown": (
+        "the ground at home ({lat:.7f}, {lon:.7f}) is unknown: give terrain that knows it, or another home"
+    ),
     "home_height_differs": (
         "home is given as {given_m:amsl.1} and the terrain model says {ground_m:height.1} there: the terrain model was "
         "taken"
@@ -45,7 +47,9 @@ TEXTS = {
         "it is the first to fly to and there is no take-off before it: the way from home to it is not judged; put a "
         "take-off before it"
     ),
-    "takes_off_elsewhere": "take-off lies {away_m:distance.0} from home: what PX4 does between is not judged",
+    "takes_off_elsewhere": (
+        "take-off lies {away_m:distance.0} from home: what PX4 does between is not judged; give it the place of home"
+    ),
     "takes_off_where_it_stands": (
         "take-off is written {away_m:distance.0} from home; ArduCopter takes off where it stands"
     ),
@@ -128,14 +132,15 @@ TEXTS = {
     "return_altitude_not_given": (
         "the return home is not judged: its altitude is the vehicle's own (give {key:rtl_rel_home_m})"
     ),
-    "return_start_unknown": "the return home is not judged: its start is unknown",
+    "return_start_unknown": "the return home is not judged: its start is unknown; it is once the items before it are",
     "landing_without_place": "a landing of a fixed wing without a place is not judged; give it one",
     "glide_to_unknown_ground": (
-        "the glide leads to the item's altitude, and the ground there is unknown: it is not judged"
+        "the glide leads to the item's altitude, and the ground there is unknown: it is not judged; give terrain "
+        "that knows it"
     ),
     "glide_off_ground": (
         "the glide leads to the item's altitude, and the ground there lies {off_m:height.1} {below:below|above} it: it "
-        "is not judged"
+        "is not judged; give the item the height of the ground"
     ),
     "glide_straight": (
         "the landing is judged as a straight glide from the way point before it, and as ArduPlane's defaults "
@@ -176,26 +181,34 @@ TEXTS = {
     # -- corners and turns: where a vehicle begins them, and what of them is not judged --
     "arcs_unread": (
         "the arcs of {radius_m:distance} that {vehicle} flies at its corners are not judged: {autopilot} begins a turn "
-        "by parameters that the mission does not hold"
+        "by parameters that the mission does not hold; those of ArduPlane are"
     ),
     "arcs_too_banked": (
         "turns of {radius_m:distance} at {speed_m_s:speed} need a bank of {bank_deg:.0f}°, and ArduPlane's "
-        "ROLL_LIMIT_DEG is {most_deg:g}°: the arcs that it flies are wider, and not judged"
+        "ROLL_LIMIT_DEG is {most_deg:g}°: the arcs that it flies are wider, and not judged; give a larger "
+        "{key:turn_radius_m}, or a lower speed"
     ),
     "l1_period_out_of_range": (
         "NAVL1_PERIOD is {period_s:g} s, and ArduPlane takes {least_s:g} to {most_s:g} s: the arcs that it flies at "
-        "its corners are not judged"
+        "its corners are not judged; set NAVL1_PERIOD within that"
     ),
-    "turns_late": "flies {past_m:distance.0} past its way point before it turns (param3): that is not judged",
-    "corner_in_terrain_frame": "what a fixed wing flies at a corner in the terrain frame is not judged",
-    "corner_turns_back": "what a fixed wing flies at a corner that turns by {turn_deg:.0f}° is not judged",
+    "turns_late": (
+        "flies {past_m:distance.0} past its way point before it turns (param3): that is not judged; set param3 to 0"
+    ),
+    "corner_in_terrain_frame": (
+        "what a fixed wing flies at a corner in the terrain frame is not judged; give altitudes above home (frame 3)"
+    ),
+    "corner_turns_back": (
+        "what a fixed wing flies at a corner that turns by {turn_deg:.0f}° is not judged; put a way point beside it, "
+        "so that it turns in two"
+    ),
     "arcs_too_long": (
         "arcs of {radius_m:distance} take {arcs_m:distance.0} of the leg to item {leg}, which is {leg_m:distance.0} "
-        "long: what is flown there is not judged"
+        "long: what is flown there is not judged; make the leg longer, or give a smaller {key:turn_radius_m}"
     ),
     "turn_too_early": (
         "the turn begins {begins_m:distance.0} before the end of the leg to item {leg}, which is {leg_m:distance.0} "
-        "long: what is flown there is not judged"
+        "long: what is flown there is not judged; make the leg longer, or give a smaller acceptance radius (param2)"
     ),
     "turns_as_arcs": (
         "turns are judged as arcs of {radius_m:distance} that begin at the acceptance radius of their way point; that "

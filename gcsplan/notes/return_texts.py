@@ -137,7 +137,7 @@ TEXTS = {
     "join_not_followed": "a return joins it, and the mission could not be followed there",
     # -- notes, and what is not judged -------------------------------------------------------------------------------
     "mission_not_followed": "the mission could not be followed",
-    "home_not_on_ground": "the ground at home is unknown",
+    "home_not_on_ground": "the ground at home is unknown: give terrain that knows it, or another home",
     "px4_joins_unread": (
         "PX4's returns along the mission (RTL_TYPE above 0) are not judged: only its return straight home is"
     ),

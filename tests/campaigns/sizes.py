@@ -73,7 +73,7 @@ FILES = {
         Size(large_inputs.parameters, 250_000, 5, 280_000),
         Size(large_inputs.tiles_named, 2000, 5, None, taken=False),
         Size(large_logs.log, 999_999, 10, 999_999, least=400),
-        Size(large_logs.readings, 1_999_990, 40, 2_000_100, least=400),
+        Size(large_logs.readings, 1_999_990, 40, 2_000_100, least=4000),
         Size(large_logs.messages, 1_999_990, 80, 2_000_100, least=400),
         Size(large_logs.noise, 255, 40, 256, least=1, taken=False),
         Size(large_logs.formats, 255, 20, 256, least=1, taken=False),

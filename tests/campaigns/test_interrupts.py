@@ -22,7 +22,7 @@ linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks a
 @linux
 @pytest.mark.parametrize("kind", list(interrupts.KINDS))
 def test_a_short_campaign_of_signals_finds_nothing(kind: str) -> None:
-    words = ["--seconds", "60", "--rounds", "6", "--kinds", kind]
+    words = ["--seconds", "60", "--rounds", "3", "--kinds", kind]
     command = [sys.executable, "-m", "tests.campaigns.interrupts", *words]
     ended = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=300)
     assert ended.returncode == 0, ended.stdout + ended.stderr
