@@ -293,8 +293,9 @@ def wrong_end(end: End, own_code: int) -> list[str]:
         document = json.loads(end.out)
         if end.code == CODES[end.number] and document.get("error", {}).get("code") != end.code:
             found.append(f"the document does not say how it ended: {end.out[-300:]}")
-    except ValueError:  # a document that was being printed may be cut off: the exit code says so
-        if end.code != CODES[end.number] or not end.out.startswith("{"):
+    except json.JSONDecodeError as why:  # a document that was being printed may be cut off: the exit code says so
+        cut_off = end.code == CODES[end.number] and end.out.startswith("{") and why.msg != "Extra data"
+        if not cut_off:
             found.append(f"standard output is no JSON document: {end.out[-300:]!r}, {end.err[-300:]!r}")
     if end.code == CODES[end.number] and sum(line.startswith("gcsplan: ") for line in end.err.splitlines()) != 1:
         found.append(f"not one message: {end.err!r}")

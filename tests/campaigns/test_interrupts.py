@@ -40,6 +40,7 @@ def test_what_a_command_owes_that_was_told_to_end() -> None:
     assert wrong_end(end(143, said(143), "gcsplan: terminated\n"), 0) == []
     assert wrong_end(end(0, "{}", ""), 0) == []
     assert wrong_end(end(-15, "", ""), 0) == []
+    assert wrong_end(end(143, '{"schema": 1, "vehi', "gcsplan: terminated\n"), 0) == []  # cut off while it was printed
     for code, out, err in (
         (130, said(130), "gcsplan: interrupted\n"), (143, "", "gcsplan: terminated\n"), (143, said(143), ""),
         (143, said(143), "Traceback (most recent call last): gcsplan"), (70, said(70), "gcsplan: internal error\n"),
