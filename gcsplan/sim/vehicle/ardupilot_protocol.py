@@ -21,11 +21,23 @@ from gcsplan.mavlink.protocol.messages import (
     Request,
     RequestList,
 )
-from gcsplan.mavlink.protocol.outcome import ACCEPTED, CANCELLED, DENIED, ERROR, INVALID_SEQUENCE, NO_SPACE, UNSUPPORTED
 from gcsplan.sim.vehicle import ardupilot_storage as storage
 from gcsplan.sim.vehicle.firmware import COUNTS_EVERY_LIST, KEEPS_HOME, KEEPS_RADII, TAKES_ARCS, Firmware
 from gcsplan.sim.vehicle.misbehaviour import Faults
-from gcsplan.sim.vehicle.stored_lists import Board, ItemRefused, Out, Phase, through_float
+from gcsplan.sim.vehicle.stored_lists import (
+    ACCEPTED,
+    CANCELLED,
+    DENIED,
+    ERROR,
+    INVALID_SEQUENCE,
+    NO_SPACE,
+    UNSUPPORTED,
+    Board,
+    ItemRefused,
+    Out,
+    Phase,
+    through_float,
+)
 
 
 class ArduPilotServer:

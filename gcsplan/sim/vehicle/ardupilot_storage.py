@@ -12,13 +12,15 @@ from collections.abc import Sequence
 
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import FENCE, GLOBAL, MISSION, RALLY, RELATIVE, TERRAIN, Home, MissionItem, float32
-from gcsplan.mavlink.protocol.outcome import INVALID, UNSUPPORTED, UNSUPPORTED_FRAME
 from gcsplan.sim.vehicle.stored_lists import (
+    INVALID,
     INVALID_PARAM1,
     INVALID_X,
     INVALID_Y,
     INVALID_Z,
     NOTHING_KEPT,
+    UNSUPPORTED,
+    UNSUPPORTED_FRAME,
     ItemRefused,
     ParamsKept,
     as_flag,

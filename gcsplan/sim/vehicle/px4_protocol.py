@@ -22,11 +22,21 @@ from gcsplan.mavlink.protocol.messages import (
     Request,
     RequestList,
 )
-from gcsplan.mavlink.protocol.outcome import ACCEPTED, CANCELLED, ERROR, NO_SPACE, UNSUPPORTED
 from gcsplan.sim.vehicle import px4_storage as storage
 from gcsplan.sim.vehicle.firmware import TAKES_ARM_ITEMS, TAKES_AUTOTUNE_ITEMS, Firmware
 from gcsplan.sim.vehicle.misbehaviour import Faults
-from gcsplan.sim.vehicle.stored_lists import Board, ItemRefused, Out, Phase, through_float
+from gcsplan.sim.vehicle.stored_lists import (
+    ACCEPTED,
+    CANCELLED,
+    ERROR,
+    NO_SPACE,
+    UNSUPPORTED,
+    Board,
+    ItemRefused,
+    Out,
+    Phase,
+    through_float,
+)
 
 _COMMANDS = {cmd.COMPONENT_ARM_DISARM: TAKES_ARM_ITEMS, cmd.DO_AUTOTUNE_ENABLE: TAKES_AUTOTUNE_ITEMS}
 """Commands that not every version takes."""

@@ -10,10 +10,12 @@ from collections.abc import Container
 
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, NO_POSITION, RALLY, MissionItem, float32
-from gcsplan.mavlink.protocol.outcome import ERROR, UNSUPPORTED, UNSUPPORTED_FRAME
 from gcsplan.sim.vehicle.stored_lists import (
+    ERROR,
     INVALID_PARAM1,
     NOTHING_KEPT,
+    UNSUPPORTED,
+    UNSUPPORTED_FRAME,
     ItemRefused,
     ParamsKept,
     as_flag,

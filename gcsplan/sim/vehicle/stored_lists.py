@@ -16,8 +16,10 @@ from typing import Protocol
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, Home, MissionItem, float32
 from gcsplan.mavlink.protocol.messages import Address, MissionMessage
 
-# MAV_MISSION_RESULT, the codes of which `gcsplan.mavlink.protocol.outcome` has no name.
+# MAV_MISSION_RESULT. Not those of `gcsplan.mavlink.protocol`: these vehicles are what the protocol is tested against.
+ACCEPTED, ERROR, UNSUPPORTED_FRAME, UNSUPPORTED, NO_SPACE, INVALID = 0, 1, 2, 3, 4, 5
 INVALID_PARAM1, INVALID_PARAM2, INVALID_PARAM3, INVALID_PARAM4, INVALID_X, INVALID_Y, INVALID_Z = range(6, 13)
+INVALID_SEQUENCE, DENIED, CANCELLED = 13, 14, 15
 
 Out = list[tuple[Address, MissionMessage]]
 
