@@ -21,7 +21,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import InputError
 from gcsplan.logs.flight_log import FlightLog, require_power
-from gcsplan.notes.note import Note
+from gcsplan.notes.note import Note, in_json
 
 LOG_STEP_S = 5.0
 """Length of a step: long enough that height noise is small beside the climb, short enough to be of one kind."""
@@ -119,8 +119,7 @@ class EnergyFit:
         } | {
             "steps": self.steps, "energy_j": self.energy_j, "speed_m_s": self.speed_m_s,
             "fitted_speed_m_s": list(self.fitted_m_s),
-            "off_percent": self.off_percent, "told": self.told, "notes": [str(note) for note in self.notes],
-            "notes_data": [note.as_dict() for note in self.notes],
+            "off_percent": self.off_percent, "told": self.told, **in_json("notes", self.notes),
         }  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from gcsplan.check.motion.turn_parameters import Tuning
 from gcsplan.errors import GcsplanError, InputError
 from gcsplan.mavlink.build.fence import Fence
 from gcsplan.mavlink.mission.mission import FENCE, Mission
-from gcsplan.notes.note import Note, Said
+from gcsplan.notes.note import Note
 
 if TYPE_CHECKING:
     from gcsplan.app.upload.job import UploadJob
@@ -29,14 +29,14 @@ def against_fence(job: UploadJob, read_back: Mission, rtl_rel_home_m: float | No
     return f"the mission would breach its own fence:\n{breach_lines(found)}" if found else None
 
 
-def with_fences(jobs: Sequence[UploadJob], *, infinite: bool = False) -> tuple[list[UploadJob], list[tuple[str, Said]]]:
+def with_fences(jobs: Sequence[UploadJob], *, infinite: bool = False) -> tuple[list[UploadJob], list[tuple[str, Note]]]:
     """``jobs``, each with the fence that its world's zones make for its mission, and notes as (name, note).
 
     Raises what `fence_for` raises, and InputError for a mission that was not checked, since nobody knows what it would
     breach.
     """
     fenced: list[UploadJob] = []
-    notes: list[tuple[str, Said]] = []
+    notes: list[tuple[str, Note]] = []
     for job in jobs:
         if job.vehicle is None or job.world is None:
             raise InputError("a fence is made of the zones that a mission was checked with, and this one was not")
@@ -46,11 +46,9 @@ def with_fences(jobs: Sequence[UploadJob], *, infinite: bool = False) -> tuple[l
     return fenced, notes
 
 
-def _notes(name: str, fence: Fence) -> list[tuple[str, Said]]:
-    notes: list[tuple[str, Said]] = [(name, words) for words in fence.notes]
-    if not fence.items:
-        notes.append((name, Note("no_zone_for_fence")))
-    return notes
+def _notes(name: str, fence: Fence) -> list[tuple[str, Note]]:
+    notes = fence.notes if fence.items else (*fence.notes, Note("no_zone_for_fence"))
+    return [(name, note) for note in notes]
 
 
 def upload_fences(

@@ -90,7 +90,7 @@ def new(
     from gcsplan.cli.output.console import remark, say, say_notes
     from gcsplan.export.durable import write_whole
     from gcsplan.mission_file.new_file import Draft
-    from gcsplan.notes.note import Note
+    from gcsplan.notes.note import Note, in_json
     from gcsplan.vehicle import Autopilot
 
     _require_file(out, force)
@@ -131,8 +131,7 @@ def new(
     write_whole(out, text)
     files = [out, *_write_schema(out.parent, remark)]
     if as_json:
-        emit({"files": [str(file) for file in files], "start": begin, "goal": end,
-              "notes": [str(note) for note in notes], "notes_data": [note.as_dict() for note in notes]})  # fmt: skip
+        emit({"files": [str(file) for file in files], "start": begin, "goal": end, **in_json("notes", notes)})
         return
     say_notes(notes)
     say(f"written: {', '.join(map(str, files))}")

@@ -22,11 +22,11 @@ def show_zones(files: Sequence[Path], units: Units, *, as_json: bool, at: str | 
     from gcsplan.cli.output.console import new_table, say, say_notes
     from gcsplan.cli.output.screens import console
     from gcsplan.figures import counted
+    from gcsplan.notes.note import in_json
 
     zones, notes = list_zones(files, at)
     if as_json:
-        emit({"zones": [zone.as_dict() for zone in zones], "notes": [str(note) for note in notes],
-              "notes_data": [note.as_dict() for note in notes]})  # fmt: skip
+        emit({"zones": [zone.as_dict() for zone in zones], **in_json("notes", notes)})
         return
     table = new_table("", [])
     for name in ("name", "shape", "size", "floor", "ceiling", "source"):
