@@ -12,8 +12,8 @@ from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.terrain.grid import SPACING_M
 from gcsplan.world.terrain.vehicle_terrain import VehicleTerrain
 
-WORLDS_KEPT = 64
-"""Most places whose ground is kept."""
+ANSWERS_KEPT = 64
+"""Most places whose ground is kept, and lengths whose bow is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class World:
         """Least ground at a place, metres AMSL; NaN where unknown."""
         place = lat_deg, lon_deg
         if place not in self._grounds:
-            if len(self._grounds) >= WORLDS_KEPT:
+            if len(self._grounds) >= ANSWERS_KEPT:
                 self._grounds.clear()
             east, north = self.frame.to_plane(lat_deg, lon_deg)
             self._grounds[place] = float(self.airspace.surface.ground_at(east, north))
@@ -57,7 +57,7 @@ class World:
         north_m, across_m = self._extent_m
         half_m = 0.5 * min(longest_m, across_m)
         if half_m not in self._bows:
-            if len(self._bows) >= WORLDS_KEPT:
+            if len(self._bows) >= ANSWERS_KEPT:
                 self._bows.clear()
             ends = self.frame.to_degrees([-half_m, half_m], [north_m, north_m])
             self._bows[half_m] = float(self.frame.bow_m(ends[0], ends[1])[0]) + 1e-3

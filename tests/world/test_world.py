@@ -13,7 +13,7 @@ from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geodesy.height_unit import METRE
 from gcsplan.world.geometry.surface import GridMap, Surface
 from gcsplan.world.terrain.model_words import BARE_DEM, SURFACE_DEM, heights_line, heights_read, what_is_not_in
-from gcsplan.world.world import WORLDS_KEPT, World
+from gcsplan.world.world import ANSWERS_KEPT, World
 
 FRAME = Frame(36.6, -84.3)
 
@@ -42,7 +42,7 @@ def test_the_ground_at_a_place_is_that_of_the_plane_and_unknown_is_no_number() -
 
 def test_more_places_than_are_kept_are_all_answered_right() -> None:
     w = world()
-    east = np.linspace(-900.0, 900.0, 3 * WORLDS_KEPT)
+    east = np.linspace(-900.0, 900.0, 3 * ANSWERS_KEPT)
     for _ in range(2):
         assert [w.ground_amsl(*degrees(e, 0.0)) for e in east] == pytest.approx(300.0 + 0.1 * east, abs=1e-6)
 

@@ -292,11 +292,16 @@ def lowest_amsl(air: Airspace, east_m: float, north_m: float, limits: Limits) ->
     return low
 
 
+def _straight_legs_m(request: VehicleRequest) -> list[float]:
+    """The lengths of the straight legs from start to goal past the vias, in the plane."""
+    places = [request.start[:2], *(v[:2] for v in request.via), request.goal[:2]]
+    return [math.dist(a, b) for a, b in pairwise(places)]
+
+
 def bow_margin_m(request: VehicleRequest, world: World, margins: Margins = MARGINS) -> float:
     """The bow that a mission's legs may have, m: that of a straight one between its terminals, `LEAST_BOW_M` at least,
     so that legs need not be cut; as many times as large as ``margins`` ask for more than `MARGINS`."""
-    places = [request.start[:2], *(v[:2] for v in request.via), request.goal[:2]]
-    longest_m = max(math.dist(a, b) for a, b in pairwise(places))
+    longest_m = max(_straight_legs_m(request))
     own_m = LEAST_BOW_M
     if request.vehicle.turn_radius_m > 0.0:
         own_m = LEG_BOW_M  # arcs, climb-outs and approaches have legs of their own
@@ -311,7 +316,6 @@ def _with_margins(limits: Limits, margins: Margins, *, terrain: bool) -> Limits:
 
     In the terrain frame, too, by what a vehicle may read amiss and still be taken: an upload judges with it.
     """
-
     return replace(
         limits,
         track_error_m=limits.track_error_m + margins.track_m + margins.bow_m,
@@ -324,15 +328,13 @@ def _slope_margin(source: MissionFile, request: VehicleRequest, limits: Limits, 
     the ends; a path may climb more where it is longer than that needs."""
     if request.vehicle.turn_radius_m > 0.0 or source.altitude_frame == "terrain":
         return FLOWN_SLOPE
-    places = [request.start[:2], *(v[:2] for v in request.via), request.goal[:2]]
-    straight_m = sum(math.dist(a, b) for a, b in pairwise(places))
-    rise_m = max(rise_m, min(limits.max_climb_slope, limits.max_descent_slope, 1.0) * straight_m)
+    slope = min(limits.max_climb_slope, limits.max_descent_slope, 1.0)
+    rise_m = max(rise_m, slope * sum(_straight_legs_m(request)))
     return slope_margin(rise_m, cut=request.vehicle.autopilot is Autopilot.ARDUCOPTER and cuts_corners(request.vehicle))
 
 
 def _less_steep(limits: Limits, part: float) -> Limits:
     """``limits`` with slopes that are less than those of the check by ``part`` of them."""
-
     up, down = (
         deg if deg >= 90.0 else math.degrees(math.atan(math.tan(math.radians(deg)) * (1.0 - part)))
         for deg in (limits.max_climb_deg, limits.max_descent_deg)
