@@ -157,8 +157,8 @@ class ReadBackDiffers(GcsplanError, RuntimeError):
     default_reason = "differs"
 
 
-def absent(path: Path) -> str:
-    """The words for a file that is not there, with the nearest name in its folder."""
+def nearest_name(path: Path) -> str:
+    """The name in a file's folder that is nearest to the file's, which is not there; empty if none is near."""
     from difflib import get_close_matches
     from itertools import islice
 
@@ -166,9 +166,7 @@ def absent(path: Path) -> str:
         names = [p.name for p in islice(path.parent.iterdir(), MOST_NAMES)]
     except (OSError, ValueError):
         names = []
-    near = get_close_matches(path.name, names, n=1, cutoff=0.75)
-    hint = f"; did you mean {path.with_name(near[0])}?" if near else ""
-    return f"{path} is not there (paths are relative to the mission file){hint}"
+    return next(iter(get_close_matches(path.name, names, n=1, cutoff=0.75)), "")
 
 
 def unknown_name(sentence: str, name: str, known: Iterable[str]) -> InputError:

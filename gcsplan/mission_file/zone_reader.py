@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gcsplan.errors import InputError, absent
+from gcsplan.errors import InputError
 from gcsplan.mission_file.published.formats import read_published
 from gcsplan.mission_file.published.openair import OPENAIR_SUFFIXES
 from gcsplan.mission_file.published.policy import Policy
@@ -14,7 +14,7 @@ from gcsplan.mission_file.zones.geojson import read_geojson
 from gcsplan.mission_file.zones.json import load_json
 from gcsplan.mission_file.zones.kml import read_kml
 from gcsplan.mission_file.zones.zip import unpack
-from gcsplan.world.terrain.input_files import tell_file
+from gcsplan.world.terrain.input_files import absent, tell_file
 
 MAX_ZONE_BYTES = 20_000_000
 """Most bytes of a file, and of what is unpacked from one."""

@@ -23,7 +23,7 @@ from gcsplan.export.durable import locked
 from gcsplan.export.outdir import write_outputs
 from gcsplan.world.terrain.input_files import reading, tell_file
 from tests.app.test_batch import mission
-from tests.support.mission_inputs import CASES, SCALED, Case, geotiff, made, published, tif
+from tests.support.mission_inputs import CASES, SCALED, Case, geotiff, made, naming, published, tif
 
 
 def batch_of(*given: Path, out: Path) -> MissionBatch:
@@ -81,6 +81,15 @@ def test_a_cache_at_another_place_counts(tmp_path: Path, monkeypatch: pytest.Mon
     assert batch.known()[1] == []
     monkeypatch.setenv("GCSPLAN_DEM_CACHE", str(tmp_path / "empty"))
     assert batch.known()[1] == [0]
+
+
+def test_a_file_that_a_sidecar_names_may_go_while_its_header_is_remembered(tmp_path: Path) -> None:
+    """It was looked for again, and its absence ended in an internal error."""
+    case = made(naming.__name__, tmp_path)
+    with_it = load_mission(case.mission)
+    (tmp_path / "far.ovr").unlink()
+    without = load_mission(case.mission)
+    assert without.inputs["dem_sha256"] != with_it.inputs["dem_sha256"]
 
 
 def test_a_sidecar_changes_the_ground_and_its_hash_in_one_process(tmp_path: Path) -> None:

@@ -20,15 +20,17 @@ import os
 import stat
 import time
 from bisect import bisect_left
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
+from gcsplan.errors import nearest_name
+
 __all__ = [
-    "FileReading", "beside", "files_of", "neighbours", "path_of", "reading", "sha256_of", "sha256_of_all", "tell_file",
-    "tell_folder", "tell_raster", "tell_setting",
+    "FileReading", "absent", "beside", "files_of", "path_of", "reading", "sha256_of", "sha256_of_all", "states_of",
+    "tell_file", "tell_folder", "tell_raster", "tell_setting",
 ]  # fmt: skip
 
 WHOLE_BYTES = 16 * 2**20
@@ -69,6 +71,8 @@ class FileReading:
         if kind == "raster":
             found = beside(rest)
             return _digest([str(found[0].parent) if found else "", *(f"{f.name} {self._of_file(f)}" for f in found)])
+        if kind == "near":
+            return nearest_name(Path(rest))
         if kind == "setting":
             return os.environ.get(rest, ABSENT)
         suffixes, _, folder = rest.partition(" ")
@@ -124,6 +128,14 @@ def tell_file(path: str | os.PathLike[str]) -> None:
     _tell("file", path)
 
 
+def absent(path: Path) -> str:
+    """The words for a file that is not there, with the nearest name in its folder, which is reported, too."""
+    _tell("near", path)
+    near = nearest_name(path)
+    hint = f"; did you mean {path.with_name(near)}?" if near else ""
+    return f"{path} is not there (paths are relative to the mission file){hint}"
+
+
 def tell_raster(path: str | os.PathLike[str]) -> None:
     """Report a file that GDAL opens, with all that may belong to it."""
     _tell("raster", path)
@@ -175,10 +187,10 @@ def beside(path: str | os.PathLike[str]) -> list[Path]:
     return found
 
 
-def neighbours(path: str | os.PathLike[str]) -> tuple[tuple[object, ...], ...]:
-    """Names, sizes, times and inodes of the files `beside` a raster: what must not change while its header is kept."""
+def states_of(files: Iterable[Path]) -> tuple[tuple[object, ...], ...]:
+    """Names, sizes, times and inodes of files that are there: what must not change while what they say is kept."""
     found = []
-    for file in beside(path):
+    for file in files:
         try:
             about = os.stat(file)
         except OSError:

@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.errors import InputError, absent
+from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.datum import RasterCRS, VerticalDatum, require_unshifted, take_apart
 from gcsplan.world.geodesy.height_unit import BY_FILE, BY_FORMAT, METRE, HeightUnit, unit_named, unit_that_counts
-from gcsplan.world.terrain.input_files import files_of, neighbours, sha256_of_all, tell_file, tell_raster
+from gcsplan.world.terrain.input_files import absent, beside, files_of, sha256_of_all, states_of, tell_file, tell_raster
 
 Reader = Callable[[int, int, int, int], Iterator[tuple[int, Floats]]]
 
@@ -96,8 +96,8 @@ class RasterStatements:
     nodata: float | None = None
 
 
-remembered_headers: dict[tuple[object, ...], tuple[Raster, tuple[float, float]]] = {}
-"""Headers of files, with scale and offset that make metres of their numbers."""
+remembered_headers: dict[tuple[object, ...], tuple[Raster, tuple[float, float], tuple[object, ...]]] = {}
+"""Headers of files, with scale and offset that make metres of their numbers, and the states of all files of each."""
 
 
 def open_raster(
@@ -113,22 +113,23 @@ def open_raster(
 
     The keywords are what the user says (`RasterStatements`).
 
-    If neither the file nor one beside it has changed since this process opened it, it is not opened again: many
-    missions use the same tiles. Raises InputError for anything that is not a readable, georeferenced, north-up raster
-    of real numbers.
+    If neither the file nor one beside it or that it names has changed since this process opened it, it is not opened
+    again: many missions use the same tiles. Raises InputError for anything that is not a readable, georeferenced,
+    north-up raster of real numbers.
     """
     tell_raster(path)
     require_file(path, where=where)
     said = RasterStatements(crs, height_unit, datum_unit, nodata)
-    key = (path.absolute(), said, neighbours(path))
+    key = (path.absolute(), said, states_of(beside(path)))
     try:
-        if key not in remembered_headers:
+        found = remembered_headers.get(key)
+        if found is None or found[2] != states_of(found[0].files):  # one that a sidecar names may lie anywhere
             with gdal(path) as dataset:
-                found = _header(dataset, path, said, where=where)
+                header, to_metres = _header(dataset, path, said, where=where)
             if len(remembered_headers) >= MOST_HEADERS:
                 remembered_headers.clear()
-            remembered_headers[key] = found
-        header, to_metres = remembered_headers[key]
+            found = remembered_headers[key] = header, to_metres, states_of(header.files)
+        header, to_metres, _ = found
         for file in header.files:
             tell_file(file)
         return replace(header, read=_reader(path, *to_metres, said.nodata, where=where))
@@ -310,9 +311,9 @@ def _reader(path: Path, scale: float, offset: float, nodata: float | None, *, wh
 
 def _prj_beside(path: Path) -> str:
     """The text of the .prj beside an .asc, as far as a coordinate system is long."""
-    for beside in (path.with_suffix(".prj"), path.with_suffix(".PRJ")):
-        if beside.is_file():
-            with beside.open("rb") as file:
+    for prj in (path.with_suffix(".prj"), path.with_suffix(".PRJ")):
+        if prj.is_file():
+            with prj.open("rb") as file:
                 return file.read(MOST_OF_PRJ).decode("utf-8", "replace")
     return ""
 

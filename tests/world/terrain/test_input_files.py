@@ -9,6 +9,7 @@ import pytest
 
 from gcsplan.world.terrain.input_files import (
     FileReading,
+    absent,
     beside,
     path_of,
     reading,
@@ -73,3 +74,15 @@ def test_the_files_beside_a_raster_begin_with_its_name_in_any_case(tmp_path: Pat
         (tmp_path / name).touch()
     assert {p.name for p in beside(tmp_path / "a.tif")} >= {"a.tfw", "A.TIF.aux.xml", "a.prj"}
     assert "b.tfw" not in {p.name for p in beside(tmp_path / "a.tif")}
+
+
+def test_the_name_that_an_absent_file_may_have_meant_belongs_to_what_was_read(tmp_path: Path) -> None:
+    (tmp_path / "zones.geojson").write_text("{}")
+    with reading() as read:
+        words = absent(tmp_path / "zone.geojson")
+    assert "did you mean" in words
+    assert not FileReading.changed(read.marks)
+    (tmp_path / "another.txt").write_text("")
+    assert not FileReading.changed(read.marks), "a name that is not near changes nothing"
+    (tmp_path / "zones.geojson").unlink()
+    assert FileReading.changed(read.marks) == str(tmp_path / "zone.geojson")
