@@ -289,7 +289,7 @@ MOST_IN_A_FOLDER = 15
 
 MOST = {
     "modules": 523,
-    "statements": 60_926,
+    "statements": 60_912,
     "type names with two meanings": 35,
     "constants with two values": 93,
     "folders with more than 15 modules": 1,

@@ -28,7 +28,6 @@ from gcsplan.errors import UsageError
 from gcsplan.mavlink.mission.parameter_file import read_param_file
 from gcsplan.mavlink.mission.parameter_list import off, vehicle_on_board
 from gcsplan.mavlink.mission.return_altitude import return_on_board_m
-from gcsplan.notes.note import of_vehicle
 from gcsplan.sim.outcome import Rehearsal, Tally, Terms
 from gcsplan.sim.part import RehearsalPart
 
@@ -127,8 +126,8 @@ def _outside(planned: Plan, parameters: Mapping[str, Mapping[str, float]], resul
     vehicles, notes = [], list(result.notes)
     for v, flown in zip(planned.vehicles, result.vehicles, strict=True):
         found = off(settings_of_plan(v, None), parameters.get(v.name, {}), v.mission.autopilot)
-        notes += [of_vehicle(v.name, o.describe()) for o in found if o.setting.matters in ("time", "told")]
-        said = tuple(o.describe() for o in found if o.setting.matters not in ("time", "told"))
+        notes += [o.note().of(vehicle=v.name) for o in found if o.setting.matters in ("time", "told")]
+        said = tuple(o.note() for o in found if o.setting.matters not in ("time", "told"))
         vehicles.append(replace(flown, not_flown=(*flown.not_flown, *said)) if said else flown)
     return replace(result, vehicles=tuple(vehicles), notes=tuple(notes))
 

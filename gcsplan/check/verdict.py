@@ -14,7 +14,7 @@ from gcsplan.check.zone_heights import ZonePass
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.parameter_safety import FlightExtent
 from gcsplan.notes.finding import Finding
-from gcsplan.notes.note import IN_FILES, Said, Wording, told
+from gcsplan.notes.note import IN_FILES, Note, Wording
 
 if TYPE_CHECKING:
     from gcsplan.fleet.arrival import Slot
@@ -113,8 +113,8 @@ class Verdict:
     mission: Mission
     legs: tuple[LegFigures, ...]
     findings: tuple[Finding, ...]
-    not_judged: tuple[Said, ...]
-    notes: tuple[Said, ...] = ()
+    not_judged: tuple[Note, ...]
+    notes: tuple[Note, ...] = ()
     battery_used_percent: float | None = None
     misses: tuple[Miss, ...] = ()
     until_reserve_s: float | None = None
@@ -228,5 +228,5 @@ class Verdict:
 
     def describe(self, wording: Wording = IN_FILES) -> str:
         """All findings and all that is not judged, one per line."""
-        unjudged = [f"not judged: {told(what, wording)}" for what in self.not_judged]
+        unjudged = [f"not judged: {note.text(wording)}" for note in self.not_judged]
         return "\n".join([f.note.text(wording) for f in self.findings] + unjudged)

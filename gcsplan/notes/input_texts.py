@@ -85,6 +85,10 @@ TEXTS = {
     ),
     "plan_home_missing": "the file has no home: the mission's own home was taken",
     "plan_home_without_place": "the file's home holds no place (0, 0): the mission's own home was taken",
+    "autopilot_taken": (
+        "a .waypoints file does not name its autopilot: it is taken to be for {autopilot} (--autopilot)"
+    ),
+    "file_not_read": "not read, and not on this page: {why}",
     "plan_without_autopilot": "the file does not say for which autopilot it is: it was read for {autopilot}",
     "plan_rally_points_unread": "the file's {keys} was not read; {cure}",
     "plan_fence_unread": "the file's {keys} is not read: {cure}",

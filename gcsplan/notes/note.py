@@ -31,7 +31,7 @@ from typing import Any, TypeAlias, get_args
 
 from gcsplan.figures import floored, raised
 from gcsplan.notes.catalogue import TEXTS
-from gcsplan.units import Joules, Kind, Quantity, Reach, Rounding, Seconds, Symbol, Units, in_units
+from gcsplan.units import Joules, Kind, Quantity, Reach, Rounding, Seconds, Symbol, Units
 
 Datum: TypeAlias = "float | str | bool | Note | tuple[Datum, ...] | None"
 
@@ -123,28 +123,10 @@ class Note:
         return _revived, (self.code, self.item, dict(self.data))
 
 
-Said: TypeAlias = "str | Note"
-"""What is said where not all of it is data yet."""
-
-
-def told(said: Said, wording: Wording = IN_FILES) -> str:
-    """The sentence of a note, or a text in the reader's units."""
-    if isinstance(said, Note):
-        return said.text(wording)
-    return str(said) if wording.units is None else in_units(said, wording.units)
-
-
-def of_vehicle(name: str, said: Said) -> Said:
-    """What is said, as that of a vehicle."""
-    return said.of(vehicle=name) if isinstance(said, Note) else f"{name}: {said}"
-
-
-def in_json(key: str, notes: Iterable[Said], wording: Wording = IN_FILES) -> dict[str, Any]:
+def in_json(key: str, notes: Iterable[Note], wording: Wording = IN_FILES) -> dict[str, Any]:
     """A list of notes for programs: its sentences under ``key``, and under ``key_data`` what they are made of."""
     every = list(notes)
-    nothing: dict[str, Any] = {"code": None, "item": None, "data": {}}
-    data = [note.as_dict() if isinstance(note, Note) else nothing for note in every]
-    return {key: [told(note, wording) for note in every], f"{key}_data": data}
+    return {key: [note.text(wording) for note in every], f"{key}_data": [note.as_dict() for note in every]}
 
 
 def _revived(code: str, item: int | None, data: dict[str, Datum]) -> Note:

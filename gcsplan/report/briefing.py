@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from gcsplan import __version__
 from gcsplan.figures import counted
 from gcsplan.mavlink.mission.return_altitude import setting
-from gcsplan.notes.note import told
 from gcsplan.report.parts.html import energy, esc, greatest, least, num, place, plain, stated, steepest, table
 from gcsplan.report.parts.map_labels import Mark, marks_html
 from gcsplan.report.parts.page_data import Page, Subject
@@ -70,9 +69,9 @@ def _problems(page: Page) -> str:
     found += [f"{name}: no mission, left out: {why}" for name, why in page.left_out]
     found += [in_units(text, page.units) for text in page.rehearsed.violations] if page.rehearsed is not None else []
     unjudged = [
-        f"{s.name}: not judged: {told(what, s.wording(page.units))}"
+        f"{s.name}: not judged: {note.text(s.wording(page.units))}"
         for s in page.subjects
-        for what in s.verdict.not_judged
+        for note in s.verdict.not_judged
     ]
     out = [*found[:MOST_FINDINGS], *unjudged[:MOST_NOTES]]
     rest = len(found) + len(unjudged) - len(out)

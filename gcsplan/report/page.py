@@ -15,7 +15,7 @@ import numpy as np
 from gcsplan import __version__
 from gcsplan.check.returns.verdict import WayHome
 from gcsplan.figures import steepened
-from gcsplan.notes.note import Said, Wording, told
+from gcsplan.notes.note import Note, Wording
 from gcsplan.report.briefing import briefing_html
 from gcsplan.report.parts.detail import in_full, left_out_html, only_some, samples_of
 from gcsplan.report.parts.html import data_block, energy, esc, greatest, least, num, place, stated, steepest, tools
@@ -57,7 +57,7 @@ def render_check(
     checked: Sequence[CheckedFile],
     *,
     inputs: Mapping[str, object],
-    notes: Sequence[Said] = (),
+    notes: Sequence[Note] = (),
     homes: Sequence[WayHome | None] = (),
     units: Units = METRIC,
 ) -> str:
@@ -300,12 +300,13 @@ def _details(
 
 
 def _unjudged(page: Page) -> list[tuple[Subject, str]]:
-    return [(s, told(what, s.wording(page.units))) for s in page.subjects for what in s.verdict.not_judged]
+    return [(s, note.text(s.wording(page.units))) for s in page.subjects for note in s.verdict.not_judged]
 
 
 def _end(page: Page) -> str:
-    notes = [(told(n, Wording(page.units)), "") for n in page.notes]
-    notes += [(told(n, s.wording(page.units)), s.name) for s in page.subjects for n in s.notes]
+    wording = next((s.wording(page.units) for s in page.subjects), Wording(page.units))  # a page has one reader
+    notes = [(note.text(wording), "") for note in page.notes]
+    notes += [(note.text(wording), s.name) for s in page.subjects for note in s.notes]
     several = len(page.subjects) > 1
     listed = "".join(
         f"<li>{f'<b>{esc(who)}</b>: ' if who and several else ''}{esc(n)}</li>" for n, who in dict.fromkeys(notes)

@@ -10,7 +10,7 @@ from typing import Any
 from gcsplan.check.verdict import PAPER_MARK
 from gcsplan.errors import CheckFailed
 from gcsplan.figures import floored
-from gcsplan.notes.note import Note, Said, in_json, of_vehicle
+from gcsplan.notes.note import Note, in_json
 from gcsplan.sim.flight.trace import Judged, Meeting, Trace, examine, meetings
 from gcsplan.sim.part import RehearsalPart, lateness
 from gcsplan.units import METRIC, Units, duration
@@ -39,11 +39,11 @@ class Breach:
 
     kind: str
     vehicles: tuple[str, ...]
-    message: Said
+    message: Note
     by: float
     runs: int
 
-    def note(self, of_runs: int) -> Said:
+    def note(self, of_runs: int) -> Note:
         """Return what was broken, and in how many of ``of_runs``, all runs."""
         return (
             self.message if of_runs == 1 else Note("in_some_runs", what=self.message, runs=self.runs, of_runs=of_runs)
@@ -51,7 +51,7 @@ class Breach:
 
     def as_dict(self) -> dict[str, Any]:
         """Return a dict for JSON."""
-        said = self.message.as_dict() if isinstance(self.message, Note) else {"code": None, "data": {}}
+        said = self.message.as_dict()
         return {
             "kind": self.kind, "vehicles": list(self.vehicles), "message": str(self.message), "by": _number(self.by),
             "runs": self.runs, "code": said["code"], "data": said["data"],
@@ -70,7 +70,7 @@ class Performance:
     min_agl_m: float
     min_agl_at: tuple[float, float]
     battery_used_percent: float | None
-    not_flown: tuple[Said, ...] = ()
+    not_flown: tuple[Note, ...] = ()
     paper_energy: bool = False
 
     @property
@@ -142,13 +142,13 @@ class Rehearsal:
     separation_kept_runs: int
     closest: Meeting | None
     breaches: tuple[Breach, ...]
-    notes: tuple[Said, ...] = ()
+    notes: tuple[Note, ...] = ()
     flown: tuple[Trace, ...] = field(default=(), compare=False, repr=False)
 
     @property
-    def not_judged(self) -> tuple[Said, ...]:
+    def not_judged(self) -> tuple[Note, ...]:
         """The parts of the missions that were not flown."""
-        return tuple(of_vehicle(v.name, what) for v in self.vehicles for what in v.not_flown)
+        return tuple(what.of(vehicle=v.name) for v in self.vehicles for what in v.not_flown)
 
     @property
     def safe(self) -> bool | None:
@@ -232,7 +232,7 @@ class Tally:
     separation_kept: int = 0
     closest: Meeting | None = None
     order_flown: tuple[str, ...] = ()
-    notes: list[Said] = field(default_factory=list)
+    notes: list[Note] = field(default_factory=list)
     flown: tuple[Trace, ...] = ()
     _breaches: dict[tuple[object, ...], Breach] = field(default_factory=dict)
     _seen: set[tuple[object, ...]] = field(default_factory=set)
@@ -299,7 +299,7 @@ class Tally:
         if meeting is not None and (self.closest is None or meeting.distance_m < self.closest.distance_m):
             self.closest = meeting
 
-    def breach(self, kind: str, vehicles: tuple[str, ...], message: Said, by: float, more: object = None) -> None:
+    def breach(self, kind: str, vehicles: tuple[str, ...], message: Note, by: float, more: object = None) -> None:
         """Record a breach; of one kind, vehicle set and ``more``, keep the worst and count each run once."""
         key = (kind, vehicles, more)
         was = self._breaches.get(key)
@@ -347,7 +347,7 @@ class Tally:
         self.separation_kept += not close
 
     def result(
-        self, simulator: str, seed: int, weather: dict[str, Any], not_flown: Sequence[tuple[Said, ...]]
+        self, simulator: str, seed: int, weather: dict[str, Any], not_flown: Sequence[tuple[Note, ...]]
     ) -> Rehearsal:
         """Return the rehearsal's result."""
         performances = []

@@ -35,6 +35,7 @@ from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
 from tests.app.fleet.test_fleet import CROSS
 from tests.support.impatient import be_impatient
+from tests.support.noted import saying
 from tests.support.paths import MISSIONS
 
 EXAMPLE = MISSIONS / "upload_fleet.py"
@@ -218,7 +219,7 @@ def test_what_does_not_pass_is_not_written_and_retires_what_was_there(cross: Pla
 def doubtful(cross: Plan) -> Plan:
     """One vehicle of it, with something that could not be judged."""
     v = cross.vehicles[0]
-    unjudged = dataclasses.replace(v, verdict=type(v.verdict)(v.mission, v.verdict.legs, (), ("the wind",)))
+    unjudged = dataclasses.replace(v, verdict=type(v.verdict)(v.mission, v.verdict.legs, (), (saying("the wind"),)))
     return dataclasses.replace(cross, vehicles=(unjudged,), fleet=None)
 
 

@@ -209,6 +209,6 @@ def test_a_rehearsal_tells_what_it_does_not_fly() -> None:
     values = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 2.0, "FENCE_RADIUS": 300.0, "FS_THR_ENABLE": 3.0, "RTL_ALT_TYPE": 1.0}
     flown = rehearse(done, parameters={"uav1": values})
     assert flown.safe is None
-    assert [words.split(" is ")[0] for words in flown.not_judged] == ["uav1: RTL_ALT_TYPE", "uav1: FENCE_RADIUS"]
-    assert any("FS_THR_ENABLE is 3 on board" in words for words in flown.notes)
+    assert [str(note).split(" is ")[0] for note in flown.not_judged] == ["uav1: RTL_ALT_TYPE", "uav1: FENCE_RADIUS"]
+    assert any("FS_THR_ENABLE is 3 on board" in str(note) for note in flown.notes)
     assert rehearse(done, parameters={"uav1": {"FENCE_ENABLE": 0.0, "FENCE_TYPE": 7.0}}).safe is True

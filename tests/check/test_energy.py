@@ -17,7 +17,6 @@ from gcsplan.arrays import Floats
 from gcsplan.check.motion.return_time import return_s
 from gcsplan.fleet.motion.timing import Course, Route
 from gcsplan.mission_file import load_mission
-from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 
 BASE, R2, R1, HOVER = 300.0, 20.0, 60.0, 450.0
@@ -149,5 +148,5 @@ def test_the_least_energy_that_is_proved_is_below_what_the_flight_takes(autopilo
 def test_a_speed_that_the_model_was_not_fitted_to_is_told() -> None:
     for fitted, told in (([9, 10], False), (8.5, False), (7, True), ([13, 15], True)):
         notes = planned(ENERGY | {"fitted_speed_m_s": fitted}).vehicles[0].verdict.notes
-        speeds = [n.data["speed_m_s"] for n in notes if isinstance(n, Note) and n.code == "energy_fitted_elsewhere"]
+        speeds = [n.data["speed_m_s"] for n in notes if n.code == "energy_fitted_elsewhere"]
         assert speeds == [10.0] * told, fitted

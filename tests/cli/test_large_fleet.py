@@ -11,6 +11,7 @@ from rich.console import Console
 from gcsplan.app.fleet.pipeline import plan
 from gcsplan.cli.output import console
 from gcsplan.mavlink.protocol.machine import TransferProgress
+from tests.support.noted import saying
 
 
 def fleet(count: int) -> dict[str, Any]:
@@ -53,7 +54,7 @@ def test_names_and_notes_of_a_thousand_are_few_lines(shown: tuple[io.StringIO, i
     assert words.startswith("uav0000, uav0001, ")
     assert words.endswith("uav0998, uav0999 (1000 in all)")
     assert len(words) < 700
-    console.say_notes_of([(name, "the same") for name in names] + [(name, f"about {name}") for name in names])
+    console.say_notes_of([(name, saying(words)) for name in names for words in ("the same", f"about {name}")])
     assert len(err.getvalue().splitlines()) == console.MOST_NOTES + 1
     assert "… and 881 more on vehicles" in err.getvalue()
 

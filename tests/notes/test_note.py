@@ -102,8 +102,18 @@ def test_angles_are_rounded_away_from_the_limit_too() -> None:
 
 
 def test_programs_get_a_list_of_sentences_and_what_they_are_made_of() -> None:
-    made = in_json("notes", ["a text", Note("no_ceiling")], Wording(options={"max_agl_m": "--max-agl"}))
+    made = in_json(
+        "notes",
+        [Note("flown_by_computer", 3, name="PAUSE"), Note("no_ceiling")],
+        Wording(options={"max_agl_m": "--max-agl"}),
+    )
     assert made == {
-        "notes": ["a text", "--max-agl is not set: nothing limits the height above ground"],
-        "notes_data": [{"code": None, "item": None, "data": {}}, {"code": "no_ceiling", "item": None, "data": {}}],
+        "notes": [
+            "item 3: PAUSE: another computer flies from there on",
+            "--max-agl is not set: nothing limits the height above ground",
+        ],
+        "notes_data": [
+            {"code": "flown_by_computer", "item": 3, "data": {"name": "PAUSE"}},
+            {"code": "no_ceiling", "item": None, "data": {}},
+        ],
     }

@@ -17,6 +17,7 @@ from gcsplan.report.parts import html as markup
 from gcsplan.report.parts.page_data import Page, Rehearsed
 from tests.report.test_page import HOSTILE, Reader, fleet_page, small_page
 from tests.support import browser as chromium
+from tests.support.noted import saying
 
 PROGRAM = chromium.find()
 LONG = "a vehicle with quite a long name, number "
@@ -40,7 +41,7 @@ def fleet_of_four(*, worst: bool) -> Page:
         if worst:
             point = RallyPoint(36.6, -84.3, 300.0, 120.0, 900.0, "a place")
             home = replace(home, rally=(point,) * 6, not_judged=(Note("mission_not_followed"),))
-            s = replace(s, verdict=replace(s.verdict, not_judged=("the arcs of 80 m " * 30,) * 2))
+            s = replace(s, verdict=replace(s.verdict, not_judged=(saying("the arcs of 80 m " * 30),) * 2))
         subjects.append(replace(s, motion=told.subjects[0].motion, home=home))
     order = tuple(s.name for s in subjects)
     rehearsed = Rehearsed(False, "Flown by nobody.", (), ("a violation " * 40,) * 9) if worst else None
@@ -87,7 +88,7 @@ def test_what_is_broken_or_not_judged_is_on_the_page_that_is_signed() -> None:
     assert "and 20 more" in worst
     assert "what that leaves with 6 rally points on board: no safe return from " in worst
     assert all(f"a vehicle with…ame, number {i}" in worst for i in (1, 2, 3, 4))
-    nothing = replace(small_page().subjects[0].verdict, legs=(), not_judged=("the mission flies nowhere",))
+    nothing = replace(small_page().subjects[0].verdict, legs=(), not_judged=(Note("flies_nowhere"),))
     assert "NOT JUDGED" in briefing(replace(page, subjects=(replace(page.subjects[0], verdict=nothing),)))
 
 

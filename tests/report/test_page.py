@@ -49,6 +49,7 @@ from gcsplan.world.terrain.model_words import BARE_DEM, SURFACE_DEM
 from gcsplan.world.world import World
 from tests.fleet.test_separation import random_fleet
 from tests.support.effort import draws
+from tests.support.noted import saying
 from tests.support.worlds import vehicle, world
 
 HOME_DEG = (36.6, -84.3)
@@ -125,7 +126,7 @@ def small_page(name: str = "Over the hills", low_m: float = 430.0) -> Page:
     where = world(hills, ZONES, half_m=8000.0)
     verdict = verdict_over(where, [[0.0, 0, 430], [2000, 0, low_m], [4500, 300, 430]], craft)
     inputs = {"dem_sha256": "ab" * 32, "vertical_datum": "EGM96", "resolution_m": 100, "bare_dem": True}
-    return Page(name, where, (Subject("uav1", verdict, craft, notes=("a note of the vehicle",)),), inputs)
+    return Page(name, where, (Subject("uav1", verdict, craft, notes=(saying("a note of the vehicle"),)),), inputs)
 
 
 @cache
@@ -245,7 +246,7 @@ def test_a_broken_limit_is_told_at_the_top_and_marked_where_it_is() -> None:
 
 def test_what_could_not_be_judged_is_neither_safe_nor_unsafe() -> None:
     page = small_page()
-    arcs = replace(page.subjects[0].verdict, not_judged=("the arcs <b> of 80 m",))
+    arcs = replace(page.subjects[0].verdict, not_judged=(saying("the arcs <b> of 80 m"),))
     read = Reader(render_page(replace(page, subjects=(replace(page.subjects[0], verdict=arcs),))))
     assert "NOT JUDGED" in read.text
     assert read.text.count("the arcs <b> of 80 m") == 3  # on the briefing, at the top and in the notes
@@ -254,7 +255,7 @@ def test_what_could_not_be_judged_is_neither_safe_nor_unsafe() -> None:
 
 def test_a_mission_that_flies_nowhere_still_has_a_report() -> None:
     page = small_page()
-    nothing = replace(page.subjects[0].verdict, legs=(), not_judged=("the mission flies nowhere",))
+    nothing = replace(page.subjects[0].verdict, legs=(), not_judged=(Note("flies_nowhere"),))
     read = Reader(render_page(replace(page, subjects=(replace(page.subjects[0], verdict=nothing),))))
     assert "NOT JUDGED" in read.text
     assert read.data["lines"] == []
@@ -292,15 +293,15 @@ def test_a_checked_file_is_named_by_itself_where_one_vehicle_has_several() -> No
         file: str
         vehicle: Vehicle
         verdict: Verdict
-        notes: tuple[str, ...] = ()
+        notes: tuple[Note, ...] = ()
         typed: Mapping[str, str] = field(default_factory=dict)
 
     page = small_page()
     craft, verdict = page.subjects[0].vehicle, page.subjects[0].verdict
-    files = [Checked("a.waypoints", craft, verdict, ("home was blank",)), Checked("b.plan", craft, verdict)]
+    files = [Checked("a.waypoints", craft, verdict, (Note("home_row_blank"),)), Checked("b.plan", craft, verdict)]
     read = Reader(render_check("two files", page.world, files, inputs=page.inputs))
     assert {line["name"] for line in read.data["lines"]} == {"a.waypoints", "b.plan"}
-    assert "home was blank" in read.text
+    assert str(Note("home_row_blank")) in read.text
 
 
 def test_the_uploads_end_is_told() -> None:
@@ -331,7 +332,7 @@ def test_a_hostile_name_is_words_and_nothing_else() -> None:
     subject = page.subjects[0]
     verdict = verdict_over(where, [[0.0, 0, 350], [4500, 300, 430]], replace(subject.vehicle, name="uav1"))
     hostile = replace(
-        subject, name=HOSTILE, verdict=verdict, notes=(HOSTILE,), upload={"url": HOSTILE, "message": HOSTILE}
+        subject, name=HOSTILE, verdict=verdict, notes=(saying(HOSTILE),), upload={"url": HOSTILE, "message": HOSTILE}
     )
     evil = Page(HOSTILE, where, (hostile,), {"vertical_datum": HOSTILE, HOSTILE: HOSTILE}, ((HOSTILE, HOSTILE),))
     text, tame = render_page(evil), render_page(replace(page, subjects=(replace(subject, verdict=verdict),)))
@@ -559,7 +560,7 @@ def many_page(count: int) -> Page:
     ]
     subjects = [replace(first, name=p.name, motion=p) for p in paths]
     last = subjects[-1]
-    unjudged = replace(last.verdict, not_judged=("the wind",))
+    unjudged = replace(last.verdict, not_judged=(saying("the wind"),))
     subjects[-1] = replace(last, verdict=unjudged)
     return replace(
         page, subjects=tuple(subjects), separation=separation(paths, Rules(50.0)), order=tuple(p.name for p in paths),

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from gcsplan.notes.note import Note, Said
+from gcsplan.notes.note import Note
 
 
-def codes(notes: Iterable[Said]) -> list[str]:
+def codes(notes: Iterable[Note]) -> list[str]:
     """The codes of the notes, in order."""
-    return [note.code for note in notes if isinstance(note, Note)]
+    return [note.code for note in notes]
 
 
 def within(note: Note) -> Iterator[Note]:
@@ -21,12 +21,17 @@ def within(note: Note) -> Iterator[Note]:
                 yield from within(each)
 
 
-def coded(notes: Iterable[Said], code: str) -> Note:
+def coded(notes: Iterable[Note], code: str) -> Note:
     """The first note with a code. Raises StopIteration if there is none."""
-    return next(note for note in notes if isinstance(note, Note) and note.code == code)
+    return next(note for note in notes if note.code == code)
 
 
-def one(code: str, notes: Iterable[Said]) -> Note:
+def one(code: str, notes: Iterable[Note]) -> Note:
     """The only note with ``code``."""
-    [found] = [note for note in notes if isinstance(note, Note) and note.code == code]
+    [found] = [note for note in notes if note.code == code]
     return found
+
+
+def saying(words: str) -> Note:
+    """A note in whose sentence ``words`` stand."""
+    return Note("flown_by_computer", name=words)

@@ -29,7 +29,7 @@ from gcsplan.mavlink.files.file_items import MissionFileRead
 from gcsplan.mavlink.mission.mission import Home, Mission
 from gcsplan.mission_file import MissionFile
 from gcsplan.mission_file.options_world import WorldOptions
-from gcsplan.notes.note import IN_FILES, Note, Said, Wording, told
+from gcsplan.notes.note import IN_FILES, Note, Wording
 from gcsplan.vehicle import Autopilot
 
 
@@ -44,7 +44,7 @@ class Batch:
     checked: tuple[Checked, ...]
     unreadable: tuple[tuple[str, InputError], ...] = ()
     inputs: Mapping[str, object] = field(default_factory=dict)
-    notes: tuple[Said, ...] = ()
+    notes: tuple[Note, ...] = ()
     typed: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -130,7 +130,7 @@ def finding_lines(c: Checked, *, allow_unjudged: bool = False, wording: Wording 
     """
     lines = [f"{c.file}:{f.seq}: {f.kind}: {f.note.text(wording, placed=False)}" for f in c.verdict.findings]
     if not allow_unjudged:
-        lines += [_not_judged(c, said, wording) for said in c.verdict.not_judged]
+        lines += [_not_judged(c, note, wording) for note in c.verdict.not_judged]
     return lines + home_lines(c, wording)
 
 
@@ -155,11 +155,9 @@ def home_lines(c: Checked, wording: Wording = IN_FILES) -> list[str]:
     return lines + [_not_judged(c, note, wording, "the way home: ") for note in home.not_judged]
 
 
-def _not_judged(c: Checked, said: Said, wording: Wording, of: str = "") -> str:
+def _not_judged(c: Checked, note: Note, wording: Wording, of: str = "") -> str:
     """The line on what was not judged of a file."""
-    if isinstance(said, Note):
-        return f"{c.file}:{said.item or 0}: not_judged: {of}{said.text(wording, placed=False)}"
-    return f"{c.file}:0: not_judged: {of}{told(said, wording)}"
+    return f"{c.file}:{note.item or 0}: not_judged: {of}{note.text(wording, placed=False)}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,7 @@ from gcsplan.mission_file import MissionFile
 from gcsplan.mission_file.load import load_content
 from gcsplan.mission_file.options_world import WorldExtent, WorldOptions
 from gcsplan.mission_file.request import Content
-from gcsplan.notes.note import Said
+from gcsplan.notes.note import Note
 from gcsplan.units import METRIC, Units
 from gcsplan.vehicle import Autopilot
 
@@ -159,7 +159,7 @@ class Archive:
         self.asked = _keep(asked, self.site)
 
     @property
-    def said(self) -> tuple[Mapping[str, object], tuple[Said, ...]]:
+    def said(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:
         """What describes the sources of the world, and notes; of the first file's, if each has a world of its own."""
         site = self.site
         for k in range(len(self.arguments) if isinstance(site, OptionsSite) and not site.said[0] else 0):

@@ -34,7 +34,7 @@ from gcsplan.mavlink.mission.mission import NO_POSITION, Home, Mission, MissionI
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.mission_file.options_world import KEY_OPTIONS, OpenWorld, WorldExtent, WorldOptions
 from gcsplan.mission_file.published.times import Hours
-from gcsplan.notes.note import Note, Said, Wording
+from gcsplan.notes.note import Note, Wording
 from gcsplan.units import Units
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.geodesy.frame import FARTHEST_M
@@ -64,7 +64,7 @@ class Checked:
     request: VehicleRequest
     mission: Mission
     verdict: Verdict
-    notes: tuple[Said, ...]
+    notes: tuple[Note, ...]
     world: World
     fence: tuple[MissionItem, ...] = ()
     rally: tuple[MissionItem, ...] = ()
@@ -102,6 +102,9 @@ class Wanted:
 class Site(Protocol):
     """Where files are checked."""
 
+    typed: Mapping[str, str]
+    """The options that the reader types, by their keys in a mission file; empty if he has one."""
+
     def read(self, argument: str) -> MissionFileRead:
         """The mission of a FILE or NAME=FILE, as it is flown here. Raises InputError."""
 
@@ -115,12 +118,8 @@ class Site(Protocol):
         """A file that was read, judged. Raises InputError."""
 
     @property
-    def said(self) -> tuple[Mapping[str, object], tuple[Said, ...]]:
+    def said(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:
         """What describes the world's sources, and notes; empty before a world is loaded."""
-
-    @property
-    def typed(self) -> Mapping[str, str]:
-        """The options that the reader types, by their keys in a mission file; empty if he has one."""
 
 
 class MissionSite:
@@ -128,6 +127,7 @@ class MissionSite:
 
     def __init__(self, source: MissionFile) -> None:
         self.source = source
+        self.typed: Mapping[str, str] = {}
         self._world: World | None = None
 
     def read(self, argument: str) -> MissionFileRead:
@@ -152,14 +152,9 @@ class MissionSite:
         return judged(request, file, read, self._world, error_m, wanted, source.hours)
 
     @property
-    def said(self) -> tuple[Mapping[str, object], tuple[Said, ...]]:
+    def said(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:
         """See `Site.said`."""
         return self.source.inputs, self.source.notes
-
-    @property
-    def typed(self) -> Mapping[str, str]:
-        """See `Site.typed`."""
-        return {}
 
 
 class OptionsSite:
@@ -170,11 +165,12 @@ class OptionsSite:
 
     def __init__(self, options: WorldOptions, autopilot: Autopilot | None) -> None:
         self.options, self.autopilot = options, autopilot
+        self.typed: Mapping[str, str] = KEY_OPTIONS
         self.opened = OpenWorld(options)
         self._hint = None if options.home is None else Home.at(*options.home, 0.0)
         self.extent: WorldExtent | None = None
         self._world: World | None = None
-        self._said: tuple[Mapping[str, object], tuple[Said, ...]] = {}, ()
+        self._said: tuple[Mapping[str, object], tuple[Note, ...]] = {}, ()
 
     def read(self, argument: str) -> MissionFileRead:
         """See `Site.read`."""
@@ -215,14 +211,9 @@ class OptionsSite:
         return world
 
     @property
-    def said(self) -> tuple[Mapping[str, object], tuple[Said, ...]]:
+    def said(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:
         """See `Site.said`."""
         return self._said
-
-    @property
-    def typed(self) -> Mapping[str, str]:
-        """See `Site.typed`."""
-        return KEY_OPTIONS
 
 
 def split_name(argument: str) -> tuple[str | None, Path]:
@@ -257,7 +248,7 @@ def at_start(read: MissionFileRead, start: Home, vehicle: Vehicle) -> MissionFil
     )
 
     mission = replace(read.mission, name=vehicle.name, sysid=vehicle.sysid)
-    notes: list[Said] = list(read.notes)
+    notes: list[Note] = list(read.notes)
     home, place = mission.home, (start.lat_e7 / 1e7, start.lon_e7 / 1e7)
     if home.lat_e7 == 0 and home.lon_e7 == 0:
         notes.append(Note("home_row_blank"))
@@ -336,7 +327,7 @@ def judged(
     """
     returns, asks_home = wanted.returns, wanted.returns.judged or wanted.returns.required
     vehicle, mission = request.vehicle, read.mission
-    notes: list[Said] = list(read.notes)
+    notes: list[Note] = list(read.notes)
     if mission.autopilot is not vehicle.autopilot:
         raise InputError(f"is for {mission.autopilot}, and {vehicle.name} is {vehicle.autopilot}", where=str(file))
     ground = world.ground_amsl(mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7)
@@ -351,7 +342,7 @@ def judged(
     more = [said for said in (read.unread_fence, beyond_hours(verdict, hours)) if said]
     verdict = replace(verdict, not_judged=(*verdict.not_judged, *more))
     notes += fence_notes
-    loops = any(isinstance(n, Note) and n.code == "jumps_without_end" for n in verdict.notes)
+    loops = any(note.code == "jumps_without_end" for note in verdict.notes)
     if verdict.legs and verdict.legs[-1].kind == "cruise" and not loops:
         notes.append(Note("ends_in_the_air"))
     home: WayHome | None = None

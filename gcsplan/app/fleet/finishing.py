@@ -11,7 +11,7 @@ from gcsplan.app.plan.flight_hours import within_hours
 from gcsplan.app.plan.left_out import LeavingOut
 from gcsplan.app.plan.model import Brief, Plan, VehiclePlan
 from gcsplan.app.plan.vehicle import over_one_terrain
-from gcsplan.notes.note import Note, Said
+from gcsplan.notes.note import Note
 from gcsplan.planners.problem import Progress
 
 __all__ = ["finished"]
@@ -31,7 +31,7 @@ def finished(
     source = brief.source
     flown, fleet = fleet_of(vehicles, brief, gate, leaving)
     flown = within_hours(source, flown, fleet)
-    notes: list[Said] = list(source.notes)
+    notes: list[Note] = list(source.notes)
     if len(flown) > 1 and source.arrival is None:
         notes.append(Note("no_arrival_asked"))
     notes += fleet.notes

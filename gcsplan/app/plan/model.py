@@ -15,7 +15,7 @@ from gcsplan.fleet.motion.timed_path import TimedPath
 from gcsplan.mavlink.build.order import Order
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest
-from gcsplan.notes.note import Note, Said
+from gcsplan.notes.note import Note
 from gcsplan.planners.problem import Problem, Solution
 from gcsplan.planners.registry import get as get_planner
 from gcsplan.world.world import World
@@ -108,7 +108,7 @@ class VehiclePlan:
         """A `packed` plan over the terrain of ``over``, under which it was made."""
         return replace(self, problem=replace(self.problem, airspace=over.world.airspace), brief=over)
 
-    def all_notes(self, fleet: FleetPlan | None) -> tuple[Said, ...]:
+    def all_notes(self, fleet: FleetPlan | None) -> tuple[Note, ...]:
         """What is said of this vehicle: of its request, its search, its mission, and its part of the time table."""
         slot = () if fleet is None else fleet.slot(self.name).notes
         return tuple(dict.fromkeys((*self.notes, *self.solution.notes, *self.verdict.notes, *slot)))
@@ -158,7 +158,7 @@ class Plan:
     objective: str
     seed: int
     vehicles: tuple[VehiclePlan, ...]
-    notes: tuple[Said, ...] = ()
+    notes: tuple[Note, ...] = ()
     fleet: FleetPlan | None = None
     left_out: tuple[LeftOut, ...] = ()
     leaves_out: bool = False

@@ -133,7 +133,7 @@ def _joined(
             continue
         over = looked_over(brief, solution)
         mission, verdict = built(over, request, solution, order)
-        crowded = [note for note in verdict.not_judged if isinstance(note, Note) and note.code in UNFITTING]
+        crowded = [note for note in verdict.not_judged if note.code in UNFITTING]
         if crowded:
             why = f"{APART}\n  {crowded[0]}"
             continue

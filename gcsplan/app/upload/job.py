@@ -13,7 +13,7 @@ from gcsplan.mavlink.build.fence import Fence
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.protocol.machine import TransferProgress
 from gcsplan.mission_file.published.times import Hours
-from gcsplan.notes.note import Said, in_json
+from gcsplan.notes.note import Note, in_json
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.terrain.grid import GroundHeights
 from gcsplan.world.world import World
@@ -78,7 +78,7 @@ class JobResult:
     retries: int = 0
     simulated: bool = False
     message: str = ""
-    warnings: tuple[Said, ...] = ()
+    warnings: tuple[Note, ...] = ()
     code: int = 0
     reason: str = ""
     details: Mapping[str, Any] | None = None

@@ -218,4 +218,4 @@ def _against_return(job: UploadJob, flies: Vehicle, verdict: Verdict) -> str:
 
 
 def _lines(what: str, found: Sequence[Off]) -> str:
-    return "\n".join([what, *(f"  {o.describe()}" for o in found)])
+    return "\n".join([what, *(f"  {o.note()}" for o in found)])

@@ -36,7 +36,7 @@ from gcsplan.mavlink.link.url import parse_url
 from gcsplan.mavlink.mission.autopilots import autopilot_of
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, Mission
 from gcsplan.mission_file import MissionFile
-from gcsplan.notes.note import Note, Said
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ def _job(c: Checked, url: str) -> UploadJob:
     )  # fmt: skip
 
 
-def unchecked_job(argument: str, url: str, sysid: int) -> tuple[UploadJob, list[Said]]:
+def unchecked_job(argument: str, url: str, sysid: int) -> tuple[UploadJob, list[Note]]:
     """The job of a file for ``--unchecked``, and what of the file is not sent with it or was not read.
 
     The vehicle is asked for its autopilot if the file does not name one.

@@ -14,7 +14,7 @@ from gcsplan.app.upload.ground import MissionGround
 from gcsplan.app.upload.run import LISTEN_S, open_link, targets
 from gcsplan.errors import GcsplanError, UsageError
 from gcsplan.mission_file import MissionFile
-from gcsplan.notes.note import Said, in_json
+from gcsplan.notes.note import Note, in_json
 from gcsplan.world.terrain.grid import PostHeights
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class ServedTo:
     loaded: int
     pending: int
     complete: bool
-    notes: tuple[Said, ...]
+    notes: tuple[Note, ...]
 
     def as_dict(self) -> dict[str, Any]:
         """The values for JSON."""

@@ -307,15 +307,13 @@ def _say_all(batch: Batch, units: Units) -> None:
 
 def _report(batch: Batch, file: Path, units: Units) -> None:
     from gcsplan.export.outdir import write_whole
-    from gcsplan.notes.note import Wording, told
+    from gcsplan.notes.note import Note
     from gcsplan.report.page import render_check
 
     worlds: list[Checked] = list({id(c.world): c for c in batch.checked}.values())
     if len(worlds) != 1:
         raise InputError("a report shows files of one area; none could be judged, or they lie too far apart")
-    wording = Wording(units, batch.typed)
-    notes = [told(note, wording) for note in batch.notes]
-    notes += [f"not read, and not on this page: {error}" for _, error in batch.unreadable]
+    notes = [*batch.notes, *(Note("file_not_read", why=str(error)) for _, error in batch.unreadable)]
     homes = [c.way_home for c in batch.checked]
     page = render_check(
         batch.name, worlds[0].world, batch.checked, inputs=batch.inputs, notes=notes, homes=homes, units=units

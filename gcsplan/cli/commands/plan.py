@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from gcsplan.app.upload.job import JobResult, UploadJob, UploadOptions
     from gcsplan.check.returns.verdict import WayHome
     from gcsplan.mission_file import MissionFile
-    from gcsplan.notes.note import Said
+    from gcsplan.notes.note import Note
     from gcsplan.units import Units
 
 SHOWN = 15
@@ -197,7 +197,7 @@ def plan(
         if upload or fence or fence_infinite:
             where = targets or dict.fromkeys((v.name for v in planned.vehicles), "")
             orders = uploads.jobs_of(planned, where, homes, is_required(source, require_way_home))
-        fence_notes: Sequence[tuple[str, Said]] = ()
+        fence_notes: Sequence[tuple[str, Note]] = ()
         if fence or fence_infinite:  # a fence that the mission would breach is refused before anything is written
             orders, fence_notes = fencing.with_fences(orders, infinite=fence_infinite)
         fences = {job.name: job.fence.items for job in orders if job.fence is not None}
@@ -336,7 +336,7 @@ def _add(directory: Path, files: Mapping[str, Callable[[], str]]) -> None:
         remark(f"note: what became of the upload is not written: {error}")
 
 
-def _say_written(directory: Path, files: list[str], notes: Sequence[tuple[str, Said]], units: Units) -> None:
+def _say_written(directory: Path, files: list[str], notes: Sequence[tuple[str, Note]], units: Units) -> None:
     """Print the notes on the fences, and what was written; a fleet has hundreds of files."""
     from gcsplan.cli.output.console import say, say_notes_of
     from gcsplan.notes.note import Wording

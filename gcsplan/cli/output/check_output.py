@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from gcsplan.app.check.archive_words import Summary, Told
     from gcsplan.app.check.files import Failing
     from gcsplan.app.check.many import Archive
-    from gcsplan.notes.note import Said
+    from gcsplan.notes.note import Note
     from gcsplan.units import Units
 
 LINE_S = 5.0
@@ -23,7 +23,7 @@ LINE_S = 5.0
 MOST_FAILING = 100
 """Files of which the ``error`` of a document says why they do not pass; the verdicts say it of all."""
 
-Header = tuple[str, Mapping[str, object], "tuple[Said, ...]", Mapping[str, str]]
+Header = tuple[str, Mapping[str, object], "tuple[Note, ...]", Mapping[str, str]]
 """The name of the mission, what describes the world's sources, notes, and the options that the reader types."""
 
 

@@ -14,7 +14,7 @@ from rich.table import Table
 from gcsplan.check.returns.words import verdict_words
 from gcsplan.cli.output.screens import RESULTS, aside, console
 from gcsplan.figures import floored, raised, steepened
-from gcsplan.notes.note import IN_FILES, Wording, told
+from gcsplan.notes.note import IN_FILES, Note, Wording
 from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Unit, Units, charge, duration, in_units
 from gcsplan.world.terrain.model_words import heights_line, notes_on, what_is_not_in
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from gcsplan.check.returns.verdict import WayHome
     from gcsplan.mavlink.protocol.machine import TransferProgress as Transfer
     from gcsplan.mission_file import MissionFile
-    from gcsplan.notes.note import Said
+    from gcsplan.notes.note import Note
 
 WIDEST = 100_000
 MOST_WHOLE = 30
@@ -127,7 +127,7 @@ def _brief(units: Units) -> tuple[str, ...]:
 def say_heights(inputs: Mapping[str, object]) -> None:
     """Print how the terrain's heights were read, as one note, in SI."""
     if (line := heights_line(inputs)) is not None:
-        say_notes([line])
+        _say_noted([line])
 
 
 def say_terrain(source: MissionFile) -> None:
@@ -256,21 +256,25 @@ def release_table(plan: Plan, results: Sequence[JobResult], gate: GateTime | Non
         say(f"T+0 is {gate.start:%Y-%m-%d %H:%M:%S} UTC")
 
 
-def say_notes(notes: Iterable[Said], wording: Wording = IN_FILES) -> None:
+def say_notes(notes: Iterable[Note], wording: Wording = IN_FILES) -> None:
     """Print notes, each once, in order."""
-    for note in dict.fromkeys(notes):
-        aside.print(f"note: {told(note, wording)}", style="dim", markup=False)
+    _say_noted([note.text(wording) for note in notes])
 
 
-def say_notes_of(notes: Sequence[tuple[str, Said]], wording: Wording = IN_FILES) -> None:
+def _say_noted(lines: Sequence[str]) -> None:
+    for line in dict.fromkeys(lines):
+        aside.print(f"note: {line}", style="dim", markup=False)
+
+
+def say_notes_of(notes: Sequence[tuple[str, Note]], wording: Wording = IN_FILES) -> None:
     """Print notes on vehicles, (name, note) each; a note on several is printed once with all their names."""
-    names: dict[Said, list[str]] = {}
+    names: dict[Note, list[str]] = {}
     for name, note in dict.fromkeys(notes):
         names.setdefault(note, []).append(name)
-    lines = [f"{names_of(of)}: {told(note, wording)}" for note, of in names.items()]
+    lines = [f"{names_of(of)}: {note.text(wording)}" for note, of in names.items()]
     if len(lines) > MOST_NOTES:
         lines = [*lines[:MOST_NOTES], f"… and {len(lines) - MOST_NOTES} more on vehicles: --json has all"]
-    say_notes(lines)
+    _say_noted(lines)
 
 
 def names_of(names: Sequence[str]) -> str:

@@ -23,7 +23,7 @@ from gcsplan.mavlink.mission.mission import (
     MissionItem,
     float32,
 )
-from gcsplan.notes.note import Note, Said
+from gcsplan.notes.note import Note
 
 MAX_FILE_BYTES = 20_000_000
 """Largest mission file that is read, in bytes."""
@@ -75,7 +75,7 @@ class MissionFileRead:
     """
 
     mission: Mission
-    notes: tuple[Said, ...] = ()
+    notes: tuple[Note, ...] = ()
     fence: tuple[MissionItem, ...] = ()
     rally: tuple[MissionItem, ...] = ()
     unread_fence: Note | None = None

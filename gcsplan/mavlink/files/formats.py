@@ -14,6 +14,7 @@ from gcsplan.mavlink.files.file_items import MAX_FILE_BYTES, MissionFileRead
 from gcsplan.mavlink.files.plan_file import parse_plan, read_plan, write_plan
 from gcsplan.mavlink.files.waypoints_file import parse_waypoints, read_waypoints, write_waypoints
 from gcsplan.mavlink.mission.mission import Home
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 
 __all__ = [
@@ -51,8 +52,7 @@ def read_mission_file(
             raise InputError("a .waypoints file does not name its autopilot; say which it is", where=where)
         read = parse_waypoints(text, autopilot=taken, where=where, home_hint=home_hint)
         if autopilot is None:
-            words = f"a .waypoints file does not name its autopilot: it is taken to be for {taken} (--autopilot)"
-            read = replace(read, notes=(*read.notes, words))
+            read = replace(read, notes=(*read.notes, Note("autopilot_taken", autopilot=taken.value)))
     else:
         raise InputError(
             f"neither a .waypoints file (first line 'QGC WPL 110') nor a .plan file (a JSON object){_instead(file)}",

@@ -108,10 +108,6 @@ class Off:
     amount: float
     raw: float
 
-    def describe(self) -> str:
-        """What it is, what was assumed and why, and what to set, as a sentence."""
-        return str(self.note())
-
     def note(self) -> Note:
         """What it is, what was assumed and why, and what to set."""
         wanted, rule = self.name.value(self.setting.value), self.setting.rule

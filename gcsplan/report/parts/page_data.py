@@ -13,7 +13,7 @@ from gcsplan.fleet.arrival import Slot
 from gcsplan.fleet.motion.timed_path import TimedPath
 from gcsplan.fleet.separation import Separation
 from gcsplan.mavlink.mission.parameter_list import Setting
-from gcsplan.notes.note import Note, Said, Wording
+from gcsplan.notes.note import Note, Wording
 from gcsplan.units import METRIC, Units
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
@@ -46,12 +46,12 @@ class Subject:
     verdict: Verdict
     vehicle: Vehicle
     certificate: Certificate | None = None
-    notes: tuple[Said, ...] = ()
+    notes: tuple[Note, ...] = ()
     motion: TimedPath | None = None
     slot: Slot | None = None
     home: WayHome | None = None
     upload: Mapping[str, object] | None = None
-    warnings: tuple[Said, ...] = ()
+    warnings: tuple[Note, ...] = ()
     flown: TimedPath | None = None
     leaves: bool = False
     settings: tuple[Setting, ...] = ()
@@ -104,8 +104,8 @@ class Rehearsed:
     safe: bool | None
     how: str
     compared: tuple[Compared, ...]
-    violations: tuple[Said, ...] = ()
-    not_flown: tuple[Said, ...] = ()
+    violations: tuple[Note, ...] = ()
+    not_flown: tuple[Note, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +120,7 @@ class Page:
     subjects: tuple[Subject, ...]
     inputs: Mapping[str, object]
     facts: tuple[tuple[str, str], ...] = ()
-    notes: tuple[Said, ...] = ()
+    notes: tuple[Note, ...] = ()
     separation: Separation | None = None
     order: tuple[str, ...] = ()
     units: Units = METRIC
@@ -154,7 +154,7 @@ class CheckedFile(Protocol):
     @property
     def verdict(self) -> Verdict: ...
     @property
-    def notes(self) -> tuple[Said, ...]: ...
+    def notes(self) -> tuple[Note, ...]: ...
     @property
     def typed(self) -> Mapping[str, str]: ...
 
@@ -165,7 +165,7 @@ def page_of_check(
     checked: Sequence[CheckedFile],
     *,
     inputs: Mapping[str, object],
-    notes: Sequence[Said] = (),
+    notes: Sequence[Note] = (),
     homes: Sequence[WayHome | None] = (),
     units: Units = METRIC,
 ) -> Page:

@@ -18,7 +18,7 @@ from gcsplan.check.flight.follow import follow
 from gcsplan.check.motion.stretch import Flight, Stretch
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.notes.note import Note, Said
+from gcsplan.notes.note import Note
 from gcsplan.sim.flight.kinematics import AT_ONCE_M_S2, STANDS_M, Kinematics, rounded
 from gcsplan.sim.flight.scurves import leg_limits, step_legs
 from gcsplan.vehicle import Autopilot, Vehicle
@@ -59,7 +59,7 @@ class CommandedTrack:
     ends_in_air: bool
     slowing_m_s2: float
     airspeed_m_s: Floats
-    not_flown: tuple[Said, ...]
+    not_flown: tuple[Note, ...]
     keeps_airspeed: bool = False
 
     @property

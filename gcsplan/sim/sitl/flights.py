@@ -37,7 +37,7 @@ from gcsplan.mavlink.mission.fences import FENCE_DECIDES
 from gcsplan.mavlink.mission.parameter_list import parameter_list
 from gcsplan.mavlink.mission.parameter_safety import safety_list
 from gcsplan.mavlink.protocol.messages import Address
-from gcsplan.notes.note import Note, Said, of_vehicle
+from gcsplan.notes.note import Note
 from gcsplan.sim.flight.trace import Trace
 from gcsplan.sim.flight.wind import Weather
 from gcsplan.sim.outcome import Rehearsal, Tally, Terms
@@ -182,7 +182,7 @@ def _all(jobs: list[PumpJob[Any]]) -> list[Any]:
 
 def _ready(
     channel: Channel, part: RehearsalPart, report: Callable[[str, str], None], *, i_know: bool
-) -> LinkSteps[tuple[VehicleState, list[Said]]]:
+) -> LinkSteps[tuple[VehicleState, list[Note]]]:
     """Wait until the vehicle has a position and a home, and make sure that it is a simulator and not armed.
 
     Return its state, and which of its parameters are not those that the mission was judged with.
@@ -211,7 +211,7 @@ def _ready(
         )
     if state.armed:
         raise VehicleRefused(f"{name}: it is armed already: let it land, or start it anew", where=channel.link.url)
-    return state, [of_vehicle(name, off) for off in settings_words(settings, values, part.vehicle.autopilot)]
+    return state, [note.of(vehicle=name) for note in settings_words(settings, values, part.vehicle.autopilot)]
 
 
 def _fly(

@@ -23,7 +23,7 @@ from gcsplan.mission_file import load_mission
 from gcsplan.notes.finding import Finding
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
-from tests.support.noted import codes, one
+from tests.support.noted import codes, one, saying
 from tests.support.paths import DATA
 
 CROSSING: dict[str, Any] = yaml.safe_load((DATA / "crossing.yaml").read_text())
@@ -201,7 +201,7 @@ planner: {gap_percent: 5}
 def test_a_verdict_that_is_not_safe_is_not_let_through() -> None:
     done = planned()
     bad = done.vehicles[0].verdict
-    unjudged = type(bad)(bad.mission, bad.legs, (), ("the wind",))
+    unjudged = type(bad)(bad.mission, bad.legs, (), (saying("the wind"),))
     require_passing({"uav1": bad})
     with pytest.raises(CheckFailed, match="the wind"):
         require_passing({"uav1": unjudged})

@@ -8,14 +8,14 @@ from gcsplan.check.judge import judge
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
-from gcsplan.notes.note import Said
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.geometry.limits import Limits
 from tests.support.noted import coded, codes
 from tests.support.worlds import world
 
 
-def notes(slope: float, error_m: float = 8.0) -> list[Said]:
+def notes(slope: float, error_m: float = 8.0) -> list[Note]:
     """Of a landing towards the north on a place 2 km north of home; the ground there falls by ``slope`` northwards."""
     where = world(lambda east, north: 300.0 - slope * (north - 2000.0))
 

@@ -126,7 +126,7 @@ def test_a_fence_counts_only_where_it_is_in_force() -> None:
     assert [o.name.name for o in off(settings, {**low, "FENCE_ENABLE": 1.0}, COPTER)] == ["FENCE_ALT_MAX"]
     assert off(settings, {**low, "FENCE_ENABLE": 0.0}, COPTER) == []
     assert off(settings, {**low, "FENCE_ENABLE": 1.0, "FENCE_ACTION": 0.0}, COPTER) == []
-    words = off(settings, {**low, "FENCE_ENABLE": 1.0}, COPTER)[0].describe()
+    words = str(off(settings, {**low, "FENCE_ENABLE": 1.0}, COPTER)[0].note())
     assert words.startswith("FENCE_ALT_MAX is 50 on board, and at least 80 is assumed")
     assert words.endswith("set FENCE_ALT_MAX 80")
 
