@@ -19,7 +19,7 @@ MOST_MISTAKES = 1000
 
 
 def read_geojson(path: Path, whole: Any) -> ZoneFile:
-    """The zones of GeoJSON, as `zone_json.load_json` returns it. Raises InputError if it is not GeoJSON."""
+    """The zones of GeoJSON, as `load_json` returns it. Raises InputError if it is not GeoJSON."""
     found = ZoneFile(path)
     if not isinstance(whole, dict):
         raise InputError("a GeoJSON file holds one object, for example a FeatureCollection", where=str(path))
