@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fnmatch
 import importlib.util
 import re
 import subprocess
@@ -172,6 +173,42 @@ def test_links_between_documents_lead_somewhere(page: Path) -> None:
         if not target.startswith(("http:", "https:", "mailto:")):
             picture = TOP / "missions" / Path(target).name if "pictures/" in target else page.parent / target
             assert picture.exists(), f"{page.name}: {target}"
+
+
+ROOMS = ("gcsplan", "tests", "sitl_tests", "missions", "docs")
+
+
+@pytest.fixture(scope="module")
+def paths() -> list[str]:
+    """Every file and folder that a page may name, from the top."""
+    return [f"/{path.relative_to(TOP).as_posix()}" for room in ROOMS for path in (TOP / room).rglob("*")]
+
+
+def named_in(page: Path) -> set[str]:
+    """What a page writes as code within a line."""
+    text = re.sub(r"^ *```.*?^ *```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+    return set(re.findall(r"`([^`\n]+)`", text))
+
+
+def lacking(named: set[str], paths: list[str]) -> list[str]:
+    """The names that no path ends with; they may have stars."""
+    return sorted(one for one in named if not fnmatch.filter(paths, f"*/{one.rstrip('/')}"))
+
+
+@pytest.mark.parametrize("page", [TOP / "README.md", TOP / "CONTRIBUTING.md", *PAGES], ids=lambda p: p.name)
+def test_modules_and_folders_that_a_page_names_are_there(page: Path, paths: list[str]) -> None:
+    path = re.compile(rf"(?:{'|'.join(ROOMS)})/[\w/.*-]+|[\w*-]+/[\w/*-]+\.py")
+    assert lacking({one for one in named_in(page) if path.fullmatch(one)}, paths) == []
+
+
+@pytest.mark.parametrize("name", ["architecture.md", "extending.md"])
+def test_names_that_developers_are_sent_to_are_there(name: str, paths: list[str]) -> None:
+    named = named_in(DOCS / name)
+    assert lacking({one for one in named if re.fullmatch(r"[\w*-]+\.py", one)}, paths) == []
+    sources = [TOP / path[1:] for path in paths if path.endswith(".py")]
+    words = {word for source in sources for word in re.findall(r"\w+", source.read_text(encoding="utf-8"))}
+    names = {match[1] for one in named if (match := re.fullmatch(r"(?:\w+\.)*?(\w+)(?:\.py|\.md|\(.*\))?", one))}
+    assert sorted(names - words - {Path(path).stem for path in paths}) == []
 
 
 def test_the_tutorial_s_mission_is_one(tmp_path: Path) -> None:
