@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,13 +15,7 @@ from sitl_tests.missions import a_mission
 pytestmark = pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
 
 
-@pytest.fixture(autouse=True)
-def closed_files() -> Iterator[None]:
-    """Close the files that mavwp leaves open, so that their warnings do not fail another test."""
-    yield
-    gc.collect()
-
-
+@pytest.mark.first_quick
 @pytest.mark.parametrize("autopilot", list(Autopilot))
 def test_mavwp_reads_our_waypoints(autopilot: Autopilot, tmp_path: Path) -> None:
     mission = a_mission(autopilot, 60)

@@ -337,6 +337,7 @@ class TwoAtOnce(Inline):
             yield number, pickle.loads(pickle.dumps(sent[0](*sent[1:])))
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("runs", [2, 7])
 def test_whoever_flies_the_runs_the_result_is_the_same(planned: Plan, monkeypatch: Any, runs: int) -> None:
     """Strong noise, so that limits are broken in some runs and the order is lost in some."""

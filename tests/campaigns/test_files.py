@@ -46,6 +46,7 @@ def test_what_a_run_owes() -> None:
         assert files.civil(code, out, err), (code, out, err)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="needs signals")
 def test_an_input_that_ends_the_process_is_told_by_its_seed(tmp_path: Path) -> None:
     with files.Worker(tmp_path, 1) as worker:

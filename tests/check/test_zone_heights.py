@@ -46,6 +46,7 @@ def brute(done: Any) -> tuple[float, list[tuple[float, float]]]:
     return most, places
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("zone", "side"),
     [

@@ -257,6 +257,7 @@ def test_the_package_runs_as_a_module() -> None:
     assert (ran.returncode, ran.stdout.strip(), ran.stderr) == (0, gcsplan.__version__, "")
 
 
+@pytest.mark.slow
 def test_results_go_to_standard_output_and_all_else_to_standard_error(run: Any, tmp_path: Path) -> None:
     asides = ("note: ", "planning ", "compiling ")
     with SimServer([vehicle()], "udpin:127.0.0.1:0", speedup=10.0) as server:
@@ -283,6 +284,7 @@ def test_results_go_to_standard_output_and_all_else_to_standard_error(run: Any, 
             assert all(line.startswith(asides) for line in err.splitlines()), (arguments, err)
 
 
+@pytest.mark.slow
 def test_what_is_piped_is_the_table_and_a_reader_that_goes_away_is_no_bug(run: Any, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "gcsplan", "plan", str(CROSSING), "-o", str(tmp_path / "out")]
     log = tmp_path / "log.txt"
@@ -302,6 +304,7 @@ def test_what_is_piped_is_the_table_and_a_reader_that_goes_away_is_no_bug(run: A
     assert {p.name: p.read_bytes() for p in (tmp_path / "out").iterdir()} == whole
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("arguments", "code"), [("--help", 0), ("planners", 0), ("plan sample:nope", 2), ("plan sample:nope --json", 2)]
 )

@@ -77,6 +77,7 @@ def test_what_a_large_fleet_leaves_out_is_said_and_the_first_to_arrive_are_shown
     assert [i for i in range(9) if f"uav{i}" in columns] == [0, 1, 2, 3]
 
 
+@pytest.mark.slow
 def test_what_is_broken_or_not_judged_is_on_the_page_that_is_signed() -> None:
     page = small_page(low_m=350.0)
     text = briefing(page)

@@ -568,6 +568,7 @@ def many_page(count: int) -> Page:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_of_a_large_fleet_all_are_on_the_map_and_some_have_profiles() -> None:
     page = many_page(130)
     text = render_page(page)
@@ -674,6 +675,7 @@ def test_no_label_of_the_map_lies_on_another() -> None:
         assert not a.padded(-1.0).overlaps(b.padded(-1.0)), (one, other)
 
 
+@pytest.mark.slow
 def test_the_map_has_the_reports_colours_low_ground_is_no_lake() -> None:
     drawn = figures(page_of_plan(planned()))["report-map.png"]
     pixels = np.asarray(Image.open(io.BytesIO(drawn)).convert("RGB"), np.int16)

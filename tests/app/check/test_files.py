@@ -367,6 +367,7 @@ vehicles:
     assert "min_agl" in out
 
 
+@pytest.mark.slow
 def test_the_way_home_is_judged_where_that_is_asked_for(run: Any, folder: Path, world: list[str]) -> None:
     file = file_of(folder, "round")  # from the east the hill stands in the way home
     assert run(file, *world, "--rtl-altitude", "120", "-q")[0] == 0
@@ -404,6 +405,7 @@ def said_and_data(value: Any) -> Iterator[tuple[str, dict[str, Any]]]:
             yield from said_and_data(each)
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("form", ["--json", "--json-lines"])
 def test_each_sentence_of_json_has_its_code_and_data(run: Any, folder: Path, world: list[str], form: str) -> None:
     files = [file_of(folder, name) for name in ("round", "jump_for_ever", "low_take_off")]

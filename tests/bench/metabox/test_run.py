@@ -29,6 +29,7 @@ def test_every_run_has_its_record_and_nobody_more_than_the_budget(result: dict[s
     assert result["versions"]["metaevobox"] == "9"
 
 
+@pytest.mark.slow
 def test_a_run_is_the_same_again_and_in_two_processes(result: dict[str, Any], python: Path, tmp_path: Path) -> None:
     again = metabox.run(tmp_path, python, jobs=2, **FEW)  # type: ignore[arg-type]
     assert again == result

@@ -8,6 +8,8 @@ import re
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from gcsplan.bench.papers.report import IMPOSSIBLE_MARK as MARK
 from gcsplan.bench.papers.report import report, scenario_table, write
 from gcsplan.bench.papers.run import PAPER_RUNS_FILE, plain, run
@@ -31,6 +33,7 @@ def test_the_report_has_ours_beside_the_printed_and_marks_the_impossible(
     assert "Rankings are judged from 30 runs on" in text
 
 
+@pytest.mark.slow
 def test_the_files_hold_the_numbers_and_the_page_needs_no_other_file(finished: tuple[dict[str, Any], Path]) -> None:
     result, out = finished
     files = {path.name: path for path in write(result, out)}

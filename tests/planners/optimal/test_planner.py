@@ -152,6 +152,7 @@ def test_ridge_under_a_ceiling_is_passed_where_it_is_low_enough() -> None:
     assert crossing == pytest.approx(1500.0, abs=30.0)
 
 
+@pytest.mark.slow
 def test_band_over_the_ground_is_followed_up_and_down_a_hill() -> None:
     def hill(east: Floats, north: Floats) -> Floats:
         return 150.0 * np.exp(-(((east - 1000.0) / 300.0) ** 2 + ((north - 1000.0) / 300.0) ** 2))
@@ -235,6 +236,7 @@ def test_energy_pays_the_detour_that_climbs_less_and_no_more() -> None:
     assert best.min() - 1.0 <= p.cost(solve(p).path) <= best.min() * 1.001
 
 
+@pytest.mark.slow
 def test_climb_limit_is_kept_by_climbing_early_and_by_a_longer_way() -> None:
     def step(east: Floats, north: Floats) -> Floats:
         return np.where(east > 1000.0, 150.0, 0.0)

@@ -82,6 +82,7 @@ def test_a_way_that_leaves_the_first_window_is_found_and_judged_where_it_leads()
     assert done.source.level > 0
 
 
+@pytest.mark.slow
 def test_a_ceiling_that_shuts_the_whole_model_is_still_proved_to() -> None:
     with pytest.raises(NoMission) as caught:
         plan(source_of(ROW_4, max_amsl_m=600.5))

@@ -39,7 +39,7 @@ def ends(track: Floats) -> Floats:
     return np.isin(np.arange(len(track)), [0, len(track) - 1])
 
 
-@pytest.mark.first_quick
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["disc", "polygon"])
 @pytest.mark.parametrize("seed", range(4))
 def test_ground_under_a_zone_is_that_of_dense_samples(shape: str, seed: int) -> None:

@@ -264,6 +264,7 @@ def test_the_scene_of_a_mission_over_unknown_ground_is_made() -> None:
     assert violations(problem, get("krill").plan(problem).path.points) == ()
 
 
+@pytest.mark.slow
 def test_a_refusal_has_a_place_on_real_ground() -> None:
     problem = random_mission(3, replace(FIELD, max_amsl_m=560.0))
     assert problem.airspace.surface is jacksboro()

@@ -1086,6 +1086,7 @@ def tile_of(folder: Path, col: int, row: int, *, written: bool) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_many_tiles_are_read_by_windows(tmp_path: Path) -> None:
     """36 tiles, 1.9 GB if they were read: the memory is that of the window, and the hash that of what was read."""
     for col in range(6):

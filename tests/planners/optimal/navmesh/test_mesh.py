@@ -398,6 +398,7 @@ def test_nodes_that_are_looked_at_lie_around_the_cells_that_are_wanted(rows: int
                 assert found[j, 0] >= found[j, 1]
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("goes_on", "shear"),
     [((False,) * 4, 0.0), ((True, False, True, False), 0.4), ((True,) * 4, 0.0),
