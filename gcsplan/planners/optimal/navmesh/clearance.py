@@ -13,14 +13,13 @@ from itertools import combinations, product
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices, Int8s, Int32s, Int64s
-from gcsplan.planners.optimal.navmesh.buffers import Scratch
 from gcsplan.planners.optimal.navmesh.clearance_kernels import fill
 from gcsplan.planners.optimal.navmesh.climb_cones import hold_down, lift_lids, look_around, walk_around
-from gcsplan.planners.optimal.navmesh.grid import Plane, box_of
+from gcsplan.planners.optimal.navmesh.grid import Plane, Scratch, box_of
+from gcsplan.planners.optimal.navmesh.interval_kernels import stamp_beside
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.mesh_kernels import NEXT, WALL, make_pieces, make_portals, sort_portals
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
-from gcsplan.planners.optimal.navmesh.shut_kernels import stamp_beside
 from gcsplan.planners.optimal.navmesh.zone_kernels import LOOKS, PAIR, PLACES, stamp_zones
 from gcsplan.planners.profile.track import divided
 
@@ -331,7 +330,7 @@ class ClearanceGrid:
         self._laid = True
 
     def _no_own_ground(self) -> tuple[Int32s, Int64s, Int64s]:
-        """Where `stamp_beside` keeps the zones' own ground, all of it unknown yet: see `shut_kernels._own_ground`."""
+        """Where `stamp_beside` keeps the zones' own ground, all unknown yet: see `interval_kernels._own_ground`."""
         looks = (self._zones[:, LOOKS] > 0.0) & (self._zones[:, PAIR] == 0.0)
         wide, high = ((self._boxes[:, k + 1] - self._boxes[:, k] + 1).clip(0).astype(np.int64) for k in (0, 2))
         end = np.cumsum(np.where(looks, wide * high, 0))

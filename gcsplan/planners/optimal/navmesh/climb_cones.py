@@ -15,7 +15,7 @@ from gcsplan.arrays import Floats, Int8s, Int32s
 from gcsplan.planners.compiled import device, kernel
 from gcsplan.planners.optimal.navmesh.clearance_kernels import blank
 from gcsplan.planners.optimal.navmesh.mesh_kernels import stands
-from gcsplan.planners.optimal.navmesh.polyanya_nodes import pop, push
+from gcsplan.planners.optimal.navmesh.polyanya import pop, push
 from gcsplan.planners.optimal.navmesh.zone_kernels import BOTTOM, PAIR, THIN, TOP, UNDER, depth, level
 
 BESIDE = 5

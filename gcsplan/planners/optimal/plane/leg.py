@@ -15,13 +15,20 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid, Cone, mesh_of
-from gcsplan.planners.optimal.navmesh.free_altitudes import MOST, intervals, ranges
 from gcsplan.planners.optimal.navmesh.grid import Box, Plane, box_of, finer_plane, make_plane, on_finer
 from gcsplan.planners.optimal.navmesh.mesh import Guide, Mesh
 from gcsplan.planners.optimal.navmesh.necks import LegNecks
 from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundTrack, Place
 from gcsplan.planners.optimal.navmesh.zone_shapes import CLOSE, LOOSE
-from gcsplan.planners.optimal.plane.altitude_intervals import SPARE_M, AltitudeIntervals, Reached, Terminal
+from gcsplan.planners.optimal.plane.altitude_intervals import (
+    MOST,
+    SPARE_M,
+    AltitudeIntervals,
+    Reached,
+    Terminal,
+    intervals,
+    ranges,
+)
 from gcsplan.planners.optimal.plane.cells import box_around, choose, fits_memory, most_parts, needs_most
 from gcsplan.planners.optimal.plane.corridor import Corridor, End, Narrow, Nearby, Spare
 from gcsplan.planners.problem import Problem

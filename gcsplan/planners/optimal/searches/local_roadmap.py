@@ -13,8 +13,7 @@ import math
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.planners.optimal.navmesh.grid import extent
-from gcsplan.planners.optimal.navmesh.terrain_nodes import Extent
+from gcsplan.planners.optimal.navmesh.grid import Extent, extent
 from gcsplan.planners.optimal.searches.roadmap import Roadmap, path_over, terminals_by_leg
 from gcsplan.planners.optimal.searches.section_dp import cost_of
 from gcsplan.planners.problem import Problem, terminals_of

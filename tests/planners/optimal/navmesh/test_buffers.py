@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gcsplan.planners.optimal.navmesh.buffers import LARGE, Scratch
+from gcsplan.planners.optimal.navmesh.grid import LARGE, Scratch
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.int32, np.bool_])

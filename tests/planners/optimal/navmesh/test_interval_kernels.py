@@ -11,9 +11,9 @@ import pytest
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.navmesh.clearance import mesh_of
-from gcsplan.planners.optimal.navmesh.free_altitudes import MOST, intervals, ranges
 from gcsplan.planners.optimal.navmesh.grid import make_plane
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
+from gcsplan.planners.optimal.plane.altitude_intervals import MOST, intervals, ranges
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.limits import Limits
