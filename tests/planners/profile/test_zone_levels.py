@@ -12,13 +12,12 @@ from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
 from gcsplan.planners.profile.taut_string import Profile
 from gcsplan.planners.profile.track import Flown, fly, make_track
-from gcsplan.planners.profile.zone_levels import ZoneLevels, widest_free
+from gcsplan.planners.profile.zone_levels import ZoneLevels, own_ground, widest_free
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.path import Path
 from gcsplan.world.geometry.surface import GridMap, Surface
 from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
-from gcsplan.world.own_ground import own_ground
 from tests.support.planner_worlds import faults
 
 STEP_M, SIZE_M, SLOPE = 30.0, 1200.0, 0.3

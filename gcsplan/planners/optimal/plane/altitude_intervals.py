@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Int32s, Int64s
-from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.interval_kernels import cut_intervals, spread
+from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.world.geometry.limits import Limits
 
 MOST = 4
