@@ -15,9 +15,8 @@ from numpy.typing import ArrayLike
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.dem.cache import Cache, TileRecord
-from gcsplan.dem.cells import cells_in, names_of
 from gcsplan.dem.dat_terrain import DatTerrain, dat_files
-from gcsplan.dem.sources import SOURCES, DemSource
+from gcsplan.dem.sources import SOURCES, DemSource, cells_in, names_of
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.datum import VerticalDatum, take_apart
