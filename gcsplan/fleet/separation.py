@@ -16,8 +16,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.errors import InputError
-from gcsplan.fleet._nearest import below, nearest
-from gcsplan.fleet._sweep import Fleet, Least
+from gcsplan.fleet._sweep import Fleet, Least, below, nearest
 from gcsplan.fleet.motion.timed_path import TimedPath
 from gcsplan.notes.note import Note
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from gcsplan.fleet.motion.ardupilot import Curved
-from gcsplan.fleet.motion.legs import legs
 from gcsplan.fleet.motion.px4 import Smoothed
 from gcsplan.fleet.motion.speeds import Stretch
+from gcsplan.fleet.motion.timing import legs
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.geometry.limits import Limits
 
