@@ -30,9 +30,10 @@ from gcsplan.dem.sources import cells_in
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.datum import VerticalDatum
-from gcsplan.world.geodesy.frame import Box, Frame
+from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geodesy.height_unit import BY_FORMAT, HeightUnit
 from gcsplan.world.geometry.surface import GridMap
+from gcsplan.world.geometry.zones import Box
 from gcsplan.world.terrain.cell import Cell
 from gcsplan.world.terrain.grid import DEGREE_E7, METRES_OF_E7, STRIDE, TerrainGrid, cell_at, longitude_scale
 from gcsplan.world.terrain.input_files import sha256_of, tell_folder

@@ -17,7 +17,8 @@ from typing import Literal
 import numpy as np
 
 from gcsplan.errors import InputError
-from gcsplan.world.geodesy.frame import Box, Frame
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.zones import Box
 from gcsplan.world.terrain.cell import Cell
 from gcsplan.world.terrain.input_files import tell_file
 from gcsplan.world.terrain.terrain import RASTER_SPARE_M

@@ -57,7 +57,7 @@ class WayPoint:
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class FlownTrack:
     """The line that one vehicle flies: (N,) degrees and AMSL metres, N >= 2, straight between neighbours.
 
     ``waypoints`` (N,) has the figures of the points that an item ends at, None for the others. ``reached_s``,

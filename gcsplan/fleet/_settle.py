@@ -42,7 +42,7 @@ HORIZONS_S = (40.0, 160.0, 640.0, math.inf)
 """Ranges in which the least change of departure is searched, one after the other, s."""
 
 
-Replan = Callable[[str, Sequence[Conflict], int], Route | None]
+Reroute = Callable[[str, Sequence[Conflict], int], Route | None]
 """``replan(name, avoid, attempt)``: another route for a vehicle that keeps away from the places of ``avoid`` (or flies
 higher). ``attempt`` counts from 1. None: no more ideas."""
 
@@ -326,7 +326,7 @@ class Ask:
     priority: Sequence[str] | None
     hold: Hold
     later_s: float
-    replan: Replan | None = None
+    replan: Reroute | None = None
     attempts: int = 0
     leave_out: bool = False
 
@@ -363,7 +363,7 @@ def _late(slot: Slot, by_s: float) -> Slot:
     return replace(slot, depart_s=slot.depart_s + by_s, arrive_s=slot.arrive_s + by_s)
 
 
-Settled = dict[str, Choice]
+ChoicesByName = dict[str, Choice]
 """Choices by name, in the order in which they were fixed."""
 
 
@@ -371,7 +371,7 @@ Settled = dict[str, Choice]
 class Settlement:
     """The choices of all vehicles but those that are ``stuck``: at most one, unless vehicles may be left out."""
 
-    done: Settled
+    done: ChoicesByName
     stuck: tuple[Stuck, ...] = ()
 
 
@@ -386,13 +386,13 @@ def settle(plan: Schedule, ask: Ask) -> Settlement:
     return _settle(plan, ask, before)[0] if found.stuck else found
 
 
-def moved(settled: Settled) -> tuple[Settled, float]:
+def moved(settled: ChoicesByName) -> tuple[ChoicesByName, float]:
     """Delay all equally, so that no vehicle leaves before 0 s; returns the choices and the delay, s."""
     later = max(0.0, -min((choice.option.slot.depart_s for choice in settled.values()), default=0.0))
     return (settled if later <= 0.0 else {name: choice.later(later) for name, choice in settled.items()}), later
 
 
-def _settle(plan: Schedule, ask: Ask, done: Settled) -> tuple[Settlement, Settled]:
+def _settle(plan: Schedule, ask: Ask, done: ChoicesByName) -> tuple[Settlement, ChoicesByName]:
     """Fix all in order; those in ``done``, the first of them, stay as they are. Also returns those before any trouble.
 
     A vehicle that is stuck is moved before those in its way, if no priority is set and not too many are fixed again;
@@ -403,7 +403,7 @@ def _settle(plan: Schedule, ask: Ask, done: Settled) -> tuple[Settlement, Settle
     freedom = Freedom(plan.mode, ask.hold, ask.later_s)
     promoted: set[str] = set()
     left: list[Stuck] = []
-    before: Settled | None = None
+    before: ChoicesByName | None = None
     taken, turn = _taken(ask.rules, done), len(done)
     while turn < len(order):
         name = order[turn]
@@ -430,7 +430,7 @@ def _settle(plan: Schedule, ask: Ask, done: Settled) -> tuple[Settlement, Settle
     return Settlement(done, tuple(left)), done if before is None else before
 
 
-def _taken(rules: Rules, done: Settled) -> Taken:
+def _taken(rules: Rules, done: ChoicesByName) -> Taken:
     taken = Taken(rules)
     for choice in done.values():
         taken.add(choice.option.path)
@@ -457,7 +457,7 @@ def _choice(chooser: Chooser, plan: Schedule, ask: Ask) -> Choice | Stuck:
     return Choice(best, replace(change, slot=best.slot))
 
 
-def _other_path(name: str, chooser: Chooser, met: Sequence[Conflict], replan: Replan, attempts: int) -> Option | None:
+def _other_path(name: str, chooser: Chooser, met: Sequence[Conflict], replan: Reroute, attempts: int) -> Option | None:
     """The first route of ``replan`` on which some option keeps clear; None if there is none."""
     avoid = list(met)
     for attempt in range(1, attempts + 1):

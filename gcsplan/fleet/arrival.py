@@ -33,7 +33,7 @@ from gcsplan.vehicle import DEFAULT_LEAN_DEG, LARGEST_LEAN_DEG, Autopilot, Vehic
 __all__ = ["WITHIN_S", "Clock", "Craft", "Crew", "Hold", "Longer", "Mode", "NoSchedule", "Schedule", "Slot", "schedule"]
 
 Clock = Literal["first", "fleet"]
-Cost = Callable[[Floats], Floats]
+OrderCost = Callable[[Floats], Floats]
 
 WITHIN_S = 1e-6
 """Times that differ by less than this, s, count as equal."""
@@ -89,7 +89,12 @@ def earliest_first(fast_s: Floats, latest_s: Floats, interval_s: float) -> float
 
 
 def best_order(
-    fast_s: Floats, latest_s: Floats, interval_s: float, clock: Clock, first_s: float | None, cost: Cost | None = None
+    fast_s: Floats,
+    latest_s: Floats,
+    interval_s: float,
+    clock: Clock,
+    first_s: float | None,
+    cost: OrderCost | None = None,
 ) -> Indices | None:
     """The order that finishes earliest, and among those with the same starting time the cheapest; None if none works.
 
@@ -124,11 +129,13 @@ def best_order(
     return None
 
 
-def _rows(cost: Cost, rows: Indices) -> Cost:
+def _rows(cost: OrderCost, rows: Indices) -> OrderCost:
     return lambda times: cost(times)[rows]
 
 
-def _assigned(fast_s: Floats, latest_s: Floats, times: Floats, cost: Cost | None, by_speed: Indices) -> Indices | None:
+def _assigned(
+    fast_s: Floats, latest_s: Floats, times: Floats, cost: OrderCost | None, by_speed: Indices
+) -> Indices | None:
     """The vehicle for each of the ``times``, at the least cost; None if the times cannot all be kept."""
     n = len(times)
     if n == 0:

@@ -27,7 +27,7 @@ from gcsplan.fleet._settle import (
     Again,
     Ask,
     Change,
-    Replan,
+    Reroute,
     Settlement,
     Stuck,
     maker,
@@ -40,9 +40,9 @@ from gcsplan.fleet._taken import Taken
 from gcsplan.fleet.arrival import EXPLAINED, Crew, Hold, Schedule
 from gcsplan.fleet.motion.timed_path import TimedPath
 from gcsplan.fleet.motion.timing import Route, flown_corners
-from gcsplan.fleet.separation import TOLERANCE_M, Conflict, Place, Rules, Separation, Where, in_metres, separation
+from gcsplan.fleet.separation import TOLERANCE_M, AirPlace, Conflict, Rules, Separation, Where, in_metres, separation
 
-__all__ = ["Again", "Change", "NotSeparated", "Replan", "Resolved", "resolve"]
+__all__ = ["Again", "Change", "NotSeparated", "Reroute", "Resolved", "resolve"]
 
 
 CUT_M = 60.0
@@ -106,7 +106,7 @@ class NotSeparated(NoMission):
         return self.conflict.worst.vehicles
 
     @property
-    def place(self) -> Place:
+    def place(self) -> AirPlace:
         """The middle between the two: east_m, north_m, amsl_m."""
         return self.conflict.worst.middle
 
@@ -123,7 +123,7 @@ def resolve(
     *,
     priority: Sequence[str] | None = None,
     hold: Hold = "ground",
-    replan: Replan | None = None,
+    replan: Reroute | None = None,
     attempts: int = ATTEMPTS,
     later_s: float = LATER_S,
     again: Again | None = None,

@@ -22,7 +22,7 @@ Value = float | int | bool | str | None
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class OptimiserEntry:
     """One optimiser.
 
     ``update`` is "module:function" of its update rule (a module of this package unless dotted, imported only on the
@@ -92,7 +92,7 @@ _ABO = "Li et al., Adaptive Budgerigar Optimization-based Obstacle Avoidance Pat
 _IB_ABC = "Tan et al. 2023, Robotica 41, 1244-1257"
 
 _ENTRIES = (
-    Entry(
+    OptimiserEntry(
         name="krill",
         summary="foraging, enemy avoidance and cruising of krill",
         update="krill:krill",
@@ -103,7 +103,7 @@ _ENTRIES = (
         evaluations_per_iteration="2P to 23P, about 20P",
         defaults=_set(sight=0.3, step=0.1, crowding=0.618, attempts=10, moves="together", crowd="ranks"),
     ),
-    Entry(
+    OptimiserEntry(
         name="abc",
         summary="artificial bee colony",
         update="bees:abc",
@@ -115,7 +115,7 @@ _ENTRIES = (
         defaults=_set(limit=20, group=1, bees="one"),
         least_population=2,
     ),
-    Entry(
+    OptimiserEntry(
         name="b-abc",
         summary="balanced bee colony: IB-ABC without its feedback (our reading)",
         update="bees:ib_abc",
@@ -127,7 +127,7 @@ _ENTRIES = (
         defaults=_set(feedback=False, scale=1.0, spent_share=0.5, group=1, counts_from="one"),
         least_population=3,
     ),
-    Entry(
+    OptimiserEntry(
         name="ib-abc",
         summary="balanced bee colony with feedback from failed searches",
         update="bees:ib_abc",
@@ -139,7 +139,7 @@ _ENTRIES = (
         defaults=_set(feedback=True, scale=1.0, spent_share=0.5, group=1, counts_from="one"),
         least_population=3,
     ),
-    Entry(
+    OptimiserEntry(
         name="gwo",
         summary="grey wolf optimizer",
         update="wolves:gwo",
@@ -150,7 +150,7 @@ _ENTRIES = (
         defaults=_set(origin=0.0),
         least_population=3,
     ),
-    Entry(
+    OptimiserEntry(
         name="mgwo",
         summary="grey wolves with weights and greedy moves (our reading)",
         update="wolves:mgwo",
@@ -161,7 +161,7 @@ _ENTRIES = (
         defaults=_set(origin=0.0),
         least_population=3,
     ),
-    Entry(
+    OptimiserEntry(
         name="igwo",
         summary="grey wolves that learn from neighbours",
         update="wolves:igwo",
@@ -173,7 +173,7 @@ _ENTRIES = (
         defaults=_set(origin=0.0),
         least_population=3,
     ),
-    Entry(
+    OptimiserEntry(
         name="sogwo",
         summary="grey wolves with selective opposition",
         update="wolves:sogwo",
@@ -184,7 +184,7 @@ _ENTRIES = (
         defaults=_set(origin=0.0, alike="ranks", span=1.0),
         least_population=3,
     ),
-    Entry(
+    OptimiserEntry(
         name="ssgwo",
         summary="grey wolves with relative distances and simulated annealing",
         update="wolves:ssgwo",
@@ -195,7 +195,7 @@ _ENTRIES = (
         defaults=_set(origin=0.0, factor="cosine", leaders="all", trial="every"),
         least_population=5,
     ),
-    Entry(
+    OptimiserEntry(
         name="ssgwo-printed",
         summary="SSGWO as its equations 13 and 17-23 are printed, for all wolves",
         update="wolves:ssgwo",
@@ -206,7 +206,7 @@ _ENTRIES = (
         defaults=_set(origin=0.0, factor="printed", leaders="printed", trial="every"),
         least_population=5,
     ),
-    Entry(
+    OptimiserEntry(
         name="foa",
         summary="fruit fly optimization, one swarm",
         update="fruit_flies:foa",
@@ -216,7 +216,7 @@ _ENTRIES = (
         iterations=200,
         defaults=_set(step=0.3),
     ),
-    Entry(
+    OptimiserEntry(
         name="mfoa",
         summary="fruit flies in several swarms of a shrinking radius",
         update="fruit_flies:mfoa",
@@ -227,7 +227,7 @@ _ENTRIES = (
         evaluations_per_iteration="P + 1",
         defaults=_set(swarms=5, power=6.0, radius=0.5),
     ),
-    Entry(
+    OptimiserEntry(
         name="iffo",
         summary="fruit flies that change one dimension at a time",
         update="fruit_flies:iffo",
@@ -237,7 +237,7 @@ _ENTRIES = (
         iterations=200,
         defaults=_set(radius_most=0.5, radius_least=0.01),
     ),
-    Entry(
+    OptimiserEntry(
         name="msfoa",
         summary="fruit flies in several swarms, global and local search, competing offspring",
         update="fruit_flies:msfoa",
@@ -250,7 +250,7 @@ _ENTRIES = (
             swarms=5, own_share=0.2, global_step=0.3, local_step=0.05, threshold=None, beyond="clipped", origin=0.0
         ),
     ),
-    Entry(
+    OptimiserEntry(
         name="pso",
         summary="particle swarm, inertia falling, synchronous",
         update="classics:pso",
@@ -260,7 +260,7 @@ _ENTRIES = (
         iterations=200,
         defaults=_set(inertia_first=0.9, inertia_last=0.4, own_pull=2.0, swarm_pull=2.0, top_speed=0.2),
     ),
-    Entry(
+    OptimiserEntry(
         name="de",
         summary="differential evolution rand/1/bin, a scale factor for each individual",
         update="classics:de",
@@ -271,7 +271,7 @@ _ENTRIES = (
         defaults=_set(scale_least=0.2, scale_most=0.9, crossover=0.9),
         least_population=4,
     ),
-    Entry(
+    OptimiserEntry(
         name="lshade",
         summary="differential evolution with learnt settings and a shrinking population",
         update="lshade:lshade",
@@ -283,7 +283,7 @@ _ENTRIES = (
         defaults=_set(memory=6, archive_share=2.6, best_share=0.11, least=4),
         least_population=4,
     ),
-    Entry(
+    OptimiserEntry(
         name="po",
         summary="parrot optimizer: budgerigars with α = β = 1",
         update="budgerigars:abo",
@@ -293,7 +293,7 @@ _ENTRIES = (
         iterations=100,
         defaults=_set(alpha=1.0, beta=1.0, origin=0.0, stay_step=0.01, talk="added", rule="equations", span=100.0),
     ),
-    Entry(
+    OptimiserEntry(
         name="abo",
         summary="adaptive budgerigars; the paper's own best choice, α = β = 1, is the parrot optimizer",
         update="budgerigars:abo",
@@ -305,7 +305,7 @@ _ENTRIES = (
     ),
 )
 
-TABLE: Mapping[str, Entry] = MappingProxyType({entry.name: entry for entry in _ENTRIES})
+TABLE: Mapping[str, OptimiserEntry] = MappingProxyType({entry.name: entry for entry in _ENTRIES})
 
 
 def names() -> tuple[str, ...]:
@@ -313,7 +313,7 @@ def names() -> tuple[str, ...]:
     return tuple(TABLE)
 
 
-def get(name: str) -> Entry:
+def get(name: str) -> OptimiserEntry:
     """The optimiser called ``name``. Raises InputError if it is unknown, with the closest known name."""
     entry = TABLE.get(name)
     if entry is None:

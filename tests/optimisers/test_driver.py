@@ -11,12 +11,12 @@ from gcsplan.arrays import Floats
 from gcsplan.errors import GcsplanError, InputError
 from gcsplan.optimisers.box import WORST, Run, Steps, clipped, partners
 from gcsplan.optimisers.driver import State, minimise
-from gcsplan.optimisers.registry import Entry, get
+from gcsplan.optimisers.registry import OptimiserEntry, get
 from tests.support.effort import draws
 
 
-def row(update: object, **rest: object) -> Entry:
-    return Entry("test", "", update, "", "", population=4, iterations=3, **rest)  # type: ignore[arg-type]
+def row(update: object, **rest: object) -> OptimiserEntry:
+    return OptimiserEntry("test", "", update, "", "", population=4, iterations=3, **rest)  # type: ignore[arg-type]
 
 
 def first_value(x: Floats) -> Floats:

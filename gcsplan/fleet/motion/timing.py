@@ -20,7 +20,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.fleet.motion.ardupilot import Curved, curved
 from gcsplan.fleet.motion.px4 import Smoothed, smoothed
-from gcsplan.fleet.motion.speeds import POSITION_ERROR_M, Stretch, column, rounded
+from gcsplan.fleet.motion.speeds import POSITION_ERROR_M, Segments, column, rounded
 from gcsplan.fleet.motion.timed_path import TimedPath
 from gcsplan.vehicle import Autopilot, MissionEnd, Vehicle
 from gcsplan.world.geodesy.atmosphere import true_per_indicated
@@ -38,7 +38,7 @@ __all__ = [
     "upright",
 ]
 
-Motion = Stretch | Curved | Smoothed
+Motion = Segments | Curved | Smoothed
 """A flight from one standstill to the next, by the autopilot's own rules."""
 
 

@@ -36,7 +36,7 @@ ROUNDS = 6
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Line:
+class GuidedTrack:
     """A track evaluated by the guide.
 
     ``points`` (N, 2); ``pinned`` (N,) vertices that stay; ``pin_m`` (N,) their altitudes, NaN where free; ``amsl_m``
@@ -57,7 +57,7 @@ class Line:
 
 
 @dataclass(eq=False, slots=True)
-class Guide:
+class CorridorRaster:
     """Rasters ``floor_m``, ``ceiling_m`` (rows, cols) from (``west_m``, ``south_m``), rows going north, and the walls:
     ``circles`` (C, 3) east, north, radius; ``edges`` (E, 4) of polygons. ``work``: working arrays of the kernel."""
 
@@ -96,7 +96,7 @@ class Guide:
                 np.maximum.at(more, (j + dj, i + di), less)
             raster += sign * more
 
-    def pull(self, line: Line, steps_m: Floats, gain_m: float, rounds: int = ROUNDS) -> Line:
+    def pull(self, line: GuidedTrack, steps_m: Floats, gain_m: float, rounds: int = ROUNDS) -> GuidedTrack:
         """Make a line cheaper by moves of ``steps_m`` metres, each of which must gain ``gain_m`` metres of track.
 
         A line of too many points is returned as it is.
@@ -139,7 +139,7 @@ class Guide:
             self.circles, self.edges, spec, steps_m, gain_m * unit, rounds, AROUND_M, *self.work,
         )  # fmt: skip
         cost, missing = self.work[-1]
-        return Line(
+        return GuidedTrack(
             points[:count].copy(),
             pinned[:count] > 0.0,
             pin_m[:count].copy(),
@@ -158,14 +158,14 @@ class Guide:
             self.floor_m[rows, cols] += by_m
 
 
-def line_of(points: Floats, pinned: Bools, pin_m: Floats) -> Line:
+def line_of(points: Floats, pinned: Bools, pin_m: Floats) -> GuidedTrack:
     """A line that is not evaluated yet."""
-    return Line(points, pinned, pin_m, np.zeros(len(points)), math.inf, math.inf)
+    return GuidedTrack(points, pinned, pin_m, np.zeros(len(points)), math.inf, math.inf)
 
 
 def make_guide(
     problem: Problem, ways: list[Floats], radius_m: float, over: dict[int, bool], finest_m: float = COARSEST_M
-) -> Guide:
+) -> CorridorRaster:
     """The guide within about ``radius_m`` of some tracks ``ways`` (N, 2).
 
     ``over``: zones known to be flown over (True) or under (False). ``finest_m``: most metres between nodes, unless the
@@ -206,7 +206,7 @@ def make_guide(
             else:
                 v = zone.shape.vertices
                 edges.extend(np.hstack([v, np.roll(v, -1, axis=0)]).tolist())
-    return Guide(
+    return CorridorRaster(
         problem, west, south, step, floor, ceiling,
         np.array(circles).reshape(-1, 3), np.array(edges).reshape(-1, 4), pull_kernels.workspace(),
     )  # fmt: skip

@@ -50,7 +50,7 @@ class Label:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Found:
+class FoundLabels:
     """``labels`` at the goal, cheapest first (none: no track was found); ``opened``: number of labels expanded."""
 
     labels: tuple[Label, ...]
@@ -73,7 +73,7 @@ def search(
     spare_m: float = 0.5,
     want: int = 1,
     most_opened: int = 600_000,
-) -> Found:
+) -> FoundLabels:
     """The cheapest tracks from ``start`` to an altitude within ``goal_m`` (lowest, highest) at ``goal``.
 
     ``starts``: labels at the start. ``cap_m``: highest altitude AMSL; ``weight``: price of a metre of height, in metres
@@ -125,7 +125,7 @@ def search(
         places = np.vstack([starts[k].places, inner, np.asarray(goal)[None]])
         cost, *altitudes = (float(x) for x in value[g])
         out.append(Label(cost, altitudes[0], altitudes[1], altitudes[2], altitudes[3], places))
-    return Found(tuple(out), int(state[search_kernels.OPENED]))
+    return FoundLabels(tuple(out), int(state[search_kernels.OPENED]))
 
 
 def _run(
@@ -162,14 +162,19 @@ def _run(
 
 
 @dataclass(frozen=True, slots=True)
-class Level:
+class LatticeSize:
     """Extent and fineness of a lattice: ``detour`` in multiples of the straight track, about ``nodes`` nodes."""
 
     detour: float
     nodes: int
 
 
-LEVELS = (Level(1.35, 25_000), Level(2.0, 60_000), Level(math.inf, 120_000), Level(math.inf, 300_000))
+LEVELS = (
+    LatticeSize(1.35, 25_000),
+    LatticeSize(2.0, 60_000),
+    LatticeSize(math.inf, 120_000),
+    LatticeSize(math.inf, 300_000),
+)
 
 
 def coverage(problem: Problem) -> tuple[float, float, float, float]:
@@ -183,7 +188,7 @@ def coverage(problem: Problem) -> tuple[float, float, float, float]:
     return float(west), float(south), float(east), float(north)
 
 
-def frame_of(problem: Problem, level: Level) -> tuple[tuple[float, float, float, float], float]:
+def frame_of(problem: Problem, level: LatticeSize) -> tuple[tuple[float, float, float, float], float]:
     """Box (west, south, east, north) and spacing of a lattice for ``level``."""
     west, south, east, north = coverage(problem)
     terminals = np.array(terminals_of(problem))
@@ -225,7 +230,7 @@ class Router:
     opened_last: int = 0
 
     @classmethod
-    def at(cls, problem: Problem, level: Level) -> Router:
+    def at(cls, problem: Problem, level: LatticeSize) -> Router:
         """Build the lattice of ``level``."""
         box, step = frame_of(problem, level)
         lattice = make_lattice(problem, box, step, level.detour)

@@ -13,7 +13,7 @@ import numpy as np
 
 from gcsplan.errors import InputError
 from gcsplan.planners.lattice.planner import cheaper, plan_band
-from gcsplan.planners.lattice.routes import Level, Router, climbing_weight
+from gcsplan.planners.lattice.routes import LatticeSize, Router, climbing_weight
 from gcsplan.planners.optimal.bounds.shorter import bound_by_caps, halve
 from gcsplan.planners.optimal.governor import Search, Size
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
@@ -322,7 +322,7 @@ def traverse(problem: Problem, longest_m: float) -> PinnedTrack | None:
     up to about ``longest_m`` metres, which may still be shorter than the best path's, so its nodes are dense. None if
     there is no track.
     """
-    router = Router.at(problem, Level(max(longest_m / straight_way_m(problem), 1.0), ASLANT_NODES))
+    router = Router.at(problem, LatticeSize(max(longest_m / straight_way_m(problem), 1.0), ASLANT_NODES))
     way = router.way(weight=climbing_weight(problem), briefly=True)
     if way is None:
         return None

@@ -17,7 +17,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import NoMission
 from gcsplan.planners.problem import ENDS_M, Problem, Refusal
-from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
+from gcsplan.planners.profile.exact import LegJudge, Unsettled, sampled_track, settle
 from gcsplan.planners.profile.track import Closed, Flown, Lacking, Track, distances, fly, lacking
 from gcsplan.planners.simplify import fewer
 from gcsplan.world.geometry.path import Path
@@ -56,7 +56,7 @@ def climb_tracks(problem: Problem, place: tuple[float, float], from_amsl: float,
     # With a limit steeper than 45 degrees, or none, laps still climb at 45 degrees.
     length = SPARE[0] * abs(to_amsl - from_amsl) / min(slope, 1.0)
     part = replace(problem, start=(*place, from_amsl), goal=(*place, to_amsl), via=())
-    judge = Judge(problem)
+    judge = LegJudge(problem)
     for one, count in laps(problem, length, None):
         if not _fits(problem, np.vstack([place, np.asarray(place) + one, place])):
             continue
@@ -133,7 +133,7 @@ def _lowered(problem: Problem, points: Floats) -> Floats | None:
     """
     found: list[Floats] = []
     pinned, pin_m = pins_of(problem, points)
-    judge = Judge(problem)
+    judge = LegJudge(problem)
     extended = extend(problem, np.ascontiguousarray(points[:, :2]), pinned, pin_m)
     if extended is not None:
         track = extended[0]

@@ -9,7 +9,16 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.profile.track import Flown, Kind, Obstruction, Track, distances, fly, make_track, values_at
+from gcsplan.planners.profile.track import (
+    Flown,
+    Obstruction,
+    ObstructionKind,
+    Track,
+    distances,
+    fly,
+    make_track,
+    values_at,
+)
 from gcsplan.planners.profile.zone_levels import SAMPLE_M, ZoneLevels
 from gcsplan.world.airspace import Band, Legs, Tube, Violation
 
@@ -33,7 +42,7 @@ class Unsettled:
 
     place: Floats
     by: float
-    kind: Kind
+    kind: ObstructionKind
     samples: Floats
     span_m: float = 0.0
     zone: int = -1
@@ -42,7 +51,7 @@ class Unsettled:
 
 
 @dataclass(eq=False, slots=True)
-class Judge:
+class LegJudge:
     """The exact check of single legs; it remembers the legs that passed."""
 
     problem: Problem
@@ -93,7 +102,7 @@ def way_points(problem: Problem, track: Track, flown: Flown) -> tuple[Floats, Bo
 
 
 def settle(
-    problem: Problem, judge: Judge, points: Floats, pinned: Bools, pin_m: Floats
+    problem: Problem, judge: LegJudge, points: Floats, pinned: Bools, pin_m: Floats
 ) -> tuple[Floats, Bools] | Unsettled:
     """Way points (N, 3) over a track that pass the exact check, and (N,) whether they must stay.
 
@@ -150,7 +159,7 @@ def settle(
                 corrected = [of.correct(flown.profile, s[leg], s[leg + 1]) for of in own]
                 if not any(corrected):
                     by = math.inf if v.kind == "coverage" else v.by
-                    kind: Kind = "zone" if v.zone >= 0 else "pinched"
+                    kind: ObstructionKind = "zone" if v.zone >= 0 else "pinched"
                     return Unsettled(np.array([v.east_m, v.north_m]), by, kind, samples(), zone=v.zone)
     assert worst is not None
     return Unsettled(np.array([worst.east_m, worst.north_m]), worst.by, "pinched", samples())

@@ -17,14 +17,12 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import CheckFailed, GcsplanError, InputError, NoMission
-from gcsplan.planners.lattice.routes import Level, Router
-from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
+from gcsplan.planners.lattice.routes import LatticeSize, Router
+from gcsplan.planners.problem import PlanFunction, Problem, Progress, Refusal
 from gcsplan.planners.profile.track import denser
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.zones import Circle, Zone
-
-Plan = Callable[[Problem], Solution]
 
 TRIES = 32
 """Most plans of changed problems."""
@@ -50,8 +48,6 @@ HIGHEST_M, LEAST_DEG = 9500.0, 0.05
 """The highest ceiling, metres, and the smallest climb limit, degrees, that are tried."""
 
 
-Place = tuple[float, float]
-
 FILLED = "give a terrain model that knows it (`gcsplan dem fetch` gets one), or fill its voids (nodata)"
 """What fills unknown ground."""
 NAMES, SINGLES = 5, 8
@@ -60,7 +56,7 @@ STEEPEST_DEG, STEEPEST_TURNING_DEG = 90.0, 45.0
 """Climb angle that means no limit; and the largest that the mission file allows a fixed wing."""
 ROUNDED_M = 0.05
 """Metres that rounding way points to whole centimetres may cost below a ceiling; generous."""
-LEVEL = Level(math.inf, 40_000)
+LEVEL = LatticeSize(math.inf, 40_000)
 """Lattice on which the altitude of the lowest pass is estimated."""
 
 
@@ -72,7 +68,7 @@ class Trials:
     plan, and may also raise CheckFailed.
     """
 
-    def __init__(self, problem: Problem, plan: Plan, whole: Plan | None = None) -> None:
+    def __init__(self, problem: Problem, plan: PlanFunction, whole: PlanFunction | None = None) -> None:
         self.problem, self._plan, self._whole = problem, plan, whole or plan
         self.share_s = max(SHARE * problem.budget_s, LEAST_S)
         self._begun_s = time.perf_counter()
@@ -127,7 +123,7 @@ class Trials:
             self.lacks = ""
         return points
 
-    def _points(self, plan: Plan, changed: Problem, what: str) -> Floats | None:
+    def _points(self, plan: PlanFunction, changed: Problem, what: str) -> Floats | None:
         if self.problem.progress is not None:
             self.problem.progress(Progress(self._now_s, None, None, f"no path; tries {what}"))
         try:
@@ -136,13 +132,15 @@ class Trials:
             self.lacks = _lacks(refused)
             return None
 
-    def least(self, name: str, at: Callable[[float], Problem], given: float, enough: float, values: Values) -> Least:
+    def least(
+        self, name: str, at: Callable[[float], Problem], given: float, enough: float, values: Values
+    ) -> LeastValue:
         """The least value over ``given`` with which a mission was planned; ``at(value)`` is the problem with it.
 
         The first value tried is ``enough``, which need not suffice; ``name`` of the limit, for progress reports. Values
         with a path are found quickly; the lowest of them with a whole plan is the result.
         """
-        bad, good, found, open_ = given, enough, Least(), list[float]()
+        bad, good, found, open_ = given, enough, LeastValue(), list[float]()
         for _ in range(VALUES):
             value = values.between(bad, good) if open_ else good
             if self.spent or not bad < value <= values.most or (open_ and value >= good):
@@ -183,7 +181,7 @@ def _lacks(refused: GcsplanError) -> str:
 
 
 @dataclass(slots=True)
-class Least:
+class LeastValue:
     """The least value with which a whole plan has a mission, its path, and the largest value below it without one, and
     what that lacks; a value with a path whose whole plan was not tried. NaN and None where there is none."""
 
@@ -245,7 +243,9 @@ def two_digits(value: float) -> float:
     return round(math.ceil(value / unit - 1e-9) * unit, 9)
 
 
-def with_cures(problem: Problem, bare: Refusal, plan: Plan, whole: Plan | None = None, but: str = "") -> Refusal:
+def with_cures(
+    problem: Problem, bare: Refusal, plan: PlanFunction, whole: PlanFunction | None = None, but: str = ""
+) -> Refusal:
     """The refusal ``bare`` of ``problem``, extended by what would help; every cure is planned before it is reported.
 
     ``plan`` returns a solution of a changed problem or raises NoMission; ``whole`` (None: the same) also refuses
@@ -296,7 +296,7 @@ class Cure:
     """A change that helps, in words for the message, and its place; ``whole``: a whole plan was made with it."""
 
     words: str
-    place: Place | None = None
+    place: tuple[float, float] | None = None
     place_of: str = ""
     whole: bool = False
 
@@ -519,7 +519,7 @@ def _list(names: Sequence[str], last: str = "and") -> str:
     return f" {last} ".join([", ".join(shown[:-1]), shown[-1]] if len(shown) > 1 else shown)
 
 
-def _over_highest_ground(problem: Problem, path: Floats) -> tuple[float, Place]:
+def _over_highest_ground(problem: Problem, path: Floats) -> tuple[float, tuple[float, float]]:
     """The path's altitude AMSL over the highest ground under it, and that place (east_m, north_m)."""
     step_m = 0.25 * float(problem.airspace.surface.grid.metres_per_cell(*problem.start[:2]).min())
     at = denser(path, step_m)
@@ -527,7 +527,7 @@ def _over_highest_ground(problem: Problem, path: Floats) -> tuple[float, Place]:
     return float(at[k, 2]), (float(at[k, 0]), float(at[k, 1]))
 
 
-def _middle(zone: Zone) -> Place:
+def _middle(zone: Zone) -> tuple[float, float]:
     if isinstance(zone.shape, Circle):
         return zone.shape.east_m, zone.shape.north_m
     west, south, east, north = zone.bounds

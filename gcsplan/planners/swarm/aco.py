@@ -16,9 +16,9 @@ import numpy as np
 
 from gcsplan.arrays import Floats, Indices
 from gcsplan.errors import InputError, unknown_name
-from gcsplan.optimisers.driver import History, Result
+from gcsplan.optimisers.driver import History, OptimiserResult
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
-from gcsplan.planners.registry import Entry
+from gcsplan.planners.registry import PlannerEntry
 from gcsplan.planners.swarm import scene_kernels as k
 from gcsplan.planners.swarm.encodings import LATERAL
 from gcsplan.planners.swarm.objectives import Cost
@@ -43,7 +43,7 @@ class Rule:
     most: float = 50.0
 
 
-def plan(problem: Problem, row: Entry) -> Solution:
+def plan(problem: Problem, row: PlannerEntry) -> Solution:
     """A path that `Airspace.examine` passes: few way points along the best ant's curve, or a repair of that curve.
 
     Raises Refusal (NoMission, ``not_found``) if within the budget no ant arrives or no curve can be repaired.
@@ -120,7 +120,7 @@ def open_between(scene: Scene, layers: list[Floats]) -> list[Floats]:
 
 def march(
     problem: Problem, cost: Cost, layers: list[Floats], lengths: list[Floats], rule: Rule, settings: Settings
-) -> tuple[Result, Floats | None]:
+) -> tuple[OptimiserResult, Floats | None]:
     """Run the colonies; return the run's result and the best ant's control points (N, 3), None if no ant arrived.
 
     An evaluation is one ant, whether it arrives or not. ``evaluations`` is used exactly: the last colony is cut to it.
@@ -157,7 +157,7 @@ def march(
     evaluations, iterations, history = (np.array(column) for column in zip(*trace, strict=True))
     stopped = "evaluations" if spent == limit else "iterations"
     account = History(evaluations, iterations, history)
-    return Result(np.zeros(0), best_cost, spent, len(trace) - 1, account, stopped, "aco"), best  # type: ignore[arg-type]
+    return OptimiserResult(np.zeros(0), best_cost, spent, len(trace) - 1, account, stopped, "aco"), best  # type: ignore[arg-type]
 
 
 def walk(rng: np.random.Generator, ants: int, eager: list[Floats], scent: list[Floats], alpha: float) -> Indices:

@@ -108,7 +108,7 @@ def _basis(controls: int, samples: int) -> Floats:
 
 
 @dataclass(frozen=True, slots=True)
-class Unit:
+class CostReference:
     """Reference values of the weights: the terms (TERMS,) and length of the straight line, height of the flight volume,
     and the mission's objective with its energy per metre."""
 
@@ -120,11 +120,11 @@ class Unit:
     horizontal_j_per_m: float
 
 
-Weigh = Callable[[Floats, Unit], Floats]
+Weigh = Callable[[Floats, CostReference], Floats]
 
 
 @dataclass(frozen=True, slots=True)
-class Objective:
+class PaperCost:
     """One cost. ``weigh``: from terms (n, TERMS) to costs (n,); ``wanted``: bits of the optional groups of terms that
     it needs."""
 
@@ -155,7 +155,7 @@ def _sums(rows: Floats) -> Floats:
     return np.asarray(np.add.accumulate(rows, axis=1)[:, -1])
 
 
-def _krill(terms: Floats, unit: Unit) -> Floats:
+def _krill(terms: Floats, unit: CostReference) -> Floats:
     """Length (eq. 12), or energy if that is the mission's objective.
 
     E eq. 12–13 sum four segments; here the whole curve is summed. E eq. 13 multiplies R1 by the horizontal and R2 by
@@ -173,7 +173,7 @@ SSGWO_WEIGHTS = (0.5, 0.2, 0.3)  # D: ρ of eq. 33, 34
 MU_OBS = 100.0  # D: eq. 31
 
 
-def _ssgwo(terms: Floats, unit: Unit) -> Floats:
+def _ssgwo(terms: Floats, unit: CostReference) -> Floats:
     """SSGWO, eq. 26–34.
 
     E eq. 29, 30: here in radians, wrapped, with e^|Δθ| - 1 and |φ|. E eq. 31, 32 sum over all nodes and obstacles
@@ -189,7 +189,7 @@ def _ssgwo(terms: Floats, unit: Unit) -> Floats:
 PC = C = 100.0  # D: eq. 25, 26, 28, 29
 
 
-def _msfoa(terms: Floats, unit: Unit) -> Floats:
+def _msfoa(terms: Floats, unit: CostReference) -> Floats:
     """MSFOA, eq. 20–27; the nearness of eq. 28–30 is added by `Cost`.
 
     E eq. 21: here the height is above ground, max(0, AGL - h_min). E eq. 24: T_de is max(0, 1 - d/R). E eq. 25 adds the
@@ -203,7 +203,7 @@ def _msfoa(terms: Floats, unit: Unit) -> Floats:
     return np.asarray(own + PENALTY * forbidden(terms, unit.straight_m))
 
 
-def _abo(terms: Floats, unit: Unit) -> Floats:
+def _abo(terms: Floats, unit: CostReference) -> Floats:
     """ABO, eq. 4–7: length, and P = 100 for each sample under ground (D: under the floor) or outside of the volume."""
     own = terms[:, k.LENGTH] + PENALTY * (terms[:, k.UNDER] + terms[:, k.OUTSIDE])
     return np.asarray(own + PENALTY * forbidden(terms, unit.straight_m, NOT_ABOS))
@@ -216,7 +216,7 @@ LEAST, NONE = np.array([1.0, math.pi, 1.0, 1.0]), np.array([1e-9, 1e-3, 1e-9, 1e
 line by some 1e-8 rad at each node (arccos)."""
 
 
-def _ib_abc(terms: Floats, unit: Unit) -> Floats:
+def _ib_abc(terms: Floats, unit: CostReference) -> Floats:
     """IB-ABC, eq. 2–6, each term divided by its value on the straight line (D; where that is 0, by π or one metre).
 
     E eq. 3: the atan of a cosine is taken as arccos, so Σ(π - α) is the sum of turns. E eq. 4 compares the length of a
@@ -228,18 +228,18 @@ def _ib_abc(terms: Floats, unit: Unit) -> Floats:
     return np.asarray(own + PENALTY * forbidden(terms, unit.straight_m) / unit.straight_m)
 
 
-OBJECTIVES: Mapping[str, Objective] = MappingProxyType(
+OBJECTIVES: Mapping[str, PaperCost] = MappingProxyType(
     {
-        "krill": Objective(0, _krill),
-        "ssgwo": Objective(k.YAWS | k.NODES_NEAR, _ssgwo),
-        "msfoa": Objective(k.ANGLES | k.SAMPLES_NEAR | k.HEIGHTS, _msfoa),
-        "abo": Objective(k.COUNTS, _abo),
-        "ib-abc": Objective(k.ANGLES | k.BENDS | k.SAMPLES_NEAR | k.HIDING, _ib_abc),
+        "krill": PaperCost(0, _krill),
+        "ssgwo": PaperCost(k.YAWS | k.NODES_NEAR, _ssgwo),
+        "msfoa": PaperCost(k.ANGLES | k.SAMPLES_NEAR | k.HEIGHTS, _msfoa),
+        "abo": PaperCost(k.COUNTS, _abo),
+        "ib-abc": PaperCost(k.ANGLES | k.BENDS | k.SAMPLES_NEAR | k.HIDING, _ib_abc),
     }
 )
 
 
-def get_objective(name: str) -> Objective:
+def get_objective(name: str) -> PaperCost:
     """The cost called ``name``. Raises InputError if it is unknown, with a list of the known ones."""
     found = OBJECTIVES.get(name)
     if found is None:
@@ -278,7 +278,7 @@ class Cost:
         self,
         problem: Problem,
         code: Code,
-        objective: Objective,
+        objective: PaperCost,
         *,
         earlier: Sequence[Earlier] = (),
         speed_m_s: float = 15.0,
@@ -294,7 +294,7 @@ class Cost:
             scene.numbers, scene.zones, scene.corners, self.stride, wanted, *k.room(self.curve.basis.shape[1]),
         )  # fmt: skip
         straight = self.terms(self.straight_controls()[None])[0]
-        self.unit = Unit(
+        self.unit = CostReference(
             straight,
             max(scene.straight_m, 1e-9),
             float(scene.high[2] - scene.low[2]),

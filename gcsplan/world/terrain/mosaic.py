@@ -22,9 +22,10 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.datum import VerticalDatum, plane_to_raster, to_wgs84
-from gcsplan.world.geodesy.frame import Box, Frame
+from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geodesy.height_unit import BY_NOBODY, METRE, OF_KEY, HeightUnit
 from gcsplan.world.geometry.surface import NO_SIDES, GridMap, Sides
+from gcsplan.world.geometry.zones import Box
 from gcsplan.world.terrain.input_files import tell_folder
 from gcsplan.world.terrain.raster import MAX_CELLS, Raster
 

@@ -21,9 +21,10 @@ from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.datum import VerticalDatum, stated_datum, vertical_datum
-from gcsplan.world.geodesy.frame import FARTHEST_M, Box, Frame
+from gcsplan.world.geodesy.frame import FARTHEST_M, Frame
 from gcsplan.world.geodesy.height_unit import METRE
 from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.geometry.zones import Box
 from gcsplan.world.terrain.geoid import GeoidGrid
 from gcsplan.world.terrain.model_words import heights_read
 from gcsplan.world.terrain.mosaic import Mosaic, Tile, Window, hash_of, tiles_of

@@ -17,7 +17,7 @@ import shapely
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.navmesh.crossing import Climb, Crossing, crossing
-from gcsplan.planners.optimal.navmesh.outlines import Outline
+from gcsplan.planners.optimal.navmesh.outlines import ZoneOutline
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.plane.corridor import joined
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
@@ -210,7 +210,7 @@ class Overflight:
                 best = others_m + found.length_m, [*around[: stretch.first], *over, *around[stretch.last :]]
         return best
 
-    def _outline(self, k: int) -> Outline:
+    def _outline(self, k: int) -> ZoneOutline:
         return self.outlines.outline(k, outer=self.outer)
 
     def _climbs(self, stretch: _Stretch, leg: int, top_m: float) -> tuple[Climb, Climb]:

@@ -19,7 +19,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.planners.budget import Budget
-from gcsplan.planners.optimal.navmesh.portals import Exhausted, Place
+from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundPlace
 
 SHRUNK_M = 0.02
 """Metres by which outlines are made smaller where they block a view: lines along their edges must not count as blocked,
@@ -76,7 +76,7 @@ class Crossing:
 
 
 def crossing(
-    a: Place, b: Place, zone: shapely.Geometry, others: Sequence[shapely.Geometry], up: Climb, down: Climb,
+    a: GroundPlace, b: GroundPlace, zone: shapely.Geometry, others: Sequence[shapely.Geometry], up: Climb, down: Climb,
     limit_m: float, budget: Budget,
 ) -> Crossing:  # fmt: skip
     """The least length, at most ``limit_m``, from ``a`` to ``b`` past the polygons ``others`` and over ``zone``, with
@@ -205,7 +205,7 @@ def _halved(before: _Pieces, after: _Pieces, i: Indices, j: Indices) -> tuple[In
 class _Views:
     """The corners of some polygons, the shortest ways to them from two places, and what each of them sees."""
 
-    def __init__(self, a: Place, b: Place, shapes: Sequence[shapely.Geometry], budget: Budget) -> None:
+    def __init__(self, a: GroundPlace, b: GroundPlace, shapes: Sequence[shapely.Geometry], budget: Budget) -> None:
         corners = np.unique(np.concatenate([shapely.get_coordinates(s) for s in shapes]), axis=0)
         if len(corners) > MOST_CORNERS:
             raise Exhausted(0.0)

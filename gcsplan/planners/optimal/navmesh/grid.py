@@ -26,16 +26,15 @@ from gcsplan.planners.optimal.navmesh.zone_kernels import PAIR, TOP, TOP_2, UNDE
 from gcsplan.planners.optimal.navmesh.zone_shapes import LOOSE, TOUCH_M, Fit, Shapes, make_shapes
 from gcsplan.planners.problem import Problem
 from gcsplan.world.geometry.surface import GridMap
+from gcsplan.world.geometry.zones import Box
 
-Extent = tuple[int, int, int, int]
+NodeExtent = tuple[int, int, int, int]
 """First and last columns and rows (col0, row0, col1, row1) of a terrain model's nodes."""
 
 LARGE = 1 << 22
 """Size of an array, in bytes, from which numpy requests huge pages."""
 
-Box = tuple[float, float, float, float]
-"""West, south, east, north, m; infinite: everywhere."""
-Reach = tuple[tuple[float, float], tuple[float, float], float]
+DetourEllipse = tuple[tuple[float, float], tuple[float, float], float]
 """Two places, and the largest sum of the distances to both, m: an ellipse."""
 
 
@@ -53,7 +52,7 @@ def slopes(z: Floats, x: Floats, y: Floats) -> Floats:
     return np.hypot(a, b)
 
 
-def nodes(z: Floats, over: Extent, parts: int, stride: int, whole: int) -> tuple[Floats, Floats]:
+def nodes(z: Floats, over: NodeExtent, parts: int, stride: int, whole: int) -> tuple[Floats, Floats]:
     """Heights at a lattice's nodes for bounds and for paths, rows going north, from the terrain model's heights ``z``;
     the lattice covers the extent ``over``. ``parts``, ``stride``, ``whole``: see `make_plane`."""
     col0, row0, col1, row1 = over
@@ -214,7 +213,7 @@ def make_plane(
     parts: int = 1,
     stride: int = 1,
     whole: int = 1,
-    reach: Reach | None = None,
+    reach: DetourEllipse | None = None,
     fit: Fit = LOOSE,
 ) -> Plane:
     """Make the lattice over ``box`` (west, south, east, north) as far as the terrain model goes.
@@ -226,7 +225,7 @@ def make_plane(
     return lattice(problem, extent(problem, box), parts, stride, whole, reach, fit)
 
 
-def extent(problem: Problem, box: Box) -> Extent:
+def extent(problem: Problem, box: Box) -> NodeExtent:
     """First and last columns and rows of the terrain model's nodes that cover a box."""
     surface = problem.airspace.surface
     rows, cols = surface.ground_m.shape
@@ -273,7 +272,7 @@ def on_finer(plane: Plane, cells: Bools, finer: Plane) -> Bools:
 
 
 def lattice(
-    problem: Problem, over: Extent, parts: int, stride: int, whole: int, reach: Reach | None, fit: Fit
+    problem: Problem, over: NodeExtent, parts: int, stride: int, whole: int, reach: DetourEllipse | None, fit: Fit
 ) -> Plane:
     """Make the lattice over an `extent`; the other arguments are those of `make_plane`."""
     surface = problem.airspace.surface

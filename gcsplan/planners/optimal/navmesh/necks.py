@@ -26,7 +26,7 @@ from gcsplan.planners.optimal.navmesh.clearance_kernels import SPARE
 from gcsplan.planners.optimal.navmesh.grid import Plane, lattice
 from gcsplan.planners.optimal.navmesh.mesh import Guide, Mesh
 from gcsplan.planners.optimal.navmesh.mesh_kernels import sort_portals
-from gcsplan.planners.optimal.navmesh.portals import GroundTrack, Place
+from gcsplan.planners.optimal.navmesh.portals import GroundPlace, GroundTrack
 from gcsplan.planners.optimal.navmesh.zone_shapes import Fit
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.zone_levels import shut_places
@@ -128,7 +128,7 @@ class Neck:
 class LegNecks:
     """The necks of all lattices of one leg from ``start`` to ``goal``, below ``top_m``."""
 
-    def __init__(self, problem: Problem, top_m: float, start: Place, goal: Place) -> None:
+    def __init__(self, problem: Problem, top_m: float, start: GroundPlace, goal: GroundPlace) -> None:
         self.problem, self.top_m, self.start, self.goal = problem, top_m, start, goal
         self._necks: dict[int, Necks] = {}
         """By the parts a side into which they cut the terrain model's cells."""

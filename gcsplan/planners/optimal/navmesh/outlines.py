@@ -20,7 +20,7 @@ import shapely
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.navmesh.mesh_kernels import sort_portals
-from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundTrack, Place, Portals
+from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundPlace, GroundTrack, Portals
 from gcsplan.world.geometry.outlines import few_corners
 from gcsplan.world.geometry.zones import Circle, Zone
 
@@ -48,7 +48,7 @@ MOST_OPENED = 1_000_000
 
 
 @dataclass(eq=False, slots=True)
-class Outline:
+class ZoneOutline:
     """One zone grown by ``reach_m``: its polygon for paths (``outer``) or for bounds.
 
     ``sectors``: those of a circle that are drawn finely, each as wide as a coarse chord; ``fine``: whether the corners
@@ -188,7 +188,7 @@ class Triangles(Portals):
             start, np.ascontiguousarray(ends), names, joins, of_piece, named, int(np.bincount(first).max())
         )
 
-    def pieces_at(self, place: Place) -> list[int]:
+    def pieces_at(self, place: GroundPlace) -> list[int]:
         """The triangles in which, or on whose border, a place lies."""
         d = np.array(place) - self.corner
         e = np.roll(self.corner, -1, axis=1) - self.corner
@@ -196,7 +196,7 @@ class Triangles(Portals):
         return np.flatnonzero((left >= -1e-6).all(axis=1)).tolist()
 
 
-def shortest_past(a: Place, b: Place, shapes: Sequence[shapely.Polygon]) -> GroundTrack | None:
+def shortest_past(a: GroundPlace, b: GroundPlace, shapes: Sequence[shapely.Polygon]) -> GroundTrack | None:
     """The shortest track around some polygons; None if they separate the places. Raises Exhausted."""
     places = np.array([a, b])
     bounds = np.array([*(s.bounds for s in shapes), (*places.min(axis=0), *places.max(axis=0))])
@@ -229,7 +229,7 @@ class Solids:
         *,
         outer: bool,
     ) -> None:
-        self.outlines = [Outline(z, reach_m, scale, outer, hair) for z, hair in zip(zones, hair_m, strict=True)]
+        self.outlines = [ZoneOutline(z, reach_m, scale, outer, hair) for z, hair in zip(zones, hair_m, strict=True)]
         self._budget = budget
         self._tree = shapely.STRtree(shapely.box(*np.array([o.bounds for o in self.outlines]).reshape(-1, 4).T))
         self._known: set[int] = set()
@@ -242,7 +242,7 @@ class Solids:
             if which[k] and self.outlines[k].refine(track):
                 self._known.add(k)
 
-    def shortest(self, a: Place, b: Place, which: Bools) -> GroundTrack | None:
+    def shortest(self, a: GroundPlace, b: GroundPlace, which: Bools) -> GroundTrack | None:
         """The shortest track from ``a`` to ``b`` around the zones ``which`` (zones,); None if they separate the two."""
         for _ in range(ROUNDS):
             known = [k for k in sorted(self._known) if which[k]]
@@ -262,7 +262,7 @@ class Solids:
                 break
         raise Exhausted(0.0)
 
-    def _past(self, a: Place, b: Place, known: list[int]) -> GroundTrack | None:
+    def _past(self, a: GroundPlace, b: GroundPlace, known: list[int]) -> GroundTrack | None:
         if not known:
             return GroundTrack(np.array([a, b]), math.dist(a, b))
         shapes = [s for k in known if not (s := self.outlines[k].shape).is_empty]

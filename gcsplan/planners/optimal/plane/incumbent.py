@@ -12,7 +12,7 @@ from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.plane.corridor import PinnedTrack
 from gcsplan.planners.problem import Problem, Progress, Solution, Step, passes_vias, straight_bound, straight_way_m
 from gcsplan.planners.profile.climb_laps import with_laps
-from gcsplan.planners.profile.exact import Judge, Unsettled, settle, way_points
+from gcsplan.planners.profile.exact import LegJudge, Unsettled, settle, way_points
 from gcsplan.planners.profile.track import Flown, Obstruction, Track, fly, make_track
 from gcsplan.planners.profile.zone_levels import may_pass
 from gcsplan.planners.simplify import fewer, polished
@@ -42,7 +42,7 @@ class Incumbent:
         self.rounding = problem.rounding()
         self.wanted = problem.gap_percent / 100.0
         self.nearer = NEARER * self.wanted
-        self.judge = Judge(problem)
+        self.judge = LegJudge(problem)
         self.best: Floats | None = None
         self.pinned: Bools | None = None
         """(N,) which points of the best path are terminals; None if that is not known."""

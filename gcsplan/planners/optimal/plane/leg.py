@@ -17,10 +17,10 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid, Cone, mesh_of
-from gcsplan.planners.optimal.navmesh.grid import Box, Plane, box_of, extent, finer_plane, make_plane, on_finer
+from gcsplan.planners.optimal.navmesh.grid import Plane, box_of, extent, finer_plane, make_plane, on_finer
 from gcsplan.planners.optimal.navmesh.mesh import Guide, Mesh
 from gcsplan.planners.optimal.navmesh.necks import LegNecks
-from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundTrack, Place
+from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundPlace, GroundTrack
 from gcsplan.planners.optimal.navmesh.zone_shapes import CLOSE, LOOSE
 from gcsplan.planners.optimal.plane.altitude_intervals import (
     MOST,
@@ -33,7 +33,7 @@ from gcsplan.planners.optimal.plane.altitude_intervals import (
 )
 from gcsplan.planners.optimal.plane.corridor import Corridor, End, Narrow, Nearby, Spare
 from gcsplan.planners.problem import Problem
-from gcsplan.world.geometry.zones import Circle
+from gcsplan.world.geometry.zones import Box, Circle
 
 COARSE_M = 100.0
 """Largest cells wanted for the first-look lattice, metres, unless the terrain model's own are larger."""
@@ -503,7 +503,7 @@ class Leg:
         return make_plane(self.problem, self._around(detour), parts, stride, stride, reach)
 
 
-def _flooded(mesh: Mesh, start: Place, goal: Place, limit_m: float, ahead: Guide | None = None) -> Guide:
+def _flooded(mesh: Mesh, start: GroundPlace, goal: GroundPlace, limit_m: float, ahead: Guide | None = None) -> Guide:
     """Distances from ``start`` over a mesh, for tracks to ``goal`` shorter than ``limit_m``; zeros, which are bounds as
     well, if the budget leaves too little to find them."""
     try:

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.planners.optimal.plane.corridor import End, Narrow, PinnedTrack, joined
-from gcsplan.planners.optimal.plane.detours import Choice, DetourSearch
+from gcsplan.planners.optimal.plane.detours import DetourSearch, SideChoice
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.plane.leg import Leg
 from gcsplan.planners.problem import Problem, terminals_of
@@ -101,11 +101,13 @@ class PlaneSearch:
         self.by_intervals = False
         """Whether bounds of length use altitude intervals: what a track can climb and descend to on its way."""
         zones = len(problem.airspace.zones)
-        self._open = Choice(np.ones(zones, np.bool_), np.ones(zones, np.bool_))
+        self._open = SideChoice(np.ones(zones, np.bool_), np.ones(zones, np.bool_))
         self.choice = self._open
         """The choice of open zone sides with which the last path past obstacles was found."""
 
-    def terminals(self, choice: Choice, cap_m: float, fine: bool, narrow: Narrow | None = None) -> PinnedTrack | None:
+    def terminals(
+        self, choice: SideChoice, cap_m: float, fine: bool, narrow: Narrow | None = None
+    ) -> PinnedTrack | None:
         """The shortest track below a cap with a choice of zone sides, through all terminals; None if a leg has none.
 
         ``fine``: on the finer lattice; ``narrow``: see `Leg.track`.

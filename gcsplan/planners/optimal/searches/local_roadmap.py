@@ -20,7 +20,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.planners.optimal.navmesh.grid import Extent, extent
+from gcsplan.planners.optimal.navmesh.grid import NodeExtent, extent
 from gcsplan.planners.optimal.searches.section_dp import FIXED, FREE, UPRIGHT, cheapest, cost_of, drawn, kinds_of
 from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.world.geometry.zones import Circle
@@ -240,7 +240,7 @@ def _within(places: Floats, low: Floats, high: Floats) -> Floats:
     return places[((places >= low) & (places <= high)).all(axis=1)]
 
 
-def _saddles(problem: Problem, part: Extent) -> Floats:
+def _saddles(problem: Problem, part: NodeExtent) -> Floats:
     """(N, 2) saddles of the surface inside cells, the sharpest first: passes that nodes alone do not show."""
     c0, r0, c1, r1 = part
     z = problem.airspace.surface.top_m[r0 : r1 + 1, c0 : c1 + 1]
