@@ -25,7 +25,7 @@ Position = list[float]
 GENERATOR = "gcsplan"
 """The mark of the collection, by which its tracks and way points are known where it is read for its zones."""
 
-HEIGHTS = "the third coordinate is metres above mean sea level (AMSL), not above the ellipsoid"
+HEIGHT_DATUM = "the third coordinate is metres above mean sea level (AMSL), not above the ellipsoid"
 THIRD = {"third_coordinate": "amsl_m"}
 
 
@@ -33,9 +33,9 @@ def write_geojson(name: str, tracks: Sequence[FlownTrack], zones: Sequence[Zone]
     """The GeoJSON text of a mission called ``name``: a FeatureCollection; the same input gives the same bytes.
 
     Positions are longitude, latitude, and for tracks and way points AMSL metres, although RFC 7946 has heights above
-    the ellipsoid: `HEIGHTS` and each feature's ``third_coordinate`` say so. A way point has its item's ``number`` and
-    ``command``, ``amsl_m``, ``agl_m``, and ``ellipsoidal_m`` if a geoid grid is known. A zone's floor and ceiling are
-    the mission file's ``floor_agl_m``, ``floor_amsl_m``, ``ceiling_agl_m``, ``ceiling_amsl_m``.
+    the ellipsoid: `HEIGHT_DATUM` and each feature's ``third_coordinate`` say so. A way point has its item's ``number``
+    and ``command``, ``amsl_m``, ``agl_m``, and ``ellipsoidal_m`` if a geoid grid is known. A zone's floor and ceiling
+    are the mission file's ``floor_agl_m``, ``floor_amsl_m``, ``ceiling_agl_m``, ``ceiling_amsl_m``.
     """
     features: list[dict[str, Any]] = []
     for track in tracks:
@@ -53,7 +53,7 @@ def write_geojson(name: str, tracks: Sequence[FlownTrack], zones: Sequence[Zone]
         "type": "FeatureCollection",
         "name": name,
         "generator": GENERATOR,
-        "heights": HEIGHTS,
+        "heights": HEIGHT_DATUM,
         "features": features,
     }
     return json.dumps(document, ensure_ascii=False) + "\n"

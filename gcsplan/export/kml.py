@@ -20,8 +20,8 @@ from gcsplan.figures import floored
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.zones import Level, Zone
 
-TRACK_COLOURS = ("ff0099ff", "ffff9900", "ff66cc00", "ffcc00cc", "ff00cccc", "ff3333ff")  # aabbggrr
-MOST_WHOLE = 100
+KML_COLOURS = ("ff0099ff", "ffff9900", "ff66cc00", "ffcc00cc", "ff00cccc", "ff3333ff")  # aabbggrr
+MOST_CURTAINS = 100
 """Most tracks that are drawn with a curtain to the ground and all way points; of more, way points are there to tick."""
 DRAWN_TOP_M = 300.0
 """Metres above the highest track up to which a zone without a ceiling is drawn."""
@@ -62,13 +62,13 @@ def write_kml(
         f"<name>{_text(name)}</name>",
         "<open>1</open>",
         *_look_at(_everything(tracks, outlines), frame),
-        *(line for number, colour in enumerate(TRACK_COLOURS) for line in _styles(number, colour)),
+        *(line for number, colour in enumerate(KML_COLOURS) for line in _styles(number, colour)),
         '<Style id="zone"><LineStyle><color>ff0000ff</color></LineStyle>'
         "<PolyStyle><color>600000ff</color></PolyStyle></Style>",
     ]
-    light = len(tracks) > MOST_WHOLE
+    light = len(tracks) > MOST_CURTAINS
     for number, track in enumerate(tracks):
-        lines += _track(track, number % len(TRACK_COLOURS), frame, start, light=light)
+        lines += _track(track, number % len(KML_COLOURS), frame, start, light=light)
     if zones:
         lines += ["<Folder>", "<name>no-fly zones</name>"]
         for zone, outline in zip(zones, outlines, strict=True):

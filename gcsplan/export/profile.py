@@ -16,7 +16,7 @@ from gcsplan.figures import floored, steepened
 from gcsplan.units import METRIC, Quantity, Units
 from gcsplan.world.world import World
 
-COLUMNS: tuple[tuple[str, str, int], ...] = (
+PROFILE_COLUMNS: tuple[tuple[str, str, int], ...] = (
     ("lat", "lat_deg", 7),
     ("lon", "lon_deg", 7),
     ("amsl_m", "amsl_m", 3),
@@ -39,9 +39,9 @@ GROUND, TRACK, BOTH, UNKNOWN = "█", "•", "▒", "?"
 
 def write_profile(rows: Iterable[ItemRow]) -> str:
     """The CSV text: a header and one line per row, with LF and a decimal point; unknown values are empty."""
-    lines: list[list[object]] = [["vehicle", "seq", "command", *(name for name, _, _ in COLUMNS)]]
+    lines: list[list[object]] = [["vehicle", "seq", "command", *(name for name, _, _ in PROFILE_COLUMNS)]]
     for row in rows:
-        numbers = [_cell(getattr(row, key), decimals, ROUNDED.get(key, round)) for _, key, decimals in COLUMNS]
+        numbers = [_cell(getattr(row, key), decimals, ROUNDED.get(key, round)) for _, key, decimals in PROFILE_COLUMNS]
         lines.append([row.vehicle, row.seq, row.command, *numbers])
     return csv_of(lines)
 

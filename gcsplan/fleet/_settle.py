@@ -30,7 +30,7 @@ EVENLY = 12
 CLOSER = 4
 """Halvings between the last departure that conflicts and the first that does not."""
 
-SPARE_M = 0.02
+CHANGE_SPARE_M = 0.02
 """Metres that a changed flight keeps beyond the need, so that it passes when the mission is timed again and rounded."""
 
 HOLDS_S = (2.0, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0)
@@ -49,7 +49,7 @@ higher). ``attempt`` counts from 1. None: no more ideas."""
 Again = Callable[[float], Schedule]
 """``again(interval_s)``: the schedule of the sequence with that interval."""
 
-ATTEMPTS = 4
+REROUTE_ATTEMPTS = 4
 PROMOTIONS, MOST_AGAIN = 3, 150
 """Most vehicles that may be put before the one in their way if nothing else helps them and no priority is set; and most
 vehicles that are fixed again for one of them."""
@@ -133,7 +133,7 @@ class Chooser:
 
     def clear(self, option: Option) -> bool:
         """Whether an option keeps clear of all vehicles with priority."""
-        spare_m = 0.0 if option.how == "as scheduled" else SPARE_M
+        spare_m = 0.0 if option.how == "as scheduled" else CHANGE_SPARE_M
         return self.taken.forbidden(option.path, spare_m=spare_m).free(0.0)
 
     # -- the arrival is free ------------------------------------------------------------------------------------
@@ -165,9 +165,9 @@ class Chooser:
         for horizon in HORIZONS_S:
             earlier, later = max(-horizon, -option.slot.depart_s), min(horizon, latest)
             if later > high or high == 0.0:
-                spans = spans.joined(self.taken.forbidden(option.path, high, later, SPARE_M))
+                spans = spans.joined(self.taken.forbidden(option.path, high, later, CHANGE_SPARE_M))
             if earlier < low:
-                spans = spans.joined(self.taken.forbidden(option.path, earlier, low, SPARE_M))
+                spans = spans.joined(self.taken.forbidden(option.path, earlier, low, CHANGE_SPARE_M))
             low, high = earlier, later
             shift = spans.least(low, high)
             if shift is not None:

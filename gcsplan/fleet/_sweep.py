@@ -25,7 +25,7 @@ FOREVER_S = 1e9
 PIECES_A_SLICE = 4
 SLICES = (16, 512)
 
-BLOCK = 400_000
+ROWS_AT_ONCE = 400_000
 """Rows that are handled together, about: some tens of megabytes."""
 
 SLACK_M = 1e-7
@@ -284,7 +284,7 @@ class Fleet:
         start = 0
         while start < len(i):
             done = total[start - 1] if start else 0
-            stop = max(start + 1, int(np.searchsorted(total, done + BLOCK, side="right")))
+            stop = max(start + 1, int(np.searchsorted(total, done + ROWS_AT_ONCE, side="right")))
             of = np.repeat(np.arange(start, stop), (many_i * many_j)[start:stop])
             local = np.arange(len(of)) - (np.concatenate([[0], total])[of] - done)
             a = self.first[i[of], k[of]] + local // many_j[of]
@@ -298,7 +298,7 @@ class Fleet:
         out = Least.none(len(i))
         w = 2.0 * self.window_s
         meet = np.flatnonzero((self.begins[i] <= self.ends[j] + w) & (self.begins[j] <= self.ends[i] + w))
-        block = max(1, BLOCK // self.stray.shape[1])
+        block = max(1, ROWS_AT_ONCE // self.stray.shape[1])
         for start in range(0, len(meet), block):
             some = meet[start : start + block]
             a, b = i[some], j[some]

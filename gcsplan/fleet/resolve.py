@@ -22,8 +22,8 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.errors import NoMission
 from gcsplan.fleet._settle import (
-    ATTEMPTS,
     LATER_S,
+    REROUTE_ATTEMPTS,
     Again,
     Ask,
     Change,
@@ -45,7 +45,7 @@ from gcsplan.fleet.separation import TOLERANCE_M, AirPlace, Conflict, Rules, Sep
 __all__ = ["Again", "Change", "NotSeparated", "Reroute", "Resolved", "resolve"]
 
 
-CUT_M = 60.0
+CORNERS_CUT_M = 60.0
 """Metres by which two flights together may leave the lines between their corners, about."""
 
 JOINED = 6
@@ -124,7 +124,7 @@ def resolve(
     priority: Sequence[str] | None = None,
     hold: Hold = "ground",
     replan: Reroute | None = None,
-    attempts: int = ATTEMPTS,
+    attempts: int = REROUTE_ATTEMPTS,
     later_s: float = LATER_S,
     again: Again | None = None,
     where: Where = in_metres,
@@ -277,7 +277,7 @@ def groups_of(plan: Schedule, rules: Rules) -> Groups:
     import shapely  # slow to import, and most plans have one vehicle
 
     lines = [shapely.LineString(flown_corners(slot.route)[:, :2]) for slot in plan.slots]
-    near = shapely.STRtree(lines).query(lines, predicate="dwithin", distance=rules.needed_m + CUT_M)
+    near = shapely.STRtree(lines).query(lines, predicate="dwithin", distance=rules.needed_m + CORNERS_CUT_M)
     names = [slot.name for slot in plan.slots]
     return _joined(names, ([names[a], names[b]] for a, b in near.T.tolist() if a < b))
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gcsplan.arrays import Floats, Int64s
 from gcsplan.errors import GcsplanError, InputError
-from gcsplan.optimisers.box import WORST, Run
+from gcsplan.optimisers.box import WORST_COST, Run
 from gcsplan.optimisers.registry import OptimiserEntry, get
 
 BatchCost = Callable[[Floats], NDArray[np.floating]]
@@ -164,9 +164,9 @@ class _Book:
         if raw.shape != (len(batch),):
             raise GcsplanError(f"the cost must have shape ({len(batch)},), one number a row; given {raw.shape}")
         run.evaluations += len(batch)
-        costs = np.where(np.isfinite(raw), raw.clip(-WORST, WORST), WORST)
+        costs = np.where(np.isfinite(raw), raw.clip(-WORST_COST, WORST_COST), WORST_COST)
         lead = int(costs.argmin())
-        if self.best_x is None or costs[lead] < min(self.best, WORST):
+        if self.best_x is None or costs[lead] < min(self.best, WORST_COST):
             self.best_x = batch[lead].copy()
             self.best = float(raw[lead]) if np.isfinite(raw[lead]) else np.inf
         at = run.iteration + 1 if run.in_cycles else 0

@@ -84,7 +84,7 @@ _BASELINE: Mapping[str, object] = {
     "encoding": ENCODING, "cost": "krill", "points": None, "population": 100, "evaluations": 10_000,
 }  # fmt: skip
 
-_ENTRIES = (
+_PLANNERS = (
     PlannerEntry(
         name="optimal",
         summary="exact shortest tracks under altitude caps, taut-string profiles, and a bound that no path can beat",
@@ -119,7 +119,7 @@ _ENTRIES = (
     _swarm("abo", "adaptive budgerigars", _ABO_PAPER, _ABO),
 )
 
-TABLE: Mapping[str, PlannerEntry] = MappingProxyType({entry.name: entry for entry in _ENTRIES})
+TABLE: Mapping[str, PlannerEntry] = MappingProxyType({entry.name: entry for entry in _PLANNERS})
 
 
 def names() -> tuple[str, ...]:

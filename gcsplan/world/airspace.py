@@ -49,8 +49,7 @@ from gcsplan.world.kernels.shared import (
     TOUCH_M,
     Demands,
 )
-from gcsplan.world.kernels.zone_arrays import BOX, over_both_grounds, zones_as_arrays
-from gcsplan.world.kernels.zone_tests import deepest_in_circle, deepest_inside
+from gcsplan.world.kernels.zone_arrays import BOX, deepest_in_circle, deepest_inside, over_both_grounds, zones_as_arrays
 from gcsplan.world.tube import ZONE_ROOM_M, Band, Reaches, Tube, make_tube
 
 __all__ = ["Airspace", "Band", "LegReport", "Legs", "Tube", "Violation", "ViolationKind"]

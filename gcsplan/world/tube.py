@@ -16,7 +16,7 @@ from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.kernels.entries import pieces
 from gcsplan.world.kernels.field import Field
 from gcsplan.world.kernels.shared import BAND_HIGH, BAND_LOW, BOW_M, CEILING, CEILING_AGL, FLOOR, FLOOR_AGL, Zones
-from gcsplan.world.kernels.zone_tests import spans
+from gcsplan.world.kernels.zone_arrays import spans
 
 ROOM_M = 0.02
 """Extra reach, m, for the accuracy that the check loses between the plane and the grid."""

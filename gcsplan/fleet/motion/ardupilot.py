@@ -48,7 +48,7 @@ MEASURED_AMSL_M, SPARE = 593.0, 1.007
 """Where the drag was measured, and what a speed should be below the fastest where the altitude is not known."""
 
 
-MARGIN_M = 10.0
+TERRAIN_MARGIN_M = 10.0
 """WPNAV_TER_MARGIN, default."""
 
 STEP_S = 0.2
@@ -69,7 +69,7 @@ counts as REST_M_S. Measured on ArduCopter 4.7 at 5 to 15 m/s, from rest and out
 _TRIED, _ROUNDS = 16, 3
 _STEPS, _WITHIN = 30, 1e-6
 _HALVINGS = 60
-_LEAST_LENGTH_M = 1e-3
+_LEAST_CURVE_M = 1e-3
 _SAME_S = 1e-9
 _LEVEL = np.array([1.0, 1.0, 0.0])
 
@@ -133,7 +133,7 @@ def _fly(
     """Time the parts from ``first`` on, until it is on its height at full speed again; return the next part."""
     lengths, rises, speeds = part_m.tolist(), rise_m.tolist(), speed_m_s.tolist()
     up, down = rates_m_s[:, 0].tolist(), rates_m_s[:, 1].tolist()
-    half, i, count = 0.5 * MARGIN_M, first, len(lengths)
+    half, i, count = 0.5 * TERRAIN_MARGIN_M, first, len(lengths)
     speed, gone_m, since_s = speeds[first], 0.0, 0.0
     climbs = max(-down[i], min(up[i], rises[i] / lengths[i] * speed))
     off = math.copysign(0.5 * climbs * climbs / vertical_m_s2, climbs)  # how far the height wanted is above its own
@@ -309,7 +309,7 @@ def curved(
     ``owner`` (N - 1,) are the caller's numbers of the parts, ``leg`` (N - 1,) numbers of the legs that they belong to;
     for the others see `legs.legs`.
     """
-    keep = np.append(True, np.linalg.norm(np.diff(points, axis=0), axis=1) > _LEAST_LENGTH_M)
+    keep = np.append(True, np.linalg.norm(np.diff(points, axis=0), axis=1) > _LEAST_CURVE_M)
     p, owner, leg = points[keep], owner[keep[1:]], leg[keep[1:]]
     if len(p) < 2:
         return None
@@ -351,7 +351,7 @@ def curved(
 
 def _unit(way: Floats, instead: Floats) -> Floats:
     """(L, 3) the directions of ``way``; those of ``instead`` where it has no length."""
-    known = np.linalg.norm(way, axis=1) > _LEAST_LENGTH_M
+    known = np.linalg.norm(way, axis=1) > _LEAST_CURVE_M
     course = np.where(known[:, None], way, instead)
     return np.asarray(course / np.linalg.norm(course, axis=1)[:, None])
 

@@ -22,17 +22,17 @@ from gcsplan.world.geometry.zones import Circle, Level, Zone
 
 SHUT_M = 1e5
 """Floor, in metres, where no altitude is free; finite, so that kernels need not handle infinities."""
-MOST_NODES = 150_000
+MOST_RASTER_NODES = 150_000
 FINEST_PART, COARSEST_M = 0.45, 40.0
 """Spacing of the raster: as a part of the terrain's cells, and at most in metres."""
-MARGIN_M = 0.3
+RASTER_MARGIN_M = 0.3
 """Metres kept from floor and ceiling of the raster, for ground between samples."""
 SLOPE_PART = 0.999
-PENALTY = 50.0
+MISSING_COST = 50.0
 """Cost, in metres of track, of each metre that is missing for a track to be legal."""
-AROUND_M = 2000.0
+MOVE_REACH_M = 2000.0
 """A move is evaluated over this many metres of the track to each side."""
-ROUNDS = 6
+PULL_ROUNDS = 6
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -70,7 +70,7 @@ class CorridorRaster:
     circles: Floats
     edges: Floats
     work: tuple[Floats | Int64s, ...]
-    margin_m: float = MARGIN_M
+    margin_m: float = RASTER_MARGIN_M
     slope_part: float = SLOPE_PART
 
     def strict(self) -> None:
@@ -96,7 +96,7 @@ class CorridorRaster:
                 np.maximum.at(more, (j + dj, i + di), less)
             raster += sign * more
 
-    def pull(self, line: GuidedTrack, steps_m: Floats, gain_m: float, rounds: int = ROUNDS) -> GuidedTrack:
+    def pull(self, line: GuidedTrack, steps_m: Floats, gain_m: float, rounds: int = PULL_ROUNDS) -> GuidedTrack:
         """Make a line cheaper by moves of ``steps_m`` metres, each of which must gain ``gain_m`` metres of track.
 
         A line of too many points is returned as it is.
@@ -104,7 +104,7 @@ class CorridorRaster:
         p, n = self.problem, len(line.points)
         energy = p.objective == "energy"
         unit = p.horizontal_j_per_m if energy else 1.0
-        capacity = pull_kernels.MOST_POINTS
+        capacity = pull_kernels.MOST_PULLED
         if n > capacity - 2:
             return line
         points, pinned, pin_m, amsl = (
@@ -129,14 +129,14 @@ class CorridorRaster:
                 p.vertical_j_per_m,
                 unit,
                 float(energy),
-                PENALTY * unit,
+                MISSING_COST * unit,
                 p.airspace.beside_m(p.limits),
             ]
         )
         p.budget.spend("pull", n * len(steps_m))
         count = pull_kernels.pull(
             points, pinned, pin_m, amsl, n, float(p.start[2]), float(p.goal[2]), self.floor_m, self.ceiling_m,
-            self.circles, self.edges, spec, steps_m, gain_m * unit, rounds, AROUND_M, *self.work,
+            self.circles, self.edges, spec, steps_m, gain_m * unit, rounds, MOVE_REACH_M, *self.work,
         )  # fmt: skip
         cost, missing = self.work[-1]
         return GuidedTrack(
@@ -169,7 +169,7 @@ def make_guide(
     """The guide within about ``radius_m`` of some tracks ``ways`` (N, 2).
 
     ``over``: zones known to be flown over (True) or under (False). ``finest_m``: most metres between nodes, unless the
-    raster would have more than `MOST_NODES`.
+    raster would have more than `MOST_RASTER_NODES`.
     """
     air, limits = problem.airspace, problem.limits
     everything = np.vstack(ways)
@@ -178,7 +178,7 @@ def make_guide(
     length = sum(float(np.hypot(*np.diff(w, axis=0).T).sum()) for w in ways)
     cell = float(air.surface.grid.metres_per_cell(*terminals_of(problem)[0]).min())
     area = min((east - west) * (north - south), 2.0 * radius_m * (length + 2.0 * radius_m))
-    step = max(min(FINEST_PART * cell, finest_m, 0.02 * length), math.sqrt(area / MOST_NODES), 0.05)
+    step = max(min(FINEST_PART * cell, finest_m, 0.02 * length), math.sqrt(area / MOST_RASTER_NODES), 0.05)
     x: Floats = np.arange(west, east + step, step)
     y: Floats = np.arange(south, north + step, step)
     near = np.zeros((len(y), len(x)), bool)

@@ -16,7 +16,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.lattice.corridor_raster import CorridorRaster, GuidedTrack, line_of, make_guide
-from gcsplan.planners.lattice.routes import LEVELS, LatticeSize, Router, climbing_weight
+from gcsplan.planners.lattice.routes import LATTICE_SIZES, LatticeSize, Router, climbing_weight
 from gcsplan.planners.problem import Problem, Refusal, straight_way_m
 from gcsplan.planners.profile.climb_laps import pins_of, with_climbs
 from gcsplan.planners.profile.exact import LegJudge, Unsettled, settle
@@ -46,7 +46,7 @@ DETOURS, DETOUR_STEPS, DETOUR_PART = (0.2, 0.4, 0.6, 0.8), 4.0, 0.03
 least as a part of the straight track."""
 BETTER = 0.5
 """Part of the work left that other tracks and kicks may take once there is a path."""
-KICKS = 10
+LINE_KICKS = 10
 KICK_PARTS = (0.02, 0.05)
 
 
@@ -59,7 +59,7 @@ def plan_band(problem: Problem, tell: Tell, *, climbs: bool = True) -> Floats:
     way = straight_way_m(problem)
     best: Floats | None = None
     router: Router | None = None
-    for level in LEVELS if climbs else LEVELS[:2]:
+    for level in LATTICE_SIZES if climbs else LATTICE_SIZES[:2]:
         if best is None and not problem.budget.goes_on():
             break
         tell("search", None if best is None else problem.cost(Path(best)))
@@ -67,7 +67,7 @@ def plan_band(problem: Problem, tell: Tell, *, climbs: bool = True) -> Floats:
         router = work.router
         cut = router.cut_off() if climbs else (False, False)
         found = None if any(cut) else work.first()
-        if found is None and climbs and best is None and (any(cut) or level is LEVELS[0]):
+        if found is None and climbs and best is None and (any(cut) or level is LATTICE_SIZES[0]):
             ends = cut if any(cut) else (True, True)
             found = with_climbs(problem, ends, lambda p: plan_band(p, tell, climbs=False))
         if found is not None:
@@ -230,7 +230,7 @@ class _Work:
         tell("polish", best.cost)
         rng = np.random.default_rng(self.problem.seed)
         for line in lines[:2]:
-            for _ in range(KICKS):
+            for _ in range(LINE_KICKS):
                 if not budget.goes_on():
                     break
                 kicked = guide.pull(self._kicked(line, rng), self._steps(FINE_STEPS), COARSE_GAIN * self.way_m)

@@ -169,7 +169,7 @@ class LatticeSize:
     nodes: int
 
 
-LEVELS = (
+LATTICE_SIZES = (
     LatticeSize(1.35, 25_000),
     LatticeSize(2.0, 60_000),
     LatticeSize(math.inf, 120_000),

@@ -45,7 +45,7 @@ INTERVAL_S, REFINED_S = 0.7e-6, 4e-6
 the least that refinement takes in nine of ten missions. Refinement raises bounds even if it ends with the budget."""
 NEARLY_ALL = 0.9
 """Part of the counted work left that the bound corridor may take beyond a gap of `MUCH`."""
-MOST_CELLS = 50_000
+MOST_CORRIDOR_CELLS = 50_000
 """Most cells of all corridors for which altitude intervals are computed."""
 ASLANT_NODES = 60_000
 """Nodes of the lattice on which tracks climb a slope aslant, about."""
@@ -302,7 +302,7 @@ class Searches:
     def _bound_by_intervals(self) -> None:
         plane = self.plane
         cells = sum(int(leg.corridor(plane.limit(leg)).cells.sum()) for leg in plane.legs)
-        plane.by_intervals = cells <= MOST_CELLS
+        plane.by_intervals = cells <= MOST_CORRIDOR_CELLS
         if plane.by_intervals:
             halve(plane)
 

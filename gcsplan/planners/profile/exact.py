@@ -19,12 +19,12 @@ from gcsplan.planners.profile.track import (
     make_track,
     values_at,
 )
-from gcsplan.planners.profile.zone_levels import SAMPLE_M, ZoneLevels
+from gcsplan.planners.profile.zone_levels import LEVEL_SAMPLE_M, ZoneLevels
 from gcsplan.world.airspace import Band, Legs, Tube, Violation
 
 TIGHT_M, TIGHT_SAMPLE_M = 1.0, 1.0
 """Where ceiling minus floor is less than `TIGHT_M` metres, samples are `TIGHT_SAMPLE_M` metres apart."""
-SPARE_M = 0.05
+PREFERRED_ROOM_M = 0.05
 """Metres kept from floor and ceiling where they are far enough apart: the exact check is fast away from its limits."""
 CORRECTIONS, CORRECTED_M = 24, 0.03
 """Most corrections of a profile after violations in the exact check; metres added to the size of each violation."""
@@ -183,7 +183,7 @@ def sampled_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats
     exact = make_track(problem, points, pinned, pin_m)
     at = [np.zeros(1)]
     for a, b in zip(exact.s_m[:-1], exact.s_m[1:], strict=True):
-        n = max(1, round((b - a) / SAMPLE_M))
+        n = max(1, round((b - a) / LEVEL_SAMPLE_M))
         at.append(a + (b - a) * np.arange(1, n + 1) / n)
     s = np.concatenate(at)
     s[-1] = exact.tube.s_m[-1]
@@ -198,7 +198,7 @@ def sampled_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats
         s = np.append(np.repeat(s[:-1], parts) + part * np.repeat(np.diff(s), parts), s[-1])
         floor, ceiling = _tube_at(problem, exact, s)
     with np.errstate(invalid="ignore"):
-        spare = np.clip(0.25 * (ceiling - floor), 0.0, SPARE_M)
+        spare = np.clip(0.25 * (ceiling - floor), 0.0, PREFERRED_ROOM_M)
     spare[[0, -1]] = 0.0
     spare = np.where(np.isfinite(floor), spare, 0.0)
     floor, ceiling = floor + spare, ceiling - spare

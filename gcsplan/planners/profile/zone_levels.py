@@ -20,7 +20,7 @@ from gcsplan.world.airspace import Band
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.geometry.zones import Polygon, Zone
 
-SAMPLE_M = 12.0
+LEVEL_SAMPLE_M = 12.0
 """Metres between samples along a track, at most."""
 SPARE_M, STEP_M = 0.05, 0.04
 """Metres added to the levels that are read; and by how much a level is corrected after its first violation in the exact
@@ -53,11 +53,11 @@ class ZoneLevels:
 
     @classmethod
     def of(cls, problem: Problem, track: Track, band: Band) -> ZoneLevels:
-        """A band's levels at samples no farther than `SAMPLE_M` apart; the band as it is if they are AMSL."""
+        """A band's levels at samples no farther than `LEVEL_SAMPLE_M` apart; the band as it is if they are AMSL."""
         air, zone = problem.airspace, problem.airspace.zones[band.zone]
         if not zone.follows_ground:
             return cls(band, np.stack([band.bottom_m, band.top_m]), np.full(len(band.bottom_m), math.inf))
-        parts = max(1, math.ceil((band.s1_m - band.s0_m) / SAMPLE_M))
+        parts = max(1, math.ceil((band.s1_m - band.s0_m) / LEVEL_SAMPLE_M))
         s = np.unique(np.concatenate([band.s_m, np.linspace(band.s0_m, band.s1_m, parts + 1)]))
         problem.budget.spend("place", len(s) * RING_POINTS)
         places = np.stack([np.interp(s, track.s_m, track.points[:, k]) for k in range(2)], axis=-1)

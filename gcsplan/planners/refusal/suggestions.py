@@ -24,7 +24,7 @@ from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.zones import Circle, Zone
 
-TRIES = 32
+MOST_TRIALS = 32
 """Most plans of changed problems."""
 SHARE, LEAST_S = 0.3, 1.0
 """No plan begins after this part of ``budget_s``, or after this many seconds if that is more."""
@@ -32,7 +32,7 @@ GRACE_S = 1.0
 """A plan that runs this many seconds beyond that time is stopped at its next progress report."""
 WHOLE_SHARE = 2.0
 """No whole plan begins after whole plans took this many times ``budget_s``, and none runs on after once more of it."""
-PARTS = 12
+BUDGET_PARTS = 12
 """The ``budget_s`` of one plan is that time divided by this number."""
 VALUES, WHOLE = 9, 3
 """Most values of one limit that are tried quickly, and that are planned whole."""
@@ -61,7 +61,7 @@ LEVEL = LatticeSize(math.inf, 40_000)
 
 
 class Trials:
-    """Plans of changed versions of one problem: at most `TRIES` quick ones, none of them begun after ``share_s``
+    """Plans of changed versions of one problem: at most `MOST_TRIALS` quick ones, none of them begun after ``share_s``
     seconds, and whole ones, bounded by `WHOLE_SHARE`.
 
     ``plan`` returns a solution or raises NoMission; ``whole`` is the same with everything that the caller asks of a
@@ -73,7 +73,7 @@ class Trials:
         self.share_s = max(SHARE * problem.budget_s, LEAST_S)
         self._begun_s = time.perf_counter()
         self._whole_s = 0.0
-        self._left = TRIES
+        self._left = MOST_TRIALS
         self.stopped = False
         """Whether the last quick plan was stopped, so that it is not known whether its problem has a path."""
         self.lacks = ""
@@ -99,7 +99,7 @@ class Trials:
                 self.stopped = True
                 raise Refusal("no mission: no path was found in the time for it", reason="not_found")
 
-        budget_s = min(self.problem.budget_s, self.share_s / PARTS)
+        budget_s = min(self.problem.budget_s, self.share_s / BUDGET_PARTS)
         quick = replace(changed, gap_percent=ANY_PERCENT, budget_s=budget_s, progress=watch)
         return self._points(self._plan, quick, what)
 

@@ -26,8 +26,8 @@ from gcsplan.planners.swarm.planner import Found, cost_of, drawn, until_found
 from gcsplan.planners.swarm.scene import Scene
 from gcsplan.planners.swarm.settings import Settings
 
-ACROSS = UPWARD = 21
-EDGE_PARTS = 16
+ACROSS = ALTITUDES = 21
+EDGE_POINTS = 16
 """Points on an edge that runs straight from one section to the next."""
 
 
@@ -98,8 +98,8 @@ def _section(scene: Scene, middle: Floats, left: Floats, reach_m: float) -> Floa
     flat = middle + np.linspace(first, max(first, last), ACROSS)[:, None] * left
     low, high = scene.room(flat)
     roomy = high >= np.nan_to_num(scene.floor(flat), nan=np.inf)
-    z = low[:, None] + np.linspace(0.0, 1.0, UPWARD) * (high - low)[:, None]
-    nodes = np.concatenate([np.repeat(flat[:, None], UPWARD, axis=1), z[..., None]], axis=-1)
+    z = low[:, None] + np.linspace(0.0, 1.0, ALTITUDES) * (high - low)[:, None]
+    nodes = np.concatenate([np.repeat(flat[:, None], ALTITUDES, axis=1), z[..., None]], axis=-1)
     return np.ascontiguousarray(nodes[roomy].reshape(-1, 3))
 
 
@@ -109,7 +109,7 @@ def open_between(scene: Scene, layers: list[Floats]) -> list[Floats]:
     for a, b in itertools.pairwise(layers):
         lengths = np.full((len(a), len(b)), np.inf)
         if lengths.size:
-            step_m = max(float(np.hypot(*(b.mean(axis=0) - a.mean(axis=0))[:2])) / EDGE_PARTS, 0.1)
+            step_m = max(float(np.hypot(*(b.mean(axis=0) - a.mean(axis=0))[:2])) / EDGE_POINTS, 0.1)
             k.open_edges(
                 a, b, step_m, scene.follows_ground, scene.heights, scene.quadratic, scene.floors, scene.floor_map,
                 scene.numbers, scene.zones, scene.corners, lengths,

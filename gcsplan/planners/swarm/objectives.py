@@ -29,13 +29,13 @@ from gcsplan.planners.swarm.encodings import Code, shares
 from gcsplan.planners.swarm.scene import SAMPLES, Scene
 from gcsplan.planners.swarm.scene_kernels import SCENE, clocks_of, nearness
 
-DEGREE = 3  # of the splines
+SPLINE_DEGREE = 3  # of the splines
 
 PENALTY = 100.0
 """Cost of a metre that is not allowed, in metres (D in all costs; C and PC of MSFOA, P of ABO, μ_obs of SSGWO are 100
 too)."""
 
-NODES = 30
+SSGWO_NODES = 30
 """SSGWO's number of nodes, at which angles and nearness are measured."""
 
 
@@ -81,7 +81,7 @@ def curve(points: tuple[int, ...], legs: tuple[int, ...]) -> Curve:
 def _bands(basis: Floats) -> tuple[Floats, Int64s]:
     """`Curve.bands` and `Curve.spans` of a basis."""
     controls, samples = basis.shape
-    width = DEGREE + 1
+    width = SPLINE_DEGREE + 1
     first = np.minimum((basis != 0.0).argmax(axis=0), max(controls - width, 0))
     begins = np.flatnonzero(np.diff(first, prepend=-1))
     spans = np.stack([begins, np.append(begins[1:], samples), first[begins]], axis=-1)
@@ -92,7 +92,7 @@ def _bands(basis: Floats) -> tuple[Floats, Int64s]:
 
 def _basis(controls: int, samples: int) -> Floats:
     """Values (controls, samples) of the clamped basis of degree 3, or of ``controls`` - 1 if that is less."""
-    degree = min(DEGREE, controls - 1)
+    degree = min(SPLINE_DEGREE, controls - 1)
     knots = np.concatenate([np.zeros(degree), np.linspace(0.0, 1.0, controls - degree + 1), np.ones(degree)])
     u = np.linspace(0.0, 1.0, samples)[:, None]
     last = controls - 1  # the interval to which u = 1 belongs
@@ -347,6 +347,6 @@ class Cost:
 
 def sampled(scene: Scene, points: tuple[int, ...]) -> tuple[Curve, int]:
     """The curve with ``points`` free control points in each stage, and the number of samples from node to node."""
-    stride = max(1, round(SAMPLES / (NODES + 1)))
-    legs = shares((NODES + 1) * stride, np.linalg.norm(np.diff(scene.terminals, axis=0), axis=1))
+    stride = max(1, round(SAMPLES / (SSGWO_NODES + 1)))
+    legs = shares((SSGWO_NODES + 1) * stride, np.linalg.norm(np.diff(scene.terminals, axis=0), axis=1))
     return curve(points, legs), stride

@@ -14,7 +14,7 @@ from gcsplan.app.fleet import pipeline
 from gcsplan.errors import CheckFailed, NoMission
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
-from gcsplan.planners.refusal.suggestions import GRACE_S, LEAST_S, SHARE, TRIES, WHOLE, WHOLE_SHARE, with_cures
+from gcsplan.planners.refusal.suggestions import GRACE_S, LEAST_S, MOST_TRIALS, SHARE, WHOLE, WHOLE_SHARE, with_cures
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.path import Path
@@ -232,7 +232,7 @@ def test_a_plan_that_runs_on_is_stopped_when_it_reports_progress(monkeypatch: py
 def test_so_many_plans_and_no_more(opens: Callable[[Problem], bool], monkeypatch: pytest.MonkeyPatch) -> None:
     slow = SlowPlan(0.0, opens)
     cures_of(many_limits(), slow, monkeypatch)
-    assert 4 <= slow.asked <= TRIES + 3 * WHOLE  # three limits have values
+    assert 4 <= slow.asked <= MOST_TRIALS + 3 * WHOLE  # three limits have values
 
 
 def test_a_value_that_was_tried_in_vain_is_not_reported_to_do(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -34,7 +34,7 @@ NARROW_M = 0.25
 """Metres; an interval between two caps that is narrower is not halved."""
 
 
-STEPS = 400
+FLOOR_STEPS = 400
 """Steps along a leg between the places at which the floor is read."""
 
 CLOSER, LEFT, FLAT = 8, 0.05, 0.2
@@ -44,7 +44,7 @@ FALLS = -0.25
 """Change of the bound of cheaper paths with their greatest cost, assumed until two such bounds are known."""
 CLIMBED = (0.98, 0.9, 0.75, 0.5)
 """Parts of the extra length that climbing costs the longest tracks, tried in turn as that of shorter tracks."""
-PIECES = 4
+LENGTH_PIECES = 4
 """Pieces into which the range of track lengths is cut; each piece has its own bound of the climb."""
 
 
@@ -104,9 +104,9 @@ def altitude_ranges(leg: Leg, track_m: float, limit_m: float) -> tuple[Floats, F
     A longer track is mapped to ``track_m`` by moving its points towards its start by at most what it is longer. So the
     floor at a place is the lowest, and the ceiling the highest, within that distance; inf and -inf where no cell is.
     """
-    at = np.linspace(0.0, track_m, STEPS + 1)[1:-1]
-    low, high = (np.full((STEPS.bit_length(), len(at)), fill) for fill in (np.inf, -np.inf))
-    range_along(*leg.cells(limit_m), limit_m, max(limit_m - track_m, 0.0), track_m / STEPS, low, high)
+    at = np.linspace(0.0, track_m, FLOOR_STEPS + 1)[1:-1]
+    low, high = (np.full((FLOOR_STEPS.bit_length(), len(at)), fill) for fill in (np.inf, -np.inf))
+    range_along(*leg.cells(limit_m), limit_m, max(limit_m - track_m, 0.0), track_m / FLOOR_STEPS, low, high)
     return at, low[0], high[0]
 
 
@@ -274,14 +274,14 @@ def _least_of_pieces(plane: PlaneSearch, tracks_m: list[float], spare_m: float) 
 
 
 def _pieces(tracks_m: list[float], spare_m: float) -> Iterator[tuple[list[float], list[float]]]:
-    """Least and greatest track lengths, leg by leg, of `PIECES` pieces of the range from ``tracks_m`` to ``spare_m``
-    more. The less lengths differ, the better it is known where a track is after so many metres. Several legs make a
-    single piece, because it is not known how they share ``spare_m``."""
+    """Least and greatest track lengths, leg by leg, of `LENGTH_PIECES` pieces of the range from ``tracks_m`` to
+    ``spare_m`` more. The less lengths differ, the better it is known where a track is after so many metres. Several
+    legs make a single piece, because it is not known how they share ``spare_m``."""
     if len(tracks_m) > 1:
         yield tracks_m, [track + spare_m for track in tracks_m]
         return
-    for k in range(PIECES):
-        yield [tracks_m[0] + spare_m * k / PIECES], [tracks_m[0] + spare_m * (k + 1) / PIECES]
+    for k in range(LENGTH_PIECES):
+        yield [tracks_m[0] + spare_m * k / LENGTH_PIECES], [tracks_m[0] + spare_m * (k + 1) / LENGTH_PIECES]
 
 
 def bound_by_caps(plane: PlaneSearch) -> None:

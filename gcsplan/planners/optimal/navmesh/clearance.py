@@ -28,7 +28,7 @@ Cone = tuple[float, float, float, float]
 
 AROUND = 8
 """Nodes on each side of the wanted cells that are looked at too, at most: more than `climb_cones.BESIDE`."""
-RIM = 12.0
+RIM_CELLS = 12.0
 """Depth, in cells, to which a zone is looked at that may be too high to climb over so near an end."""
 ALIKE = 12.0
 """A bound's floors make use of the track error only if a cell's diagonal is less than this many times the error."""
@@ -41,7 +41,7 @@ NODE_BYTES = 150.0
 """Bytes of a node that is looked at, with the cells and pieces beside it."""
 MOST_MEET = 8
 """Most pieces of a lattice that meet at one node: two triangles of each of the four cells around it."""
-MANY = 8
+MANY_NAMES = 8
 """If a mesh has more possible names per portal than this, names are renumbered without gaps: searches allocate arrays
 with an entry for every name."""
 
@@ -222,7 +222,7 @@ class ClearanceGrid:
             self._lift, self._either = self._array("lift", self.shape), np.zeros(self.shape, np.int8)
             lift_lids(
                 self._around, self._floor, self._ground, self._x, self._y, self._zones, self._edges, self._boxes,
-                self.cap_m, RIM * cell_m / (self.plane.parts * self.fineness), self._lift, self._either,
+                self.cap_m, RIM_CELLS * cell_m / (self.plane.parts * self.fineness), self._lift, self._either,
             )  # fmt: skip
         if not self._laid:
             self._lay()
@@ -293,7 +293,7 @@ class ClearanceGrid:
         start, order = np.zeros(count + 1, np.int32), np.empty(2 * n, np.int32)
         sort_portals(joins[:n], start, order)
         names, named = names[:n], 8 * (rows * cols + 1)
-        if named > MANY * n:
+        if named > MANY_NAMES * n:
             corner = names >= 0
             used, names[corner] = np.unique(names[corner], return_inverse=True)
             named = len(used)

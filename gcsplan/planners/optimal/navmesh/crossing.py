@@ -26,7 +26,7 @@ SHRUNK_M = 0.02
 and a smaller outline keeps the bound a bound."""
 TOUCHING_M = 1e-6
 """Metres within which two shapes count as touching; much less than `SHRUNK_M`."""
-MOST_CORNERS = 256
+MOST_WAY_CORNERS = 256
 """Most corners of all outlines around which the ways lead: the work grows with their square."""
 PART, OFF_PARTS = 1e-5, (5e-5, 2e-4)
 """Parts of the length by which the bound may be too low, and by which arcs may be drawn too small: a way that turns
@@ -207,7 +207,7 @@ class _Views:
 
     def __init__(self, a: GroundPlace, b: GroundPlace, shapes: Sequence[shapely.Geometry], budget: Budget) -> None:
         corners = np.unique(np.concatenate([shapely.get_coordinates(s) for s in shapes]), axis=0)
-        if len(corners) > MOST_CORNERS:
+        if len(corners) > MOST_WAY_CORNERS:
             raise Exhausted(0.0)
         small = [s.buffer(-SHRUNK_M, join_style="mitre", mitre_limit=10.0) for s in shapes]
         self.solid = shapely.union_all(small)

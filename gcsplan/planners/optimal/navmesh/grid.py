@@ -31,7 +31,7 @@ from gcsplan.world.geometry.zones import Box
 NodeExtent = tuple[int, int, int, int]
 """First and last columns and rows (col0, row0, col1, row1) of a terrain model's nodes."""
 
-LARGE = 1 << 22
+HUGE_PAGE_BYTES = 1 << 22
 """Size of an array, in bytes, from which numpy requests huge pages."""
 
 DetourEllipse = tuple[tuple[float, float], tuple[float, float], float]
@@ -120,7 +120,7 @@ class Scratch:
 
 
 def _small_pages(size: int, dtype: np.dtype[Any]) -> NDArray[Any]:
-    if size * dtype.itemsize < LARGE:
+    if size * dtype.itemsize < HUGE_PAGE_BYTES:
         return np.empty(size, dtype)
     return np.frombuffer(mmap.mmap(-1, size * dtype.itemsize), dtype)
 

@@ -44,7 +44,7 @@ ROUNDING = 1e-9
 """Part of a step between places by which a cell's range is widened at both ends."""
 
 
-RINGS = ((1.0, 32), (0.8, 16), (0.5, 8), (0.25, 4), (0.0, 1))
+CELL_RINGS = ((1.0, 32), (0.8, 16), (0.5, 8), (0.25, 4), (0.0, 1))
 """Circles around a cell on which ground is read, as parts of the reach, and cells on each: on a slope, the lowest and
 the highest lie on the largest."""
 
@@ -176,7 +176,7 @@ def range_along(
                 highs[level - 1, i] = max(highs[level - 1, i], highs[level, k])
 
 
-DISC = np.array([(r * math.sin(a), r * math.cos(a)) for r, n in RINGS for a in np.arange(n) * (2.0 * math.pi / n)])
+DISC = np.array([(r * math.sin(a), r * math.cos(a)) for r, n in CELL_RINGS for a in np.arange(n) * (2.0 * math.pi / n)])
 """Those cells: rows and columns away, for a reach of 1."""
 
 

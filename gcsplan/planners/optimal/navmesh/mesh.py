@@ -16,14 +16,14 @@ from gcsplan.planners.optimal.navmesh.zone_shapes import LOOSE
 
 BENT_M = LOOSE.bent_m
 """Metres that a raster's line may bow between the corners of a block, at most."""
-ASIDE = 0.25
+PLACE_OFF_CELLS = 0.25
 """Cells that a place may lie beside its computed position on a lattice, at most."""
-BESIDE = 1e-3
+PIECE_OFF_CELLS = 1e-3
 """Cells that a place may lie beside a piece that tracks from it begin in, at most, east and north."""
 MOST_OPENED, ANYHOW, OF_PORTAL = 3_000_000, 100_000, 64
 """Intervals that a search may open before it is given up: at most `MOST_OPENED`, and at most `ANYHOW` plus `OF_PORTAL`
 per portal. If the goal is farther than the limit, and many tracks lead around many corners, it would open many more."""
-NODE_BYTES = 200.0
+INTERVAL_BYTES = 200.0
 """Bytes of an opened interval, with those that it yields and that are never opened."""
 
 
@@ -88,19 +88,20 @@ class Mesh(Portals):
         rows, cols = self.excess.shape
         c, r = self.plane.at(place)
         i, j = (
-            {math.floor(at - first + off) for off in (-ASIDE, ASIDE)} for at, first in ((c, self.col), (r, self.row))
+            {math.floor(at - first + off) for off in (-PLACE_OFF_CELLS, PLACE_OFF_CELLS)}
+            for at, first in ((c, self.col), (r, self.row))
         )
         found = {q * (cols - 1) + p for q in j for p in i if 0 <= q < rows - 1 and 0 <= p < cols - 1}
         return np.array(sorted(found), np.int64)
 
     def pieces_at(self, place: GroundPlace) -> list[int]:
-        """The free pieces at a place: in its own cell, and in cells no farther than `BESIDE`."""
+        """The free pieces at a place: in its own cell, and in cells no farther than `PIECE_OFF_CELLS`."""
         found: list[int] = []
         rows, cols = self.excess.shape
         c, r = self.plane.at(place)
         c, r = self.fineness * (c - self.col), self.fineness * (r - self.row)
-        for dj in (0.0, -BESIDE, BESIDE):
-            for di in (0.0, -BESIDE, BESIDE):
+        for dj in (0.0, -PIECE_OFF_CELLS, PIECE_OFF_CELLS):
+            for di in (0.0, -PIECE_OFF_CELLS, PIECE_OFF_CELLS):
                 i, j = math.floor(c + di), math.floor(r + dj)
                 if not (0 <= i < cols - 1 and 0 <= j < rows - 1):
                     continue
@@ -144,7 +145,7 @@ class Mesh(Portals):
     ) -> GroundTrack | None:
         budget = self.plane.problem.budget
         most = min(MOST_OPENED, ANYHOW + OF_PORTAL * len(self.joins))
-        most = int(min(most, budget.megabytes * 1e6 / NODE_BYTES, max(budget.left, 0.0) / RATES["opened"] + ANYHOW))
+        most = int(min(most, budget.megabytes * 1e6 / INTERVAL_BYTES, max(budget.left, 0.0) / RATES["opened"] + ANYHOW))
         budget.spend("portal", len(self.joins))
         opened = float(most)
         try:
@@ -222,7 +223,7 @@ class Guide:
         entered = self._entered(cells)
         most = np.fmax(*np.where(np.isfinite(entered), entered, np.nan))
         # The place itself may lie beside the pieces at it, see `Mesh.pieces_at`.
-        across = (1.0 + 2.0 * BESIDE) * (self.mesh.widths(cells) + 2.0 * BENT_M)
+        across = (1.0 + 2.0 * PIECE_OFF_CELLS) * (self.mesh.widths(cells) + 2.0 * BENT_M)
         return np.asarray(np.where(np.isnan(most), np.inf, most + across))
 
     def _entered(self, cells: Int64s) -> Floats:

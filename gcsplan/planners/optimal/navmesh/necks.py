@@ -45,7 +45,7 @@ MOST_NODES = 1e6
 """Most nodes in the box of one neck's finer lattice; a neck that needs more is not looked at."""
 NEW = np.iinfo(np.int64).min
 """The name of the ends of a new portal until it gets one."""
-SAME_M = 1e-4
+SAME_END_M = 1e-4
 """Ends of portals that are no farther apart are at one place."""
 LOOKS, LOOK_M = 24, 1.0
 """Most times that necks are looked at for one track; and the least step, m, at which it is read where it is shut. The
@@ -361,7 +361,7 @@ def _names(names: Indices, joins: Indices, ends: Floats, cut: Floats, first: int
     The ends at one place have the same name if pieces join them there: of the parts of a cell that meet at a node, a
     track at the node in one part is not in the other. If the way around a node is open, no track turns there.
     """
-    both = np.round(np.vstack([ends, cut]).reshape(-1, 2) / SAME_M).astype(np.int64)
+    both = np.round(np.vstack([ends, cut]).reshape(-1, 2) / SAME_END_M).astype(np.int64)
     place = np.unique(both, axis=0, return_inverse=True)[1].ravel()
     place, gone = place[: 2 * len(ends)], place[2 * len(ends) :]
     end = np.arange(len(place))

@@ -32,18 +32,18 @@ is a leg, `OFF_OUTER_M` or the share `OFF_OUTER` of the radius, whichever is mor
 NEAR = 1.03
 """Arcs are drawn finely where a track comes nearer than this times the distance to keep: there, coarse arcs may block
 what fine ones leave free, or leave a slit that fine ones shut; chords of `COARSE` are off by 2 % of the radius."""
-ROUNDS = 300
+MOST_SEARCHES_OF_TRACK = 300
 """Times that a track is searched for, each time with more zones or finer arcs, at most."""
-MOST_CORNERS = 12_000
+MOST_MESH_CORNERS = 12_000
 """Corners of all outlines of one mesh, at most: with more, the triangulation takes seconds."""
 MOST_GROWN = 1000
 """Corners of one polygon that is grown, at most: its edges are grown one by one, a thousand in half a second."""
-APART_M = 1e-5
+CORNERS_APART_M = 1e-5
 """Metres that corners of a mesh are apart at least: where outlines meet, rounding may make two of one, and a track that
 turns there would be missed. Outlines keep a hair that is much more."""
 BEYOND_M = 1.0
 """Metres that the mesh reaches beyond the outlines and the places."""
-MOST_OPENED = 1_000_000
+MOST_SEARCH_NODES = 1_000_000
 """Search nodes that Polyanya may open over one mesh."""
 
 
@@ -201,14 +201,14 @@ def shortest_past(a: GroundPlace, b: GroundPlace, shapes: Sequence[shapely.Polyg
     places = np.array([a, b])
     bounds = np.array([*(s.bounds for s in shapes), (*places.min(axis=0), *places.max(axis=0))])
     box = shapely.box(*(bounds[:, :2].min(axis=0) - BEYOND_M), *(bounds[:, 2:].max(axis=0) + BEYOND_M))
-    free = shapely.set_precision(box.difference(shapely.union_all(shapes)), APART_M) if shapes else box
-    if shapely.get_num_coordinates(free) > MOST_CORNERS:
+    free = shapely.set_precision(box.difference(shapely.union_all(shapes)), CORNERS_APART_M) if shapes else box
+    if shapely.get_num_coordinates(free) > MOST_MESH_CORNERS:
         raise Exhausted(0.0)
     parts = [p for p in shapely.get_parts(free) if shapely.dwithin(p, shapely.points(places), 1e-6).all()]
     if not parts:
         return None
     mesh = Triangles(parts[0])
-    return mesh.shortest(a, b, mesh.pieces_at(a), mesh.pieces_at(b), MOST_OPENED)[0]
+    return mesh.shortest(a, b, mesh.pieces_at(a), mesh.pieces_at(b), MOST_SEARCH_NODES)[0]
 
 
 class Solids:
@@ -244,7 +244,7 @@ class Solids:
 
     def shortest(self, a: GroundPlace, b: GroundPlace, which: Bools) -> GroundTrack | None:
         """The shortest track from ``a`` to ``b`` around the zones ``which`` (zones,); None if they separate the two."""
-        for _ in range(ROUNDS):
+        for _ in range(MOST_SEARCHES_OF_TRACK):
             known = [k for k in sorted(self._known) if which[k]]
             track = self._past(a, b, known)
             if track is None:

@@ -23,11 +23,11 @@ from gcsplan.planners.optimal.navmesh.interval_kernels import cut_intervals, spr
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.world.geometry.limits import Limits
 
-MOST = 4
+MOST_INTERVALS = 4
 """Most intervals over one cell; zones that would make more are ignored."""
 
 
-SPARE_M = 1e-3
+INTERVAL_SPARE_M = 1e-3
 """Metres by which intervals and the altitudes of the ends are widened, for rounding and for intervals that touch."""
 KEPT = 4
 """Most track lengths for which all intervals are cached."""
@@ -47,7 +47,7 @@ def ranges(mesh: Mesh, top_m: float, cells: Int64s) -> tuple[Floats, Floats]:
         most = np.maximum(pairs[:, :-1], pairs[:, 1:]).ravel()[cells]
         high = np.fmin(high, most + (limits.max_agl_m - limits.altitude_error_m + plane.fit.spare_m))
     count, lows, highs = intervals(mesh, cells, low, high, 0.0)
-    there = np.arange(MOST) < count[:, None]
+    there = np.arange(MOST_INTERVALS) < count[:, None]
     return np.where(there, lows, np.inf).min(axis=1), np.where(there, highs, -np.inf).max(axis=1)
 
 
@@ -57,10 +57,10 @@ def intervals(
     """Cut the range of each of ``cells``, ``low_m`` to ``high_m`` from `ranges`, into the altitude intervals that zones
     leave.
 
-    Returns the number of intervals (K,), at most `MOST`, and their lower and upper ends (K, `MOST`), each ``spare_m``
-    further out. ``mesh``: as for `ranges`.
+    Returns the number of intervals (K,), at most `MOST_INTERVALS`, and their lower and upper ends (K,
+    `MOST_INTERVALS`), each ``spare_m`` further out. ``mesh``: as for `ranges`.
     """
-    low, high = np.empty((len(cells), MOST)), np.empty((len(cells), MOST))
+    low, high = np.empty((len(cells), MOST_INTERVALS)), np.empty((len(cells), MOST_INTERVALS))
     low[:, 0], high[:, 0] = low_m - spare_m, high_m + spare_m
     count = (low_m <= high_m).astype(np.int32)
     number = np.full(len(mesh.piece), -1, np.int32)
@@ -166,7 +166,7 @@ class AltitudeIntervals:
         room = np.empty(n), np.empty(n, np.int32), np.empty(n, np.int64)
         low, high, away = self.low_m, self.high_m, self.away_m.copy()
         latest, z, shut = limit_m - self.left_m, self.start.amsl_m, np.zeros(n - 1, np.bool_)
-        off_m = self.start.off_m + SPARE_M
+        off_m = self.start.off_m + INTERVAL_SPARE_M
 
         def least(own: Floats, most: Floats, begin: float) -> Floats:
             nonlocal shut
@@ -191,7 +191,7 @@ class AltitudeIntervals:
             away, low = np.maximum(away, (rises - high) / down), np.maximum(low, rises - down * latest)
         if falls is not None and rises is not None:
             away = np.maximum(away, (rises - falls) / (up + down))
-        left = ~shut & (away <= latest + SPARE_M) & (low <= high)
+        left = ~shut & (away <= latest + INTERVAL_SPARE_M) & (low <= high)
         return replace(self, low_m=low, high_m=high, away_m=away).only(left)
 
 

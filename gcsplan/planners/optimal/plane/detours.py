@@ -35,7 +35,7 @@ TAKEN = 5
 """Most tracks over which paths are looked for."""
 MORE = 1.1
 """A track that takes more than this many times the spare metres near the ends in laps takes its laps elsewhere."""
-LITTLE = 1e-4
+LEAST_GAIN = 1e-4
 """Part of the cost below which a gain is not worth a search."""
 NARROW = 0.04
 """Ranges of spare metres are not split if they cost less than this part of the difference between path and bound."""
@@ -150,7 +150,7 @@ class DetourSearch:
         """Whether a choice whose track is at least ``length_m`` long may hold a path that is better by more than a
         little."""
         cost = self.incumbent.cost
-        little = min(NARROW * (cost - self.incumbent.bound), LITTLE * cost) if math.isfinite(cost) else 0.0
+        little = min(NARROW * (cost - self.incumbent.bound), LEAST_GAIN * cost) if math.isfinite(cost) else 0.0
         return self.incumbent.least(length_m + sum(choice.least_m)) < cost - little
 
     def _closed(self, length_m: float, choice: SideChoice, zones: tuple[int, ...], push: Callable[..., None]) -> None:

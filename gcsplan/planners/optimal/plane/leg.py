@@ -23,8 +23,8 @@ from gcsplan.planners.optimal.navmesh.necks import LegNecks
 from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundPlace, GroundTrack
 from gcsplan.planners.optimal.navmesh.zone_shapes import CLOSE, LOOSE
 from gcsplan.planners.optimal.plane.altitude_intervals import (
-    MOST,
-    SPARE_M,
+    INTERVAL_SPARE_M,
+    MOST_INTERVALS,
     AltitudeIntervals,
     Reached,
     Terminal,
@@ -64,7 +64,7 @@ MOST_ALONE = 50_000
 """Most cells of the finer lattice that `refine` cuts again, into four parts for ``cut`` 2."""
 LEARNT = 10
 """Most searches for one track over nodes that are only as high as in the exact check; see ``narrow`` of `track`."""
-BESIDE = 8
+CELLS_BESIDE = 8
 """Cells that the finer lattice extends beyond the requested ones, because later tracks may lie beside them."""
 MUCH_LONGER, ROUGHLY = 1.1, 3
 """If tracks may be this many times as long as the known bound, cells for their bound are this many times larger."""
@@ -268,7 +268,7 @@ class Leg:
             elif (
                 plane is self.plane
                 and self.cells_of.has_fine
-                and fits_memory(self.problem, cells, BESIDE, self.cells_of.ratio)
+                and fits_memory(self.problem, cells, CELLS_BESIDE, self.cells_of.ratio)
             ):
                 plane, cells = self._over(cells)
         if roughly:
@@ -423,8 +423,8 @@ class Leg:
         close = self._closer(limit)
         if self._reached is None or self._reached[0] is not close:
             mesh, a, b, off_m = close.left.mesh, self.start, self.goal, self.problem.rounding_m[1]
-            count, low, high = intervals(mesh, close.cell, close.low_m, close.high_m, SPARE_M)
-            k, nth = np.nonzero(np.arange(MOST) < count[:, None])
+            count, low, high = intervals(mesh, close.cell, close.low_m, close.high_m, INTERVAL_SPARE_M)
+            k, nth = np.nonzero(np.arange(MOST_INTERVALS) < count[:, None])
             every = AltitudeIntervals(
                 (mesh.excess.shape[0] - 1, mesh.excess.shape[1] - 1),
                 close.cell[k],
@@ -477,7 +477,10 @@ class Leg:
         if self._twin is None or (cells & ~self._twin[1]).any():
             row, col, last_row, last_col = box_of(cells)
             wide = np.zeros(cells.shape, np.bool_)
-            wide[max(row - BESIDE, 0) : last_row + BESIDE, max(col - BESIDE, 0) : last_col + BESIDE] = True
+            wide[
+                max(row - CELLS_BESIDE, 0) : last_row + CELLS_BESIDE,
+                max(col - CELLS_BESIDE, 0) : last_col + CELLS_BESIDE,
+            ] = True
             self._twin = finer_plane(self.plane, wide, self.cells_of.parts, self.cells_of.fine_stride, LOOSE)[0], wide
         plane = self._twin[0]
         return plane, on_finer(self.plane, cells, plane)

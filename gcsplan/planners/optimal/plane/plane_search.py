@@ -24,7 +24,7 @@ from gcsplan.world.geometry.surface import GridMap, Surface
 
 FEW = 64
 """A level terrain model of at most this many nodes is replaced."""
-NODES = 65
+LEVEL_NODES = 65
 """Nodes along each side of the terrain model that replaces it."""
 MARGIN = 0.02
 """Part by which the new model extends beyond the places that paths can reach."""
@@ -66,10 +66,10 @@ def in_window(incumbent: Incumbent) -> Problem:
         reach = 0.5 * (length_m - straight) * (1.0 + MARGIN) + 0.5 * straight * MARGIN
         reach = max(reach, 0.5 * math.sqrt(max(length_m**2 - straight**2, 0.0)) * (1.0 + MARGIN)) + 1.0
         low, high = np.maximum(low, places.min(axis=0) - reach), np.minimum(high, places.max(axis=0) + reach)
-    step = (high - low) / (NODES - 1)
+    step = (high - low) / (LEVEL_NODES - 1)
     grid = GridMap.affine(float(low[0]), float(high[1]), float(step[0]), float(step[1]))
-    heights = np.full((NODES, NODES), float(ground[0, 0]))
-    tops = heights if top is ground else np.full((NODES, NODES), float(top[0, 0]))
+    heights = np.full((LEVEL_NODES, LEVEL_NODES), float(ground[0, 0]))
+    tops = heights if top is ground else np.full((LEVEL_NODES, LEVEL_NODES), float(top[0, 0]))
     air = Airspace(
         Surface(heights, tops, grid, dict(surface.info)), problem.airspace.zones, scale=problem.airspace.scale
     )

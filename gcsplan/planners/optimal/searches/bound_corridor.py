@@ -38,9 +38,9 @@ REACHED = 0.95
 """Part of the climb limit at which the track from or to a terminal is taken to climb."""
 ASIDE_M = 0.3
 """Metres by which places are moved away from zones."""
-APART_M = 1e-3
+SAME_PLACE_M = 1e-3
 """Metres; places nearer to each other count as one."""
-SLACKS = (0.008, 0.15)
+STRETCH_SLACKS = (0.008, 0.15)
 """Parts by which tracks of a stretch may be longer than its shortest; tracks that are longer pass through no slit."""
 FARTHEST = 1.5
 """Most times as long as the straight track that tracks of a stretch may be."""
@@ -52,9 +52,9 @@ FAR, CLOSE_BY = 5e-3, (3e-3, 3e-2, math.inf)
 pieces on finer cells; and the parts by which tracks may be longer than the bound for the former, in turn."""
 SHORTER = 0.7
 """Most of a leg's straight track for a piece to be searched on finer cells."""
-MOST = 24
+MOST_STRETCHES = 24
 """Most stretches of a track; a track with more is not tried."""
-AT_ONCE = 512
+PLACES_AT_ONCE = 512
 """Places whose distance from a track is computed in one batch."""
 
 
@@ -160,9 +160,9 @@ def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
             better.append((a, b, part))
     out, begin = [], -math.inf
     for a, b, part in better:
-        out += [path[(on_path > begin + APART_M) & (on_path < a - APART_M)], part]
+        out += [path[(on_path > begin + SAME_PLACE_M) & (on_path < a - SAME_PLACE_M)], part]
         begin = b
-    return np.vstack([*out, path[on_path > begin + APART_M]]) if out else None
+    return np.vstack([*out, path[on_path > begin + SAME_PLACE_M]]) if out else None
 
 
 def _part(plane: PlaneSearch, problem: Problem, start: Floats, goal: Floats) -> PlaneSearch:
@@ -213,7 +213,7 @@ def _past(
     """`_along` past the stretches that are shut; ``low``, ``high`` (N,): what is free at the places."""
     # An infinite floor is shut (unknown ground), or given (an end), whatever is free below the cap.
     stretches = shut_stretches(np.subtract(low, high, out=low.copy(), where=np.isfinite(low)))
-    if len(stretches) > MOST:
+    if len(stretches) > MOST_STRETCHES:
         return None
     cuts = sorted({0, len(s) - 1, *(k for stretch in stretches for k in stretch)})
     out: list[Floats] = []
@@ -230,7 +230,7 @@ def _past(
         if (first, last) not in stretches:
             sub.take_along(joined([np.vstack([start[:2], places[first + 1 : last], goal[:2]])], []))
         if sub.best is None:
-            for _ in found.first_looks(SLACKS):
+            for _ in found.first_looks(STRETCH_SLACKS):
                 pass
         if sub.best is None and not sub.proved_infeasible and found.legs:
             lowest = over_pass(
@@ -249,8 +249,8 @@ def nearest_on(places: Floats, track: Floats) -> tuple[Floats, Floats]:
     """(N,) distances of places from a track, and metres along the track (N,) of the points nearest to them."""
     a, d, s = track[:-1], np.diff(track, axis=0), distances(track)
     away, where = np.empty(len(places)), np.empty(len(places))
-    for first in range(0, len(places), AT_ONCE):
-        part = slice(first, first + AT_ONCE)
+    for first in range(0, len(places), PLACES_AT_ONCE):
+        part = slice(first, first + PLACES_AT_ONCE)
         t = ((places[part, None] - a) * d).sum(axis=-1) / np.maximum((d * d).sum(axis=-1), 1e-12)
         t = t.clip(0.0, 1.0)
         off = np.hypot(*(places[part, None] - a - t[..., None] * d).transpose(2, 0, 1))
@@ -306,7 +306,7 @@ def _height(plane: PlaneSearch, leg: Leg, from_start_m: float, to_goal_m: float,
         (leg.goal, to_goal_m, limits.max_descent_slope),
     ):
         if terminal.amsl_m is not None:
-            z = terminal.amsl_m if way_m < APART_M else min(z, terminal.amsl_m + REACHED * slope * way_m)
+            z = terminal.amsl_m if way_m < SAME_PLACE_M else min(z, terminal.amsl_m + REACHED * slope * way_m)
     return z
 
 

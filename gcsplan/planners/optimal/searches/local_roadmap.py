@@ -29,7 +29,7 @@ NODES, PLACES, LEVELS = 8000, (200, 1000), (7, 30)
 """About how many nodes a roadmap has; fewest and most places; fewest and most altitudes at each place."""
 NEIGHBOURS = 16
 """Each place is linked to that many nearest places."""
-SPOKES = 12
+CIRCLE_PLACES = 12
 """Places around a circle."""
 MOST_RIMS, MOST_SLITS = 600, 60
 """Most places on rims of zones, and most slits."""
@@ -39,7 +39,7 @@ HAIR_M = 1e-3
 """How far outside a zone places lie, beyond the clearance and the track error."""
 SLIT = 0.5
 """Slits between circles matter up to that part of the roadmap's spacing in width."""
-WORTH = 0.03
+SECOND_WORTH = 0.03
 """Part of the cost that a first search must gain for a second one, nearer to the path that it found."""
 
 
@@ -49,11 +49,11 @@ PATHS, APART = 10, 3.0
 """Most paths between two terminals, and how many spacings each must lie from all before it at some node."""
 DRAWN = 8
 """The cheapest of those paths, which are drawn together."""
-HOPE = 1.06
+DRAWN_HOPE = 1.06
 """A path drawn together coarsely that costs more than this times the best known one is dropped."""
 VIA_LEVELS = 24
 """Most altitudes of a via whose altitude is free."""
-AT_ONCE = 20_000
+LEGS_AT_ONCE = 20_000
 """Legs under the exact check between two looks at the budget."""
 
 
@@ -75,7 +75,7 @@ def small_path(problem: Problem, known: Floats | None) -> tuple[Floats, Bools] |
             break
         before, found, known = best, better, better[0]
         best = cost_of(problem, known)
-        if best > before * (1.0 - WORTH):
+        if best > before * (1.0 - SECOND_WORTH):
             break
     return found
 
@@ -257,8 +257,8 @@ def _saddles(problem: Problem, part: NodeExtent) -> Floats:
 def _rims(problem: Problem) -> list[Floats]:
     """(N, 2) places just outside of each zone: around circles, at the corners of polygons."""
     more, out = problem.airspace.beside_m(problem.limits) + HAIR_M, []
-    turn = np.arange(SPOKES) * (2.0 * math.pi / SPOKES)
-    around = np.stack([np.cos(turn), np.sin(turn)], axis=-1) / math.cos(math.pi / SPOKES)
+    turn = np.arange(CIRCLE_PLACES) * (2.0 * math.pi / CIRCLE_PLACES)
+    around = np.stack([np.cos(turn), np.sin(turn)], axis=-1) / math.cos(math.pi / CIRCLE_PLACES)
     for zone in problem.airspace.zones:
         shape = zone.shape
         if isinstance(shape, Circle):
@@ -329,7 +329,7 @@ def path_over(
         kinds = np.full(len(points), FREE)
         ends = np.cumsum([0, *(len(part) - 1 for part in parts)])
         kinds[ends] = [FIXED, *(UPRIGHT if v.amsl_m is None else FIXED for v in problem.via), FIXED]
-        if cost_of(problem, points) <= HOPE * best:
+        if cost_of(problem, points) <= DRAWN_HOPE * best:
             tried.append((points, kinds))
     size_m = min(x.spacing_m for x in roadmaps)
     out: tuple[Floats, Bools] | None = None
@@ -431,10 +431,10 @@ class Roadmap:
 def _legal(problem: Problem, nodes: Floats, a: Indices, b: Indices) -> Bools:
     """(E,) which legs from nodes ``a`` to nodes ``b`` pass the exact check; False once the budget is spent."""
     out = np.zeros(len(a), np.bool_)
-    for k in range(0, len(a), AT_ONCE):
+    for k in range(0, len(a), LEGS_AT_ONCE):
         if not problem.budget.goes_on():
             break
-        some = slice(k, k + AT_ONCE)
+        some = slice(k, k + LEGS_AT_ONCE)
         out[some] = problem.legal(nodes[a[some]], nodes[b[some]])
     return out
 

@@ -124,7 +124,7 @@ def test_worlds_with_very_many_zones_are_searched_as_well() -> None:
 
 
 def test_a_roadmap_asks_for_budget_between_blocks_of_legs(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(local_roadmap, "AT_ONCE", 500)
+    monkeypatch.setattr(local_roadmap, "LEGS_AT_ONCE", 500)
     asked: list[float] = []
 
     class Counted(Budget):
