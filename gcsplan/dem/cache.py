@@ -14,8 +14,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
-from gcsplan.dem.cells import names_of
-from gcsplan.dem.sources import DemSource
+from gcsplan.dem.sources import DemSource, names_of
 from gcsplan.errors import InputError, Problem
 from gcsplan.world.terrain.cell import Cell
 from gcsplan.world.terrain.input_files import tell_file, tell_setting

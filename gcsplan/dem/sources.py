@@ -1,21 +1,38 @@
-"""The table of published terrain: where each source lies, what its heights mean, and how its tiles are named.
+"""The table of published terrain: where each source lies, what its heights mean, and which of its tiles an area needs.
 
 Addresses, names and spacings are those of the publishers' own descriptions (docs/how-to/terrain.md names them). A
-source belongs here only if its datum and its kind of model are stated by its publisher for every tile.
+source belongs here only if its datum and its kind of model are stated by its publisher for every tile. Tiles have one
+degree.
 """
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
+from gcsplan.errors import InputError
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.zones import Box
 from gcsplan.world.terrain.cell import Cell
 from gcsplan.world.terrain.input_files import tell_file
+from gcsplan.world.terrain.terrain import RASTER_SPARE_M
 
 ModelKind = Literal["surface", "bare"]
+
+
+MOST_LIST_BYTES = 64 * 2**20
+
+CELL_SPARE_M = RASTER_SPARE_M + 200.0
+"""Around a box, m: what is read around it, and three cells of the coarsest source."""
+
+MOST_TILES_OF_AREA = 100
+"""Most tiles that one mission or one command may need: a mission is much smaller, and so many take gigabytes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,8 +139,6 @@ SOURCES: dict[str, DemSource] = {source.name: source for source in (GLO30, SRTM)
 WITNESS = GLO90
 """The fuller source, whose list must agree before a missing tile counts as sea."""
 
-MOST_LIST_BYTES = 64 * 2**20
-
 
 def source_or_path(name: str, folder: Path) -> str:
     """The name of a source, or the path of a file in ``folder``; a file that has a source's name is that file."""
@@ -132,3 +147,36 @@ def source_or_path(name: str, folder: Path) -> str:
         tell_file(path)
         return str(path.absolute()) if path.exists() else name
     return str(path)
+
+
+def names_of(cells: Iterable[Cell]) -> str:
+    """The names, with commas."""
+    return ",".join(cell.name for cell in cells)
+
+
+def cells_in(frame: Frame, box: Box, *, where: str) -> tuple[Cell, ...]:
+    """The tiles that terrain for ``box`` (west, south, east, north, plane metres) is read from, north-west first.
+
+    Raises InputError if they are more than `MOST_TILES_OF_AREA`.
+    """
+    f = np.linspace(0.0, 1.0, 65)
+    west, south, east, north = (
+        box[0] - CELL_SPARE_M,
+        box[1] - CELL_SPARE_M,
+        box[2] + CELL_SPARE_M,
+        box[3] + CELL_SPARE_M,
+    )
+    e, n = np.meshgrid(west + f * (east - west), south + f * (north - south))
+    degrees = np.asarray(frame.to_degrees(e, n), float)
+    lat, lon = degrees[..., 0], degrees[..., 1]
+    middle = float(frame.to_degrees(0.5 * (west + east), 0.5 * (south + north))[1])
+    lon = middle + (lon - middle + 180.0) % 360.0 - 180.0  # the antimeridian is no edge
+    lats = range(max(-90, math.floor(np.min(lat))), min(89, math.floor(np.max(lat))) + 1)
+    lons = range(math.floor(lon.min()), math.floor(lon.max()) + 1)
+    if len(lats) * len(lons) > MOST_TILES_OF_AREA:
+        raise InputError(
+            f"this area needs {len(lats) * len(lons)} tiles of one degree, more than {MOST_TILES_OF_AREA}; choose a "
+            "smaller one",
+            where=where,
+        )
+    return tuple(Cell(a, (o + 180) % 360 - 180) for a in reversed(lats) for o in lons)

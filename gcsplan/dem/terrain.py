@@ -15,14 +15,14 @@ from numpy.typing import ArrayLike
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.dem.cache import Cache, TileRecord
-from gcsplan.dem.cells import cells_in, names_of
 from gcsplan.dem.dat_terrain import DatTerrain, dat_files
-from gcsplan.dem.sources import SOURCES, DemSource
+from gcsplan.dem.sources import SOURCES, DemSource, cells_in, names_of
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.datum import VerticalDatum, take_apart
-from gcsplan.world.geodesy.frame import Box, Frame
+from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geodesy.height_unit import METRE
+from gcsplan.world.geometry.zones import Box
 from gcsplan.world.terrain.cell import Cell
 from gcsplan.world.terrain.input_files import sha256_of, sha256_of_all
 from gcsplan.world.terrain.mosaic import Mosaic

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.export.rows import HEIGHT_DECIMALS, Track, WayPoint, outlines_deg
+from gcsplan.export.rows import HEIGHT_DECIMALS, FlownTrack, WayPoint, outlines_deg
 from gcsplan.figures import floored
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.zones import Level, Zone
@@ -25,17 +25,17 @@ Position = list[float]
 GENERATOR = "gcsplan"
 """The mark of the collection, by which its tracks and way points are known where it is read for its zones."""
 
-HEIGHTS = "the third coordinate is metres above mean sea level (AMSL), not above the ellipsoid"
+HEIGHT_DATUM = "the third coordinate is metres above mean sea level (AMSL), not above the ellipsoid"
 THIRD = {"third_coordinate": "amsl_m"}
 
 
-def write_geojson(name: str, tracks: Sequence[Track], zones: Sequence[Zone], frame: Frame) -> str:
+def write_geojson(name: str, tracks: Sequence[FlownTrack], zones: Sequence[Zone], frame: Frame) -> str:
     """The GeoJSON text of a mission called ``name``: a FeatureCollection; the same input gives the same bytes.
 
     Positions are longitude, latitude, and for tracks and way points AMSL metres, although RFC 7946 has heights above
-    the ellipsoid: `HEIGHTS` and each feature's ``third_coordinate`` say so. A way point has its item's ``number`` and
-    ``command``, ``amsl_m``, ``agl_m``, and ``ellipsoidal_m`` if a geoid grid is known. A zone's floor and ceiling are
-    the mission file's ``floor_agl_m``, ``floor_amsl_m``, ``ceiling_agl_m``, ``ceiling_amsl_m``.
+    the ellipsoid: `HEIGHT_DATUM` and each feature's ``third_coordinate`` say so. A way point has its item's ``number``
+    and ``command``, ``amsl_m``, ``agl_m``, and ``ellipsoidal_m`` if a geoid grid is known. A zone's floor and ceiling
+    are the mission file's ``floor_agl_m``, ``floor_amsl_m``, ``ceiling_agl_m``, ``ceiling_amsl_m``.
     """
     features: list[dict[str, Any]] = []
     for track in tracks:
@@ -53,7 +53,7 @@ def write_geojson(name: str, tracks: Sequence[Track], zones: Sequence[Zone], fra
         "type": "FeatureCollection",
         "name": name,
         "generator": GENERATOR,
-        "heights": HEIGHTS,
+        "heights": HEIGHT_DATUM,
         "features": features,
     }
     return json.dumps(document, ensure_ascii=False) + "\n"
@@ -95,7 +95,7 @@ def _unwrapped(lon_deg: Floats) -> Floats:
     return np.concatenate([lon_deg[:1], lon_deg[0] + np.cumsum(steps)])
 
 
-def _line(track: Track) -> dict[str, Any]:
+def _line(track: FlownTrack) -> dict[str, Any]:
     points = np.stack([track.lon_deg, track.lat_deg, track.amsl_m], axis=-1)
     points[:, 0] = _unwrapped(points[:, 0])
     parts: list[list[Position]] = [[]]

@@ -15,13 +15,13 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.export.rows import HEIGHT_DECIMALS, Track, WayPoint, extent_words, outlines_deg
+from gcsplan.export.rows import HEIGHT_DECIMALS, FlownTrack, WayPoint, extent_words, outlines_deg
 from gcsplan.figures import floored
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.zones import Level, Zone
 
-TRACK_COLOURS = ("ff0099ff", "ffff9900", "ff66cc00", "ffcc00cc", "ff00cccc", "ff3333ff")  # aabbggrr
-MOST_WHOLE = 100
+KML_COLOURS = ("ff0099ff", "ffff9900", "ff66cc00", "ffcc00cc", "ff00cccc", "ff3333ff")  # aabbggrr
+MOST_CURTAINS = 100
 """Most tracks that are drawn with a curtain to the ground and all way points; of more, way points are there to tick."""
 DRAWN_TOP_M = 300.0
 """Metres above the highest track up to which a zone without a ceiling is drawn."""
@@ -45,7 +45,7 @@ _NOT_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 
 
 def write_kml(
-    name: str, tracks: Sequence[Track], zones: Sequence[Zone], frame: Frame, start: datetime | None = None
+    name: str, tracks: Sequence[FlownTrack], zones: Sequence[Zone], frame: Frame, start: datetime | None = None
 ) -> str:
     """The KML text of a mission called ``name``; the same input gives the same bytes.
 
@@ -62,13 +62,13 @@ def write_kml(
         f"<name>{_text(name)}</name>",
         "<open>1</open>",
         *_look_at(_everything(tracks, outlines), frame),
-        *(line for number, colour in enumerate(TRACK_COLOURS) for line in _styles(number, colour)),
+        *(line for number, colour in enumerate(KML_COLOURS) for line in _styles(number, colour)),
         '<Style id="zone"><LineStyle><color>ff0000ff</color></LineStyle>'
         "<PolyStyle><color>600000ff</color></PolyStyle></Style>",
     ]
-    light = len(tracks) > MOST_WHOLE
+    light = len(tracks) > MOST_CURTAINS
     for number, track in enumerate(tracks):
-        lines += _track(track, number % len(TRACK_COLOURS), frame, start, light=light)
+        lines += _track(track, number % len(KML_COLOURS), frame, start, light=light)
     if zones:
         lines += ["<Folder>", "<name>no-fly zones</name>"]
         for zone, outline in zip(zones, outlines, strict=True):
@@ -77,14 +77,14 @@ def write_kml(
     return "\n".join([*lines, "</Document>", "</kml>"]) + "\n"
 
 
-def _everything(tracks: Sequence[Track], outlines: Sequence[Floats]) -> Floats:
+def _everything(tracks: Sequence[FlownTrack], outlines: Sequence[Floats]) -> Floats:
     """(N, 3) degrees and AMSL of what the document shows: the tracks, or the zones if there are none."""
     if tracks:
         return np.vstack([_places(t) for t in tracks])
     return np.vstack([np.column_stack([o, np.zeros(len(o))]) for o in outlines]) if outlines else np.zeros((0, 3))
 
 
-def _places(track: Track) -> Floats:
+def _places(track: FlownTrack) -> Floats:
     return np.column_stack([track.lat_deg, track.lon_deg, track.amsl_m])
 
 
@@ -132,7 +132,7 @@ def _place(lat_deg: float, lon_deg: float, height_m: float) -> str:
     return f"{lon_deg:.7f},{lat_deg:.7f},{height_m:.2f}"
 
 
-def _track(track: Track, style: int, frame: Frame, start: datetime | None, *, light: bool) -> Iterable[str]:
+def _track(track: FlownTrack, style: int, frame: Frame, start: datetime | None, *, light: bool) -> Iterable[str]:
     name = _text(track.vehicle)
     yield "<Folder>"
     yield f"<name>{name}</name>"
@@ -163,7 +163,7 @@ def _track(track: Track, style: int, frame: Frame, start: datetime | None, *, li
     yield "</Folder>"
 
 
-def _fields(track: Track, point: WayPoint, amsl_m: float) -> str:
+def _fields(track: FlownTrack, point: WayPoint, amsl_m: float) -> str:
     """What the balloon of a way point shows."""
     agl = f"{floored(point.agl_m, HEIGHT_DECIMALS):.{HEIGHT_DECIMALS}f}" if math.isfinite(point.agl_m) else "unknown"
     values = {
@@ -177,7 +177,7 @@ def _fields(track: Track, point: WayPoint, amsl_m: float) -> str:
     return "".join(f'<Data name="{key}"><value>{_text(value)}</value></Data>' for key, value in values.items())
 
 
-def _moving(track: Track, style: int, start: datetime) -> Iterable[str]:
+def _moving(track: FlownTrack, style: int, start: datetime) -> Iterable[str]:
     """The track with the time of day at each point, and at the end of each wait."""
     assert track.reached_s is not None
     assert track.left_s is not None

@@ -15,7 +15,7 @@ from gcsplan.world.geometry.zones import Circle, Level, Zone
 HEIGHT_DECIMALS = 2
 """Of heights on a map, metres."""
 
-CIRCLE_CORNERS = 72
+OUTLINE_CORNERS = 72
 OUTLINE_MARGIN_M = 0.02
 """Metres that a circle's outline stays outside the circle, to contain it after rounding to 1e-7 degrees (11 mm)."""
 
@@ -57,7 +57,7 @@ class WayPoint:
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class FlownTrack:
     """The line that one vehicle flies: (N,) degrees and AMSL metres, N >= 2, straight between neighbours.
 
     ``waypoints`` (N,) has the figures of the points that an item ends at, None for the others. ``reached_s``,
@@ -90,15 +90,15 @@ class Track:
 def outlines_deg(zones: Sequence[Zone], frame: Frame) -> list[Floats]:
     """For each of the zones (N, 2) latitude, longitude of its corners, counter-clockwise, not closed.
 
-    A circle becomes a polygon of `CIRCLE_CORNERS` corners that contains all of it.
+    A circle becomes a polygon of `OUTLINE_CORNERS` corners that contains all of it.
     """
-    turn = 2.0 * np.pi * np.arange(CIRCLE_CORNERS) / CIRCLE_CORNERS
+    turn = 2.0 * np.pi * np.arange(OUTLINE_CORNERS) / OUTLINE_CORNERS
     east, north = np.cos(turn), np.sin(turn)
     rings = []
     for zone in zones:
         shape = zone.shape
         if isinstance(shape, Circle):
-            reach = (shape.radius_m + OUTLINE_MARGIN_M) / math.cos(math.pi / CIRCLE_CORNERS)
+            reach = (shape.radius_m + OUTLINE_MARGIN_M) / math.cos(math.pi / OUTLINE_CORNERS)
             rings.append(np.stack([shape.east_m + reach * east, shape.north_m + reach * north], axis=-1))
         else:
             rings.append(shape.vertices)

@@ -1,34 +1,280 @@
-"""Fix the vehicles' times one after the other, by priority; retry with a later clock or with other paths."""
+"""Fix the vehicles' times one after the other, by priority; retry with a later clock or with other paths.
+
+Each vehicle gets the cheapest change to its flight that keeps it clear of the vehicles before it. A change costs joules
+beyond the scheduled flight, and seconds by which any time moves; energy is compared first.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
-from gcsplan.fleet._changes import Chooser, Freedom, Option
-from gcsplan.fleet._taken import Taken
-from gcsplan.fleet.arrival import Craft, Crew, Hold, Schedule, Slot, schedule
+from gcsplan.fleet._taken import Spans, Taken
+from gcsplan.fleet.arrival import WITHIN_S, Craft, Crew, Hold, Mode, Schedule, Slot, schedule
 from gcsplan.fleet.motion.timed_path import TimedPath
-from gcsplan.fleet.motion.timing import Route
+from gcsplan.fleet.motion.timing import Route, speed_for
 from gcsplan.fleet.separation import TOLERANCE_M, Conflict, Rules, separation
 from gcsplan.notes.note import Note
+from gcsplan.vehicle import Vehicle
 
-Replan = Callable[[str, Sequence[Conflict], int], Route | None]
+How = Literal["as scheduled", "departure", "speed", "hold", "path"]
+
+EARLIER_LATER_S = (1.0, 2.0, 3.0, 5.0, 8.0, 13.0, 21.0, 34.0, 55.0, 89.0, 144.0, 233.0)
+"""Shifts of the departure to try, s, with the speed that keeps the arrival; then `EVENLY` over the whole range."""
+
+EVENLY = 12
+CLOSER = 4
+"""Halvings between the last departure that conflicts and the first that does not."""
+
+CHANGE_SPARE_M = 0.02
+"""Metres that a changed flight keeps beyond the need, so that it passes when the mission is timed again and rounded."""
+
+HOLDS_S = (2.0, 5.0, 10.0, 20.0, 40.0, 80.0, 160.0)
+SLOWER = (0.9, 0.8, 0.7, 0.6, 0.5)
+LONG_S = 20.0
+"""Change of departure, s, beyond which lower speeds are tried too. Speeds below `SLOWER` would block the others."""
+
+HORIZONS_S = (40.0, 160.0, 640.0, math.inf)
+"""Ranges in which the least change of departure is searched, one after the other, s."""
+
+
+Reroute = Callable[[str, Sequence[Conflict], int], Route | None]
 """``replan(name, avoid, attempt)``: another route for a vehicle that keeps away from the places of ``avoid`` (or flies
 higher). ``attempt`` counts from 1. None: no more ideas."""
 
 Again = Callable[[float], Schedule]
 """``again(interval_s)``: the schedule of the sequence with that interval."""
 
-ATTEMPTS = 4
+REROUTE_ATTEMPTS = 4
 PROMOTIONS, MOST_AGAIN = 3, 150
 """Most vehicles that may be put before the one in their way if nothing else helps them and no priority is set; and most
 vehicles that are fixed again for one of them."""
 
 LATER_S = 600.0
 """Seconds by which the whole fleet may arrive later if its clock leaves a vehicle no possibility to evade."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Option:
+    """One candidate flight: joules more than scheduled, seconds by which its times move, its slot and its motion.
+
+    ``moved_s`` adds up how far departure or arrival (the larger) and the hold move.
+    """
+
+    extra_j: float
+    moved_s: float
+    how: How
+    slot: Slot
+    path: TimedPath
+
+    @property
+    def cost(self) -> tuple[float, float]:
+        """The key to minimise: energy, then seconds."""
+        return max(0.0, round(self.extra_j, 6)), self.moved_s
+
+
+@dataclass(frozen=True, slots=True)
+class Freedom:
+    """What may be changed. With ``mode`` sequence or together the arrival is fixed, with none it is free.
+
+    No vehicle leaves before 0 s. If nothing else helps, one may leave up to ``before_s`` earlier; the whole fleet then
+    starts, and arrives, that much later.
+    """
+
+    mode: Mode
+    hold: Hold
+    before_s: float = 0.0
+
+    @property
+    def keeps_arrival(self) -> bool:
+        """Whether a change of departure goes with a change of speed."""
+        return self.mode != "none"
+
+
+class Chooser:
+    """The options of one vehicle on one route, against the vehicles that have priority."""
+
+    def __init__(self, vehicle: Vehicle, route: Route, was: Slot, freedom: Freedom, taken: Taken) -> None:
+        self.craft = Craft(Crew(vehicle, route))
+        self.was, self.freedom, self.taken = was, freedom, taken
+
+    def base(self) -> Option | None:
+        """The flight as scheduled; on another route, one that keeps the arrival. None if that is impossible."""
+        was, craft = self.was, self.craft
+        if craft.crew.route is was.route:
+            return Option(0.0, 0.0, "as scheduled", was, self._motion(was))
+        if not self.freedom.keeps_arrival:
+            slot = craft.fly(was.speed_m_s, was.depart_s, was.hold_s)
+        else:
+            found = craft.at(was.arrive_s, self.freedom.hold)
+            early_s = was.arrive_s - craft.fast_s
+            if found is None and self.freedom.hold == "ground" and -self.freedom.before_s <= early_s < 0.0:
+                found = craft.fly(craft.fastest_m_s, early_s)  # too long for the time left: leave before all others
+            if found is None:
+                return None
+            slot = found
+        return self._option("path", slot)
+
+    def best(self, base: Option) -> Option | None:
+        """The cheapest option that keeps clear; None if none of those tried does."""
+        if self.clear(base):
+            return base
+        if not self.freedom.keeps_arrival:
+            found = self._delays(base)
+        else:
+            found = self._departures(base, 0.0)
+            if found is None and self.freedom.before_s > 0.0:
+                found = self._departures(base, -self.freedom.before_s)
+        return self._holds(base) if found is None else found  # changes that cost nothing come first
+
+    def clear(self, option: Option) -> bool:
+        """Whether an option keeps clear of all vehicles with priority."""
+        spare_m = 0.0 if option.how == "as scheduled" else CHANGE_SPARE_M
+        return self.taken.forbidden(option.path, spare_m=spare_m).free(0.0)
+
+    # -- the arrival is free ------------------------------------------------------------------------------------
+
+    def _delays(self, base: Option) -> Option | None:
+        """The least change of departure that keeps clear, exact; if long, lower speeds that move less are tried."""
+        found = self._shifted(base, "departure")
+        if found is not None and found.moved_s <= LONG_S:
+            return found
+        for part in SLOWER:
+            slot = self.craft.fly(part * base.slot.speed_m_s, base.slot.depart_s, base.slot.hold_s)
+            option: Option | None = self._option("speed", slot)
+            assert option is not None
+            if found is not None and option.moved_s >= found.moved_s:
+                break  # a lower speed moves even more
+            if not self.clear(option):
+                option = None if found is not None else self._shifted(option, "speed")
+            if option is not None and (found is None or option.cost < found.cost):
+                found = option
+        return found
+
+    def _shifted(self, option: Option, how: How) -> Option | None:
+        """The same flight, earlier or later by the least time that keeps clear."""
+        if self.freedom.hold != "ground":
+            return option if self.clear(option) else None
+        last = max((p.end_s for p in self.taken.paths), default=0.0)
+        latest = max(last - option.path.begin_s, 0.0) + 2.0 * self.taken.rules.window_s + 1.0
+        spans, low, high = Spans.none(), 0.0, 0.0
+        for horizon in HORIZONS_S:
+            earlier, later = max(-horizon, -option.slot.depart_s), min(horizon, latest)
+            if later > high or high == 0.0:
+                spans = spans.joined(self.taken.forbidden(option.path, high, later, CHANGE_SPARE_M))
+            if earlier < low:
+                spans = spans.joined(self.taken.forbidden(option.path, earlier, low, CHANGE_SPARE_M))
+            low, high = earlier, later
+            shift = spans.least(low, high)
+            if shift is not None:
+                slot = option.slot
+                slot = replace(slot, depart_s=slot.depart_s + shift, arrive_s=slot.arrive_s + shift)
+                moved = self._option("departure" if option.how == "as scheduled" else how, slot)
+                return moved if self.clear(moved) else None
+        return None
+
+    # -- the arrival stays --------------------------------------------------------------------------------------
+
+    def _departures(self, base: Option, earliest_s: float) -> Option | None:
+        """The nearest other departure that keeps clear, at the speed that keeps the arrival."""
+        if self.freedom.hold != "ground":
+            return None
+        low, high = self._range(base.slot.hold_s, earliest_s)
+        now = base.slot.depart_s
+        offsets = [s for step in EARLIER_LATER_S for s in (now + step, now - step)]
+        tried = sorted({d for d in [*offsets, *np.linspace(low, high, EVENLY)] if low <= d <= high},
+                       key=lambda d: (abs(d - now), -d))  # fmt: skip
+        last = {True: now, False: now}
+        for depart in tried:
+            option = self._arriving(float(depart), base.slot.hold_s, "departure")
+            if option is None:
+                continue
+            if self.clear(option):
+                return self._closer(option, last[depart > now], float(depart), base.slot.hold_s)
+            last[depart > now] = float(depart)
+        return None
+
+    def _closer(self, option: Option, bad_s: float, good_s: float, hold_s: float) -> Option:
+        """The flight whose departure is, by a few halvings, as near as possible to ``bad_s``, one that conflicts."""
+        for _ in range(CLOSER):
+            middle = 0.5 * (bad_s + good_s)
+            other = self._arriving(middle, hold_s, "departure")
+            if other is not None and self.clear(other):
+                option, good_s = other, middle
+            else:
+                bad_s = middle
+        return option
+
+    def _range(self, hold_s: float, earliest_s: float = 0.0) -> tuple[float, float]:
+        """The range of departures that can keep the arrival with this hold; empty if the first is above the second."""
+        arrive = self.was.arrive_s
+        return max(earliest_s, arrive - self.craft.slow_s - hold_s), arrive - self.craft.fast_s - hold_s
+
+    def _arriving(self, depart_s: float, hold_s: float, how: How) -> Option | None:
+        """The flight that leaves near ``depart_s``, holds ``hold_s``, and arrives as scheduled; None if impossible."""
+        craft, arrive = self.craft, self.was.arrive_s
+        wanted = arrive - depart_s - hold_s
+        if not craft.fast_s - WITHIN_S <= wanted <= craft.slow_s + WITHIN_S:
+            return None
+        speed = speed_for(craft.course.time_to_goal_s, wanted, craft.slowest_m_s, craft.fastest_m_s, 1e-3)
+        slot = craft.fly(speed, depart_s, hold_s)
+        # The speed is a float32 from a coarse search; the departure corrects its error.
+        depart = depart_s + arrive - slot.arrive_s
+        if depart_s >= 0.0:
+            depart = max(0.0, depart)
+        slot = replace(slot, depart_s=depart, arrive_s=slot.arrive_s + depart - depart_s)
+        return self._option(how, slot)
+
+    # -- a hold at the gate -------------------------------------------------------------------------------------
+
+    def _holds(self, base: Option) -> Option | None:
+        if self.freedom.hold == "none" or not self.craft.vehicle.can_hold:
+            return None
+        found: Option | None = None
+        for hold in HOLDS_S:
+            for option in self._with_hold(base, hold):
+                if (found is None or option.cost < found.cost) and self.clear(option):
+                    found = option
+            if found is not None and self.craft.vehicle.energy.hold_w() > 0.0:
+                break  # a longer hold costs more
+        return found
+
+    def _with_hold(self, base: Option, hold_s: float) -> Iterator[Option]:
+        was = base.slot
+        total = was.hold_s + hold_s
+        if not self.freedom.keeps_arrival:
+            option = self._option("hold", self.craft.fly(was.speed_m_s, was.depart_s, total))
+            yield option
+            shifted = self._shifted(option, "hold")
+            if shifted is not None:
+                yield shifted
+            return
+        low, high = self._range(total)
+        if high < low:
+            return
+        departs = (
+            [0.0] if self.freedom.hold == "gate" else np.unique(np.append(np.linspace(low, high, 4), was.depart_s))
+        )
+        for depart in departs:
+            if low <= depart <= high:
+                option_or_none = self._arriving(float(depart), total, "hold")
+                if option_or_none is not None:
+                    yield option_or_none
+
+    # -----------------------------------------------------------------------------------------------------------
+
+    def _option(self, how: How, slot: Slot) -> Option:
+        was = self.was
+        moved = max(abs(slot.depart_s - was.depart_s), abs(slot.arrive_s - was.arrive_s))
+        moved += abs(slot.hold_s - was.hold_s)
+        return Option(slot.energy_j - was.energy_j, moved, how, slot, self._motion(slot))
+
+    def _motion(self, slot: Slot) -> TimedPath:
+        return self.craft.course.fly(slot.speed_m_s, slot.depart_s, slot.hold_s)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -80,7 +326,7 @@ class Ask:
     priority: Sequence[str] | None
     hold: Hold
     later_s: float
-    replan: Replan | None = None
+    replan: Reroute | None = None
     attempts: int = 0
     leave_out: bool = False
 
@@ -117,7 +363,7 @@ def _late(slot: Slot, by_s: float) -> Slot:
     return replace(slot, depart_s=slot.depart_s + by_s, arrive_s=slot.arrive_s + by_s)
 
 
-Settled = dict[str, Choice]
+ChoicesByName = dict[str, Choice]
 """Choices by name, in the order in which they were fixed."""
 
 
@@ -125,7 +371,7 @@ Settled = dict[str, Choice]
 class Settlement:
     """The choices of all vehicles but those that are ``stuck``: at most one, unless vehicles may be left out."""
 
-    done: Settled
+    done: ChoicesByName
     stuck: tuple[Stuck, ...] = ()
 
 
@@ -140,13 +386,13 @@ def settle(plan: Schedule, ask: Ask) -> Settlement:
     return _settle(plan, ask, before)[0] if found.stuck else found
 
 
-def moved(settled: Settled) -> tuple[Settled, float]:
+def moved(settled: ChoicesByName) -> tuple[ChoicesByName, float]:
     """Delay all equally, so that no vehicle leaves before 0 s; returns the choices and the delay, s."""
     later = max(0.0, -min((choice.option.slot.depart_s for choice in settled.values()), default=0.0))
     return (settled if later <= 0.0 else {name: choice.later(later) for name, choice in settled.items()}), later
 
 
-def _settle(plan: Schedule, ask: Ask, done: Settled) -> tuple[Settlement, Settled]:
+def _settle(plan: Schedule, ask: Ask, done: ChoicesByName) -> tuple[Settlement, ChoicesByName]:
     """Fix all in order; those in ``done``, the first of them, stay as they are. Also returns those before any trouble.
 
     A vehicle that is stuck is moved before those in its way, if no priority is set and not too many are fixed again;
@@ -157,7 +403,7 @@ def _settle(plan: Schedule, ask: Ask, done: Settled) -> tuple[Settlement, Settle
     freedom = Freedom(plan.mode, ask.hold, ask.later_s)
     promoted: set[str] = set()
     left: list[Stuck] = []
-    before: Settled | None = None
+    before: ChoicesByName | None = None
     taken, turn = _taken(ask.rules, done), len(done)
     while turn < len(order):
         name = order[turn]
@@ -184,7 +430,7 @@ def _settle(plan: Schedule, ask: Ask, done: Settled) -> tuple[Settlement, Settle
     return Settlement(done, tuple(left)), done if before is None else before
 
 
-def _taken(rules: Rules, done: Settled) -> Taken:
+def _taken(rules: Rules, done: ChoicesByName) -> Taken:
     taken = Taken(rules)
     for choice in done.values():
         taken.add(choice.option.path)
@@ -211,7 +457,7 @@ def _choice(chooser: Chooser, plan: Schedule, ask: Ask) -> Choice | Stuck:
     return Choice(best, replace(change, slot=best.slot))
 
 
-def _other_path(name: str, chooser: Chooser, met: Sequence[Conflict], replan: Replan, attempts: int) -> Option | None:
+def _other_path(name: str, chooser: Chooser, met: Sequence[Conflict], replan: Reroute, attempts: int) -> Option | None:
     """The first route of ``replan`` on which some option keeps clear; None if there is none."""
     avoid = list(met)
     for attempt in range(1, attempts + 1):

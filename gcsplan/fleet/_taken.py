@@ -1,7 +1,7 @@
 """The space and time that vehicles with priority occupy, and the shifts that keep a motion clear of them.
 
 A motion that leaves ``d`` seconds later meets another if its place at t1 is near the other's at t2 = t1 + d. For two
-straight pieces these delays are one interval in closed form (`_nearest.shifts`), so the least change of departure is
+straight pieces these delays are one interval in closed form (`_sweep.shifts`), so the least change of departure is
 computed directly, without trials.
 """
 
@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.fleet._nearest import Pieces, shifts
-from gcsplan.fleet._sweep import pieces_of
+from gcsplan.fleet._sweep import Pieces, pieces_of, shifts
 from gcsplan.fleet.motion.timed_path import TimedPath
 from gcsplan.fleet.separation import TOLERANCE_M, Rules
 

@@ -16,22 +16,21 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.errors import InputError
-from gcsplan.fleet._nearest import below, nearest
-from gcsplan.fleet._sweep import Fleet, Least
+from gcsplan.fleet._sweep import Fleet, Least, below, nearest
 from gcsplan.fleet.motion.timed_path import TimedPath
 from gcsplan.notes.note import Note
 
-Place = tuple[float, float, float]
-Where = Callable[[Place], Note]
+AirPlace = tuple[float, float, float]
+Where = Callable[[AirPlace], Note]
 """Names the place of east_m, north_m, amsl_m. Callers that know degrees pass their own function."""
 
-Kind = Literal["air", "take-off", "landing"]
+ConflictKind = Literal["air", "take-off", "landing"]
 
 TOLERANCE_M = 1e-6
 """Allowance for rounding, m: a distance equal to the separation is legal."""
 
 
-def in_metres(place: Place) -> Note:
+def in_metres(place: AirPlace) -> Note:
     """A place in the plane, the default if the caller knows no degrees."""
     return Note("place_in_plane", east_m=place[0], north_m=place[1], amsl_m=place[2])
 
@@ -75,11 +74,11 @@ class Encounter:
     distance_m: float
     time_s: float
     times_s: tuple[float, float]
-    places: tuple[Place, Place]
+    places: tuple[AirPlace, AirPlace]
     pieces: tuple[int, int]
 
     @property
-    def middle(self) -> Place:
+    def middle(self) -> AirPlace:
         """The middle between the two."""
         a, b = self.places
         return 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])
@@ -93,7 +92,7 @@ class Conflict:
     With a window the time span is that of the pieces that may meet, rounded outward.
     """
 
-    kind: Kind
+    kind: ConflictKind
     worst: Encounter
     needed_m: float
     from_s: float
@@ -264,7 +263,9 @@ def on_the_pads(paths: Sequence[TimedPath], rules: Rules) -> list[Conflict]:
     waits = landing[:, None] & (ends[:, None] <= begins[None, :] + apart)
     lands_before = near(goals, starts) & waits
 
-    def conflict(kind: Kind, y: int, x: int, place: Floats, stand: Floats, time_s: float, until: float) -> Conflict:
+    def conflict(
+        kind: ConflictKind, y: int, x: int, place: Floats, stand: Floats, time_s: float, until: float
+    ) -> Conflict:
         here, there = (float(place[0]), float(place[1]), float(place[2])), (
             float(stand[0]), float(stand[1]), float(stand[2]))  # fmt: skip
         apart_m = math.hypot(here[0] - there[0], here[1] - there[1])

@@ -31,8 +31,8 @@ from gcsplan.mission_file.zones.draft import ZoneDraft, looks_swapped, one_line,
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace
-from gcsplan.world.geodesy.frame import FARTHEST_M, Box, Frame, centre_of
-from gcsplan.world.geometry.zones import Zone
+from gcsplan.world.geodesy.frame import FARTHEST_M, Frame, centre_of
+from gcsplan.world.geometry.zones import Box, Zone
 from gcsplan.world.terrain.model_words import notes_on
 from gcsplan.world.terrain.terrain import OpenTerrain
 from gcsplan.world.world import World

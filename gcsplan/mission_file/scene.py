@@ -27,9 +27,9 @@ from gcsplan.mission_file.zones.draft import (
 )
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.degree_shapes import MOST_LON_DEG
-from gcsplan.world.geodesy.frame import FARTHEST_M, Box, Frame, centre_of
+from gcsplan.world.geodesy.frame import FARTHEST_M, Frame, centre_of
 from gcsplan.world.geometry.surface import Surface
-from gcsplan.world.geometry.zones import Circle, Level, Zone
+from gcsplan.world.geometry.zones import Box, Circle, Level, Zone
 from gcsplan.world.terrain.peaks import Peak
 from gcsplan.world.terrain.terrain import OpenTerrain, TerrainSpec
 

@@ -8,7 +8,7 @@ from dataclasses import fields, replace
 from typing import Any
 
 from gcsplan.errors import Problem
-from gcsplan.fleet.motion.lean import lean_needed_deg
+from gcsplan.fleet.motion.ardupilot import lean_needed_deg
 from gcsplan.mission_file.energy import make_energy
 from gcsplan.mission_file.request import ArrivalRequest
 from gcsplan.mission_file.values.schema import ArrivalKeys, LimitKeys, VehicleKeys, nearest

@@ -19,9 +19,9 @@ from gcsplan.mission_file.request import MissionFile, VehicleRequest
 from gcsplan.mission_file.scene import LOCAL_MARGIN_M, MARGIN_M, MissionPlace, settle_zones
 from gcsplan.mission_file.terminals import Terminals, make_request
 from gcsplan.mission_file.zones.draft import ZoneDraft
-from gcsplan.world.geodesy.frame import FARTHEST_M, Box, Frame
+from gcsplan.world.geodesy.frame import FARTHEST_M, Frame
 from gcsplan.world.geometry.surface import Surface
-from gcsplan.world.geometry.zones import Zone
+from gcsplan.world.geometry.zones import Box, Zone
 from gcsplan.world.terrain.model_words import notes_on
 from gcsplan.world.terrain.terrain import RASTER_SPARE_M, OpenTerrain, Terrain, TerrainSpec, open_terrain
 

@@ -13,7 +13,7 @@ from gcsplan.errors import InputError
 Steps = Generator[Floats, Floats, None]
 """A running optimiser: yields populations (n, dim) in [0, 1]; is sent their finite costs (n,), which it may change."""
 
-WORST = 1e100
+WORST_COST = 1e100
 """Cost that a rule receives for one that is larger or not finite; its squares and sums stay finite."""
 
 

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from gcsplan.arrays import Floats, Int64s
 from gcsplan.errors import GcsplanError, InputError
-from gcsplan.optimisers.box import WORST, Run
-from gcsplan.optimisers.registry import Entry, get
+from gcsplan.optimisers.box import WORST_COST, Run
+from gcsplan.optimisers.registry import OptimiserEntry, get
 
-Cost = Callable[[Floats], NDArray[np.floating]]
+BatchCost = Callable[[Floats], NDArray[np.floating]]
 """A batch objective: from points (n, dim) in [0, 1] to costs (n,). It must not change its argument."""
 
 StoppedBy = Literal["iterations", "evaluations", "target", "told"]
@@ -51,7 +51,7 @@ class History:
 
 
 @dataclass(frozen=True, slots=True)
-class Result:
+class OptimiserResult:
     """The best point ``x`` (dim,) that was evaluated, its cost (inf if no cost was finite), and a record of the run."""
 
     x: Floats
@@ -64,8 +64,8 @@ class Result:
 
 
 def minimise(
-    optimiser: str | Entry,
-    cost: Cost,
+    optimiser: str | OptimiserEntry,
+    cost: BatchCost,
     dim: int,
     *,
     population: int | None = None,
@@ -76,7 +76,7 @@ def minimise(
     target: float | None = None,
     start: ArrayLike | None = None,
     tell: Callable[[State], bool | None] | None = None,
-) -> Result:
+) -> OptimiserResult:
     """Minimise ``cost`` over the unit box [0, 1]^dim; the same arguments give the same bytes.
 
     Args:
@@ -141,7 +141,9 @@ def _start(start: ArrayLike | None, dim: int) -> Floats:
 class _Book:
     """Evaluates batches and records a run."""
 
-    def __init__(self, run: Run, cost: Cost, target: float | None, tell: Callable[[State], bool | None] | None) -> None:
+    def __init__(
+        self, run: Run, cost: BatchCost, target: float | None, tell: Callable[[State], bool | None] | None
+    ) -> None:
         self.run = run
         self.cost = cost
         self.target = -np.inf if target is None else target
@@ -162,9 +164,9 @@ class _Book:
         if raw.shape != (len(batch),):
             raise GcsplanError(f"the cost must have shape ({len(batch)},), one number a row; given {raw.shape}")
         run.evaluations += len(batch)
-        costs = np.where(np.isfinite(raw), raw.clip(-WORST, WORST), WORST)
+        costs = np.where(np.isfinite(raw), raw.clip(-WORST_COST, WORST_COST), WORST_COST)
         lead = int(costs.argmin())
-        if self.best_x is None or costs[lead] < min(self.best, WORST):
+        if self.best_x is None or costs[lead] < min(self.best, WORST_COST):
             self.best_x = batch[lead].copy()
             self.best = float(raw[lead]) if np.isfinite(raw[lead]) else np.inf
         at = run.iteration + 1 if run.in_cycles else 0
@@ -183,8 +185,10 @@ class _Book:
             return "told"
         return "evaluations" if run.evaluations == run.evaluations_limit else None
 
-    def result(self, name: str, stopped_by: StoppedBy) -> Result:
+    def result(self, name: str, stopped_by: StoppedBy) -> OptimiserResult:
         assert self.best_x is not None
         evaluations, iterations, cost = (np.array(column) for column in zip(*self.trace, strict=True))
         history = History(evaluations, iterations, cost)
-        return Result(self.best_x, self.best, self.run.evaluations, int(iterations[-1]), history, stopped_by, name)
+        return OptimiserResult(
+            self.best_x, self.best, self.run.evaluations, int(iterations[-1]), history, stopped_by, name
+        )

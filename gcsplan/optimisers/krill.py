@@ -26,7 +26,7 @@ def krill(run: Run, *, sight: float, step: float, crowding: float, attempts: int
     x = run.first()
     f = yield x
     everyone = np.arange(len(x))
-    rule = _Rule(run.rng, sight, step, crowding, attempts, crowd == "printed")
+    rule = _KrillMove(run.rng, sight, step, crowding, attempts, crowd == "printed")
     seen = rule.sees(x, everyone)
     for _ in run.cycles():
         for who in (everyone,) if moves == "together" else everyone[:, None]:
@@ -36,7 +36,7 @@ def krill(run: Run, *, sight: float, step: float, crowding: float, attempts: int
 
 
 @dataclass(frozen=True, slots=True)
-class _Rule:
+class _KrillMove:
     """One move of some krill; the parameters are those of `krill`."""
 
     rng: np.random.Generator

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices
-from gcsplan.optimisers.box import WORST, Run, Steps, clipped, keep_better, require
+from gcsplan.optimisers.box import WORST_COST, Run, Steps, clipped, keep_better, require
 
 PACK = 3  # α, β, δ
 ANNEALING_SHARE = 0.95  # η of eq. 25
@@ -99,7 +99,7 @@ def ssgwo(run: Run, *, origin: float, factor: str, leaders: str, trial: str) -> 
     require("ssgwo", "trial", trial, ("every", "alpha"))
     x = run.first()
     f = yield x
-    finite = f[f < WORST]
+    finite = f[f < WORST_COST]
     temperature = float(finite.std()) if finite.size else 0.0
     for _ in run.cycles():
         a = FACTORS[factor](run.elapsed)

@@ -20,13 +20,13 @@ from gcsplan.world.geometry.outlines import few_corners
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.geometry.zones import Circle, Zone
 
-PIECES = 8
+SIDE_PIECES = 8
 """Straight pieces that approximate one side of a window; in the plane a side is curved."""
 INSET_CELLS = 1.0
 """Cells along the border that count as beyond it, in addition to the distance that paths keep from unknown ground."""
-MOST_CORNERS = 2000
+MOST_ENCLOSING_CORNERS = 2000
 """Corners of one polygon in that test; of a polygon with more, a smaller one inside it counts."""
-TOUCH_M = 0.01
+SHRUNK_M = 0.01
 """Metres by which zones are shrunk in the test whether they enclose a place."""
 
 
@@ -113,7 +113,7 @@ def border(problem: Problem) -> tuple[Floats, float]:
         keep += INSET_CELLS
     c0, r0 = np.minimum(keep, 0.49 * np.array([cols - 1, rows - 1])).tolist()
     c1, r1 = cols - 1 - c0, rows - 1 - r0
-    f = np.linspace(0.0, 1.0, 2 * PIECES + 1)
+    f = np.linspace(0.0, 1.0, 2 * SIDE_PIECES + 1)
     along_c, along_r, one = f * (cols - 1), f * (rows - 1), np.ones_like(f)
     sides = [(c0 * one, along_r), (along_c, r0 * one), (c1 * one, along_r), (along_c, r1 * one)]
     met = np.array([side for side, more in zip(sides, surface.goes_on, strict=True) if more])
@@ -164,13 +164,13 @@ def _by_zones(problem: Problem) -> bool:
 
     air, limits = problem.airspace, problem.bound_limits
     top = math.inf if limits.max_amsl_m is None else limits.max_amsl_m - limits.altitude_error_m
-    reach = limits.horizontal_clearance_m + limits.track_error_m - TOUCH_M - problem.bound_spare_m
+    reach = limits.horizontal_clearance_m + limits.track_error_m - SHRUNK_M - problem.bound_spare_m
     walls = [_shape(z, reach) for z in air.zones if _is_wall(z, top)]
     if not walls:
         return False
     surface = air.surface
     rows, cols = surface.ground_m.shape
-    f = np.linspace(0.0, 1.0, PIECES + 1)[:-1]
+    f = np.linspace(0.0, 1.0, SIDE_PIECES + 1)[:-1]
     c = np.concatenate([f, 1.0 + 0.0 * f, 1.0 - f, 0.0 * f]) * (cols - 1)
     r = np.concatenate([0.0 * f, f, 1.0 + 0.0 * f, 1.0 - f]) * (rows - 1)
     window = shapely.Polygon(surface.grid.to_plane(c, r))
@@ -198,7 +198,7 @@ def _shape(zone: Zone, reach_m: float) -> Any:
 
     if isinstance(zone.shape, Circle):
         return shapely.Point(zone.shape.east_m, zone.shape.north_m).buffer(zone.shape.radius_m + reach_m, quad_segs=64)
-    few = few_corners(zone.shape.vertices, MOST_CORNERS, outward=False)
+    few = few_corners(zone.shape.vertices, MOST_ENCLOSING_CORNERS, outward=False)
     if few is None:
         return shapely.Polygon()
     shape = shapely.Polygon(few)
@@ -215,8 +215,8 @@ def _bounds(zone: Zone, air: Airspace, limits: Limits) -> tuple[float, float, fl
 
 
 def _reach_m(air: Airspace, limits: Limits) -> float:
-    """Metres that paths keep from unknown ground, with one percent and `TOUCH_M` added."""
-    return air.beside_m(limits) * 1.01 + TOUCH_M
+    """Metres that paths keep from unknown ground, with one percent and `SHRUNK_M` added."""
+    return air.beside_m(limits) * 1.01 + SHRUNK_M
 
 
 def _least_step_m(surface: Surface) -> Floats:

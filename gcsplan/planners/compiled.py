@@ -18,8 +18,6 @@ UNIT = KernelUnit(
         "optimal.navmesh.interval_kernels",
         "optimal.navmesh.mesh_kernels",
         "optimal.navmesh.polyanya",
-        "optimal.navmesh.polyanya_nodes",
-        "optimal.navmesh.shut_kernels",
         "optimal.navmesh.zone_kernels",
         "profile.taut_kernels",
     ),

@@ -48,7 +48,7 @@ class Progress:
 
 
 @dataclass(frozen=True, slots=True)
-class Rounding:
+class EndRounding:
     """What the rounding of ends and vias takes from lower bounds: `Problem.connectors`, and the cost of the
     ``straight`` line between places that lie as near to each other as they may."""
 
@@ -146,9 +146,9 @@ class Problem:
             each = self.horizontal_j_per_m * flat + self.vertical_j_per_m * rise
         return (2 + 2 * len(self.via)) * each
 
-    def rounding(self) -> Rounding:
+    def rounding(self) -> EndRounding:
         """What the rounding of ends and vias takes from lower bounds."""
-        return Rounding(self.connectors, straight_bound(self, self.rounding_m) * (1.0 - 1e-12))
+        return EndRounding(self.connectors, straight_bound(self, self.rounding_m) * (1.0 - 1e-12))
 
     def leg_costs(self, start: Floats, end: Floats) -> Floats:
         """(...) costs of straight legs between points (..., 3); `cost` of a path is their sum."""
@@ -219,6 +219,10 @@ class Solution:
     repaired: bool | None = None
     search: tuple[Step, ...] = ()
     problem: Problem | None = None
+
+
+PlanFunction = Callable[[Problem], Solution]
+"""Finds a path, or raises `Refusal`."""
 
 
 class Refusal(NoMission):

@@ -21,7 +21,7 @@ VOLUME_KEYS = ("west_m", "south_m", "bottom_m", "east_m", "north_m", "top_m")
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class PlannerEntry:
     """One planner; ``module`` holds its ``plan`` and is imported only on the first call.
 
     ``paper`` is its source, empty if it is gcsplan's own. ``optimiser`` names a swarm's optimiser in
@@ -45,14 +45,14 @@ class Entry:
         return cast(Solution, run(problem))
 
 
-def _swarm(name: str, summary: str, paper: str, system: Mapping[str, object], **own: object) -> Entry:
+def _swarm(name: str, summary: str, paper: str, system: Mapping[str, object], **own: object) -> PlannerEntry:
     """The table's row for an optimiser: its paper's search space and cost (``system``), then its ``own`` defaults."""
     both = {**system, **own}
     space = {key: both[key] for key in ("encoding", "points")}
     if name != "aco":  # ants know their own sections alone
         del both["points"]
         both["encoding"] = ENCODING
-    return Entry(
+    return PlannerEntry(
         name=name,
         summary=summary,
         module="gcsplan.planners.swarm.aco" if name == "aco" else "gcsplan.planners.swarm.planner",
@@ -84,8 +84,8 @@ _BASELINE: Mapping[str, object] = {
     "encoding": ENCODING, "cost": "krill", "points": None, "population": 100, "evaluations": 10_000,
 }  # fmt: skip
 
-_ENTRIES = (
-    Entry(
+_PLANNERS = (
+    PlannerEntry(
         name="optimal",
         summary="exact shortest tracks under altitude caps, taut-string profiles, and a bound that no path can beat",
         module="gcsplan.planners.optimal.planner",
@@ -119,7 +119,7 @@ _ENTRIES = (
     _swarm("abo", "adaptive budgerigars", _ABO_PAPER, _ABO),
 )
 
-TABLE: Mapping[str, Entry] = MappingProxyType({entry.name: entry for entry in _ENTRIES})
+TABLE: Mapping[str, PlannerEntry] = MappingProxyType({entry.name: entry for entry in _PLANNERS})
 
 
 def names() -> tuple[str, ...]:
@@ -127,7 +127,7 @@ def names() -> tuple[str, ...]:
     return tuple(TABLE)
 
 
-def get(name: str) -> Entry:
+def get(name: str) -> PlannerEntry:
     """The planner called ``name``. Raises InputError, which suggests the nearest known name, if there is none."""
     entry = TABLE.get(name)
     if entry is None:

@@ -15,13 +15,13 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices, Int8s
 from gcsplan.planners.problem import Problem
 
-PARTS = np.array([1.0, 0.5, 0.22, 0.1, 0.04, 0.015])
+MOVED_PARTS = np.array([1.0, 0.5, 0.22, 0.1, 0.04, 0.015])
 """How far a point is moved towards the line between its neighbours, as parts of the distance to that line."""
-ROUNDS = 24
+MOVE_ROUNDS = 24
 """Most rounds of moves; each round moves the points of odd and then of even index."""
 SHARE = 0.3
 """Part of the counted work left that the moves of one path may take: legs along a zone over a slope take long."""
-LITTLE = 2e-6
+LAST_GAIN = 2e-6
 """A round that gains at most this part of the cost is the last."""
 
 OPEN, LEGAL, SHUT = 0, 1, 2
@@ -35,13 +35,13 @@ def polished(problem: Problem, points: Floats, pinned: Bools) -> tuple[Floats, B
     points = points.copy()
     still = np.zeros(len(points), np.bool_)
     with problem.budget.allow(SHARE):
-        for k in range(2 * ROUNDS):
+        for k in range(2 * MOVE_ROUNDS):
             if not problem.budget.goes_on():
                 break
             _move(problem, points, pinned, still, k % 2)
             if k % 2:
                 now = _cost(problem, points)
-                if cost - now <= LITTLE * cost:
+                if cost - now <= LAST_GAIN * cost:
                     break
                 cost = now
     return points, pinned
@@ -63,7 +63,7 @@ def _move(problem: Problem, points: Floats, pinned: Bools, still: Bools, parity:
     foot = before + np.clip(t, 0.0, 1.0)[:, None] * chord
     aims = np.stack([foot, foot, here], axis=1)  # (n, 3, 3): in space, in the plane alone, in altitude alone
     aims[:, 1, 2], aims[:, 2, 2] = here[:, 2], foot[:, 2]
-    places = here[:, None, None] + PARTS[None, None, :, None] * (aims - here[:, None])[:, :, None]
+    places = here[:, None, None] + MOVED_PARTS[None, None, :, None] * (aims - here[:, None])[:, :, None]
     places = places.reshape(len(at), -1, 3)
     old = problem.leg_costs(before, here) + problem.leg_costs(here, after)
     new = problem.leg_costs(before[:, None], places) + problem.leg_costs(places, after[:, None])

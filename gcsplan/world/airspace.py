@@ -12,6 +12,7 @@ limit is legal; a micrometre is float noise.
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -24,7 +25,7 @@ from gcsplan.native.signature import Held
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.geometry.zones import Polygon, Zone
-from gcsplan.world.kernels.compiled import FOUND, ONE_SURFACE, SURFACE, ZONES
+from gcsplan.world.kernels.compiled import FOUND, ONE_SURFACE, SURFACE, WORK, ZONES
 from gcsplan.world.kernels.entries import around, judge
 from gcsplan.world.kernels.field import Field
 from gcsplan.world.kernels.neighbourhood import LineBatch, Neighbourhoods
@@ -37,6 +38,7 @@ from gcsplan.world.kernels.shared import (
     CEILING_AGL,
     CLIMB,
     COVERAGE,
+    CUT,
     DESCENT,
     FLOOR,
     FLOOR_AGL,
@@ -47,18 +49,28 @@ from gcsplan.world.kernels.shared import (
     TOUCH_M,
     Demands,
 )
-from gcsplan.world.kernels.work_arrays import work_arrays
-from gcsplan.world.kernels.zone_arrays import BOX, over_both_grounds, zones_as_arrays
-from gcsplan.world.kernels.zone_tests import deepest_in_circle, deepest_inside
+from gcsplan.world.kernels.zone_arrays import BOX, deepest_in_circle, deepest_inside, over_both_grounds, zones_as_arrays
 from gcsplan.world.tube import ZONE_ROOM_M, Band, Reaches, Tube, make_tube
 
 __all__ = ["Airspace", "Band", "LegReport", "Legs", "Tube", "Violation", "ViolationKind"]
+
 
 NEAR_M, NEAR_PART = 0.01, 0.01
 """The kernel finds the nearest place of a zone over ground to this many metres, or this part of the distance
 (`_sweep_zones.nearest_conflict`)."""
 
 ViolationKind = Literal["min_agl", "max_agl", "max_amsl", "terrain_clearance", "zone", "climb", "descent", "coverage"]
+
+ZONE = 7  # follows the kernel's kinds
+_VIOLATION_KINDS: dict[int, ViolationKind] = {
+    ZONE: "zone", MIN_AGL: "min_agl", TERRAIN: "terrain_clearance", MAX_AGL: "max_agl", MAX_AMSL: "max_amsl",
+    COVERAGE: "coverage", CLIMB: "climb", DESCENT: "descent",
+}  # fmt: skip
+
+_NO_ZONES = (
+    np.zeros((0, 4)), np.zeros((0, 7, 2)), np.zeros(0, np.intp), np.zeros((0, 2), np.intp), np.zeros((0, 2)),
+)  # fmt: skip
+_HELD_NOTHING = Held(FOUND, *_NO_ZONES)
 
 
 @dataclass(frozen=True, eq=False)
@@ -384,14 +396,39 @@ class Airspace:
         return value, at
 
 
-ZONE = 7  # follows the kernel's kinds
-_VIOLATION_KINDS: dict[int, ViolationKind] = {
-    ZONE: "zone", MIN_AGL: "min_agl", TERRAIN: "terrain_clearance", MAX_AGL: "max_agl", MAX_AMSL: "max_amsl",
-    COVERAGE: "coverage", CLIMB: "climb", DESCENT: "descent",
-}  # fmt: skip
 _KIND_NUMBERS = {kind: number for number, kind in _VIOLATION_KINDS.items()}
 
-_NO_ZONES = (
-    np.zeros((0, 4)), np.zeros((0, 7, 2)), np.zeros(0, np.intp), np.zeros((0, 2), np.intp), np.zeros((0, 2)),
-)  # fmt: skip
-_HELD_NOTHING = Held(FOUND, *_NO_ZONES)
+
+class WorkArrays(threading.local):
+    """Arrays for `judge` to work in: one set for each thread, reset before each call.
+
+    Pieces of legs that are still to be looked at (256, 8); numbers of the leg at hand (`_sweep_terrain`), and the count
+    `cut`; splits of a leg by a polygon, two for each corner; for each zone the leg that it was listed for, -1 before;
+    and a list of zones (0, 1, …).
+    """
+
+    def __init__(self) -> None:
+        self._size = (-1, -1)
+        self._out = np.zeros(CUT + 1)
+
+    def __call__(self, most_corners: int, zones: int) -> Held:
+        """The arrays for polygons of at most ``most_corners`` corners, and ``zones`` zones."""
+        if self._size != (most_corners, zones):
+            self._seen = np.empty(zones, np.int64)
+            self._list = np.arange(zones)
+            self._ready = Held(
+                WORK, np.empty((256, 8)), self._out, np.empty(2 * most_corners), self._seen, np.arange(zones)
+            )
+            self._size = most_corners, zones
+        self._out.fill(0.0)
+        self._seen.fill(-1)
+        self._ready.arguments[-1][:] = self._list
+        return self._ready
+
+    @property
+    def cut(self) -> float:
+        """How many pieces of ground the last call of `judge` cut, see `_sweep_beside.deepest`."""
+        return float(self._out[CUT])
+
+
+work_arrays = WorkArrays()

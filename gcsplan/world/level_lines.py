@@ -37,7 +37,7 @@ from gcsplan.world.kernels.shared import (
     TOUCH_M,
     WEST_E,
 )
-from gcsplan.world.kernels.zone_tests import grown_edges
+from gcsplan.world.kernels.zone_arrays import grown_edges
 from gcsplan.world.tube import TUBE_MARGIN_M, ZONE_ROOM_M, Reaches
 
 BOX_LOW, BOX_HIGH = [WEST_E, SOUTH_N], [EAST_E, NORTH_N]

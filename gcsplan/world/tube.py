@@ -1,8 +1,11 @@
-"""The tube: floor and ceiling for an altitude profile along a track."""
+"""The tube: floor and ceiling for an altitude profile along a track.
+
+Tubes are cut and joined, so that after a change of the track only the changed part needs a new tube.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +16,19 @@ from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.kernels.entries import pieces
 from gcsplan.world.kernels.field import Field
 from gcsplan.world.kernels.shared import BAND_HIGH, BAND_LOW, BOW_M, CEILING, CEILING_AGL, FLOOR, FLOOR_AGL, Zones
-from gcsplan.world.kernels.zone_tests import spans
+from gcsplan.world.kernels.zone_arrays import spans
+
+ROOM_M = 0.02
+"""Extra reach, m, for the accuracy that the check loses between the plane and the grid."""
+
+FINE_ROOM_M = 0.002
+"""The same where the map is exact: twice the smallest pieces that the check cuts beside a cliff."""
+
+ZONE_ROOM_M = 0.05
+"""The same beside a zone whose levels follow the ground."""
+
+TUBE_MARGIN_M = 0.01
+"""Extra height, m: twice what the check's branch and bound resolves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,19 +61,6 @@ class Band:
     s_m: Floats
     bottom_m: Floats
     top_m: Floats
-
-
-ROOM_M = 0.02
-"""Extra reach, m, for the accuracy that the check loses between the plane and the grid."""
-
-FINE_ROOM_M = 0.002
-"""The same where the map is exact: twice the smallest pieces that the check cuts beside a cliff."""
-
-ZONE_ROOM_M = 0.05
-"""The same beside a zone whose levels follow the ground."""
-
-TUBE_MARGIN_M = 0.01
-"""Extra height, m: twice what the check's branch and bound resolves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,3 +183,67 @@ def _between(track: Floats, length: Floats, s0: float, s1: float) -> Floats:
     inner = (length > s0) & (length < s1)
     ends = [np.array([np.interp(s, length, track[:, k]) for k in range(2)]) for s in (s0, s1)]
     return np.ascontiguousarray(np.vstack([ends[0], track[inner], ends[1]]))
+
+
+def cut(tube: Tube, s0_m: float, s1_m: float) -> Tube | None:
+    """The part of a tube from ``s0_m`` to ``s1_m``, its ``s_m`` counted from 0; None if it is shorter than 1e-6 m."""
+    if s1_m - s0_m < 1e-6:
+        return None
+    s, (floor, ceiling) = _cut_pieces(tube.s_m, (tube.floor_m, tube.ceiling_m), s0_m, s1_m)
+    bands = []
+    for b in tube.bands:
+        low, high = max(float(b.s_m[0]), s0_m), min(float(b.s_m[-1]), s1_m)
+        if high - low > 0.0:
+            bs, (bottom, top) = _cut_pieces(b.s_m, (b.bottom_m, b.top_m), low, high)
+            bs = bs - s0_m
+            bands.append(Band(b.zone, float(bs[0]), float(bs[-1]), bs, bottom, top))
+    return Tube(s - s0_m, floor, ceiling, tuple(bands))
+
+
+def _cut_pieces(s: Floats, values: tuple[Floats, Floats], s0: float, s1: float) -> tuple[Floats, tuple[Floats, Floats]]:
+    i = min(max(int(np.searchsorted(s, s0, "right")) - 1, 0), len(s) - 2)
+    j = min(max(int(np.searchsorted(s, s1, "left")), i + 1), len(s) - 1)
+    out = s[i : j + 1].copy()
+    u = (s0 - out[0]) / (out[1] - out[0])
+    v = (s1 - out[-2]) / (out[-1] - out[-2])
+    out[0], out[-1] = s0, s1
+    cuts = []
+    for value in values:
+        part = value[i:j].copy()
+        first, last = value[i].copy(), value[j - 1].copy()
+        if u > 0.0 and np.isfinite(first).all():
+            part[0, 0] = first[0] + u * (first[1] - first[0])
+        if v < 1.0 and np.isfinite(last).all():
+            part[-1, 1] = last[0] + v * (last[1] - last[0])
+        cuts.append(part)
+    return out, (cuts[0], cuts[1])
+
+
+def join(tubes: Sequence[Tube]) -> Tube:
+    """Join tubes end to end. Bands of one zone that touch become one band, so that one side is chosen for both."""
+    if len(tubes) == 1:
+        return tubes[0]
+    offsets = np.concatenate([[0.0], np.cumsum([t.s_m[-1] for t in tubes])])
+    s = np.concatenate([tubes[0].s_m] + [t.s_m[1:] + o for t, o in zip(tubes[1:], offsets[1:], strict=False)])
+    floor = np.concatenate([t.floor_m for t in tubes])
+    ceiling = np.concatenate([t.ceiling_m for t in tubes])
+    bands: list[Band] = []
+    for t, o in zip(tubes, offsets, strict=False):
+        for b in t.bands:
+            moved = Band(b.zone, b.s0_m + o, b.s1_m + o, b.s_m + o, b.bottom_m, b.top_m)
+            for k in range(len(bands) - 1, -1, -1):
+                if bands[k].zone == b.zone:
+                    if abs(bands[k].s1_m - moved.s0_m) < 1e-6:
+                        a = bands[k]
+                        moved = Band(
+                            b.zone,
+                            a.s0_m,
+                            moved.s1_m,
+                            np.concatenate([a.s_m, moved.s_m[1:]]),
+                            np.concatenate([a.bottom_m, moved.bottom_m]),
+                            np.concatenate([a.top_m, moved.top_m]),
+                        )
+                        del bands[k]
+                    break
+            bands.append(moved)
+    return Tube(s, floor, ceiling, tuple(bands))

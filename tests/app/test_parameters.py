@@ -24,7 +24,7 @@ from gcsplan.app.upload.job import JobResult
 from gcsplan.app.upload.run import verify_file
 from gcsplan.check.judge import judge
 from gcsplan.errors import InputError, UsageError
-from gcsplan.fleet.motion.lean import lean_needed_deg
+from gcsplan.fleet.motion.ardupilot import lean_needed_deg
 from gcsplan.mission_file import load_mission
 from gcsplan.sim.rehearsal import rehearse
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle

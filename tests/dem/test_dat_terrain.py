@@ -15,10 +15,11 @@ from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.geometry.zones import Box
 from gcsplan.world.terrain.cell import Cell
 from gcsplan.world.terrain.grid import GroundHeights, PostHeights, TerrainGrid
 from gcsplan.world.terrain.model_words import notes_on
-from gcsplan.world.terrain.terrain import Box, TerrainSpec
+from gcsplan.world.terrain.terrain import TerrainSpec
 from tests.oracles import terrain_grid as oracle
 
 BOX = (-2500.0, -2500.0, 2500.0, 2500.0)

@@ -18,10 +18,9 @@ import numpy as np
 import pytest
 
 from gcsplan.dem.cache import Cache, cache_folder
-from gcsplan.dem.cells import cells_in
 from gcsplan.dem.download import DownloadPatience
 from gcsplan.dem.fetch import Fetch, Fetched
-from gcsplan.dem.sources import GLO30, GLO90, SRTM, DemSource
+from gcsplan.dem.sources import GLO30, GLO90, SRTM, DemSource, cells_in
 from gcsplan.errors import InputError, LinkError
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.terrain.cell import Cell, cell_of

@@ -11,8 +11,7 @@ import pytest
 
 from gcsplan.arrays import Floats
 from gcsplan.dem.cache import Cache, MissingTiles, TileRecord, text_of
-from gcsplan.dem.cells import cells_in
-from gcsplan.dem.sources import GLO30, SRTM, DemSource
+from gcsplan.dem.sources import GLO30, SRTM, DemSource, cells_in
 from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError
 from gcsplan.mission_file import load_mission

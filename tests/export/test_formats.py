@@ -23,7 +23,7 @@ from pyproj import Geod
 from gcsplan.export.geojson import write_geojson
 from gcsplan.export.kml import DRAWN_TOP_M, write_kml
 from gcsplan.export.profile import write_profile
-from gcsplan.export.rows import ItemRow, Track, WayPoint, outlines_deg
+from gcsplan.export.rows import FlownTrack, ItemRow, WayPoint, outlines_deg
 from gcsplan.export.summary import ORDER, SCHEMA, json_of, write_summary
 from gcsplan.export.table import csv_of
 from gcsplan.mission_file.zone_reader import read_zones
@@ -35,7 +35,7 @@ from tests.support.effort import draws
 from tests.support.paths import REPOSITORY
 
 FRAME = Frame(36.6, -84.3)
-TRACK = Track(
+TRACK = FlownTrack(
     "uav1",
     np.array([36.6, 36.61234567, 36.62]),
     np.array([-84.38, -84.37, -84.36000001]),
@@ -93,7 +93,7 @@ def test_a_zero_has_no_sign_and_a_comma_in_a_name_is_quoted() -> None:
 )
 def test_a_track_that_is_none_is_refused(lat: list[float], lon: list[float], waypoints: tuple[None, ...]) -> None:
     with pytest.raises(ValueError, match=r"track|way points"):
-        Track("a", np.array(lat), np.array(lon), np.array(lat), waypoints)
+        FlownTrack("a", np.array(lat), np.array(lon), np.array(lat), waypoints)
 
 
 @settings(max_examples=draws(60))
@@ -249,7 +249,7 @@ def test_a_large_fleets_way_points_are_there_to_tick_and_its_tracks_lack_curtain
 def test_a_hundred_vehicles_make_a_file_that_viewers_open() -> None:
     points = tuple(WayPoint(f"{n} NAV_WAYPOINT", n, "NAV_WAYPOINT", 60.0, None, 10.0 * n) for n in range(50))
     places = np.linspace(36.6, 36.7, 50)
-    tracks = [Track(f"uav{n}", places, places - 121.0, 1e3 * places, points) for n in range(100)]
+    tracks = [FlownTrack(f"uav{n}", places, places - 121.0, 1e3 * places, points) for n in range(100)]
     assert len(write_kml("m", tracks, [], FRAME)) < 100 * 50 * 700
 
 
@@ -280,7 +280,7 @@ def test_zones_stand_in_the_kml_from_floor_to_ceiling() -> None:
 @given(st.text())
 def test_no_name_breaks_the_kml(name: str) -> None:
     zone = Zone(name, Circle(0.0, 0.0, 10.0))
-    track = Track(name, TRACK.lat_deg, TRACK.lon_deg, TRACK.amsl_m, (WayPoint(name, 1, name, 0.0), None, None))
+    track = FlownTrack(name, TRACK.lat_deg, TRACK.lon_deg, TRACK.amsl_m, (WayPoint(name, 1, name, 0.0), None, None))
     text = write_kml(name, [track], [zone], FRAME)
     root = ET.fromstring(text.encode("utf-8"))
     said = root.findtext(f"{KML}Document/{KML}name") or ""
@@ -352,7 +352,7 @@ def test_the_geojson_can_be_given_back_as_a_file_of_zones(tmp_path: Path) -> Non
 
 def test_a_track_across_the_antimeridian_is_cut_there() -> None:
     lon = np.array([179.9, -179.9, -179.8, 179.8])
-    track = Track("a", np.array([10.0, 10.2, 10.3, 10.7]), lon, np.array([100.0, 200.0, 300.0, 500.0]))
+    track = FlownTrack("a", np.array([10.0, 10.2, 10.3, 10.7]), lon, np.array([100.0, 200.0, 300.0, 500.0]))
     (line,) = features(write_geojson("m", [track], [], FRAME), "track")
     assert line["geometry"] == {
         "type": "MultiLineString",
@@ -366,7 +366,7 @@ def test_a_track_across_the_antimeridian_is_cut_there() -> None:
 
 def test_a_track_that_ends_or_turns_on_the_antimeridian_is_not_cut() -> None:
     for lon in ([179.9, 180.0, 179.9], [179.9, -180.0, 179.9], [180.0, 179.9, 179.8]):
-        track = Track("a", np.array([1.0, 2.0, 3.0]), np.array(lon), np.zeros(3))
+        track = FlownTrack("a", np.array([1.0, 2.0, 3.0]), np.array(lon), np.zeros(3))
         (line,) = features(write_geojson("m", [track], [], FRAME), "track")
         assert line["geometry"]["type"] == "LineString"
         assert {p[0] for p in line["geometry"]["coordinates"]} <= {180.0, 179.9, 179.8}

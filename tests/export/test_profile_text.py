@@ -11,7 +11,7 @@ import pytest
 
 from gcsplan.app.fleet import pipeline
 from gcsplan.check.verdict import Verdict
-from gcsplan.export.profile_text import BOTH, GROUND, TRACK, UNKNOWN, profile_lines
+from gcsplan.export.profile import BOTH, GROUND, TRACK, UNKNOWN, profile_lines
 from gcsplan.units import AVIATION, METRIC
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.world import World

@@ -14,10 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
-from gcsplan.fleet.arrival import NoSchedule, Schedule, schedule
-from gcsplan.fleet.craft import Craft, Crew
+from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, best_order, interval_range, schedule
 from gcsplan.fleet.motion.timing import Route
-from gcsplan.fleet.order import best_order, interval_range
 from gcsplan.mission_file.request import ArrivalRequest
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Energy, Vehicle

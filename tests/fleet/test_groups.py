@@ -5,12 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gcsplan.fleet import _groups
-from gcsplan.fleet._groups import groups_of, settle_groups
 from gcsplan.fleet._settle import Ask, moved, settle
-from gcsplan.fleet.arrival import schedule
-from gcsplan.fleet.craft import Crew
-from gcsplan.fleet.resolve import resolve
+from gcsplan.fleet.arrival import Crew, schedule
+from gcsplan.fleet.resolve import groups_of, resolve, settle_groups
 from gcsplan.fleet.separation import Rules, separation
 from tests.fleet.test_resolve import crew
 from tests.support.flights import motions
@@ -61,7 +58,7 @@ def test_groups_that_meet_after_all_are_joined(monkeypatch: pytest.MonkeyPatch) 
     crews = clusters(2)
     plan = schedule(crews, "sequence", interval_s=1.0)
     assert not separation(motions(plan, crews), RULES).safe
-    monkeypatch.setattr(_groups, "groups_of", lambda plan, rules: [[name] for name in plan.order])
+    monkeypatch.setattr("gcsplan.fleet.resolve.groups_of", lambda plan, rules: [[name] for name in plan.order])
     found, judged, _ = settle_groups(plan, Ask(crews, RULES, None, "ground", 600.0))
     assert judged is not None
     assert judged.safe

@@ -14,12 +14,10 @@ from hypothesis import strategies as st
 
 from gcsplan.errors import NoMission
 from gcsplan.fleet._taken import Taken
-from gcsplan.fleet.arrival import Schedule, schedule
-from gcsplan.fleet.craft import Craft, Crew, Slot
-from gcsplan.fleet.goals import least_interval_s
+from gcsplan.fleet.arrival import Craft, Crew, Schedule, Slot, schedule
 from gcsplan.fleet.motion.timed_path import TimedPath
 from gcsplan.fleet.motion.timing import MissionEnd, Route
-from gcsplan.fleet.resolve import Change, NotSeparated, Resolved, resolve
+from gcsplan.fleet.resolve import Change, NotSeparated, Resolved, least_interval_s, resolve
 from gcsplan.fleet.separation import Conflict, Rules, separation
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Energy, Vehicle

@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import GcsplanError, InputError
-from gcsplan.optimisers.box import WORST, Run, Steps, clipped, partners
+from gcsplan.optimisers.box import WORST_COST, Run, Steps, clipped, partners
 from gcsplan.optimisers.driver import State, minimise
-from gcsplan.optimisers.registry import Entry, get
+from gcsplan.optimisers.registry import OptimiserEntry, get
 from tests.support.effort import draws
 
 
-def row(update: object, **rest: object) -> Entry:
-    return Entry("test", "", update, "", "", population=4, iterations=3, **rest)  # type: ignore[arg-type]
+def row(update: object, **rest: object) -> OptimiserEntry:
+    return OptimiserEntry("test", "", update, "", "", population=4, iterations=3, **rest)  # type: ignore[arg-type]
 
 
 def first_value(x: Floats) -> Floats:
@@ -105,7 +105,7 @@ def test_costs_that_are_not_finite_reach_a_rule_as_the_worst_and_never_win() -> 
 
     values = np.array([np.nan, 3.0, -np.inf, 1e300])
     result = minimise(row(watch), lambda x: values, 2)
-    assert sent[0].tolist() == [WORST, 3.0, WORST, WORST]
+    assert sent[0].tolist() == [WORST_COST, 3.0, WORST_COST, WORST_COST]
     assert result.cost == 3.0
 
 

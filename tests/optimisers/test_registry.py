@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats
-from gcsplan.optimisers.driver import Result, minimise
+from gcsplan.optimisers.driver import OptimiserResult, minimise
 from gcsplan.optimisers.functions import FUNCTIONS
 from gcsplan.optimisers.registry import TABLE, get, names
 
@@ -87,7 +87,7 @@ def test_the_best_so_far_never_rises_and_is_the_best_point_ever_asked_for(name: 
 
 @every
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_other_ones(name: str) -> None:
-    def once(seed: int) -> Result:
+    def once(seed: int) -> OptimiserResult:
         return minimise(name, FUNCTIONS["f7"].on_unit_box(6, shifted=True), 6, population=10, iterations=15, seed=seed)
 
     first, again, other = once(5), once(5), once(6)

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gcsplan.planners.optimal.navmesh.terrain_nodes import nodes
+from gcsplan.planners.optimal.navmesh.grid import nodes
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.optimal.searches import bound_corridor
 from gcsplan.planners.problem import Problem, Refusal, Solution

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gcsplan.world.terrain import mosaic, overlap, terrain, voids
+from gcsplan.world.terrain import mosaic, terrain, voids
 from gcsplan.world.terrain.raster import MAX_CELLS
 from tests.campaigns import sizes
 from tests.support.paths import REPOSITORY
@@ -22,7 +22,7 @@ HELD = {"obstacle_height_m": 2, "canopy": 4}
 
 
 def most_cells(monkeypatch: pytest.MonkeyPatch, count: int) -> None:
-    for module in (mosaic, overlap, terrain, voids):
+    for module in (mosaic, terrain, voids):
         monkeypatch.setattr(module, "MAX_CELLS", count)
 
 

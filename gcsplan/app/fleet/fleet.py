@@ -30,7 +30,7 @@ from gcsplan.notes.note import Note
 from gcsplan.world.world import World
 
 if TYPE_CHECKING:
-    from gcsplan.fleet.separation import Conflict, Place, Rules, Separation, Where
+    from gcsplan.fleet.separation import AirPlace, Conflict, Rules, Separation, Where
 
 LATER_S = 600.0
 """Seconds by which all arrivals may be delayed to keep a fleet apart, if the mission file sets no arrival time."""
@@ -271,7 +271,7 @@ def motion_of(v: VehiclePlan, slot: Slot, world: World) -> TimedPath:
 def on_map(world: World) -> Where:
     """A function that names a place so that a person can find it on a map."""
 
-    def named(place: Place) -> Note:
+    def named(place: AirPlace) -> Note:
         lat_deg, lon_deg = (float(x) for x in world.frame.to_degrees(place[0], place[1]))
         return Note("place_on_map", lat_deg=lat_deg, lon_deg=lon_deg, amsl_m=place[2])
 

@@ -21,7 +21,7 @@ from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.export.geojson import write_geojson
 from gcsplan.export.kml import write_kml
 from gcsplan.export.profile import write_profile
-from gcsplan.export.rows import ItemRow, Track, WayPoint
+from gcsplan.export.rows import FlownTrack, ItemRow, WayPoint
 from gcsplan.export.summary import write_summary
 from gcsplan.figures import floored, raised
 from gcsplan.fleet.arrival import Slot
@@ -230,7 +230,7 @@ def item_rows(vehicle: str, verdict: Verdict, slot: Slot | None = None) -> list[
     return rows
 
 
-def _track(v: VehiclePlan, geoid: GeoidGrid | None, slot: Slot | None, returns: WayHome | None) -> Track:
+def _track(v: VehiclePlan, geoid: GeoidGrid | None, slot: Slot | None, returns: WayHome | None) -> FlownTrack:
     legs = v.verdict.legs
     places = np.array([legs[0].start, *(leg.end for leg in legs)])
     commands = {seq: command_name(item.command) for seq, item in enumerate(v.mission.wire_items())}
@@ -245,7 +245,7 @@ def _track(v: VehiclePlan, geoid: GeoidGrid | None, slot: Slot | None, returns: 
         point = WayPoint(name, leg.seq, commands.get(leg.seq), leg.agl_end_m, above[i + 1], float(left[i + 1]))
         points.append(None if goes_on else point)
     words = _described(v.verdict, returns)
-    return Track(v.name, places[:, 0], places[:, 1], places[:, 2], tuple(points), reached, left, words)
+    return FlownTrack(v.name, places[:, 0], places[:, 1], places[:, 2], tuple(points), reached, left, words)
 
 
 def _described(verdict: Verdict, home: WayHome | None) -> str:

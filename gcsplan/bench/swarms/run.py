@@ -27,7 +27,7 @@ from gcsplan.bench.terrain.problems import NamedProblem, problems
 from gcsplan.errors import GcsplanError, InputError
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.problem import Problem, Refusal
-from gcsplan.planners.registry import Entry
+from gcsplan.planners.registry import PlannerEntry
 from gcsplan.planners.registry import get as get_planner
 from gcsplan.planners.swarm import warm_start
 from gcsplan.planners.swarm.planner import Found, cost_of, drawn, search, settle, until_found
@@ -191,7 +191,7 @@ def attempt_of(one: NamedProblem, method: Method, evaluations: int) -> Attempt:
     )  # fmt: skip
 
 
-def _searches(problem: Problem, row: Entry, settings: Settings) -> int | None:
+def _searches(problem: Problem, row: PlannerEntry, settings: Settings) -> int | None:
     """Searches that the planner needs until one is legal or repaired; None if it refuses."""
     count = 0
 

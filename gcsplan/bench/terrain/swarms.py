@@ -19,7 +19,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.bench.measure import length_m, passes
 from gcsplan.bench.terrain.ompl import RivalAnswer, box_of, rival_module
-from gcsplan.optimisers.driver import History, Result
+from gcsplan.optimisers.driver import History, OptimiserResult
 from gcsplan.planners.problem import Problem
 from gcsplan.world.geometry.zones import Circle, Level
 
@@ -131,7 +131,7 @@ def _amsl(level: Level | None, ground: Floats, without: float) -> Floats:
     )
 
 
-def minimised(cost: Callable[[Floats], Floats], dim: int, name: str, evaluations: int, seed: int) -> Result:
+def minimised(cost: Callable[[Floats], Floats], dim: int, name: str, evaluations: int, seed: int) -> OptimiserResult:
     """Run mealpy's swarm ``name`` (of `BASELINES`) on a batch cost over the unit box, for exactly ``evaluations``.
 
     Raises InputError if mealpy is missing.
@@ -161,6 +161,6 @@ def minimised(cost: Callable[[Floats], Floats], dim: int, name: str, evaluations
     with contextlib.suppress(Spent):
         model.solve({"bounds": bounds, "minmax": "min", "obj_func": one, "log_to": None}, seed=seed)
     counts, rounds, costs = (np.array(column) for column in zip(*trace, strict=True))
-    return Result(
+    return OptimiserResult(
         best, trace[-1][2], trace[-1][0], 0, History(counts, rounds, costs), "evaluations", f"mealpy {name}"
     )  # fmt: skip

@@ -16,8 +16,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats, Indices
 from gcsplan.check.motion.stretch import Stretch
-from gcsplan.fleet.motion.legs import legs
-from gcsplan.fleet.motion.timing import upright
+from gcsplan.fleet.motion.timing import legs, upright
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.terrain.vehicle_terrain import VehicleTerrain

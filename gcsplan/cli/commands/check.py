@@ -284,7 +284,7 @@ def _say_all(batch: Batch, units: Units) -> None:
     from gcsplan.cli.output.console import say, say_heights, say_notes
     from gcsplan.cli.output.return_table import say_home, say_warnings
     from gcsplan.cli.output.verdict_table import verdict_table
-    from gcsplan.export.profile_text import profile_lines
+    from gcsplan.export.profile import profile_lines
     from gcsplan.notes.note import Wording
 
     wording = Wording(units, batch.typed)

@@ -134,7 +134,7 @@ def _of_mission(path: Path, wanted: str | None) -> tuple[DemSource, Sequence[Cel
 
 
 def _around(text: str, radius_km: float) -> Sequence[Cell]:
-    from gcsplan.dem.cells import cells_in
+    from gcsplan.dem.sources import cells_in
     from gcsplan.mission_file.values.places import read_place
     from gcsplan.world.geodesy.frame import Frame
 
@@ -153,7 +153,7 @@ def _around(text: str, radius_km: float) -> Sequence[Cell]:
 
 
 def _named(text: str) -> Sequence[Cell]:
-    from gcsplan.dem.cells import MOST_TILES_OF_AREA
+    from gcsplan.dem.sources import MOST_TILES_OF_AREA
     from gcsplan.world.terrain.cell import cell_of
 
     names = [name.strip().upper() for name in text.split(",") if name.strip()]

@@ -57,7 +57,7 @@ def dat(
     """
     from gcsplan.app.upload.ground import MissionGround
     from gcsplan.cli.output.console import remark, say
-    from gcsplan.dem.dat_write import blocks_around, contents_of
+    from gcsplan.dem.dat_file import blocks_around, contents_of
     from gcsplan.export.durable import write_whole
     from gcsplan.mission_file import load_mission
     from gcsplan.world.terrain.grid import PostHeights, TerrainGrid

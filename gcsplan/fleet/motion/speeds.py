@@ -29,7 +29,7 @@ _LEAST_TURN = 1e-7  # radians
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Stretch:
+class Segments:
     """Segments between two standstills: straight ones and the arcs of rounded corners.
 
     ``start``, ``end`` are (S, 3) metres; ``length_m`` (S,) is along the path. The speed along a segment is at most
@@ -151,7 +151,7 @@ class Stretch:
 
 def rounded(
     points: Floats, vehicle: Vehicle, owner: Indices, pace: Floats | None = None, rates_m_s: Floats | None = None
-) -> Stretch | None:
+) -> Segments | None:
     """The stretch through ``points`` (N, 3) without a stop, its corners rounded; None if nothing moves.
 
     ``owner`` (N - 1,) numbers the legs. With a corner acceleration of inf, corners are sharp. In the middle of a corner
@@ -203,7 +203,7 @@ def rounded(
     arc = arc_m > 0.0
     bend_most = np.sqrt(vehicle.corner_accel_m_s2 * arc_m[arc]) * (length[arc] / run_m[arc])
     most[arc] = np.minimum(most[arc], bend_most)
-    return Stretch(
+    return Segments(
         start[there], end[there], length[there], most[there], per_cruise[there], arc_m[there], arc_turn[there],
         towards[there], owners[there], vehicle.accel_m_s2,
     )  # fmt: skip
@@ -229,7 +229,9 @@ def _corners(heading: Floats, run: Floats, corner_accel_m_s2: float) -> tuple[Fl
     return back, turn, radius
 
 
-def column(heights_m: Floats, most_m_s: Floats, place: Floats, vehicle: Vehicle, owner: int, *, stops: bool) -> Stretch:
+def column(
+    heights_m: Floats, most_m_s: Floats, place: Floats, vehicle: Vehicle, owner: int, *, stops: bool
+) -> Segments:
     """A vertical stretch over ``place`` (2,) through ``heights_m`` (S + 1,) amsl, at most ``most_m_s`` (S,).
 
     A speed of inf means the cruise speed.
@@ -240,7 +242,7 @@ def column(heights_m: Floats, most_m_s: Floats, place: Floats, vehicle: Vehicle,
     start[:, 2], end[:, 2] = heights_m[:-1], heights_m[1:]
     none = np.zeros(n)
     per_cruise = np.where(np.isinf(most_m_s), 1.0, math.inf)
-    return Stretch(
+    return Segments(
         start, end, np.abs(np.diff(heights_m)), most_m_s, per_cruise, none, none, none,
         np.full(n, owner, dtype=np.intp), vehicle.vertical_accel_m_s2, stops,
     )  # fmt: skip

@@ -9,8 +9,8 @@ from pathlib import PurePath
 from gcsplan.errors import Problem
 from gcsplan.mission_file.zones.draft import ZoneDraft, one_line
 from gcsplan.notes.note import Note
-from gcsplan.world.geodesy.frame import Box, Frame
-from gcsplan.world.geometry.zones import Zone
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geometry.zones import Box, Zone
 
 TURNS = (-720.0, -360.0, 0.0, 360.0, 720.0)
 """Whole turns by which a longitude may be written otherwise than the frame's, degrees."""

@@ -22,21 +22,21 @@ from gcsplan.world.geometry.zones import Circle, Level, Zone
 
 SHUT_M = 1e5
 """Floor, in metres, where no altitude is free; finite, so that kernels need not handle infinities."""
-MOST_NODES = 150_000
+MOST_RASTER_NODES = 150_000
 FINEST_PART, COARSEST_M = 0.45, 40.0
 """Spacing of the raster: as a part of the terrain's cells, and at most in metres."""
-MARGIN_M = 0.3
+RASTER_MARGIN_M = 0.3
 """Metres kept from floor and ceiling of the raster, for ground between samples."""
 SLOPE_PART = 0.999
-PENALTY = 50.0
+MISSING_COST = 50.0
 """Cost, in metres of track, of each metre that is missing for a track to be legal."""
-AROUND_M = 2000.0
+MOVE_REACH_M = 2000.0
 """A move is evaluated over this many metres of the track to each side."""
-ROUNDS = 6
+PULL_ROUNDS = 6
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Line:
+class GuidedTrack:
     """A track evaluated by the guide.
 
     ``points`` (N, 2); ``pinned`` (N,) vertices that stay; ``pin_m`` (N,) their altitudes, NaN where free; ``amsl_m``
@@ -57,7 +57,7 @@ class Line:
 
 
 @dataclass(eq=False, slots=True)
-class Guide:
+class CorridorRaster:
     """Rasters ``floor_m``, ``ceiling_m`` (rows, cols) from (``west_m``, ``south_m``), rows going north, and the walls:
     ``circles`` (C, 3) east, north, radius; ``edges`` (E, 4) of polygons. ``work``: working arrays of the kernel."""
 
@@ -70,7 +70,7 @@ class Guide:
     circles: Floats
     edges: Floats
     work: tuple[Floats | Int64s, ...]
-    margin_m: float = MARGIN_M
+    margin_m: float = RASTER_MARGIN_M
     slope_part: float = SLOPE_PART
 
     def strict(self) -> None:
@@ -96,7 +96,7 @@ class Guide:
                 np.maximum.at(more, (j + dj, i + di), less)
             raster += sign * more
 
-    def pull(self, line: Line, steps_m: Floats, gain_m: float, rounds: int = ROUNDS) -> Line:
+    def pull(self, line: GuidedTrack, steps_m: Floats, gain_m: float, rounds: int = PULL_ROUNDS) -> GuidedTrack:
         """Make a line cheaper by moves of ``steps_m`` metres, each of which must gain ``gain_m`` metres of track.
 
         A line of too many points is returned as it is.
@@ -104,7 +104,7 @@ class Guide:
         p, n = self.problem, len(line.points)
         energy = p.objective == "energy"
         unit = p.horizontal_j_per_m if energy else 1.0
-        capacity = pull_kernels.MOST_POINTS
+        capacity = pull_kernels.MOST_PULLED
         if n > capacity - 2:
             return line
         points, pinned, pin_m, amsl = (
@@ -129,17 +129,17 @@ class Guide:
                 p.vertical_j_per_m,
                 unit,
                 float(energy),
-                PENALTY * unit,
+                MISSING_COST * unit,
                 p.airspace.beside_m(p.limits),
             ]
         )
         p.budget.spend("pull", n * len(steps_m))
         count = pull_kernels.pull(
             points, pinned, pin_m, amsl, n, float(p.start[2]), float(p.goal[2]), self.floor_m, self.ceiling_m,
-            self.circles, self.edges, spec, steps_m, gain_m * unit, rounds, AROUND_M, *self.work,
+            self.circles, self.edges, spec, steps_m, gain_m * unit, rounds, MOVE_REACH_M, *self.work,
         )  # fmt: skip
         cost, missing = self.work[-1]
-        return Line(
+        return GuidedTrack(
             points[:count].copy(),
             pinned[:count] > 0.0,
             pin_m[:count].copy(),
@@ -158,18 +158,18 @@ class Guide:
             self.floor_m[rows, cols] += by_m
 
 
-def line_of(points: Floats, pinned: Bools, pin_m: Floats) -> Line:
+def line_of(points: Floats, pinned: Bools, pin_m: Floats) -> GuidedTrack:
     """A line that is not evaluated yet."""
-    return Line(points, pinned, pin_m, np.zeros(len(points)), math.inf, math.inf)
+    return GuidedTrack(points, pinned, pin_m, np.zeros(len(points)), math.inf, math.inf)
 
 
 def make_guide(
     problem: Problem, ways: list[Floats], radius_m: float, over: dict[int, bool], finest_m: float = COARSEST_M
-) -> Guide:
+) -> CorridorRaster:
     """The guide within about ``radius_m`` of some tracks ``ways`` (N, 2).
 
     ``over``: zones known to be flown over (True) or under (False). ``finest_m``: most metres between nodes, unless the
-    raster would have more than `MOST_NODES`.
+    raster would have more than `MOST_RASTER_NODES`.
     """
     air, limits = problem.airspace, problem.limits
     everything = np.vstack(ways)
@@ -178,7 +178,7 @@ def make_guide(
     length = sum(float(np.hypot(*np.diff(w, axis=0).T).sum()) for w in ways)
     cell = float(air.surface.grid.metres_per_cell(*terminals_of(problem)[0]).min())
     area = min((east - west) * (north - south), 2.0 * radius_m * (length + 2.0 * radius_m))
-    step = max(min(FINEST_PART * cell, finest_m, 0.02 * length), math.sqrt(area / MOST_NODES), 0.05)
+    step = max(min(FINEST_PART * cell, finest_m, 0.02 * length), math.sqrt(area / MOST_RASTER_NODES), 0.05)
     x: Floats = np.arange(west, east + step, step)
     y: Floats = np.arange(south, north + step, step)
     near = np.zeros((len(y), len(x)), bool)
@@ -206,7 +206,7 @@ def make_guide(
             else:
                 v = zone.shape.vertices
                 edges.extend(np.hstack([v, np.roll(v, -1, axis=0)]).tolist())
-    return Guide(
+    return CorridorRaster(
         problem, west, south, step, floor, ceiling,
         np.array(circles).reshape(-1, 3), np.array(edges).reshape(-1, 4), pull_kernels.workspace(),
     )  # fmt: skip

@@ -15,11 +15,11 @@ from collections.abc import Callable
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.planners.lattice.corridor_raster import Guide, Line, line_of, make_guide
-from gcsplan.planners.lattice.routes import LEVELS, Level, Router, climbing_weight
+from gcsplan.planners.lattice.corridor_raster import CorridorRaster, GuidedTrack, line_of, make_guide
+from gcsplan.planners.lattice.routes import LATTICE_SIZES, LatticeSize, Router, climbing_weight
 from gcsplan.planners.problem import Problem, Refusal, straight_way_m
 from gcsplan.planners.profile.climb_laps import pins_of, with_climbs
-from gcsplan.planners.profile.exact import Judge, Unsettled, settle
+from gcsplan.planners.profile.exact import LegJudge, Unsettled, settle
 from gcsplan.planners.profile.track import Obstruction, distances, make_track
 from gcsplan.planners.simplify import fewer
 from gcsplan.world.geometry.path import Path
@@ -46,7 +46,7 @@ DETOURS, DETOUR_STEPS, DETOUR_PART = (0.2, 0.4, 0.6, 0.8), 4.0, 0.03
 least as a part of the straight track."""
 BETTER = 0.5
 """Part of the work left that other tracks and kicks may take once there is a path."""
-KICKS = 10
+LINE_KICKS = 10
 KICK_PARTS = (0.02, 0.05)
 
 
@@ -59,7 +59,7 @@ def plan_band(problem: Problem, tell: Tell, *, climbs: bool = True) -> Floats:
     way = straight_way_m(problem)
     best: Floats | None = None
     router: Router | None = None
-    for level in LEVELS if climbs else LEVELS[:2]:
+    for level in LATTICE_SIZES if climbs else LATTICE_SIZES[:2]:
         if best is None and not problem.budget.goes_on():
             break
         tell("search", None if best is None else problem.cost(Path(best)))
@@ -67,7 +67,7 @@ def plan_band(problem: Problem, tell: Tell, *, climbs: bool = True) -> Floats:
         router = work.router
         cut = router.cut_off() if climbs else (False, False)
         found = None if any(cut) else work.first()
-        if found is None and climbs and best is None and (any(cut) or level is LEVELS[0]):
+        if found is None and climbs and best is None and (any(cut) or level is LATTICE_SIZES[0]):
             ends = cut if any(cut) else (True, True)
             found = with_climbs(problem, ends, lambda p: plan_band(p, tell, climbs=False))
         if found is not None:
@@ -97,7 +97,7 @@ def cheaper(problem: Problem, tell: Tell, known: Floats, longest_m: float) -> Fl
         if not problem.budget.goes_on():
             break
         tell("search", cost)
-        work = _Work(problem, Router.at(problem, Level(detour, nodes)), way, climbing_weight(problem))
+        work = _Work(problem, Router.at(problem, LatticeSize(detour, nodes)), way, climbing_weight(problem))
         found = [work.first()]
         if work.line is None or work.line.cost > cost:
             work.begin(known)
@@ -157,9 +157,9 @@ class _Work:
         """The price of climbing for the first track: metres of track for each metre of height."""
         self.router = router
         self.way_m = way_m
-        self.guide: Guide | None = None
-        self.line: Line | None = None
-        self.judge = Judge(problem)
+        self.guide: CorridorRaster | None = None
+        self.line: GuidedTrack | None = None
+        self.judge = LegJudge(problem)
         self.over: dict[int, bool] = {}
         """Zones known to be passed over (True) or under (False), by index."""
 
@@ -209,7 +209,7 @@ class _Work:
             return None
         return fewer(self.problem, *found, WORTH * self.way_m * _unit(self.problem))[0]
 
-    def _best_line(self, tell: Tell) -> Line:
+    def _best_line(self, tell: Tell) -> GuidedTrack:
         """The best line of several tracks, after kicks."""
         assert self.line is not None
         assert self.guide is not None
@@ -230,7 +230,7 @@ class _Work:
         tell("polish", best.cost)
         rng = np.random.default_rng(self.problem.seed)
         for line in lines[:2]:
-            for _ in range(KICKS):
+            for _ in range(LINE_KICKS):
                 if not budget.goes_on():
                     break
                 kicked = guide.pull(self._kicked(line, rng), self._steps(FINE_STEPS), COARSE_GAIN * self.way_m)
@@ -241,18 +241,18 @@ class _Work:
                 best = line
         return best
 
-    def _line(self, way: Floats) -> Line:
+    def _line(self, way: Floats) -> GuidedTrack:
         track = self.router.track_of(way)
         return line_of(track.points, track.pinned, track.pin_m)
 
-    def _guide(self, ways: list[Floats]) -> Guide:
+    def _guide(self, ways: list[Floats]) -> CorridorRaster:
         radius = max(CORRIDOR * self.way_m, CORRIDOR_STEPS * self.router.lattice.step_m)
         return make_guide(self.problem, ways, radius, self.over)
 
     def _steps(self, parts: tuple[float, ...]) -> Floats:
         return np.array(parts) * self.way_m
 
-    def _mend(self, line: Line) -> tuple[tuple[Floats, Bools] | Unsettled, Line]:
+    def _mend(self, line: GuidedTrack) -> tuple[tuple[Floats, Bools] | Unsettled, GuidedTrack]:
         """Make way points of a line; after each refusal by the exact check, correct the guide and pull the line again.
 
         Return the way points, or why there are none, and the line as last pulled.
@@ -302,7 +302,7 @@ class _Work:
         router.lattice.floor_m = floor
         return ways
 
-    def _kicked(self, line: Line, rng: np.random.Generator) -> Line:
+    def _kicked(self, line: GuidedTrack, rng: np.random.Generator) -> GuidedTrack:
         """The line with a random bump to one side."""
         s = distances(line.points)
         at, side = rng.uniform(0.05, 0.95) * s[-1], rng.choice([-1.0, 1.0]) * rng.uniform(*KICK_PARTS) * self.way_m
@@ -313,7 +313,7 @@ class _Work:
         bump = np.maximum(0.0, 1.0 - np.abs(s - at) / half) * ~line.pinned
         points = line.points + bump[:, None] * (side * across)
         middle = np.array([np.interp(at, s, line.points[:, k]) for k in range(2)]) + side * across
-        return Line(
+        return GuidedTrack(
             np.insert(points, i + 1, middle, axis=0),
             np.insert(line.pinned, i + 1, False),
             np.insert(line.pin_m, i + 1, math.nan),

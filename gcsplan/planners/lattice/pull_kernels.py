@@ -16,7 +16,7 @@ from gcsplan.arrays import Floats, Int64s
 from gcsplan.planners.compiled import device, kernel
 from gcsplan.planners.profile.taut_kernels import draw
 
-MOST_POINTS = 400
+MOST_PULLED = 400
 MOST_DOORS = 6000
 
 # Indices of the kernels' parameters in `spec`.
@@ -259,7 +259,7 @@ def workspace() -> tuple[Floats | Int64s, ...]:
         np.empty((4, MOST_DOORS)),
         np.empty((3, MOST_DOORS + 1), np.int64),
         np.empty((3, MOST_DOORS + 1)),
-        np.empty((MOST_POINTS + 2, 4)),
-        np.empty(MOST_POINTS + 2),
+        np.empty((MOST_PULLED + 2, 4)),
+        np.empty(MOST_PULLED + 2),
         np.zeros(2),
     )

@@ -19,7 +19,7 @@ STEP, GOAL_X, GOAL_Y, GOAL_LOW, GOAL_HIGH, CAP, UP, DOWN, WEIGHT, SPARE = range(
 """Indices in the parameters of the search (``terms``)."""
 
 DONE, SHORT = 0, 1
-AT_ONCE = 1024
+MOST_NEW_LABELS = 1024
 """Most labels that the expansion of one label can add; the arrays must have space for them before it begins."""
 
 
@@ -169,7 +169,7 @@ def reach(  # type: ignore[no-untyped-def]
     count, size = state[COUNT], state[SIZE]
     status = DONE
     while size > 0:
-        if count + AT_ONCE > len(keys):
+        if count + MOST_NEW_LABELS > len(keys):
             status = SHORT
             break
         item = ids[0]

@@ -19,7 +19,7 @@ Size = tuple[float, float]
 """Counted seconds and megabytes."""
 LEAST_S = 1e-3
 """Least counted seconds that a search is assumed to cost."""
-MOST_STEPS = 200
+MOST_SEARCHES = 200
 """Most searches of one plan, refused ones included."""
 AGAIN = 0.02
 """Part of the gap that a better path must have closed before a search runs once more."""
@@ -61,7 +61,7 @@ def govern(incumbent: Incumbent, searches: list[Search], without: Collection[str
     """
     left = [s for s in searches if s.name not in without]
     budget = incumbent.budget
-    for _ in range(MOST_STEPS):
+    for _ in range(MOST_SEARCHES):
         ended = incumbent.proved_infeasible or incumbent.gap <= incumbent.nearer or incumbent.needs_terrain
         if ended or not budget.goes_on():
             return

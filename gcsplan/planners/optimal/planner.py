@@ -8,16 +8,16 @@ altitude profile is a taut string through it, found in one pass (`taut_string`).
 
 **The bound.** The same search between walls that *certainly* stand (outlines inside the zones; a linear surface that
 lies nowhere above the ground) gives a length that no track below the cap can beat. A path is longer than its track
-because it climbs: the altitudes that a short enough track must have along its length are bounded, too (`climb_bound`).
-For energy the cap itself has a price: caps are searched from both sides until no altitude between two of them can hold
-a better path (`cap_search`). Close to its ends a path can be only as high as its track up to there lets it climb, which
-moves the walls (`clearance`); and everywhere only those altitudes between zones count that a short enough track can
-climb to and return from (`altitude_intervals`).
+because it climbs: the altitudes that a short enough track must have along its length are bounded, too. For energy the
+cap itself has a price: caps are searched from both sides until no altitude between two of them can hold a better path
+(`shorter` has all these bounds). Close to its ends a path can be only as high as its track up to there lets it climb,
+which moves the walls (`clearance`); and everywhere only those altitudes between zones count that a short enough track
+can climb to and return from (`altitude_intervals`).
 
 **Where that does not hold**, under a maximum AGL, or where the climb limit binds far from the ends, paths are searched
 on a lattice of reachable altitudes (`lattice`); the bound from the plane is valid there as well.
 
-Each of these is a search that the governor can choose (`governor`); `searches` is the table of them.
+Each of these is a search that the governor can choose (`governor`); `table` lists them.
 """
 
 from __future__ import annotations

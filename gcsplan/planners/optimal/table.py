@@ -13,17 +13,16 @@ import numpy as np
 
 from gcsplan.errors import InputError
 from gcsplan.planners.lattice.planner import cheaper, plan_band
+from gcsplan.planners.lattice.routes import LatticeSize, Router, climbing_weight
 from gcsplan.planners.optimal.bounds.shorter import bound_by_caps, halve
 from gcsplan.planners.optimal.governor import Search, Size
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
-from gcsplan.planners.optimal.plane.cap_search import above_all
+from gcsplan.planners.optimal.plane.corridor import PinnedTrack
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
-from gcsplan.planners.optimal.plane.level_world import in_window
-from gcsplan.planners.optimal.plane.plane_search import SLACKS, PlaneSearch
+from gcsplan.planners.optimal.plane.plane_search import SLACKS, PlaneSearch, above_all, in_window
 from gcsplan.planners.optimal.searches.bound_corridor import follow
-from gcsplan.planners.optimal.searches.contour import traverse
 from gcsplan.planners.optimal.searches.section_dp import tightened
-from gcsplan.planners.problem import Problem, Refusal, terminals_of
+from gcsplan.planners.problem import Problem, Refusal, straight_way_m, terminals_of
 from gcsplan.planners.profile.track import Obstruction, fly, make_track
 
 if TYPE_CHECKING:
@@ -46,9 +45,10 @@ INTERVAL_S, REFINED_S = 0.7e-6, 4e-6
 the least that refinement takes in nine of ten missions. Refinement raises bounds even if it ends with the budget."""
 NEARLY_ALL = 0.9
 """Part of the counted work left that the bound corridor may take beyond a gap of `MUCH`."""
-MOST_CELLS = 50_000
+MOST_CORRIDOR_CELLS = 50_000
 """Most cells of all corridors for which altitude intervals are computed."""
-
+ASLANT_NODES = 60_000
+"""Nodes of the lattice on which tracks climb a slope aslant, about."""
 
 NAMES = (
     "straight", "outlines", "outline_bound", "track_bound", "cap_search", "corridor_first", "lattice_first",
@@ -302,7 +302,7 @@ class Searches:
     def _bound_by_intervals(self) -> None:
         plane = self.plane
         cells = sum(int(leg.corridor(plane.limit(leg)).cells.sum()) for leg in plane.legs)
-        plane.by_intervals = cells <= MOST_CELLS
+        plane.by_intervals = cells <= MOST_CORRIDOR_CELLS
         if plane.by_intervals:
             halve(plane)
 
@@ -311,3 +311,20 @@ class Searches:
         cut = 2 if self.incumbent.gap > FAR else 1
         if sum(leg.refine(plane.limit(leg), FINER, cut) for leg in plane.legs):
             halve(plane, far=True)
+
+
+def traverse(problem: Problem, longest_m: float) -> PinnedTrack | None:
+    """The best track that climbs a slope aslant, where a path must follow ground that is steeper than the climb limit.
+
+    Under a zone whose floor is a few metres over the lowest legal altitude, nothing else is possible. The shortest
+    track in the plane ignores this, because whether a slope can be climbed depends on the direction. So where a gap
+    remains between path and bound, the lattice of reachable altitudes (`routes`) is searched. It covers only tracks of
+    up to about ``longest_m`` metres, which may still be shorter than the best path's, so its nodes are dense. None if
+    there is no track.
+    """
+    router = Router.at(problem, LatticeSize(max(longest_m / straight_way_m(problem), 1.0), ASLANT_NODES))
+    way = router.way(weight=climbing_weight(problem), briefly=True)
+    if way is None:
+        return None
+    track = router.track_of(way)
+    return track.points, track.pinned, track.pin_m

@@ -17,17 +17,15 @@ import numpy as np
 
 from gcsplan.notes.note import Note
 from gcsplan.planners.border import enclosed, exit_cost, goes_on, margin_for, within_m
-from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
+from gcsplan.planners.problem import PlanFunction, Problem, Progress, Refusal, Solution
 from gcsplan.planners.refusal.explain import NoPath, check_ends
 from gcsplan.world.airspace import Legs
-
-Window = Callable[[Problem], Solution]
 
 MOST_WINDOWS = 12
 """Most windows of one plan. Each is at least twice as wide as the one before, so the last is wider than any frame."""
 
 
-def plan_over(problem: Problem, plan_window: Window) -> Solution:
+def plan_over(problem: Problem, plan_window: PlanFunction) -> Solution:
     """The solution of ``plan_window`` over the problem's surface, with a bound for all terrain. Plans over more terrain
     if paths beyond the border could be better by more than the wanted gap, or if there are none within it.
 

@@ -17,20 +17,20 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import NoMission
 from gcsplan.planners.problem import ENDS_M, Problem, Refusal
-from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
+from gcsplan.planners.profile.exact import LegJudge, Unsettled, sampled_track, settle
 from gcsplan.planners.profile.track import Closed, Flown, Lacking, Track, distances, fly, lacking
 from gcsplan.planners.simplify import fewer
 from gcsplan.world.geometry.path import Path
 
-DIRECTIONS = 12
-SHORTEST_M = 20.0
+LAP_DIRECTIONS = 12
+SHORTEST_LAP_M = 20.0
 """Shortest leg out and back, and smallest circle radius: an autopilot does not follow anything smaller."""
 MOST_LAPS = 64
-HIGHEST_M = 1000.0
+MOST_LAP_CLIMB_M = 1000.0
 """Most metres climbed over one place."""
 SIDES = 12
 """Sides of a circle's polygon; an arc of the turn radius fits into each of its corners."""
-ROUNDS = 6
+LAP_ROUNDS = 6
 """Most times that laps are added to one track."""
 TRIED, LOOKED_AT, FORGIVEN = 12, 9, 0.1
 """For one piece that is too steep: most laps over which a profile is drawn; points of each lap at which the floor is
@@ -40,7 +40,7 @@ GENTLER = (1.0, 0.98, 0.94)
 TIGHT, SPARE = (1.0 + 1e-5, 0.0), (1.02, 1.0)
 """Length of laps, as a multiple of the length that the height needs, and metres more: as short as open ground allows,
 and what rough ground may need, where there is also more to be drawn together."""
-FAR_M = 1e6
+ABOVE_ALL_M = 1e6
 """An altitude above everything."""
 
 
@@ -56,7 +56,7 @@ def climb_tracks(problem: Problem, place: tuple[float, float], from_amsl: float,
     # With a limit steeper than 45 degrees, or none, laps still climb at 45 degrees.
     length = SPARE[0] * abs(to_amsl - from_amsl) / min(slope, 1.0)
     part = replace(problem, start=(*place, from_amsl), goal=(*place, to_amsl), via=())
-    judge = Judge(problem)
+    judge = LegJudge(problem)
     for one, count in laps(problem, length, None):
         if not _fits(problem, np.vstack([place, np.asarray(place) + one, place])):
             continue
@@ -90,13 +90,13 @@ def on_the_spot(problem: Problem) -> Floats:
 def highest(problem: Problem, place: tuple[float, float], amsl_m: float, *, down: bool = False) -> float:
     """Highest altitude, roughly, to which laps over ``place`` can climb from ``amsl_m``.
 
-    With ``down``: from which they can descend to it. At most `HIGHEST_M` higher; found by bisection to 2 m or 3 %.
+    With ``down``: from which they can descend to it. At most `MOST_LAP_CLIMB_M` higher; by bisection to 2 m or 3 %.
     """
 
     def can(other_m: float) -> bool:
         return climb_tracks(problem, place, *((other_m, amsl_m) if down else (amsl_m, other_m))) is not None
 
-    top = min(float(problem.airspace.ceiling_amsl(*place, problem.limits)), amsl_m + HIGHEST_M)
+    top = min(float(problem.airspace.ceiling_amsl(*place, problem.limits)), amsl_m + MOST_LAP_CLIMB_M)
     if top <= amsl_m + 1.0:
         return amsl_m
     if can(top):
@@ -133,7 +133,7 @@ def _lowered(problem: Problem, points: Floats) -> Floats | None:
     """
     found: list[Floats] = []
     pinned, pin_m = pins_of(problem, points)
-    judge = Judge(problem)
+    judge = LegJudge(problem)
     extended = extend(problem, np.ascontiguousarray(points[:, :2]), pinned, pin_m)
     if extended is not None:
         track = extended[0]
@@ -177,7 +177,7 @@ def extend(
     """
     track = sampled_track(problem, points, pinned, pin_m)
     lack = lacking(problem, track)
-    for _ in range(ROUNDS):
+    for _ in range(LAP_ROUNDS):
         if isinstance(lack, Closed):
             return None
         if not lack.steep:
@@ -292,7 +292,7 @@ def _detours(problem: Problem, track: Track, low_s: float, high_s: float, length
             ends = np.stack([track.place(s0), track.place(s1)])
             chord = ends[1] - ends[0]
             straight = float(np.hypot(*chord))
-            if straight < SHORTEST_M:
+            if straight < SHORTEST_LAP_M:
                 continue
             aside = 0.5 * math.sqrt((s1 - s0 + length_m) ** 2 - straight**2) / straight
             for side in (1.0, -1.0):
@@ -313,23 +313,23 @@ def laps(problem: Problem, length_m: float, heading: float | None) -> Iterator[t
     long. ``heading``: direction of the track there (radians from east, anticlockwise); laps to its sides come first.
     """
     radius = problem.turn_radius_m
-    turns = [2.0 * math.pi * k / DIRECTIONS for k in range(DIRECTIONS)]
+    turns = [2.0 * math.pi * k / LAP_DIRECTIONS for k in range(LAP_DIRECTIONS)]
     if heading is not None:
         # Sideways first: a lap along the track would make it turn back on itself.
         turns = [heading + 0.5 * math.pi + t for t in turns]
-    least = max(1.02 * radius / math.cos(math.pi / SIDES), SHORTEST_M)
+    least = max(1.02 * radius / math.cos(math.pi / SIDES), SHORTEST_LAP_M)
     count = 1
     while count <= MOST_LAPS:
         one = length_m / count
         side = one / (2.0 * SIDES * math.sin(math.pi / SIDES))
-        if radius <= 0.0 and (one >= 2.0 * SHORTEST_M or count == 1):
+        if radius <= 0.0 and (one >= 2.0 * SHORTEST_LAP_M or count == 1):
             for turn in turns:
-                yield max(0.5 * one, SHORTEST_M) * np.array([[math.cos(turn), math.sin(turn)]]), count
+                yield max(0.5 * one, SHORTEST_LAP_M) * np.array([[math.cos(turn), math.sin(turn)]]), count
         elif radius > 0.0 and (side >= least or count == 1):
             for turn in turns:
                 for sense in (1.0, -1.0):
                     yield _circle(max(side, least), turn, sense), count
-        if one < 2.0 * SHORTEST_M or (radius > 0.0 and side < least):
+        if one < 2.0 * SHORTEST_LAP_M or (radius > 0.0 and side < least):
             break
         count = count + 1 if count < 4 else 2 * count
 
@@ -346,7 +346,7 @@ def _circle(radius_m: float, turn: float, sense: float) -> Floats:
     return np.asarray(radius_m * (middle + np.stack([np.cos(angles), np.sin(angles)], axis=-1)))
 
 
-def _fits(problem: Problem, shape: Floats, low_m: float = -FAR_M, high_m: float = FAR_M) -> bool:
+def _fits(problem: Problem, shape: Floats, low_m: float = -ABOVE_ALL_M, high_m: float = ABOVE_ALL_M) -> bool:
     """False if ground closes a track (N, 2) at all altitudes, or a zone closes it from ``low_m`` to ``high_m``."""
     tube = problem.airspace.tube(shape, problem.limits)
     if not (tube.floor_m <= tube.ceiling_m + 2.0 * ENDS_M).all():

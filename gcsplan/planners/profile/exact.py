@@ -9,13 +9,22 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.profile.track import Flown, Kind, Obstruction, Track, distances, fly, make_track, values_at
-from gcsplan.planners.profile.zone_levels import SAMPLE_M, ZoneLevels
+from gcsplan.planners.profile.track import (
+    Flown,
+    Obstruction,
+    ObstructionKind,
+    Track,
+    distances,
+    fly,
+    make_track,
+    values_at,
+)
+from gcsplan.planners.profile.zone_levels import LEVEL_SAMPLE_M, ZoneLevels
 from gcsplan.world.airspace import Band, Legs, Tube, Violation
 
 TIGHT_M, TIGHT_SAMPLE_M = 1.0, 1.0
 """Where ceiling minus floor is less than `TIGHT_M` metres, samples are `TIGHT_SAMPLE_M` metres apart."""
-SPARE_M = 0.05
+PREFERRED_ROOM_M = 0.05
 """Metres kept from floor and ceiling where they are far enough apart: the exact check is fast away from its limits."""
 CORRECTIONS, CORRECTED_M = 24, 0.03
 """Most corrections of a profile after violations in the exact check; metres added to the size of each violation."""
@@ -33,7 +42,7 @@ class Unsettled:
 
     place: Floats
     by: float
-    kind: Kind
+    kind: ObstructionKind
     samples: Floats
     span_m: float = 0.0
     zone: int = -1
@@ -42,7 +51,7 @@ class Unsettled:
 
 
 @dataclass(eq=False, slots=True)
-class Judge:
+class LegJudge:
     """The exact check of single legs; it remembers the legs that passed."""
 
     problem: Problem
@@ -93,7 +102,7 @@ def way_points(problem: Problem, track: Track, flown: Flown) -> tuple[Floats, Bo
 
 
 def settle(
-    problem: Problem, judge: Judge, points: Floats, pinned: Bools, pin_m: Floats
+    problem: Problem, judge: LegJudge, points: Floats, pinned: Bools, pin_m: Floats
 ) -> tuple[Floats, Bools] | Unsettled:
     """Way points (N, 3) over a track that pass the exact check, and (N,) whether they must stay.
 
@@ -150,7 +159,7 @@ def settle(
                 corrected = [of.correct(flown.profile, s[leg], s[leg + 1]) for of in own]
                 if not any(corrected):
                     by = math.inf if v.kind == "coverage" else v.by
-                    kind: Kind = "zone" if v.zone >= 0 else "pinched"
+                    kind: ObstructionKind = "zone" if v.zone >= 0 else "pinched"
                     return Unsettled(np.array([v.east_m, v.north_m]), by, kind, samples(), zone=v.zone)
     assert worst is not None
     return Unsettled(np.array([worst.east_m, worst.north_m]), worst.by, "pinched", samples())
@@ -174,7 +183,7 @@ def sampled_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats
     exact = make_track(problem, points, pinned, pin_m)
     at = [np.zeros(1)]
     for a, b in zip(exact.s_m[:-1], exact.s_m[1:], strict=True):
-        n = max(1, round((b - a) / SAMPLE_M))
+        n = max(1, round((b - a) / LEVEL_SAMPLE_M))
         at.append(a + (b - a) * np.arange(1, n + 1) / n)
     s = np.concatenate(at)
     s[-1] = exact.tube.s_m[-1]
@@ -189,7 +198,7 @@ def sampled_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats
         s = np.append(np.repeat(s[:-1], parts) + part * np.repeat(np.diff(s), parts), s[-1])
         floor, ceiling = _tube_at(problem, exact, s)
     with np.errstate(invalid="ignore"):
-        spare = np.clip(0.25 * (ceiling - floor), 0.0, SPARE_M)
+        spare = np.clip(0.25 * (ceiling - floor), 0.0, PREFERRED_ROOM_M)
     spare[[0, -1]] = 0.0
     spare = np.where(np.isfinite(floor), spare, 0.0)
     floor, ceiling = floor + spare, ceiling - spare

@@ -35,17 +35,17 @@ BRANCHES = 64
 """Most over/under combinations that are tried for one track."""
 
 
-Sides = tuple[bool | None, ...]
+BandSides = tuple[bool | None, ...]
 """For each band of a tube: True over it, False under it, None not chosen."""
 
-Kind = Literal["pinched", "climb", "descent", "zone"]
+ObstructionKind = Literal["pinched", "climb", "descent", "zone"]
 
 
 @dataclass(frozen=True, slots=True)
 class Obstruction:
     """Why a track has no legal profile, where along it, and by how many metres; ``zone`` -1: terrain or limits."""
 
-    kind: Kind
+    kind: ObstructionKind
     s0_m: float
     s1_m: float
     by: float
@@ -160,7 +160,7 @@ def fly(
     sections = sections_of(problem, track, known)
     horizontal = float(sections.s_m[-1])
 
-    def solve(over: Sides) -> Profile | Blocked:
+    def solve(over: BandSides) -> Profile | Blocked:
         low, high = sections.between(over)
         return taut_string(sections.s_m, low, high, *ends, limits.max_climb_slope, limits.max_descent_slope)
 
@@ -169,7 +169,7 @@ def fly(
             return problem.vertical_j_per_m * p.vertical_m + problem.horizontal_j_per_m * horizontal
         return p.length_m
 
-    none: Sides = (None,) * len(tube.bands)
+    none: BandSides = (None,) * len(tube.bands)
     root = solve(none)
     if isinstance(root, Blocked):
         return Obstruction(root.kind, root.s0_m, root.s1_m, root.by)
@@ -213,7 +213,7 @@ def lacking(problem: Problem, track: Track) -> Lacking | Closed:
     closed = Closed(math.inf, ())
     deepest_zone: tuple[int, ...] = ()
 
-    def solve(over: Sides) -> tuple[float, Profile, Floats] | None:
+    def solve(over: BandSides) -> tuple[float, Profile, Floats] | None:
         nonlocal closed
         low, high = sections.between(over)
         found = taut_string(sections.s_m, low, high, problem.start[2], problem.goal[2])
@@ -229,7 +229,7 @@ def lacking(problem: Problem, track: Track) -> Lacking | Closed:
             cost = float(np.hypot(needed, rise).sum())
         return cost, found, needed - run
 
-    none: Sides = (None,) * len(tube.bands)
+    none: BandSides = (None,) * len(tube.bands)
     root = solve(none)
     if root is None:
         return closed
@@ -272,7 +272,7 @@ class _Sections:
     bottoms: list[Floats]
     tops: list[Floats]
 
-    def between(self, over: Sides) -> tuple[Floats, Floats]:
+    def between(self, over: BandSides) -> tuple[Floats, Floats]:
         """Lowest and highest altitude of each door with bands passed as in ``over``, narrowed by `KEEP_M` on both sides
         (to the middle where a door is smaller than that). The two ends are not narrowed."""
         low, high = self.low_m.copy(), self.high_m.copy()
@@ -285,12 +285,12 @@ class _Sections:
         _narrow(low, high)
         return low, high
 
-    def zones(self, tube: Tube, over: Sides, s0_m: float, s1_m: float) -> tuple[int, ...]:
+    def zones(self, tube: Tube, over: BandSides, s0_m: float, s1_m: float) -> tuple[int, ...]:
         """Zones with a chosen side whose bands come within `BESIDE_M` of the piece from ``s0_m`` to ``s1_m``."""
         chosen = (b for b, side in zip(tube.bands, over, strict=True) if side is not None)
         return tuple({b.zone: None for b in chosen if b.s0_m < s1_m + BESIDE_M and b.s1_m > s0_m - BESIDE_M})
 
-    def deepest(self, profile: Profile, over: Sides) -> tuple[int, float] | None:
+    def deepest(self, profile: Profile, over: BandSides) -> tuple[int, float] | None:
         """Of the bands without a chosen side the one that ``profile`` runs into deepest, and how many metres deep; None
         if it clears all of them by `KEEP_M`."""
         hits: list[tuple[int, float]] = []

@@ -16,9 +16,9 @@ import numpy as np
 
 from gcsplan.arrays import Floats, Indices
 from gcsplan.errors import InputError, unknown_name
-from gcsplan.optimisers.driver import History, Result
+from gcsplan.optimisers.driver import History, OptimiserResult
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
-from gcsplan.planners.registry import Entry
+from gcsplan.planners.registry import PlannerEntry
 from gcsplan.planners.swarm import scene_kernels as k
 from gcsplan.planners.swarm.encodings import LATERAL
 from gcsplan.planners.swarm.objectives import Cost
@@ -26,8 +26,8 @@ from gcsplan.planners.swarm.planner import Found, cost_of, drawn, until_found
 from gcsplan.planners.swarm.scene import Scene
 from gcsplan.planners.swarm.settings import Settings
 
-ACROSS = UPWARD = 21
-EDGE_PARTS = 16
+ACROSS = ALTITUDES = 21
+EDGE_POINTS = 16
 """Points on an edge that runs straight from one section to the next."""
 
 
@@ -43,7 +43,7 @@ class Rule:
     most: float = 50.0
 
 
-def plan(problem: Problem, row: Entry) -> Solution:
+def plan(problem: Problem, row: PlannerEntry) -> Solution:
     """A path that `Airspace.examine` passes: few way points along the best ant's curve, or a repair of that curve.
 
     Raises Refusal (NoMission, ``not_found``) if within the budget no ant arrives or no curve can be repaired.
@@ -98,8 +98,8 @@ def _section(scene: Scene, middle: Floats, left: Floats, reach_m: float) -> Floa
     flat = middle + np.linspace(first, max(first, last), ACROSS)[:, None] * left
     low, high = scene.room(flat)
     roomy = high >= np.nan_to_num(scene.floor(flat), nan=np.inf)
-    z = low[:, None] + np.linspace(0.0, 1.0, UPWARD) * (high - low)[:, None]
-    nodes = np.concatenate([np.repeat(flat[:, None], UPWARD, axis=1), z[..., None]], axis=-1)
+    z = low[:, None] + np.linspace(0.0, 1.0, ALTITUDES) * (high - low)[:, None]
+    nodes = np.concatenate([np.repeat(flat[:, None], ALTITUDES, axis=1), z[..., None]], axis=-1)
     return np.ascontiguousarray(nodes[roomy].reshape(-1, 3))
 
 
@@ -109,7 +109,7 @@ def open_between(scene: Scene, layers: list[Floats]) -> list[Floats]:
     for a, b in itertools.pairwise(layers):
         lengths = np.full((len(a), len(b)), np.inf)
         if lengths.size:
-            step_m = max(float(np.hypot(*(b.mean(axis=0) - a.mean(axis=0))[:2])) / EDGE_PARTS, 0.1)
+            step_m = max(float(np.hypot(*(b.mean(axis=0) - a.mean(axis=0))[:2])) / EDGE_POINTS, 0.1)
             k.open_edges(
                 a, b, step_m, scene.follows_ground, scene.heights, scene.quadratic, scene.floors, scene.floor_map,
                 scene.numbers, scene.zones, scene.corners, lengths,
@@ -120,7 +120,7 @@ def open_between(scene: Scene, layers: list[Floats]) -> list[Floats]:
 
 def march(
     problem: Problem, cost: Cost, layers: list[Floats], lengths: list[Floats], rule: Rule, settings: Settings
-) -> tuple[Result, Floats | None]:
+) -> tuple[OptimiserResult, Floats | None]:
     """Run the colonies; return the run's result and the best ant's control points (N, 3), None if no ant arrived.
 
     An evaluation is one ant, whether it arrives or not. ``evaluations`` is used exactly: the last colony is cut to it.
@@ -157,7 +157,7 @@ def march(
     evaluations, iterations, history = (np.array(column) for column in zip(*trace, strict=True))
     stopped = "evaluations" if spent == limit else "iterations"
     account = History(evaluations, iterations, history)
-    return Result(np.zeros(0), best_cost, spent, len(trace) - 1, account, stopped, "aco"), best  # type: ignore[arg-type]
+    return OptimiserResult(np.zeros(0), best_cost, spent, len(trace) - 1, account, stopped, "aco"), best  # type: ignore[arg-type]
 
 
 def walk(rng: np.random.Generator, ants: int, eager: list[Floats], scent: list[Floats], alpha: float) -> Indices:

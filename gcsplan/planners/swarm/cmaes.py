@@ -15,7 +15,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.optimisers.box import Run, Steps, clipped
-from gcsplan.optimisers.registry import Entry
+from gcsplan.optimisers.registry import OptimiserEntry
 
 DOUBLINGS = 5
 """Most times that a restart doubles the population."""
@@ -57,7 +57,7 @@ def _asked(search: Any) -> Floats:
     return clipped(np.array(search.ask(), dtype=np.float64))
 
 
-ENTRY = Entry(
+ENTRY = OptimiserEntry(
     name="cmaes",
     summary="CMA-ES with restarts of twice the population, by the package cma",
     update="gcsplan.planners.swarm.cmaes:cmaes",

@@ -3,6 +3,10 @@
 Each is the paper's own formula plus `forbidden`, how far the path breaks limits of the mission that the paper does not
 know, so that every objective ranks illegal paths too. All costs are sampled and never pass a mission. D marks a
 decision of ours where a paper is silent, E a departure from its printed text.
+
+The paths are cubic B-splines from terminal to terminal, and few way points that stay close to the curve. E: the krill
+paper's eq. 11 prints the second numerator as ``u - u_{i+1}``; de Boor's is ``u_{i+k} - u``. The basis is clamped, so
+that a curve begins and ends in its terminals; with two or three control points its degree is 1 or 2.
 """
 
 from __future__ import annotations
@@ -10,31 +14,101 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices, Int64s
 from gcsplan.errors import unknown_name
 from gcsplan.native.signature import Held
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.swarm import cost_kernels as k
-from gcsplan.planners.swarm.bspline import Curve, curve
-from gcsplan.planners.swarm.curve_kernels import CURVE
+from gcsplan.planners.swarm.curve_kernels import CURVE, samples_of
 from gcsplan.planners.swarm.encodings import Code, shares
 from gcsplan.planners.swarm.scene import SAMPLES, Scene
 from gcsplan.planners.swarm.scene_kernels import SCENE, clocks_of, nearness
+
+SPLINE_DEGREE = 3  # of the splines
 
 PENALTY = 100.0
 """Cost of a metre that is not allowed, in metres (D in all costs; C and PC of MSFOA, P of ABO, μ_obs of SSGWO are 100
 too)."""
 
-NODES = 30
+SSGWO_NODES = 30
 """SSGWO's number of nodes, at which angles and nearness are measured."""
 
 
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """The map from control points (N, 3) to samples (S, 3).
+
+    ``basis`` (N, S); ``terminals`` (M,): indices of the samples that are terminals; ``bands`` (4, S), ``spans`` (n, 3):
+    the basis without its zeros, for kernels (`curve_kernels.draw`).
+    """
+
+    basis: Floats
+    terminals: Indices
+    bands: Floats
+    spans: Int64s
+
+    def samples(self, controls: Floats) -> Floats:
+        """Samples (..., S, 3) of control points (..., N, 3)."""
+        count = self.basis.shape[1]
+        paths = np.ascontiguousarray(controls).reshape(-1, *controls.shape[-2:])
+        out = np.empty((len(paths), count, 3))
+        samples_of(paths, self.bands, self.spans, *np.empty((3, count)), out)
+        return out.reshape(*controls.shape[:-2], count, 3)
+
+
+@lru_cache(maxsize=64)
+def curve(points: tuple[int, ...], legs: tuple[int, ...]) -> Curve:
+    """The curve with ``points[i]`` free control points on stage i, sampled by ``legs[i]`` legs there; neighbouring
+    stages share a terminal."""
+    controls, samples = sum(points) + len(points) + 1, sum(legs) + 1
+    basis = np.zeros((controls, samples))
+    row = column = 0
+    terminals = [0]
+    for free, count in zip(points, legs, strict=True):
+        part = _basis(free + 2, count + 1)
+        basis[row : row + free + 2, column : column + count + 1] = part
+        row, column = row + free + 1, column + count
+        terminals.append(column)
+    basis.setflags(write=False)
+    return Curve(basis, np.array(terminals), *_bands(basis))
+
+
+def _bands(basis: Floats) -> tuple[Floats, Int64s]:
+    """`Curve.bands` and `Curve.spans` of a basis."""
+    controls, samples = basis.shape
+    width = SPLINE_DEGREE + 1
+    first = np.minimum((basis != 0.0).argmax(axis=0), max(controls - width, 0))
+    begins = np.flatnonzero(np.diff(first, prepend=-1))
+    spans = np.stack([begins, np.append(begins[1:], samples), first[begins]], axis=-1)
+    rows = first + np.arange(width)[:, None]
+    bands = np.where(rows < controls, basis[np.minimum(rows, controls - 1), np.arange(samples)], 0.0)
+    return np.ascontiguousarray(bands), np.ascontiguousarray(spans, dtype=np.int64)
+
+
+def _basis(controls: int, samples: int) -> Floats:
+    """Values (controls, samples) of the clamped basis of degree 3, or of ``controls`` - 1 if that is less."""
+    degree = min(SPLINE_DEGREE, controls - 1)
+    knots = np.concatenate([np.zeros(degree), np.linspace(0.0, 1.0, controls - degree + 1), np.ones(degree)])
+    u = np.linspace(0.0, 1.0, samples)[:, None]
+    last = controls - 1  # the interval to which u = 1 belongs
+    here = (knots[:-1] <= u) & (u < knots[1:])
+    here[-1, last] = True
+    basis = here.astype(float)
+    for order in range(1, degree + 1):
+        width = knots[order:] - knots[:-order]
+        share = np.divide(u - knots[:-order], width, out=np.zeros((samples, len(width))), where=width > 0.0)
+        rest = np.where(width > 0.0, 1.0 - share, 0.0)
+        basis = share[:, :-1] * basis[:, :-1] + rest[:, 1:] * basis[:, 1:]
+    return np.ascontiguousarray(basis.T)
+
+
 @dataclass(frozen=True, slots=True)
-class Unit:
+class CostReference:
     """Reference values of the weights: the terms (TERMS,) and length of the straight line, height of the flight volume,
     and the mission's objective with its energy per metre."""
 
@@ -46,11 +120,11 @@ class Unit:
     horizontal_j_per_m: float
 
 
-Weigh = Callable[[Floats, Unit], Floats]
+Weigh = Callable[[Floats, CostReference], Floats]
 
 
 @dataclass(frozen=True, slots=True)
-class Objective:
+class PaperCost:
     """One cost. ``weigh``: from terms (n, TERMS) to costs (n,); ``wanted``: bits of the optional groups of terms that
     it needs."""
 
@@ -81,7 +155,7 @@ def _sums(rows: Floats) -> Floats:
     return np.asarray(np.add.accumulate(rows, axis=1)[:, -1])
 
 
-def _krill(terms: Floats, unit: Unit) -> Floats:
+def _krill(terms: Floats, unit: CostReference) -> Floats:
     """Length (eq. 12), or energy if that is the mission's objective.
 
     E eq. 12–13 sum four segments; here the whole curve is summed. E eq. 13 multiplies R1 by the horizontal and R2 by
@@ -99,7 +173,7 @@ SSGWO_WEIGHTS = (0.5, 0.2, 0.3)  # D: ρ of eq. 33, 34
 MU_OBS = 100.0  # D: eq. 31
 
 
-def _ssgwo(terms: Floats, unit: Unit) -> Floats:
+def _ssgwo(terms: Floats, unit: CostReference) -> Floats:
     """SSGWO, eq. 26–34.
 
     E eq. 29, 30: here in radians, wrapped, with e^|Δθ| - 1 and |φ|. E eq. 31, 32 sum over all nodes and obstacles
@@ -115,7 +189,7 @@ def _ssgwo(terms: Floats, unit: Unit) -> Floats:
 PC = C = 100.0  # D: eq. 25, 26, 28, 29
 
 
-def _msfoa(terms: Floats, unit: Unit) -> Floats:
+def _msfoa(terms: Floats, unit: CostReference) -> Floats:
     """MSFOA, eq. 20–27; the nearness of eq. 28–30 is added by `Cost`.
 
     E eq. 21: here the height is above ground, max(0, AGL - h_min). E eq. 24: T_de is max(0, 1 - d/R). E eq. 25 adds the
@@ -129,7 +203,7 @@ def _msfoa(terms: Floats, unit: Unit) -> Floats:
     return np.asarray(own + PENALTY * forbidden(terms, unit.straight_m))
 
 
-def _abo(terms: Floats, unit: Unit) -> Floats:
+def _abo(terms: Floats, unit: CostReference) -> Floats:
     """ABO, eq. 4–7: length, and P = 100 for each sample under ground (D: under the floor) or outside of the volume."""
     own = terms[:, k.LENGTH] + PENALTY * (terms[:, k.UNDER] + terms[:, k.OUTSIDE])
     return np.asarray(own + PENALTY * forbidden(terms, unit.straight_m, NOT_ABOS))
@@ -142,7 +216,7 @@ LEAST, NONE = np.array([1.0, math.pi, 1.0, 1.0]), np.array([1e-9, 1e-3, 1e-9, 1e
 line by some 1e-8 rad at each node (arccos)."""
 
 
-def _ib_abc(terms: Floats, unit: Unit) -> Floats:
+def _ib_abc(terms: Floats, unit: CostReference) -> Floats:
     """IB-ABC, eq. 2–6, each term divided by its value on the straight line (D; where that is 0, by π or one metre).
 
     E eq. 3: the atan of a cosine is taken as arccos, so Σ(π - α) is the sum of turns. E eq. 4 compares the length of a
@@ -154,18 +228,18 @@ def _ib_abc(terms: Floats, unit: Unit) -> Floats:
     return np.asarray(own + PENALTY * forbidden(terms, unit.straight_m) / unit.straight_m)
 
 
-OBJECTIVES: Mapping[str, Objective] = MappingProxyType(
+OBJECTIVES: Mapping[str, PaperCost] = MappingProxyType(
     {
-        "krill": Objective(0, _krill),
-        "ssgwo": Objective(k.YAWS | k.NODES_NEAR, _ssgwo),
-        "msfoa": Objective(k.ANGLES | k.SAMPLES_NEAR | k.HEIGHTS, _msfoa),
-        "abo": Objective(k.COUNTS, _abo),
-        "ib-abc": Objective(k.ANGLES | k.BENDS | k.SAMPLES_NEAR | k.HIDING, _ib_abc),
+        "krill": PaperCost(0, _krill),
+        "ssgwo": PaperCost(k.YAWS | k.NODES_NEAR, _ssgwo),
+        "msfoa": PaperCost(k.ANGLES | k.SAMPLES_NEAR | k.HEIGHTS, _msfoa),
+        "abo": PaperCost(k.COUNTS, _abo),
+        "ib-abc": PaperCost(k.ANGLES | k.BENDS | k.SAMPLES_NEAR | k.HIDING, _ib_abc),
     }
 )
 
 
-def get_objective(name: str) -> Objective:
+def get_objective(name: str) -> PaperCost:
     """The cost called ``name``. Raises InputError if it is unknown, with a list of the known ones."""
     found = OBJECTIVES.get(name)
     if found is None:
@@ -204,7 +278,7 @@ class Cost:
         self,
         problem: Problem,
         code: Code,
-        objective: Objective,
+        objective: PaperCost,
         *,
         earlier: Sequence[Earlier] = (),
         speed_m_s: float = 15.0,
@@ -220,7 +294,7 @@ class Cost:
             scene.numbers, scene.zones, scene.corners, self.stride, wanted, *k.room(self.curve.basis.shape[1]),
         )  # fmt: skip
         straight = self.terms(self.straight_controls()[None])[0]
-        self.unit = Unit(
+        self.unit = CostReference(
             straight,
             max(scene.straight_m, 1e-9),
             float(scene.high[2] - scene.low[2]),
@@ -273,6 +347,6 @@ class Cost:
 
 def sampled(scene: Scene, points: tuple[int, ...]) -> tuple[Curve, int]:
     """The curve with ``points`` free control points in each stage, and the number of samples from node to node."""
-    stride = max(1, round(SAMPLES / (NODES + 1)))
-    legs = shares((NODES + 1) * stride, np.linalg.norm(np.diff(scene.terminals, axis=0), axis=1))
+    stride = max(1, round(SAMPLES / (SSGWO_NODES + 1)))
+    legs = shares((SSGWO_NODES + 1) * stride, np.linalg.norm(np.diff(scene.terminals, axis=0), axis=1))
     return curve(points, legs), stride

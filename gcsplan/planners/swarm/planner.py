@@ -17,12 +17,12 @@ import numpy as np
 
 from gcsplan.arrays import Floats, Indices
 from gcsplan.notes.note import Note
-from gcsplan.optimisers.driver import Result, State, minimise
-from gcsplan.optimisers.registry import Entry as Row
+from gcsplan.optimisers.driver import OptimiserResult, State, minimise
+from gcsplan.optimisers.registry import OptimiserEntry as Row
 from gcsplan.optimisers.registry import get as get_optimiser
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
 from gcsplan.planners.refusal.explain import check_ends
-from gcsplan.planners.registry import Entry
+from gcsplan.planners.registry import PlannerEntry
 from gcsplan.planners.simplify import thinned
 from gcsplan.planners.swarm import cmaes, warm_start
 from gcsplan.planners.swarm.encodings import Code
@@ -52,7 +52,7 @@ class Found:
     """The result of a search: its ``curve`` (S, 3), the indices of its ``terminals``, and the ``violations`` that the
     exact check finds. ``pitch_deg``, ``yaw_deg``: mean slope and mean turn between nodes (SSGWO's tables)."""
 
-    result: Result
+    result: OptimiserResult
     scene: Scene
     curve: Floats
     terminals: Indices
@@ -121,7 +121,7 @@ def search(problem: Problem, optimiser: str, settings: Settings, scene: Scene | 
     return drawn(problem, cost, result)
 
 
-def drawn(problem: Problem, cost: Cost, result: Result, controls: Floats | None = None) -> Found:
+def drawn(problem: Problem, cost: Cost, result: OptimiserResult, controls: Floats | None = None) -> Found:
     """The curve of a search's best numbers, or of its control points ``controls`` (N, 3), with its violations."""
     if controls is None:
         controls = cost.code.controls(result.x[None])[0]
@@ -136,7 +136,7 @@ def drawn(problem: Problem, cost: Cost, result: Result, controls: Floats | None 
     return Found(result, scene, curve, terminals, found, float(pitch.mean()), float(yaw.mean()) if len(yaw) else 0.0)
 
 
-def plan(problem: Problem, row: Entry) -> Solution:
+def plan(problem: Problem, row: PlannerEntry) -> Solution:
     """A path that `Airspace.examine` passes: few way points along the curve that the optimiser found, or its repair.
 
     Raises Refusal (NoMission, ``not_found``) if no curve within the budget can be repaired, InputError for bad options.
@@ -144,7 +144,7 @@ def plan(problem: Problem, row: Entry) -> Solution:
     return until_found(problem, row, lambda again, settings: search(again, row.optimiser, settings))
 
 
-def until_found(problem: Problem, row: Entry, once: Callable[[Problem, Settings], Found]) -> Solution:
+def until_found(problem: Problem, row: PlannerEntry, once: Callable[[Problem, Settings], Found]) -> Solution:
     """The first solution of the searches ``once``, each with a seed of its own; the first with the problem's.
 
     At most `SEARCHES`, and none is begun when the budget for a first path is spent. The first search always runs to

@@ -31,7 +31,7 @@ PUSHES = ((0.03, 0.0), (0.1, 0.0), (0.1, 0.01), (0.3, 0.0), (0.3, 0.01), (0.6, 0
 CORRECTIONS, CORRECTED_M = 12, 0.01
 """Most corrections of a profile after violations in the exact check; metres added to the size of each violation."""
 
-WORTH = 1e-4
+FEWER_POINTS_COST = 1e-4
 """Extra cost that fewer way points may have, as a part of the cost."""
 
 
@@ -94,7 +94,7 @@ def _checked(problem: Problem, track: Track, flown: Flown) -> Floats | None:
         points, pinned = way_points(problem, track, flown)
         found = violations(problem, points)
         if not found:
-            few = fewer(problem, points, pinned, WORTH * flown.cost)[0]
+            few = fewer(problem, points, pinned, FEWER_POINTS_COST * flown.cost)[0]
             return points if violations(problem, few) else few
         s = distances(points[:, :2])
         for v in found:

@@ -24,7 +24,7 @@ GROWN = 0.1
 """Margin of the flight volume around the terminals, on every side, as a part of their box's longer side. The box is
 first made square: a mission due east needs as much space to either side."""
 
-KEEP_M = 0.05
+SAMPLED_KEEP_M = 0.05
 """Metres that the sampled cost keeps from floor, ceiling and zones, for what lies between two samples."""
 
 KEEP_SLOPE = 0.999
@@ -77,7 +77,7 @@ class Scene:
         known = heights[np.isfinite(heights)]
         lowest, highest = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
         standing = 0.0 if top is ground else float(np.nanmax((top - ground)[r0:r1, c0:c1], initial=0.0))
-        error = limits.altitude_error_m + KEEP_M
+        error = limits.altitude_error_m + SAMPLED_KEEP_M
         floors, floor_map = _floors(problem, (c0, r0, c1, r1), (west, south, east, north), centre, scale_m)
         floor_map = quadratic if floor_map is None else floor_map
         least = floors[np.isfinite(floors)]
@@ -119,7 +119,7 @@ class Scene:
         spacing = 1.5 * straight / SAMPLES
         numbers[k.SPACING] = spacing
         zones = scene.zones.copy()
-        zones[:, k.REACH] += np.minimum(spacing**2 / (8.0 * zones[:, k.ZR]), 0.2 * zones[:, k.ZR]) + KEEP_M
+        zones[:, k.REACH] += np.minimum(spacing**2 / (8.0 * zones[:, k.ZR]), 0.2 * zones[:, k.ZR]) + SAMPLED_KEEP_M
         return cls(heights, quadratic, floors, floor_map, numbers, zones, scene.corners, low, high, terminals, straight)
 
     @property
@@ -221,7 +221,7 @@ def _floors(
         to_nodes = np.zeros((2, 6))
         to_nodes[0, :2] = (centre[0] - west) * per_e, scale_m * per_e
         to_nodes[1, [0, 2]] = (north - centre[1]) * per_n, -scale_m * per_n
-    floor = air.floor_amsl(at[..., 0], at[..., 1], problem.limits) + KEEP_M
+    floor = air.floor_amsl(at[..., 0], at[..., 1], problem.limits) + SAMPLED_KEEP_M
     return np.ascontiguousarray(np.where(np.isfinite(floor), floor, np.nan), dtype=np.float32), to_nodes
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import unknown_name
-from gcsplan.planners.registry import PAPER, VOLUME_KEYS, Entry
+from gcsplan.planners.registry import PAPER, VOLUME_KEYS, PlannerEntry
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class Settings:
     around: Floats | None = None
 
     @classmethod
-    def of(cls, row: Entry, options: Mapping[str, object]) -> Settings:
+    def of(cls, row: PlannerEntry, options: Mapping[str, object]) -> Settings:
         """Settings of a planner's ``row``, replaced by ``options``. Raises InputError for an unknown key."""
         known = cls.__dataclass_fields__
         for key in options:

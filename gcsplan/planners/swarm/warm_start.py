@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from gcsplan.planners.swarm.settings import Settings
 
 OPTIMAL = "optimal"
-MORE = 2
+MORE_POINTS = 2
 """Times the way points of a search that begins anywhere."""
 RAISES = 8
 """Rounds in which a curve is raised where it is below the path."""
@@ -35,8 +35,8 @@ unit box."""
 def resolved(problem: Problem, settings: Settings) -> Settings:
     """``settings`` with the path of the planner `optimal`, if they ask for it. Raises NoMission if it finds none.
 
-    Unless they say otherwise, a search around a path has `MORE` times the encoding's way points: it can follow the path
-    more closely, and need not find it among so many numbers.
+    Unless they say otherwise, a search around a path has `MORE_POINTS` times the encoding's way points: it can follow
+    the path more closely, and need not find it among so many numbers.
     """
     around, points = settings.around, settings.points
     if around is None and settings.warm_start == OPTIMAL:
@@ -44,7 +44,7 @@ def resolved(problem: Problem, settings: Settings) -> Settings:
 
         around = get(OPTIMAL).plan(replace(problem, options={}, turn_radius_m=0.0, progress=None)).path.points
     if around is not None and points is None:
-        points = MORE * get_encoding(settings.encoding).points
+        points = MORE_POINTS * get_encoding(settings.encoding).points
     return replace(settings, around=around, points=points)
 
 

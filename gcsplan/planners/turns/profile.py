@@ -16,10 +16,10 @@ from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.taut_string import Profile
 from gcsplan.planners.profile.track import Flown, Obstruction, Track, fly
-from gcsplan.planners.profile.tubes import cut, join
 from gcsplan.planners.turns.arc_path import Outline
 from gcsplan.planners.turns.kernels import CHORD_M, level, straighten
 from gcsplan.world.airspace import Band, Legs, Tube
+from gcsplan.world.tube import cut, join
 
 CORRECTIONS, CORRECTED_M = 8, 0.01
 """Most corrections of a profile after violations in the exact check; metres added to the size of each violation."""

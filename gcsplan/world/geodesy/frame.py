@@ -22,9 +22,6 @@ FARTHEST_M = 150_000.0
 
 EARTH_RADIUS_M = 6_371_008.8  # mean radius R1 of WGS84 (IUGG)
 
-Box = tuple[float, float, float, float]
-"""A part of a plane: west, south, east, north, m."""
-
 BOW_PARTS = np.arange(17) / 16.0
 """Parts of a leg at which `Frame.bow_m` measures; at the ends the distance is 0."""
 

@@ -15,8 +15,8 @@ from gcsplan.arrays import Floats
 Sides = tuple[bool, bool, bool, bool]
 NO_SIDES: Sides = (False, False, False, False)
 DEGREE = 6
-TERMS = tuple((i, j) for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i))
-_IN_U, _IN_V = np.array(TERMS).T
+POWERS = tuple((i, j) for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i))
+_IN_U, _IN_V = np.array(POWERS).T
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +58,9 @@ class GridMap:
     @classmethod
     def affine(cls, west_m: float, north_m: float, dx_m: float, dy_m: float) -> GridMap:
         """A grid in the plane itself: node (0, 0) at (west_m, north_m), rows going south."""
-        coefficients = np.zeros((len(TERMS), 2))
-        coefficients[TERMS.index((1, 0)), 0] = 1.0 / dx_m
-        coefficients[TERMS.index((0, 1)), 1] = -1.0 / dy_m
+        coefficients = np.zeros((len(POWERS), 2))
+        coefficients[POWERS.index((1, 0)), 0] = 1.0 / dx_m
+        coefficients[POWERS.index((0, 1)), 1] = -1.0 / dy_m
         return cls(coefficients, (west_m, north_m), 1.0, 0.0)
 
     def __call__(self, east_m: ArrayLike, north_m: ArrayLike) -> Floats:
@@ -92,8 +92,8 @@ class GridMap:
     def jacobian(self, east_m: float, north_m: float) -> Floats:
         """(2, 2) d(col, row) / d(east_m, north_m) at a point."""
         u, v = (east_m - self.centre[0]) / self.scale_m, (north_m - self.centre[1]) / self.scale_m
-        du = np.array([i * u ** max(i - 1, 0) * v**j for i, j in TERMS]) / self.scale_m
-        dv = np.array([j * u**i * v ** max(j - 1, 0) for i, j in TERMS]) / self.scale_m
+        du = np.array([i * u ** max(i - 1, 0) * v**j for i, j in POWERS]) / self.scale_m
+        dv = np.array([j * u**i * v ** max(j - 1, 0) for i, j in POWERS]) / self.scale_m
         return np.stack([du @ self.coefficients, dv @ self.coefficients], axis=-1)
 
     def metres_per_cell(self, east_m: float, north_m: float) -> Floats:

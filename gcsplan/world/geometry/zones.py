@@ -8,6 +8,9 @@ from typing import Literal
 
 from gcsplan.arrays import Floats
 
+Box = tuple[float, float, float, float]
+"""A part of the plane: west, south, east, north, m; infinite: everywhere."""
+
 
 @dataclass(frozen=True, slots=True)
 class Level:
@@ -39,7 +42,7 @@ class Polygon:
     vertices: Floats
 
     @cached_property
-    def bounds(self) -> tuple[float, float, float, float]:
+    def bounds(self) -> Box:
         """West, south, east, north, metres."""
         (west, south), (east, north) = self.vertices.min(axis=0).tolist(), self.vertices.max(axis=0).tolist()
         return west, south, east, north
@@ -63,7 +66,7 @@ class Zone:
         return any(level is not None and level.datum == "agl" for level in (self.floor, self.ceiling))
 
     @property
-    def bounds(self) -> tuple[float, float, float, float]:
+    def bounds(self) -> Box:
         """West, south, east, north of the shape, metres."""
         s = self.shape
         if isinstance(s, Circle):

@@ -1,8 +1,9 @@
 """Kernels: bounds of a surface over and beside a track, and around points.
 
-The height under a straight line is a quadratic in each cell. It is cut until a chord lies within `CHORD_M`, after the
-chord is raised by the quadratic's rise above it (or lowered by its dip below it). The surface beside the line, within
-reach, is bounded by reach times the steepest slope there, or by the highest and lowest node, whichever is tighter.
+The height under a straight line is a quadratic in each cell. It is cut until a chord lies within `HEIGHT_CHORD_M`,
+after the chord is raised by the quadratic's rise above it (or lowered by its dip below it). The surface beside the
+line, within reach, is bounded by reach times the steepest slope there, or by the highest and lowest node, whichever is
+tighter.
 """
 
 from __future__ import annotations
@@ -14,12 +15,12 @@ from gcsplan.world.kernels.compiled import device
 from gcsplan.world.kernels.shared import BOW_M, ERROR_M, MASK, SHIFT, STEP_X, STEP_Y, LocalExtrema
 from gcsplan.world.kernels.sweep import parts_of, slab, to_grid
 from gcsplan.world.kernels.sweep_beside import unknown_near
-from gcsplan.world.kernels.sweep_terrain import EDGE
+from gcsplan.world.kernels.sweep_terrain import BORDER_SPARE
 
-CHORD_M = 0.05
+HEIGHT_CHORD_M = 0.05
 MOST_CUTS = 64  # most parts of the line in one cell
 NEAR_UNKNOWN_M = 10.0  # pieces are cut to this beside unknown ground, so that little of the track is lost
-MOST_CELLS = 16  # examined one by one for the slope beside a piece; if there are more, the local extrema bound them
+MOST_EXAMINED = 16  # examined one by one for the slope beside a piece; if there are more, the local extrema bound them
 
 
 @device
@@ -29,7 +30,7 @@ def steepest_in(
     """Steepest slope of the known cells that meet a box of the grid around a place in cell (i, j)."""
     rows, cols = z.shape
     i0, i1, j0, j1 = math.floor(c0), math.floor(c1), math.floor(r0), math.floor(r1)
-    if (i1 - i0 + 1) * (j1 - j0 + 1) > MOST_CELLS:
+    if (i1 - i0 + 1) * (j1 - j0 + 1) > MOST_EXAMINED:
         return float(abs(slopes[i >> SHIFT, j, i & MASK]))
     square = 0.0
     for jj in range(max(j0, 0), min(j1, rows - 2) + 1):
@@ -116,8 +117,8 @@ def pieces(
             cb, rb = to_grid(m, e0 + (e1 - e0) * fb, n0 + (n1 - n0) * fb)
             dc, dr = cb - c0, rb - r0
             s0, run = s_start + fa * length, (fb - fa) * length
-            t, end = slab(c0, dc, -EDGE, high_c - 1.0 + EDGE, 0.0, 1.0)
-            t, end = slab(r0, dr, -EDGE, high_r - 1.0 + EDGE, t, end)
+            t, end = slab(c0, dc, -BORDER_SPARE, high_c - 1.0 + BORDER_SPARE, 0.0, 1.0)
+            t, end = slab(r0, dr, -BORDER_SPARE, high_r - 1.0 + BORDER_SPARE, t, end)
             if not (t <= end and math.isfinite(dc) and math.isfinite(dr)):
                 count = put_unknown(rows, count, s0 + run)
                 continue
@@ -151,7 +152,7 @@ def pieces(
                     t = tb
                     continue
                 turn = dc * dr * (tb - t) * (tb - t)
-                cuts = math.ceil(math.sqrt(0.25 * max(abs(gd * turn), abs(td * turn)) / CHORD_M))
+                cuts = math.ceil(math.sqrt(0.25 * max(abs(gd * turn), abs(td * turn)) / HEIGHT_CHORD_M))
                 strip, own = ii >> SHIFT, ii & MASK
                 edge = under.slope[strip, jj, own] < 0.0 or beside.slope[strip, jj, own] < 0.0
                 if edge or beyond.slope[strip, jj, own] < 0.0:
@@ -217,7 +218,7 @@ def around(
     for p in range(len(points)):
         out[p] = math.nan
         c, r = to_grid(m, points[p, 0], points[p, 1])
-        if not (-EDGE <= c <= cols - 1.0 + EDGE and -EDGE <= r <= rows - 1.0 + EDGE):
+        if not (-BORDER_SPARE <= c <= cols - 1.0 + BORDER_SPARE and -BORDER_SPARE <= r <= rows - 1.0 + BORDER_SPARE):
             continue
         i, j = min(max(int(math.floor(c)), 0), cols - 2), min(max(int(math.floor(r)), 0), rows - 2)
         strip, own = i >> SHIFT, i & MASK
@@ -246,7 +247,7 @@ def around(
             best = min(best, h + reach_m * math.sqrt(gx * gx + gy * gy) + 0.5 * abs(kd) * x * y)
         i0, i1 = max(int(math.floor(c - x)), 0), min(int(math.floor(c + x)), cols - 2)
         j0, j1 = max(int(math.floor(r - y)), 0), min(int(math.floor(r + y)), rows - 2)
-        if (i1 - i0 + 1) * (j1 - j0 + 1) <= MOST_CELLS:
+        if (i1 - i0 + 1) * (j1 - j0 + 1) <= MOST_EXAMINED:
             most = -math.inf
             for jj in range(j0, j1 + 1):
                 for ii in range(i0, i1 + 1):

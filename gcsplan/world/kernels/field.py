@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.world.geometry.surface import DEGREE, TERMS, GridMap
+from gcsplan.world.geometry.surface import DEGREE, POWERS, GridMap
 from gcsplan.world.kernels.shared import steps_of
 
 
@@ -31,9 +31,9 @@ class Field(NamedTuple):
     @classmethod
     def of(cls, grid: GridMap) -> Field:
         """The bounds of ``grid``, and its numbers in the kernels' order."""
-        order = [TERMS.index((i, j)) for i in range(DEGREE, -1, -1) for j in range(DEGREE - i, -1, -1)]
-        low = [TERMS.index(t) for t in ((0, 0), (1, 0), (0, 1))]
-        affine = not grid.coefficients[[k for k, (i, j) in enumerate(TERMS) if i + j > 1]].any()
+        order = [POWERS.index((i, j)) for i in range(DEGREE, -1, -1) for j in range(DEGREE - i, -1, -1)]
+        low = [POWERS.index(t) for t in ((0, 0), (1, 0), (0, 1))]
+        affine = not grid.coefficients[[k for k, (i, j) in enumerate(POWERS) if i + j > 1]].any()
         bend, step_x, step_y = _bounds(grid, affine)
         half = math.inf if affine else 1.0 + 1e-9
         head = [affine, *grid.centre, 1.0 / grid.scale_m, half, bend, grid.error_m, step_x, step_y]
@@ -49,7 +49,7 @@ def _bounds(grid: GridMap, affine: bool) -> tuple[float, float, float]:
 
     def derivative(du: int, dv: int) -> Floats:
         total = np.zeros((len(u), 2))
-        for k, (i, j) in enumerate(TERMS):
+        for k, (i, j) in enumerate(POWERS):
             if i >= du and j >= dv:
                 factor = math.perm(i, du) * math.perm(j, dv) / grid.scale_m ** (du + dv)
                 total += factor * (u ** (i - du) * v ** (j - dv))[:, None] * grid.coefficients[k]

@@ -29,7 +29,7 @@ BOW = 2
 """Upper bound, in cells, of how far a line of the plane leaves the straight grid line between two such places."""
 CELL_BYTES = 12
 """Of a cell that was examined: a slope and two heights."""
-MOST_BYTES = 250_000_000
+MOST_EXAMINED_BYTES = 250_000_000
 """Of what all neighbourhoods of an airspace have examined: those that were asked for least lately forget it."""
 AT_ONCE = 3
 """Neighbourhoods that one call of a kernel takes."""
@@ -107,7 +107,7 @@ class Neighbourhood:
 
 
 class Neighbourhoods:
-    """The local extrema of an airspace for each reach that is asked for, of at most `MOST_BYTES` or a little more.
+    """The local extrema of an airspace for each reach that is asked for, little more than `MOST_EXAMINED_BYTES`.
 
     A way home asks for a dozen reaches along lines that cover all of the terrain: 40 million cells took 4 GB.
     """
@@ -127,14 +127,14 @@ class Neighbourhoods:
         key = of_top, math.ceil(reach_m / self._field.step_x), math.ceil(reach_m / self._field.step_y)
         with self._lock:
             own = self._kept.pop(key, None)
-            if own is None or own.examined_bytes > MOST_BYTES // AT_ONCE:
+            if own is None or own.examined_bytes > MOST_EXAMINED_BYTES // AT_ONCE:
                 own = Neighbourhood(self._grid, self._field, heights, reach_m)
             self._kept[key] = own
         held = own.along(lines)  # the arrays live as long as somebody uses them, forgotten or not
         with self._lock:
             held_bytes = sum(one.examined_bytes for one in self._kept.values())
             for old in list(self._kept)[:-AT_ONCE]:
-                if held_bytes <= MOST_BYTES:
+                if held_bytes <= MOST_EXAMINED_BYTES:
                     break
                 held_bytes -= self._kept.pop(old).examined_bytes
         return held

@@ -9,12 +9,12 @@ from gcsplan.world.kernels.compiled import device
 from gcsplan.world.kernels.shared import BEND, ERROR_M, RESOLUTION_M, TOUCH_M
 from gcsplan.world.kernels.sweep import local_steps, segment_box, to_grid, within
 
-MOST_PIECES = 1_000_000
+MOST_WORKED = 1_000_000
 """Most pieces of one search; beyond it the demand counts as broken. Only hostile input reaches it."""
 
 RESOLUTION = 0.1  # part of itself to which the depth of a break is resolved, if more than RESOLUTION_M
 SPOKES = 16
-SMALLEST_M = 1e-3
+FINEST_M = 1e-3
 
 
 @device
@@ -152,9 +152,9 @@ def deepest(
                     wide, tall = (u1 - u0) * sx, (v1 - v0) * sy
                     across = math.hypot(wide, tall)
                     fine = max(RESOLUTION_M, RESOLUTION * found)
-                    if stack[size, 6] + rise * across <= fine or across <= SMALLEST_M or worked > MOST_PIECES:
+                    if stack[size, 6] + rise * across <= fine or across <= FINEST_M or worked > MOST_WORKED:
                         found, at = bound, stack[size, 5]
-                        if not full or worked > MOST_PIECES:
+                        if not full or worked > MOST_WORKED:
                             return found, at, worked
                         continue
                     um = 0.5 * (u0 + u1) if wide >= tall else u1

@@ -20,7 +20,7 @@ from gcsplan.world.kernels.shared import BEND, BOW_M, CUT, ERROR_M, MASK, SHIFT,
 from gcsplan.world.kernels.sweep import parts_of, slab, to_grid
 from gcsplan.world.kernels.sweep_beside import bar_above, beside_point, deepest, unknown_near
 
-EDGE = 1e-9  # columns or rows by which a leg along the border may seem to lie beyond it
+BORDER_SPARE = 1e-9  # columns or rows by which a leg along the border may seem to lie beyond it
 INSIDE = 1e-6  # columns or rows from the border within which `glance` leaves the leg to `sweep`
 GROUP_M, GROUP_BOW_M = 500.0, 0.003  # longest stretch, m, and its bow, that the second tier judges at once
 
@@ -169,8 +169,8 @@ def sweep(
             else:
                 cb, rb = to_grid(m, e0 + (e1 - e0) * (first + share), n0 + (n1 - n0) * (first + share))
             dc, dr = cb - c0, rb - r0
-            t, end = slab(c0, dc, -EDGE, cols - 1.0 + EDGE, 0.0, 1.0)
-            t, end = slab(r0, dr, -EDGE, rows - 1.0 + EDGE, t, end)
+            t, end = slab(c0, dc, -BORDER_SPARE, cols - 1.0 + BORDER_SPARE, 0.0, 1.0)
+            t, end = slab(r0, dr, -BORDER_SPARE, rows - 1.0 + BORDER_SPARE, t, end)
             if not (t == 0.0 and end == 1.0 and math.isfinite(dc) and math.isfinite(dr)):
                 out[UNKNOWN], out[UNKNOWN_AT] = 0.0, first if t > 0.0 else first + share
                 out[STEEPEST] = math.inf

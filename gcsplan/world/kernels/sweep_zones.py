@@ -46,7 +46,7 @@ from gcsplan.world.kernels.sweep import (
     slab,
     to_grid,
 )
-from gcsplan.world.kernels.sweep_beside import MOST_PIECES, SMALLEST_M
+from gcsplan.world.kernels.sweep_beside import FINEST_M, MOST_WORKED
 
 ACROSS_M = 0.02
 """Size, m, to which pieces are cut beside a zone whose levels follow the ground."""
@@ -252,11 +252,11 @@ def nearest_conflict(
                     out[CUT] += 1.0
                     if (
                         (across <= ACROSS_M and stack[size, 6] + rise * across <= RESOLUTION_M)
-                        or across <= SMALLEST_M
-                        or worked > MOST_PIECES
+                        or across <= FINEST_M
+                        or worked > MOST_WORKED
                     ):
                         best, at = stack[size, 4], stack[size, 5]
-                        if not full or best <= 0.01 or worked > MOST_PIECES:
+                        if not full or best <= 0.01 or worked > MOST_WORKED:
                             return best, at
                         continue
                     um = 0.5 * (u0 + u1) if wide >= tall else u1
@@ -330,7 +330,7 @@ def meets(
     if zone[k, FLOOR_AGL] == 0.0 and zone[k, CEILING_AGL] == 0.0:
         return True, dist, where
     # The levels follow the ground: search along the part that is near the zone's box.
-    cutoff = max(bound, SMALLEST_M)
+    cutoff = max(bound, FINEST_M)
     t0, t1 = slab(e0, de, zone[k, WEST_E] - reach - 1.0, zone[k, EAST_E] + reach + 1.0, t0, t1)
     if t0 <= t1:
         t0, t1 = slab(n0, dn, zone[k, SOUTH_N] - reach - 1.0, zone[k, NORTH_N] + reach + 1.0, t0, t1)

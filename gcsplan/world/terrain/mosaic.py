@@ -1,12 +1,19 @@
-"""Several tiles as one grid, and the window of it that a mission needs, with a polynomial map from plane to grid."""
+"""Several tiles as one grid, and the window of it that a mission needs, with a polynomial map from plane to grid.
+
+The window has one surface, and a second one where tiles overlap and differ. Nobody knows which of two tiles is right.
+Where they differ the ground lies between a least and a greatest height, and each limit counts the unfavourable one.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,11 +21,12 @@ from numpy.typing import ArrayLike
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
-from gcsplan.world.geodesy.datum import plane_to_raster, to_wgs84
-from gcsplan.world.geodesy.frame import Box, Frame
-from gcsplan.world.geodesy.height_unit import BY_NOBODY, METRE, OF_KEY
+from gcsplan.world.geodesy.datum import VerticalDatum, plane_to_raster, to_wgs84
+from gcsplan.world.geodesy.frame import Frame
+from gcsplan.world.geodesy.height_unit import BY_NOBODY, METRE, OF_KEY, HeightUnit
 from gcsplan.world.geometry.surface import NO_SIDES, GridMap, Sides
-from gcsplan.world.terrain.overlap import PlacedTile, read_tiles
+from gcsplan.world.geometry.zones import Box
+from gcsplan.world.terrain.input_files import tell_folder
 from gcsplan.world.terrain.raster import MAX_CELLS, Raster
 
 FIT_ERROR_M = 0.01
@@ -34,6 +42,19 @@ WIDEST_COLUMNS = 10
 """Columns of tiles may differ by a ratio of numbers up to this."""
 
 _SPARE_CELLS = 3
+
+
+SharedNodes = tuple[int, int, int, int]
+"""Column, row, columns, rows of the common grid that a tile and a window share."""
+
+HASHED_BYTES = 256 * 2**20
+"""Tiles of more bytes together are not hashed whole."""
+
+RASTERS = (".tif", ".tiff", ".hgt", ".hgt.zip", ".asc")
+"""The names of tiles in a folder end with these."""
+
+MOST_TILES = 20_000
+"""Most tiles of a mosaic."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -311,3 +332,192 @@ def _ratio(raster: Raster, first: Raster) -> Fraction:
     """The width of a raster's columns in columns of the first one, as a ratio of small numbers; 1 if it is none."""
     ratio = Fraction(raster.dx / first.dx).limit_denominator(WIDEST_COLUMNS)
     return ratio if 0 < ratio <= WIDEST_COLUMNS else Fraction(1)
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedTile:
+    """A tile with its first node in the common grid; each of its columns is ``step`` common ones wide."""
+
+    raster: Raster
+    col: int
+    row: int
+    step: int = 1
+
+    @property
+    def cols(self) -> int:
+        """Columns of the common grid from its first node to its last."""
+        return (self.raster.cols - 1) * self.step + 1
+
+    def overlap(self, col: int, row: int, cols: int, rows: int) -> tuple[int, int, int, int] | None:
+        """Column, row, columns, rows shared with a window of the common grid; None if they do not overlap.
+
+        A tile with wider columns is taken one of them farther to each side: nodes between two of them need both.
+        """
+        c0, c1 = max(col - self.step + 1, self.col), min(col + cols + self.step - 1, self.col + self.cols)
+        r0, r1 = max(row, self.row), min(row + rows, self.row + self.raster.rows)
+        return (c0, r0, c1 - c0, r1 - r0) if c0 < c1 and r0 < r1 else None
+
+
+class Heights:
+    """Greatest heights (rows, cols), NaN where unknown, and the least ones as soon as two differ.
+
+    ``nodes`` counts the heights that differ, ``worst_m`` is the largest difference. ``where`` names the files.
+    """
+
+    def __init__(self, rows: int, cols: int, where: str = "") -> None:
+        self._where = where
+        self.high_m = np.full((rows, cols), np.nan)
+        self.low_m: Floats | None = None
+        self.nodes = 0
+        self.worst_m = 0.0
+
+    def put(self, part: tuple[slice, slice], high_m: Floats, low_m: Floats | None = None) -> None:
+        """Put heights into a part: unknown ones change nothing, and of two that are known both count.
+
+        Raises InputError if two heights of each node do not fit into memory.
+        """
+        into = self.high_m[part]
+        off = np.abs(into - high_m)
+        both = off > 0.0
+        if both.any():
+            self.nodes += int(np.count_nonzero(both))
+            self.worst_m = max(self.worst_m, float(off[both].max()))
+        if self.low_m is None and (low_m is not None or both.any()):
+            if self.high_m.size > MAX_CELLS // 2:
+                raise InputError(
+                    f"tiles differ where they overlap, and two heights of {self.high_m.size / 1e6:.3g} million cells "
+                    f"are more than {MAX_CELLS // 2 / 1e6:.3g} million: make one file of them (gdal_merge.py), or use "
+                    f"a coarser DEM (gdalwarp -tr) or a smaller mission",
+                    where=self._where,
+                )
+            self.low_m = self.high_m.copy()
+        if self.low_m is not None:
+            low = self.low_m[part]
+            np.fmin(low, high_m if low_m is None else low_m, out=low)
+        np.fmax(into, high_m, out=into)
+
+    def count(self, other: Heights) -> None:
+        """Count what differs in other heights, too."""
+        self.nodes, self.worst_m = self.nodes + other.nodes, max(self.worst_m, other.worst_m)
+
+
+def read_tiles(
+    parts: Sequence[tuple[PlacedTile, SharedNodes]], c0: int, r0: int, cols: int, rows: int, where: str = ""
+) -> tuple[Heights, list[Note]]:
+    """The heights of a window that begins at column ``c0`` and row ``r0``, and notes on what differs or is unknown.
+
+    ``where`` names the files in messages. Raises InputError.
+    """
+    heights = Heights(rows, cols, where)
+    for tile, (col, row, width, height) in parts:
+        if tile.step == 1:
+            for first, new in tile.raster.read(col - tile.col, row - tile.row, width, height):
+                top = row - r0 + first
+                heights.put((slice(top, top + len(new)), slice(col - c0, col - c0 + width)), new)
+    # Tiles whose columns are the same nodes: between neighbours there is no gap.
+    wide = [(tile, shared) for tile, shared in parts if tile.step > 1]
+    for step, phase in sorted({(tile.step, tile.col % tile.step) for tile, _ in wide}):
+        some = [(tile, shared) for tile, shared in wide if (tile.step, tile.col % tile.step) == (step, phase)]
+        _put_wide(heights, some, c0, r0, phase)
+    notes = []
+    if heights.nodes:
+        worst_m = max(heights.worst_m, 0.001)  # what single precision makes of one height in two units is less
+        notes.append(Note("tiles_differ", nodes=heights.nodes, worst_m=worst_m))
+    unknown = int(np.count_nonzero(np.isnan(heights.high_m)))
+    if unknown:
+        notes.append(Note("nodes_unknown", unknown=unknown, nodes=rows * cols))
+    return heights, notes
+
+
+def _put_wide(heights: Heights, parts: Sequence[tuple[PlacedTile, SharedNodes]], c0: int, r0: int, phase: int) -> None:
+    """Put tiles whose columns are wider than the common ones into ``heights``, linear between their own nodes."""
+    cols = heights.high_m.shape[1]
+    step = parts[0][0].step
+    first, last = (c0 - phase) // step, -((phase - c0 - cols + 1) // step)  # own columns around the window
+    top, bottom = min(s[1] for _, s in parts) - r0, max(s[1] + s[3] for _, s in parts) - r0
+    own = Heights(bottom - top, last - first + 1)
+    for tile, (col, row, width, height) in parts:
+        own_first = -((tile.col - col) // step)  # the tile's own first column in the window
+        count = (col + width - 1 - tile.col) // step - own_first + 1
+        at = (tile.col - phase) // step + own_first - first
+        if count < 1:
+            continue
+        for line, new in tile.raster.read(own_first, row - tile.row, count, height):
+            above = row - r0 - top + line
+            own.put((slice(above, above + len(new)), slice(at, at + count)), new)
+    common = np.arange(c0, c0 + cols) - phase - first * step
+    k, part = common // step, (common % step) / step
+    on = part == 0.0  # a node of its own needs no neighbour
+    after = np.minimum(k + 1, last - first)
+
+    def between(z: Floats) -> Floats:
+        return np.where(on, z[:, k], (1.0 - part) * z[:, k] + part * z[:, after])
+
+    heights.count(own)
+    heights.put(
+        (slice(top, bottom), slice(0, cols)), between(own.high_m), None if own.low_m is None else between(own.low_m)
+    )
+
+
+class Tile(Protocol):
+    """What reports say of one file, and the datum that it states."""
+
+    @property
+    def stored_bytes(self) -> int:
+        """Its size."""
+
+    @property
+    def name(self) -> str:
+        """The file's name."""
+
+    @property
+    def vertical(self) -> VerticalDatum | None:
+        """What its heights are above; None if it does not say."""
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """What a user should know of it."""
+
+    @property
+    def unit(self) -> HeightUnit:
+        """The unit in which it counts heights."""
+
+    def sha256(self) -> str:
+        """Its hash."""
+
+
+def hash_of(tiles: Sequence[Tile], window: Window) -> str:
+    """The hash of a single file; for several files the hash of their hashes, in the order given.
+
+    Beyond `HASHED_BYTES` nobody waits until all is read: then it is of every tile's name and size, and of the heights
+    that the mission has read, with their places.
+    """
+    if sum(tile.stored_bytes for tile in tiles) <= HASHED_BYTES:
+        hashes = [tile.sha256() for tile in tiles]
+        return hashes[0] if len(hashes) == 1 else hashlib.sha256("\n".join(hashes).encode()).hexdigest()
+    digest = hashlib.sha256("\n".join(f"{tile.name} {tile.stored_bytes}" for tile in tiles).encode())
+    for numbers in (window.x, window.y, window.heights_m):
+        digest.update(np.ascontiguousarray(numbers).tobytes())
+    return digest.hexdigest()
+
+
+def tiles_of(paths: Sequence[str], *, where: str) -> list[str]:
+    """The rasters that ``paths`` name, as files or in folders. Raises InputError."""
+    found = [tile for path in paths for tile in _in_folder(path, where)]
+    if len(found) > MOST_TILES:
+        raise InputError(f"{len(found)} tiles are named; {MOST_TILES} are the most: give those around", where=where)
+    return found
+
+
+def _in_folder(path: str, where: str) -> list[str]:
+    """The rasters in a folder, or the file itself."""
+    tell_folder(path, RASTERS)
+    if not os.path.isdir(path):  # not pathlib's, which raises for a name that no disk can hold
+        return [path]
+    try:
+        found = sorted(str(p) for p in Path(path).iterdir() if p.name.lower().endswith(RASTERS) and p.is_file())
+    except OSError as why:
+        raise InputError(f"{path} cannot be read: {why.strerror or why}", where=where) from why
+    if not found:
+        raise InputError(f"{path} is a folder without tiles ({', '.join(RASTERS)}, .DAT); give a file", where=where)
+    return found

@@ -10,8 +10,8 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
-from gcsplan.world.geodesy.frame import Box
 from gcsplan.world.geometry.surface import GridMap
+from gcsplan.world.geometry.zones import Box
 
 WANTED_ERROR_M = 0.01
 """The gridded surface lies at most this far above the true one, m, if `MAX_PEAK_NODES` permits."""

@@ -21,17 +21,17 @@ from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.datum import VerticalDatum, stated_datum, vertical_datum
-from gcsplan.world.geodesy.frame import FARTHEST_M, Box, Frame
+from gcsplan.world.geodesy.frame import FARTHEST_M, Frame
 from gcsplan.world.geodesy.height_unit import METRE
 from gcsplan.world.geometry.surface import Surface
+from gcsplan.world.geometry.zones import Box
 from gcsplan.world.terrain.geoid import GeoidGrid
 from gcsplan.world.terrain.model_words import heights_read
-from gcsplan.world.terrain.mosaic import Mosaic, Window
+from gcsplan.world.terrain.mosaic import Mosaic, Tile, Window, hash_of, tiles_of
 from gcsplan.world.terrain.obstacles import canopy_on
 from gcsplan.world.terrain.peaks import Peak, flat_grid, peaks_grid
 from gcsplan.world.terrain.raster import MAX_CELLS, Raster, open_raster, require_file
 from gcsplan.world.terrain.sample import SAMPLE, sample_jacksboro
-from gcsplan.world.terrain.tiles import Tile, hash_of, tiles_of
 from gcsplan.world.terrain.voids import take_out_zeros
 
 HeightUnitKey = Literal["m", "ft", "us_ft"]

@@ -12,10 +12,9 @@ import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 
 from gcsplan.arrays import Floats
-from gcsplan.fleet.motion.ardupilot import CORNER_M, Curved
-from gcsplan.fleet.motion.lean import leaning_m_s
-from gcsplan.fleet.motion.legs import legs
+from gcsplan.fleet.motion.ardupilot import CORNER_M, Curved, leaning_m_s
 from gcsplan.fleet.motion.scurve import curves
+from gcsplan.fleet.motion.timing import legs
 from gcsplan.sim.flight.kinematics import Kinematics
 from gcsplan.sim.flight.scurves import step_legs
 from gcsplan.vehicle import Autopilot, Vehicle

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from gcsplan.fleet.motion.ardupilot import Curved
-from gcsplan.fleet.motion.legs import legs
 from gcsplan.fleet.motion.px4 import Smoothed
-from gcsplan.fleet.motion.speeds import Stretch
+from gcsplan.fleet.motion.speeds import Segments
+from gcsplan.fleet.motion.timing import legs
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.geometry.limits import Limits
 
@@ -66,6 +66,6 @@ def test_only_bounded_motion_of_ardupilot_is_curved() -> None:
         replace(COPTER, leg_jerk_m_s3=math.inf),
         replace(COPTER, corner_accel_m_s2=math.inf), replace(COPTER, accel_m_s2=math.inf), WING,
     ):  # fmt: skip
-        assert isinstance(legs(points, other, owner), Stretch)
+        assert isinstance(legs(points, other, owner), Segments)
     assert isinstance(legs(points, replace(COPTER, autopilot=Autopilot.PX4), owner), Smoothed)
     assert legs(points[[0, 0]], COPTER, owner) is None

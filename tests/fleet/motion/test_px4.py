@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats
-from gcsplan.fleet.motion.legs import at_own_speed
 from gcsplan.fleet.motion.px4 import Smoothed, smoothed
+from gcsplan.fleet.motion.timing import at_own_speed
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.geometry.limits import Limits
 from tests.oracles.px4_smoothing import fly

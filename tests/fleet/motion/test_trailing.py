@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats
-from gcsplan.fleet.motion.trailing import trailing_s
+from gcsplan.fleet.motion.ardupilot import trailing_s
 from tests.oracles.terrain_margin import fly
 
 PART_M = 25.0

@@ -15,7 +15,7 @@ from gcsplan.planners.lattice.planner import plan_band, sides_to_pass
 from gcsplan.planners.optimal import planner as optimal
 from gcsplan.planners.problem import Problem, Progress, Via, straight_bound
 from gcsplan.planners.profile.climb_laps import climb_tracks, extend, laps, pins_of
-from gcsplan.planners.profile.exact import Judge, Unsettled, settle
+from gcsplan.planners.profile.exact import LegJudge, Unsettled, settle
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.path import Path
@@ -165,7 +165,7 @@ def extended(p: Problem) -> Floats:
     stops = np.array([p.start[:2], p.goal[:2]])
     found = extend(p, stops, np.ones(2, bool), np.full(2, np.nan))
     assert found is not None
-    settled = settle(p, Judge(p), found[0].points, found[0].pinned, found[0].pin_m)
+    settled = settle(p, LegJudge(p), found[0].points, found[0].pinned, found[0].pin_m)
     assert not isinstance(settled, Unsettled)
     return settled[0]
 

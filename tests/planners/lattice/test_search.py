@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gcsplan.planners.lattice.lattice import LINK_DOORS, STEPS, Lattice, Links, gaps, make_lattice, make_links
-from gcsplan.planners.lattice.search import Label, search
+from gcsplan.planners.lattice.routes import Label, search
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.taut_string import Profile, taut_string
 from gcsplan.world.airspace import Airspace

@@ -9,16 +9,15 @@ import pytest
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.profile.exact import Judge, Unsettled, sampled_track, settle
+from gcsplan.planners.profile.exact import LegJudge, Unsettled, sampled_track, settle
 from gcsplan.planners.profile.taut_string import Profile
 from gcsplan.planners.profile.track import Flown, fly, make_track
-from gcsplan.planners.profile.zone_levels import ZoneLevels, widest_free
+from gcsplan.planners.profile.zone_levels import ZoneLevels, own_ground, widest_free
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.path import Path
 from gcsplan.world.geometry.surface import GridMap, Surface
 from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
-from gcsplan.world.own_ground import own_ground
 from tests.support.planner_worlds import faults
 
 STEP_M, SIZE_M, SLOPE = 30.0, 1200.0, 0.3
@@ -105,7 +104,7 @@ def test_a_path_over_a_zone_on_a_slope_is_found_if_the_exact_check_passes_it(roo
     problem, track = over_a_slope(room_m)
     pins = ends(track), np.full(2, math.nan)
     assert not isinstance(fly(problem, sampled_track(problem, track, *pins)), Flown)  # the tube leaves no way
-    way = settle(problem, Judge(problem), track, *pins)
+    way = settle(problem, LegJudge(problem), track, *pins)
     if not found:
         assert isinstance(way, Unsettled)
         return

@@ -14,8 +14,7 @@ from gcsplan.app.fleet import pipeline
 from gcsplan.errors import CheckFailed, NoMission
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
-from gcsplan.planners.refusal.suggestions import with_cures
-from gcsplan.planners.refusal.trials import GRACE_S, LEAST_S, SHARE, TRIES, WHOLE, WHOLE_SHARE
+from gcsplan.planners.refusal.suggestions import GRACE_S, LEAST_S, MOST_TRIALS, SHARE, WHOLE, WHOLE_SHARE, with_cures
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.path import Path
@@ -197,7 +196,7 @@ def many_limits() -> Problem:
 
 
 def cures_of(problem: Problem, slow: SlowPlan, monkeypatch: pytest.MonkeyPatch) -> Refusal:
-    monkeypatch.setattr("gcsplan.planners.refusal.trials.time.perf_counter", lambda: slow.now_s)
+    monkeypatch.setattr("gcsplan.planners.refusal.suggestions.time.perf_counter", lambda: slow.now_s)
     return with_cures(problem, BARE, slow)
 
 
@@ -233,7 +232,7 @@ def test_a_plan_that_runs_on_is_stopped_when_it_reports_progress(monkeypatch: py
 def test_so_many_plans_and_no_more(opens: Callable[[Problem], bool], monkeypatch: pytest.MonkeyPatch) -> None:
     slow = SlowPlan(0.0, opens)
     cures_of(many_limits(), slow, monkeypatch)
-    assert 4 <= slow.asked <= TRIES + 3 * WHOLE  # three limits have values
+    assert 4 <= slow.asked <= MOST_TRIALS + 3 * WHOLE  # three limits have values
 
 
 def test_a_value_that_was_tried_in_vain_is_not_reported_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -266,7 +265,7 @@ def test_a_value_whose_whole_plan_is_refused_does_not_do(
             raise refused
         return slow(p)
 
-    monkeypatch.setattr("gcsplan.planners.refusal.trials.time.perf_counter", lambda: 0.0)
+    monkeypatch.setattr("gcsplan.planners.refusal.suggestions.time.perf_counter", lambda: 0.0)
     found, slow = {}, SlowPlan(0.0, opens)
     for least_m in (0.0, 90.0, 1e9):
         asked = list[float | None]()
@@ -289,7 +288,7 @@ def test_a_whole_plan_that_runs_on_is_stopped_and_told_of(monkeypatch: pytest.Mo
             slow.now_s += 0.25
             p.progress(Progress(slow.now_s, None, None, "search"))
 
-    monkeypatch.setattr("gcsplan.planners.refusal.trials.time.perf_counter", lambda: slow.now_s)
+    monkeypatch.setattr("gcsplan.planners.refusal.suggestions.time.perf_counter", lambda: slow.now_s)
     message = with_cures(problem, BARE, slow, endless).message
     assert "there is a path, but with 69 none is found, and with 71, whose whole mission was not tried in " in message
     assert slow.now_s <= (WHOLE_SHARE + 1.0) * problem.budget_s + 0.25

@@ -13,8 +13,8 @@ from scipy.interpolate import BSpline
 
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem, Via
-from gcsplan.planners.swarm.bspline import curve
 from gcsplan.planners.swarm.encodings import ENCODINGS, LATERAL, OFFSET, Code, get_encoding, shares
+from gcsplan.planners.swarm.objectives import curve
 from gcsplan.planners.swarm.scene import GROWN, Scene
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits

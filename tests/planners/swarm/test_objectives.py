@@ -18,7 +18,7 @@ from gcsplan.planners.swarm import objectives as o
 from gcsplan.planners.swarm import scene_kernels as sk
 from gcsplan.planners.swarm.encodings import Code
 from gcsplan.planners.swarm.objectives import OBJECTIVES, Cost, Earlier, get_objective
-from gcsplan.planners.swarm.scene import FAR, KEEP_M, KEEP_SLOPE, Scene
+from gcsplan.planners.swarm.scene import FAR, KEEP_SLOPE, SAMPLED_KEEP_M, Scene
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
@@ -116,10 +116,10 @@ class Oracle:
             t[k.STEEP] += max(0.0, rise - KEEP_SLOPE * math.tan(math.radians(20.0)) * run)
             t[k.STEEP] += max(0.0, -rise - KEEP_SLOPE * math.tan(math.radians(15.0)) * run)
         t[k.OUTSIDE] = float(sum(not (inside(q, self.scene)) for q in pts))
-        error = limits.altitude_error_m + KEEP_M
+        error = limits.altitude_error_m + SAMPLED_KEEP_M
         for (x, y, z), w, between in self.points_and_more:
             g = float(self.p.airspace.surface.top_at(x, y))
-            low, high = self.floor(x, y) + KEEP_M, min(g + limits.max_agl_m, limits.max_amsl_m) - error
+            low, high = self.floor(x, y) + SAMPLED_KEEP_M, min(g + limits.max_agl_m, limits.max_amsl_m) - error
             if between and z < low:
                 t[k.BELOW] += w
                 t[k.SUNK] += w * (low - z)
@@ -133,7 +133,7 @@ class Oracle:
                     t[k.INSIDE] += w
                     t[k.DEEP] += w * min(reach - gap, z - bottom, top - z)
         for i, ((x, y, z), g) in enumerate(zip(pts, self.ground, strict=True)):
-            t[k.UNDER] += 0 < i < len(pts) - 1 and z < self.floor(x, y) + KEEP_M
+            t[k.UNDER] += 0 < i < len(pts) - 1 and z < self.floor(x, y) + SAMPLED_KEEP_M
             t[k.HIGH] += max(0.0, z - g - limits.min_agl_m) / len(pts)
             t[k.BURIED] += max(0.0, g - z)
             apart = z - g

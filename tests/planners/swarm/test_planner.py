@@ -80,9 +80,9 @@ def test_a_cost_that_sees_nothing_cannot_pass_a_path_through_a_zone(monkeypatch:
 
     def blind(name: str) -> object:
         from gcsplan.planners.swarm import cost_kernels as k
-        from gcsplan.planners.swarm.objectives import Objective
+        from gcsplan.planners.swarm.objectives import PaperCost
 
-        return Objective(0, lambda terms, unit: terms[:, k.LENGTH])
+        return PaperCost(0, lambda terms, unit: terms[:, k.LENGTH])
 
     monkeypatch.setattr(swarm_planner, "get_objective", blind)
     found = search(problem, "de", Settings.of(get("de"), problem.options))

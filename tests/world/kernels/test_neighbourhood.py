@@ -166,7 +166,7 @@ def test_neighbourhoods_forget_those_asked_for_least_lately_and_judge_alike(monk
     field = Field.of(grid)
     monkeypatch.setattr(_neighbourhood, "LARGE_WINDOW", 1000)
     tile = _neighbourhood.TILE**2 * _neighbourhood.CELL_BYTES
-    monkeypatch.setattr(_neighbourhood, "MOST_BYTES", 30 * tile)
+    monkeypatch.setattr(_neighbourhood, "MOST_EXAMINED_BYTES", 30 * tile)
     kept = Neighbourhoods(grid, field)
     reaches = [5.0 * k for k in (1, 2, 3, 4, 5, 6)]
     whole = {reach_m: extrema_around(field, z, reach_m) for reach_m in reaches}

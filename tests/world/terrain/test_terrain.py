@@ -35,10 +35,10 @@ from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.terrain import mosaic, peaks, raster
 from gcsplan.world.terrain.geoid import GeoidGrid
 from gcsplan.world.terrain.model_words import notes_on
+from gcsplan.world.terrain.mosaic import tiles_of
 from gcsplan.world.terrain.peaks import Peak
 from gcsplan.world.terrain.raster import open_raster
 from gcsplan.world.terrain.terrain import TerrainSpec, load_terrain, open_terrain
-from gcsplan.world.terrain.tiles import tiles_of
 from tests.support.attacks import draw_attacks, require_told
 from tests.support.effort import draws
 
@@ -1109,7 +1109,7 @@ def test_many_tiles_are_read_by_windows(tmp_path: Path) -> None:
 
     assert len(tiles_of([str(tmp_path)], where="m")) == 36
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("gcsplan.world.terrain.tiles.HASHED_BYTES", 0)
+        patch.setattr("gcsplan.world.terrain.mosaic.HASHED_BYTES", 0)
         patch.setattr("gcsplan.world.terrain.raster.sha256_of_all", lambda path: pytest.fail(f"{path} is read whole"))
         read = load().info["dem_sha256"]
         assert read == load().info["dem_sha256"] != first.info["dem_sha256"]

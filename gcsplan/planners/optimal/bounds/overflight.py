@@ -17,7 +17,7 @@ import shapely
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.navmesh.crossing import Climb, Crossing, crossing
-from gcsplan.planners.optimal.navmesh.outlines import Outline
+from gcsplan.planners.optimal.navmesh.outlines import ZoneOutline
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.plane.corridor import joined
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
@@ -27,9 +27,9 @@ from gcsplan.planners.profile.track import distances
 
 MOST_CASES = 48
 """Most cases that are looked at."""
-ROUNDS = 6
+CROSSING_ROUNDS = 6
 """Most times that one crossing is computed again, with arcs drawn more finely or more zones beside it."""
-DEARER = 10.0
+SHORT_TRACK_COST_M = 10.0
 """What each metre of track that is too short for its climb costs a path, m: then it is made longer without laps."""
 LOWER_M = 0.01
 """A way is too low over a zone if it is more than this below its top, m."""
@@ -72,7 +72,7 @@ class _Stretch:
         beyond_m = sum(self.lengths_m[: leg - self.first]), sum(self.lengths_m[leg - self.first + 1 :])
         slopes = limits.max_climb_slope, limits.max_descent_slope
         up, down = (
-            Climb(rise, rise * math.hypot(1.0, 1.0 / slope) if rise > 0.0 else 0.0, more, DEARER * outer)
+            Climb(rise, rise * math.hypot(1.0, 1.0 / slope) if rise > 0.0 else 0.0, more, SHORT_TRACK_COST_M * outer)
             for rise, slope, more in zip(rises_m, slopes, beyond_m, strict=True)
         )
         return up, down
@@ -210,7 +210,7 @@ class Overflight:
                 best = others_m + found.length_m, [*around[: stretch.first], *over, *around[stretch.last :]]
         return best
 
-    def _outline(self, k: int) -> Outline:
+    def _outline(self, k: int) -> ZoneOutline:
         return self.outlines.outline(k, outer=self.outer)
 
     def _climbs(self, stretch: _Stretch, leg: int, top_m: float) -> tuple[Climb, Climb]:
@@ -223,7 +223,7 @@ class Overflight:
         a, b, _ = outlines.legs[leg]
         beside: set[int] = set()
         found = None
-        for _ in range(ROUNDS):
+        for _ in range(CROSSING_ROUNDS):
             known = [self._outline(j) for j in (k, *sorted(beside))]
             shapes = tuple(o.shape for o in known)
             if shapely.intersects_xy(shapes, *np.transpose([a, b])[:, :, None]).any():

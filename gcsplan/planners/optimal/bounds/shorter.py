@@ -3,17 +3,39 @@
 Few tracks are that short, they can climb only little near their ends, and they must climb over the ground on their way.
 If no path is cheaper, the value is the new bound. Otherwise the value replaces the upper end of the interval that is
 left, and the bound of the cheaper paths its lower end.
+
+A path is longer than its ground track by the altitudes that no short track avoids. After s metres, every track shorter
+than some length is in one of the cells that are no farther than s from its start and no farther than the remaining
+length from its goal. The lowest floor of those cells is a floor for the altitude after s metres, whatever the track. A
+taut string over these floors is no longer than any path.
+
+For energy there is a bound from pairs of altitude caps, too, for paths whose highest point lies between the two. Such a
+path flies a track that is legal below the upper cap, and climbs at least to the lower cap. So the shortest track below
+the upper cap plus the climb to the lower one is a bound for all such paths. Intervals between caps are halved until
+none of them can hold a better path than the best one found.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
-from gcsplan.planners.optimal.bounds.climb_bound import climb_bound, rise_bound
-from gcsplan.planners.optimal.plane.cap_search import Layer, search_caps
+import numpy as np
+
+from gcsplan.arrays import Floats
+from gcsplan.planners.optimal.navmesh.interval_kernels import range_along
 from gcsplan.planners.optimal.plane.leg import Leg
 from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
+from gcsplan.planners.profile.taut_string import Blocked, Profile, taut_string
+
+MOST_CAPS = 40
+NARROW_M = 0.25
+"""Metres; an interval between two caps that is narrower is not halved."""
+
+
+FLOOR_STEPS = 400
+"""Steps along a leg between the places at which the floor is read."""
 
 CLOSER, LEFT, FLAT = 8, 0.05, 0.2
 """Most cuts of the interval between bound and best path; the part of the gap below which neither an interval is cut nor
@@ -22,8 +44,107 @@ FALLS = -0.25
 """Change of the bound of cheaper paths with their greatest cost, assumed until two such bounds are known."""
 CLIMBED = (0.98, 0.9, 0.75, 0.5)
 """Parts of the extra length that climbing costs the longest tracks, tried in turn as that of shorter tracks."""
-PIECES = 4
+LENGTH_PIECES = 4
 """Pieces into which the range of track lengths is cut; each piece has its own bound of the climb."""
+
+
+@dataclass(slots=True)
+class Layer:
+    """Paths whose highest point lies between ``low_m`` and ``high_m``. Their tracks are at least ``track_m`` long, a
+    bound that was computed with ``care`` (0 or 1)."""
+
+    low_m: float
+    high_m: float
+    track_m: float
+    care: int = 0
+
+    def cost(self, rise: Callable[[float], float], vertical: float, horizontal: float) -> float:
+        """A lower bound of the energy of such paths. ``rise(amsl_m)``: least metres climbed and descended in all by a
+        path that reaches an altitude; ``vertical``, ``horizontal``: joules per metre."""
+        return vertical * rise(self.low_m) + horizontal * self.track_m
+
+
+def search_caps(
+    layers: list[Layer],
+    cost_of: Callable[[Layer], float],
+    track_m: Callable[[float, int], float],
+    best: Callable[[], float],
+    try_at: Callable[[float], None],
+    gap: float,
+    in_time: Callable[[], bool],
+) -> float:
+    """Split the cheapest layer until its cost is within ``gap`` (a part) of the best path's. Returns the lower bound.
+
+    ``track_m(cap, care)``: a lower bound of tracks below a cap; care 1 costs more and bounds better than care 0.
+    ``try_at(cap)`` looks for a path below a cap; ``best()``: cost of the best path; ``in_time()``: whether to go on.
+    """
+    for _ in range(MOST_CAPS):
+        layers.sort(key=cost_of)
+        layer = layers[0]
+        bound = min(cost_of(layer), best())
+        if bound >= best() * (1.0 - gap) or not in_time():
+            return bound
+        if layer.care == 0:
+            layer.track_m = max(layer.track_m, track_m(layer.high_m, 1))
+            layer.care = 1
+            continue
+        if layer.high_m - layer.low_m < NARROW_M:
+            return bound
+        middle = 0.5 * (layer.low_m + layer.high_m)
+        try_at(middle)
+        lower = Layer(layer.low_m, middle, max(track_m(middle, 0), layer.track_m))
+        layer.low_m = middle
+        layers.append(lower)
+    return min(min(map(cost_of, layers)), best())
+
+
+def altitude_ranges(leg: Leg, track_m: float, limit_m: float) -> tuple[Floats, Floats, Floats]:
+    """Metres along a leg (M,), and floor and ceiling there (M,), for all tracks of ``track_m`` to ``limit_m`` metres.
+
+    A longer track is mapped to ``track_m`` by moving its points towards its start by at most what it is longer. So the
+    floor at a place is the lowest, and the ceiling the highest, within that distance; inf and -inf where no cell is.
+    """
+    at = np.linspace(0.0, track_m, FLOOR_STEPS + 1)[1:-1]
+    low, high = (np.full((FLOOR_STEPS.bit_length(), len(at)), fill) for fill in (np.inf, -np.inf))
+    range_along(*leg.cells(limit_m), limit_m, max(limit_m - track_m, 0.0), track_m / FLOOR_STEPS, low, high)
+    return at, low[0], high[0]
+
+
+def rise_bound(legs: list[Leg], tracks_m: list[float], limits_m: list[float]) -> float:
+    """A lower bound of the length in space of paths over tracks of ``tracks_m`` to ``limits_m`` metres, leg by leg.
+
+    It ignores climb limits, which only make paths longer.
+    """
+    found = _string(legs, tracks_m, limits_m)
+    return found.length_m if isinstance(found, Profile) else sum(tracks_m)
+
+
+def climb_bound(legs: list[Leg], tracks_m: list[float], limits_m: list[float]) -> float:
+    """A lower bound of the metres climbed and descended in all by paths over such tracks."""
+    found = _string(legs, tracks_m, limits_m)
+    return found.vertical_m if isinstance(found, Profile) else 0.0
+
+
+def _string(legs: list[Leg], tracks_m: list[float], limits_m: list[float]) -> Profile | Blocked:
+    """The taut string between the floors and ceilings of such tracks (`altitude_ranges`)."""
+    places, lows, highs = [np.zeros(1)], [np.full(1, -np.inf)], [np.full(1, np.inf)]
+    begin = 0.0
+    for k, (leg, track_m, limit_m) in enumerate(zip(legs, tracks_m, limits_m, strict=True)):
+        at, low, high = altitude_ranges(leg, track_m, limit_m)
+        end = leg.goal.amsl_m if k < len(legs) - 1 else None
+        places += [begin + at, np.array([begin + track_m])]
+        lows += [np.where(np.isfinite(low), low, -np.inf), np.array([-np.inf if end is None else end])]
+        highs += [np.where(np.isfinite(high), high, np.inf), np.array([np.inf if end is None else end])]
+        begin += track_m
+    s = np.concatenate(places)
+    keep = np.concatenate([[True], np.diff(s) > 1e-9])
+    low, high = np.concatenate(lows)[keep], np.concatenate(highs)[keep]
+    z0, z1 = legs[0].start.amsl_m, legs[-1].goal.amsl_m
+    assert z0 is not None
+    assert z1 is not None
+    low[0] = low[-1] = -math.inf
+    high[0] = high[-1] = math.inf
+    return taut_string(s[keep], np.minimum(low, high), high, z0, z1)
 
 
 def halve(plane: PlaneSearch, *, far: bool = False) -> None:
@@ -153,14 +274,14 @@ def _least_of_pieces(plane: PlaneSearch, tracks_m: list[float], spare_m: float) 
 
 
 def _pieces(tracks_m: list[float], spare_m: float) -> Iterator[tuple[list[float], list[float]]]:
-    """Least and greatest track lengths, leg by leg, of `PIECES` pieces of the range from ``tracks_m`` to ``spare_m``
-    more. The less lengths differ, the better it is known where a track is after so many metres. Several legs make a
-    single piece, because it is not known how they share ``spare_m``."""
+    """Least and greatest track lengths, leg by leg, of `LENGTH_PIECES` pieces of the range from ``tracks_m`` to
+    ``spare_m`` more. The less lengths differ, the better it is known where a track is after so many metres. Several
+    legs make a single piece, because it is not known how they share ``spare_m``."""
     if len(tracks_m) > 1:
         yield tracks_m, [track + spare_m for track in tracks_m]
         return
-    for k in range(PIECES):
-        yield [tracks_m[0] + spare_m * k / PIECES], [tracks_m[0] + spare_m * (k + 1) / PIECES]
+    for k in range(LENGTH_PIECES):
+        yield [tracks_m[0] + spare_m * k / LENGTH_PIECES], [tracks_m[0] + spare_m * (k + 1) / LENGTH_PIECES]
 
 
 def bound_by_caps(plane: PlaneSearch) -> None:

@@ -13,14 +13,13 @@ from itertools import combinations, product
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices, Int8s, Int32s, Int64s
-from gcsplan.planners.optimal.navmesh.buffers import Scratch
 from gcsplan.planners.optimal.navmesh.clearance_kernels import fill
 from gcsplan.planners.optimal.navmesh.climb_cones import hold_down, lift_lids, look_around, walk_around
-from gcsplan.planners.optimal.navmesh.grid import Plane, box_of
+from gcsplan.planners.optimal.navmesh.grid import Plane, Scratch, box_of
+from gcsplan.planners.optimal.navmesh.interval_kernels import stamp_beside
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.mesh_kernels import NEXT, WALL, make_pieces, make_portals, sort_portals
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
-from gcsplan.planners.optimal.navmesh.shut_kernels import stamp_beside
 from gcsplan.planners.optimal.navmesh.zone_kernels import LOOKS, PAIR, PLACES, stamp_zones
 from gcsplan.planners.profile.track import divided
 
@@ -29,7 +28,7 @@ Cone = tuple[float, float, float, float]
 
 AROUND = 8
 """Nodes on each side of the wanted cells that are looked at too, at most: more than `climb_cones.BESIDE`."""
-RIM = 12.0
+RIM_CELLS = 12.0
 """Depth, in cells, to which a zone is looked at that may be too high to climb over so near an end."""
 ALIKE = 12.0
 """A bound's floors make use of the track error only if a cell's diagonal is less than this many times the error."""
@@ -42,7 +41,7 @@ NODE_BYTES = 150.0
 """Bytes of a node that is looked at, with the cells and pieces beside it."""
 MOST_MEET = 8
 """Most pieces of a lattice that meet at one node: two triangles of each of the four cells around it."""
-MANY = 8
+MANY_NAMES = 8
 """If a mesh has more possible names per portal than this, names are renumbered without gaps: searches allocate arrays
 with an entry for every name."""
 
@@ -223,7 +222,7 @@ class ClearanceGrid:
             self._lift, self._either = self._array("lift", self.shape), np.zeros(self.shape, np.int8)
             lift_lids(
                 self._around, self._floor, self._ground, self._x, self._y, self._zones, self._edges, self._boxes,
-                self.cap_m, RIM * cell_m / (self.plane.parts * self.fineness), self._lift, self._either,
+                self.cap_m, RIM_CELLS * cell_m / (self.plane.parts * self.fineness), self._lift, self._either,
             )  # fmt: skip
         if not self._laid:
             self._lay()
@@ -294,7 +293,7 @@ class ClearanceGrid:
         start, order = np.zeros(count + 1, np.int32), np.empty(2 * n, np.int32)
         sort_portals(joins[:n], start, order)
         names, named = names[:n], 8 * (rows * cols + 1)
-        if named > MANY * n:
+        if named > MANY_NAMES * n:
             corner = names >= 0
             used, names[corner] = np.unique(names[corner], return_inverse=True)
             named = len(used)
@@ -331,7 +330,7 @@ class ClearanceGrid:
         self._laid = True
 
     def _no_own_ground(self) -> tuple[Int32s, Int64s, Int64s]:
-        """Where `stamp_beside` keeps the zones' own ground, all of it unknown yet: see `shut_kernels._own_ground`."""
+        """Where `stamp_beside` keeps the zones' own ground, all unknown yet: see `interval_kernels._own_ground`."""
         looks = (self._zones[:, LOOKS] > 0.0) & (self._zones[:, PAIR] == 0.0)
         wide, high = ((self._boxes[:, k + 1] - self._boxes[:, k] + 1).clip(0).astype(np.int64) for k in (0, 2))
         end = np.cumsum(np.where(looks, wide * high, 0))

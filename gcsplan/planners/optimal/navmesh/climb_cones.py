@@ -15,10 +15,10 @@ from gcsplan.arrays import Floats, Int8s, Int32s
 from gcsplan.planners.compiled import device, kernel
 from gcsplan.planners.optimal.navmesh.clearance_kernels import blank
 from gcsplan.planners.optimal.navmesh.mesh_kernels import stands
-from gcsplan.planners.optimal.navmesh.polyanya_nodes import pop, push
+from gcsplan.planners.optimal.navmesh.polyanya import pop, push
 from gcsplan.planners.optimal.navmesh.zone_kernels import BOTTOM, PAIR, THIN, TOP, UNDER, depth, level
 
-BESIDE = 5
+NODES_BESIDE = 5
 """Nodes on each side of those that a cone could shut for which the distance must be known, too."""
 FROM_END = -1
 """Value of ``root`` where the straight line to a node begins at the end of the leg, not at a node."""
@@ -222,8 +222,8 @@ def _mark(
     around: Int32s, excess: Floats, floor: Floats, lift: Floats, x: Floats, y: Floats, cone: Floats, left: int,
     right: int, low: int, high: int, seen: Int8s,
 ) -> bool:  # fmt: skip
-    """Set ``seen`` to -1 at nodes above a cone, and to -1 or -2 at `BESIDE` nodes around; return whether any are."""
-    wide, found = BESIDE, False
+    """Set ``seen`` to -1 at nodes above a cone, to -1 or -2 at `NODES_BESIDE` nodes around; return whether any are."""
+    wide, found = NODES_BESIDE, False
     for j in range(low, high + 1):
         last = -wide - 1
         for i in range(max(left, around[j, 0]), min(right + 1, around[j, 1])):

@@ -19,14 +19,14 @@ from scipy.sparse.csgraph import dijkstra
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.planners.budget import Budget
-from gcsplan.planners.optimal.navmesh.portals import Exhausted, Place
+from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundPlace
 
 SHRUNK_M = 0.02
 """Metres by which outlines are made smaller where they block a view: lines along their edges must not count as blocked,
 and a smaller outline keeps the bound a bound."""
 TOUCHING_M = 1e-6
 """Metres within which two shapes count as touching; much less than `SHRUNK_M`."""
-MOST_CORNERS = 256
+MOST_WAY_CORNERS = 256
 """Most corners of all outlines around which the ways lead: the work grows with their square."""
 PART, OFF_PARTS = 1e-5, (5e-5, 2e-4)
 """Parts of the length by which the bound may be too low, and by which arcs may be drawn too small: a way that turns
@@ -76,7 +76,7 @@ class Crossing:
 
 
 def crossing(
-    a: Place, b: Place, zone: shapely.Geometry, others: Sequence[shapely.Geometry], up: Climb, down: Climb,
+    a: GroundPlace, b: GroundPlace, zone: shapely.Geometry, others: Sequence[shapely.Geometry], up: Climb, down: Climb,
     limit_m: float, budget: Budget,
 ) -> Crossing:  # fmt: skip
     """The least length, at most ``limit_m``, from ``a`` to ``b`` past the polygons ``others`` and over ``zone``, with
@@ -205,9 +205,9 @@ def _halved(before: _Pieces, after: _Pieces, i: Indices, j: Indices) -> tuple[In
 class _Views:
     """The corners of some polygons, the shortest ways to them from two places, and what each of them sees."""
 
-    def __init__(self, a: Place, b: Place, shapes: Sequence[shapely.Geometry], budget: Budget) -> None:
+    def __init__(self, a: GroundPlace, b: GroundPlace, shapes: Sequence[shapely.Geometry], budget: Budget) -> None:
         corners = np.unique(np.concatenate([shapely.get_coordinates(s) for s in shapes]), axis=0)
-        if len(corners) > MOST_CORNERS:
+        if len(corners) > MOST_WAY_CORNERS:
             raise Exhausted(0.0)
         small = [s.buffer(-SHRUNK_M, join_style="mitre", mitre_limit=10.0) for s in shapes]
         self.solid = shapely.union_all(small)

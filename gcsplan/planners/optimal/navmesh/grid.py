@@ -4,6 +4,7 @@ The lattice is the terrain model's own, each cell cut into parts where a finer o
 in those cells and in no others. A bilinear patch can be cut into two triangles along either diagonal: one gives a
 surface that never lies above the patch, the other one that never lies below it. So there are two kinds of mesh: one
 holds every legal track (``low``: for bounds), and in the other every track is legal but for rounding (for paths).
+The values of the nodes come from the terrain model: heights for bounds and for paths, slopes, and places.
 
 In the plane the raster's lines are not quite straight. Here they are straight between the corners of blocks, so short
 that nothing moves by more than a few centimetres, or millimetres; the margins of a `Fit` make up for that.
@@ -12,21 +13,116 @@ that nothing moves by more than a few centimetres, or millimetres; the margins o
 from __future__ import annotations
 
 import math
+import mmap
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from gcsplan.arrays import Bools, Floats, Int32s
-from gcsplan.planners.optimal.navmesh.buffers import Scratch
-from gcsplan.planners.optimal.navmesh.terrain_nodes import Extent, nodes, places, slopes
+from gcsplan.planners.optimal.navmesh.clearance_kernels import lay, pool
 from gcsplan.planners.optimal.navmesh.zone_kernels import PAIR, TOP, TOP_2, UNDER, UNDER_2
 from gcsplan.planners.optimal.navmesh.zone_shapes import LOOSE, TOUCH_M, Fit, Shapes, make_shapes
 from gcsplan.planners.problem import Problem
+from gcsplan.world.geometry.surface import GridMap
+from gcsplan.world.geometry.zones import Box
 
-Box = tuple[float, float, float, float]
-"""West, south, east, north, m; infinite: everywhere."""
-Reach = tuple[tuple[float, float], tuple[float, float], float]
+NodeExtent = tuple[int, int, int, int]
+"""First and last columns and rows (col0, row0, col1, row1) of a terrain model's nodes."""
+
+HUGE_PAGE_BYTES = 1 << 22
+"""Size of an array, in bytes, from which numpy requests huge pages."""
+
+DetourEllipse = tuple[tuple[float, float], tuple[float, float], float]
 """Two places, and the largest sum of the distances to both, m: an ellipse."""
+
+
+def slopes(z: Floats, x: Floats, y: Floats) -> Floats:
+    """(rows, cols) the steepest slope (m per m) of the cells around each node."""
+    z = np.where(np.isfinite(z), z, np.nan)
+    across = math.dist((x[0, 0], y[0, 0]), (x[0, 1], y[0, 1]))
+    along = math.dist((x[0, 0], y[0, 0]), (x[1, 0], y[1, 0]))
+    east, north = np.abs(np.diff(z, axis=1)) / across, np.abs(np.diff(z, axis=0)) / along
+    a, b = np.zeros_like(z), np.zeros_like(z)
+    a[:, 1:] = east
+    np.maximum(a[:, :-1], east, out=a[:, :-1])
+    b[1:] = north
+    np.maximum(b[:-1], north, out=b[:-1])
+    return np.hypot(a, b)
+
+
+def nodes(z: Floats, over: NodeExtent, parts: int, stride: int, whole: int) -> tuple[Floats, Floats]:
+    """Heights at a lattice's nodes for bounds and for paths, rows going north, from the terrain model's heights ``z``;
+    the lattice covers the extent ``over``. ``parts``, ``stride``, ``whole``: see `make_plane`."""
+    col0, row0, col1, row1 = over
+    if stride == 1 and whole == 1:
+        finer = _finer(z[row0 : row1 + 1, col0 : col1 + 1][::-1], parts)
+        return finer, finer
+    cells = [-(-n // whole) * whole // stride for n in (row1 - row0, col1 - col0)]
+    low, high = (np.empty((cells[0] + 1, cells[1] + 1)) for _ in range(2))
+    pool(np.ascontiguousarray(z), np.array(over), stride, low, high)
+    # Beyond the border, paths may not go; for bounds, its heights go on.
+    high[(row1 - row0) // stride + 1 :] = np.inf
+    high[:, (col1 - col0) // stride + 1 :] = np.inf
+    return low, high
+
+
+def _finer(z: Floats, parts: int) -> Floats:
+    """Interpolate heights bilinearly at nodes ``parts`` times as close."""
+    if parts == 1:
+        return np.ascontiguousarray(z)
+    u = np.arange(parts) / parts
+    for _ in range(2):  # along the rows; then, transposed, along the columns
+        wide = np.empty((z.shape[0], (z.shape[1] - 1) * parts + 1))
+        wide[:, :-1] = (z[:, :-1, None] * (1.0 - u) + z[:, 1:, None] * u).reshape(len(z), -1)
+        wide[:, ::parts] = z  # a weight of 0 must not carry an unknown neighbour's NaN over
+        z = wide.T
+    return np.ascontiguousarray(z)
+
+
+def places(
+    grid: GridMap, col0: int, row1: int, shape: tuple[int, int], parts: float, span: int,
+    reach: tuple[tuple[float, float], tuple[float, float], float] | None = None,
+) -> tuple[Floats, Floats, Bools]:  # fmt: skip
+    """(rows, cols) x and y of a lattice's nodes, bilinear between the corners of blocks of ``span`` cells, and
+    (rows - 1, cols - 1) which cells lie within ``reach``: two places, and the largest sum of distances to both, m."""
+    rows, cols = shape
+    step = min(span, max(rows, cols))
+    c = np.arange(0, cols + step, step)
+    r = np.arange(0, rows + step, step)
+    corner = grid.to_plane(col0 + c[None, :] / parts, row1 - r[:, None] / parts)
+    x, y, inside = np.empty(shape), np.empty(shape), np.ones((rows - 1, cols - 1), np.bool_)
+    a, b, most = reach if reach is not None else ((0.0, 0.0), (0.0, 0.0), math.inf)
+    corner_x, corner_y = (np.ascontiguousarray(corner[..., k]) for k in range(2))
+    lay(corner_x, corner_y, step, *a, *b, most, x, y, inside)
+    return x, y, inside
+
+
+class Scratch:
+    """Named arrays that are kept and handed out again, with what their last user left in them.
+
+    New memory is cleared by the operating system when it is first touched, which takes longer than the work done in it.
+    Of a large array only a corridor is touched, a few numbers of each row; with huge pages, all of it would be cleared.
+    """
+
+    def __init__(self) -> None:
+        self._held: dict[str, NDArray[Any]] = {}
+
+    def array(self, name: str, shape: tuple[int, ...], dtype: DTypeLike = np.float64) -> NDArray[Any]:
+        """An array of that shape with arbitrary content, free to use until the same name is requested again."""
+        size = math.prod(shape)
+        held = self._held.get(name)
+        if held is None or held.size < size:
+            self._held.pop(name, None)
+            held = self._held[name] = _small_pages(size, np.dtype(dtype))
+        return held[:size].reshape(shape)
+
+
+def _small_pages(size: int, dtype: np.dtype[Any]) -> NDArray[Any]:
+    if size * dtype.itemsize < HUGE_PAGE_BYTES:
+        return np.empty(size, dtype)
+    return np.frombuffer(mmap.mmap(-1, size * dtype.itemsize), dtype)
 
 
 @dataclass(eq=False, slots=True)
@@ -117,7 +213,7 @@ def make_plane(
     parts: int = 1,
     stride: int = 1,
     whole: int = 1,
-    reach: Reach | None = None,
+    reach: DetourEllipse | None = None,
     fit: Fit = LOOSE,
 ) -> Plane:
     """Make the lattice over ``box`` (west, south, east, north) as far as the terrain model goes.
@@ -129,7 +225,7 @@ def make_plane(
     return lattice(problem, extent(problem, box), parts, stride, whole, reach, fit)
 
 
-def extent(problem: Problem, box: Box) -> Extent:
+def extent(problem: Problem, box: Box) -> NodeExtent:
     """First and last columns and rows of the terrain model's nodes that cover a box."""
     surface = problem.airspace.surface
     rows, cols = surface.ground_m.shape
@@ -176,7 +272,7 @@ def on_finer(plane: Plane, cells: Bools, finer: Plane) -> Bools:
 
 
 def lattice(
-    problem: Problem, over: Extent, parts: int, stride: int, whole: int, reach: Reach | None, fit: Fit
+    problem: Problem, over: NodeExtent, parts: int, stride: int, whole: int, reach: DetourEllipse | None, fit: Fit
 ) -> Plane:
     """Make the lattice over an `extent`; the other arguments are those of `make_plane`."""
     surface = problem.airspace.surface

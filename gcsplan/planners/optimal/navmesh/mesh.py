@@ -11,19 +11,19 @@ from gcsplan.arrays import Bools, Floats, Int8s, Int32s, Int64s
 from gcsplan.planners.budget import RATES
 from gcsplan.planners.optimal.navmesh.grid import Plane
 from gcsplan.planners.optimal.navmesh.mesh_kernels import in_reach, least_of_cells, least_of_portals, within
-from gcsplan.planners.optimal.navmesh.portals import GroundTrack, Place, Portals
+from gcsplan.planners.optimal.navmesh.portals import GroundPlace, GroundTrack, Portals
 from gcsplan.planners.optimal.navmesh.zone_shapes import LOOSE
 
 BENT_M = LOOSE.bent_m
 """Metres that a raster's line may bow between the corners of a block, at most."""
-ASIDE = 0.25
+PLACE_OFF_CELLS = 0.25
 """Cells that a place may lie beside its computed position on a lattice, at most."""
-BESIDE = 1e-3
+PIECE_OFF_CELLS = 1e-3
 """Cells that a place may lie beside a piece that tracks from it begin in, at most, east and north."""
 MOST_OPENED, ANYHOW, OF_PORTAL = 3_000_000, 100_000, 64
 """Intervals that a search may open before it is given up: at most `MOST_OPENED`, and at most `ANYHOW` plus `OF_PORTAL`
 per portal. If the goal is farther than the limit, and many tracks lead around many corners, it would open many more."""
-NODE_BYTES = 200.0
+INTERVAL_BYTES = 200.0
 """Bytes of an opened interval, with those that it yields and that are never opened."""
 
 
@@ -48,7 +48,7 @@ class Mesh(Portals):
         at = self._corners(cells)
         return np.asarray(np.where(np.isposinf(self.excess[at]), -np.inf, self.floor[at]).min(axis=0))
 
-    def straight_to(self, place: Place, cells: Int64s) -> Floats:
+    def straight_to(self, place: GroundPlace, cells: Int64s) -> Floats:
         """(K,) a lower bound of the distance from a place to each cell, m; for meshes as fine as their plane."""
         x, y = self._corner_places(cells)
         middle = np.hypot(x.mean(axis=0) - place[0], y.mean(axis=0) - place[1])
@@ -83,24 +83,25 @@ class Mesh(Portals):
         out[self.row : self.row + cells.shape[0], self.col : self.col + cells.shape[1]] = cells
         return out
 
-    def cells_at(self, place: Place) -> Int64s:
+    def cells_at(self, place: GroundPlace) -> Int64s:
         """The numbers of the cells that a place may lie in, rising; for meshes as fine as their plane."""
         rows, cols = self.excess.shape
         c, r = self.plane.at(place)
         i, j = (
-            {math.floor(at - first + off) for off in (-ASIDE, ASIDE)} for at, first in ((c, self.col), (r, self.row))
+            {math.floor(at - first + off) for off in (-PLACE_OFF_CELLS, PLACE_OFF_CELLS)}
+            for at, first in ((c, self.col), (r, self.row))
         )
         found = {q * (cols - 1) + p for q in j for p in i if 0 <= q < rows - 1 and 0 <= p < cols - 1}
         return np.array(sorted(found), np.int64)
 
-    def pieces_at(self, place: Place) -> list[int]:
-        """The free pieces at a place: in its own cell, and in cells no farther than `BESIDE`."""
+    def pieces_at(self, place: GroundPlace) -> list[int]:
+        """The free pieces at a place: in its own cell, and in cells no farther than `PIECE_OFF_CELLS`."""
         found: list[int] = []
         rows, cols = self.excess.shape
         c, r = self.plane.at(place)
         c, r = self.fineness * (c - self.col), self.fineness * (r - self.row)
-        for dj in (0.0, -BESIDE, BESIDE):
-            for di in (0.0, -BESIDE, BESIDE):
+        for dj in (0.0, -PIECE_OFF_CELLS, PIECE_OFF_CELLS):
+            for di in (0.0, -PIECE_OFF_CELLS, PIECE_OFF_CELLS):
                 i, j = math.floor(c + di), math.floor(r + dj)
                 if not (0 <= i < cols - 1 and 0 <= j < rows - 1):
                     continue
@@ -112,14 +113,14 @@ class Mesh(Portals):
         return found
 
     def track(
-        self, start: Place, goal: Place, limit_m: float = math.inf, guide: Guide | None = None
+        self, start: GroundPlace, goal: GroundPlace, limit_m: float = math.inf, guide: Guide | None = None
     ) -> GroundTrack | None:
         """The shortest track, None if none is shorter than ``limit_m``. ``guide``: distances to ``goal`` over a mesh
         that is free wherever this one is. Raises Exhausted."""
         return self._search(start, goal, limit_m, -1.0, guide, None)
 
     def flood(
-        self, start: Place, goal: Place, limit_m: float, slack: float, guide: Guide | None = None
+        self, start: GroundPlace, goal: GroundPlace, limit_m: float, slack: float, guide: Guide | None = None
     ) -> tuple[GroundTrack | None, Guide]:
         """The shortest track as in `track`, and lower bounds of the distance from ``start`` to the pieces.
 
@@ -134,11 +135,17 @@ class Mesh(Portals):
         return track, Guide(self, start, met, entered)
 
     def _search(
-        self, start: Place, goal: Place, limit_m: float, slack: float, guide: Guide | None, met: Floats | None
+        self,
+        start: GroundPlace,
+        goal: GroundPlace,
+        limit_m: float,
+        slack: float,
+        guide: Guide | None,
+        met: Floats | None,
     ) -> GroundTrack | None:
         budget = self.plane.problem.budget
         most = min(MOST_OPENED, ANYHOW + OF_PORTAL * len(self.joins))
-        most = int(min(most, budget.megabytes * 1e6 / NODE_BYTES, max(budget.left, 0.0) / RATES["opened"] + ANYHOW))
+        most = int(min(most, budget.megabytes * 1e6 / INTERVAL_BYTES, max(budget.left, 0.0) / RATES["opened"] + ANYHOW))
         budget.spend("portal", len(self.joins))
         opened = float(most)
         try:
@@ -157,7 +164,7 @@ class Guide:
     entrance of each piece (``entered`` (pieces,)), m; inf where the search did not come."""
 
     mesh: Mesh
-    place: Place
+    place: GroundPlace
     met: Floats
     entered: Floats
 
@@ -178,7 +185,7 @@ class Guide:
             out[len(out) - len(finer.parts_of) :] = whole[finer.parts_of].min(axis=1)
         return out
 
-    def reach(self, place: Place, limit_m: float) -> Bools:
+    def reach(self, place: GroundPlace, limit_m: float) -> Bools:
         """(rows - 1, cols - 1) the plane's cells that tracks shorter than ``limit_m`` from this guide's own place to
         another ``place`` may meet."""
         x, y = self.mesh.places()
@@ -216,7 +223,7 @@ class Guide:
         entered = self._entered(cells)
         most = np.fmax(*np.where(np.isfinite(entered), entered, np.nan))
         # The place itself may lie beside the pieces at it, see `Mesh.pieces_at`.
-        across = (1.0 + 2.0 * BESIDE) * (self.mesh.widths(cells) + 2.0 * BENT_M)
+        across = (1.0 + 2.0 * PIECE_OFF_CELLS) * (self.mesh.widths(cells) + 2.0 * BENT_M)
         return np.asarray(np.where(np.isnan(most), np.inf, most + across))
 
     def _entered(self, cells: Int64s) -> Floats:

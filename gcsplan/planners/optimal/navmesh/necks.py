@@ -5,25 +5,35 @@ Finer cells show the ridge, but are too many for a whole corridor. So only the c
 The free parts of a cell that hang together on the finer lattice become pieces of their own, with portals where the
 parts of neighbouring cells meet. Whatever can be flown passes through these pieces in turn, so the mesh is one for
 bounds as before. Pieces of one cell overlap in the plane, which does not matter to a track: it is led by portals.
+
+There, the terrain beside a track makes walls for bounds, too: on a pass, the ground at both sides is higher than that
+below. An aircraft may be as far from its track as the track error. So a place is shut if the terrain is too high
+anywhere within that distance; for all places of a small cell, the terrain in one direction is that of the cell moved
+there.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid
+from gcsplan.planners.optimal.navmesh.clearance_kernels import SPARE
 from gcsplan.planners.optimal.navmesh.grid import Plane, lattice
 from gcsplan.planners.optimal.navmesh.mesh import Guide, Mesh
 from gcsplan.planners.optimal.navmesh.mesh_kernels import sort_portals
-from gcsplan.planners.optimal.navmesh.portals import GroundTrack, Place
-from gcsplan.planners.optimal.navmesh.walls_beside import walls_beside
+from gcsplan.planners.optimal.navmesh.portals import GroundPlace, GroundTrack
 from gcsplan.planners.optimal.navmesh.zone_shapes import Fit
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.zone_levels import shut_places
+
+DIRECTIONS = 32
+"""Directions in which the terrain is read for a cell."""
+
 
 FINE_M, MOST_PARTS = 1.5, 24
 """Width of the finer cells, m, and most of them along a side of a cell."""
@@ -35,13 +45,73 @@ MOST_NODES = 1e6
 """Most nodes in the box of one neck's finer lattice; a neck that needs more is not looked at."""
 NEW = np.iinfo(np.int64).min
 """The name of the ends of a new portal until it gets one."""
-SAME_M = 1e-4
+SAME_END_M = 1e-4
 """Ends of portals that are no farther apart are at one place."""
 LOOKS, LOOK_M = 24, 1.0
 """Most times that necks are looked at for one track; and the least step, m, at which it is read where it is shut. The
 step is the track error if that is more: even the sharpest ridge shuts twice as much of a track."""
 FAN = 24
 """Most pieces of a mesh with necks that a track passes while it turns at one node."""
+
+
+def walls_beside(clearance: ClearanceGrid) -> Iterator[tuple[Indices, Floats]]:
+    """Cells (K,) of a fine lattice for bounds, and the excess (K, 4) of walls at their corners, from the terrain as far
+    away as the track error reaches, in several directions; see `ClearanceGrid.add_walls`."""
+    from scipy.ndimage import maximum_filter  # most missions have no necks
+
+    plane, limits = clearance.plane, clearance.plane.problem.bound_limits
+    reach_m = SPARE * limits.track_error_m - 2.0 * plane.fit.bent_m
+    if reach_m <= 0.0:
+        return
+    rows, cols = clearance.shape
+    part = np.s_[clearance.row : clearance.row + rows, clearance.col : clearance.col + cols]
+    more = limits.min_agl_m + limits.altitude_error_m - plane.fit.spare_m - clearance.cap_m
+    excess, places = plane.tops[0][part] + more, np.stack([plane.x[part], plane.y[part]])
+    step = np.stack([places[:, 0, 1] - places[:, 0, 0], places[:, 1, 0] - places[:, 0, 0]], axis=-1)
+    angle = np.linspace(0.0, 2.0 * np.pi, DIRECTIONS, endpoint=False)
+    off = SPARE * reach_m * np.linalg.solve(step, np.stack([np.cos(angle), np.sin(angle)]))  # columns, and rows
+    most = np.ceil(np.abs(off)).astype(np.intp).max(axis=1) + 1
+    least = np.minimum(np.minimum(excess[:-1, :-1], excess[:-1, 1:]), np.minimum(excess[1:, :-1], excess[1:, 1:]))
+    highest = maximum_filter(np.nan_to_num(excess, nan=-np.inf), size=(2 * most[1] + 1, 2 * most[0] + 1))[:-1, :-1]
+    j, i = np.nonzero((least <= 0.0) & (highest > 0.0))
+    for a, b in off.T.tolist():
+        inside = (j + math.floor(b) >= 0) & (j + math.floor(b) < rows - 2)
+        inside &= (i + math.floor(a) >= 0) & (i + math.floor(a) < cols - 2)
+        jj, ii = j[inside], i[inside]
+        walls = _moved(excess, jj, ii, b, a)
+        apart = np.stack([_at(z, jj, ii, b, a) - z[jj, ii] for z in places])  # alike at the other corners
+        stands = (walls.max(axis=1) > 0.0) & (np.hypot(*apart) <= reach_m)  # not where ground is unknown
+        yield (jj * (cols - 1) + ii)[stands], walls[stands]
+
+
+def _moved(z: Floats, j: Indices, i: Indices, b: float, a: float) -> Floats:
+    """(K, 4) values at the corners of cells (K,) of a lattice, such that they are nowhere above the surface ``z`` moved
+    by ``b`` rows and ``a`` columns, whichever diagonal the cells are cut along. ``z`` is bilinear in each cell."""
+    v, u = b - math.floor(b), a - math.floor(a)
+    rows, cols = ([math.floor(of) + more for more in (t, 1.0, 1.0 + t)] for of, t in ((b, v), (a, u)))
+    # The difference from what is bilinear in the cell is so in each of the four parts that the moved lattice's lines
+    # cut the cell into. So it is least at a corner of theirs.
+    seen = [[_at(z, j, i, row, col) for col in cols] for row in rows]
+    low, high = (seen[0][0], seen[0][2]), (seen[2][0], seen[2][2])
+    lower = np.zeros(len(j))
+    for row, t in zip(seen, (0.0, 1.0 - v, 1.0), strict=True):
+        for value, s in zip(row, (0.0, 1.0 - u, 1.0), strict=True):
+            west, east = ((1.0 - t) * of + t * on for of, on in zip(low, high, strict=True))
+            np.minimum(lower, value - (1.0 - s) * west - s * east, out=lower)
+    corners = np.stack([low[0], low[1], high[1], high[0]], axis=-1)
+    twist = 0.25 * np.abs(corners[:, 0] + corners[:, 2] - corners[:, 1] - corners[:, 3])
+    return np.asarray(corners + (lower - twist)[:, None])
+
+
+def _at(z: Floats, j: Indices, i: Indices, b: float, a: float) -> Floats:
+    """(K,) the bilinear values ``b`` rows and ``a`` columns from nodes (K,) of a lattice."""
+    row, col = math.floor(b), math.floor(a)
+    v, u = b - row, a - col
+    south, north = (
+        (1.0 - u) * z[j + row + k, i + col] + u * z[j + row + k, i + col + 1] if u > 0.0 else z[j + row + k, i + col]
+        for k in (0, 1 if v > 0.0 else 0)
+    )
+    return np.asarray((1.0 - v) * south + v * north)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -58,7 +128,7 @@ class Neck:
 class LegNecks:
     """The necks of all lattices of one leg from ``start`` to ``goal``, below ``top_m``."""
 
-    def __init__(self, problem: Problem, top_m: float, start: Place, goal: Place) -> None:
+    def __init__(self, problem: Problem, top_m: float, start: GroundPlace, goal: GroundPlace) -> None:
         self.problem, self.top_m, self.start, self.goal = problem, top_m, start, goal
         self._necks: dict[int, Necks] = {}
         """By the parts a side into which they cut the terrain model's cells."""
@@ -291,7 +361,7 @@ def _names(names: Indices, joins: Indices, ends: Floats, cut: Floats, first: int
     The ends at one place have the same name if pieces join them there: of the parts of a cell that meet at a node, a
     track at the node in one part is not in the other. If the way around a node is open, no track turns there.
     """
-    both = np.round(np.vstack([ends, cut]).reshape(-1, 2) / SAME_M).astype(np.int64)
+    both = np.round(np.vstack([ends, cut]).reshape(-1, 2) / SAME_END_M).astype(np.int64)
     place = np.unique(both, axis=0, return_inverse=True)[1].ravel()
     place, gone = place[: 2 * len(ends)], place[2 * len(ends) :]
     end = np.arange(len(place))

@@ -20,7 +20,7 @@ import shapely
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.navmesh.mesh_kernels import sort_portals
-from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundTrack, Place, Portals
+from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundPlace, GroundTrack, Portals
 from gcsplan.world.geometry.outlines import few_corners
 from gcsplan.world.geometry.zones import Circle, Zone
 
@@ -32,23 +32,23 @@ is a leg, `OFF_OUTER_M` or the share `OFF_OUTER` of the radius, whichever is mor
 NEAR = 1.03
 """Arcs are drawn finely where a track comes nearer than this times the distance to keep: there, coarse arcs may block
 what fine ones leave free, or leave a slit that fine ones shut; chords of `COARSE` are off by 2 % of the radius."""
-ROUNDS = 300
+MOST_SEARCHES_OF_TRACK = 300
 """Times that a track is searched for, each time with more zones or finer arcs, at most."""
-MOST_CORNERS = 12_000
+MOST_MESH_CORNERS = 12_000
 """Corners of all outlines of one mesh, at most: with more, the triangulation takes seconds."""
 MOST_GROWN = 1000
 """Corners of one polygon that is grown, at most: its edges are grown one by one, a thousand in half a second."""
-APART_M = 1e-5
+CORNERS_APART_M = 1e-5
 """Metres that corners of a mesh are apart at least: where outlines meet, rounding may make two of one, and a track that
 turns there would be missed. Outlines keep a hair that is much more."""
 BEYOND_M = 1.0
 """Metres that the mesh reaches beyond the outlines and the places."""
-MOST_OPENED = 1_000_000
+MOST_SEARCH_NODES = 1_000_000
 """Search nodes that Polyanya may open over one mesh."""
 
 
 @dataclass(eq=False, slots=True)
-class Outline:
+class ZoneOutline:
     """One zone grown by ``reach_m``: its polygon for paths (``outer``) or for bounds.
 
     ``sectors``: those of a circle that are drawn finely, each as wide as a coarse chord; ``fine``: whether the corners
@@ -188,7 +188,7 @@ class Triangles(Portals):
             start, np.ascontiguousarray(ends), names, joins, of_piece, named, int(np.bincount(first).max())
         )
 
-    def pieces_at(self, place: Place) -> list[int]:
+    def pieces_at(self, place: GroundPlace) -> list[int]:
         """The triangles in which, or on whose border, a place lies."""
         d = np.array(place) - self.corner
         e = np.roll(self.corner, -1, axis=1) - self.corner
@@ -196,19 +196,19 @@ class Triangles(Portals):
         return np.flatnonzero((left >= -1e-6).all(axis=1)).tolist()
 
 
-def shortest_past(a: Place, b: Place, shapes: Sequence[shapely.Polygon]) -> GroundTrack | None:
+def shortest_past(a: GroundPlace, b: GroundPlace, shapes: Sequence[shapely.Polygon]) -> GroundTrack | None:
     """The shortest track around some polygons; None if they separate the places. Raises Exhausted."""
     places = np.array([a, b])
     bounds = np.array([*(s.bounds for s in shapes), (*places.min(axis=0), *places.max(axis=0))])
     box = shapely.box(*(bounds[:, :2].min(axis=0) - BEYOND_M), *(bounds[:, 2:].max(axis=0) + BEYOND_M))
-    free = shapely.set_precision(box.difference(shapely.union_all(shapes)), APART_M) if shapes else box
-    if shapely.get_num_coordinates(free) > MOST_CORNERS:
+    free = shapely.set_precision(box.difference(shapely.union_all(shapes)), CORNERS_APART_M) if shapes else box
+    if shapely.get_num_coordinates(free) > MOST_MESH_CORNERS:
         raise Exhausted(0.0)
     parts = [p for p in shapely.get_parts(free) if shapely.dwithin(p, shapely.points(places), 1e-6).all()]
     if not parts:
         return None
     mesh = Triangles(parts[0])
-    return mesh.shortest(a, b, mesh.pieces_at(a), mesh.pieces_at(b), MOST_OPENED)[0]
+    return mesh.shortest(a, b, mesh.pieces_at(a), mesh.pieces_at(b), MOST_SEARCH_NODES)[0]
 
 
 class Solids:
@@ -229,7 +229,7 @@ class Solids:
         *,
         outer: bool,
     ) -> None:
-        self.outlines = [Outline(z, reach_m, scale, outer, hair) for z, hair in zip(zones, hair_m, strict=True)]
+        self.outlines = [ZoneOutline(z, reach_m, scale, outer, hair) for z, hair in zip(zones, hair_m, strict=True)]
         self._budget = budget
         self._tree = shapely.STRtree(shapely.box(*np.array([o.bounds for o in self.outlines]).reshape(-1, 4).T))
         self._known: set[int] = set()
@@ -242,9 +242,9 @@ class Solids:
             if which[k] and self.outlines[k].refine(track):
                 self._known.add(k)
 
-    def shortest(self, a: Place, b: Place, which: Bools) -> GroundTrack | None:
+    def shortest(self, a: GroundPlace, b: GroundPlace, which: Bools) -> GroundTrack | None:
         """The shortest track from ``a`` to ``b`` around the zones ``which`` (zones,); None if they separate the two."""
-        for _ in range(ROUNDS):
+        for _ in range(MOST_SEARCHES_OF_TRACK):
             known = [k for k in sorted(self._known) if which[k]]
             track = self._past(a, b, known)
             if track is None:
@@ -262,7 +262,7 @@ class Solids:
                 break
         raise Exhausted(0.0)
 
-    def _past(self, a: Place, b: Place, known: list[int]) -> GroundTrack | None:
+    def _past(self, a: GroundPlace, b: GroundPlace, known: list[int]) -> GroundTrack | None:
         if not known:
             return GroundTrack(np.array([a, b]), math.dist(a, b))
         shapes = [s for k in known if not (s := self.outlines[k].shape).is_empty]

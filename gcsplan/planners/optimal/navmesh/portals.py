@@ -11,7 +11,7 @@ import numpy as np
 from gcsplan.arrays import Floats, Int32s, Int64s
 from gcsplan.planners.optimal.navmesh.polyanya import search
 
-Place = tuple[float, float]
+GroundPlace = tuple[float, float]
 
 FIRST_NODES, NODES_OF_PIECE = 1 << 19, 8
 """Search nodes that memory is first allocated for: `FIRST_NODES`, or `NODES_OF_PIECE` for each piece if that is more.
@@ -55,8 +55,8 @@ class Portals:
 
     def shortest(
         self,
-        start: Place,
-        goal: Place,
+        start: GroundPlace,
+        goal: GroundPlace,
         start_pieces: Sequence[int],
         goal_pieces: Sequence[int],
         most: int,

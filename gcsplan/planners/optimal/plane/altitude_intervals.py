@@ -1,5 +1,7 @@
 """Which altitude intervals a short enough track can reach, and continue from to the goal, within the climb limits.
 
+Over each cell of a mesh, the ground below and the zones leave intervals of altitudes that can be flown at.
+
 After s metres of its track a path is at altitude z. If it climbs no steeper than c and descends no steeper than d, then
 z - c s never rises and z + d s never falls. Nor do s - r and s + t ever fall, where r and t are the lengths of the
 shortest tracks from the start and to the goal past what certainly stands in the way. In an interval, z lies within it
@@ -16,16 +18,64 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gcsplan.arrays import Bools, Floats, Int64s
-from gcsplan.planners.optimal.navmesh.interval_kernels import spread
+from gcsplan.arrays import Bools, Floats, Int32s, Int64s
+from gcsplan.planners.optimal.navmesh.interval_kernels import cut_intervals, spread
+from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.world.geometry.limits import Limits
 
-SPARE_M = 1e-3
+MOST_INTERVALS = 4
+"""Most intervals over one cell; zones that would make more are ignored."""
+
+
+INTERVAL_SPARE_M = 1e-3
 """Metres by which intervals and the altitudes of the ends are widened, for rounding and for intervals that touch."""
 KEPT = 4
 """Most track lengths for which all intervals are cached."""
 ROUNDS, WORTHWHILE = 4, 0.01
 """Most rounds of shutting intervals, and the part of the intervals that a round must shut for another to follow."""
+
+
+def ranges(mesh: Mesh, top_m: float, cells: Int64s) -> tuple[Floats, Floats]:
+    """(K,) the lowest and the highest altitude, at most ``top_m``, that can be flown at in each of ``cells`` (K,);
+    lowest above highest where there is none. ``mesh`` must be for bounds and as fine as its plane."""
+    plane, (rows, cols) = mesh.plane, mesh.excess.shape
+    low, high = mesh.lowest(cells), np.full(len(cells), top_m)
+    limits = plane.problem.bound_limits
+    if limits.max_agl_m is not None:
+        ground = plane.grounds[1][mesh.row : mesh.row + rows, mesh.col : mesh.col + cols]
+        pairs = np.maximum(ground[:-1], ground[1:])
+        most = np.maximum(pairs[:, :-1], pairs[:, 1:]).ravel()[cells]
+        high = np.fmin(high, most + (limits.max_agl_m - limits.altitude_error_m + plane.fit.spare_m))
+    count, lows, highs = intervals(mesh, cells, low, high, 0.0)
+    there = np.arange(MOST_INTERVALS) < count[:, None]
+    return np.where(there, lows, np.inf).min(axis=1), np.where(there, highs, -np.inf).max(axis=1)
+
+
+def intervals(
+    mesh: Mesh, cells: Int64s, low_m: Floats, high_m: Floats, spare_m: float
+) -> tuple[Int32s, Floats, Floats]:
+    """Cut the range of each of ``cells``, ``low_m`` to ``high_m`` from `ranges`, into the altitude intervals that zones
+    leave.
+
+    Returns the number of intervals (K,), at most `MOST_INTERVALS`, and their lower and upper ends (K,
+    `MOST_INTERVALS`), each ``spare_m`` further out. ``mesh``: as for `ranges`.
+    """
+    low, high = np.empty((len(cells), MOST_INTERVALS)), np.empty((len(cells), MOST_INTERVALS))
+    low[:, 0], high[:, 0] = low_m - spare_m, high_m + spare_m
+    count = (low_m <= high_m).astype(np.int32)
+    number = np.full(len(mesh.piece), -1, np.int32)
+    number[cells] = np.arange(len(cells))
+    cut_intervals(*_laid(mesh), spare_m, number, count, low, high)
+    return count, low, high
+
+
+def _laid(mesh: Mesh) -> tuple[Floats, Floats, Floats, Floats, Floats, Int32s, bool, float, float]:
+    """What the zone kernels take: ground, x and y of the mesh's nodes, numbers and forms of the shapes that are
+    certainly shut, their boxes on the mesh, whether the ground is the terrain model's own, and `Plane.reach_m`."""
+    plane, (rows, cols) = mesh.plane, mesh.excess.shape
+    ground = np.ascontiguousarray(plane.grounds[0][mesh.row : mesh.row + rows, mesh.col : mesh.col + cols])
+    boxes = plane.boxes(mesh.row, mesh.col, 1, rows, cols)
+    return ground, *mesh.places(), *plane.shapes.low, boxes, plane.stride == 1, *plane.reach_m(True)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -116,7 +166,7 @@ class AltitudeIntervals:
         room = np.empty(n), np.empty(n, np.int32), np.empty(n, np.int64)
         low, high, away = self.low_m, self.high_m, self.away_m.copy()
         latest, z, shut = limit_m - self.left_m, self.start.amsl_m, np.zeros(n - 1, np.bool_)
-        off_m = self.start.off_m + SPARE_M
+        off_m = self.start.off_m + INTERVAL_SPARE_M
 
         def least(own: Floats, most: Floats, begin: float) -> Floats:
             nonlocal shut
@@ -141,7 +191,7 @@ class AltitudeIntervals:
             away, low = np.maximum(away, (rises - high) / down), np.maximum(low, rises - down * latest)
         if falls is not None and rises is not None:
             away = np.maximum(away, (rises - falls) / (up + down))
-        left = ~shut & (away <= latest + SPARE_M) & (low <= high)
+        left = ~shut & (away <= latest + INTERVAL_SPARE_M) & (low <= high)
         return replace(self, low_m=low, high_m=high, away_m=away).only(left)
 
 

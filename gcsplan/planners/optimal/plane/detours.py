@@ -35,14 +35,14 @@ TAKEN = 5
 """Most tracks over which paths are looked for."""
 MORE = 1.1
 """A track that takes more than this many times the spare metres near the ends in laps takes its laps elsewhere."""
-LITTLE = 1e-4
+LEAST_GAIN = 1e-4
 """Part of the cost below which a gain is not worth a search."""
 NARROW = 0.04
 """Ranges of spare metres are not split if they cost less than this part of the difference between path and bound."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Choice:
+class SideChoice:
     """``under``, ``over`` (zones,): which zones may be passed below their floor, above their ceiling; ``least_m``,
     ``most_m``: the range of spare metres near the ends; ``lower_m``: metres by which the cap is lowered. ``tried``:
     zones for which choices with one side more shut, and no fewer spare metres, have been made before."""
@@ -55,7 +55,7 @@ class Choice:
     tried: frozenset[int] = frozenset()
 
 
-_Open = tuple[float, int, float, Choice, Lacking | None, PinnedTrack | None]
+_Open = tuple[float, int, float, SideChoice, Lacking | None, PinnedTrack | None]
 """The least cost of a path of a choice (the key), a running number, the least length of its track, the choice; what the
 track lacks, if known; and the track itself, if a path over it is to be looked for."""
 
@@ -66,19 +66,19 @@ class DetourSearch:
     track of a choice with its most spare metres, through all terminals; ``fine``: whether that is on a fine lattice."""
 
     incumbent: Incumbent
-    terminals: Callable[[Choice], PinnedTrack | None]
+    terminals: Callable[[SideChoice], PinnedTrack | None]
     fine: bool
 
     def run(
-        self, roots: list[Choice], most: int, *, first: bool, laps: bool, given: PinnedTrack | None = None
-    ) -> Choice | None:
+        self, roots: list[SideChoice], most: int, *, first: bool, laps: bool, given: PinnedTrack | None = None
+    ) -> SideChoice | None:
         """Try at most ``most`` tracks; return the choice with which the best path was found, None if none was better.
 
         ``first``: stop at the first path that is better than the best known; ``laps``: whether it may have laps;
         ``roots``: the choices to begin with; ``given``: the track of the first of them, if it is known.
         """
         open_set: list[_Open] = []
-        best: Choice | None = None
+        best: SideChoice | None = None
         known: dict[bytes, Lacking | Closed] = {}
         flat: set[tuple[bytes, bytes, Lacking]] = set()
         done: set[tuple[bytes, bytes, Spare, float]] = set()
@@ -86,7 +86,7 @@ class DetourSearch:
         hoped = self.incumbent.cost
 
         def push(
-            length_m: float, choice: Choice, found: Lacking | None = None, over: PinnedTrack | None = None
+            length_m: float, choice: SideChoice, found: Lacking | None = None, over: PinnedTrack | None = None
         ) -> None:
             nonlocal pushed
             pushed += 1
@@ -146,14 +146,14 @@ class DetourSearch:
                 self._split(length_m, replace(choice, tried=choice.tried.union(lack.zones)), lack, hoped, push)
         return best
 
-    def _may_help(self, length_m: float, choice: Choice) -> bool:
+    def _may_help(self, length_m: float, choice: SideChoice) -> bool:
         """Whether a choice whose track is at least ``length_m`` long may hold a path that is better by more than a
         little."""
         cost = self.incumbent.cost
-        little = min(NARROW * (cost - self.incumbent.bound), LITTLE * cost) if math.isfinite(cost) else 0.0
+        little = min(NARROW * (cost - self.incumbent.bound), LEAST_GAIN * cost) if math.isfinite(cost) else 0.0
         return self.incumbent.least(length_m + sum(choice.least_m)) < cost - little
 
-    def _closed(self, length_m: float, choice: Choice, zones: tuple[int, ...], push: Callable[..., None]) -> None:
+    def _closed(self, length_m: float, choice: SideChoice, zones: tuple[int, ...], push: Callable[..., None]) -> None:
         """Push, for each of the ``zones`` and each of its open sides, the choice with that side shut."""
         for zone in zones:
             levels, more = self.incumbent.problem.airspace.zones[zone], replace(choice, tried=frozenset())
@@ -162,7 +162,9 @@ class DetourSearch:
             if zone not in choice.tried and levels.ceiling is not None and choice.over[zone]:
                 push(length_m, replace(more, over=_without(choice.over, zone)))
 
-    def _split(self, length_m: float, choice: Choice, lack: Lacking, hoped: float, push: Callable[..., None]) -> None:
+    def _split(
+        self, length_m: float, choice: SideChoice, lack: Lacking, hoped: float, push: Callable[..., None]
+    ) -> None:
         """Split the choice's range of spare metres, up to what this track takes, in two halves and push both; the upper
         one has the same track. ``hoped``: expected cost of the best path."""
         most = _needed(self.incumbent.problem, choice, lack)
@@ -176,7 +178,7 @@ class DetourSearch:
         push(length_m, replace(choice, least_m=(more[0], more[1]), most_m=most), lack)
 
 
-def _needed(problem: Problem, choice: Choice, lack: Lacking) -> Spare:
+def _needed(problem: Problem, choice: SideChoice, lack: Lacking) -> Spare:
     """The spare metres near start and goal that a choice's track takes in laps, within the choice's range: with no more
     than these the track stays the same."""
     limits = problem.limits

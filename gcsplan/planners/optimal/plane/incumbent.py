@@ -12,7 +12,7 @@ from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.plane.corridor import PinnedTrack
 from gcsplan.planners.problem import Problem, Progress, Solution, Step, passes_vias, straight_bound, straight_way_m
 from gcsplan.planners.profile.climb_laps import with_laps
-from gcsplan.planners.profile.exact import Judge, Unsettled, settle, way_points
+from gcsplan.planners.profile.exact import LegJudge, Unsettled, settle, way_points
 from gcsplan.planners.profile.track import Flown, Obstruction, Track, fly, make_track
 from gcsplan.planners.profile.zone_levels import may_pass
 from gcsplan.planners.simplify import fewer, polished
@@ -25,9 +25,9 @@ HOPE = 1.5
 a path of its kind so far."""
 NEARER = 0.45
 """Part of the wanted gap down to which cheap searches that mostly help still run, and which a bound tries first."""
-ROUNDING_M = 0.2
+HIGHER_M = 0.2
 """Added to the highest altitude of better paths, m."""
-STEEP = 0.15
+STEEP_RISE = 0.15
 """Rise of a path, as a part of its track's length, from which it counts as steep: one cap for the whole track says
 little then, since a zone that is passed low must be flown around, and one that is passed high need not."""
 
@@ -42,7 +42,7 @@ class Incumbent:
         self.rounding = problem.rounding()
         self.wanted = problem.gap_percent / 100.0
         self.nearer = NEARER * self.wanted
-        self.judge = Judge(problem)
+        self.judge = LegJudge(problem)
         self.best: Floats | None = None
         self.pinned: Bools | None = None
         """(N,) which points of the best path are terminals; None if that is not known."""
@@ -171,7 +171,7 @@ class Incumbent:
         else:
             climbed_m = math.sqrt(max(self.cost**2 - self.track_m**2, 0.0))
         spare_m = max(climbed_m - self.rise(-math.inf), 0.0)
-        return min(max(self.known_m) + 0.5 * spare_m + ROUNDING_M, else_m)
+        return min(max(self.known_m) + 0.5 * spare_m + HIGHER_M, else_m)
 
     def longest(self, else_m: float, cost: float | None = None, climbed_m: float = -math.inf) -> float:
         """An upper bound, metres, of the track length of every path cheaper than ``cost`` (None: than the best) that
@@ -207,11 +207,11 @@ class Incumbent:
 
     @property
     def is_steep(self) -> bool:
-        """Whether the best path rises by at least `STEEP` of its track's length."""
+        """Whether the best path rises by at least `STEEP_RISE` of its track's length."""
         if self.best is None:
             return False
         track_m = float(np.hypot(*np.diff(self.best[:, :2], axis=0).T).sum())
-        return float(np.ptp(self.best[:, 2])) >= STEEP * track_m
+        return float(np.ptp(self.best[:, 2])) >= STEEP_RISE * track_m
 
     @property
     def climbs(self) -> bool:

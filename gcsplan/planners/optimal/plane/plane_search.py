@@ -1,4 +1,7 @@
-"""Tracks over the lattices of a problem's legs, and the lower bounds that follow from them; see `planner`."""
+"""Tracks over the lattices of a problem's legs, and the lower bounds that follow from them; see `planner`.
+
+Level ground is cut into cells first: a terrain model of two by two nodes is a single cell, too coarse for a lattice.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +12,23 @@ from itertools import pairwise
 
 import numpy as np
 
-from gcsplan.planners.optimal.plane.cap_search import above_all
 from gcsplan.planners.optimal.plane.corridor import End, Narrow, PinnedTrack, joined
-from gcsplan.planners.optimal.plane.detours import Choice, DetourSearch
+from gcsplan.planners.optimal.plane.detours import DetourSearch, SideChoice
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.plane.leg import Leg
 from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.planners.profile.track import Flown, fly, make_track
 from gcsplan.planners.profile.zone_levels import may_pass
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.geometry.surface import GridMap, Surface
+
+FEW = 64
+"""A level terrain model of at most this many nodes is replaced."""
+LEVEL_NODES = 65
+"""Nodes along each side of the terrain model that replaces it."""
+MARGIN = 0.02
+"""Part by which the new model extends beyond the places that paths can reach."""
+
 
 SLACKS = (0.008, 0.15, 0.6)
 """While no path is known, tracks longer than the shortest by these parts of it are searched, in turn."""
@@ -33,6 +45,35 @@ NODE_S, NODE_MB = 0.8e-6, 3e-4
 """Counted seconds and megabytes of a searched node, with what a search keeps of it."""
 SMALL = 50.0
 """A world is small if the straight line of each leg is at most this many cells of the terrain model long."""
+
+
+def in_window(incumbent: Incumbent) -> Problem:
+    """The incumbent's problem with its level ground cut into cells, over the area that a better path could reach; the
+    unchanged problem if its terrain model is not level or has many nodes."""
+    problem = incumbent.problem
+    surface = problem.airspace.surface
+    ground, top = surface.ground_m, surface.top_m
+    if ground.size > FEW or surface.level_m is None:
+        return problem
+    rows, cols = ground.shape
+    corners = surface.grid.to_plane([0.0, cols - 1.0], [rows - 1.0, 0.0])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    length_m = incumbent.longest(math.inf)
+    if math.isfinite(length_m):
+        places = np.array(terminals_of(problem))
+        straight = float(np.hypot(*np.diff(places, axis=0).T).sum())
+        # No place of a track of that length is farther outside the terminals' box.
+        reach = 0.5 * (length_m - straight) * (1.0 + MARGIN) + 0.5 * straight * MARGIN
+        reach = max(reach, 0.5 * math.sqrt(max(length_m**2 - straight**2, 0.0)) * (1.0 + MARGIN)) + 1.0
+        low, high = np.maximum(low, places.min(axis=0) - reach), np.minimum(high, places.max(axis=0) + reach)
+    step = (high - low) / (LEVEL_NODES - 1)
+    grid = GridMap.affine(float(low[0]), float(high[1]), float(step[0]), float(step[1]))
+    heights = np.full((LEVEL_NODES, LEVEL_NODES), float(ground[0, 0]))
+    tops = heights if top is ground else np.full((LEVEL_NODES, LEVEL_NODES), float(top[0, 0]))
+    air = Airspace(
+        Surface(heights, tops, grid, dict(surface.info)), problem.airspace.zones, scale=problem.airspace.scale
+    )
+    return replace(problem, airspace=air)
 
 
 class PlaneSearch:
@@ -60,11 +101,13 @@ class PlaneSearch:
         self.by_intervals = False
         """Whether bounds of length use altitude intervals: what a track can climb and descend to on its way."""
         zones = len(problem.airspace.zones)
-        self._open = Choice(np.ones(zones, np.bool_), np.ones(zones, np.bool_))
+        self._open = SideChoice(np.ones(zones, np.bool_), np.ones(zones, np.bool_))
         self.choice = self._open
         """The choice of open zone sides with which the last path past obstacles was found."""
 
-    def terminals(self, choice: Choice, cap_m: float, fine: bool, narrow: Narrow | None = None) -> PinnedTrack | None:
+    def terminals(
+        self, choice: SideChoice, cap_m: float, fine: bool, narrow: Narrow | None = None
+    ) -> PinnedTrack | None:
         """The shortest track below a cap with a choice of zone sides, through all terminals; None if a leg has none.
 
         ``fine``: on the finer lattice; ``narrow``: see `Leg.track`.
@@ -238,3 +281,15 @@ class PlaneSearch:
         cell_m = float(self.problem.airspace.surface.grid.metres_per_cell(*self.problem.start[:2]).max())
         short = [leg for leg in self.legs if leg.straight_m <= SMALL * cell_m]
         return len(short) == len(self.problem.via) + 1  # legs from a place to itself are not among the legs
+
+
+def above_all(problem: Problem) -> float:
+    """An altitude AMSL, metres, above all ground, zone ceilings and terminals, with at least 100 m to spare."""
+    surface, limits = problem.airspace.surface, problem.limits
+    high = float(np.nanmax(surface.top_m))
+    tops = [0.0]
+    for zone in problem.airspace.zones:
+        if zone.ceiling is not None:
+            tops.append(zone.ceiling.value_m + (high if zone.ceiling.datum == "agl" else 0.0))
+    ends = [problem.start[2], problem.goal[2], *(v.amsl_m for v in problem.via if v.amsl_m is not None)]
+    return max(high + limits.min_agl_m, *tops, *ends) + limits.altitude_error_m + 2.0 * limits.track_error_m + 100.0

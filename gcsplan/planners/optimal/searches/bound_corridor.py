@@ -2,27 +2,27 @@
 
 The track of a bound is as short as a track can be. Where the exact check shuts it, the stretch is a few hundred metres
 long at most, and metres or centimetres are missing. Beside it there may be an open slit that the cells are too large to
-show. Each such stretch is planned as a problem of its own, so small that its cells are a metre or two wide. If that
-finds nothing and the gap is large, the piece between the places where the track leaves and meets the path is searched
-as a leg of its own, whose cells are finer than those of the whole leg.
+show: the line is searched on which the track crosses a pass that is open by centimetres, and each such stretch is
+planned as a problem of its own, so small that its cells are a metre or two wide. If that finds nothing and the gap is
+large, the piece between the places where the track leaves and meets the path is searched as a leg of its own, whose
+cells are finer than those of the whole leg.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from gcsplan.arrays import Bools, Floats
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.planners.optimal.plane.corridor import joined
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.plane.leg import Leg
 from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
-from gcsplan.planners.optimal.searches.pass_line import over_pass
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.profile.track import distances
+from gcsplan.planners.profile.track import denser, distances
 from gcsplan.planners.profile.zone_levels import free_below
 from gcsplan.world.geometry.path import Path
 
@@ -38,9 +38,9 @@ REACHED = 0.95
 """Part of the climb limit at which the track from or to a terminal is taken to climb."""
 ASIDE_M = 0.3
 """Metres by which places are moved away from zones."""
-APART_M = 1e-3
+SAME_PLACE_M = 1e-3
 """Metres; places nearer to each other count as one."""
-SLACKS = (0.008, 0.15)
+STRETCH_SLACKS = (0.008, 0.15)
 """Parts by which tracks of a stretch may be longer than its shortest; tracks that are longer pass through no slit."""
 FARTHEST = 1.5
 """Most times as long as the straight track that tracks of a stretch may be."""
@@ -52,10 +52,22 @@ FAR, CLOSE_BY = 5e-3, (3e-3, 3e-2, math.inf)
 pieces on finer cells; and the parts by which tracks may be longer than the bound for the former, in turn."""
 SHORTER = 0.7
 """Most of a leg's straight track for a piece to be searched on finer cells."""
-MOST = 24
+MOST_STRETCHES = 24
 """Most stretches of a track; a track with more is not tried."""
-AT_ONCE = 512
+PLACES_AT_ONCE = 512
 """Places whose distance from a track is computed in one batch."""
+
+
+DENSE_M, BEFORE_M, MOST_PLACES = 0.5, 15.0, 600
+"""Step of a track through a pass, m; how far before and behind the pass it may be moved; and its most places."""
+SIDE_M, TRIED, MOST_ASIDE, WITHIN_M = 6.0, 49, 3, 1e-3
+"""How far it may be moved aside, m; the places tried for that; how many of them from step to step; and how closely the
+lowest floor is found, m."""
+STRAIGHT_M = 2e-3
+"""Metres by which its places may be left aside where it is straight."""
+SPARE_M, DEAR, LITTLE = 0.1, 100.0, 1e-6
+"""Metres below the cap at which a floor is low enough; metres aside that a metre lower is worth; and what decides
+between floors that are alike."""
 
 
 def follow(plane: PlaneSearch) -> bool:
@@ -148,9 +160,9 @@ def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
             better.append((a, b, part))
     out, begin = [], -math.inf
     for a, b, part in better:
-        out += [path[(on_path > begin + APART_M) & (on_path < a - APART_M)], part]
+        out += [path[(on_path > begin + SAME_PLACE_M) & (on_path < a - SAME_PLACE_M)], part]
         begin = b
-    return np.vstack([*out, path[on_path > begin + APART_M]]) if out else None
+    return np.vstack([*out, path[on_path > begin + SAME_PLACE_M]]) if out else None
 
 
 def _part(plane: PlaneSearch, problem: Problem, start: Floats, goal: Floats) -> PlaneSearch:
@@ -201,7 +213,7 @@ def _past(
     """`_along` past the stretches that are shut; ``low``, ``high`` (N,): what is free at the places."""
     # An infinite floor is shut (unknown ground), or given (an end), whatever is free below the cap.
     stretches = shut_stretches(np.subtract(low, high, out=low.copy(), where=np.isfinite(low)))
-    if len(stretches) > MOST:
+    if len(stretches) > MOST_STRETCHES:
         return None
     cuts = sorted({0, len(s) - 1, *(k for stretch in stretches for k in stretch)})
     out: list[Floats] = []
@@ -218,7 +230,7 @@ def _past(
         if (first, last) not in stretches:
             sub.take_along(joined([np.vstack([start[:2], places[first + 1 : last], goal[:2]])], []))
         if sub.best is None:
-            for _ in found.first_looks(SLACKS):
+            for _ in found.first_looks(STRETCH_SLACKS):
                 pass
         if sub.best is None and not sub.proved_infeasible and found.legs:
             lowest = over_pass(
@@ -237,8 +249,8 @@ def nearest_on(places: Floats, track: Floats) -> tuple[Floats, Floats]:
     """(N,) distances of places from a track, and metres along the track (N,) of the points nearest to them."""
     a, d, s = track[:-1], np.diff(track, axis=0), distances(track)
     away, where = np.empty(len(places)), np.empty(len(places))
-    for first in range(0, len(places), AT_ONCE):
-        part = slice(first, first + AT_ONCE)
+    for first in range(0, len(places), PLACES_AT_ONCE):
+        part = slice(first, first + PLACES_AT_ONCE)
         t = ((places[part, None] - a) * d).sum(axis=-1) / np.maximum((d * d).sum(axis=-1), 1e-12)
         t = t.clip(0.0, 1.0)
         off = np.hypot(*(places[part, None] - a - t[..., None] * d).transpose(2, 0, 1))
@@ -294,5 +306,90 @@ def _height(plane: PlaneSearch, leg: Leg, from_start_m: float, to_goal_m: float,
         (leg.goal, to_goal_m, limits.max_descent_slope),
     ):
         if terminal.amsl_m is not None:
-            z = terminal.amsl_m if way_m < APART_M else min(z, terminal.amsl_m + REACHED * slope * way_m)
+            z = terminal.amsl_m if way_m < SAME_PLACE_M else min(z, terminal.amsl_m + REACHED * slope * way_m)
     return z
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Strip:
+    """The ``places`` (N, 2) of a track over a pass, and the direction ``aside`` (2,) in which they may be moved.
+
+    All of them in one direction: across a bend of the track, they would come apart.
+    """
+
+    problem: Problem
+    cap_m: float
+    places: Floats
+    aside: Floats
+
+    def moved(self, by_m: Floats) -> Floats:
+        """(N, ..., 2) the places, moved aside by metres (N, ...)."""
+        places = self.places.reshape(len(self.places), *(1,) * (by_m.ndim - 1), 2)
+        return np.asarray(places + by_m[..., None] * self.aside)
+
+    def over(self, at: Floats) -> Floats:
+        """(...) by how many metres the exact check's floor over places (..., 2) exceeds the cap, at least -`SPARE_M`:
+        a floor that is low enough need not be lower."""
+        floor = self.problem.floors(*at.reshape(-1, 2).T).reshape(at.shape[:-1])
+        return np.asarray(np.maximum(floor - self.cap_m, -SPARE_M))
+
+
+def over_pass(problem: Problem, cap_m: float, track: Floats) -> Floats:
+    """A track (N, 2) moved aside where terrain shuts it below ``cap_m``, to where the exact check's floor is low, and
+    without jumps. Its ends stay; all of it does where nothing is shut, or too much."""
+    import shapely  # most missions need none here
+
+    places = denser(track, DENSE_M)
+    shut = np.flatnonzero(problem.floors(*places.T) > cap_m)
+    if not len(shut):
+        return track
+    near = round(BEFORE_M / DENSE_M)
+    first, last = max(int(shut[0]) - near, 0), min(int(shut[-1]) + near, len(places) - 1)
+    if last - first > MOST_PLACES:
+        return track
+    aside = (places[last] - places[first])[::-1] * [-1.0, 1.0]
+    aside /= max(float(np.hypot(*aside)), 1e-9)
+    strip = _Strip(problem, cap_m, places[first : last + 1], aside)
+    off = _settled(strip, _chain(strip))
+    line = np.vstack([places[:first], strip.moved(off), places[last + 1 :]])
+    return np.asarray(shapely.LineString(line).simplify(STRAIGHT_M).coords)
+
+
+def _chain(strip: _Strip) -> Floats:
+    """(N,) metres aside, of `TRIED` places each, with which the sum of floors above the cap is least; by dynamic
+    programming."""
+    steps = np.linspace(-1.0, 1.0, TRIED)
+    at = strip.moved(np.tile(SIDE_M * steps, (len(strip.places), 1)))
+    # From each place of a row to those of the next that are a few places aside, by way of the middle.
+    beside = np.arange(TRIED)[:, None] + np.arange(-MOST_ASIDE, MOST_ASIDE + 1)
+    there = beside.clip(0, TRIED - 1)
+    ways = strip.over(0.5 * (at[:-1, :, None] + at[1:, there])) + strip.over(at)[1:, there]
+    ways = DEAR * ways + 2.0 * SIDE_M / (TRIED - 1) * np.abs(beside - np.arange(TRIED)[:, None])
+    ways[:, beside != there] = np.inf
+    left, back = np.where(steps == 0.0, 0.0, np.inf), list[Indices]()
+    for row in ways[::-1]:  # from the end
+        whole = row + left[there]
+        back.append(there[np.arange(TRIED), whole.argmin(axis=1)])
+        left = whole.min(axis=1)
+    chosen = [TRIED // 2]
+    for to in reversed(back):
+        chosen.append(int(to[chosen[-1]]))
+    return np.asarray(SIDE_M * steps[chosen])
+
+
+def _settled(strip: _Strip, off: Floats) -> Floats:
+    """Metres aside (N,) near ``off`` with the lowest floors; 0 at both ends."""
+    steps, rows = np.linspace(-1.0, 1.0, TRIED), np.arange(len(off))
+    width = 2.0 * SIDE_M / (TRIED - 1)
+    while width > WITHIN_M:
+        tried = off[:, None] + width * steps
+        best = (strip.over(strip.moved(tried)) + LITTLE * np.abs(steps)).argmin(axis=1)
+        off = tried[rows, best]
+        width *= 4.0 / (TRIED - 1)
+    # The line goes on before and behind the pass, so that no leg cuts its corner.
+    tight = strip.over(strip.moved(off)) > -SPARE_M
+    for step in (1, -1):
+        further = np.where(np.roll(tight, step) & ~tight, np.roll(off, step), off)
+        off = np.where(strip.over(strip.moved(further)) <= 0.0, further, off)
+    off[[0, -1]] = 0.0
+    return off

@@ -14,10 +14,10 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.planners.optimal.navmesh.outlines import Outline, Solids
+from gcsplan.planners.optimal.navmesh.outlines import Solids, ZoneOutline
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.plane.corridor import PinnedTrack, joined
-from gcsplan.planners.optimal.plane.detours import Choice, DetourSearch
+from gcsplan.planners.optimal.plane.detours import DetourSearch, SideChoice
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.problem import Problem, terminals_of
 
@@ -48,7 +48,7 @@ class OutlineTracks:
         self._hints: list[Floats] = []
         """The tracks of the bound. Outlines are refined along them, so that paths find slits that coarse ones shut."""
 
-    def terminals(self, choice: Choice) -> PinnedTrack | None:
+    def terminals(self, choice: SideChoice) -> PinnedTrack | None:
         """The shortest track past the zones that a choice shuts; None if there is none or it takes too much work."""
         which = ~((choice.under & self.under) | (choice.over & self.over))
         try:
@@ -74,7 +74,7 @@ class OutlineTracks:
             self._hints = tracks
             incumbent.raise_track_bound(_length_m(tracks))
         zones = len(self.under)
-        root = Choice(np.ones(zones, np.bool_), np.ones(zones, np.bool_))
+        root = SideChoice(np.ones(zones, np.bool_), np.ones(zones, np.bool_))
         laps = incumbent.climbs and incumbent.sharp
         roots = [root]
         if laps and math.isfinite(incumbent.cost):
@@ -86,7 +86,7 @@ class OutlineTracks:
         too_high = self.over & (self.tops_m > self.incumbent.highest(math.inf) + HARDLY_M)
         return (too_high & ~self.under) | ~(self.under | self.over)
 
-    def outline(self, zone: int, *, outer: bool) -> Outline:
+    def outline(self, zone: int, *, outer: bool) -> ZoneOutline:
         """A zone's outline for paths (``outer``) or for bounds, once `tracks` was asked for such."""
         return self._solids[outer].outlines[zone]
 

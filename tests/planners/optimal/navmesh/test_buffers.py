@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gcsplan.planners.optimal.navmesh.buffers import LARGE, Scratch
+from gcsplan.planners.optimal.navmesh.grid import HUGE_PAGE_BYTES, Scratch
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.int32, np.bool_])
@@ -28,6 +28,6 @@ def test_the_same_name_is_the_same_memory_until_more_is_asked_for() -> None:
 
 
 def test_a_large_one_can_be_written_to_its_ends() -> None:
-    array = Scratch().array("a", (LARGE // 8 + 1,))
+    array = Scratch().array("a", (HUGE_PAGE_BYTES // 8 + 1,))
     array[0], array[-1] = 1.0, 2.0
-    assert (array[0], array[-1], array.nbytes) == (1.0, 2.0, LARGE + 8)
+    assert (array[0], array[-1], array.nbytes) == (1.0, 2.0, HUGE_PAGE_BYTES + 8)

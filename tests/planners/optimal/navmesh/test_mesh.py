@@ -21,7 +21,7 @@ from gcsplan.planners.optimal.navmesh.zone_shapes import convex_parts
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.limits import Limits
-from gcsplan.world.geometry.surface import TERMS, GridMap, Surface
+from gcsplan.world.geometry.surface import POWERS, GridMap, Surface
 from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from tests.support.effort import draws, worlds
 
@@ -36,9 +36,9 @@ def turned_grid(degrees: float, shear: float) -> GridMap:
     a = math.radians(degrees)
     step = STEP_M * np.array([[math.cos(a), math.sin(a)], [-math.sin(a), math.cos(a)]]) @ np.array([[1, shear], [0, 1]])
     inverse = np.linalg.inv(step)
-    coefficients = np.zeros((len(TERMS), 2))
-    coefficients[TERMS.index((1, 0))] = inverse[:, 0]
-    coefficients[TERMS.index((0, 1))] = -inverse[:, 1]
+    coefficients = np.zeros((len(POWERS), 2))
+    coefficients[POWERS.index((1, 0))] = inverse[:, 0]
+    coefficients[POWERS.index((0, 1))] = -inverse[:, 1]
     return GridMap(coefficients, (0.0, SIZE_M), 1.0, 0.0)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid
 from gcsplan.planners.optimal.navmesh.grid import lattice
-from gcsplan.planners.optimal.navmesh.walls_beside import walls_beside
+from gcsplan.planners.optimal.navmesh.necks import walls_beside
 from gcsplan.planners.optimal.navmesh.zone_shapes import CLOSE
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace

@@ -12,10 +12,9 @@ import pytest
 
 from gcsplan.arrays import Floats
 from gcsplan.planners.optimal.navmesh.clearance import mesh_of
-from gcsplan.planners.optimal.navmesh.free_altitudes import intervals, ranges
 from gcsplan.planners.optimal.navmesh.grid import make_plane
 from gcsplan.planners.optimal.navmesh.interval_kernels import spread
-from gcsplan.planners.optimal.plane.altitude_intervals import AltitudeIntervals, Reached, Terminal
+from gcsplan.planners.optimal.plane.altitude_intervals import AltitudeIntervals, Reached, Terminal, intervals, ranges
 from gcsplan.planners.optimal.plane.corridor import End
 from gcsplan.planners.optimal.plane.leg import Leg
 from gcsplan.planners.problem import Problem

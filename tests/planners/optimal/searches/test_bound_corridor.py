@@ -18,7 +18,7 @@ from gcsplan.planners.lattice.planner import plan_band
 from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.optimal.searches import bound_corridor
-from gcsplan.planners.optimal.searches.pass_line import over_pass
+from gcsplan.planners.optimal.searches.bound_corridor import over_pass
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.geometry.path import Path
 from tests.planners.optimal.navmesh.test_necks import ridge as pass_over_a_ridge

@@ -9,7 +9,7 @@ import pytest
 
 from gcsplan.planners.budget import RATES, Budget
 from gcsplan.planners.optimal.planner import plan
-from gcsplan.planners.optimal.searches import roadmap
+from gcsplan.planners.optimal.searches import local_roadmap
 from gcsplan.planners.optimal.searches.local_roadmap import small_path
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.airspace import Airspace
@@ -124,7 +124,7 @@ def test_worlds_with_very_many_zones_are_searched_as_well() -> None:
 
 
 def test_a_roadmap_asks_for_budget_between_blocks_of_legs(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(roadmap, "AT_ONCE", 500)
+    monkeypatch.setattr(local_roadmap, "LEGS_AT_ONCE", 500)
     asked: list[float] = []
 
     class Counted(Budget):

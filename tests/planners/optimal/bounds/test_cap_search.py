@@ -14,9 +14,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.arrays import Floats
-from gcsplan.planners.optimal.bounds.climb_bound import altitude_ranges, climb_bound, rise_bound
+from gcsplan.planners.optimal.bounds.shorter import (
+    MOST_CAPS,
+    Layer,
+    altitude_ranges,
+    climb_bound,
+    rise_bound,
+    search_caps,
+)
 from gcsplan.planners.optimal.navmesh.interval_kernels import range_along
-from gcsplan.planners.optimal.plane.cap_search import MOST_CAPS, Layer, search_caps
 from gcsplan.planners.optimal.plane.corridor import End
 from gcsplan.planners.optimal.plane.leg import Leg
 from gcsplan.planners.optimal.plane.plane_search import PlaneSearch

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats
-from gcsplan.planners.profile.tubes import cut, join
-from gcsplan.world.tube import Band, Tube
+from gcsplan.world.tube import Band, Tube, cut, join
 
 
 def tube_of(rng: np.random.Generator, length_m: float = 100.0) -> Tube:

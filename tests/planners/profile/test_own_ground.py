@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import shapely
 
+from gcsplan.planners.profile.zone_levels import RING_POINTS, own_ground
 from gcsplan.world.geometry.surface import GridMap, Surface
 from gcsplan.world.geometry.zones import Circle, Polygon, Zone
-from gcsplan.world.own_ground import RING_POINTS, own_ground
 
 
 def surface(void: bool = False) -> Surface:

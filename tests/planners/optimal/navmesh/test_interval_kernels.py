@@ -11,9 +11,9 @@ import pytest
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.navmesh.clearance import mesh_of
-from gcsplan.planners.optimal.navmesh.free_altitudes import MOST, intervals, ranges
 from gcsplan.planners.optimal.navmesh.grid import make_plane
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
+from gcsplan.planners.optimal.plane.altitude_intervals import MOST_INTERVALS, intervals, ranges
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.limits import Limits
@@ -82,7 +82,9 @@ def test_no_altitude_that_the_exact_check_passes_is_shut(turned: bool, parts: in
         for _ in range(8):
             z = np.minimum(ground + rng.uniform(25.0, 230.0, len(places)), TOP_M)
             ok = legal(problem, places, z)
-            held = (z[:, None] >= low[cell]) & (z[:, None] <= high[cell]) & (np.arange(MOST) < count[cell, None])
+            held = (
+                (z[:, None] >= low[cell]) & (z[:, None] <= high[cell]) & (np.arange(MOST_INTERVALS) < count[cell, None])
+            )
             assert held.any(axis=1)[ok].all(), places[ok & ~held.any(axis=1)]
             passed += int(ok.sum())
             near += int((~held.any(axis=1)).sum())
