@@ -25,10 +25,9 @@ from gcsplan.check.motion.project import PlaneLegs, legs_in_plane, steep_report,
 from gcsplan.check.motion.stretch import Flight, Stretch
 from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
 from gcsplan.check.verdict import LegFigures, Verdict
-from gcsplan.mavlink.mission.autopilots import profile_of
-from gcsplan.mavlink.mission.firmware import needs_straight
+from gcsplan.mavlink.mission.autopilots import needs_straight, profile_of
 from gcsplan.mavlink.mission.mission import Home, Mission
-from gcsplan.mavlink.mission.parameter_safety import FlightExtent
+from gcsplan.mavlink.mission.parameter_list import FlightExtent
 from gcsplan.notes.finding import Finding
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle

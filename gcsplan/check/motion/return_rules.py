@@ -7,7 +7,7 @@
 - PX4 (rtl.cpp): the same with RTL_RETURN_ALT (30 m for multicopters, rc.mc_defaults) and RTL_CONE_ANG (45 degrees).
   Later versions have the cone only within RTL_MIN_DIST (10 m) of home and climb fully beyond it; older ones go to
   RTL_DESCEND_ALT within that distance. It flies home at MPC_XY_CRUISE (`Vehicle.return_speed_m_s`). It
-  returns so with RTL_TYPE 0 alone (`return_altitude.returns_otherwise`).
+  returns so with RTL_TYPE 0 alone (`return_parameters.returns_otherwise`).
 - ArduPlane, a QuadPlane too: turns and flies home at once, and on the way climbs or glides to RTL_ALTITUDE
   (ALT_HOLD_RTL before 4.5; -1 keeps its altitude). Over home it circles with WP_LOITER_RAD, grown with altitude.
 

@@ -46,7 +46,7 @@ from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.commands import command_name
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.mavlink.mission.return_route import ReturnRoute
+from gcsplan.mavlink.mission.return_parameters import ReturnRoute
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world import level_lines

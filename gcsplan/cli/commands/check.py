@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from gcsplan.app.check.files import Batch
     from gcsplan.app.check.many import Archive, Form, Shown
     from gcsplan.app.check.worlds import Checked, Returns
-    from gcsplan.mavlink.mission.return_route import ReturnRoute
+    from gcsplan.mavlink.mission.return_parameters import ReturnRoute
     from gcsplan.mission_file.options_world import WorldOptions
     from gcsplan.mission_file.values.places import Degrees
     from gcsplan.units import Units

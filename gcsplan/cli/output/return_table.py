@@ -11,7 +11,7 @@ from gcsplan.app.plan.way_home import warnings
 from gcsplan.cli.output.console import rows_table, say
 from gcsplan.cli.output.screens import aside, console
 from gcsplan.figures import raised
-from gcsplan.mavlink.mission.return_altitude import setting
+from gcsplan.mavlink.mission.return_parameters import setting
 from gcsplan.notes.note import Wording
 from gcsplan.units import Reach, Unit, Units
 

@@ -34,8 +34,7 @@ from gcsplan.mavlink.link.url import parse_url
 from gcsplan.mavlink.link.watch import VehicleState, Watch
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.fences import FENCE_DECIDES
-from gcsplan.mavlink.mission.parameter_list import parameter_list
-from gcsplan.mavlink.mission.parameter_safety import safety_list
+from gcsplan.mavlink.mission.parameter_list import parameter_list, safety_list
 from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.notes.note import Note
 from gcsplan.sim.flight.trace import Trace
