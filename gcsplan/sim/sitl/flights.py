@@ -39,8 +39,7 @@ from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.notes.note import Note
 from gcsplan.sim.flight.trace import Trace
 from gcsplan.sim.flight.wind import Weather
-from gcsplan.sim.outcome import Rehearsal, Tally, Terms
-from gcsplan.sim.part import RehearsalPart, energy_of
+from gcsplan.sim.outcome import Rehearsal, RehearsalPart, Tally, Terms, energy_of
 from gcsplan.sim.rehearsal import upload_parts
 from gcsplan.sim.sitl.flight_watch import FlightWatch
 from gcsplan.sim.sitl.wind_parameters import change_steps, wind_parameters, wind_vector
