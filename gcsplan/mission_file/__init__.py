@@ -1,8 +1,8 @@
 """The only reader of the user's request: it turns a mission file into vehicles, zones and a surface in metres.
 
-`load` reads the parts in order. `schema` holds the keys, `vehicles` the aircraft, `terminals` the start, via points and
-goal of each, `world` points, terrain and zones. `zone_geojson` and `zone_kml` read zone files of other programs,
-`airspace` those of authorities.
+`load` reads the parts in order. `values` holds the keys, `vehicles` the aircraft, `terminals` the start, via points and
+goal of each, `scene` points, terrain and zones. `zones` reads zone files of other programs, `published` those of
+authorities.
 """
 
 from gcsplan.mission_file.load import load_mission
