@@ -1,19 +1,32 @@
 """`python docs/_make_pictures.py`: the pictures of README and documents, made from the sample mission.
 
 They lie in `missions/`. Each holds the path's length in its description, which a test compares with a plan.
+That of the default planner's proof (`draw_proof`) has terrain above the cap, and the cells that a shorter path could
+meet.
 """
 
 from __future__ import annotations
 
 import io
 from pathlib import Path
+from typing import IO
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LightSource, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from gcsplan.app.fleet.pipeline import load_mission, plan, world_of
 from gcsplan.app.output.files import figures_of, picture_of
 from gcsplan.app.plan.problem import make_problem
-from gcsplan.report.views import proof_picture as idea
+from gcsplan.planners.optimal.navmesh.clearance import mesh_of
+from gcsplan.planners.optimal.planner import search
+from gcsplan.planners.problem import Problem
 
 MISSIONS = Path(__file__).parents[1] / "missions"
+WALL, ROOM = "#b04a3a", "#2c7fb8"
 
 
 def main() -> None:
@@ -22,7 +35,7 @@ def main() -> None:
     planned = plan(source)
     problem, _ = make_problem(source, source.vehicles[0], world_of(source), source.planner.objective, 1)
     proof = io.BytesIO()
-    idea.save(problem, proof)
+    save_proof(problem, proof)
     for name, content in (
         ("jacksboro.png", picture_of(planned)),
         ("jacksboro-space.png", figures_of(planned)["report-space.png"]),
@@ -30,6 +43,57 @@ def main() -> None:
     ):
         (MISSIONS / name).write_bytes(content)
         print(f"{MISSIONS / name}: {len(content):,} bytes")
+
+
+def draw_proof(problem: Problem) -> Figure:
+    """The plane of a problem's first leg: walls below the cap, the path, and the cells that a shorter one may meet."""
+    searches = search(problem)
+    below, incumbent = searches.plane, searches.incumbent
+    below.reach_longest()
+    solution = incumbent.solution()
+    leg = below.legs[0]
+    plane = leg.plane
+    walls = mesh_of(plane, below.top_m, True).piece.max(axis=1).reshape(plane.inside.shape) < 0
+    room = leg.corridor(incumbent.cost)
+    points = solution.path.points
+    figure = Figure(figsize=(9.5, 5.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    ax = figure.subplots()
+    x, y = plane.x / 1000.0, plane.y / 1000.0
+    cell_m = float(np.hypot(*np.diff(np.stack([plane.x[0, :2], plane.y[0, :2]]), axis=1).ravel()))
+    ground = np.where(np.isnan(plane.grounds[0]), np.nanmin(plane.grounds[0]), plane.grounds[0])
+    shade = LightSource(azdeg=315, altdeg=40).hillshade(ground[::-1], vert_exag=1.5, dx=cell_m, dy=cell_m)[::-1]
+    ax.pcolormesh(x, y, shade, cmap="gray", vmin=-0.2, vmax=1.1, shading="gouraud", rasterized=True)
+    fine = room.guide.mesh.plane  # the cells may be of a finer lattice
+    layers = ((walls & plane.inside, plane, WALL, 0.45), (room.cells, fine, ROOM, 0.75))
+    for mask, lattice, colour, alpha in layers:
+        layer = np.where(mask, 1.0, np.nan)
+        at = lattice.x / 1000.0, lattice.y / 1000.0
+        ax.pcolormesh(*at, layer, cmap=ListedColormap([colour]), alpha=alpha, lw=0, rasterized=True)
+    ax.plot(points[:, 0] / 1000.0, points[:, 1] / 1000.0, color="#111111", lw=1.8, marker=".", ms=5)
+    far = 0.08 * float(np.ptp(points[:, :2], axis=0).max()) + 200.0
+    low, high = (points[:, :2].min(axis=0) - far) / 1000.0, (points[:, :2].max(axis=0) + far) / 1000.0
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel="east, km", ylabel="north, km")
+    ax.set_aspect("equal")
+    gap = 100.0 * (incumbent.cost / incumbent.bound - 1.0)
+    ax.legend(
+        handles=[
+            Patch(fc=WALL, alpha=0.45, label=f"no path below {below.top_m:,.0f} m AMSL can be here"),
+            Patch(fc=ROOM, alpha=0.75, label="a shorter path would have to stay here"),
+            Line2D([], [], color="#111111", marker=".", label=f"path, {incumbent.cost:,.0f} m"),
+        ],
+        loc="upper right",
+        fontsize=8,
+    )
+    ax.set_title(f"no path is shorter than {incumbent.bound:,.0f} m: gap {gap:.2f} %", loc="left", fontsize=10)
+    return figure
+
+
+def save_proof(problem: Problem, file: IO[bytes]) -> None:
+    """Write the picture of `draw_proof` as PNG."""
+    figure = draw_proof(problem)
+    words = figure.axes[0].get_title(loc="left")
+    figure.savefig(file, format="png", dpi=110, metadata={"Software": None, "Description": words})
 
 
 if __name__ == "__main__":

@@ -11,8 +11,7 @@ from gcsplan.check.judge import judge
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
-from gcsplan.sim.outcome import Terms
-from gcsplan.sim.part import RehearsalPart
+from gcsplan.sim.outcome import RehearsalPart, Terms
 from gcsplan.sim.sitl.flights import rehearse_sitl
 from gcsplan.sim.sitl.instances import sitl_instances
 from gcsplan.vehicle import Autopilot, Vehicle

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fnmatch
 import importlib.util
 import re
+import runpy
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -18,6 +19,8 @@ from PIL import Image
 
 import gcsplan
 from gcsplan import errors
+from gcsplan.app.fleet.pipeline import load_mission, world_of
+from gcsplan.app.plan.problem import make_problem
 from gcsplan.export.summary import ORDER
 from gcsplan.mission_file.values import schema
 from gcsplan.planners import registry
@@ -254,3 +257,17 @@ def test_the_pictures_show_the_sample_mission_as_it_is_planned_today() -> None:
     for name, words in (("jacksboro.png", length), ("jacksboro-space.png", length), ("optimal.png", bound)):
         with Image.open(TOP / "missions" / name) as picture:
             assert picture.info["Description"].startswith(words), CURE
+
+
+def test_the_picture_of_the_proof_tells_walls_room_path_and_gap_with_units() -> None:
+    source = load_mission("missions/jacksboro.yaml")
+    problem, _ = make_problem(source, source.vehicles[0], world_of(source), "length", 1)
+    axes = runpy.run_path(str(DOCS / "_make_pictures.py"))["draw_proof"](problem).axes[0]
+    assert "km" in axes.get_xlabel()
+    assert "km" in axes.get_ylabel()
+    legend = axes.get_legend()
+    assert legend is not None
+    words = [text.get_text() for text in legend.get_texts()]
+    assert any("shorter path" in w for w in words)
+    assert any(w.startswith("path, ") and w.endswith(" m") for w in words)
+    assert "gap" in axes.get_title(loc="left")

@@ -31,7 +31,7 @@ from gcsplan.app.rehearse import rehearse
 from gcsplan.check.returns.verdict import WayHome
 from gcsplan.cli import main as cli
 from gcsplan.cli.output import console, verdict_table
-from gcsplan.cli.output.return_table import say_homes
+from gcsplan.cli.output.verdict_table import say_homes
 from gcsplan.errors import UsageError
 from gcsplan.figures import floored, raised
 from gcsplan.mission_file import load_mission

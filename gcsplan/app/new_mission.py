@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from gcsplan.app.upload import run as uploads
 from gcsplan.errors import InputError, Problem, VehicleRefused
-from gcsplan.mavlink.mission.return_altitude import return_on_board_m
+from gcsplan.mavlink.mission.return_parameters import return_on_board_m
 from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.new_file import Draft, text_of
 from gcsplan.notes.note import Note

@@ -27,9 +27,8 @@ from gcsplan.app.upload.on_board import settings_of_plan
 from gcsplan.errors import UsageError
 from gcsplan.mavlink.mission.parameter_file import read_param_file
 from gcsplan.mavlink.mission.parameter_list import off, vehicle_on_board
-from gcsplan.mavlink.mission.return_altitude import return_on_board_m
-from gcsplan.sim.outcome import Rehearsal, Tally, Terms
-from gcsplan.sim.part import RehearsalPart
+from gcsplan.mavlink.mission.return_parameters import return_on_board_m
+from gcsplan.sim.outcome import Rehearsal, RehearsalPart, Tally, Terms
 
 if TYPE_CHECKING:
     from gcsplan.sim.flight.wind import Weather

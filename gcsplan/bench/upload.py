@@ -26,9 +26,9 @@ from typing import Any
 from gcsplan.errors import GcsplanError, InputError, LinkError
 from gcsplan.mavlink.link.link import Link
 from gcsplan.mavlink.link.link import run as run_steps
-from gcsplan.mavlink.link.session.drive import drive
 from gcsplan.mavlink.link.session.results import UploadResult
 from gcsplan.mavlink.link.session.session import SessionOptions, UploadOrder, upload_fleet
+from gcsplan.mavlink.link.session.steps import drive
 from gcsplan.mavlink.mission.commands import WAYPOINT
 from gcsplan.mavlink.mission.mission import RELATIVE, Home, Mission, MissionItem
 from gcsplan.mavlink.protocol.messages import Address

@@ -17,8 +17,7 @@ from itertools import groupby
 from typing import Any
 
 from gcsplan.check.motion.geodesy import flat_m
-from gcsplan.check.motion.return_rules import RULES
-from gcsplan.check.motion.return_time import return_s
+from gcsplan.check.motion.return_rules import RULES, return_s
 from gcsplan.check.motion.stopping import more_m
 from gcsplan.check.motion.stretch import Place
 from gcsplan.check.verdict import LegFigures, Verdict

@@ -2,6 +2,7 @@
 
 The check judges what is flown: wire numbers rounded as on board, and every leg along its whole length, widened by the
 track and altitude errors and by the bow between the line straight in the plane and the line straight in degrees.
+`extent_of` is what a fence on board must hold of it.
 """
 
 from __future__ import annotations
@@ -14,26 +15,23 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices
-from gcsplan.check.extent import extent_of
 from gcsplan.check.fixed_wing.climb_out import slant_findings
 from gcsplan.check.flight.corners import round_corners
 from gcsplan.check.flight.follow import follow
 from gcsplan.check.flight.times import seconds_of
-from gcsplan.check.margins import nearest_misses
-from gcsplan.check.motion.home_height import why_unknown, with_error_of_home
-from gcsplan.check.motion.project import PlaneLegs, legs_in_plane, steep_report
+from gcsplan.check.margins import enough, nearest_misses, nearest_pass
+from gcsplan.check.motion.geodesy import degree_m
+from gcsplan.check.motion.project import PlaneLegs, legs_in_plane, steep_report, why_unknown, with_error_of_home
 from gcsplan.check.motion.stretch import Flight, Stretch
 from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
-from gcsplan.check.motion.violation_depth import enough
 from gcsplan.check.verdict import LegFigures, Verdict
-from gcsplan.check.zone_heights import nearest_pass
-from gcsplan.mavlink.mission.autopilots import profile_of
-from gcsplan.mavlink.mission.firmware import needs_straight
-from gcsplan.mavlink.mission.mission import Mission
+from gcsplan.mavlink.mission.autopilots import needs_straight, profile_of
+from gcsplan.mavlink.mission.mission import Home, Mission
+from gcsplan.mavlink.mission.parameter_list import FlightExtent
 from gcsplan.notes.finding import Finding
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
-from gcsplan.world.airspace import LegReport, Violation
+from gcsplan.world.airspace import LegReport, Legs, Violation
 from gcsplan.world.geodesy.frame import EARTH_RADIUS_M, FARTHEST_M
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.world import World
@@ -394,3 +392,26 @@ def _lead_j(vehicle: Vehicle, s: Stretch, run_m: float, time_s: float) -> float:
 
 def _finding(seq: int, kind: str, note: Note, value: float, limit: float, by: float, unit: str) -> Finding:
     return Finding(seq, kind, note, math.nan, math.nan, math.nan, value, limit, by, unit)
+
+
+def extent_of(
+    stretches: Sequence[Stretch], legs: Sequence[Legs], home: Home, limits: Limits, home_error_m: float = 0.0
+) -> FlightExtent:
+    """The extent of ``stretches``, at least one, with the errors of ``limits`` and what widens each of them.
+
+    ``legs``: the same in the plane, where those of the terrain frame follow the ground; their errors of height count,
+    but for ``home_error_m``, which moves home and all heights above it alike. The ground at home is part of it.
+    """
+    ends = np.array([(*s.start, *s.end) for s in stretches])
+    lat, lon = ends[:, [0, 3]], ends[:, [1, 4]]
+    home_lat, home_lon = home.lat_e7 / 1e7, home.lon_e7 / 1e7
+    north_m = degree_m(0.5 * (home_lat + float(lat.mean())))[1]
+    east_m = degree_m(float(np.abs(np.append(lat, home_lat)).min()))[0]  # the longest of the flight's degrees
+    away_m = np.hypot(east_m * ((lon - home_lon + 180.0) % 360.0 - 180.0), north_m * (lat - home_lat)).max(axis=1)
+    reach_m = float((away_m + np.array([s.reach_m for s in stretches])).max()) + limits.track_error_m
+    top_m, bottom_m = -np.inf, home.amsl_m - limits.altitude_error_m
+    for part in legs:
+        error_m = part.altitude_error_m - home_error_m
+        top_m = max(top_m, float((np.maximum(part.start[:, 2], part.end[:, 2]) + error_m).max()))
+        bottom_m = min(bottom_m, float((np.minimum(part.start[:, 2], part.end[:, 2]) - error_m).min()))
+    return FlightExtent(top_m - home.amsl_m, bottom_m - home.amsl_m, reach_m)

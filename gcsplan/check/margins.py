@@ -1,4 +1,11 @@
-"""How near a mission comes to each limit that it keeps: the smallest margin, and its place."""
+"""How near a mission comes to the limits that it keeps, and by how much it breaks the others.
+
+`nearest_misses`: the smallest margin to each limit, and its place. `nearest_pass`: how high the mission passes over a
+zone, or how low under one: the distance that the horizontal one does not tell. `enough`: by how much a limit is broken.
+A leg that is moved by this depth keeps the limit. The exact check resolves the ground beside a leg only as finely as a
+yes or no needs, so its depth of a violation is exact to about a tenth. The depth reported here was tried: the leg,
+moved by it, passes, unless `TRIES` steps found no such depth.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +15,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gcsplan.arrays import Floats, Indices
+from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.motion.stretch import Stretch
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
-from gcsplan.world.airspace import LegReport, Legs, Violation
-from gcsplan.world.geometry.zones import Circle
+from gcsplan.world.airspace import Airspace, LegReport, Legs, Violation
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.zones import Circle, Level
 from gcsplan.world.world import World
 
 MOST_ZONES = 3
@@ -153,3 +161,132 @@ def _nearest_part(start: Floats, end: Floats, world: World, zone: int) -> float:
         if off < best:
             best, part = off, f
     return part
+
+
+FARTHEST_M, WITHIN_M = 1000.0, 0.002
+"""Passes at a greater height are not told; and how closely the height is found, metres."""
+
+
+@dataclass(frozen=True, slots=True)
+class ZonePass:
+    """The least height of the mission's line over (``over``) or under a zone within its outline, seen from above."""
+
+    seq: int
+    zone: str
+    height_m: float
+    over: bool
+    lat_deg: float
+    lon_deg: float
+
+    @property
+    def side(self) -> str:
+        """``over`` or ``under``."""
+        return "over" if self.over else "under"
+
+
+def nearest_pass(
+    stretches: Sequence[Stretch], legs: Legs, owner: Indices, limits: Limits, world: World
+) -> ZonePass | None:  # fmt: skip
+    """The nearest pass over or under a zone; None if there is none, or if the line leads into a zone.
+
+    ``owner`` (N,): index of each leg's stretch. The exact check of the legs, without errors and clearance to the side,
+    is asked how large an altitude error may be: no less than told is free above a zone or below it.
+    """
+    air = world.airspace
+    near = np.flatnonzero(_meets_box(legs, air.zone_boxes))
+    if not len(near):
+        return None
+    free = replace(limits, horizontal_clearance_m=0.0, min_agl_m=0.0, max_agl_m=None, max_amsl_m=None)
+    some = Legs(legs.start[near], legs.end[near], legs.column[near], np.zeros(len(near)), np.zeros(len(near)))
+
+    def hit(error_m: float) -> Violation | None:
+        lifted = replace(some, altitude_error_m=np.full(len(near), error_m))
+        return next((v for v in air.examine(lifted, free).violations if v.kind == "zone"), None)
+
+    found, clear_m, hits_m = hit(FARTHEST_M), 0.0, FARTHEST_M
+    if found is None or hit(0.0) is not None:
+        return None
+    while hits_m - clear_m > WITHIN_M:
+        middle = 0.5 * (clear_m + hits_m)
+        v = hit(middle)
+        clear_m, hits_m, found = (middle, hits_m, found) if v is None else (clear_m, middle, v)
+    zone = air.zones[found.zone]
+    ground = float(air.surface.ground_at(found.east_m, found.north_m))
+    floor, ceiling = _amsl_m(zone.floor, ground, -math.inf), _amsl_m(zone.ceiling, ground, math.inf)
+    lat, lon = (float(x) for x in world.frame.to_degrees(found.east_m, found.north_m))
+    over = found.amsl_m - ceiling >= floor - found.amsl_m
+    seq = stretches[int(owner[near[found.leg]])].seq
+    return ZonePass(seq, zone.name, clear_m, over, lat, lon)
+
+
+def _amsl_m(level: Level | None, ground_m: float, without_m: float) -> float:
+    if level is None:
+        return without_m
+    return level.value_m + (ground_m if level.datum == "agl" else 0.0)
+
+
+def _meets_box(legs: Legs, boxes: Floats) -> Bools:
+    """(N,) whether a leg's box meets that of a zone, (Z, 4) west, south, east, north."""
+    low, high = (f(legs.start[:, :2], legs.end[:, :2]) for f in (np.minimum, np.maximum))
+    met = np.zeros(len(low), np.bool_)
+    all_low, all_high = low.min(axis=0, initial=np.inf), high.max(axis=0, initial=-np.inf)
+    for west, south, east, north in boxes[((boxes[:, :2] <= all_high) & (boxes[:, 2:] >= all_low)).all(axis=1)]:
+        met |= (low <= (east, north)).all(axis=1) & (high >= (west, south)).all(axis=1)
+    return met
+
+
+UPWARD = {"min_agl": 1.0, "terrain_clearance": 1.0, "max_agl": -1.0}
+"""The direction in which a leg is moved to keep a limit of height: 1 up, −1 down."""
+
+TRIES = 8
+LEAST_PART = 0.95
+"""The part of a depth that suffices which is tried next, at least: the kernel's depth is mostly exact to 1 %."""
+
+FINE_PART = 1 / 200
+"""A depth that suffices is the answer if this part less of it does not."""
+
+CENTIMETRE = 0.01
+
+
+def rounded_up(by: float) -> float:
+    """``by`` rounded up to whole hundredths; unchanged if it is not finite or is 1e9 or more."""
+    return round(math.ceil(by * 100.0 - 1e-7) / 100.0, 2) if math.isfinite(by) and by < 1e9 else by
+
+
+def enough(v: Violation, broken: Indices, legs: Legs, limits: Limits, air: Airspace) -> Violation:
+    """``v`` with a ``by`` in hundredths that is enough for all of ``broken``, the legs that break the same limit."""
+    if v.kind == "coverage":
+        return v
+    by = _lift(v, broken, legs, limits, air) if v.kind in UPWARD else rounded_up(v.by)
+    below = v.kind in ("min_agl", "terrain_clearance", "zone")
+    return replace(v, by=by, value=v.limit - by if below else v.limit + by)
+
+
+def _lift(v: Violation, broken: Indices, legs: Legs, limits: Limits, air: Airspace) -> float:
+    """The smallest sufficient move found by trial, in metres: up, or down under a ceiling."""
+    alone = Limits(
+        min_agl_m=limits.min_agl_m if v.kind == "min_agl" else -1e9,
+        max_agl_m=limits.max_agl_m if v.kind == "max_agl" else None,
+        horizontal_clearance_m=limits.horizontal_clearance_m if v.kind == "terrain_clearance" else 0.0,
+    )
+
+    def left(by: float) -> float:
+        lift = np.array([0.0, 0.0, UPWARD[v.kind] * by])
+        moved = Legs(
+            legs.start[broken] + lift, legs.end[broken] + lift, legs.column[broken], legs.track_error_m[broken],
+            legs.altitude_error_m[broken],
+        )  # fmt: skip
+        return air.deepest(moved, alone, v.kind)
+
+    low, by = 0.0, rounded_up(v.by)
+    for _ in range(TRIES):
+        missing = left(by)
+        if missing <= 0.0:
+            break
+        low, by = by, rounded_up(by + max(missing, CENTIMETRE))
+    for _ in range(TRIES):
+        less = rounded_up(max(0.5 * (low + by), LEAST_PART * by))
+        if by - low <= FINE_PART * by or not low < less < by:
+            break
+        low, by = (low, less) if left(less) <= 0.0 else (less, by)
+    return by

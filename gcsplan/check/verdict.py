@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import TYPE_CHECKING
 
-from gcsplan.check.margins import Miss
+from gcsplan.check.margins import Miss, ZonePass
 from gcsplan.check.motion.stretch import Place, StretchKind
-from gcsplan.check.zone_heights import ZonePass
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.mavlink.mission.parameter_safety import FlightExtent
+from gcsplan.mavlink.mission.parameter_list import FlightExtent
 from gcsplan.notes.finding import Finding
 from gcsplan.notes.note import IN_FILES, Note, Wording
 

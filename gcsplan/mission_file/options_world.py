@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from gcsplan.arrays import Floats
 from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError, Problem
-from gcsplan.mavlink.mission.return_route import ReturnRoute
+from gcsplan.mavlink.mission.return_parameters import ReturnRoute
 from gcsplan.mission_file.load import TERRAIN_ERROR_M
 from gcsplan.mission_file.published.policy import Policy
 from gcsplan.mission_file.published.times import Hours, hours_of

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from gcsplan.mavlink.mission.mission import AltitudeFrame
-from gcsplan.mavlink.mission.return_route import ReturnRoute
+from gcsplan.mavlink.mission.return_parameters import ReturnRoute
 from gcsplan.mission_file.published.times import Hours
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import MissionEnd, Vehicle

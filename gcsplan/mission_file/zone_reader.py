@@ -1,19 +1,24 @@
-"""Zones from a file of any format, chosen by its name, and in JSON by its members."""
+"""Zones from a file of any format, chosen by its name, and in JSON by its members.
+
+Published formats are known likewise: OpenAir by its name, the others by members that no other format has.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from gcsplan.errors import InputError
-from gcsplan.mission_file.published.formats import read_published
-from gcsplan.mission_file.published.openair import OPENAIR_SUFFIXES
+from gcsplan.mission_file.published.ed269 import is_ed269, read_ed269
+from gcsplan.mission_file.published.ed318 import is_ed318, read_ed318
+from gcsplan.mission_file.published.openaip import is_openaip, read_openaip
+from gcsplan.mission_file.published.openair import OPENAIR_SUFFIXES, read_openair
 from gcsplan.mission_file.published.policy import Policy
+from gcsplan.mission_file.zones.contents import load_json, unpack
 from gcsplan.mission_file.zones.csv import read_csv
 from gcsplan.mission_file.zones.file import ZoneFile
 from gcsplan.mission_file.zones.geojson import read_geojson
-from gcsplan.mission_file.zones.json import load_json
 from gcsplan.mission_file.zones.kml import read_kml
-from gcsplan.mission_file.zones.zip import unpack
 from gcsplan.world.terrain.input_files import absent, tell_file
 
 MAX_ZONE_BYTES = 20_000_000
@@ -86,3 +91,13 @@ def _bytes(path: Path, where: str) -> bytes:
         if isinstance(why, InputError):
             raise
         raise InputError(f"{path} cannot be read: {why}", where=where) from None
+
+
+def read_published(path: Path, data: bytes, whole: Any, policy: Policy) -> ZoneFile | None:
+    """The zones of a published file; None if it has none of these formats. ``whole`` is what its JSON holds."""
+    if path.suffix.lower() in OPENAIR_SUFFIXES:
+        return read_openair(path, data, policy)
+    for is_format, read in ((is_ed269, read_ed269), (is_ed318, read_ed318), (is_openaip, read_openaip)):
+        if is_format(whole):
+            return read(path, whole, policy)
+    return None

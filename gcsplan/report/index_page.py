@@ -8,8 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import Any
 
-from gcsplan.report.parts.html import THIN, energy, esc, greatest, least, num
-from gcsplan.report.parts.html_document import document
+from gcsplan.report.parts.html import THIN, document, energy, esc, greatest, least, num
 from gcsplan.units import Units, duration
 
 Row = Mapping[str, Any]

@@ -17,10 +17,29 @@ from gcsplan.check.returns.verdict import WayHome
 from gcsplan.figures import steepened
 from gcsplan.notes.note import Note, Wording
 from gcsplan.report.briefing import briefing_html
-from gcsplan.report.parts.detail import in_full, left_out_html, only_some, samples_of
-from gcsplan.report.parts.html import data_block, energy, esc, greatest, least, num, place, stated, steepest, tools
-from gcsplan.report.parts.html_document import document
-from gcsplan.report.parts.page_data import CheckedFile, Page, Subject, page_of_check
+from gcsplan.report.parts.html import (
+    data_block,
+    document,
+    energy,
+    esc,
+    greatest,
+    least,
+    num,
+    place,
+    stated,
+    steepest,
+    tools,
+)
+from gcsplan.report.parts.page_data import (
+    CheckedFile,
+    Page,
+    Subject,
+    in_full,
+    left_out_html,
+    only_some,
+    page_of_check,
+    samples_of,
+)
 from gcsplan.report.parts.track_samples import Line, Passage, line_of, passages
 from gcsplan.report.views import tables
 from gcsplan.report.views.fleet import fleet_html, motions_of

@@ -20,8 +20,7 @@ from gcsplan.sim.flight.kinematics import Kinematics
 from gcsplan.sim.flight.mission_flight import FlownLanes, fly
 from gcsplan.sim.flight.track import CommandedTrack, make_track
 from gcsplan.sim.flight.wind import Weather
-from gcsplan.sim.outcome import Rehearsal, Tally, Terms
-from gcsplan.sim.part import RehearsalPart, energy_of
+from gcsplan.sim.outcome import Rehearsal, RehearsalPart, Tally, Terms, energy_of
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.world.world import World

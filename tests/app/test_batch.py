@@ -13,8 +13,7 @@ import yaml
 from typer import testing as runner
 
 from gcsplan.app import batch as module
-from gcsplan.app.batch import BatchOptions, MissionBatch, exit_code, missions_of
-from gcsplan.app.output.records import Record
+from gcsplan.app.batch import BatchOptions, MissionBatch, Record, exit_code, missions_of
 from gcsplan.app.parallel.executor import Dask, Inline, executor
 from gcsplan.cli.command_table import app
 from gcsplan.errors import GcsplanError, UsageError

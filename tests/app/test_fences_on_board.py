@@ -14,8 +14,8 @@ from gcsplan.app.upload.on_board import settings_of_plan
 from gcsplan.check.motion.geodesy import flat_m
 from gcsplan.mavlink.link.session.parameters import judge_fence_parameters
 from gcsplan.mavlink.mission.fences import fences_in_force
+from gcsplan.mavlink.mission.parameter_list import needed_groups
 from gcsplan.mavlink.mission.parameter_names import OnBoard, unanswered
-from gcsplan.mavlink.mission.parameter_safety import needed_groups
 from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
 from gcsplan.vehicle import Autopilot
 from tests.app.test_parameters import CRUISE, LAT, LON, WING, board, keys, planned, sent

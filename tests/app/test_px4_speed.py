@@ -11,7 +11,7 @@ from gcsplan import upload
 from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.rehearse import rehearse
 from gcsplan.errors import InputError
-from gcsplan.mavlink.link.session.px4_motion import slower_words, speed_shortage
+from gcsplan.mavlink.link.session.parameters import slower_words, speed_shortage
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.server import SimServer

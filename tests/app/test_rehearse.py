@@ -25,8 +25,7 @@ from gcsplan.errors import CheckFailed, LinkError, UsageError, VehicleRefused
 from gcsplan.mission_file import load_mission
 from gcsplan.sim.flight.mission_flight import fly
 from gcsplan.sim.flight.wind import Weather
-from gcsplan.sim.outcome import Terms
-from gcsplan.sim.part import RehearsalPart
+from gcsplan.sim.outcome import RehearsalPart, Terms
 from gcsplan.sim.rehearsal import track_of
 from gcsplan.sim.sitl import flights
 from gcsplan.sim.sitl.flights import rehearse_sitl, require_here

@@ -16,7 +16,7 @@ from gcsplan.app.plan.way_home import against_on_board, homes_of, warnings
 from gcsplan.check.motion.commands import flown_in_order
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission import commands as cmd
-from gcsplan.mavlink.mission.return_route import COPTER_RETURNS
+from gcsplan.mavlink.mission.return_parameters import COPTER_RETURNS
 from gcsplan.mission_file import load_mission
 
 WALL = {

@@ -14,8 +14,7 @@ import pytest
 from typer import testing as runner
 
 from gcsplan import load_mission
-from gcsplan.app.batch import BatchOptions, MissionBatch, missions_of
-from gcsplan.app.output.records import Record
+from gcsplan.app.batch import BatchOptions, MissionBatch, Record, missions_of
 from gcsplan.app.parallel.executor import Inline
 from gcsplan.cli.command_table import app
 from gcsplan.errors import InputError

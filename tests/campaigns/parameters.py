@@ -40,7 +40,7 @@ from gcsplan.sim.flight.kinematics import Kinematics
 from gcsplan.sim.flight.mission_flight import fly
 from gcsplan.sim.flight.trace import Trace
 from gcsplan.sim.flight.track import make_track
-from gcsplan.sim.part import RehearsalPart
+from gcsplan.sim.outcome import RehearsalPart
 from gcsplan.sim.vehicle.firmware import firmware_of
 from gcsplan.sim.vehicle.parameters import Parameters
 from gcsplan.vehicle import Autopilot, Vehicle

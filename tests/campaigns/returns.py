@@ -21,9 +21,9 @@ from gcsplan.check.flight.follow import follow
 from gcsplan.check.motion.return_rules import RULES
 from gcsplan.check.motion.stopping import circle_home_m
 from gcsplan.check.returns.footprint import ReturnPlaces, Target, places_of_returns
-from gcsplan.check.returns.lowest_height import heights_agl
-from gcsplan.check.returns.obstacles_met import CIRCLE_ABOVE_M
+from gcsplan.check.returns.obstacles import CIRCLE_ABOVE_M
 from gcsplan.check.returns.trace import MissionTrace, TraceParts, trace_of
+from gcsplan.check.returns.way_home import heights_agl
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.commands import DO_CHANGE_SPEED, TAKEOFF, WAYPOINT
 from gcsplan.mavlink.mission.mission import NO_POSITION, RELATIVE, Home, Mission, MissionItem

@@ -26,8 +26,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from gcsplan.app.batch import BatchOptions, MissionBatch, missions_of
-from gcsplan.app.output.records import Record
+from gcsplan.app.batch import BatchOptions, MissionBatch, Record, missions_of
 from gcsplan.app.parallel.executor import Inline
 from gcsplan.errors import GcsplanError
 from gcsplan.export.outdir import write_outputs

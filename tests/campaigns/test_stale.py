@@ -16,7 +16,7 @@ NOTHING = {
     # what belongs to a Shapefile is not reported
     "gcsplan.mission_file.zones.vector.tell_file": (["shapefile"], lambda path: None),
     # outputs are not compared with their digests
-    "gcsplan.app.output.records.has_outputs": (["kml"], lambda folder, digests: True),
+    "gcsplan.app.batch.has_outputs": (["kml"], lambda folder, digests: True),
     # earlier outputs of a mission that fails now stay
     "gcsplan.app.batch.retire_outputs": (["kml"], lambda folder: []),
 }
@@ -34,7 +34,7 @@ def test_a_planted_fault_is_found(fault: str, monkeypatch: pytest.MonkeyPatch) -
 
 def test_a_killed_batch_is_found_if_outputs_are_not_compared(monkeypatch: pytest.MonkeyPatch) -> None:
     """It leaves files that are not those of the record beside them."""
-    monkeypatch.setattr("gcsplan.app.output.records.has_outputs", lambda folder, digests: True)
+    monkeypatch.setattr("gcsplan.app.batch.has_outputs", lambda folder, digests: True)
     monkeypatch.setattr(stale, "MISSIONS", 1)
     monkeypatch.setattr(stale, "STEPS_OF", {stale.kill: 1})
     _, found = stale.campaign(60.0, 3, 60, ["kml"])

@@ -14,7 +14,7 @@ from gcsplan.app.plan.model import Plan
 from gcsplan.app.plan.problem import least_horizontal_j_per_m
 from gcsplan.app.plan.way_home import homes_of
 from gcsplan.arrays import Floats
-from gcsplan.check.motion.return_time import return_s
+from gcsplan.check.motion.return_rules import return_s
 from gcsplan.fleet.motion.timing import Course, Route
 from gcsplan.mission_file import load_mission
 from gcsplan.vehicle import Autopilot

@@ -11,15 +11,13 @@ from pathlib import Path
 import pytest
 
 from gcsplan.errors import InputError, Problem
-from gcsplan.mission_file.read_files import FIRST_BYTES, SUFFIXES_BY_KIND, what_else
+from gcsplan.mission_file.source import FIRST_BYTES, SUFFIXES_BY_KIND, what_else
 from gcsplan.mission_file.values.errors import few, key_path, unknown_keys
 from gcsplan.mission_file.zone_reader import read_zones
+from gcsplan.mission_file.zones.contents import decoded, load_json, unpack
 from gcsplan.mission_file.zones.csv import read_csv
 from gcsplan.mission_file.zones.geojson import read_geojson
-from gcsplan.mission_file.zones.json import load_json
 from gcsplan.mission_file.zones.kml import read_kml
-from gcsplan.mission_file.zones.text import decoded
-from gcsplan.mission_file.zones.zip import unpack
 
 HERE = Path("z.geojson")
 

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gcsplan.report.parts.detail import (
+from gcsplan.report.parts.page_data import (
     LIGHT_SAMPLES,
     MOST_FULL,
     MOST_WHOLE,
+    Subject,
     in_full,
     left_out_html,
     only_some,
     samples_of,
 )
-from gcsplan.report.parts.page_data import Subject
 from gcsplan.report.views.plan import scale_bar, zone_heights
 from gcsplan.units import AVIATION, METRIC
 from gcsplan.world.geometry.zones import Circle, Level, Zone

@@ -8,8 +8,7 @@ from gcsplan.check.judge import judge
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
-from gcsplan.sim.outcome import Rehearsal
-from gcsplan.sim.part import RehearsalPart
+from gcsplan.sim.outcome import Rehearsal, RehearsalPart
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
 from tests.support import worlds

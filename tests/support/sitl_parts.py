@@ -8,7 +8,7 @@ from gcsplan.check.judge import judge
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
-from gcsplan.sim.part import RehearsalPart
+from gcsplan.sim.outcome import RehearsalPart
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.geometry.limits import Limits
 from tests.support.worlds import world

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 from gcsplan.app.plan.model import Brief
 from gcsplan.check.judge import judge
-from gcsplan.check.motion.home_height import why_unknown
+from gcsplan.check.motion.project import why_unknown
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mavlink.build.multirotor import build_mission, corner_m, cuts_corners

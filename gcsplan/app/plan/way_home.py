@@ -15,8 +15,13 @@ from gcsplan.app.plan.model import Plan, VehiclePlan
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import CheckFailed, NoMission
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.mavlink.mission.return_altitude import on_board, return_on_board_m, returns_otherwise
-from gcsplan.mavlink.mission.return_route import route_setting, takes_another_route
+from gcsplan.mavlink.mission.return_parameters import (
+    on_board,
+    return_on_board_m,
+    returns_otherwise,
+    route_setting,
+    takes_another_route,
+)
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.notes.note import IN_FILES, Note, Wording
 from gcsplan.vehicle import Autopilot

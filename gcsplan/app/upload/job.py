@@ -28,7 +28,7 @@ class UploadOptions:
     """The user's permissions. ``allow_parameters``: parameters on board that are outside of the list are judged as they
     are. ``atomic``: if one upload fails, the missions that others took are cleared again.
 
-    ``timeout_s``: the longest time without progress, see `gcsplan.mavlink.protocol.patience`.
+    ``timeout_s``: the longest time without progress, see `gcsplan.mavlink.link.options`.
     """
 
     allow_armed: bool = False

@@ -24,13 +24,14 @@ from gcsplan.mavlink.mission.parameter_list import (
     Off,
     Setting,
     corners_as_it_leans,
+    needed_groups,
     off,
     parameter_list,
+    safety_list,
     vehicle_on_board,
 )
 from gcsplan.mavlink.mission.parameter_names import OnBoard, unanswered
-from gcsplan.mavlink.mission.parameter_safety import needed_groups, safety_list
-from gcsplan.mavlink.mission.return_altitude import return_on_board_m
+from gcsplan.mavlink.mission.return_parameters import return_on_board_m
 from gcsplan.vehicle import Autopilot, Vehicle, fastest_at_m_s
 
 if TYPE_CHECKING:
@@ -91,8 +92,7 @@ def judge_on_board(
     """
     if job.world is None or job.vehicle is None:
         return None
-    from gcsplan.mavlink.link.session.parameters import lean_shortage
-    from gcsplan.mavlink.link.session.px4_motion import speed_shortage
+    from gcsplan.mavlink.link.session.parameters import lean_shortage, speed_shortage
     from gcsplan.mavlink.link.terrain import TERRAIN_DECIDES, flies_terrain, odd_spacing, terrain_error_m
 
     world, vehicle, settings = job.world, job.vehicle, () if simulated else settings_of(job)

@@ -12,8 +12,7 @@ from typing import Any
 
 from gcsplan.bench.files import ready
 from gcsplan.bench.measure import MOST_RUNS
-from gcsplan.bench.papers.claims import MEASURES
-from gcsplan.bench.papers.judge import judge
+from gcsplan.bench.papers.judge import MEASURES, judge
 from gcsplan.bench.papers.printed import PRINTED, StraightFlight, faults, least_of
 from gcsplan.bench.papers.runs import OPTIMA, PaperRun, RunRecord, Store, carry_out, code_digest, key_of
 from gcsplan.bench.papers.scenarios import ReadyScenario, Scenario, choose, mission_text, prepare

@@ -52,7 +52,7 @@ CONVERGED_PART = 0.01
 """A run has converged when its cost is within this part of its final cost."""
 
 CODE = (
-    "*.py", "app/fleet/pipeline.py", "app/plan/problem.py", "app/parallel/sites.py", "bench/papers/readings.py",
+    "*.py", "app/fleet/pipeline.py", "app/plan/problem.py", "app/parallel/sites.py",
     "bench/papers/runs.py", "bench/papers/scenarios.py",
     "mavlink/build/*.py", "mavlink/mission/mission.py", "mission_file/**/*.py", "native/*.py", "optimisers/*.py",
     "planners/**/*.py", "world/**/*.py",

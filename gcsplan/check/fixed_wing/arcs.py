@@ -26,11 +26,10 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.check.fixed_wing.climbed import climbed
-from gcsplan.check.motion.circles import circle_growth
+from gcsplan.check.fixed_wing.climb_out import climbed
+from gcsplan.check.motion.circles import circle_growth, tracking_m, true_m_s
 from gcsplan.check.motion.geodesy import flat_m
 from gcsplan.check.motion.stretch import Flight, Place, Stretch
-from gcsplan.check.motion.tracking import tracking_m, true_m_s
 from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem

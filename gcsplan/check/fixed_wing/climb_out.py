@@ -5,20 +5,27 @@ course over ground on which it was launched and holds its nose on that heading, 
 climbs with the pitch of param1 (4° if that is 0). With an airspeed sensor that is the least pitch: with power to spare
 it climbs at up to TECS_PITCH_MAX (15°; its path is steeper still: 23° flown), so the space between the slant and the
 item's altitude is judged too. At the item's altitude, wherever that is, it turns and flies straight to the next item,
-not along the leg from the item's place (`early_turn`). The mission holds no heading, so the climb-out is judged towards
-the item's place, as maps draw it; if the item has no place, towards the next item.
+not along the leg from the item's place: one that climbs well is there early (`turns_early`). The mission holds no
+heading, so the climb-out is judged towards the item's place, as maps draw it; if the item has no place, towards the
+next item.
 
 Climb-outs and glides (`glide`) are exempt from min AGL, climb angle and terrain clearance, as columns are; never from
 zones, their clearance and ceilings. They must keep a clearance over the ground and what stands on it: the altitude
 error. Near the ends, where that is more than half of the height above the touch point, the aircraft is over the landing
 strip: there it keeps that half, over bare ground.
+
+`climbed`: the speeds of the climb-out, where the vehicle says how it climbs (`vehicle.ClimbOut`). It climbs at its own
+speed, is at the altitude of its take-off long before the slant of its least pitch is, levels off there, and slows down
+to its cruise speed. The slant stays the climb-out's line, for with less power it is flown; its pieces get the speeds
+over ground at which their places are passed.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
+from dataclasses import replace
+from itertools import pairwise, takewhile
 
 import numpy as np
 
@@ -27,13 +34,16 @@ from gcsplan.check.motion.circles import circle_growth
 from gcsplan.check.motion.flight_state import Aboard
 from gcsplan.check.motion.geodesy import degree_m, flat_m, offset_m
 from gcsplan.check.motion.spline import towards
+from gcsplan.check.motion.stopping import about_turn_m
 from gcsplan.check.motion.stretch import Place, Stretch
+from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.notes.finding import Finding
 from gcsplan.notes.note import Note
-from gcsplan.vehicle import Vehicle
+from gcsplan.vehicle import ClimbOut, Vehicle
 from gcsplan.world.airspace import Airspace, Legs
+from gcsplan.world.geodesy.atmosphere import true_per_indicated
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.world import World
@@ -301,3 +311,98 @@ def _one(p: Place, world: World) -> Floats:
 
 def _in_plane(s: Stretch, world: World) -> Floats:
     return np.array([_one(s.start, world), _one(s.end, world)])
+
+
+STEEPEST_DEG = 45.0
+"""No aircraft climbs out more steeply; 30° were flown in simulation, with TECS_PITCH_MAX 25."""
+
+OVER_FOR_M = 150.0
+"""It is above the altitude of its take-off for so many metres after it was there first."""
+
+
+def turns_early(pilot: Aboard, seq: int, after: MissionItem | None) -> None:
+    """The ways to the next item from all places of the climb-out at which the aircraft may be at its altitude."""
+    if after is None or not pilot.known or place_of(pilot, after) is None or after.command == cmd.LOITER_TO_ALT:
+        return
+    target = pilot.target(after)
+    if target is None:
+        return
+    home, end = pilot.home, pilot.at
+    first = min((end[2] - home[2]) / math.tan(math.radians(STEEPEST_DEG)) / flat_m(home, end), 1.0)
+    ahead = offset_m(home, end)
+    place = (home[0] + first * (end[0] - home[0]), home[1] + first * (end[1] - home[1]), end[2])
+    way, rest = offset_m(place, target), offset_m(place, end)
+    part = min(max((rest[0] * way[0] + rest[1] * way[1]) / max(way[0] ** 2 + way[1] ** 2, 1e-9), 0.0), 1.0)
+    aside_m = math.hypot(rest[0] - part * way[0], rest[1] - part * way[1])
+    if aside_m <= pilot.vehicle.limits.track_error_m:
+        return
+    parts = min(math.ceil(aside_m / max(pilot.vehicle.limits.track_error_m, 1.0)), MOST_PARTS)
+    half = over_m(pilot.vehicle) / 2.0
+    terrain = m.FRAME_SYNONYMS.get(after.frame, after.frame) == m.TERRAIN
+    for k in range(parts):
+        share = first + (1.0 - first) * (k + 0.5) / parts
+        start = (home[0] + share * (end[0] - home[0]), home[1] + share * (end[1] - home[1]), end[2])
+        turn = offset_m(start, target)
+        length = math.hypot(*ahead) * math.hypot(*turn)
+        cosine = (ahead[0] * turn[0] + ahead[1] * turn[1]) / max(length, 1e-9)
+        swing_m = 0.5 * (1.0 - cosine) * about_turn_m(pilot.vehicle, pilot.pace.speed_m_s, end[2])
+        gap_m = 0.5 * (1.0 - first) * math.hypot(*ahead) / parts * math.sqrt(max(0.0, 1.0 - cosine**2))
+        pilot.instead(seq, "cruise", start, target, terrain=terrain, reach_m=swing_m + gap_m)
+        pilot.at_once(seq, "cruise", start, target, terrain=terrain, reach_m=swing_m + gap_m)
+        if half > 0.0:
+            near = min(1.0, OVER_FOR_M / max(flat_m(start, target), 1.0))
+            low, high = (*start[:2], end[2] + half), (*between(start, target, near), end[2] + half)
+            pilot.instead(seq, "takeoff", low, high, column=True, reach_m=swing_m + gap_m, band_m=half)
+    pilot.note(Note("turns_early", seq))
+
+
+SLOWS_M_S2 = 1.5
+"""How quickly an aircraft that climbed with more than its cruise speed loses the rest: ten flights, within 1.4 s."""
+
+
+def climbed(stretches: Sequence[Stretch], vehicle: Vehicle) -> list[Stretch]:
+    """The stretches with the climb-out in pieces at the speeds of the vehicle's own; the same if it says nothing."""
+    known = vehicle.climb_out
+    out = list(takewhile(lambda s: s.column and s.kind == "takeoff" and s.seq == stretches[0].seq, stretches))
+    if known is None or not out or flat_m(out[0].start, out[-1].end) <= SAME_M:
+        return list(stretches)
+    top_m = out[-1].end[2]
+    cruise_m_s = out[-1].speed_m_s * float(true_per_indicated(top_m))
+    up_m = (top_m - out[0].start[2]) * known.speed_m_s / known.climb_m_s
+    slow_m = max(known.space_m_s**2 - cruise_m_s**2, 0.0) / (2.0 * SLOWS_M_S2)
+    pieces, at_m = [], 0.0
+    for s in out:
+        length = flat_m(s.start, s.end)
+        if length <= SAME_M:
+            pieces.append(s)
+            continue
+        within = {x for x in (up_m, up_m + slow_m) if at_m + SAME_M < x < at_m + length - SAME_M}
+        for a, b in pairwise([at_m, *sorted(within), at_m + length]):
+            took_s = _seconds(b, up_m, known, cruise_m_s) - _seconds(a, up_m, known, cruise_m_s)
+            start, end = _on(s, (a - at_m) / length), _on(s, (b - at_m) / length)
+            true_m_s = math.hypot(b - a, end[2] - start[2]) / took_s
+            indicated = true_m_s / float(true_per_indicated(0.5 * (start[2] + end[2])))
+            rates = (true_m_s, true_m_s)  # they bound nothing
+            pieces.append(replace(s, start=start, end=end, speed_m_s=indicated, rates_m_s=rates))
+        at_m += length
+    return pieces + list(stretches[len(out) :])  # circles that continue it have another item
+
+
+def _on(s: Stretch, part: float) -> tuple[float, float, float]:
+    if part <= 0.0 or part >= 1.0:
+        return s.start if part <= 0.0 else s.end
+    a, b = s.start, s.end
+    return a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1]), a[2] + part * (b[2] - a[2])
+
+
+def _seconds(along_m: float, up_m: float, known: ClimbOut, cruise_m_s: float) -> float:
+    """Seconds from leaving the ground to a place ``along_m`` ahead over ground; it is high enough at ``up_m``."""
+    if along_m <= up_m:
+        return along_m / known.speed_m_s
+    first_s, level_m, fast_m_s = up_m / known.speed_m_s, along_m - up_m, known.space_m_s
+    if fast_m_s <= cruise_m_s:
+        return first_s + level_m / cruise_m_s
+    slow_m = (fast_m_s**2 - cruise_m_s**2) / (2.0 * SLOWS_M_S2)
+    if level_m < slow_m:
+        return first_s + (fast_m_s - math.sqrt(fast_m_s**2 - 2.0 * SLOWS_M_S2 * level_m)) / SLOWS_M_S2
+    return first_s + (fast_m_s - cruise_m_s) / SLOWS_M_S2 + (level_m - slow_m) / cruise_m_s

@@ -1,9 +1,22 @@
-"""Circles that ArduPlane flies: their default radius, and how they grow with altitude."""
+"""Circles and arcs that ArduPlane flies: their radius, how it grows with altitude, and how far off the arc it flies.
+
+ArduPlane has no arcs: where a turn begins it steers for the next leg, and approaches it at 45° at most
+(AP_L1_Control.cpp, `update_waypoint`). A turn that begins at the tangent length stays near the arc, as long as the turn
+is not much more than a right angle and the tangent not much longer than the L1 distance; else it cuts the corner or
+swings wide. `l1_off_m` simulates that law. The aircraft also banks late: `late_m` is the offset of ArduPlane 4.6.0's
+own simulated plane (NAVL1_PERIOD 17) at corners of 3° to 120°, on arcs of 100 m at 15 and 21 m/s and of 180 m at 28
+m/s: 4 m at 6°, 6 m at 15°, 10 to 16 m from 30° on.
+"""
 
 from __future__ import annotations
 
+import math
+from functools import lru_cache
+
+from gcsplan.check.motion.stretch import Stretch
+from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
 from gcsplan.notes.note import Note
-from gcsplan.world.geodesy.atmosphere import density_ratio
+from gcsplan.world.geodesy.atmosphere import density_ratio, true_per_indicated
 
 PLANE_LOITER_RADIUS_M = 60.0  # ArduPlane WP_LOITER_RAD, default
 
@@ -29,3 +42,69 @@ def circle_widened(seq: int, radius_m: float, amsl_m: float) -> Note | None:
     if flown_m - radius_m < TOLD_M:
         return None
     return Note("circle_widened", seq, radius_m=radius_m, amsl_m=amsl_m, flown_m=flown_m, judged_m=most_m)
+
+
+LATE_S, LATE_PER_SINE = 0.72, 3.0
+"""Seconds of flight by which a turn lies outside its arc, and how fast that grows with the sine of a small turn."""
+
+MOST_BANK_DEG, BANK_S = 45.0, 0.5
+"""Default of ROLL_LIMIT_DEG, and the time constant of a simulated aircraft's bank, s."""
+
+STEP_S, CALM_S = 0.1, 30.0
+"""Time step (ArduPlane steers ten times a second), and how long the flight is simulated after the turn, s."""
+
+SLOWEST_M_S = 1.0
+"""Slower turns are simulated at this speed, which no plane flies: the steps of a turn grow as its speed falls."""
+
+CAPTURE_SINE = math.sqrt(0.5)
+GRAVITY_M_S2 = 9.80665
+
+
+def true_m_s(s: Stretch) -> float:
+    """The true airspeed at the higher end of a stretch, m/s."""
+    return s.speed_m_s * float(true_per_indicated(max(s.start[2], s.end[2])))
+
+
+def late_m(turn_rad: float, speed_m_s: float, tuning: Tuning = DEFAULTS) -> float:
+    """How far outside its arc a turn was measured to lie, m, scaled to a speed; and to a NAVL1_PERIOD that is longer
+    than the one it was measured with."""
+    turn = min(abs(turn_rad), 0.5 * math.pi)
+    return LATE_S * tuning.l1_slower * speed_m_s * min(1.0, LATE_PER_SINE * math.sin(turn))
+
+
+def tracking_m(radius_m: float, turn_rad: float, speed_m_s: float, tuning: Tuning = DEFAULTS) -> float:
+    """How far from its arc a turn that begins at the tangent length is flown in calm air, m; 0 at speed 0."""
+    if not speed_m_s > 0.0:
+        return 0.0
+    turn = min(math.radians(math.ceil(math.degrees(abs(turn_rad)) - 1e-6)), math.radians(170.0))
+    speed = max(round(speed_m_s, 1), SLOWEST_M_S)
+    return max(late_m(turn_rad, speed_m_s, tuning), l1_off_m(radius_m, turn, speed, tuning))
+
+
+@lru_cache(maxsize=4096)
+def l1_off_m(radius_m: float, turn_rad: float, speed_m_s: float, tuning: Tuning = DEFAULTS) -> float:
+    """The largest distance from the arc under the L1 law, m, for a turn to the left between long legs."""
+    tangent = radius_m * math.tan(0.5 * turn_rad)
+    ahead = tuning.l1_ahead_m(speed_m_s)
+    gain = 4.0 * tuning.l1_damping**2 * speed_m_s**2 / ahead
+    cos, sin = math.cos(turn_rad), math.sin(turn_rad)
+    x, y, heading, bank, worst = -tangent, 0.0, 0.0, 0.0, 0.0  # the corner is the origin, the first leg the x axis
+    steps = math.ceil((2.0 * tangent / speed_m_s + CALM_S * tuning.l1_slower) / STEP_S)
+    most = math.radians(min(tuning.roll_deg, MOST_BANK_DEG))
+    for _ in range(steps):
+        aside = cos * y - sin * x  # left of the new leg
+        closing = math.asin(min(max(-aside / ahead, -CAPTURE_SINE), CAPTURE_SINE))
+        wanted = closing + (turn_rad - heading + math.pi) % (2.0 * math.pi) - math.pi
+        push = gain * math.sin(min(max(wanted, -0.5 * math.pi), 0.5 * math.pi))
+        bank += (min(max(math.atan(push / GRAVITY_M_S2), -most), most) - bank) * STEP_S / BANK_S
+        heading += GRAVITY_M_S2 * math.tan(bank) / speed_m_s * STEP_S
+        x += speed_m_s * math.cos(heading) * STEP_S
+        y += speed_m_s * math.sin(heading) * STEP_S
+        off = min(
+            math.hypot(max(x + tangent, 0.0), y),
+            math.hypot(max(tangent - cos * x - sin * y, 0.0), cos * y - sin * x),
+        )
+        if math.atan2(x + tangent, radius_m - y) % (2.0 * math.pi) <= turn_rad:
+            off = min(off, abs(math.hypot(x + tangent, y - radius_m) - radius_m))
+        worst = max(worst, off)
+    return worst

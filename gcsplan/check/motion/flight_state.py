@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from gcsplan.check.motion.pace import Pace
+from gcsplan.check.motion.commands import Pace
 from gcsplan.check.motion.spline import Direction
 from gcsplan.check.motion.stretch import Flight, Place, Stretch, StretchKind
 from gcsplan.mavlink.mission import commands as cmd

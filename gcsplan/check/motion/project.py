@@ -2,6 +2,8 @@
 
 Over a bilinear surface the ground under a straight line is a quadratic in each cell. So is the altitude of a leg that
 is interpolated above ground: its middle gives its distance from a chord, and its slope is steepest at an end.
+
+Home's ground may have two heights. Relative altitudes count from it, so all of them are uncertain together.
 """
 
 from __future__ import annotations
@@ -14,13 +16,45 @@ import numpy as np
 
 from gcsplan.arrays import Floats, Indices
 from gcsplan.check.motion.stretch import Stretch
+from gcsplan.figures import raised
+from gcsplan.mavlink.mission.mission import Home
+from gcsplan.notes.note import Note
+from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import LegReport, Legs, Violation, ViolationKind
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.terrain.vehicle_terrain import VehicleTerrain
 from gcsplan.world.world import World
 
-__all__ = ["PlaneLegs", "legs_in_plane", "steep_report"]
+
+def spread_at_home_m(home: Home, world: World) -> float:
+    """How far the greatest ground at home lies above the least one, m; 0 where they are one or unknown."""
+    return world.spread_m(home.lat_e7 / 1e7, home.lon_e7 / 1e7)
+
+
+def why_unknown(home: Home, vehicle: Vehicle, world: World) -> Note | None:
+    """Why altitudes above home cannot be judged: its ground is not one number within the altitude error; else None."""
+    spread_m, error_m = spread_at_home_m(home, world), vehicle.limits.altitude_error_m
+    if spread_m <= error_m:
+        return None
+    lat, lon = home.lat_e7 / 1e7, home.lon_e7 / 1e7
+    low_m = world.ground_amsl(lat, lon)
+    return Note(
+        "home_has_two_heights", lat=lat, lon=lon, low_m=low_m, high_m=low_m + spread_m, spread_m=raised(spread_m, 1)
+    )
+
+
+def with_error_of_home(vehicle: Vehicle, home: Home, world: World) -> Vehicle:
+    """The vehicle with an altitude error that holds the uncertainty of home's ground too.
+
+    Home is taken for its least height: from a higher one the whole mission is flown higher.
+    """
+    spread_m = spread_at_home_m(home, world)
+    if spread_m == 0.0:
+        return vehicle
+    limits = vehicle.limits
+    return replace(vehicle, limits=replace(limits, altitude_error_m=limits.altitude_error_m + spread_m))
+
 
 SAG_M = 0.05
 """How far a chord may lie from the quadratic that it replaces, m; added to the altitude error of its piece."""

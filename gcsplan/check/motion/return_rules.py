@@ -1,4 +1,4 @@
-"""How each autopilot returns: one table of rules, and one return as straight pieces.
+"""How each autopilot returns: one table of rules, one return as straight pieces, and the seconds that it takes at most.
 
 - ArduCopter (mode_rtl.cpp, ``compute_return_target``): climbs on the spot to the higher of its altitude and RTL_ALT
   (RTL_ALT_M since 4.7; relative to home), flies straight home at that altitude, descends. Within a cone around home it
@@ -7,17 +7,19 @@
 - PX4 (rtl.cpp): the same with RTL_RETURN_ALT (30 m for multicopters, rc.mc_defaults) and RTL_CONE_ANG (45 degrees).
   Later versions have the cone only within RTL_MIN_DIST (10 m) of home and climb fully beyond it; older ones go to
   RTL_DESCEND_ALT within that distance. It flies home at MPC_XY_CRUISE (`Vehicle.return_speed_m_s`). It
-  returns so with RTL_TYPE 0 alone (`return_altitude.returns_otherwise`).
+  returns so with RTL_TYPE 0 alone (`return_parameters.returns_otherwise`).
 - ArduPlane, a QuadPlane too: turns and flies home at once, and on the way climbs or glides to RTL_ALTITUDE
   (ALT_HOLD_RTL before 4.5; -1 keeps its altitude). Over home it circles with WP_LOITER_RAD, grown with altitude.
 
-How far each goes on before it flies home is in `run_on`.
+How far each goes on before it flies home is in `stopping`.
 
-Two modules read these rules. `returned` is the return of an RTL item, from one place; `sweep` judges the return
-after a failsafe, from every point of a mission. Where an autopilot may fly one of several altitudes, both judge all of
-them: in the cone from the cone's altitude up to the return altitude, on a plane's flight home from its altitude to the
-return altitude. Not judged: RTL_ALT_TYPE 1 (terrain), RTL_CLIMB_MIN, fences that cap the return, Q_RTL_MODE, missions
-with DO_LAND_START. `cone_differs` is judged in `returned` alone.
+Two modules read these rules. `returned` is the return of an RTL item, from one place; `returns.obstacles` judges the
+return after a failsafe, from every point of a mission. Where an autopilot may fly one of several altitudes, both judge
+all of them: in the cone from the cone's altitude up to the return altitude, on a plane's flight home from its altitude
+to the return altitude. Not judged: RTL_ALT_TYPE 1 (terrain), RTL_CLIMB_MIN, fences that cap the return, Q_RTL_MODE,
+missions with DO_LAND_START. `cone_differs` is judged in `returned` alone.
+
+`return_s` is for still air: what a base power (`gcsplan.vehicle.Energy`) needs to know of a return.
 """
 
 from __future__ import annotations
@@ -33,7 +35,8 @@ from gcsplan.arrays import Floats
 from gcsplan.check.motion.circles import PLANE_LOITER_RADIUS_M, circle_growth
 from gcsplan.check.motion.geodesy import flat_m
 from gcsplan.check.motion.stretch import Place, Stretch
-from gcsplan.vehicle import Autopilot
+from gcsplan.fleet.motion.timing import LAND_SLOWLY_M, PX4_LAND_SLOWLY_M
+from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.geometry.limits import Limits
 
 AT_HOME_M = 5.0
@@ -163,3 +166,36 @@ def _band(flies: Flies, at: Place, home: Place, a_amsl_m: float, b_amsl_m: float
     """A level flight home at any altitude between two."""
     middle, half = 0.5 * (a_amsl_m + b_amsl_m), 0.5 * abs(b_amsl_m - a_amsl_m)
     return flies((*at[:2], middle), (*home[:2], middle), band_m=half)
+
+
+CHANGES = 1.5
+"""A flight home stops, starts and stops: each takes half of speed over acceleration longer than at full speed."""
+
+OWN_METRES = 1.02
+"""ArduPilot's own metres may be this much longer than those over ground, 150 km from home at most."""
+
+
+def return_s(vehicle: Vehicle, way_m: float, rise_m: float, down_m: float, speed_m_s: float) -> float:
+    """Seconds of a return without its wait over home: no fewer than the time table has (`fleet.timing`).
+
+    ``way_m``: horizontal; ``rise_m``: from its beginning to its level, negative if that is lower; ``down_m``: from
+    there to the ground at home; ``speed_m_s``: that of the mission where it begins (NaN: the vehicle's fastest). It is
+    convex in the three lengths.
+    """
+    own_m_s = vehicle.speed_max_m_s if math.isnan(speed_m_s) else speed_m_s
+    speed = own_m_s if vehicle.return_speed_m_s is None else min(own_m_s, vehicle.return_speed_m_s)
+    # A rate that is not bounded is the speed in space.
+    climb, descent, land = (
+        speed if math.isinf(rate) else rate for rate in (vehicle.climb_m_s, vehicle.descent_m_s, vehicle.land_m_s)
+    )
+    slow_m = PX4_LAND_SLOWLY_M if vehicle.autopilot is Autopilot.PX4 else LAND_SLOWLY_M
+    seconds = max(rise_m, 0.0) / climb + max(-rise_m, 0.0) / descent + down_m / descent
+    seconds += min(down_m, slow_m) / min(land, descent)
+    seconds += way_m / speed * (OWN_METRES if vehicle.lays_curves else 1.0)
+    if math.isfinite(vehicle.vertical_accel_m_s2):
+        seconds += (climb + 2.0 * descent) / vehicle.vertical_accel_m_s2
+    if math.isfinite(vehicle.accel_m_s2):
+        # PX4 brakes by 2 a/j seconds at the speed earlier (`fleet.smoothed`); without a bound of the jerk this is 0.
+        jerks_s = (4.0 if vehicle.smooths else 2.0) * vehicle.accel_m_s2 / vehicle.leg_jerk_m_s3
+        seconds += CHANGES * (speed / vehicle.accel_m_s2 + jerks_s)
+    return seconds

@@ -19,8 +19,8 @@ from dataclasses import replace
 import numpy as np
 
 from gcsplan.arrays import Floats
+from gcsplan.check.motion.commands import Pace
 from gcsplan.check.motion.geodesy import degree_m, offset_m
-from gcsplan.check.motion.pace import Pace
 from gcsplan.check.motion.stretch import Place
 from gcsplan.fleet.motion.ardupilot import FULL_ACCEL
 from gcsplan.fleet.motion.scurve import along_slope, curves

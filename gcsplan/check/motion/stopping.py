@@ -20,8 +20,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from gcsplan.check.motion.circles import circle_growth
-from gcsplan.check.motion.tracking import GRAVITY_M_S2
+from gcsplan.check.motion.circles import GRAVITY_M_S2, circle_growth
 from gcsplan.check.motion.turn_parameters import DEFAULTS
 from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, Autopilot, Vehicle
 

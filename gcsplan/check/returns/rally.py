@@ -18,8 +18,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.motion.return_rules import RULES, RallyAltitude
 from gcsplan.check.returns.footprint import Target
-from gcsplan.check.returns.obstacles import Obstacles
-from gcsplan.check.returns.obstacles_met import GradedObstacles, obstacles_of_returns
+from gcsplan.check.returns.obstacles import GradedObstacles, Obstacles, obstacles_of_returns
 from gcsplan.check.returns.refinement import CLEAR, Refinement
 from gcsplan.check.returns.stretches import stretches_of
 from gcsplan.check.returns.trace import MissionTrace, TraceParts

@@ -12,8 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from gcsplan.arrays import Bools
-from gcsplan.check.returns.obstacles import Obstacles
-from gcsplan.check.returns.obstacles_met import GradedObstacles
+from gcsplan.check.returns.obstacles import GradedObstacles, Obstacles
 from gcsplan.check.returns.trace import MissionTrace, TraceParts
 
 Judge = Callable[[TraceParts, bool], GradedObstacles]

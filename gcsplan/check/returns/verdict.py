@@ -9,8 +9,7 @@ from typing import Any
 from gcsplan.check.battery import BatteryHome
 from gcsplan.check.motion.stretch import Place
 from gcsplan.check.returns.words import Row, listed, together_m, verdict_words
-from gcsplan.mavlink.mission.return_altitude import setting, settings
-from gcsplan.mavlink.mission.return_route import ReturnRoute, route_setting
+from gcsplan.mavlink.mission.return_parameters import ReturnRoute, route_setting, setting, settings
 from gcsplan.notes.note import IN_FILES, Note, Wording, in_json
 from gcsplan.vehicle import Autopilot
 

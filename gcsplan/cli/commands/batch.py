@@ -27,7 +27,7 @@ from gcsplan.figures import counted
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from gcsplan.app.output.records import Record
+    from gcsplan.app.batch import Record
 
 SHOWN = 20
 """Missions without a plan that are printed at most; the table has all of them."""
@@ -58,7 +58,7 @@ def batch(
     from gcsplan.app.batch import PIECE_S, BatchOptions, MissionBatch, exit_code, missions_of
     from gcsplan.app.parallel.executor import executor
     from gcsplan.cli.output.console import remark, say
-    from gcsplan.cli.output.work_display import WorkDisplay
+    from gcsplan.cli.output.progress import WorkDisplay
 
     options = BatchOptions(planner, objective, seed, report, allow_unjudged, at)
     work = MissionBatch(missions_of(missions), out, options)

@@ -131,8 +131,7 @@ def bench_terrain(
 
     from gcsplan.bench.terrain import report as terrain_report
     from gcsplan.bench.terrain import run as terrain
-    from gcsplan.cli.output.console import remark
-    from gcsplan.cli.output.screens import RESULTS
+    from gcsplan.cli.output.console import RESULTS, remark
 
     try:
         budgets = [float(s) for s in seconds.split(",")]
@@ -166,8 +165,7 @@ def bench_swarms(
     from rich.console import Console
 
     from gcsplan.bench.swarms import run as swarms
-    from gcsplan.cli.output.console import remark
-    from gcsplan.cli.output.screens import RESULTS
+    from gcsplan.cli.output.console import RESULTS, remark
 
     result = swarms.run(
         out,

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from gcsplan.app.check.files import Batch
     from gcsplan.app.check.many import Archive, Form, Shown
     from gcsplan.app.check.worlds import Checked, Returns
-    from gcsplan.mavlink.mission.return_route import ReturnRoute
+    from gcsplan.mavlink.mission.return_parameters import ReturnRoute
     from gcsplan.mission_file.options_world import WorldOptions
     from gcsplan.mission_file.values.places import Degrees
     from gcsplan.units import Units
@@ -145,8 +145,7 @@ def check(
     """
     from gcsplan.app.check import files as checking
     from gcsplan.app.check import worlds as check_sites
-    from gcsplan.app.check.archive_words import told_of_batch
-    from gcsplan.app.check.many import Shown
+    from gcsplan.app.check.many import Shown, told_of_batch
     from gcsplan.cli.output.check_output import Document, Lines, Rows, tell, tell_archive
     from gcsplan.export.outdir import steady
     from gcsplan.units import units_of
@@ -282,8 +281,7 @@ def _home(text: str) -> Degrees:
 
 def _say_all(batch: Batch, units: Units) -> None:
     from gcsplan.cli.output.console import say, say_heights, say_notes
-    from gcsplan.cli.output.return_table import say_home, say_warnings
-    from gcsplan.cli.output.verdict_table import verdict_table
+    from gcsplan.cli.output.verdict_table import say_home, say_warnings, verdict_table
     from gcsplan.export.profile import profile_lines
     from gcsplan.notes.note import Wording
 

@@ -168,7 +168,7 @@ def _named(text: str) -> Sequence[Cell]:
 @contextmanager
 def _progress() -> Iterator[FetchProgress | None]:
     """Bars of what is being brought, on a terminal only."""
-    from gcsplan.cli.output.screens import aside
+    from gcsplan.cli.output.console import aside
 
     if not aside.is_terminal:
         yield None

@@ -157,8 +157,8 @@ def plan(
     from gcsplan.app.output import files as outputs
     from gcsplan.app.plan.way_home import is_required
     from gcsplan.cli.output.console import plan_table, release_table, remark, upload_table
-    from gcsplan.cli.output.planning_display import planning_display
-    from gcsplan.cli.output.return_table import say_homes
+    from gcsplan.cli.output.progress import planning_display
+    from gcsplan.cli.output.verdict_table import say_homes
     from gcsplan.export.outdir import settle_outputs
     from gcsplan.mission_file.samples import file_of
     from gcsplan.units import units_of

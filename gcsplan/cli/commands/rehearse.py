@@ -105,9 +105,8 @@ def rehearse(
     from gcsplan.app.output.report import render_rehearsal
     from gcsplan.app.plan.left_out import refusal_of
     from gcsplan.cli.output.console import remark, say, say_notes
-    from gcsplan.cli.output.planning_display import planning_display
-    from gcsplan.cli.output.return_table import say_homes
-    from gcsplan.cli.output.work_display import WorkDisplay
+    from gcsplan.cli.output.progress import WorkDisplay, planning_display
+    from gcsplan.cli.output.verdict_table import say_homes
     from gcsplan.export.outdir import write_whole
     from gcsplan.notes.note import Wording
     from gcsplan.sim.flight.wind import Weather

@@ -202,7 +202,7 @@ def _against(name: str, compared: TerrainComparison) -> GcsplanError | None:
 @contextmanager
 def _progress(words: str, as_json: bool) -> Iterator[Report | None]:
     """A line for each vehicle, on a terminal only."""
-    from gcsplan.cli.output.screens import aside
+    from gcsplan.cli.output.console import aside
 
     if as_json or not aside.is_terminal:
         yield None

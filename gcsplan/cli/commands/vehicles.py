@@ -84,8 +84,7 @@ def upload(
     from gcsplan.app.upload import run as uploads
     from gcsplan.app.upload.job import UploadOptions
     from gcsplan.cli.output.console import say_notes, say_notes_of, transfer_progress, upload_table
-    from gcsplan.cli.output.return_table import say_warnings
-    from gcsplan.cli.output.verdict_table import verdict_table
+    from gcsplan.cli.output.verdict_table import say_warnings, verdict_table
     from gcsplan.export.outdir import require_settled, steady
     from gcsplan.notes.note import Wording
     from gcsplan.sim.vehicle.server import loopback_fleet

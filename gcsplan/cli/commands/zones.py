@@ -19,8 +19,7 @@ def show_zones(files: Sequence[Path], units: Units, *, as_json: bool, at: str | 
     from rich.markup import escape
 
     from gcsplan.app.output.zones import list_zones
-    from gcsplan.cli.output.console import new_table, say, say_notes
-    from gcsplan.cli.output.screens import console
+    from gcsplan.cli.output.console import console, new_table, say, say_notes
     from gcsplan.figures import counted
     from gcsplan.notes.note import in_json
 

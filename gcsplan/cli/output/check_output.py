@@ -11,9 +11,8 @@ from gcsplan.cli.process.exit import closers, complain, explained, interrupted, 
 from gcsplan.errors import GcsplanError, InputError
 
 if TYPE_CHECKING:
-    from gcsplan.app.check.archive_words import Summary, Told
     from gcsplan.app.check.files import Failing
-    from gcsplan.app.check.many import Archive
+    from gcsplan.app.check.many import Archive, Summary, Told
     from gcsplan.notes.note import Note
     from gcsplan.units import Units
 
@@ -172,8 +171,8 @@ def tell(
 
     What ends it early closes a document, in which it is the ``error``, and ends the command with its code.
     """
-    from gcsplan.app.check.archive_words import Summary
     from gcsplan.app.check.files import failure
+    from gcsplan.app.check.many import Summary
 
     summary, more = Summary(), 0
     failing: list[Failing] = []

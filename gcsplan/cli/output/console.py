@@ -1,18 +1,22 @@
-"""Output for people: tables and verdicts on standard output; notes, progress and messages on standard error."""
+"""Output for people: tables and verdicts on standard output; notes, progress and messages on standard error.
+
+Both are consoles of rich: `console` and `aside`.
+"""
 
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO, cast
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from gcsplan.check.returns.words import verdict_words
-from gcsplan.cli.output.screens import RESULTS, aside, console
+from gcsplan.cli.process.exit import put
 from gcsplan.figures import floored, raised, steepened
 from gcsplan.notes.note import IN_FILES, Note, Wording
 from gcsplan.units import KILOJOULE, METRIC, WATT_HOUR, Unit, Units, charge, duration, in_units
@@ -26,6 +30,48 @@ if TYPE_CHECKING:
     from gcsplan.mavlink.protocol.machine import TransferProgress as Transfer
     from gcsplan.mission_file import MissionFile
     from gcsplan.notes.note import Note
+
+PLAIN_WIDTH = 130
+"""Columns of a log file or a pipe, whose width is unknown."""
+
+
+class _Results:
+    """Standard output as a file for rich: a full disk or a closed output is our error, not one of rich."""
+
+    def write(self, text: str) -> int:
+        try:
+            if text:
+                put(text)
+        except BaseException:  # rich would keep what it could not write, and write it before the next words
+            console.begin_capture()
+            console.end_capture()
+            raise
+        return len(text)
+
+    def flush(self) -> None:
+        """`put` has flushed already."""
+
+    def isatty(self) -> bool:
+        return sys.stdout is not None and sys.stdout.isatty()
+
+    def fileno(self) -> int:
+        return sys.stdout.fileno()
+
+    @property
+    def encoding(self) -> str:
+        return getattr(sys.stdout, "encoding", None) or "utf-8"
+
+
+RESULTS = cast(TextIO, _Results())
+
+console = Console(file=RESULTS, highlight=False, soft_wrap=True)
+"""Results."""
+aside = Console(stderr=True, highlight=False, soft_wrap=True)
+"""Notes, progress and errors."""
+for screen in (console, aside):
+    if not screen.is_terminal:
+        screen.width = PLAIN_WIDTH
+
 
 WIDEST = 100_000
 MOST_WHOLE = 30

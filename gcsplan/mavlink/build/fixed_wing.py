@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.arrays import Floats
-from gcsplan.mavlink.build.heights import most_cm, whole_cm
-from gcsplan.mavlink.build.order import Order, split_legs
+from gcsplan.mavlink.build.order import Order, most_cm, split_legs, whole_cm
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.autopilots import altitude_of_cm

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.mavlink.build.fixed_wing import build_wing
-from gcsplan.mavlink.build.heights import most_cm, whole_cm
-from gcsplan.mavlink.build.order import Order, split_legs
+from gcsplan.mavlink.build.order import Order, most_cm, split_legs, whole_cm
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.autopilots import altitude_of_cm

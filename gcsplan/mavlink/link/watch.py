@@ -1,6 +1,10 @@
 """The state that a vehicle reports: heartbeats, position, capabilities and texts, combined into a `VehicleState`.
 
 Reports are kept separately for each address, so that two vehicles with the same system id are not taken for one.
+
+Every number from a vehicle's messages passes through `finite`, `whole` or `place` before it is used in a calculation:
+NaN, infinity and values out of range are rejected. Mission items do not pass: they are compared bit for bit, and NaN
+has a meaning in them.
 """
 
 from __future__ import annotations
@@ -8,16 +12,53 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.mavlink.link.link import Heard
 from gcsplan.mavlink.link.transport import Peer
-from gcsplan.mavlink.link.validate import VehiclePosition, place
 from gcsplan.mavlink.mission.autopilots import GENERIC, INVALID, autopilot_name, type_name
 from gcsplan.mavlink.mission.mission import Home
 from gcsplan.mavlink.protocol.messages import Address
+
+_MOST_HEIGHT_M = 100_000.0
+
+
+class VehiclePosition(NamedTuple):
+    """A position in degrees and metres above mean sea level."""
+
+    lat_deg: float
+    lon_deg: float
+    amsl_m: float
+
+
+def finite(value: object) -> float | None:
+    """Return ``value`` as a float; None if it is NaN, infinite or not a number."""
+    if not isinstance(value, (int, float)):
+        return None
+    try:
+        number = float(value)
+    except OverflowError:
+        return None
+    return number if math.isfinite(number) else None
+
+
+def whole(value: object, low: int, high: int) -> int | None:
+    """Return ``value`` as a whole number within ``low`` … ``high``; None if it is not one."""
+    number = finite(value)
+    return int(number) if number is not None and number == int(number) and low <= number <= high else None
+
+
+def place(lat_e7: object, lon_e7: object, alt_mm: object) -> VehiclePosition | None:
+    """Return the place for 1e-7 degrees and millimetres; None if out of range, or at 0, 0, which means no fix."""
+    lat, lon = whole(lat_e7, -900_000_000, 900_000_000), whole(lon_e7, -1_800_000_000, 1_800_000_000)
+    height_mm = finite(alt_mm)
+    if lat is None or lon is None or height_mm is None or (lat, lon) == (0, 0):
+        return None
+    amsl_m = height_mm / 1e3
+    return VehiclePosition(lat / 1e7, lon / 1e7, amsl_m) if abs(amsl_m) <= _MOST_HEIGHT_M else None
+
 
 # MAV_STATE
 UNINIT, BOOT, CALIBRATING, STANDBY, ACTIVE, CRITICAL, EMERGENCY, POWEROFF, TERMINATION = range(9)

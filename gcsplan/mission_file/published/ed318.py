@@ -1,4 +1,9 @@
-"""Zones from ED-318 JSON (EUROCAE, 2023): GeoJSON whose geometries have a ``layer`` of limits, and Points an extent."""
+"""Zones from ED-318 JSON (EUROCAE, 2023): GeoJSON whose geometries have a ``layer`` of limits, and Points an extent.
+
+States publish its members in other layouts, which `standard_properties` brings to the standard's own. ENAIRE (Spain)
+publishes two: ``UASZone`` and ``verticalLayer`` beside each other, and one flat table. In both, an empty
+text means that there is no value.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.mission_file.published.ed269 import published
-from gcsplan.mission_file.published.layouts import ZONE, standard_properties
 from gcsplan.mission_file.published.members import (
     MemberError,
     add_polygons,
@@ -112,3 +116,33 @@ def _limits(layer: Any, where: str, policy: Policy) -> VolumeLimits:
     found = VolumeLimits.read(given[0], given[1], where, policy=policy)
     found.remarks += remarks
     return found
+
+
+ZONE, LAYER = "UASZone", "verticalLayer"
+_LIMITS = ("lower", "lowerReference", "upper", "upperReference", "uom", "UOM")
+_PERIOD = ("startDateTime", "endDateTime")
+_DAILY = ("day", "startTime", "startEvent", "endTime", "endEvent")
+_AUTHORITY = ("purpose", "intervalBefore", "service", "contactName", "siteURL", "email", "phone")
+
+
+def standard_properties(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any] | None]:
+    """The properties of a feature as ED-318 has them, and its layer of limits if that stands among them."""
+    zone = given.get(ZONE)
+    whole = {k: v for k, v in given.items() if k != ZONE} | zone if isinstance(zone, dict) else dict(given)
+    layer = whole.pop(LAYER) if isinstance(whole.get(LAYER), dict) else _group(whole, _LIMITS)
+    if layer is not None:
+        layer = {k.lower() if k == "UOM" else k: v for k, v in layer.items() if not _empty(v)}
+    if "limitedApplicability" not in whole and (daily := _group(whole, _DAILY)) is not None:
+        whole["limitedApplicability"] = [(_group(whole, _PERIOD) or {}) | {"schedule": [daily]}]
+    if "zoneAuthority" not in whole and (authority := _group(whole, _AUTHORITY)) is not None:
+        whole["zoneAuthority"] = [authority | {"name": whole.get("name_authority")}]
+    return whole, layer
+
+
+def _group(whole: dict[str, Any], keys: tuple[str, ...]) -> dict[str, Any] | None:
+    found = {k: whole[k] for k in keys if k in whole}
+    return found or None
+
+
+def _empty(given: Any) -> bool:
+    return isinstance(given, str) and not given.strip()

@@ -15,8 +15,7 @@ from gcsplan.mission_file.values.places import PLACE_EXAMPLES
 from gcsplan.mission_file.values.point_keys import POINT_FORMS
 from gcsplan.mission_file.values.schema import POINT_FORM_NAMES, PlannerKeys, TerrainKeys, ZoneKeys, nearest, shown
 from gcsplan.mission_file.values.units import UNIT_SYMBOLS, nearest_keys, other_names, unit_end
-from gcsplan.mission_file.values.yaml import lines_of
-from gcsplan.mission_file.values.yaml_slips import missing_space
+from gcsplan.mission_file.values.yaml import lines_of, missing_space
 
 Section = TypeVar("Section", bound=Keys)
 

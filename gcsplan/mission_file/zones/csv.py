@@ -11,9 +11,9 @@ from pathlib import Path
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.values.places import read_place
 from gcsplan.mission_file.zones.attributes import Attribute, as_figure, read_attributes
+from gcsplan.mission_file.zones.contents import decoded
 from gcsplan.mission_file.zones.draft import SIZE_KEYS
 from gcsplan.mission_file.zones.file import ZoneFile
-from gcsplan.mission_file.zones.text import decoded
 
 LAT = ("lat", "latitude", "latdeg", "latitudedeg", "latdec", "latdd", "latwgs84")
 LON = ("lon", "lng", "long", "longitude", "londeg", "longitudedeg", "londec", "longdec", "londd", "longdd", "lonwgs84")

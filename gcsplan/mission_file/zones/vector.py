@@ -14,9 +14,9 @@ import numpy as np
 
 from gcsplan.errors import InputError, Problem
 from gcsplan.mission_file.zones.attributes import Attribute, ZoneStatements, as_figure, read_attributes
+from gcsplan.mission_file.zones.contents import unpack
 from gcsplan.mission_file.zones.draft import MAX_VERTICES, SIZE_KEYS
 from gcsplan.mission_file.zones.file import MAX_ZONES, Drawn, ZoneFile, drawn_unread
-from gcsplan.mission_file.zones.zip import unpack
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.degree_shapes import beyond_outline
 from gcsplan.world.geodesy.reprojection import ToDegrees

@@ -1,13 +1,21 @@
-"""Words and numbers as HTML: texts from files are escaped here, and every number gets its unit here."""
+"""Words and numbers as HTML, and the document around them.
+
+Texts from files are escaped here, and every number gets its unit here. A document has its style and scripts inside,
+nothing from elsewhere, and no other script can run.
+"""
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import html
 import json
 import math
 import unicodedata
 from collections.abc import Callable, Iterable, Sequence
+from importlib import resources
 
+from gcsplan import __version__
 from gcsplan.figures import floored, raised, steepened
 from gcsplan.units import KILOJOULE, WATT_HOUR, Unit, charge
 
@@ -132,3 +140,38 @@ def data_block(name: str, value: object) -> str:
     text = json.dumps(value, separators=(",", ":"), ensure_ascii=True, allow_nan=False, sort_keys=True)
     text = text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
     return f'<script type="application/json" id="{name}">{text}</script>'
+
+
+def document(
+    title: str,
+    body: str,
+    data: str,
+    *,
+    scripts: Sequence[str],
+    styles: Sequence[str] = ("report.css",),
+    what: str = "mission report",
+) -> str:
+    """The whole page: ``body`` and ``data`` (blocks for the scripts) are HTML, ``what`` stands behind the title.
+
+    ``scripts`` and ``styles`` are names in ``assets/``.
+    """
+    style = "".join(_asset(name) for name in styles)
+    script = "(function(){\n'use strict';\n" + "\n".join(_asset(name) for name in scripts) + "\n})();"
+    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
+    # Nothing is loaded from elsewhere, and no other script can run, whatever the names in a file contain.
+    policy = (
+        f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'; base-uri 'none'"
+    )
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
+        '<meta name="viewport" content="width=device-width,initial-scale=1">'
+        '<meta name="color-scheme" content="light dark">'
+        f'<meta name="generator" content="gcsplan {esc(__version__)}">'
+        f"<title>{esc(title)} – {what}</title><style>\n{style}</style></head>"
+        f'<body>{body}<div id="tip" role="status" hidden></div>{data}<script>{script}</script></body></html>\n'
+    )
+
+
+def _asset(name: str) -> str:
+    return resources.files("gcsplan.report").joinpath("assets", name).read_text(encoding="utf-8")

@@ -10,9 +10,8 @@ from gcsplan.arrays import Floats
 from gcsplan.check.returns.verdict import WayHome
 from gcsplan.figures import counted
 from gcsplan.notes.note import Wording
-from gcsplan.report.parts.detail import only_some
 from gcsplan.report.parts.html import at_least, between, energy, esc, num, place, stated, table, tools
-from gcsplan.report.parts.page_data import Page, Subject
+from gcsplan.report.parts.page_data import Page, Subject, only_some
 from gcsplan.report.parts.track_samples import Line
 from gcsplan.report.views.chart import chart_html
 from gcsplan.report.views.plan import COLOURS

@@ -3,7 +3,6 @@
 ====================  ========================================================================================
 `flights`             upload, arm, start, observe and judge
 `instances`           starts one SITL for each vehicle, with its airframe and parameters
-`terrain_files`       the ground under an SITL: the mission's terrain as ArduPilot's own files
 `wind_parameters`     the wind in an SITL
 `flight_watch`        why a vehicle does not arrive
 ====================  ========================================================================================

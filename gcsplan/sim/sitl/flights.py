@@ -34,14 +34,12 @@ from gcsplan.mavlink.link.url import parse_url
 from gcsplan.mavlink.link.watch import VehicleState, Watch
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.fences import FENCE_DECIDES
-from gcsplan.mavlink.mission.parameter_list import parameter_list
-from gcsplan.mavlink.mission.parameter_safety import safety_list
+from gcsplan.mavlink.mission.parameter_list import parameter_list, safety_list
 from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.notes.note import Note
 from gcsplan.sim.flight.trace import Trace
 from gcsplan.sim.flight.wind import Weather
-from gcsplan.sim.outcome import Rehearsal, Tally, Terms
-from gcsplan.sim.part import RehearsalPart, energy_of
+from gcsplan.sim.outcome import Rehearsal, RehearsalPart, Tally, Terms, energy_of
 from gcsplan.sim.rehearsal import upload_parts
 from gcsplan.sim.sitl.flight_watch import FlightWatch
 from gcsplan.sim.sitl.wind_parameters import change_steps, wind_parameters, wind_vector

@@ -17,9 +17,8 @@ import pytest
 
 from gcsplan.app.check import many as module
 from gcsplan.app.check import worlds as check_sites
-from gcsplan.app.check.archive_words import Summary, Told
 from gcsplan.app.check.files import check_batch, check_with_options, finding_lines
-from gcsplan.app.check.many import Archive, Form, Shown
+from gcsplan.app.check.many import Archive, Form, Shown, Summary, Told
 from gcsplan.app.check.worlds import UNASKED, Returns
 from gcsplan.app.parallel.executor import Executor, Inline, executor
 from gcsplan.cli import main as cli

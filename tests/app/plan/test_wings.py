@@ -28,8 +28,8 @@ from gcsplan.check.fixed_wing.climb_out import above_slant, over_m, slant_shorta
 from gcsplan.check.fixed_wing.glide import flared
 from gcsplan.check.flight.follow import follow
 from gcsplan.check.judge import judge
+from gcsplan.check.motion.circles import l1_off_m, tracking_m
 from gcsplan.check.motion.stretch import Flight, Stretch
-from gcsplan.check.motion.tracking import l1_off_m, tracking_m
 from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission

@@ -1,4 +1,4 @@
-"""The benchmark beside MetaEvoBox, over a small package that looks like it."""
+"""The benchmark beside MetaEvoBox, over a small package that looks like it: its processes answer, and end."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from gcsplan.bench.metabox import run as metabox
+from gcsplan.bench.metabox.run import Worker
 from gcsplan.errors import InputError
 from gcsplan.optimisers.registry import TABLE
 from tests.bench.metabox.made import FEW
@@ -67,3 +68,27 @@ def test_what_cannot_be_run_is_refused(change: dict[str, Any], message: str, tmp
 
 def test_ours_are_all_rules_once() -> None:
     assert set(TABLE) - set(metabox.ours()) == {"po"}  # ABO with α = β = 1
+
+
+def test_clear_paths_are_those_without_a_penalty(tmp_path: Path, python: Path) -> None:
+    file = tmp_path / "one.pkl"
+    with Worker(python) as worker:
+        worker.ask("make", file=str(file), threats=2, seed=1)
+        worker.load([file])
+        import numpy as np
+
+        points = np.random.default_rng(2).random((200, 30))
+        judged = worker.ask("judge", points, instance=0)
+        found = worker.cost(0)(points)
+    np.testing.assert_allclose(found, judged["costs"], rtol=1e-9)
+    # Without a penalty of 10 000 a path of this little world costs a few thousand.
+    assert judged["clear"] == [cost < 1e4 for cost in judged["costs"]]
+    assert 0 < sum(judged["clear"]) < 200
+
+
+def test_a_process_that_ends_is_told_with_its_last_words(tmp_path: Path) -> None:
+    program = tmp_path / "python"
+    program.write_text("#!/bin/sh\necho a broken thing >&2\n", encoding="utf-8")
+    program.chmod(0o755)
+    with pytest.raises(InputError, match="Its last words: a broken thing"):
+        Worker(program)

@@ -1,4 +1,4 @@
-"""The papers' report: ours beside the printed, in text, tables and files."""
+"""The papers' report: ours beside the printed, in text, tables and files; remarks follow from printed numbers alone."""
 
 from __future__ import annotations
 
@@ -10,11 +10,14 @@ from typing import Any
 
 import pytest
 
+from gcsplan.bench.papers.printed import PRINTED
 from gcsplan.bench.papers.report import IMPOSSIBLE_MARK as MARK
-from gcsplan.bench.papers.report import report, scenario_table, write
+from gcsplan.bench.papers.report import remarks, report, scenario_table, schedules, write
 from gcsplan.bench.papers.run import PAPER_RUNS_FILE, plain, run
 from gcsplan.bench.papers.runs import Store
-from tests.bench.papers.made import PAIR, SCENARIO
+from gcsplan.bench.papers.scenarios import mission_text, prepare
+from gcsplan.bench.papers.statistics import row
+from tests.bench.papers.made import PAIR, SCENARIO, record
 
 
 def test_the_report_has_ours_beside_the_printed_and_marks_the_impossible(
@@ -66,8 +69,8 @@ def test_another_clock_changes_the_files_of_times_alone(
     (tmp_path / "slow").mkdir()
     (tmp_path / "fast").mkdir()
     runs = [json.loads(line) for line in (finished[1] / PAPER_RUNS_FILE).read_text(encoding="utf-8").splitlines()]
-    for record in runs[::-1]:  # finished in another order, at another speed
-        Store(tmp_path / "slow" / PAPER_RUNS_FILE).append(record | {"time_s": 7.0 + record["time_s"]})
+    for one in runs[::-1]:  # finished in another order, at another speed
+        Store(tmp_path / "slow" / PAPER_RUNS_FILE).append(one | {"time_s": 7.0 + one["time_s"]})
     (tmp_path / "fast" / PAPER_RUNS_FILE).write_bytes((finished[1] / PAPER_RUNS_FILE).read_bytes())
     said, seen = [], []
     for place in (tmp_path / "slow", tmp_path / "fast"):
@@ -76,3 +79,28 @@ def test_another_clock_changes_the_files_of_times_alone(
         seen.append({file.name: file.read_bytes() for file in write(result, place, draw=lambda _: {})})
     assert said[0] == said[1]
     assert {name for name in seen[0] if seen[0][name] != seen[1][name]} == {"papers-times.csv", "papers-times.md"}
+
+
+def test_what_is_said_of_the_tables_is_worked_out_from_them() -> None:
+    krill = " ".join(remarks("krill-forest"))
+    assert "5 are 14.32 J/m" in krill
+    assert "1.0 % against abc" in krill
+    assert "2.1 % against aco" in krill
+    msfoa = [" ".join(remarks(f"msfoa-{i}")) for i in (1, 2, 3)]
+    assert "abc 411.17 < msfoa 416.96 < mfoa 417.06" in msfoa[0]
+    assert "mfoa 388.33 < abc 401.01 < msfoa 404.21" in msfoa[1]
+    assert "msfoa 454.52 < abc 457.46" in msfoa[2]
+    assert "rows of foa and pso are identical" in msfoa[1]
+    assert "identical" not in msfoa[0] + msfoa[2]
+
+
+def test_printed_times_that_stand_in_the_wrong_column_are_marked() -> None:
+    name = "ib-abc-sequence"
+    rows = [row(name, a, [record(a, 0, 1000.0, lengths_m=[250.0] * 4)], 0) for a in ("ib-abc", "b-abc", "abc")]
+    summary = {"paper": "ib-abc", "set": prepare(name, mission_text(name)), "rows": rows,
+               "printed": {a: PRINTED[name, a] for a in ("ib-abc", "b-abc", "abc")}}  # fmt: skip
+    header, cells = schedules(summary)
+    at = header.index("printed T, s")
+    marked = {(c[0], c[1]) for c in cells if "≠" in c[at]}
+    right = {("ib-abc", "uav1"), ("b-abc", "uav1"), ("abc", "uav1"), ("ib-abc", "uav4")}
+    assert marked == {(a, f"uav{i}") for a in ("ib-abc", "b-abc", "abc") for i in (1, 2, 3, 4)} - right

@@ -1,4 +1,4 @@
-"""A run of the benchmark: what it refuses, and what it has written when it is interrupted."""
+"""A run of the benchmark: what it refuses, what an interrupted one has written; every answer of ours is an outcome."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from gcsplan.bench.terrain import ours as terrain_ours
 from gcsplan.bench.terrain import run as terrain
-from gcsplan.bench.terrain.outcome import MethodOutcome
+from gcsplan.bench.terrain.outcome import OUR_METHOD, MethodOutcome
 from gcsplan.bench.terrain.problems import NamedProblem, key_of
-from gcsplan.errors import InputError
-from tests.bench.terrain.made import several
+from gcsplan.errors import InputError, NoMission
+from tests.bench.terrain.made import Fake, easy, several
 
 
 @pytest.mark.slow
@@ -30,9 +29,9 @@ def test_the_report_is_written_whole_even_when_the_run_is_interrupted(
         found = replace(several()[len(asked) - 1], key=key_of(one.problem), name=one.name, group=one.group)
         return replace(found, gap_asked_percent=one.problem.gap_percent)
 
-    monkeypatch.setattr(terrain_ours, "measure", measure)
-    monkeypatch.setattr(terrain_ours, "Sweep", lambda: None)
-    monkeypatch.setattr(terrain_ours, "warm_up", lambda named, planner: 0.0)
+    monkeypatch.setattr(terrain, "measure", measure)
+    monkeypatch.setattr(terrain, "Sweep", lambda: None)
+    monkeypatch.setattr(terrain, "warm_up", lambda named, planner: 0.0)
     said: list[str] = []
     with pytest.raises(KeyboardInterrupt):
         terrain.run(tmp_path, kinds=["main"], runs=1, count=1, rivals=False, tell=said.append)
@@ -65,3 +64,38 @@ def test_wrong_orders_are_refused_before_anything_is_done(
         terrain.run(tmp_path, **wrong, tell=told.append)  # type: ignore[arg-type]
     assert told == []
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("error", "status"),
+    [
+        (None, "solved"),
+        (NoMission("no way", reason="infeasible"), "infeasible"),
+        (NoMission("no way seen", reason="not_found"), "not found"),
+        (ZeroDivisionError("a bug"), "failed"),
+    ],
+)
+def test_every_answer_of_ours_is_an_outcome(
+    main: list[NamedProblem], monkeypatch: pytest.MonkeyPatch, error: Exception | None, status: str
+) -> None:
+    fake = Fake(error)
+    monkeypatch.setattr(terrain, "get_planner", lambda name: fake)
+    one = easy(main)
+    outcome = terrain.measure(one, lambda: 0.01, runs=3)  # type: ignore[arg-type]
+    assert (outcome.status, outcome.method, outcome.runs, outcome.sweep_s) == (status, OUR_METHOD, 3, 0.01)
+    assert len(fake.airspaces) == 3
+    assert id(one.problem.airspace) not in fake.airspaces
+    if error is None:
+        assert outcome.gap_percent == pytest.approx(100.0)
+        assert outcome.first_path_s == 0.1
+    else:
+        assert str(error) in outcome.detail
+
+
+@pytest.mark.slow
+def test_a_path_that_the_exact_check_rejects_is_unsafe_whatever_its_planner_says(
+    main: list[NamedProblem], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(terrain, "get_planner", lambda name: Fake())
+    assert terrain.measure(main[8], lambda: 0.01, runs=1).status == "unsafe"  # type: ignore[arg-type]

@@ -16,7 +16,7 @@ from gcsplan.check.motion.return_rules import RULES, at_home_m, returned
 from gcsplan.check.motion.stopping import about_turn_m, run_on_m, run_past_m
 from gcsplan.check.motion.stretch import Place, Stretch
 from gcsplan.check.returns.footprint import Target
-from gcsplan.check.returns.obstacles_met import obstacles_of_returns
+from gcsplan.check.returns.obstacles import obstacles_of_returns
 from gcsplan.check.returns.trace import MissionTrace
 from gcsplan.vehicle import Autopilot
 from tests.campaigns.returns import in_twin

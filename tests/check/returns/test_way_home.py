@@ -16,10 +16,9 @@ import pytest
 from gcsplan.arrays import Floats
 from gcsplan.check.flight.follow import follow
 from gcsplan.check.judge import judge
-from gcsplan.check.returns import obstacles_met as sweep
+from gcsplan.check.returns import obstacles as sweep
 from gcsplan.check.returns.footprint import Target
-from gcsplan.check.returns.obstacles import Obstacles
-from gcsplan.check.returns.obstacles_met import obstacles_of_returns
+from gcsplan.check.returns.obstacles import Obstacles, obstacles_of_returns
 from gcsplan.check.returns.rally import rally_items
 from gcsplan.check.returns.refinement import CLEAR, LEGAL
 from gcsplan.check.returns.stretches import rel_home

@@ -18,7 +18,7 @@ from gcsplan.mavlink.files.plan_fence import (
     rally_json,
     unread_keys,
 )
-from gcsplan.mavlink.files.plan_landing import landing_entries
+from gcsplan.mavlink.files.plan_file import landing_entries
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.notes.note import Note
 from tests.support.effort import draws

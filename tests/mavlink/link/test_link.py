@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from gcsplan.errors import InputError, LinkError
 from gcsplan.mavlink.link.frames import FrameParser, FrameWriter, Signing, SigningKey, signing_key
 from gcsplan.mavlink.link.link import GCS, Channel, Heard, Link, LinkSteps, PumpJob, pump, run
-from gcsplan.mavlink.link.session.drive import drive
+from gcsplan.mavlink.link.session.steps import drive
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.mavlink.protocol import wire
 from gcsplan.mavlink.protocol.messages import (

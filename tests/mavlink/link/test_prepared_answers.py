@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from gcsplan.mavlink.link.frames import FrameParser, FrameWriter, Signing, SigningKey, checksum
 from gcsplan.mavlink.link.link import GCS, Link, PumpJob, pump, run
 from gcsplan.mavlink.link.prepared_answers import Prepared, PromptAnswers
-from gcsplan.mavlink.link.session.drive import drive
+from gcsplan.mavlink.link.session.steps import drive
 from gcsplan.mavlink.link.transport import Udp
 from gcsplan.mavlink.link.url import parse_url
 from gcsplan.mavlink.mission.mission import FENCE, MissionItem

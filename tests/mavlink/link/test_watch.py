@@ -9,11 +9,10 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 import pytest
 
 from gcsplan.mavlink.link.link import Heard
+from gcsplan.mavlink.link.options import Patience
 from gcsplan.mavlink.link.session.parameters import decode_value, judge_fence_parameters, judge_parameters
-from gcsplan.mavlink.link.validate import finite, place, whole
-from gcsplan.mavlink.link.watch import STANDBY, VehicleState, Watch
+from gcsplan.mavlink.link.watch import STANDBY, VehicleState, Watch, finite, place, whole
 from gcsplan.mavlink.protocol.messages import Address
-from gcsplan.mavlink.protocol.patience import Patience
 from tests.mavlink.link.session.test_session import mission
 
 ODD = (math.nan, math.inf, -math.inf, 3.4e38, -1.0, 1e-40, 2.0**31)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gcsplan.mavlink.mission import commands as cmd
-from gcsplan.mavlink.mission.firmware import flies_straight, needs_straight, version_words
+from gcsplan.mavlink.mission.autopilots import flies_straight, needs_straight, version_words
 from gcsplan.mavlink.mission.mission import NO_POSITION, RELATIVE, MissionItem
 from gcsplan.vehicle import Autopilot
 

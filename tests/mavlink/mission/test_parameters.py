@@ -12,9 +12,15 @@ from gcsplan.errors import InputError
 from gcsplan.mavlink.mission.fences import CIRCLE, FLOOR, POLYGON, SAFETY, TOP, acts, fences_in_force, is_fence
 from gcsplan.mavlink.mission.mission import Home, Mission
 from gcsplan.mavlink.mission.parameter_file import PARAM_ENDING, param_file, read_param_file
-from gcsplan.mavlink.mission.parameter_list import Setting, off, parameter_list
+from gcsplan.mavlink.mission.parameter_list import (
+    FlightExtent,
+    Setting,
+    needed_groups,
+    off,
+    parameter_list,
+    safety_list,
+)
 from gcsplan.mavlink.mission.parameter_names import PARAMETERS, Name, OnBoard, Parameter, unanswered
-from gcsplan.mavlink.mission.parameter_safety import FlightExtent, needed_groups, safety_list
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.geometry.limits import Limits
 

@@ -6,7 +6,7 @@ import pytest
 
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import NO_POSITION, Home, Mission, MissionItem
-from gcsplan.mavlink.mission.return_route import COPTER_RETURNS, ReturnRoute, route_setting, takes_another_route
+from gcsplan.mavlink.mission.return_parameters import COPTER_RETURNS, ReturnRoute, route_setting, takes_another_route
 from gcsplan.vehicle import Autopilot
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4

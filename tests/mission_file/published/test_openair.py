@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pyproj import Geod
 
-from gcsplan.mission_file.published.arcs import Arc, outline
+from gcsplan.mission_file.published.openair import Arc, outline
 from gcsplan.mission_file.published.times import Hours
 from gcsplan.mission_file.zones.draft import ZoneDraft
 from tests.mission_file.airspace.made import limits, outcome, read, remarks, said

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 
 from gcsplan.errors import InputError
 from gcsplan.mission_file.values import yaml as strict_yaml
-from gcsplan.mission_file.values.yaml import lines_of, read_yaml
-from gcsplan.mission_file.values.yaml_slips import cure
+from gcsplan.mission_file.values.yaml import cure, lines_of, read_yaml
 from tests.support.effort import draws
 
 

@@ -19,8 +19,16 @@ from gcsplan.mavlink.link.watch import (
     UNINIT,
     VehicleState,
 )
-from gcsplan.mavlink.mission.autopilots import is_generic, max_items, profile_of, type_name
-from gcsplan.mavlink.mission.firmware import STRAIGHT_UNTIL, flies_straight, needs_straight, version_words
+from gcsplan.mavlink.mission.autopilots import (
+    STRAIGHT_UNTIL,
+    flies_straight,
+    is_generic,
+    max_items,
+    needs_straight,
+    profile_of,
+    type_name,
+    version_words,
+)
 from gcsplan.mavlink.mission.mission import FENCE, MISSION, RALLY, RELATIVE, TERRAIN, Home, Mission, MissionItem
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot

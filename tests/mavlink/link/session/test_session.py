@@ -32,9 +32,8 @@ from gcsplan.mavlink.link.session.session import (
     verify_mission,
 )
 from gcsplan.mavlink.link.watch import BOOT, CRITICAL, POWEROFF, STANDBY, UNINIT, VehicleState, Watch
-from gcsplan.mavlink.mission.autopilots import altitude_of_cm
+from gcsplan.mavlink.mission.autopilots import altitude_of_cm, flies_straight
 from gcsplan.mavlink.mission.compare import compare, faults
-from gcsplan.mavlink.mission.firmware import flies_straight
 from gcsplan.mavlink.mission.mission import ALL, FENCE, RALLY, Home, Mission, MissionItem
 from gcsplan.mavlink.protocol.messages import Address
 from gcsplan.mavlink.protocol.transfer import Timers, TransferProgress
@@ -430,7 +429,7 @@ def test_what_a_px4_says_of_its_version_decides_an_upload(monkeypatch: pytest.Mo
     with air(board) as link:
         found = discover(link, 1, listen_s=0.0)
         assert flies_straight(found.flight_sw_version)
-        monkeypatch.setattr("gcsplan.mavlink.mission.firmware.STRAIGHT_UNTIL", (1, 9))
+        monkeypatch.setattr("gcsplan.mavlink.mission.autopilots.STRAIGHT_UNTIL", (1, 9))
         with pytest.raises(VehicleRefused, match="the vehicle is PX4 1"):
             upload_mission(link, sent, options=OPTIONS, judge=lambda read, values: None)
         assert board.items() == ()

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcsplan.mavlink.build.heights import MOVED_CM, most_cm, whole_cm
+from gcsplan.mavlink.build.order import MOVED_CM, most_cm, whole_cm
 from tests.support.effort import draws
 
 LEGS = st.lists(st.tuples(st.floats(0.0, 6.0), st.floats(0.0, 6.0), st.floats(-5.0, 5.0)), min_size=1, max_size=4)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gcsplan.mavlink.mission.return_altitude import on_board, setting, settings
+from gcsplan.mavlink.mission.return_parameters import on_board, setting, settings
 from gcsplan.vehicle import Autopilot
 
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4

@@ -1,4 +1,7 @@
-"""How planning stands: redrawn on a terminal though the planner is silent, a line now and then elsewhere."""
+"""How planning stands: redrawn on a terminal though the planner is silent, a line now and then elsewhere.
+
+How far the work of an executor is: a line from time to time on standard error, whatever is done in between.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +11,16 @@ import re
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from rich.console import Console
 
 from gcsplan.cli import command_table as commands
 from gcsplan.cli.output import console as words
-from gcsplan.cli.output import planning_display as display
-from gcsplan.cli.output.planning_display import PlanningBoard, planning_display
+from gcsplan.cli.output import progress as display
+from gcsplan.cli.output.progress import LINE_S, PlanningBoard, WorkDisplay, planning_display
 from gcsplan.planners.problem import Progress
 from tests.support.paths import MISSIONS
 
@@ -158,3 +163,32 @@ def test_lines_go_to_standard_error_and_the_document_to_standard_output(
     assert {f"uav{k} ({k} of 4)" for k in (1, 4)} <= {
         line.split(", ")[0].removeprefix("planning ") for line in err.splitlines()
     }
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
+    """The display's clock, which stands still until it is set."""
+    now = SimpleNamespace(s=100.0)
+    monkeypatch.setattr(display, "time", SimpleNamespace(perf_counter=lambda: now.s))
+    return now
+
+
+def test_a_line_is_said_every_few_seconds_and_not_more_often(capfd: Any, clock: SimpleNamespace) -> None:
+    display = WorkDisplay(40, "missions")
+    for count in range(40):
+        clock.s = 100.0 + 0.5 * count
+        display.done(count, ", 3 refused")
+    out, err = capfd.readouterr()
+    assert out == ""
+    assert [int(s) for s in re.findall(r"of 40 missions, 3 refused, (\d+) s", err)] == [5, 10, 15]
+    assert re.findall(r"(\d+) of 40", err) == ["10", "20", "30"]
+    assert LINE_S == 5.0
+    assert display.elapsed_s == 19.5
+
+
+def test_where_workers_can_be_watched_is_said_if_there_is_a_place(capfd: Any) -> None:
+    display = WorkDisplay(1, "missions")
+    display.workers(SimpleNamespace(dashboard=""))  # type: ignore[arg-type]
+    assert capfd.readouterr().err == ""
+    display.workers(SimpleNamespace(dashboard="http://127.0.0.1:8787"))  # type: ignore[arg-type]
+    assert "can be watched at http://127.0.0.1:8787" in capfd.readouterr().err

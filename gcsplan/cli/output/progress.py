@@ -1,6 +1,7 @@
-"""The state of planning while it runs: elapsed time, best path, bound and gap, redrawn by a separate thread.
+"""The state of work while it runs: of one planning (`planning_display`), and of many pieces of work (`WorkDisplay`).
 
-A planner reports only changes, and may search for seconds without one; the shown time continues meanwhile.
+A separate thread redraws elapsed time, best path, bound and gap. A planner reports only changes, and may search for
+seconds without one; the shown time continues meanwhile. Of an executor's work there is a line from time to time.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from gcsplan.app.parallel.executor import Executor
 from gcsplan.cli.output import console as words
-from gcsplan.cli.output.screens import aside
+from gcsplan.cli.output.console import aside, remark
 from gcsplan.planners.problem import Progress
 
 REDRAWN_HZ = 4.0
@@ -103,3 +105,28 @@ def _repeated(board: PlanningBoard) -> Iterator[None]:
     finally:
         ended.set()
         thread.join()
+
+
+class WorkDisplay:
+    """Lines of how much of a whole is done, on standard error, at most one every `LINE_S` seconds."""
+
+    def __init__(self, whole: int, what: str) -> None:
+        self._whole, self._what = whole, what
+        self._begun_s = self._said_s = time.perf_counter()
+
+    @property
+    def elapsed_s(self) -> float:
+        """Seconds since the work began."""
+        return time.perf_counter() - self._begun_s
+
+    def workers(self, executor: Executor) -> None:
+        """Say where the workers can be watched, if somewhere."""
+        if executor.dashboard:
+            remark(f"the workers can be watched at {executor.dashboard}")
+
+    def done(self, count: int, more: str = "") -> None:
+        """Take note that ``count`` of the whole are done; ``more`` is said of them."""
+        now_s = time.perf_counter()
+        if now_s - self._said_s >= LINE_S:
+            self._said_s = now_s
+            remark(f"{count} of {self._whole} {self._what}{more}, {self.elapsed_s:.0f} s")

@@ -7,8 +7,8 @@ import math
 import pytest
 
 from gcsplan.errors import InputError
+from gcsplan.mavlink.link.options import ITEM_S, Patience, checked_timeout_s
 from gcsplan.mavlink.protocol.machine import Timers
-from gcsplan.mavlink.protocol.patience import ITEM_S, Patience, checked_timeout_s
 
 
 @pytest.mark.parametrize("timeout_s", [0.0, -1.0, 3600.1, math.inf, math.nan])

@@ -10,7 +10,7 @@ import re
 import numpy as np
 import pytest
 
-from gcsplan.report.parts.html_document import document
+from gcsplan.report.parts.html import document
 from gcsplan.report.parts.map_labels import LETTER_PX, LINE_PX, Mark, marks_html
 
 

@@ -1,16 +1,64 @@
-"""Zip archives of zone files, KMZ and zipped Shapefiles: one member is unpacked, never more than is allowed."""
+"""What the bytes of a zone file hold, read strictly: a text, the values of JSON, or the members of a zip archive.
+
+A text is UTF-8, or UTF-16 where its first bytes say so, as Windows programs save it. JSON has no key twice, no NaN and
+no number without bounds. Of an archive, KMZ or a zipped Shapefile, one member is unpacked, never more than is allowed.
+"""
 
 from __future__ import annotations
 
+import codecs
 import io
+import json
 import lzma
+import math
 import struct
 import zipfile
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from gcsplan.errors import InputError
+
+UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+
+
+def decoded(data: bytes) -> str:
+    """The text, without a mark of its encoding. Raises UnicodeDecodeError."""
+    return data.decode("utf-16" if data.startswith(UTF16) else "utf-8-sig")
+
+
+def load_json(path: Path, data: bytes) -> Any:
+    """The value that the text holds. Raises InputError."""
+    try:
+        return json.loads(decoded(data), object_pairs_hook=_unique, parse_constant=_no_constant, parse_int=_bounded_int)
+    except RecursionError:
+        raise InputError("the file is nested too deeply to be GeoJSON", where=str(path)) from None
+    except ValueError as why:  # bad UTF-8, bad JSON, and the refusals below
+        start = data[:200].lstrip(b"\xef\xbb\xbf \t\r\n")
+        hint = "; it looks like KML: name it .kml" if start.startswith(b"<") else ""
+        raise InputError(f"this is not GeoJSON: {str(why)[:200]}{hint}", where=str(path)) from None
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    whole = dict(pairs)
+    if len(whole) < len(pairs):
+        seen: set[str] = set()
+        for key, _ in pairs:
+            if key in seen:
+                raise ValueError(f"the key {key[:60]!r} stands twice")
+            seen.add(key)
+    return whole
+
+
+def _no_constant(name: str) -> Iterator[None]:
+    raise ValueError(f"{name} is no number")
+
+
+def _bounded_int(digits: str) -> float:
+    # int() refuses thousands of digits with a message about its own limits; as inf the number is refused by gcsplan.
+    return int(digits) if len(digits) <= 300 else math.inf
+
 
 DAMAGED = (
     zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, OSError, RuntimeError, ValueError,

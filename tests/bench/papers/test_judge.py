@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from gcsplan.bench.papers import judge as papers_judge
-from gcsplan.bench.papers import readings as papers_readings
-from gcsplan.bench.papers.claims import CLAIMS
+from gcsplan.bench.papers import scenarios as papers_scenarios
 from gcsplan.bench.papers.judge import (
+    CLAIMS,
     HOLDS,
     IMPOSSIBLE_AS_PRINTED,
     NO_LEGAL,
@@ -24,8 +24,7 @@ from gcsplan.bench.papers.judge import (
     judge,
     standing,
 )
-from gcsplan.bench.papers.readings import READINGS, PaperReading
-from gcsplan.bench.papers.scenarios import SCENARIOS, choose
+from gcsplan.bench.papers.scenarios import READINGS, SCENARIOS, PaperReading, choose
 from gcsplan.bench.papers.tables import claims_table, readings_table
 from gcsplan.optimisers.registry import get as get_optimiser
 from gcsplan.planners.registry import get as get_planner
@@ -166,7 +165,7 @@ def test_every_reading_runs_under_a_name_of_its_own_with_options_that_exist() ->
 
 
 def test_readings_run_in_the_papers_own_scenarios_and_not_in_their_twins() -> None:
-    assert papers_readings.readings_of("none") == ()
+    assert papers_scenarios.readings_of("none") == ()
     for scenario, contenders in choose(None, None):
         assert any(":" in c.name for c in contenders) <= (not scenario.twin_of)
     assert not any(":" in c.name for _, contenders in choose(None, None, readings=False) for c in contenders)

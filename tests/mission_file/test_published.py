@@ -10,11 +10,11 @@ import pytest
 
 from gcsplan.mission_file.published.ed269 import is_ed269
 from gcsplan.mission_file.published.ed318 import is_ed318
-from gcsplan.mission_file.published.formats import read_published
 from gcsplan.mission_file.published.members import MemberError, number_or_none, outer_ring, position, text_of, unread
 from gcsplan.mission_file.published.openaip import is_openaip
 from gcsplan.mission_file.published.openair import OPENAIR_SUFFIXES, read_openair
 from gcsplan.mission_file.published.policy import Policy
+from gcsplan.mission_file.zone_reader import read_published
 from tests.mission_file.airspace.made import HOLE, RING, collection, ed269, ed318, openaip, volume
 
 POLICY = Policy(where="m: no_fly[0]")

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from gcsplan.mavlink.link.session.px4_motion import slower_words, speed_shortage
+from gcsplan.mavlink.link.session.parameters import slower_words, speed_shortage
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.geometry.limits import Limits
