@@ -37,7 +37,7 @@ from gcsplan.world.geometry.zones import Box
 from gcsplan.world.terrain.cell import Cell
 from gcsplan.world.terrain.grid import DEGREE_E7, METRES_OF_E7, STRIDE, TerrainGrid, cell_at, longitude_scale
 from gcsplan.world.terrain.input_files import sha256_of, tell_folder
-from gcsplan.world.terrain.mosaic import FIT_ERROR_M, Window
+from gcsplan.world.terrain.mosaic import FIT_ERROR_M, Window, box_lattice
 from gcsplan.world.terrain.raster import MAX_CELLS, require_file
 from gcsplan.world.terrain.terrain import NO_MORE_VOIDS, Terrain, TerrainSpec, place, require_metres, terrain_of
 
@@ -202,7 +202,7 @@ class DatMosaic:
             return numbers(degrees[..., 0], degrees[..., 1])
 
         wide = (box[0] - spare_m, box[1] - spare_m, box[2] + spare_m, box[3] + spare_m)
-        east, north = exact(*_lattice(wide))
+        east, north = exact(*box_lattice(wide))
         held = numbers(*self._border)
         first = (max(math.floor(east.min()), math.floor(held[0].min())),
                  max(math.floor(north.min()), math.floor(held[1].min())))  # fmt: skip
@@ -327,12 +327,6 @@ def _cells_between(lat_e7: Floats, lon_e7: Floats) -> list[Cell]:
     turned = west + (lon_e7 - west + 180.0 * DEGREE_E7) % (360.0 * DEGREE_E7) - 180.0 * DEGREE_E7
     lons = range(math.floor(turned.min() / DEGREE_E7), math.floor(turned.max() / DEGREE_E7) + 1)
     return [Cell(a, (o + 180) % 360 - 180) for a in lats for o in lons if -90 <= a < 90]
-
-
-def _lattice(box: Box) -> tuple[Floats, Floats]:
-    f = np.linspace(0.0, 1.0, 33)
-    e, n = np.meshgrid(box[0] + f * (box[2] - box[0]), box[1] + f * (box[3] - box[1]))
-    return e.ravel(), n.ravel()
 
 
 def _around(frame: Frame, grid: TerrainGrid, anchor: Cell, wide: Box, x: Floats, y: Floats) -> Box:

@@ -31,7 +31,6 @@ except ImportError:  # Windows: every process brings its own copy of a tile
 else:
     POSIX = True
 
-MIRROR_VARIABLE = "GCSPLAN_DEM_MIRROR"
 LIST_DAYS = 30.0
 """A list is asked for anew after this many days."""
 

@@ -17,6 +17,7 @@ from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.outlines import few_corners
+from gcsplan.world.geometry.path import runs_m
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.geometry.zones import Circle, Zone
 
@@ -63,7 +64,7 @@ def exit_cost(problem: Problem) -> float:
         return math.inf
     lines, bow_m = border(problem)
     terminals = np.array(terminals_of(problem))
-    legs = np.hypot(*np.diff(terminals, axis=0).T)
+    legs = runs_m(terminals)
     more_m = min(
         _past(a, b, lines) - leg for a, b, leg in zip(terminals[:-1], terminals[1:], legs.tolist(), strict=True)
     )

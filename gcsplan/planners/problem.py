@@ -158,6 +158,10 @@ class Problem:
             return np.asarray(self.horizontal_j_per_m * flat + self.vertical_j_per_m * np.abs(d[..., 2]))
         return np.asarray(np.hypot(flat, d[..., 2]))
 
+    def cost_through(self, points: Floats) -> float:
+        """Metres or joules of the path through ``points`` (N, 3)."""
+        return float(self.leg_costs(points[:-1], points[1:]).sum())
+
     def legal(self, start: Floats, end: Floats) -> Bools:
         """(N,) whether straight legs from ``start`` (N, 3) to ``end`` (N, 3) pass the exact check; counted as work."""
         if not len(start):

@@ -31,7 +31,7 @@ OPEN, LEGAL, SHUT = 0, 1, 2
 def polished(problem: Problem, points: Floats, pinned: Bools) -> tuple[Floats, Bools]:
     """Move free points towards the lines between their neighbours as far as is legal: in space, in the plane alone, or
     in altitude alone. Returns the points (N, 3) and ``pinned`` (N,), which of them are terminals, unchanged."""
-    cost = _cost(problem, points)
+    cost = problem.cost_through(points)
     points = points.copy()
     still = np.zeros(len(points), np.bool_)
     with problem.budget.allow(SHARE):
@@ -40,7 +40,7 @@ def polished(problem: Problem, points: Floats, pinned: Bools) -> tuple[Floats, B
                 break
             _move(problem, points, pinned, still, k % 2)
             if k % 2:
-                now = _cost(problem, points)
+                now = problem.cost_through(points)
                 if cost - now <= LAST_GAIN * cost:
                     break
                 cost = now
@@ -191,10 +191,6 @@ def _look(problem: Problem, points: Floats, choices: _Choices, asked: Bools, mar
     legal[two] = problem.legal(points[first[two]], place[two])
     legal[legal] = problem.legal(place[legal], points[last[legal]])
     marks[row, column] = np.where(legal, LEGAL, SHUT)
-
-
-def _cost(problem: Problem, points: Floats) -> float:
-    return float(problem.leg_costs(points[:-1], points[1:]).sum())
 
 
 def thinned(points: Floats, kept: Indices, corridor_m: float) -> Indices:

@@ -16,6 +16,7 @@ from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry import hulls
 from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import runs_m
 from gcsplan.world.kernels.entries import pieces
 from gcsplan.world.kernels.neighbourhood import LineBatch
 from gcsplan.world.kernels.shared import (
@@ -192,7 +193,7 @@ def _pieces(
     lines = LineBatch(track[:-1], track[1:])
     held = [air.extrema_along(top, _few(max(reach, 0.0) + bow, air), lines) for top, reach in kinds]
     surfaces = air.surfaces if of_top else air.grounds
-    length = np.hypot(*np.diff(track, axis=0).T)
+    length = runs_m(track)
     room = 4096 + 16 * n + int(3.0 * float(length.sum()) / min(air.field.step_x, air.field.step_y))
     while True:
         rows = np.empty((room, 7))

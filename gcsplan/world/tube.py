@@ -13,6 +13,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.native.signature import Held
 from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import distances_m
 from gcsplan.world.kernels.entries import pieces
 from gcsplan.world.kernels.field import Field
 from gcsplan.world.kernels.shared import BAND_HIGH, BAND_LOW, BOW_M, CEILING, CEILING_AGL, FLOOR, FLOOR_AGL, Zones
@@ -147,7 +148,7 @@ def _bands(
     """One band for each span of the track within reach of a zone, by zone and distance along the track."""
     error = limits.altitude_error_m
     wide = reach.far_m + ZONE_ROOM_M
-    length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(track, axis=0).T))])
+    length = distances_m(track)
     out: list[Band] = []
     for zone, s0, s1 in spans(track, zones, reach.zone_m, wide):
         numbers = zones.table[zone]

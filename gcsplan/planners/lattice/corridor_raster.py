@@ -18,6 +18,7 @@ from gcsplan.planners.lattice.lattice import near_zone
 from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.planners.profile.track import denser
 from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import track_length_m
 from gcsplan.world.geometry.zones import Circle, Level, Zone
 
 SHUT_M = 1e5
@@ -115,7 +116,7 @@ class CorridorRaster:
         )
         points[:n], pinned[:n], pin_m[:n], amsl[:n] = line.points, line.pinned, line.pin_m, line.amsl_m
         pin_m[[0, n - 1]] = np.nan
-        length = float(np.hypot(*np.diff(line.points, axis=0).T).sum())
+        length = track_length_m(line.points)
         limits = p.limits
         spec = np.array(
             [
@@ -175,7 +176,7 @@ def make_guide(
     everything = np.vstack(ways)
     west, south = (float(x) for x in everything.min(axis=0) - radius_m)
     east, north = (float(x) for x in everything.max(axis=0) + radius_m)
-    length = sum(float(np.hypot(*np.diff(w, axis=0).T).sum()) for w in ways)
+    length = sum(track_length_m(w) for w in ways)
     cell = float(air.surface.grid.metres_per_cell(*terminals_of(problem)[0]).min())
     area = min((east - west) * (north - south), 2.0 * radius_m * (length + 2.0 * radius_m))
     step = max(min(FINEST_PART * cell, finest_m, 0.02 * length), math.sqrt(area / MOST_RASTER_NODES), 0.05)

@@ -20,9 +20,9 @@ from gcsplan.planners.lattice.routes import LATTICE_SIZES, LatticeSize, Router, 
 from gcsplan.planners.problem import Problem, Refusal, straight_way_m
 from gcsplan.planners.profile.climb_laps import pins_of, with_climbs
 from gcsplan.planners.profile.exact import LegJudge, Unsettled, settle
-from gcsplan.planners.profile.track import Obstruction, distances, make_track
+from gcsplan.planners.profile.track import Obstruction, make_track
 from gcsplan.planners.simplify import fewer
-from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.path import Path, distances_m, track_length_m
 
 Tell = Callable[[str, float | None], None]
 
@@ -73,7 +73,7 @@ def plan_band(problem: Problem, tell: Tell, *, climbs: bool = True) -> Floats:
         if found is not None:
             best = found if best is None else min(best, found, key=lambda p: problem.cost(Path(p)))
         # A path longer than the detours that this lattice holds may have a shorter rival outside it: try the next one.
-        if best is not None and (work.line is None or _flat(best) <= level.detour * way):
+        if best is not None and (work.line is None or track_length_m(best) <= level.detour * way):
             tell("pull", problem.cost(Path(best)))
             if work.line is not None:
                 better = work.improve(tell)
@@ -132,14 +132,10 @@ def _unit(problem: Problem) -> float:
     return problem.horizontal_j_per_m if problem.objective == "energy" else 1.0
 
 
-def _flat(points: Floats) -> float:
-    return float(np.hypot(*np.diff(points[:, :2], axis=0).T).sum())
-
-
 def sides_to_pass(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> dict[int, bool]:
     """For each zone within reach of a path, by index: whether the path passes over it."""
     track = make_track(problem, points[:, :2], pinned, pin_m)
-    s = distances(points[:, :2])  # of all points: a track keeps one of two that are less than a millimetre apart
+    s = distances_m(points)  # of all points: a track keeps one of two that are less than a millimetre apart
     over: dict[int, bool] = {}
     for band in track.tube.bands:
         at = 0.5 * (band.s_m[:-1] + band.s_m[1:]) * (s[-1] / track.tube.s_m[-1])
@@ -288,7 +284,7 @@ class _Work:
         weight = climbing_weight(p)
         prices = [] if weight == self.weight else [weight]
         ways = [way for way in (router.way(weight=w, briefly=True) for w in prices) if way is not None]
-        s = distances(self.line.points)
+        s = distances_m(self.line.points)
         floor = router.lattice.floor_m
         for f in DETOURS:
             if not p.budget.goes_on() or router.opened > MOST_OPENED // 4:
@@ -304,7 +300,7 @@ class _Work:
 
     def _kicked(self, line: GuidedTrack, rng: np.random.Generator) -> GuidedTrack:
         """The line with a random bump to one side."""
-        s = distances(line.points)
+        s = distances_m(line.points)
         at, side = rng.uniform(0.05, 0.95) * s[-1], rng.choice([-1.0, 1.0]) * rng.uniform(*KICK_PARTS) * self.way_m
         half = rng.uniform(0.04, 0.15) * s[-1]
         i = int(np.clip(np.searchsorted(s, at, "right") - 1, 0, len(s) - 2))

@@ -24,6 +24,7 @@ from gcsplan.planners.optimal.searches.bound_corridor import follow
 from gcsplan.planners.optimal.searches.section_dp import tightened
 from gcsplan.planners.problem import Problem, Refusal, straight_way_m, terminals_of
 from gcsplan.planners.profile.track import Obstruction, fly, make_track
+from gcsplan.world.geometry.path import runs_m
 
 if TYPE_CHECKING:
     from gcsplan.planners.optimal.searches.outline_tracks import OutlineTracks
@@ -175,7 +176,7 @@ class Searches:
     def _fly_straight(self) -> None:
         p, incumbent = self.problem, self.incumbent
         places = np.array(terminals_of(p))
-        apart = np.concatenate([[True], np.hypot(*np.diff(places, axis=0).T) > 1e-3])
+        apart = np.concatenate([[True], runs_m(places) > 1e-3])
         pin_m = np.array([math.nan, *(math.nan if v.amsl_m is None else v.amsl_m for v in p.via), math.nan])[apart]
         track = make_track(p, places[apart], np.ones(int(apart.sum()), np.bool_), pin_m)
         flown = fly(p, track)

@@ -18,9 +18,9 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import NoMission
 from gcsplan.planners.problem import ENDS_M, Problem, Refusal
 from gcsplan.planners.profile.exact import LegJudge, Unsettled, sampled_track, settle
-from gcsplan.planners.profile.track import Closed, Flown, Lacking, Track, distances, fly, lacking
+from gcsplan.planners.profile.track import Closed, Flown, Lacking, Track, fly, lacking
 from gcsplan.planners.simplify import fewer
-from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.path import Path, distances_m
 
 LAP_DIRECTIONS = 12
 SHORTEST_LAP_M = 20.0
@@ -259,9 +259,9 @@ def _promising(problem: Problem, track: Track, lack: Lacking, length_m: float) -
     found = list(_detours(problem, track, low_s, high_s, length_m))
     shapes = [d.shape if up else d.shape[::-1] for d in found]
     part = np.linspace(0.0, 1.0, LOOKED_AT)
-    along = np.array([part * distances(shape)[-1] for shape in shapes])
+    along = np.array([part * distances_m(shape)[-1] for shape in shapes])
     east, north = (
-        np.array([np.interp(at, distances(way), way[:, k]) for at, way in zip(along, shapes, strict=True)])
+        np.array([np.interp(at, distances_m(way), way[:, k]) for at, way in zip(along, shapes, strict=True)])
         for k in range(2)
     )
     floor = problem.airspace.floor_amsl(east.ravel(), north.ravel(), problem.limits).reshape(along.shape)

@@ -9,18 +9,10 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.profile.track import (
-    Flown,
-    Obstruction,
-    ObstructionKind,
-    Track,
-    distances,
-    fly,
-    make_track,
-    values_at,
-)
+from gcsplan.planners.profile.track import Flown, Obstruction, ObstructionKind, Track, fly, make_track, values_at
 from gcsplan.planners.profile.zone_levels import LEVEL_SAMPLE_M, ZoneLevels
 from gcsplan.world.airspace import Band, Legs, Tube, Violation
+from gcsplan.world.geometry.path import distances_m
 
 TIGHT_M, TIGHT_SAMPLE_M = 1.0, 1.0
 """Where ceiling minus floor is less than `TIGHT_M` metres, samples are `TIGHT_SAMPLE_M` metres apart."""
@@ -143,7 +135,7 @@ def settle(
         violations = judge.violations(found)
         if not violations:
             return found, pins
-        s = distances(found[:, :2])
+        s = distances_m(found)
         for leg, v in violations:
             at = float(s[leg] + v.fraction * (s[leg + 1] - s[leg]))
             worst = v

@@ -18,6 +18,7 @@ from gcsplan.planners.problem import ENDS_M, Problem
 from gcsplan.planners.profile.taut_kernels import edge
 from gcsplan.planners.profile.taut_string import NO_LIMIT, Blocked, Profile, taut_string
 from gcsplan.world.airspace import Tube
+from gcsplan.world.geometry.path import distances_m
 
 KEEP_M = 1e-4
 """Metres kept from floors and ceilings where they are far enough apart, so that rounding never decides."""
@@ -103,12 +104,6 @@ class Closed:
     zones: tuple[int, ...]
 
 
-def distances(points: Floats) -> Floats:
-    """Metres (N,) along a track (N, 2), from 0 at its first point."""
-    d = np.diff(points, axis=0)
-    return np.concatenate([[0.0], np.cumsum(np.hypot(d[:, 0], d[:, 1]))])
-
-
 def divided(points: Floats, step_m: float) -> tuple[Indices, Indices, Indices]:
     """Divide legs of a track or path (N, 2 or 3) into equal parts, none longer than ``step_m``; for each part (K,) its
     leg, its index within that leg, and the number of parts of that leg."""
@@ -140,7 +135,7 @@ def make_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -
     points, pinned, pin_m = points[keep], pinned[keep], pin_m[keep]
     tube = problem.airspace.tube(points, problem.limits)
     problem.budget.spend("piece", len(tube.s_m))
-    s = distances(points)
+    s = distances_m(points)
     return Track(points, pinned, pin_m, s * (tube.s_m[-1] / s[-1]), tube)
 
 

@@ -15,8 +15,9 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.taut_string import Profile
-from gcsplan.planners.profile.track import Obstruction, Track, denser, distances, make_track, values_at
+from gcsplan.planners.profile.track import Obstruction, Track, denser, make_track, values_at
 from gcsplan.world.airspace import Band
+from gcsplan.world.geometry.path import distances_m
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.geometry.zones import Polygon, Zone
 
@@ -136,7 +137,7 @@ def free_below(problem: Problem, places: Floats, cap_m: float, enough_m: float) 
     """`widest_free` at the vertices (N, 2) of a track."""
     ends = np.isin(np.arange(len(places)), [0, len(places) - 1])
     track = make_track(problem, places, ends, np.full(len(places), math.nan))
-    return widest_free(problem, track, distances(places), problem.floors(*places.T), cap_m, enough_m)
+    return widest_free(problem, track, distances_m(places), problem.floors(*places.T), cap_m, enough_m)
 
 
 def shut_places(problem: Problem, points: Floats, cap_m: float, step_m: float) -> Floats:

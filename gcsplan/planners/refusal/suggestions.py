@@ -22,6 +22,7 @@ from gcsplan.planners.problem import PlanFunction, Problem, Progress, Refusal
 from gcsplan.planners.profile.track import denser
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import runs_m
 from gcsplan.world.geometry.zones import Circle, Zone
 
 MOST_TRIALS = 32
@@ -360,7 +361,7 @@ def _climbing(trials: Trials, path: Floats) -> Cure:
     def at(angle: float) -> Problem:
         return _limited(problem, max_climb_deg=max(up, angle), max_descent_deg=max(down, angle))
 
-    run = np.hypot(*np.diff(path[:, :2], axis=0).T)
+    run = runs_m(path)
     steep = float(np.degrees(np.arctan2(np.abs(np.diff(path[:, 2])), run)).max())
     given = min(up, down)
     values = replace(DEGREES, most=min(DEGREES.most, _steepest_deg(problem)))

@@ -16,11 +16,12 @@ import numpy as np
 from gcsplan.arrays import Floats, Indices
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.exact import way_points
-from gcsplan.planners.profile.track import Flown, Track, distances, fly, make_track
+from gcsplan.planners.profile.track import Flown, Track, fly, make_track
 from gcsplan.planners.simplify import fewer
 from gcsplan.planners.swarm import scene_kernels as k
 from gcsplan.planners.swarm.scene import Scene
 from gcsplan.world.airspace import Legs, Violation
+from gcsplan.world.geometry.path import distances_m, track_length_m
 
 STATIONS, SIDES, REACH = 160, 30, 4
 """Stations along the ribbon; side steps to either side; most side steps between neighbouring stations."""
@@ -57,7 +58,7 @@ def repair(problem: Problem, scene: Scene, samples: Floats, terminals: Indices) 
     points = _with_profile(problem, flat, terminals)
     if points is not None:
         return Repaired(points, 0.0)
-    way = float(np.hypot(*np.diff(scene.terminals[:, :2], axis=0).T).sum())
+    way = track_length_m(scene.terminals)
     for width, margin in PUSHES:
         pushed = _push(problem, scene, flat, terminals, width * way, margin * way)
         if pushed is None:
@@ -96,7 +97,7 @@ def _checked(problem: Problem, track: Track, flown: Flown) -> Floats | None:
         if not found:
             few = fewer(problem, points, pinned, FEWER_POINTS_COST * flown.cost)[0]
             return points if violations(problem, few) else few
-        s = distances(points[:, :2])
+        s = distances_m(points)
         for v in found:
             at = float(s[v.leg] + v.fraction * (s[v.leg + 1] - s[v.leg]))
             room = v.by + CORRECTED_M
@@ -174,10 +175,10 @@ def _ribbon(flat: Floats, terminals: Indices, half_m: float) -> tuple[Floats, Fl
     A ribbon must not fold: so turns of the track within the half-width are smoothed between terminals.
     """
     parts, at_terminal = [flat[:1]], [0]
-    whole = float(distances(flat)[-1])
+    whole = float(distances_m(flat)[-1])
     for a, b in itertools.pairwise(terminals):
         track = _smoothed(flat[a : b + 1], half_m)
-        s = distances(track)
+        s = distances_m(track)
         count = max(2, round(STATIONS * s[-1] / max(whole, 1e-9)))
         at = np.linspace(0.0, s[-1], count + 1)[1:]
         parts.append(np.stack([np.interp(at, s, track[:, i]) for i in range(2)], axis=-1))
@@ -190,7 +191,7 @@ def _ribbon(flat: Floats, terminals: Indices, half_m: float) -> tuple[Floats, Fl
 
 def _smoothed(track: Floats, reach_m: float) -> Floats:
     """A track (n, 2) averaged along itself over ``reach_m`` to either side; over less near its ends, which stay."""
-    s = distances(track)
+    s = distances_m(track)
     count = 400  # parts of the track
     at = np.linspace(0.0, s[-1], count + 1)
     even = np.stack([np.interp(at, s, track[:, i]) for i in range(2)], axis=-1)

@@ -17,6 +17,7 @@ from gcsplan.planners.registry import VOLUME_KEYS
 from gcsplan.planners.swarm import scene_kernels as k
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import distances_m
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.geometry.zones import Level, Zone
 
@@ -167,7 +168,7 @@ class Scene:
         altitude, clipped to floor and ceiling."""
         known = [problem.start[2], *(math.nan if v.amsl_m is None else v.amsl_m for v in problem.via), problem.goal[2]]
         z = np.array(known)
-        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(flat, axis=0).T))])
+        along = distances_m(flat)
         fixed = np.isfinite(z)
         low, high = self.room(flat)
         z = np.where(fixed, z, np.clip(np.interp(along, along[fixed], z[fixed]), low, high))

@@ -22,12 +22,11 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.profile.track import distances
 from gcsplan.planners.simplify import thinned
 from gcsplan.planners.turns.arc_path import ArcPath, through, unlooped
 from gcsplan.planners.turns.loop_discs import with_loops
 from gcsplan.planners.turns.repair import Patience, Tried, cost_of, mended, polished
-from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.path import Path, distances_m
 
 Replan = Callable[[float], tuple[Floats, Bools] | None]
 """Plans a path with additional track error, its argument in metres (`with_more_clearance`); returns the points and
@@ -171,6 +170,6 @@ def _corners(flat: Floats, must: Bools, slack_m: float) -> Indices:
     """Indices of the points that remain without those near a straight line; ``must`` stay, and points within 1 mm of
     the one before are dropped."""
     index = thinned(flat, np.flatnonzero(must), slack_m)
-    apart = np.concatenate([[True], distances(flat[index])[1:] - distances(flat[index])[:-1] > 1e-3])
+    apart = np.concatenate([[True], distances_m(flat[index])[1:] - distances_m(flat[index])[:-1] > 1e-3])
     apart[-1] = True
     return np.asarray(index[apart])

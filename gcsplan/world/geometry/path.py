@@ -25,8 +25,7 @@ class Path:
     @property
     def leg_horizontal_m(self) -> Floats:
         """(N - 1,) horizontal length of each leg."""
-        d = np.diff(self.points, axis=0)
-        return np.asarray(np.hypot(d[:, 0], d[:, 1]))
+        return runs_m(self.points)
 
     @property
     def leg_length_m(self) -> Floats:
@@ -46,3 +45,19 @@ class Path:
     def energy_j(self, vertical_j_per_m: float, horizontal_j_per_m: float) -> float:
         """Energy ``R1·Σ|Δz| + R2·Σ horizontal``, J (krill paper, Table 1)."""
         return vertical_j_per_m * self.vertical_m + horizontal_j_per_m * float(self.leg_horizontal_m.sum())
+
+
+def runs_m(points: Floats) -> Floats:
+    """(N - 1,) horizontal metres from point to point of a track or path (N, 2 or 3)."""
+    d = np.diff(points[:, :2], axis=0)
+    return np.asarray(np.hypot(d[:, 0], d[:, 1]))
+
+
+def distances_m(points: Floats) -> Floats:
+    """(N,) horizontal metres along a track or path (N, 2 or 3), from 0 at its first point."""
+    return np.concatenate([[0.0], np.cumsum(runs_m(points))])
+
+
+def track_length_m(points: Floats) -> float:
+    """Horizontal metres of a track or path (N, 2 or 3)."""
+    return float(runs_m(points).sum())

@@ -194,7 +194,7 @@ class Mosaic:
             return layout.grid_of(self._near(x, reference), y)
 
         wide = (box[0] - spare_m, box[1] - spare_m, box[2] + spare_m, box[3] + spare_m)
-        col, row = exact(*_lattice(wide))
+        col, row = exact(*box_lattice(wide))
         first_col, last_col = min(p.col for p in tiles), max(p.col + p.cols for p in tiles)
         first_row, last_row = min(p.row for p in tiles), max(p.row + p.raster.rows for p in tiles)
         c0, c1 = max(math.floor(col.min()) - _SPARE_CELLS, first_col), math.ceil(col.max()) + _SPARE_CELLS + 1
@@ -309,7 +309,8 @@ def _datum(raster: Raster) -> str:
     return raster.vertical.name if raster.vertical is not None else "nothing"
 
 
-def _lattice(box: Box) -> tuple[Floats, Floats]:
+def box_lattice(box: Box) -> tuple[Floats, Floats]:
+    """East and north of 33 by 33 places all over a box of the plane, one row after the other."""
     f = np.linspace(0.0, 1.0, 33)
     e, n = np.meshgrid(box[0] + f * (box[2] - box[0]), box[1] + f * (box[3] - box[1]))
     return e.ravel(), n.ravel()

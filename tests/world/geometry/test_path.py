@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.path import Path, distances_m, runs_m, track_length_m
 
 POINTS = np.array([[0.0, 0.0, 10.0], [3.0, 4.0, 10.0], [3.0, 4.0, 22.0], [8.0, 16.0, 8.0]])
 
@@ -20,6 +20,14 @@ def test_lengths_climbs_and_energy_are_those_of_its_legs() -> None:
     assert path.length_m == pytest.approx(17.0 + last_m)
     assert path.vertical_m == 12.0 + 14.0
     assert path.energy_j(120.0, 100.0) == pytest.approx(120.0 * 26.0 + 100.0 * 18.0)
+
+
+@pytest.mark.parametrize("columns", [2, 3])
+def test_lengths_along_a_track_are_horizontal(columns: int) -> None:
+    points = POINTS[:, :columns]
+    assert runs_m(points).tolist() == [5.0, 0.0, 13.0]
+    assert distances_m(points).tolist() == [0.0, 5.0, 5.0, 18.0]
+    assert track_length_m(points) == 18.0
 
 
 def test_its_points_are_its_own_and_do_not_change() -> None:

@@ -23,7 +23,7 @@ from gcsplan.planners.optimal.plane.corridor import joined
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.searches.outline_tracks import OutlineTracks
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.profile.track import distances
+from gcsplan.world.geometry.path import distances_m, track_length_m
 
 MOST_CASES = 48
 """Most cases that are looked at."""
@@ -84,16 +84,16 @@ class _Stretch:
         if over is not None:
             leg, found, top_m = over
             parts[leg - self.first] = np.concatenate([found.before, found.after])
-            begin_m = sum(map(_length_m, parts[: leg - self.first]))
+            begin_m = sum(map(track_length_m, parts[: leg - self.first]))
             at_m += [
-                begin_m + _length_m(found.before),
-                begin_m + _length_m(parts[leg - self.first]) - _length_m(found.after),
+                begin_m + track_length_m(found.before),
+                begin_m + track_length_m(parts[leg - self.first]) - track_length_m(found.after),
             ]
             z_m += [max(top_m, self.from_m), max(top_m, self.to_m)]
-        at_m, z_m = [*at_m, sum(map(_length_m, parts))], [*z_m, self.to_m]
-        begins_m = np.concatenate([[0.0], np.cumsum([_length_m(part) for part in parts])])
+        at_m, z_m = [*at_m, sum(map(track_length_m, parts))], [*z_m, self.to_m]
+        begins_m = np.concatenate([[0.0], np.cumsum([track_length_m(part) for part in parts])])
         return [
-            np.column_stack([part, np.interp(begin + distances(part[:, :2]), at_m, z_m)])
+            np.column_stack([part, np.interp(begin + distances_m(part), at_m, z_m)])
             for part, begin in zip(parts, begins_m.tolist(), strict=False)
         ]
 
@@ -144,7 +144,7 @@ class Overflight:
         """The zone below whose top a case's way is deepest, out of those that may be passed over or around; None if
         there is none."""
         outlines, way = self.outlines, np.concatenate(case.ways)
-        line, along_m = shapely.LineString(way[:, :2]), distances(way[:, :2])
+        line, along_m = shapely.LineString(way[:, :2]), distances_m(way)
         deepest_m, found = LOWER_M, None
         for k in np.flatnonzero(outlines.over & ~outlines.under & ~case.shut).tolist():
             inside = line.intersection(self._outline(k).shape) if k not in case.over else shapely.LineString()
@@ -161,7 +161,7 @@ class Overflight:
         if tracks is None:
             return []
         p, incumbent = self.problem, self.incumbent
-        lengths_m = [_length_m(t) * (1.0 - 1e-9) for t in tracks]
+        lengths_m = [track_length_m(t) * (1.0 - 1e-9) for t in tracks]
         if p.objective == "energy":
             top_m = max((float(self.outlines.tops_m[k]) for k in over), default=-math.inf)
             least = p.horizontal_j_per_m * sum(lengths_m) + p.vertical_j_per_m * incumbent.rise(top_m)
@@ -249,7 +249,3 @@ class Overflight:
             if not any(finer) and not met:
                 break
         return found
-
-
-def _length_m(track: Floats) -> float:
-    return float(np.hypot(*np.diff(track[:, :2], axis=0).T).sum())

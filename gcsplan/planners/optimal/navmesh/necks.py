@@ -30,6 +30,7 @@ from gcsplan.planners.optimal.navmesh.portals import GroundPlace, GroundTrack
 from gcsplan.planners.optimal.navmesh.zone_shapes import Fit
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.zone_levels import shut_places
+from gcsplan.world.geometry.path import runs_m
 
 DIRECTIONS = 32
 """Directions in which the terrain is read for a cell."""
@@ -169,7 +170,7 @@ class Necks:
     def look(self, plane: Plane, places: Floats) -> bool:
         """Look at the cells around the places (N, 2) of a track, as long as the budget lasts; return whether any was
         not looked at before. Raises Exhausted."""
-        apart = np.flatnonzero(np.hypot(*np.diff(places, axis=0).T) > AROUND_M) + 1
+        apart = np.flatnonzero(runs_m(places) > AROUND_M) + 1
         budget = plane.problem.budget
         looked = [budget.goes_on() and self._look(plane, group) for group in np.split(places, apart)]
         return any(looked)

@@ -10,6 +10,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats, Int32s, Int64s
 from gcsplan.planners.optimal.navmesh.polyanya import search
+from gcsplan.world.geometry.path import runs_m
 
 GroundPlace = tuple[float, float]
 
@@ -100,6 +101,6 @@ class Portals:
         if n <= 0:
             return None, opened
         points = out[:n][::-1, :2].copy()
-        keep = np.concatenate([[True], np.hypot(*np.diff(points, axis=0).T) > 1e-6])
+        keep = np.concatenate([[True], runs_m(points) > 1e-6])
         keep[-1] = True
         return GroundTrack(points[keep], float(out[1, 2])), opened

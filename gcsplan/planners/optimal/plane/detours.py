@@ -25,7 +25,8 @@ from gcsplan.planners.optimal.plane.corridor import PinnedTrack, Spare
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.exact import sampled_track
-from gcsplan.planners.profile.track import Closed, Lacking, distances, lacking
+from gcsplan.planners.profile.track import Closed, Lacking, lacking
+from gcsplan.world.geometry.path import distances_m
 
 LACKING_M, HAIR_M = 3.0, 0.2
 """If a track lacks less than `LACKING_M` between floor and ceiling, cells may be more lenient than the exact check,
@@ -123,7 +124,7 @@ class DetourSearch:
             terminals = known_terminals or self.terminals(choice)
             if terminals is None:
                 continue
-            length_m = float(distances(terminals[0])[-1])
+            length_m = float(distances_m(terminals[0])[-1])
             if not self._may_help(length_m, choice):
                 continue
             name = terminals[0].tobytes()

@@ -16,7 +16,7 @@ from gcsplan.planners.profile.exact import LegJudge, Unsettled, settle, way_poin
 from gcsplan.planners.profile.track import Flown, Obstruction, Track, fly, make_track
 from gcsplan.planners.profile.zone_levels import may_pass
 from gcsplan.planners.simplify import fewer, polished
-from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.path import Path, track_length_m
 
 LITTLE, WORTH = 5e-6, 2e-5
 """Part of the cost that removing way points may add: during the searches, and for the final path."""
@@ -210,7 +210,7 @@ class Incumbent:
         """Whether the best path rises by at least `STEEP_RISE` of its track's length."""
         if self.best is None:
             return False
-        track_m = float(np.hypot(*np.diff(self.best[:, :2], axis=0).T).sum())
+        track_m = track_length_m(self.best)
         return float(np.ptp(self.best[:, 2])) >= STEEP_RISE * track_m
 
     @property

@@ -20,6 +20,7 @@ from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.planners.profile.track import Flown, fly, make_track
 from gcsplan.planners.profile.zone_levels import may_pass
 from gcsplan.world.airspace import Airspace
+from gcsplan.world.geometry.path import track_length_m
 from gcsplan.world.geometry.surface import GridMap, Surface
 
 FEW = 64
@@ -61,7 +62,7 @@ def in_window(incumbent: Incumbent) -> Problem:
     length_m = incumbent.longest(math.inf)
     if math.isfinite(length_m):
         places = np.array(terminals_of(problem))
-        straight = float(np.hypot(*np.diff(places, axis=0).T).sum())
+        straight = track_length_m(places)
         # No place of a track of that length is farther outside the terminals' box.
         reach = 0.5 * (length_m - straight) * (1.0 + MARGIN) + 0.5 * straight * MARGIN
         reach = max(reach, 0.5 * math.sqrt(max(length_m**2 - straight**2, 0.0)) * (1.0 + MARGIN)) + 1.0

@@ -22,9 +22,9 @@ from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.plane.leg import Leg
 from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.profile.track import denser, distances
+from gcsplan.planners.profile.track import denser
 from gcsplan.planners.profile.zone_levels import free_below
-from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.path import Path, distances_m
 
 Point = tuple[float, float, float]
 
@@ -132,7 +132,7 @@ def _end(plane: PlaneSearch, leg: Leg, along_m: float, whole_m: float) -> Floats
 def _sampled(way: Floats) -> tuple[Floats, Floats, Floats]:
     """Metres along a track of its vertices, metres along it (N,) of places at most `STEP_M` apart, and those places
     (N, 2)."""
-    at = distances(way)
+    at = distances_m(way)
     s = np.linspace(0.0, at[-1], math.ceil(at[-1] / STEP_M) + 1)
     return at, s, np.stack([np.interp(s, at, way[:, k]) for k in range(2)], axis=-1)
 
@@ -140,7 +140,7 @@ def _sampled(way: Floats) -> tuple[Floats, Floats, Floats]:
 def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
     """(N, 3) a path of a leg that is cheaper than the known ``path``, which it leaves where the track of the last bound
     does; None if none was found."""
-    on_path = distances(path[:, :2])
+    on_path = distances_m(path)
     at, s, places = _sampled(leg.last_track)
     away, nearest = nearest_on(places, path[:, :2])
     better: list[tuple[float, float, Floats]] = []
@@ -247,7 +247,7 @@ def _past(
 
 def nearest_on(places: Floats, track: Floats) -> tuple[Floats, Floats]:
     """(N,) distances of places from a track, and metres along the track (N,) of the points nearest to them."""
-    a, d, s = track[:-1], np.diff(track, axis=0), distances(track)
+    a, d, s = track[:-1], np.diff(track, axis=0), distances_m(track)
     away, where = np.empty(len(places)), np.empty(len(places))
     for first in range(0, len(places), PLACES_AT_ONCE):
         part = slice(first, first + PLACES_AT_ONCE)

@@ -21,8 +21,9 @@ from scipy.sparse.csgraph import dijkstra
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.planners.optimal.navmesh.grid import NodeExtent, extent
-from gcsplan.planners.optimal.searches.section_dp import FIXED, FREE, UPRIGHT, cheapest, cost_of, drawn, kinds_of
+from gcsplan.planners.optimal.searches.section_dp import FIXED, FREE, UPRIGHT, cheapest, drawn, kinds_of
 from gcsplan.planners.problem import Problem, terminals_of
+from gcsplan.world.geometry.path import distances_m
 from gcsplan.world.geometry.zones import Circle
 
 NODES, PLACES, LEVELS = 8000, (200, 1000), (7, 30)
@@ -67,14 +68,14 @@ def small_path(problem: Problem, known: Floats | None) -> tuple[Floats, Bools] |
         return _roadmap(problem, starts, goals, limit)
 
     found: tuple[Floats, Bools] | None = None
-    best = math.inf if known is None else cost_of(problem, known)
+    best = math.inf if known is None else problem.cost_through(known)
     for _ in range(2):
         terminals = terminals_by_leg(problem, _straight(problem) if known is None else known)
         better = path_over(problem, terminals, best, known, between)
         if better is None:
             break
         before, found, known = best, better, better[0]
-        best = cost_of(problem, known)
+        best = problem.cost_through(known)
         if best > before * (1.0 - SECOND_WORTH):
             break
     return found
@@ -83,7 +84,7 @@ def small_path(problem: Problem, known: Floats | None) -> tuple[Floats, Bools] |
 def _straight(problem: Problem) -> Floats:
     """(K, 3) the terminals, heights that are free in between those that are not, but not below the floor."""
     flat = np.array(terminals_of(problem))
-    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(flat, axis=0).T))])
+    s = distances_m(flat)
     heights = np.array([problem.start[2], *(math.nan if v.amsl_m is None else v.amsl_m for v in problem.via),
                         problem.goal[2]])  # fmt: skip
     known = np.isfinite(heights)
@@ -329,13 +330,13 @@ def path_over(
         kinds = np.full(len(points), FREE)
         ends = np.cumsum([0, *(len(part) - 1 for part in parts)])
         kinds[ends] = [FIXED, *(UPRIGHT if v.amsl_m is None else FIXED for v in problem.via), FIXED]
-        if cost_of(problem, points) <= DRAWN_HOPE * best:
+        if problem.cost_through(points) <= DRAWN_HOPE * best:
             tried.append((points, kinds))
     size_m = min(x.spacing_m for x in roadmaps)
     out: tuple[Floats, Bools] | None = None
     for points, kinds in tried:
         points, kinds = drawn(problem, points, kinds, size_m)
-        cost = cost_of(problem, points)
+        cost = problem.cost_through(points)
         if cost < best:
             best, out = cost, (points, kinds != FREE)
     return out
@@ -369,13 +370,13 @@ def _best(problem: Problem, paths: list[Floats], spacing_m: float) -> Floats:
         kinds = np.full(len(path), FREE)
         kinds[[0, -1]] = FIXED
         simpler.append(cheapest(problem, path, kinds))
-    simpler.sort(key=lambda path: cost_of(problem, path[0]))
+    simpler.sort(key=lambda path: problem.cost_through(path[0]))
     tight: list[Floats] = []
     for points, kinds in simpler[:DRAWN]:
         if tight and not problem.budget.goes_on():
             break
         tight.append(drawn(problem, points, kinds, spacing_m, halvings=2)[0])
-    return min(tight, key=lambda path: cost_of(problem, path))
+    return min(tight, key=lambda path: problem.cost_through(path))
 
 
 @dataclass(frozen=True, eq=False, slots=True)

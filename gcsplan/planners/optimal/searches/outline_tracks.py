@@ -20,6 +20,7 @@ from gcsplan.planners.optimal.plane.corridor import PinnedTrack, joined
 from gcsplan.planners.optimal.plane.detours import DetourSearch, SideChoice
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.problem import Problem, terminals_of
+from gcsplan.world.geometry.path import track_length_m
 
 TRACKS = 24
 """Most tracks that are tried."""
@@ -116,7 +117,7 @@ class OutlineTracks:
 
 def _length_m(tracks: list[Floats]) -> float:
     """The length of all tracks together, rounded down."""
-    return sum(float(np.hypot(*np.diff(t, axis=0).T).sum()) for t in tracks) * (1.0 - 1e-9)
+    return sum(track_length_m(t) for t in tracks) * (1.0 - 1e-9)
 
 
 def _sides(problem: Problem) -> tuple[Bools, Floats]:

@@ -14,6 +14,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import divided
+from gcsplan.world.geometry.path import track_length_m
 
 FREE, UPRIGHT, FIXED = 0, 1, 2
 """Kinds of points: free to move, free to move up and down only, fixed."""
@@ -31,7 +32,7 @@ SIZE, FEW = 0.016, 5
 
 def tightened(problem: Problem, points: Floats) -> tuple[Floats, Bools]:
     """A path (N, 3) drawn together with moves that suit its length, and (N,) which of its points are terminals."""
-    size_m = SIZE * float(np.hypot(*np.diff(points[:, :2], axis=0).T).sum())
+    size_m = SIZE * track_length_m(points)
     found, kinds = drawn(problem, points, kinds_of(problem, points), size_m, FEW)
     return found, kinds != FREE
 
@@ -53,7 +54,7 @@ def drawn(
     problem: Problem, points: Floats, kinds: Indices, size_m: float, halvings: int = HALVINGS
 ) -> tuple[Floats, Indices]:
     """A legal path (N, 3) of points of ``kinds`` (N,) made cheaper by moves of half ``size_m`` and less."""
-    cost = cost_of(problem, points)
+    cost = problem.cost_through(points)
     for k in range(halvings):
         move_m = size_m * 0.5 ** (k + 1)
         for _ in range(ROUNDS):
@@ -61,13 +62,13 @@ def drawn(
                 return points, kinds
             finer, its_kinds = _divided(points, kinds, 1.5 * math.sqrt(size_m * move_m))
             moved = _moved(problem, finer, its_kinds, move_m)
-            before, now = cost, cost_of(problem, moved)
+            before, now = cost, problem.cost_through(moved)
             if now < cost:
                 points, kinds, cost = moved, its_kinds, now
             if cost > before * (1.0 - LITTLE):
                 break
         points, kinds = cheapest(problem, points, kinds)
-        cost = cost_of(problem, points)
+        cost = problem.cost_through(points)
     return points, kinds
 
 
@@ -144,8 +145,3 @@ def _divided(points: Floats, kinds: Indices, step_m: float) -> tuple[Floats, Ind
     t = (part / parts)[:, None]
     inner = points[leg] + t * (points[leg + 1] - points[leg])
     return np.vstack([inner, points[-1:]]), np.append(np.where(part == 0, kinds[leg], FREE), kinds[-1])
-
-
-def cost_of(problem: Problem, points: Floats) -> float:
-    """Metres or joules of a path (N, 3)."""
-    return float(problem.leg_costs(points[:-1], points[1:]).sum())

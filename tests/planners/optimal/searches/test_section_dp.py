@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats, Indices
-from gcsplan.planners.optimal.searches.section_dp import FAR_AHEAD, FIXED, FREE, cheapest, cost_of, tightened
+from gcsplan.planners.optimal.searches.section_dp import FAR_AHEAD, FIXED, FREE, cheapest, tightened
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
@@ -54,7 +54,7 @@ def test_the_cheapest_chain_is_that_of_brute_force(count: int) -> None:
         kinds = np.where(rng.random(count) < 0.1, FIXED, FREE)
         kinds[[0, -1]] = FIXED
         found, kept = cheapest(problem, points, kinds)
-        assert cost_of(problem, found) == pytest.approx(brute_force(problem, points, kinds), rel=1e-12)
+        assert problem.cost_through(found) == pytest.approx(brute_force(problem, points, kinds), rel=1e-12)
         assert (kept != FREE).sum() == (kinds != FREE).sum()
 
 
