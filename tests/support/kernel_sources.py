@@ -1,0 +1,32 @@
+"""What a unit of kernels must list: each module that marks a function of it, and all that these take constants from."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+from types import ModuleType
+
+import gcsplan
+
+ROOT = Path(gcsplan.__file__).parent
+HARMLESS = {"gcsplan.arrays", "gcsplan.world.geometry.limits"}
+"""Types alone: no machine code depends on them."""
+
+
+def imported_by(path: Path) -> set[str]:
+    """The modules of gcsplan that a file imports names from."""
+    nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    return {n.module for n in nodes if isinstance(n, ast.ImportFrom) and (n.module or "").startswith("gcsplan.")}
+
+
+def faults(compiled: ModuleType) -> list[str]:
+    """What the list of the unit in ``compiled`` lacks, or has too much."""
+    listed = {path.resolve() for path in compiled.UNIT.sources}
+    modules = {".".join(("gcsplan", *p.resolve().relative_to(ROOT).with_suffix("").parts)) for p in listed}
+    marked = {p for p in ROOT.rglob("*.py") if compiled.__name__ in imported_by(p)}
+    markers = {p for p in marked if any(word in p.read_text(encoding="utf-8") for word in ("@kernel", "@device"))}
+    found = [f"{path.name} marks kernels and is not listed" for path in sorted(markers - listed)]
+    for path in sorted(listed):
+        others = imported_by(path) - modules - HARMLESS - {compiled.__name__}
+        found += [f"{path.name} takes names from {other}, which is not listed" for other in sorted(others)]
+    return found
