@@ -2,7 +2,7 @@
 
 Polygons are prisms, points with ``radius_m`` are cylinders, lines with ``buffer_m`` corridors; the mission may give
 both sizes for all shapes of a file that have none of their own. Floors and ceilings are in a feature's properties, or
-in a Placemark's ExtendedData (`zone_attributes`). A feature that cannot be understood is refused, never skipped,
+in a Placemark's ExtendedData (`zones.attributes`). A feature that cannot be understood is refused, never skipped,
 because a zone that is left out would be flown through. A hole counts as no-fly.
 """
 
