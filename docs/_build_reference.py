@@ -20,7 +20,7 @@ from gcsplan import errors
 from gcsplan.cli.process import exit as ending
 from gcsplan.mission_file import json_schema
 from gcsplan.mission_file.values import schema, units
-from gcsplan.notes.catalogue import TEXTS
+from gcsplan.notes.note import TEXTS
 from gcsplan.planners import registry
 from gcsplan.sim.vehicle.firmware import FIRMWARE_CHANGES
 

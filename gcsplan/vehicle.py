@@ -12,6 +12,9 @@ from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.atmosphere import true_per_indicated
 from gcsplan.world.geometry.limits import Limits
 
+GRAVITY_M_S2 = 9.80665
+"""Standard gravity."""
+
 DEFAULT_LEAN_DEG, LARGEST_LEAN_DEG = 30.0, 80.0
 """ArduCopter's largest lean angle: its default, and the most that it accepts."""
 

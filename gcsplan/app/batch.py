@@ -33,16 +33,25 @@ from gcsplan.export.outdir import has_outputs, is_output, retire_outputs, settle
 from gcsplan.mission_file.samples import file_of, is_sample
 from gcsplan.world.terrain.input_files import SPECIAL, FileReading, reading
 
-__all__ = ["COLUMNS", "PIECE_S", "BatchOptions", "MissionBatch", "Record", "exit_code", "missions_of", "record_of"]
+__all__ = [
+    "BATCH_COLUMNS",
+    "MISSION_S",
+    "BatchOptions",
+    "MissionBatch",
+    "Record",
+    "exit_code",
+    "missions_of",
+    "record_of",
+]
 
 FOLDER = "records"
 """The folder within the batch's directory that says what is done."""
 
-TABLES = ("results.csv", "results.parquet", "index.html")
+BATCH_TABLES = ("results.csv", "results.parquet", "index.html")
 """The files of a batch beside the folders of its missions."""
 
 FORMAT = 3
-MOST_BYTES = 64_000_000
+MOST_BYTES_OF_A_RECORD = 64_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +93,7 @@ def kept_record(directory: Path, mission: str, asked: str) -> Record | None:
     """The record of an earlier run; None unless it is of what is ``asked`` now, and nothing has changed since."""
     try:
         with _file_of(directory, mission).open("rb") as file:
-            kept = json.loads(file.read(MOST_BYTES))
+            kept = json.loads(file.read(MOST_BYTES_OF_A_RECORD))
         if not isinstance(kept, dict) or kept.get("format") != FORMAT or not isinstance(kept.get("body"), str):
             return None
         if kept.get("sha256") != _sha256(kept["body"]):
@@ -114,7 +123,7 @@ def fault_of_name(name: str, missions: set[str]) -> str:
     ``missions`` are the names of all, in lower case, for some disks ignore case.
     """
     parts = name.casefold().split("/")
-    if parts[0] in (FOLDER, *TABLES):
+    if parts[0] in (FOLDER, *BATCH_TABLES):
         return f"{name.split('/')[0]} is a name of the batch's own files; rename the mission, or its folder"
     for k, part in enumerate(parts):
         above = "/".join(parts[:k])
@@ -135,10 +144,10 @@ def _sha256(text: str) -> str:
     return hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
 
 
-RULES = 3
+RECORD_RULES = 3
 """Counts the changes of what lets a mission fly: records of earlier rules do not hold."""
 
-PIECE_S = 0.4
+MISSION_S = 0.4
 """Seconds that a mission takes, about: 0.16 over hills (`bench scale`), 0.6 in mountains with margins."""
 
 POINTS = 60
@@ -265,7 +274,7 @@ class MissionBatch:
 
 def asked_of(path: str | Path, options: BatchOptions) -> str:
     """A digest of what is asked beside the content of files: which mission, the options, the version."""
-    asked = repr((__version__, RULES, options, os.path.abspath(path)))
+    asked = repr((__version__, RECORD_RULES, options, os.path.abspath(path)))
     return hashlib.sha256(asked.encode("utf-8", "surrogatepass")).hexdigest()
 
 
@@ -300,7 +309,7 @@ def _failed(name: str, asked: str, why: GcsplanError, read: FileReading | None =
     return Record(name, asked, why.exit_code, (row,), inputs=None if read is None else read.marks)
 
 
-COLUMNS = (
+BATCH_COLUMNS = (
     "mission", "vehicle", "code", "verdict", "reason", "message", "length_m", "gap_percent", "energy_j",
     "flight_energy_j", "energy_figures", "battery_used_percent", "min_agl_m", "max_agl_m", "min_zone_clearance_m",
     "min_zone_height_m",
@@ -320,7 +329,7 @@ def _rows(name: str, summary: str) -> list[dict[str, Any]]:
     for told in json.loads(summary)["vehicles"]:
         row = {"mission": name, "vehicle": told["name"], "code": 0, "reason": "", "message": ""}
         row |= {"return_safe": told.get("way_home", {}).get("safe")}
-        rows.append(row | {key: told[key] for key in COLUMNS if key in told})
+        rows.append(row | {key: told[key] for key in BATCH_COLUMNS if key in told})
     return rows
 
 

@@ -17,7 +17,7 @@ from gcsplan.vehicle import Autopilot
 if TYPE_CHECKING:
     from gcsplan.mavlink.link.watch import VehicleState
 
-NEAR_M = 30.0
+HOME_NEAR_M = 30.0
 """A home farther than this from the vehicle is told, m."""
 
 OPTIONS = {
@@ -89,7 +89,7 @@ def _start(state: VehicleState) -> tuple[str | None, list[Note]]:
             return None, []
         return f"{home[0]:.7f}, {home[1]:.7f}", [Note("start_at_home")]
     notes = [] if not state.armed else [Note("position_of_armed_vehicle")]
-    if home is not None and (away_m := distance_m(state.lat_deg, state.lon_deg, *home)) > NEAR_M:
+    if home is not None and (away_m := distance_m(state.lat_deg, state.lon_deg, *home)) > HOME_NEAR_M:
         notes.append(Note("start_at_vehicle", away_m=away_m))
     return f"{state.lat_deg:.7f}, {state.lon_deg:.7f}", notes
 

@@ -1,10 +1,10 @@
 """The battery along a mission: what each leg uses, and whether the rest is enough for the return from every point.
 
 The model is `gcsplan.vehicle.Energy`: a return costs R1 for its climb and its descent, R2 for the straight line home
-and for what the vehicle goes on before it turns home (`rtl.run_on`), the base power for no less than its time
-(`rtl.return_time`), and the power of hovering for the seconds over home. Along a straight leg the energy spent is at
-most linear (`LegFigures.lead_j`), and the energy of the return is convex, because the distance to home and the climb to
-the return's altitude are. So their sum exceeds a limit at most on two parts of a leg, one at each end, and bisection
+and for what the vehicle goes on before it turns home (`motion.stopping`), the base power for no less than its time
+(`return_rules.return_s`), and the power of hovering for the seconds over home. Along a straight leg the energy spent is
+at most linear (`LegFigures.lead_j`), and the energy of the return is convex, because the distance to home and the climb
+to the return's altitude are. So their sum exceeds a limit at most on two parts of a leg, one at each end, and bisection
 finds where it crosses the limit, without sampling.
 """
 
@@ -16,10 +16,9 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
-from gcsplan.check.motion.geodesy import flat_m
-from gcsplan.check.motion.return_rules import RULES, return_s
+from gcsplan.check.motion.return_rules import RETURN_RULES, return_s
 from gcsplan.check.motion.stopping import more_m
-from gcsplan.check.motion.stretch import Place
+from gcsplan.check.motion.stretch import Place, flat_m
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.figures import raised
 from gcsplan.notes.note import Note
@@ -97,7 +96,7 @@ class BatteryHome:
 
 def battery_home(verdict: Verdict, vehicle: Vehicle, home: Place, return_amsl_m: float) -> BatteryHome | None:
     """The energy spent so far plus the return, from every point of a flight; None if the capacity is not given."""
-    energy, rule = vehicle.energy, RULES[vehicle.autopilot]
+    energy, rule = vehicle.energy, RETURN_RULES[vehicle.autopilot]
     if energy.battery_j is None or not verdict.legs:
         return None
     usable = (1.0 - energy.reserve) * energy.battery_j

@@ -20,16 +20,14 @@ from gcsplan.check.flight.corners import round_corners
 from gcsplan.check.flight.follow import follow
 from gcsplan.check.flight.times import seconds_of
 from gcsplan.check.margins import enough, nearest_misses, nearest_pass
-from gcsplan.check.motion.geodesy import degree_m
 from gcsplan.check.motion.project import PlaneLegs, legs_in_plane, steep_report, why_unknown, with_error_of_home
-from gcsplan.check.motion.stretch import Flight, Stretch
+from gcsplan.check.motion.stretch import Flight, Stretch, degree_m
 from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
 from gcsplan.check.verdict import LegFigures, Verdict
 from gcsplan.mavlink.mission.autopilots import needs_straight, profile_of
 from gcsplan.mavlink.mission.mission import Home, Mission
 from gcsplan.mavlink.mission.parameter_list import FlightExtent
-from gcsplan.notes.finding import Finding
-from gcsplan.notes.note import Note
+from gcsplan.notes.note import Finding, Note
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import LegReport, Legs, Violation
 from gcsplan.world.geodesy.frame import EARTH_RADIUS_M, FARTHEST_M
@@ -42,7 +40,7 @@ TERRAIN_ERROR_M = 30.0
 NEAR_DEG = FARTHEST_M / 111_700.0
 """Degrees of latitude, or of longitude anywhere, that are surely no more than `FARTHEST_M`."""
 
-HIGHEST_M = 20_000.0
+HIGHEST_JUDGED_M = 20_000.0
 """Above any aircraft that gcsplan plans for, m; keeps absurd numbers out of the exact check."""
 
 
@@ -167,19 +165,19 @@ def _unread(stretches: Sequence[Stretch], plane: PlaneLegs) -> list[Finding]:
 
 
 def _is_too_far(stretch: Stretch, world: World) -> bool:
-    """Whether it leads beyond `FARTHEST_M` from the frame's origin, off the globe, or beyond `HIGHEST_M` up or down."""
+    """Whether it leads beyond `FARTHEST_M` from the frame's origin, off the globe, or beyond `HIGHEST_JUDGED_M`."""
     frame = world.frame
     lat0, lon0 = math.radians(frame.lat_deg), math.radians(frame.lon_deg)
     for lat_deg, lon_deg, amsl_m in (stretch.start, stretch.end):
         beside_deg = abs(lat_deg - frame.lat_deg) + abs(lon_deg - frame.lon_deg)
-        if beside_deg <= NEAR_DEG and abs(lat_deg) <= 90.0 and abs(amsl_m) <= HIGHEST_M:
+        if beside_deg <= NEAR_DEG and abs(lat_deg) <= 90.0 and abs(amsl_m) <= HIGHEST_JUDGED_M:
             continue
         lat, lon = math.radians(lat_deg), math.radians(lon_deg)
         h = math.sin(0.5 * (lat - lat0)) ** 2 + math.cos(lat) * math.cos(lat0) * math.sin(0.5 * (lon - lon0)) ** 2
         away_m = 2.0 * EARTH_RADIUS_M * math.asin(math.sqrt(min(max(h, 0.0), 1.0)))
-        if abs(lat_deg) > 90.0 or not (away_m <= FARTHEST_M and abs(amsl_m) <= HIGHEST_M):
+        if abs(lat_deg) > 90.0 or not (away_m <= FARTHEST_M and abs(amsl_m) <= HIGHEST_JUDGED_M):
             return True
-    return not (stretch.reach_m <= FARTHEST_M and stretch.band_m <= HIGHEST_M)
+    return not (stretch.reach_m <= FARTHEST_M and stretch.band_m <= HIGHEST_JUDGED_M)
 
 
 def _too_far(s: Stretch) -> Finding:

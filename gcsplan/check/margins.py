@@ -4,7 +4,7 @@
 zone, or how low under one: the distance that the horizontal one does not tell. `enough`: by how much a limit is broken.
 A leg that is moved by this depth keeps the limit. The exact check resolves the ground beside a leg only as finely as a
 yes or no needs, so its depth of a violation is exact to about a tenth. The depth reported here was tried: the leg,
-moved by it, passes, unless `TRIES` steps found no such depth.
+moved by it, passes, unless `MOST_TRIES` steps found no such depth.
 """
 
 from __future__ import annotations
@@ -235,10 +235,10 @@ def _meets_box(legs: Legs, boxes: Floats) -> Bools:
     return met
 
 
-UPWARD = {"min_agl": 1.0, "terrain_clearance": 1.0, "max_agl": -1.0}
+LIFT_SIGN = {"min_agl": 1.0, "terrain_clearance": 1.0, "max_agl": -1.0}
 """The direction in which a leg is moved to keep a limit of height: 1 up, −1 down."""
 
-TRIES = 8
+MOST_TRIES = 8
 LEAST_PART = 0.95
 """The part of a depth that suffices which is tried next, at least: the kernel's depth is mostly exact to 1 %."""
 
@@ -257,7 +257,7 @@ def enough(v: Violation, broken: Indices, legs: Legs, limits: Limits, air: Airsp
     """``v`` with a ``by`` in hundredths that is enough for all of ``broken``, the legs that break the same limit."""
     if v.kind == "coverage":
         return v
-    by = _lift(v, broken, legs, limits, air) if v.kind in UPWARD else rounded_up(v.by)
+    by = _lift(v, broken, legs, limits, air) if v.kind in LIFT_SIGN else rounded_up(v.by)
     below = v.kind in ("min_agl", "terrain_clearance", "zone")
     return replace(v, by=by, value=v.limit - by if below else v.limit + by)
 
@@ -271,7 +271,7 @@ def _lift(v: Violation, broken: Indices, legs: Legs, limits: Limits, air: Airspa
     )
 
     def left(by: float) -> float:
-        lift = np.array([0.0, 0.0, UPWARD[v.kind] * by])
+        lift = np.array([0.0, 0.0, LIFT_SIGN[v.kind] * by])
         moved = Legs(
             legs.start[broken] + lift, legs.end[broken] + lift, legs.column[broken], legs.track_error_m[broken],
             legs.altitude_error_m[broken],
@@ -279,12 +279,12 @@ def _lift(v: Violation, broken: Indices, legs: Legs, limits: Limits, air: Airspa
         return air.deepest(moved, alone, v.kind)
 
     low, by = 0.0, rounded_up(v.by)
-    for _ in range(TRIES):
+    for _ in range(MOST_TRIES):
         missing = left(by)
         if missing <= 0.0:
             break
         low, by = by, rounded_up(by + max(missing, CENTIMETRE))
-    for _ in range(TRIES):
+    for _ in range(MOST_TRIES):
         less = rounded_up(max(0.5 * (low + by), LEAST_PART * by))
         if by - low <= FINE_PART * by or not low < less < by:
             break

@@ -12,8 +12,7 @@ from gcsplan.check.margins import Miss, ZonePass
 from gcsplan.check.motion.stretch import Place, StretchKind
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.mission.parameter_list import FlightExtent
-from gcsplan.notes.finding import Finding
-from gcsplan.notes.note import IN_FILES, Note, Wording
+from gcsplan.notes.note import IN_FILES, Finding, Note, Wording
 
 if TYPE_CHECKING:
     from gcsplan.fleet.arrival import Slot

@@ -17,6 +17,7 @@ from gcsplan.mission_file.values.schema import ArrivalKeys, EnergyKeys, LimitKey
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import (
     DEFAULT_LEAN_DEG,
+    GRAVITY_M_S2,
     LARGEST_LEAN_DEG,
     PX4_VEL_MAX_M_S,
     Autopilot,
@@ -40,7 +41,6 @@ STEEPEST_WING_DEG = 45.0
 MOST_BANK_DEG = 45.0
 """ArduPlane's default of ROLL_LIMIT_DEG."""
 
-GRAVITY_M_S2 = 9.80665
 
 SEPARATION_M = 30.0
 

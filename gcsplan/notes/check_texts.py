@@ -1,6 +1,6 @@
 """Sentences on what the check finds, does not judge and notes: items, turns, findings, energy."""
 
-TEXTS = {
+CHECK_TEXTS = {
     # -- what an autopilot does with a mission's items, and on what of it is not judged --
     # -- home --------------------------------------------------------------------------------------------------------
     "home_ground_unknown": (

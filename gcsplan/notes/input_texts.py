@@ -1,6 +1,6 @@
 """Sentences on files that were read: missions, zones, terrain, logs."""
 
-TEXTS = {
+INPUT_TEXTS = {
     # -- how the keys of a mission file, and the options that stand for them, were read --
     "value_converted": "{given} {symbol}, read as {own_key}: {value}",
     "charge_converted": "{given} {symbol} at {volts:g} V, read as {own_key}: {value}",

@@ -1,6 +1,6 @@
 """Sentences on vehicles on their links: what is on board, what was sent."""
 
-TEXTS = {
+LINK_TEXTS = {
     # -- a vehicle that a list is sent to: its state, its parameters, its terrain, and the link to it --
     # -- the link, and the vehicle's state --
     "sends_from_another_port": (

@@ -1,5 +1,7 @@
 """`Note`: one thing to say of a mission, as a code, the item that it is about, and data; and how its sentence is made.
 
+`Finding`: one limit that a mission breaks, with a note on it.
+
 A sentence of the catalogue names the data by fields of ``str.format``, each with the kind of number that it is:
 
     {away_m:distance.0}         a length in the units of the reader, without decimals; ``path leg far distance height
@@ -27,15 +29,23 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from string import Formatter
+from types import MappingProxyType
 from typing import Any, TypeAlias, get_args
 
 from gcsplan.figures import floored, raised
-from gcsplan.notes.catalogue import TEXTS
+from gcsplan.notes.check_texts import CHECK_TEXTS
+from gcsplan.notes.input_texts import INPUT_TEXTS
+from gcsplan.notes.link_texts import LINK_TEXTS
+from gcsplan.notes.plan_texts import PLAN_TEXTS
+from gcsplan.notes.return_texts import RETURN_TEXTS
 from gcsplan.units import Joules, Kind, Quantity, Reach, Rounding, Seconds, Symbol, Units
+
+TEXTS: Mapping[str, str] = MappingProxyType(CHECK_TEXTS | INPUT_TEXTS | LINK_TEXTS | PLAN_TEXTS | RETURN_TEXTS)
+"""The catalogue: all sentences that gcsplan says of missions, by code."""
 
 Datum: TypeAlias = "float | str | bool | Note | tuple[Datum, ...] | None"
 
-KINDS: tuple[str, ...] = get_args(Kind)
+NUMBER_KINDS: tuple[str, ...] = get_args(Kind)
 
 BEFORE = ("file", "place", "vehicle")
 """Data that stand before the sentence, in this order."""
@@ -173,7 +183,7 @@ def _shown(value: Any, spec: str, wording: Wording) -> str:
         return ""
     kind, *how = spec.split() or [""]
     name, _, decimals = kind.partition(".")
-    if name in KINDS:
+    if name in NUMBER_KINDS:
         exactly = int(decimals) if decimals else None
         return Quantity(value, name, exactly, _rounding(how), "trimmed" in how, "bare" in how).text(wording.units)  # type: ignore[arg-type]
     if name == "angle":
@@ -199,3 +209,35 @@ def _plain(value: Datum) -> Any:
     if isinstance(value, Note):
         return value.as_dict()
     return [_plain(each) for each in value] if isinstance(value, tuple) else value
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One limit broken by wire item ``seq``: what is said of it, the place, and by how much.
+
+    ``zone`` is the zone's name or empty.
+    """
+
+    seq: int
+    kind: str
+    note: Note
+    lat_deg: float
+    lon_deg: float
+    amsl_m: float
+    value: float
+    limit: float
+    by: float
+    unit: str
+    zone: str = ""
+
+    @property
+    def message(self) -> str:
+        """What is said of it, in SI."""
+        return str(self.note)
+
+    def as_dict(self, wording: Wording = IN_FILES) -> dict[str, Any]:
+        """The finding for programs: its fields with the message, and the note's code and data."""
+        fields = {name: getattr(self, name) for name in self.__slots__ if name != "note"}
+        said = self.note.as_dict()
+        begins = {"seq": fields.pop("seq"), "kind": fields.pop("kind"), "message": self.note.text(wording)}
+        return begins | fields | {"code": said["code"], "data": said["data"]}

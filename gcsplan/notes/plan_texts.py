@@ -1,6 +1,6 @@
 """Sentences on plans, fleets and rehearsals."""
 
-TEXTS = {
+PLAN_TEXTS = {
     # -- a plan: its bound, its search, and what of the request had to be changed --
     # -- the bound and the search
     "bound_of_farther_paths": (

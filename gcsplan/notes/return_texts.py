@@ -1,6 +1,6 @@
 """Sentences on the way home: from where a return is not safe and why, what to set, and what of it is not judged."""
 
-TEXTS = {
+RETURN_TEXTS = {
     "and_also": "{one} and {other}",
     "and_then": "{one}; {other}",
     # -- the verdict in a sentence -----------------------------------------------------------------------------------

@@ -30,7 +30,7 @@ MAP_MM, SMALL_MAP_MM, WIDE_MM = 44.0, 16.0, 180.0
 PX_PER_MM = 96.0 / 25.4
 MAIN_PARAMETERS = ("speed", "return_speed", "lean", "roll")
 """The parameters that stand on the briefing, by their newest names; the report's tables have all."""
-KINDS = ("start", "goal", "rally", "name")
+MARK_KINDS = ("start", "goal", "rally", "name")
 """The marks of the map that are on the briefing's, too."""
 NOT_IN_IT = "Wind, emergency landing sites and moving obstacles are not in the model."
 
@@ -85,7 +85,7 @@ def _map(page: Page, relief: Relief, marks: Sequence[Mark], high_mm: float) -> s
     extent = relief.extent
     ratio = extent.height_m / extent.width_m
     wide_mm = min(WIDE_MM, high_mm / ratio)
-    few = [m for m in marks if m.kind.split(" ")[0] in KINDS]
+    few = [m for m in marks if m.kind.split(" ")[0] in MARK_KINDS]
     return (
         f'<figure class="view map brief" id="brief" style="aspect-ratio:{1.0 / ratio:.4f};'
         f'width:{wide_mm:.1f}mm"><svg viewBox="0 0 10000 {extent.height_m * extent.scale:.1f}" '

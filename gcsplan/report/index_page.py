@@ -11,7 +11,7 @@ from typing import Any
 from gcsplan.report.parts.html import THIN, document, energy, esc, greatest, least, num
 from gcsplan.units import Units, duration
 
-Row = Mapping[str, Any]
+MissionRow = Mapping[str, Any]
 METRES_PER_DEGREE = 111_195.0
 """Of a great circle, m."""
 WIDE = 1000.0
@@ -19,7 +19,7 @@ WIDE = 1000.0
 
 
 def render_index(
-    title: str, rows: Sequence[Row], tracks: Mapping[int, Sequence[Sequence[float]]], units: Units, page: str
+    title: str, rows: Sequence[MissionRow], tracks: Mapping[int, Sequence[Sequence[float]]], units: Units, page: str
 ) -> str:
     """The page; ``tracks`` are the row's number to its [latitude, longitude], ``page`` is a mission's file to open.
 
@@ -41,7 +41,7 @@ def render_index(
     return document(title, body, "", scripts=("index.js",), styles=("report.css", "index.css"), what="batch")
 
 
-def _failures(rows: Sequence[Row]) -> str:
+def _failures(rows: Sequence[MissionRow]) -> str:
     bad = [row for row in rows if row["code"] != 0]
     if not bad:
         return ""
@@ -53,7 +53,7 @@ def _failures(rows: Sequence[Row]) -> str:
     return f'<h2>Without a plan</h2><ul class="findings">{"".join(items)}</ul>'
 
 
-def _map(rows: Sequence[Row], tracks: Mapping[int, Sequence[Sequence[float]]], units: Units) -> str:
+def _map(rows: Sequence[MissionRow], tracks: Mapping[int, Sequence[Sequence[float]]], units: Units) -> str:
     """All tracks, north up, each degree of longitude as short as it is in the middle; nothing without a track."""
     if not tracks:
         return ""
@@ -85,7 +85,7 @@ def _turned(lon_deg: float, from_deg: float) -> float:
     return (lon_deg - from_deg + 180.0) % 360.0 - 180.0
 
 
-def _table(rows: Sequence[Row], units: Units, page: str) -> str:
+def _table(rows: Sequence[MissionRow], units: Units, page: str) -> str:
     head = (
         ("mission", ""), ("vehicle", ""), ("verdict", ""), ("length", "n"), ("gap", "n"), ("energy", "n"),
         ("lowest AGL", "n"), ("highest AGL", "n"), ("arrives, T+", "n"),
@@ -113,7 +113,7 @@ def _table(rows: Sequence[Row], units: Units, page: str) -> str:
     return "".join(out)
 
 
-def _colour(row: Row) -> str:
+def _colour(row: MissionRow) -> str:
     """The class of a verdict: good if the path is safe and no return was found unsafe."""
     return "good" if row.get("safe") is True and row.get("return_safe") is not False else "bad"
 

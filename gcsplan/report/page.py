@@ -40,7 +40,7 @@ from gcsplan.report.parts.page_data import (
     page_of_check,
     samples_of,
 )
-from gcsplan.report.parts.track_samples import Line, Passage, line_of, passages
+from gcsplan.report.parts.track_samples import Passage, TrackLine, line_of, passages
 from gcsplan.report.views import tables
 from gcsplan.report.views.fleet import fleet_html, motions_of
 from gcsplan.report.views.home import home_html, home_lines
@@ -282,7 +282,7 @@ def _scene(page: Page, relief: Relief) -> str:
 
 
 def _profiles(
-    page: Page, lines: Sequence[Line | None], found: Sequence[list[Passage]], full: frozenset[int]
+    page: Page, lines: Sequence[TrackLine | None], found: Sequence[list[Passage]], full: frozenset[int]
 ) -> list[str]:
     parts = ['<section id="profiles"><h2>Altitude along the way</h2>', only_some(page, full)]
     for i in sorted(full):
@@ -303,7 +303,7 @@ def _profiles(
 
 
 def _details(
-    page: Page, lines: Sequence[Line | None], found: Sequence[list[Passage]], full: frozenset[int]
+    page: Page, lines: Sequence[TrackLine | None], found: Sequence[list[Passage]], full: frozenset[int]
 ) -> list[str]:
     parts = ['<section id="numbers"><h2>Numbers</h2>', tables.certificate_table(page), only_some(page, full)]
     for i in sorted(full):
@@ -360,7 +360,7 @@ def _broken(subject: Subject, world: World) -> list[list[object]]:
     return found
 
 
-def _line_data(index: int, subject: Subject, line: Line) -> dict[str, object]:
+def _line_data(index: int, subject: Subject, line: TrackLine) -> dict[str, object]:
     """One line for the page's script, rounded to decimetres (a short one to millimetres), which is enough to view."""
     legs = subject.verdict.legs
 

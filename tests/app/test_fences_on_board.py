@@ -11,7 +11,7 @@ import pytest
 from gcsplan.app.output.files import outputs_of
 from gcsplan.app.rehearse import rehearse
 from gcsplan.app.upload.on_board import settings_of_plan
-from gcsplan.check.motion.geodesy import flat_m
+from gcsplan.check.motion.stretch import flat_m
 from gcsplan.mavlink.link.session.parameters import judge_fence_parameters
 from gcsplan.mavlink.mission.fences import fences_in_force
 from gcsplan.mavlink.mission.parameter_list import needed_groups

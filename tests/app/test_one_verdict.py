@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from gcsplan.app.batch import COLUMNS, BatchOptions, MissionBatch
+from gcsplan.app.batch import BATCH_COLUMNS, BatchOptions, MissionBatch
 from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.output.files import outputs_of, report_of, summary_of
 from gcsplan.app.parallel.executor import Inline
@@ -70,7 +70,7 @@ def test_a_batch_tells_in_index_and_csv_what_its_pages_tell(tmp_path: Path) -> N
         [row] = records[0].rows
         assert row["verdict"].endswith(ends)
         assert (row["safe"], row["return_safe"]) == (True, False if report else None)
-        assert row["verdict"] in csv_text(COLUMNS, [row])
+        assert row["verdict"] in csv_text(BATCH_COLUMNS, [row])
         assert row["verdict"] in render_index("b", records[0].rows, {}, METRIC, "report.html")
         if report:
             assert row["verdict"] in (out / "crossing" / "report.html").read_text(encoding="utf-8")

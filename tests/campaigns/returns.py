@@ -18,7 +18,7 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.check.flight.corners import round_corners
 from gcsplan.check.flight.follow import follow
-from gcsplan.check.motion.return_rules import RULES
+from gcsplan.check.motion.return_rules import RETURN_RULES
 from gcsplan.check.motion.stopping import circle_home_m
 from gcsplan.check.returns.footprint import ReturnPlaces, Target, places_of_returns
 from gcsplan.check.returns.obstacles import CIRCLE_ABOVE_M
@@ -142,9 +142,9 @@ def outside_m(places: ReturnPlaces, points: Floats, scene: Scene) -> float:
     limits, vehicle = scene.vehicle.limits, scene.vehicle
     gap = np.empty(len(points))
     circle = 0.0
-    if not RULES[vehicle.autopilot].climbs_first:
+    if not RETURN_RULES[vehicle.autopilot].climbs_first:
         high = HOME_AMSL_M + CIRCLE_ABOVE_M
-        circle = circle_home_m(RULES[vehicle.autopilot].circle_m(high), vehicle, high)
+        circle = circle_home_m(RETURN_RULES[vehicle.autopilot].circle_m(high), vehicle, high)
         begin = places.regions[0, :2]
         gap = np.full(len(points), np.inf)
         for f in np.linspace(0.0, 1.0, 200):

@@ -15,8 +15,7 @@ from gcsplan.mavlink.build.order import MARGINS, Order
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
-from gcsplan.notes.finding import Finding
-from gcsplan.notes.note import Note
+from gcsplan.notes.note import Finding, Note
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geodesy.frame import Frame

@@ -40,7 +40,7 @@ from gcsplan.report.views import tables
 from gcsplan.report.views.chart import Axes, ticks
 from gcsplan.report.views.picture import draw, figures
 from gcsplan.report.views.scene_data import triangles, zone_meshes
-from gcsplan.report.views.shaded_terrain import UNKNOWN, extent_of, relief_of
+from gcsplan.report.views.shaded_terrain import NO_GROUND, extent_of, relief_of
 from gcsplan.units import AVIATION, METRE, METRIC, duration
 from gcsplan.vehicle import Energy, Vehicle
 from gcsplan.world.geometry.path import Path
@@ -282,7 +282,7 @@ def test_unknown_ground_is_left_out_of_the_heights_and_told() -> None:
     read = Reader(render_page(replace(page, world=where, subjects=(replace(page.subjects[0], verdict=verdict),))))
     grid = read.data["grid"]
     heights = np.frombuffer(base64.b64decode(grid["heights"]), "<u2")
-    assert (heights == UNKNOWN).any()
+    assert (heights == NO_GROUND).any()
     assert "ground unknown" in read.text
     assert None in read.data["lines"][0]["g"]
 

@@ -25,14 +25,13 @@ from gcsplan.errors import CheckFailed, InputError
 from gcsplan.mavlink.build.fence import Area, Fence, areas_of, fence_of
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
-from gcsplan.notes.finding import Finding
-from gcsplan.notes.note import Note
+from gcsplan.notes.note import Finding, Note
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.zones import Circle, Polygon, Zone
 from gcsplan.world.world import World
 
-ROUNDING_M = 0.15
+FENCE_ROUNDING_M = 0.15
 
 
 def fence_for(
@@ -95,7 +94,7 @@ def breaches(
     if out:
         fenced = World(world.frame, Airspace(world.airspace.surface, out, scale=world.airspace.scale))
         # A fence is a zone rounded to the precision of its items, so that much is taken off the clearance.
-        clearance_m = max(0.0, vehicle.limits.horizontal_clearance_m - ROUNDING_M)
+        clearance_m = max(0.0, vehicle.limits.horizontal_clearance_m - FENCE_ROUNDING_M)
         craft = replace(vehicle, limits=replace(vehicle.limits, horizontal_clearance_m=clearance_m))
         verdict = judge(mission, craft, fenced, rtl_rel_home_m=rtl_rel_home_m, tuning=tuning)
         found += [_of_fence(f) for f in verdict.findings if f.kind == "zone"]

@@ -12,10 +12,10 @@ from gcsplan.app.check.verdict_json import flat
 from gcsplan.app.check.worlds import (
     UNASKED,
     Checked,
+    CheckSite,
     MissionSite,
     OptionsSite,
     Returns,
-    Site,
     Wanted,
     at_start,
     beyond_m,
@@ -95,7 +95,7 @@ def check_with_options(
     return check_at(OptionsSite(options, autopilot), "check", arguments, Wanted(returns))
 
 
-def check_at(site: Site, name: str, arguments: Sequence[str], wanted: Wanted) -> Batch:
+def check_at(site: CheckSite, name: str, arguments: Sequence[str], wanted: Wanted) -> Batch:
     """Judge each file at a site; one that cannot be read or judged does not stop the others."""
     read: list[tuple[str, MissionFileRead]] = []
     unreadable: list[tuple[str, InputError]] = []

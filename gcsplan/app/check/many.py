@@ -1,8 +1,8 @@
 """Check an archive: any number of files in one world, whose results come one by one, in the order of the files.
 
 Files are read first, for the world that they share must hold all of them; then they are judged, in pieces, by whatever
-executor. What was read is kept in `KEPT_BYTES` at most; the rest is read again. A result holds texts and counts, and
-neither mission nor terrain, so memory does not grow with what was judged.
+executor. What was read is kept in `KEPT_READ_BYTES` at most; the rest is read again. A result holds texts and counts,
+and neither mission nor terrain, so memory does not grow with what was judged.
 
 What is told of the files: the lines of each, its JSON, and the summary by finding.
 """
@@ -23,10 +23,10 @@ from gcsplan.app.check.files import Batch, Failing, failing_of, failing_to_read,
 from gcsplan.app.check.verdict_json import verdict_of
 from gcsplan.app.check.worlds import (
     Checked,
+    CheckSite,
     MissionSite,
     OptionsSite,
     Returns,
-    Site,
     Wanted,
     beyond_m,
     match,
@@ -71,7 +71,7 @@ class Told:
 
 
 def told_of(c: Checked, form: str, *, allow_unjudged: bool, units: Units) -> Told:
-    """What is told of a file that was judged; see `archive.Form`."""
+    """What is told of a file that was judged; see `Form`."""
     failing = failing_of(c, allow_unjudged=allow_unjudged)
     kinds = Counter(f.kind for f in c.verdict.findings)
     if c.verdict.not_judged:
@@ -152,7 +152,7 @@ class Summary:
 
 
 MOST_FILES = 100_000
-KEPT_BYTES = 64_000_000
+KEPT_READ_BYTES = 64_000_000
 """Most bytes of what was read that are kept until it is judged: some 20,000 files of 50 items."""
 
 PIECE, PIECE_HOME = 32, 2
@@ -161,7 +161,7 @@ PIECE, PIECE_HOME = 32, 2
 FILE_S, FILE_HOME_S = 0.006, 1.0
 """Seconds that a file of 50 items takes, about."""
 
-Result = TypeVar("Result")
+Done = TypeVar("Done")
 Form = Literal["lines", "row", "whole"]
 """What is told of a file: its findings alone, a row of JSON too, or its whole JSON document."""
 
@@ -177,7 +177,7 @@ class Shown:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class ArchiveRequest:
     """What all files share, in the form in which another process can make it: a mission's content, or options.
 
     ``extent``: of the world that options describe, if all share one; ``inputs`` are what it must be made of. ``key`` is
@@ -203,14 +203,14 @@ class Read:
     reach_m: float
 
 
-_sites: dict[str, Site] = {}
+_sites: dict[str, CheckSite] = {}
 """The site that this process has made for others; the last one only, for terrain is large."""
 
 
 class Archive:
     """Files that are checked in one call, at one site."""
 
-    def __init__(self, name: str, asked: Asked, site: Site, arguments: Sequence[str]) -> None:
+    def __init__(self, name: str, asked: ArchiveRequest, site: CheckSite, arguments: Sequence[str]) -> None:
         if len(arguments) > MOST_FILES:
             raise UsageError(f"at most {MOST_FILES} files are checked in one call, given {len(arguments)}")
         self.name, self.asked, self.site, self.arguments = name, _keep(asked, site), site, arguments
@@ -223,7 +223,9 @@ class Archive:
         for argument in arguments:
             match(source, argument)
         returns = Returns(returns.judged, is_required(source, returns.required))
-        return cls(source.name, Asked(source.content, None, None, returns, shown), MissionSite(source), arguments)
+        return cls(
+            source.name, ArchiveRequest(source.content, None, None, returns, shown), MissionSite(source), arguments
+        )
 
     @classmethod
     def with_options(
@@ -231,7 +233,7 @@ class Archive:
         shown: Shown,
     ) -> Archive:  # fmt: skip
         """Files in the world that options describe. Raises InputError if they are wrong."""
-        asked = Asked(None, options, autopilot, returns, shown)
+        asked = ArchiveRequest(None, options, autopilot, returns, shown)
         return cls("check", asked, OptionsSite(options, autopilot), arguments)
 
     @property
@@ -259,7 +261,7 @@ class Archive:
                     continue
                 places.append(one.places)
                 reach_m = max(reach_m, one.reach_m)
-                if (kept := kept + len(one.packed)) <= KEPT_BYTES:
+                if (kept := kept + len(one.packed)) <= KEPT_READ_BYTES:
                     self._packed[k] = one.packed
             told(min((number + 1) * PIECE, len(self.arguments)))
         if places:
@@ -304,13 +306,13 @@ class Archive:
             yield self._unread[k] if k in self._unread else next(found)
 
 
-def read_piece(asked: Asked, arguments: Sequence[str]) -> list[Read | Told]:
+def read_piece(asked: ArchiveRequest, arguments: Sequence[str]) -> list[Read | Told]:
     """Read some files, in whatever process; why one cannot be read is told."""
     site = _site_of(asked)
     return [_told_unless(asked, argument, partial(_read, site, argument)) for argument in arguments]
 
 
-def judge_piece(asked: Asked, items: Sequence[tuple[str, bytes | None]]) -> list[Told]:
+def judge_piece(asked: ArchiveRequest, items: Sequence[tuple[str, bytes | None]]) -> list[Told]:
     """Judge some files that were read, in whatever process."""
     site = _site_of(asked)
     shown = asked.shown
@@ -324,7 +326,7 @@ def judge_piece(asked: Asked, items: Sequence[tuple[str, bytes | None]]) -> list
     return [_told_unless(asked, argument, partial(judged, argument, packed)) for argument, packed in items]
 
 
-def _told_unless(asked: Asked, argument: str, done: Callable[[], Result]) -> Result | Told:
+def _told_unless(asked: ArchiveRequest, argument: str, done: Callable[[], Done]) -> Done | Told:
     """The result, or what is told of the error: in one file of several it must not cost the others."""
     try:
         return done()
@@ -339,13 +341,13 @@ def _told_unless(asked: Asked, argument: str, done: Callable[[], Result]) -> Res
         return told_of_error(argument, GcsplanError(words, where=argument), asked.shown.form)
 
 
-def _read(site: Site, argument: str) -> Read:
+def _read(site: CheckSite, argument: str) -> Read:
     read = site.read(argument)
     places = np.array(places_of(read.mission), float)
     return Read(pickle.dumps(read, pickle.HIGHEST_PROTOCOL), places, beyond_m(read.mission))
 
 
-def _unpacked(site: Site, argument: str, packed: bytes | None) -> MissionFileRead:
+def _unpacked(site: CheckSite, argument: str, packed: bytes | None) -> MissionFileRead:
     """What was read of a file, from this process or one that it asks; read again if it was not kept."""
     if packed is None:
         return site.read(argument)
@@ -353,7 +355,7 @@ def _unpacked(site: Site, argument: str, packed: bytes | None) -> MissionFileRea
     return read
 
 
-def _keep(asked: Asked, site: Site) -> Asked:
+def _keep(asked: ArchiveRequest, site: CheckSite) -> ArchiveRequest:
     """``asked`` with its key, by which `_site_of` then finds ``site`` in this process."""
     made_of = asked.content, asked.options, asked.autopilot
     asked = replace(asked, key=hashlib.sha256(pickle.dumps(made_of)).hexdigest())
@@ -362,7 +364,7 @@ def _keep(asked: Asked, site: Site) -> Asked:
     return asked
 
 
-def _site_of(asked: Asked) -> Site:
+def _site_of(asked: ArchiveRequest) -> CheckSite:
     """The site of what is asked, with its world if that is known; made once in each process."""
     site = _sites.get(asked.key)
     if site is None:

@@ -99,7 +99,7 @@ class Wanted:
     times: bool = True
 
 
-class Site(Protocol):
+class CheckSite(Protocol):
     """Where files are checked."""
 
     typed: Mapping[str, str]
@@ -131,7 +131,7 @@ class MissionSite:
         self._world: World | None = None
 
     def read(self, argument: str) -> MissionFileRead:
-        """See `Site.read`. Raises UsageError too, if it is not clear which vehicle the file is for."""
+        """See `CheckSite.read`. Raises UsageError too, if it is not clear which vehicle the file is for."""
         request, file = match(self.source, argument)
         start = Home.at(*request.start_deg, request.start[2])
         return at_start(
@@ -139,11 +139,11 @@ class MissionSite:
         )
 
     def settle(self, places: Floats, reach_m: float, *, several: bool) -> None:
-        """See `Site.settle`: more terrain is loaded if they reach beyond that of the mission."""
+        """See `CheckSite.settle`: more terrain is loaded if they reach beyond that of the mission."""
         self.source, self._world = reaching(self.source, places), None
 
     def judged(self, argument: str, read: MissionFileRead, wanted: Wanted) -> Checked:
-        """See `Site.judged`."""
+        """See `CheckSite.judged`."""
         source = self.source
         request, file = match(source, argument)
         error_m = source.terrain_error_m if source.altitude_frame == "terrain" else TERRAIN_ERROR_M
@@ -153,7 +153,7 @@ class MissionSite:
 
     @property
     def said(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:
-        """See `Site.said`."""
+        """See `CheckSite.said`."""
         return self.source.inputs, self.source.notes
 
 
@@ -173,14 +173,14 @@ class OptionsSite:
         self._said: tuple[Mapping[str, object], tuple[Note, ...]] = {}, ()
 
     def read(self, argument: str) -> MissionFileRead:
-        """See `Site.read`."""
+        """See `CheckSite.read`."""
         found = read_mission_file(
             Path(argument), autopilot=self.autopilot, home_hint=self._hint, otherwise=Autopilot.ARDUCOPTER
         )
         return _with_home(found, self._hint, argument)
 
     def settle(self, places: Floats, reach_m: float, *, several: bool) -> None:
-        """See `Site.settle`. Without a world for several, each gets its own as it is judged."""
+        """See `CheckSite.settle`. Without a world for several, each gets its own as it is judged."""
         try:
             self.settle_in(self.opened.extent(places, reach_m))
         except InputError:
@@ -194,7 +194,7 @@ class OptionsSite:
         self.extent = extent
 
     def judged(self, argument: str, read: MissionFileRead, wanted: Wanted) -> Checked:
-        """See `Site.judged`."""
+        """See `CheckSite.judged`."""
         world = self._world
         if world is None:
             world = self._tell(*self.opened.around(places_of(read.mission), beyond_m(read.mission)))
@@ -212,7 +212,7 @@ class OptionsSite:
 
     @property
     def said(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:
-        """See `Site.said`."""
+        """See `CheckSite.said`."""
         return self._said
 
 

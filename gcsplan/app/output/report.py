@@ -20,7 +20,7 @@ from gcsplan.sim.flight.trace import Trace
 from gcsplan.sim.outcome import Rehearsal
 from gcsplan.units import METRIC, Units
 
-MOST_NAMES = 100
+MOST_IN_ORDER = 100
 """Most names of the order of arrival in one line; the schedule has all."""
 
 
@@ -42,7 +42,7 @@ def page_of_plan(
     several = fleet is not None and len(plan.vehicles) > 1
     if fleet is not None and several and fleet.mode != "none":
         apart = f", {fleet.interval_s:g} s apart" if fleet.mode == "sequence" else ""
-        order = ", ".join(fleet.order[:MOST_NAMES]) + (" …" if len(fleet.order) > MOST_NAMES else "")
+        order = ", ".join(fleet.order[:MOST_IN_ORDER]) + (" …" if len(fleet.order) > MOST_IN_ORDER else "")
         facts += [("arrival", f"{fleet.mode}: {order}{apart}")]
     subjects = []
     for v in plan.vehicles:

@@ -26,8 +26,8 @@ from gcsplan.errors import GcsplanError, InputError, UsageError
 __all__ = ["Executor", "Inline", "Lost", "executor", "in_order", "require_same_inputs"]
 
 Shared = TypeVar("Shared")
-Item = TypeVar("Item")
-Result = TypeVar("Result")
+WorkItem = TypeVar("WorkItem")
+WorkResult = TypeVar("WorkResult")
 
 ANSWER_S = 15.0
 """Seconds within which a scheduler must answer."""
@@ -51,11 +51,11 @@ MOST_JOBS = 512
 SILENT = 60
 """Level of the logs of dask's own processes: above all, since what matters is raised here."""
 
-ENDED = "the dask scheduler has ended, or does not answer any more"
+SCHEDULER_ENDED = "the dask scheduler has ended, or does not answer any more"
 MISSING = "needs dask.distributed, which is not installed: pip install 'gcsplan[cluster]'"
 
 
-Lost = Callable[[Item, GcsplanError], Result]
+Lost = Callable[[WorkItem, GcsplanError], WorkResult]
 """The result of a piece that no worker outlives."""
 
 
@@ -73,9 +73,9 @@ class Executor(Protocol):
         ...
 
     def each(
-        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item], *,
-        lost: Lost[Item, Result] | None = None, finish: bool = False,
-    ) -> Iterator[tuple[int, Result]]:  # fmt: skip
+        self, function: Callable[[Shared, WorkItem], WorkResult], shared: Shared, items: Sequence[WorkItem], *,
+        lost: Lost[WorkItem, WorkResult] | None = None, finish: bool = False,
+    ) -> Iterator[tuple[int, WorkResult]]:  # fmt: skip
         """Yield (number of the item, result) as results come; the order is free.
 
         An error of ``function`` is raised, and what still waits is given up. A piece whose worker dies is done again;
@@ -103,9 +103,9 @@ class Inline:
         return ""
 
     def each(
-        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item], *,
-        lost: Lost[Item, Result] | None = None, finish: bool = False,
-    ) -> Iterator[tuple[int, Result]]:  # fmt: skip
+        self, function: Callable[[Shared, WorkItem], WorkResult], shared: Shared, items: Sequence[WorkItem], *,
+        lost: Lost[WorkItem, WorkResult] | None = None, finish: bool = False,
+    ) -> Iterator[tuple[int, WorkResult]]:  # fmt: skip
         """See `Executor.each`."""
         for number, item in enumerate(items):
             yield number, function(shared, item)
@@ -128,9 +128,9 @@ class Dask:
         return max(1, int(sum(self.client.nthreads().values())))
 
     def each(
-        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item], *,
-        lost: Lost[Item, Result] | None = None, finish: bool = False,
-    ) -> Iterator[tuple[int, Result]]:  # fmt: skip
+        self, function: Callable[[Shared, WorkItem], WorkResult], shared: Shared, items: Sequence[WorkItem], *,
+        lost: Lost[WorkItem, WorkResult] | None = None, finish: bool = False,
+    ) -> Iterator[tuple[int, WorkResult]]:  # fmt: skip
         """See `Executor.each`."""
         suspects: list[int] = []
         yield from self._together(function, shared, items, range(len(items)), suspects, finish)
@@ -148,9 +148,9 @@ class Dask:
                 yield number, lost(items[number], error)
 
     def _together(
-        self, function: Callable[[Shared, Item], Result], shared: Shared, items: Sequence[Item],
+        self, function: Callable[[Shared, WorkItem], WorkResult], shared: Shared, items: Sequence[WorkItem],
         asked: Sequence[int], suspects: list[int], finish: bool,
-    ) -> Iterator[tuple[int, Result]]:  # fmt: skip
+    ) -> Iterator[tuple[int, WorkResult]]:  # fmt: skip
         """The pieces ``asked``; ``suspects`` gets those that were with a worker that died, too often."""
         distributed = import_module("distributed")
         client = self.client
@@ -193,7 +193,7 @@ class Dask:
                     suspects.append(number)
                     answers = []
                 except distributed.CancelledError as error:
-                    raise InputError(ENDED) from error
+                    raise InputError(SCHEDULER_ENDED) from error
                 if not stopped:
                     hand_out()
                 for result in answers:
@@ -222,13 +222,15 @@ class Dask:
             except queue.Empty:
                 pass
             if self.client.status != "running":
-                raise InputError(ENDED)
+                raise InputError(SCHEDULER_ENDED)
             deserted_s = 0.0 if self.client.nthreads() else deserted_s + LOOK_S
             if deserted_s > DESERTED_S:
                 raise InputError(f"the dask scheduler has had no worker for {DESERTED_S:g} s: start some")
 
 
-def _done(function: Callable[[Shared, Item], Result], version: str, shared: Shared, item: Item) -> Result:
+def _done(
+    function: Callable[[Shared, WorkItem], WorkResult], version: str, shared: Shared, item: WorkItem
+) -> WorkResult:
     """A piece of work, if the worker has the version of gcsplan that asks for it."""
     if version != __version__:
         raise InputError(
@@ -238,9 +240,9 @@ def _done(function: Callable[[Shared, Item], Result], version: str, shared: Shar
     return function(shared, item)
 
 
-def in_order(results: Iterable[tuple[int, Result]]) -> Iterator[tuple[int, Result]]:
+def in_order(results: Iterable[tuple[int, WorkResult]]) -> Iterator[tuple[int, WorkResult]]:
     """The results of `Executor.each` by number, from 0 on; those that come early wait."""
-    early: dict[int, Result] = {}
+    early: dict[int, WorkResult] = {}
     wanted = 0
     for number, result in results:
         early[number] = result

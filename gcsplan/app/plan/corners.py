@@ -18,7 +18,7 @@ from gcsplan.arrays import Floats
 from gcsplan.mavlink.build.multirotor import ROUNDED_M, SHORT_LEG_M
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.notes.finding import Finding
+from gcsplan.notes.note import Finding
 from gcsplan.world.world import World
 
 __all__ = ["cut", "moved", "sharpened"]

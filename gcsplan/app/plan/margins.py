@@ -10,7 +10,7 @@ from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.build.order import Margins
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission
-from gcsplan.notes.finding import Finding
+from gcsplan.notes.note import Finding
 
 __all__ = ["larger", "on_path"]
 

@@ -28,13 +28,12 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.check.fixed_wing.climb_out import climbed
 from gcsplan.check.motion.circles import circle_growth, tracking_m, true_m_s
-from gcsplan.check.motion.geodesy import flat_m
-from gcsplan.check.motion.stretch import Flight, Place, Stretch
+from gcsplan.check.motion.stretch import SAME_PLACE_M, Flight, Place, Stretch, flat_m
 from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.notes.note import Note
-from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.vehicle import GRAVITY_M_S2, Autopilot, Vehicle
 from gcsplan.world.geodesy.frame import Frame
 
 __all__ = ["SAG_M", "bend", "tangent_m"]
@@ -59,9 +58,6 @@ SETTLES_S, REMAINS = 15.0, 0.03
 
 L1_PERIODS_S = (1.0, 60.0)
 """ArduPlane's range for NAVL1_PERIOD, s; it also bounds the simulation of a turn in `tracking`."""
-
-SAME_M = 0.02
-GRAVITY_M_S2 = 9.80665
 
 
 def tangent_m(radius_m: float, turn_rad: float) -> float:
@@ -282,7 +278,7 @@ class _Run:
             return
         kept = [track[0]]
         for one in track[1:]:
-            if math.dist(one[0], kept[-1][0]) > SAME_M:
+            if math.dist(one[0], kept[-1][0]) > SAME_PLACE_M:
                 kept.append(one)
         if len(kept) == 1:
             kept.append(track[-1])
@@ -337,18 +333,18 @@ class _Run:
             half = self._parts(corner.turn)
             part = track[: half + 1] if corner is a else track[-half - 1 :]
             for p, q in pairwise(part):
-                if math.dist(p[0], q[0]) > SAME_M:
+                if math.dist(p[0], q[0]) > SAME_PLACE_M:
                     level = 0.5 * (low + high)
                     yield replace(
                         s, start=self._place(p[0], level), end=self._place(q[0], level), band_m=0.5 * (high - low),
                         reach_m=s.reach_m + q[2], hold_s=0.0,
                     )  # fmt: skip
-        if self.straight_m[k] > SAME_M:
+        if self.straight_m[k] > SAME_PLACE_M:
             along = np.array([math.cos(self.heading[k]), math.sin(self.heading[k])])
             settled_m = min(self._settles_m(k, a.off_m), float(self.straight_m[k]))
             cuts = a.tangent + np.array([0.0, settled_m, float(self.straight_m[k])])
             for i, (p, q) in enumerate(pairwise(cuts.tolist())):
-                if q - p > SAME_M:
+                if q - p > SAME_PLACE_M:
                     start, end = (self._place(self.points[k, :2] + m * along, z0 + slope * m) for m in (p, q))
                     yield replace(
                         s, start=start, end=end, reach_m=s.reach_m + self._widen_m(k, settled=i == 1), hold_s=0.0
@@ -364,7 +360,7 @@ def _chord(radius: float, heading: float, turn: float) -> Floats:
 def _moves(s: Stretch) -> bool:
     """Whether a stretch leads to another place with turns on arcs at its ends."""
     circles = s.reach_m > 0.0  # a climb in circles is a turn already
-    return s.kind in ("takeoff", "cruise", "land") and not circles and flat_m(s.start, s.end) > SAME_M
+    return s.kind in ("takeoff", "cruise", "land") and not circles and flat_m(s.start, s.end) > SAME_PLACE_M
 
 
 def _runs(stretches: Sequence[Stretch]) -> Iterator[tuple[int, int]]:

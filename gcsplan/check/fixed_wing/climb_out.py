@@ -32,15 +32,13 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.check.motion.circles import circle_growth
 from gcsplan.check.motion.flight_state import Aboard
-from gcsplan.check.motion.geodesy import degree_m, flat_m, offset_m
 from gcsplan.check.motion.spline import towards
 from gcsplan.check.motion.stopping import about_turn_m
-from gcsplan.check.motion.stretch import Place, Stretch
+from gcsplan.check.motion.stretch import SAME_PLACE_M, Place, Stretch, degree_m, flat_m, offset_m
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import MissionItem
-from gcsplan.notes.finding import Finding
-from gcsplan.notes.note import Note
+from gcsplan.notes.note import Finding, Note
 from gcsplan.vehicle import ClimbOut, Vehicle
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geodesy.atmosphere import true_per_indicated
@@ -51,12 +49,10 @@ from gcsplan.world.world import World
 LEAST_PITCH_DEG = 4.0
 """ArduPlane's pitch if the item has none."""
 
-NEAR_M = 1.0
+NO_COURSE_M = 1.0
 """An item this near to home, m, does not define the direction of a climb-out."""
 
-SAME_M = 0.02
-
-SPARED = 0.5
+CLEARANCE_PART = 0.5
 """The part of its height that the aircraft needs as clearance while it is too low for the full altitude error."""
 
 
@@ -65,13 +61,13 @@ OVER_M, OVER_S, OVER_FROM = 16.0, 2.0, 0.15
 18 m, 1.4 to 1.8 s of its mean climb rate. Metres if that rate is not known, otherwise its seconds; and from which part
 of its climb-out on."""
 
-MOST_PARTS = 24
+MOST_BANDS = 24
 """Most level bands into which the space above a climb-out is divided."""
 
 REACHED_M = 5.0
 """LOITER_TO_ALT counts an altitude as reached within this, m (navigation.cpp, `loiter_angle_update`)."""
 
-CHORD_M = 2.0
+CIRCLE_CHORD_M = 2.0
 """How far the chords of a climbing circle may lie inside it, m."""
 
 BOUND_M = 0.05
@@ -125,7 +121,7 @@ def above_slant(ground: Place, top: Place, limits: Limits, over_m: float) -> lis
     how far above its end the space reaches, from the altitude error on (`over_m`).
     """
     rise = top[2] - ground[2]
-    parts = min(max(1, math.ceil(0.5 * rise / max(limits.altitude_error_m, 0.1))), MOST_PARTS)
+    parts = min(max(1, math.ceil(0.5 * rise / max(limits.altitude_error_m, 0.1))), MOST_BANDS)
     found = []
     for i in range(parts - 1):
         a, b, half = i / parts, (i + 1) / parts, 0.5 * rise * (1.0 - (i + 1) / parts)
@@ -164,7 +160,7 @@ def circle_up(pilot: Aboard, seq: int, item: MissionItem, radius_m: float) -> bo
     low = (*target[:2], pilot.at[2])
     turns = -1.0 if item.params[1] < 0.0 else 1.0
     for a, b in pairwise(_helix(pilot.at, target, radius_m, turns, pilot.vehicle.limits.max_climb_slope)):
-        pilot.add(seq, "takeoff", a, b, column=True, reach_m=reach_m - radius_m + CHORD_M)
+        pilot.add(seq, "takeoff", a, b, column=True, reach_m=reach_m - radius_m + CIRCLE_CHORD_M)
     pilot.add(seq, "takeoff", target, target, reach_m=reach_m)
     pilot.instead(seq, "takeoff", low, target, column=True, reach_m=reach_m)
     # A climb that is steeper than judged reaches these altitudes before the circle.
@@ -183,7 +179,7 @@ def _helix(begin: Place, top: Place, radius_m: float, turns: float, slope: float
     east, north = offset_m(top, begin)
     angle = math.atan2(north, east)
     whole = (top[2] - begin[2]) / slope / radius_m
-    parts = max(1, math.ceil(whole / (2.0 * math.acos(max(0.0, 1.0 - CHORD_M / radius_m)))))
+    parts = max(1, math.ceil(whole / (2.0 * math.acos(max(0.0, 1.0 - CIRCLE_CHORD_M / radius_m)))))
     places = [begin]
     for i in range(1, parts + 1):
         now, z = angle - turns * whole * i / parts, begin[2] + (top[2] - begin[2]) * i / parts
@@ -194,14 +190,16 @@ def _helix(begin: Place, top: Place, radius_m: float, turns: float, slope: float
 
 def slants(stretches: Sequence[Stretch]) -> list[Stretch]:
     """The stretches that leave the ground or come down to it on a slant."""
-    return [s for s in stretches if s.column and s.kind in ("takeoff", "land") and flat_m(s.start, s.end) > SAME_M]
+    return [
+        s for s in stretches if s.column and s.kind in ("takeoff", "land") and flat_m(s.start, s.end) > SAME_PLACE_M
+    ]
 
 
 def slant_findings(stretches: Sequence[Stretch], vehicle: Vehicle, world: World) -> list[Finding]:
     """Findings where a climb-out or a glide is too near to the ground or too steep."""
     found = []
     for s in stretches:
-        if s.column and s.kind == "takeoff" and s.reach_m > 0.0 and flat_m(s.start, s.end) <= SAME_M:
+        if s.column and s.kind == "takeoff" and s.reach_m > 0.0 and flat_m(s.start, s.end) <= SAME_PLACE_M:
             east, north, amsl = (float(x) for x in _one(s.start, world))
             by = circle_missing_m(np.array([east, north, amsl]), s.reach_m, vehicle.limits, world.airspace)
             if by > BOUND_M:
@@ -242,16 +240,16 @@ def slant_shortage(
     begun = float(a[2] - touch[2])
 
     def clearance(z: float) -> float:
-        return min(error, SPARED * max(z - float(touch[2]), 0.0))
+        return min(error, CLEARANCE_PART * max(z - float(touch[2]), 0.0))
 
-    split = min(max((error / SPARED - begun) / rise, 0.0), 1.0)
+    split = min(max((error / CLEARANCE_PART - begun) / rise, 0.0), 1.0)
     middle = a + split * (b - a)
     plain, bad = Limits(min_agl_m=0.0), []
     for p, q in ((a, middle), (middle, b)):
         if float(np.linalg.norm(q - p)) <= 1e-6:
             continue
         start, end = p - [0.0, 0.0, clearance(p[2])], q - [0.0, 0.0, clearance(q[2])]
-        low = p[2] - touch[2] < error / SPARED - 1e-9
+        low = p[2] - touch[2] < error / CLEARANCE_PART - 1e-9
         # So near to the touch point the aircraft is over the landing strip: no track error.
         track = np.array([reach_m if low else limits.track_error_m + reach_m])
         leg = Legs(start[None], end[None], np.zeros(1, bool), track, np.zeros(1))
@@ -297,7 +295,7 @@ def place_of(pilot: Aboard, item: MissionItem) -> Place | None:
     if not pilot.has_place(item):
         return None
     place = (item.lat_deg, item.lon_deg, 0.0)
-    return place if flat_m(pilot.home, place) > NEAR_M else None
+    return place if flat_m(pilot.home, place) > NO_COURSE_M else None
 
 
 def _bearing(a: Place, b: Place) -> float:
@@ -336,7 +334,7 @@ def turns_early(pilot: Aboard, seq: int, after: MissionItem | None) -> None:
     aside_m = math.hypot(rest[0] - part * way[0], rest[1] - part * way[1])
     if aside_m <= pilot.vehicle.limits.track_error_m:
         return
-    parts = min(math.ceil(aside_m / max(pilot.vehicle.limits.track_error_m, 1.0)), MOST_PARTS)
+    parts = min(math.ceil(aside_m / max(pilot.vehicle.limits.track_error_m, 1.0)), MOST_BANDS)
     half = over_m(pilot.vehicle) / 2.0
     terrain = m.FRAME_SYNONYMS.get(after.frame, after.frame) == m.TERRAIN
     for k in range(parts):
@@ -364,7 +362,7 @@ def climbed(stretches: Sequence[Stretch], vehicle: Vehicle) -> list[Stretch]:
     """The stretches with the climb-out in pieces at the speeds of the vehicle's own; the same if it says nothing."""
     known = vehicle.climb_out
     out = list(takewhile(lambda s: s.column and s.kind == "takeoff" and s.seq == stretches[0].seq, stretches))
-    if known is None or not out or flat_m(out[0].start, out[-1].end) <= SAME_M:
+    if known is None or not out or flat_m(out[0].start, out[-1].end) <= SAME_PLACE_M:
         return list(stretches)
     top_m = out[-1].end[2]
     cruise_m_s = out[-1].speed_m_s * float(true_per_indicated(top_m))
@@ -373,10 +371,10 @@ def climbed(stretches: Sequence[Stretch], vehicle: Vehicle) -> list[Stretch]:
     pieces, at_m = [], 0.0
     for s in out:
         length = flat_m(s.start, s.end)
-        if length <= SAME_M:
+        if length <= SAME_PLACE_M:
             pieces.append(s)
             continue
-        within = {x for x in (up_m, up_m + slow_m) if at_m + SAME_M < x < at_m + length - SAME_M}
+        within = {x for x in (up_m, up_m + slow_m) if at_m + SAME_PLACE_M < x < at_m + length - SAME_PLACE_M}
         for a, b in pairwise([at_m, *sorted(within), at_m + length]):
             took_s = _seconds(b, up_m, known, cruise_m_s) - _seconds(a, up_m, known, cruise_m_s)
             start, end = _on(s, (a - at_m) / length), _on(s, (b - at_m) / length)

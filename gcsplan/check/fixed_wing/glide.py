@@ -11,8 +11,7 @@ import math
 from itertools import pairwise
 
 from gcsplan.check.motion.flight_state import Aboard
-from gcsplan.check.motion.geodesy import flat_m, offset_m
-from gcsplan.check.motion.stretch import Place
+from gcsplan.check.motion.stretch import Place, flat_m, offset_m
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.notes.note import Note
 

@@ -33,8 +33,7 @@ from itertools import pairwise
 
 from gcsplan.check.fixed_wing.arcs import bend
 from gcsplan.check.motion.circles import circle_growth
-from gcsplan.check.motion.geodesy import flat_m, offset_m
-from gcsplan.check.motion.stretch import Flight, Place, Stretch
+from gcsplan.check.motion.stretch import SAME_PLACE_M, Flight, Place, Stretch, flat_m, offset_m
 from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
@@ -44,10 +43,8 @@ from gcsplan.world.geodesy.frame import Frame
 
 __all__ = ["round_corners"]
 
-PARTS = (0.0, 0.0625, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
+LEG_PARTS = (0.0, 0.0625, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0)
 """Places along a leg where it is cut into parts; each part is widened by what its beginning needs."""
-
-SAME_M = 0.02
 
 
 def round_corners(flight: Flight, mission: Mission, vehicle: Vehicle, frame: Frame, tuning: Tuning = DEFAULTS) -> None:
@@ -122,7 +119,7 @@ class _Cutter:
             if last is not None:
                 found += self._before(last, s, begun, stops)
             blends = self.copter and last is not None
-            found += self._parts(s, (0.0, 0.5) if blends else PARTS, self._beyond(begun, s), fading=not blends)
+            found += self._parts(s, (0.0, 0.5) if blends else LEG_PARTS, self._beyond(begun, s), fading=not blends)
             off, last, stops = begun, s, s.hold_s > 0.0
         return found
 
@@ -268,4 +265,4 @@ def _turn(s: Stretch, after: Stretch) -> float:
 
 def _course(s: Stretch) -> float | None:
     east, north = offset_m(s.start, s.end)
-    return math.atan2(north, east) if math.hypot(east, north) > SAME_M else None
+    return math.atan2(north, east) if math.hypot(east, north) > SAME_PLACE_M else None

@@ -35,11 +35,10 @@ from gcsplan.check.flight.route import fly_all
 from gcsplan.check.motion.circles import PLANE_LOITER_RADIUS_M, circle_growth, circle_widened
 from gcsplan.check.motion.commands import flown_otherwise, moves_nothing, why_lost
 from gcsplan.check.motion.flight_state import Aboard
-from gcsplan.check.motion.geodesy import flat_m
-from gcsplan.check.motion.return_rules import RULES, returned
+from gcsplan.check.motion.return_rules import RETURN_RULES, returned
 from gcsplan.check.motion.spline import NO_DIRECTION, chords, slowed, towards
 from gcsplan.check.motion.stopping import about_turn_m
-from gcsplan.check.motion.stretch import Flight, Place, StretchKind
+from gcsplan.check.motion.stretch import Flight, Place, StretchKind, flat_m
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Mission, MissionItem
@@ -345,7 +344,7 @@ class _Pilot(Aboard):
         self.pace = replace(self.pace, speed_m_s=self.vehicle.return_speed_m_s or self.pace.speed_m_s)
         flown, instead = returned(
             lambda start, end, **more: self.stretch(seq, "rtl", start, end, more),
-            RULES[self.autopilot], self.at, self.home, self.home[2] + self.rtl_rel_home_m,
+            RETURN_RULES[self.autopilot], self.at, self.home, self.home[2] + self.rtl_rel_home_m,
             about_m=about_turn_m(self.vehicle, self.pace.speed_m_s, self.at[2], flat_m(self.at, self.home)),
             waits_s=self.vehicle.return_waits_s,
         )  # fmt: skip

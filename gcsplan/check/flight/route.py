@@ -26,7 +26,7 @@ from gcsplan.mavlink.mission.mission import Mission, MissionItem
 from gcsplan.notes.note import Note
 
 MOST_JUMPS = 15  # AP_MISSION_MAX_NUM_DO_JUMP_COMMANDS on small boards, 100 on large ones; the rest count as used up
-MOST_STEPS = 100_000
+MOST_ROUTE_STEPS = 100_000
 """Most steps before a mission is given up as endless. Rounds that repeat the round before them are not counted."""
 
 
@@ -110,8 +110,8 @@ def fly_in_order(mission: Mission, pilot: Pilot, start: int = 0) -> bool:
     index, steps = start, 0
     while index < len(items):
         steps += 1
-        if steps > MOST_STEPS:
-            flight.not_judged.append(Note("too_many_steps", most=MOST_STEPS))
+        if steps > MOST_ROUTE_STEPS:
+            flight.not_judged.append(Note("too_many_steps", most=MOST_ROUTE_STEPS))
             return False
         if pilot.over and mission.autopilot.is_ardupilot and items[index].command in LAND_STARTS:
             flight.apart_from = index

@@ -1,8 +1,9 @@
-"""How long each stretch of a flight takes: the fleet's model of motion (`fleet.legs`), with the mission's own speeds.
+"""How long each stretch of a flight takes: the fleet's model of motion (`fleet.motion.legs`), with the mission's own
+speeds.
 
-The same model makes a fleet's time table (`fleet.timing.Course`), so all times of a mission are of one kind: a vehicle
-accelerates, brakes, rounds its corners, and stops where it holds and where a take-off or a landing begins or ends. A
-corner's halves count for their own legs.
+The same model makes a fleet's time table (`fleet.motion.timing.Course`), so all times of a mission are of one kind: a
+vehicle accelerates, brakes, rounds its corners, and stops where it holds and where a take-off or a landing begins or
+ends. A corner's halves count for their own legs.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ ARDUPILOT_DEGREE_M = 111318.84502145034
 """Metres per degree, Location.h, `LOCATION_SCALING_FACTOR`. An ArduCopter flew 0.2 % faster than commanded east and
 west at 37° N."""
 
-SAME_M = 1.0
+WITHOUT_STOP_M = 1.0
 """A stretch that begins within this of the end of the one before it is flown without a stop: halves of arcs that
 overlap end this near to each other."""
 
@@ -103,7 +104,7 @@ def _stops(s: Stretch, after: Stretch, ends: Floats, ends_after: Floats) -> bool
         return True
     # Between stretches that do not meet something is flown that is not known; but from its circles a climb-out flies to
     # the point over their middle, which is a stretch without a length.
-    return math.dist(ends[1], ends_after[0]) > SAME_M and (math.dist(*ends_after) > 0.0 or after.hold_s > 0.0)
+    return math.dist(ends[1], ends_after[0]) > WITHOUT_STOP_M and (math.dist(*ends_after) > 0.0 or after.hold_s > 0.0)
 
 
 def _upright(s: Stretch, ends: Floats) -> bool:

@@ -16,6 +16,7 @@ from functools import lru_cache
 from gcsplan.check.motion.stretch import Stretch
 from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
 from gcsplan.notes.note import Note
+from gcsplan.vehicle import GRAVITY_M_S2
 from gcsplan.world.geodesy.atmosphere import density_ratio, true_per_indicated
 
 PLANE_LOITER_RADIUS_M = 60.0  # ArduPlane WP_LOITER_RAD, default
@@ -57,7 +58,6 @@ SLOWEST_M_S = 1.0
 """Slower turns are simulated at this speed, which no plane flies: the steps of a turn grow as its speed falls."""
 
 CAPTURE_SINE = math.sqrt(0.5)
-GRAVITY_M_S2 = 9.80665
 
 
 def true_m_s(s: Stretch) -> float:

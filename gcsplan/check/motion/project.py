@@ -56,15 +56,15 @@ def with_error_of_home(vehicle: Vehicle, home: Home, world: World) -> Vehicle:
     return replace(vehicle, limits=replace(limits, altitude_error_m=limits.altitude_error_m + spread_m))
 
 
-SAG_M = 0.05
+GROUND_SAG_M = 0.05
 """How far a chord may lie from the quadratic that it replaces, m; added to the altitude error of its piece."""
 
 GRID_BOW_M = 0.01
 """How far lines straight in the plane may lie from lines straight in the grid, m, when legs are cut at cell borders."""
 
-SHORTEST_M = 1e-3
-MOST_PARTS = 200
-"""Most parts into which a piece of a terrain-frame leg is cut to keep `SAG_M`."""
+SHORTEST_PIECE_M = 1e-3
+MOST_GROUND_PARTS = 200
+"""Most parts into which a piece of a terrain-frame leg is cut to keep `GROUND_SAG_M`."""
 
 NOISE_DEG = 1e-6
 _STRAIGHT = (math.nan, math.nan)
@@ -136,7 +136,7 @@ def follow_ground(ends: Floats, terrain: VehicleTerrain) -> Followed | None:
     Height above that ground is interpolated between the ends.
     """
     run_m = float(np.hypot(*(ends[1, :2] - ends[0, :2])))
-    if run_m <= SHORTEST_M:
+    if run_m <= SHORTEST_PIECE_M:
         return ends[:1], ends[1:], np.zeros(1), np.full((1, 2), np.nan)
     parts = terrain.pieces(ends[:, :2])
     if parts is None:
@@ -145,7 +145,7 @@ def follow_ground(ends: Floats, terrain: VehicleTerrain) -> Followed | None:
     agl = np.array([ends[0, 2] - float(first.ground_at(*xy[0])), ends[1, 2] - float(last.ground_at(*xy[1]))])
     found = []
     for a, b, surface in parts:
-        if (b - a) * run_m <= SHORTEST_M:
+        if (b - a) * run_m <= SHORTEST_PIECE_M:
             continue
         piece = _follow(
             xy[0] + a * (xy[1] - xy[0]),
@@ -177,7 +177,7 @@ def _follow(begin: Floats, end: Floats, surface: Surface, agl: Floats) -> Follow
     sag = middle - 0.5 * (z[1:] + z[:-1])
     long_m = np.diff(t) * run_m
     slope, bend = np.diff(z) / long_m, 4.0 * np.abs(sag) / long_m
-    parts = np.clip(np.ceil(np.sqrt(np.abs(sag) / SAG_M)), 1, MOST_PARTS).astype(int)
+    parts = np.clip(np.ceil(np.sqrt(np.abs(sag) / GROUND_SAG_M)), 1, MOST_GROUND_PARTS).astype(int)
     piece = np.repeat(np.arange(len(parts)), parts)
     begun = np.concatenate([[0], np.cumsum(parts)[:-1]])
     share = (np.arange(len(piece)) - begun[piece]) / parts[piece]
@@ -190,7 +190,7 @@ def _follow(begin: Floats, end: Floats, surface: Surface, agl: Floats) -> Follow
 
 
 def _cell_cuts(ends: Floats, surface: Surface, run_m: float) -> Floats:
-    """Where a line crosses cell borders: rising parts from 0 to 1, at least `SHORTEST_M` apart."""
+    """Where a line crosses cell borders: rising parts from 0 to 1, at least `SHORTEST_PIECE_M` apart."""
     way = ends[1, :2] - ends[0, :2]
     middle, both = surface.grid(*(ends[0, :2] + 0.5 * way)), surface.grid(ends[:, 0], ends[:, 1])
     bow_m = float(np.hypot(*((middle - both.mean(axis=0)) * surface.grid.metres_per_cell(*ends[0, :2]))))
@@ -205,8 +205,8 @@ def _cell_cuts(ends: Floats, surface: Surface, run_m: float) -> Floats:
             if a != b:
                 cuts.append((k + (lines - a) / (b - a)) / parts)
     t = np.unique(np.clip(np.concatenate(cuts), 0.0, 1.0))
-    far = np.diff(t) * run_m > SHORTEST_M
-    return np.concatenate([t[:1], t[1:-1][far[:-1] & (1.0 - t[1:-1] > SHORTEST_M / run_m)], t[-1:]])
+    far = np.diff(t) * run_m > SHORTEST_PIECE_M
+    return np.concatenate([t[:1], t[1:-1][far[:-1] & (1.0 - t[1:-1] > SHORTEST_PIECE_M / run_m)], t[-1:]])
 
 
 def steep_report(plane: PlaneLegs, report: LegReport, limits: Limits) -> LegReport:

@@ -33,8 +33,7 @@ from typing import TypeAlias, TypeVar
 
 from gcsplan.arrays import Floats
 from gcsplan.check.motion.circles import PLANE_LOITER_RADIUS_M, circle_growth
-from gcsplan.check.motion.geodesy import flat_m
-from gcsplan.check.motion.stretch import Place, Stretch
+from gcsplan.check.motion.stretch import Place, Stretch, flat_m
 from gcsplan.fleet.motion.timing import LAND_SLOWLY_M, PX4_LAND_SLOWLY_M
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.geometry.limits import Limits
@@ -42,7 +41,7 @@ from gcsplan.world.geometry.limits import Limits
 AT_HOME_M = 5.0
 """Within this distance of home, m, or within the track error if that is larger, a return is only a descent."""
 
-ASIDE = (0.0, 0.25, 0.5, 0.75, 1.0)
+ASIDE_PARTS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Parts of a plane's flight home: it begins aside of the line, and nears the line all the way; each has one width."""
 
 Metres = TypeVar("Metres", float, Floats)
@@ -88,7 +87,7 @@ class ReturnRule:
         return self.loiter_radius_m * circle_growth(amsl_m)
 
 
-RULES = {
+RETURN_RULES = {
     Autopilot.ARDUCOPTER: ReturnRule(
         "RTL_ALT", 15.0, climbs_first=True,
         cone_slope=3.0,  # RTL_CONE_SLOPE
@@ -127,7 +126,7 @@ def returned(
 ) -> tuple[list[Stretch], list[Stretch]]:
     """The return from ``at`` to ``home`` (a place on the ground); and what some versions fly in place of parts of it.
 
-    ``waits_s``: the seconds over home before it descends. ``about_m``: see `run_on.about_turn_m`; a plane flies home
+    ``waits_s``: the seconds over home before it descends. ``about_m``: see `stopping.about_turn_m`; a plane flies home
     from anywhere that far from ``at``.
     """
     lat, lon, ground = home
@@ -140,7 +139,7 @@ def returned(
             flies(over, over, reach_m=rule.circle_m(level), hold_s=math.inf),
         ], [
             flies(at, at, reach_m=about_m),
-            *(_part(aside, a, b, (1.0 - a) * about_m) for a, b in pairwise(ASIDE)),
+            *(_part(aside, a, b, (1.0 - a) * about_m) for a, b in pairwise(ASIDE_PARTS)),
         ]
     cone = rule.cone_amsl_m(ground, flat_m(at, home))
     if rule.cone_differs and cone < level:
@@ -171,12 +170,12 @@ def _band(flies: Flies, at: Place, home: Place, a_amsl_m: float, b_amsl_m: float
 CHANGES = 1.5
 """A flight home stops, starts and stops: each takes half of speed over acceleration longer than at full speed."""
 
-OWN_METRES = 1.02
+RETURN_OWN_METRES = 1.02
 """ArduPilot's own metres may be this much longer than those over ground, 150 km from home at most."""
 
 
 def return_s(vehicle: Vehicle, way_m: float, rise_m: float, down_m: float, speed_m_s: float) -> float:
-    """Seconds of a return without its wait over home: no fewer than the time table has (`fleet.timing`).
+    """Seconds of a return without its wait over home: no fewer than the time table has (`fleet.motion.timing`).
 
     ``way_m``: horizontal; ``rise_m``: from its beginning to its level, negative if that is lower; ``down_m``: from
     there to the ground at home; ``speed_m_s``: that of the mission where it begins (NaN: the vehicle's fastest). It is
@@ -191,11 +190,11 @@ def return_s(vehicle: Vehicle, way_m: float, rise_m: float, down_m: float, speed
     slow_m = PX4_LAND_SLOWLY_M if vehicle.autopilot is Autopilot.PX4 else LAND_SLOWLY_M
     seconds = max(rise_m, 0.0) / climb + max(-rise_m, 0.0) / descent + down_m / descent
     seconds += min(down_m, slow_m) / min(land, descent)
-    seconds += way_m / speed * (OWN_METRES if vehicle.lays_curves else 1.0)
+    seconds += way_m / speed * (RETURN_OWN_METRES if vehicle.lays_curves else 1.0)
     if math.isfinite(vehicle.vertical_accel_m_s2):
         seconds += (climb + 2.0 * descent) / vehicle.vertical_accel_m_s2
     if math.isfinite(vehicle.accel_m_s2):
-        # PX4 brakes by 2 a/j seconds at the speed earlier (`fleet.smoothed`); without a bound of the jerk this is 0.
+        # PX4 brakes by 2 a/j seconds at the speed earlier (`fleet.motion.px4`); without a bound of the jerk this is 0.
         jerks_s = (4.0 if vehicle.smooths else 2.0) * vehicle.accel_m_s2 / vehicle.leg_jerk_m_s3
         seconds += CHANGES * (speed / vehicle.accel_m_s2 + jerks_s)
     return seconds

@@ -20,8 +20,7 @@ import numpy as np
 
 from gcsplan.arrays import Floats
 from gcsplan.check.motion.commands import Pace
-from gcsplan.check.motion.geodesy import degree_m, offset_m
-from gcsplan.check.motion.stretch import Place
+from gcsplan.check.motion.stretch import Place, degree_m, offset_m
 from gcsplan.fleet.motion.ardupilot import FULL_ACCEL
 from gcsplan.fleet.motion.scurve import along_slope, curves
 from gcsplan.mavlink.mission import commands as cmd
@@ -29,13 +28,13 @@ from gcsplan.vehicle import Vehicle
 
 LONGEST = 4.0  # SPLINE_FACTOR
 BULGE_M = 0.25
-MOST_PIECES = 200
+MOST_CHORDS = 200
 LOOKS, BESIDE, STILL = 16, 1e-5, 1e-6
 """Samples per piece; offset of the samples on both sides of a place, as a part of the curve; and the part of its
 fastest speed below which a curve counts as standing still."""
 
 
-SPARED = 0.5
+SPLINE_ACCEL_PART = 0.5
 """TANGENTIAL_ACCEL_SCALER, LATERAL_ACCEL_SCALER: the part of the accelerations that a curve is flown with."""
 
 PASSES_TO = (cmd.WAYPOINT, cmd.SPLINE_WAYPOINT, cmd.LOITER_UNLIM, cmd.LOITER_TIME)
@@ -65,7 +64,7 @@ def chords(start: Place, end: Place, leaving: Direction, arriving: Direction) ->
     """
     leaves, square, cube = _cubic(start, end, leaving, arriving)
     bend = max(float(np.linalg.norm(2.0 * square)), float(np.linalg.norm(2.0 * square + 6.0 * cube)))
-    pieces = int(min(max(4, math.ceil(math.sqrt(bend / (8.0 * BULGE_M)))), MOST_PIECES))
+    pieces = int(min(max(4, math.ceil(math.sqrt(bend / (8.0 * BULGE_M)))), MOST_CHORDS))
     t = np.linspace(0.0, 1.0, pieces + 1)[1:-1, None]
     points = leaves * t + square * t**2 + cube * t**3
     east_m, north_m = degree_m(0.5 * (start[0] + end[0]))
@@ -111,8 +110,8 @@ def mean_speed_m_s(
     pace = np.linalg.norm(velocity, axis=1)
     unit = np.divide(velocity, pace[:, None], out=np.zeros_like(velocity), where=pace[:, None] > STILL)
     across = bend - unit * (bend * unit).sum(axis=1)[:, None]
-    along = _limit(unit, level, upright, upright) * SPARED
-    turning = _limit(across, level, upright, upright) * SPARED
+    along = _limit(unit, level, upright, upright) * SPLINE_ACCEL_PART
+    turning = _limit(across, level, upright, upright) * SPLINE_ACCEL_PART
     most = np.minimum(_limit(unit, speed_m_s, *rates_m_s), 1e3)
     with np.errstate(divide="ignore", invalid="ignore"):
         bent = pace * np.sqrt(turning / np.linalg.norm(across, axis=1))

@@ -20,9 +20,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from gcsplan.check.motion.circles import GRAVITY_M_S2, circle_growth
+from gcsplan.check.motion.circles import circle_growth
 from gcsplan.check.motion.turn_parameters import DEFAULTS
-from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, Autopilot, Vehicle
+from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, GRAVITY_M_S2, Autopilot, Vehicle
 
 CORNER_M_S2, CORNER_M = 5.0, 2.0
 """ArduCopter: acceleration in a corner, twice WPNAV_ACCEL; how far the arc stays from the corner, WPNAV_RADIUS."""

@@ -2,8 +2,8 @@
 
 Parts of the mission are judged as a whole. From each part, for each item that `joins` may be joined from there, one
 straight leg of the exact check covers all ways to that item: it is widened by where the vehicle may be when it turns,
-in the plane and in height. Parts from which that is not legal are split, down to `SMALLEST_M`. So a point reported as
-safe is safe; the others may be reported as unsafe up to the ends of a smallest part too early.
+in the plane and in height. Parts from which that is not legal are split, down to `SMALLEST_BY_GRADE_M`. So a point
+reported as safe is safe; the others may be reported as unsafe up to the ends of a smallest part too early.
 
 Which item is joined is decided by the nearest leg of the return path. A part's candidates are all that may be nearest
 from anywhere in it, within the errors of the vehicle's place. What is flown from the join on is judged with the
@@ -25,7 +25,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.battery import BatteryHome, LegBattery
-from gcsplan.check.motion.return_rules import RULES, at_home_m, return_s
+from gcsplan.check.motion.return_rules import RETURN_RULES, at_home_m, return_s
 from gcsplan.check.motion.stopping import about_turn_m, more_m
 from gcsplan.check.motion.stretch import Stretch
 from gcsplan.check.returns.footprint import Target, places_of_returns
@@ -43,7 +43,7 @@ CLEAR, LEGAL, KNOWN = 0, 1, 2
 FIRST_M, FIRST_PARTS = 64.0, 2000
 """First parts are this long, or so long that there are no more than this many."""
 
-SMALLEST_M = (4.0, 16.0)
+SMALLEST_BY_GRADE_M = (4.0, 16.0)
 """Parts no longer than this are not split, by grade, m."""
 
 PIECES, MOST_ROUNDS = 4, 8
@@ -53,7 +53,7 @@ MOST_LEGS = 400_000
 STRIP_PIECES = 6
 """Where the ways from a part do not pass as a whole, the strip in which they begin is cut into so many pieces."""
 
-LOOKED_AT = 200
+LEGS_LOOKED_AT = 200
 """Most legs of one stretch that are looked at for the reason that is told."""
 
 
@@ -80,14 +80,14 @@ def return_by_mission(
     length = float((trace.last - trace.first).sum())
     parts = trace.cut(max(FIRST_M, length / FIRST_PARTS))
     seq = trace.seq[parts.stretch]
-    copter = RULES[vehicle.autopilot].climbs_first
+    copter = RETURN_RULES[vehicle.autopilot].climbs_first
     parts = parts.take((seq <= past) & ~(np.isin(seq, list(landing)) & copter))
     done: list[tuple[TraceParts, Floats, Bools]] = []
     stopped = False
     for _ in range(MOST_ROUNDS):
         good, back_j = judge.look(parts)
-        open_ = ~good[KNOWN] & (parts.size > SMALLEST_M[CLEAR])
-        for grade, least_m in enumerate(SMALLEST_M):
+        open_ = ~good[KNOWN] & (parts.size > SMALLEST_BY_GRADE_M[CLEAR])
+        for grade, least_m in enumerate(SMALLEST_BY_GRADE_M):
             open_ |= ~good[grade] & (parts.size > least_m)
         stopped = judge.legs > MOST_LEGS and bool(open_.any())
         if stopped:
@@ -121,7 +121,7 @@ class _Judge:
             max_descent_deg=90.0,
         )  # fmt: skip
         self.limits: tuple[Limits, Limits] = (free, limits)
-        self.copter = RULES[vehicle.autopilot].climbs_first
+        self.copter = RETURN_RULES[vehicle.autopilot].climbs_first
         self.legs = 0
         fastest = max(trace.speed_m_s.tolist(), default=vehicle.speed_max_m_s)
         self.about_m = 0.0 if self.copter else about_turn_m(vehicle, fastest, float(trace.amsl.max()))
@@ -253,7 +253,7 @@ class _Judge:
         trace = self.trace
         a, b = float(parts.start[run[0]]), float(parts.end[run[-1]])
         from_m, to_m = (float(np.interp(u, trace.u, trace.along)) for u in (a, b))
-        why, zone = self._why(parts.take(run[:: max(1, len(run) // LOOKED_AT)]), grade)
+        why, zone = self._why(parts.take(run[:: max(1, len(run) // LEGS_LOOKED_AT)]), grade)
         return UnsafeStretch(
             int(trace.seq[parts.stretch[run[0]]]), int(trace.seq[parts.stretch[run[-1]]]),
             trace.place(a), trace.place(b), from_m, max(from_m, to_m), why, zone, None, None,

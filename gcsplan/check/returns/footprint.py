@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.check.motion.return_rules import RULES
+from gcsplan.check.motion.return_rules import RETURN_RULES
 from gcsplan.check.motion.stopping import about_turn_m, levels_off_m
 from gcsplan.check.returns.trace import TINY_M, MissionTrace, TraceParts
 from gcsplan.vehicle import Vehicle
@@ -110,7 +110,7 @@ def places_of_returns(trace: MissionTrace, sides: TraceParts, target: Target, ve
     low, high = trace.heights(sides)
     down_m, up_m = levels_off_m(vehicle)
     aside = np.zeros(len(sides))
-    if not RULES[vehicle.autopilot].climbs_first:
+    if not RETURN_RULES[vehicle.autopilot].climbs_first:
         away = np.hypot(*(begin[:, 0] - target.en).T)
         speed = trace.speed_m_s[sides.stretch]
         aside = np.array([about_turn_m(vehicle, *one) for one in zip(speed, high, away, strict=True)])

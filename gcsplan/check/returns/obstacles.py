@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.check.motion.return_rules import ASIDE, RULES, at_home_m
+from gcsplan.check.motion.return_rules import ASIDE_PARTS, RETURN_RULES, at_home_m
 from gcsplan.check.motion.stopping import circle_home_m
 from gcsplan.check.returns.footprint import ReturnPlaces, Target, places_of_returns
 from gcsplan.check.returns.trace import TINY_M, MissionTrace, TraceParts
@@ -162,7 +162,7 @@ GROUPS = 6
 
 LEAST_IN_GROUP = 50
 
-MOST_PIECES = 1_000_000
+MOST_PIECES_HELD = 1_000_000
 """Most pieces of ground under lines home held at once, 80 MB; over 240 km of cells of 30 m there are millions."""
 
 CIRCLE_ABOVE_M = 1000.0
@@ -192,7 +192,7 @@ def obstacles_of_returns(
     trace: MissionTrace, parts: TraceParts, target: Target, vehicle: Vehicle, *, whole: bool
 ) -> GradedObstacles:
     """The obstacles of returns from ``parts`` to ``target``: from all of each if ``whole``, else from its middle."""
-    rule, limits, air = RULES[vehicle.autopilot], vehicle.limits, trace.world.airspace
+    rule, limits, air = RETURN_RULES[vehicle.autopilot], vehicle.limits, trace.world.airspace
     n = len(parts)
     sides = parts if whole else TraceParts(parts.middle, parts.middle, parts.stretch)
     places = places_of_returns(trace, sides, target, vehicle)
@@ -267,7 +267,7 @@ def _flies_home(
     reach, extra, aside = widths
     start, step = lines[0][some], (lines[1] - lines[0])[some]
     length = np.hypot(*step.T)
-    for a, b in pairwise(ASIDE):
+    for a, b in pairwise(ASIDE_PARTS):
         wide = float((extra + (1.0 - a) * aside)[some].max())
         spare = (reach + aside)[some] - a * length
         for k in _in_turn(air, start + a * step, start + b * step, np.arange(len(some))):
@@ -277,8 +277,8 @@ def _flies_home(
 
 
 def _in_turn(air: Airspace, starts: Floats, ends: Floats, some: Indices) -> Iterator[Indices]:
-    """Parts of the lines ``some`` that have about `MOST_PIECES` pieces together, and of which only one is held."""
-    for first, last in pairwise(level_lines.batches(air, starts[some], ends[some], MOST_PIECES)):
+    """Parts of the lines ``some`` that have about `MOST_PIECES_HELD` pieces together, and of which only one is held."""
+    for first, last in pairwise(level_lines.batches(air, starts[some], ends[some], MOST_PIECES_HELD)):
         yield some[first:last]
 
 
@@ -345,14 +345,14 @@ def _climbs_on_the_spot(
 def _over_home(found: _Builder, trace: MissionTrace, target: Target, vehicle: Vehicle, n: int) -> None:
     """Add the descent over home, or a plane's circle there, with which every return ends."""
     air, limits = trace.world.airspace, vehicle.limits
-    if RULES[vehicle.autopilot].climbs_first:
+    if RETURN_RULES[vehicle.autopilot].climbs_first:
         at = level_lines.over(air, target.en[None], target.en[None], limits).crossings
         for zone, bottom, top in zip(at.zone.tolist(), at.bottom_m.tolist(), at.top_m.tolist(), strict=True):
             if top > target.ground_amsl_m:
                 found.ceiling(np.arange(n), np.full(n, bottom), zone, (0, 1))
         return
     high = target.ground_amsl_m + CIRCLE_ABOVE_M
-    circle = circle_home_m(RULES[vehicle.autopilot].circle_m(high), vehicle, high)
+    circle = circle_home_m(RETURN_RULES[vehicle.autopilot].circle_m(high), vehicle, high)
     met = level_lines.over(air, target.en[None], target.en[None], limits, circle * air.scale)
     every = np.arange(n)
     for grade, floor in enumerate((met.clear_m[0], met.legal_m[0])):

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.check.motion.return_rules import RULES, RallyAltitude
+from gcsplan.check.motion.return_rules import RETURN_RULES, RallyAltitude
 from gcsplan.check.returns.footprint import Target
 from gcsplan.check.returns.obstacles import GradedObstacles, Obstacles, obstacles_of_returns
 from gcsplan.check.returns.refinement import CLEAR, Refinement
@@ -28,20 +28,20 @@ from gcsplan.mavlink.mission.mission import RELATIVE, MissionItem
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 
-MOST_POINTS = 6
-LEVELS = 40
+MOST_RALLY_POINTS = 6
+MOST_RETURN_LEVELS = 40
 """Most return altitudes that are compared."""
 
 CANDIDATES = 16
-LOOKED_AT = 4
+PLACES_TRIED = 4
 """Places examined for each candidate; the flattest is used."""
 
-PARTS = 120
+MISSION_PARTS = 120
 """Parts into which a mission is cut, about, to choose the points; the choice is then refined."""
 
 NEAREST_HOME_M = 200.0
 FLAT_WITHIN_M = 10.0
-WORTH = 0.01
+WORTH_PART = 0.01
 """The least part of the mission that a point, or a higher altitude, must make safe."""
 
 
@@ -84,7 +84,7 @@ def propose(
         best_level(refinement.strict[CLEAR], refinement.parts.size, ground + return_rel_home_m, refinement.start),
         ground,
     )
-    parts = trace.cut(max(refinement.first_m, float((trace.last - trace.first).sum()) / PARTS))
+    parts = trace.cut(max(refinement.first_m, float((trace.last - trace.first).sum()) / MISSION_PARTS))
     middle = trace.points(parts.middle)[:, :2]
     size = np.maximum(parts.size, 1e-3)
     obstacles = obstacles_of_returns(trace, parts, home, vehicle, whole=False).clear
@@ -125,13 +125,13 @@ def propose(
 
 
 def best_level(obstacles: Obstacles, size: Floats, level: float, start: float) -> float:
-    """The lowest of ``level`` and higher levels whose unsafe length is within `WORTH` of the least."""
+    """The lowest of ``level`` and higher levels whose unsafe length is within `WORTH_PART` of the least."""
     each = obstacles.lowest(start)
     each = np.sort(each[np.isfinite(each) & (each > level)])
-    few = each[np.linspace(0, len(each) - 1, min(len(each), LEVELS)).astype(int)]
+    few = each[np.linspace(0, len(each) - 1, min(len(each), MOST_RETURN_LEVELS)).astype(int)]
     levels: list[float] = [level, *few.tolist()]
     unsafe = [float(size[~obstacles.passes(h)].sum()) for h in levels]
-    enough = min(unsafe) + WORTH * float(size.sum())
+    enough = min(unsafe) + WORTH_PART * float(size.sum())
     return next(h for h, m in zip(levels, unsafe, strict=True) if m <= enough)
 
 
@@ -139,7 +139,7 @@ def _level_there(
     obstacles: Obstacles, size: Floats, target: Target, level: float, vehicle: Vehicle, home_amsl_m: float
 ) -> float:
     """The level of a return to ``target``, chosen if the autopilot leaves a choice."""
-    rally = RULES[vehicle.autopilot].rally
+    rally = RETURN_RULES[vehicle.autopilot].rally
     if rally is RallyAltitude.GROUND:
         return target.ground_amsl_m + level - home_amsl_m
     start = level if rally is RallyAltitude.RAISES else max(level, target.ground_amsl_m)
@@ -155,7 +155,7 @@ def _rounded(level: float, home_amsl_m: float) -> float:
 def _candidates(trace: MissionTrace, home: Target, vehicle: Vehicle) -> list[tuple[Target, float, bool]]:
     """Candidate places on the ground: the flattest near each of a few places along the mission, and where it ends."""
     ends = trace.last[: trace.mains]
-    u = np.linspace(trace.first[0], ends[-1], CANDIDATES * LOOKED_AT + 1)
+    u = np.linspace(trace.first[0], ends[-1], CANDIDATES * PLACES_TRIED + 1)
     places = trace.points(np.append(u, ends[-1]))[:, :2]
     surface = trace.world.airspace.surface
     ground = surface.ground_at(*places.T)
@@ -168,13 +168,13 @@ def _candidates(trace: MissionTrace, home: Target, vehicle: Vehicle) -> list[tup
     fit &= np.isfinite(ground) & np.isfinite(slope)
     found = []
     for k in range(CANDIDATES):
-        some = np.arange(k * LOOKED_AT, (k + 1) * LOOKED_AT)
+        some = np.arange(k * PLACES_TRIED, (k + 1) * PLACES_TRIED)
         some = some[fit[some]]
         if len(some):
             found.append((int(some[slope[some].argmin()]), False))
     if fit[-1]:
         found.append((len(places) - 1, True))
-    on_ground = RULES[vehicle.autopilot].rally is RallyAltitude.GROUND
+    on_ground = RETURN_RULES[vehicle.autopilot].rally is RallyAltitude.GROUND
     out = []
     for i, end in found:
         east, north = places[i].tolist()
@@ -200,9 +200,9 @@ def _choose(away: Floats, safe: Bools, size: Floats) -> list[int]:
     while rows:
         rows = max(([k for k in rows if k != out] for out in rows), key=lambda fewer: safe_m([0, *fewer]))
         tried.append((safe_m([0, *rows]), rows))
-    few = [(m, rows) for m, rows in tried if len(rows) <= MOST_POINTS]
+    few = [(m, rows) for m, rows in tried if len(rows) <= MOST_RALLY_POINTS]
     best = max(m for m, _ in few)
-    return min((rows for m, rows in few if m >= best - WORTH * total), key=len)
+    return min((rows for m, rows in few if m >= best - WORTH_PART * total), key=len)
 
 
 def _judged_with(trace: MissionTrace, vehicle: Vehicle, places: Sequence[_Place], like: Refinement) -> Refinement:
@@ -250,7 +250,7 @@ def _on_one(parts: Sequence[Obstacles], count: int) -> Obstacles:
 def _point(trace: MissionTrace, place: _Place, serves_m: float, vehicle: Vehicle, home_amsl_m: float) -> RallyPoint:
     t = place.target
     lat, lon = trace.world.frame.to_degrees(t.east_m, t.north_m).tolist()
-    on_ground = RULES[vehicle.autopilot].rally is RallyAltitude.GROUND
+    on_ground = RETURN_RULES[vehicle.autopilot].rally is RallyAltitude.GROUND
     rel = round((t.ground_amsl_m if on_ground else place.level) - home_amsl_m, 2)
     why = Note("where_mission_ends") if place.at_end else Note("under_mission", slope_percent=100.0 * place.slope)
     return RallyPoint(round(lat, 7), round(lon, 7), t.ground_amsl_m, rel, serves_m, why)
@@ -258,6 +258,6 @@ def _point(trace: MissionTrace, place: _Place, serves_m: float, vehicle: Vehicle
 
 def _conditions(vehicle: Vehicle, farthest_m: float) -> tuple[Note, ...]:
     look = Note("look_at_rally_points")
-    if RULES[vehicle.autopilot].rally is RallyAltitude.GROUND:
+    if RETURN_RULES[vehicle.autopilot].rally is RallyAltitude.GROUND:
         return Note("rally_points_of_px4"), look
     return Note("rally_points_of_ardupilot", limit_km=farthest_m / 1e3 + 0.05), look

@@ -15,14 +15,14 @@ from gcsplan.arrays import Bools
 from gcsplan.check.returns.obstacles import GradedObstacles, Obstacles
 from gcsplan.check.returns.trace import MissionTrace, TraceParts
 
-Judge = Callable[[TraceParts, bool], GradedObstacles]
+JudgeParts = Callable[[TraceParts, bool], GradedObstacles]
 """``judge(parts, whole)``: see `sweep.obstacles_of_returns`."""
 
 CLEAR, LEGAL = 0, 1
 FIRST_PIECES = 120_000  # pieces of ground for the first parts, about; sets their size
-MOST_PIECES = 1_500_000  # of ground; beyond this nothing is split further
+MOST_PIECES_OF_GROUND = 1_500_000  # of ground; beyond this nothing is split further
 COARSE_M, COARSEST_M = 64.0, 400.0
-SMALLEST_M = 4.0
+SMALLEST_PART_M = 4.0
 """Parts shorter than this, m, are not split."""
 
 COARSER = 4.0
@@ -32,7 +32,7 @@ be split along its whole length."""
 LEAST_PARTS, SMALLER = 30, 16.0
 """Least number of parts of a short mission at first, and how many times smaller its smallest parts are."""
 
-PIECES = 4
+SPLIT_PIECES = 4
 LEVEL_M = 0.5
 """The lowest level is found to within this, m."""
 
@@ -43,7 +43,7 @@ class Refinement:
     def __init__(
         self,
         trace: MissionTrace,
-        judge: Judge,
+        judge: JudgeParts,
         start: float,
         levels: tuple[float, ...],
         size_m: float,
@@ -56,7 +56,7 @@ class Refinement:
         self.cost = self.strict.cost + self.lenient.cost
         self.stopped_early = False
         while (open_ := self._open()).any():
-            if self.cost > MOST_PIECES:
+            if self.cost > MOST_PIECES_OF_GROUND:
                 self.stopped_early = True
                 break
             self._split(open_)
@@ -92,7 +92,7 @@ class Refinement:
         return bad & (~bad_lenient | beside)
 
     def _split(self, chosen: Bools) -> None:
-        new = self.parts.take(chosen).split(PIECES)
+        new = self.parts.take(chosen).split(SPLIT_PIECES)
         strict, lenient = self.judge(new, True), self.judge(new, False)
         self.cost += strict.cost + lenient.cost
         start = np.concatenate([self.parts.start[~chosen], new.start])
@@ -114,4 +114,4 @@ def sizes_m(trace: MissionTrace, away_m: float, cell_m: float) -> tuple[float, f
     length = float((trace.last - trace.first).sum())
     first = np.clip(length * 2.5 * (away_m / cell_m + 1.0) / FIRST_PIECES, COARSE_M, COARSEST_M)
     first = min(float(first), max(length, 1e-3) / LEAST_PARTS)
-    return first, min(SMALLEST_M, first / SMALLER)
+    return first, min(SMALLEST_PART_M, first / SMALLER)

@@ -28,9 +28,8 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.flight.times import seconds_of
 from gcsplan.check.motion.commands import LAND_STARTS
-from gcsplan.check.motion.geodesy import flat_m
 from gcsplan.check.motion.stopping import levels_off_m
-from gcsplan.check.motion.stretch import Flight, Stretch
+from gcsplan.check.motion.stretch import Flight, Stretch, flat_m
 from gcsplan.check.returns.trace import MissionTrace, TraceParts
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m

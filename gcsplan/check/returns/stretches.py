@@ -18,7 +18,7 @@ from gcsplan.check.returns.words import both
 from gcsplan.notes.note import Note
 
 ROUND_M = 0.1
-LOOKED_AT = 500
+LINE_SAMPLES = 500
 """Samples on the line home; messages name the highest of them."""
 
 SHORT_M, MOST_PIECES = 100.0, 12
@@ -170,7 +170,7 @@ def _because(trace: MissionTrace, own: Obstacles, start: float, level: float) ->
 def _obstacle(trace: MissionTrace, u: float, target: Target) -> Place | None:
     """The highest ground, with what stands on it, on the straight line from a place on the trace to ``target``."""
     start = trace.points(np.array([u]))[0, :2]
-    places = start + np.linspace(0.0, 1.0, LOOKED_AT)[:, None] * (target.en - start)
+    places = start + np.linspace(0.0, 1.0, LINE_SAMPLES)[:, None] * (target.en - start)
     top = trace.world.airspace.surface.top_at(*places.T)
     if np.isnan(top).all():
         return None

@@ -10,7 +10,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.motion.project import legs_in_plane
-from gcsplan.check.motion.return_rules import RULES
+from gcsplan.check.motion.return_rules import RETURN_RULES
 from gcsplan.check.motion.stopping import run_on_m, run_past_m
 from gcsplan.check.motion.stretch import Flight, Place, Stretch
 from gcsplan.vehicle import Vehicle
@@ -185,7 +185,7 @@ def trace_of(flight: Flight, vehicle: Vehicle, world: World, terrain_error_m: fl
             low, high = begun.get(s.seq, (so_far, so_far))
             part = way / way[-1] if way[-1] > 0.0 else way
             mine_along = low + part * (high - low)
-        if s.column and not RULES[vehicle.autopilot].climbs_first:
+        if s.column and not RETURN_RULES[vehicle.autopilot].climbs_first:
             continue
         kept.append(number)
         along.append(mine_along)

@@ -8,7 +8,7 @@ from typing import Any
 
 from gcsplan.check.battery import BatteryHome
 from gcsplan.check.motion.stretch import Place
-from gcsplan.check.returns.words import Row, listed, together_m, verdict_words
+from gcsplan.check.returns.words import ReturnRow, listed, together_m, verdict_words
 from gcsplan.mavlink.mission.return_parameters import ReturnRoute, route_setting, setting, settings
 from gcsplan.notes.note import IN_FILES, Note, Wording, in_json
 from gcsplan.vehicle import Autopilot
@@ -301,30 +301,30 @@ class WayHome:
             ]
         return out
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[ReturnRow]:
         """The rows of a table of two columns, below the headline."""
         if self.route == "mission":
             return self._rows_of_mission()
-        out = [Row("judged_at", Note("judged_at", rel_home_m=self.rtl_rel_home_m, assumed=self.assumed))]
+        out = [ReturnRow("judged_at", Note("judged_at", rel_home_m=self.rtl_rel_home_m, assumed=self.assumed))]
         if self.advice is not None:
-            out.append(Row("set", self.advice))
+            out.append(ReturnRow("set", self.advice))
         if self.path_back is not None:
-            out.append(Row("path_back", self.path_back))
-        out += [Row("no_return", Note("from_stretch", stretch=s.described())) for s in worst_first(self.unsafe)]
+            out.append(ReturnRow("path_back", self.path_back))
+        out += [ReturnRow("no_return", Note("from_stretch", stretch=s.described())) for s in worst_first(self.unsafe)]
         if self.irregular:
             first, length = self.irregular[0].described(legal=True), self._irregular_m
             from_part = Note("outside_limit_from", length_m=length, first=first)
-            out.append(Row("irregular", from_part if length >= 0.5 else Note("outside_limit_at", first=first)))
+            out.append(ReturnRow("irregular", from_part if length >= 0.5 else Note("outside_limit_at", first=first)))
         if self.not_judged and not self.unsafe and self.lowest_rel_home_m is None:
             return out + self._last_rows()
         out += [
-            Row("clear", _altitudes(self.lowest_rel_home_m, self.highest_rel_home_m)),
-            Row("legal", _altitudes(self.lowest_legal_rel_home_m, None)),
+            ReturnRow("clear", _altitudes(self.lowest_rel_home_m, self.highest_rel_home_m)),
+            ReturnRow("legal", _altitudes(self.lowest_legal_rel_home_m, None)),
             *self._lowest(),
             *self._battery(),
         ]
         out += [
-            Row(
+            ReturnRow(
                 "rally",
                 Note(
                     "rally_point", lat=r.lat_deg, lon=r.lon_deg, rel_home_m=r.rel_home_m, why=r.why,
@@ -335,39 +335,41 @@ class WayHome:
             for number, r in enumerate(self.rally, start=1)
         ]  # fmt: skip
         left = [Note("from_stretch", stretch=s.place_and_why) for s in worst_first(self.left)]
-        return out + [Row("still_no_return", note) for note in left] + self._last_rows(battery=False)
+        return out + [ReturnRow("still_no_return", note) for note in left] + self._last_rows(battery=False)
 
-    def _rows_of_mission(self) -> list[Row]:
-        out: list[Row] = []
+    def _rows_of_mission(self) -> list[ReturnRow]:
+        out: list[ReturnRow] = []
         if self.starts:
             out.append(
-                Row("judged_as", Note("joined_to_path" if self.along_path else "joined_to_landing", items=self.starts))
+                ReturnRow(
+                    "judged_as", Note("joined_to_path" if self.along_path else "joined_to_landing", items=self.starts)
+                )
             )
         if self.advice is not None:
-            out.append(Row("set", self.advice))
-        out += [Row("no_return", Note("from_stretch", stretch=s.place_and_why)) for s in worst_first(self.unsafe)]
+            out.append(ReturnRow("set", self.advice))
+        out += [ReturnRow("no_return", Note("from_stretch", stretch=s.place_and_why)) for s in worst_first(self.unsafe)]
         if self.irregular:
             first = self.irregular[0].place_and_why
-            out.append(Row("irregular", Note("outside_limit_from", length_m=self._irregular_m, first=first)))
+            out.append(ReturnRow("irregular", Note("outside_limit_from", length_m=self._irregular_m, first=first)))
         return out + self._last_rows()
 
     @property
     def _irregular_m(self) -> float:
         return together_m((s.from_m, s.to_m) for s in self.irregular)
 
-    def _last_rows(self, *, battery: bool = True) -> list[Row]:
-        return (self._battery() if battery else []) + [Row("not_judged", note) for note in self.not_judged]
+    def _last_rows(self, *, battery: bool = True) -> list[ReturnRow]:
+        return (self._battery() if battery else []) + [ReturnRow("not_judged", note) for note in self.not_judged]
 
-    def _lowest(self) -> list[Row]:
+    def _lowest(self) -> list[ReturnRow]:
         if self.lowest is None:
             return []
         agl_m, at_m, seq = self.lowest.agl_m, self.lowest.at_m, self.lowest.seq
         if agl_m < 0.0:
-            return [Row("lowest", Note("lowest_below_ground", below_m=-agl_m, at_m=at_m, seq=seq))]
-        return [Row("lowest", Note("lowest_on_return", agl_m=agl_m, at_m=at_m, seq=seq))]
+            return [ReturnRow("lowest", Note("lowest_below_ground", below_m=-agl_m, at_m=at_m, seq=seq))]
+        return [ReturnRow("lowest", Note("lowest_on_return", agl_m=agl_m, at_m=at_m, seq=seq))]
 
-    def _battery(self) -> list[Row]:
-        return [] if self.battery is None else [Row("battery", self.battery.note)]
+    def _battery(self) -> list[ReturnRow]:
+        return [] if self.battery is None else [ReturnRow("battery", self.battery.note)]
 
     def describe(self, wording: Wording = IN_FILES) -> str:
         """All of `rows` and the notes, one per line."""

@@ -29,14 +29,14 @@ from gcsplan.check.flight.follow import follow
 from gcsplan.check.judge import TERRAIN_ERROR_M
 from gcsplan.check.motion.commands import LAND_STARTS
 from gcsplan.check.motion.project import why_unknown, with_error_of_home
-from gcsplan.check.motion.return_rules import ASIDE, RULES, at_home_m
+from gcsplan.check.motion.return_rules import ASIDE_PARTS, RETURN_RULES, at_home_m
 from gcsplan.check.motion.stopping import circle_home_m
 from gcsplan.check.motion.stretch import Flight, Place
 from gcsplan.check.returns.along_mission import return_by_mission
 from gcsplan.check.returns.footprint import Target, places_of_returns
 from gcsplan.check.returns.obstacles import CIRCLE_ABOVE_M, GradedObstacles, alike_in_width, obstacles_of_returns
 from gcsplan.check.returns.rally import Proposal, propose
-from gcsplan.check.returns.refinement import CLEAR, LEGAL, SMALLEST_M, Refinement, sizes_m
+from gcsplan.check.returns.refinement import CLEAR, LEGAL, SMALLEST_PART_M, Refinement, sizes_m
 from gcsplan.check.returns.return_targets import LANDS, joins_of
 from gcsplan.check.returns.stretches import rel_home, stretches_of
 from gcsplan.check.returns.trace import TINY_M, MissionTrace, TraceParts, trace_of
@@ -76,7 +76,7 @@ def way_home(
     rally points if no altitude is clear from every point. ``route``: straight home, or to where the return joins the
     mission (`joins`); None: not said, which counts as straight home. Never raises for a mission that is merely unsafe.
     """
-    mission, rule = verdict.mission, RULES[vehicle.autopilot]
+    mission, rule = verdict.mission, RETURN_RULES[vehicle.autopilot]
     stored = replace(mission, items=tuple(profile_of(mission.autopilot).stored(item) for item in mission.items))
     lat, lon = mission.home.lat_e7 / 1e7, mission.home.lon_e7 / 1e7
     ground, unsure = world.ground_amsl(lat, lon), why_unknown(mission.home, vehicle, world)
@@ -234,7 +234,7 @@ def _profile(trace: MissionTrace, refinement: Refinement) -> tuple[ProfilePoint,
 
 
 def _notes(vehicle: Vehicle, judged_m: float, assumed: bool) -> list[Note]:
-    rule = RULES[vehicle.autopilot]
+    rule = RETURN_RULES[vehicle.autopilot]
     notes = []
     if assumed:
         notes.append(Note("return_altitude_assumed", rel_home_m=judged_m, parameter=rule.parameter))
@@ -277,7 +277,7 @@ def _not_judged(verdict: Verdict, vehicle: Vehicle, judged_m: float, assumed: bo
     home = verdict.mission.home
     return WayHome(
         vehicle=vehicle.name, autopilot=vehicle.autopilot, path_safe=verdict.safe,
-        parameter=RULES[vehicle.autopilot].parameter, rtl_rel_home_m=judged_m, assumed=assumed,
+        parameter=RETURN_RULES[vehicle.autopilot].parameter, rtl_rel_home_m=judged_m, assumed=assumed,
         home=(home.lat_e7 / 1e7, home.lon_e7 / 1e7, home.amsl_m), lowest_rel_home_m=None, highest_rel_home_m=None,
         lowest_legal_rel_home_m=None, unsafe=(), irregular=(), battery=None, advised_rel_home_m=None,
         set_rel_home_m=None, set_leaves_m=None, rally=(), left=(), profile=(), lowest=None, not_judged=why,
@@ -302,7 +302,7 @@ def lowest_agl(
         few = parts.take(lowest)
         middle = TraceParts(few.middle, few.middle, few.stretch)
         known = float(heights_agl(trace, middle, target, vehicle, level_amsl_m).min())
-        open_ = lowest[(agl[lowest] < known - ENOUGH_M) & (few.size > SMALLEST_M)]
+        open_ = lowest[(agl[lowest] < known - ENOUGH_M) & (few.size > SMALLEST_PART_M)]
         if not len(open_):
             break
         new = parts.take(open_).split(PIECES)
@@ -324,7 +324,7 @@ def heights_agl(
     trace: MissionTrace, parts: TraceParts, target: Target, vehicle: Vehicle, level_amsl_m: float
 ) -> Floats:
     """(N,) a lower bound of the height above ground of the returns from all of each part; -inf over unknown ground."""
-    rule, air, n = RULES[vehicle.autopilot], trace.world.airspace, len(parts)
+    rule, air, n = RETURN_RULES[vehicle.autopilot], trace.world.airspace, len(parts)
     limits = replace(vehicle.limits, min_agl_m=0.0, max_agl_m=None, horizontal_clearance_m=0.0, altitude_error_m=0.0)
     places = places_of_returns(trace, parts, target, vehicle)
     start, reach, half, nearest = places.lines_home()
@@ -356,7 +356,7 @@ def heights_agl(
         out[i] = np.minimum(level_amsl_m, places.low[i]) - met.clear_m
         step = end[i] - start[i]
         length = np.hypot(*step.T)
-        for a, b in pairwise(ASIDE):
+        for a, b in pairwise(ASIDE_PARTS):
             met = ground(start[i] + a * step, start[i] + b * step, (extra + (1.0 - a) * aside)[i])
             flown = np.maximum(met.piece_s_m + (a * length - reach[i] - aside[i])[met.piece_line], 0.0)
             reached = np.minimum(level_amsl_m, places.low[i][met.piece_line] + climb * flown)

@@ -19,7 +19,7 @@ LABELS = {
 """What stands before the rows on a way home, by what they are about."""
 
 
-class Row(NamedTuple):
+class ReturnRow(NamedTuple):
     """One row on a way home: what it is about, a key of `LABELS`, and what is said; ``number`` of several."""
 
     about: str

@@ -22,7 +22,7 @@ MISBEHAVIOURS = (
 )
 
 
-class UnitsName(StrEnum):
+class UnitsChoice(StrEnum):
     """What ``--units`` may be."""
 
     METRIC = METRIC.name
@@ -31,7 +31,7 @@ class UnitsName(StrEnum):
 
 
 UnitsOption = Annotated[
-    UnitsName,
+    UnitsChoice,
     typer.Option(
         "--units",
         envvar="GCSPLAN_UNITS",

@@ -16,7 +16,7 @@ from gcsplan.cli.arguments.options import (
     ObjectiveOption,
     PlannerOption,
     SeedOption,
-    UnitsName,
+    UnitsChoice,
     UnitsOption,
     UnjudgedOption,
 )  # fmt: skip
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from gcsplan.app.batch import Record
 
-SHOWN = 20
+MOST_FAILURES = 20
 """Missions without a plan that are printed at most; the table has all of them."""
 
 
@@ -47,7 +47,7 @@ def batch(
     at: AtOption = None,
     report: Annotated[bool, typer.Option("--report", help="Also write a report.html for each mission.")] = False,
     allow_unjudged: UnjudgedOption = False,
-    units: UnitsOption = UnitsName.METRIC,
+    units: UnitsOption = UnitsChoice.METRIC,
     as_json: JsonOption = False,
 ) -> None:
     """Plan many mission files: a table of all results, a page with a map, the outputs of each.
@@ -55,7 +55,7 @@ def batch(
     Nothing is sent. A mission that fails never stops the others, and the exit code is the worst. What is done and
     unchanged is not planned again, so that the same command goes on after an interruption.
     """
-    from gcsplan.app.batch import PIECE_S, BatchOptions, MissionBatch, exit_code, missions_of
+    from gcsplan.app.batch import MISSION_S, BatchOptions, MissionBatch, exit_code, missions_of
     from gcsplan.app.parallel.executor import executor
     from gcsplan.cli.output.console import remark, say
     from gcsplan.cli.output.progress import WorkDisplay
@@ -75,7 +75,7 @@ def batch(
         pages = [] if report else [page for k in todo if isfile(page := out / work.missions[k][0] / "report.html")]
         try:
             if todo:
-                with executor(jobs, cluster, pieces=len(todo), piece_s=PIECE_S) as workers:
+                with executor(jobs, cluster, pieces=len(todo), piece_s=MISSION_S) as workers:
                     display.workers(workers)
                     work.run(workers, todo, told)
         finally:
@@ -89,12 +89,12 @@ def batch(
         emit({"missions": len(work.missions), "rows": [dict(row) for r in done for row in r.rows]})
     else:
         bad = [r for r in done if r.code != 0]
-        for record in bad[:SHOWN]:
+        for record in bad[:MOST_FAILURES]:
             row = next(row for row in record.rows if row["code"] != 0)
             name = f"{record.mission} {row['vehicle']}".rstrip()
             say(f"{name}: {row['verdict']}: {str(row['message']).splitlines()[0]}")
-        if len(bad) > SHOWN:
-            say(f"… and {len(bad) - SHOWN} more; the table has all of them")
+        if len(bad) > MOST_FAILURES:
+            say(f"… and {len(bad) - MOST_FAILURES} more; the table has all of them")
         count = sum(row["code"] == 0 for r in done for row in r.rows)
         took = f"{count} vehicles, in {display.elapsed_s:.1f} s"
         say(f"{len(done) - len(bad)} of {len(done)} missions planned, {took}")
@@ -102,9 +102,9 @@ def batch(
     raise typer.Exit(exit_code(done))
 
 
-def _tables(out: Path, done: Sequence[Record], units: UnitsName, page: str) -> list[str]:
+def _tables(out: Path, done: Sequence[Record], units: UnitsChoice, page: str) -> list[str]:
     """Write the table and the page of all results; returns their names."""
-    from gcsplan.app.batch import COLUMNS
+    from gcsplan.app.batch import BATCH_COLUMNS
     from gcsplan.cli.output.console import remark
     from gcsplan.export.outdir import write_whole
     from gcsplan.export.table import csv_text, parquet_bytes
@@ -115,11 +115,11 @@ def _tables(out: Path, done: Sequence[Record], units: UnitsName, page: str) -> l
     tracks = [track for r in done for track in (*r.tracks, *[[]] * (len(r.rows) - len(r.tracks)))]
     drawn = {k: track for k, track in enumerate(tracks) if len(track) > 1}
     files: dict[str, str | bytes] = {
-        "results.csv": csv_text(COLUMNS, rows),
+        "results.csv": csv_text(BATCH_COLUMNS, rows),
         "index.html": render_index(out.resolve().name, rows, drawn, units_of(units), page),
     }
     try:
-        files["results.parquet"] = parquet_bytes(COLUMNS, rows)
+        files["results.parquet"] = parquet_bytes(BATCH_COLUMNS, rows)
     except InputError as why:
         remark(f"note: results.parquet is not written: {why}")
     for name, content in files.items():

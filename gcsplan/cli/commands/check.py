@@ -18,7 +18,7 @@ from gcsplan.cli.arguments.options import (
     ListZonesOption,
     NodataOption,
     RequireWayHomeOption,
-    UnitsName,
+    UnitsChoice,
     UnitsOption,
     UnjudgedOption,
     WayHomeOption,
@@ -43,7 +43,7 @@ Number = float | None
 READ_BY = {"vertical_datum": "--vertical-datum", "height_unit": "--height-unit", "nodata": "--nodata"}
 """Keys of a mission's terrain, and the options that count before them."""
 
-TABLES = 20
+MOST_TABLES = 20
 """Most files of which tables are printed; of more, findings and a summary."""
 
 
@@ -113,7 +113,7 @@ def check(
     at: AtOption = None,
     way_home: WayHomeOption = False,
     require_way_home: RequireWayHomeOption = False,
-    units: UnitsOption = UnitsName.METRIC,
+    units: UnitsOption = UnitsChoice.METRIC,
     allow_unjudged: UnjudgedOption = False,
     quiet: Annotated[
         bool, typer.Option("-q", "--quiet", help="Only findings, one a line: file:item: message. Nothing if all pass.")
@@ -177,13 +177,13 @@ def check(
     archive = _archive(mission, arguments, given, asked, shown, at)
     printer = Document() if as_json else Rows() if json_lines else Lines(shown.units, summed=not quiet)
     reading = steady(check_sites.split_name(file)[1] for file in arguments)
-    if report is None and (rows or quiet or len(arguments) > TABLES):
+    if report is None and (rows or quiet or len(arguments) > MOST_TABLES):
         raise typer.Exit(tell_archive(archive, printer, jobs, cluster, reading))
     with reading:
         batch = checking.check_at(archive.site, archive.name, arguments, check_sites.Wanted(archive.asked.returns))
     if report is not None:
         _report(batch, report, units_of(units))
-    if rows or quiet or len(arguments) > TABLES:
+    if rows or quiet or len(arguments) > MOST_TABLES:
         told = told_of_batch(batch, form, allow_unjudged=allow_unjudged, units=units_of(units))
         header = (batch.name, batch.inputs, batch.notes, batch.typed)
         raise typer.Exit(tell(header, told, printer, len(arguments)))

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from gcsplan.vehicle import Autopilot
 
 T = TypeVar("T")
-TRIES = 5
+MOST_ASKED = 5
 """How often a question is asked before the command gives up."""
 
 
@@ -188,7 +188,7 @@ def _ground(answer: str) -> tuple[list[str] | None, float | None]:
 
 def _ask(question: str, read: Callable[[str], T], default: str | None = None) -> T:
     """Ask on the terminal until the answer can be read, a few times."""
-    for _ in range(TRIES):
+    for _ in range(MOST_ASKED):
         answer = typer.prompt(question, default=default, show_default=bool(default), err=True)
         try:
             return read(str(answer))

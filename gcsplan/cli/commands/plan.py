@@ -32,7 +32,7 @@ from gcsplan.cli.arguments.options import (
     RequireWayHomeOption,
     SeedOption,
     TimeoutOption,
-    UnitsName,
+    UnitsChoice,
     UnitsOption,
     UnjudgedOption,
     WayHomeOption,
@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from gcsplan.notes.note import Note
     from gcsplan.units import Units
 
-SHOWN = 15
+MOST_NAMED = 15
 """Names of written files that are printed at most; a fleet has hundreds of files."""
 
 
@@ -129,7 +129,7 @@ def plan(
             help="Also draw map and profiles to this picture; into a directory: each figure as a picture of its own.",
         ),
     ] = None,
-    units: UnitsOption = UnitsName.METRIC,
+    units: UnitsOption = UnitsChoice.METRIC,
     allow_unjudged: UnjudgedOption = False,
     allow_armed: ArmedOption = False,
     ignore_position: PlaceOption = False,
@@ -317,7 +317,12 @@ def _write(directory: Path, files: Mapping[str, str], pictures: dict[Path, bytes
     for file, content in pictures.items():
         write_whole(file, content)
     if gone:
-        shown = ", ".join([*gone[:SHOWN], *([f"{len(gone) - SHOWN} more"] if len(gone) > SHOWN else [])])
+        shown = ", ".join(
+            [
+                *gone[:MOST_NAMED],
+                *([f"{len(gone) - MOST_NAMED} more"] if len(gone) > MOST_NAMED else []),
+            ]
+        )
         cure = "; --report writes one of this plan" if "report.html" in gone else ""
         remark(f"note: gone from {directory}, because this plan has no such output: {shown}{cure}")
     if in_the_way:
@@ -342,7 +347,7 @@ def _say_written(directory: Path, files: list[str], notes: Sequence[tuple[str, N
     from gcsplan.notes.note import Wording
 
     say_notes_of(notes, Wording(units))
-    shown = [*files[:SHOWN], f"… and {len(files) - SHOWN} more"] if len(files) > SHOWN + 1 else files
+    shown = [*files[:MOST_NAMED], f"… and {len(files) - MOST_NAMED} more"] if len(files) > MOST_NAMED + 1 else files
     say(f"written to {directory}{os.sep}: {', '.join(shown)}")
 
 

@@ -15,7 +15,7 @@ from gcsplan.cli.arguments.options import (
     MissionArgument,
     PlannerOption,
     RequireWayHomeOption,
-    UnitsName,
+    UnitsChoice,
     UnitsOption,
     UnjudgedOption,
     WayHomeOption,
@@ -85,7 +85,7 @@ def rehearse(
     at: AtOption = None,
     way_home: WayHomeOption = False,
     require_way_home: RequireWayHomeOption = False,
-    units: UnitsOption = UnitsName.METRIC,
+    units: UnitsOption = UnitsChoice.METRIC,
     allow_unjudged: UnjudgedOption = False,
     report: Annotated[
         Path | None,

@@ -74,7 +74,7 @@ for screen in (console, aside):
 
 
 WIDEST = 100_000
-MOST_WHOLE = 30
+MOST_WITH_ALL_COLUMNS = 30
 """Most vehicles whose table has all columns, and whose transfers have a bar each."""
 MOST_NOTES, MOST_NAMES = 120, 110
 """Most notes on vehicles that are printed, and most names in one line."""
@@ -146,7 +146,7 @@ def plan_table(plan: Plan, homes: Mapping[str, WayHome], units: Units = METRIC) 
     for rare in ("energy, mAh", f"over or under a zone, {units.distance.symbol}"):  # mostly there is none
         if all(row[rare] == "–" for row in rows):
             rows = [{name: words for name, words in row.items() if name != rare} for row in rows]
-    if len(rows) > MOST_WHOLE:
+    if len(rows) > MOST_WITH_ALL_COLUMNS:
         brief = _brief(units)
         rows = [{name: row[name] for name in brief} for row in rows]
     title = f"[bold]{escape(plan.source.name)}[/]  planner {plan.planner}, objective {plan.objective}"
@@ -334,7 +334,7 @@ def names_of(names: Sequence[str]) -> str:
 def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, Transfer], None]]:
     """Show a live table of transfers, on a terminal only; yields a function to call with (name, progress).
 
-    Of more than `MOST_WHOLE` vehicles it shows how many have ended.
+    Of more than `MOST_WITH_ALL_COLUMNS` vehicles it shows how many have ended.
     """
     if not aside.is_terminal:
         yield lambda name, transfer: None
@@ -347,7 +347,7 @@ def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, Transfer]
         TimeElapsedColumn(),
     )  # fmt: skip
     with Bars(*columns, console=aside, transient=True) as bars:
-        if len(names) > MOST_WHOLE:
+        if len(names) > MOST_WITH_ALL_COLUMNS:
             whole, over = bars.add_task(f"{len(names)} vehicles", total=len(names), phase=""), dict[str, bool]()
 
             def count(name: str, transfer: Transfer) -> None:

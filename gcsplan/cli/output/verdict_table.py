@@ -123,7 +123,7 @@ def energy_words(joules: float, volts: float | None = None) -> str:
 MOST_ROWS = 8
 """Rows with one label that are printed; the report and JSON have all of them."""
 
-WORDS = {True: "[green]safe[/]", False: "[bold red]no safe return[/]", None: "[yellow]not judged[/]"}
+RETURN_WORDS = {True: "[green]safe[/]", False: "[bold red]no safe return[/]", None: "[yellow]not judged[/]"}
 
 
 def say_homes(homes: Mapping[str, WayHome], units: Units) -> None:
@@ -135,7 +135,7 @@ def say_homes(homes: Mapping[str, WayHome], units: Units) -> None:
         {
             "vehicle": escape(name),
             f"return at, {unit.symbol}": _return_at(home, unit),
-            "way home": WORDS[home.safe],
+            "way home": RETURN_WORDS[home.safe],
             "unsafe from": Reach(home.no_return_m).text(units) if home.safe is False else "–",
             f"to set, {unit.symbol}": _to_set(home, unit),
             "then unsafe from": "–" if not home.set_leaves_m else Reach(home.set_leaves_m).text(units),

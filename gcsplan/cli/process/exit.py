@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any, ClassVar, NoReturn
 
-from gcsplan.cli.process.signals import Watch
+from gcsplan.cli.process.signals import SignalWatch
 from gcsplan.errors import GcsplanError, InputError, UsageError
 from gcsplan.export.summary import SCHEMA, write_summary
 
@@ -51,7 +51,7 @@ AGAIN_S = 0.01
 
 _received: list[int] = []
 _last: list[int] = []
-_watch: list[Watch] = []
+_watch: list[SignalWatch] = []
 _as_json: list[bool] = []
 
 closers: list[Callable[[GcsplanError], None]] = []
@@ -67,7 +67,7 @@ def end_in_good_order(*, as_json: bool = False) -> None:
     if threading.current_thread() is not threading.main_thread():  # Python sets handlers in the main thread only
         return
     if not _watch:  # one for a process, which may run several commands
-        _watch.append(Watch(_end_at_once))
+        _watch.append(SignalWatch(_end_at_once))
         _raise_again()
     _as_json[:] = [as_json]
     owner, watch = os.getpid(), _watch[0]

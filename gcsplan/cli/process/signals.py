@@ -25,7 +25,7 @@ LATE_S = 0.2
 """A look that comes this late was kept from looking, as Python was from handling signals."""
 
 
-class Watch:
+class SignalWatch:
     """Hears signals beside Python's handlers, which call `heard`. ``end(number)`` must end the process."""
 
     def __init__(self, end: Callable[[int], None]) -> None:

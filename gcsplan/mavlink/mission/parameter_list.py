@@ -32,7 +32,7 @@ from gcsplan.mavlink.mission.mission import FRAME_SYNONYMS, TERRAIN, Mission
 from gcsplan.mavlink.mission.parameter_names import PARAMETERS, Name, OnBoard, Parameter, unanswered
 from gcsplan.mavlink.mission.return_parameters import AUTO_RTL
 from gcsplan.notes.note import Note
-from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, Autopilot, Vehicle
+from gcsplan.vehicle import COPTER_CORNER_ACCEL, COPTER_PEAK_ACCEL, GRAVITY_M_S2, Autopilot, Vehicle
 from gcsplan.world.geodesy.atmosphere import true_per_indicated
 
 __all__ = [
@@ -53,7 +53,6 @@ Matters = Literal["time", "pace", "turns", "return", "flight", "told"]
 SAME = 0.01
 """Part by which a value may differ and still count as the same."""
 
-GRAVITY_M_S2 = 9.80665
 CIRCLE_M = 60.0
 """WP_LOITER_RAD, default: what circles without a radius of their own, and the circle over home, are judged with."""
 

@@ -61,11 +61,11 @@ def yaw(degrees: float) -> float:
     return float32(radians * _DEGREES_PER_RADIAN)
 
 
-_Rule = tuple[NumberKept, NumberKept, NumberKept, NumberKept]
-_NOTHING_KEPT: _Rule = (_lost, _lost, _lost, _lost)
-_YAW: _Rule = (_lost, _lost, _lost, yaw)
+_NumberRules = tuple[NumberKept, NumberKept, NumberKept, NumberKept]
+_NOTHING_KEPT: _NumberRules = (_lost, _lost, _lost, _lost)
+_YAW: _NumberRules = (_lost, _lost, _lost, yaw)
 
-LOCATED: dict[int, _Rule] = {
+LOCATED: dict[int, _NumberRules] = {
     cmd.WAYPOINT: (_f32, _f32, _lost, yaw),  # hold, acceptance radius
     cmd.LOITER_UNLIM: (_lost, _lost, _f32, yaw),  # radius
     cmd.LOITER_TIME: (_f32, _flag, _f32, _flag),

@@ -21,7 +21,7 @@ MOST_SAMPLES = 12_000
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class TrackLine:
     """One flown line as (N,) samples, metres; the ends of every leg are among them.
 
     ``run_m`` is the horizontal distance so far. ``ground_m`` and ``top_m`` (with obstacles) are NaN where unknown.
@@ -51,7 +51,7 @@ class Line:
 
 def line_of(
     verdict: Verdict, world: World, limits: Limits, *, samples: int = 1200, slot: Slot | None = None
-) -> Line | None:
+) -> TrackLine | None:
     """The samples of a verdict's legs; None if it has none (nothing could be followed).
 
     ``slot``: the vehicle's part of the time table, see `Verdict.clock_s`.
@@ -86,7 +86,7 @@ def line_of(
             )
         )  # fmt: skip
     run, east, north, amsl, time_s, used, index, end = (np.concatenate(c) for c in zip(*columns, strict=True))
-    return Line(
+    return TrackLine(
         run, east, north, amsl, surface.ground_at(east, north), surface.top_at(east, north),
         world.airspace.floor_amsl(east, north, limits), world.airspace.ceiling_amsl(east, north, limits),
         time_s, used, index.astype(np.intp), end.astype(np.bool_),
@@ -132,7 +132,7 @@ class Passage:
     under_m: float | None
 
 
-def passages(line: Line, zones: tuple[Zone, ...], reach_m: float) -> list[Passage]:
+def passages(line: TrackLine, zones: tuple[Zone, ...], reach_m: float) -> list[Passage]:
     """The passages of ``line`` within ``reach_m`` of each zone's shape, in the order flown."""
     found = []
     box = (line.east_m.min(), line.north_m.min(), line.east_m.max(), line.north_m.max())

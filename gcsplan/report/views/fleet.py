@@ -20,7 +20,7 @@ from gcsplan.units import Units, duration
 INSTANTS = 600
 MOST_PAIRS = 6
 """Most pairs that are drawn one by one; with more, only the nearest two at each time are drawn."""
-TALL = 0.34
+FLEET_TALL = 0.34
 
 
 def motions_of(page: Page) -> list[tuple[int, TimedPath]]:
@@ -150,7 +150,7 @@ def _distance_chart(
         marks.append(axes.mark(m.arrive_s, y, f"goal t{i % COLOURS}", m.name, tip, 1))
     charts["distance"] = _numbers(times, [(m.name, "far", 3, w) for (_, m), w in zip(motions, ways, strict=True)])
     words = f"Way flown over time by {len(motions)} vehicles, from {duration(times[0])} to {duration(times[-1])}"
-    return chart_html("distance", axes, shapes, marks, words, TALL)
+    return chart_html("distance", axes, shapes, marks, words, FLEET_TALL)
 
 
 def _separation_chart(
@@ -184,7 +184,7 @@ def _separation_chart(
         + ('<li><i class="swatch below"></i>nearer than needed</li>' if needed_m else "")
         + "</ul>"
     )
-    return chart_html("separation", axes, shapes, marks, words, TALL) + key
+    return chart_html("separation", axes, shapes, marks, words, FLEET_TALL) + key
 
 
 def _nearest_mark(page: Page, axes: Axes, times: Floats, nearest: Floats) -> Mark | None:

@@ -12,13 +12,13 @@ from gcsplan.figures import counted
 from gcsplan.notes.note import Wording
 from gcsplan.report.parts.html import at_least, between, energy, esc, num, place, stated, table, tools
 from gcsplan.report.parts.page_data import Page, Subject, only_some
-from gcsplan.report.parts.track_samples import Line
+from gcsplan.report.parts.track_samples import TrackLine
 from gcsplan.report.views.chart import chart_html
 from gcsplan.report.views.plan import COLOURS
 from gcsplan.report.views.profile import along_axes
 from gcsplan.units import METRIC
 
-TALL = 0.3
+HOME_TALL = 0.3
 
 
 MOST_LINES = 4
@@ -47,7 +47,7 @@ def _home_line(subject: Subject, several: bool, wording: Wording) -> str:
     return f'<p class="bare{bad}"><b>{who}{esc(home.headline.text(wording))}</b>{cure}; {see}</p>'
 
 
-def home_html(page: Page, lines: Sequence[Line | None], charts: dict[str, object], full: frozenset[int]) -> str:
+def home_html(page: Page, lines: Sequence[TrackLine | None], charts: dict[str, object], full: frozenset[int]) -> str:
     """The section; empty if no way home was judged. The charts' numbers are added to ``charts``."""
     parts: list[str] = []
     for i in sorted(full):
@@ -61,7 +61,7 @@ def home_html(page: Page, lines: Sequence[Line | None], charts: dict[str, object
 
 
 def _one(
-    subject: Subject, home: WayHome, line: Line | None, index: int, charts: dict[str, object], wording: Wording, *,
+    subject: Subject, home: WayHome, line: TrackLine | None, index: int, charts: dict[str, object], wording: Wording, *,
     open_: bool,
 ) -> str:  # fmt: skip
     chart = ""
@@ -90,7 +90,7 @@ def _facts(home: WayHome, wording: Wording) -> str:
 
 
 def _chart(
-    name: str, subject: Subject, home: WayHome, line: Line, index: int, charts: dict[str, object], wording: Wording
+    name: str, subject: Subject, home: WayHome, line: TrackLine, index: int, charts: dict[str, object], wording: Wording
 ) -> str:
     units = wording.units or METRIC
     x = np.array([(p.from_m, p.to_m) for p in home.profile]).ravel()
@@ -120,7 +120,7 @@ def _chart(
     marks = [axes.mark(0.08 * long, level, "tag", f"return at {stated(home.rtl_rel_home_m, units.height)}", tip, 1)]
     charts[name] = _numbers(x, clear, legal, np.interp(x, run, line.amsl_m), level, line.length_m > 2000.0)
     words = f"Return altitude needed along the way of {subject.name}, beside {num(level, 0, units.amsl)} that is set"
-    return chart_html(name, axes, shapes, marks, words, TALL)
+    return chart_html(name, axes, shapes, marks, words, HOME_TALL)
 
 
 def _legend(home: WayHome) -> str:

@@ -29,15 +29,15 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-u
 from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Verdict
 from gcsplan.report.parts.page_data import Page
-from gcsplan.report.parts.track_samples import Line, line_of
+from gcsplan.report.parts.track_samples import TrackLine, line_of
 from gcsplan.report.views.fleet import apart_m, flown_m, instants, motions_of
 from gcsplan.report.views.scene_data import exaggeration, zone_meshes
 from gcsplan.report.views.shaded_terrain import TINTS, extent_of, relief_of, shaded
 from gcsplan.world.geometry.zones import Circle, Zone
 from gcsplan.world.world import World
 
-TRACK_COLOURS = ("#d62728", "#1f77b4", "#9467bd", "#e377c2", "#17becf", "#bcbd22")
-ZONE_COLOUR = "#ff7f0e"
+PICTURE_COLOURS = ("#d62728", "#1f77b4", "#9467bd", "#e377c2", "#17becf", "#bcbd22")
+PICTURE_ZONE_COLOUR = "#ff7f0e"
 PIXELS = 900
 LABEL_PT, LINE_PT, LETTER_PT = 6.5, 9.0, 4.2
 """Size of a zone's label, height of its line, and mean width of a letter, points."""
@@ -145,7 +145,7 @@ def _fleet_alone(page: Page) -> Figure:
 
 
 def _colours(n: int) -> list[str]:
-    return [TRACK_COLOURS[i % len(TRACK_COLOURS)] for i in range(n)]
+    return [PICTURE_COLOURS[i % len(PICTURE_COLOURS)] for i in range(n)]
 
 
 def track_en(world: World, verdict: Verdict) -> Floats:
@@ -187,7 +187,7 @@ def _map(ax: Axes, page: Page, extent: tuple[float, float, float, float]) -> Non
     ax.set(xlim=(west, east), ylim=(south, north), xlabel="east, m", ylabel="north, m")
     ax.set_aspect("equal")
     handles, _ = ax.get_legend_handles_labels()
-    ax.legend(handles=[*handles, Patch(fc=ZONE_COLOUR, alpha=0.4, label="no-fly")], loc="upper right")
+    ax.legend(handles=[*handles, Patch(fc=PICTURE_ZONE_COLOUR, alpha=0.4, label="no-fly")], loc="upper right")
     ax.set_title(f"{page.title}: planner {dict(page.facts).get('planner', 'none')}", loc="left")
 
 
@@ -197,7 +197,7 @@ def _zone_patch(zone: Zone) -> CirclePatch | PolygonPatch:
         patch = CirclePatch((zone.shape.east_m, zone.shape.north_m), zone.shape.radius_m)
     else:
         patch = PolygonPatch(zone.shape.vertices)
-    patch.set(facecolor=ZONE_COLOUR, edgecolor="#a04000", alpha=0.4, linewidth=1.2)
+    patch.set(facecolor=PICTURE_ZONE_COLOUR, edgecolor="#a04000", alpha=0.4, linewidth=1.2)
     return patch
 
 
@@ -252,12 +252,12 @@ def _profile(ax: Axes, world: World, verdict: Verdict, min_agl_m: float, colour:
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, fontsize=8, frameon=False)
 
 
-NODES = 140
+SPACE_NODES = 140
 TURN_DEG, TILT_DEG = -118.0, 38.0
 SOLID_COLOUR = "#e0511a"
 
 
-def draw_space(title: str, world: World, tracks: Sequence[tuple[str, str, Line]]) -> Figure | None:
+def draw_space(title: str, world: World, tracks: Sequence[tuple[str, str, TrackLine]]) -> Figure | None:
     """The figure of ``tracks`` (name, colour and line of each vehicle); None if no ground is known."""
     lines = [line for _, _, line in tracks]
     relief = relief_of(world, extent_of(lines, world.airspace.zones, world.airspace.surface))
@@ -265,8 +265,8 @@ def draw_space(title: str, world: World, tracks: Sequence[tuple[str, str, Line]]
         return None
     extent, high = relief.extent, exaggeration(relief, lines)
     longer = max(extent.width_m, extent.height_m)
-    east = np.linspace(extent.west_m, extent.east_m, max(2, round(NODES * extent.width_m / longer)))
-    north = np.linspace(extent.north_m, extent.south_m, max(2, round(NODES * extent.height_m / longer)))
+    east = np.linspace(extent.west_m, extent.east_m, max(2, round(SPACE_NODES * extent.width_m / longer)))
+    north = np.linspace(extent.north_m, extent.south_m, max(2, round(SPACE_NODES * extent.height_m / longer)))
     ground = world.airspace.surface.ground_at(east, north[:, None])
     figure = Figure(figsize=(11, 6.5), layout="constrained")
     FigureCanvasAgg(figure)

@@ -11,21 +11,21 @@ from gcsplan.arrays import Floats
 from gcsplan.report.parts.html import at_least, esc, least, num, place, stated
 from gcsplan.report.parts.map_labels import Mark, marks_html
 from gcsplan.report.parts.page_data import Page, Subject
-from gcsplan.report.parts.track_samples import Line, distance_m
-from gcsplan.report.views.shaded_terrain import TINTS, Extent, Relief, nice_step, tints
+from gcsplan.report.parts.track_samples import TrackLine, distance_m
+from gcsplan.report.views.shaded_terrain import TINTS, MapExtent, Relief, nice_step, tints
 from gcsplan.units import Unit, Units, duration
 from gcsplan.world.geometry.zones import Circle, Level, Zone
 from gcsplan.world.world import World
 
-LARGE = 0.12
+NAME_INSIDE = 0.12
 """Part of the map's height above which a zone's name is inside it; the names of smaller ones are beside them."""
-MOST_NAMES = 100
+MOST_IN_LEGEND = 100
 """Most vehicles that the legend names."""
 COLOURS = 8
 """Number of the style sheet's classes t0 …; more vehicles reuse them from the first."""
 
 
-def map_marks(page: Page, lines: Sequence[Line | None], relief: Relief, full: Container[int]) -> list[Mark]:
+def map_marks(page: Page, lines: Sequence[TrackLine | None], relief: Relief, full: Container[int]) -> list[Mark]:
     """The marks of the map: zones' names, and of the vehicles in ``full`` way points, starts, goals, tight places."""
     marks = [m for zone in page.world.airspace.zones for m in _zone_mark(zone, relief.extent, page.units)]
     for i, (subject, line) in enumerate(zip(page.subjects, lines, strict=True)):
@@ -35,7 +35,7 @@ def map_marks(page: Page, lines: Sequence[Line | None], relief: Relief, full: Co
 
 
 def map_html(
-    page: Page, lines: Sequence[Line | None], relief: Relief, marks: Sequence[Mark], flown: Sequence[Floats] = ()
+    page: Page, lines: Sequence[TrackLine | None], relief: Relief, marks: Sequence[Mark], flown: Sequence[Floats] = ()
 ) -> str:
     """The map as a figure with its legend. ``marks``: see `map_marks`.
 
@@ -78,7 +78,7 @@ def legend(page: Page, relief: Relief) -> str:
     tracks = "".join(
         f'<li><i class="swatch t{i % COLOURS}"></i>{esc(s.name)}</li>' for i, s in enumerate(page.subjects)
     )
-    if len(page.subjects) > MOST_NAMES:
+    if len(page.subjects) > MOST_IN_LEGEND:
         tracks = f"<li>{len(page.subjects)} vehicles in {COLOURS} colours</li>"
     stops = ",".join(f"rgb({r},{g},{b}) {100 * at:g}%" for at, (r, g, b) in TINTS)
     ground = ""
@@ -117,7 +117,7 @@ def zone_heights(zone: Zone, units: Units) -> str:
     return f"{low} – {'unlimited' if zone.ceiling is None else words(zone.ceiling)}"
 
 
-def _zone_svg(zone: Zone, index: int, extent: Extent, units: Units) -> str:
+def _zone_svg(zone: Zone, index: int, extent: MapExtent, units: Units) -> str:
     title = f"<title>no-fly zone {esc(zone.name)}: {esc(zone_heights(zone, units))}{_size(zone, units)}</title>"
     part = " part" if zone.floor is not None or zone.ceiling is not None else ""
     if isinstance(zone.shape, Circle):
@@ -134,9 +134,9 @@ def _size(zone: Zone, units: Units) -> str:
     return f", radius {stated(zone.shape.radius_m, units.distance)}" if isinstance(zone.shape, Circle) else ""
 
 
-def _zone_mark(zone: Zone, extent: Extent, units: Units) -> list[Mark]:
+def _zone_mark(zone: Zone, extent: MapExtent, units: Units) -> list[Mark]:
     west, south, east, north = zone.bounds
-    large = (north - south) / extent.height_m > LARGE
+    large = (north - south) / extent.height_m > NAME_INSIDE
     x, y = _part(extent, 0.5 * (west + east), 0.5 * (south + north) if large else north)
     if not (0 < x < 1 and 0 < y < 1):
         return []
@@ -145,7 +145,7 @@ def _zone_mark(zone: Zone, extent: Extent, units: Units) -> list[Mark]:
     return [Mark(x, y, "name" if large else "name beside", label, f"no-fly zone {zone.name}: {heights}", 3)]
 
 
-def _track_svg(line: Line, index: int, extent: Extent) -> str:
+def _track_svg(line: TrackLine, index: int, extent: MapExtent) -> str:
     xy = extent.units(line.east_m, line.north_m)
     keep = line.end.copy()
     keep[0] = True
@@ -156,13 +156,13 @@ def _track_svg(line: Line, index: int, extent: Extent) -> str:
     )
 
 
-def _flown_svg(line: Floats, extent: Extent) -> str:
+def _flown_svg(line: Floats, extent: MapExtent) -> str:
     points = " ".join(f"{x:.1f},{y:.1f}" for x, y in extent.units(line[:, 0], line[:, 1]))
     return f'<polyline class="flown" points="{points}"/>'
 
 
 def _track_marks(
-    subject: Subject, line: Line, index: int, extent: Extent, world: World, units: Units
+    subject: Subject, line: TrackLine, index: int, extent: MapExtent, world: World, units: Units
 ) -> list[Mark]:  # fmt: skip
     legs, colour = subject.verdict.legs, f"t{index % COLOURS}"
     ends = np.flatnonzero(line.end)
@@ -186,7 +186,7 @@ def _track_marks(
     return marks + [Mark(*_part(extent, e, n), kind, many + label, tip, 0) for e, n, kind, label, tip in places]
 
 
-def _no_return_svg(subject: Subject, line: Line, extent: Extent, units: Units) -> str:
+def _no_return_svg(subject: Subject, line: TrackLine, extent: MapExtent, units: Units) -> str:
     """Lines along the parts of the track from which the way home is not safe."""
     home, paths = subject.home, []
     for s in home.unsafe if home is not None else ():
@@ -213,7 +213,9 @@ def _home_places(subject: Subject, world: World, units: Units) -> list[tuple[flo
     return found
 
 
-def tight_places(subject: Subject, line: Line, world: World, units: Units) -> list[tuple[float, float, str, str, str]]:
+def tight_places(
+    subject: Subject, line: TrackLine, world: World, units: Units
+) -> list[tuple[float, float, str, str, str]]:
     """East, north, class, label and words of the lowest point, the nearest zone, and every finding with a place."""
     found = []
     verdict = subject.verdict
@@ -246,7 +248,7 @@ def tight_places(subject: Subject, line: Line, world: World, units: Units) -> li
     return [t for t in found if math.isfinite(t[0]) and math.isfinite(t[1])]
 
 
-def _part(extent: Extent, east_m: float, north_m: float) -> tuple[float, float]:
+def _part(extent: MapExtent, east_m: float, north_m: float) -> tuple[float, float]:
     return (float(east_m) - extent.west_m) / extent.width_m, (extent.north_m - float(north_m)) / extent.height_m
 
 

@@ -10,17 +10,17 @@ from gcsplan.arrays import Floats
 from gcsplan.report.parts.html import greatest, least, num, place, stated
 from gcsplan.report.parts.map_labels import Mark
 from gcsplan.report.parts.page_data import Subject
-from gcsplan.report.parts.track_samples import Line, Passage, level_amsl
+from gcsplan.report.parts.track_samples import Passage, TrackLine, level_amsl
 from gcsplan.report.views.chart import Axes, chart_html
 from gcsplan.report.views.plan import COLOURS, zone_heights
 from gcsplan.units import Units
 from gcsplan.world.world import World
 
-TALL = 0.38
+PROFILE_TALL = 0.38
 
 
 def profile_html(
-    subject: Subject, line: Line, found: list[Passage], index: int, world: World, units: Units
+    subject: Subject, line: TrackLine, found: list[Passage], index: int, world: World, units: Units
 ) -> str:  # fmt: skip
     """The chart of one vehicle; ``found`` are the zones that its line passes over, under or through."""
     run = line.run_m
@@ -52,10 +52,10 @@ def profile_html(
         f"{greatest(float(line.amsl_m.max()), 0, units.amsl)}, min AGL {stated(limits.min_agl_m, units.height)}"
     )
     marks = _marks(subject, line, found, axes, index, units) + _broken(subject, line, axes, world, units)
-    return chart_html(f"profile-{index}", axes, shapes, marks, words, TALL)
+    return chart_html(f"profile-{index}", axes, shapes, marks, words, PROFILE_TALL)
 
 
-def profile_legend(subject: Subject, line: Line, found: list[Passage], world: World, units: Units) -> str:
+def profile_legend(subject: Subject, line: TrackLine, found: list[Passage], world: World, units: Units) -> str:
     """The legend of a profile's colours."""
     limits = subject.vehicle.limits
     trees = not np.array_equal(line.top_m, line.ground_m, equal_nan=True)
@@ -79,7 +79,7 @@ def _standing(world: World) -> str:
     return "the ground's greatest height" if bare else "trees and buildings on the ground's greatest height"
 
 
-def _axes(line: Line, found: list[Passage], units: Units) -> Axes:
+def _axes(line: TrackLine, found: list[Passage], units: Units) -> Axes:
     low, high = _least(line.ground_m, line.amsl_m), _most(line.amsl_m, line.ground_m)
     for p in found:  # include a level near the path, but not one far above, which would flatten everything else
         ground = line.ground_m[p.first : p.last + 1]
@@ -95,7 +95,7 @@ def _axes(line: Line, found: list[Passage], units: Units) -> Axes:
     return along_axes(line, low - room, high + 1.6 * room, units)
 
 
-def along_axes(line: Line, low_m: float, high_m: float, units: Units) -> Axes:
+def along_axes(line: TrackLine, low_m: float, high_m: float, units: Units) -> Axes:
     """Altitudes over the way along a line."""
     long_m = max(line.length_m, 1e-3)
     unit = units.along(line.length_m)
@@ -120,7 +120,7 @@ def _wide(run: Floats, axes: Axes) -> Floats:
 
 
 def _marks(
-    subject: Subject, line: Line, found: list[Passage], axes: Axes, index: int, units: Units
+    subject: Subject, line: TrackLine, found: list[Passage], axes: Axes, index: int, units: Units
 ) -> list[Mark]:  # fmt: skip
     legs, colour, height = subject.verdict.legs, f"t{index % COLOURS}", units.height
     marks = []
@@ -149,7 +149,7 @@ def _marks(
     return marks
 
 
-def _broken(subject: Subject, line: Line, axes: Axes, world: World, units: Units) -> list[Mark]:
+def _broken(subject: Subject, line: TrackLine, axes: Axes, world: World, units: Units) -> list[Mark]:
     """Marks of the findings, each at the nearest sample of its item."""
     marks, seq = [], np.array([leg.seq for leg in subject.verdict.legs])
     for f in subject.verdict.findings:

@@ -10,7 +10,7 @@ from gcsplan.report.parts.page_data import Compared, Page
 from gcsplan.report.views.plan import COLOURS
 from gcsplan.units import Unit, Units, duration, in_units
 
-WORDS = {
+REHEARSAL_WORDS = {
     False: ("unsafe", "✕", "NOT AS PLANNED", "The rehearsal broke a limit, or lost what the fleet must keep."),
     None: ("unjudged", "?", "NOT ALL FLOWN", "No limit was broken, but parts of the missions were not flown."),
 }
@@ -20,7 +20,7 @@ def headline(page: Page, verdict: tuple[str, str, str, str]) -> tuple[str, str, 
     """The page's ``verdict`` (class, sign, word, sentence), or the rehearsal's if that is worse."""
     if page.rehearsed is None or page.rehearsed.safe is True or verdict[0] == "unsafe":
         return verdict
-    return WORDS[page.rehearsed.safe]
+    return REHEARSAL_WORDS[page.rehearsed.safe]
 
 
 def rehearsal_html(page: Page) -> str:

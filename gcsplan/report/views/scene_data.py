@@ -8,21 +8,21 @@ from collections.abc import Sequence
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices
-from gcsplan.report.parts.track_samples import Line, level_amsl
+from gcsplan.report.parts.track_samples import TrackLine, level_amsl
 from gcsplan.report.views.shaded_terrain import Relief
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.geometry.zones import Circle, Polygon, Zone
 
-CIRCLE_CORNERS = 48
-RINGS = (1.0, 0.66, 0.33)
-EDGE_PARTS = 160
+MESH_CIRCLE_CORNERS = 48
+MESH_RINGS = (1.0, 0.66, 0.33)
+MESH_EDGE_PARTS = 160
 """Corners of a polygon after its edges are cut, about; each corner has its own height above ground."""
-MOST_CORNERS = 240
+MOST_MESH_CORNERS = 240
 BELOW_M = 1.0
 """Metres below ground at which a zone without a floor is drawn to begin."""
 
 
-def exaggeration(relief: Relief, lines: Sequence[Line]) -> float:
+def exaggeration(relief: Relief, lines: Sequence[TrackLine]) -> float:
     """The factor by which heights are stretched at first, to a tenth of the width: 1 to 8, in halves."""
     highest = max([relief.high_m, *(float(line.amsl_m.max()) for line in lines)])
     span = highest - relief.low_m
@@ -33,7 +33,7 @@ def exaggeration(relief: Relief, lines: Sequence[Line]) -> float:
 
 
 def zone_meshes(
-    zones: Sequence[Zone], surface: Surface, relief: Relief, lines: Sequence[Line]
+    zones: Sequence[Zone], surface: Surface, relief: Relief, lines: Sequence[TrackLine]
 ) -> list[dict[str, object]]:
     """Each zone on the map: name, whether it is open above (no ceiling), and the mesh of its sides and lids.
 
@@ -89,16 +89,16 @@ def _lid(zone: Zone) -> tuple[Floats, Floats, Indices]:
     """The rim of a zone's shape, points inside it, and the triangles over both."""
     shape = zone.shape
     if isinstance(shape, Circle):
-        turn = 2.0 * np.pi * np.arange(CIRCLE_CORNERS) / CIRCLE_CORNERS
+        turn = 2.0 * np.pi * np.arange(MESH_CIRCLE_CORNERS) / MESH_CIRCLE_CORNERS
         centre = np.array([shape.east_m, shape.north_m])
-        rings = [centre + part * shape.radius_m * np.column_stack([np.cos(turn), np.sin(turn)]) for part in RINGS]
-        here, then = np.arange(CIRCLE_CORNERS), np.roll(np.arange(CIRCLE_CORNERS), -1)
+        rings = [centre + part * shape.radius_m * np.column_stack([np.cos(turn), np.sin(turn)]) for part in MESH_RINGS]
+        here, then = np.arange(MESH_CIRCLE_CORNERS), np.roll(np.arange(MESH_CIRCLE_CORNERS), -1)
         faces = []
-        for k in range(len(RINGS) - 1):
-            a, b = k * CIRCLE_CORNERS, (k + 1) * CIRCLE_CORNERS
+        for k in range(len(MESH_RINGS) - 1):
+            a, b = k * MESH_CIRCLE_CORNERS, (k + 1) * MESH_CIRCLE_CORNERS
             faces += [np.column_stack([a + here, a + then, b + then]), np.column_stack([a + here, b + then, b + here])]
-        last, middle = (len(RINGS) - 1) * CIRCLE_CORNERS, len(RINGS) * CIRCLE_CORNERS
-        faces.append(np.column_stack([last + here, last + then, np.full(CIRCLE_CORNERS, middle)]))
+        last, middle = (len(MESH_RINGS) - 1) * MESH_CIRCLE_CORNERS, len(MESH_RINGS) * MESH_CIRCLE_CORNERS
+        faces.append(np.column_stack([last + here, last + then, np.full(MESH_CIRCLE_CORNERS, middle)]))
         return rings[0], np.concatenate([*rings[1:], centre[None]]), np.concatenate(faces)
     corners = _thinned(shape)
     ends = np.roll(corners, -1, axis=0)
@@ -110,13 +110,13 @@ def _lid(zone: Zone) -> tuple[Floats, Floats, Indices]:
 
 def _thinned(shape: Polygon) -> Floats:
     """A polygon's corners, thinned out if there are very many."""
-    return shape.vertices[:: max(1, len(shape.vertices) // MOST_CORNERS)]
+    return shape.vertices[:: max(1, len(shape.vertices) // MOST_MESH_CORNERS)]
 
 
 def _parts(corners: Floats) -> Indices:
     """The number of parts that each edge is cut into."""
     lengths = np.hypot(*(np.roll(corners, -1, axis=0) - corners).T)
-    return np.asarray(np.maximum(1, np.round(EDGE_PARTS * lengths / lengths.sum())), dtype=np.intp)
+    return np.asarray(np.maximum(1, np.round(MESH_EDGE_PARTS * lengths / lengths.sum())), dtype=np.intp)
 
 
 def _corners(zone: Zone, n: int) -> Indices:

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 
 from gcsplan.arrays import Floats
-from gcsplan.report.parts.track_samples import Line
+from gcsplan.report.parts.track_samples import TrackLine
 from gcsplan.units import METRE, Unit
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.geometry.zones import Zone
@@ -26,7 +26,7 @@ PIXELS, CONTOUR_EVERY, GRID_EVERY = 720, 3, 5
 LATTICE = 9
 SHAPE = (0.45, 1.3)
 """Least and greatest height over width of the map, so that it fits a page and a screen."""
-UNKNOWN = 65535
+NO_GROUND = 65535
 
 TINTS = (
     (0.00, (172, 193, 152)), (0.25, (205, 209, 162)), (0.50, (224, 205, 160)),
@@ -37,7 +37,7 @@ UNKNOWN_TINT = (150, 150, 160)
 
 
 @dataclass(frozen=True, slots=True)
-class Extent:
+class MapExtent:
     """The box of the plane that the map shows, metres."""
 
     west_m: float
@@ -74,7 +74,7 @@ class Extent:
         return np.linspace(self.west_m, self.east_m, cols + 1), np.linspace(self.north_m, self.south_m, rows + 1)
 
 
-def extent_of(lines: Sequence[Line], zones: Sequence[Zone], surface: Surface) -> Extent:
+def extent_of(lines: Sequence[TrackLine], zones: Sequence[Zone], surface: Surface) -> MapExtent:
     """The box around all lines with a margin; without lines, around the zones or the middle of the terrain."""
     if lines:
         e = np.concatenate([line.east_m for line in lines])
@@ -92,7 +92,7 @@ def extent_of(lines: Sequence[Line], zones: Sequence[Zone], surface: Surface) ->
     width, height = (float(v) for v in high - low)
     middle = 0.5 * (low + high)
     width, height = max(width, height / SHAPE[1]), max(height, width * SHAPE[0])
-    return Extent(
+    return MapExtent(
         float(middle[0]) - 0.5 * width, float(middle[1]) - 0.5 * height,
         float(middle[0]) + 0.5 * width, float(middle[1]) + 0.5 * height,
     )  # fmt: skip
@@ -106,7 +106,7 @@ class Relief:
     the data with which the page's script shows the ground under the pointer and builds the terrain's mesh.
     """
 
-    extent: Extent
+    extent: MapExtent
     low_m: float
     high_m: float
     picture: str
@@ -117,7 +117,7 @@ class Relief:
     grid: dict[str, object]
 
 
-def relief_of(world: World, extent: Extent, unit: Unit = METRE) -> Relief:
+def relief_of(world: World, extent: MapExtent, unit: Unit = METRE) -> Relief:
     """Sample, shade and contour the ground under ``extent``; contours are at round numbers of ``unit``."""
     east, north = extent.grid()
     ground = world.airspace.surface.ground_at(east, north[:, None])
@@ -163,7 +163,7 @@ def shaded(ground: Floats, east_m: Floats, north_m: Floats, low: float, high: fl
 
 
 def _contours(
-    ground: Floats, east_m: Floats, north_m: Floats, extent: Extent, heights_m: tuple[float, float], unit: Unit
+    ground: Floats, east_m: Floats, north_m: Floats, extent: MapExtent, heights_m: tuple[float, float], unit: Unit
 ) -> tuple[str, float]:
     """Contours as one SVG path, and their interval; an empty path on flat ground."""
     low, high = heights_m
@@ -190,16 +190,16 @@ def nice_step(at_least: float) -> float:
     return next(m * power for m in (1.0, 2.0, 5.0, 10.0) if m * power >= at_least * (1.0 - 1e-9))
 
 
-def _grid(world: World, extent: Extent, ground: Floats, low: float, high: float) -> dict[str, object]:
+def _grid(world: World, extent: MapExtent, ground: Floats, low: float, high: float) -> dict[str, object]:
     """Heights as 16-bit steps, and latitudes and longitudes on a coarse lattice, to interpolate linearly."""
     base, step = (low, max((high - low) / 65000.0, 1e-4)) if math.isfinite(low) else (0.0, 1.0)
-    whole = np.where(np.isnan(ground), UNKNOWN, np.clip(np.nan_to_num((ground - base) / step), 0, 65000))
+    whole = np.where(np.isnan(ground), NO_GROUND, np.clip(np.nan_to_num((ground - base) / step), 0, 65000))
     lattice = np.meshgrid(
         np.linspace(extent.west_m, extent.east_m, LATTICE), np.linspace(extent.north_m, extent.south_m, LATTICE)
     )
     degrees = world.frame.to_degrees(*lattice)
     return {
-        "cols": ground.shape[1], "rows": ground.shape[0], "base": round(base, 3), "step": step, "unknown": UNKNOWN,
+        "cols": ground.shape[1], "rows": ground.shape[0], "base": round(base, 3), "step": step, "unknown": NO_GROUND,
         "heights": base64.b64encode(np.rint(whole).astype("<u2").tobytes()).decode("ascii"),
         "box": [round(v, 3) for v in (extent.west_m, extent.south_m, extent.east_m, extent.north_m)],
         "lattice": LATTICE,

@@ -24,7 +24,7 @@ from gcsplan.report.parts.html import (
     table,
 )
 from gcsplan.report.parts.page_data import Page, Subject
-from gcsplan.report.parts.track_samples import Line, Passage
+from gcsplan.report.parts.track_samples import Passage, TrackLine
 from gcsplan.report.views.plan import zone_heights
 from gcsplan.report.views.profile import passed
 from gcsplan.units import KILOJOULE, Unit, Units, duration, in_units
@@ -89,7 +89,7 @@ def legs_table(subject: Subject, units: Units) -> str:
     return table(f"Legs of {esc(subject.name)}, in the order flown", head, rows, marks=marks)
 
 
-def limits_table(subject: Subject, line: Line | None, units: Units) -> str:
+def limits_table(subject: Subject, line: TrackLine | None, units: Units) -> str:
     """Every limit with its errors, the value that was reached, and what is left."""
     rows, marks = [], []
     for name, needed, reached, left, unit, where, share in _limits(subject, line, units):
@@ -107,16 +107,16 @@ def _decimals(unit: str | Unit) -> int:
     return 2 if isinstance(unit, Unit) else 1 if unit else 0
 
 
-Row = tuple[str, str, str, float | None, str | Unit, str, float | None]
+LimitRow = tuple[str, str, str, float | None, str | Unit, str, float | None]
 """Limit, required value, value reached, what is left, its unit, place, and what is left at most to be called close."""
 
 
-def _limits(subject: Subject, line: Line | None, units: Units) -> list[Row]:
+def _limits(subject: Subject, line: TrackLine | None, units: Units) -> list[LimitRow]:
     verdict, limits = subject.verdict, subject.vehicle.limits
     error, track = limits.altitude_error_m, limits.track_error_m
     flown = [leg for leg in verdict.legs if not leg.column]
     height, distance = units.height, units.distance
-    rows: list[Row] = []
+    rows: list[LimitRow] = []
     low = verdict.lowest
     if low is not None:
         needed_m = limits.min_agl_m + error
@@ -166,7 +166,7 @@ def _limits(subject: Subject, line: Line | None, units: Units) -> list[Row]:
     return rows
 
 
-def _height_left(subject: Subject, line: Line, units: Units) -> list[Row]:
+def _height_left(subject: Subject, line: TrackLine, units: Units) -> list[LimitRow]:
     """The least height above all that terrain requires: min AGL, clearance and errors together, at the samples."""
     legs = subject.verdict.legs
     free = np.array([leg.column for leg in legs])[line.leg]
@@ -183,8 +183,8 @@ def _height_left(subject: Subject, line: Line, units: Units) -> list[Row]:
              f"item {legs[line.leg[at]].seq}, {num(line.run_m[at], 2, units.far)} along", 1.0)]  # fmt: skip
 
 
-def _steepness(flown: Sequence[LegFigures], climb_deg: float, descent_deg: float) -> list[Row]:
-    rows: list[Row] = []
+def _steepness(flown: Sequence[LegFigures], climb_deg: float, descent_deg: float) -> list[LimitRow]:
+    rows: list[LimitRow] = []
     if not flown:
         return rows
     up, down = max(flown, key=lambda leg: leg.climb_deg), min(flown, key=lambda leg: leg.climb_deg)
@@ -197,7 +197,7 @@ def _steepness(flown: Sequence[LegFigures], climb_deg: float, descent_deg: float
     return rows
 
 
-def zones_table(page: Page, subject: Subject, line: Line, found: Sequence[Passage]) -> str:
+def zones_table(page: Page, subject: Subject, line: TrackLine, found: Sequence[Passage]) -> str:
     """The zones along the track of one vehicle: those passed over, under or at their height."""
     if not found:
         return ""

@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.vehicle import GRAVITY_M_S2, Autopilot, Vehicle
 
 AT_ONCE_M_S2 = 1e4
 """Acceleration that stands for "unlimited", m/s²: 30 m/s in 3 ms."""
@@ -157,7 +157,6 @@ def _leaning_m_s(kinematics: Kinematics, rise: float, amsl_m: float) -> float:
 MASS_KG, DISC_M2, ROTOR_DRAG = 3.0, 0.385, 0.2
 HELD_M_S, HELD_DEG, HELD_AMSL_M = 15.08, 45.0, 593.0
 """ArduPilot's simulated quadrotor (SIM_Frame.h): it holds this speed with this lean at this altitude."""
-GRAVITY_M_S2 = 9.80665
 
 
 def _pushes_on(lean_deg: float, speed_m_s: float, rise: float, amsl_m: float) -> bool:

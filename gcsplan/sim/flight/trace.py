@@ -16,8 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.notes.finding import Finding
-from gcsplan.notes.note import Note
+from gcsplan.notes.note import Finding, Note
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Legs, Violation
 from gcsplan.world.world import World

@@ -23,8 +23,7 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.motion.commands import flown_in_order
-from gcsplan.check.motion.geodesy import flat_m, offset_m
-from gcsplan.check.motion.stretch import Place
+from gcsplan.check.motion.stretch import Place, flat_m, offset_m
 from gcsplan.errors import LinkError, UsageError, VehicleRefused
 from gcsplan.mavlink.link.frames import signing_key
 from gcsplan.mavlink.link.link import Channel, Link, LinkSteps, PumpJob, pump

@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.check.motion.geodesy import offset_m
+from gcsplan.check.motion.stretch import offset_m
 from gcsplan.dem.dat_file import file_name, packed
 from gcsplan.errors import InputError, LinkError, UsageError
 from gcsplan.mavlink.mission import commands as cmd

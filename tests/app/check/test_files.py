@@ -16,8 +16,7 @@ from gcsplan.app.check.files import Batch, check_with_options, finding_lines
 from gcsplan.cli import main as cli
 from gcsplan.errors import InputError
 from gcsplan.mission_file.options_world import WorldOptions
-from gcsplan.notes.catalogue import TEXTS
-from gcsplan.notes.note import fields_of
+from gcsplan.notes.note import TEXTS, fields_of
 from gcsplan.vehicle import Autopilot
 from tests.support import corpus
 from tests.support.corpus import Case

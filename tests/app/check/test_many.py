@@ -98,7 +98,7 @@ def test_results_do_not_depend_on_who_works_nor_on_what_is_kept(
     assert archive.work[0] == -(-len(files) // 5)
     other, _ = results(options, files, Scattered(), form)
     assert [told_without_error(t) for t in other] == [told_without_error(t) for t in alone]
-    monkeypatch.setattr(module, "KEPT_BYTES", 0)
+    monkeypatch.setattr(module, "KEPT_READ_BYTES", 0)
     again, archive = results(options, files, Inline(), form)
     assert not archive._packed
     assert [told_without_error(t) for t in again] == [told_without_error(t) for t in alone]
@@ -362,7 +362,7 @@ def garbage_soon() -> Iterator[None]:
 def test_memory_does_not_grow_with_the_files(
     options: WorldOptions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "KEPT_BYTES", 200_000)
+    monkeypatch.setattr(module, "KEPT_READ_BYTES", 200_000)
     names = many(tmp_path / "many", 1200)
     peaks = []
     for count in (100, 300, 1200):

@@ -20,8 +20,7 @@ from gcsplan.mavlink.files.formats import read_plan, read_waypoints
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mission_file import load_mission
-from gcsplan.notes.finding import Finding
-from gcsplan.notes.note import Note
+from gcsplan.notes.note import Finding, Note
 from gcsplan.vehicle import Autopilot
 from tests.support.noted import codes, one, saying
 from tests.support.paths import DATA

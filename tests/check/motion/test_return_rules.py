@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 from gcsplan.check.motion.circles import circle_growth
-from gcsplan.check.motion.geodesy import flat_m
-from gcsplan.check.motion.return_rules import RULES, at_home_m, returned
+from gcsplan.check.motion.return_rules import RETURN_RULES, at_home_m, returned
 from gcsplan.check.motion.stopping import about_turn_m, run_on_m, run_past_m
-from gcsplan.check.motion.stretch import Place, Stretch
+from gcsplan.check.motion.stretch import Place, Stretch, flat_m
 from gcsplan.check.returns.footprint import Target
 from gcsplan.check.returns.obstacles import obstacles_of_returns
 from gcsplan.check.returns.trace import MissionTrace
@@ -65,15 +64,15 @@ def spans(pieces: list[Stretch]) -> list[tuple[float, float]]:
 def test_the_altitudes_of_the_way_home(
     autopilot: Autopilot, metres: float, amsl_m: float, expected: list[tuple[float, float]]
 ) -> None:
-    flown, instead = returned(flies, RULES[autopilot], away(metres, amsl_m), HOME, 360.0, about_m=8.0)
+    flown, instead = returned(flies, RETURN_RULES[autopilot], away(metres, amsl_m), HOME, 360.0, about_m=8.0)
     for found, want in zip(spans([*instead, *flown]), expected, strict=True):
         assert found == pytest.approx(want, abs=1e-3)
 
 
 def test_a_copter_ends_on_the_ground_and_a_plane_on_a_circle() -> None:
-    down, _ = returned(flies, RULES[COPTER], away(500.0, 320.0), HOME, 360.0, about_m=8.0)
+    down, _ = returned(flies, RETURN_RULES[COPTER], away(500.0, 320.0), HOME, 360.0, about_m=8.0)
     assert down[-1].end == HOME
-    (_, circle), (about, *aside) = returned(flies, RULES[PLANE], away(500.0, 320.0), HOME, 360.0, about_m=8.0)
+    (_, circle), (about, *aside) = returned(flies, RETURN_RULES[PLANE], away(500.0, 320.0), HOME, 360.0, about_m=8.0)
     assert about.reach_m == 8.0
     assert [(s.reach_m, s.band_m) for s in aside] == [(w, 20.0) for w in (8.0, 6.0, 4.0, 2.0)]
     assert aside[0].start == (*away(500.0, 320.0)[:2], 340.0)
@@ -105,7 +104,7 @@ def test_the_sweep_has_the_cone_of_a_single_return(metres: float, amsl_m: float)
     met = obstacles_of_returns(trace, trace.cut(1.0), Target(0.0, 0.0, 300.0, 300.0), v, whole=True).clear
     (base,), (limit,) = met.base[:1], met.limit[:1]
     lowest = max(base, min(max(345.0, amsl_m), limit))
-    flown, instead = returned(flies, RULES[COPTER], away(metres, amsl_m), HOME, 345.0, about_m=0.0)
+    flown, instead = returned(flies, RETURN_RULES[COPTER], away(metres, amsl_m), HOME, 345.0, about_m=0.0)
     assert lowest == pytest.approx(min(low for low, _ in spans([*instead, *flown])), abs=0.01)
 
 

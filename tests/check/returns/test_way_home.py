@@ -143,7 +143,7 @@ def test_lines_home_that_are_judged_a_few_at_once_give_the_same(
     monkeypatch.setattr(level_lines, "over", counting)
     judged(w, m, v, 90.0)
     calls = len(counted_at_once)
-    monkeypatch.setattr(sweep, "MOST_PIECES", max(counted_at_once) // 10)
+    monkeypatch.setattr(sweep, "MOST_PIECES_HELD", max(counted_at_once) // 10)
     counted_at_once.clear()
     assert json.dumps(judged(w, m, v, 90.0).as_dict()) == json.dumps(together.as_dict())
     assert len(counted_at_once) > calls
