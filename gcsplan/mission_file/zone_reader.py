@@ -18,6 +18,7 @@ from gcsplan.mission_file.zones.contents import load_json, unpack
 from gcsplan.mission_file.zones.csv import read_csv
 from gcsplan.mission_file.zones.file import ZoneFile
 from gcsplan.mission_file.zones.geojson import read_geojson
+from gcsplan.mission_file.zones.json_document import require_wgs84, sent_in_part
 from gcsplan.mission_file.zones.kml import read_kml
 from gcsplan.world.terrain.input_files import absent, tell_file
 
@@ -55,13 +56,17 @@ def read_zones(
     policy = policy or Policy()
     data = _bytes(path, where)
     whole = load_json(path, data) if kind in JSON else None
+    require_wgs84(whole, path)
+    in_part = sent_in_part(whole, path)
     published = read_published(path, data, whole, policy)
     if published is not None:
+        published.problems[:0] = in_part
         return published
     for key in policy.keys:
         words = f"{path.name} is no file of an authority (OpenAir, ED-269, ED-318, openAIP), and has no {key}"
         raise InputError(words, where=f"{policy.where}.{key}")
     found = read_geojson(path, whole) if kind in JSON else _read(path, kind, data, layer)
+    found.problems[:0] = in_part
     found.give_sizes(radius_m, buffer_m)
     return found
 

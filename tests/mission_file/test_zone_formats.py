@@ -9,6 +9,7 @@ import sqlite3
 import struct
 import sys
 import zipfile
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -489,3 +490,17 @@ def test_a_kmz_of_a_folder_alone_is_refused(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "z.kmz", "w") as archive:
         archive.writestr("doc.kml/", "")
     assert "must hold one .kml file" in message(tmp_path / "z.kmz")
+
+
+@pytest.mark.parametrize("corners", [2, 3])
+def test_a_ring_that_is_not_closed_is_refused(tmp_path: Path, corners: int) -> None:
+    """GDAL gives out such rings of a GeoPackage as they are; GEOS cannot hold them."""
+    file = write(tmp_path / "z.gpkg", [shapely.box(8.0, 46.5, 8.1, 46.6)], kind="Polygon", name=["z"])
+    places = [(8.0, 46.5), (8.1, 46.5), (8.1, 46.6)][:corners]
+    ring = struct.pack("<BIII", 1, 3, 1, corners) + b"".join(struct.pack("<dd", *p) for p in places)
+    with closing(sqlite3.connect(file)) as database, database:
+        for (trigger,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'trigger'").fetchall():
+            database.execute(f'DROP TRIGGER "{trigger}"')  # they call functions that GDAL alone has
+        database.execute("UPDATE z SET geom = ?", (b"GP\0\x01" + struct.pack("<i", 4326) + ring,))
+    with pytest.raises(InputError, match=r"z\.gpkg: z: a geometry cannot be read \(.*\); repair it"):
+        read(file)

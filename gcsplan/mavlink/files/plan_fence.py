@@ -24,6 +24,7 @@ FENCE_KEYS = frozenset({"circles", "polygons", "breachReturn"})
 RALLY_KEYS = frozenset({"points"})
 SHAPE_KEYS = {"circles": frozenset({"circle", "inclusion", "version"}),
               "polygons": frozenset({"polygon", "inclusion", "version"})}  # fmt: skip
+CIRCLE_KEYS = frozenset({"center", "radius"})
 SHAPE_VERSION = 1
 RESAVE = "open the file in QGroundControl and save it again"
 
@@ -120,6 +121,9 @@ def unread_keys(section: object, known: Collection[str], version: int, where: st
         for i, entry in enumerate(entries if kind in known and isinstance(entries, list) else []):
             inner = entry if isinstance(entry, dict) else {}
             others += [f"{where}.{kind}[{i}].{key[:40]}" for key in inner if key not in own]
+            circle = inner.get("circle")
+            within = circle if isinstance(circle, dict) else {}
+            others += [f"{where}.{kind}[{i}].circle.{key[:40]}" for key in within if key not in CIRCLE_KEYS]
             if inner.get("version", SHAPE_VERSION) != SHAPE_VERSION:
                 others.append(f"{where}.{kind}[{i}] of version {str(inner['version'])[:20]}")
     return ", ".join(others[:8])

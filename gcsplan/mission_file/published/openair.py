@@ -188,6 +188,8 @@ class _OpenAirReading:
         elif code in DRAWING_RECORDS:
             self._draw(self.block, code, value)
         elif code == "AN":
+            if self.block.pieces or self.block.circles:
+                raise _RecordError("a second name behind the zone's outline: does a line AC before it lack?")
             self.block.name = value
         elif code == "AY":
             self.block.kinds.append(_kind(value))

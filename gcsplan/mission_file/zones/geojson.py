@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,10 @@ MOST_MISTAKES = 1000
 
 
 def read_geojson(path: Path, whole: Any) -> ZoneFile:
-    """The zones of GeoJSON, as `load_json` returns it. Raises InputError if it is not GeoJSON."""
+    """The zones of GeoJSON, as `load_json` returns it. Raises InputError if it is not GeoJSON.
+
+    The coordinate system, and whether a server sent all of it, are looked at before (`json_document`).
+    """
     found = ZoneFile(path)
     if not isinstance(whole, dict):
         raise InputError("a GeoJSON file holds one object, for example a FeatureCollection", where=str(path))
@@ -28,8 +30,6 @@ def read_geojson(path: Path, whole: Any) -> ZoneFile:
             "this is Esri's JSON, not GeoJSON: ask the server for f=geojson, or convert it (ogr2ogr a.geojson FILE)",
             where=str(path),
         )
-    _require_wgs84(whole, path)
-    _require_whole(found, whole)
     features = whole.get("features") if whole.get("type") == "FeatureCollection" else [whole]
     if not isinstance(features, list) or not features:
         raise InputError("a FeatureCollection needs a list `features` that is not empty", where=str(path))
@@ -58,34 +58,6 @@ def _is_flown(whole: dict[str, Any], feature: Any) -> bool:
     drawn = {"track": ("LineString", "MultiLineString"), "waypoint": ("Point",)}.get(str(properties.get("kind")), ())
     is_drawn = isinstance(geometry, dict) and geometry.get("type") in drawn
     return is_drawn and (whole.get("generator") == GENERATOR or before)
-
-
-def _require_whole(found: ZoneFile, whole: dict[str, Any]) -> None:
-    """Refuse what a server sent in part: the zones of the rest would be missing."""
-    inner = whole.get("properties")
-    given = {**inner, **whole} if isinstance(inner, dict) else whole
-    matched: Any = given.get("numberMatched")
-    returned: Any = given.get("numberReturned")
-    if given.get("exceededTransferLimit") is True:
-        words = "the server sent a part of the features alone (exceededTransferLimit); ask for all, page by page"
-        found.problems.append(Problem(f"{found.path}: exceededTransferLimit", words))
-    elif is_number(matched) and is_number(returned) and matched > returned:
-        words = f"the server sent {returned} of {matched} features; ask for all, page by page"
-        found.problems.append(Problem(f"{found.path}: numberMatched", words))
-
-
-def _require_wgs84(whole: dict[str, Any], path: Path) -> None:
-    """Refuse other coordinate systems in `crs`: RFC 7946 removed this member of the 2008 draft, but files use it."""
-    crs = whole.get("crs")
-    if crs is None:
-        return
-    text = json.dumps(crs)
-    if "CRS84" not in text and "4326" not in text:
-        raise InputError(
-            f"GeoJSON is in WGS84 degrees (RFC 7946), this file says {text[:100]}; convert it with "
-            "ogr2ogr -t_srs EPSG:4326",
-            where=f"{path}: crs",
-        )
 
 
 def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:

@@ -136,7 +136,7 @@ def _layer(found: ZoneFile, pyogrio: Any, source: Path, layer: str) -> None:
         raise InputError(
             f"{len(shapes)} of {stated['features']} features can be read; the file is damaged", where=where
         )
-    geometries = shapely.from_wkb(shapes)
+    geometries = _geometries(shapes, where)
     extent = shapely.total_bounds(geometries)
     if not np.isfinite(extent).all():
         extent = np.zeros(4)  # no shape at all: every feature is refused below
@@ -152,6 +152,18 @@ def _layer(found: ZoneFile, pyogrio: Any, source: Path, layer: str) -> None:
         said = read_attributes(given, f"{found.path.stem}[{fid}]", found.problems)
         if said is not None:
             _feature(found, geometry, said, at, to_degrees)
+
+
+def _geometries(shapes: Any, where: str) -> Any:
+    """The features' geometries. Raises InputError for one that is none, such as a ring that is not closed."""
+    import shapely
+
+    try:
+        return shapely.from_wkb(shapes)
+    except shapely.errors.ShapelyError as why:
+        raise InputError(
+            f"a geometry cannot be read ({str(why)[:120]}); repair it (in QGIS, Fix geometries)", where=where
+        ) from None
 
 
 def _attributes(row: Mapping[str, Any], where: str) -> list[Attribute]:
