@@ -109,6 +109,31 @@ def take_apart(crs: str, *, where: str) -> RasterCRS:
     return RasterCRS(horizontal, geographic, length, vertical, unit)
 
 
+def with_vertical_of(said: RasterCRS, own: str, prj: str, *, where: str) -> RasterCRS:
+    """``said``, which stands for a file's own system, with what that one, ``own``, states of heights.
+
+    ``prj`` is its text beside the file, if there is one: libraries forget a part of that (`require_unshifted`).
+
+    A user who names the grid has said nothing of heights, and what counts downwards or from another zero does so all
+    the same. A vertical system that no register knows counts as none: this is the way to read such a file. Raises
+    InputError for heights that are refused; a ``said`` with a vertical part is taken as it is.
+    """
+    if said.vertical is not None:
+        return said
+    try:
+        require_unshifted(prj or own, where=where)
+        whole = CRS.from_user_input(own)
+        if whole.is_geocentric or not (whole.is_compound or whole.is_vertical or len(whole.axis_info) == 3):
+            return said
+        _, vertical, unit = _parts(whole, BY_FILE, where, any_name=True)
+    except ProjError:
+        return said
+    except InputError as why:
+        cure = "if the file is wrong about that, state both parts with `crs:`, such as EPSG:4326+5773"
+        raise InputError(f"{why.message}; {cure}", where=where) from None
+    return replace(said, vertical=vertical, vertical_unit=unit)
+
+
 def require_unshifted(text: str, *, where: str) -> None:
     """Raise InputError for Esri's text of a vertical system that shifts its heights; libraries read it without that."""
     shift = _SHIFT.search(text)
@@ -120,11 +145,14 @@ def require_unshifted(text: str, *, where: str) -> None:
         )
 
 
-def _parts(whole: Any, by: str, where: str) -> tuple[Any, VerticalDatum | None, HeightUnit | None]:
+def _parts(
+    whole: Any, by: str, where: str, *, any_name: bool = False
+) -> tuple[Any, VerticalDatum | None, HeightUnit | None]:
     """Of a pyproj CRS: the horizontal part in 2D (None if there is none), the vertical datum, and the unit of heights.
 
-    Unit and direction are those of the vertical axis itself. ``by`` names the one who states the unit. Raises
-    InputError for what counts downwards, and for zeros that are not the sea's.
+    Unit and direction are those of the vertical axis itself. ``by`` names the one who states the unit. ``any_name``:
+    a vertical system that no register knows has a unit and no datum. Raises InputError for what counts downwards, and
+    for zeros that are not the sea's.
     """
     parts = whole.sub_crs_list if whole.is_compound else [whole]
     horizontal = None if parts[0].is_vertical else parts[0]
@@ -157,10 +185,13 @@ def _parts(whole: Any, by: str, where: str) -> tuple[Any, VerticalDatum | None, 
     ellipsoidal = "ellipsoid" in f"{name} {axes[0].name}".lower()
     if ellipsoidal and not _GEOCENTRIC.match(name):
         raise _not_geocentric(name, where)
-    if not ellipsoidal:
-        _require_registered(vertical[0], where)
-    datum = VerticalDatum("WGS84 ellipsoidal", ellipsoidal=True) if ellipsoidal else _named_by_raster(name)
-    return horizontal, datum, replace(unit_of_length(float(axes[0].unit_conversion_factor), axes[0].unit_name), by=by)
+    unit = replace(unit_of_length(float(axes[0].unit_conversion_factor), axes[0].unit_name), by=by)
+    if ellipsoidal:
+        return horizontal, VerticalDatum("WGS84 ellipsoidal", ellipsoidal=True), unit
+    if any_name and not _is_registered(vertical[0]):
+        return horizontal, None, unit
+    _require_registered(vertical[0], where)
+    return horizontal, _named_by_raster(name), unit
 
 
 def _require_registered(vertical: Any, where: str) -> None:
@@ -172,13 +203,20 @@ def _require_registered(vertical: Any, where: str) -> None:
             "-t_srs with that system)",
             where=where,
         )
-    datum = "" if vertical.datum is None else str(vertical.datum.name)
-    if vertical.to_authority() is None and not _is_known(name) and not _is_known(datum):
+    if not _is_registered(vertical):
         raise InputError(
             f"the raster has heights in {name!r}, which no register knows; say `vertical_datum:` (AMSL if it follows "
             "mean sea level) and, in place of the raster's own system, `crs:` (its horizontal part, such as EPSG:4326)",
             where=where,
         )
+
+
+def _is_registered(vertical: Any) -> bool:
+    """Whether a vertical system, or its datum, is one that a register knows."""
+    if vertical.source_crs is not None:
+        return True  # of a shifted one the shift is refused
+    datum = "" if vertical.datum is None else str(vertical.datum.name)
+    return vertical.to_authority() is not None or _is_known(str(vertical.name)) or _is_known(datum)
 
 
 def _is_known(name: str) -> bool:
@@ -233,7 +271,7 @@ def vertical_datum(given: str | None, raster: VerticalDatum | None, *, where: st
         return raster
     raise InputError(
         f"the mission says {stated.name}, the raster itself says {raster.name}; remove the key, or correct the "
-        "raster (gdal_edit.py -a_srs)",
+        "raster (gdal_edit.py -a_srs, or `crs:` with both parts, such as EPSG:4326+5773)",
         where=where,
     )
 

@@ -69,6 +69,16 @@ def unit_named(words: str) -> HeightUnit | None:
     return _SPELLED.get(re.sub(r"[^a-z]", "", words.lower()))
 
 
+def unit_of_prj(text: str) -> str:
+    """What the text of a .prj of ArcInfo calls the unit of its heights (``Zunits FEET``); empty if it says none.
+
+    GDAL reads the unit of its places alone. A number is how many make a metre, of which 1 alone is a unit with a name.
+    """
+    found = re.search(r"(?im)^[ \t]*zunits[ \t]+(\S.*?)\s*$", text)
+    words = "" if found is None else found[1]
+    return "" if words.upper() == "NO" else "metres" if re.fullmatch(r"1(\.0*)?", words) else words
+
+
 def unit_of_length(metres: float, name: str) -> HeightUnit:
     """The unit of a coordinate system's axis, by its length; one without a name of its own is called ``name``."""
     for unit in OF_KEY.values():

@@ -20,8 +20,16 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
-from gcsplan.world.geodesy.datum import RasterCRS, VerticalDatum, require_unshifted, take_apart
-from gcsplan.world.geodesy.height_unit import BY_FILE, BY_FORMAT, METRE, HeightUnit, unit_named, unit_that_counts
+from gcsplan.world.geodesy.datum import RasterCRS, VerticalDatum, require_unshifted, take_apart, with_vertical_of
+from gcsplan.world.geodesy.height_unit import (
+    BY_FILE,
+    BY_FORMAT,
+    METRE,
+    HeightUnit,
+    unit_named,
+    unit_of_prj,
+    unit_that_counts,
+)
 from gcsplan.world.terrain.input_files import absent, beside, files_of, sha256_of_all, states_of, tell_file, tell_raster
 
 Reader = Callable[[int, int, int, int], Iterator[tuple[int, Floats]]]
@@ -276,12 +284,15 @@ def _header(dataset: Any, path: Path, said: RasterStatements, *, where: str) -> 
         )
     if crs is not None and dataset.crs:
         notes.append(Note("crs_replaced", file=path.name, crs=crs))
-    if crs is None and dataset.driver == "AAIGrid":
-        require_unshifted(_prj_beside(path), where=where)
+    prj = _prj_beside(path) if dataset.driver == "AAIGrid" else ""
+    if crs is None:
+        require_unshifted(prj, where=where)
     system = take_apart(text, where=where)
+    if crs is not None and dataset.crs:
+        system = with_vertical_of(system, dataset.crs.to_wkt(), prj, where=where)
     if system.geographic:
         _require_degrees(t, dataset, path, where=where)
-    unit, unit_notes = _unit(dataset, system, said, path, where=where)
+    unit, unit_notes = _unit(dataset, system, said, path, prj, where=where)
     factor = unit.metres
     notes += unit_notes
     scale, offset = float(dataset.scales[0]), float(dataset.offsets[0])
@@ -342,18 +353,19 @@ def _require_degrees(t: Any, dataset: Any, path: Path, *, where: str) -> None:
 
 
 def _unit(
-    dataset: Any, system: RasterCRS, said: RasterStatements, path: Path, *, where: str
+    dataset: Any, system: RasterCRS, said: RasterStatements, path: Path, prj: str, *, where: str
 ) -> tuple[HeightUnit, list[Note]]:
-    """The unit of the heights, and notes. Raises InputError."""
+    """The unit of the heights, and notes; ``prj`` is the text of the .prj beside an .asc. Raises InputError."""
     stated = [unit for unit in (system.vertical_unit, said.datum_unit) if unit is not None]
-    band = str(dataset.units[0] or "").strip()
-    if band:
-        unit = unit_named(band)
+    for words in (str(dataset.units[0] or "").strip(), unit_of_prj(prj)):
+        if not words:
+            continue
+        unit = unit_named(words)
         if unit is not None:
             stated.append(replace(unit, by=BY_FORMAT if dataset.driver == "SRTMHGT" else BY_FILE))
-        elif said.height_unit is None and (system.vertical_unit is None or band != system.vertical_unit.name):
+        elif said.height_unit is None and (system.vertical_unit is None or words != system.vertical_unit.name):
             raise InputError(
-                f"{path} gives heights in {band!r}, which is not known; say the unit with `height_unit: m` "
+                f"{path} gives heights in {words!r}, which is not known; say the unit with `height_unit: m` "
                 "(or ft, us_ft; a canopy says its own: gdal_edit.py -units metre)",
                 where=where,
             )

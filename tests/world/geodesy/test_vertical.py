@@ -160,6 +160,47 @@ def test_esri_s_shift_of_heights_is_not_forgotten(tmp_path: Path) -> None:
     assert "is shifted by 100.0 (Vertical_Shift)" in str(refusal(path, vertical_datum=None))
 
 
+@pytest.mark.parametrize(
+    ("zunits", "metres"), [("FEET", FOOT), ("METERS", 1.0), ("1", 1.0), ("NO", 1.0), ("10", None), ("YARDS", None)]
+)
+def test_the_unit_of_heights_of_an_arcinfo_prj(tmp_path: Path, zunits: str, metres: float | None) -> None:
+    """GDAL does not look at it."""
+    lat, lon = FRAME.lat_deg, FRAME.lon_deg
+    head = f"ncols 100\nnrows 100\nxllcorner {lon - 0.05!r}\nyllcorner {lat - 0.05!r}\ncellsize 0.001\n"
+    path = tmp_path / "a.asc"
+    path.write_text(head + "\n".join(" ".join(["700"] * 100) for _ in range(100)))
+    (tmp_path / "a.prj").write_text(
+        f"Projection    GEOGRAPHIC\nDatum WGS84\nZunits        {zunits}\nUnits DD\nParameters\n"
+    )
+    if metres is None:
+        assert f"gives heights in '{zunits}', which is not known" in str(refusal(path))
+    else:
+        assert np.nanmax(load(path).ground_m) == pytest.approx(700.0 * metres)
+        assert np.nanmax(load(path, crs="EPSG:4326").ground_m) == pytest.approx(700.0 * metres)
+    assert np.nanmax(load(path, height_unit="us_ft").ground_m) == pytest.approx(700.0 * US_FOOT)
+
+
+@pytest.mark.parametrize("code", [*DEPTHS[:3], *OTHER_ZEROS[:3]])
+def test_a_key_for_the_grid_does_not_change_what_the_file_says_of_heights(tmp_path: Path, code: int) -> None:
+    """Depths were read as heights, with a unit "from the file"."""
+    path = degrees_tif(tmp_path / "a.tif", crs=f"EPSG:4326+{code}")
+    error = str(refusal(path, crs="EPSG:4326"))
+    assert "counts depths" in error if code in DEPTHS else "do not count from mean sea level" in error
+    assert "state both parts with `crs:`, such as EPSG:4326+5773" in error
+    assert load(path, crs="EPSG:4326+5773", height_unit="m").info["vertical_datum"] == "EGM96"
+
+
+def test_a_key_for_the_grid_leaves_the_file_s_datum_and_unit(tmp_path: Path) -> None:
+    heights = np.round(hills(100, 100))
+    ellipsoidal = degrees_tif(tmp_path / "a.tif", heights, crs="EPSG:4979")
+    assert "the raster itself says WGS 84 ellipsoidal" in str(refusal(ellipsoidal, crs="EPSG:4326"))
+    assert is_times(load(ellipsoidal, crs="EPSG:4326+5773"), heights, 1.0)
+    feet = degrees_tif(tmp_path / "b.tif", heights, crs="EPSG:4326+6360")
+    surface = load(feet, crs="EPSG:4326", vertical_datum=None)
+    assert is_times(surface, heights, US_FOOT)
+    assert surface.info["vertical_datum"] == "NAVD88"
+
+
 def test_tiles_in_feet_do_not_lend_their_unit_to_one_that_states_none(tmp_path: Path) -> None:
     heights = np.round(hills(100, 100)) + 300.0
     a = degrees_tif(tmp_path / "a.tif", heights, units=("ft",))
