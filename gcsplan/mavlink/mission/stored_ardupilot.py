@@ -197,6 +197,13 @@ NAN_TAKEN = {
 
 _FRAMES_KEPT = (0, 2, 3, 5, 6, 10, 11)
 
+MOST_ALTITUDE_M = 83_000.0
+"""ArduPilot stores altitudes in 24 bits of centimetres and refuses this and more (`LOCATION_ALT_MAX_M`)."""
+
+_OF_INTEGERS = frozenset({_u8, _u16, _i8, _i16, _radius_u16, _byte})
+_MOST_CONVERTED = 2.0**31
+"""C does not say what an integer of a larger float is: a hold of 1e10 s is none on one processor, 18 h on another."""
+
 
 def refused_by_copter(item: MissionItem) -> str:
     """Return why ArduCopter refuses ``item`` on upload; empty if it accepts it or is not known to refuse it."""
@@ -204,11 +211,27 @@ def refused_by_copter(item: MissionItem) -> str:
         if math.isinf(value) or (math.isnan(value) and index not in NAN_TAKEN.get(item.command, ())):
             return f"ArduPilot refuses param{index + 1} of command {item.command}, which is {value}"
     rule = STORAGE_RULES.get(item.command)
-    if rule is None or not rule.located:
+    if rule is None:
+        return ""
+    for number in _in_integers(item.command, rule):
+        if abs(value := item.params[number - 1]) >= _MOST_CONVERTED:
+            return (
+                f"param{number} of command {item.command} is {value:g}, of which each processor stores something else"
+            )
+    if not rule.located:
         return ""
     if item.frame not in _FRAMES_KEPT:
         return f"ArduPilot takes no item in frame {item.frame}"
-    return f"ArduPilot refuses an altitude of {item.z}" if math.isnan(item.z) else ""
+    if math.isnan(item.z):
+        return f"ArduPilot refuses an altitude of {item.z}"
+    return f"ArduPilot refuses an altitude of {item.z:g} m" if abs(item.z) >= MOST_ALTITUDE_M else ""
+
+
+def _in_integers(command: int, rule: StorageRule) -> tuple[int, ...]:
+    """Numbers of the params that are stored as integers."""
+    if command == cmd.LOITER_TURNS:
+        return 1, 3
+    return tuple(number for number, keep in enumerate(rule.params, start=1) if keep in _OF_INTEGERS)
 
 
 def refused_by_plane(item: MissionItem) -> str:

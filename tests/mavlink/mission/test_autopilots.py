@@ -281,6 +281,25 @@ def test_what_is_refused_is_just_what_the_simulated_vehicle_refuses(autopilot: A
     assert profile_of(COPTER).refuses(item(16, frame=11)) == ""
 
 
+@pytest.mark.parametrize("autopilot", [COPTER, PLANE])
+def test_numbers_that_ardupilot_cannot_store_are_refused(autopilot: Autopilot) -> None:
+    """A hold of 1e30 s was taken for none: C leaves open what its integer is, and other processors make 18 h of it."""
+    refuses = profile_of(autopilot).refuses
+    for command, params in ((19, (1e30, 0.0, 0.0, 0.0)), (177, (1.0, -3e9, 0.0, 0.0)), (18, (1.0, 0.0, 1e10, 0.0))):
+        number = 1 + max(range(3), key=lambda i: abs(params[i]))
+        assert refuses(MissionItem(command, 3, params, X, Y, 60.0)).startswith(f"param{number} of command {command} is")
+    for command, params in (
+        (19, (70_000.0, 0.0, 0.0, 0.0)),
+        (178, (1.0, 1e30, 0.0, 0.0)),
+        (18, (0.5, 0.0, -300.0, 0.0)),
+    ):
+        assert refuses(MissionItem(command, 3, params, X, Y, 60.0)) == ""
+    assert refuses(MissionItem(16, 3, (0.0,) * 4, X, Y, 82_999.0)) == ""
+    for altitude_m in (83_000.0, -90_000.0, 3e9):
+        assert "refuses an altitude of" in refuses(MissionItem(16, 3, (0.0,) * 4, X, Y, altitude_m))
+    assert refuses(MissionItem(178, 2, (1.0, 5.0, 0.0, 0.0), 0, 0, 90_000.0)) == ""
+
+
 @pytest.mark.parametrize(
     ("ids", "found"),
     [
