@@ -14,6 +14,7 @@ from itertools import product
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Singles
+from gcsplan.errors import InputError
 from gcsplan.native.signature import Held
 from gcsplan.world.geometry.surface import GridMap
 from gcsplan.world.kernels.compiled import EXTREMA
@@ -33,6 +34,8 @@ MOST_EXAMINED_BYTES = 250_000_000
 """Of what all neighbourhoods of an airspace have examined: those that were asked for least lately forget it."""
 AT_ONCE = 3
 """Neighbourhoods that one call of a kernel takes."""
+MOST_ROOM_BYTES = 700_000_000
+"""Of the work array of one neighbourhood: a reach of some 3000 cells on a large surface."""
 TALL, WIDE, WIDER = 64, 1024, 4
 """Fewest rows and columns worked on at once, so that they stay in the processor's cache; and the fewest as a multiple
 of the reach around them, in cells."""
@@ -150,9 +153,32 @@ def extrema_around(field: Field, heights: Floats, reach_m: float) -> LocalExtrem
 def _empty(field: Field, heights: Floats, reach_m: float) -> LocalExtrema:
     """Local extrema that are unknown everywhere."""
     shape = -(-(heights.shape[1] - 1) // STRIP), heights.shape[0] - 1, STRIP
-    cols, rows = (math.ceil(reach_m / step) for step in (field.step_x, field.step_y))
+    cols, rows = _cells(field, heights, reach_m)
     slope, high, low = (_zeros(shape) for _ in range(3))
     return LocalExtrema(slope, high, low, cols, rows)
+
+
+def _cells(field: Field, heights: Floats, reach_m: float) -> tuple[int, int]:
+    """Columns and rows of a reach. From one as large as the surface on, any window holds all of it and what is beyond.
+
+    Raises InputError for a reach whose work array is larger than `MOST_ROOM_BYTES`.
+    """
+    rows, cols = heights.shape
+    cols, rows = (min(math.ceil(reach_m / s), most) for s, most in ((field.step_x, cols), (field.step_y, rows)))
+    box = [n - 1 if (heights.shape[0] - 1) * (heights.shape[1] - 1) <= LARGE_WINDOW else TILE for n in heights.shape]
+    room_bytes = 4 * math.prod(_room(rows, cols, *box))
+    if room_bytes > MOST_ROOM_BYTES:
+        raise InputError(
+            f"a reach of {reach_m:.0f} m, of clearances and errors together, is {max(cols, rows)} cells of this "
+            "terrain, which is more than is examined around a leg: give smaller ones, or a coarser terrain model"
+        )
+    return cols, rows
+
+
+def _room(reach_rows: int, reach_cols: int, rows: int, cols: int) -> tuple[int, int, int]:
+    """The shape of the work array for blocks of a box of so many rows and columns, with the reach around them."""
+    tall, wide = min(max(TALL, WIDER * reach_rows), rows), min(max(WIDE, WIDER * reach_cols), cols)
+    return tall + 2 * reach_rows, 4, wide + 2 * reach_cols
 
 
 def _zeros(shape: tuple[int, ...]) -> Singles:
@@ -171,9 +197,7 @@ def _zeros(shape: tuple[int, ...]) -> Singles:
 
 def _look_at(field: Field, heights: Floats, extrema: LocalExtrema, rows: slice, cols: slice) -> None:
     """Fill these rows and columns of local extrema."""
-    tall = min(max(TALL, WIDER * extrema.rows), rows.stop - rows.start)
-    wide = min(max(WIDE, WIDER * extrema.cols), cols.stop - cols.start)
-    room = np.empty((tall + 2 * extrema.rows, 4, wide + 2 * extrema.cols), np.float32)
+    room = np.empty(_room(extrema.rows, extrema.cols, rows.stop - rows.start, cols.stop - cols.start), np.float32)
     box = np.array([rows.start, rows.stop, cols.start, cols.stop], np.int64)
     local_extrema(
         heights,

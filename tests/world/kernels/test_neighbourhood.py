@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from gcsplan.arrays import Floats
+from gcsplan.errors import InputError
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.surface import GridMap, Surface
@@ -77,6 +79,29 @@ def test_it_bounds_all_that_is_around_and_hardly_more(seed: int) -> None:
         a, b = sign * ours[known].astype(float), sign * theirs[known]
         assert (a >= b).all()
         assert (a <= b + 1e-3 + 3e-6 * abs(b)).all()
+
+
+def test_a_reach_beyond_the_surface_takes_no_more_room_than_one_as_large() -> None:
+    """A clearance of 1000 km asked for 28 GB around 160 by 160 posts."""
+    z = rough(np.random.default_rng(1), (60, 45), 0.01)
+    field = Field.of(GridMap.affine(0.0, 0.0, 20.0, 30.0))
+    whole = extrema_around(field, z, 1800.0)
+    tracemalloc.start()
+    beyond = extrema_around(field, z, 1e6)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 4e6
+    assert all(np.array_equal(a, b) for a, b in zip(beyond[:3], whole[:3], strict=True))
+
+
+def test_a_reach_that_takes_too_much_room_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    z = np.zeros((400, 400))
+    field = Field.of(GridMap.affine(0.0, 0.0, 1.0, 1.0))
+    extrema_around(field, z, 100.0)
+    monkeypatch.setattr(_neighbourhood, "MOST_ROOM_BYTES", 4 * 4 * (399 + 2 * 100) ** 2 - 1)
+    with pytest.raises(InputError, match="a reach of 100 m, of clearances and errors together, is 100 cells"):
+        extrema_around(field, z, 100.0)
+    extrema_around(field, z, 99.0)
 
 
 def same_where_seen(part: LocalExtrema, whole: LocalExtrema, rows: NDArray[np.intp], cols: NDArray[np.intp]) -> bool:
