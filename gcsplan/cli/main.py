@@ -37,6 +37,11 @@ if _hears:
     signal.signal(signal.SIGINT, _before)
 
 
+NO_MEMORY = "not enough memory for this: give a smaller area, coarser terrain, fewer zones or items"
+NO_THREAD = "can't start new thread"
+"""What Python says, as a RuntimeError, where there is no memory for the stack of a thread."""
+
+
 def command_of(called: str) -> Any:
     """The command ``called``; its imports, the most of the time until it begins, are made here."""
     from gcsplan.cli.command_table import commands
@@ -67,9 +72,10 @@ def main() -> NoReturn:
     except KeyboardInterrupt:
         fail(interrupted(), as_json, debug)
     except MemoryError:
-        words = "not enough memory for this: give a smaller area, coarser terrain, fewer zones or items"
-        fail(InputError(words, reason="memory"), as_json, debug)
+        fail(InputError(NO_MEMORY, reason="memory"), as_json, debug)
     except Exception as error:  # the only place where a bug of gcsplan becomes an exit code
+        if str(error) == NO_THREAD:
+            fail(InputError(NO_MEMORY, reason="memory"), as_json, debug)
         fail(interrupted() if type(error).__name__ == "Abort" else explained(error), as_json, debug)
 
 

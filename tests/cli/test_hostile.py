@@ -320,9 +320,10 @@ def test_ctrl_c_during_an_upload_says_what_is_unknown_now(run: Run, monkeypatch:
     assert "uav1" in json.loads(out)["error"]["message"]
 
 
-def test_no_memory_is_an_error_that_can_be_cured(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("why", [MemoryError(), RuntimeError("can't start new thread")])
+def test_no_memory_is_an_error_that_can_be_cured(run: Run, monkeypatch: pytest.MonkeyPatch, why: Exception) -> None:
     def hungry(*_: object, **__: object) -> None:
-        raise MemoryError
+        raise why
 
     monkeypatch.setattr(pipeline, "load_mission", hungry)
     code, _, err = run("plan", "m.yaml")
