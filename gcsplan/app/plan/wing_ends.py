@@ -13,7 +13,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from gcsplan.app.plan.problem import lowest_amsl
 from gcsplan.arrays import Floats
 from gcsplan.check.fixed_wing.climb_out import (
     REACHED_M,
@@ -29,7 +28,7 @@ from gcsplan.errors import NoMission
 from gcsplan.mavlink.build.fixed_wing import pitch_deg
 from gcsplan.mavlink.build.order import FLOWN_SLOPE
 from gcsplan.mission_file import VehicleRequest
-from gcsplan.planners.problem import Problem
+from gcsplan.planners.problem import Problem, lowest_amsl
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.limits import Limits
 

@@ -25,13 +25,13 @@ from gcsplan.app.plan.wing_ends import FlightEnd, circle_m, goals, starts
 from gcsplan.arrays import Floats, Indices
 from gcsplan.check.motion.circles import circle_growth
 from gcsplan.errors import NoMission
-from gcsplan.mavlink.build.fixed_wing import flown_m, tangents_m, thinned
 from gcsplan.mavlink.build.order import MARGINS, Order, Wing
 from gcsplan.mission_file import VehicleRequest
 from gcsplan.notes.note import Note
 from gcsplan.planners.problem import Problem, Progress, Solution, straight_bound
 from gcsplan.planners.refusal.suggestions import FILLED
 from gcsplan.vehicle import Vehicle
+from gcsplan.world.geometry.fly_by import flown_m, tangents_m, thinned
 from gcsplan.world.geometry.path import Path
 from gcsplan.world.world import World
 

@@ -34,7 +34,7 @@ from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
 from gcsplan.fleet.motion.timing import Course
-from gcsplan.mavlink.build.fixed_wing import accepted_m, build_wing, flown_m, parted, tangents_m, thinned
+from gcsplan.mavlink.build.fixed_wing import accepted_m, build_wing, parted
 from gcsplan.mavlink.build.order import Order, Wing
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
@@ -48,6 +48,7 @@ from gcsplan.sim.flight.mission_flight import fly
 from gcsplan.sim.flight.track import make_track
 from gcsplan.vehicle import Autopilot, ClimbOut, Vehicle
 from gcsplan.world.geodesy.atmosphere import true_per_indicated
+from gcsplan.world.geometry.fly_by import flown_m, tangents_m, thinned
 from gcsplan.world.geometry.path import Path
 from gcsplan.world.geometry.zones import Circle, Level, Zone
 from gcsplan.world.world import World
