@@ -21,7 +21,7 @@ from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.output.files import outputs_of
 from gcsplan.app.plan import wings
 from gcsplan.app.plan.model import Plan
-from gcsplan.app.plan.wing_ends import FlightEnd, starts
+from gcsplan.app.plan.wing_ends import FlightEnd, pairs
 from gcsplan.arrays import Floats
 from gcsplan.check.fixed_wing.arcs import REMAINS, SAG_M, SETTLES_S, bend
 from gcsplan.check.fixed_wing.climb_out import above_slant, over_m, slant_shortage
@@ -538,7 +538,7 @@ def test_out_of_a_bowl_it_climbs_in_circles() -> None:
     problem = Problem(where.airspace, craft.limits, (0.0, 0.0, 365.0), (3500.0, 0.0, 365.0), turn_radius_m=RADIUS_M)
     request = VehicleRequest(craft, home, (3500.0, 0.0, GROUND_M), HOME_DEG, HOME_DEG)
     sharp = np.array([[0.0, 0.0, 365.0], [3500.0, 0.0, 365.0]])
-    end = next(starts(problem, request, sharp))
+    end = next(wings.starts(problem, request, sharp))
     assert end.circle is not None
     ends = Wing(tuple(end.top), None, 100.0, tuple(end.circle), end.circle_m)
     path = Path(np.vstack([end.chain, [3500.0, 0.0, 800.0]]))
@@ -752,14 +752,8 @@ def test_a_via_nearer_than_the_climb_out_is_long_is_reached_by_a_detour() -> Non
     assert_past_vias(over_flat(*places), places[:-1])
 
 
-def test_neither_end_stays_the_same_while_all_others_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:
-    def ends(first: str, most: int) -> object:
-        return lambda *_: (f"{first}{k}" for k in range(most))
-
-    monkeypatch.setattr(wings, "starts", ends("s", 3))
-    monkeypatch.setattr(wings, "goals", ends("g", 2))
-    nothing = np.zeros((2, 3))
-    found = [f"{a}{b}" for a, b in wings._pairs(None, None, nothing)]  # type: ignore[arg-type]
+def test_neither_end_stays_the_same_while_all_others_are_tried() -> None:
+    found = [f"{start}{goal}" for start, goal in pairs(iter(("s0", "s1", "s2")), iter(("g0", "g1")))]
     assert found == ["s0g0", "s0g1", "s1g0", "s1g1", "s2g0", "s2g1"]
 
 
@@ -769,7 +763,7 @@ def test_neither_end_stays_the_same_while_all_others_are_tried(monkeypatch: pyte
 def test_a_refusal_says_whether_the_ends_or_the_vias_leave_no_room(
     leg: int, words: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(wings, "_unfitting", lambda *_: np.array([leg]))
+    monkeypatch.setattr(wings, "unfitting_legs", lambda *_: np.array([leg]))
     with pytest.raises(NoMission, match=words):
         over_flat((2000.0, 0.0), (2000.0, 1500.0), (4000.0, 1500.0))
 
