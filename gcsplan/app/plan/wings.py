@@ -19,19 +19,6 @@ from gcsplan.app.plan.attempts import of_all, with_bound, within_budget
 from gcsplan.app.plan.margins import larger, on_path
 from gcsplan.app.plan.model import Brief, VehiclePlan
 from gcsplan.app.plan.problem import built, looked_over, make_problem, run_planner, unsafe
-from gcsplan.app.plan.wing_ends import (
-    FlightEnd,
-    WantedEnd,
-    around_m,
-    circling_ends,
-    column_clear,
-    cut_off_m,
-    joined,
-    pairs,
-    problem_between,
-    straight_ends,
-    unfitting_legs,
-)
 from gcsplan.arrays import Floats
 from gcsplan.check.fixed_wing.climb_out import (
     REACHED_M,
@@ -50,6 +37,19 @@ from gcsplan.mission_file import VehicleRequest
 from gcsplan.notes.note import Note
 from gcsplan.planners.problem import Problem, Progress, Solution, straight_bound
 from gcsplan.planners.refusal.suggestions import FILLED
+from gcsplan.planners.turns.ends import (
+    FlightEnd,
+    WantedEnd,
+    around_m,
+    circling_ends,
+    column_clear,
+    cut_off_m,
+    joined,
+    pairs,
+    problem_between,
+    straight_ends,
+    unfitting_legs,
+)
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.geometry.path import Path
 from gcsplan.world.world import World

@@ -21,7 +21,6 @@ from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.output.files import outputs_of
 from gcsplan.app.plan import wings
 from gcsplan.app.plan.model import Plan
-from gcsplan.app.plan.wing_ends import FlightEnd, pairs
 from gcsplan.arrays import Floats
 from gcsplan.check.fixed_wing.arcs import REMAINS, SAG_M, SETTLES_S, bend
 from gcsplan.check.fixed_wing.climb_out import above_slant, over_m, slant_shortage
@@ -43,6 +42,7 @@ from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.mission_file import VehicleRequest, load_mission
 from gcsplan.notes.note import Note
 from gcsplan.planners.problem import Problem
+from gcsplan.planners.turns.ends import FlightEnd, pairs
 from gcsplan.sim.flight.kinematics import Kinematics
 from gcsplan.sim.flight.mission_flight import fly
 from gcsplan.sim.flight.track import make_track
