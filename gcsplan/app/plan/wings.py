@@ -8,17 +8,15 @@ goal is made likewise, backwards. The planner joins the ends. Then the mission i
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from gcsplan.app.plan.attempts import of_all, with_bound, within_budget
-from gcsplan.app.plan.margins import larger, on_path
 from gcsplan.app.plan.model import Brief, VehiclePlan
-from gcsplan.app.plan.problem import built, looked_over, make_problem, run_planner, unsafe
+from gcsplan.app.plan.problem import built, looked_over, run_planner
+from gcsplan.app.plan.replanning import Attempts, with_bound
 from gcsplan.arrays import Floats
 from gcsplan.check.fixed_wing.climb_out import (
     REACHED_M,
@@ -35,7 +33,7 @@ from gcsplan.mavlink.build.fixed_wing import pitch_deg
 from gcsplan.mavlink.build.order import FLOWN_SLOPE, MARGINS, Order, Wing
 from gcsplan.mission_file import VehicleRequest
 from gcsplan.notes.note import Note
-from gcsplan.planners.problem import Problem, Progress, Solution, straight_bound
+from gcsplan.planners.problem import Problem, Solution, straight_bound
 from gcsplan.planners.refusal.suggestions import FILLED
 from gcsplan.planners.turns.ends import (
     FlightEnd,
@@ -54,7 +52,7 @@ from gcsplan.vehicle import Vehicle
 from gcsplan.world.geometry.path import Path
 from gcsplan.world.world import World
 
-__all__ = ["plan_wing", "starts"]
+__all__ = ["starts", "wing_attempts"]
 
 
 ATTEMPTS = 5
@@ -76,48 +74,22 @@ ACCEPTED_M, CHORDS_M = 1.0, 0.2
 wider."""
 
 
-def plan_wing(
-    brief: Brief,
-    request: VehicleRequest,
-    limited: VehicleRequest,
-    world: World,
-    options: Mapping[str, object],
-    progress: Callable[[Progress], None] | None = None,
-) -> VehiclePlan:
-    """One fixed wing's path, mission and verdict, as `planning.plan_vehicle`. Raises InputError, NoMission.
+def wing_attempts(brief: Brief, request: VehicleRequest, limited: VehicleRequest, world: World) -> Attempts:
+    """How a fixed wing is planned; ``limited`` and ``world`` are those of the search.
 
-    ``limited``, ``world`` and ``options`` are those of the search: the request with its limits, the world, the
-    planner's options.
+    The path without arcs shows where its ends should lead. Margins hardly move it, so it is found once.
     """
-    source, vehicle = brief.source, request.vehicle
+    sharp: list[Floats] = []
+
+    def fly(problem: Problem) -> VehiclePlan:
+        problem = _with_goal_circle(problem, limited)
+        if not sharp:
+            straight = replace(problem, turn_radius_m=0.0, progress=None)
+            sharp.append(run_planner(brief.run, straight, request.vehicle, world).path.points)
+        return _joined(brief, request, limited, problem, sharp[0], world)
+
     margins = replace(MARGINS, track_m=MARGINS.track_m + ACCEPTED_M + CHORDS_M)
-    sharp: Floats | None = None
-    failed: VehiclePlan | None = None
-    tried: list[Solution] = []
-    begun_s = time.perf_counter()
-    for _ in range(ATTEMPTS):
-        problem, notes = make_problem(source, limited, world, brief.objective, brief.seed, margins, progress, options)
-        try:
-            problem = _with_goal_circle(within_budget(problem, tried, begun_s), limited)
-            if sharp is None:
-                straight = replace(problem, turn_radius_m=0.0, progress=None)
-                sharp = run_planner(brief.run, straight, vehicle, world).path.points
-            plan = _joined(brief, request, limited, problem, sharp, world)
-        except NoMission:
-            if failed is None:
-                raise
-            break  # there is no path with margins this large: report what the last mission broke
-        tried.append(plan.solution)
-        if not plan.verdict.findings:
-            solution = of_all(tried, problem)
-            return replace(plan, solution=solution, notes=(*notes, *plan.notes))
-        failed = plan
-        findings = on_path(plan.mission, plan.verdict)
-        if not findings:
-            break  # larger margins cannot cure a battery or the ends
-        margins = larger(margins, findings)
-    assert failed is not None
-    raise unsafe(failed.verdict, vehicle)
+    return Attempts(ATTEMPTS, margins, fly)
 
 
 def _joined(
