@@ -240,7 +240,7 @@ def parameters_table(subject: Subject) -> str:
         (
             "<br>".join(esc(n.name) for n in s.parameter.names),
             "<br>".join(f"{n.value(s.value):.6g}" for n in s.parameter.names),
-            esc(s.rule_words()), esc(s.why),
+            esc(s.rule_words()), esc(str(s.why)),
         )
         for s in subject.settings
     ]  # fmt: skip
