@@ -205,6 +205,33 @@ LINK_TEXTS = {
     "assumed_lowest_place": "the lowest place of the flight, from home, errors counted",
     "assumed_farthest_place": "the farthest place of the flight from home, errors counted",
     "assumed_fence_action": "a breach of a fence makes it return",
+    # -- why the mission cannot be flown as it was judged with what is on board --
+    "return_required_and": "a safe return is required, and {why}",
+    "return_required_but": "a safe return is required: {why}",
+    "return_required_elsewhere": (
+        "a safe return is required; it was judged at {judged_m:height} above home, and this vehicle returns at "
+        "{returns_m:height}: set {setting}"
+    ),
+    "parameters_unanswered": (
+        "{names} could not be read from the vehicle, and no answer is not the default: try again, nearer or with a "
+        "longer --timeout"
+    ),
+    "parameters_not_judged": (
+        "this is not what was judged, and cannot be judged{allowed:; --allow-parameters takes that|}{off:lines}"
+    ),
+    "breaks_limits_on_board": "{found:rows}",
+    "not_judged_on_board": "not judged: {why}",
+    "return_runs_farther": "a safe return is required, and it runs on farther than was judged{off:lines}",
+    "flight_takes_otherwise": (
+        "the flight takes {takes_s:.1f} s instead of {told_s:.1f} s ({late_s:+.1f} s)"
+        "{leans:, for ArduCopter before 4.5 takes corners with all that its lean allows|}; --allow-parameters takes "
+        "that{off:lines}"
+    ),
+    "too_near_on_board": "with these parameters {near}{off:lines}",
+    "breaches_own_fence": "the mission would breach its own fence:{found:lines}",
+    "not_judged_in_time": (
+        "it could not be judged with this vehicle's parameters within {timeout_s:g} s: give more --timeout"
+    ),
     # -- an upload or a comparison, by what was done before and after it --
     "fence_on_board": "a fence of {items} {items:item|items} is on board too, read back and compared",
     "judged_again_safe": "what is on board is judged again: safe",

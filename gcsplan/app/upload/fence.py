@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from gcsplan.app.check.fence_breaches import breach_lines, breaches, fence_areas, fence_for
+from gcsplan.app.check.fence_breaches import breaches, fence_areas, fence_for
 from gcsplan.check.motion.turn_parameters import Tuning
 from gcsplan.errors import GcsplanError, InputError
 from gcsplan.mavlink.build.fence import Fence
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from gcsplan.mavlink.link.session.results import UploadResult
 
 
-def against_fence(job: UploadJob, read_back: Mission, rtl_rel_home_m: float | None, tuning: Tuning) -> str | None:
+def against_fence(job: UploadJob, read_back: Mission, rtl_rel_home_m: float | None, tuning: Tuning) -> Note | None:
     """Why the vehicle would breach the job's fence as it flies with the parameters that were read; None if not."""
     if job.fence is None or not job.fence.items or job.vehicle is None or job.world is None:
         return None
     areas = fence_areas(job.fence, read_back, job.world)
     found = breaches(areas, read_back, job.vehicle, job.world, rtl_rel_home_m=rtl_rel_home_m, tuning=tuning)
-    return f"the mission would breach its own fence:\n{breach_lines(found)}" if found else None
+    return Note("breaches_own_fence", found=tuple(f.note for f in found)) if found else None
 
 
 def with_fences(jobs: Sequence[UploadJob], *, infinite: bool = False) -> tuple[list[UploadJob], list[tuple[str, Note]]]:

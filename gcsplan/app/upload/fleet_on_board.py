@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from gcsplan.app.plan.model import Plan
 from gcsplan.check.verdict import Verdict
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 
 __all__ = ["FleetOnBoard"]
@@ -28,14 +29,14 @@ class FleetOnBoard:
         """Whether there are others to keep apart from, and the file asks for it."""
         return self._plan.fleet is not None and self._plan.source.arrival is not None and len(self._motions) > 1
 
-    def against(self, name: str, vehicle: Vehicle, verdict: Verdict) -> str:
-        """Why the others do not keep apart from ``name``, flown as ``vehicle`` with ``verdict``; empty if they do.
+    def against(self, name: str, vehicle: Vehicle, verdict: Verdict) -> Note | None:
+        """Why the others do not keep apart from ``name``, flown as ``vehicle`` with ``verdict``; None if they do.
 
         Nothing is asked of a fleet whose file says no ``arrival``, nor of a single vehicle.
         """
         plan = self._plan
         if not self.keeps_apart or plan.fleet is None or plan.source.arrival is None:
-            return ""
+            return None
         from gcsplan.app.fleet.fleet import motion_of, rules_of, too_near
         from gcsplan.fleet.separation import separation
 
@@ -48,4 +49,4 @@ class FleetOnBoard:
         kept = [flown if v.name == name else v for v in plan.vehicles]
         found = separation([motion, *others], rules_of(plan.source.arrival, kept))
         met = [c for c in found.conflicts if name in c.worst.vehicles]
-        return str(too_near(met, plan.world)) if met else ""
+        return too_near(met, plan.world) if met else None
