@@ -19,8 +19,7 @@ from gcsplan.app.output.files import outputs_of, report_of
 from gcsplan.app.plan.model import Plan
 from gcsplan.app.rehearse import parameters_of, parts_of, terms_of
 from gcsplan.app.rehearse import rehearse as fly_plan
-from gcsplan.app.upload.fleet_on_board import FleetOnBoard
-from gcsplan.app.upload.job import JobResult
+from gcsplan.app.upload.job import FleetOnBoard, JobResult
 from gcsplan.app.upload.run import verify_file
 from gcsplan.check.judge import judge
 from gcsplan.errors import InputError, UsageError

@@ -24,9 +24,16 @@ from gcsplan.app.check.worlds import Checked, split_name
 from gcsplan.app.plan.flight_hours import hours_left
 from gcsplan.app.plan.model import Plan
 from gcsplan.app.upload.fence import not_fenced, upload_fences
-from gcsplan.app.upload.fleet_on_board import FleetOnBoard
-from gcsplan.app.upload.ground import MissionGround
-from gcsplan.app.upload.job import LINK, SIM, JobResult, ProgressCall, UploadJob, UploadOptions
+from gcsplan.app.upload.job import (
+    LINK,
+    SIM,
+    FleetOnBoard,
+    JobResult,
+    MissionGround,
+    ProgressCall,
+    UploadJob,
+    UploadOptions,
+)
 from gcsplan.app.upload.on_board import judge_on_board, settings_of
 from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, UsageError, VehicleRefused
 from gcsplan.export.outdir import write_whole
