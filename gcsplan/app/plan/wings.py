@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -43,6 +43,7 @@ from gcsplan.planners.turns.ends import (
     column_clear,
     cut_off_m,
     joined,
+    numbers_of,
     pairs,
     problem_between,
     straight_ends,
@@ -177,11 +178,11 @@ class _EndRules:
         limits, air = self.problem.limits, self.problem.airspace
         lines = [np.array([ground, top])]
         if self.lands_m_s > 0.0:
-            below = flared(_three(top), _three(ground), math.dist(top[:2], ground[:2]), self.lands_m_s)
+            below = flared(numbers_of(top), numbers_of(ground), math.dist(top[:2], ground[:2]), self.lands_m_s)
             lines += [np.array([b, a]) for a, b in pairwise(below)]
         elif not all(
             column_clear(np.array(a), np.array(b), 0.0, limits, air, band_m)
-            for a, b, band_m in above_slant(_three(ground), _three(top), limits, self.over)
+            for a, b, band_m in above_slant(numbers_of(ground), numbers_of(top), limits, self.over)
         ):
             return False
         return all(
@@ -205,43 +206,40 @@ def starts(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator
     heading = None if given is None else math.radians(90.0 - given)
     rules = _EndRules(problem, over=over_m(request.vehicle))
     wanted = WantedEnd(np.array(request.start), slope, request.takeoff_agl_m, heading, rules)
-    found = False
-    for end in straight_ends(problem, wanted, sharp):
-        found = True
-        yield end
-    for end in () if found else circling_ends(problem, wanted, sharp):
-        found = True
-        yield end
-    if not found:
-        which = "on any heading" if given is None else f"on takeoff_heading_deg {given:g}"
-        other = "start" if given is None else "heading"
-        raise NoMission(
-            f"{request.vehicle.name}: no climb-out {which} clears the ground, the zones and the ceiling at "
-            f"{pitch_deg(request.vehicle)}° (max_climb_deg, whole degrees) and leads to where min AGL is met, straight "
-            f"or in circles: another {other} or a steeper climb may{beside_strip(problem.airspace)}",
-            reason="not_found",
-        )
+    straight = straight_ends(problem, wanted, sharp)
+    first = next(straight, None)
+    which = "on any heading" if given is None else f"on takeoff_heading_deg {given:g}"
+    other = "start" if given is None else "heading"
+    return _some(
+        circling_ends(problem, wanted, sharp) if first is None else chain([first], straight),
+        f"{request.vehicle.name}: no climb-out {which} clears the ground, the zones and the ceiling at "
+        f"{pitch_deg(request.vehicle)}° (max_climb_deg, whole degrees) and leads to where min AGL is met, straight "
+        f"or in circles: another {other} or a steeper climb may{beside_strip(problem.airspace)}",
+    )
 
 
 def goals(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[FlightEnd | None]:
     """Approaches, the most natural ones first; one None if it does not land. Raises NoMission if there is none."""
     if request.end != "land":
-        yield None
-        return
+        return iter([None])
     slope = request.vehicle.limits.max_descent_slope * (1.0 - FLOWN_SLOPE)
     rules = _EndRules(problem, lands_m_s=request.vehicle.speed_max_m_s)
     wanted = WantedEnd(np.array(request.goal), slope, request.approach_agl_m, None, rules)
-    found = False
-    for end in straight_ends(problem, wanted, sharp[::-1]):
-        found = True
-        yield end
-    if not found:
-        raise NoMission(
-            f"{request.vehicle.name}: no straight approach to the goal, on any heading, clears the ground and the "
-            f"zones at max_descent_deg {request.vehicle.limits.max_descent_deg:g}: use end: loiter, or another goal"
-            f"{beside_strip(problem.airspace)}",
-            reason="not_found",
-        )
+    return _some(
+        straight_ends(problem, wanted, sharp[::-1]),
+        f"{request.vehicle.name}: no straight approach to the goal, on any heading, clears the ground and the "
+        f"zones at max_descent_deg {request.vehicle.limits.max_descent_deg:g}: use end: loiter, or another goal"
+        f"{beside_strip(problem.airspace)}",
+    )
+
+
+def _some(ends: Iterator[FlightEnd], refusal: str) -> Iterator[FlightEnd]:
+    """The ends; at the first one, NoMission with the words of ``refusal`` is raised if there is none."""
+    first = next(ends, None)
+    if first is None:
+        raise NoMission(refusal, reason="not_found")
+    yield first
+    yield from ends
 
 
 def _whole(problem: Problem, solution: Solution, start: FlightEnd, goal: FlightEnd | None) -> Solution:
@@ -275,7 +273,7 @@ def _bound_between(
     """
     first, last = start.leaves, np.array(inner.goal) if goal is None else goal.top
     outer = replace(
-        inner, start=_three(first), goal=_three(last), limits=inner.checked or inner.limits, checked=None,
+        inner, start=numbers_of(first), goal=numbers_of(last), limits=inner.checked or inner.limits, checked=None,
         turn_radius_m=0.0, progress=None, widen=None, budget_s=0.5 * inner.budget_s,
     )  # fmt: skip
     try:
@@ -288,17 +286,12 @@ def _bound_between(
     return max(bound - ends_m * (inner.horizontal_j_per_m if inner.objective == "energy" else 1.0), 0.0)
 
 
-def _three(point: Floats) -> tuple[float, float, float]:
-    east, north, amsl = point.tolist()
-    return east, north, amsl
-
-
 def _order(brief: Brief, request: VehicleRequest, start: FlightEnd, goal: FlightEnd | None) -> Order:
-    top = tuple(float(x) for x in start.top)
-    touch = None if goal is None else tuple(float(x) for x in goal.ground)
-    circle = float(math.ceil(request.vehicle.turn_radius_m)) if request.end == "loiter" else 0.0
-    up = None if start.circle is None else tuple(float(x) for x in start.circle)
-    wing = Wing(top, touch, circle, up, start.circle_m)  # type: ignore[arg-type]
+    wing = Wing(
+        numbers_of(start.top), None if goal is None else numbers_of(goal.ground),
+        float(math.ceil(request.vehicle.turn_radius_m)) if request.end == "loiter" else 0.0,
+        None if start.circle is None else numbers_of(start.circle), start.circle_m,
+    )  # fmt: skip
     return Order(request.end, brief.source.altitude_frame, wing=wing)
 
 

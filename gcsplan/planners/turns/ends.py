@@ -30,6 +30,7 @@ __all__ = [
     "column_clear",
     "cut_off_m",
     "joined",
+    "numbers_of",
     "pairs",
     "problem_between",
     "straight_ends",
@@ -270,8 +271,8 @@ def pairs(begins: Iterator[Begin], finishes: Iterator[Finish]) -> Iterator[tuple
 
 def problem_between(problem: Problem, start: FlightEnd, goal: FlightEnd | None) -> Problem:
     """The planner's part: from the end of the climb-out and its turns to the beginning of the approach."""
-    last = problem.goal if goal is None else _place(goal.chain[-1])
-    return replace(problem, start=_place(start.chain[-1]), goal=last)
+    last = problem.goal if goal is None else numbers_of(goal.chain[-1])
+    return replace(problem, start=numbers_of(start.chain[-1]), goal=last)
 
 
 def joined(problem: Problem, inner: Floats, start: FlightEnd, goal: FlightEnd | None) -> Floats:
@@ -311,6 +312,6 @@ def cut_off_m(points: Floats, start: FlightEnd, goal: FlightEnd | None, radius_m
     return float(cut_m[1] + cut_m[-2]) + abs(start.circle_m)
 
 
-def _place(point: Floats) -> tuple[float, float, float]:
-    east, north, amsl = point.tolist()
-    return east, north, amsl
+def numbers_of(point: Floats) -> tuple[float, float, float]:
+    """East, north and altitude of a point (3,)."""
+    return float(point[0]), float(point[1]), float(point[2])
