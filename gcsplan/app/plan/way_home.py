@@ -121,7 +121,7 @@ def require(homes: Mapping[str, WayHome | None], *, required: bool) -> None:
     lines = [line for name, home in list(bad.items())[:MOST_SHOWN] for line in _lines(name, home)]
     if len(bad) > MOST_SHOWN:
         lines.append(f"… and {len(bad) - MOST_SHOWN} more")
-    raise CheckFailed("\n".join([what, *lines]), reason="violation" if broken else "not_judged")
+    raise CheckFailed(what, lines=lines, reason="violation" if broken else "not_judged")
 
 
 def _lines(name: str, home: WayHome | None, wording: Wording = IN_FILES) -> list[str]:
