@@ -53,7 +53,7 @@ from gcsplan.vehicle import Vehicle
 from gcsplan.world.geometry.path import Path
 from gcsplan.world.world import World
 
-__all__ = ["starts", "wing_attempts"]
+__all__ = ["bound_between", "solution_between", "starts", "wing_attempts"]
 
 
 ATTEMPTS = 5
@@ -107,7 +107,7 @@ def _joined(
             break
         inner = problem_between(problem, start, goal)
         try:
-            found = _between(brief, inner, vehicle, world)
+            found = solution_between(brief, inner, vehicle, world)
         except NoMission as refusal:
             refused.append(refusal)
             if refusal.reason != "not_found" or len(refused) == MOST_REFUSED:
@@ -128,7 +128,7 @@ def _joined(
             why = f"{APART}\n  {crowded[0]}"
             continue
         if not verdict.findings and found.lower_bound is not None:
-            bound = _bound_between(brief, inner, solution.path.points, start, goal, vehicle, world)
+            bound = bound_between(brief, inner, solution.path.points, start, goal, vehicle, world)
             solution = with_bound(solution, bound, problem)
         speed = vehicle.speed_max_m_s
         return VehiclePlan(request, inner, solution, mission, verdict, speed, tuple(_notes(start, goal)), order, over)
@@ -251,7 +251,7 @@ def _whole(problem: Problem, solution: Solution, start: FlightEnd, goal: FlightE
     return replace(solution, path=Path(points), flown=None, lower_bound=None, notes=notes)
 
 
-def _between(brief: Brief, inner: Problem, vehicle: Vehicle, world: World) -> Solution:
+def solution_between(brief: Brief, inner: Problem, vehicle: Vehicle, world: World) -> Solution:
     """The planner's part. Its bound only ends the search, and assumes the margins, which are metres here: against one
     without them the gap would stay open whatever is tried. A refusal is that of the limits of the check."""
     try:
@@ -262,7 +262,7 @@ def _between(brief: Brief, inner: Problem, vehicle: Vehicle, world: World) -> So
     return run_planner(brief.run, inner, vehicle, world)
 
 
-def _bound_between(
+def bound_between(
     brief: Brief, inner: Problem, points: Floats, start: FlightEnd, goal: FlightEnd | None, vehicle: Vehicle,
     world: World,
 ) -> float:  # fmt: skip

@@ -27,8 +27,8 @@ SIM, LINK = "sim", "link"
 MOST_CELLS = 25_000_000
 """Cells of the widest terrain that is loaded, 400 MB."""
 ProgressCall = Callable[[str, TransferProgress], None]
-"""Called with a vehicle's name and the progress of its upload. In the last call, the phase is the outcome in a word, and
-``failed`` is no longer None."""
+"""Called with a vehicle's name and the progress of its upload. In the last call, the phase is the outcome in a word and
+``failed`` is told."""
 
 
 @dataclass(frozen=True, slots=True)

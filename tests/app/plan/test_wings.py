@@ -900,13 +900,13 @@ def test_the_bound_of_a_wing_holds_from_the_end_of_its_climb_out_under_the_limit
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Not from behind the turns that this plan makes there, and not under the larger margins of a later attempt."""
-    real, asked = wings._bound_between, list[tuple[Problem, FlightEnd, float]]()
+    real, asked = wings.bound_between, list[tuple[Problem, FlightEnd, float]]()
 
     def bound_between(brief: Any, inner: Problem, points: Floats, start: FlightEnd, *more: Any) -> float:
         asked.append((inner, start, real(brief, inner, points, start, *more)))
         return asked[-1][2]
 
-    monkeypatch.setattr(wings, "_bound_between", bound_between)
+    monkeypatch.setattr(wings, "bound_between", bound_between)
     (v,) = plan(load_mission(MISSIONS / "m.yaml", text=text_of())).vehicles
     ((inner, start, bound),) = asked
     assert v.solution.lower_bound == bound <= v.verdict.length_m
@@ -930,6 +930,6 @@ def test_that_margins_shut_the_way_between_a_wings_ends_is_no_proof(monkeypatch:
 
     monkeypatch.setattr(wings, "run_planner", shut)
     with pytest.raises(NoMission) as caught:
-        wings._between(v.brief, v.problem, v.request.vehicle, v.brief.world)
+        wings.solution_between(v.brief, v.problem, v.request.vehicle, v.brief.world)
     assert caught.value.reason == "not_found"
     assert [p.checked for p in asked] == [None, v.problem.checked]
