@@ -130,10 +130,17 @@ class NoMission(GcsplanError, RuntimeError):
 
 
 class CheckFailed(GcsplanError, RuntimeError):
-    """A mission breaks a limit, or something in it could not be judged."""
+    """A mission breaks a limit, or something in it could not be judged.
+
+    ``headline`` says what failed, and the message below it where: ``lines``.
+    """
 
     exit_code = 4
     default_reason = "violation"
+
+    def __init__(self, message: str, *, lines: Iterable[str] = (), where: str = "", reason: str = "") -> None:
+        super().__init__("\n".join([message, *lines]), where=where, reason=reason)
+        self.headline = message
 
 
 class VehicleRefused(GcsplanError, ConnectionError):

@@ -116,3 +116,10 @@ def test_an_unknown_name_is_told_the_nearest_and_all() -> None:
     assert str(error) == "there is no planner 'krll'. Did you mean 'krill'? Known: optimal, krill"
     assert str(unknown_name("there is no x 'q'", "q", ["optimal"])) == "there is no x 'q'. Known: optimal"
     assert str(unknown_name("it has no y 'q'", "q", [])) == "it has no y 'q'. Known: none"
+
+
+def test_what_failed_in_a_check_is_told_apart_from_where() -> None:
+    failed = CheckFailed("limits are broken", lines=["uav1:", "  item 3: too low"], reason="violation")
+    assert (failed.headline, failed.message) == ("limits are broken", "limits are broken\nuav1:\n  item 3: too low")
+    again = pickle.loads(pickle.dumps(failed))
+    assert (again.headline, str(again), again.reason) == (failed.headline, str(failed), "violation")

@@ -14,7 +14,7 @@ import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +26,7 @@ from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.named_files import named_files
 from gcsplan.app.output import files as outputs
 from gcsplan.app.parallel.executor import Executor
-from gcsplan.app.plan.model import Plan
+from gcsplan.app.plan.model import Plan, PlanOptions
 from gcsplan.errors import GcsplanError, InputError, NoMission, UsageError, worst_of
 from gcsplan.export.durable import locked, write_whole
 from gcsplan.export.outdir import has_outputs, is_output, retire_outputs, settle_outputs, write_outputs
@@ -158,14 +158,11 @@ MOST_MISSIONS = 100_000
 
 @dataclass(frozen=True, slots=True)
 class BatchOptions:
-    """What overrides every mission file's own settings, as in `plan`; ``report``: a page for each mission."""
+    """``plan``: what overrides every mission file's own settings. ``report``: a page for each mission."""
 
-    planner: str | None = None
-    objective: str | None = None
-    seed: int | None = None
+    plan: PlanOptions = field(default_factory=PlanOptions)
     report: bool = False
     allow_unjudged: bool = False
-    at: str | None = None
 
 
 def missions_of(given: Sequence[str]) -> list[tuple[str, Path]]:
@@ -284,9 +281,7 @@ def record_of(options: BatchOptions, item: tuple[str, str]) -> Record:
     asked = asked_of(file, options)
     with reading() as read:
         try:
-            planned = plan(
-                file, planner=options.planner, objective=options.objective, seed=options.seed, at=options.at,
-            )  # fmt: skip
+            planned = plan(file, **asdict(options.plan))
             planned, homes = flyable(planned, allow_unjudged=options.allow_unjudged, asked=options.report)
             files = outputs.outputs_of(planned, homes)
             if options.report:

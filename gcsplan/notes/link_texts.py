@@ -153,6 +153,85 @@ LINK_TEXTS = {
     "returns_slower_than_planned": (
         "MPC_XY_CRUISE is {value:g} on board, and a return at {speed_m_s:speed} was planned with"
     ),
+    # -- what a mission was judged with, by parameter --
+    "assumed_speed_or_interrupted": "the mission's speed: one that was interrupted goes on at this parameter's",
+    "assumed_return_speed": "the speed of the return",
+    "assumed_motion": "{motion:key}, in all times",
+    "assumed_last_ten_metres": "{key:land_m_s}, the landing's last 10 m",
+    "assumed_last_metres": "{key:land_m_s}, the landing's last metres",
+    "assumed_landing_higher_up": "a landing's speed higher up: 0 is {key:descent_m_s}",
+    "assumed_slow_landing": "from where on a landing is slow",
+    "assumed_slower_landing": "from where on a landing is slower",
+    "assumed_acceleration": "{key:accel_m_s2}, in all times and in how far a return runs on",
+    "assumed_key": "{motion:key}",
+    "assumed_in_corners": "{key:corner_accel_m_s2}, in corners; 0 is twice the acceleration",
+    "assumed_over_acceleration": "{key:corner_accel_m_s2} over {key:accel_m_s2}, in corners",
+    "assumed_corners_begin": "where corners begin",
+    "assumed_return_above_home": "returns are judged above home, not above terrain",
+    "assumed_return_cone": "how low a return may be near home",
+    "assumed_return_no_higher": "a return is no higher than was judged",
+    "assumed_return_lands": "a return lands",
+    "assumed_return_waits": "how long a return waits over home",
+    "assumed_airspeed": "the airspeed of the climb-out, of a return, and of a mission that was interrupted",
+    "assumed_fastest": "the fastest speed of the plan",
+    "assumed_slowest": "the slowest speed of the plan",
+    "assumed_circles": "the radius of circles that say none, and over home",
+    "assumed_circle_over_home": "the radius of the circle over home",
+    "assumed_turns_begin": "how early turns begin at way points that say no radius",
+    "assumed_settling_time": "how fast it settles on a leg",
+    "assumed_settling": "how it settles on a leg",
+    "assumed_pitch": "how far a climb-out rises too high",
+    "assumed_mission_speed": "the mission's speed",
+    "assumed_return_speed_whatever": "the speed of the return, whatever the mission's is",
+    "assumed_first_metres": "the speed of a take-off's first metres",
+    "assumed_reached": "where items without a radius count as reached",
+    "assumed_reached_height": "the height at which an item counts as reached",
+    "assumed_return_straight": "returns are judged straight home",
+    "assumed_terrain_margin": "how far off its height above ground it slows down",
+    "assumed_lean": "{key:lean_angle_deg}: {speed_m_s:.3g} m/s, and forecasts in wind",
+    "assumed_return_altitude": "the return altitude, above home{judged:, as judged|}",
+    "assumed_return_turns": "turns of the return",
+    "assumed_bank": "the bank of its turns at {speed_m_s:.3g} m/s, and a tenth to steer",
+    "after_radio_loss": "loss of radio control",
+    "after_ground_station_loss": "loss of the ground station",
+    "after_low_battery": "a low battery",
+    "after_critical_battery": "a critical battery",
+    "after_long_failsafe": "a long failsafe",
+    "assumed_failsafe": "{after} makes it return{by_mission: along the mission|}; 0 does nothing",
+    "assumed_lost_position": "a lost position makes it land, wherever it is",
+    "assumed_highest_place": "the highest place of the flight above home, errors counted",
+    "assumed_return_below_fence": "a return at {returns_m:height} keeps FENCE_MARGIN below this",
+    "assumed_fence_margin": "how far below FENCE_ALT_MAX a return keeps",
+    "assumed_lowest_place": "the lowest place of the flight, from home, errors counted",
+    "assumed_farthest_place": "the farthest place of the flight from home, errors counted",
+    "assumed_fence_action": "a breach of a fence makes it return",
+    # -- why the mission cannot be flown as it was judged with what is on board --
+    "return_required_and": "a safe return is required, and {why}",
+    "return_required_but": "a safe return is required: {why}",
+    "return_required_elsewhere": (
+        "a safe return is required; it was judged at {judged_m:height} above home, and this vehicle returns at "
+        "{returns_m:height}: set {setting}"
+    ),
+    "parameters_unanswered": (
+        "{names} could not be read from the vehicle, and no answer is not the default: try again, nearer or with a "
+        "longer --timeout"
+    ),
+    "parameters_not_judged": (
+        "this is not what was judged, and cannot be judged{allowed:; --allow-parameters takes that|}{off:lines}"
+    ),
+    "breaks_limits_on_board": "{found:rows}",
+    "not_judged_on_board": "not judged: {why}",
+    "return_runs_farther": "a safe return is required, and it runs on farther than was judged{off:lines}",
+    "flight_takes_otherwise": (
+        "the flight takes {takes_s:.1f} s instead of {told_s:.1f} s ({late_s:+.1f} s)"
+        "{leans:, for ArduCopter before 4.5 takes corners with all that its lean allows|}; --allow-parameters takes "
+        "that{off:lines}"
+    ),
+    "too_near_on_board": "with these parameters {near}{off:lines}",
+    "breaches_own_fence": "the mission would breach its own fence:{found:lines}",
+    "not_judged_in_time": (
+        "it could not be judged with this vehicle's parameters within {timeout_s:g} s: give more --timeout"
+    ),
     # -- an upload or a comparison, by what was done before and after it --
     "fence_on_board": "a fence of {items} {items:item|items} is on board too, read back and compared",
     "judged_again_safe": "what is on board is judged again: safe",

@@ -14,6 +14,7 @@ A sentence of the catalogue names the data by fields of ``str.format``, each wit
     {count} {count:item|items}  the first word for 1 and True, else the second; of a list its length decides
     {share:.1f} {zones}         anything else is formatted as Python does; a list is joined by commas
     {conflicts:lines}           a list, each of it in a line of its own below the sentence
+    {findings:rows}             a list, each of it in a line of its own
     {unit:height}               the symbol of a kind's unit alone
     {key:max_agl_m}             what the reader types for a key of the mission file: the key, or an option
     {limit:key}                 the same for a datum that is the name of a key
@@ -175,6 +176,8 @@ def _shown(value: Any, spec: str, wording: Wording) -> str:
         return one if (len(value) if isinstance(value, tuple) else value) == 1 else several
     if spec == "lines":
         return "".join(f"\n  {_shown(each, '', wording)}" for each in value)
+    if spec == "rows":
+        return "\n".join(_shown(each, "", wording) for each in value)
     if isinstance(value, tuple):
         return ", ".join(_shown(each, spec, wording) for each in value)
     if isinstance(value, Note):

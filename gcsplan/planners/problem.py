@@ -270,6 +270,18 @@ def passes_vias(problem: Problem, points: Floats) -> bool:
     return True
 
 
+def lowest_amsl(air: Airspace, east_m: float, north_m: float, limits: Limits) -> float:
+    """The lowest altitude that a path may begin or end with, for any direction; inf over unknown ground.
+
+    A path's altitudes are bounded piece by piece (`Airspace.tube`), a little higher than hovering at the point needs.
+    """
+    low = float(air.floor_amsl(east_m, north_m, limits))
+    for east, north in ((0.5, 0.0), (0.0, 0.5), (-0.5, 0.0), (0.0, -0.5)):
+        tube = air.tube([(east_m, north_m), (east_m + east, north_m + north)], limits)
+        low = max(low, float(tube.floor_m.max()))
+    return low
+
+
 def straight_way_m(problem: Problem) -> float:
     """Length in metres of the straight track from terminal to terminal."""
     return sum(math.dist(a, b) for a, b in pairwise(terminals_of(problem)))

@@ -15,6 +15,7 @@ from typer import testing as runner
 from gcsplan.app import batch as module
 from gcsplan.app.batch import BatchOptions, MissionBatch, Record, exit_code, missions_of
 from gcsplan.app.parallel.executor import Dask, Inline, executor
+from gcsplan.app.plan.model import PlanOptions
 from gcsplan.cli.command_table import app
 from gcsplan.errors import GcsplanError, UsageError
 from gcsplan.export.table import csv_text, parquet_bytes
@@ -82,9 +83,9 @@ def test_what_is_unchanged_is_kept(folder: Path, tmp_path: Path) -> None:
     assert ran(folder, out)[1] == 1
     (out / "good" / "summary.json").unlink()
     assert ran(folder, out)[1] == 1
-    assert ran(folder, out, objective="energy")[1] == 4  # other options are another batch
+    assert ran(folder, out, plan=PlanOptions(objective="energy"))[1] == 4  # other options are another batch
     (out / "records" / "good.json").write_text("{")
-    assert ran(folder, out, objective="energy")[1] == 1
+    assert ran(folder, out, plan=PlanOptions(objective="energy"))[1] == 1
 
 
 def test_a_mission_that_fails_now_loses_its_old_outputs(folder: Path, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.output.files import outputs_of, report_of
 from gcsplan.app.plan.model import Plan
 from gcsplan.app.upload.job import JobResult, UploadJob
-from gcsplan.app.upload.orders import _judge_again
+from gcsplan.app.upload.on_board import judge_on_board
 from gcsplan.errors import InputError
 from gcsplan.mavlink.link.session.parameters import judge_parameters, lean_shortage
 from gcsplan.mission_file import load_mission
@@ -170,15 +170,16 @@ def test_simulated_vehicles_lean_as_far_as_their_missions_need() -> None:
     ],
 )  # fmt: skip
 def test_the_parameter_is_named_and_scaled_as_the_vehicles_version_does(values: dict[str, float], words: str) -> None:
-    found = str(lean_shortage(values, 15.0) or "")
+    short = lean_shortage(values, 15.0)
+    found = str(short or "")
     assert words in found
     assert bool(words) == bool(found)
     done = planned(lean_angle_deg=45)
     v = done.vehicles[0]
     job = UploadJob("uav1", "sim", v.mission, v.verdict, v.request.vehicle, done.world)
-    again = _judge_again(job)
+    again = judge_on_board(job, allow_unjudged=False)
     assert again is not None
-    assert (again(v.mission, values) or "") == found
+    assert again(v.mission, values) == short
 
 
 def test_what_could_not_be_read_is_told() -> None:

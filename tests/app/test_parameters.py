@@ -19,8 +19,7 @@ from gcsplan.app.output.files import outputs_of, report_of
 from gcsplan.app.plan.model import Plan
 from gcsplan.app.rehearse import parameters_of, parts_of, terms_of
 from gcsplan.app.rehearse import rehearse as fly_plan
-from gcsplan.app.upload.fleet_on_board import FleetOnBoard
-from gcsplan.app.upload.job import JobResult
+from gcsplan.app.upload.job import FleetOnBoard, JobResult
 from gcsplan.app.upload.run import verify_file
 from gcsplan.check.judge import judge
 from gcsplan.errors import InputError, UsageError
@@ -152,6 +151,9 @@ def test_a_flight_that_takes_another_time_is_refused_or_allowed(
     assert sent(done, board(autopilot, **own)).verified
     refused = sent(done, board(autopilot, **(own | parameters)))
     assert (refused.outcome, refused.code, refused.reason) == ("refused", 5, "parameters")
+    told = refused.as_dict()
+    assert told["failed_check_data"]["code"] == "flight_takes_otherwise"
+    assert told["message"].endswith(told["failed_check"])
     assert words in refused.message
     assert "the flight takes" in refused.message
     allowed = sent(done, board(autopilot, **(own | parameters)), allow_parameters=True)
@@ -272,9 +274,9 @@ def test_a_fleet_keeps_apart_as_its_parameters_make_it_fly() -> None:
     for speed in np.arange(8.0, 16.0, 0.5).tolist():
         other = replace(v.request.vehicle, return_m_s=speed)
         verdict = judge(v.mission, other, done.world, rtl_rel_home_m=60.0)
-        words = FleetOnBoard(done).against("a", other, verdict)
-        met.append(bool(words))
-        assert not words or "come as near as" in words
+        near = FleetOnBoard(done).against("a", other, verdict)
+        met.append(near is not None)
+        assert near is None or "come as near as" in str(near)
     assert not met[4]  # as planned, at 10 m/s
     assert any(met)
     assert a.end_s > c.begin_s

@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gcsplan.app.fleet.pipeline import load_mission, plan
-from gcsplan.app.upload.on_board import settings_of
-from gcsplan.app.upload.orders import judge_on_board
+from gcsplan.app.upload.on_board import judge_on_board, settings_of
 from gcsplan.app.upload.run import jobs_of
 from gcsplan.mavlink.link.terrain import OFF
 from gcsplan.mavlink.mission.parameter_names import OnBoard

@@ -315,7 +315,7 @@ def one(seed: int) -> tuple[str, str]:
         broken = faults(kind, case, raw, 1.0)
         return ("fault" if broken else "accepted", f"{kind} {changed}: {'; '.join(broken)}")
     needless = not faults(kind, case, raw, 0.4)
-    return ("needless" if needless else "refused", f"{kind} {changed}: {refused.splitlines()[-1]}")
+    return ("needless" if needless else "refused", f"{kind} {changed}: {str(refused).splitlines()[-1]}")
 
 
 def main() -> int:

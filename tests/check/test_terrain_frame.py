@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from gcsplan.app.plan.margins import MOST_SLOPE, larger
+from gcsplan.app.plan.replanning import MOST_SLOPE, larger
 from gcsplan.check.judge import judge
 from gcsplan.check.motion.project import follow_ground
 from gcsplan.mavlink.build.multirotor import build_mission

@@ -66,8 +66,8 @@ def test_transfers_of_many_share_one_bar(monkeypatch: pytest.MonkeyPatch) -> Non
     with console.transfer_progress(names) as moved_on:
         for name in names[:7]:
             moved_on(name, TransferProgress("sending", 1, 5))
-            moved_on(name, TransferProgress("verified", 5, 5))
-        moved_on("uav9", TransferProgress("refused!", 0, 5))
+            moved_on(name, TransferProgress("verified", 5, 5, failed=False))
+        moved_on("uav9", TransferProgress("refused", 0, 5, failed=True))
     text = screen.file.getvalue()
     assert "40 vehicles" in text
     assert "8/40" in text

@@ -13,7 +13,7 @@ import gcsplan
 from gcsplan.notes.note import NUMBER_KINDS, TEXTS, fields_of, parts_of
 
 ROOT = Path(gcsplan.__file__).parent
-FORMS = {*NUMBER_KINDS, "angle", "key", "reach", "seconds", "joules", "lines", "g"}
+FORMS = {*NUMBER_KINDS, "angle", "key", "reach", "seconds", "joules", "lines", "rows", "g"}
 
 
 def made() -> Iterator[tuple[str, ast.Call, dict[str, list[str]]]]:

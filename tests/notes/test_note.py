@@ -27,6 +27,7 @@ from gcsplan.units import AVIATION, IMPERIAL, METRIC
         ("{zones:zone|zones} {zones}", {"zones": ("a", "b")}, "zones a, b", "zones a, b"),
         ("{loop:round|hold}", {"loop": True}, "round", "round"),
         ("near:{pairs:lines}", {"pairs": ("a", "b")}, "near:\n  a\n  b", "near:\n  a\n  b"),
+        ("{found:rows}", {"found": ("a", "b")}, "a\nb", "a\nb"),
         ("{share:.1f} %", {"share": 3.14}, "3.1 %", "3.1 %"),
         ("because {why}", {"why": Note("battery_lasts_unknown", 3)},
          "because item 3: how long the battery lasts there is not known, for hover_w is 0",

@@ -45,12 +45,14 @@ from gcsplan.units import AVIATION, METRE, METRIC, duration
 from gcsplan.vehicle import Energy, Vehicle
 from gcsplan.world.geometry.path import Path
 from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
-from gcsplan.world.terrain.model_words import BARE_DEM, SURFACE_DEM
 from gcsplan.world.world import World
 from tests.fleet.test_separation import random_fleet
 from tests.support.effort import draws
 from tests.support.noted import saying
 from tests.support.worlds import vehicle, world
+
+BARE_DEM = "bare DEM: trees, masts and wires are not in it"
+SURFACE_DEM = "surface DEM: trees and buildings as the radar saw them; newer ones, masts and wires are not in it"
 
 HOME_DEG = (36.6, -84.3)
 HOSTILE = "</script><script>alert('x')</script>\"'><img src=x onerror=alert(1)>&amp;\u202egnp.exe\x00"

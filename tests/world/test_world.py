@@ -12,8 +12,11 @@ from gcsplan.world.airspace import Airspace
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geodesy.height_unit import METRE
 from gcsplan.world.geometry.surface import GridMap, Surface
-from gcsplan.world.terrain.model_words import BARE_DEM, SURFACE_DEM, heights_line, heights_read, what_is_not_in
+from gcsplan.world.terrain.model_words import heights_line, heights_read, what_is_not_in
 from gcsplan.world.world import ANSWERS_KEPT, World
+
+BARE_DEM = "bare DEM: trees, masts and wires are not in it"
+SURFACE_DEM = "surface DEM: trees and buildings as the radar saw them; newer ones, masts and wires are not in it"
 
 FRAME = Frame(36.6, -84.3)
 
@@ -66,6 +69,7 @@ def test_other_posts_are_another_world_and_the_same_ones_are_not() -> None:
 )
 def test_what_a_terrain_model_does_not_hold_is_said(info: dict[str, object], words: str) -> None:
     assert what_is_not_in(info) == words
+    assert what_is_not_in(info, model="") == words.replace(" DEM", "")
 
 
 def test_how_heights_were_read_is_one_line_with_the_ends_rounded_outwards() -> None:

@@ -53,15 +53,15 @@ def fence_for(
         ) from None
     found = breaches(areas, mission, vehicle, world, rtl_rel_home_m=rtl_rel_home_m)
     if found:
-        lines = breach_lines(found)
         cure = (
             "leave out --fence-infinite: those zones have a height, and a fence has none"
             if infinite
             else "the vehicle would turn round in the air; plan again, or send no fence"
         )
         raise CheckFailed(
-            f"the mission itself would breach this fence:\n{lines}\n{cure}", where=vehicle.name, reason="fence"
-        )
+            "the mission itself would breach this fence:", lines=[*(f"  {f.message}" for f in found), cure],
+            where=vehicle.name, reason="fence",
+        )  # fmt: skip
     return fence
 
 
@@ -69,10 +69,6 @@ def fence_areas(fence: Fence, mission: Mission, world: World) -> list[Area]:
     """The areas of ``fence`` as the autopilot stores them, each with its zone's name."""
     areas = areas_of([profile_of(mission.autopilot).stored(item) for item in fence.items], world.frame)
     return [replace(a, name=z.name) for a, z in zip(areas, fence.zones, strict=True)]
-
-
-def breach_lines(found: Sequence[Finding]) -> str:
-    return "\n".join(f"  {f.message}" for f in found)
 
 
 def breaches(

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from gcsplan.app.fleet.finishing import finished
+from gcsplan.app.fleet.fleet import finished
 from gcsplan.app.fleet.may_fly import flyable
 from gcsplan.app.plan.model import Brief, VehiclePlan
 from gcsplan.app.plan.problem import in_degrees, make_problem

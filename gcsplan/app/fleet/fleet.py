@@ -8,7 +8,7 @@ resolved or refused.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
@@ -17,9 +17,10 @@ import numpy as np
 from gcsplan.app.fleet.climb_out import circling_m, climb_out_and_glide, climb_out_m_s
 from gcsplan.app.fleet.reroute import Detours
 from gcsplan.app.fleet.start_time import SLACK_S, GateTime, gated
+from gcsplan.app.plan.flight_hours import within_hours
 from gcsplan.app.plan.left_out import LeavingOut, least_to_leave
-from gcsplan.app.plan.model import Brief, FleetPlan, VehiclePlan
-from gcsplan.app.plan.vehicle import rebuilt
+from gcsplan.app.plan.model import Brief, FleetPlan, Plan, VehiclePlan
+from gcsplan.app.plan.vehicle import over_one_terrain, rebuilt
 from gcsplan.check.flight.times import over_ground, pace_over_ground
 from gcsplan.errors import NoMission
 from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, schedule
@@ -27,6 +28,7 @@ from gcsplan.fleet.motion.timed_path import TimedPath
 from gcsplan.fleet.motion.timing import Course, Route, motion_error_m
 from gcsplan.mission_file import ArrivalRequest
 from gcsplan.notes.note import Note
+from gcsplan.planners.problem import Progress
 from gcsplan.world.world import World
 
 if TYPE_CHECKING:
@@ -39,7 +41,34 @@ SEPARATION_M = 30.0
 MOST_CONFLICTS = 8
 """Most conflicts that a refusal or a note names."""
 
-__all__ = ["crew_of", "fleet_of", "motion_of", "route_of", "rules_of", "too_near", "without"]
+__all__ = ["crew_of", "finished", "fleet_of", "motion_of", "route_of", "rules_of", "too_near", "without"]
+
+
+def finished(
+    brief: Brief,
+    vehicles: Sequence[VehiclePlan],
+    progress: Callable[[str, Progress], None] | None = None,
+    leaving: LeavingOut | None = None,
+    gate: GateTime | None = None,
+) -> Plan:
+    """The plan of a mission from its vehicles' own ones. Raises InputError, NoMission."""
+    leaving = leaving or LeavingOut(allowed=False)
+    brief, vehicles = over_one_terrain(brief, vehicles, progress, leaving)
+    leaving.require_some(vehicles)
+    source = brief.source
+    flown, fleet = fleet_of(vehicles, brief, gate, leaving)
+    flown = within_hours(source, flown, fleet)
+    notes: list[Note] = list(source.notes)
+    if len(flown) > 1 and source.arrival is None:
+        notes.append(Note("no_arrival_asked"))
+    notes += fleet.notes
+    if brief.objective == "energy" and any(not v.verdict.energy_stated for v in flown):
+        flown = tuple(replace(v, verdict=replace(v.verdict, energy_stated=True, paper_energy=True)) for v in flown)
+        notes.append(Note("paper_energy_minimised"))
+    return Plan(
+        source, brief.world, brief.planner, brief.objective, brief.seed, flown, tuple(notes), fleet,
+        tuple(leaving.found), leaving.allowed,
+    )  # fmt: skip
 
 
 def fleet_of(

@@ -57,8 +57,8 @@ def require_passing(verdicts: Mapping[str, Verdict], *, allow_unjudged: bool = F
     bad = {name: v for name, v in verdicts.items() if v.safe is False or (v.safe is None and not allow_unjudged)}
     if bad:
         broken = any(v.safe is False for v in bad.values())
-        lines = "\n".join(f"{name}:\n  " + v.describe().replace("\n", "\n  ") for name, v in bad.items())
         raise CheckFailed(
-            f"{'limits are broken' if broken else 'not everything could be judged'}\n{lines}",
+            "limits are broken" if broken else "not everything could be judged",
+            lines=[f"{name}:\n  " + v.describe().replace("\n", "\n  ") for name, v in bad.items()],
             reason="violation" if broken else "not_judged",
         )

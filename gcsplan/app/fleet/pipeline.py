@@ -13,14 +13,14 @@ from os import PathLike
 from typing import Any
 
 from gcsplan.app.fleet.explain import plan_or_explain
-from gcsplan.app.fleet.finishing import finished
+from gcsplan.app.fleet.fleet import finished
 from gcsplan.app.fleet.start_time import GateTime
 from gcsplan.app.fleet.workers import PIECE_S, planned_by
 from gcsplan.app.parallel.executor import Inline, executor
 from gcsplan.app.parallel.sites import world_of
 from gcsplan.app.plan.arguments import require
 from gcsplan.app.plan.left_out import LeavingOut
-from gcsplan.app.plan.model import Brief, Plan, VehiclePlan
+from gcsplan.app.plan.model import Brief, Plan, PlanOptions, VehiclePlan
 from gcsplan.errors import InputError, NoMission, unknown_name
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.planners.problem import Progress
@@ -88,7 +88,7 @@ def plan(
         source = load_mission(source, departure=gate_utc, at=at)
     elif at is not None:
         raise InputError("the mission is read already: give `at` to load_mission", where="at")
-    brief = _brief_of(source, planner or source.planner.name, objective, seed, options or {})
+    brief = _brief_of(source, PlanOptions(planner, objective, seed, options or {}))
     if leave_out is None:
         leave_out = source.arrival is not None and source.arrival.leave_out
     leaving = LeavingOut(allowed=leave_out)
@@ -96,18 +96,17 @@ def plan(
     return finished(brief, vehicles, progress, leaving, None if gate_utc is None else GateTime(gate_utc))
 
 
-def _brief_of(
-    source: MissionFile, name: str, objective: str | None, seed: int | None, options: Mapping[str, object]
-) -> Brief:
-    """What all vehicles of a mission are planned with; what is given overrides the file's."""
+def _brief_of(source: MissionFile, asked: PlanOptions) -> Brief:
+    """What all vehicles of a mission are planned with; what is asked overrides the file's."""
+    name = asked.planner or source.planner.name
     entry = get_planner(name)
-    goal = objective or source.planner.objective
+    goal = asked.objective or source.planner.objective
     if goal not in ("length", "energy"):
         raise InputError(f"objective must be length or energy, given {goal!r}")
-    merged = _options(source, name) | dict(options)
+    merged = _options(source, name) | dict(asked.options)
     by_priority = bool(entry.optimiser) and (merged.get("cost") or entry.defaults.get("cost")) == "msfoa"
     _require_warm_start(source, name, merged)
-    number = source.planner.seed if seed is None else seed
+    number = source.planner.seed if asked.seed is None else asked.seed
     return Brief(source, world_of(source), name, goal, number, merged, by_priority and len(source.vehicles) > 1)
 
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gcsplan.app.plan.attempts import same_ends, with_bound
 from gcsplan.app.plan.model import Brief, VehiclePlan
+from gcsplan.app.plan.replanning import same_ends, with_bound
 from gcsplan.app.plan.vehicle import plan_vehicle
 from gcsplan.errors import InputError, NoMission
 from gcsplan.fleet.motion.timing import Route

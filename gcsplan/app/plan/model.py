@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import TYPE_CHECKING
@@ -26,6 +26,22 @@ if TYPE_CHECKING:
 
 TOUCH_M, TOUCH = 1e-3, 1e-7
 """Metres, and part of the bound, by which rounding may put the cost of a plan below its bound."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanOptions:
+    """What is asked for in place of a mission file's own keys, by the names of `plan`'s arguments; None: as it says.
+
+    ``options``: keys of single planners. ``at``: when it is flown. ``leave_out``: vehicles without a mission are left
+    out.
+    """
+
+    planner: str | None = None
+    objective: str | None = None
+    seed: int | None = None
+    options: Mapping[str, object] = field(default_factory=dict)
+    at: str | Sequence[str] | None = None
+    leave_out: bool | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.mission import Home, Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest
 from gcsplan.notes.note import Note
-from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via
+from gcsplan.planners.problem import Problem, Progress, Refusal, Solution, Via, lowest_amsl
 from gcsplan.planners.refusal.suggestions import FILLED
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.airspace import Airspace
@@ -278,18 +278,6 @@ def _wanted_agl_m(agl_m: float | None, amsl_m: float | None, ground_m: float) ->
     if agl_m is None and amsl_m is not None and amsl_m > ground_m:
         return amsl_m - ground_m
     return agl_m
-
-
-def lowest_amsl(air: Airspace, east_m: float, north_m: float, limits: Limits) -> float:
-    """The lowest altitude that a path may begin or end with, for any direction; inf over unknown ground.
-
-    A path's altitudes are bounded piece by piece (`Airspace.tube`), a little higher than hovering at the point needs.
-    """
-    low = float(air.floor_amsl(east_m, north_m, limits))
-    for east, north in ((0.5, 0.0), (0.0, 0.5), (-0.5, 0.0), (0.0, -0.5)):
-        tube = air.tube([(east_m, north_m), (east_m + east, north_m + north)], limits)
-        low = max(low, float(tube.floor_m.max()))
-    return low
 
 
 def _straight_legs_m(request: VehicleRequest) -> list[float]:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from gcsplan.app.plan.attempts import of_all, within_budget
 from gcsplan.app.plan.corners import cut, moved, sharpened
 from gcsplan.app.plan.left_out import LeavingOut
-from gcsplan.app.plan.margins import larger, on_path
 from gcsplan.app.plan.model import Brief, VehiclePlan
 from gcsplan.app.plan.problem import bow_margin_m, built, looked_over, make_problem, run_planner, unsafe
+from gcsplan.app.plan.replanning import Attempts, on_path, replanned
 from gcsplan.arrays import Floats
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
@@ -54,41 +52,33 @@ def plan_vehicle(
     world = brief.world if searched is None else searched
     merged = {**brief.options, **(options or {})}
     if vehicle.turn_radius_m > 0.0:
-        from gcsplan.app.plan.wings import plan_wing  # imported here because most vehicles are multicopters
+        from gcsplan.app.plan.wings import wing_attempts  # imported here because most vehicles are multicopters
 
-        return plan_wing(brief, request, limited, world, merged, progress)
-    margins, failed = MARGINS, None
-    tried: list[Solution] = []
-    begun_s = time.perf_counter()
-    for _ in range(ATTEMPTS):
-        try:
-            problem, notes = make_problem(
-                source, limited, world, brief.objective, brief.seed, margins, progress, merged
-            )
-            problem = within_budget(problem, tried, begun_s)
-            solution = run_planner(brief.run, problem, vehicle, world)
-        except NoMission:
-            if failed is None:
-                raise
-            break  # there is no path with margins this large: report what the last mission broke
-        tried.append(solution)
+        attempts = wing_attempts(brief, request, limited, world)
+    else:
+        attempts = _copter_attempts(brief, request, limited, world)
+    return replanned(
+        attempts,
+        lambda margins: make_problem(source, limited, world, brief.objective, brief.seed, margins, progress, merged),
+    )
+
+
+def _copter_attempts(brief: Brief, request: VehicleRequest, limited: VehicleRequest, world: World) -> Attempts:
+    """How an aircraft that can stand still is planned; ``limited`` and ``world`` are those of the search."""
+    vehicle = request.vehicle
+
+    def fly(problem: Problem) -> VehiclePlan:
+        solution = run_planner(brief.run, problem, vehicle, world)
         over = looked_over(brief, solution)
         order = Order(
-            request.end, source.altitude_frame, return_path=request.return_route == "mission",
+            request.end, brief.source.altitude_frame, return_path=request.return_route == "mission",
             bow_m=bow_margin_m(limited, world),
             exact=tuple((v.east_m, v.north_m) for v in problem.via if v.amsl_m is not None),
         )  # fmt: skip
         solution, order, mission, verdict = _built(over, request, problem, solution, order)
-        if not verdict.findings:
-            solution = of_all([*tried[:-1], solution], problem)
-            return VehiclePlan(request, problem, solution, mission, verdict, vehicle.speed_max_m_s, notes, order, over)
-        failed = verdict
-        findings = on_path(mission, verdict)
-        if not findings:
-            break  # larger margins cannot cure a battery, a take-off column or a return
-        margins = larger(margins, findings, acceptance_radius_m(vehicle))
-    assert failed is not None
-    raise unsafe(failed, vehicle)
+        return VehiclePlan(request, problem, solution, mission, verdict, vehicle.speed_max_m_s, (), order, over)
+
+    return Attempts(ATTEMPTS, MARGINS, fly, acceptance_radius_m(vehicle))
 
 
 def _built(

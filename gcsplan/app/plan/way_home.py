@@ -121,7 +121,7 @@ def require(homes: Mapping[str, WayHome | None], *, required: bool) -> None:
     lines = [line for name, home in list(bad.items())[:MOST_SHOWN] for line in _lines(name, home)]
     if len(bad) > MOST_SHOWN:
         lines.append(f"… and {len(bad) - MOST_SHOWN} more")
-    raise CheckFailed("\n".join([what, *lines]), reason="violation" if broken else "not_judged")
+    raise CheckFailed(what, lines=lines, reason="violation" if broken else "not_judged")
 
 
 def _lines(name: str, home: WayHome | None, wording: Wording = IN_FILES) -> list[str]:
@@ -132,24 +132,24 @@ def _lines(name: str, home: WayHome | None, wording: Wording = IN_FILES) -> list
     return [f"{name}: {note.text(wording)}" for note in notes if note is not None]
 
 
-def against_on_board(home: WayHome, values: Mapping[str, float], mission: Mission) -> str | None:
+def against_on_board(home: WayHome, values: Mapping[str, float], mission: Mission) -> Note | None:
     """Why a required return is not the one that a vehicle with these parameters would fly; None if it is."""
     if otherwise := takes_another_route(values, mission, home.route):
-        return f"a safe return is required, and {otherwise}"
+        return Note("return_required_and", why=otherwise)
     if home.route == "mission":
         return None
     height_m = return_on_board_m(values)
     parameter = on_board(values)
     if height_m is None or parameter is None:
-        return "a safe return is required, and the return altitude on board could not be read"
+        return Note("return_required_and", why=Note("return_altitude_unread"))
     if otherwise := returns_otherwise(values):
-        return f"a safe return is required, and {otherwise}"
+        return Note("return_required_and", why=otherwise)
     if abs(height_m - home.rtl_rel_home_m) <= SAME_M:
         return None
-    return (
-        f"a safe return is required; it was judged at {home.rtl_rel_home_m:g} m above home, and this vehicle returns "
-        f"at {height_m:g} m: set {parameter.setting(home.rtl_rel_home_m)}"
-    )
+    return Note(
+        "return_required_elsewhere", judged_m=home.rtl_rel_home_m, returns_m=height_m,
+        setting=parameter.setting(home.rtl_rel_home_m),
+    )  # fmt: skip
 
 
 def warnings(homes: Mapping[str, WayHome | None], wording: Wording = IN_FILES) -> list[str]:

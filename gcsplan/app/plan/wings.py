@@ -1,41 +1,59 @@
 """A fixed wing's plan: a climb-out, a path of arcs, and an approach, joined end to end.
 
-A path of arcs (`planners.turns`) has no heading at its ends, but a fixed wing has one at both. So the ends are made
-first. The climb-out goes straight from the start as far as it must climb, on the requested heading or the first legal
-one near the direction of the path; then a straight piece to begin the first turn from, and further turns if the heading
-is far off. If the vehicle lands, the approach to the goal is made likewise, backwards. The planner joins the ends; the
-turns at the joints are corners like any other. Then the mission is built, and judged as flown.
+The ends are made first (`planners.turns.ends`): the climb-out goes straight from the start as far as it must climb, on
+the requested heading or the first legal one near the direction of the path. If the vehicle lands, the approach to the
+goal is made likewise, backwards. The planner joins the ends. Then the mission is built, and judged as flown.
 """
 
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
-from itertools import count, islice
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import chain, pairwise
 
 import numpy as np
 
-from gcsplan.app.plan.attempts import of_all, with_bound, within_budget
-from gcsplan.app.plan.margins import larger, on_path
 from gcsplan.app.plan.model import Brief, VehiclePlan
-from gcsplan.app.plan.problem import built, looked_over, make_problem, run_planner, unsafe
-from gcsplan.app.plan.wing_ends import FlightEnd, circle_m, goals, starts
-from gcsplan.arrays import Floats, Indices
+from gcsplan.app.plan.problem import built, looked_over, run_planner
+from gcsplan.app.plan.replanning import Attempts, with_bound
+from gcsplan.arrays import Floats
+from gcsplan.check.fixed_wing.climb_out import (
+    REACHED_M,
+    above_slant,
+    beside_strip,
+    circle_missing_m,
+    over_m,
+    slant_shortage,
+)
+from gcsplan.check.fixed_wing.glide import flared
 from gcsplan.check.motion.circles import circle_growth
 from gcsplan.errors import NoMission
-from gcsplan.mavlink.build.fixed_wing import flown_m, tangents_m, thinned
-from gcsplan.mavlink.build.order import MARGINS, Order, Wing
+from gcsplan.mavlink.build.fixed_wing import pitch_deg
+from gcsplan.mavlink.build.order import FLOWN_SLOPE, MARGINS, Order, Wing
 from gcsplan.mission_file import VehicleRequest
 from gcsplan.notes.note import Note
-from gcsplan.planners.problem import Problem, Progress, Solution, straight_bound
+from gcsplan.planners.problem import Problem, Solution, straight_bound
 from gcsplan.planners.refusal.suggestions import FILLED
+from gcsplan.planners.turns.ends import (
+    FlightEnd,
+    WantedEnd,
+    around_m,
+    circling_ends,
+    column_clear,
+    cut_off_m,
+    joined,
+    numbers_of,
+    pairs,
+    problem_between,
+    straight_ends,
+    unfitting_legs,
+)
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.geometry.path import Path
 from gcsplan.world.world import World
 
-__all__ = ["plan_wing"]
+__all__ = ["bound_between", "solution_between", "starts", "wing_attempts"]
 
 
 ATTEMPTS = 5
@@ -52,56 +70,27 @@ UNFITTING = ("arcs_too_long", "turn_too_early")
 
 APART = "none whose turns all fit between its way points: put vias farther apart, or allow tighter turns"
 
-PART_OF_SLOPE = 0.9993
-"""Factor on the slope limits: arcs are judged by their chords, which are shorter, and so steeper."""
-
 ACCEPTED_M, CHORDS_M = 1.0, 0.2
 """Metres by which a turn begins early or late (acceptance radii are whole metres), and by which arcs are judged
 wider."""
 
 
-def plan_wing(
-    brief: Brief,
-    request: VehicleRequest,
-    limited: VehicleRequest,
-    world: World,
-    options: Mapping[str, object],
-    progress: Callable[[Progress], None] | None = None,
-) -> VehiclePlan:
-    """One fixed wing's path, mission and verdict, as `planning.plan_vehicle`. Raises InputError, NoMission.
+def wing_attempts(brief: Brief, request: VehicleRequest, limited: VehicleRequest, world: World) -> Attempts:
+    """How a fixed wing is planned; ``limited`` and ``world`` are those of the search.
 
-    ``limited``, ``world`` and ``options`` are those of the search: the request with its limits, the world, the
-    planner's options.
+    The path without arcs shows where its ends should lead. Margins hardly move it, so it is found once.
     """
-    source, vehicle = brief.source, request.vehicle
+    sharp: list[Floats] = []
+
+    def fly(problem: Problem) -> VehiclePlan:
+        problem = _with_goal_circle(problem, limited)
+        if not sharp:
+            straight = replace(problem, turn_radius_m=0.0, progress=None)
+            sharp.append(run_planner(brief.run, straight, request.vehicle, world).path.points)
+        return _joined(brief, request, limited, problem, sharp[0], world)
+
     margins = replace(MARGINS, track_m=MARGINS.track_m + ACCEPTED_M + CHORDS_M)
-    sharp: Floats | None = None
-    failed: VehiclePlan | None = None
-    tried: list[Solution] = []
-    begun_s = time.perf_counter()
-    for _ in range(ATTEMPTS):
-        problem, notes = make_problem(source, limited, world, brief.objective, brief.seed, margins, progress, options)
-        try:
-            problem = _with_goal_circle(within_budget(problem, tried, begun_s), limited)
-            if sharp is None:
-                straight = replace(problem, turn_radius_m=0.0, progress=None)
-                sharp = run_planner(brief.run, straight, vehicle, world).path.points
-            plan = _joined(brief, request, limited, problem, sharp, world)
-        except NoMission:
-            if failed is None:
-                raise
-            break  # there is no path with margins this large: report what the last mission broke
-        tried.append(plan.solution)
-        if not plan.verdict.findings:
-            solution = of_all(tried, problem)
-            return replace(plan, solution=solution, notes=(*notes, *plan.notes))
-        failed = plan
-        findings = on_path(plan.mission, plan.verdict)
-        if not findings:
-            break  # larger margins cannot cure a battery or the ends
-        margins = larger(margins, findings)
-    assert failed is not None
-    raise unsafe(failed.verdict, vehicle)
+    return Attempts(ATTEMPTS, margins, fly)
 
 
 def _joined(
@@ -112,12 +101,13 @@ def _joined(
     vehicle = request.vehicle
     refused: list[NoMission] = []
     why = ""
-    for tried, (start, goal) in enumerate(_pairs(problem, limited, sharp)):
+    ends = pairs(starts(problem, limited, sharp), goals(problem, limited, sharp))
+    for tried, (start, goal) in enumerate(ends):
         if tried == MOST_JOINTS:
             break
-        inner = _inner(problem, start, goal)
+        inner = problem_between(problem, start, goal)
         try:
-            found = _between(brief, inner, vehicle, world)
+            found = solution_between(brief, inner, vehicle, world)
         except NoMission as refusal:
             refused.append(refusal)
             if refusal.reason != "not_found" or len(refused) == MOST_REFUSED:
@@ -125,7 +115,7 @@ def _joined(
             continue
         solution = _whole(problem, found, start, goal)
         order = _order(brief, limited, start, goal)
-        unfit = _unfitting(solution.path.points, order, vehicle.turn_radius_m)
+        unfit = unfitting_legs(solution.path.points, start, goal, vehicle.turn_radius_m)
         if len(unfit):
             last = len(solution.path.points) - (0 if goal is None else len(goal.chain))
             inside = (unfit > len(start.chain)) & (unfit < last)
@@ -138,7 +128,7 @@ def _joined(
             why = f"{APART}\n  {crowded[0]}"
             continue
         if not verdict.findings and found.lower_bound is not None:
-            bound = _bound_between(brief, inner, solution.path.points, start, goal, vehicle, world)
+            bound = bound_between(brief, inner, solution.path.points, start, goal, vehicle, world)
             solution = with_bound(solution, bound, problem)
         speed = vehicle.speed_max_m_s
         return VehiclePlan(request, inner, solution, mission, verdict, speed, tuple(_notes(start, goal)), order, over)
@@ -150,25 +140,10 @@ def _joined(
     )
 
 
-def _pairs(problem: Problem, limited: VehicleRequest, sharp: Floats) -> Iterator[tuple[FlightEnd, FlightEnd | None]]:
-    """All pairs of ends, the most natural ones first; neither end stays the same while all others are gone through."""
-    left, right = starts(problem, limited, sharp), goals(problem, limited, sharp)
-    begins: list[FlightEnd] = []
-    finishes: list[FlightEnd | None] = []
-    for total in count():
-        begins += islice(left, 1)
-        finishes += islice(right, 1)
-        if total > len(begins) + len(finishes) - 2:
-            return
-        for k in range(total + 1):
-            if k < len(begins) and total - k < len(finishes):
-                yield begins[k], finishes[total - k]
-
-
 def _with_goal_circle(problem: Problem, request: VehicleRequest) -> Problem:
     """Raise the goal as high as the flight around it needs: the circle of a loiter, or the turn for home."""
     east, north, amsl = problem.goal
-    around = {"loiter": circle_m(problem) * circle_growth(amsl + 100.0), "rtl": 2.0 * problem.turn_radius_m}
+    around = {"loiter": around_m(problem) * circle_growth(amsl + 100.0), "rtl": 2.0 * problem.turn_radius_m}
     reach_m = around.get(request.end)
     if reach_m is None:
         return problem
@@ -185,30 +160,98 @@ def _with_goal_circle(problem: Problem, request: VehicleRequest) -> Problem:
     return replace(problem, goal=(east, north, raised))
 
 
-# -- joining -------------------------------------------------------------------------------------------------------
+@dataclass(frozen=True, eq=False, slots=True)
+class _EndRules:
+    """The rules of the check for one end, as the planner asks for them (`EndJudge`).
+
+    ``lands_m_s`` is the speed of a landing, 0 for a take-off, and ``over``: how far a take-off gets above its altitude,
+    m.
+    """
+
+    problem: Problem
+    lands_m_s: float = 0.0
+    over: float = 0.0
+    reached_m: float = REACHED_M
+
+    def slant_clear(self, ground: Floats, top: Floats) -> bool:
+        """See `EndJudge.slant_clear`."""
+        limits, air = self.problem.limits, self.problem.airspace
+        lines = [np.array([ground, top])]
+        if self.lands_m_s > 0.0:
+            below = flared(numbers_of(top), numbers_of(ground), math.dist(top[:2], ground[:2]), self.lands_m_s)
+            lines += [np.array([b, a]) for a, b in pairwise(below)]
+        elif not all(
+            column_clear(np.array(a), np.array(b), 0.0, limits, air, band_m)
+            for a, b, band_m in above_slant(numbers_of(ground), numbers_of(top), limits, self.over)
+        ):
+            return False
+        return all(
+            column_clear(line[0], line[1], 0.0, limits, air) and slant_shortage(line, ground, 0.0, limits, air) is None
+            for line in lines
+        )
+
+    def circle_growth(self, amsl_m: float) -> float:
+        """See `EndJudge.circle_growth`."""
+        return circle_growth(amsl_m)
+
+    def circle_missing_m(self, middle: Floats, reach_m: float) -> float:
+        """See `EndJudge.circle_missing_m`."""
+        return circle_missing_m(middle, reach_m, self.problem.limits, self.problem.airspace)
 
 
-def _inner(problem: Problem, start: FlightEnd, goal: FlightEnd | None) -> Problem:
-    """The planner's part: from the end of the climb-out and its turns to the beginning of the approach."""
-    first = tuple(float(x) for x in start.chain[-1])
-    last = problem.goal if goal is None else tuple(float(x) for x in goal.chain[-1])
-    return replace(problem, start=first, goal=last)  # type: ignore[arg-type]
+def starts(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[FlightEnd]:
+    """Climb-outs, on the requested heading or the most natural ones first. Raises NoMission if there is none."""
+    slope = math.tan(math.radians(pitch_deg(request.vehicle)))
+    given = request.takeoff_heading_deg
+    heading = None if given is None else math.radians(90.0 - given)
+    rules = _EndRules(problem, over=over_m(request.vehicle))
+    wanted = WantedEnd(np.array(request.start), slope, request.takeoff_agl_m, heading, rules)
+    straight = straight_ends(problem, wanted, sharp)
+    first = next(straight, None)
+    which = "on any heading" if given is None else f"on takeoff_heading_deg {given:g}"
+    other = "start" if given is None else "heading"
+    return _some(
+        circling_ends(problem, wanted, sharp) if first is None else chain([first], straight),
+        f"{request.vehicle.name}: no climb-out {which} clears the ground, the zones and the ceiling at "
+        f"{pitch_deg(request.vehicle)}° (max_climb_deg, whole degrees) and leads to where min AGL is met, straight "
+        f"or in circles: another {other} or a steeper climb may{beside_strip(problem.airspace)}",
+    )
+
+
+def goals(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[FlightEnd | None]:
+    """Approaches, the most natural ones first; one None if it does not land. Raises NoMission if there is none."""
+    if request.end != "land":
+        return iter([None])
+    slope = request.vehicle.limits.max_descent_slope * (1.0 - FLOWN_SLOPE)
+    rules = _EndRules(problem, lands_m_s=request.vehicle.speed_max_m_s)
+    wanted = WantedEnd(np.array(request.goal), slope, request.approach_agl_m, None, rules)
+    return _some(
+        straight_ends(problem, wanted, sharp[::-1]),
+        f"{request.vehicle.name}: no straight approach to the goal, on any heading, clears the ground and the "
+        f"zones at max_descent_deg {request.vehicle.limits.max_descent_deg:g}: use end: loiter, or another goal"
+        f"{beside_strip(problem.airspace)}",
+    )
+
+
+def _some(ends: Iterator[FlightEnd], refusal: str) -> Iterator[FlightEnd]:
+    """The ends; at the first one, NoMission with the words of ``refusal`` is raised if there is none."""
+    first = next(ends, None)
+    if first is None:
+        raise NoMission(refusal, reason="not_found")
+    yield first
+    yield from ends
 
 
 def _whole(problem: Problem, solution: Solution, start: FlightEnd, goal: FlightEnd | None) -> Solution:
     """The solution with both ends added, yet without a lower bound."""
-    inner = solution.path.points
-    before = np.vstack([start.leaves, start.chain[:-1]])
-    behind = np.empty((0, 3)) if goal is None else np.vstack([goal.chain[-2::-1], goal.top])
-    points = thinned(np.vstack([before[1:], inner, behind]), problem.turn_radius_m)
-    points = _slowed(points, start.leaves, problem)
+    points = joined(problem, solution.path.points, start, goal)
     notes = solution.notes
     if solution.lower_bound is not None:
         notes = (*notes, Note("bound_with_climb_out", approach=goal is not None))
     return replace(solution, path=Path(points), flown=None, lower_bound=None, notes=notes)
 
 
-def _between(brief: Brief, inner: Problem, vehicle: Vehicle, world: World) -> Solution:
+def solution_between(brief: Brief, inner: Problem, vehicle: Vehicle, world: World) -> Solution:
     """The planner's part. Its bound only ends the search, and assumes the margins, which are metres here: against one
     without them the gap would stay open whatever is tried. A refusal is that of the limits of the check."""
     try:
@@ -219,7 +262,7 @@ def _between(brief: Brief, inner: Problem, vehicle: Vehicle, world: World) -> So
     return run_planner(brief.run, inner, vehicle, world)
 
 
-def _bound_between(
+def bound_between(
     brief: Brief, inner: Problem, points: Floats, start: FlightEnd, goal: FlightEnd | None, vehicle: Vehicle,
     world: World,
 ) -> float:  # fmt: skip
@@ -230,7 +273,7 @@ def _bound_between(
     """
     first, last = start.leaves, np.array(inner.goal) if goal is None else goal.top
     outer = replace(
-        inner, start=_three(first), goal=_three(last), limits=inner.checked or inner.limits, checked=None,
+        inner, start=numbers_of(first), goal=numbers_of(last), limits=inner.checked or inner.limits, checked=None,
         turn_radius_m=0.0, progress=None, widen=None, budget_s=0.5 * inner.budget_s,
     )  # fmt: skip
     try:
@@ -239,46 +282,17 @@ def _bound_between(
         bound = None
     if bound is None:
         bound = straight_bound(outer, outer.rounding_m)
-    whole = np.vstack([start.ground, first, points, *([] if goal is None else [goal.ground])])
-    tangent = tangents_m(whole, vehicle.turn_radius_m)
-    cut_m = 2.0 * (tangent - vehicle.turn_radius_m * np.arctan(tangent / vehicle.turn_radius_m))
-    ends_m = float(cut_m[1] + cut_m[-2]) + abs(start.circle_m)
+    ends_m = cut_off_m(points, start, goal, vehicle.turn_radius_m)
     return max(bound - ends_m * (inner.horizontal_j_per_m if inner.objective == "energy" else 1.0), 0.0)
 
 
-def _three(point: Floats) -> tuple[float, float, float]:
-    east, north, amsl = point.tolist()
-    return east, north, amsl
-
-
-def _slowed(points: Floats, leaves: Floats, problem: Problem) -> Floats:
-    """Lower ``points`` where they are too steep: arcs at the joints, unknown to the planner, shorten legs."""
-    flown = flown_m(np.vstack([leaves, points]), problem.turn_radius_m)[1:]
-    up, down = (PART_OF_SLOPE * s for s in (problem.limits.max_climb_slope, problem.limits.max_descent_slope))
-    z = points[:, 2].copy()
-    for i in range(1, len(z) - 1):
-        z[i] = min(z[i], z[i - 1] + up * flown[i - 1])
-    for i in range(len(z) - 2, 0, -1):
-        z[i] = min(z[i], z[i + 1] + down * flown[i])
-    return np.column_stack([points[:, :2], z])
-
-
 def _order(brief: Brief, request: VehicleRequest, start: FlightEnd, goal: FlightEnd | None) -> Order:
-    top = tuple(float(x) for x in start.top)
-    touch = None if goal is None else tuple(float(x) for x in goal.ground)
-    circle = float(math.ceil(request.vehicle.turn_radius_m)) if request.end == "loiter" else 0.0
-    up = None if start.circle is None else tuple(float(x) for x in start.circle)
-    wing = Wing(top, touch, circle, up, start.circle_m)  # type: ignore[arg-type]
+    wing = Wing(
+        numbers_of(start.top), None if goal is None else numbers_of(goal.ground),
+        float(math.ceil(request.vehicle.turn_radius_m)) if request.end == "loiter" else 0.0,
+        None if start.circle is None else numbers_of(start.circle), start.circle_m,
+    )  # fmt: skip
     return Order(request.end, brief.source.altitude_frame, wing=wing)
-
-
-def _unfitting(points: Floats, order: Order, radius: float) -> Indices:
-    """The legs between whose corners, joints included, the arcs do not fit; leg 0 leaves the climb-out."""
-    assert order.wing is not None
-    whole = np.array([order.wing.leaves, *points, *([] if order.wing.touch is None else [order.wing.touch])])
-    tangent = tangents_m(whole, radius)
-    run = np.hypot(*np.diff(whole[:, :2], axis=0).T)
-    return np.flatnonzero(tangent[:-1] + tangent[1:] > run + 0.05)
 
 
 def _notes(start: FlightEnd, goal: FlightEnd | None) -> Iterator[Note]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from gcsplan.app.check.fence_breaches import breach_lines, breaches, fence_areas, fence_for
+from gcsplan.app.check.fence_breaches import breaches, fence_areas, fence_for
 from gcsplan.check.motion.turn_parameters import Tuning
 from gcsplan.errors import GcsplanError, InputError
 from gcsplan.mavlink.build.fence import Fence
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from gcsplan.mavlink.link.session.results import UploadResult
 
 
-def against_fence(job: UploadJob, read_back: Mission, rtl_rel_home_m: float | None, tuning: Tuning) -> str | None:
+def against_fence(job: UploadJob, read_back: Mission, rtl_rel_home_m: float | None, tuning: Tuning) -> Note | None:
     """Why the vehicle would breach the job's fence as it flies with the parameters that were read; None if not."""
     if job.fence is None or not job.fence.items or job.vehicle is None or job.world is None:
         return None
     areas = fence_areas(job.fence, read_back, job.world)
     found = breaches(areas, read_back, job.vehicle, job.world, rtl_rel_home_m=rtl_rel_home_m, tuning=tuning)
-    return f"the mission would breach its own fence:\n{breach_lines(found)}" if found else None
+    return Note("breaches_own_fence", found=tuple(f.note for f in found)) if found else None
 
 
 def with_fences(jobs: Sequence[UploadJob], *, infinite: bool = False) -> tuple[list[UploadJob], list[tuple[str, Note]]]:
@@ -41,14 +41,10 @@ def with_fences(jobs: Sequence[UploadJob], *, infinite: bool = False) -> tuple[l
         if job.vehicle is None or job.world is None:
             raise InputError("a fence is made of the zones that a mission was checked with, and this one was not")
         fence = fence_for(job.mission, job.vehicle, job.world, infinite=infinite, rtl_rel_home_m=job.rtl_rel_home_m)
-        notes += _notes(job.name, fence)
+        said = fence.notes if fence.items else (*fence.notes, Note("no_zone_for_fence"))
+        notes += [(job.name, note) for note in said]
         fenced.append(replace(job, fence=fence))
     return fenced, notes
-
-
-def _notes(name: str, fence: Fence) -> list[tuple[str, Note]]:
-    notes = fence.notes if fence.items else (*fence.notes, Note("no_zone_for_fence"))
-    return [(name, note) for note in notes]
 
 
 def upload_fences(

@@ -1,17 +1,22 @@
-"""An upload job (what is sent to a vehicle), the user's options, and the result."""
+"""An upload job: what is sent to a vehicle, the ground and the fleet that it is judged with, options and the result."""
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from gcsplan.app.upload.fleet_on_board import FleetOnBoard
+import numpy as np
+
+from gcsplan.app.plan.model import Plan
+from gcsplan.arrays import Floats
 from gcsplan.check.returns.verdict import WayHome
 from gcsplan.check.verdict import Verdict
 from gcsplan.mavlink.build.fence import Fence
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mavlink.protocol.machine import TransferProgress
+from gcsplan.mission_file import MissionFile
 from gcsplan.mission_file.published.times import Hours
 from gcsplan.notes.note import Note, in_json
 from gcsplan.vehicle import Vehicle
@@ -19,8 +24,11 @@ from gcsplan.world.terrain.grid import GroundHeights
 from gcsplan.world.world import World
 
 SIM, LINK = "sim", "link"
+MOST_CELLS = 25_000_000
+"""Cells of the widest terrain that is loaded, 400 MB."""
 ProgressCall = Callable[[str, TransferProgress], None]
-"""Called with a vehicle's name and the progress of its upload. In the last call, the phase is the outcome in a word."""
+"""Called with a vehicle's name and the progress of its upload. In the last call, the phase is the outcome in a word and
+``failed`` is told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +45,86 @@ class UploadOptions:
     unchecked: bool = False
     atomic: bool = False
     timeout_s: float = 60.0
+
+
+@dataclass(eq=False)
+class MissionGround:
+    """Ground, m AMSL, at latitudes and longitudes; NaN where the mission's terrain does not know it."""
+
+    source: MissionFile
+
+    def __call__(self, lat_deg: Floats, lon_deg: Floats) -> Floats:
+        """See `terrain_grid.GroundHeights`. Raises InputError if the terrain cannot be read."""
+        while True:
+            plane = self.source.frame.to_plane(lat_deg, lon_deg)
+            heights = self.source.surface.high_at(plane[..., 0], plane[..., 1])
+            unknown = np.isnan(heights)
+            if not unknown.any() or not self._widened(plane[unknown]):
+                return heights
+
+    def _widened(self, plane: Floats) -> bool:
+        """Load more terrain if some of these places lie beyond a side where there is more."""
+        surface = self.source.surface
+        rows, cols = surface.ground_m.shape
+        at = surface.grid(plane[:, 0], plane[:, 1])
+        beyond = (at[:, 0] < 0.0, at[:, 1] < 0.0, at[:, 0] > cols - 1, at[:, 1] > rows - 1)
+        if not any(more and bool(out.any()) for more, out in zip(surface.goes_on, beyond, strict=True)):
+            return False
+        wide = None if self.source.wider is None else self.source.wider(0.0, MOST_CELLS)
+        if wide is None:
+            return False
+        self.source = wide
+        return True
+
+    def degrees_box(self) -> tuple[float, float, float, float]:
+        """South, west, north, east, degrees, of the terrain that is loaded; east is beyond 180 where it wraps."""
+        surface, frame = self.source.surface, self.source.frame
+        rows, cols = surface.ground_m.shape
+        f = np.linspace(0.0, 1.0, 33)
+        c, r = np.meshgrid(f * (cols - 1), f * (rows - 1))
+        plane = surface.grid.to_plane(c.ravel(), r.ravel())
+        degrees = frame.to_degrees(plane[:, 0], plane[:, 1])
+        lon = frame.lon_deg + (degrees[:, 1] - frame.lon_deg + 180.0) % 360.0 - 180.0
+        return float(degrees[:, 0].min()), float(lon.min()), float(degrees[:, 0].max()), float(lon.max())
+
+
+class FleetOnBoard:
+    """The motions of a plan's vehicles: as planned, until a vehicle's parameters tell that it flies another.
+
+    The vehicles are read at the same time, in any order: the later one of each pair meets the earlier one as it flies.
+    """
+
+    def __init__(self, plan: Plan) -> None:
+        self._plan = plan
+        self._motions = {} if plan.fleet is None else {m.name: m for m in plan.fleet.motions}
+        self._lock = threading.Lock()
+
+    @property
+    def keeps_apart(self) -> bool:
+        """Whether there are others to keep apart from, and the file asks for it."""
+        return self._plan.fleet is not None and self._plan.source.arrival is not None and len(self._motions) > 1
+
+    def against(self, name: str, vehicle: Vehicle, verdict: Verdict) -> Note | None:
+        """Why the others do not keep apart from ``name``, flown as ``vehicle`` with ``verdict``; None if they do.
+
+        Nothing is asked of a fleet whose file says no ``arrival``, nor of a single vehicle.
+        """
+        plan = self._plan
+        if not self.keeps_apart or plan.fleet is None or plan.source.arrival is None:
+            return None
+        from gcsplan.app.fleet.fleet import motion_of, rules_of, too_near
+        from gcsplan.fleet.separation import separation
+
+        planned = next(v for v in plan.vehicles if v.name == name)
+        flown = replace(planned, request=replace(planned.request, vehicle=vehicle), verdict=verdict)
+        motion = motion_of(flown, plan.fleet.slot(name), plan.world)
+        with self._lock:
+            others = [m for m in self._motions.values() if m.name != name]
+            self._motions[name] = motion
+        kept = [flown if v.name == name else v for v in plan.vehicles]
+        found = separation([motion, *others], rules_of(plan.source.arrival, kept))
+        met = [c for c in found.conflicts if name in c.worst.vehicles]
+        return too_near(met, plan.world) if met else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,6 +32,7 @@ from gcsplan.mavlink.mission.parameter_list import (
 )
 from gcsplan.mavlink.mission.parameter_names import OnBoard, unanswered
 from gcsplan.mavlink.mission.return_parameters import return_on_board_m
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle, fastest_at_m_s
 
 if TYPE_CHECKING:
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
 __all__ = ["judge_on_board", "settings_of", "settings_of_plan"]
 
 RIGHT_ANGLE_RAD = 0.5 * math.pi
-LEANS = ", for ArduCopter before 4.5 takes corners with all that its lean allows"
 SAME_S, SAME_PART = 1.0, 0.005
 """A flight that takes as long as told within this, s, or within this part of it, is the one that was told."""
 
@@ -101,7 +101,7 @@ def judge_on_board(
     if vehicle.lean_angle_deg is not None:
         planned_m_s = min(planned_m_s, fastest_at_m_s(vehicle.lean_angle_deg))
 
-    def again(read_back: Mission, values: Mapping[str, float]) -> str | None:
+    def again(read_back: Mission, values: Mapping[str, float]) -> Note | None:
         if job.home_required and job.way_home is not None and not simulated:
             against = against_on_board(job.way_home, values, job.mission)
             if against is not None:
@@ -110,18 +110,18 @@ def judge_on_board(
         if silent := _silent(settings, values, vehicle.autopilot, terrain):
             return silent
         if vehicle.lean_angle_deg is not None and (short := lean_shortage(values, planned_m_s)):
-            return str(short)
+            return short
         if short := speed_shortage(values, vehicle, planned_m_s):
-            return str(short)
+            return short
         if flies_terrain(read_back.wire_items()) and (odd := odd_spacing(values)):
-            return str(odd)
+            return odd
         found = off(settings, values, vehicle.autopilot)
         decide = {"flight", "return"} | ({"turns"} if straight else set())
         if not allow_parameters or (job.fleet is not None and job.fleet.keeps_apart):
             decide.add("pace")
         if unlike := [o for o in found if o.setting.matters in decide]:
-            allowed = "; --allow-parameters takes that" if {o.setting.matters for o in unlike} == {"pace"} else ""
-            return _lines(f"this is not what was judged, and cannot be judged{allowed}", unlike)
+            allowed = {o.setting.matters for o in unlike} == {"pace"}
+            return Note("parameters_not_judged", allowed=allowed, off=_notes(unlike))
         # Home on board is where the vehicle is now, but the altitudes count from the planned start.
         flown, tuning = replace(read_back, home=job.mission.home), Tuning.of(values)
         flies = vehicle if simulated else vehicle_on_board(vehicle, flown, values)
@@ -132,9 +132,10 @@ def judge_on_board(
         error_m = terrain_error_m(values, job.terrain_error_m)
         verdict = judge(flown, flies, spaced, rtl_rel_home_m=rtl_rel_home_m, terrain_error_m=error_m, tuning=tuning)
         if not (verdict.safe is True or (verdict.safe is None and allow_unjudged)):
-            return verdict.describe()
+            unjudged = (Note("not_judged_on_board", why=note) for note in verdict.not_judged)
+            return Note("breaks_limits_on_board", found=(*(f.note for f in verdict.findings), *unjudged))
         if not allow_unjudged and (beyond := beyond_hours(verdict, job.hours)):
-            return f"not judged: {beyond}"
+            return Note("not_judged_on_board", why=beyond)
         if flies != vehicle:
             against = _against_motion(job, flies, verdict, found, values, allow_parameters=allow_parameters)
             if against is not None:
@@ -146,22 +147,18 @@ def judge_on_board(
 
 def _silent(
     settings: Sequence[Setting], values: Mapping[str, float], autopilot: Autopilot, others: tuple[tuple[str, ...], ...]
-) -> str:
-    """Which parameters that the proof hangs on, or ``others``, gave no answer, in words; empty if all did.
+) -> Note | None:
+    """Which parameters that the proof hangs on, or ``others``, gave no answer; None if all did.
 
     A peer that does not say what autopilot it is has no known parameters, and values that no vehicle was asked for say
     nothing of the others.
     """
     if not isinstance(values, OnBoard) or values.generic:
-        return ""
+        return None
     silent = unanswered(values, [*needed_groups(settings, autopilot, values), *others])
     if not silent:
-        return ""
-    names = ", ".join(" or ".join(group) for group in silent)
-    return (
-        f"{names} could not be read from the vehicle, and no answer is not the default: try again, nearer or with a "
-        f"longer --timeout"
-    )
+        return None
+    return Note("parameters_unanswered", names=tuple(" or ".join(group) for group in silent))
 
 
 def _against_motion(
@@ -172,7 +169,7 @@ def _against_motion(
     values: Mapping[str, float],
     *,
     allow_parameters: bool,
-) -> str | None:
+) -> Note | None:
     """Why a vehicle that moves otherwise than planned is refused: its return, its times, or its separation.
 
     A return that runs on farther from corners because the firmware has no other rule is judged with that.
@@ -183,17 +180,18 @@ def _against_motion(
         if not allow_parameters and job.vehicle is not None:
             turning = replace(flies, corner_accel_m_s2=job.vehicle.corner_accel_m_s2) if leans else flies
             if _runs_farther(job.vehicle, turning, job.mission):
-                return _lines("a safe return is required, and it runs on farther than was judged", timed)
+                return Note("return_runs_farther", off=_notes(timed))
         if (allow_parameters or leans) and (against := _against_return(job, flies, verdict)):
             return against
     if job.verdict is not None and not allow_parameters:
         told_s, takes_s = job.verdict.time_s, verdict.time_s
         late_s = takes_s - told_s
         if math.isfinite(late_s) and abs(late_s) > max(SAME_S, SAME_PART * told_s):
-            words = f"the flight takes {takes_s:.1f} s instead of {told_s:.1f} s ({late_s:+.1f} s)"
-            return _lines(f"{words}{LEANS if leans else ''}; --allow-parameters takes that", timed)
+            return Note(
+                "flight_takes_otherwise", takes_s=takes_s, told_s=told_s, late_s=late_s, leans=leans, off=_notes(timed)
+            )
     if job.fleet is not None and (near := job.fleet.against(job.name, flies, verdict)):
-        return _lines(f"with these parameters {near}", timed)
+        return Note("too_near_on_board", near=near, off=_notes(timed))
     return None
 
 
@@ -204,8 +202,8 @@ def _runs_farther(judged: Vehicle, flies: Vehicle, mission: Mission) -> bool:
     return run_on_m(flies, speed_m_s) > more * run_on_m(judged, speed_m_s) or past_m[1] > more * past_m[0]
 
 
-def _against_return(job: UploadJob, flies: Vehicle, verdict: Verdict) -> str:
-    """Why the return of a vehicle with these parameters is not safe; empty if it is."""
+def _against_return(job: UploadJob, flies: Vehicle, verdict: Verdict) -> Note | None:
+    """Why the return of a vehicle with these parameters is not safe; None if it is."""
     from gcsplan.check.returns.way_home import way_home
 
     assert job.world is not None
@@ -214,8 +212,8 @@ def _against_return(job: UploadJob, flies: Vehicle, verdict: Verdict) -> str:
         verdict, flies, job.world, rtl_rel_home_m=job.way_home.rtl_rel_home_m, terrain_error_m=job.terrain_error_m,
         rally=False, route=job.way_home.route,
     )  # fmt: skip
-    return "" if home.safe is True else f"a safe return is required: {home.headline}"
+    return None if home.safe is True else Note("return_required_but", why=home.headline)
 
 
-def _lines(what: str, found: Sequence[Off]) -> str:
-    return "\n".join([what, *(f"  {o.note()}" for o in found)])
+def _notes(found: Sequence[Off]) -> tuple[Note, ...]:
+    return tuple(o.note() for o in found)

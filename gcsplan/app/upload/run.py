@@ -9,6 +9,7 @@ slow to import.
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -23,12 +24,17 @@ from gcsplan.app.check.worlds import Checked, split_name
 from gcsplan.app.plan.flight_hours import hours_left
 from gcsplan.app.plan.model import Plan
 from gcsplan.app.upload.fence import not_fenced, upload_fences
-from gcsplan.app.upload.fleet_on_board import FleetOnBoard
-from gcsplan.app.upload.ground import MissionGround
-from gcsplan.app.upload.job import LINK, SIM, JobResult, ProgressCall, UploadJob, UploadOptions
+from gcsplan.app.upload.job import (
+    LINK,
+    SIM,
+    FleetOnBoard,
+    JobResult,
+    MissionGround,
+    ProgressCall,
+    UploadJob,
+    UploadOptions,
+)
 from gcsplan.app.upload.on_board import judge_on_board, settings_of
-from gcsplan.app.upload.orders import order_of, report_end
-from gcsplan.app.upload.rollback import rolled_back
 from gcsplan.errors import GcsplanError, InputError, LinkError, ReadBackDiffers, UsageError, VehicleRefused
 from gcsplan.export.outdir import write_whole
 from gcsplan.mavlink.files.formats import read_mission_file, write_plan, write_waypoints
@@ -42,6 +48,7 @@ from gcsplan.vehicle import Autopilot, Vehicle
 if TYPE_CHECKING:
     from gcsplan.check.returns.verdict import WayHome
     from gcsplan.mavlink.link.link import Link
+    from gcsplan.mavlink.link.session import session
     from gcsplan.mavlink.link.session.results import UploadResult
 
 LISTEN_S = 1.5
@@ -243,6 +250,106 @@ def run_jobs(
         return rolled_back(done, orders, ended) if options.atomic else done
 
 
+def order_of(
+    job: UploadJob,
+    link: Link,
+    options: UploadOptions,
+    progress: ProgressCall | None,
+    *,
+    simulated: bool,
+    listen_s: float,
+) -> session.UploadOrder:
+    """``job`` as an order of the session over ``link``. ``listen_s``: how long to listen for rivals, s."""
+    from gcsplan.mavlink.link.session import session
+
+    ground_m = None
+    if job.world is not None:
+        home = job.mission.home
+        ground_m = job.world.ground_amsl(home.lat_e7 / 1e7, home.lon_e7 / 1e7)
+        ground_m = None if math.isnan(ground_m) else ground_m
+    settings = session.SessionOptions(
+        unchecked=options.unchecked or (job.verdict is not None and job.verdict.safe is None),
+        allow_armed=options.allow_armed,
+        ignore_position=options.ignore_position,
+        ground_amsl_m=ground_m,
+        rtl_rel_home_m=job.rtl_rel_home_m if job.way_home is None else job.way_home.rtl_rel_home_m,
+        route=None if job.way_home is None else job.way_home.route,
+        advised_rel_home_m=None if job.way_home is None else job.way_home.set_rel_home_m,
+        simulated=simulated,
+        terrain=None if simulated else job.ground,
+        timeout_s=options.timeout_s,
+        listen_s=listen_s,
+        vehicle=job.vehicle,
+        settings=() if simulated else settings_of(job),
+    )
+    again = None
+    if job.verdict is not None:
+        again = judge_on_board(
+            job, allow_unjudged=job.verdict.safe is None, allow_parameters=options.allow_parameters, simulated=simulated
+        )
+    return session.UploadOrder(link, job.mission, job.verdict, settings, again, progress)
+
+
+def report_end(progress: ProgressCall | None) -> session.EndCall | None:
+    """A call that reports the outcome of each order, in a word, to ``progress``."""
+    if progress is None:
+        return None
+    from gcsplan.mavlink.protocol.machine import TransferProgress
+
+    def report(order: session.UploadOrder, ended: UploadResult | GcsplanError) -> None:
+        count = len(order.mission.wire_items())
+        refused = isinstance(ended, VehicleRefused)
+        word: str = ("refused" if refused else "unknown") if isinstance(ended, GcsplanError) else ended.outcome
+        verified = not isinstance(ended, GcsplanError) and ended.verified
+        if not isinstance(ended, GcsplanError) and ended.changed:
+            word = f"verified, {ended.changed}" if verified else f"stopped, {ended.changed}"
+        failed = not (verified and word == "accepted")
+        done = TransferProgress(word if failed else "verified", count if verified else 0, count, failed)
+        progress(order.mission.name, done)
+
+    return report
+
+
+def rolled_back(
+    uploads: Sequence[JobResult],
+    orders: Mapping[str, session.UploadOrder],
+    ended: Mapping[str, UploadResult | GcsplanError],
+) -> list[JobResult]:
+    """All or nothing (``--atomic``): if one upload is not verified, clear the missions that the vehicles took, and read
+    back that they are gone.
+
+    A list is cleared if it was accepted or may have been; a vehicle that never took anything of this upload keeps its
+    own list. Nothing further is sent to a vehicle that has changed since it was checked: it keeps what it has, and the
+    result says so.
+    """
+    from gcsplan.mavlink.link.session import session
+
+    failures = [d.vehicle for d in uploads if d.code]
+    if not failures:
+        return list(uploads)
+    results = {name: result for name, result in ended.items() if not isinstance(result, GcsplanError)}
+    taken = [name for name, r in results.items() if r.outcome in ("accepted", "unknown") and not r.changed]
+    again = [orders[name] for name in taken]  # also listens for rivals: the upload may have ended minutes ago
+    seen = {orders[name].mission.name: results[name].state for name in taken}
+    cleared = dict(zip(taken, session.clear_fleet(again, seen), strict=True))
+    why = f"not verified: {', '.join(failures)}"
+    return [_after_clearing(d, cleared[d.vehicle], why) if d.vehicle in cleared else d for d in uploads]
+
+
+def _after_clearing(d: JobResult, cleared: UploadResult | GcsplanError, why: str) -> JobResult:
+    error = cleared if isinstance(cleared, GcsplanError) else cleared.error()
+    if error is not None:
+        earlier = f"; {d.message}" if d.message else ""
+        return replace(
+            d, verified=False, code=d.code or LinkError.exit_code, reason=d.reason or LinkError.default_reason,
+            message=f"all or nothing ({why}), but it could not be cleared and still holds the mission: "
+            f"{error}{earlier}",
+        )  # fmt: skip
+    earlier = f"; {d.message}" if d.message else ""
+    words = f"the mission was cleared again, all or nothing ({why}): the vehicle holds none now{earlier}"
+    return replace(d, outcome="withdrawn", verified=False, message=words)
+
+
 def _apart(jobs: Sequence[UploadJob]) -> list[list[UploadJob]]:
     """The jobs in groups, in none of which two have one system id."""
     groups: list[list[UploadJob]] = []
@@ -288,11 +395,14 @@ def _with_fence(result: JobResult, fence: UploadResult | GcsplanError | None) ->
 
 
 def _result(job: UploadJob, ended: UploadResult | GcsplanError) -> JobResult:
+    from gcsplan.mavlink.link.session.results import FailsCheck, failed_in_json
+
     if isinstance(ended, GcsplanError):
         outcome = "refused" if isinstance(ended, VehicleRefused) else "unknown"
         return JobResult(
             job.name, job.url, outcome, False, len(job.mission.wire_items()), 0.0, simulated=job.url == SIM,
             message=str(ended), code=ended.exit_code, reason=ended.reason,
+            details=failed_in_json(ended.note) if isinstance(ended, FailsCheck) else None,
         )  # fmt: skip
     error = ended.error()
     return JobResult(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from gcsplan.app.upload.ground import MissionGround
+from gcsplan.app.upload.job import MissionGround
 from gcsplan.app.upload.run import LISTEN_S, open_link, targets
 from gcsplan.errors import GcsplanError, UsageError
 from gcsplan.mission_file import MissionFile

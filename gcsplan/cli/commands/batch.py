@@ -57,10 +57,11 @@ def batch(
     """
     from gcsplan.app.batch import MISSION_S, BatchOptions, MissionBatch, exit_code, missions_of
     from gcsplan.app.parallel.executor import executor
+    from gcsplan.app.plan.model import PlanOptions
     from gcsplan.cli.output.console import remark, say
     from gcsplan.cli.output.progress import WorkDisplay
 
-    options = BatchOptions(planner, objective, seed, report, allow_unjudged, at)
+    options = BatchOptions(PlanOptions(planner, objective, seed, at=at), report, allow_unjudged)
     work = MissionBatch(missions_of(missions), out, options)
     display = WorkDisplay(len(work.missions), "missions")
     with work.alone():

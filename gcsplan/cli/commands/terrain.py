@@ -55,7 +55,7 @@ def dat(
     Heights are whole metres, upwards: no post lies below the mission's terrain. Where that is unknown, nothing is
     written, and the vehicle asks a ground station. A file that is there is not replaced: --add puts the blocks in.
     """
-    from gcsplan.app.upload.ground import MissionGround
+    from gcsplan.app.upload.job import MissionGround
     from gcsplan.cli.output.console import remark, say
     from gcsplan.dem.dat_file import blocks_around, contents_of
     from gcsplan.export.durable import write_whole

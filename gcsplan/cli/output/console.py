@@ -351,9 +351,8 @@ def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, Transfer]
             whole, over = bars.add_task(f"{len(names)} vehicles", total=len(names), phase=""), dict[str, bool]()
 
             def count(name: str, transfer: Transfer) -> None:
-                failed = transfer.phase.endswith("!")
-                if failed or transfer.phase == "verified":
-                    over[name] = failed
+                if transfer.failed is not None:
+                    over[name] = transfer.failed
                     bad = f"[bold red]{sum(over.values())} failed[/]" if any(over.values()) else ""
                     bars.update(whole, completed=len(over), phase=bad)
 
@@ -362,12 +361,11 @@ def transfer_progress(names: Sequence[str]) -> Iterator[Callable[[str, Transfer]
         tasks = {name: bars.add_task(escape(name), total=None, phase="looking for it") for name in names}
 
         def update(name: str, transfer: Transfer) -> None:
-            ended = {"verified": "[green]verified[/]"}.get(transfer.phase)
-            if transfer.phase.endswith("!"):
-                ended = f"[bold red]{transfer.phase.removesuffix('!')}[/]"
-            bars.update(tasks[name], completed=transfer.done, total=transfer.total, phase=ended or transfer.phase)
-            if ended:
+            phase = transfer.phase
+            if transfer.failed is not None:
+                phase = f"[{'bold red' if transfer.failed else 'green'}]{phase}[/]"
                 bars.stop_task(tasks[name])
+            bars.update(tasks[name], completed=transfer.done, total=transfer.total, phase=phase)
 
         yield update
 

@@ -13,6 +13,7 @@ from gcsplan.mavlink.mission.mission import MISSION, Mission, MissionItem
 from gcsplan.mavlink.mission.parameter_list import Setting
 from gcsplan.mavlink.mission.return_parameters import ReturnRoute
 from gcsplan.mavlink.protocol.transfer import Timers, TransferProgress
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.terrain.grid import GroundHeights
 
@@ -66,8 +67,8 @@ class Patience:
 
 
 TransferReport = Callable[[str, TransferProgress], None]
-ReadBackJudge = Callable[[Mission, Mapping[str, float]], str | None]
-"""Repeats the caller's check with the parameters that were read: None if it passes, else the reason."""
+ReadBackJudge = Callable[[Mission, Mapping[str, float]], Note | None]
+"""Repeats the caller's check with the parameters that were read: None if it passes, else why it does not."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -77,7 +77,7 @@ class Setting:
     parameter: Parameter
     value: float
     rule: SettingRule
-    why: str
+    why: Note
     matters: Matters
     also: tuple[float, ...] = ()
 
@@ -103,7 +103,7 @@ class Setting:
         ]
         return {
             "names": names, "value": self.value, "unit": self.parameter.unit, "rule": self.rule, "also": [*self.also],
-            "why": self.why,
+            "why": str(self.why), "why_data": self.why.as_dict(),
         }  # fmt: skip
 
     def rule_words(self) -> str:
@@ -166,33 +166,34 @@ def _copter(
     lands = _pace(mission, vehicle, LAND, RTL)
     rows = [
         Setting(known["speed"], _speed_m_s(mission, vehicle), "equal",
-                "the mission's speed: one that was interrupted goes on at this parameter's", own),
-        Setting(known["return_speed"], home, "equal", "the speed of the return", "time" if ends else "told"),
-        Setting(known["climb"], vehicle.climb_m_s, "equal", "climb_m_s, in all times", "time"),
-        Setting(known["descent"], vehicle.descent_m_s, "equal", "descent_m_s, in all times", "time"),
-        Setting(known["land"], vehicle.land_m_s, "equal", "land_m_s, the landing's last 10 m", "time"),
-        Setting(known["land_high"], 0.0, "equal", "a landing's speed higher up: 0 is descent_m_s", lands,
+                Note("assumed_speed_or_interrupted"), own),
+        Setting(known["return_speed"], home, "equal", Note("assumed_return_speed"), "time" if ends else "told"),
+        Setting(known["climb"], vehicle.climb_m_s, "equal", Note("assumed_motion", motion="climb_m_s"), "time"),
+        Setting(known["descent"], vehicle.descent_m_s, "equal", Note("assumed_motion", motion="descent_m_s"), "time"),
+        Setting(known["land"], vehicle.land_m_s, "equal", Note("assumed_last_ten_metres"), "time"),
+        Setting(known["land_high"], 0.0, "equal", Note("assumed_landing_higher_up"), lands,
                 (vehicle.descent_m_s,)),
-        Setting(known["land_low"], 10.0, "equal", "from where on a landing is slow", lands),
+        Setting(known["land_low"], 10.0, "equal", Note("assumed_slow_landing"), lands),
         Setting(known["accel"], COPTER_PEAK_ACCEL * vehicle.accel_m_s2, "equal",
-                "accel_m_s2, in all times and in how far a return runs on", "time"),
-        Setting(known["vertical_accel"], vehicle.vertical_accel_m_s2, "equal", "vertical_accel_m_s2", "time"),
+                Note("assumed_acceleration"), "time"),
+        Setting(known["vertical_accel"], vehicle.vertical_accel_m_s2, "equal",
+                Note("assumed_key", motion="vertical_accel_m_s2"), "time"),
         Setting(known["corner_accel"], COPTER_CORNER_ACCEL * vehicle.corner_accel_m_s2, "equal",
-                "corner_accel_m_s2, in corners; 0 is twice the acceleration", "time"),
-        Setting(known["jerk"], vehicle.leg_jerk_m_s3, "equal", "leg_jerk_m_s3, in all times", "time"),
-        Setting(known["radius"], 2.0, "at most", "where corners begin", "turns"),
-        Setting(known["return_altitude_type"], 0.0, "equal", "returns are judged above home, not above terrain", back),
-        Setting(known["cone"], 3.0, "at least", "how low a return may be near home", back, also=(0.0,)),
-        Setting(known["return_climb"], 0.0, "at most", "a return is no higher than was judged", back),
-        Setting(known["return_end"], 0.0, "at most", "a return lands", "told"),
-        Setting(known["return_waits"], vehicle.return_waits_s, "equal", "how long a return waits over home",
+                Note("assumed_in_corners"), "time"),
+        Setting(known["jerk"], vehicle.leg_jerk_m_s3, "equal", Note("assumed_motion", motion="leg_jerk_m_s3"), "time"),
+        Setting(known["radius"], 2.0, "at most", Note("assumed_corners_begin"), "turns"),
+        Setting(known["return_altitude_type"], 0.0, "equal", Note("assumed_return_above_home"), back),
+        Setting(known["cone"], 3.0, "at least", Note("assumed_return_cone"), back, also=(0.0,)),
+        Setting(known["return_climb"], 0.0, "at most", Note("assumed_return_no_higher"), back),
+        Setting(known["return_end"], 0.0, "at most", Note("assumed_return_lands"), "told"),
+        Setting(known["return_waits"], vehicle.return_waits_s, "equal", Note("assumed_return_waits"),
                 "time" if ends else "told"),
     ]  # fmt: skip
     if any(FRAME_SYNONYMS.get(item.frame, item.frame) == TERRAIN for item in mission.items):
-        why = "how far off its height above ground it slows down"
+        why = Note("assumed_terrain_margin")
         rows.append(Setting(known["terrain_margin"], 10.0, "equal", why, _pace(mission, vehicle, WAYPOINT)))
     if vehicle.lean_angle_deg is not None:
-        why = f"lean_angle_deg: {_speed_m_s(mission, vehicle):.3g} m/s, and forecasts in wind"
+        why = Note("assumed_lean", speed_m_s=_speed_m_s(mission, vehicle))
         rows.append(Setting(known["lean"], vehicle.lean_angle_deg, "at least", why, "time"))
     return _finite(rows + _altitude(known, rtl_rel_home_m, returns))
 
@@ -206,7 +207,7 @@ def _pace(mission: Mission, vehicle: Vehicle, *commands: int) -> Matters:
 def _altitude(known: Mapping[str, Parameter], rtl_rel_home_m: float | None, returns: bool) -> list[Setting]:
     if rtl_rel_home_m is None:
         return []
-    why = "the return altitude, above home" + (", as judged" if returns else "")
+    why = Note("assumed_return_altitude", judged=returns)
     return [Setting(known["return_altitude"], rtl_rel_home_m, "equal", why, "told")]
 
 
@@ -221,24 +222,34 @@ def _plane(
     uses_default = returns or any(_without_radius(item.command, item.params) for item in mission.items)
     rows = [
         Setting(known["speed"], vehicle.speed_max_m_s, "equal",
-                "the airspeed of the climb-out, of a return, and of a mission that was interrupted", "time"),
-        Setting(known["speed_most"], fastest, "at least", "the fastest speed of the plan", "flight"),
-        Setting(known["speed_least"], slowest, "at most", "the slowest speed of the plan", "flight"),
-        Setting(known["circle"], max(circles), "at most", "the radius of circles that say none, and over home",
+                Note("assumed_airspeed"), "time"),
+        Setting(known["speed_most"], fastest, "at least", Note("assumed_fastest"), "flight"),
+        Setting(known["speed_least"], slowest, "at most", Note("assumed_slowest"), "flight"),
+        Setting(known["circle"], max(circles), "at most", Note("assumed_circles"),
                 "flight" if uses_default else "told"),
-        Setting(known["return_circle"], CIRCLE_M, "at most", "the radius of the circle over home", back),
-        Setting(known["radius"], 90.0, "at most", "how early turns begin at way points that say no radius", "turns"),
-        Setting(known["l1_period"], 17.0, "equal", "how fast it settles on a leg", "turns"),
-        Setting(known["l1_damping"], 0.75, "equal", "how it settles on a leg", "turns"),
-        Setting(known["pitch"], 15.0, "at most", "how far a climb-out rises too high", "told"),
+        Setting(known["return_circle"], CIRCLE_M, "at most", Note("assumed_circle_over_home"), back),
+        Setting(known["radius"], 90.0, "at most", Note("assumed_turns_begin"), "turns"),
+        Setting(known["l1_period"], 17.0, "equal", Note("assumed_settling_time"), "turns"),
+        Setting(known["l1_damping"], 0.75, "equal", Note("assumed_settling"), "turns"),
+        Setting(known["pitch"], 15.0, "at most", Note("assumed_pitch"), "told"),
     ]  # fmt: skip
     roll_deg = RETURN_ROLL_DEG if returns else _roll_deg(mission, vehicle, fastest, uses_default)
     if roll_deg > 0.0:
-        why = "turns of the return" if returns else f"the bank of its turns at {fastest:.3g} m/s, and a tenth to steer"
+        why = Note("assumed_return_turns") if returns else Note("assumed_bank", speed_m_s=fastest)
         rows.append(Setting(known["roll"], roll_deg, "at least", why, "flight"))
     if vehicle.turn_radius_m > 0.0:
-        rows.append(Setting(known["climb_most"], vehicle.climb_m_s, "at least", "climb_m_s", "told"))
-        rows.append(Setting(known["descent_most"], vehicle.descent_m_s, "at least", "descent_m_s", "told"))
+        rows.append(
+            Setting(known["climb_most"], vehicle.climb_m_s, "at least", Note("assumed_key", motion="climb_m_s"), "told")
+        )
+        rows.append(
+            Setting(
+                known["descent_most"],
+                vehicle.descent_m_s,
+                "at least",
+                Note("assumed_key", motion="descent_m_s"),
+                "told",
+            )
+        )
     return _finite(rows + _altitude(known, rtl_rel_home_m, returns))
 
 
@@ -275,25 +286,25 @@ def _px4(mission: Mission, vehicle: Vehicle, rtl_rel_home_m: float | None, ends:
     plain = commands_speed(mission)
     accel, lands = vehicle.accel_m_s2, _pace(mission, vehicle, LAND, RTL)
     rows = [
-        Setting(known["speed_most"], _speed_m_s(mission, vehicle), "at least", "the mission's speed", "flight"),
-        Setting(known["return_speed"], home, "equal", "the speed of the return, whatever the mission's is",
+        Setting(known["speed_most"], _speed_m_s(mission, vehicle), "at least", Note("assumed_mission_speed"), "flight"),
+        Setting(known["return_speed"], home, "equal", Note("assumed_return_speed_whatever"),
                 "time" if ends or not plain else "told"),
-        Setting(known["climb"], vehicle.climb_m_s, "equal", "climb_m_s, in all times", "time"),
-        Setting(known["descent"], vehicle.descent_m_s, "equal", "descent_m_s, in all times", "time"),
-        Setting(known["land"], vehicle.land_m_s, "equal", "land_m_s, the landing's last metres", "time"),
-        Setting(known["land_high"], 10.0, "equal", "from where on a landing is slower", lands),
-        Setting(known["land_low"], 5.0, "equal", "from where on a landing is slow", lands),
-        Setting(known["takeoff"], 1.5, "equal", "the speed of a take-off's first metres",
+        Setting(known["climb"], vehicle.climb_m_s, "equal", Note("assumed_motion", motion="climb_m_s"), "time"),
+        Setting(known["descent"], vehicle.descent_m_s, "equal", Note("assumed_motion", motion="descent_m_s"), "time"),
+        Setting(known["land"], vehicle.land_m_s, "equal", Note("assumed_last_metres"), "time"),
+        Setting(known["land_high"], 10.0, "equal", Note("assumed_slower_landing"), lands),
+        Setting(known["land_low"], 5.0, "equal", Note("assumed_slow_landing"), lands),
+        Setting(known["takeoff"], 1.5, "equal", Note("assumed_first_metres"),
                 _pace(mission, vehicle, TAKEOFF)),
-        Setting(known["accel"], accel, "equal", "accel_m_s2, in all times and in how far a return runs on", "time"),
-        Setting(known["jerk"], vehicle.leg_jerk_m_s3, "equal", "leg_jerk_m_s3, in all times", "time"),
+        Setting(known["accel"], accel, "equal", Note("assumed_acceleration"), "time"),
+        Setting(known["jerk"], vehicle.leg_jerk_m_s3, "equal", Note("assumed_motion", motion="leg_jerk_m_s3"), "time"),
         Setting(known["corner"], vehicle.corner_accel_m_s2 / accel if math.isfinite(accel) else math.inf, "equal",
-                "corner_accel_m_s2 over accel_m_s2, in corners", "time"),
-        Setting(known["radius"], 10.0, "at most", "where items without a radius count as reached", "turns"),
-        Setting(known["radius_height"], 0.8, "at most", "the height at which an item counts as reached", "turns"),
-        Setting(known["return_type"], 0.0, "equal", "returns are judged straight home", back),
-        Setting(known["cone"], 45.0, "at most", "how low a return may be near home", back),
-        Setting(known["return_waits"], vehicle.return_waits_s, "equal", "how long a return waits over home",
+                Note("assumed_over_acceleration"), "time"),
+        Setting(known["radius"], 10.0, "at most", Note("assumed_reached"), "turns"),
+        Setting(known["radius_height"], 0.8, "at most", Note("assumed_reached_height"), "turns"),
+        Setting(known["return_type"], 0.0, "equal", Note("assumed_return_straight"), back),
+        Setting(known["cone"], 45.0, "at most", Note("assumed_return_cone"), back),
+        Setting(known["return_waits"], vehicle.return_waits_s, "equal", Note("assumed_return_waits"),
                 "time" if ends else "told"),
     ]  # fmt: skip
     return _finite(rows + _altitude(known, rtl_rel_home_m, returns))
@@ -394,16 +405,16 @@ def vehicle_on_board(vehicle: Vehicle, mission: Mission, values: Mapping[str, fl
     return replace(vehicle, **(changed | least))  # type: ignore[arg-type]
 
 
-_RADIO, _GROUND, _LOW = "loss of radio control", "loss of the ground station", "a low battery"
-_CRITICAL = "a critical battery"
-_FAILSAFE_VALUES: dict[Autopilot, dict[str, tuple[float, tuple[float, ...], str]]] = {
+_RADIO, _GROUND = Note("after_radio_loss"), Note("after_ground_station_loss")
+_LOW, _CRITICAL = Note("after_low_battery"), Note("after_critical_battery")
+_FAILSAFE_VALUES: dict[Autopilot, dict[str, tuple[float, tuple[float, ...], Note]]] = {
     Autopilot.ARDUCOPTER: {
         "fs_radio": (1.0, (0.0, 2.0), _RADIO), "fs_ground": (1.0, (0.0, 2.0), _GROUND),
         "fs_battery": (2.0, (0.0,), _LOW), "fs_battery_critical": (2.0, (0.0,), _CRITICAL),
     },
     Autopilot.ARDUPLANE: {
         "fs_radio": (1.0, (0.0, 2.0), _RADIO), "fs_ground": (1.0, (0.0, 2.0, 3.0), _GROUND),
-        "fs_long": (1.0, (0.0,), "a long failsafe"),
+        "fs_long": (1.0, (0.0,), Note("after_long_failsafe")),
         "fs_battery": (1.0, (0.0,), _LOW), "fs_battery_critical": (1.0, (0.0,), _CRITICAL),
     },
     Autopilot.PX4: {
@@ -438,10 +449,10 @@ def safety_list(
     for key, (value, also, after) in _FAILSAFE_VALUES[autopilot].items():
         if by_mission and copter:
             value, also = AUTO_RTL, (0.0,)
-        why = f"{after} makes it return{' along the mission' if by_mission else ''}; 0 does nothing"
+        why = Note("assumed_failsafe", after=after, by_mission=by_mission)
         rows.append(Setting(known[key], value, "equal", why, "told", also))
     if copter:
-        why = "a lost position makes it land, wherever it is"
+        why = Note("assumed_lost_position")
         rows.append(Setting(known["fs_position"], 1.0, "equal", why, "told", _LANDS))
     return tuple(rows)
 
@@ -449,22 +460,20 @@ def safety_list(
 def _fences(autopilot: Autopilot, extent: FlightExtent, returns_m: float | None) -> Iterator[Setting]:
     known, copter = SAFETY[autopilot], autopilot is Autopilot.ARDUCOPTER
     lowered = copter and returns_m is not None
-    top_m, why = extent.top_rel_home_m, "the highest place of the flight above home, errors counted"
+    top_m, why = extent.top_rel_home_m, Note("assumed_highest_place")
     if lowered and returns_m is not None and returns_m + FENCE_MARGIN_M > top_m:
-        top_m, why = returns_m + FENCE_MARGIN_M, f"a return at {returns_m:g} m keeps FENCE_MARGIN below this"
+        top_m, why = returns_m + FENCE_MARGIN_M, Note("assumed_return_below_fence", returns_m=returns_m)
     matters: Matters = "return" if lowered else "flight"
     yield Setting(known["fence_top"], float(math.ceil(top_m)), "at least", why, matters)
     if lowered:
-        yield Setting(
-            known["fence_margin"], FENCE_MARGIN_M, "at most", "how far below FENCE_ALT_MAX a return keeps", "return"
-        )
+        yield Setting(known["fence_margin"], FENCE_MARGIN_M, "at most", Note("assumed_fence_margin"), "return")
     if autopilot is not Autopilot.PX4:
-        why = "the lowest place of the flight, from home, errors counted"
+        why = Note("assumed_lowest_place")
         yield Setting(known["fence_floor"], float(math.floor(extent.bottom_rel_home_m)), "at most", why, "flight")
-    why = "the farthest place of the flight from home, errors counted"
+    why = Note("assumed_farthest_place")
     yield Setting(known["fence_radius"], float(math.ceil(extent.reach_m)), "at least", why, "flight")
     value, also = (3.0, (0.0, 1.0)) if autopilot is Autopilot.PX4 else (1.0, (0.0, 3.0) if copter else (0.0,))
-    yield Setting(known["fence_action"], value, "equal", "a breach of a fence makes it return", "told", also)
+    yield Setting(known["fence_action"], value, "equal", Note("assumed_fence_action"), "told", also)
 
 
 def needed_groups(

@@ -47,11 +47,16 @@ class Timers:
 
 @dataclass(frozen=True, slots=True)
 class TransferProgress:
-    """``done`` of ``total`` items are transferred; ``phase`` is one of: upload, read back, clear."""
+    """``done`` of ``total`` items are transferred; ``phase`` is one of: upload, read back, clear.
+
+    ``failed``: None while it goes on. In the last report of an upload, whose phase is the outcome in a word, it tells
+    whether that is another than verified.
+    """
 
     phase: str
     done: int
     total: int
+    failed: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -174,8 +174,8 @@ class Trials:
 
 def _lacks(refused: GcsplanError) -> str:
     """What a plan that was refused lacks, in words that follow ``with VALUE``."""
-    if isinstance(refused, CheckFailed):  # its first line says what failed, those behind it where
-        return refused.message.partition("\n")[0]
+    if isinstance(refused, CheckFailed):
+        return refused.headline
     if isinstance(refused, InputError):
         return "the mission file is refused"
     return LACKS.get(refused.reason or "", "none is found")

@@ -240,7 +240,7 @@ def parameters_table(subject: Subject) -> str:
         (
             "<br>".join(esc(n.name) for n in s.parameter.names),
             "<br>".join(f"{n.value(s.value):.6g}" for n in s.parameter.names),
-            esc(s.rule_words()), esc(s.why),
+            esc(s.rule_words()), esc(str(s.why)),
         )
         for s in subject.settings
     ]  # fmt: skip
@@ -287,7 +287,7 @@ def inputs_table(inputs: Mapping[str, object], facts: Sequence[tuple[str, str]],
             continue
         words = esc(value)  # a text as files have it
         if key == "bare_dem":
-            words = esc(what_is_not_in(inputs).replace(" DEM: ", ": ", 1) or "obstacle heights were given")
+            words = esc(what_is_not_in(inputs, model="") or "obstacle heights were given")
         elif key == "resolution_m" and isinstance(value, int | float):
             words = num(float(value), 0 if value >= 10 else 3, units.distance)
         elif key.endswith("sha256"):

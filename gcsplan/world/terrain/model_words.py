@@ -8,15 +8,18 @@ from gcsplan.figures import floored, raised
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.height_unit import HeightUnit
 
-BARE_DEM = "bare DEM: trees, masts and wires are not in it"
-SURFACE_DEM = "surface DEM: trees and buildings as the radar saw them; newer ones, masts and wires are not in it"
+ABSENT = {
+    "bare": "trees, masts and wires are not in it",
+    "surface": "trees and buildings as the radar saw them; newer ones, masts and wires are not in it",
+}
+"""By the kind of a DEM, what it does not hold."""
 
 
-def what_is_not_in(inputs: Mapping[str, object]) -> str:
-    """The sentence for a surface's ``info`` or a report's inputs; empty if a bare DEM has obstacle heights."""
-    if inputs.get("dem_kind") == "surface":
-        return SURFACE_DEM
-    return BARE_DEM if inputs.get("bare_dem", True) else ""
+def what_is_not_in(inputs: Mapping[str, object], model: str = " DEM") -> str:
+    """The sentence for a surface's ``info`` or a report's inputs; empty if a bare DEM has obstacle heights. ``model``
+    stands behind the kind; it is empty where the kind stands beside "terrain model" anyway."""
+    kind = "surface" if inputs.get("dem_kind") == "surface" else "bare" if inputs.get("bare_dem", True) else ""
+    return f"{kind}{model}: {ABSENT[kind]}" if kind else ""
 
 
 def notes_on(info: Mapping[str, object]) -> tuple[Note, ...]:

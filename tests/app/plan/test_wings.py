@@ -21,7 +21,6 @@ from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.output.files import outputs_of
 from gcsplan.app.plan import wings
 from gcsplan.app.plan.model import Plan
-from gcsplan.app.plan.wing_ends import FlightEnd, starts
 from gcsplan.arrays import Floats
 from gcsplan.check.fixed_wing.arcs import REMAINS, SAG_M, SETTLES_S, bend
 from gcsplan.check.fixed_wing.climb_out import above_slant, over_m, slant_shortage
@@ -34,7 +33,7 @@ from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import InputError, NoMission
 from gcsplan.fleet.motion.timing import Course
-from gcsplan.mavlink.build.fixed_wing import accepted_m, build_wing, flown_m, parted, tangents_m, thinned
+from gcsplan.mavlink.build.fixed_wing import accepted_m, build_wing, parted
 from gcsplan.mavlink.build.order import Order, Wing
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
@@ -43,11 +42,13 @@ from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.mission_file import VehicleRequest, load_mission
 from gcsplan.notes.note import Note
 from gcsplan.planners.problem import Problem
+from gcsplan.planners.turns.ends import FlightEnd
 from gcsplan.sim.flight.kinematics import Kinematics
 from gcsplan.sim.flight.mission_flight import fly
 from gcsplan.sim.flight.track import make_track
 from gcsplan.vehicle import Autopilot, ClimbOut, Vehicle
 from gcsplan.world.geodesy.atmosphere import true_per_indicated
+from gcsplan.world.geometry.fly_by import flown_m, tangents_m, thinned
 from gcsplan.world.geometry.path import Path
 from gcsplan.world.geometry.zones import Circle, Level, Zone
 from gcsplan.world.world import World
@@ -537,7 +538,7 @@ def test_out_of_a_bowl_it_climbs_in_circles() -> None:
     problem = Problem(where.airspace, craft.limits, (0.0, 0.0, 365.0), (3500.0, 0.0, 365.0), turn_radius_m=RADIUS_M)
     request = VehicleRequest(craft, home, (3500.0, 0.0, GROUND_M), HOME_DEG, HOME_DEG)
     sharp = np.array([[0.0, 0.0, 365.0], [3500.0, 0.0, 365.0]])
-    end = next(starts(problem, request, sharp))
+    end = next(wings.starts(problem, request, sharp))
     assert end.circle is not None
     ends = Wing(tuple(end.top), None, 100.0, tuple(end.circle), end.circle_m)
     path = Path(np.vstack([end.chain, [3500.0, 0.0, 800.0]]))
@@ -751,24 +752,13 @@ def test_a_via_nearer_than_the_climb_out_is_long_is_reached_by_a_detour() -> Non
     assert_past_vias(over_flat(*places), places[:-1])
 
 
-def test_neither_end_stays_the_same_while_all_others_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:
-    def ends(first: str, most: int) -> object:
-        return lambda *_: (f"{first}{k}" for k in range(most))
-
-    monkeypatch.setattr(wings, "starts", ends("s", 3))
-    monkeypatch.setattr(wings, "goals", ends("g", 2))
-    nothing = np.zeros((2, 3))
-    found = [f"{a}{b}" for a, b in wings._pairs(None, None, nothing)]  # type: ignore[arg-type]
-    assert found == ["s0g0", "s0g1", "s1g0", "s1g1", "s2g0", "s2g1"]
-
-
 @pytest.mark.parametrize(
     ("leg", "words"), [(0, "another takeoff_heading_deg"), (4, "put vias farther apart, or allow tighter turns")]
 )
 def test_a_refusal_says_whether_the_ends_or_the_vias_leave_no_room(
     leg: int, words: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(wings, "_unfitting", lambda *_: np.array([leg]))
+    monkeypatch.setattr(wings, "unfitting_legs", lambda *_: np.array([leg]))
     with pytest.raises(NoMission, match=words):
         over_flat((2000.0, 0.0), (2000.0, 1500.0), (4000.0, 1500.0))
 
@@ -910,13 +900,13 @@ def test_the_bound_of_a_wing_holds_from_the_end_of_its_climb_out_under_the_limit
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Not from behind the turns that this plan makes there, and not under the larger margins of a later attempt."""
-    real, asked = wings._bound_between, list[tuple[Problem, FlightEnd, float]]()
+    real, asked = wings.bound_between, list[tuple[Problem, FlightEnd, float]]()
 
     def bound_between(brief: Any, inner: Problem, points: Floats, start: FlightEnd, *more: Any) -> float:
         asked.append((inner, start, real(brief, inner, points, start, *more)))
         return asked[-1][2]
 
-    monkeypatch.setattr(wings, "_bound_between", bound_between)
+    monkeypatch.setattr(wings, "bound_between", bound_between)
     (v,) = plan(load_mission(MISSIONS / "m.yaml", text=text_of())).vehicles
     ((inner, start, bound),) = asked
     assert v.solution.lower_bound == bound <= v.verdict.length_m
@@ -940,6 +930,6 @@ def test_that_margins_shut_the_way_between_a_wings_ends_is_no_proof(monkeypatch:
 
     monkeypatch.setattr(wings, "run_planner", shut)
     with pytest.raises(NoMission) as caught:
-        wings._between(v.brief, v.problem, v.request.vehicle, v.brief.world)
+        wings.solution_between(v.brief, v.problem, v.request.vehicle, v.brief.world)
     assert caught.value.reason == "not_found"
     assert [p.checked for p in asked] == [None, v.problem.checked]

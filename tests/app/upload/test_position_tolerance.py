@@ -15,6 +15,7 @@ from gcsplan.mavlink.link.session.results import UploadResult
 from gcsplan.mavlink.mission.autopilots import altitude_of_cm, stored
 from gcsplan.mavlink.mission.compare import compare, faults
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 
 PX4, COPTER = Autopilot.PX4, Autopilot.ARDUCOPTER
@@ -44,11 +45,14 @@ def changed(sent: Mission, index: int, **fields: object) -> list[MissionItem]:
     return read
 
 
+TOO_LOW = Note("no_parameter_read", autopilot="px4")
+
+
 def shift(sent: Mission, read: list[MissionItem]) -> Shift | None:
     return shift_of(sent, read, faults(compare(sent.wire_items(), read, sent.autopilot)))
 
 
-def result(sent: Mission, read: list[MissionItem], failed: str | None = None) -> UploadResult:
+def result(sent: Mission, read: list[MissionItem], failed: Note | None = None) -> UploadResult:
     differences = tuple(compare(sent.wire_items(), read, sent.autopilot))
     verified = not faults(differences) and failed is None
     return UploadResult(
@@ -128,7 +132,7 @@ def test_a_tolerance_takes_what_lies_within_it_and_nothing_else(
         assert kept.verified == (off_m < tolerance_m)
         assert (note is not None and note.data["safe"] is True) == (off_m < tolerance_m)
         assert ("more than --tolerance-m" in more) == (off_m > tolerance_m)
-    failing, note, _ = within(result(sent, read, "too low"), sent, tolerance_m)
+    failing, note, _ = within(result(sent, read, TOO_LOW), sent, tolerance_m)
     assert not failing.verified
     assert note is None or note.data["safe"] is False
 
@@ -136,7 +140,7 @@ def test_a_tolerance_takes_what_lies_within_it_and_nothing_else(
 def test_what_is_not_safe_is_no_verified_mission_however_near() -> None:
     sent = mission()
     read = changed(sent, 2, x=366_849_291)
-    kept, note, _ = within(result(sent, read, "too low above ground"), sent, 1.0)
+    kept, note, _ = within(result(sent, read, TOO_LOW), sent, 1.0)
     assert isinstance(kept.error(), CheckFailed)
     assert note is not None
     assert (note.code, note.data["items"], note.data["safe"]) == ("positions_shifted", 1, False)

@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 
 from gcsplan.world.terrain.cell import Cell
-from gcsplan.world.terrain.model_words import SURFACE_DEM
 from tests.support.tiles import Served, serving
+
+SURFACE_DEM = "surface DEM: trees and buildings as the radar saw them; newer ones, masts and wires are not in it"
 
 MISSION = """version: 1
 terrain:

@@ -40,7 +40,7 @@ SENDS_OR_DRAWS = {
 
 READS_FILES_OR_A_FLEET = {
     "defusedxml", "shapely", "gcsplan.app.plan.wings", "gcsplan.dem.terrain", "gcsplan.fleet.separation",
-    "gcsplan.mission_file.published.policy", "gcsplan.mission_file.zone_reader",
+    "gcsplan.mission_file.published.policy", "gcsplan.mission_file.zone_reader", "gcsplan.planners.turns.ends",
 }  # fmt: skip
 """What reads terrain or zones from files, and what several vehicles or a fixed wing need."""
 

@@ -1,4 +1,4 @@
-"""The arcs of a fixed wing's track: tangents, lengths, corners in two parts, against plane geometry."""
+"""A fixed wing's items: corners in two parts, against plane geometry, acceptance radii and pitch."""
 
 from __future__ import annotations
 
@@ -11,40 +11,13 @@ from gcsplan.mavlink.build.fixed_wing import (
     FARTHEST_ACCEPTED_M,
     LEAST_ACCEPTED_M,
     accepted_m,
-    flown_m,
     parted,
     pitch_deg,
-    tangents_m,
-    thinned,
-    turns_of,
 )
 from gcsplan.vehicle import Autopilot, Vehicle
+from gcsplan.world.geometry.fly_by import flown_m, tangents_m, turns_of
 from gcsplan.world.geometry.limits import Limits
-
-
-def corner(turn_deg: float, run_m: float = 1000.0) -> np.ndarray:
-    turn = math.radians(turn_deg)
-    return np.array([[-run_m, 0.0, 50.0], [0.0, 0.0, 60.0], [run_m * math.cos(turn), run_m * math.sin(turn), 80.0]])
-
-
-@pytest.mark.parametrize("turn_deg", [-120.0, -45.0, 1.0, 30.0, 90.0, 150.0])
-def test_a_corner_turns_by_its_angle_on_a_tangent_of_r_times_tan_of_half(turn_deg: float) -> None:
-    points, half = corner(turn_deg), math.radians(abs(turn_deg)) / 2.0
-    assert np.degrees(turns_of(points)) == pytest.approx([turn_deg])
-    assert tangents_m(points, 80.0) == pytest.approx([0.0, 80.0 * math.tan(half), 0.0])
-
-
-@pytest.mark.parametrize("turn_deg", [30.0, -90.0, 120.0])
-def test_what_is_flown_is_the_lines_less_their_tangents_and_the_arc(turn_deg: float) -> None:
-    radius_m, turn = 80.0, math.radians(abs(turn_deg))
-    whole = 2.0 * (1000.0 - radius_m * math.tan(turn / 2.0)) + radius_m * turn
-    flown = flown_m(corner(turn_deg), radius_m)
-    assert flown == pytest.approx([whole / 2.0, whole / 2.0])
-
-
-def test_a_leg_straight_up_turns_nothing() -> None:
-    points = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0], [100.0, 0.0, 50.0], [100.0, 100.0, 50.0]])
-    assert turns_of(points).tolist() == [0.0, 0.0]
+from tests.world.geometry.test_fly_by import corner
 
 
 @pytest.mark.parametrize("turn_deg", [120.0, 150.0, 170.0])
@@ -62,12 +35,9 @@ def test_a_corner_too_large_for_one_byte_is_parted_on_the_same_arc(turn_deg: flo
         assert math.dist(new[k, :2], centre) * math.cos(turn / 2.0) == pytest.approx(radius_m, rel=1e-6)
 
 
-def test_a_small_corner_is_not_parted_and_a_slight_one_beside_another_is_dropped() -> None:
+def test_a_small_corner_is_not_parted() -> None:
     points = corner(45.0)
     assert parted(points, 80.0) is points
-    beside = np.array([[0.0, 0.0, 0.0], [500.0, 0.0, 0.0], [501.0, 0.001, 0.0], [800.0, 300.0, 0.0]])
-    assert len(thinned(beside, 80.0)) == 3
-    assert thinned(points, 80.0) is points
 
 
 @pytest.mark.parametrize(

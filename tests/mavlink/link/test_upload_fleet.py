@@ -124,8 +124,11 @@ def test_one_failure_leaves_the_others_results_standing(monkeypatch: pytest.Monk
     assert [d.verified for d in done.values()] == [True, False, False, True]
     assert uploads.exit_code(list(done.values())) == 7
     assert boards["uav1"] == boards["uav4"] == 11
-    last = {name: progress.phase for name, progress in told}
-    assert last == {"uav1": "verified", "uav2": "refused!", "uav3": "accepted!", "uav4": "verified"}
+    last = {name: (progress.phase, progress.failed) for name, progress in told}
+    assert last == {
+        "uav1": ("verified", False), "uav2": ("refused", True), "uav3": ("accepted", True), "uav4": ("verified", False),
+    }  # fmt: skip
+    assert {progress.failed for _, progress in told if progress.phase in ("upload", "read back")} == {None}
 
 
 def test_all_or_nothing_takes_back_what_the_others_took_and_reads_that_back(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -192,8 +195,8 @@ def test_the_live_table_is_for_terminals_and_shows_where_each_vehicle_is(monkeyp
     monkeypatch.setattr(console, "aside", Console(file=screen, force_terminal=True, width=100, color_system=None))
     with console.transfer_progress(["uav1", "[/]odd"]) as tell:
         tell("uav1", TransferProgress("upload", 3, 12))
-        tell("uav1", TransferProgress("verified", 12, 12))
-        tell("[/]odd", TransferProgress("refused!", 0, 12))
+        tell("uav1", TransferProgress("verified", 12, 12, failed=False))
+        tell("[/]odd", TransferProgress("refused", 0, 12, failed=True))
     shown = screen.getvalue()
     assert all(word in shown for word in ("uav1", "[/]odd", "verified", "refused", "12/12"))
     plain = io.StringIO()

@@ -21,6 +21,7 @@ from gcsplan.mavlink.mission.parameter_list import (
     safety_list,
 )
 from gcsplan.mavlink.mission.parameter_names import PARAMETERS, Name, OnBoard, Parameter, unanswered
+from gcsplan.notes.note import Note, Wording
 from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.geometry.limits import Limits
 
@@ -105,7 +106,7 @@ def test_a_breach_that_is_only_told_changes_no_flight() -> None:
 def test_a_rule_allows_its_side_of_the_value_and_what_else_it_names(
     rule: str, within: tuple[float, ...], outside: tuple[float, ...]
 ) -> None:
-    setting = Setting(RADIUS, 100.0, rule, "why", "flight", (0.0,))  # type: ignore[arg-type]
+    setting = Setting(RADIUS, 100.0, rule, Note("assumed_circles"), "flight", (0.0,))  # type: ignore[arg-type]
     assert all(setting.allows(amount) for amount in within)
     assert not any(setting.allows(amount) for amount in outside)
 
@@ -185,3 +186,17 @@ def test_the_list_of_a_mission_allows_what_it_was_made_with() -> None:
         assert all(setting.allows(setting.value) for setting in settings)
         on_board = {s.parameter.names[0].name: s.parameter.names[0].value(s.value) for s in settings}
         assert off(settings, on_board, autopilot) == []
+
+
+@pytest.mark.parametrize("autopilot", list(Autopilot))
+def test_why_a_parameter_matters_is_said_with_its_code_and_in_the_readers_keys(autopilot: Autopilot) -> None:
+    rows = safety_list(autopilot, FlightExtent(80.2, -3.4, 900.1), rtl_rel_home_m=100.0)
+    told = {s.parameter.key: s.as_dict() for s in rows}
+    assert told["fence_action"]["why"] == "a breach of a fence makes it return"
+    assert told["fence_action"]["why_data"]["code"] == "assumed_fence_action"
+    ground = told["fs_ground"]
+    assert ground["why"] == "loss of the ground station makes it return; 0 does nothing"
+    assert ground["why_data"]["data"]["after"]["code"] == "after_ground_station_loss"
+    climb = Note("assumed_motion", motion="climb_m_s")
+    assert str(climb) == "climb_m_s, in all times"
+    assert climb.text(Wording(options={"climb_m_s": "--climb"})) == "--climb, in all times"

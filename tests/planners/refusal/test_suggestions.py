@@ -246,7 +246,7 @@ def test_a_value_that_was_tried_in_vain_is_not_reported_to_do(monkeypatch: pytes
     ("refused", "words"),
     [
         (NoMission("battery: 9 J", reason="battery"), "the battery is too small"),
-        (CheckFailed("a safe return is required, and there is none\nuav1: 3 m"), "and there is none"),
+        (CheckFailed("a safe return is required, and there is none", lines=["uav1: 3 m"]), "and there is none"),
     ],
 )
 def test_a_value_whose_whole_plan_is_refused_does_not_do(

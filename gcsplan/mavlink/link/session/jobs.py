@@ -35,7 +35,7 @@ from gcsplan.mavlink.link.session.preflight import (
 )
 from gcsplan.mavlink.link.session.recheck import Recheck
 from gcsplan.mavlink.link.session.recheck import StateJudge as JudgeState
-from gcsplan.mavlink.link.session.results import UploadResult, outcome_word
+from gcsplan.mavlink.link.session.results import FailsCheck, UploadResult, outcome_word
 from gcsplan.mavlink.link.session.steps import SLOW_ANSWER_S, discover_steps, drive, parameter_steps
 from gcsplan.mavlink.link.terrain import TERRAIN_GROUPS, flies_terrain, terrain_steps
 from gcsplan.mavlink.link.watch import VehicleState, Watch
@@ -90,12 +90,7 @@ def uploading(channel: Channel, task: Task) -> LinkSteps[UploadResult]:
     if task.mission and options.read_parameters:
         failed = yield from judging(channel, task, task.mission, values, recheck)
     if failed is not None:
-        raise VehicleRefused(
-            f"with this vehicle's parameters the mission cannot be flown as it was judged, and it was not sent; plan "
-            f"it for them (more track_error_m, another lean_angle_deg or rtl_rel_home_m), or set them:\n{failed}",
-            where=f"vehicle {task.sysid}",
-            reason="parameters",
-        )
+        raise FailsCheck(failed, task.sysid)
     said_before = watch.said
     machine = VerifiedUpload(
         task.items,
@@ -295,7 +290,7 @@ def result_of(
 ) -> LinkSteps[UploadResult]:
     """Return the result of ``task``; the caller's check is repeated on the read-back with the parameters read."""
     mission: Mission | None = None
-    failed: str | None = None
+    failed: Note | None = None
     if task.mission and settled.read_back:
         mission = Mission.from_wire(
             task.autopilot, settled.read_back, home=task.mission.home, name=task.name, sysid=task.sysid
@@ -360,7 +355,7 @@ def reading_parameters(
 
 def judging(
     channel: Channel, task: Task, mission: Mission, values: Mapping[str, float], recheck: Recheck
-) -> LinkSteps[str | None]:
+) -> LinkSteps[Note | None]:
     """Ask the task's judge, beside the other vehicles' transfers; return its answer, None without a judge.
 
     A judge that has not ended after the timeout has not passed. In simulated time it is asked in line, for there no
@@ -372,7 +367,7 @@ def judging(
     clock = channel.link.clock
     if clock is not time.monotonic:
         return judge(mission, values)
-    ended: list[str | BaseException | None] = []
+    ended: list[Note | BaseException | None] = []
 
     def ask() -> None:
         try:
@@ -384,10 +379,7 @@ def judging(
     until = clock() + task.options.timeout_s
     while not ended:
         if clock() >= until:
-            return (
-                f"it could not be judged with this vehicle's parameters within {task.options.timeout_s:g} s: give more "
-                f"--timeout"
-            )
+            return Note("not_judged_in_time", timeout_s=task.options.timeout_s)
         yield clock() + _LOOK_S
         for heard in channel.take():
             recheck.note(heard, clock())

@@ -24,6 +24,24 @@ def outcome_word(outcome: Outcome) -> OutcomeWord:
     return "refused" if isinstance(outcome, (Refused, Changed)) else "unknown"
 
 
+def failed_in_json(note: Note | None) -> dict[str, Any]:
+    """Why a mission fails the caller's check, as a sentence and as data; empty if it does not."""
+    return {} if note is None else {"failed_check": str(note), "failed_check_data": note.as_dict()}
+
+
+class FailsCheck(VehicleRefused):
+    """Nothing was sent: with the vehicle's parameters the mission fails the caller's check, and ``note`` says why."""
+
+    def __init__(self, note: Note, sysid: int) -> None:
+        super().__init__(
+            f"with this vehicle's parameters the mission cannot be flown as it was judged, and it was not sent; plan "
+            f"it for them (more track_error_m, another lean_angle_deg or rtl_rel_home_m), or set them:\n{note}",
+            where=f"vehicle {sysid}",
+            reason="parameters",
+        )
+        self.note = note
+
+
 @dataclass(frozen=True, slots=True)
 class UploadResult:
     """The result for one list and one vehicle.
@@ -50,7 +68,7 @@ class UploadResult:
     mission_type: int = MISSION
     reason: str = ""
     on_board: str = ""
-    failed_check: str | None = None
+    failed_check: Note | None = None
     differences: tuple[Difference, ...] = ()
     warnings: tuple[Note, ...] = ()
     texts: tuple[str, ...] = ()
@@ -81,7 +99,7 @@ class UploadResult:
             "reason": self.reason if not self.verified else None,
             "changed": self.changed,
             "on_board": self.on_board,
-            "failed_check": self.failed_check,
+            **failed_in_json(self.failed_check),
             "differences": [str(d) for d in self.differences],
             "warnings": [str(note) for note in self.warnings],
             "texts": list(self.texts) if not self.verified else None,

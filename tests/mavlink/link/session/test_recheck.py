@@ -35,6 +35,7 @@ from gcsplan.mavlink.protocol import wire
 from gcsplan.mavlink.protocol.machine import Wait
 from gcsplan.mavlink.protocol.messages import Ack, Address, Count, Item, Packet, Request, RequestList
 from gcsplan.mavlink.protocol.outcome import Changed
+from gcsplan.notes.note import Note
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
 from gcsplan.sim.vehicle.server import SimServer
@@ -399,7 +400,7 @@ def test_parameters_that_are_no_numbers_are_said_and_end_nothing() -> None:
 
 
 def test_a_bug_in_one_vehicles_job_leaves_the_others_standing() -> None:
-    def broken(_: Mission, __: object) -> str | None:
+    def broken(_: Mission, __: object) -> Note | None:
         raise ZeroDivisionError("a bug")
 
     first, second = fleet(vehicle(), vehicle(sysid=2), judge=broken)

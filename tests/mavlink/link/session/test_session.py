@@ -20,6 +20,7 @@ from gcsplan.mavlink.link.options import SessionOptions
 from gcsplan.mavlink.link.session import steps
 from gcsplan.mavlink.link.session.parameters import judge_fence_parameters, judge_parameters
 from gcsplan.mavlink.link.session.preflight import preflight
+from gcsplan.mavlink.link.session.results import FailsCheck
 from gcsplan.mavlink.link.session.session import (
     UploadOrder,
     clear_mission,
@@ -46,6 +47,7 @@ from gcsplan.vehicle import Autopilot
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
 HOME = Home.at(36.6, -84.38, 371.0)
 QUICK = Timers(response_s=0.15, item_s=0.05, silence_s=0.6, retries=3)
+CUT_CORNER = Note("parameters_not_judged", allowed=False, off=())
 OPTIONS = SessionOptions(
     unchecked=True, listen_s=0.0, standby_s=0.0, discover_s=5.0, read_parameters=False, timers=QUICK
 )
@@ -139,23 +141,26 @@ def test_nothing_is_sent_without_a_passing_verdict_of_this_mission(
 def test_a_mission_that_the_vehicles_own_parameters_make_unsafe_is_not_sent() -> None:
     board, heard = vehicle(Autopilot.PX4), []
 
-    def judge(_: Mission, values: Mapping[str, float]) -> str | None:
+    def judge(_: Mission, values: Mapping[str, float]) -> Note | None:
         heard.append(dict(values))
-        return "a corner in a zone" if values.get("NAV_ACC_RAD") == 2.0 else None
+        return CUT_CORNER if values.get("NAV_ACC_RAD") == 2.0 else None
 
-    with air(board) as link, pytest.raises(VehicleRefused, match="a corner in a zone") as caught:
+    with air(board) as link, pytest.raises(FailsCheck, match="this is not what was judged") as caught:
         upload_mission(link, mission(Autopilot.PX4), options=replace(OPTIONS, read_parameters=True), judge=judge)
-    assert caught.value.reason == "parameters"
+    assert (caught.value.reason, caught.value.note) == ("parameters", CUT_CORNER)
     assert board.items() == ()
     assert heard[0]["NAV_MC_ALT_RAD"] == pytest.approx(0.8)
 
 
 def test_the_read_back_is_checked_again() -> None:
+    silent = Note("parameters_unanswered", names=("ANGLE_MAX or ATC_ANGLE_MAX",))
     with air(vehicle()) as link:
-        result = upload_mission(link, mission(), options=OPTIONS, judge=lambda read, values: "a hill in the way")
+        result = upload_mission(link, mission(), options=OPTIONS, judge=lambda read, values: silent)
     assert not result.verified
-    with pytest.raises(CheckFailed, match="a hill in the way"):
+    with pytest.raises(CheckFailed, match="ANGLE_MAX or ATC_ANGLE_MAX could not be read"):
         result.raise_for_outcome()
+    told = result.as_dict()
+    assert (told["failed_check"], told["failed_check_data"]) == (str(silent), silent.as_dict())
 
 
 @pytest.mark.parametrize(
@@ -605,9 +610,9 @@ def test_what_was_uploaded_is_downloaded_verified_and_cleared(autopilot: Autopil
 def test_what_is_on_board_is_judged_with_the_vehicles_own_parameters() -> None:
     board, sent, heard = vehicle(PX4), mission(PX4), []
 
-    def judge(read: Mission, values: Mapping[str, float]) -> str | None:
+    def judge(read: Mission, values: Mapping[str, float]) -> Note | None:
         heard.append((read, dict(values)))
-        return "a corner in a zone" if values.get("NAV_ACC_RAD") == 2.0 else None
+        return CUT_CORNER if values.get("NAV_ACC_RAD") == 2.0 else None
 
     with air(board) as link:
         upload_mission(link, sent, options=OPTIONS).raise_for_outcome()
