@@ -305,17 +305,17 @@ _OPTIMISERS = (
     ),
 )
 
-TABLE: Mapping[str, OptimiserEntry] = MappingProxyType({entry.name: entry for entry in _OPTIMISERS})
+OPTIMISERS: Mapping[str, OptimiserEntry] = MappingProxyType({entry.name: entry for entry in _OPTIMISERS})
 
 
 def names() -> tuple[str, ...]:
     """Names of all optimisers, family by family."""
-    return tuple(TABLE)
+    return tuple(OPTIMISERS)
 
 
 def get(name: str) -> OptimiserEntry:
     """The optimiser called ``name``. Raises InputError if it is unknown, with the closest known name."""
-    entry = TABLE.get(name)
+    entry = OPTIMISERS.get(name)
     if entry is None:
-        raise unknown_name(f"there is no optimiser {name!r}", name, TABLE)
+        raise unknown_name(f"there is no optimiser {name!r}", name, OPTIMISERS)
     return entry

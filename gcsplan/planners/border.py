@@ -27,7 +27,7 @@ INSET_CELLS = 1.0
 """Cells along the border that count as beyond it, in addition to the distance that paths keep from unknown ground."""
 MOST_ENCLOSING_CORNERS = 2000
 """Corners of one polygon in that test; of a polygon with more, a smaller one inside it counts."""
-SHRUNK_M = 0.01
+ENCLOSING_SHRUNK_M = 0.01
 """Metres by which zones are shrunk in the test whether they enclose a place."""
 
 
@@ -165,7 +165,7 @@ def _by_zones(problem: Problem) -> bool:
 
     air, limits = problem.airspace, problem.bound_limits
     top = math.inf if limits.max_amsl_m is None else limits.max_amsl_m - limits.altitude_error_m
-    reach = limits.horizontal_clearance_m + limits.track_error_m - SHRUNK_M - problem.bound_spare_m
+    reach = limits.horizontal_clearance_m + limits.track_error_m - ENCLOSING_SHRUNK_M - problem.bound_spare_m
     walls = [_shape(z, reach) for z in air.zones if _is_wall(z, top)]
     if not walls:
         return False
@@ -216,8 +216,8 @@ def _bounds(zone: Zone, air: Airspace, limits: Limits) -> tuple[float, float, fl
 
 
 def _reach_m(air: Airspace, limits: Limits) -> float:
-    """Metres that paths keep from unknown ground, with one percent and `SHRUNK_M` added."""
-    return air.beside_m(limits) * 1.01 + SHRUNK_M
+    """Metres that paths keep from unknown ground, with one percent and `ENCLOSING_SHRUNK_M` added."""
+    return air.beside_m(limits) * 1.01 + ENCLOSING_SHRUNK_M
 
 
 def _least_step_m(surface: Surface) -> Floats:

@@ -65,8 +65,8 @@ def _swarm(name: str, summary: str, paper: str, system: Mapping[str, object], **
 
 _KRILL_PAPER = "Xu, Zhu, Sun 2024, Biomimetics 9, 353"
 _SSGWO_PAPER = "Feng et al. 2024, Electronics 13, 68"
-_MSFOA_PAPER = "Shi et al. 2020, Applied Sciences 10, 2822"
-_ABO_PAPER = "Li et al. 2024, adaptive budgerigar optimization"
+_MSFOA_CITED = "Shi et al. 2020, Applied Sciences 10, 2822"
+_ABO_CITED = "Li et al. 2024, adaptive budgerigar optimization"
 _IB_ABC_PAPER = "Tan et al. 2023, Robotica 41, 1244-1257"
 
 # The search space of each paper. D, our decision where the paper is silent: the number of points of MSFOA and IB-ABC.
@@ -101,12 +101,12 @@ _PLANNERS = (
     _swarm("igwo", "grey wolves that learn from neighbours", f"Nadimi-Shahraki 2021; as in {_SSGWO_PAPER}", _SSGWO),
     _swarm("sogwo", "grey wolves with selective opposition", f"Dhargupta 2020; as in {_SSGWO_PAPER}", _SSGWO),
     _swarm("ssgwo", "grey wolves, relative distances, annealing", _SSGWO_PAPER, _SSGWO),
-    _swarm("foa", "fruit flies, one swarm", f"Pan 2012; as in {_MSFOA_PAPER}", _MSFOA, encoding="polar"),
-    _swarm("mfoa", "fruit flies, swarms of a shrinking radius", f"Yuan 2014; as in {_MSFOA_PAPER}", _MSFOA),
-    _swarm("iffo", "fruit flies, one dimension at a time", f"Pan 2014; as in {_MSFOA_PAPER}", _MSFOA),
-    _swarm("msfoa", "fruit flies, competing swarms", _MSFOA_PAPER, _MSFOA, encoding="polar"),
-    _swarm("pso", "particle swarm", f"Shi, Eberhart 1998; as in {_MSFOA_PAPER}", _MSFOA),
-    _swarm("de", "differential evolution rand/1/bin", f"Storn, Price 1997; as in {_MSFOA_PAPER}", _MSFOA),
+    _swarm("foa", "fruit flies, one swarm", f"Pan 2012; as in {_MSFOA_CITED}", _MSFOA, encoding="polar"),
+    _swarm("mfoa", "fruit flies, swarms of a shrinking radius", f"Yuan 2014; as in {_MSFOA_CITED}", _MSFOA),
+    _swarm("iffo", "fruit flies, one dimension at a time", f"Pan 2014; as in {_MSFOA_CITED}", _MSFOA),
+    _swarm("msfoa", "fruit flies, competing swarms", _MSFOA_CITED, _MSFOA, encoding="polar"),
+    _swarm("pso", "particle swarm", f"Shi, Eberhart 1998; as in {_MSFOA_CITED}", _MSFOA),
+    _swarm("de", "differential evolution rand/1/bin", f"Storn, Price 1997; as in {_MSFOA_CITED}", _MSFOA),
     _swarm("lshade", "differential evolution, learnt settings", "Tanabe, Fukunaga 2014, CEC", _BASELINE),
     _swarm(
         "cmaes",
@@ -115,8 +115,8 @@ _PLANNERS = (
         _BASELINE,
         population=30,
     ),
-    _swarm("po", "parrot optimizer", f"Lian 2024; as in {_ABO_PAPER}", _ABO),
-    _swarm("abo", "adaptive budgerigars", _ABO_PAPER, _ABO),
+    _swarm("po", "parrot optimizer", f"Lian 2024; as in {_ABO_CITED}", _ABO),
+    _swarm("abo", "adaptive budgerigars", _ABO_CITED, _ABO),
 )
 
 TABLE: Mapping[str, PlannerEntry] = MappingProxyType({entry.name: entry for entry in _PLANNERS})

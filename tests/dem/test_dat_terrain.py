@@ -11,6 +11,7 @@ import pytest
 
 from gcsplan.arrays import Floats
 from gcsplan.dem.dat_file import RECORD_BYTES, crc_of, file_name, packed, read_dat
+from gcsplan.dem.dat_terrain import bounds
 from gcsplan.dem.terrain import open_dem
 from gcsplan.errors import InputError
 from gcsplan.world.geodesy.frame import Frame
@@ -238,3 +239,42 @@ def test_a_plane_over_a_degree_line_has_one_height(
     east, north = (a.ravel() for a in np.meshgrid(np.linspace(-400.0, 400.0, 41), np.linspace(-400.0, 400.0, 41)))
     spread = surface.high_at(east, north) - surface.ground_at(east, north)
     assert float(spread.max()) < 2.1
+
+
+def test_bounds_of_posts_on_a_plane_are_the_plane() -> None:
+    row, col = (a.ravel() for a in np.meshgrid(np.arange(-3.0, 10.0) + 0.3, np.arange(-3.0, 12.0) - 0.4, indexing="ij"))
+    heights = 100.0 + 3.0 * row - 2.0 * col
+    high, low = bounds((7, 9), row, col, heights, heights)
+    j, i = np.mgrid[0:7, 0:9]
+    np.testing.assert_allclose(high, 100.0 + 3.0 * j - 2.0 * i)
+    np.testing.assert_allclose(low, high)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_bounds_hold_for_ground_that_is_bilinear_between_other_posts(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    z, (down, left) = rng.normal(100.0, 10.0, (14, 16)), rng.uniform(0.0, 1.0, 2)
+    row, col = (a.ravel() for a in np.meshgrid(np.arange(14) - 4.0 + down, np.arange(16) - 4.0 + left, indexing="ij"))
+    high, low = bounds((6, 8), row, col, z.ravel(), z.ravel())
+    y, x = rng.uniform(0.0, 5.0, 3000), rng.uniform(0.0, 7.0, 3000)
+
+    def at(grid: Floats, r: Floats, c: Floats) -> Floats:
+        j, i = np.floor(r).astype(int), np.floor(c).astype(int)
+        v, u = r - j, c - i
+        south = grid[j, i] * (1.0 - u) + grid[j, i + 1] * u
+        return np.asarray(south * (1.0 - v) + (grid[j + 1, i] * (1.0 - u) + grid[j + 1, i + 1] * u) * v)
+
+    true = at(z, y + 4.0 - down, x + 4.0 - left)
+    assert (at(high, y, x) >= true - 1e-9).all()
+    assert (at(low, y, x) <= true + 1e-9).all()
+    assert np.isfinite(high).all()
+
+
+def test_bounds_are_unknown_where_a_post_nearby_is() -> None:
+    row, col = (a.ravel().astype(float) for a in np.mgrid[-2:9, -2:9])
+    heights = np.full(len(row), 50.0)
+    heights[(row == 3.0) & (col == 3.0)] = math.nan
+    high, low = bounds((7, 7), row, col, heights, heights)
+    assert np.isnan(high[3, 3])
+    assert np.isnan(low[3, 3])
+    assert high[0, 0] == low[0, 0] == 50.0

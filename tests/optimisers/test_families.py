@@ -11,7 +11,7 @@ from gcsplan.arrays import Floats
 from gcsplan.bench.measure import compare, holm
 from gcsplan.optimisers.driver import minimise
 from gcsplan.optimisers.functions import FUNCTIONS
-from gcsplan.optimisers.registry import TABLE
+from gcsplan.optimisers.registry import OPTIMISERS
 from tests.oracles.swarm_families import FAMILIES, Rule
 
 SEEDS, N, DIM, ROUNDS = 40, 15, 6, 20
@@ -27,8 +27,11 @@ Cost = Callable[[Floats], Floats]
 
 def test_every_optimiser_has_a_second_implementation() -> None:
     """The others: PO is ABO with α = β = 1, SSGWO as printed is a reading, L-SHADE is compared point by point."""
-    assert set(TABLE) - set(FAMILIES) == {"po", "ssgwo-printed", "lshade"}
-    assert (TABLE["po"].update, TABLE["po"].defaults) == (TABLE["abo"].update, TABLE["abo"].defaults)
+    assert set(OPTIMISERS) - set(FAMILIES) == {"po", "ssgwo-printed", "lshade"}
+    assert (OPTIMISERS["po"].update, OPTIMISERS["po"].defaults) == (
+        OPTIMISERS["abo"].update,
+        OPTIMISERS["abo"].defaults,
+    )
 
 
 def ours(name: str, cost: Cost, dim: int) -> Floats:

@@ -10,7 +10,7 @@ import pytest
 from gcsplan.arrays import Floats
 from gcsplan.optimisers.driver import minimise
 from gcsplan.optimisers.functions import FUNCTIONS
-from gcsplan.optimisers.registry import TABLE
+from gcsplan.optimisers.registry import OPTIMISERS
 from tests.oracles import swarms
 
 N, DIM, ROUNDS = 9, 4, 8
@@ -88,7 +88,7 @@ def test_each_reading_differs_from_what_is_decided() -> None:
         asked = {
             k: v for k, v in parameters.items() if k in ("swarms", "sight", "attempts", "limit", "group", "global_step")
         }
-        if parameters.items() <= {**TABLE[optimiser].defaults, **asked}.items():  # it is what is decided
+        if parameters.items() <= {**OPTIMISERS[optimiser].defaults, **asked}.items():  # it is what is decided
             continue
         plain, other = (
             minimise(optimiser, cost, DIM, population=N, iterations=ROUNDS, seed=12, parameters=p).history.cost

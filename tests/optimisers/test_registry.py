@@ -11,7 +11,7 @@ import pytest
 from gcsplan.arrays import Floats
 from gcsplan.optimisers.driver import OptimiserResult, minimise
 from gcsplan.optimisers.functions import FUNCTIONS
-from gcsplan.optimisers.registry import TABLE, get, names
+from gcsplan.optimisers.registry import OPTIMISERS, get, names
 
 every = pytest.mark.parametrize("name", names())
 DIM, BUDGET, RUNS = 30, 6000, 3
@@ -102,7 +102,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_other_ones(name: st
 def test_it_beats_random_search_of_equal_evaluations_or_its_row_says_why_not(name: str, function: str) -> None:
     cost = FUNCTIONS[function].on_unit_box(DIM, shifted=True)
     found = [minimise(name, cost, DIM, evaluations=BUDGET, seed=seed).cost for seed in range(RUNS)]
-    if not TABLE[name].loses_to_random:
+    if not OPTIMISERS[name].loses_to_random:
         assert np.median(found) < np.median(at_random(function))
 
 
@@ -152,7 +152,7 @@ def test_an_iteration_evaluates_as_many_as_its_row_says(name: str) -> None:
 
 
 def test_the_table_names_what_each_paper_needs() -> None:
-    for entry in TABLE.values():
+    for entry in OPTIMISERS.values():
         assert entry.summary
         assert entry.paper
         assert entry.equations

@@ -31,7 +31,7 @@ def test_a_row_names_a_planner_that_takes_what_it_is_called_with(name: str) -> N
 @pytest.mark.parametrize("name", [name for name in registry.names() if registry.get(name).optimiser])
 def test_a_swarm_has_its_optimiser_and_encodings_that_a_mission_may_ask_for(name: str) -> None:
     entry = registry.get(name)
-    assert name in ("aco", "cmaes") or entry.optimiser in optimisers.TABLE  # ants on a grid, and a package
+    assert name in ("aco", "cmaes") or entry.optimiser in optimisers.OPTIMISERS  # ants on a grid, and a package
     assert {entry.space["encoding"], entry.defaults["encoding"]} <= set(get_args(EncodingName))
 
 

@@ -32,7 +32,7 @@ from gcsplan.arrays import Floats
 from gcsplan.bench.files import ready
 from gcsplan.errors import InputError, unknown_name
 from gcsplan.optimisers.driver import minimise
-from gcsplan.optimisers.registry import TABLE
+from gcsplan.optimisers.registry import OPTIMISERS
 
 BUDGET = 2500
 """MetaEvoBox's number of cost evaluations for this family."""
@@ -150,7 +150,9 @@ class Worker:
 
 def ours() -> tuple[str, ...]:
     """Our optimisers; of those with the same rule and defaults the last."""
-    known = {(row.update, row.population, tuple(sorted(row.defaults.items()))): name for name, row in TABLE.items()}
+    known = {
+        (row.update, row.population, tuple(sorted(row.defaults.items()))): name for name, row in OPTIMISERS.items()
+    }
     return tuple(known.values())
 
 

@@ -11,7 +11,7 @@ import pytest
 from gcsplan.bench.metabox import run as metabox
 from gcsplan.bench.metabox.run import Worker
 from gcsplan.errors import InputError
-from gcsplan.optimisers.registry import TABLE
+from gcsplan.optimisers.registry import OPTIMISERS
 from tests.bench.metabox.made import FEW
 from tests.support.metabox import interpreter
 
@@ -67,7 +67,7 @@ def test_what_cannot_be_run_is_refused(change: dict[str, Any], message: str, tmp
 
 
 def test_ours_are_all_rules_once() -> None:
-    assert set(TABLE) - set(metabox.ours()) == {"po"}  # ABO with α = β = 1
+    assert set(OPTIMISERS) - set(metabox.ours()) == {"po"}  # ABO with α = β = 1
 
 
 def test_clear_paths_are_those_without_a_penalty(tmp_path: Path, python: Path) -> None:

@@ -246,7 +246,7 @@ def test_an_earlier_vehicle_bends_the_path_of_the_next() -> None:
 
 
 def test_every_swarms_row_names_its_source_and_a_known_optimiser() -> None:
-    from gcsplan.optimisers.registry import TABLE as OPTIMISERS
+    from gcsplan.optimisers.registry import OPTIMISERS
 
     assert names()[0] == "optimal"
     swarms = [row for row in TABLE.values() if row.optimiser]

@@ -34,7 +34,7 @@ NEAR = 1.03
 what fine ones leave free, or leave a slit that fine ones shut; chords of `COARSE` are off by 2 % of the radius."""
 MOST_SEARCHES_OF_TRACK = 300
 """Times that a track is searched for, each time with more zones or finer arcs, at most."""
-MOST_MESH_CORNERS = 12_000
+MOST_OUTLINE_CORNERS = 12_000
 """Corners of all outlines of one mesh, at most: with more, the triangulation takes seconds."""
 MOST_GROWN = 1000
 """Corners of one polygon that is grown, at most: its edges are grown one by one, a thousand in half a second."""
@@ -202,7 +202,7 @@ def shortest_past(a: GroundPlace, b: GroundPlace, shapes: Sequence[shapely.Polyg
     bounds = np.array([*(s.bounds for s in shapes), (*places.min(axis=0), *places.max(axis=0))])
     box = shapely.box(*(bounds[:, :2].min(axis=0) - BEYOND_M), *(bounds[:, 2:].max(axis=0) + BEYOND_M))
     free = shapely.set_precision(box.difference(shapely.union_all(shapes)), CORNERS_APART_M) if shapes else box
-    if shapely.get_num_coordinates(free) > MOST_MESH_CORNERS:
+    if shapely.get_num_coordinates(free) > MOST_OUTLINE_CORNERS:
         raise Exhausted(0.0)
     parts = [p for p in shapely.get_parts(free) if shapely.dwithin(p, shapely.points(places), 1e-6).all()]
     if not parts:

@@ -38,7 +38,7 @@ REACHED = 0.95
 """Part of the climb limit at which the track from or to a terminal is taken to climb."""
 ASIDE_M = 0.3
 """Metres by which places are moved away from zones."""
-SAME_PLACE_M = 1e-3
+SAME_WAY_M = 1e-3
 """Metres; places nearer to each other count as one."""
 STRETCH_SLACKS = (0.008, 0.15)
 """Parts by which tracks of a stretch may be longer than its shortest; tracks that are longer pass through no slit."""
@@ -160,9 +160,9 @@ def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
             better.append((a, b, part))
     out, begin = [], -math.inf
     for a, b, part in better:
-        out += [path[(on_path > begin + SAME_PLACE_M) & (on_path < a - SAME_PLACE_M)], part]
+        out += [path[(on_path > begin + SAME_WAY_M) & (on_path < a - SAME_WAY_M)], part]
         begin = b
-    return np.vstack([*out, path[on_path > begin + SAME_PLACE_M]]) if out else None
+    return np.vstack([*out, path[on_path > begin + SAME_WAY_M]]) if out else None
 
 
 def _part(plane: PlaneSearch, problem: Problem, start: Floats, goal: Floats) -> PlaneSearch:
@@ -306,7 +306,7 @@ def _height(plane: PlaneSearch, leg: Leg, from_start_m: float, to_goal_m: float,
         (leg.goal, to_goal_m, limits.max_descent_slope),
     ):
         if terminal.amsl_m is not None:
-            z = terminal.amsl_m if way_m < SAME_PLACE_M else min(z, terminal.amsl_m + REACHED * slope * way_m)
+            z = terminal.amsl_m if way_m < SAME_WAY_M else min(z, terminal.amsl_m + REACHED * slope * way_m)
     return z
 
 

@@ -22,7 +22,6 @@ from gcsplan.planners.optimal.bounds.shorter import (
     rise_bound,
     search_caps,
 )
-from gcsplan.planners.optimal.navmesh.interval_kernels import range_along
 from gcsplan.planners.optimal.plane.corridor import End
 from gcsplan.planners.optimal.plane.leg import Leg
 from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
@@ -124,25 +123,6 @@ def test_out_of_time_the_bound_holds_and_nothing_more_is_asked() -> None:
 
 
 # --- altitudes that no short track avoids -------------------------------------------------------------------------
-
-
-@given(st.integers(0, 2**31))
-@settings(max_examples=draws(80))
-def test_the_altitudes_along_a_track_are_those_of_each_place_alone(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    size, count, step = int(rng.integers(1, 70)), int(rng.integers(0, 30)), float(rng.uniform(0.1, 50.0))
-    low, away = rng.normal(0.0, 1.0, count), step * rng.uniform(-0.2, 1.2 * size, count)
-    high = low + rng.uniform(-0.3, 2.0, count)
-    limit, slack = step * rng.uniform(0.5, 1.5) * size, step * float(rng.choice([0.0, rng.uniform(0.0, 10.0)]))
-    left = limit - away - step * rng.uniform(-2.0, size, count)
-    away[rng.random(count) < 0.1] = left[rng.random(count) < 0.1] = np.inf
-    lows, highs = (np.full((size.bit_length(), size), fill) for fill in (np.inf, -np.inf))
-    range_along(low, high, away, left, limit, slack, step, lows, highs)
-    for k in range(size):
-        s = (k + 1) * step
-        there = (away - slack <= s) & (s <= limit - left) & (low <= high) & np.isfinite(away) & np.isfinite(left)
-        assert lows[0, k] == min(low[there], default=np.inf)
-        assert highs[0, k] == max(high[there], default=-np.inf)
 
 
 def hills(seed: int, limits: Limits, zones: int = 0, **more: object) -> Problem:

@@ -8,7 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gcsplan.planners.optimal.bounds.overflight import Overflight
+from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.planner import plan
+from gcsplan.planners.optimal.searches.outline_tracks import OutlineTracks
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
@@ -95,3 +98,16 @@ def test_the_bound_of_energy_counts_the_climb_over_the_highest_zone(seed: int) -
     cost = p.cost(found.path)
     assert found.lower_bound <= cost <= found.lower_bound * 1.001
     assert math.isfinite(cost)
+
+
+def test_the_bound_over_a_long_wall_has_its_climb_and_descent_and_the_path_is_as_long() -> None:
+    """Around the wall it is kilometres: over it a path rises by 119 m within 617 m, and sinks again."""
+    incumbent = Incumbent(CASES["over a long wall"])
+    outlines = OutlineTracks(incumbent, 1000.0)
+    outlines.look()
+    around_m = incumbent.bound
+    Overflight(incumbent, outlines).look()
+    over_m = 2.0 * math.hypot(617.0, 155.0 - 36.0) + 166.0
+    assert around_m == pytest.approx(1400.0, rel=1e-3)
+    assert incumbent.bound == pytest.approx(over_m, rel=1e-3)
+    assert incumbent.bound <= incumbent.cost == pytest.approx(over_m, rel=2e-3)

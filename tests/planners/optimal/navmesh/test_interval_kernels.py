@@ -8,10 +8,13 @@ from typing import Literal
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.navmesh.clearance import mesh_of
 from gcsplan.planners.optimal.navmesh.grid import make_plane
+from gcsplan.planners.optimal.navmesh.interval_kernels import range_along
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.plane.altitude_intervals import MOST_INTERVALS, intervals, ranges
 from gcsplan.planners.problem import Problem
@@ -20,7 +23,7 @@ from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.surface import GridMap, Surface
 from gcsplan.world.geometry.zones import Circle, Level, Zone
 from tests.planners.optimal.navmesh.test_mesh import EVERYWHERE, SIZE_M, STEP_M, free, polygon, terrain, turned_grid
-from tests.support.effort import worlds
+from tests.support.effort import draws, worlds
 
 LIMITS = Limits(min_agl_m=20.0, horizontal_clearance_m=30.0, track_error_m=3.0, altitude_error_m=5.0)
 TOP_M = 480.0
@@ -138,3 +141,22 @@ def test_a_steep_slope_shuts_what_is_left_between_two_zones(slope: float, open_:
     assert legal(problem, np.tile(at, (len(tries), 1)), tries).any() == open_
     for fineness in (1, 3):
         assert free(mesh_of(plane, TOP_M, True, fineness), at[None]).all() == open_
+
+
+@given(st.integers(0, 2**31))
+@settings(max_examples=draws(80))
+def test_the_altitudes_along_a_track_are_those_of_each_place_alone(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    size, count, step = int(rng.integers(1, 70)), int(rng.integers(0, 30)), float(rng.uniform(0.1, 50.0))
+    low, away = rng.normal(0.0, 1.0, count), step * rng.uniform(-0.2, 1.2 * size, count)
+    high = low + rng.uniform(-0.3, 2.0, count)
+    limit, slack = step * rng.uniform(0.5, 1.5) * size, step * float(rng.choice([0.0, rng.uniform(0.0, 10.0)]))
+    left = limit - away - step * rng.uniform(-2.0, size, count)
+    away[rng.random(count) < 0.1] = left[rng.random(count) < 0.1] = np.inf
+    lows, highs = (np.full((size.bit_length(), size), fill) for fill in (np.inf, -np.inf))
+    range_along(low, high, away, left, limit, slack, step, lows, highs)
+    for k in range(size):
+        s = (k + 1) * step
+        there = (away - slack <= s) & (s <= limit - left) & (low <= high) & np.isfinite(away) & np.isfinite(left)
+        assert lows[0, k] == min(low[there], default=np.inf)
+        assert highs[0, k] == max(high[there], default=-np.inf)

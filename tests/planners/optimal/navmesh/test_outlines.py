@@ -169,7 +169,7 @@ def test_a_low_zone_is_flown_over_where_that_is_shorter() -> None:
 
 
 def test_what_would_be_too_large_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(outlines, "MOST_MESH_CORNERS", 10)
+    monkeypatch.setattr(outlines, "MOST_OUTLINE_CORNERS", 10)
     zones = [Zone("disc", Circle(0.0, 0.0, 300.0))]
     with pytest.raises(Exhausted):
         Solids(zones, 0.0, 1.0, [2e-3] * len(zones), Budget.endless(), outer=True).shortest(

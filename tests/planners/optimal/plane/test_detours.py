@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gcsplan.bench.terrain.problems import problems
+from gcsplan.planners.optimal.plane.detours import DetourSearch, SideChoice
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.plane.plane_search import PAST, PlaneSearch
 from gcsplan.planners.optimal.table import PAST_FINE
@@ -256,3 +257,18 @@ def test_a_zones_ceiling_that_is_shut_is_none() -> None:
         lengths.append(way.length_m)
     assert lengths[0] == pytest.approx(1600.0, abs=0.1)
     assert lengths[1] == lengths[2] > 1800.0
+
+
+def test_a_choice_without_a_track_costs_nothing_and_the_number_of_tracks_is_kept() -> None:
+    incumbent = Incumbent(crossing(box(900.0, 900.0, 1100.0, 1100.0, 40.0, 200.0)))
+    asked: list[SideChoice] = []
+
+    def nothing(choice: SideChoice) -> None:
+        asked.append(choice)
+
+    roots = [SideChoice(np.ones(1, np.bool_), np.zeros(1, np.bool_)), SideChoice(*np.zeros((2, 1), np.bool_))]
+    assert DetourSearch(incumbent, nothing, False).run(roots, 5, first=False, laps=False) is None
+    assert incumbent.best is None
+    assert asked == roots
+    assert DetourSearch(incumbent, nothing, False).run(roots, 1, first=False, laps=False) is None
+    assert asked == [*roots, roots[0]]
