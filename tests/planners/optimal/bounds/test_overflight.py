@@ -100,7 +100,7 @@ def test_the_bound_of_energy_counts_the_climb_over_the_highest_zone(seed: int) -
     assert math.isfinite(cost)
 
 
-def test_the_bound_over_a_long_wall_has_its_climb_and_descent_and_the_path_is_as_long() -> None:
+def test_the_bound_over_a_long_wall_has_its_climb_and_its_descent() -> None:
     """Around the wall it is kilometres: over it a path rises by 119 m within 617 m, and sinks again."""
     incumbent = Incumbent(CASES["over a long wall"])
     outlines = OutlineTracks(incumbent, 1000.0)
