@@ -7,7 +7,6 @@ Each mistake has its file, its key path, the given value and the required one. T
 from __future__ import annotations
 
 import os
-from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
@@ -60,7 +59,15 @@ from gcsplan.mission_file.vehicles import (
     within_vel_max,
 )
 from gcsplan.mission_file.window import GroundWindow, MissionPlane, known_in_plane, opened
-from gcsplan.mission_file.zones.draft import ZoneDraft, looks_swapped, one_line, place_zones, zone_notes, zones_sha256
+from gcsplan.mission_file.zones.draft import (
+    ZoneDraft,
+    looks_swapped,
+    one_line,
+    place_zones,
+    uniquely_named,
+    zone_notes,
+    zones_sha256,
+)
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.terrain.model_words import notes_on
@@ -362,13 +369,7 @@ class _MissionReading:
             drafts += make_zones(
                 keys, at, self.file.parent, f"no_fly[{i}]", self.problems, self.notes, local=self.local, hours=hours
             )
-        # Names in zone files of other programs may repeat; reports need unique names.
-        seen: Counter[str] = Counter()
-        for k, draft in enumerate(drafts):
-            name = one_line(draft.name)
-            seen[name] += 1
-            drafts[k] = replace(draft, name=f"{name} #{seen[name]}" if seen[name] > 1 else name)
-        return drafts
+        return uniquely_named(drafts)
 
     def _far(self, far: list[ZoneDraft], frame: Frame) -> None:
         """Report zones too far away to matter: a mistake in this file, but normal in a zone file of a whole country."""

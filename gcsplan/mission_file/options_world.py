@@ -6,7 +6,6 @@ Everything is judged by the same rules as in a mission file; a mistake is report
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -27,7 +26,14 @@ from gcsplan.mission_file.values.errors import read_section
 from gcsplan.mission_file.values.schema import LimitKeys, TerrainKeys, VehicleKeys
 from gcsplan.mission_file.vehicles import make_vehicle
 from gcsplan.mission_file.zone_reader import read_zones
-from gcsplan.mission_file.zones.draft import ZoneDraft, looks_swapped, one_line, place_zones, zone_notes, zones_sha256
+from gcsplan.mission_file.zones.draft import (
+    ZoneDraft,
+    looks_swapped,
+    place_zones,
+    uniquely_named,
+    zone_notes,
+    zones_sha256,
+)
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace
@@ -210,12 +216,7 @@ def _drafts(files: Sequence[str], problems: list[Problem], notes: list[Note], ho
         problems += found.problems
         notes += found.notes
         drafts += found.zones
-    seen: Counter[str] = Counter()
-    for k, draft in enumerate(drafts):
-        name = one_line(draft.name)
-        seen[name] += 1
-        drafts[k] = replace(draft, name=f"{name} #{seen[name]}" if seen[name] > 1 else name)
-    return drafts
+    return uniquely_named(drafts)
 
 
 def _renamed(problem: Problem) -> Problem:

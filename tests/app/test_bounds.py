@@ -199,12 +199,12 @@ def test_a_plan_below_its_own_bound_is_a_bug_and_not_a_gap_of_0() -> None:
     assert caught.value.exit_code == 70
 
 
-def test_a_short_level_leg_may_be_shorter_by_the_rounding_of_its_ends_in_the_plane_alone() -> None:
+def test_a_short_level_leg_is_shorter_by_the_rounding_in_the_plane_alone() -> None:
     v = planned(ERRORS, goal_m=30.0)
     assert v.solution.lower_bound == pytest.approx(30.0 - 0.022, abs=1e-6)
 
 
-def test_only_vias_take_track_error_from_bounds_for_the_ends_keep_the_rounding_themselves() -> None:
+def test_only_vias_take_track_error_from_bounds_since_ends_keep_the_rounding() -> None:
     v = planned(ERRORS, DISC)
     assert v.problem.checked is not None
     assert v.problem.bound_limits == v.problem.checked

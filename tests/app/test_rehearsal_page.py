@@ -51,7 +51,7 @@ def table(read: Reader) -> list[str]:
     return read.text.split("Flown beside planned")[1].split("In space")[0].split()
 
 
-def test_flown_figures_come_from_the_flown_tracks_and_stand_beside_the_plans_with_their_difference(
+def test_flown_figures_come_from_the_tracks_and_stand_beside_the_plans(
     folder: Path,
 ) -> None:
     made, result = planned(folder), flown(folder)

@@ -83,7 +83,7 @@ def test_a_leg_takes_the_time_of_its_acceleration_its_corner_and_its_braking_too
     assert down.time_s == pytest.approx(by_hand_s, rel=1e-6)
 
 
-def test_a_vehicle_that_flies_arcs_is_not_called_safe_on_the_strength_of_its_straight_legs() -> None:
+def test_a_vehicle_that_flies_arcs_is_not_safe_for_its_straight_legs_alone() -> None:
     verdict = verdict_of(world(), HIGH_ENOUGH, replace(vehicle(), turn_radius_m=80.0))
     assert verdict.safe is None
     assert verdict.findings == ()
@@ -251,7 +251,7 @@ def test_a_way_point_beyond_all_reason_is_a_finding_and_not_a_crash(
         assert "coverage" in {f.kind for f in verdict.findings}
 
 
-def test_terrain_following_is_as_steep_as_its_steepest_metre_and_not_as_the_chord_of_a_cell() -> None:
+def test_terrain_following_is_as_steep_as_its_steepest_metre_not_as_a_chord() -> None:
     # In a twisted cell the ground under a diagonal is a parabola: equally high at both edges, and steep there.
     twisted = world(lambda e, n: 300 + np.where((np.abs(e) < 60) & (np.abs(n) < 60) & (e != n), 30.0, 0.0))
     points = [[-300.0, -280, 450], [300.0, 320, 450]]

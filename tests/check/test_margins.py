@@ -23,7 +23,7 @@ from tests.support.noted import codes
 from tests.support.worlds import vehicle, world
 
 
-def test_a_zone_whose_clearance_is_kept_is_not_called_broken_for_a_bound_of_its_distance() -> None:
+def test_a_zone_whose_clearance_is_kept_is_not_broken_for_a_bound_of_distance() -> None:
     # Beside a zone over ground the distance is a lower bound, here a hair below what is required.
     craft = vehicle(horizontal_clearance_m=30.0)
     limits = craft.limits

@@ -108,7 +108,7 @@ def test_two_landings_that_only_returns_lead_to_are_both_judged() -> None:
     assert "jumps_back_into_return" in codes(back.not_judged)
 
 
-def test_what_stands_behind_a_loop_without_end_is_a_finding_and_how_long_it_lasts_is_told() -> None:
+def test_what_stands_behind_an_endless_loop_is_a_finding_and_its_time_is_told() -> None:
     at_once = dict.fromkeys(("accel_m_s2", "corner_accel_m_s2"), math.inf)  # a round takes its length over the speed
     craft = replace(vehicle(COPTER), energy=Energy(120.0, 100.0, battery_j=1e6, reserve=0.0), **at_once)
     back = do(cmd.DO_JUMP, 2, -1)

@@ -16,6 +16,7 @@ from types import MappingProxyType
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices
+from gcsplan.check.motion.project import ends_of
 from gcsplan.check.motion.stretch import Stretch
 from gcsplan.fleet.motion.timing import legs, upright
 from gcsplan.vehicle import Vehicle
@@ -47,10 +48,7 @@ def seconds_of(
 
     ``radius_m``: acceptance radii of items, by seq, that are not the vehicle's own.
     """
-    places = np.array([(s.start, s.end) for s in stretches])
-    ends = np.empty_like(places)
-    ends[..., :2] = world.frame.to_plane(places[..., 0], places[..., 1])
-    ends[..., 2] = places[..., 2]
+    _, ends = ends_of(stretches, world)
     seconds = np.zeros(len(stretches))
     home_m = world.ground_amsl(*home_deg)
     home_amsl_m = None if math.isnan(home_m) else home_m

@@ -84,12 +84,18 @@ class PlaneLegs:
     unread: tuple[int, ...] = ()
 
 
-def legs_in_plane(stretches: Sequence[Stretch], limits: Limits, world: World, terrain_error_m: float) -> PlaneLegs:
-    """The stretches as straight legs of the plane, with their errors; terrain-frame stretches in many pieces."""
+def ends_of(stretches: Sequence[Stretch], world: World) -> tuple[Floats, Floats]:
+    """(N, 2, 3) start and end of each stretch: as latitude, longitude, AMSL, and as metres of the plane."""
     places = np.array([(s.start, s.end) for s in stretches])
     plane = np.empty_like(places)
     plane[..., :2] = world.frame.to_plane(places[..., 0], places[..., 1])
     plane[..., 2] = places[..., 2]
+    return places, plane
+
+
+def legs_in_plane(stretches: Sequence[Stretch], limits: Limits, world: World, terrain_error_m: float) -> PlaneLegs:
+    """The stretches as straight legs of the plane, with their errors; terrain-frame stretches in many pieces."""
+    places, plane = ends_of(stretches, world)
     bow_m = world.frame.bow_m(places[:, 0, :2], places[:, 1, :2])
     track = limits.track_error_m + bow_m + np.array([s.reach_m for s in stretches])
     height = limits.altitude_error_m + np.array([s.band_m + (terrain_error_m if s.terrain else 0.0) for s in stretches])

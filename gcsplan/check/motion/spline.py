@@ -69,7 +69,7 @@ def chords(start: Place, end: Place, leaving: Direction, arriving: Direction) ->
     points = leaves * t + square * t**2 + cube * t**3
     east_m, north_m = degree_m(0.5 * (start[0] + end[0]))
     inner = [(start[0] + n / north_m, start[1] + e / east_m, start[2] + u) for e, n, u in points.tolist()]
-    return [start, *inner, end], bend / (8.0 * pieces**2), _slopes(leaves, square, cube, pieces)
+    return [start, *inner, end], bend / (8.0 * pieces**2), steepest_slopes(leaves, square, cube, pieces)
 
 
 def _cubic(start: Place, end: Place, leaving: Direction, arriving: Direction) -> tuple[Floats, Floats, Floats]:
@@ -140,7 +140,7 @@ def _limit(way: Floats, level: float, up: float, down: float) -> Floats:
     return np.where(np.isfinite(each), each, level)
 
 
-def _slopes(leaves: Floats, square: Floats, cube: Floats, pieces: int) -> Slopes:
+def steepest_slopes(leaves: Floats, square: Floats, cube: Floats, pieces: int) -> Slopes:
     """Steepest slopes of each piece, up and down: at its ends, at the slope's extremes, and at samples between.
 
     With the speed v(t), a quadratic in each direction, the slope is v_up / sqrt(r), r = v_east² + v_north². Its

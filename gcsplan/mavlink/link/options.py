@@ -29,7 +29,7 @@ def checked_timeout_s(timeout_s: float) -> float:
     return timeout_s
 
 
-class Patience:
+class TransferPatience:
     """Two limits: ``timeout_s`` without progress, and ``timeout_s`` plus `ITEM_S` per item in all, even with progress.
 
     ``items`` is None if the number is unknown until the vehicle reports it.
@@ -77,7 +77,7 @@ class SessionOptions:
 
     ``discover_s``: seconds to wait for a first heartbeat; ``listen_s``: to listen for rivals after it; ``standby_s``:
     to wait for a vehicle that is booting. ``ground_amsl_m``: DEM altitude at the start, by default the altitude of the
-    mission's home. ``timeout_s``: longest time without progress of a transfer (see `Patience`); it also limits
+    mission's home. ``timeout_s``: longest time without progress of a transfer (see `TransferPatience`); it also limits
     ``discover_s`` and ``standby_s``. The parameters on board are compared with ``rtl_rel_home_m`` (the return altitude
     that was checked), ``route`` (of the return that was checked), ``advised_rel_home_m`` (the one to set, if another is
     better), ``settings`` (what the mission was judged with) and ``expected_parameters``, and a PX4's motion with

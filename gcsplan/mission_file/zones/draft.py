@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -330,6 +331,17 @@ def looks_swapped(draft: ZoneDraft, frame: Frame) -> bool:
         return False
     turned = replace(draft, points=tuple((lon, lat) for lat, lon in draft.points))
     return bool(_shapes(turned, frame))
+
+
+def uniquely_named(drafts: Sequence[ZoneDraft]) -> list[ZoneDraft]:
+    """The drafts with a name of one line each: those in zone files may repeat, and reports need unique names."""
+    seen: Counter[str] = Counter()
+    named = []
+    for draft in drafts:
+        name = one_line(draft.name)
+        seen[name] += 1
+        named.append(replace(draft, name=f"{name} #{seen[name]}" if seen[name] > 1 else name))
+    return named
 
 
 def one_line(text: str) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.fixed_wing.arcs import bend
 from gcsplan.check.flight.follow import follow
+from gcsplan.check.motion.project import ends_of
 from gcsplan.check.motion.stretch import Flight, Stretch
 from gcsplan.errors import InputError
 from gcsplan.mavlink.mission.mission import Mission
@@ -174,10 +175,7 @@ def make_track(
         bend(flight, mission, vehicle, world.frame)
         if vehicle.autopilot is Autopilot.ARDUPLANE:
             flight.stretches = [_in_thin_air(s, kinematics) for s in flight.stretches]
-    places = np.array([(s.start, s.end) for s in flight.stretches])
-    ends = np.empty_like(places)
-    ends[..., :2] = world.frame.to_plane(places[..., 0], places[..., 1])
-    ends[..., 2] = places[..., 2]
+    _, ends = ends_of(flight.stretches, world)
     if airborne:
         first = next((k for k, s in enumerate(flight.stretches) if not s.column), 0)
         flight.stretches, ends = flight.stretches[first:], ends[first:]

@@ -346,7 +346,7 @@ vehicles:
     assert "does not know" in out
 
 
-def test_a_file_in_terrain_frame_is_judged_with_the_terrain_error_whatever_the_mission_files_own_frame(
+def test_a_file_in_terrain_frame_is_judged_with_the_terrain_error_in_any_mission(
     run: Any, folder: Path, world: list[str]
 ) -> None:
     lat, lon = corpus.degrees(*corpus.HOME)

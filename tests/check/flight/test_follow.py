@@ -55,7 +55,7 @@ def test_a_whole_mission_is_followed_from_the_ground_to_the_ground() -> None:
     assert flight.stretches[-1].end[2] == GROUND_M
 
 
-def test_relative_altitudes_count_from_the_ground_where_the_vehicle_arms_not_from_the_files_home_row() -> None:
+def test_relative_altitudes_count_from_the_ground_at_arming_not_the_home_row() -> None:
     flight = fly(TAKEOFF, home=Home.at(36.6, -84.3, 0.0))
     assert flight.stretches[0].end[2] == GROUND_M + 65
     assert codes(flight.notes) == ["home_height_differs"]
@@ -337,7 +337,7 @@ def test_an_arduplanes_endless_loiter_takes_the_items_radius_and_a_timed_one_its
     assert 60 < fly(VTOL_TAKEOFF, timed, autopilot=Autopilot.ARDUPLANE).stretches[-1].reach_m < 75
 
 
-def test_a_loiter_to_an_altitude_circles_through_the_whole_band_on_arduplane_and_climbs_on_copter() -> None:
+def test_a_loiter_to_altitude_circles_the_band_on_arduplane_climbs_on_copter() -> None:
     place = m.degrees_e7(36.61), m.degrees_e7(-84.3)
     up = MissionItem(31, m.RELATIVE, (0, 100, 0, 0), *place, 165)
     circle = fly(VTOL_TAKEOFF, up, autopilot=Autopilot.ARDUPLANE).stretches[-1]

@@ -7,7 +7,7 @@ import pytest
 from pyproj import Geod
 
 from gcsplan.check.judge import judge
-from gcsplan.check.motion.spline import _slopes, chords, towards
+from gcsplan.check.motion.spline import chords, steepest_slopes, towards
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
@@ -33,11 +33,11 @@ def test_no_place_of_a_curve_is_steeper_than_is_said(seed: int) -> None:
     speed = leaves + 2.0 * square * t[:, None] + 3.0 * cube * t[:, None] ** 2
     slope = speed[:, 2] / np.hypot(speed[:, 0], speed[:, 1])
     pieces = 8
-    for k, (up, down) in enumerate(_slopes(leaves, square, cube, pieces)):
+    for k, (up, down) in enumerate(steepest_slopes(leaves, square, cube, pieces)):
         mine = slope[k * LOOKS // pieces : (k + 1) * LOOKS // pieces + 1]
         assert mine.max() <= up + 1e-9 * max(1.0, abs(up))
         assert mine.min() >= down - 1e-9 * max(1.0, abs(down))
-    ups, downs = zip(*_slopes(leaves, square, cube, pieces), strict=True)
+    ups, downs = zip(*steepest_slopes(leaves, square, cube, pieces), strict=True)
     assert max(ups) <= slope.max() + 1e-3 * abs(slope.max()) + 1e-3  # and the bound is tight
     assert min(downs) >= slope.min() - 1e-3 * abs(slope.min()) - 1e-3
 
@@ -58,7 +58,7 @@ def test_where_a_curve_stands_still_it_is_as_steep_as_it_leaves_and_arrives(stan
     speed = leaves + 2.0 * square * t[:, None] + 3.0 * cube * t[:, None] ** 2
     run = np.hypot(speed[:, 0], speed[:, 1])
     slope, t = (speed[:, 2] / run)[run > 1e-7 * run.max()], t[run > 1e-7 * run.max()]
-    for k, (up, down) in enumerate(_slopes(leaves, square, cube, pieces)):
+    for k, (up, down) in enumerate(steepest_slopes(leaves, square, cube, pieces)):
         mine = slope[(t >= k / pieces) & (t <= (k + 1) / pieces)]
         assert np.degrees(np.arctan(mine.max())) <= np.degrees(np.arctan(up)) + 0.002
         assert np.degrees(np.arctan(mine.min())) >= np.degrees(np.arctan(down)) - 0.002

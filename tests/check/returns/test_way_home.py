@@ -194,7 +194,7 @@ def test_over_a_zone_on_a_slope_the_climb_counts_the_ceiling_there_alone() -> No
     assert {s.zone for s in judged(under, m, v, 150.0).unsafe} == {"shelf"}
 
 
-def test_what_stays_unsafe_without_rally_points_is_not_called_a_matter_of_the_battery() -> None:
+def test_what_stays_unsafe_without_rally_points_is_no_matter_of_the_battery() -> None:
     w = world(300.0, [Zone("lid", Circle(1000.0, 0.0, 100.0), floor=Level(340.0, "amsl"))])
     home = judged(w, mission(w, [(0, 0, 20), (1000, 0, 20)]), vehicle(**BARE), 60.0)
     left = home.left or home.unsafe
@@ -361,7 +361,7 @@ def test_the_lowest_height_of_all_returns_is_told() -> None:
     assert high.as_dict()["lowest_agl_m"] == high.lowest.agl_m
 
 
-def test_all_reasons_of_a_return_are_named_together_and_stretches_are_cut_where_they_change() -> None:
+def test_reasons_of_a_return_are_named_together_and_stretches_cut_where_they_change() -> None:
     # Behind the ridge, on the northern half of the way, the line home meets the tower too.
     tower = Zone("tower", Circle(1600.0, 400.0, 150.0))
     w = world(ridge, [tower])
@@ -386,7 +386,7 @@ def test_all_reasons_of_a_return_are_named_together_and_stretches_are_cut_where_
     assert [s.from_m for s in home.unsafe] == sorted(s.from_m for s in home.unsafe)
 
 
-def test_where_no_altitude_helps_though_each_obstacle_could_be_passed_it_says_what_is_above() -> None:
+def test_where_no_altitude_helps_though_each_obstacle_has_one_it_says_what_is_above() -> None:
     lid = Zone("lid", Circle(1000.0, 0.0, 400.0), floor=Level(402.0, "amsl"))
     w = world(ridge, [lid])
     home = judged(w, mission(w, [(0, 0, 40), (0, 1500, 40), (2000, 1500, 130), (2500, 0, 40)]), vehicle(**BARE), 50.0)
@@ -459,9 +459,7 @@ def test_what_cannot_be_followed_is_not_called_safe() -> None:
 
 
 @pytest.mark.parametrize(("autopilot", "name"), [(COPTER, "RTL_ALT_M "), (PX4, "RTL_RETURN_ALT ")])
-def test_the_altitude_to_set_is_safe_within_all_limits_and_hardly_higher_than_it_must_be(
-    autopilot: Autopilot, name: str
-) -> None:
+def test_the_altitude_to_set_is_safe_within_all_limits_and_hardly_too_high(autopilot: Autopilot, name: str) -> None:
     w = world(ridge, [Zone("lid", Circle(1000.0, 600.0, 150.0), floor=Level(520.0, "amsl"))])
     m, v = mission(w, OVER, autopilot), vehicle(autopilot, **BARE)
     home = judged(w, m, v, 40.0)
@@ -624,7 +622,7 @@ def test_the_lowest_level_goes_up_from_top_to_top() -> None:
     assert swapped.lowest(0.0).tolist() == [50.0, 40.0]
 
 
-def test_the_return_from_the_middle_is_never_judged_more_strictly_than_from_the_whole() -> None:
+def test_a_return_from_the_middle_is_never_judged_more_strictly_than_the_whole() -> None:
     w = world(ridge, [Zone("p", Polygon(np.array([[500.0, 50], [700, 50], [600, 300]])), ceiling=Level(60.0, "agl"))])
     v = replace(vehicle(**BARE), limits=Limits(20.0, 150.0, 480.0, 30.0, 3.0, 5.0))
     m = mission(w, OVER)

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from gcsplan.errors import InputError
-from gcsplan.mavlink.link.options import ITEM_S, Patience, checked_timeout_s
+from gcsplan.mavlink.link.options import ITEM_S, TransferPatience, checked_timeout_s
 from gcsplan.mavlink.protocol.machine import Timers
 
 
@@ -16,7 +16,7 @@ def test_a_timeout_beyond_an_hour_or_of_nothing_is_refused(timeout_s: float) -> 
     with pytest.raises(InputError, match="0 … 3600 s"):
         checked_timeout_s(timeout_s)
     with pytest.raises(InputError, match="0 … 3600 s"):
-        Patience(timeout_s, 1, 0.0)
+        TransferPatience(timeout_s, 1, 0.0)
 
 
 def test_a_timeout_of_an_hour_is_taken() -> None:
@@ -24,7 +24,7 @@ def test_a_timeout_of_an_hour_is_taken() -> None:
 
 
 def test_silence_is_over_after_the_timeout_and_each_step_begins_it_anew() -> None:
-    patience = Patience(10.0, 100, now=5.0)
+    patience = TransferPatience(10.0, 100, now=5.0)
     assert patience.deadline == 15.0
     assert patience.over((0, 1), 100, now=14.9) is None
     assert patience.deadline == 24.9
@@ -34,7 +34,7 @@ def test_silence_is_over_after_the_timeout_and_each_step_begins_it_anew() -> Non
 
 
 def test_steps_without_an_end_are_over_after_the_time_of_all_items() -> None:
-    patience, now = Patience(10.0, 5, now=0.0), 0.0
+    patience, now = TransferPatience(10.0, 5, now=0.0), 0.0
     while (words := patience.over((int(now),), 5, now)) is None:
         now += 1.0
     assert now == 10.0 + 5 * ITEM_S
@@ -42,8 +42,8 @@ def test_steps_without_an_end_are_over_after_the_time_of_all_items() -> None:
 
 
 def test_a_list_of_unknown_length_gets_the_time_of_what_the_vehicle_tells() -> None:
-    told, untold = Patience(10.0, None, now=0.0), Patience(10.0, None, now=0.0)
-    known = Patience(10.0, 0, now=0.0)
+    told, untold = TransferPatience(10.0, None, now=0.0), TransferPatience(10.0, None, now=0.0)
+    known = TransferPatience(10.0, 0, now=0.0)
     for patience in (told, known):
         assert patience.over((1,), 50, now=9.0) is None
     assert untold.over((1,), 0, now=9.0) is None

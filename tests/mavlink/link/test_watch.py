@@ -9,7 +9,7 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 import pytest
 
 from gcsplan.mavlink.link.link import Heard
-from gcsplan.mavlink.link.options import Patience
+from gcsplan.mavlink.link.options import TransferPatience
 from gcsplan.mavlink.link.session.parameters import decode_value, judge_fence_parameters, judge_parameters
 from gcsplan.mavlink.link.watch import STANDBY, VehicleState, Watch, finite, place, whole
 from gcsplan.mavlink.protocol.messages import Address
@@ -154,10 +154,10 @@ def test_no_parameter_on_board_breaks_the_judgement(value: float, kind: int, aut
 
 
 def test_patience_ends_without_progress_and_after_two_seconds_an_item() -> None:
-    stuck = Patience(10.0, 5, 0.0)
+    stuck = TransferPatience(10.0, 5, 0.0)
     assert stuck.over((1,), 5, 9.9) is None
     assert "nothing new" in (stuck.over((1,), 5, 19.9) or "")
-    slow = Patience(10.0, 5, 0.0)
+    slow = TransferPatience(10.0, 5, 0.0)
     assert [slow.over((n,), 5, 4.0 * n) is None for n in range(6)] == [True] * 5 + [False]
-    unknown = Patience(10.0, None, 0.0)
+    unknown = TransferPatience(10.0, None, 0.0)
     assert all(unknown.over((n,), 100, 4.0 * n) is None for n in range(50))

@@ -14,7 +14,7 @@ from typing import Any
 
 from gcsplan.errors import LinkError, VehicleRefused
 from gcsplan.mavlink.link.link import Channel, LinkSteps
-from gcsplan.mavlink.link.options import Patience, SessionOptions, Task
+from gcsplan.mavlink.link.options import SessionOptions, Task, TransferPatience
 from gcsplan.mavlink.link.session.parameters import (
     FENCE_GROUPS,
     PARAMETER_GROUPS,
@@ -108,7 +108,7 @@ def uploading(channel: Channel, task: Task) -> LinkSteps[UploadResult]:
         machine,
         channel,
         recheck=recheck,
-        patience=Patience(options.timeout_s, len(task.items), started),
+        patience=TransferPatience(options.timeout_s, len(task.items), started),
         progress=lambda: task.progress(task.name, machine.progress) if task.progress else None,
     )
     settled = machine.result
@@ -160,7 +160,7 @@ def reading(
         most=_MOST_HELD.get(state.mav_autopilot, _MOST_HELD_BY_ANY),
     )  # fmt: skip
     yield from drive(
-        machine, channel, recheck=recheck, patience=Patience(options.timeout_s, None, channel.link.clock())
+        machine, channel, recheck=recheck, patience=TransferPatience(options.timeout_s, None, channel.link.clock())
     )
     where = f"vehicle {state.address.sysid}"
     if isinstance(machine.outcome, Changed):
@@ -227,7 +227,7 @@ def clearing(
         machine = Clear(
             us=channel.link.us, vehicle=state.address, mission_type=kind, timers=options.timers, gate=recheck.gate
         )
-        yield from drive(machine, channel, recheck=recheck, patience=Patience(options.timeout_s, 1, clock()))
+        yield from drive(machine, channel, recheck=recheck, patience=TransferPatience(options.timeout_s, 1, clock()))
         retries += machine.retries
         assert machine.outcome is not None
         if isinstance(machine.outcome, (Refused, Changed)):

@@ -1,6 +1,7 @@
 """The exchanges of a session, as tasks for `link.pump`: find a vehicle, read its parameters, run a protocol machine.
 
-`drive` runs the machine on a channel, subject to `Recheck` and `Patience`; the others lie outside the mission protocol.
+`drive` runs the machine on a channel, subject to `Recheck` and `TransferPatience`; the others lie outside the mission
+protocol.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import pymavlink.dialects.v20.ardupilotmega as dialect
 
 from gcsplan.errors import LinkError
 from gcsplan.mavlink.link.link import Channel, Heard, Link, LinkSteps
-from gcsplan.mavlink.link.options import Patience
+from gcsplan.mavlink.link.options import TransferPatience
 from gcsplan.mavlink.link.prepared_answers import Prepared
 from gcsplan.mavlink.link.session.parameters import decode_value, parameter_name
 from gcsplan.mavlink.link.session.recheck import Recheck, request_message
@@ -248,7 +249,7 @@ def drive(
     channel: Channel,
     *,
     recheck: Recheck | None = None,
-    patience: Patience | None = None,
+    patience: TransferPatience | None = None,
     progress: Callable[[], None] | None = None,
 ) -> LinkSteps[None]:
     """Run ``machine`` to its end, as a task; if the task is closed before (Ctrl-C), cancel the machine.
@@ -283,7 +284,7 @@ def drive(
             _give_up(machine, channel, recheck, CANCELLED_BY_US)
 
 
-def _next(machine: Driven, recheck: Recheck | None, patience: Patience | None) -> float:
+def _next(machine: Driven, recheck: Recheck | None, patience: TransferPatience | None) -> float:
     due = [one.deadline for one in (machine, recheck, patience) if one is not None]
     return min(at for at in due if at is not None)
 
@@ -301,7 +302,7 @@ def _take(machine: Driven, channel: Channel, prepared: Prepared, heard: Heard, r
         channel.link.prompt.learn(prepared, heard.peer, heard.message)
 
 
-def _ended_early(machine: Driven, channel: Channel, recheck: Recheck | None, patience: Patience | None) -> bool:
+def _ended_early(machine: Driven, channel: Channel, recheck: Recheck | None, patience: TransferPatience | None) -> bool:
     if machine.deadline is None:
         return False
     now = channel.link.clock()
