@@ -36,7 +36,7 @@ TEETH = (1, 2, 4, 8)
 LONGER_BY = 1e-3
 """Part by which a longer path is made longer than requested."""
 
-SPARE_M = 2.0
+DETOUR_SPARE_M = 2.0
 """Metres by which a path is raised, or a disc widened, beyond the need: way points are rounded, corners are cut."""
 
 
@@ -97,7 +97,7 @@ class Detours:
     def _higher(self, name: str, avoid: Sequence[Conflict]) -> Route | None:
         request = self._plans[name].request
         limits = request.vehicle.limits
-        low_m = limits.min_agl_m + self._rules.needed_m + SPARE_M
+        low_m = limits.min_agl_m + self._rules.needed_m + DETOUR_SPARE_M
         if limits.max_agl_m is not None and low_m + 2.0 * limits.altitude_error_m > limits.max_agl_m:
             return None
         return self._planned(name, request, limits=replace(limits, min_agl_m=low_m))
@@ -105,9 +105,9 @@ class Detours:
     def _round(self, name: str, avoid: Sequence[Conflict], wider: float) -> Route | None:
         request, air = self._plans[name].request, self._brief.world.airspace
         limits = request.vehicle.limits
-        radius_m = wider * self._rules.needed_m + SPARE_M
+        radius_m = wider * self._rules.needed_m + DETOUR_SPARE_M
         reach_m = radius_m + limits.horizontal_clearance_m + limits.track_error_m
-        half_m = self._rules.needed_m + limits.altitude_error_m + SPARE_M
+        half_m = self._rules.needed_m + limits.altitude_error_m + DETOUR_SPARE_M
         discs = []
         for i, conflict in enumerate(avoid):
             east, north, amsl = conflict.worst.middle

@@ -25,11 +25,11 @@ __all__ = ["cut", "moved", "sharpened"]
 
 NEAR_M = 0.05
 """Metres within which an item is at a point of the path: rounding, and more."""
-SLIGHT = 1e-3
+SLIGHT_TURN_RAD = 1e-3
 """A turn, rad, that is none."""
 MORE, MORE_M = 1.05, 0.03
 """Times and metres by which a corner is moved farther than it is cut: moved, it turns more sharply."""
-SHARPEST = 0.5
+LEAST_COSINE = 0.5
 """Least cosine of half a turn that counts: what turns back on itself would have to be moved very far."""
 
 
@@ -49,7 +49,7 @@ def cut(mission: Mission, findings: Sequence[Finding], points: Floats, world: Wo
             continue
         place = np.array(world.frame.to_plane(item.x / 1e7, item.y / 1e7), dtype=float)
         for k in (np.flatnonzero(np.hypot(*(way[1:-1] - place).T) < NEAR_M) + 1).tolist():
-            if turns[k - 1] > SLIGHT and long[k] > 2.0 * SHORT_LEG_M:
+            if turns[k - 1] > SLIGHT_TURN_RAD and long[k] > 2.0 * SHORT_LEG_M:
                 found.add(k)
     return found
 
@@ -81,7 +81,7 @@ def moved(points: Floats, corners: Collection[int], radius_m: float) -> Floats:
         half = math.asin(min(0.5 * float(np.hypot(*bend)), 1.0))
         part = min(radius_m / float(long[k - 1]), 1.0)
         off_m = min(radius_m, radius_m * math.sin(min(2.0 * half, 0.5 * math.pi)) + part * off_m)
-        if k in corners and half > 0.5 * SLIGHT:
-            away_m = (MORE * off_m + MORE_M) / max(math.cos(half), SHARPEST)
+        if k in corners and half > 0.5 * SLIGHT_TURN_RAD:
+            away_m = (MORE * off_m + MORE_M) / max(math.cos(half), LEAST_COSINE)
             out[k, :2] += away_m * bend / float(np.hypot(*bend))
     return out

@@ -24,7 +24,7 @@ from gcsplan.notes.note import Finding, Note
 from gcsplan.planners.budget import FIRST, FIRST_S, Budget
 from gcsplan.planners.problem import Problem, Solution
 
-SAME_M = 1e-6
+SAME_ENDS_M = 1e-6
 """Metres within which two paths end at the same place."""
 HEIGHTS = ("min_agl", "max_agl", "max_amsl", "terrain_clearance")
 
@@ -146,4 +146,4 @@ def same_ends(one: Solution, other: Solution) -> bool:
     """Whether the paths of two solutions for the same vias begin and end at the same places and altitudes: then the
     lower bound of either is one of both."""
     a, b = (s.path.points[[0, -1]] for s in (one, other))
-    return bool(np.abs(a - b).max() < SAME_M)
+    return bool(np.abs(a - b).max() < SAME_ENDS_M)

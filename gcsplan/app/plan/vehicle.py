@@ -27,7 +27,7 @@ from gcsplan.world.world import World
 
 __all__ = ["over_one_terrain", "plan_vehicle", "rebuilt"]
 
-ATTEMPTS = 4
+COPTER_ATTEMPTS = 4
 """Most plans for one vehicle, each with larger margins than the one before, until the decoded mission passes."""
 
 
@@ -78,7 +78,7 @@ def _copter_attempts(brief: Brief, request: VehicleRequest, limited: VehicleRequ
         solution, order, mission, verdict = _built(over, request, problem, solution, order)
         return VehiclePlan(request, problem, solution, mission, verdict, vehicle.speed_max_m_s, (), order, over)
 
-    return Attempts(ATTEMPTS, MARGINS, fly, acceptance_radius_m(vehicle))
+    return Attempts(COPTER_ATTEMPTS, MARGINS, fly, acceptance_radius_m(vehicle))
 
 
 def _built(

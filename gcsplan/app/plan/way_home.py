@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 MOST_SHOWN = 5
 """Vehicles that a warning or a refusal names one by one."""
 
-SAME_M = 0.5
+SAME_RETURN_M = 0.5
 """Return altitudes that differ by no more than this, m, count as the same."""
 
 
@@ -144,7 +144,7 @@ def against_on_board(home: WayHome, values: Mapping[str, float], mission: Missio
         return Note("return_required_and", why=Note("return_altitude_unread"))
     if otherwise := returns_otherwise(values):
         return Note("return_required_and", why=otherwise)
-    if abs(height_m - home.rtl_rel_home_m) <= SAME_M:
+    if abs(height_m - home.rtl_rel_home_m) <= SAME_RETURN_M:
         return None
     return Note(
         "return_required_elsewhere", judged_m=home.rtl_rel_home_m, returns_m=height_m,

@@ -56,7 +56,7 @@ from gcsplan.world.world import World
 __all__ = ["bound_between", "solution_between", "starts", "wing_attempts"]
 
 
-ATTEMPTS = 5
+WING_ATTEMPTS = 5
 
 MOST_JOINTS = 8
 """Most pairs of climb-out and approach for which a path is searched."""
@@ -90,7 +90,7 @@ def wing_attempts(brief: Brief, request: VehicleRequest, limited: VehicleRequest
         return _joined(brief, request, limited, problem, sharp[0], world)
 
     margins = replace(MARGINS, track_m=MARGINS.track_m + ACCEPTED_M + CHORDS_M)
-    return Attempts(ATTEMPTS, margins, fly)
+    return Attempts(WING_ATTEMPTS, margins, fly)
 
 
 def _joined(

@@ -40,7 +40,7 @@ __all__ = [
 Begin = TypeVar("Begin")
 Finish = TypeVar("Finish")
 
-SHARPEST = math.radians(60.0)
+SHARPEST_RAD = math.radians(60.0)
 """The largest turn at a joint that the straight pieces are long enough for; a larger turn is split into several."""
 
 STEP_DEG = 15.0
@@ -122,7 +122,7 @@ def around_m(problem: Problem) -> float:
 def straight_ends(problem: Problem, wanted: WantedEnd, sharp: Floats) -> Iterator[FlightEnd]:
     """The legal ends, seen outwards from the ground; ``sharp`` (N, 3) is the path from there, without arcs."""
     ground, radius = wanted.ground, problem.turn_radius_m
-    run_m = radius * math.tan(0.5 * SHARPEST) + 20.0
+    run_m = radius * math.tan(0.5 * SHARPEST_RAD) + 20.0
     aim = _along(sharp, (float(sharp[0, 2]) - float(ground[2])) / wanted.slope + run_m + 2.0 * radius)
     for heading in _headings(ground, aim, wanted.heading):
         end = _end(problem, wanted, heading, aim, run_m)
@@ -207,7 +207,7 @@ def _circle(problem: Problem, judge: EndJudge, middle: Floats, least_m: float, a
         return None
     wide = replace(_steep(limits), track_error_m=limits.track_error_m + reach_m)
     off = math.atan2(aim[1] - middle[1], aim[0] - middle[0])
-    run_m = reach_m + radius * math.tan(0.5 * SHARPEST) + 20.0
+    run_m = reach_m + radius * math.tan(0.5 * SHARPEST_RAD) + 20.0
     there = middle[:2] + run_m * np.array([math.cos(off), math.sin(off)])
     needed = max(_floor(air, np.array([[*middle[:2], 0.0], [*there, 0.0]]), wide), least_m)
     if not middle[2] < needed <= middle[2] + HIGHEST_CIRCLE_M:
@@ -221,18 +221,18 @@ def _circle(problem: Problem, judge: EndJudge, middle: Floats, least_m: float, a
 
 
 def _chain(top: Floats, heading: float, aim: Floats, run_m: float, radius: float) -> Floats:
-    """(N, 3) level corners after the slant, until the direction to ``aim`` is a turn of at most `SHARPEST`."""
+    """(N, 3) level corners after the slant, until the direction to ``aim`` is a turn of at most `SHARPEST_RAD`."""
     z, here = float(top[2]), top[:2]
     points = []
     for k in range(5):
-        step = run_m if k == 0 else run_m + radius * math.tan(0.5 * SHARPEST)
+        step = run_m if k == 0 else run_m + radius * math.tan(0.5 * SHARPEST_RAD)
         here = here + step * np.array([math.cos(heading), math.sin(heading)])
         points.append([*here, z])
         off = math.atan2(aim[1] - here[1], aim[0] - here[0]) - heading
         off = (off + math.pi) % (2.0 * math.pi) - math.pi
-        if abs(off) <= SHARPEST:
+        if abs(off) <= SHARPEST_RAD:
             break
-        heading += math.copysign(SHARPEST, off)
+        heading += math.copysign(SHARPEST_RAD, off)
     return np.array(points)
 
 

@@ -13,7 +13,7 @@ from gcsplan.arrays import Floats
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.turns.ends import (
     LONGER_M,
-    SHARPEST,
+    SHARPEST_RAD,
     FlightEnd,
     WantedEnd,
     around_m,
@@ -75,7 +75,7 @@ def test_an_end_climbs_towards_the_path_to_where_min_agl_is_met_or_as_high_as_as
     for end in (least, asked):
         assert (end.top[2] - 100.0) / end.top[0] == pytest.approx(SLOPE, rel=1e-3)
         assert end.chain[:, 2].tolist() == [end.top[2]] * len(end.chain)
-        assert end.chain[0, 0] - end.top[0] == pytest.approx(RADIUS_M * math.tan(0.5 * SHARPEST) + 20.0)
+        assert end.chain[0, 0] - end.top[0] == pytest.approx(RADIUS_M * math.tan(0.5 * SHARPEST_RAD) + 20.0)
         assert end.leaves is end.top
 
 
@@ -93,7 +93,7 @@ def test_an_end_away_from_the_path_turns_back_in_steps_that_have_room() -> None:
     legs = np.diff(np.vstack([end.top, end.chain])[:, :2], axis=0)
     turns = np.diff(np.arctan2(legs[:, 1], legs[:, 0]))
     assert len(turns) == 1
-    assert turns[0] == pytest.approx(-SHARPEST)
+    assert turns[0] == pytest.approx(-SHARPEST_RAD)
     assert not len(unfitting_legs(np.vstack([end.chain, SHARP[-1]]), end, None, RADIUS_M))
 
 
