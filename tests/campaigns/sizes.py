@@ -72,7 +72,7 @@ FILES = {
         Size(large_inputs.unknown_keys, 240_000, 6, None, taken=False),
         Size(large_inputs.parameters, 250_000, 5, 280_000),
         Size(large_inputs.tiles_named, 2000, 5, None, taken=False),
-        Size(large_logs.log, 999_999, 10, 999_999, least=400),
+        Size(large_logs.log, 999_999, 10, 999_999, least=1000),
         Size(large_logs.readings, 1_999_990, 40, 2_000_100, least=4000),
         Size(large_logs.messages, 1_999_990, 80, 2_000_100, least=400),
         Size(large_logs.noise, 255, 40, 256, least=1, taken=False),
@@ -112,6 +112,7 @@ WORLDS = {
         Size(large_inputs.fleet, 100, 20, 2000, least=1),
         Size(large_inputs.long_wing, 240, 20, None, least=1),
         Size(large_inputs.wing_over_cells, 240, 40, None, least=1),
+        Size(large_inputs.wing_over_hills, 240, 40, None, least=1),
         Size(large_inputs.runs, 100, 5, 10_000, least=1),
     )
 }
