@@ -56,7 +56,9 @@ def mission(
         "name": "u", "sysid": 1, "autopilot": "arducopter", "start": start, "goal": end, "speed_m_s": [3, 10],
     }  # fmt: skip
     vehicle |= {
-        k: keys.pop(k) for k in ("via", "turn_radius_m", "autopilot", "takeoff_heading_deg", "end") if k in keys
+        k: keys.pop(k)
+        for k in ("start", "via", "turn_radius_m", "autopilot", "takeoff_heading_deg", "end")
+        if k in keys
     }
     document: dict[str, object] = {
         "version": 1, "terrain": {"flat_m": 100}, "limits": {"min_agl_m": 30}, "no_fly": no_fly or [],
