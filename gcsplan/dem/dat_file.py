@@ -10,15 +10,16 @@ from __future__ import annotations
 import binascii
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Indices
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
 from gcsplan.world.terrain.cell import Cell, cell_of
@@ -28,6 +29,7 @@ from gcsplan.world.terrain.grid import (
     PARTS_OF_BLOCK,
     POSTS_OF_BLOCK,
     SAME_CORNER_E7,
+    STRIDE,
     Block,
     PostHeights,
     TerrainGrid,
@@ -39,7 +41,7 @@ RECORD_BYTES = 2048
 DAT_SUFFIX = ".DAT"
 VERSION = 1
 MOST_DAT_BYTES = 256 * 2**20
-"""A tile with posts every 15 m has less."""
+"""Of a file, and of all files that one mission uses. A tile with posts every 15 m has less, nine of every 40 m too."""
 
 RECORD = np.dtype([
     ("bitmap", "<u8"), ("lat", "<i4"), ("lon", "<i4"), ("crc", "<u2"), ("version", "<u2"), ("spacing", "<u2"),
@@ -56,9 +58,47 @@ MOST_BLOCKS_WRITTEN = 20_000
 KM_A_DEGREE = 111.2
 
 
+class DatBlocks(Mapping[Block, Floats]):
+    """Heights (28, 32) of the good blocks of a file, NaN for parts that are not known.
+
+    They are kept as the file's own records, which take a quarter of the memory, and are decoded when they are asked
+    for: a mission uses a few blocks of a tile.
+    """
+
+    def __init__(self, records: NDArray[np.void], numbers: Mapping[Block, int]) -> None:
+        self._records, self._numbers = records, numbers
+
+    def __getitem__(self, block: Block) -> Floats:
+        return _heights(self._records[self._numbers[block]])
+
+    def __contains__(self, block: object) -> bool:
+        return block in self._numbers
+
+    def __iter__(self) -> Iterator[Block]:
+        return iter(self._numbers)
+
+    @cached_property
+    def places(self) -> Indices:
+        """(N, 2) the places of all blocks in the tile, north and east, in their order."""
+        return np.array([(block.north, block.east) for block in self._numbers], np.intp).reshape(-1, 2)
+
+    def within(self, north: tuple[float, float], east: tuple[float, float]) -> Iterator[tuple[Block, Floats]]:
+        """The blocks that hold posts with these first and last numbers, and their heights."""
+        some = np.ones(len(self), np.bool_)
+        for at, (first, last), stride in zip(self.places.T, (north, east), STRIDE, strict=True):
+            some &= (at * stride <= last) & ((at + 1) * stride >= first)
+        cell = next(iter(self._numbers)).cell
+        for k in np.flatnonzero(some).tolist():
+            block = Block(cell, *self.places[k].tolist())
+            yield block, self[block]
+
+    def __len__(self) -> int:
+        return len(self._numbers)
+
+
 @dataclass(frozen=True, eq=False)
 class DatFile:
-    """One file: its tile, its spacing, and the heights of its good blocks (NaN for parts that are not known).
+    """One file: its tile, its spacing, and the heights of its good blocks.
 
     ``left_out``: how many blocks are not used, by what is wrong with them.
     """
@@ -66,7 +106,7 @@ class DatFile:
     name: str
     cell: Cell
     grid: TerrainGrid
-    blocks: Mapping[Block, Floats]
+    blocks: DatBlocks
     left_out: Mapping[Note, int]
 
     @property
@@ -145,17 +185,16 @@ def read_dat(path: Path, *, where: str) -> DatFile:
     if not used:
         raise InputError(f"{path} holds no block of terrain: copy it after the autopilot has filled it", where=where)
     grid = TerrainGrid(max(spacings, key=lambda s: (spacings[s], -s)))
-    blocks: dict[Block, Floats] = {}
+    numbers: dict[Block, int] = {}
     for k in used:
         fault = _fault(records, k, data, grid, cell) if grid.spacing_m > 0 else Note("spacing_is_zero")
         if fault:
             left_out[fault] += 1
             continue
-        block = Block(cell, int(records["north"][k]), int(records["east"][k]))
-        blocks[block] = _heights(records[k])
-    if not blocks:
+        numbers[Block(cell, int(records["north"][k]), int(records["east"][k]))] = k
+    if not numbers:
         raise InputError(f"{path} holds no good block of terrain: {next(iter(left_out))}", where=where)
-    return DatFile(path.name, cell, grid, blocks, dict(left_out))
+    return DatFile(path.name, cell, grid, DatBlocks(records, numbers), dict(left_out))
 
 
 def _fault(records: NDArray[np.void], k: int, data: bytes, grid: TerrainGrid, cell: Cell) -> Note | None:
@@ -177,6 +216,8 @@ def _fault(records: NDArray[np.void], k: int, data: bytes, grid: TerrainGrid, ce
 
 
 def _heights(record: np.void) -> Floats:
+    if int(record["bitmap"]) & ALL_PARTS == ALL_PARTS:
+        return np.asarray(record["height"], float)
     bits = (
         int(record["bitmap"]) >> np.arange(PARTS_OF_BLOCK[0] * PARTS_OF_BLOCK[1], dtype=np.uint64).astype(object)
     ) & 1

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.dem.dat_file import DatFile, cell_of_file, is_dat, read_dat
+from gcsplan.dem.dat_file import MOST_DAT_BYTES, DatFile, cell_of_file, is_dat, read_dat
 from gcsplan.dem.sources import cells_in
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
@@ -42,6 +42,12 @@ from gcsplan.world.terrain.raster import MAX_CELLS, require_file
 from gcsplan.world.terrain.terrain import NO_MORE_VOIDS, Terrain, TerrainSpec, place, require_metres, terrain_of
 
 WHOLE_METRES = HeightUnit("whole metres", 1.0, BY_FORMAT)
+
+MOST_POSTS = MAX_CELLS // 4
+"""Posts around a mission: they have a greatest and a least height, and the files are in memory beside them."""
+
+POSTS_AT_ONCE = 500_000
+"""Posts that are joined with those of other tiles at once: that takes 250 bytes for each."""
 
 
 REACH = 1.1
@@ -95,6 +101,7 @@ class DatTerrain:
         self._spec, self._where, self._at = spec, where, place(where, "dem")
         self._paths: dict[Cell, Path] = {}
         self._files: dict[Cell, DatFile] = {}
+        self._held_bytes = 0
         for path in paths:
             require_file(path, where=self._at)
             cell = cell_of_file(path, where=self._at)
@@ -131,6 +138,13 @@ class DatTerrain:
 
     def _file(self, cell: Cell) -> DatFile:
         if cell not in self._files:
+            self._held_bytes += self._paths[cell].stat().st_size
+            if self._held_bytes > MOST_DAT_BYTES:
+                raise InputError(
+                    f"the .DAT files that this mission uses have more than {MOST_DAT_BYTES >> 20} MB together; take "
+                    "files of a larger TERRAIN_SPACING",
+                    where=self._at,
+                )
             self._files[cell] = read_dat(self._paths[cell], where=self._at)
         return self._files[cell]
 
@@ -173,7 +187,7 @@ class DatMosaic:
         """Latitudes and longitudes, 1e-7°, of the corners of all blocks."""
         lat, lon = [], []
         for file in self._files.values():
-            at = np.array([(b.north, b.east) for b in file.blocks])
+            at = file.blocks.places
             for north, east in ((0, 0), (0, 1), (1, 0), (1, 1)):
                 found = self.grid.post_e7(file.cell, (at[:, 0] + north) * STRIDE[0], (at[:, 1] + east) * STRIDE[1])
                 lat.append(found[0])
@@ -215,10 +229,11 @@ class DatMosaic:
                 f"around {frame.lat_deg:.4f}, {frame.lon_deg:.4f}; give the files of this place",
                 where=self.where,
             )
-        most = min(MAX_CELLS, MAX_CELLS if most_cells is None else most_cells)
+        most = min(MOST_POSTS, MOST_POSTS if most_cells is None else most_cells)
         if cols * rows > most:
             raise InputError(
-                f"the mission needs {cols} × {rows} posts, more than {most / 1e6:.3g} million; plan a smaller mission",
+                f"the mission needs {cols} × {rows} posts, more than {most / 1e6:.3g} million; plan a smaller mission, "
+                "or take files of a larger TERRAIN_SPACING",
                 where=self.where,
             )
 
@@ -240,16 +255,18 @@ class DatMosaic:
 
     def _heights(self, anchor: Cell, x: Floats, y: Floats) -> tuple[Floats, Floats]:
         """(rows, cols) greatest and least heights of nodes with these numbers of columns and rows, rows going south."""
-        north, east = y[::-1], x
-        inside, outside = self._sides(anchor, north, east)
-        own = self._posts(anchor, north, east)
-        there = self._bounds(anchor, north, east) if outside.any() else own
-        found = []
-        for sign, mine, others in zip((1.0, -1.0), own, there, strict=True):
-            heights = np.where(inside, sign * mine, -np.inf)
-            heights = np.maximum(heights, np.where(outside, sign * others, -np.inf))
-            found.append(np.ascontiguousarray(sign * heights[::-1]))
-        return found[0], found[1]
+        found = np.empty((len(y), len(x))), np.empty((len(y), len(x)))
+        at_once = max(POSTS_AT_ONCE // len(x), STRIDE[0])
+        for k in range(0, len(y), at_once):
+            north, east = y[k : k + at_once][::-1], x
+            inside, outside = self._sides(anchor, north, east)
+            own = self._posts(anchor, north, east)
+            there = self._bounds(anchor, north, east) if outside.any() else own
+            for out, sign, mine, others in zip(found, (1.0, -1.0), own, there, strict=True):
+                heights = np.where(inside, sign * mine, -np.inf)
+                heights = np.maximum(heights, np.where(outside, sign * others, -np.inf))
+                out[k : k + at_once] = sign * heights[::-1]
+        return found
 
     def _sides(self, anchor: Cell, north: Floats, east: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Of each node: whether a cell beside it meets its own tile, and whether one meets another tile."""
@@ -270,7 +287,8 @@ class DatMosaic:
         """
         high, low = (np.full((len(north), len(east)), end) for end in (-np.inf, np.inf))
         file = self._files.get(cell)
-        for block, heights in ({} if file is None else file.blocks).items():
+        ends = (float(north[0]), float(north[-1])), (float(east[0]), float(east[-1]))
+        for block, heights in () if file is None else file.blocks.within(*ends):
             r0, c0 = block.north * STRIDE[0] - int(north[0]), block.east * STRIDE[1] - int(east[0])
             rows = slice(max(r0, 0), max(0, min(r0 + STRIDE[0] + 1, len(north))))
             cols = slice(max(c0, 0), max(0, min(c0 + STRIDE[1] + 1, len(east))))

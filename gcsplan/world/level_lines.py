@@ -136,28 +136,29 @@ def over(
     near, far = reach.near_m + wide_m, reach.far_m + wide_m
     error = limits.altitude_error_m
     margin = reach.near_margin_m if wide_m == 0.0 else TUBE_MARGIN_M
-    found: list[tuple[Indices, Floats, Floats, Floats, Floats]] = []
+    n = len(starts)
+    clear_m, legal_m, ceiling_m = np.full(n, -np.inf), np.full(n, -np.inf), np.full(n, np.inf)
+    found: list[tuple[Indices, Floats, Floats, Floats]] = []
     for first, last in pairwise(batches(air, starts, ends, MOST_LEVEL_ROWS)):
         line, s0, rows = _pieces(
             air, starts[first:last], ends[first:last],
             (near if limits.max_agl_m is not None else UNUSED, near, far), of_top=True,
         )  # fmt: skip
-        high = rows[:, 3:5].max(axis=1) + (error + margin)
+        high = _higher(rows, 3) + (error + margin)
         legal = high + limits.min_agl_m
         if limits.horizontal_clearance_m > 0.0:
-            beside = rows[:, 5:7].max(axis=1) + (error + max(reach.far_margin_m, margin))
+            beside = _higher(rows, 5) + (error + max(reach.far_margin_m, margin))
             high, legal = np.maximum(high, beside), np.maximum(legal, beside)
         unknown = np.isnan(high) | np.isnan(legal)
         high, legal = np.where(unknown, np.inf, high), np.where(unknown, np.inf, legal)
-        low = np.where(unknown, -np.inf, rows[:, 1:3].min(axis=1) - (error + margin))
-        found.append((line + first, s0, high, legal, low))
-    line, s0, high, legal, low = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    n = len(starts)
-    clear_m, legal_m, ceiling_m = np.full(n, -np.inf), np.full(n, -np.inf), np.full(n, np.inf)
-    np.maximum.at(clear_m, line, high)
-    np.maximum.at(legal_m, line, legal)
-    if limits.max_agl_m is not None:
-        np.minimum.at(ceiling_m, line, low + limits.max_agl_m)
+        line += first
+        np.maximum.at(clear_m, line, high)
+        np.maximum.at(legal_m, line, legal)
+        if limits.max_agl_m is not None:
+            low = np.where(unknown, -np.inf, _lower(rows, 1) - (error + margin))
+            np.minimum.at(ceiling_m, line, low + limits.max_agl_m)
+        found.append((line, s0, high, legal))
+    line, s0, high, legal = (np.concatenate(parts) for parts in zip(*found, strict=True))
     clearance_m = limits.horizontal_clearance_m * air.scale
     crossings = _crossings(air, starts, ends, reach, wide_m, error, swept, clearance_m)
     return LevelLines(clear_m, legal_m, ceiling_m, crossings, line, s0, high, legal)
@@ -211,6 +212,16 @@ def _pieces(
     base = np.concatenate([[0.0], after])[leg]
     s0 = np.where(back[line], after[leg] - rows[:, 0], begin - base)
     return line, np.maximum(s0, 0.0), rows
+
+
+def _higher(rows: Floats, column: int) -> Floats:
+    """(P,) the greater of this column and the next: of two columns, that is ten times faster than ``max(axis=1)``."""
+    return np.maximum(rows[:, column], rows[:, column + 1])
+
+
+def _lower(rows: Floats, column: int) -> Floats:
+    """(P,) the smaller of this column and the next."""
+    return np.minimum(rows[:, column], rows[:, column + 1])
 
 
 def _few(reach_m: float, air: Airspace) -> float:
@@ -273,8 +284,8 @@ def _crossings(
         row = table[zone[follow]]
         with np.errstate(invalid="ignore"):
             unknown = np.isnan(rows[:, 1:3]).any(axis=1)
-            np.minimum.at(low, part, np.where(unknown, -np.inf, rows[:, 1:3].min(axis=1)))
-            np.maximum.at(high, part, np.where(unknown, np.inf, rows[:, 3:5].max(axis=1)))
+            np.minimum.at(low, part, np.where(unknown, -np.inf, _lower(rows, 1)))
+            np.maximum.at(high, part, np.where(unknown, np.inf, _higher(rows, 3)))
             known = np.isfinite(low) & np.isfinite(high)
             floor = np.fmax(low + (bottom[follow] - TUBE_MARGIN_M), row[:, BAND_LOW])
             ceiling = np.fmin(high + (top[follow] + TUBE_MARGIN_M), row[:, BAND_HIGH])

@@ -56,7 +56,9 @@ def mission(
         "name": "u", "sysid": 1, "autopilot": "arducopter", "start": start, "goal": end, "speed_m_s": [3, 10],
     }  # fmt: skip
     vehicle |= {
-        k: keys.pop(k) for k in ("via", "turn_radius_m", "autopilot", "takeoff_heading_deg", "end") if k in keys
+        k: keys.pop(k)
+        for k in ("start", "via", "turn_radius_m", "autopilot", "takeoff_heading_deg", "end")
+        if k in keys
     }
     document: dict[str, object] = {
         "version": 1, "terrain": {"flat_m": 100}, "limits": {"min_agl_m": 30}, "no_fly": no_fly or [],
@@ -185,6 +187,15 @@ def long_wing(count: int, rng: random.Random) -> list[str]:
 
 def wing_over_cells(count: int, rng: random.Random) -> list[str]:
     """The same across hills of 80 m in cells of 30 m: 40 million cells for 240 km."""
+    return _wing_over(40.0, count, rng)
+
+
+def wing_over_hills(count: int, rng: random.Random) -> list[str]:
+    """The same across hills of 300 m: no return altitude is safe from everywhere, and rally points are looked for."""
+    return _wing_over(150.0, count, rng)
+
+
+def _wing_over(high_m: float, count: int, rng: random.Random) -> list[str]:
     goal = 950.0 * count, 312.0 * count
     columns, rows = (math.ceil((d + 60_000.0) / 30.0) for d in goal)
     lat, lon = 30.0 / NORTH_M, 30.0 / EAST_M
@@ -198,7 +209,7 @@ def wing_over_cells(count: int, rng: random.Random) -> list[str]:
         for row in range(0, rows, 256):
             height = min(256, rows - row)
             north = np.cos(np.arange(row, row + height) / 45.0)
-            heights = 400.0 + 40.0 * north[:, None] * hills + noise.uniform(0.0, 5.0, (height, columns))
+            heights = 400.0 + high_m * north[:, None] * hills + noise.uniform(0.0, 5.0, (height, columns))
             file.write(heights.astype(np.float32), 1, window=((row, row + height), (0, columns)))
     keys: dict[str, Any] = {"autopilot": "arduplane", "turn_radius_m": 100, "takeoff_heading_deg": 90, "end": "loiter"}
     terrain = {"dem": "dem.tif", "vertical_datum": "EGM96"}

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 import random
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -165,6 +166,63 @@ def squares_in_kml(count: int, rng: random.Random) -> list[str]:
         f'<kml xmlns="http://www.opengis.net/kml/2.2"><Document>{"".join(marks)}</Document></kml>'
     )
     return ["plan", *mission([{"file": "zones.kml"}]), "-o", "out", "--json"]
+
+
+def squares_in_kmz(count: int, rng: random.Random) -> list[str]:
+    """The same, zipped: the archive is small, and its content has the limit of any file."""
+    arguments = squares_in_kml(count, rng)
+    Path("zones.kml").rename("doc.kml")
+    with zipfile.ZipFile("zones.kmz", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.write("doc.kml")
+    mission([{"file": "zones.kmz"}])
+    return arguments
+
+
+def bomb_in_kmz(count: int, rng: random.Random) -> list[str]:
+    """A KMZ of some kilobytes whose one member has ``count`` megabytes of blanks."""
+    with zipfile.ZipFile("zones.kmz", "w", zipfile.ZIP_DEFLATED) as archive, archive.open("doc.kml", "w") as member:
+        for _ in range(count):
+            member.write(b" " * 1_000_000)
+    return ["plan", *mission([{"file": "zones.kmz"}]), "-o", "out", "--json"]
+
+
+def squares_in_ed318(count: int, rng: random.Random) -> list[str]:
+    layer = {"upper": 900, "upperReference": "AGL", "lower": 0, "lowerReference": "AGL", "uom": "m"}
+    features = [
+        {
+            "type": "Feature",
+            "properties": {
+                "identifier": f"Z{k}", "country": "SVN", "name": [{"text": f"z{k}", "lang": "en"}],
+                "type": "PROHIBITED", "variant": "COMMON", "zoneAuthority": [{"purpose": "INFORMATION"}],
+            },
+            "geometry": {"type": "Polygon", "coordinates": [ring], "layer": layer},
+        }
+        for k, ring in enumerate(_rounded_squares(count, rng))
+    ]  # fmt: skip
+    return _in_json({"type": "FeatureCollection", "features": features})
+
+
+def squares_in_openaip(count: int, rng: random.Random) -> list[str]:
+    lower, upper = ({"value": m, "unit": 0, "referenceDatum": 0} for m in (0, 900))
+    items = [
+        {
+            "_id": f"i{k}", "name": f"z{k}", "type": 3, "icaoClass": 8, "lowerLimit": lower, "upperLimit": upper,
+            "geometry": {"type": "Polygon", "coordinates": [ring]},
+        }
+        for k, ring in enumerate(_rounded_squares(count, rng))
+    ]  # fmt: skip
+    return _in_json({"items": items})
+
+
+def _rounded_squares(count: int, rng: random.Random) -> Iterator[list[list[float]]]:
+    """The squares as authorities write them: with six decimals."""
+    for ring in _squares(count, rng):
+        yield [[round(lon, 6), round(lat, 6)] for lon, lat in ring]
+
+
+def _in_json(whole: dict[str, object]) -> list[str]:
+    Path("zones.json").write_text(json.dumps(whole, separators=(",", ":")))
+    return ["plan", *mission([{"file": "zones.json"}]), "-o", "out", "--json"]
 
 
 def squares_in_openair(count: int, rng: random.Random) -> list[str]:

@@ -31,7 +31,7 @@ from typing import Any
 
 import gcsplan
 from gcsplan.cli import main
-from tests.campaigns import large_inputs, large_logs, large_zones
+from tests.campaigns import large_inputs, large_logs, large_terrain, large_zones
 from tests.campaigns.disk import workshop
 
 Kind = Callable[[Any, random.Random], list[str]]
@@ -72,7 +72,7 @@ FILES = {
         Size(large_inputs.unknown_keys, 240_000, 6, None, taken=False),
         Size(large_inputs.parameters, 250_000, 5, 280_000),
         Size(large_inputs.tiles_named, 2000, 5, None, taken=False),
-        Size(large_logs.log, 999_999, 10, 999_999, least=400),
+        Size(large_logs.log, 999_999, 10, 999_999, least=1000),
         Size(large_logs.readings, 1_999_990, 40, 2_000_100, least=4000),
         Size(large_logs.messages, 1_999_990, 80, 2_000_100, least=400),
         Size(large_logs.noise, 255, 40, 256, least=1, taken=False),
@@ -102,6 +102,10 @@ WORLDS = {
         Size(large_zones.great_circles, 800, 12, 20_000),
         Size(large_zones.squares_in_kml, 20_000, 20, 20_000),
         Size(large_zones.squares_in_openair, 20_000, 20, 20_000),
+        Size(large_zones.squares_in_kmz, 20_000, 20, 20_000),
+        Size(large_zones.bomb_in_kmz, 19, 5, 21, least=1, taken=False),
+        Size(large_zones.squares_in_ed318, 20_000, 20, 20_000),
+        Size(large_zones.squares_in_openaip, 20_000, 20, 20_000),
         Size(large_zones.masts, 20_000, 20, 20_000),
         Size(large_zones.geopackage, 20_000, 15, 20_000),
         Size(large_zones.shapefile, 20_000, 15, 20_000),
@@ -109,9 +113,12 @@ WORLDS = {
         Size(large_inputs.vias, 500, 5, 500),
         Size(large_inputs.cells, 49, 5, 51, least=0.01),
         Size(large_inputs.tiles, 2000, 10, 2000, least=9),
+        Size(large_terrain.dat_megabytes, 255, 15, 270, least=40),
+        Size(large_terrain.dat_posts, 22, 15, 26, least=1),
         Size(large_inputs.fleet, 100, 20, 2000, least=1),
         Size(large_inputs.long_wing, 240, 20, None, least=1),
         Size(large_inputs.wing_over_cells, 240, 40, None, least=1),
+        Size(large_inputs.wing_over_hills, 240, 40, None, least=1),
         Size(large_inputs.runs, 100, 5, 10_000, least=1),
     )
 }

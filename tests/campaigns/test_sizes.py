@@ -72,7 +72,8 @@ def test_every_kind_is_in_the_table_of_limits() -> None:
 
 
 DEAR = {
-    "messages", "items_at_home", "splines", "readings", "wing_over_cells", "corners_drawn", "corners_at_home",
+    "messages", "items_at_home", "splines", "readings", "wing_over_cells", "wing_over_hills", "corners_drawn",
+    "corners_at_home",
 }  # fmt: skip
 """Kinds that take 15 to 40 s each at their limit: with GCSPLAN_SIZES=all."""
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats
+from gcsplan.dem import dat_terrain
 from gcsplan.dem.dat_file import RECORD_BYTES, crc_of, file_name, packed, read_dat
 from gcsplan.dem.dat_terrain import bounds
 from gcsplan.dem.terrain import open_dem
@@ -278,3 +279,53 @@ def test_bounds_are_unknown_where_a_post_nearby_is() -> None:
     assert np.isnan(high[3, 3])
     assert np.isnan(low[3, 3])
     assert high[0, 0] == low[0, 0] == 50.0
+
+
+@pytest.mark.parametrize(("lat", "lon"), [(37.002, -84.005), (36.55, -84.40)])
+def test_posts_that_are_joined_a_few_at_once_are_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lat: float, lon: float
+) -> None:
+    folder = write(tmp_path / "terrain", lat, lon, reach_deg=0.08)
+    _, whole = surface_of(folder, lat, lon)
+    monkeypatch.setattr(dat_terrain, "POSTS_AT_ONCE", 1)
+    _, few = surface_of(folder, lat, lon)
+    np.testing.assert_allclose(few.ground_m, whole.ground_m, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(few.top_m, whole.top_m, rtol=0.0, atol=1e-9)
+
+
+def test_files_that_are_too_large_together_are_refused_before_they_are_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Four files of 256 MB are a gigabyte, and took six."""
+    folder = write(tmp_path / "terrain", 37.002, -84.005, reach_deg=0.03)
+    sizes = sorted(f.stat().st_size for f in folder.iterdir())
+    assert len(sizes) == 4
+    monkeypatch.setattr(dat_terrain, "MOST_DAT_BYTES", sum(sizes))
+    surface_of(folder, 37.002, -84.005)
+    monkeypatch.setattr(dat_terrain, "MOST_DAT_BYTES", sum(sizes) - 1)
+    with pytest.raises(InputError, match="take files of a larger TERRAIN_SPACING"):
+        surface_of(folder, 37.002, -84.005)
+
+
+def test_too_many_posts_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = write(tmp_path / "terrain", 36.55, -84.40)
+    monkeypatch.setattr(dat_terrain, "MOST_POSTS", 1000)
+    with pytest.raises(InputError, match="larger TERRAIN_SPACING"):
+        surface_of(folder, 36.55, -84.40)
+
+
+def test_blocks_are_decoded_when_they_are_asked_for(tmp_path: Path) -> None:
+    """As floats they take four times the file: 255 MB took 1.6 GB."""
+    blocks = read_dat(write(tmp_path, 36.55, -84.40) / "N36W085.DAT", where="").blocks
+    every = {block: blocks[block] for block in blocks}
+    assert len(every) == len(blocks) == len(blocks.places)
+    first, last = (100.0, 200.0), (50.0, 60.0)
+    some = dict(blocks.within(first, last))
+    for block, heights in some.items():
+        np.testing.assert_array_equal(heights, every[block])
+    held = {
+        b for b in every
+        if b.north * 24 <= 200 and (b.north + 1) * 24 >= 100 and b.east * 28 <= 60 and (b.east + 1) * 28 >= 50
+    }  # fmt: skip
+    assert set(some) == held
+    assert not any(isinstance(v, np.ndarray) and v.dtype == float for v in vars(blocks).values())

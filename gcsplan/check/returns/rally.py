@@ -19,7 +19,7 @@ from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.motion.return_rules import RETURN_RULES, RallyAltitude
 from gcsplan.check.returns.footprint import Target
 from gcsplan.check.returns.obstacles import GradedObstacles, Obstacles, obstacles_of_returns
-from gcsplan.check.returns.refinement import CLEAR, Refinement
+from gcsplan.check.returns.refinement import CLEAR, Refinement, pieces_of
 from gcsplan.check.returns.stretches import stretches_of
 from gcsplan.check.returns.trace import MissionTrace, TraceParts
 from gcsplan.check.returns.verdict import RallyPoint, UnsafeStretch
@@ -36,8 +36,9 @@ CANDIDATES = 16
 PLACES_TRIED = 4
 """Places examined for each candidate; the flattest is used."""
 
-MISSION_PARTS = 120
-"""Parts into which a mission is cut, about, to choose the points; the choice is then refined."""
+MISSION_PARTS, FEWEST_PARTS, CANDIDATE_PIECES = 120, 60, 400_000
+"""Most parts of a mission that are looked at to choose the points; the choice is then refined. Fewer where their
+returns have more than so many pieces of ground for each candidate: a mission of 100 km over cells of 30 m."""
 
 NEAREST_HOME_M = 200.0
 FLAT_WITHIN_M = 10.0
@@ -84,9 +85,8 @@ def propose(
         best_level(refinement.strict[CLEAR], refinement.parts.size, ground + return_rel_home_m, refinement.start),
         ground,
     )
-    parts = trace.cut(max(refinement.first_m, float((trace.last - trace.first).sum()) / MISSION_PARTS))
+    parts, size = _few_parts(trace, home, refinement.first_m)
     middle = trace.points(parts.middle)[:, :2]
-    size = np.maximum(parts.size, 1e-3)
     obstacles = obstacles_of_returns(trace, parts, home, vehicle, whole=False).clear
     away, safe = [np.hypot(*(middle - home.en).T)], [obstacles.passes(level)]
     places = [_Place(home, level, 0.0, False, obstacles, np.arange(len(parts)))]
@@ -122,6 +122,21 @@ def propose(
     served_m = [float(size[nearest == i].sum()) for i in range(len(used))]
     points = tuple(_point(trace, p, m, vehicle, ground) for p, m in zip(used[1:], served_m[1:], strict=True))
     return Proposal(points, level - ground, left, _conditions(vehicle, float(apart.min(axis=0).max())))
+
+
+def _few_parts(trace: MissionTrace, home: Target, least_m: float) -> tuple[TraceParts, Floats]:
+    """Parts of the mission to choose the points by, and the length in u (N,), m, for which each stands."""
+    field = trace.world.airspace.field
+    away_m = float(np.hypot(trace.east - home.east_m, trace.north - home.north_m).mean())
+    pieces = pieces_of(away_m, min(field.step_x, field.step_y))
+    most = int(np.clip(CANDIDATE_PIECES / pieces, FEWEST_PARTS, MISSION_PARTS))
+    parts = trace.cut(max(least_m, float((trace.last - trace.first).sum()) / most))
+    size = np.maximum(parts.size, 1e-3)
+    if len(parts) <= 2 * most:  # each stretch has a part at least
+        return parts, size
+    after = np.cumsum(size)
+    chosen, times = np.unique(np.searchsorted(after, (np.arange(most) + 0.5) * (after[-1] / most)), return_counts=True)
+    return parts.take(chosen), times * (after[-1] / most)
 
 
 def best_level(obstacles: Obstacles, size: Floats, level: float, start: float) -> float:

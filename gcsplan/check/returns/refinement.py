@@ -109,9 +109,14 @@ class Refinement:
         self.strict, self.lenient = joined(self.strict, strict), joined(self.lenient, lenient)
 
 
+def pieces_of(away_m: float, cell_m: float) -> float:
+    """About how many pieces of ground a return of ``away_m`` has over cells of ``cell_m``."""
+    return 2.5 * (away_m / cell_m + 1.0)
+
+
 def sizes_m(trace: MissionTrace, away_m: float, cell_m: float) -> tuple[float, float]:
     """Length of the first parts and of the smallest, m, for returns ``away_m`` long over cells of ``cell_m``."""
     length = float((trace.last - trace.first).sum())
-    first = np.clip(length * 2.5 * (away_m / cell_m + 1.0) / FIRST_PIECES, COARSE_M, COARSEST_M)
+    first = np.clip(length * pieces_of(away_m, cell_m) / FIRST_PIECES, COARSE_M, COARSEST_M)
     first = min(float(first), max(length, 1e-3) / LEAST_PARTS)
     return first, min(SMALLEST_PART_M, first / SMALLER)

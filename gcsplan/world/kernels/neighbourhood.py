@@ -30,7 +30,7 @@ BOW = 2
 """Upper bound, in cells, of how far a line of the plane leaves the straight grid line between two such places."""
 CELL_BYTES = 12
 """Of a cell that was examined: a slope and two heights."""
-MOST_EXAMINED_BYTES = 250_000_000
+MOST_EXAMINED_BYTES = 150_000_000
 """Of what all neighbourhoods of an airspace have examined: those that were asked for least lately forget it."""
 AT_ONCE = 3
 """Neighbourhoods that one call of a kernel takes."""

@@ -17,6 +17,7 @@ from gcsplan.arrays import Floats
 from gcsplan.check.flight.follow import follow
 from gcsplan.check.judge import judge
 from gcsplan.check.returns import obstacles as sweep
+from gcsplan.check.returns import rally
 from gcsplan.check.returns.footprint import Target
 from gcsplan.check.returns.obstacles import Obstacles, obstacles_of_returns
 from gcsplan.check.returns.rally import rally_items
@@ -25,6 +26,7 @@ from gcsplan.check.returns.stretches import rel_home
 from gcsplan.check.returns.trace import trace_of
 from gcsplan.check.returns.verdict import worst_first
 from gcsplan.check.returns.way_home import WayHome, refinement_of, way_home
+from gcsplan.check.returns.words import together_m
 from gcsplan.figures import counted
 from gcsplan.mavlink.mission.autopilots import profile_of
 from gcsplan.mavlink.mission.commands import LAND, RTL, TAKEOFF, VTOL_LAND, VTOL_TAKEOFF, WAYPOINT
@@ -234,6 +236,32 @@ def test_a_wall_without_a_top_leaves_no_altitude_and_rally_points_mend_it() -> N
         east, north = w.frame.to_plane(item.lat_deg, item.lon_deg)
         assert math.hypot(float(east) - 1500.0, float(north)) > 150.0
     assert judged(w, m, v, 60.0, rally=False).rally == ()
+
+
+def test_rally_points_are_chosen_by_few_parts_of_a_mission_of_many_stretches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each stretch was looked at from each candidate: most of the time that a long mission took."""
+    w = world(300.0, [Zone("tower", Circle(1500.0, 0.0, 150.0))])
+    v = vehicle(**BARE)
+    there = [(7.5 * k, 900.0 * k / 200.0 + 3.0 * (k % 2), 80.0) for k in range(201)]
+    back = [(1500.0 + 12.5 * k, 900.0 - 4.5 * k + 3.0 * (k % 2), 80.0) for k in range(1, 201)]
+    m = mission(w, [*there, *back])
+    looked_at: list[int] = []
+
+    def counted_parts(trace: Any, parts: Any, target: Any, vehicle: Any, *, whole: bool) -> Any:
+        looked_at.append(len(parts))
+        return obstacles_of_returns(trace, parts, target, vehicle, whole=whole)
+
+    monkeypatch.setattr(rally, "obstacles_of_returns", counted_parts)
+    monkeypatch.setattr(rally, "PARTS", 60)
+    home = judged(w, m, v, 60.0)
+    assert home.rally
+    assert max(looked_at[: 1 + rally.CANDIDATES]) <= 120
+    few = home.left
+    monkeypatch.setattr(rally, "PARTS", 1000)
+    assert (
+        together_m((s.from_m, s.to_m) for s in few)
+        < 1.2 * together_m((s.from_m, s.to_m) for s in judged(w, m, v, 60.0).left) + 20.0
+    )
 
 
 def test_a_mission_that_hugs_a_zone_is_not_called_shut_in() -> None:
