@@ -252,7 +252,7 @@ def test_rally_points_are_chosen_by_few_parts_of_a_mission_of_many_stretches(mon
         return obstacles_of_returns(trace, parts, target, vehicle, whole=whole)
 
     monkeypatch.setattr(rally, "obstacles_of_returns", counted_parts)
-    monkeypatch.setattr(rally, "PARTS", 60)
+    monkeypatch.setattr(rally, "MISSION_PARTS", 60)
     home = judged(w, m, v, 60.0)
     assert home.rally
     assert max(looked_at[: 1 + rally.CANDIDATES]) <= 120
