@@ -107,6 +107,19 @@ def test_a_sidecar_changes_the_ground_and_its_hash_in_one_process(tmp_path: Path
     assert load_mission(case.mission).inputs["dem_sha256"] == alone.inputs["dem_sha256"]
 
 
+def test_a_geopackage_with_half_a_change_is_refused(tmp_path: Path) -> None:
+    case = made("geopackage", tmp_path / "w")
+    batch = batch_of(case.mission, out=tmp_path / "out")
+    ran(batch)
+    journal = case.folder / "z.gpkg-journal"
+    journal.write_bytes(b"\0" * 28)  # of changes that are ended, as journal_mode=PERSIST leaves it
+    assert [r.code for r in ran(batch)] == [0]
+    journal.write_bytes(bytes.fromhex("d9d505f920a163d7") + b"\0" * 504)
+    (record,) = ran(batch)
+    assert record.code == 2
+    assert "begun and not ended" in record.rows[0]["message"]
+
+
 def test_files_above_16_mb_go_by_size_time_and_inode(tmp_path: Path) -> None:
     large = tmp_path / "large.tif"
     large.write_bytes(bytes(17 << 20))

@@ -27,6 +27,12 @@ def coast(count: int, rng: random.Random) -> list[str]:
     return ["plan", *mission([{"file": "zones.geojson"}]), "-o", "out", "--json"]
 
 
+def spikes_far_away(count: int, rng: random.Random) -> list[str]:
+    """Spikes of 300 m, most of whose edges lie beside each other, in a zone that no mission is near."""
+    ring_file(spiky(count, rng, middle=(2000.0, 300_000.0)))
+    return ["plan", *mission([{"file": "zones.geojson"}]), "-o", "out", "--json"]
+
+
 def corners_checked(count: int, rng: random.Random) -> list[str]:
     ring_file(spiky(count, rng))
     waypoints([(300.0 + 10.0 * k, 950.0) for k in range(300)])

@@ -28,6 +28,7 @@ from gcsplan.dem.sources import GLO30
 from gcsplan.world.terrain.cell import Cell
 from gcsplan.world.terrain.grid import PostHeights, TerrainGrid
 from gcsplan.world.terrain.input_files import sha256_of
+from tests.mission_file.airspace.made import collection, ed269, ed318, openaip, volume
 from tests.support.tiles import tile
 
 START, GOAL = [47.4, 8.4], [47.4, 8.412]
@@ -164,6 +165,19 @@ def ascii_grid(case: Case) -> None:
     case.without("dem.asc.aux.xml", "dem.asc.ovr")
 
 
+def linked_grid(case: Case) -> None:
+    """An ESRI grid by a link: what belongs to it lies beside the grid."""
+    ascii_grid(case)
+    (case.folder / "elsewhere").mkdir()
+    case.reads.clear()
+    for name in ("dem.asc", "dem.prj"):
+        (case.folder / name).rename(case.folder / "elsewhere" / name)
+        case.file(f"elsewhere/{name}")
+    (case.folder / "dem.asc").symlink_to("elsewhere/dem.asc")
+    case.absent.clear()
+    case.without("elsewhere/dem.asc.aux.xml")
+
+
 def _hgt() -> bytes:
     row, col = np.mgrid[0:1201, 0:1201]
     return bytes((400 + (row + col) % 7).astype(">i2").tobytes())
@@ -277,6 +291,26 @@ def openair(case: Case) -> None:
     _zone(case, "z.txt", OPENAIR)
 
 
+def authority(case: Case) -> None:
+    """Zones of ED-269."""
+    _zone(case, "z.json", json.dumps({"features": [ed269(volume(horizontalProjection=_shape()))]}))
+
+
+def authority_318(case: Case) -> None:
+    """Zones of ED-318."""
+    layer = {"upper": 150, "upperReference": "AGL", "lower": 0, "lowerReference": "AGL", "uom": "m"}
+    _zone(case, "z.json", json.dumps(collection(ed318(_shape() | {"layer": layer}))))
+
+
+def open_aip(case: Case) -> None:
+    """Zones of openAIP."""
+    _zone(case, "z.json", json.dumps({"items": [openaip(geometry=_shape())]}))
+
+
+def _shape() -> dict[str, Any]:
+    return {"type": "Polygon", "coordinates": [[[x, y] for x, y in BOX.exterior.coords]]}
+
+
 def _vector(path: Path) -> None:
     import pyogrio
 
@@ -311,7 +345,7 @@ def zipped_shapefile(case: Case) -> None:
 def geopackage(case: Case) -> None:
     """Zones of a GeoPackage."""
     _vector(_zone(case, "z.gpkg"))
-    case.without("z.gpkg-wal")
+    case.without("z.gpkg-wal", "z.gpkg-journal")
 
 
 def flatgeobuf(case: Case) -> None:
@@ -323,7 +357,8 @@ CASES: Mapping[str, Callable[[Case], None]] = {
     make.__name__: make
     for make in (
         geotiff, scaled, naming, masked, world_file, ascii_grid, hgt, hgt_zip, folder_of_tiles, list_of_tiles,
-        dat_files, published, geoid, canopy, geojson, kml, kmz, table, openair, shapefile, zipped_shapefile,
+        dat_files, published, geoid, canopy, geojson, kml, kmz, table, openair, authority, authority_318, open_aip,
+        linked_grid, shapefile, zipped_shapefile,
         geopackage, flatgeobuf,
     )
 }  # fmt: skip

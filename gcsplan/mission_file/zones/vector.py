@@ -31,6 +31,9 @@ BEGINNINGS = {".gpkg": b"SQLite format 3\0", ".shp": b"\x00\x00\x27\x0a", ".fgb"
 ARC_STEP_DEG = "0.1"
 """GDAL draws arcs as chords of this angle: at a radius of 50 km they lie 2 cm inside."""
 
+HOT_JOURNAL = bytes.fromhex("d9d505f920a163d7")
+"""How a journal of SQLite begins whose changes are not ended: without it they are half in the file."""
+
 MOST_WARNINGS = 5
 
 COMPANIONS = (".shx", ".dbf", ".prj", ".cpg")
@@ -75,12 +78,8 @@ def _on_disk(path: Path, data: bytes, most_bytes: int) -> Iterator[Path]:
         kind = next(iter(parts))
     else:
         parts = {kind: data, **(_beside(path, most_bytes - len(data)) if kind == ".shp" else {})}
-    unsaved = path.with_name(path.name + "-wal")
     if kind == ".gpkg":
-        tell_file(unsaved)
-    if kind == ".gpkg" and unsaved.is_file() and unsaved.stat().st_size:
-        words = f"{unsaved.name} beside it holds changes that are not in it yet; close the program that has it open"
-        raise InputError(words, where=str(path))
+        _require_settled(path)
     if not parts[kind].startswith(BEGINNINGS[kind]):
         raise InputError(f"this is not a {kind} file; its content is of another kind", where=str(path))
     if kind == ".shp" and (missing := [part for part in NEEDED_COMPANIONS if part not in parts]):
@@ -91,6 +90,25 @@ def _on_disk(path: Path, data: bytes, most_bytes: int) -> Iterator[Path]:
         for suffix, content in parts.items():
             (Path(folder) / f"zones{suffix}").write_bytes(content)
         yield Path(folder) / f"zones{kind}"
+
+
+def _require_settled(path: Path) -> None:
+    """Raise InputError if SQLite has changes of a GeoPackage, or what would undo them, in a file beside it."""
+    unsaved, undo = (path.with_name(path.name + end) for end in ("-wal", "-journal"))
+    tell_file(unsaved)
+    tell_file(undo)
+    if unsaved.is_file() and unsaved.stat().st_size:
+        words = f"{unsaved.name} beside it holds changes that are not in it yet; close the program that has it open"
+        raise InputError(words, where=str(path))
+    if undo.is_file():
+        with undo.open("rb") as file:
+            hot = file.read(len(HOT_JOURNAL)) == HOT_JOURNAL
+        if hot:
+            words = (
+                f"{undo.name} beside it belongs to changes that were begun and not ended; close the program that has "
+                "it open, or open and close it once"
+            )
+            raise InputError(words, where=str(path))
 
 
 def _beside(path: Path, most_bytes: int) -> dict[str, bytes]:
