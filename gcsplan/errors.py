@@ -32,7 +32,7 @@ ProblemCode = Literal["", "unknown_key", "missing", "missing_limit", "swapped"]
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class Mistake:
     """One mistake in the input: its place (``file: key.path``) and what to do about it.
 
     ``code`` is its kind, where programs tell kinds apart, ``meant`` are the names that may have been meant, and
@@ -95,16 +95,16 @@ class InputError(GcsplanError, ValueError):
     exit_code = 2
     default_reason = "bad_input"
 
-    def __init__(self, message: str, *, where: str = "", reason: str = "", problems: Iterable[Problem] = ()) -> None:
+    def __init__(self, message: str, *, where: str = "", reason: str = "", problems: Iterable[Mistake] = ()) -> None:
         super().__init__(message, where=where, reason=reason)
-        self.problems: tuple[Problem, ...] = tuple(problems) or (Problem(where, message),)
+        self.problems: tuple[Mistake, ...] = tuple(problems) or (Mistake(where, message),)
 
     def as_dict(self) -> dict[str, object]:
         """What ``--json`` says of it, each problem included."""
         return super().as_dict() | {"problems": [p.as_dict() for p in self.problems]}
 
     @classmethod
-    def of(cls, problems: Iterable[Problem], *, headline: str = "") -> InputError:
+    def of(cls, problems: Iterable[Mistake], *, headline: str = "") -> InputError:
         """Make one error of all ``problems`` (at least one), one per line."""
         found = tuple(problems)
         if len(found) == 1 and not headline:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gcsplan.app.upload import run as uploads
-from gcsplan.errors import InputError, Problem, VehicleRefused
+from gcsplan.errors import InputError, Mistake, VehicleRefused
 from gcsplan.mavlink.mission.return_parameters import return_on_board_m
 from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.new_file import Draft, text_of
@@ -103,7 +103,7 @@ def checked_text(draft: Draft, file: Path) -> tuple[str, tuple[Note, ...]]:
         raise InputError.of([_renamed(problem, f"{file}: ") for problem in error.problems]) from None
 
 
-def _renamed(problem: Problem, where: str) -> Problem:
+def _renamed(problem: Mistake, where: str) -> Mistake:
     """The problem at its option, without the line of a file that is not written."""
     place = problem.where.removeprefix(where)
     return replace(problem, where=OPTIONS.get(place, problem.where), message=problem.message.removesuffix(problem.line))

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Literal
 
 from gcsplan.dem.sources import DemSource, names_of
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.world.terrain.cell import Cell
 from gcsplan.world.terrain.input_files import tell_file, tell_setting
 
@@ -26,7 +26,7 @@ MOST_RECORD_BYTES = 65_536
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MissingTiles(Problem):
+class MissingTiles(Mistake):
     """Tiles that are needed and not in the cache."""
 
     source: str

@@ -13,7 +13,7 @@ from datetime import datetime
 from functools import partial
 from typing import Any, get_args
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mavlink.mission.mission import AltitudeFrame
 from gcsplan.mission_file.published.times import Hours, hours_of, texts_of
 from gcsplan.mission_file.published.unused import faults_near, left_out_by_hours, unused_notes, used
@@ -154,7 +154,7 @@ class _MissionReading:
         self.where = f"{content.where}: "
         self.units = in_own_units(content.given, self.where)
         self.raw = self.units.raw
-        self.problems: list[Problem] = [*self.units.problems]
+        self.problems: list[Mistake] = [*self.units.problems]
         self.notes: list[Note] = [*self.units.notes]
         self.local = content.given.get("frame") is not None
 
@@ -162,7 +162,7 @@ class _MissionReading:
         raw, problems = self.raw, self.problems
         problems += unknown_keys(raw, TOP_KEYS, self.where)
         problems += [
-            Problem(self.where + key, f"is missing; {cure}", "missing")
+            Mistake(self.where + key, f"is missing; {cure}", "missing")
             for key, cure in WANTED_KEYS.items()
             if raw.get(key) is None
         ]
@@ -233,7 +233,7 @@ class _MissionReading:
     def _reaching(self, places: Sequence[tuple[float, float]]) -> MissionFile:
         return load_content(replace(self.content, around=tuple(places)))
 
-    def _refusal(self, problems: list[Problem]) -> InputError:
+    def _refusal(self, problems: list[Mistake]) -> InputError:
         """All problems as the user wrote the keys, with their lines if the mission was a text."""
         told = told_once(few(problems, self.where.removesuffix(": "), 10 * MOST_TOLD))
         told = [self.units.as_written(p) for p in told]
@@ -247,7 +247,7 @@ class _MissionReading:
             return self.file.stem
         if not isinstance(value, str) or not value.strip() or len(value) > 300:
             words = f"must be text, 300 characters at most, given {shown(value)}"
-            self.problems.append(Problem(f"{self.where}name", words))
+            self.problems.append(Mistake(f"{self.where}name", words))
         return one_line(str(value))
 
     def _choice(self, key: str, choices: tuple[str, ...], default: str) -> Any:
@@ -256,7 +256,7 @@ class _MissionReading:
             return value or default
         near = nearest(value, choices) if isinstance(value, str) else ""
         self.problems.append(
-            Problem(self.where + key, f"must be one of {', '.join(choices)}, given {shown(value)}{near}")
+            Mistake(self.where + key, f"must be one of {', '.join(choices)}, given {shown(value)}{near}")
         )
         return default
 
@@ -266,7 +266,7 @@ class _MissionReading:
             return TERRAIN_ERROR_M if altitude_frame == "terrain" else 0.0
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1000.0:
             self.problems.append(
-                Problem(f"{self.where}terrain_error_m", f"must be a number from 0 to 1000, given {shown(value)}")
+                Mistake(f"{self.where}terrain_error_m", f"must be a number from 0 to 1000, given {shown(value)}")
             )
             return TERRAIN_ERROR_M
         if altitude_frame != "terrain":
@@ -293,7 +293,7 @@ class _MissionReading:
             known = names()
         if keys.name not in known:
             near = nearest(keys.name, known) or f"; known are {', '.join(known)}"
-            self.problems.append(Problem(f"{self.where}planner.name", f"no planner is named {keys.name[:64]!r}{near}"))
+            self.problems.append(Mistake(f"{self.where}planner.name", f"no planner is named {keys.name[:64]!r}{near}"))
         plain = ("name", "objective", "seed", "gap_percent", "budget_s", "budget_mb")
         extras = {k: v for k, v in keys.given.items() if k not in plain and v is not None}
         return PlannerRequest(
@@ -306,7 +306,7 @@ class _MissionReading:
         if value is not None and (not isinstance(value, list) or not 1 <= len(value) <= MOST_VEHICLES_OF_FILE):
             dash = "; begin each vehicle with a dash: `- name: …`" if isinstance(value, dict) else ""
             words = f"must be a list of 1 to {MOST_VEHICLES_OF_FILE} vehicles, given {shown(value)}{dash}"
-            self.problems.append(Problem(where, words))
+            self.problems.append(Mistake(where, words))
             return []
         shared = self._section(LimitKeys, "limits") or LimitKeys()
         # If the shared limits are broken, a vehicle's complaint about a missing limit would only repeat that.
@@ -329,11 +329,11 @@ class _MissionReading:
                     vehicle = within(vehicle, keys, at, self.problems, own, local=self.local)
             if altitude_frame == "terrain" and keys.autopilot == "px4":
                 self.problems.append(
-                    Problem(f"{at}.autopilot", "px4 flies no terrain frame; use altitude_frame: relative or amsl")
+                    Mistake(f"{at}.autopilot", "px4 flies no terrain frame; use altitude_frame: relative or amsl")
                 )
             if altitude_frame == "terrain" and keys.turn_radius_m > 0.0:
                 words = "a fixed wing's turns are planned above home or sea level: use altitude_frame: relative or amsl"
-                self.problems.append(Problem(f"{at}.turn_radius_m", words))
+                self.problems.append(Mistake(f"{at}.turn_radius_m", words))
             start = make_place(keys.start, f"{at}.start", self.problems, self.notes, local=self.local)
             goal = make_place(keys.goal, f"{at}.goal", self.problems, self.notes, local=self.local)
             via = [
@@ -353,7 +353,7 @@ class _MissionReading:
         value = self.raw.get("no_fly")
         if value is not None and not isinstance(value, list):
             dash = "; begin each zone with a dash: `- name: …`" if isinstance(value, dict) else ""
-            self.problems.append(Problem(where, f"must be a list of zones, given {shown(value)}{dash}"))
+            self.problems.append(Mistake(where, f"must be a list of zones, given {shown(value)}{dash}"))
         drafts: list[ZoneDraft] = []
         inline: dict[str, int] = {}
         for i, one in enumerate(self._list("no_fly")):
@@ -364,7 +364,7 @@ class _MissionReading:
             if keys.name is not None and inline.setdefault(keys.name, i) != i:
                 first = inline[keys.name]
                 self.problems.append(
-                    Problem(f"{at}.name", f"{keys.name[:64]!r} is the name of no_fly[{first}] already; change one")
+                    Mistake(f"{at}.name", f"{keys.name[:64]!r} is the name of no_fly[{first}] already; change one")
                 )
             drafts += make_zones(
                 keys, at, self.file.parent, f"no_fly[{i}]", self.problems, self.notes, local=self.local, hours=hours
@@ -377,10 +377,10 @@ class _MissionReading:
         for draft in far:
             if looks_swapped(draft, frame):
                 words = f"latitude and longitude of the zone {draft.name!r} look swapped"
-                self.problems.append(Problem(draft.where, words))
+                self.problems.append(Mistake(draft.where, words))
             elif draft.where.startswith(self.where):
                 words = f"the zone {draft.name!r} lies too far from the mission to matter; is it the right place?"
-                self.problems.append(Problem(draft.where, words))
+                self.problems.append(Mistake(draft.where, words))
             else:
                 left_out += 1
         if left_out:
@@ -390,7 +390,7 @@ class _MissionReading:
         where = f"{self.where}terrain"
         if spec.peaks and not self.local:
             self.problems.append(
-                Problem(f"{where}.peaks", "peaks are in local metres: add `frame: {origin: [lat, lon], amsl_m: 0}`")
+                Mistake(f"{where}.peaks", "peaks are in local metres: add `frame: {origin: [lat, lon], amsl_m: 0}`")
             )
             return None
         try:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from gcsplan.arrays import Floats
 from gcsplan.dem.terrain import open_dem
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mavlink.mission.return_parameters import ReturnRoute
 from gcsplan.mission_file.load import TERRAIN_ERROR_M
 from gcsplan.mission_file.published.policy import Policy
@@ -90,7 +90,7 @@ class OpenWorld:
     """Terrain and zones of the options, opened and checked; `over` loads the part that some places need (`extent`)."""
 
     def __init__(self, options: WorldOptions) -> None:
-        problems: list[Problem] = []
+        problems: list[Mistake] = []
         self.options = options
         self.notes: list[Note] = [*options.notes]
         hours = hours_of(None, None, "--at", problems, instead=options.at)
@@ -119,7 +119,7 @@ class OpenWorld:
 
     def _make(self, autopilot: str) -> Vehicle:
         """See `vehicle`."""
-        problems: list[Problem] = []
+        problems: list[Mistake] = []
         notes: list[Note] = []
         given = {"name": "file", "sysid": 1, "autopilot": autopilot, "start": [0.0, 0.0], "goal": [0.0, 0.0]}
         keys = read_section(VehicleKeys, given | dict(self.options.vehicle), "", problems)
@@ -169,7 +169,7 @@ class OpenWorld:
         placed, far = place_zones(drafts, frame)
         # A swapped zone would belong to the mission; as it stands it would be left out, and flown through.
         problems = [
-            Problem(draft.where, f"latitude and longitude of the zone {draft.name!r} look swapped")
+            Mistake(draft.where, f"latitude and longitude of the zone {draft.name!r} look swapped")
             for draft in far
             if looks_swapped(draft, frame)
         ]
@@ -178,7 +178,7 @@ class OpenWorld:
         surface = self._terrain.around(frame, box).load(frame, box)
         zones: list[Zone] = []
         for draft, zone in placed:
-            own: list[Problem] = []
+            own: list[Mistake] = []
             settled = settle_zones([(draft, zone)], surface, own)
             west, south, east, north = zone.bounds
             if own and not (west > box[0] and south > box[1] and east < box[2] and north < box[3]):
@@ -204,7 +204,7 @@ class OpenWorld:
         return low[0] - margin, low[1] - margin, high[0] + margin, high[1] + margin
 
 
-def _drafts(files: Sequence[str], problems: list[Problem], notes: list[Note], hours: Hours | None) -> list[ZoneDraft]:
+def _drafts(files: Sequence[str], problems: list[Mistake], notes: list[Note], hours: Hours | None) -> list[ZoneDraft]:
     """The zones of all files, each with a unique name; those are not used that do not apply in the hours."""
     drafts: list[ZoneDraft] = []
     for file in files:
@@ -219,7 +219,7 @@ def _drafts(files: Sequence[str], problems: list[Problem], notes: list[Note], ho
     return uniquely_named(drafts)
 
 
-def _renamed(problem: Problem) -> Problem:
+def _renamed(problem: Mistake) -> Mistake:
     """The problem with its option as the place, in place of a key such as ``.min_agl_m``."""
     key = problem.where.removeprefix(".").split(".")[-1].split("[")[0]
     option = KEY_OPTIONS.get(key)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gcsplan.dem.sources import source_or_path
-from gcsplan.errors import InputError, Problem, ProblemCode
+from gcsplan.errors import InputError, Mistake, ProblemCode
 from gcsplan.mission_file.published.times import Hours
 from gcsplan.mission_file.values.places import Degrees
 from gcsplan.mission_file.values.point_keys import LocalPoint
@@ -72,13 +72,13 @@ class MissionPlace:
 
 
 def make_place(
-    point: Degrees | LocalPoint, where: str, problems: list[Problem], notes: list[Note], *, local: bool,
+    point: Degrees | LocalPoint, where: str, problems: list[Mistake], notes: list[Note], *, local: bool,
     most_lon_deg: float = 180.0,
 ) -> MissionPlace | None:  # fmt: skip
     """A point of the file; None, and ``problems``, if it cannot be a place."""
     if isinstance(point, LocalPoint):
         if not local:
-            problems.append(Problem(where, "local metres need `frame: {origin: [lat, lon], amsl_m: …}` in the mission"))
+            problems.append(Mistake(where, "local metres need `frame: {origin: [lat, lon], amsl_m: …}` in the mission"))
             return None
         return MissionPlace(where, None, (point.east_m, point.north_m), point.up_m, point.agl_m)
     degrees = (point.lat_deg, point.lon_deg)
@@ -112,7 +112,7 @@ def make_spec(keys: TerrainKeys, folder: Path) -> TerrainSpec:
     )
 
 
-def covered(places: Sequence[MissionPlace], terrain: OpenTerrain, problems: list[Problem]) -> list[MissionPlace]:
+def covered(places: Sequence[MissionPlace], terrain: OpenTerrain, problems: list[Mistake]) -> list[MissionPlace]:
     """The places that the DEM covers; the others go to ``problems``, with a guess at swapped numbers."""
     good = []
     for place in places:
@@ -126,12 +126,12 @@ def covered(places: Sequence[MissionPlace], terrain: OpenTerrain, problems: list
             message = f"latitude and longitude look swapped: the DEM holds [{lon:g}, {lat:g}], not [{lat:g}, {lon:g}]"
         else:
             message = f"{lat:g}, {lon:g} lies outside the DEM, where the ground is unknown; add the tile of this place"
-        problems.append(Problem(place.where, message, code))
+        problems.append(Mistake(place.where, message, code))
     return good
 
 
 def make_frame(
-    places: Sequence[MissionPlace], keys: FrameKeys | None, problems: list[Problem], where: str
+    places: Sequence[MissionPlace], keys: FrameKeys | None, problems: list[Mistake], where: str
 ) -> Frame | None:
     """The mission's plane; None, and ``problems``, if the points are too far apart for one plane."""
     try:
@@ -141,7 +141,7 @@ def make_frame(
             points = np.array([p.degrees for p in places if p.degrees is not None])
             frame = Frame(*centre_of(points[:, 0], points[:, 1]))
     except InputError as why:
-        problems.append(Problem(f"{where}frame.origin" if keys is not None else places[0].where, why.message))
+        problems.append(Mistake(f"{where}frame.origin" if keys is not None else places[0].where, why.message))
         return None
     away = [(math.hypot(*p.in_plane(frame)), p) for p in places]
     if all(d <= FARTHEST_M for d, _ in away):
@@ -150,7 +150,7 @@ def make_frame(
     what = "from the frame's origin" if keys is not None else "from the middle of the mission's points"
     far = f"lies {distance / 1000:.0f} km" if math.isfinite(distance) else "lies too far"
     words = f"{far} {what}, more than {FARTHEST_M / 1000:.0f} km; {_slip(place, places) or 'is it the right place?'}"
-    problems.append(Problem(place.where, words))
+    problems.append(Mistake(place.where, words))
     return None
 
 
@@ -207,7 +207,7 @@ def make_box(points: Sequence[tuple[float, float]], zones: Sequence[Zone], *, lo
 
 
 def make_zones(
-    keys: ZoneKeys, where: str, folder: Path, fallback: str, problems: list[Problem], notes: list[Note], *, local: bool,
+    keys: ZoneKeys, where: str, folder: Path, fallback: str, problems: list[Mistake], notes: list[Note], *, local: bool,
     hours: Hours | None = None,
 ) -> list[ZoneDraft]:  # fmt: skip
     """The zones of one entry of ``no_fly``: a single zone, or all zones of a file, at the mission's ``hours``."""
@@ -215,21 +215,21 @@ def make_zones(
     if len(kinds) != 1:
         given = " and ".join(kinds) or "none"
         wanted = "give one of center (with radius_m), polygon, line (with buffer_m) and file"
-        problems.append(Problem(where, f"{wanted}, given {given}"))
+        problems.append(Mistake(where, f"{wanted}, given {given}"))
         return []
     if keys.file is not None:
         return _zones_of_file(keys, keys.file, where, folder, problems, notes, hours)
     for key in sorted(OF_FILES & keys.given.keys()):
-        problems.append(Problem(f"{where}.{key}", "belongs to a file of an authority"))
+        problems.append(Mistake(f"{where}.{key}", "belongs to a file of an authority"))
     return _own_zone(keys, where, fallback, problems, notes, local=local)
 
 
 def _zones_of_file(
-    keys: ZoneKeys, file: str, where: str, folder: Path, problems: list[Problem], notes: list[Note], hours: Hours | None
+    keys: ZoneKeys, file: str, where: str, folder: Path, problems: list[Mistake], notes: list[Note], hours: Hours | None
 ) -> list[ZoneDraft]:
     others = sorted(keys.given.keys() - {"file", "layer", *SIZE_KEYS, *OF_FILES})
     words = "stands in the file itself, in a feature's properties; leave it out here"
-    problems += [Problem(f"{where}.{k}", words) for k in others]
+    problems += [Mistake(f"{where}.{k}", words) for k in others]
     sizes = [(getattr(keys, size), f"{where}.{size}") for size in SIZE_KEYS if getattr(keys, size) is not None]
     good = [check_size(size_m, at, problems) for size_m, at in sizes]
     if not all(good):
@@ -253,7 +253,7 @@ def _zones_of_file(
 
 
 def _own_zone(
-    keys: ZoneKeys, where: str, fallback: str, problems: list[Problem], notes: list[Note], *, local: bool
+    keys: ZoneKeys, where: str, fallback: str, problems: list[Mistake], notes: list[Note], *, local: bool
 ) -> list[ZoneDraft]:
     """The zone whose shape stands in the mission file."""
     name = keys.name or fallback
@@ -267,16 +267,16 @@ def _own_zone(
         for p, a in zip(points, at, strict=True)
     ]
     if len(problems) == before and len({isinstance(p, LocalPoint) for p in points}) > 1:
-        problems.append(Problem(f"{where}.{kind}", "give all corners in degrees, or all in local metres"))
+        problems.append(Mistake(f"{where}.{kind}", "give all corners in degrees, or all in local metres"))
     for size, owner, words in zip(
         SIZE_KEYS, ("center", "line"), ("the radius", "half the corridor's width"), strict=True
     ):
         if kind == owner and getattr(keys, size) is None:
-            problems.append(Problem(f"{where}.{size}", f"is missing: {words}, m", "missing"))
+            problems.append(Mistake(f"{where}.{size}", f"is missing: {words}, m", "missing"))
         if kind != owner and getattr(keys, size) is not None:
-            problems.append(Problem(f"{where}.{size}", f"belongs to a {owner}, not to a {kind}"))
+            problems.append(Mistake(f"{where}.{size}", f"belongs to a {owner}, not to a {kind}"))
     if keys.layer is not None:
-        problems.append(Problem(f"{where}.layer", "belongs to a file; leave it out"))
+        problems.append(Mistake(f"{where}.layer", "belongs to a file; leave it out"))
     if len(problems) > before:
         return []
     flat = [p.degrees or p.metres or (0.0, 0.0) for p in places if p is not None]
@@ -290,7 +290,7 @@ def _own_zone(
     return [draft] if draft is not None else []
 
 
-def settle_zones(placed: Sequence[tuple[ZoneDraft, Zone]], surface: Surface, problems: list[Problem]) -> list[Zone]:
+def settle_zones(placed: Sequence[tuple[ZoneDraft, Zone]], surface: Surface, problems: list[Mistake]) -> list[Zone]:
     """The zones after comparison with the ground.
 
     A zone wholly under ground goes to ``problems``. A floor nowhere above ground is removed (nothing passes below).
@@ -312,7 +312,7 @@ def settle_zones(placed: Sequence[tuple[ZoneDraft, Zone]], surface: Surface, pro
             low, high = ground
             if ceiling is not None and ceiling.datum == "amsl" and ceiling.value_m <= low:
                 problems.append(
-                    Problem(
+                    Mistake(
                         f"{draft.where}.ceiling_amsl_m",
                         f"the zone {draft.name!r} lies wholly under ground: its ceiling is at {ceiling.value_m:g} m "
                         f"AMSL, the lowest ground in it at {low:.1f} m",
@@ -320,7 +320,7 @@ def settle_zones(placed: Sequence[tuple[ZoneDraft, Zone]], surface: Surface, pro
                 )
             elif (bottom := _crossed(floor, ceiling, low, high)) is not None:
                 problems.append(
-                    Problem(
+                    Mistake(
                         draft.where,
                         f"the floor of the zone {draft.name!r} is nowhere below its ceiling (at best {bottom:.1f} m "
                         "above it)",

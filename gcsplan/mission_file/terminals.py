@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
-from gcsplan.errors import Problem
+from gcsplan.errors import Mistake
 from gcsplan.mission_file.request import VehicleRequest
 from gcsplan.mission_file.scene import MissionPlace, zone_around
 from gcsplan.mission_file.values.schema import VehicleKeys
@@ -51,7 +51,7 @@ def make_request(
     surface: Surface,
     zones: Sequence[Zone],
     good: Collection[MissionPlace],
-    problems: list[Problem],
+    problems: list[Mistake],
 ) -> VehicleRequest | None:
     """A vehicle's request over the ground; None, and ``problems``, if a place is on unknown ground or in a zone.
 
@@ -87,14 +87,14 @@ def make_request(
 
 
 def _ground(
-    place: MissionPlace, frame: Frame, surface: Surface, problems: list[Problem]
+    place: MissionPlace, frame: Frame, surface: Surface, problems: list[Mistake]
 ) -> tuple[float, float, float] | None:
     """East, north and ground; None, and a problem, if the ground is unknown."""
     east, north = place.in_plane(frame)
     ground_m = float(surface.ground_at(east, north))
     if math.isnan(ground_m):
         words = "lies on a void or at the edge of the DEM, where the ground is unknown; give a DEM with data here"
-        problems.append(Problem(place.where, words))
+        problems.append(Mistake(place.where, words))
         return None
     return east, north, ground_m
 
@@ -106,7 +106,7 @@ def _end(
     surface: Surface,
     zones: Sequence[Zone],
     agl_m: float | None,
-    problems: list[Problem],
+    problems: list[Mistake],
 ) -> _End | None:
     at = _ground(place, frame, surface, problems)
     if at is None:
@@ -117,20 +117,20 @@ def _end(
         above_m = frame.amsl_m + place.up_m - ground_m
         if above_m < -ON_GROUND_M:
             words = f"lies {-above_m:.2f} m under ground, which is at {ground_m:.2f} m AMSL"
-            problems.append(Problem(f"{place.where}.up_m", words))
+            problems.append(Mistake(f"{place.where}.up_m", words))
             return None
         above_m = above_m if above_m > ON_GROUND_M else 0.0
     if above_m > 0.0 and agl_m is not None:
         key = "takeoff_agl_m" if what == "start" else "approach_agl_m"
-        problems.append(Problem(place.where, f"hangs {above_m:g} m above ground: leave {key} out"))
+        problems.append(Mistake(place.where, f"hangs {above_m:g} m above ground: leave {key} out"))
     zone = zone_around(zones, east, north, ground_m + above_m, ground_m)
     if zone is not None:
-        problems.append(Problem(place.where, f"the {what} lies inside the no-fly zone {zone.name!r}{ELSEWHERE}"))
+        problems.append(Mistake(place.where, f"the {what} lies inside the no-fly zone {zone.name!r}{ELSEWHERE}"))
     return _End(at, ground_m + above_m if above_m > 0.0 else None)
 
 
 def _via(
-    place: MissionPlace, frame: Frame, surface: Surface, zones: Sequence[Zone], problems: list[Problem]
+    place: MissionPlace, frame: Frame, surface: Surface, zones: Sequence[Zone], problems: list[Mistake]
 ) -> tuple[float, float, float | None] | None:
     at = _ground(place, frame, surface, problems)
     if at is None:
@@ -144,5 +144,5 @@ def _via(
     else:
         zone = zone_around(zones, east, north, ground_m + agl_m, ground_m)
     if zone is not None:
-        problems.append(Problem(place.where, f"lies inside the no-fly zone {zone.name!r}{ELSEWHERE}"))
+        problems.append(Mistake(place.where, f"lies inside the no-fly zone {zone.name!r}{ELSEWHERE}"))
     return east, north, agl_m

@@ -10,7 +10,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
-from gcsplan.errors import Problem
+from gcsplan.errors import Mistake
 from gcsplan.fleet.motion.ardupilot import lean_needed_deg
 from gcsplan.mission_file.request import ArrivalRequest
 from gcsplan.mission_file.values.schema import ArrivalKeys, EnergyKeys, LimitKeys, VehicleKeys, nearest
@@ -58,7 +58,7 @@ PX4_MOTION = {"climb_m_s": 3.0, "land_m_s": 0.7, "accel_m_s2": 3.0, "corner_acce
 MPC_JERK_AUTO; defaults."""
 
 
-def check_unique(vehicles: Sequence[Any], where: str, problems: list[Problem]) -> tuple[str, ...]:
+def check_unique(vehicles: Sequence[Any], where: str, problems: list[Mistake]) -> tuple[str, ...]:
     """Report duplicate names and system ids among the vehicles as written; returns the names.
 
     Names must differ by more than upper and lower case, because they become file names. A system id is that of one
@@ -72,7 +72,7 @@ def check_unique(vehicles: Sequence[Any], where: str, problems: list[Problem]) -
             first = names.setdefault(name.lower(), i)
             if first != i:
                 problems.append(
-                    Problem(f"{where}[{i}].name", f"{name[:64]!r} is the name of vehicles[{first}] already; change one")
+                    Mistake(f"{where}[{i}].name", f"{name[:64]!r} is the name of vehicles[{first}] already; change one")
                 )
         if isinstance(sysid, int) and not isinstance(sysid, bool):
             link = keys.get("link")
@@ -81,14 +81,14 @@ def check_unique(vehicles: Sequence[Any], where: str, problems: list[Problem]) -
                 first = others.get(link, next(iter(others.values())))
                 cure = "change one, or give each of them a `link` of its own"
                 problems.append(
-                    Problem(f"{where}[{i}].sysid", f"{sysid} is the system id of vehicles[{first}] already; {cure}")
+                    Mistake(f"{where}[{i}].sysid", f"{sysid} is the system id of vehicles[{first}] already; {cure}")
                 )
             others.setdefault(link if isinstance(link, str) else None, i)
     return tuple(k["name"] for k in vehicles if isinstance(k, dict) and isinstance(k.get("name"), str))
 
 
 def make_vehicle(
-    keys: VehicleKeys, shared: LimitKeys, where: str, problems: list[Problem], notes: list[Note],
+    keys: VehicleKeys, shared: LimitKeys, where: str, problems: list[Mistake], notes: list[Note],
     *, local: bool, obstacle_m: float,
 ) -> Vehicle | None:  # fmt: skip
     """A vehicle with its limits merged: the file's, overridden by its own. None, and ``problems``, if it is wrong.
@@ -102,12 +102,12 @@ def make_vehicle(
     slow, fast = keys.speed_m_s
     if slow > fast:
         words = f"the slowest speed must not be above the fastest, given [{slow:g}, {fast:g}]"
-        problems.append(Problem(f"{where}.speed_m_s", words))
+        problems.append(Mistake(f"{where}.speed_m_s", words))
     if keys.turn_radius_m > 0.0:
         _check_wing(keys, limits, where, problems)
     if keys.end == "rtl" and keys.rtl_rel_home_m is None:
         problems.append(
-            Problem(
+            Mistake(
                 f"{where}.rtl_rel_home_m",
                 "is missing: end: rtl needs the height above home that the vehicle returns at (its own parameter)",
                 "missing",
@@ -128,7 +128,7 @@ def make_vehicle(
 
 
 def within_lean(
-    vehicle: Vehicle, keys: VehicleKeys, where: str, problems: list[Problem], notes: list[Note], *, local: bool
+    vehicle: Vehicle, keys: VehicleKeys, where: str, problems: list[Mistake], notes: list[Note], *, local: bool
 ) -> Vehicle:
     """``vehicle`` with the speeds that its lean angle allows, and a note if that is less than its keys want.
 
@@ -155,7 +155,7 @@ def within_lean(
 
 
 def within_vel_max(
-    vehicle: Vehicle, keys: VehicleKeys, where: str, problems: list[Problem], notes: list[Note], *, local: bool
+    vehicle: Vehicle, keys: VehicleKeys, where: str, problems: list[Mistake], notes: list[Note], *, local: bool
 ) -> Vehicle:
     """``vehicle`` with the speeds that PX4's MPC_XY_VEL_MAX allows, and a note if that is less than its keys want.
 
@@ -174,11 +174,11 @@ def within_vel_max(
     return _no_faster(replace(vehicle, vel_max_m_s=own), own)
 
 
-def _of_another(vehicle: Vehicle, owner: str, where: str, value: float | None) -> list[Problem]:
+def _of_another(vehicle: Vehicle, owner: str, where: str, value: float | None) -> list[Mistake]:
     """The problem of a key that only the autopilot ``owner`` has, if it is given for this vehicle."""
     if value is None:
         return []
-    return [Problem(where, f"is {owner}'s alone: leave it out for {vehicle.autopilot}, given {value:g}")]
+    return [Mistake(where, f"is {owner}'s alone: leave it out for {vehicle.autopilot}, given {value:g}")]
 
 
 def _no_faster(vehicle: Vehicle, most_m_s: float) -> Vehicle:
@@ -188,19 +188,19 @@ def _no_faster(vehicle: Vehicle, most_m_s: float) -> Vehicle:
     )
 
 
-def _check_wing(keys: VehicleKeys, limits: Limits | None, where: str, problems: list[Problem]) -> None:
+def _check_wing(keys: VehicleKeys, limits: Limits | None, where: str, problems: list[Mistake]) -> None:
     """Check a vehicle with a turn radius: only ArduPlane begins turns where the mission says."""
     radius, at = keys.turn_radius_m, f"{where}.turn_radius_m"
     if keys.autopilot == "arducopter":
         words = f"a multicopter has no turn radius: use 0, or autopilot: arduplane for a fixed wing, given {radius:g}"
-        problems.append(Problem(at, words))
+        problems.append(Mistake(at, words))
         return
     if keys.autopilot == "px4":
         words = (
             f"px4 begins a fixed wing's turns at a distance of its own and not at the mission's, so its arcs cannot be "
             f"vouched for: use autopilot: arduplane, or 0 for a multicopter, given {radius:g}"
         )
-        problems.append(Problem(at, words))
+        problems.append(Mistake(at, words))
         return
     bank_deg = math.degrees(math.atan(keys.speed_m_s[1] ** 2 / (GRAVITY_M_S2 * radius)))
     if bank_deg > MOST_BANK_DEG:
@@ -209,34 +209,34 @@ def _check_wing(keys: VehicleKeys, limits: Limits | None, where: str, problems: 
             f"turns of {radius:g} m at {keys.speed_m_s[1]:g} m/s need a bank of {bank_deg:.0f}°, and ArduPlane's "
             f"ROLL_LIMIT_DEG is {MOST_BANK_DEG:g}°: give at least {least}, or a lower speed"
         )
-        problems.append(Problem(at, words))
+        problems.append(Mistake(at, words))
     if limits is not None and not 1.0 <= limits.max_climb_deg <= STEEPEST_WING_DEG:
         words = f"a fixed wing climbs at 1 to {STEEPEST_WING_DEG:g}°, given {limits.max_climb_deg:g}"
-        problems.append(Problem(f"{where}.max_climb_deg", words))
+        problems.append(Mistake(f"{where}.max_climb_deg", words))
     if limits is not None and limits.max_descent_deg > STEEPEST_WING_DEG:
         words = f"a fixed wing descends at {STEEPEST_WING_DEG:g}° at most, given {limits.max_descent_deg:g}"
-        problems.append(Problem(f"{where}.max_descent_deg", words))
+        problems.append(Mistake(f"{where}.max_descent_deg", words))
 
 
-def _climb_out(keys: VehicleKeys, limits: Limits | None, where: str, problems: list[Problem]) -> ClimbOut | None:
+def _climb_out(keys: VehicleKeys, limits: Limits | None, where: str, problems: list[Mistake]) -> ClimbOut | None:
     """How a fixed wing climbs out, if the file says so; it must not be less steep than its climb-out is judged."""
     rate, speed = keys.climb_out_m_s, keys.climb_out_speed_m_s
     if rate is None:
         if speed is not None:
             problems.append(
-                Problem(
+                Mistake(
                     f"{where}.climb_out_m_s", "is missing; climb_out_speed_m_s is the speed of its climb", "missing"
                 )
             )
         return None
     if keys.turn_radius_m <= 0.0:
         words = f"is a fixed wing's, which has a turn_radius_m above 0: leave it out, or use climb_m_s, given {rate:g}"
-        problems.append(Problem(f"{where}.climb_out_m_s", words))
+        problems.append(Mistake(f"{where}.climb_out_m_s", words))
         return None
     fast = keys.speed_m_s[1]
     if speed is None and rate >= fast:
         words = f"must be below the fastest speed {fast:g}, or climb_out_speed_m_s be given too, given {rate:g}"
-        problems.append(Problem(f"{where}.climb_out_m_s", words))
+        problems.append(Mistake(f"{where}.climb_out_m_s", words))
         return None
     over_ground = math.sqrt(fast * fast - rate * rate) if speed is None else speed
     steep_deg = math.degrees(math.atan2(rate, over_ground))
@@ -247,7 +247,7 @@ def _climb_out(keys: VehicleKeys, limits: Limits | None, where: str, problems: l
         )
         least = math.floor(steep_deg)
         words += f"write max_climb_deg: {least}" if least >= 1 else "it needs more power"
-        problems.append(Problem(f"{where}.climb_out_m_s", words))
+        problems.append(Mistake(f"{where}.climb_out_m_s", words))
         return None
     return ClimbOut(rate, over_ground)
 
@@ -277,16 +277,16 @@ def _motion(keys: VehicleKeys, *, local: bool) -> dict[str, float]:
 
 
 def _limits(
-    keys: VehicleKeys, shared: LimitKeys, where: str, problems: list[Problem], notes: list[Note], *, local: bool
+    keys: VehicleKeys, shared: LimitKeys, where: str, problems: list[Mistake], notes: list[Note], *, local: bool
 ) -> Limits | None:
     names = tuple(LimitKeys.model_fields)
     own = {k: v for k, v in keys.given.items() if k in names}
     nested = keys.limits.given if keys.limits is not None else {}
     for key in sorted(own.keys() & nested.keys()):
-        problems.append(Problem(f"{where}.{key}", f"stands in limits.{key} too; keep one"))
+        problems.append(Mistake(f"{where}.{key}", f"stands in limits.{key} too; keep one"))
     merged: dict[str, Any] = shared.given | nested | own
     if merged.get("min_agl_m") is None:
-        problems.append(Problem(f"{where}.min_agl_m", "is missing; give it here or in limits", "missing_limit"))
+        problems.append(Mistake(f"{where}.min_agl_m", "is missing; give it here or in limits", "missing_limit"))
         return None
     for key, default in ERRORS.items():
         if merged.get(key) is None:
@@ -303,7 +303,7 @@ def _limits(
     return Limits(**{f.name: merged.get(f.name) for f in fields(Limits)})  # type: ignore[arg-type]
 
 
-def _check_heights(keys: VehicleKeys, limits: Limits, where: str, problems: list[Problem], obstacle_m: float) -> None:
+def _check_heights(keys: VehicleKeys, limits: Limits, where: str, problems: list[Mistake], obstacle_m: float) -> None:
     """Check that max AGL leaves room above min AGL, and that take-off, approach and via heights are within it."""
     error_m = limits.altitude_error_m
     low = limits.min_agl_m + error_m + obstacle_m
@@ -315,11 +315,11 @@ def _check_heights(keys: VehicleKeys, limits: Limits, where: str, problems: list
         high = limits.max_agl_m - error_m
         if limits.min_agl_m > limits.max_agl_m:
             message = f"min_agl_m must not be above max_agl_m, given {limits.min_agl_m:g} and {limits.max_agl_m:g}"
-            problems.append(Problem(f"{where}.min_agl_m", message))
+            problems.append(Mistake(f"{where}.min_agl_m", message))
             return
         if low > high + 1e-9:
             problems.append(
-                Problem(
+                Mistake(
                     f"{where}.max_agl_m",
                     f"leaves no room: {words} is above max_agl_m {limits.max_agl_m:g} - altitude_error_m {error_m:g}; "
                     f"write {math.ceil(low + error_m + CURE_ROUNDING_M)} or more",
@@ -333,15 +333,15 @@ def _check_heights(keys: VehicleKeys, limits: Limits, where: str, problems: list
         if agl_m is None:
             continue
         if agl_m < low - 1e-9:
-            problems.append(Problem(f"{where}.{key}", f"must be at least {low:g} m AGL ({words}), given {agl_m:g}"))
+            problems.append(Mistake(f"{where}.{key}", f"must be at least {low:g} m AGL ({words}), given {agl_m:g}"))
         elif agl_m > high + 1e-9:
             most = f"must be at most {high:g} m AGL (max_agl_m - altitude_error_m), given {agl_m:g}"
             most += f"; write {math.floor(high - CURE_ROUNDING_M)} or less"
-            problems.append(Problem(f"{where}.{key}", most))
+            problems.append(Mistake(f"{where}.{key}", most))
 
 
 def make_arrival(
-    keys: ArrivalKeys | None, names: Collection[str], where: str, problems: list[Problem]
+    keys: ArrivalKeys | None, names: Collection[str], where: str, problems: list[Mistake]
 ) -> ArrivalRequest | None:
     """The fleet's arrival; ``names`` are the vehicles' names as written."""
     if keys is None:
@@ -349,23 +349,23 @@ def make_arrival(
     order = keys.order if isinstance(keys.order, list) else list(names)
     for i, name in enumerate(order):
         if name not in names:
-            problems.append(Problem(f"{where}.order[{i}]", f"no vehicle is named {name[:64]!r}{nearest(name, names)}"))
+            problems.append(Mistake(f"{where}.order[{i}]", f"no vehicle is named {name[:64]!r}{nearest(name, names)}"))
         elif name in order[:i]:
-            problems.append(Problem(f"{where}.order[{i}]", f"{name!r} stands twice"))
+            problems.append(Mistake(f"{where}.order[{i}]", f"{name!r} stands twice"))
     missing = [n for n in names if n not in order]
     if missing and all(name in names for name in order):  # a name that is wrong stands for one that is missing
-        problems.append(Problem(f"{where}.order", f"must name every vehicle, missing: {', '.join(missing)[:200]}"))
+        problems.append(Mistake(f"{where}.order", f"must name every vehicle, missing: {', '.join(missing)[:200]}"))
     if keys.mode == "sequence" and keys.interval_s is None:
         words = "is missing: seconds between one arrival and the next"
-        problems.append(Problem(f"{where}.interval_s", words, "missing"))
+        problems.append(Mistake(f"{where}.interval_s", words, "missing"))
     if keys.mode == "none":
         unused = [k for k in ("arrive_s", "clock", "hold") if getattr(keys, k) is not None and k in keys.given]
-        problems += [Problem(f"{where}.{k}", "counts with mode: sequence or together only") for k in unused]
+        problems += [Mistake(f"{where}.{k}", "counts with mode: sequence or together only") for k in unused]
     if keys.clock is not None and keys.arrive_s is not None:
-        problems.append(Problem(f"{where}.clock", "arrive_s sets the time of the first already; keep one"))
+        problems.append(Mistake(f"{where}.clock", "arrive_s sets the time of the first already; keep one"))
     elif keys.clock is not None and keys.mode == "together":
         problems.append(
-            Problem(f"{where}.clock", "counts with mode: sequence only; together the slowest sets the time")
+            Mistake(f"{where}.clock", "counts with mode: sequence only; together the slowest sets the time")
         )
     return ArrivalRequest(
         keys.mode, tuple(order), keys.interval_s or 0.0,
@@ -379,7 +379,7 @@ WAYS = (("base_w", "horizontal_j_per_m"), ("cruise_w",), ("endurance_s",))
 """Keys that say what cruising takes: those of one way alone may be given."""
 
 
-def make_energy(keys: VehicleKeys, where: str, problems: list[Problem], notes: list[Note]) -> Energy:
+def make_energy(keys: VehicleKeys, where: str, problems: list[Mistake], notes: list[Note]) -> Energy:
     """The energy model of a vehicle; ``problems`` if its keys contradict each other.
 
     Without any key under ``energy:`` it is the paper's, marked as not stated; with a battery alone, as the paper's.
@@ -390,14 +390,14 @@ def make_energy(keys: VehicleKeys, where: str, problems: list[Problem], notes: l
     if len(said) > 1:
         first, second = said[0][0], said[1][0]
         problems.append(
-            Problem(
+            Mistake(
                 f"{where}.energy.{second}",
                 f"says what cruising takes, and {first} says it too, in another way: keep one of them",
             )
         )
     if given.endurance_s is not None and given.battery_j is None:
         problems.append(
-            Problem(
+            Mistake(
                 f"{where}.energy.endurance_s",
                 "needs the energy that lasts so long: give battery_wh too, or cruise_w instead",
             )
@@ -405,7 +405,7 @@ def make_energy(keys: VehicleKeys, where: str, problems: list[Problem], notes: l
     speeds = given.fitted_speed_m_s
     if speeds is not None and speeds[0] > speeds[1]:
         words = f"the slowest speed must not be above the fastest, given [{speeds[0]:g}, {speeds[1]:g}]"
-        problems.append(Problem(f"{where}.energy.fitted_speed_m_s", words))
+        problems.append(Mistake(f"{where}.energy.fitted_speed_m_s", words))
     base_w, along = given.base_w, given.horizontal_j_per_m
     papers = bool(given.model_fields_set) and not said and "vertical_j_per_m" not in given.model_fields_set
     if (cruise_w := _cruise_w(given)) is not None:

@@ -14,7 +14,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file.request import MissionFile, VehicleRequest
 from gcsplan.mission_file.scene import LOCAL_MARGIN_M, MARGIN_M, MissionPlace, settle_zones
 from gcsplan.mission_file.terminals import Terminals, make_request
@@ -74,7 +74,7 @@ class MissionPlane:
     _extent: Box | None = None
     _loaded: WeakValueDictionary[int, MissionFile] = field(default_factory=WeakValueDictionary)
 
-    def load(self, problems: list[Problem]) -> GroundWindow | None:
+    def load(self, problems: list[Mistake]) -> GroundWindow | None:
         """The first window; None, and ``problems``, if there is no terrain."""
         return self._ground(self.box, None, problems, spare_m=0.0)
 
@@ -106,7 +106,7 @@ class MissionPlane:
         known = self._loaded.get(level)
         if known is not None and (most_cells is None or known.surface.ground_m.size <= most_cells):
             return known
-        problems: list[Problem] = []
+        problems: list[Mistake] = []
         found = self._ground(self._box(level), most_cells, problems, spare_m=RASTER_SPARE_M)
         if found is None or problems:
             return None
@@ -115,7 +115,7 @@ class MissionPlane:
         self._loaded[level] = wide
         return wide
 
-    def _ground(self, box: Box, most_cells: int | None, problems: list[Problem], spare_m: float) -> GroundWindow | None:
+    def _ground(self, box: Box, most_cells: int | None, problems: list[Mistake], spare_m: float) -> GroundWindow | None:
         corner_m = max(math.hypot(e, n) for e in (box[0], box[2]) for n in (box[1], box[3]))
         scale = self.frame.scale_at(corner_m + spare_m)
         try:

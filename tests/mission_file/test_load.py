@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rasterio.transform import Affine
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Energy
@@ -71,7 +71,7 @@ def load(whole: Any, folder: Path = Path()) -> MissionFile:
     return load_mission(folder / "m.yaml", text=text, planner_names=PLANNERS)
 
 
-def problems(whole: Any, folder: Path = Path()) -> tuple[Problem, ...]:
+def problems(whole: Any, folder: Path = Path()) -> tuple[Mistake, ...]:
     with pytest.raises(InputError) as caught:
         load(whole, folder)
     assert caught.value.exit_code == 2

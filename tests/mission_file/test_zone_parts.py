@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file.source import FIRST_BYTES, SUFFIXES_BY_KIND, what_else
 from gcsplan.mission_file.values.errors import few, key_path, unknown_keys
 from gcsplan.mission_file.zone_reader import read_zones
@@ -133,9 +133,9 @@ def test_a_mission_file_and_one_that_is_not_there_are_nothing_else(tmp_path: Pat
 
 
 def test_of_many_complaints_the_first_are_listed_and_the_rest_counted() -> None:
-    problems = [Problem(f"a[{k}]", "is wrong") for k in range(5)]
+    problems = [Mistake(f"a[{k}]", "is wrong") for k in range(5)]
     assert few(problems, "a", 5) == problems
-    assert few(problems, "a", 3) == [*problems[:3], Problem("a", "has 2 more mistakes, which are not listed")]
+    assert few(problems, "a", 3) == [*problems[:3], Mistake("a", "has 2 more mistakes, which are not listed")]
     assert few(problems, "a", 5, count=100)[-1].message == "has 95 more mistakes, which are not listed"
 
 

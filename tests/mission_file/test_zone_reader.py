@@ -15,7 +15,7 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file import zone_reader
 from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.mission_file.zones import file as zone_file
@@ -334,7 +334,7 @@ def test_an_entity_bomb_is_refused_at_once(tmp_path: Path) -> None:
 
 
 def test_touching_bounds_of_different_datums_are_left_to_the_ground() -> None:
-    problems: list[Problem] = []
+    problems: list[Mistake] = []
     assert Bounds(floor_agl_m=100.0, ceiling_amsl_m=50.0).levels("z", problems) == (
         Level(100.0, "agl"),
         Level(50.0, "amsl"),
@@ -354,7 +354,7 @@ def test_the_hash_follows_what_zones_say_and_not_how_they_are_laid_out(tmp_path:
 
 
 def test_a_local_polygon_stays_as_it_is() -> None:
-    problems: list[Problem] = []
+    problems: list[Mistake] = []
     draft = polygon("p", "z", [(0.0, 0.0), (10.0, 0.0), (10.0, 5.0)], Bounds(), problems, local=True)
     assert draft is not None
     ((_, zone),), far = place_zones([draft], FRAME)
@@ -364,7 +364,7 @@ def test_a_local_polygon_stays_as_it_is() -> None:
 
 
 def test_a_swapped_zone_is_told_from_a_far_one() -> None:
-    problems: list[Problem] = []
+    problems: list[Mistake] = []
     swapped = circle("c", "z", (-84.3, 36.6), 100.0, Bounds(), problems)
     far = circle("c", "z", (50.0, 10.0), 100.0, Bounds(), problems)
     assert swapped is not None
@@ -386,7 +386,7 @@ def test_any_star_of_degrees_is_the_same_star_in_the_plane(
     reach = size * rng.uniform(0.4, 1.0, corners)
     star = [(lat + float(r * math.sin(t)), lon + float(r * math.cos(t))) for t, r in zip(turn, reach, strict=True)]
     wrapped = [(a, (b + 180.0) % 360.0 - 180.0) for a, b in star][:: -1 if backwards else 1]
-    problems: list[Problem] = []
+    problems: list[Mistake] = []
     draft = polygon("s", "z", wrapped, Bounds(), problems)
     assert problems == []
     assert draft is not None

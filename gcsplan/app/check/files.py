@@ -23,7 +23,7 @@ from gcsplan.app.check.worlds import (
     places_of,
 )
 from gcsplan.app.plan.way_home import is_required, lets_fly
-from gcsplan.errors import CheckFailed, GcsplanError, InputError, Problem, worst_of
+from gcsplan.errors import CheckFailed, GcsplanError, InputError, Mistake, worst_of
 from gcsplan.figures import counted
 from gcsplan.mavlink.files.file_items import MissionFileRead
 from gcsplan.mavlink.mission.mission import Home, Mission
@@ -169,7 +169,7 @@ class Failing:
     reason: str
     lines: tuple[str, ...]
     home_lines: tuple[str, ...] = ()
-    problems: tuple[Problem, ...] = ()
+    problems: tuple[Mistake, ...] = ()
 
 
 def failing_of(c: Checked, *, allow_unjudged: bool) -> Failing | None:

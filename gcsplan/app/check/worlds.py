@@ -40,7 +40,7 @@ from gcsplan.vehicle import Autopilot, Vehicle
 from gcsplan.world.geodesy.frame import FARTHEST_M
 from gcsplan.world.world import World
 
-SAME_PLACE_M = 1.0
+HOME_MOVED_M = 1.0
 """A home row within this distance of the vehicle's start, m, counts as the start."""
 
 
@@ -253,7 +253,7 @@ def at_start(read: MissionFileRead, start: Home, vehicle: Vehicle) -> MissionFil
     if home.lat_e7 == 0 and home.lon_e7 == 0:
         notes.append(Note("home_row_blank"))
         mission = replace(mission, home=start)
-    elif distance_m(home.lat_e7 / 1e7, home.lon_e7 / 1e7, *place) > SAME_PLACE_M:
+    elif distance_m(home.lat_e7 / 1e7, home.lon_e7 / 1e7, *place) > HOME_MOVED_M:
         notes.append(Note("home_row_elsewhere"))
         mission = replace(mission, home=start)
     return replace(read, mission=mission, notes=tuple(notes))

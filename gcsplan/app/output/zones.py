@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file.load import read_no_fly
 from gcsplan.mission_file.published.policy import Policy
 from gcsplan.mission_file.published.times import hours_of, texts_of
@@ -65,7 +65,7 @@ def list_zones(files: Sequence[Path], at: str | None = None) -> tuple[list[Liste
     """
     drafts: list[ZoneDraft] = []
     notes: list[Note] = []
-    wrong: list[Problem] = []
+    wrong: list[Mistake] = []
     texts = texts_of(at)
     policy = Policy(hours=hours_of(None, None, "--at", wrong, instead=texts))
     if wrong:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import ROUND_HALF_EVEN, Decimal
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import (
     FRAME_SYNONYMS,
@@ -138,12 +138,12 @@ def whole(value: float, low: int, high: int) -> int | None:
     return int(value) if math.isfinite(value) and value == math.floor(value) and low <= value <= high else None
 
 
-def read_item(raw: RawItem, problems: list[Problem], where: str) -> MissionItem | None:
+def read_item(raw: RawItem, problems: list[Mistake], where: str) -> MissionItem | None:
     """Return the wire item of ``raw`` with frame synonyms replaced; or None, and add every mistake to ``problems``."""
     before = len(problems)
 
     def bad(message: str) -> None:
-        problems.append(Problem(where, message))
+        problems.append(Mistake(where, message))
 
     command = whole(raw.command, 0, 65535)
     if command is None:
@@ -195,10 +195,10 @@ def check_writable(mission: Mission, *, nan: bool) -> None:
 
     ``nan``: the format can express "not set" (.plan can, .waypoints cannot), except for an altitude.
     """
-    problems: list[Problem] = []
+    problems: list[Mistake] = []
 
     def bad(message: str) -> None:
-        problems.append(Problem(mission.name, message))
+        problems.append(Mistake(mission.name, message))
 
     for seq, item in enumerate(mission.items, start=mission.first_seq):
         placed = in_degrees(item.command, item.frame)
@@ -240,14 +240,14 @@ def _jumps(
     items: Sequence[MissionItem], renumbered: Mapping[int, int], first_seq: int, where: str
 ) -> tuple[MissionItem, ...]:
     out: list[MissionItem] = []
-    problems: list[Problem] = []
+    problems: list[Mistake] = []
     for seq, item in enumerate(items, start=first_seq):
         if item.command != cmd.DO_JUMP:
             out.append(item)
             continue
         target = whole(item.params[0], 0, 2**24)
         if target is None or target not in renumbered:
-            problems.append(Problem(where, f"item {seq} jumps to item {item.params[0]:g}, which the mission has not"))
+            problems.append(Mistake(where, f"item {seq} jumps to item {item.params[0]:g}, which the mission has not"))
             continue
         out.append(replace(item, params=(float(renumbered[target]), *item.params[1:])))
     if problems:

@@ -11,7 +11,7 @@ import math
 from collections.abc import Collection, Sequence
 from typing import Any
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mavlink.files.file_items import MAX_ITEMS, degrees_e7_of, float32_text, whole
 from gcsplan.mavlink.mission.commands import CIRCLE_IN, CIRCLE_OUT, POLYGON_IN, POLYGON_OUT, RALLY_POINT
 from gcsplan.mavlink.mission.mission import GLOBAL, RELATIVE, MissionItem
@@ -81,14 +81,14 @@ def fence_items(fence: object, where: str, notes: list[Note]) -> tuple[MissionIt
     """
     if not isinstance(fence, dict) or fence.get("version", FENCE_VERSION) != FENCE_VERSION:
         return ()
-    problems: list[Problem] = []
+    problems: list[Mistake] = []
     items: list[MissionItem] = []
     for kind in ("circles", "polygons"):
         for index, entry in enumerate(_list(fence.get(kind), f"{where}.{kind}", problems)):
             at = f"{where}.{kind}[{index}]"
             inside = entry.get("inclusion") if isinstance(entry, dict) else None
             if not isinstance(entry, dict) or not isinstance(inside, bool):
-                problems.append(Problem(at, "must be an object with inclusion true or false"))
+                problems.append(Mistake(at, "must be an object with inclusion true or false"))
             elif kind == "circles":
                 items += _circle(entry.get("circle"), inside, at, problems)
             else:
@@ -131,7 +131,7 @@ def unread_keys(section: object, known: Collection[str], version: int, where: st
 
 def rally_items(rally: object, where: str) -> tuple[MissionItem, ...]:
     """Return the wire items of ``rallyPoints``, [latitude, longitude, metres above home] each. Raises InputError."""
-    problems: list[Problem] = []
+    problems: list[Mistake] = []
     items: list[MissionItem] = []
     is_known = isinstance(rally, dict) and rally.get("version", RALLY_VERSION) == RALLY_VERSION
     points = _list(rally.get("points"), f"{where}.points", problems) if isinstance(rally, dict) and is_known else []
@@ -140,7 +140,7 @@ def rally_items(rally: object, where: str) -> tuple[MissionItem, ...]:
         place = _place(point[:2] if isinstance(point, list) and len(point) == 3 else None, at, problems)
         height = json_float(point[2]) if isinstance(point, list) and len(point) == 3 else None
         if place is not None and (height is None or not math.isfinite(height)):
-            problems.append(Problem(at, "a rally point is [latitude, longitude, altitude above home]"))
+            problems.append(Mistake(at, "a rally point is [latitude, longitude, altitude above home]"))
         elif place is not None and height is not None:
             items.append(MissionItem(RALLY_POINT, RELATIVE, (0.0, 0.0, 0.0, 0.0), *place, height))
         if len(problems) >= MAX_PROBLEMS:
@@ -150,40 +150,40 @@ def rally_items(rally: object, where: str) -> tuple[MissionItem, ...]:
     return tuple(items)
 
 
-def _list(value: object, where: str, problems: list[Problem]) -> list[Any]:
+def _list(value: object, where: str, problems: list[Mistake]) -> list[Any]:
     if value is None:
         return []
     if not isinstance(value, list) or len(value) > MAX_ITEMS:
-        problems.append(Problem(where, f"must be a list of {MAX_ITEMS} entries at most"))
+        problems.append(Mistake(where, f"must be a list of {MAX_ITEMS} entries at most"))
         return []
     return value
 
 
-def _place(value: object, where: str, problems: list[Problem]) -> tuple[int, int] | None:
+def _place(value: object, where: str, problems: list[Mistake]) -> tuple[int, int] | None:
     numbers = [json_float(v) for v in value] if isinstance(value, list) and len(value) == 2 else []
     good = [n for n in numbers if n is not None and math.isfinite(n)]
     if len(good) != 2 or abs(good[0]) > 90.0 or abs(good[1]) > 180.0:
-        problems.append(Problem(where, f"must be [latitude, longitude] within ±90°, ±180°, given {str(value)[:60]}"))
+        problems.append(Mistake(where, f"must be [latitude, longitude] within ±90°, ±180°, given {str(value)[:60]}"))
         return None
     return degrees_e7_of(good[0]), degrees_e7_of(good[1])
 
 
-def _circle(value: object, inside: bool, where: str, problems: list[Problem]) -> list[MissionItem]:
+def _circle(value: object, inside: bool, where: str, problems: list[Mistake]) -> list[MissionItem]:
     circle = value if isinstance(value, dict) else {}
     place = _place(circle.get("center"), f"{where}.circle.center", problems)
     radius_m = json_float(circle.get("radius"))
     if radius_m is None or not 0.0 < radius_m <= 1e7:
         text = str(circle.get("radius"))[:40]
-        problems.append(Problem(f"{where}.circle.radius", f"must be metres above 0, given {text}"))
+        problems.append(Mistake(f"{where}.circle.radius", f"must be metres above 0, given {text}"))
         return []
     command = CIRCLE_IN if inside else CIRCLE_OUT
     return [MissionItem(command, GLOBAL, (radius_m, 0.0, 0.0, 0.0), *place)] if place is not None else []
 
 
-def _polygon(value: object, inside: bool, where: str, problems: list[Problem]) -> list[MissionItem]:
+def _polygon(value: object, inside: bool, where: str, problems: list[Mistake]) -> list[MissionItem]:
     corners = _list(value, f"{where}.polygon", problems)
     if len(corners) < 3:
-        problems.append(Problem(f"{where}.polygon", f"must have at least 3 corners, given {len(corners)}"))
+        problems.append(Mistake(f"{where}.polygon", f"must have at least 3 corners, given {len(corners)}"))
         return []
     places = [_place(c, f"{where}.polygon[{i}]", problems) for i, c in enumerate(corners)]
     command, count = POLYGON_IN if inside else POLYGON_OUT, float(len(corners))

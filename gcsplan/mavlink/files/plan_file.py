@@ -17,7 +17,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mavlink.files.file_items import (
     HAS_PLACE,
     MAX_FILE_BYTES,
@@ -278,13 +278,13 @@ class _Items:
         self.items: list[MissionItem] = []
         self.index_of: dict[int, int] = {}
         self.twice: set[int] = set()
-        self.problems: list[Problem] = []
+        self.problems: list[Mistake] = []
         self.count = 0
 
     def finish(self) -> tuple[MissionItem, ...]:
         if self.twice and any(item.command == DO_JUMP for item in self.items):
             bad = f"doJumpId {min(self.twice)} stands twice, so it is not clear where a DO_JUMP leads"
-            self.problems.append(Problem(f"{self.where}: mission.items", bad))
+            self.problems.append(Mistake(f"{self.where}: mission.items", bad))
         self._raise()
         first_seq = 1 if self.autopilot.is_ardupilot else 0
         return jumps_from_file(self.items, self.index_of, first_seq, self.where)
@@ -295,7 +295,7 @@ class _Items:
             raise InputError.of(self.problems, headline=f"{self.where} is damaged" if many else "")
 
     def _bad(self, key: str, message: str) -> None:
-        self.problems.append(Problem(f"{self.where}: {key}", message))
+        self.problems.append(Mistake(f"{self.where}: {key}", message))
         if len(self.problems) >= MAX_PROBLEMS:
             self._raise()
 

@@ -13,7 +13,7 @@ import math
 import re
 from collections.abc import Iterator
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mavlink.files.file_items import (
     MAX_FILE_BYTES,
     MAX_ITEMS,
@@ -115,7 +115,7 @@ def parse_waypoints(text: str, *, autopilot: Autopilot, where: str, home_hint: H
             f"the first line of a .waypoints file must be '{HEADER}' (or '… 120'), given {' '.join(header)[:40]!r}",
             where=f"{where}:1",
         )
-    problems: list[Problem] = []
+    problems: list[Mistake] = []
     rows = list(_rows(lines, where, problems))
     if problems:
         raise InputError.of(problems, headline=f"{where} is damaged" if len(problems) > 1 else "")
@@ -131,36 +131,36 @@ class _Row:
         self.line, self.seq, self.raw, self.decimals = line, seq, raw, decimals
 
 
-def _rows(lines: io.StringIO, where: str, problems: list[Problem]) -> Iterator[_Row]:
+def _rows(lines: io.StringIO, where: str, problems: list[Mistake]) -> Iterator[_Row]:
     number, count, expected = 1, 0, None
     while line := lines.readline(MAX_LINE):
         number += 1
         place = f"{where}:{number}"
         if len(line) >= MAX_LINE:
-            problems.append(Problem(place, f"a line of more than {MAX_LINE} characters is not one of a mission"))
+            problems.append(Mistake(place, f"a line of more than {MAX_LINE} characters is not one of a mission"))
             return
         line = line.strip(" \t\n,")
         if not line or line.startswith("#"):
             continue
         if (row := _row(line, number, place, problems)) is not None:
             if expected is None and row.seq > 1:
-                problems.append(Problem(place, f"the first row must be 0 (home) or 1 (no home), given {row.seq}"))
+                problems.append(Mistake(place, f"the first row must be 0 (home) or 1 (no home), given {row.seq}"))
             elif expected is not None and row.seq != expected:
                 what = "the same row twice" if row.seq < expected else "rows are missing"
-                problems.append(Problem(place, f"seq must be {expected} here, given {row.seq}: {what}"))
+                problems.append(Mistake(place, f"seq must be {expected} here, given {row.seq}: {what}"))
             expected = row.seq + 1
             count += 1
             yield row
         if count > MAX_ITEMS:
-            problems.append(Problem(place, f"a mission of more than {MAX_ITEMS} items is not read"))
+            problems.append(Mistake(place, f"a mission of more than {MAX_ITEMS} items is not read"))
         if len(problems) >= MAX_PROBLEMS or count > MAX_ITEMS:
             return
 
 
-def _row(line: str, number: int, place: str, problems: list[Problem]) -> _Row | None:
+def _row(line: str, number: int, place: str, problems: list[Mistake]) -> _Row | None:
     fields = _SPLIT.split(line)
     if len(fields) != len(ROW_COLUMNS):
-        problems.append(Problem(place, f"a row has {len(ROW_COLUMNS)} columns, this one has {len(fields)}"))
+        problems.append(Mistake(place, f"a row has {len(ROW_COLUMNS)} columns, this one has {len(fields)}"))
         return None
     values = numbers_at_once(line, fields)
     for name, field in zip(ROW_COLUMNS, fields, strict=True) if not values else ():
@@ -169,12 +169,12 @@ def _row(line: str, number: int, place: str, problems: list[Problem]) -> _Row | 
         elif len(field) <= MAX_NUMBER and _ROW_NUMBER.fullmatch(field) and math.isfinite(float(field)):
             values.append(float(field))
         else:
-            problems.append(Problem(place, f"{name} must be a number, given {field[:40]!r}"))
+            problems.append(Mistake(place, f"{name} must be a number, given {field[:40]!r}"))
             return None
     seq, autocontinue = whole(values[0], 0, 65535), whole(values[11], 0, 1)
     if seq is None or whole(values[1], 0, 255) is None or autocontinue is None:
         problems.append(
-            Problem(place, f"seq, current and autocontinue must be whole (the last 0 or 1), given {line[:50]!r}")
+            Mistake(place, f"seq, current and autocontinue must be whole (the last 0 or 1), given {line[:50]!r}")
         )
         return None
     p1, p2, p3, p4, x, y, z = values[4:11]
@@ -221,7 +221,7 @@ def _mission(rows: list[_Row], has_home: bool, autopilot: Autopilot, where: str,
             f"(TABs between) in front and count the other rows from 1",
             where=where,
         )
-    problems: list[Problem] = []
+    problems: list[Mistake] = []
     items: list[MissionItem] = []
     for row in rows:
         item = read_item(row.raw, problems, f"{where}:{row.line}")

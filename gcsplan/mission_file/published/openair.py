@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.figures import counted
 from gcsplan.mission_file.published.policy import UNREAD_TIMES, Policy, Published
 from gcsplan.mission_file.published.times import Period, TimeError, read_end, read_instant
@@ -281,7 +281,7 @@ class _OpenAirReading:
         zone = Published(name, kinds, restricts, "", periods, remarks)
         limits = _limits(block, where, file.policy)
         limits.faults += [
-            Problem(f"{file.path}: line {number}", words) for number, words in block.mistakes[:MOST_MISTAKES]
+            Mistake(f"{file.path}: line {number}", words) for number, words in block.mistakes[:MOST_MISTAKES]
         ]
         if block.lost and not file.judge.reason(zone):  # it may reach farther than what is understood of it
             for number, words in block.lost[:MOST_MISTAKES]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, field
 
-from gcsplan.errors import Problem
+from gcsplan.errors import Mistake
 from gcsplan.mission_file.published.times import Hours, Period, apply_in
 from gcsplan.mission_file.values.schema import nearest
 from gcsplan.mission_file.zones.draft import Remark
@@ -84,16 +84,16 @@ class PolicyJudge:
             return Note("zones_out_of_hours", hours=str(self.policy.hours))
         return None
 
-    def slips(self) -> list[Problem]:
+    def slips(self) -> list[Mistake]:
         """Names of the policy that fit nothing: a slip would leave zones out, or not let a zone be entered."""
         known = sorted({_plain(k) for k in (*self.vocabulary, *self.kinds)})
         found = [
-            Problem(f"{self.policy.where}.kinds[{i}]", _unknown("kind", kind, known))
+            Mistake(f"{self.policy.where}.kinds[{i}]", _unknown("kind", kind, known))
             for i, kind in enumerate(self.policy.kinds or ())
             if _plain(kind) not in known
         ]
         return found + [
-            Problem(f"{self.policy.where}.authorised[{i}]", f"no zone of the file has the identifier or name {name!r}")
+            Mistake(f"{self.policy.where}.authorised[{i}]", f"no zone of the file has the identifier or name {name!r}")
             for i, name in enumerate(self.policy.authorised)
             if name not in self.entered
         ]

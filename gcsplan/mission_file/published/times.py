@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, time, timedelta
 from typing import Any
 
-from gcsplan.errors import Problem
+from gcsplan.errors import Mistake
 
 ALONE = timedelta(hours=2)
 """How long the hours last if their beginning alone is stated."""
@@ -256,7 +256,7 @@ def apply_in(periods: Sequence[Period], hours: Hours | None) -> bool:
 
 
 def hours_of(
-    given: Any, departure: datetime | None, where: str, problems: list[Problem],
+    given: Any, departure: datetime | None, where: str, problems: list[Mistake],
     *, instead: Sequence[str] | None = None,
 ) -> Hours | None:  # fmt: skip
     """When a mission is flown: its ``at`` as ``given``, if it has one, or else the departure that the caller states.
@@ -269,5 +269,5 @@ def hours_of(
     try:
         return Hours.read(given)
     except TimeError as why:
-        problems.append(Problem(where, str(why)))
+        problems.append(Mistake(where, str(why)))
         return None

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from pathlib import PurePath
 
-from gcsplan.errors import Problem
+from gcsplan.errors import Mistake
 from gcsplan.mission_file.zones.draft import ZoneDraft, one_line
 from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.frame import Frame
@@ -19,9 +19,9 @@ NAMED_WITHIN_M = 5000.0
 """Zones this near to the mission's surroundings are named at least, m."""
 
 
-def faults_near(placed: Sequence[tuple[ZoneDraft, Zone]], box: Box) -> list[Problem]:
+def faults_near(placed: Sequence[tuple[ZoneDraft, Zone]], box: Box) -> list[Mistake]:
     """What is not understood of zones that reach into the mission's surroundings."""
-    found: dict[Problem, None] = {}
+    found: dict[Mistake, None] = {}
     for draft, zone in placed:
         if draft.faults and _meets(zone, box):
             found |= dict.fromkeys(draft.faults)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file.published.policy import Policy, PolicyJudge, Published
 from gcsplan.mission_file.zones.attributes import OVER_PRESSURE, UNDER_PRESSURE, level_read
 from gcsplan.mission_file.zones.draft import (
@@ -77,7 +77,7 @@ class VolumeLimits:
 
     bounds: Bounds = field(default_factory=Bounds)
     remarks: list[Remark] = field(default_factory=list)
-    faults: list[Problem] = field(default_factory=list)
+    faults: list[Mistake] = field(default_factory=list)
 
     @classmethod
     def read(
@@ -94,7 +94,7 @@ class VolumeLimits:
                 level = found._level(bound, given, spared, error_m)
             except LevelError as why:
                 cure = f"{given} cannot be read as a level: {why}. Write for example {LEVEL_EXAMPLES}"
-                found.faults.append(Problem(where, cure))
+                found.faults.append(Mistake(where, cure))
                 continue
             if level is not None:
                 levels[f"{bound}_{level.datum}_m"] = level.value_m
@@ -167,7 +167,7 @@ class AirspaceFile:
 
     def fault(self, where: str, message: str) -> None:
         """Refuse the file for a zone of which not even the place is known."""
-        self.found.problems.append(Problem(where, message))
+        self.found.problems.append(Mistake(where, message))
 
     def add_circle(
         self, zone: Published, part: str, where: str, centre: Corner, radius_m: float, limits: VolumeLimits
@@ -196,7 +196,7 @@ class AirspaceFile:
         ring, doubt = across(ring, holes)
         wide = wide_fault(ring, holes)
         if wide:
-            self._add(zone, part, where, self._around(ring), None, limits, [Problem(where, wide)])
+            self._add(zone, part, where, self._around(ring), None, limits, [Mistake(where, wide)])
             return
         outline, why = outline_of(ring)
         if not why:
@@ -210,7 +210,7 @@ class AirspaceFile:
         if not parts:
             if ring:
                 self._add(
-                    zone, part, where, self._around(ring), None, limits, [Problem(where, f"{why}; {OUTLINE_CURE}")]
+                    zone, part, where, self._around(ring), None, limits, [Mistake(where, f"{why}; {OUTLINE_CURE}")]
                 )
             else:
                 self.fault(where, "the polygon has no points")
@@ -219,7 +219,7 @@ class AirspaceFile:
             try:
                 bent = along_great_circles(outline)
             except InputError as too_many:
-                self._add(zone, part, where, self._around(ring), None, limits, [Problem(where, too_many.message)])
+                self._add(zone, part, where, self._around(ring), None, limits, [Mistake(where, too_many.message)])
                 return
             parts = parts if bent is None else enclosed(outline, bent)
         limits = VolumeLimits(limits.bounds, [*limits.remarks, (Note("zone_outline_crosses"), None)], limits.faults)
@@ -249,9 +249,9 @@ class AirspaceFile:
 
     def _add(
         self, zone: Published, part: str, where: str, points: tuple[Corner, ...], radius_m: float | None,
-        limits: VolumeLimits, faults: list[Problem], doubt: tuple[Corner, ...] = (),
+        limits: VolumeLimits, faults: list[Mistake], doubt: tuple[Corner, ...] = (),
     ) -> None:  # fmt: skip
-        faults = [Problem(p.where, f"zone {zone.name[:60]!r}: {p.message}") for p in (*limits.faults, *faults)]
+        faults = [Mistake(p.where, f"zone {zone.name[:60]!r}: {p.message}") for p in (*limits.faults, *faults)]
         floor, ceiling = (None, None) if faults else limits.bounds.levels(where, [])
         remarks = [*zone.remarks, *limits.remarks]
         if faults:

@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeVar, get_args, get_origin
 
 from pydantic import ValidationError
 
-from gcsplan.errors import Problem
+from gcsplan.errors import Mistake
 from gcsplan.mission_file.values.keys import Keys
 from gcsplan.mission_file.values.places import PLACE_EXAMPLES
 from gcsplan.mission_file.values.point_keys import POINT_FORMS
@@ -31,7 +31,7 @@ _RANGE = re.compile(r"\s*(\d+(?:\.\d+)?)\s*(?:-|–|\.\.|to)\s*(\d+(?:\.\d+)?)\s
 _NUMBER_AND_UNIT = re.compile(r"\s*[±+]?(-?\d+(?:[.,]\d+)?)\s*([a-zA-Z/²°%]*)\s*")
 
 
-def read_section(kind: type[Section], value: Any, where: str, problems: list[Problem]) -> Section | None:
+def read_section(kind: type[Section], value: Any, where: str, problems: list[Mistake]) -> Section | None:
     """``value`` as a section; None if it is not one, with every mistake added to ``problems``.
 
     If the only mistakes are unknown keys, the section is returned without them.
@@ -45,7 +45,7 @@ def read_section(kind: type[Section], value: Any, where: str, problems: list[Pro
         elif isinstance(value, str):
             tight = f"did you mean `{{{SHORT[kind]}: {value[:60]}}}`?"
         hint = f"; {tight}" if tight else ""
-        problems.append(Problem(where, f"must be a mapping of keys ({keys}, …), given {shown(value)}{hint}"))
+        problems.append(Mistake(where, f"must be a mapping of keys ({keys}, …), given {shown(value)}{hint}"))
         return None
     try:
         return kind.model_validate(value)
@@ -59,23 +59,23 @@ def read_section(kind: type[Section], value: Any, where: str, problems: list[Pro
     return kind.model_validate({k: v for k, v in value.items() if k not in unknown})
 
 
-def with_lines(problems: Sequence[Problem], text: str, where: str) -> list[Problem]:
+def with_lines(problems: Sequence[Mistake], text: str, where: str) -> list[Mistake]:
     """The problems with their lines in a mission's ``text``, whose keys begin with ``where``; others unchanged."""
     lines = lines_of(text, [p.where.removeprefix(where) if p.where.startswith(where) else "" for p in problems])
     ends = ["" if n is None else f" (line {n})" for n in lines]
     return [replace(p, message=p.message + end, line=end) for p, end in zip(problems, ends, strict=True)]
 
 
-def few(problems: Sequence[Problem], where: str, most: int, count: int | None = None) -> list[Problem]:
+def few(problems: Sequence[Mistake], where: str, most: int, count: int | None = None) -> list[Mistake]:
     """The first ``most`` problems, and how many of ``count`` (None: of these) are left out."""
     more = (len(problems) if count is None else count) - most
     return [
         *problems[:most],
-        *([Problem(where, f"has {more} more mistakes, which are not listed")] if more > 0 else []),
+        *([Mistake(where, f"has {more} more mistakes, which are not listed")] if more > 0 else []),
     ]
 
 
-def told_once(problems: Iterable[Problem]) -> list[Problem]:
+def told_once(problems: Iterable[Mistake]) -> list[Mistake]:
     """The problems without those that end with another one's cure.
 
     A key is not missing if an unknown one beside it stands for it, and one message is enough for places that are all
@@ -84,7 +84,7 @@ def told_once(problems: Iterable[Problem]) -> list[Problem]:
     found = list(problems)
     unknown = [p for p in found if p.code == "unknown_key"]
     missing = [p for p in found if p.code in ("missing", "missing_limit")]
-    meant: dict[int, Problem] = {}  # the unknown key that stands for a missing one, by the id of that one's problem
+    meant: dict[int, Mistake] = {}  # the unknown key that stands for a missing one, by the id of that one's problem
     for gap in missing:
         section, key = _section_and_key(gap.where)
         beside = [u for u in unknown if _section_and_key(u.where)[0] == section]
@@ -119,7 +119,7 @@ def _section_and_key(where: str) -> tuple[str, str]:
     return f"{file}: {section}", key
 
 
-def unknown_keys(given: Iterable[str], known: Iterable[str], where: str) -> list[Problem]:
+def unknown_keys(given: Iterable[str], known: Iterable[str], where: str) -> list[Mistake]:
     """One problem for each unknown key, with the nearest known one."""
     names = list(known)
     prefix = where if where.endswith(": ") else where + "."
@@ -139,17 +139,17 @@ def key_path(where: str, loc: Iterable[int | str]) -> str:
     return path
 
 
-def _unknown_of(where: str, key: str, known: list[str]) -> Problem:
+def _unknown_of(where: str, key: str, known: list[str]) -> Mistake:
     """The problem of an unknown ``key``, with the nearest of the known ones."""
     meant, words = nearest_keys(key, known)
     return _unknown(where, meant, words or f"; known are {', '.join(known)}")
 
 
-def _unknown(where: str, meant: tuple[str, ...], words: str) -> Problem:
-    return Problem(where, f"unknown key{words}", "unknown_key", meant)
+def _unknown(where: str, meant: tuple[str, ...], words: str) -> Mistake:
+    return Mistake(where, f"unknown key{words}", "unknown_key", meant)
 
 
-def _problem(kind: type[Keys], error: Any, where: str) -> Problem:
+def _problem(kind: type[Keys], error: Any, where: str) -> Mistake:
     loc, given = error["loc"], shown(error["input"])
     path = key_path(where, loc)
     context = error.get("ctx", {})
@@ -158,46 +158,46 @@ def _problem(kind: type[Keys], error: Any, where: str) -> Problem:
             field = _model_at(kind, loc[:-1]).model_fields.get(str(loc[-1]))
             choices = [] if field is None or get_origin(field.annotation) is not Literal else get_args(field.annotation)
             words = f"; it is one of {', '.join(choices)}" if choices else ""
-            return Problem(path, f"is missing{words}", "missing")
+            return Mistake(path, f"is missing{words}", "missing")
         case "extra_forbidden":
             return _unknown_of(path, str(loc[-1]), list(_model_at(kind, loc[:-1]).model_fields))
         case "value_error":
-            return Problem(path, str(context["error"]))
+            return Mistake(path, str(context["error"]))
         case "literal_error":
             choices = re.findall(r"'([^']*)'", context["expected"])
             near = nearest(error["input"], choices, most=2) if isinstance(error["input"], str) else ""
-            return Problem(path, f"must be one of {', '.join(choices)}, given {given}{near}")
+            return Mistake(path, f"must be one of {', '.join(choices)}, given {given}{near}")
         case "string_pattern_mismatch":
-            return Problem(path, f"must be made of letters, digits, _ and -, given {given}")
+            return Mistake(path, f"must be made of letters, digits, _ and -, given {given}")
         case "string_type":
-            return Problem(path, f"must be text (in quotes, if it looks like a number), given {given}")
+            return Mistake(path, f"must be text (in quotes, if it looks like a number), given {given}")
         case "float_type":
-            return Problem(path, f"must be a number, given {given}{_as_number(loc, error['input'])}")
+            return Mistake(path, f"must be a number, given {given}{_as_number(loc, error['input'])}")
         case "int_type" | "int_from_float" | "int_parsing_size":
-            return Problem(path, f"must be a whole number, given {given}{_as_number(loc, error['input'])}")
+            return Mistake(path, f"must be a whole number, given {given}{_as_number(loc, error['input'])}")
         case "finite_number":
-            return Problem(path, f"must be a finite number, given {given}")
+            return Mistake(path, f"must be a finite number, given {given}")
         case "greater_than" | "greater_than_equal" | "less_than" | "less_than_equal":
             word = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
             bound = next(k for k in ("gt", "ge", "lt", "le") if k in context)
             part = bound == "lt" and context[bound] == 1.0 and 1.0 <= error["input"] < 100.0
             hint = f"; {error['input']:g} % is {error['input'] / 100.0:g}" if part else ""
-            return Problem(path, f"must be {word[bound]} {context[bound]:g}, given {given}{hint}")
+            return Mistake(path, f"must be {word[bound]} {context[bound]:g}, given {given}{hint}")
         case "too_short" | "too_long":
             least, most = context.get("min_length"), context.get("max_length")
             bound = f"at least {least}" if least is not None else f"at most {most}"
             given = context.get("actual_length", given)
             whole = _form_of(loc) and given == 4 and all(type(v) is int for v in error["input"])
             hint = f"; decimals begin with a point: [{PLACE_EXAMPLES[0]}]" if whole else ""
-            return Problem(path, f"must have {bound} values{_form_of(loc)}, given {given}{hint}")
+            return Mistake(path, f"must have {bound} values{_form_of(loc)}, given {given}{hint}")
         case "list_type" if _form_of(loc):
             words = f"must be [lat, lon], {{lat, lon}}, or text such as {PLACE_EXAMPLES[0]}"
-            return Problem(path, f"{words}, or {{east_m, north_m}} in a mission with a frame, given {given}")
+            return Mistake(path, f"{words}, or {{east_m, north_m}} in a mission with a frame, given {given}")
         case "list_type":
-            return Problem(path, f"must be a list, given {given}")
+            return Mistake(path, f"must be a list, given {given}")
         case "model_type" | "dict_type" | "model_attributes_type":
-            return Problem(path, f"must be a mapping of keys, given {given}")
-    return Problem(path, f"{error['msg'][:1].lower()}{error['msg'][1:]}, given {given}")
+            return Mistake(path, f"must be a mapping of keys, given {given}")
+    return Mistake(path, f"{error['msg'][:1].lower()}{error['msg'][1:]}, given {given}")
 
 
 def _as_number(loc: tuple[int | str, ...], given: Any) -> str:

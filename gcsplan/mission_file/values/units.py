@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, NamedTuple, TypeGuard, get_args
 
-from gcsplan.errors import Problem
+from gcsplan.errors import Mistake
 from gcsplan.mission_file.values.keys import Keys
 from gcsplan.mission_file.values.schema import MOST_VOLTS, MissionKeys, shown
 from gcsplan.notes.note import Note
@@ -66,10 +66,10 @@ class Converted:
 
     raw: dict[str, Any]
     notes: tuple[Note, ...]
-    problems: tuple[Problem, ...]
+    problems: tuple[Mistake, ...]
     given: Mapping[str, tuple[str, Note]]
 
-    def as_written(self, problem: Problem) -> Problem:
+    def as_written(self, problem: Mistake) -> Mistake:
         """The problem at the key that is in the file, if it is about a converted one."""
         for place, (written, how) in self.given.items():
             rest = problem.where.removeprefix(place)
@@ -138,7 +138,7 @@ class _Walk:
     """One walk over a file, section by section, with what it found."""
 
     def __init__(self) -> None:
-        self.problems: list[Problem] = []
+        self.problems: list[Mistake] = []
         self.given: dict[str, tuple[str, Note]] = {}
 
     def section(self, kind: type[Keys], raw: Mapping[str, Any], where: str) -> dict[str, Any]:
@@ -152,7 +152,7 @@ class _Walk:
             elif key in charges and charges[key] not in raw and not self._is_charged(charges[key], raw, others):
                 names = ", ".join(_names_of(others[charges[key]]))
                 self.problems.append(
-                    Problem(where + key, f"counts with the battery's capacity only: give one of {names}")
+                    Mistake(where + key, f"counts with the battery's capacity only: give one of {names}")
                 )
             elif key not in charges or charges[key] not in raw or _is_voltage(value):
                 plain[key] = self._inside(inner[key], value, where + key) if key in inner else value
@@ -180,7 +180,7 @@ class _Walk:
         place, value = where + key, raw[key]
         twice = [name for name in raw if name == written.key or (name != key and name in _siblings(written))]
         if twice:
-            self.problems.append(Problem(place, f"stands as {' and '.join(twice)} too; keep one"))
+            self.problems.append(Mistake(place, f"stands as {' and '.join(twice)} too; keep one"))
         size, volts = written.other.size, 0.0
         if written.end == CHARGE:
             beside = _volts_of(written)
@@ -188,7 +188,7 @@ class _Walk:
             if not _is_voltage(volt):
                 given = "" if volt is None else f", given {shown(volt)}"
                 words = f"needs {beside}, the nominal voltage: a number above 0 and at most {MOST_VOLTS:g}{given}"
-                self.problems.append(Problem(place, words))
+                self.problems.append(Mistake(place, words))
                 return
             volts = float(volt)
             size *= volts

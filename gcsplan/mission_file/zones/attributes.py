@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
-from gcsplan.errors import Problem
+from gcsplan.errors import Mistake
 from gcsplan.mission_file.zones.draft import SIZE_KEYS, Bounds, Remark, one_line
 from gcsplan.mission_file.zones.levels import (
     LARGEST_M,
@@ -132,7 +132,7 @@ class ZoneStatements:
     buffer_m: float | None = None
 
 
-def read_attributes(given: Sequence[Attribute], name: str, problems: list[Problem]) -> ZoneStatements | None:
+def read_attributes(given: Sequence[Attribute], name: str, problems: list[Mistake]) -> ZoneStatements | None:
     """What the attributes say; ``name`` is for a zone without one. None, and ``problems``, if they cannot be read."""
     known: list[Attribute] = []
     ignored: list[Attribute] = []
@@ -204,7 +204,7 @@ class _ZoneReading:
     """One zone while its attributes are read."""
 
     name: str
-    problems: list[Problem]
+    problems: list[Mistake]
     remarks: list[Remark] = field(default_factory=list)
     of_levels: bool = False
     read_as: list[Note] = field(default_factory=list)
@@ -219,7 +219,7 @@ class _ZoneReading:
         value = attribute.value
         if is_number(value) and abs(value) <= LARGEST_M:
             return float(value)
-        self.problems.append(Problem(attribute.where, f"must be a number, given {shown(value)}"))
+        self.problems.append(Mistake(attribute.where, f"must be a number, given {shown(value)}"))
         return None
 
     def bounds(self, given: Sequence[Attribute]) -> Bounds:
@@ -286,7 +286,7 @@ class _ZoneReading:
             return None
 
     def _wrong(self, attribute: Attribute, words: str) -> None:
-        self.problems.append(Problem(attribute.where, f"zone {self.name[:60]!r}: {attribute} {words}"))
+        self.problems.append(Mistake(attribute.where, f"zone {self.name[:60]!r}: {attribute} {words}"))
 
 
 def _parts(value: dict[Any, Any]) -> tuple[Any, list[str]]:

@@ -8,7 +8,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file.values.places import read_place
 from gcsplan.mission_file.zones.attributes import Attribute, as_figure, read_attributes
 from gcsplan.mission_file.zones.contents import decoded
@@ -106,7 +106,7 @@ def _row(found: ZoneFile, columns: _Columns, row: list[str], where: str, fallbac
             f"has {len(row)} cells, the first line {len(columns.names)}: is there a comma within a number or a name? "
         )
         cure = 'Write a point in numbers, and names in quotes "…"'
-        found.problems.append(Problem(where, words + cure))
+        found.problems.append(Mistake(where, words + cure))
         return
     cells = [cell.strip() for cell in row] + [""] * (len(columns.names) - len(row))
     centre = _place(found, columns, cells, where)
@@ -127,7 +127,7 @@ def _place(found: ZoneFile, columns: _Columns, cells: list[str], where: str) -> 
             raise ValueError(f"{' and '.join(empty)} is empty; write the place, or remove the row")
         place = read_place(", ".join(written))
     except ValueError as why:
-        found.problems.append(Problem(where, str(why)))
+        found.problems.append(Mistake(where, str(why)))
         return None
     if place.note:
         found.said.append(place.note.of(place=where.rpartition(": ")[2]))

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file.values.places import is_swapped, range_fault
 from gcsplan.notes.note import Datum, Note
 from gcsplan.world.geodesy.degree_shapes import (
@@ -86,7 +86,7 @@ class ZoneDraft:
     remarks: tuple[Remark, ...] = ()
     buffer_m: float | None = None
     unused: Note | None = None
-    faults: tuple[Problem, ...] = ()
+    faults: tuple[Mistake, ...] = ()
     great_circles: bool = False
     doubt: tuple[tuple[float, float], ...] = ()
 
@@ -100,7 +100,7 @@ class Bounds:
     floor_amsl_m: float | None = None
     ceiling_amsl_m: float | None = None
 
-    def levels(self, where: str, problems: list[Problem]) -> tuple[Level | None, Level | None]:
+    def levels(self, where: str, problems: list[Mistake]) -> tuple[Level | None, Level | None]:
         """Floor and ceiling; contradictions go to ``problems``.
 
         A floor at 0 m AGL is no floor: the zone reaches down without end, so nothing passes below it.
@@ -108,22 +108,22 @@ class Bounds:
         for bound in ("floor", "ceiling"):
             if getattr(self, f"{bound}_agl_m") is not None and getattr(self, f"{bound}_amsl_m") is not None:
                 problems.append(
-                    Problem(f"{where}.{bound}_agl_m", f"give {bound}_agl_m or {bound}_amsl_m, not both for one {bound}")
+                    Mistake(f"{where}.{bound}_agl_m", f"give {bound}_agl_m or {bound}_amsl_m, not both for one {bound}")
                 )
         floor = _level(self.floor_agl_m, self.floor_amsl_m)
         ceiling = _level(self.ceiling_agl_m, self.ceiling_amsl_m)
         if floor is not None and floor.datum == "agl" and floor.value_m < 0.0:
-            problems.append(Problem(f"{where}.floor_agl_m", f"must be at least 0, given {floor.value_m:g}"))
+            problems.append(Mistake(f"{where}.floor_agl_m", f"must be at least 0, given {floor.value_m:g}"))
         if ceiling is not None and ceiling.datum == "agl" and ceiling.value_m <= 0.0:
             problems.append(
-                Problem(
+                Mistake(
                     f"{where}.ceiling_agl_m",
                     f"must be above 0, given {ceiling.value_m:g}: the zone would lie wholly under ground",
                 )
             )
         elif floor and ceiling and floor.datum == ceiling.datum and floor.value_m >= ceiling.value_m:
             problems.append(
-                Problem(
+                Mistake(
                     f"{where}.floor_{floor.datum}_m",
                     f"the floor must be below the ceiling, given {floor.value_m:g} and {ceiling.value_m:g}",
                 )
@@ -140,7 +140,7 @@ def _level(agl_m: float | None, amsl_m: float | None) -> Level | None:
 
 
 def circle(
-    name: str, where: str, centre: tuple[float, float], radius_m: float, bounds: Bounds, problems: list[Problem],
+    name: str, where: str, centre: tuple[float, float], radius_m: float, bounds: Bounds, problems: list[Mistake],
     *, local: bool = False,
 ) -> ZoneDraft | None:  # fmt: skip
     """A cylinder; None, and new ``problems``, if it is wrong."""
@@ -155,7 +155,7 @@ def circle(
 
 
 def polygon(
-    name: str, where: str, points: Sequence[tuple[float, float]], bounds: Bounds, problems: list[Problem],
+    name: str, where: str, points: Sequence[tuple[float, float]], bounds: Bounds, problems: list[Mistake],
     *, local: bool = False, key: str = "polygon", holes: int = 0,
 ) -> ZoneDraft | None:  # fmt: skip
     """A prism; None, and new ``problems``, if its outline is not simple or its bounds contradict each other."""
@@ -167,11 +167,11 @@ def polygon(
         return None
     points, doubt = (points, ()) if local else across(points, holes)
     if not local and (wide := wide_fault(points, holes)):
-        problems.append(Problem(at, f"zone {name[:60]!r}: {wide}"))
+        problems.append(Mistake(at, f"zone {name[:60]!r}: {wide}"))
         return None
     ring, fault = outline_of(points, local=local)
     if fault:
-        problems.append(Problem(at, fault))
+        problems.append(Mistake(at, fault))
         return None
     said = ((ACROSS_ANTIMERIDIAN, None),) if doubt else ()
     return ZoneDraft(name, where, tuple(ring), local, None, floor, ceiling, remarks=said, doubt=doubt)
@@ -179,7 +179,7 @@ def polygon(
 
 def corridor(
     name: str, where: str, points: Sequence[tuple[float, float]], buffer_m: float, bounds: Bounds,
-    problems: list[Problem], *, local: bool = False, key: str = "line",
+    problems: list[Mistake], *, local: bool = False, key: str = "line",
 ) -> ZoneDraft | None:  # fmt: skip
     """All within ``buffer_m`` of a line, as a prism; None, and new ``problems``, if it is wrong."""
     before = len(problems)
@@ -187,11 +187,11 @@ def corridor(
     check_size(buffer_m, f"{where}.buffer_m", problems)
     _check_points(points, at, problems, local=local)
     if len(points) > MAX_LINE_POINTS:
-        problems.append(Problem(at, f"has {len(points)} points, more than {MAX_LINE_POINTS}; simplify or split it"))
+        problems.append(Mistake(at, f"has {len(points)} points, more than {MAX_LINE_POINTS}; simplify or split it"))
     elif len(set(points)) < 2:
-        problems.append(Problem(at, f"a line needs at least 2 different points, given {len(set(points))}"))
+        problems.append(Mistake(at, f"a line needs at least 2 different points, given {len(set(points))}"))
     elif not local and (wide := wide_fault(points, closed=False)):
-        problems.append(Problem(at, wide))
+        problems.append(Mistake(at, wide))
     floor, ceiling = bounds.levels(where, problems)
     if len(problems) > before:
         return None
@@ -199,27 +199,27 @@ def corridor(
     return ZoneDraft(name, where, line, local, None, floor, ceiling, buffer_m=buffer_m)
 
 
-def check_size(value_m: float, where: str, problems: list[Problem]) -> bool:
+def check_size(value_m: float, where: str, problems: list[Mistake]) -> bool:
     """Whether a radius, or a half-width (``where`` ends in ``buffer_m``), is sound; if not, a problem is added."""
     is_buffer = where.endswith("buffer_m")
     most = LARGEST_BUFFER_M if is_buffer else LARGEST_RADIUS_M
     if 0.0 < value_m <= most:
         return True
     words = f"must be above 0 and at most {most:g} (a {'wider' if is_buffer else 'larger'} zone is a polygon)"
-    problems.append(Problem(where, f"{words}, given {value_m:g}"))
+    problems.append(Mistake(where, f"{words}, given {value_m:g}"))
     return False
 
 
-def _check_points(points: Sequence[tuple[float, float]], at: str, problems: list[Problem], *, local: bool) -> None:
+def _check_points(points: Sequence[tuple[float, float]], at: str, problems: list[Mistake], *, local: bool) -> None:
     if len(points) > MAX_VERTICES:
-        problems.append(Problem(at, f"has {len(points)} points, more than {MAX_VERTICES}; simplify it"))
+        problems.append(Mistake(at, f"has {len(points)} points, more than {MAX_VERTICES}; simplify it"))
     elif not local:
         # One swapped point means that all are swapped, so that one problem is enough.
         all(check_degrees(point, f"{at}[{i}]", problems) for i, point in enumerate(points))
 
 
 def check_degrees(
-    point: tuple[float, float], where: str, problems: list[Problem], most_lon_deg: float = MOST_LON_DEG
+    point: tuple[float, float], where: str, problems: list[Mistake], most_lon_deg: float = MOST_LON_DEG
 ) -> bool:
     """Whether (latitude, longitude) can be a place; if not, a problem is added, with a guess at swapped numbers.
 
@@ -227,7 +227,7 @@ def check_degrees(
     """
     fault = range_fault(*point, most_lon_deg=most_lon_deg)
     if fault:
-        problems.append(Problem(where, fault, "swapped" if is_swapped(*point) else ""))
+        problems.append(Mistake(where, fault, "swapped" if is_swapped(*point) else ""))
     return not fault
 
 
@@ -254,7 +254,7 @@ def place_zones(drafts: Sequence[ZoneDraft], frame: Frame) -> tuple[list[tuple[Z
             words = (
                 f"with this one the zones have {corners} corners, more than {MOST_ALL_CORNERS} together; simplify them"
             )
-            fault = Problem(draft.where, f"zone {draft.name[:60]!r}: {words}")
+            fault = Mistake(draft.where, f"zone {draft.name[:60]!r}: {words}")
             if corners > 2 * MOST_ALL_CORNERS:
                 raise InputError(
                     f"{fault.message}, or give a file of those around the mission alone (ogr2ogr -spat)",
@@ -265,7 +265,7 @@ def place_zones(drafts: Sequence[ZoneDraft], frame: Frame) -> tuple[list[tuple[Z
             name = draft.name if len(shapes) == 1 else f"{draft.name}/{i + 1}"
             placed.append((draft, Zone(name, shape, draft.floor, draft.ceiling)))
         if draft.doubt:
-            fault = Problem(draft.where, f"zone {draft.name[:60]!r}: {OTHER_SIDE}")
+            fault = Mistake(draft.where, f"zone {draft.name[:60]!r}: {OTHER_SIDE}")
             other = replace(draft, points=draft.doubt, faults=(fault,), remarks=())
             placed += [(other, Zone(draft.name, shape)) for shape in near_polygons(other.points, frame)]
     return placed, far
@@ -293,7 +293,7 @@ def _with_fewer_corners(
         cures = (f"drawn up to {more_m:g} m wider it has {len(ring)}" for more_m, ring in tried if ring is not None)
         words = f"its outline has {count} corners, more than {MOST_ZONE_CORNERS}; simplify it: "
         words += next(cures, "draw a simpler one around it")
-        fault = Problem(draft.where, f"zone {draft.name[:60]!r}: {words}")
+        fault = Mistake(draft.where, f"zone {draft.name[:60]!r}: {words}")
         draft = replace(draft, faults=(*draft.faults, fault))
         found.append(shape)
     return draft, found

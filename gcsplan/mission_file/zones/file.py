@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Literal
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file.zones.attributes import ZoneStatements
 from gcsplan.mission_file.zones.draft import Remark, ZoneDraft, circle, corridor, polygon
 from gcsplan.notes.note import Note
@@ -61,7 +61,7 @@ class ZoneFile:
 
     path: Path
     zones: list[ZoneDraft] = field(default_factory=list)
-    problems: list[Problem] = field(default_factory=list)
+    problems: list[Mistake] = field(default_factory=list)
     holes: int = 0
     said: list[Note] = field(default_factory=list)
     columns: tuple[str, ...] = ()
@@ -91,7 +91,7 @@ class ZoneFile:
                     f"a {kind} needs {what} to be a zone{others}: give each a {key}, or write {key} beside `file` in "
                     f"the mission, for all of them{found}"
                 )
-                self.problems.append(Problem(lacking[0], words))
+                self.problems.append(Mistake(lacking[0], words))
         self.unsized = []
 
     def add_ring(

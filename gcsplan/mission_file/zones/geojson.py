@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.export.geojson import GENERATOR
 from gcsplan.mission_file.zones.attributes import Attribute, ZoneStatements, is_number, read_attributes, shown
 from gcsplan.mission_file.zones.draft import SIZE_KEYS
@@ -62,7 +62,7 @@ def _is_flown(whole: dict[str, Any], feature: Any) -> bool:
 
 def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
     if not isinstance(feature, dict):
-        found.problems.append(Problem(where, f"must be a Feature or a geometry, given {shown(feature)}"))
+        found.problems.append(Mistake(where, f"must be a Feature or a geometry, given {shown(feature)}"))
         return
     geometry: Any = feature
     properties: Any = {}
@@ -71,7 +71,7 @@ def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
         properties = feature.get("properties") or {}
     if not isinstance(properties, dict) or not isinstance(geometry, dict):
         what = "properties must be an object" if not isinstance(properties, dict) else "the feature has no geometry"
-        found.problems.append(Problem(where, what))
+        found.problems.append(Mistake(where, what))
         return
     said = read_attributes(_attributes(properties, geometry, where), fallback, found.problems)
     if said is None:
@@ -95,7 +95,7 @@ def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
                 _line(found, one, said, part, where, place)
     else:
         found.problems.append(
-            Problem(
+            Mistake(
                 where, f"must be a Polygon, a Point with radius_m or a LineString with buffer_m, given {shown(kind)}"
             )
         )
@@ -106,7 +106,7 @@ def _parts(found: ZoneFile, coordinates: Any, said: ZoneStatements, at: str, kin
     several = kind.startswith("Multi")
     parts = coordinates if several else [coordinates]
     if not isinstance(parts, list) or not parts:
-        found.problems.append(Problem(at, f"a {kind} needs a list of coordinates, given {shown(parts)}"))
+        found.problems.append(Mistake(at, f"a {kind} needs a list of coordinates, given {shown(parts)}"))
         return []
     return [(part, f"{said.name}/{i + 1}" if several else said.name, f"{at}[{i}]" if several else at)
             for i, part in enumerate(parts)]  # fmt: skip
@@ -128,12 +128,12 @@ def _unread(positions: list[Any]) -> Drawn:
 
 def _rings(found: ZoneFile, rings: Any, said: ZoneStatements, part: str, where: str, at: str) -> None:
     if not isinstance(rings, list) or not rings or not isinstance(rings[0], list):
-        found.problems.append(Problem(at, f"a polygon is a list of rings, given {shown(rings)}"))
+        found.problems.append(Mistake(at, f"a polygon is a list of rings, given {shown(rings)}"))
         return
     outline = _positions(found, rings[0], f"{at}[0]")
     holes = [_positions(found, ring, f"{at}[{k}]") for k, ring in enumerate(rings[1:], 1) if isinstance(ring, list)]
     if outline is not None and (odd := beyond_outline(outline, [hole for hole in holes if hole])):
-        found.problems.append(Problem(at, f"zone {part[:60]!r}: {odd}"))
+        found.problems.append(Mistake(at, f"zone {part[:60]!r}: {odd}"))
     elif outline is not None:
         found.add_ring(said, part, where, outline, at.removeprefix(where).removeprefix("."), _unread(rings[0]),
                        holes=len(rings) - 1)  # fmt: skip
@@ -141,7 +141,7 @@ def _rings(found: ZoneFile, rings: Any, said: ZoneStatements, part: str, where: 
 
 def _line(found: ZoneFile, positions: Any, said: ZoneStatements, part: str, where: str, at: str) -> None:
     if not isinstance(positions, list):
-        found.problems.append(Problem(at, f"a line is a list of positions, given {shown(positions)}"))
+        found.problems.append(Mistake(at, f"a line is a list of positions, given {shown(positions)}"))
         return
     line = _positions(found, positions, at)
     if line is not None:
@@ -162,12 +162,12 @@ def _positions(found: ZoneFile, positions: list[Any], at: str) -> list[tuple[flo
 def _position(found: ZoneFile, position: Any, where: str) -> tuple[float, float] | None:
     """(latitude, longitude) of GeoJSON's [lon, lat]; None, and a problem, if it is not a position."""
     if not isinstance(position, list) or len(position) < 2 or not all(is_number(x) for x in position[:2]):
-        found.problems.append(Problem(where, f"a position is [longitude, latitude], given {shown(position)}"))
+        found.problems.append(Mistake(where, f"a position is [longitude, latitude], given {shown(position)}"))
         return None
     lon, lat = float(position[0]), float(position[1])
     if abs(lat) > 90.0 and abs(lon) <= 90.0 and abs(lat) <= 180.0:
         found.problems.append(
-            Problem(where, f"longitude and latitude look swapped: GeoJSON is [lon, lat], given [{lon:g}, {lat:g}]")
+            Mistake(where, f"longitude and latitude look swapped: GeoJSON is [lon, lat], given [{lon:g}, {lat:g}]")
         )
         return None
     return lat, lon

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file.zones.attributes import is_number
 
 _DEGREES = re.compile(r"(?:^|[^A-Z0-9])(?:CRS:?84H?|4326(?:\+\d+)?|4979)[^A-Z0-9]*$", re.IGNORECASE)
@@ -60,7 +60,7 @@ def _name_of(crs: Any) -> str:
     return given if isinstance(given, str) else json.dumps(given)
 
 
-def sent_in_part(whole: Any, path: Path) -> list[Problem]:
+def sent_in_part(whole: Any, path: Path) -> list[Mistake]:
     """The problem of what a server sent in part, since the zones of the rest would be missing; empty if it is whole."""
     if not isinstance(whole, dict):
         return []
@@ -70,8 +70,8 @@ def sent_in_part(whole: Any, path: Path) -> list[Problem]:
     returned: Any = given.get("numberReturned")
     if given.get("exceededTransferLimit") is True:
         words = "the server sent a part of the features alone (exceededTransferLimit); ask for all, page by page"
-        return [Problem(f"{path}: exceededTransferLimit", words)]
+        return [Mistake(f"{path}: exceededTransferLimit", words)]
     if is_number(matched) and is_number(returned) and matched > returned:
         words = f"the server sent {returned} of {matched} features; ask for all, page by page"
-        return [Problem(f"{path}: numberMatched", words)]
+        return [Mistake(f"{path}: numberMatched", words)]
     return []

@@ -16,7 +16,7 @@ from typing import Any, Literal
 import defusedxml.ElementTree
 from defusedxml.common import DefusedXmlException
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.figures import counted
 from gcsplan.mission_file.zones.attributes import Attribute, ZoneStatements, as_figure, read_attributes
 from gcsplan.mission_file.zones.draft import SIZE_KEYS
@@ -69,13 +69,13 @@ def read_kml(path: Path, data: bytes) -> ZoneFile:
             placemarks += 1
             _placemark(found, element, placemarks)
         elif kind in ("NetworkLink", "NetworkLinkControl", "GroundOverlay"):
-            found.problems.append(Problem(f"{path}: {kind}", f"a {kind} cannot be read as a zone; remove it"))
+            found.problems.append(Mistake(f"{path}: {kind}", f"a {kind} cannot be read as a zone; remove it"))
     if pictures:
         kinds = tuple(counted(count, kind) for kind, count in pictures.items())
         found.said.append(Note("pictures_unused", kinds=kinds))
     for kind, count in loose.items():
         words = f"{counted(count, kind)} outside of a Placemark cannot be read as a zone; put each into a Placemark"
-        found.problems.append(Problem(f"{path}: {kind}", words))
+        found.problems.append(Mistake(f"{path}: {kind}", words))
     if not placemarks and not found.problems:
         raise InputError("the KML holds no Placemark", where=str(path))
     return found
@@ -110,7 +110,7 @@ def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
     if others or not shapes:
         kind = others[0] if others else "none"
         found.problems.append(
-            Problem(
+            Mistake(
                 where,
                 f"its geometry must be Polygons, Points with a radius_m or LineStrings with a buffer_m, given {kind}",
             )
@@ -123,7 +123,7 @@ def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
             if points is not None and len(points) == 1:
                 found.add_circle(said, part, where, points[0][:2], _unread(points).remarks)
             elif points is not None:
-                found.problems.append(Problem(where, f"a Point has one coordinate, given {len(points)}"))
+                found.problems.append(Mistake(where, f"a Point has one coordinate, given {len(points)}"))
         elif _kind(shape) == "LineString":
             points = _coordinates(found, shape, where)
             if points is not None:
@@ -135,14 +135,14 @@ def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
 def _polygon(found: ZoneFile, shape: Any, said: ZoneStatements, part: str, where: str) -> None:
     outer = [e for e in _walk(shape, found.path) if _kind(e) == "outerBoundaryIs"]
     if len(outer) != 1:
-        found.problems.append(Problem(where, f"a Polygon has one outerBoundaryIs, given {len(outer)}"))
+        found.problems.append(Mistake(where, f"a Polygon has one outerBoundaryIs, given {len(outer)}"))
         return
     points = _coordinates(found, outer[0], where)
     inner = [e for e in _walk(shape, found.path) if _kind(e) == "innerBoundaryIs"]
     rings = [_coordinates(found, e, where) for e in inner]
     odd = beyond_outline([p[:2] for p in points or []], [[p[:2] for p in ring] for ring in rings if ring])
     if odd:
-        found.problems.append(Problem(where, odd))
+        found.problems.append(Mistake(where, odd))
     elif points is not None:
         drawn = _unread(points) if said.of_levels else _drawn(shape, points)
         found.add_ring(said, part, where, [p[:2] for p in points], "", drawn, len(inner))
@@ -191,15 +191,15 @@ def _coordinates(found: ZoneFile, parent: Any, where: str) -> list[DrawnCorner] 
         except ValueError:
             lon, lat, up = math.nan, math.nan, []
         if not (math.isfinite(lon) and math.isfinite(lat)):
-            found.problems.append(Problem(where, f"coordinates are lon,lat[,alt] without spaces, given {word[:60]!r}"))
+            found.problems.append(Mistake(where, f"coordinates are lon,lat[,alt] without spaces, given {word[:60]!r}"))
             return None
         if abs(lat) > 90.0 and abs(lon) <= 90.0 and abs(lat) <= 180.0:
             swapped = f"longitude and latitude look swapped: KML is lon,lat, given {word[:60]}"
-            found.problems.append(Problem(where, swapped))
+            found.problems.append(Mistake(where, swapped))
             return None
         points.append((lat, lon, up[0] if up and abs(up[0]) <= LARGEST_M else math.nan))
     if not points:
-        found.problems.append(Problem(where, "has no coordinates"))
+        found.problems.append(Mistake(where, "has no coordinates"))
         return None
     return points
 

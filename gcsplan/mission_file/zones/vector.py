@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file.zones.attributes import Attribute, ZoneStatements, as_figure, read_attributes
 from gcsplan.mission_file.zones.contents import unpack
 from gcsplan.mission_file.zones.draft import MAX_VERTICES, SIZE_KEYS
@@ -202,11 +202,11 @@ def _feature(
     """Add every part of a feature's geometry."""
     parts = [] if geometry is None else _parts(geometry)
     if not parts:
-        found.problems.append(Problem(where, "the feature has no geometry; remove it, or draw it"))
+        found.problems.append(Mistake(where, "the feature has no geometry; remove it, or draw it"))
     for i, shape in enumerate(parts):
         part = said.name if len(parts) == 1 else f"{said.name}/{i + 1}"
         if shape.geom_type not in ("Polygon", "Point", "LineString"):
-            found.problems.append(Problem(where, f"must be polygons, points or lines, given a {shape.geom_type}"))
+            found.problems.append(Mistake(where, f"must be polygons, points or lines, given a {shape.geom_type}"))
             continue
         outline = shape.exterior if shape.geom_type == "Polygon" else shape
         drawn = _unread(outline)
@@ -216,11 +216,11 @@ def _feature(
             drawn_deg = to_degrees.line(xy, MAX_VERTICES, any_width=is_keep_in)
             corners = [(float(lat), float(lon)) for lat, lon in drawn_deg]
         except InputError as why:
-            found.problems.append(Problem(where, f"zone {said.name[:60]!r}: {why.message}"))
+            found.problems.append(Mistake(where, f"zone {said.name[:60]!r}: {why.message}"))
             continue
         rings = [np.asarray(ring.coords)[:, :2] for ring in getattr(shape, "interiors", ())]
         if odd := beyond_outline(xy.tolist(), [ring.tolist() for ring in rings], metres=True):
-            found.problems.append(Problem(where, f"zone {said.name[:60]!r}: {odd}"))
+            found.problems.append(Mistake(where, f"zone {said.name[:60]!r}: {odd}"))
         elif shape.geom_type == "Polygon":
             found.add_ring(said, part, where, corners, "", drawn, len(shape.interiors))
         elif shape.geom_type == "Point":

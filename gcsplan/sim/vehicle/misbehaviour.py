@@ -13,7 +13,7 @@ import math
 import random
 from dataclasses import dataclass
 
-from gcsplan.errors import Problem, UsageError
+from gcsplan.errors import Mistake, UsageError
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import MISSION, MissionItem, float32
 from gcsplan.mavlink.protocol.messages import Packet
@@ -68,22 +68,22 @@ class Misbehaviour:
         problems = []
         for name in ("drop", "duplicate", "reorder", "delay"):
             if not 0.0 <= getattr(self, name) <= 1.0:
-                problems.append(Problem(name, f"wants a probability 0 … 1, given {getattr(self, name)}"))
+                problems.append(Mistake(name, f"wants a probability 0 … 1, given {getattr(self, name)}"))
         for name in ("delay_s", "reboot_s"):
             if not 0.0 <= getattr(self, name) <= 3600.0:
-                problems.append(Problem(name, f"wants seconds 0 … 3600, given {getattr(self, name)}"))
+                problems.append(Mistake(name, f"wants seconds 0 … 3600, given {getattr(self, name)}"))
         for name in ("corrupt", "edit", "refuse", "silent_after", "reboot_at", "mute_times"):
             if (value := getattr(self, name)) is not None and not 0 <= value <= 65535:
-                problems.append(Problem(name, f"wants a whole number 0 … 65535, given {value}"))
+                problems.append(Mistake(name, f"wants a whole number 0 … 65535, given {value}"))
         for name in ("stray_sysid", "answer_sysid"):
             if (value := getattr(self, name)) is not None and not 1 <= value <= 255:
-                problems.append(Problem(name, f"wants a system id 1 … 255, given {value}"))
+                problems.append(Mistake(name, f"wants a system id 1 … 255, given {value}"))
         if self.stale_type is not None and self.stale_type not in (0, 1, 2):
-            problems.append(Problem("stale_type", f"wants 0 mission, 1 fence or 2 rally, given {self.stale_type}"))
+            problems.append(Mistake("stale_type", f"wants 0 mission, 1 fence or 2 rally, given {self.stale_type}"))
         if not 1 <= self.refuse_code <= 15:
-            problems.append(Problem("refuse_code", f"wants a MAV_MISSION_RESULT 1 … 15, given {self.refuse_code}"))
+            problems.append(Mistake("refuse_code", f"wants a MAV_MISSION_RESULT 1 … 15, given {self.refuse_code}"))
         if self.corrupt_field not in FIELDS:
-            problems.append(Problem("corrupt_field", f"wants one of {', '.join(FIELDS)}, given {self.corrupt_field!r}"))
+            problems.append(Mistake("corrupt_field", f"wants one of {', '.join(FIELDS)}, given {self.corrupt_field!r}"))
         if problems:
             raise UsageError.of(problems)
 
@@ -101,14 +101,14 @@ class Misbehaviour:
             if name not in kinds:
                 near = difflib.get_close_matches(name, kinds, n=1)
                 hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(kinds)}"
-                problems.append(Problem("--misbehave", f"unknown misbehaviour {name!r}; {hint}"))
+                problems.append(Mistake("--misbehave", f"unknown misbehaviour {name!r}; {hint}"))
             elif name in given:
-                problems.append(Problem("--misbehave", f"{name} is given twice"))
+                problems.append(Mistake("--misbehave", f"{name} is given twice"))
             else:
                 try:
                     given[name] = _parsed(kinds[name], value)
                 except ValueError as error:
-                    problems.append(Problem("--misbehave", f"{name} wants {error}, given {value!r}"))
+                    problems.append(Mistake("--misbehave", f"{name} wants {error}, given {value!r}"))
         if problems:
             raise UsageError.of(problems)
         return cls(**given)  # type: ignore[arg-type]  # each value was read as its field's type

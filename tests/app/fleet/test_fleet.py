@@ -84,7 +84,7 @@ def speeds_of(done: Plan) -> list[float]:
 # -- arrivals -----------------------------------------------------------------------------------------------------
 
 
-def test_a_sequence_arrives_at_its_intervals_with_the_speeds_that_the_missions_command() -> None:
+def test_a_sequence_arrives_at_its_intervals_at_the_commanded_speeds() -> None:
     done = planned(sequence(20))
     summary = summary_of(done)
     west, south = summary["vehicles"]
@@ -123,7 +123,7 @@ def test_together_all_are_at_their_goals_at_the_same_moment() -> None:
     assert summary_of(done)["vehicles"][0]["speed_m_s"] == 10.0
 
 
-def test_a_first_that_would_leave_the_others_behind_waits_for_the_fleet_unless_its_clock_is_asked_for() -> None:
+def test_a_first_that_would_leave_others_behind_waits_unless_its_clock_is_set() -> None:
     far = {"start": {"east_m": 0, "north_m": -2500}}
     done = planned(sequence(9), {}, far)
     west, south = summary_of(done)["vehicles"]
@@ -194,7 +194,7 @@ def test_a_goal_for_two_is_refused_with_the_distance_that_works() -> None:
 
 
 @pytest.mark.parametrize("autopilot", ["arducopter", "px4"])
-def test_a_hold_at_the_gate_stands_in_the_mission_before_the_speed_and_costs_hover_power(autopilot: str) -> None:
+def test_a_hold_at_the_gate_comes_before_the_speed_and_costs_hover_power(autopilot: str) -> None:
     slow = {"speed_m_s": [9, 10], "energy": {"hover_w": 500}, "autopilot": autopilot}
     done = planned(sequence(60, hold="gate"), {}, slow)
     south = done.vehicles[1]
@@ -353,7 +353,7 @@ def test_bad_arrivals_are_input_errors() -> None:
         planned({"mode": "sequence"})
 
 
-def test_a_note_is_a_sentence_and_data_in_json_and_in_the_readers_units_on_page_and_terminal(
+def test_a_note_is_sentence_and_data_in_json_and_in_units_on_page_and_terminal(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     done = planned(sequence(60, hold="none"), {}, {"speed_m_s": [9, 10]})

@@ -153,7 +153,7 @@ def test_a_battery_that_is_too_small_is_named() -> None:
     assert refused.value.reason == "battery"
 
 
-def test_a_take_off_below_the_limits_is_bad_input_and_one_just_at_them_is_raised_with_a_note() -> None:
+def test_a_take_off_below_the_limits_is_bad_input_and_one_at_them_is_raised() -> None:
     with pytest.raises(InputError, match="takeoff_agl_m"):
         planned({"takeoff_agl_m": 50})
     done = planned({"takeoff_agl_m": 65})

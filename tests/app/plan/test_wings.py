@@ -170,7 +170,7 @@ def path_of(turns: list[tuple[float, float, float]]) -> list[tuple[float, float,
 @settings(max_examples=draws(12))
 @given(corners)
 @pytest.mark.slow
-def test_the_judged_pieces_hold_the_flown_track_with_every_way_to_reckon_its_altitude(
+def test_the_judged_pieces_hold_the_flown_track_in_every_frame_of_altitude(
     turns: list[tuple[float, float, float]],
 ) -> None:
     points = path_of(turns)
@@ -337,7 +337,7 @@ def hill(east_m: float, north_m: float, high_m: float, wide_m: float = 150.0) ->
     return world(height, half_m=4000.0)
 
 
-def test_a_climb_out_goes_to_where_its_item_lies_as_steeply_as_its_pitch_and_the_limit_allow() -> None:
+def test_a_climb_out_goes_to_its_item_as_steeply_as_pitch_and_limit_allow() -> None:
     flight = bent(mission(take_off(80.0, 300.0, 300.0), at(cmd.LOITER_UNLIM, 2000, 2000, 80, 0, 0, 100)), wing())
     first = flight.stretches[0]
     east, north = FLAT.frame.to_plane(*first.end[:2])
@@ -464,7 +464,7 @@ def test_a_zone_above_the_slant_is_hit_by_one_that_climbs_steeper() -> None:
     assert {(f.seq, f.kind) for f in verdict.findings} == {(1, "zone")}
 
 
-def test_what_lies_above_a_slant_is_level_and_reaches_from_within_two_errors_of_it_to_the_top() -> None:
+def test_what_lies_above_a_slant_is_level_and_begins_within_two_errors_of_it() -> None:
     limits = wing().limits
     *found, over = above_slant((0.0, 0.0, 10.0), (100.0, 0.0, 90.0), limits, over_m(wing()))
     assert over[1][2] - over[2] == pytest.approx(90.0)
@@ -515,7 +515,7 @@ def circling_up(where: World) -> Verdict:
     return judge(mission(*items), wing(), where)
 
 
-def test_a_take_off_may_go_on_in_circles_which_are_flown_and_held_against_what_is_within_them() -> None:
+def test_a_take_off_may_go_on_in_circles_which_are_flown_and_judged() -> None:
     good = circling_up(FLAT)
     assert good.safe is True, good.describe()
     helix = [leg for leg in good.legs if leg.seq == 2 and leg.horizontal_m > 0.0]
@@ -598,7 +598,7 @@ def test_no_corner_is_accepted_from_before_its_leg(tangent_m: float, run_m: floa
     assert accepted_m(tangent_m, run_m) == accepted
 
 
-def test_a_corner_that_needs_more_acceptance_than_a_byte_holds_is_two_on_the_same_arc() -> None:
+def test_a_corner_with_more_acceptance_than_a_byte_holds_is_two_on_its_arc() -> None:
     craft, turn = wing(300.0), math.radians(120.0)
     points = np.array(
         [[0.0, 0.0, 300.0], [3000.0, 0.0, 400.0], [3000.0 + 3000 * math.cos(turn), 3000 * math.sin(turn), 350.0]]
@@ -896,7 +896,7 @@ def test_a_climb_out_that_obstacles_close_says_so_and_what_to_do() -> None:
         plan(load_mission(MISSIONS / "m.yaml", text=forested))
 
 
-def test_the_bound_of_a_wing_holds_from_the_end_of_its_climb_out_under_the_limits_of_the_check(
+def test_the_bound_of_a_wing_holds_from_the_end_of_its_climb_out(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Not from behind the turns that this plan makes there, and not under the larger margins of a later attempt."""

@@ -80,7 +80,7 @@ def refusal(of: UploadJob, values: OnBoard, **options: bool) -> Note | None:
     return judge(of.mission, values)
 
 
-def test_a_vehicle_with_the_assumed_parameters_is_taken_and_another_time_names_what_is_off() -> None:
+def test_assumed_parameters_are_taken_and_what_is_off_is_named() -> None:
     made = job()
     assert refusal(made, as_assumed(made)) is None
     [land] = [s.parameter.names[0] for s in settings_of(made) if s.parameter.key == "land"]

@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.values.errors import told_once
 from tests.check.test_energy import mission
 
 
-def refused(**changes: Any) -> tuple[Problem, ...]:
+def refused(**changes: Any) -> tuple[Mistake, ...]:
     """The problems of a mission with changed keys; None takes one away. Those of a vehicle begin with an underscore."""
     content = copy.deepcopy(mission({}))
     for key, value in changes.items():
@@ -48,13 +48,13 @@ def test_limits_that_stand_under_another_name_are_not_missing() -> None:
 
 
 def test_swapped_places_are_one_problem_whatever_its_words_are() -> None:
-    swapped = [Problem(f"m.yaml: vehicles[{i}].start", f"words {i}", "swapped") for i in range(3)]
+    swapped = [Mistake(f"m.yaml: vehicles[{i}].start", f"words {i}", "swapped") for i in range(3)]
     [one] = told_once(swapped)
     assert one.code == "swapped"
     assert one.message == "words 0 (the same at vehicles[1].start, vehicles[2].start)"
-    alike = [Problem(p.where, "latitude and longitude look swapped") for p in swapped]
+    alike = [Mistake(p.where, "latitude and longitude look swapped") for p in swapped]
     assert told_once(alike) == alike  # the words alone decide nothing
 
 
 def test_a_problem_without_a_kind_has_no_code_in_json() -> None:
-    assert Problem("a", "b").as_dict() == {"where": "a", "message": "b"}
+    assert Mistake("a", "b").as_dict() == {"where": "a", "message": "b"}

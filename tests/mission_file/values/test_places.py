@@ -14,7 +14,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from gcsplan.cli.commands.check import world_options
-from gcsplan.errors import InputError, Problem
+from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file.load import load_mission
 from gcsplan.mission_file.options_world import OpenWorld
 from gcsplan.mission_file.request import MissionFile
@@ -279,7 +279,7 @@ def load(whole: dict[str, Any] | str) -> MissionFile:
     return load_mission(text=whole if isinstance(whole, str) else yaml.safe_dump(whole, allow_unicode=True))
 
 
-def problems(whole: dict[str, Any] | str) -> tuple[Problem, ...]:
+def problems(whole: dict[str, Any] | str) -> tuple[Mistake, ...]:
     with pytest.raises(InputError) as caught:
         load(whole)
     return caught.value.problems
