@@ -258,7 +258,7 @@ def reasons_of(kind: type[errors.GcsplanError]) -> list[str]:
 
 _RAISED: Mapping[str, type[errors.GcsplanError]] = {
     **{kind.__name__: kind for kind in kinds()},
-    "Problem": errors.InputError,
+    "Mistake": errors.InputError,
     "Refusal": errors.NoMission,
     "NoPath": errors.NoMission,
 }
@@ -296,7 +296,7 @@ def messages() -> tuple[Message, ...]:
             named = {ast.unparse(node.targets[0]): node.value for node in nodes if isinstance(node, ast.Assign)}
             for node in calls:
                 raised = _called(node)
-                given = node.args[1:2] if raised == "Problem" else node.args[:1]
+                given = node.args[1:2] if raised == "Mistake" else node.args[:1]
                 text = _text(given[0], named) if given else ""
                 if len(re.sub(r"‹.*?›|\W", "", text)) > 3:
                     found.append(Message(module, raised, text, node))

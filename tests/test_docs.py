@@ -123,11 +123,11 @@ def test_every_exit_code_and_reason_stands_in_the_table(made: ModuleType) -> Non
 def test_messages_are_read_out_of_the_code_with_what_is_only_known_later(made: ModuleType) -> None:
     texts = {message.text for message in made.messages()}
     assert "give either `dem` or `flat_m` and `peaks`" in texts  # a plain one
-    assert "no vehicle is named ‹name›‹nearest›" in texts  # of a Problem, whose second argument it is
+    assert "no vehicle is named ‹name›‹nearest›" in texts  # of a Mistake, whose second argument it is
     assert "must be text, 300 characters at most, given ‹shown›" in texts  # put into a name before
     assert len(texts) > 300
     raised = {message.raised for message in made.messages()}
-    assert raised >= {"InputError", "UsageError", "Problem", "NoMission", "Refusal", "LinkError", "VehicleRefused"}
+    assert raised >= {"InputError", "UsageError", "Mistake", "NoMission", "Refusal", "LinkError", "VehicleRefused"}
 
 
 def test_every_planner_stands_in_the_table(made: ModuleType) -> None:

@@ -2,7 +2,7 @@
 
 The routes are those of the missions as the autopilots store them. A schedule sets departures, holds and speeds. Each
 mission is rebuilt with its own and judged again. Then the separation of every pair is judged, and conflicts are
-resolved or refused.
+resolved or refused. Of a fixed wing's flight the time table needs climb-out, glide and final circle besides the path.
 """
 
 from __future__ import annotations
@@ -14,14 +14,16 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from gcsplan.app.fleet.climb_out import circling_m, climb_out_and_glide, climb_out_m_s
 from gcsplan.app.fleet.reroute import Detours
 from gcsplan.app.fleet.start_time import SLACK_S, GateTime, gated
 from gcsplan.app.plan.flight_hours import within_hours
 from gcsplan.app.plan.left_out import LeavingOut, least_to_leave
 from gcsplan.app.plan.model import Brief, FleetPlan, Plan, VehiclePlan
 from gcsplan.app.plan.vehicle import over_one_terrain, rebuilt
+from gcsplan.arrays import Floats
 from gcsplan.check.flight.times import over_ground, pace_over_ground
+from gcsplan.check.motion.circles import PLANE_LOITER_RADIUS_M, circle_growth
+from gcsplan.check.verdict import LegFigures
 from gcsplan.errors import NoMission
 from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, schedule
 from gcsplan.fleet.motion.timed_path import TimedPath
@@ -34,14 +36,49 @@ from gcsplan.world.world import World
 if TYPE_CHECKING:
     from gcsplan.fleet.separation import AirPlace, Conflict, Rules, Separation, Where
 
+__all__ = ["crew_of", "finished", "fleet_of", "motion_of", "route_of", "rules_of", "too_near", "without"]
+
+
+def _climb_out_and_glide(v: VehiclePlan, world: World) -> tuple[Floats | None, Floats | None]:
+    """The climb-out and the glide of a fixed wing, (K, 3) metres each; None where the flight has no such part."""
+    if v.order.wing is None:
+        return None, None
+    legs = v.verdict.legs
+    first = next(i for i, leg in enumerate(legs) if leg.on_path)
+    down = [leg for leg in legs[first:] if leg.kind == "land"]
+    return _line(legs[:first], world), _line(down, world) if down else None
+
+
+def _climb_out_m_s(v: VehiclePlan) -> Floats | None:
+    """Speeds (K - 1,) of the parts of the climb-out, m/s; None: those of any leg, also for what is not a fixed wing."""
+    if v.order.wing is None or v.request.vehicle.climb_out is None:
+        return None
+    legs = v.verdict.legs
+    first = next(i for i, leg in enumerate(legs) if leg.on_path)
+    return np.array([leg.length_m / leg.time_s if leg.time_s > 0.0 else 1.0 for leg in legs[:first]])
+
+
+def _circling_m(v: VehiclePlan) -> float:
+    """Distance from its last point, m, that a vehicle may have while it circles there for good; 0 for any other end."""
+    wing = v.order.wing
+    if wing is None or v.request.end not in ("loiter", "rtl"):
+        return 0.0  # circles for climbing are part of the motion
+    highest = max(leg.end[2] for leg in v.verdict.legs)
+    radius = wing.circle_m if v.request.end == "loiter" else PLANE_LOITER_RADIUS_M
+    return max(radius, math.ceil(v.request.vehicle.turn_radius_m)) * circle_growth(highest)
+
+
+def _line(legs: Sequence[LegFigures], world: World) -> Floats:
+    places = np.array([legs[0].start, *(leg.end for leg in legs)])
+    return np.column_stack([world.frame.to_plane(places[:, 0], places[:, 1]), places[:, 2]])
+
+
 LATER_S = 600.0
 """Seconds by which all arrivals may be delayed to keep a fleet apart, if the mission file sets no arrival time."""
 SEPARATION_M = 30.0
 """Separation that is judged if the file has no `arrival`, m."""
 MOST_CONFLICTS = 8
 """Most conflicts that a refusal or a note names."""
-
-__all__ = ["crew_of", "finished", "fleet_of", "motion_of", "route_of", "rules_of", "too_near", "without"]
 
 
 def finished(
@@ -196,7 +233,7 @@ def route_of(v: VehiclePlan, world: World) -> Route:
         points, holds, numbers = over_ground(points, holds, numbers, world.vehicle_terrain)
     items = np.array([legs[0].seq, *numbers, last.seq], dtype=np.intp)
     pace = pace_over_ground(points, legs[0].start[:2], world.frame) if request.vehicle.lays_curves else None
-    climb_out, glide = climb_out_and_glide(v, world)
+    climb_out, glide = _climb_out_and_glide(v, world)
     return Route(
         v.name, points,
         start_ground_amsl_m=None if ideal else ground,
@@ -206,7 +243,7 @@ def route_of(v: VehiclePlan, world: World) -> Route:
         holds_s=holds,
         items=items,
         climb_out=climb_out,
-        climb_out_m_s=climb_out_m_s(v),
+        climb_out_m_s=_climb_out_m_s(v),
         glide=glide,
         pace=pace,
         follows=v.order.altitude_frame == "terrain",
@@ -217,7 +254,7 @@ def rules_of(arrival: ArrivalRequest | None, vehicles: Sequence[VehiclePlan]) ->
     """The requested separation, with the error of the modelled motions."""
     from gcsplan.fleet.separation import Rules
 
-    error_m = max(motion_error_m(v.request.vehicle) + circling_m(v) for v in vehicles)
+    error_m = max(motion_error_m(v.request.vehicle) + _circling_m(v) for v in vehicles)
     leaving = frozenset(v.name for v in vehicles if v.request.end == "none")
     if arrival is None:
         return Rules(SEPARATION_M, error_m=error_m, leaving=leaving)
