@@ -88,7 +88,7 @@ WORLDS = {
     size.make.__name__: size
     for size in (
         Size(large_zones.corners, 20_000, 10, 100_000),
-        Size(large_zones.spikes_far_away, 27_000, 5, 32_000),
+        Size(large_zones.spikes_far_away, 24_000, 5, 38_000),
         Size(large_zones.coast, 99_999, 5, 100_000),
         Size(large_zones.corners_at_home, 20_000, 25, 100_000),
         Size(large_zones.corners_fenced, 20_000, 10, 100_000, taken=False),
