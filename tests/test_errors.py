@@ -14,9 +14,9 @@ from gcsplan.errors import (
     GcsplanError,
     InputError,
     LinkError,
+    Mistake,
     NoMission,
     NoMissionReason,
-    Problem,
     ReadBackDiffers,
     UsageError,
     VehicleRefused,
@@ -67,18 +67,18 @@ def test_the_table_in_the_docstring_is_the_tree() -> None:
 
 def test_an_input_error_carries_its_problem_even_when_it_is_only_one() -> None:
     error = InputError("must be positive", where="m.yaml: a")
-    assert error.problems == (Problem("m.yaml: a", "must be positive"),)
-    assert InputError("x", problems=iter([Problem("a", "b"), Problem("c", "d")])).problems[1].where == "c"
+    assert error.problems == (Mistake("m.yaml: a", "must be positive"),)
+    assert InputError("x", problems=iter([Mistake("a", "b"), Mistake("c", "d")])).problems[1].where == "c"
 
 
 def test_one_problem_is_told_as_itself() -> None:
-    error = InputError.of([Problem("m.yaml: a", "must be positive")])
+    error = InputError.of([Mistake("m.yaml: a", "must be positive")])
     assert (error.message, error.where) == ("must be positive", "m.yaml: a")
     assert str(error) == "m.yaml: a: must be positive"
 
 
 def test_many_problems_are_told_at_once_one_a_line() -> None:
-    problems = [Problem("m.yaml: a", "must be positive"), Problem("", "and a last thing")]
+    problems = [Mistake("m.yaml: a", "must be positive"), Mistake("", "and a last thing")]
     error = InputError.of(p for p in problems)
     assert error.problems == tuple(problems)
     assert str(error).splitlines() == [
@@ -90,12 +90,12 @@ def test_many_problems_are_told_at_once_one_a_line() -> None:
 
 
 def test_a_problem_without_a_place_is_its_message_alone() -> None:
-    assert str(Problem("", "x")) == "x"
-    assert str(Problem("a", "x")) == "a: x"
+    assert str(Mistake("", "x")) == "x"
+    assert str(Mistake("a", "x")) == "a: x"
 
 
 def test_errors_survive_the_way_between_processes() -> None:
-    problems = (Problem("a", "b"), Problem("c", "d"))
+    problems = (Mistake("a", "b"), Mistake("c", "d"))
     for error in (
         GcsplanError("m", where="w", reason="r"),
         InputError("m", where="w", problems=problems),

@@ -257,7 +257,7 @@ def test_rally_points_are_chosen_by_few_parts_of_a_mission_of_many_stretches(mon
     assert home.rally
     assert max(looked_at[: 1 + rally.CANDIDATES]) <= 120
     few = home.left
-    monkeypatch.setattr(rally, "PARTS", 1000)
+    monkeypatch.setattr(rally, "MISSION_PARTS", 1000)
     assert (
         together_m((s.from_m, s.to_m) for s in few)
         < 1.2 * together_m((s.from_m, s.to_m) for s in judged(w, m, v, 60.0).left) + 20.0
