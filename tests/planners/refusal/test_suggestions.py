@@ -143,7 +143,6 @@ def test_what_is_reported_to_help_does(name: str) -> None:
     [
         ("jacksboro.yaml", "max_amsl_m", "600.5"),
         pytest.param("jacksboro.yaml", "max_climb_deg", "0.1", marks=pytest.mark.slow),
-        pytest.param("jacksboro-wing.yaml", "max_amsl_m", "500.5", marks=pytest.mark.slow),
     ],
 )
 def test_a_mission_file_with_the_reported_value_has_a_mission(
