@@ -139,7 +139,8 @@ class Trials:
         """The least value over ``given`` with which a mission was planned; ``at(value)`` is the problem with it.
 
         The first value tried is ``enough``, which need not suffice; ``name`` of the limit, for progress reports. Values
-        with a path are found quickly; the lowest of them with a whole plan is the result.
+        with a path are found quickly; of them the lowest are planned whole, and at last the highest: the result is the
+        first of these that has a mission.
         """
         bad, good, found, open_ = given, enough, LeastValue(), list[float]()
         for _ in range(VALUES):
@@ -154,10 +155,10 @@ class Trials:
                 found.failed(value, self.lacks)
                 if not open_:
                     good = min(values.beyond(given, value), values.most)
-        for _ in range(WHOLE):
+        for left in reversed(range(WHOLE)):
             if not open_:
                 break
-            value = open_.pop()
+            value = open_.pop(-1 if left else 0)
             found.path = self.whole(at(value), f"{name} {value:g}")
             if found.path is not None:
                 found.value = value

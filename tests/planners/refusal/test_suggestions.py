@@ -143,11 +143,14 @@ def test_what_is_reported_to_help_does(name: str) -> None:
     [
         ("jacksboro.yaml", "max_amsl_m", "600.5"),
         pytest.param("jacksboro.yaml", "max_climb_deg", "0.1", marks=pytest.mark.slow),
+        pytest.param("jacksboro-wing.yaml", "max_amsl_m", "500.5", marks=pytest.mark.slow),
     ],
 )
 def test_a_mission_file_with_the_reported_value_has_a_mission(
-    tmp_path: FilePath, file: str, key: str, given: str
+    tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch, file: str, key: str, given: str
 ) -> None:
+    # All values have their turn, however fast the machine is.
+    monkeypatch.setattr("gcsplan.planners.refusal.suggestions.WHOLE_SHARE", 20.0)
     text = (MISSIONS / file).read_text(encoding="utf-8")
     mission = tmp_path / "mission.yaml"
     mission.write_text(re.sub(rf"{key}: [\d.]+", f"{key}: {given}", text), encoding="utf-8")
@@ -275,6 +278,23 @@ def test_a_value_whose_whole_plan_is_refused_does_not_do(
     assert re.search(rf"max_agl_m \d+ would do \(50 is given, with \d+ .*{words}\)", found[90.0])
     assert re.search(rf"without max_agl_m there is a path, but with \d+ .*{words}", found[1e9])
     assert "others" not in found[1e9]
+
+
+def test_the_highest_value_with_a_path_has_its_turn_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All lower ones may lack the same, such as a safe return."""
+    problem = replace(many_limits(), airspace=Airspace(ground(0.0)), limits=Limits(10.0, 50.0))
+    slow = SlowPlan(0.0, lambda p: p.limits.max_agl_m is None or p.limits.max_agl_m >= 70.0)
+
+    def whole(p: Problem) -> Solution:
+        if p.limits.max_agl_m is not None and p.limits.max_agl_m < 400.0:
+            raise CheckFailed("a safe return is required, and there is none", lines=["uav1: 3 m"])
+        return slow(p)
+
+    monkeypatch.setattr("gcsplan.planners.refusal.suggestions.time.perf_counter", lambda: 0.0)
+    message = with_cures(problem, BARE, slow, whole).message
+    found = re.search(r"max_agl_m (\d+) would do \(50 is given, with \d+ .* there is none\)", message)
+    assert found is not None, message
+    assert 400 <= int(found[1]) <= 501
 
 
 def test_a_whole_plan_that_runs_on_is_stopped_and_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
