@@ -4,7 +4,7 @@ Files are read first, for the world that they share must hold all of them; then 
 executor. What was read is kept in `KEPT_READ_BYTES` at most; the rest is read again. A result holds texts and counts,
 and neither mission nor terrain, so memory does not grow with what was judged.
 
-What is told of the files: the lines of each, its JSON, and the summary by finding.
+A `Form` says what is told of them: the lines of each file, its JSON, or the summary by finding.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ What is assumed of ArduPlane (commands_logic.cpp, `verify_nav_wp`; AP_L1_Control
 - If that is not the tangent length of the corner, the arc moves along the leg before it by the difference, and the leg
   after it moves to the side by the difference times the turn's sine: both legs are widened by that, the leg after it
   until the aircraft is back on it (`SETTLES_S`).
-- The aircraft leaves the arc in calm air too (`tracking`): the excess over ``track_error_m`` widens both legs as well.
+- The aircraft leaves the arc in calm air too (`tracking_m`): the excess over ``track_error_m`` widens both legs, too.
 - Altitude changes evenly along what is flown, from the middle of one arc to the middle of the next. ArduPlane instead
   computes it along the straight line between way points, and aims at the altitude of the way point once a turn begins:
   all altitudes between these are judged too (``Flight.instead``).
@@ -57,7 +57,7 @@ SETTLES_S, REMAINS = 15.0, 0.03
 (NAVL1_PERIOD 17) and as many metres as it was off: the L1 law simulated, with NAVL1_DAMPING from 0.6 to 1."""
 
 L1_PERIODS_S = (1.0, 60.0)
-"""ArduPlane's range for NAVL1_PERIOD, s; it also bounds the simulation of a turn in `tracking`."""
+"""ArduPlane's range for NAVL1_PERIOD, s; it also bounds the simulation of a turn in `tracking_m`."""
 
 
 def tangent_m(radius_m: float, turn_rad: float) -> float:

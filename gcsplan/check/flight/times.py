@@ -1,9 +1,9 @@
-"""How long each stretch of a flight takes: the fleet's model of motion (`fleet.motion.legs`), with the mission's own
+"""How long each stretch of a flight takes: the fleet's model of motion (`fleet.motion.timing`), with the mission's own
 speeds.
 
-The same model makes a fleet's time table (`fleet.motion.timing.Course`), so all times of a mission are of one kind: a
-vehicle accelerates, brakes, rounds its corners, and stops where it holds and where a take-off or a landing begins or
-ends. A corner's halves count for their own legs.
+The same model makes a fleet's time table (`timing.Course`), so all times of a mission are of one kind: a vehicle
+accelerates, brakes, rounds its corners, and stops where it holds and where a take-off or a landing begins or ends. A
+corner's halves count for their own legs.
 """
 
 from __future__ import annotations

@@ -174,7 +174,7 @@ class Curved:
     is level. ``begins``, ``ends`` (L, 3) are the directions in which each leg begins and ends; of a curve they differ.
     ``part_m`` (P,) are the parts' lengths so counted. The speed along a part is at most ``most_m_s`` (P,) and
     at most the cruise speed times ``per_cruise`` (P,). ``owner`` (P,) is the caller's number of each part. Parts that
-    ``follows`` (P,) follow the ground, with ``rates_m_s`` (P, 2) of climb and descent (`trailing`).
+    ``follows`` (P,) follow the ground, with ``rates_m_s`` (P, 2) of climb and descent (`trailing_s`).
     """
 
     knots: Floats
@@ -307,7 +307,7 @@ def curved(
     """The stretch through ``points`` (N, 3) without a stop; None if nothing moves.
 
     ``owner`` (N - 1,) are the caller's numbers of the parts, ``leg`` (N - 1,) numbers of the legs that they belong to;
-    for the others see `legs.legs`.
+    for the others see `timing.legs`.
     """
     keep = np.append(True, np.linalg.norm(np.diff(points, axis=0), axis=1) > _LEAST_CURVE_M)
     p, owner, leg = points[keep], owner[keep[1:]], leg[keep[1:]]
@@ -327,7 +327,7 @@ def curved(
     trails = np.zeros(len(d), dtype=np.bool_)
     if follows is not None:
         trails = follows[keep[1:]] & cut
-        most = np.where(trails, math.inf, most)  # `trailing` keeps the rates
+        most = np.where(trails, math.inf, most)  # `trailing_s` keeps the rates
     if vehicle.autopilot is Autopilot.ARDUCOPTER and vehicle.lean_angle_deg is not None:
         slope = np.arctan2(d[:, 2], np.maximum(run, 1e-12))
         lean = leaning_m_s(vehicle.lean_angle_deg, slope, 0.5 * (p[1:, 2] + p[:-1, 2]))

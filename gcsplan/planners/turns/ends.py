@@ -212,9 +212,8 @@ def _circle(problem: Problem, judge: EndJudge, middle: Floats, least_m: float, a
     needed = max(_floor(air, np.array([[*middle[:2], 0.0], [*there, 0.0]]), wide), least_m)
     if not middle[2] < needed <= middle[2] + HIGHEST_CIRCLE_M:
         return None
-    z = (
-        middle[2] + math.ceil((needed - middle[2]) * 100.0 - 1e-6) / 100.0 + judge.reached_m
-    )  # it may leave that much lower
+    # It may leave the circle lower by what the judge says.
+    z = middle[2] + math.ceil((needed - middle[2]) * 100.0 - 1e-6) / 100.0 + judge.reached_m
     line = np.array([[*middle[:2], z], [*there, z]])
     clear = column_clear(middle, line[0], reach_m, limits, air) and air.clear(Legs.of_path(line, wide), wide).all()
     return line if clear else None
