@@ -68,7 +68,7 @@ def end_in_good_order(*, as_json: bool = False) -> None:
         return
     if not _watch:  # one for a process, which may run several commands
         _watch.append(SignalWatch(_end_at_once))
-        _raise_again()
+        sys.unraisablehook = sent_again(_last, sys.unraisablehook)
     _as_json[:] = [as_json]
     owner, watch = os.getpid(), _watch[0]
 
@@ -88,23 +88,22 @@ def end_in_good_order(*, as_json: bool = False) -> None:
             signal.signal(number, stop)
 
 
-def _raise_again() -> None:
-    """Send a signal once more if its KeyboardInterrupt was raised where Python drops exceptions.
+def sent_again(last: Sequence[int], before: Callable[[Any], object]) -> Callable[[Any], None]:
+    """A ``sys.unraisablehook`` that sends the signal ``last[0]`` again if Python dropped its KeyboardInterrupt.
 
     Callbacks of weak references and finalizers are such places, and imports have many of them: the exception is told of
-    with a traceback, and the command would go on.
+    with a traceback, and the command would go on. What else is lost goes to ``before``.
     """
-    before = sys.unraisablehook
 
     def told(lost: Any) -> None:
-        if not isinstance(lost.exc_value, KeyboardInterrupt) or not _last:
+        if not isinstance(lost.exc_value, KeyboardInterrupt) or not last:
             before(lost)
             return
-        again = threading.Timer(AGAIN_S, os.kill, (os.getpid(), _last[0]))
+        again = threading.Timer(AGAIN_S, os.kill, (os.getpid(), last[0]))
         again.daemon = True
         again.start()
 
-    sys.unraisablehook = told
+    return told
 
 
 def _end_at_once(number: int) -> NoReturn:
