@@ -14,9 +14,11 @@ from gcsplan.bench.everyday.missions import EVERYDAY_KINDS, draw
 from gcsplan.errors import InputError
 from gcsplan.planners.budget import COUNTED, FIRST, FIRST_S, Budget
 from gcsplan.planners.optimal import planner
-from gcsplan.planners.optimal.governor import Search, govern
+from gcsplan.planners.optimal.loop.governor import govern
+from gcsplan.planners.optimal.loop.search import Search, Size
+from gcsplan.planners.optimal.loop.workspace import Workspace
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
-from gcsplan.planners.optimal.table import NAMES, Searches
+from gcsplan.planners.optimal.table import NAMES, kinds
 from gcsplan.planners.problem import Problem, Refusal, Solution
 
 
@@ -64,10 +66,24 @@ def test_a_search_that_does_not_fit_is_refused_before_it_runs_and_recorded() -> 
     p = replace(p, budget=Budget(10.0, 100.0))
     ran: list[str] = []
 
-    def search(name: str, share: float, seconds: float, megabytes: float) -> Search:
-        return Search(name, share, lambda: True, lambda: (seconds, megabytes), lambda: ran.append(name))
+    work = Workspace(Incumbent(p))
+    incumbent = work.incumbent
 
-    incumbent = Incumbent(p)
+    def search(name: str, share: float, seconds: float, megabytes: float) -> Search:
+        class Named(Search):
+            NAME, IMPROVES, SHARE = name, "paths", share
+
+            def applies(self) -> bool:
+                return True
+
+            def size(self) -> Size:
+                return seconds, megabytes
+
+            def run(self) -> None:
+                ran.append(name)
+
+        return Named(work)
+
     govern(incumbent, [search("a", 0.1, 0.1, 1.0), search("b", 1.0, 0.1, 200.0), search("c", 1.0, 0.2, 1.0)])
     assert ran == ["c", "a"]  # in order of promised gain per cost
     assert [(s.name, s.refused) for s in incumbent.steps] == [("b", True), ("c", False), ("a", False)]
@@ -122,8 +138,9 @@ def test_every_name_of_a_search_is_known_and_others_are_refused() -> None:
     for objective in ("length", "energy"):
         for max_agl_m in (None, 300.0):
             limits = replace(p.limits, max_agl_m=max_agl_m)
-            seen |= {s.name for s in Searches(Incumbent(replace(p, objective=objective, limits=limits))).table()}
-    assert seen == set(NAMES)
+            ran = planner.plan(replace(p, objective=objective, limits=limits)).search
+            seen |= {step.name for step in ran}
+    assert seen <= set(NAMES) == {search.NAME for search in kinds()}
     with pytest.raises(InputError, match="outlines"):
         planner.plan(replace(p, options={"without": ("outline",)}))
     found = planner.plan(replace(p, options={"without": ("outlines",)}))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from gcsplan.planners.budget import Budget
-from gcsplan.planners.optimal.governor import govern
+from gcsplan.planners.optimal.loop.governor import govern
+from gcsplan.planners.optimal.loop.workspace import Workspace
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
-from gcsplan.planners.optimal.table import Searches
+from gcsplan.planners.optimal.searches.cap_search import CapSearch
+from gcsplan.planners.optimal.table import all_searches
 from gcsplan.planners.problem import Problem
 
 
@@ -17,21 +19,23 @@ def spent_budget() -> Budget:
     return budget
 
 
+def work_of(problem: Problem) -> Workspace:
+    """A workspace over the problem's own cells, with an incumbent that has no path and no bound yet."""
+    return Workspace(Incumbent(problem))
+
+
 def plane_of(problem: Problem) -> PlaneSearch:
     """Lattices over a problem's legs, with an incumbent that has no path and no bound yet."""
-    return PlaneSearch(Incumbent(problem))
+    return work_of(problem).plane
 
 
-def looked(problem: Problem) -> PlaneSearch:
-    """`plane_of` a problem, after the search for a first path below the ceiling."""
-    plane = plane_of(problem)
-    for _ in plane.first_looks():
-        pass
-    return plane
+def looked(problem: Problem) -> Workspace:
+    """`work_of` a problem, after the search for a first path below the ceiling."""
+    work = work_of(problem)
+    CapSearch(work).run()
+    return work
 
 
-def improve(plane: PlaneSearch, without: tuple[str, ...] = ()) -> None:
-    """Run all searches, except those named in ``without``, over these lattices."""
-    searches = Searches(plane.incumbent)
-    searches.plane = plane
-    govern(plane.incumbent, searches.table(), without)
+def improve(work: Workspace, without: tuple[str, ...] = ()) -> None:
+    """Run all searches, except those named in ``without``."""
+    govern(work.incumbent, [search for search in all_searches(work) if search.NAME not in without])

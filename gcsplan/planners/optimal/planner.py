@@ -10,14 +10,14 @@ altitude profile is a taut string through it, found in one pass (`taut_string`).
 lies nowhere above the ground) gives a length that no track below the cap can beat. A path is longer than its track
 because it climbs: the altitudes that a short enough track must have along its length are bounded, too. For energy the
 cap itself has a price: caps are searched from both sides until no altitude between two of them can hold a better path
-(`shorter` has all these bounds). Close to its ends a path can be only as high as its track up to there lets it climb,
-which moves the walls (`clearance`); and everywhere only those altitudes between zones count that a short enough track
-can climb to and return from (`altitude_intervals`).
+(`searches/bound`, `searches/cap_pairs`). Close to its ends a path can be only as high as its track up to there lets it
+climb, which moves the walls (`clearance`); and everywhere only those altitudes between zones count that a short enough
+track can climb to and return from (`altitude_intervals`).
 
 **Where that does not hold**, under a maximum AGL, or where the climb limit binds far from the ends, paths are searched
 on a lattice of reachable altitudes (`lattice`); the bound from the plane is valid there as well.
 
-Each of these is a search that the governor can choose (`governor`); `table` lists them.
+Each of these is a module of `searches`, which the governor can choose (`governor`).
 """
 
 from __future__ import annotations
@@ -30,9 +30,10 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats
 from gcsplan.errors import NoMission
 from gcsplan.notes.note import Note
-from gcsplan.planners.optimal.governor import govern
+from gcsplan.planners.optimal.loop.governor import govern
+from gcsplan.planners.optimal.loop.workspace import Workspace
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
-from gcsplan.planners.optimal.table import Searches, left_out
+from gcsplan.planners.optimal.table import all_searches
 from gcsplan.planners.optimal.window import plan_over
 from gcsplan.planners.problem import Problem, Refusal, Solution, terminals_of
 from gcsplan.planners.profile.climb_laps import on_the_spot
@@ -65,13 +66,13 @@ def _within(problem: Problem) -> Solution:
     return _sharp(problem)
 
 
-def search(problem: Problem, sharp: bool = True) -> Searches:
+def search(problem: Problem, sharp: bool = True) -> Workspace:
     """Run all searches on a problem; the result, with best path and bound, is in the ``incumbent`` of what returns."""
     incumbent = Incumbent(_under_one_ceiling(problem), sharp)
     incumbent.tell("search")
-    searches = Searches(incumbent)
-    govern(incumbent, searches.table(), left_out(problem))
-    return searches
+    work = Workspace(incumbent)
+    govern(incumbent, all_searches(work))
+    return work
 
 
 def _sharp(problem: Problem, sharp: bool = True) -> Solution:
@@ -81,8 +82,7 @@ def _sharp(problem: Problem, sharp: bool = True) -> Solution:
         incumbent = Incumbent(problem)
         incumbent.take(on_the_spot(problem))
         return incumbent.solution()
-    searches = search(problem, sharp)
-    incumbent = searches.incumbent
+    incumbent = search(problem, sharp).incumbent
     if incumbent.best is None:
         raise explain(problem, proved=True if incumbent.proved_infeasible else None)
     found = incumbent.solution()

@@ -195,12 +195,12 @@ def with_laps(
     points: Floats,
     pinned: Bools,
     pin_m: Floats,
-    exact: Callable[[Track, Flown], tuple[Floats, Bools] | None],
+    exact: Callable[[Track, Flown], tuple[Floats, Bools] | Unsettled],
 ) -> list[tuple[Floats, Bools]]:
     """Paths over a track (N, 2) with laps where it is too steep: way points (M, 3), and (M,) whether they must stay.
 
-    ``exact`` makes way points of a track and its profile, or returns None if the exact check refuses them; then longer
-    laps are tried. At most two paths; none if no laps help.
+    ``exact`` makes way points of a track and its profile, or tells why the exact check refuses them; then longer laps
+    are tried. At most two paths; none if no laps help.
     """
     limits = problem.limits
     found = []
@@ -211,9 +211,9 @@ def with_laps(
             longer = extend(gentler, points, pinned, pin_m, length)
             if longer is not None:
                 found.append(exact(*longer))
-        if not found or any(path is not None for path in found):
+        if not found or any(not isinstance(path, Unsettled) for path in found):
             break
-    return [path for path in found if path is not None]
+    return [path for path in found if not isinstance(path, Unsettled)]
 
 
 def _lengthened(

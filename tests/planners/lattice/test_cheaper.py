@@ -13,7 +13,7 @@ from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.path import Path
 from gcsplan.world.geometry.zones import Circle, Level, Zone
-from tests.planners.optimal.test_contour import under_a_lid
+from tests.planners.optimal.searches.test_contour_climb import under_a_lid
 from tests.support.planner_worlds import faults, ground
 from tests.support.searches import looked
 

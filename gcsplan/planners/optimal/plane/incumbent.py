@@ -34,10 +34,11 @@ little then, since a zone that is passed low must be flown around, and one that 
 
 class Incumbent:
     """Best path, bound and budget of one problem; ``sharp``: paths are flown with sharp corners. If not, their corners
-    become arcs afterwards: then paths fly no laps if one without laps is known, and leave room for arcs at terrain."""
+    become arcs afterwards: then paths fly no laps if one without laps is known, and leave room for arcs at terrain.
+    ``piece``: the problem is a piece of another one, whose first path starts the next budget; this one's does not."""
 
-    def __init__(self, problem: Problem, sharp: bool = True) -> None:
-        self.problem, self.sharp = problem, sharp
+    def __init__(self, problem: Problem, sharp: bool = True, *, piece: bool = False) -> None:
+        self.problem, self.sharp, self.piece = problem, sharp, piece
         self.budget: Budget = problem.budget
         self.rounding = problem.rounding()
         self.wanted = problem.gap_percent / 100.0
@@ -53,8 +54,6 @@ class Incumbent:
         self.first_s = math.inf
         self.proved_infeasible = False
         """Whether it is proved that there is no path."""
-        self.unsettled: Unsettled | None = None
-        """Why no path was found over the last track whose profile was settled under the exact check."""
         self.steps: list[Step] = []
         self._gained: dict[tuple[bool, bool], float] = {}
         self._simplified: set[tuple[bool, bytes]] = set()
@@ -69,28 +68,26 @@ class Incumbent:
         if not isinstance(flown, Flown) and not may_pass(self.problem, track, flown):
             return False
         found = self.exact(track, flown)
-        return found is not None and self.take_simpler(*found, fine=True, longer=False)
+        return not isinstance(found, Unsettled) and self.take_simpler(*found, fine=True, longer=False)
 
     def take_longer(self, terminals: PinnedTrack, fine: bool) -> bool:
         """Look for a path over a track, with laps where it is too steep; return whether it is the best so far."""
         track = make_track(self.problem, *terminals)
         flown = fly(self.problem, track)
-        if isinstance(flown, Flown) and (found := self.exact(track, flown)) is not None:
+        if isinstance(flown, Flown) and not isinstance(found := self.exact(track, flown), Unsettled):
             return self.take_simpler(*found, fine=fine, longer=False)
         laps = with_laps(self.problem, *terminals, self.exact)
         taken = [self.take_simpler(*path, fine=fine, longer=True) for path in laps]
         return any(taken)
 
-    def exact(self, track: Track, flown: Flown | Obstruction) -> tuple[Floats, Bools] | None:
+    def exact(self, track: Track, flown: Flown | Obstruction) -> tuple[Floats, Bools] | Unsettled:
         """Way points over a track that pass the exact check, and which must stay: of the profile ``flown``, or else of
-        one that `settle` draws from floors read point by point. None, with `unsettled` set, if neither passes."""
+        one that `settle` draws from floors read point by point; or why neither passes."""
         if isinstance(flown, Flown):
             found = way_points(self.problem, track, flown)
             if not self.judge.violations(found[0]):
                 return found
-        careful = settle(self.problem, self.judge, track.points, track.pinned, track.pin_m)
-        self.unsettled = careful if isinstance(careful, Unsettled) else None
-        return None if isinstance(careful, Unsettled) else careful
+        return settle(self.problem, self.judge, track.points, track.pinned, track.pin_m)
 
     def take_simpler(self, points: Floats, pinned: Bools, *, fine: bool, longer: bool) -> bool:
         """Simplify a path and keep it if it is then the best so far; do nothing if that is unlikely (`HOPE`).
@@ -129,7 +126,7 @@ class Incumbent:
         return found is not None and not self.judge.violations(found[0]) and self.take(*found)
 
     def _first(self) -> None:
-        if self.best is None and math.isinf(self.first_s):
+        if self.best is None and math.isinf(self.first_s) and not self.piece:
             self.first_s = self.budget.elapsed_s
             self.budget.found_first()
 
@@ -140,6 +137,10 @@ class Incumbent:
         # The factor covers rounding in the bound's own arithmetic.
         self.bound = max(self.bound, min(cost * (1.0 - 1e-9), self.cost))
         self.tell("bound")
+
+    def prove_infeasible(self) -> None:
+        """Note that there is no path."""
+        self.proved_infeasible = True
 
     def raise_track_bound(self, track_m: float) -> None:
         """Raise the lower bound to the least cost of paths whose tracks are at least ``track_m`` metres long, as those

@@ -159,10 +159,13 @@ def needs_most(problem: Problem, box: Box) -> bool:
 
 
 class Leg:
-    """One leg of a problem, from terminal to terminal, under caps of at most ``top_m`` AMSL, the highest of bounds."""
+    """One leg of a problem, from terminal to terminal, under caps of at most ``top_m`` AMSL, the highest of bounds.
 
-    def __init__(self, problem: Problem, start: End, goal: End, top_m: float) -> None:
-        self.problem, self.start, self.goal, self.top_m = problem, start, goal, top_m
+    ``farthest``: most times as long as the straight track that tracks may be for which the lattice is widened.
+    """
+
+    def __init__(self, problem: Problem, start: End, goal: End, top_m: float, farthest: float = math.inf) -> None:
+        self.problem, self.start, self.goal, self.top_m, self.farthest = problem, start, goal, top_m, farthest
         self.straight_m = math.dist(start.place, goal.place)
         self.length_m = math.inf
         """A lower bound of every track's length below the highest cap; inf: it is proved that there is no track."""
@@ -172,8 +175,6 @@ class Leg:
         """Whether the leg was flooded."""
         self.reach_m = 0.0
         """Tracks shorter than this, in metres, lie within the lattice and within the flooded cells."""
-        self.farthest = math.inf
-        """Most times as long as the straight track that tracks may be for which the lattice is widened."""
         self.plane: Plane
         self._twin: tuple[Plane, Bools] | None = None
         self._detour = 0.0
@@ -185,7 +186,7 @@ class Leg:
         self._reached: tuple[Nearby, Reached] | None = None
         self.cells_of = choose(problem, start.place, self.straight_m, self._around(DETOURS[0]))
         self._necks = LegNecks(problem, top_m, start.place, goal.place)
-        self.closer = 1
+        self._finer = 1
         """Parts a side into which the finer lattice's cells are cut once more; see `refine`."""
 
     @property
@@ -206,7 +207,7 @@ class Leg:
         Widens the lattice until those tracks lie within it.
         """
         self._ahead = self._close = self._reached = None
-        self.closer = 1
+        self._finer = 1
         self.seen = True
         detours = (*(d for d in DETOURS if d < self.farthest), self.farthest)
         limited = math.isfinite(within_m)
@@ -262,7 +263,7 @@ class Leg:
             cells = guide.reach(self.start.place, limit_m)
         else:
             plane, guide, cells = within.guide.mesh.plane, within.guide, within.cells
-            fineness = self.closer
+            fineness = self._finer
             if plane is self.plane and self.cells_of.stride == 1:
                 fineness *= self.cells_of.cut
             elif (
@@ -375,7 +376,7 @@ class Leg:
         """
         limit = min(limit_m, self.reach_m)
         close = self._closer(limit)
-        if close.left is self._guide or self.closer > 1:
+        if close.left is self._guide or self._finer > 1:
             return False
         wanted = close.away.between(close.left, limit)
         row, col, last_row, last_col = box_of(wanted)
@@ -394,7 +395,7 @@ class Leg:
         )
         if found is None:
             return False
-        self._close, self.reach_m, self.closer = found, limit, parts // cut
+        self._close, self.reach_m, self._finer = found, limit, parts // cut
         return True
 
     def corridor(self, limit_m: float) -> Corridor:

@@ -6,17 +6,17 @@ Level ground is cut into cells first: a terrain model of two by two nodes is a s
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from gcsplan.planners.optimal.plane.corridor import End, Narrow, PinnedTrack, joined
-from gcsplan.planners.optimal.plane.detours import DetourSearch, SideChoice
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.plane.leg import Leg
+from gcsplan.planners.optimal.plane.side_choices import DetourSearch, SideChoice
 from gcsplan.planners.problem import Problem, terminals_of
+from gcsplan.planners.profile.exact import Unsettled
 from gcsplan.planners.profile.track import Flown, fly, make_track
 from gcsplan.planners.profile.zone_levels import may_pass
 from gcsplan.world.airspace import Airspace
@@ -35,11 +35,6 @@ SLACKS = (0.008, 0.15, 0.6)
 """While no path is known, tracks longer than the shortest by these parts of it are searched, in turn."""
 ZONES_SHUT = 8
 """Most tracks that are tried below a cap if a zone can be passed neither over nor under on the first."""
-PAST = 12
-"""Most tracks past obstacles that are tried on the first-look lattice."""
-DARED_M, PINCHED_M = (0.05, 0.1, 0.2, 0.4, 0.8), 1.0
-"""Metres by which the nodes beside a track through a slit are raised, in turn, beyond the altitude that it lacked, or
-that later tracks keep from zones over ground; and the most it may be pinched for another track to be searched."""
 PROVED = 1e-8
 """A gap, as a part, that is smaller is due to rounding: the best path is proved optimal."""
 NODE_S, NODE_MB = 0.8e-6, 3e-4
@@ -80,10 +75,10 @@ def in_window(incumbent: Incumbent) -> Problem:
 class PlaneSearch:
     """The legs of one problem in the plane; paths and bounds go to the incumbent.
 
-    ``problem``: the incumbent's own (None), or the same problem over other cells.
+    ``problem``: the incumbent's own (None), or the same problem over other cells; ``farthest``: see `Leg`.
     """
 
-    def __init__(self, incumbent: Incumbent, problem: Problem | None = None) -> None:
+    def __init__(self, incumbent: Incumbent, problem: Problem | None = None, farthest: float = math.inf) -> None:
         self.incumbent = incumbent
         self.problem = problem = incumbent.problem if problem is None else problem
         most_m = above_all(problem)
@@ -98,9 +93,8 @@ class PlaneSearch:
         places = terminals_of(problem)
         heights = [problem.start[2], *(v.amsl_m for v in problem.via), problem.goal[2]]
         ends = [End(*place, z) for place, z in zip(places, heights, strict=True)]
-        self.legs = [Leg(problem, a, b, self.top_m) for a, b in pairwise(ends) if math.dist(a.place, b.place) > 1e-3]
-        self.by_intervals = False
-        """Whether bounds of length use altitude intervals: what a track can climb and descend to on its way."""
+        apart = [(a, b) for a, b in pairwise(ends) if math.dist(a.place, b.place) > 1e-3]
+        self.legs = [Leg(problem, a, b, self.top_m, farthest) for a, b in apart]
         zones = len(problem.airspace.zones)
         self._open = SideChoice(np.ones(zones, np.bool_), np.ones(zones, np.bool_))
         self.choice = self._open
@@ -128,21 +122,6 @@ class PlaneSearch:
 
     # -------------------------------------------------------------------- paths
 
-    def first_looks(self, slacks: tuple[float, ...] = SLACKS) -> Iterator[None]:
-        """Look for a first path over tracks that are longer than the shortest by at most each of ``slacks`` in turn;
-        the legs are flooded that far. Ends when a path is found, or when it is proved that there is none."""
-        for slack in slacks:
-            if not self.flood(slack):
-                return
-            self.raise_tracks()
-            # Tracks that only the finer lattice shows are nearly the shortest; in the last round nothing else is left.
-            patient = slack in (slacks[0], slacks[-1])
-            if self.try_below(self.path_top_m, fine=False) or (patient and self.try_below(self.path_top_m, fine=True)):
-                return
-            if self.past(PAST, fine=False, first=True):
-                return
-            yield
-
     def flood(self, slack: float) -> bool:
         """Flood all legs, for tracks longer than the shortest by at most the part ``slack``. Returns False if it is
         proved that a leg has no track."""
@@ -156,7 +135,7 @@ class PlaneSearch:
     def _prove_nothing_better(self) -> None:
         """Note that there is no better path, or no path at all."""
         if self.incumbent.best is None:
-            self.incumbent.proved_infeasible = True
+            self.incumbent.prove_infeasible()
         else:
             self.incumbent.raise_bound(math.inf)
 
@@ -176,51 +155,26 @@ class PlaneSearch:
                 leg.flood((limit / leg.length_m - 1.0) * (1.0 + 1e-9), limit)
         return incumbent.gap > PROVED
 
-    def try_below(self, cap_m: float, *, fine: bool, narrow: Narrow | None = None) -> bool:
-        """Look for a path below a cap; return whether it is the best so far. ``narrow``: see `Leg.track`."""
+    def try_below(self, cap_m: float, *, fine: bool) -> bool:
+        """Look for a path below a cap; return whether it is the best so far."""
+        return self.look_below(cap_m, fine=fine)[0]
+
+    def look_below(self, cap_m: float, *, fine: bool, narrow: Narrow | None = None) -> tuple[bool, Unsettled | None]:
+        """`try_below`, and why no path leads over the track, if that is known. ``narrow``: see `Leg.track`."""
         incumbent = self.incumbent
-        incumbent.unsettled = None
         terminals = self.terminals(self.choice, cap_m, fine, narrow)
         if terminals is None:
-            return False
+            return False, None
         track = make_track(incumbent.problem, *terminals)
         flown = fly(incumbent.problem, track)
-        if isinstance(flown, Flown):
+        why = None
+        if isinstance(flown, Flown) or narrow is not None or may_pass(incumbent.problem, track, flown):
             found = incumbent.exact(track, flown)
-            return found is not None and incumbent.take_simpler(*found, fine=fine, longer=False)
-        if narrow is not None or may_pass(incumbent.problem, track, flown):
-            found = incumbent.exact(track, flown)
-            if found is not None:
-                return incumbent.take_simpler(*found, fine=fine, longer=False)
-        past = flown.kind == "zone" or incumbent.best is None
-        return past and self.past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=terminals)
-
-    def look_finely(self) -> bool:
-        """Look for a path on the finer lattice; return whether it is the best so far."""
-        # With a track error, that lattice keeps metres from the terrain that the exact check leaves open.
-        near = self.incumbent.sharp and self.problem.limits.track_error_m > 0.0
-        return (near and self.narrow_passage()) or self.try_below(self.path_top_m, fine=True)
-
-    def narrow_passage(self) -> bool:
-        """Look for a path over nodes that are only as high as in the exact check: through slits that are shut in the
-        other lattices, because these reserve what the ground may rise beside a track, and nearer to terrain. Returns
-        whether the path is the best so far."""
-        narrow, before_m = Narrow(), math.nan
-        for more_m in DARED_M:
-            if self.try_below(self.path_top_m, fine=True, narrow=narrow):
-                return True
-            lacks = self.incumbent.unsettled
-            # Where the last change did not matter, the next one will not.
-            if lacks is None or math.isclose(lacks.by, before_m, rel_tol=1e-3) or not self.incumbent.goes_on():
-                break
-            before_m = lacks.by
-            if lacks.kind == "zone":
-                narrow.zones_m = more_m
-            elif lacks.kind == "pinched" and lacks.by < PINCHED_M:
-                narrow.pinched.append((lacks.place, lacks.by + more_m))
-            else:
-                break
-        return False
+            if not isinstance(found, Unsettled):
+                return incumbent.take_simpler(*found, fine=fine, longer=False), None
+            why = found
+        past = not isinstance(flown, Flown) and (flown.kind == "zone" or incumbent.best is None)
+        return past and self.past(ZONES_SHUT, fine=fine, cap_m=cap_m, given=terminals), why
 
     def past(
         self,

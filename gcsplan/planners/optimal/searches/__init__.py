@@ -1,1 +1,1 @@
-"""Sources of paths: searches other than that for the shortest track below a cap."""
+"""The searches of the default planner: one a module, named like it."""

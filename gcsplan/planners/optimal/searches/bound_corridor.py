@@ -17,10 +17,15 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
+from gcsplan.planners.optimal.loop.governor import govern
+from gcsplan.planners.optimal.loop.search import FAR, MUCH, OF_REST, Search, Size
+from gcsplan.planners.optimal.loop.workspace import Workspace
 from gcsplan.planners.optimal.plane.corridor import joined
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.plane.leg import Leg
 from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
+from gcsplan.planners.optimal.searches.cap_search import CapSearch
+from gcsplan.planners.optimal.searches.fine_tracks import FineTracks, narrow_passage
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.track import denser
 from gcsplan.planners.profile.zone_levels import free_below
@@ -47,9 +52,11 @@ FARTHEST = 1.5
 BESIDE_M, WORTH = 10.0, 0.03
 """Metres from the path beyond which a track has left it; and the least that a stretch must gain to be planned, as a
 part of what the longest useful track is longer than the bound's."""
-FAR, CLOSE_BY = 5e-3, (3e-3, 3e-2, math.inf)
-"""The gap, as a part, from which cells are looked at through which the bound's track is shut, and
-pieces on finer cells; and the parts by which tracks may be longer than the bound for the former, in turn."""
+CLOSE_BY = 3e-3, 3e-2, math.inf
+"""Beyond a gap of `FAR`, cells are looked at through which the bound's track is shut: parts by which tracks may be
+longer than the bound, in turn."""
+NEARLY_ALL = 0.9
+"""Part of the counted work left that it may take beyond a gap of `MUCH`."""
 SHORTER = 0.7
 """Most of a leg's straight track for a piece to be searched on finer cells."""
 MOST_STRETCHES = 24
@@ -68,6 +75,39 @@ STRAIGHT_M = 2e-3
 SPARE_M, DEAR, LITTLE = 0.1, 100.0, 1e-6
 """Metres below the cap at which a floor is low enough; metres aside that a metre lower is worth; and what decides
 between floors that are alike."""
+
+
+class BoundCorridor(Search):
+    """If no path is known, and once more when one is. Remembers nothing: a bound's track is the leg's."""
+
+    NAME, IMPROVES, SHARE, ANEW = "bound_corridor", "paths, bounds", 0.2, True
+    FIRST_SHARE, FIRST_PASSES, PASSES = 0.5, 4.0, 3.0
+    """The share if no path is known; passes over the lattices that it takes then, and else."""
+
+    @property
+    def share(self) -> float:
+        """By whether a path is known."""
+        return self.FIRST_SHARE if self.incumbent.best is None else self.SHARE
+
+    def applies(self) -> bool:
+        """Whether there is no maximum AGL."""
+        return self.problem.limits.max_agl_m is None
+
+    def size(self) -> Size:
+        """What it takes is not known before; it gets a part of the rest."""
+        return self.work.plane.size(self.FIRST_PASSES if self.incumbent.best is None else self.PASSES)
+
+    def run(self) -> None:
+        """Look for a path."""
+        incumbent, plane = self.incumbent, self.work.plane
+        if not plane.reach_longest():
+            return
+        if incumbent.best is None:
+            follow(plane)
+            return
+        # Where path and bound are that far apart, a slit is open that nothing else finds.
+        with incumbent.budget.allow(NEARLY_ALL if incumbent.gap > MUCH else OF_REST):
+            follow(plane)
 
 
 def follow(plane: PlaneSearch) -> bool:
@@ -165,12 +205,10 @@ def _nearer(plane: PlaneSearch, leg: Leg, path: Floats) -> Floats | None:
     return np.vstack([*out, path[on_path > begin + SAME_WAY_M]]) if out else None
 
 
-def _part(plane: PlaneSearch, problem: Problem, start: Floats, goal: Floats) -> PlaneSearch:
-    """Lattices of a problem like the plane's, but between two points (3,) on a path."""
+def _part(plane: PlaneSearch, problem: Problem, start: Floats, goal: Floats, farthest: float = math.inf) -> Workspace:
+    """A workspace of a problem like the plane's, but between two points (3,) on a path; ``farthest``: see `Leg`."""
     part = replace(problem, start=_point(start), goal=_point(goal), via=(), progress=None)
-    sub = Incumbent(part, plane.incumbent.sharp)
-    sub.first_s = 0.0  # a path of a piece is not the mission's first path, which would start the next budget
-    return PlaneSearch(sub)
+    return Workspace(Incumbent(part, plane.incumbent.sharp, piece=True), farthest)
 
 
 def _finer(plane: PlaneSearch, leg: Leg, ends: list[Floats], known: Floats) -> Floats | None:
@@ -178,9 +216,11 @@ def _finer(plane: PlaneSearch, leg: Leg, ends: list[Floats], known: Floats) -> F
     cells of a shorter leg; None if there are none or the leg is hardly shorter."""
     if math.dist(ends[0][:2], ends[1][:2]) > SHORTER * leg.straight_m:
         return None
-    found = _part(plane, plane.problem, ends[0], ends[1])
-    found.incumbent.take(known, np.isin(np.arange(len(known)), (0, len(known) - 1)))
-    return found.incumbent.best if found.reach_longest() and found.look_finely() else None
+    work = _part(plane, plane.problem, ends[0], ends[1])
+    work.incumbent.take(known, np.isin(np.arange(len(known)), (0, len(known) - 1)))
+    before = work.incumbent.cost
+    govern(work.incumbent, [FineTracks(work)])
+    return work.incumbent.best if work.incumbent.cost < before else None
 
 
 def _along(
@@ -223,26 +263,62 @@ def _past(
         if last < len(s) - 1:
             height = _height(plane, leg, *map(float, (s[last], whole_m - s[last], low[last], high[last])))
             goal = np.array([*places[last], height])
-        found = _part(plane, replace(plane.problem, objective="length"), start, goal)
-        sub = found.incumbent
-        for piece in found.legs:
-            piece.farthest = FARTHEST
-        if (first, last) not in stretches:
-            sub.take_along(joined([np.vstack([start[:2], places[first + 1 : last], goal[:2]])], []))
-        if sub.best is None:
-            for _ in found.first_looks(STRETCH_SLACKS):
-                pass
-        if sub.best is None and not sub.proved_infeasible and found.legs:
-            lowest = over_pass(
-                plane.problem, plane.path_top_m, np.vstack([start[:2], places[first + 1 : last], goal[:2]])
-            )
-            if not sub.take_along(joined([lowest], [])):
-                found.narrow_passage()
+        work = _part(plane, replace(plane.problem, objective="length"), start, goal, FARTHEST)
+        sub, track = work.incumbent, np.vstack([start[:2], places[first + 1 : last], goal[:2]])
+        along = [] if (first, last) in stretches else [_AlongTrack(work, track)]
+        govern(sub, [*along, CapSearch(work, STRETCH_SLACKS), _OverPass(work, track, plane.path_top_m), _Slit(work)])
         if sub.best is None or not plane.incumbent.budget.goes_on():
             return None
         out.append(sub.best if not out else sub.best[1:])
         start = goal
     return np.vstack(out)
+
+
+class _PieceSearch(Search):
+    """A search of one stretch, while no path of it is known; in the order of their shares."""
+
+    IMPROVES = "paths"
+
+    def applies(self) -> bool:
+        return self.incumbent.best is None
+
+    def size(self) -> Size:
+        return self.takes(0.0)
+
+
+class _AlongTrack(_PieceSearch):
+    """The track itself, where it is not shut."""
+
+    NAME, SHARE = "along", 1.0
+
+    def __init__(self, work: Workspace, track: Floats) -> None:
+        super().__init__(work)
+        self.track = track
+
+    def run(self) -> None:
+        self.incumbent.take_along(joined([self.track], []))
+
+
+class _OverPass(_PieceSearch):
+    """The track moved aside to where a pass is lowest."""
+
+    NAME, SHARE = "over_pass", 1e-4
+
+    def __init__(self, work: Workspace, track: Floats, cap_m: float) -> None:
+        super().__init__(work)
+        self.track, self.cap_m = track, cap_m
+
+    def run(self) -> None:
+        self.incumbent.take_along(joined([over_pass(self.problem, self.cap_m, self.track)], []))
+
+
+class _Slit(_PieceSearch):
+    """Tracks over nodes that are only as high as in the exact check."""
+
+    NAME, SHARE = "slit", 1e-5
+
+    def run(self) -> None:
+        narrow_passage(self.work.plane)
 
 
 def nearest_on(places: Floats, track: Floats) -> tuple[Floats, Floats]:

@@ -5,7 +5,7 @@ between two cylinders, a climb that must wind along a wall. The roadmap has few 
 and its saddles, the rims of zones, slits between them, and a regular lattice in between. Each has a column of altitudes
 from its floor up; legs between neighbours pass the exact check.
 
-The cheapest path over the roadmap and others well apart from it are each drawn together (`section_dp`) on
+The cheapest path over the roadmap and others well apart from it are each drawn together (`cross_sections`) on
 cross-sections along them; the best of those is the result. A roadmap is a source of paths and gives no lower bound.
 """
 
@@ -14,17 +14,21 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
 
 from gcsplan.arrays import Bools, Floats, Indices
+from gcsplan.planners.optimal.loop.search import FAR, MUCH, OF_REST, Search, Size
+from gcsplan.planners.optimal.loop.workspace import Workspace
 from gcsplan.planners.optimal.navmesh.grid import NodeExtent, extent
-from gcsplan.planners.optimal.searches.section_dp import FIXED, FREE, UPRIGHT, cheapest, drawn, kinds_of
 from gcsplan.planners.problem import Problem, terminals_of
+from gcsplan.planners.profile.cross_sections import FIXED, FREE, UPRIGHT, cheapest, drawn, kinds_of
 from gcsplan.world.geometry.path import distances_m
 from gcsplan.world.geometry.zones import Circle
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 NODES, PLACES, LEVELS = 8000, (200, 1000), (7, 30)
 """About how many nodes a roadmap has; fewest and most places; fewest and most altitudes at each place."""
@@ -56,6 +60,63 @@ VIA_LEVELS = 24
 """Most altitudes of a via whose altitude is free."""
 LEGS_AT_ONCE = 20_000
 """Legs under the exact check between two looks at the budget."""
+
+FIRST, NEAR, LAST = (0.6, 1.0), (0.5, 0.5), (0.01, 0.5)
+"""Shares and counted seconds: while no path is known, beyond a gap of `MUCH`, and beyond one of `FAR`."""
+
+
+class LocalRoadmap(Search):
+    """In worlds of a few dozen cells and for steep paths: if no path is known, if the gap exceeds 5 %, and last.
+
+    Remembers which of these it was chosen for.
+    """
+
+    NAME, IMPROVES, SHARE = "local_roadmap", "paths", LAST[0]
+
+    def __init__(self, work: Workspace) -> None:
+        super().__init__(work)
+        self._chosen: set[tuple[float, float]] = set()
+
+    @property
+    def _turn(self) -> tuple[float, float] | None:
+        """Which of its turns it is; None if it is none, or that one was taken."""
+        i = self.incumbent
+        if self.problem.limits.max_agl_m is not None:
+            return None
+        if i.best is None:
+            return FIRST if FIRST not in self._chosen and self.work.plane.is_small else None
+        if i.gap <= FAR or not (i.is_steep or self.work.plane.is_small):
+            return None
+        turns = (NEAR, LAST) if i.gap > MUCH else (LAST,)
+        return next((turn for turn in turns if turn not in self._chosen), None)
+
+    @property
+    def share(self) -> float:
+        """By the turn."""
+        return (self._turn or LAST)[0]
+
+    def applies(self) -> bool:
+        """Whether the world is small or the path steep."""
+        return self._turn is not None
+
+    def is_open(self) -> bool:
+        """Each turn once."""
+        return self.applies()
+
+    def choose(self) -> None:
+        """Note the turn."""
+        self._chosen.add(self._turn or LAST)
+
+    def size(self) -> Size:
+        """What it takes is not known before; it gets a part of the rest."""
+        return self.takes((self._turn or LAST)[1])
+
+    def run(self) -> None:
+        """Look for a path."""
+        incumbent = self.incumbent
+        with incumbent.budget.allow(1.0 if incumbent.best is None else OF_REST):
+            found = small_path(self.problem, incumbent.best)
+        incumbent.offer(found)
 
 
 def small_path(problem: Problem, known: Floats | None) -> tuple[Floats, Bools] | None:
@@ -400,6 +461,8 @@ class Roadmap:
         back = there if limits.max_climb_deg == limits.max_descent_deg else _legal(problem, nodes, b, a)
         cost = problem.leg_costs(nodes[a], nodes[b])
         rows, columns = np.concatenate([a[there], b[back]]), np.concatenate([b[there], a[back]])
+        from scipy.sparse import csr_array  # most missions need none
+
         graph = csr_array((np.concatenate([cost[there], cost[back]]), (rows, columns)), shape=(len(nodes), len(nodes)))
         return cls(nodes, *ends, spacing_m, graph)
 
@@ -442,6 +505,8 @@ def _legal(problem: Problem, nodes: Floats, a: Indices, b: Indices) -> Bools:
 
 def _reached(graph: csr_array, source: int) -> tuple[Floats, Indices]:
     """(N,) the least cost from a source to each node, and the node before it; negative without one."""
+    from scipy.sparse.csgraph import dijkstra  # most missions need none
+
     cost, before = dijkstra(graph, indices=[source], return_predecessors=True)
     return cost[0], before[0].astype(np.intp)
 

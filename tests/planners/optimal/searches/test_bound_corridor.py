@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import cast
 
 import numpy as np
 import pytest
@@ -15,60 +13,60 @@ from hypothesis import strategies as st
 from gcsplan.arrays import Floats
 from gcsplan.bench.terrain.problems import problems
 from gcsplan.planners.lattice.planner import plan_band
-from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
+from gcsplan.planners.optimal.loop.workspace import Workspace
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.optimal.searches import bound_corridor
 from gcsplan.planners.optimal.searches.bound_corridor import over_pass
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.geometry.path import Path
 from tests.planners.optimal.navmesh.test_necks import ridge as pass_over_a_ridge
-from tests.planners.optimal.sources.test_notches import MIDDLE_M, ROUND_M, STRAIGHT_M, ridge
+from tests.planners.optimal.searches.test_notches import MIDDLE_M, ROUND_M, STRAIGHT_M, ridge
 from tests.support.planner_worlds import faults
 from tests.support.searches import improve, looked
 
 
-def through(over_m: float, **more: object) -> PlaneSearch:
-    """A search with a path around the ridge and the track of a bound through its notch."""
+def through(over_m: float, **more: object) -> Workspace:
+    """A workspace with a path around the ridge and the track of a bound through its notch."""
     problem = replace(ridge(over_m, 0.2, 80.0, True), **more)  # type: ignore[arg-type]
-    plane = looked(problem)
-    below = plane.incumbent
+    work = looked(problem)
+    below, plane = work.incumbent, work.plane
     assert below.best is None
     below.take(plan_band(problem, below.tell))
     assert below.cost > ROUND_M
     for leg in plane.legs:
         limit_m = 1.05 * leg.straight_m
         leg.bound(plane.top_m, leg.corridor(limit_m), limit_m)
-    return plane
+    return work
 
 
 def test_a_path_leads_through_a_notch_that_was_passed_by() -> None:
-    plane = through(0.1)
-    below = plane.incumbent
-    assert bound_corridor.follow(plane)
+    work = through(0.1)
+    below = work.incumbent
+    assert bound_corridor.follow(work.plane)
     assert below.best is not None
     assert below.cost < STRAIGHT_M
     assert faults(below.problem, Path(below.best)) == []
-    assert not bound_corridor.follow(plane)  # there is no other notch
+    assert not bound_corridor.follow(work.plane)  # there is no other notch
 
 
 @pytest.mark.slow
 def test_a_notch_that_is_shut_is_left_alone() -> None:
-    plane = through(-0.3)
-    before = plane.incumbent.cost
-    assert not bound_corridor.follow(plane)
-    assert plane.incumbent.cost == before
+    work = through(-0.3)
+    before = work.incumbent.cost
+    assert not bound_corridor.follow(work.plane)
+    assert work.incumbent.cost == before
 
 
 @pytest.mark.slow
 def test_stops_are_passed_as_before() -> None:
-    plane = through(0.1, via=(Via(500.0, MIDDLE_M + 30.0, 82.0),))
-    below = plane.incumbent
+    work = through(0.1, via=(Via(500.0, MIDDLE_M + 30.0, 82.0),))
+    below = work.incumbent
     assert below.best is not None
-    assert not bound_corridor.follow(plane)  # the incumbent does not know which of its points are vias
+    assert not bound_corridor.follow(work.plane)  # the incumbent does not know which of its points are vias
     stop = np.array([500.0, MIDDLE_M + 30.0, 82.0])
     below.pinned = (np.abs(below.best - stop) < 1e-6).all(axis=1)
     below.pinned[[0, -1]] = True
-    assert bound_corridor.follow(plane)
+    assert bound_corridor.follow(work.plane)
     assert below.best is not None
     assert below.cost < STRAIGHT_M + 10.0
     assert below.pinned.sum() == 3
@@ -78,10 +76,10 @@ def test_stops_are_passed_as_before() -> None:
 
 @pytest.mark.slow
 def test_the_planner_asks_for_it() -> None:
-    plane = through(0.1)
-    improve(plane, ())
-    assert plane.incumbent.cost < STRAIGHT_M
-    assert plane.incumbent.gap < 0.003
+    work = through(0.1)
+    improve(work)
+    assert work.incumbent.cost < STRAIGHT_M
+    assert work.incumbent.gap < 0.003
 
 
 places = st.lists(st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0)), min_size=2, max_size=6, unique=True)
@@ -107,9 +105,8 @@ def test_a_track_is_moved_aside_to_the_line_on_which_a_pass_is_open(aside_m: flo
     problem, cap_m = pass_over_a_ridge(0.012, across)
     north = 585.0 if across else 600.0
     track = np.array([[600.0 + aside_m + 2.0, north - 60.0], [600.0 + aside_m, north], [604.0 + aside_m, north + 60.0]])
-    plane = cast(PlaneSearch, SimpleNamespace(problem=problem, top_m=cap_m))
     assert (_dense(track, problem) > cap_m).any()
-    moved = over_pass(plane.problem, plane.top_m, track)
+    moved = over_pass(problem, cap_m, track)
     assert (moved[[0, -1]] == track[[0, -1]]).all()
     assert (_dense(moved, problem) <= cap_m).all()
     assert len(moved) < 40

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gcsplan.planners.optimal import planner as optimal
-from gcsplan.planners.optimal.table import traverse
+from gcsplan.planners.optimal.searches.contour_climb import traverse
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits

@@ -21,7 +21,7 @@ from gcsplan.planners.optimal.navmesh.outlines import ZoneOutline
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.plane.corridor import joined
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
-from gcsplan.planners.optimal.searches.outline_tracks import OutlineTracks
+from gcsplan.planners.optimal.plane.outline_tracks import OutlineTracks
 from gcsplan.planners.problem import Problem
 from gcsplan.world.geometry.path import distances_m, track_length_m
 

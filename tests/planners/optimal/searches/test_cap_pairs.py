@@ -14,18 +14,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.arrays import Floats
-from gcsplan.planners.optimal.bounds.shorter import (
-    MOST_CAPS,
-    Layer,
-    altitude_ranges,
-    climb_bound,
-    rise_bound,
-    search_caps,
-)
 from gcsplan.planners.optimal.plane.corridor import End
 from gcsplan.planners.optimal.plane.leg import Leg
-from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
 from gcsplan.planners.optimal.planner import plan
+from gcsplan.planners.optimal.searches import fine_tracks
+from gcsplan.planners.optimal.searches.bound import altitude_ranges, climb_bound, rise_bound
+from gcsplan.planners.optimal.searches.cap_pairs import MOST_CAPS, Layer, search_caps
 from gcsplan.planners.optimal.table import NAMES
 from gcsplan.planners.problem import Objective, Problem, Via
 from gcsplan.planners.profile.track import Flown, fly, make_track
@@ -282,11 +276,11 @@ def test_no_path_past_vias_costs_less_than_the_bound(objective: Objective, climb
             if not inside:
                 via.append(Via(e, n, z if kind == "fixed" or (kind == "both" and k == 0) else None))
         problem = replace(problem, via=tuple(via))
-        plane = looked(problem)
-        below = plane.incumbent
+        work = looked(problem)
+        below = work.incumbent
         assert not below.proved_infeasible
         if below.best is not None:
-            improve(plane)
+            improve(work)
         assert 0.0 < below.bound <= below.cost
         costs = []
         for track in tracks(problem, rng, 25, 0.04):
@@ -311,5 +305,5 @@ def test_fine_tracks_with_a_track_error_pass_as_near_to_terrain_as_allowed(
     problem = replace(problem, limits=replace(limits, max_amsl_m=ceiling_m), options={"without": others})
     near = plan(problem).path
     assert faults(problem, near) == []
-    monkeypatch.setattr(PlaneSearch, "narrow_passage", lambda self: False)
+    monkeypatch.setattr(fine_tracks, "narrow_passage", lambda plane: False)
     assert problem.cost(plan(problem).path) > (1.0 + 0.01 * least_percent) * problem.cost(near)

@@ -14,10 +14,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gcsplan.bench.terrain.problems import problems
-from gcsplan.planners.optimal.plane.detours import DetourSearch, SideChoice
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
-from gcsplan.planners.optimal.plane.plane_search import PAST, PlaneSearch
-from gcsplan.planners.optimal.table import PAST_FINE
+from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
+from gcsplan.planners.optimal.plane.side_choices import DetourSearch, SideChoice
+from gcsplan.planners.optimal.searches.cap_search import PAST
+from gcsplan.planners.optimal.searches.detours import PAST_FINE
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.climb_laps import extend
 from gcsplan.planners.profile.exact import sampled_track
@@ -75,8 +76,8 @@ def past(plane: PlaneSearch) -> None:
 
 def found_in(p: Problem, closer: Callable[[PlaneSearch], None] = past) -> Incumbent:
     """The incumbent after the searches below the ceiling alone, checked after each."""
-    plane = looked(p)
-    below = plane.incumbent
+    work = looked(p)
+    below, plane = work.incumbent, work.plane
     for again in (False, True):
         if again:
             closer(plane)

@@ -9,9 +9,9 @@ import pytest
 
 from gcsplan.bench.terrain.problems import problems
 from gcsplan.planners.budget import Budget
-from gcsplan.planners.optimal.bounds.shorter import bound_cheaper, longest_track
 from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
 from gcsplan.planners.optimal.planner import search
+from gcsplan.planners.optimal.searches.bound import bound_cheaper, longest_track
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.limits import Limits

@@ -8,31 +8,22 @@ A path is longer than its ground track by the altitudes that no short track avoi
 than some length is in one of the cells that are no farther than s from its start and no farther than the remaining
 length from its goal. The lowest floor of those cells is a floor for the altitude after s metres, whatever the track. A
 taut string over these floors is no longer than any path.
-
-For energy there is a bound from pairs of altitude caps, too, for paths whose highest point lies between the two. Such a
-path flies a track that is legal below the upper cap, and climbs at least to the lower cap. So the shortest track below
-the upper cap plus the climb to the lower one is a bound for all such paths. Intervals between caps are halved until
-none of them can hold a better path than the best one found.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 
 import numpy as np
 
 from gcsplan.arrays import Floats
+from gcsplan.planners.optimal.loop.search import FAR, Search, Size
+from gcsplan.planners.optimal.loop.workspace import Workspace
 from gcsplan.planners.optimal.navmesh.interval_kernels import range_along
 from gcsplan.planners.optimal.plane.leg import Leg
 from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
 from gcsplan.planners.profile.taut_string import Blocked, Profile, taut_string
-
-MOST_CAPS = 40
-NARROW_M = 0.25
-"""Metres; an interval between two caps that is narrower is not halved."""
-
 
 FLOOR_STEPS = 400
 """Steps along a leg between the places at which the floor is read."""
@@ -48,54 +39,102 @@ LENGTH_PIECES = 4
 """Pieces into which the range of track lengths is cut; each piece has its own bound of the climb."""
 
 
-@dataclass(slots=True)
-class Layer:
-    """Paths whose highest point lies between ``low_m`` and ``high_m``. Their tracks are at least ``track_m`` long, a
-    bound that was computed with ``care`` (0 or 1)."""
+PLAIN, BY_INTERVALS, REFINED = 0, 1, 2
+"""Efforts: floors of the ground alone; with the altitudes that a short enough track can climb to, and descend from in
+time; and with the cells that short enough tracks may meet cut finer."""
+SHARES = {PLAIN: 0.9, BY_INTERVALS: 0.08, REFINED: 0.04}
+ENERGY_SHARE = 0.5
+"""`PLAIN` for energy."""
+INTERVAL_S, REFINED_S = 0.7e-6, 4e-6
+"""Counted seconds for each cell of the finer lattice near short tracks: what altitude intervals take on average, and
+the least that refinement takes in nine of ten missions. Refinement raises bounds even if it ends with the budget."""
+REFINED_GAP = 1.75
+"""Times the wanted gap beyond which cells are cut finer, which takes as long as all other searches together."""
+MOST_CORRIDOR_CELLS = 50_000
+"""Most cells of all corridors for which altitude intervals are computed."""
+FINER = 2
+"""Parts a side into which cells are cut once more, for walls and zones that the first lattice rounds off."""
 
-    low_m: float
-    high_m: float
-    track_m: float
-    care: int = 0
 
-    def cost(self, rise: Callable[[float], float], vertical: float, horizontal: float) -> float:
-        """A lower bound of the energy of such paths. ``rise(amsl_m)``: least metres climbed and descended in all by a
-        path that reaches an altitude; ``vertical``, ``horizontal``: joules per metre."""
-        return vertical * rise(self.low_m) + horizontal * self.track_m
+class Bound(Search):
+    """When a path is known: with rising effort, and after a better path again with the effort so far.
 
-
-def search_caps(
-    layers: list[Layer],
-    cost_of: Callable[[Layer], float],
-    track_m: Callable[[float, int], float],
-    best: Callable[[], float],
-    try_at: Callable[[float], None],
-    gap: float,
-    in_time: Callable[[], bool],
-) -> float:
-    """Split the cheapest layer until its cost is within ``gap`` (a part) of the best path's. Returns the lower bound.
-
-    ``track_m(cap, care)``: a lower bound of tracks below a cap; care 1 costs more and bounds better than care 0.
-    ``try_at(cap)`` looks for a path below a cap; ``best()``: cost of the best path; ``in_time()``: whether to go on.
+    Remembers which efforts were chosen, and whether altitude intervals are used.
     """
-    for _ in range(MOST_CAPS):
-        layers.sort(key=cost_of)
-        layer = layers[0]
-        bound = min(cost_of(layer), best())
-        if bound >= best() * (1.0 - gap) or not in_time():
-            return bound
-        if layer.care == 0:
-            layer.track_m = max(layer.track_m, track_m(layer.high_m, 1))
-            layer.care = 1
-            continue
-        if layer.high_m - layer.low_m < NARROW_M:
-            return bound
-        middle = 0.5 * (layer.low_m + layer.high_m)
-        try_at(middle)
-        lower = Layer(layer.low_m, middle, max(track_m(middle, 0), layer.track_m))
-        layer.low_m = middle
-        layers.append(lower)
-    return min(min(map(cost_of, layers)), best())
+
+    NAME, IMPROVES, SHARE, AGAIN = "bound", "bounds", SHARES[PLAIN], True
+
+    def __init__(self, work: Workspace) -> None:
+        super().__init__(work)
+        self.by_intervals = False
+        self._chosen: set[int] = set()
+        self._now: int | None = None
+
+    @property
+    def share(self) -> float:
+        """By the effort."""
+        plain = self._effort == PLAIN
+        return ENERGY_SHARE if plain and self._is_energy else SHARES[self._effort or PLAIN]
+
+    @property
+    def nearer(self) -> bool:
+        """The least effort is cheap and mostly helps, but for energy."""
+        return self._effort == PLAIN and not self._is_energy
+
+    @property
+    def _is_energy(self) -> bool:
+        return self.problem.objective == "energy"
+
+    @property
+    def _effort(self) -> int | None:
+        """The least effort that is left; None if there is none."""
+        incumbent = self.incumbent
+        if super().is_open():
+            return PLAIN
+        if BY_INTERVALS not in self._chosen and incumbent.climbs:
+            return BY_INTERVALS
+        # Under a maximum AGL it takes twice as long as all others together, for a tenth or two of the gap.
+        far = incumbent.gap > REFINED_GAP * incumbent.wanted and self.problem.limits.max_agl_m is None
+        return REFINED if REFINED not in self._chosen and far else None
+
+    def applies(self) -> bool:
+        """Whether a path is known."""
+        return self.incumbent.best is not None
+
+    def is_open(self) -> bool:
+        """Whether an effort is left."""
+        return self.applies() and self._effort is not None
+
+    def choose(self) -> None:
+        """Note the effort."""
+        self._now = self._effort
+        if self._now == PLAIN:
+            super().choose()
+        elif self._now is not None:
+            self._chosen.add(self._now)
+
+    def size(self) -> Size:
+        """By the effort: a pass over the lattices, or cells near short tracks."""
+        plane = self.work.plane
+        if self._effort == PLAIN:
+            return plane.size(1.0)
+        return plane.size_nearby(REFINED_S if self._effort == REFINED else INTERVAL_S)
+
+    def run(self) -> None:
+        """Raise the bound with the chosen effort."""
+        plane = self.work.plane
+        if not plane.reach_longest():
+            return
+        if self._now == BY_INTERVALS:
+            cells = sum(int(leg.corridor(plane.limit(leg)).cells.sum()) for leg in plane.legs)
+            self.by_intervals = cells <= MOST_CORRIDOR_CELLS
+            if not self.by_intervals:
+                return
+        if self._now == REFINED:
+            cut = 2 if self.incumbent.gap > FAR else 1
+            if not sum(leg.refine(plane.limit(leg), FINER, cut) for leg in plane.legs):
+                return
+        halve(plane, far=self._now == REFINED, by_intervals=self.by_intervals)
 
 
 def altitude_ranges(leg: Leg, track_m: float, limit_m: float) -> tuple[Floats, Floats, Floats]:
@@ -147,11 +186,11 @@ def _string(legs: list[Leg], tracks_m: list[float], limits_m: list[float]) -> Pr
     return taut_string(s[keep], np.minimum(low, high), high, z0, z1)
 
 
-def halve(plane: PlaneSearch, *, far: bool = False) -> None:
+def halve(plane: PlaneSearch, *, far: bool = False, by_intervals: bool = False) -> None:
     """Raise the lower bound of the cost until the gap is as small as wanted, if possible; unless ``far``, the value for
     that is tried first. The interval between bound and path is halved until bounds predict the best cut."""
     incumbent = plane.incumbent
-    if plane.by_intervals:
+    if by_intervals:
         _raise_by_intervals(plane)
     low, high = incumbent.bound, incumbent.cost
     cheaper: list[tuple[float, float]] = []  # costs that were tried, and the bounds of all paths cheaper than them
@@ -169,7 +208,7 @@ def halve(plane: PlaneSearch, *, far: bool = False) -> None:
         # No path is cheaper than `low`; is any cheaper than `middle`?
         middle = where if where < high else low + part * (high - low)
         middle = max(middle, nearer if at_once else 0.0)
-        found = bound_cheaper(plane, middle)
+        found = bound_cheaper(plane, middle, by_intervals=by_intervals)
         if found < middle:
             high = middle
         part = 0.5 if found < middle else min(2.0 * part, 0.5)
@@ -214,9 +253,10 @@ def _limits(plane: PlaneSearch, most_m: float) -> list[tuple[Leg, float]]:
     return [(leg, leg.lower_m + spare) for leg in plane.legs]
 
 
-def bound_cheaper(plane: PlaneSearch, cost: float) -> float:
+def bound_cheaper(plane: PlaneSearch, cost: float, *, by_intervals: bool = False) -> float:
     """A lower bound of all paths cheaper than ``cost``: from their tracks on the fine lattice, then their climb;
-    ``cost`` or more if there are none."""
+    ``cost`` or more if there are none. ``by_intervals``: only over cells with altitude intervals that they can enter.
+    """
     most_m = longest_track(plane, cost)
 
     def least(tracks: list[float]) -> float:
@@ -229,7 +269,7 @@ def bound_cheaper(plane: PlaneSearch, cost: float) -> float:
     tracks = []
     for leg, limit in _limits(plane, most_m):
         wanted = leg.corridor(limit)
-        if plane.by_intervals:
+        if by_intervals:
             intervals = leg.intervals(limit)
             if not len(intervals.cell):
                 tracks.append(min(limit, leg.reach_m))
@@ -282,31 +322,3 @@ def _pieces(tracks_m: list[float], spare_m: float) -> Iterator[tuple[list[float]
         return
     for k in range(LENGTH_PIECES):
         yield [tracks_m[0] + spare_m * k / LENGTH_PIECES], [tracks_m[0] + spare_m * (k + 1) / LENGTH_PIECES]
-
-
-def bound_by_caps(plane: PlaneSearch) -> None:
-    """Look for paths below lower caps, which climb less, and raise the bound of energy to the least of all caps."""
-    p, incumbent = plane.problem, plane.incumbent
-    tried: set[float] = set()
-
-    def cost_of(layer: Layer) -> float:
-        return layer.cost(incumbent.rise, p.vertical_j_per_m, p.horizontal_j_per_m)
-
-    def track_m(cap: float, care: int) -> float:
-        limits = [plane.limit(leg) for leg in plane.legs]
-        wanted = [leg.corridor(limit) if care else None for leg, limit in zip(plane.legs, limits, strict=True)]
-        looked_at = zip(plane.legs, wanted, limits, strict=True)
-        return sum(leg.bound(cap, cells, limit, care > 0) for leg, cells, limit in looked_at)
-
-    def try_at(cap: float) -> None:
-        cap = min(cap, plane.path_top_m)
-        if round(cap, 1) not in tried:
-            tried.add(round(cap, 1))
-            if plane.try_below(cap, fine=False):
-                plane.try_below(cap, fine=True)
-
-    layers = [Layer(max(incumbent.known_m), plane.top_m, sum(leg.length_m for leg in plane.legs))]
-    found = search_caps(
-        layers, cost_of, track_m, lambda: incumbent.cost, try_at, incumbent.nearer, incumbent.budget.goes_on
-    )
-    incumbent.raise_bound(found)

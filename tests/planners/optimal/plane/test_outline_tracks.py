@@ -7,15 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from gcsplan.planners.optimal.plane.detours import SideChoice
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
-from gcsplan.planners.optimal.searches.outline_tracks import OutlineTracks
+from gcsplan.planners.optimal.plane.outline_tracks import OutlineTracks
+from gcsplan.planners.optimal.plane.side_choices import SideChoice
+from gcsplan.planners.optimal.searches.outlines import Outlines
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.path import Path
 from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from tests.support.planner_worlds import faults, ground
+from tests.support.searches import work_of
 
 RADIUS_M, HALF_M = 200.0, 600.0
 
@@ -37,9 +39,9 @@ def tracks_of(problem: Problem) -> OutlineTracks:
 
 def test_the_bound_and_the_path_around_a_disc_are_its_tangents_and_arc() -> None:
     problem = crossing(Zone("disc", Circle(1000.0, 1000.0, RADIUS_M)))
-    tracks = tracks_of(problem)
-    tracks.look()
-    incumbent = tracks.incumbent
+    work = work_of(problem)
+    Outlines(work).run()
+    incumbent = work.incumbent
     assert incumbent.bound <= around_disc_m() <= incumbent.cost
     assert incumbent.cost == pytest.approx(incumbent.bound, rel=1e-3)
     assert incumbent.best is not None
@@ -68,6 +70,4 @@ def test_a_goal_that_is_walled_in_is_proved_to_be_out_of_reach() -> None:
         Zone(f"wall {k}", Polygon(np.array([[a, b], [c, b], [c, d], [a, d]]))) for k, (a, b, c, d) in enumerate(sides)
     ]
     tracks = tracks_of(crossing(*walls))
-    tracks.look()
-    assert tracks.incumbent.proved_infeasible
-    assert tracks.incumbent.best is None
+    assert tracks.look() is None

@@ -1,14 +1,8 @@
-"""Tracks around the zones' own outlines: exact where only zones are in the way, and a lower bound everywhere.
-
-Zones that can be passed neither over nor under are obstacles in the plane with their own outlines (`outlines`). The
-shortest track around them is a bound for every path. Tracks around them, and around zones whose sides are shut because
-passing over or under costs more, give paths (`detours`).
-"""
+"""Tracks around the zones' own outlines: exact where only zones are in the way, and a lower bound everywhere."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,13 +11,10 @@ from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.navmesh.outlines import Solids, ZoneOutline
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.plane.corridor import PinnedTrack, joined
-from gcsplan.planners.optimal.plane.detours import DetourSearch, SideChoice
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
+from gcsplan.planners.optimal.plane.side_choices import SideChoice
 from gcsplan.planners.problem import Problem, terminals_of
-from gcsplan.world.geometry.path import track_length_m
 
-TRACKS = 24
-"""Most tracks that are tried."""
 HARDLY_M, TOUCH_M = 0.1, 1e-4
 """Zones that lack less than this to be passed under or over count as passable, m: `HARDLY_M` where a level or a limit
 counts from the ground, `TOUCH_M` for rounding where both count from mean sea level."""
@@ -60,27 +51,12 @@ class OutlineTracks:
             return None
         return joined(tracks, [z for _, _, z in self.legs[:-1]])
 
-    def look(self) -> None:
-        """Raise the bound to the shortest track around the zones that can be passed neither over nor under, or prove
-        that there is none; then look for paths."""
-        incumbent = self.incumbent
-        try:
-            tracks = self.tracks(~(self.under | self.over), outer=False)
-        except Exhausted:
-            tracks = []
-        if tracks is None:
-            incumbent.proved_infeasible = True
-            return
-        if tracks:
-            self._hints = tracks
-            incumbent.raise_track_bound(_length_m(tracks))
-        zones = len(self.under)
-        root = SideChoice(np.ones(zones, np.bool_), np.ones(zones, np.bool_))
-        laps = incumbent.climbs and incumbent.sharp
-        roots = [root]
-        if laps and math.isfinite(incumbent.cost):
-            roots.insert(0, replace(root, most_m=(incumbent.cost - incumbent.bound,) * 2))
-        DetourSearch(incumbent, self.terminals, False).run(roots, TRACKS, first=False, laps=laps)
+    def look(self) -> list[Floats] | None:
+        """The shortest tracks of the legs around the zones that can be passed neither over nor under, along which all
+        outlines are refined from now on; None if a leg has none. Raises Exhausted."""
+        tracks = self.tracks(~(self.under | self.over), outer=False)
+        self._hints = tracks or []
+        return tracks
 
     def walls(self) -> Bools:
         """(zones,) which zones can be passed neither over nor under by a path that is better than the best."""
@@ -113,11 +89,6 @@ class OutlineTracks:
                 return None
             tracks.append(found.points)
         return tracks
-
-
-def _length_m(tracks: list[Floats]) -> float:
-    """The length of all tracks together, rounded down."""
-    return sum(track_length_m(t) for t in tracks) * (1.0 - 1e-9)
 
 
 def _sides(problem: Problem) -> tuple[Bools, Floats]:

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from gcsplan.planners.optimal import planner as optimal
-from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
-from gcsplan.planners.optimal.searches import bound_corridor
+from gcsplan.planners.optimal.searches import bound_corridor, fine_tracks
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
@@ -54,7 +53,8 @@ def test_a_path_leads_through_what_is_open_by_centimetres(
     assert found.lower_bound is not None
     assert problem.cost(found.path) < 1.003 * found.lower_bound
     assert faults(problem, found.path) == []
-    monkeypatch.setattr(PlaneSearch, "narrow_passage", lambda self: False)
+    for module in (fine_tracks, bound_corridor):
+        monkeypatch.setattr(module, "narrow_passage", lambda plane: False)
     monkeypatch.setattr(bound_corridor, "over_pass", lambda problem, cap_m, track: track)
     assert problem.cost(optimal.plan(problem).path) > ROUND_M, "the notch is too wide to show anything"
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats, Indices
-from gcsplan.planners.optimal.searches.section_dp import FAR_AHEAD, FIXED, FREE, cheapest, tightened
 from gcsplan.planners.problem import Problem, Via
+from gcsplan.planners.profile.cross_sections import FAR_AHEAD, FIXED, FREE, cheapest, tightened
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.path import Path

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gcsplan.planners.optimal.bounds.overflight import Overflight
+from gcsplan.planners.optimal.loop.workspace import Workspace
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.planner import plan
-from gcsplan.planners.optimal.searches.outline_tracks import OutlineTracks
+from gcsplan.planners.optimal.searches.outline_bound import OutlineBound
+from gcsplan.planners.optimal.searches.outlines import Outlines
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
@@ -102,11 +103,11 @@ def test_the_bound_of_energy_counts_the_climb_over_the_highest_zone(seed: int) -
 
 def test_the_bound_over_a_long_wall_has_its_climb_and_its_descent() -> None:
     """Around the wall it is kilometres: over it a path rises by 119 m within 617 m, and sinks again."""
-    incumbent = Incumbent(CASES["over a long wall"])
-    outlines = OutlineTracks(incumbent, 1000.0)
-    outlines.look()
+    work = Workspace(Incumbent(CASES["over a long wall"]))
+    incumbent = work.incumbent
+    Outlines(work).run()
     around_m = incumbent.bound
-    Overflight(incumbent, outlines).look()
+    OutlineBound(work).run()
     over_m = 2.0 * math.hypot(617.0, 155.0 - 36.0) + 166.0
     assert around_m == pytest.approx(1400.0, rel=1e-3)
     assert incumbent.bound == pytest.approx(over_m, rel=1e-3)

@@ -1,1 +1,0 @@
-"""Sources of lower bounds: lengths and energies that no path can beat."""
