@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import combinations, product
 
 import numpy as np
@@ -46,31 +47,37 @@ MANY_NAMES = 8
 with an entry for every name."""
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class PlaneSpec:
+    """What a plane's mesh is for: all that any legal track may cross at or below ``cap_m`` (``low``: for bounds), or
+    what can certainly be crossed legally (for paths).
+
+    ``ends``: the cones in which paths climb from the ends of the leg, see `clearance_kernels.fill`; ``under``, ``over``
+    (zones,): which zones may be passed below their floors, above their ceilings; None for all. ``exact_m``: if not
+    None, floors are those of the exact check at the nodes, without a margin for what lies between them, and these
+    metres are kept from levels of zones that follow the ground.
+    """
+
+    cap_m: float
+    low: bool
+    ends: tuple[Cone, ...] = ()
+    under: Bools | None = None
+    over: Bools | None = None
+    exact_m: float | None = None
+
+
 class ClearanceGrid:
     """The *excess* (floor minus cap, m) at the nodes of a plane's ``wanted`` cells (None: all), cut ``fineness`` times
     finer, and the walls of the zones.
 
-    ``cap_m``, ``low`` as in `mesh_of`; ``ends``: the cones in which paths climb from the ends of the leg, see
-    `clearance_kernels.fill`; ``under``, ``over`` (zones,): which zones may be passed below their floors, above their
-    ceilings; None for all. ``whole``: the mesh is kept and can be read at all its nodes; other grids are valid only
-    until the plane's next one. ``exact_m``: if not None, floors are those of the exact check at the nodes, without a
-    margin for what lies between them, and these metres are kept from levels of zones that follow the ground. Raises
-    Exhausted if the nodes take more memory than the budget leaves.
+    ``whole``: the mesh is kept and can be read at all its nodes; other grids are valid only until the plane's next one.
+    Raises Exhausted if the nodes take more memory than the budget leaves.
     """
 
     def __init__(
-        self,
-        plane: Plane,
-        cap_m: float,
-        low: bool,
-        fineness: int,
-        wanted: Bools | None,
-        ends: list[Cone] | None = None,
-        under: Bools | None = None,
-        over: Bools | None = None,
-        whole: bool = False,
-        exact_m: float | None = None,
+        self, plane: Plane, spec: PlaneSpec, fineness: int = 1, wanted: Bools | None = None, *, whole: bool = False
     ) -> None:
+        cap_m, low, exact_m = spec.cap_m, spec.low, spec.exact_m
         problem = plane.problem
         limits, scale = problem.bound_limits if low else problem.limits, problem.airspace.scale
         whole = whole or wanted is None
@@ -107,12 +114,12 @@ class ClearanceGrid:
                 beside += limits.horizontal_clearance_m * scale
         fill(
             top, ground, steep, x, y, np.ascontiguousarray(wanted[inner]), fineness, more, beside, cap_m,
-            np.array(ends or []).reshape(-1, 4), low, self._around, self._excess, self._floor, self._ground, self._x,
+            np.array(spec.ends).reshape(-1, 4), low, self._around, self._excess, self._floor, self._ground, self._x,
             self._y, self._diagonal,
         )  # fmt: skip
         if exact_m is not None:
             self._be_exact()
-        self._zones, self._edges = plane.zones(low, under, over)
+        self._zones, self._edges = plane.zones(low, spec.under, spec.over)
         self._boxes = plane.boxes(self.row, self.col, fineness, rows, cols)
         self._coarse, self._steep, self._exact_m = (ground, x, y), steep, exact_m
         self._up, self._down = (self._array(name, self.shape) for name in ("up", "down"))
@@ -347,7 +354,7 @@ def mesh_of(
 
     ``wanted``: only these cells. ``single``: each free cell is a piece of its own. Raises Exhausted.
     """
-    return ClearanceGrid(plane, cap_m, low, fineness, wanted, whole=single).mesh(single=single)
+    return ClearanceGrid(plane, PlaneSpec(cap_m, low), fineness, wanted, whole=single).mesh(single=single)
 
 
 def sampled(track: Floats, step_m: float) -> Floats:

@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid
+from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid, PlaneSpec
 from gcsplan.planners.optimal.navmesh.clearance_kernels import SPARE
 from gcsplan.planners.optimal.navmesh.grid import Plane, lattice
 from gcsplan.planners.optimal.navmesh.mesh import Guide, Mesh
@@ -227,7 +227,7 @@ class Necks:
             row, col = at[((at >= 0) & (at < size)).all(axis=1)].T
             mask[row, col] = True
         finely = np.repeat(np.repeat(around, ratio, axis=0), ratio, axis=1)
-        clearance = ClearanceGrid(finer, self.cap_m, True, 1, finely, whole=True)
+        clearance = ClearanceGrid(finer, PlaneSpec(self.cap_m, True), 1, finely, whole=True)
         clearance.add_walls(*walls_beside(clearance))
         mesh = clearance.mesh(single=True)
         return Neck(cells, *_openings(mesh, own, ratio, first))

@@ -83,6 +83,20 @@ class Narrow:
     zones_m: float = 0.0
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class SideChoice:
+    """``under``, ``over`` (zones,): which zones may be passed below their floor, above their ceiling; ``least_m``,
+    ``most_m``: the range of spare metres near the ends; ``lower_m``: metres by which the cap is lowered. ``tried``:
+    zones for which choices with one side more shut, and no fewer spare metres, have been made before."""
+
+    under: Bools
+    over: Bools
+    least_m: Spare = (0.0, 0.0)
+    most_m: Spare = (0.0, 0.0)
+    lower_m: float = 0.0
+    tried: frozenset[int] = frozenset()
+
+
 def joined(ways: list[Floats], heights: list[float | None]) -> PinnedTrack:
     """Join the tracks of all legs (N, 2) into one; ``heights``: altitudes of the inner terminals, None where free."""
     points = np.vstack([ways[0], *(w[1:] for w in ways[1:])])

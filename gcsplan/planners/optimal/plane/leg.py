@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid, Cone, mesh_of
+from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid, PlaneSpec, mesh_of
 from gcsplan.planners.optimal.navmesh.grid import Plane, box_of, extent, finer_plane, make_plane, on_finer
 from gcsplan.planners.optimal.navmesh.mesh import Guide, Mesh
 from gcsplan.planners.optimal.navmesh.necks import LegNecks
@@ -31,7 +31,7 @@ from gcsplan.planners.optimal.plane.altitude_intervals import (
     intervals,
     ranges,
 )
-from gcsplan.planners.optimal.plane.corridor import Corridor, End, Narrow, Nearby, Spare
+from gcsplan.planners.optimal.plane.corridor import Corridor, End, Narrow, Nearby, SideChoice
 from gcsplan.planners.problem import Problem
 from gcsplan.world.geometry.zones import Box, Circle
 
@@ -244,20 +244,11 @@ class Leg:
                 return
 
     def _clearance(
-        self,
-        cap_m: float,
-        low: bool,
-        within: Corridor | None,
-        limit_m: float,
-        ends: list[Cone] | None = None,
-        under: Bools | None = None,
-        over: Bools | None = None,
-        narrow: Narrow | None = None,
-        roughly: bool = False,
+        self, spec: PlaneSpec, within: Corridor | None, limit_m: float, *, roughly: bool = False
     ) -> tuple[ClearanceGrid, Guide]:
         """The clearance grid, and a guide with distances to the goal: on the finer lattice ``within`` a corridor, or
         else on the first-look lattice for tracks shorter than ``limit_m``. ``roughly``: cells are `ROUGHLY` times
-        larger; ``narrow``: as in `track`; the other arguments are those of `ClearanceGrid`. Raises Exhausted."""
+        larger. Raises Exhausted."""
         if within is None:
             plane, fineness, guide = self.plane, 1, self._guide
             cells = guide.reach(self.start.place, limit_m)
@@ -275,32 +266,31 @@ class Leg:
         if roughly:
             fineness = -(-fineness // ROUGHLY)
         fineness = min(fineness, most_parts(self.problem, cells))
-        exact_m = None if narrow is None else narrow.zones_m
-        return ClearanceGrid(plane, cap_m, low, fineness, cells, ends, under, over, exact_m=exact_m), guide
+        return ClearanceGrid(plane, spec, fineness, cells), guide
 
     def track(
-        self,
-        cap_m: float,
-        within: Corridor | None,
-        limit_m: float,
-        under: Bools | None,
-        spare_m: Spare = (0.0, 0.0),
-        over: Bools | None = None,
+        self, cap_m: float, within: Corridor | None, limit_m: float, choice: SideChoice | None = None,
         narrow: Narrow | None = None,
-    ) -> GroundTrack | None:
+    ) -> GroundTrack | None:  # fmt: skip
         """The shortest track that is legal below ``cap_m`` by the mesh for paths, if it is shorter than ``limit_m`` and
         `reach_m`; None if there is none or the search is exhausted.
 
-        ``within``: the corridor to search on the finer lattice; None: the first-look lattice. ``spare_m``: metres that
-        may be added near start and goal to climb. ``under``, ``over`` (zones,): which zones may be passed below, above;
-        None for all. ``narrow``: if not None, nodes are only as high as in the exact check, which may miss a little
-        between nodes, and are raised where earlier tracks lacked altitude.
+        ``within``: the corridor to search on the finer lattice; None: the first-look lattice. ``choice``: which zones
+        may be passed below and above, and the most metres that may be added near start and goal to climb (None: all
+        zones, no metres). ``narrow``: if not None, nodes are only as high as in the exact check, which may miss a
+        little between nodes, and are raised where earlier tracks lacked altitude.
         """
         limit, limits = min(limit_m, self.reach_m), self.problem.limits
+        under, over, spare_m = (
+            (None, None, (0.0, 0.0)) if choice is None else (choice.under, choice.over, choice.most_m)
+        )
         cones = self.start.cone(limits.max_climb_slope, spare_m[0])
         cones += self.goal.cone(limits.max_descent_slope, spare_m[1])
+        exact_m = None if narrow is None else narrow.zones_m
         try:
-            clearance, guide = self._clearance(cap_m, False, within, limit, cones, under, over, narrow)
+            clearance, guide = self._clearance(
+                PlaneSpec(cap_m, False, tuple(cones), under, over, exact_m), within, limit
+            )
             for place, by in narrow.pinched if narrow else ():
                 clearance.lift(place[None], np.array([by]))
             for _ in range(1 if narrow is None else LEARNT):
@@ -343,7 +333,9 @@ class Leg:
         # Not `lower_m`, which counts laps: near the ends, a path that flew laps has climbed for as many metres.
         known = self.length_m
         try:
-            clearance, guide = self._clearance(cap_m, True, within, limit, roughly=limit > MUCH_LONGER * known)
+            clearance, guide = self._clearance(
+                PlaneSpec(cap_m, True), within, limit, roughly=limit > MUCH_LONGER * known
+            )
         except Exhausted:
             return known
         for k in range(RAISED):

@@ -10,9 +10,8 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats
 from gcsplan.planners.optimal.navmesh.outlines import Solids, ZoneOutline
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
-from gcsplan.planners.optimal.plane.corridor import PinnedTrack, joined
+from gcsplan.planners.optimal.plane.corridor import PinnedTrack, SideChoice, joined
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
-from gcsplan.planners.optimal.plane.side_choices import SideChoice
 from gcsplan.planners.problem import Problem, terminals_of
 
 HARDLY_M, TOUCH_M = 0.1, 1e-4

@@ -11,10 +11,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from gcsplan.planners.optimal.plane.corridor import End, Narrow, PinnedTrack, joined
+from gcsplan.planners.optimal.plane.corridor import End, Narrow, PinnedTrack, SideChoice, joined
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.plane.leg import Leg
-from gcsplan.planners.optimal.plane.side_choices import DetourSearch, SideChoice
+from gcsplan.planners.optimal.plane.side_choices import DetourSearch
 from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.planners.profile.exact import Unsettled
 from gcsplan.planners.profile.track import Flown, fly, make_track
@@ -113,8 +113,7 @@ class PlaneSearch:
                 return None
             limit = self.limit(leg)
             wanted = leg.corridor(limit) if fine and leg.cells_of.has_fine else None
-            spare_m = choice.most_m
-            way = leg.track(cap_m - choice.lower_m, wanted, limit, choice.under, spare_m, choice.over, narrow)
+            way = leg.track(cap_m - choice.lower_m, wanted, limit, choice, narrow)
             if way is None:
                 return None
             ways.append(way.points)

@@ -21,7 +21,7 @@ from heapq import heappop, heappush
 import numpy as np
 
 from gcsplan.arrays import Bools
-from gcsplan.planners.optimal.plane.corridor import PinnedTrack, Spare
+from gcsplan.planners.optimal.plane.corridor import PinnedTrack, SideChoice, Spare
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.exact import sampled_track
@@ -40,20 +40,6 @@ LEAST_GAIN = 1e-4
 """Part of the cost below which a gain is not worth a search."""
 NARROW = 0.04
 """Ranges of spare metres are not split if they cost less than this part of the difference between path and bound."""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class SideChoice:
-    """``under``, ``over`` (zones,): which zones may be passed below their floor, above their ceiling; ``least_m``,
-    ``most_m``: the range of spare metres near the ends; ``lower_m``: metres by which the cap is lowered. ``tried``:
-    zones for which choices with one side more shut, and no fewer spare metres, have been made before."""
-
-    under: Bools
-    over: Bools
-    least_m: Spare = (0.0, 0.0)
-    most_m: Spare = (0.0, 0.0)
-    lower_m: float = 0.0
-    tried: frozenset[int] = frozenset()
 
 
 _Open = tuple[float, int, float, SideChoice, Lacking | None, PinnedTrack | None]

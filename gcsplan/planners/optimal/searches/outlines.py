@@ -15,7 +15,8 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.planners.optimal.loop.search import FAR, Search, Size
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
-from gcsplan.planners.optimal.plane.side_choices import DetourSearch, SideChoice
+from gcsplan.planners.optimal.plane.corridor import SideChoice
+from gcsplan.planners.optimal.plane.side_choices import DetourSearch
 from gcsplan.planners.profile.track import Obstruction
 from gcsplan.world.geometry.path import track_length_m
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gcsplan.planners.optimal.navmesh import clearance
-from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid
+from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid, PlaneSpec
 from gcsplan.planners.optimal.navmesh.climb_cones import hold_down, lift_lids, look_around, walk_around
 from gcsplan.planners.optimal.navmesh.grid import lattice
 from gcsplan.planners.optimal.navmesh.zone_shapes import CLOSE
@@ -29,14 +29,14 @@ def held(zones: tuple[Zone, ...] = ()) -> ClearanceGrid:
     limits = Limits(10.0, max_climb_deg=11.3, max_descent_deg=11.3)
     problem = Problem(Airspace(ground(ridge), zones), limits, (400.0, 1000.0, 20.0), (1600.0, 1000.0, 20.0))
     plane = lattice(problem, (0, 0, 100, 100), 1, 1, 1, None, CLOSE)
-    grid = ClearanceGrid(plane, CAP_M, True, 1, None, whole=True)
+    grid = ClearanceGrid(plane, PlaneSpec(CAP_M, True), whole=True)
     grid.hold([(400.0, 1000.0, 20.0, SLOPE)])
     return grid
 
 
 def test_a_ridge_too_near_to_the_start_is_shut_and_far_from_it_is_open() -> None:
     grid = held()
-    open_before = ClearanceGrid(grid.plane, CAP_M, True, 1, None, whole=True)
+    open_before = ClearanceGrid(grid.plane, PlaneSpec(CAP_M, True), whole=True)
     row, col = 50 - grid.row, 30 - grid.col  # on the crest, 200 m east of the start: 60 m up at most
     piece = row * (grid.shape[1] - 1) + col
     assert (grid.mesh().piece[piece] < 0).all()

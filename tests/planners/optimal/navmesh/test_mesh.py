@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.arrays import Bools, Floats
-from gcsplan.planners.optimal.navmesh.clearance import AROUND, ClearanceGrid, columns_around, mesh_of
+from gcsplan.planners.optimal.navmesh.clearance import AROUND, ClearanceGrid, PlaneSpec, columns_around, mesh_of
 from gcsplan.planners.optimal.navmesh.grid import Plane, make_plane
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.zone_shapes import convex_parts
@@ -450,7 +450,7 @@ def test_the_rim_of_a_zone_over_a_slope_is_no_wall_where_the_zone_can_be_passed_
     line = np.linspace(inside, outside, 60)
     assert legal(problem, line, cap_m).all()
     plane = make_plane(problem, EVERYWHERE, 20)
-    mesh = ClearanceGrid(plane, cap_m, False, 1, None, exact_m=0.0, whole=True).mesh()
+    mesh = ClearanceGrid(plane, PlaneSpec(cap_m, False, exact_m=0.0), whole=True).mesh()
     way = mesh.track((float(inside[0]), float(inside[1])), (float(outside[0]), float(outside[1])))
     assert way is not None
     assert way.length_m == pytest.approx(16.0, abs=1e-6)

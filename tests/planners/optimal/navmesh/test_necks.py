@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats
-from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid
+from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid, PlaneSpec
 from gcsplan.planners.optimal.navmesh.grid import Plane, make_plane
 from gcsplan.planners.optimal.navmesh.mesh import Mesh
 from gcsplan.planners.optimal.navmesh.necks import Necks
@@ -28,7 +28,7 @@ ENOUGH = 8
 
 
 def grid_of(plane: Plane, cap_m: float, fineness: int) -> ClearanceGrid:
-    return ClearanceGrid(plane, cap_m, True, fineness, None, whole=True)
+    return ClearanceGrid(plane, PlaneSpec(cap_m, True), fineness, whole=True)
 
 
 def with_necks(plane: Plane, cap_m: float, fineness: int, ends: Floats, looks: list[Floats]) -> Mesh:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid
+from gcsplan.planners.optimal.navmesh.clearance import ClearanceGrid, PlaneSpec
 from gcsplan.planners.optimal.navmesh.grid import lattice
 from gcsplan.planners.optimal.navmesh.necks import walls_beside
 from gcsplan.planners.optimal.navmesh.zone_shapes import CLOSE
@@ -31,7 +31,7 @@ def test_walls_are_no_higher_than_the_exact_floor(seed: int) -> None:
     parts = int(rng.integers(4, 12))
     plane = lattice(problem, (0, 0, 12, 11), parts, 1, 1, None, CLOSE)
     cap = 22.0 + float(np.median(problem.airspace.surface.ground_m))
-    clearance = ClearanceGrid(plane, cap, True, 1, None, whole=True)
+    clearance = ClearanceGrid(plane, PlaneSpec(cap, True), whole=True)
     cols = clearance.shape[1]
     found = list(walls_beside(clearance))
     cell, walls = np.concatenate([c for c, _ in found]), np.concatenate([w for _, w in found])

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from gcsplan.planners.optimal.plane.corridor import SideChoice
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.plane.outline_tracks import OutlineTracks
-from gcsplan.planners.optimal.plane.side_choices import SideChoice
 from gcsplan.planners.optimal.searches.outlines import Outlines
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace

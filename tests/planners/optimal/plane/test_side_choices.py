@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gcsplan.bench.terrain.problems import problems
+from gcsplan.planners.optimal.plane.corridor import SideChoice
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
-from gcsplan.planners.optimal.plane.side_choices import DetourSearch, SideChoice
+from gcsplan.planners.optimal.plane.side_choices import DetourSearch
 from gcsplan.planners.optimal.searches.cap_search import PAST
 from gcsplan.planners.optimal.searches.detours import PAST_FINE
 from gcsplan.planners.problem import Problem
@@ -253,7 +254,9 @@ def test_a_zones_ceiling_that_is_shut_is_none() -> None:
         below = plane_of(problem)
         leg = below.legs[0]
         leg.flood(1.0)
-        way = leg.track(below.top_m, None, math.inf, None, (0.0, 0.0), over)
+        way = leg.track(
+            below.top_m, None, math.inf, SideChoice(np.ones(1, bool), np.ones(1, bool) if over is None else over)
+        )
         assert way is not None
         lengths.append(way.length_m)
     assert lengths[0] == pytest.approx(1600.0, abs=0.1)
