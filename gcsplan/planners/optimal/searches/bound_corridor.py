@@ -265,13 +265,19 @@ def _past(
             goal = np.array([*places[last], height])
         work = _part(plane, replace(plane.problem, objective="length"), start, goal, FARTHEST)
         sub, track = work.incumbent, np.vstack([start[:2], places[first + 1 : last], goal[:2]])
-        along = [] if (first, last) in stretches else [_AlongTrack(work, track)]
-        govern(sub, [*along, CapSearch(work, STRETCH_SLACKS), _OverPass(work, track, plane.path_top_m), _Slit(work)])
+        govern(sub, searches_of_stretch(work, track, plane.path_top_m, shut=(first, last) in stretches))
         if sub.best is None or not plane.incumbent.budget.goes_on():
             return None
         out.append(sub.best if not out else sub.best[1:])
         start = goal
     return np.vstack(out)
+
+
+def searches_of_stretch(work: Workspace, track: Floats, cap_m: float, *, shut: bool) -> list[Search]:
+    """The searches of a stretch along a ``track`` (N, 2), which may be ``shut``, below a cap; each while no path of it
+    is known."""
+    along = [] if shut else [_AlongTrack(work, track)]
+    return [*along, CapSearch(work, STRETCH_SLACKS), _OverPass(work, track, cap_m), _Slit(work)]
 
 
 class _PieceSearch(Search):
@@ -283,7 +289,7 @@ class _PieceSearch(Search):
         return self.incumbent.best is None
 
     def size(self) -> Size:
-        return self.takes(0.0)
+        return 0.0, 0.0
 
 
 class _AlongTrack(_PieceSearch):
@@ -316,6 +322,10 @@ class _Slit(_PieceSearch):
     """Tracks over nodes that are only as high as in the exact check."""
 
     NAME, SHARE = "slit", 1e-5
+
+    def applies(self) -> bool:
+        legs = self.work.plane.legs  # none are seen if there was no room for `cap_search`
+        return super().applies() and bool(legs) and all(leg.seen for leg in legs)
 
     def run(self) -> None:
         narrow_passage(self.work.plane)

@@ -26,7 +26,8 @@ class CapSearch(Search):
     def applies(self) -> bool:
         """Whether no path is known; under a maximum AGL, whether a bound may help."""
         i = self.incumbent
-        return i.best is None if self.problem.limits.max_agl_m is None else i.bound < i.cost
+        may_help = i.best is None if self.problem.limits.max_agl_m is None else i.bound < i.cost
+        return may_help and bool(self.work.plane.legs)
 
     def size(self) -> Size:
         """One pass over the lattices."""

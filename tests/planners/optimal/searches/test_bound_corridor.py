@@ -14,6 +14,7 @@ from gcsplan.arrays import Floats
 from gcsplan.bench.terrain.problems import problems
 from gcsplan.planners.lattice.planner import plan_band
 from gcsplan.planners.optimal.loop.workspace import Workspace
+from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.optimal.searches import bound_corridor
 from gcsplan.planners.optimal.searches.bound_corridor import over_pass
@@ -47,6 +48,17 @@ def test_a_path_leads_through_a_notch_that_was_passed_by() -> None:
     assert below.cost < STRAIGHT_M
     assert faults(below.problem, Path(below.best)) == []
     assert not bound_corridor.follow(work.plane)  # there is no other notch
+
+
+def test_slits_are_not_looked_for_before_a_stretch_was_flooded() -> None:
+    """The flood may be refused, for it may be more work than is left."""
+    problem = ridge(-0.3, 0.2, 80.0, True)
+    work = Workspace(Incumbent(problem, piece=True))
+    track = np.array([problem.start[:2], problem.goal[:2]])
+    slits = bound_corridor.searches_of_stretch(work, track, work.plane.path_top_m, shut=True)[-1]
+    assert not slits.is_open()
+    work.plane.flood(0.008)
+    assert slits.is_open()
 
 
 @pytest.mark.slow
