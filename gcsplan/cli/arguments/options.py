@@ -36,8 +36,8 @@ UnitsOption = Annotated[
         "--units",
         envvar="GCSPLAN_UNITS",
         metavar="NAME",
-        help="Of tables, findings, notes and report: metric, imperial (ft, mi, mph) or aviation (ft, NM, kt). Other "
-        "files and JSON stay in SI.",
+        help="Units of tables, findings, notes and report: metric, imperial (ft, mi, mph) or aviation (ft, NM, kt). "
+        "Other files and JSON stay in SI.",
     ),
 ]
 MissionArgument = Annotated[
@@ -48,7 +48,7 @@ MissionArgument = Annotated[
 ]
 DatumOption = Annotated[
     str | None,
-    typer.Option("--vertical-datum", metavar="NAME", help="Of the terrain: EGM96, EGM2008, NAVD88, EPSG:6360, …"),
+    typer.Option("--vertical-datum", metavar="NAME", help="Zero of the terrain's heights: EGM96, NAVD88, EPSG:6360, …"),
 ]
 HeightUnitOption = Annotated[
     str | None,
@@ -56,7 +56,7 @@ HeightUnitOption = Annotated[
         "--height-unit",
         metavar="UNIT",
         autocompletion=completion.words("m", "ft", "us_ft"),
-        help="Of the terrain's heights, in place of what the file states: m, ft or us_ft.",
+        help="Unit of the terrain's heights, before the one that the file states: m, ft or us_ft.",
     ),
 ]
 NodataOption = Annotated[

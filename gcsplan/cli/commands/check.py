@@ -69,8 +69,8 @@ def check(
     height_unit: HeightUnitOption = None,
     nodata: NodataOption = None,
     geoid_grid: Annotated[str | None, typer.Option(metavar="FILE", help="For an ellipsoidal DEM.")] = None,
-    crs: Annotated[str | None, typer.Option(metavar="EPSG:N", help="Of a DEM that does not say.")] = None,
-    obstacle_height: Annotated[Number, typer.Option(metavar="M", help="Of trees and houses, everywhere.")] = None,
+    crs: Annotated[str | None, typer.Option(metavar="EPSG:N", help="Coordinates of a DEM that states none.")] = None,
+    obstacle_height: Annotated[Number, typer.Option(metavar="M", help="Height of trees and houses everywhere.")] = None,
     zones: Annotated[
         list[str] | None,
         typer.Option(

@@ -136,7 +136,7 @@ def check(
     points: Annotated[
         int, typer.Option("--points", metavar="N", min=1, max=100_000, help="Random places that are compared.")
     ] = 200,
-    seed: Annotated[int, typer.Option("--seed", metavar="N", help="Of the places.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the random places.")] = 1,
     spacing: SpacingOption = 100,
     as_json: JsonOption = False,
 ) -> None:
