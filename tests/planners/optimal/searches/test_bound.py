@@ -11,12 +11,21 @@ from gcsplan.bench.terrain.problems import problems
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
 from gcsplan.planners.optimal.planner import search
-from gcsplan.planners.optimal.searches.bound import bound_cheaper, longest_track
+from gcsplan.planners.optimal.searches.bound import (
+    BY_INTERVALS,
+    PLAIN,
+    REFINED,
+    SHARES,
+    Bound,
+    bound_cheaper,
+    longest_track,
+)
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.surface import GridMap, Surface
 from tests.support.planner_worlds import Floats, ground
+from tests.support.searches import work_of
 
 
 @pytest.mark.slow
@@ -71,3 +80,36 @@ def test_a_wall_that_only_finer_cells_close_is_closed_for_energy_too(zones: str,
     assert found.best is not None
     assert not problem.airspace.examine(Legs.of_path(found.best, problem.limits), problem.limits).violations
     assert 100.0 * found.gap < gap_percent
+
+
+def with_a_path(cost: float, bound: float, limits: Limits) -> Bound:
+    """The search of bounds where the best path costs ``cost``."""
+    problem = Problem(Airspace(ground(0.0), ()), limits, (400.0, 1000.0, 20.0), (1500.0, 1000.0, 20.0))
+    work = work_of(problem)
+    work.incumbent.best = np.array([problem.start, problem.goal])
+    work.incumbent.cost, work.incumbent.bound = cost, bound
+    return Bound(work)
+
+
+def efforts(search: Bound) -> list[float]:
+    """The shares with which a search is open, one after another."""
+    out = []
+    while search.is_open() and len(out) < 10:
+        out.append(search.share)
+        assert search.nearer == (search.share == SHARES[PLAIN])
+        search.choose()
+    return out
+
+
+def test_its_effort_rises_and_begins_again_after_a_better_path() -> None:
+    search = with_a_path(1500.0, 1100.0, Limits(10.0, max_climb_deg=10.0))
+    assert efforts(search) == [SHARES[PLAIN], SHARES[BY_INTERVALS], SHARES[REFINED]]
+    search.incumbent.cost = 1490.0
+    assert efforts(search) == [SHARES[PLAIN]]
+
+
+def test_efforts_that_cannot_help_are_left_out() -> None:
+    assert efforts(with_a_path(1500.0, 1100.0, Limits(10.0))) == [SHARES[PLAIN], SHARES[REFINED]]
+    assert efforts(with_a_path(1100.1, 1100.0, Limits(10.0))) == [SHARES[PLAIN]]  # the gap is as small as wanted
+    band = Limits(10.0, max_agl_m=100.0, max_climb_deg=10.0)
+    assert efforts(with_a_path(1500.0, 1100.0, band)) == [SHARES[PLAIN], SHARES[BY_INTERVALS]]

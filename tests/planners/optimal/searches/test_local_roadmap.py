@@ -10,7 +10,7 @@ import pytest
 from gcsplan.planners.budget import RATES, Budget
 from gcsplan.planners.optimal.planner import plan
 from gcsplan.planners.optimal.searches import local_roadmap
-from gcsplan.planners.optimal.searches.local_roadmap import small_path
+from gcsplan.planners.optimal.searches.local_roadmap import FIRST, LAST, NEAR, LocalRoadmap, small_path
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
@@ -23,7 +23,7 @@ from tests.oracles.optima_polish import cost_of
 from tests.oracles.optima_witnesses import known
 from tests.oracles.optima_worlds import Case, make, plane_ground
 from tests.support.planner_worlds import Floats, random_mission
-from tests.support.searches import plane_of, spent_budget
+from tests.support.searches import plane_of, spent_budget, work_of
 
 
 def flat(discs: list[tuple[float, float, float]], via: tuple[Via, ...] = (), clearance_m: float = 0.0) -> Case:
@@ -143,6 +143,23 @@ def test_long_missions_and_stops_in_one_place_are_left_alone() -> None:
     assert not plane_of(random_mission(0)).is_small
     assert not plane_of(flat([], (Via(700.0, 1000.0),)).problem).is_small
     assert plane_of(flat([]).problem).is_small
+
+
+def test_it_has_a_turn_without_a_path_one_beyond_a_large_gap_and_one_at_last() -> None:
+    work = work_of(flat([]).problem)
+    search, incumbent = LocalRoadmap(work), work.incumbent
+    shares = []
+    for cost in (np.inf, 800.0, 800.0, 800.0, 700.0):
+        if np.isfinite(cost):
+            incumbent.best, incumbent.cost = np.array([incumbent.problem.start, incumbent.problem.goal]), cost
+        shares.append(search.share if search.is_open() else 0.0)
+        search.choose()
+    assert shares == [FIRST[0], NEAR[0], LAST[0], 0.0, 0.0]
+    near = LocalRoadmap(work)
+    incumbent.cost = 1.01 * incumbent.bound
+    assert near.share == LAST[0]
+    incumbent.cost = 1.001 * incumbent.bound
+    assert not near.is_open()
 
 
 @pytest.mark.slow
