@@ -25,7 +25,7 @@ class PlannerEntry:
     """One planner; ``module`` holds its ``plan`` and is imported only on the first call.
 
     ``paper`` is its source, empty if it is gcsplan's own. ``optimiser`` names a swarm's optimiser in
-    `gcsplan.optimisers.registry`, empty otherwise. ``defaults`` are fields of `Problem`; for a swarm, keys of
+    `gcsplan.research.optimisers.registry`, empty otherwise. ``defaults`` are fields of `Problem`; for a swarm, keys of
     ``Problem.options``. ``space``: the ``encoding`` and ``points`` of a swarm's paper, which stand for `PAPER`.
     """
 
@@ -55,7 +55,7 @@ def _swarm(name: str, summary: str, paper: str, system: Mapping[str, object], **
     return PlannerEntry(
         name=name,
         summary=summary,
-        module="gcsplan.planners.swarm.aco" if name == "aco" else "gcsplan.planners.swarm.planner",
+        module="gcsplan.research.swarm.aco" if name == "aco" else "gcsplan.research.swarm.planner",
         paper=paper,
         defaults=MappingProxyType(both),
         optimiser=name,

@@ -10,8 +10,8 @@ import pytest
 
 from gcsplan.errors import InputError
 from gcsplan.mission_file.values.schema import EncodingName
-from gcsplan.optimisers import registry as optimisers
 from gcsplan.planners import registry
+from gcsplan.research.optimisers import registry as optimisers
 
 
 def test_the_default_planner_stands_first_and_every_name_finds_its_row() -> None:

@@ -19,8 +19,8 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.bench.measure import length_m, passes
 from gcsplan.bench.terrain.ompl import RivalAnswer, box_of, rival_module
-from gcsplan.optimisers.driver import History, OptimiserResult
 from gcsplan.planners.problem import Problem
+from gcsplan.research.optimisers.driver import History, OptimiserResult
 from gcsplan.world.geometry.zones import Circle, Level
 
 SWARMS = {"GWO": "OriginalGWO", "PSO": "OriginalPSO", "DE": "OriginalDE", "ABC": "OriginalABC", "FOA": "OriginalFOA"}
