@@ -18,6 +18,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
 from rich.table import Table
 
 from gcsplan.app.parallel.executor import executor
@@ -33,6 +34,7 @@ from gcsplan.planners.problem import Problem, Refusal
 from gcsplan.planners.registry import PlannerEntry
 from gcsplan.planners.registry import get as get_planner
 from gcsplan.research.bench.papers.runs import code_digest
+from gcsplan.research.optimisers.driver import History, OptimiserResult
 from gcsplan.research.swarm import warm_start
 from gcsplan.research.swarm.planner import Found, cost_of, drawn, search, settle, until_found
 from gcsplan.research.swarm.settings import Settings
@@ -371,4 +373,9 @@ def _searches(problem: Problem, row: PlannerEntry, settings: Settings) -> int | 
 
 def _mealpy(problem: Problem, settings: Settings, name: str, evaluations: int) -> Found:
     cost = cost_of(problem, settings)
-    return drawn(problem, cost, terrain_swarms.minimised(cost, cost.dim, name, evaluations, problem.seed))
+    best, least = terrain_swarms.minimised(cost, cost.dim, name, evaluations, problem.seed)
+    history = History(np.arange(len(least)), np.zeros(len(least), dtype=int), least)
+    return drawn(
+        problem, cost,
+        OptimiserResult(best, float(least[-1]), len(least) - 1, 0, history, "evaluations", f"mealpy {name}"),
+    )  # fmt: skip
