@@ -271,6 +271,17 @@ def test_terrain_is_fetched_by_its_own_command_alone() -> None:
     assert not {own(name) for name in imported(outside, ("gcsplan", "cli"))} & network, "other commands import it too"
 
 
+def test_research_is_imported_by_the_benches_that_are_called_alone() -> None:
+    def of_research(names: Iterable[str]) -> set[str]:
+        return {name for name in names if name.startswith("gcsplan.research")}
+
+    users = {name_of(p) for p in MODULES if of_research(imports_of(p)) and not name_of(p).startswith("research/")}
+    assert users == {"cli/commands/bench.py"}
+    tree = ast.parse((ROOT / "cli/commands/bench.py").read_text(encoding="utf-8"))
+    outside = [n for n in tree.body if isinstance(n, ast.Import | ast.ImportFrom)]
+    assert not of_research(imported(outside, ("gcsplan", "cli"))), "other commands import it too"
+
+
 def test_no_module_has_grown_into_two() -> None:
     lines = {name_of(p): len(p.read_text(encoding="utf-8").splitlines()) for p in MODULES}
     assert {name: n for name, n in lines.items() if n > MOST_LINES} == {}

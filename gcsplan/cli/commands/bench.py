@@ -10,7 +10,7 @@ import typer
 
 from gcsplan.cli.arguments.options import ClusterOption, JobsOption, JsonOption
 from gcsplan.cli.process.exit import emit, put
-from gcsplan.errors import UsageError
+from gcsplan.errors import UsageError, needs
 
 bench_app = typer.Typer(
     help="Measurements: planners on real terrain, the papers' tables, legs checked, uploads.", no_args_is_help=True
@@ -96,7 +96,9 @@ def bench_functions(
 ) -> None:
     """Run SSGWO's tables 1 and 2 again, beside the printed numbers, with optima in the middle and moved."""
     from gcsplan.bench.files import ready
-    from gcsplan.research.bench import functions as bench
+
+    with needs("gcsplan.research", "this benchmark"):
+        from gcsplan.research.bench import functions as bench
 
     if out is not None:
         ready(out)  # find a bad directory before the long run
@@ -165,7 +167,9 @@ def bench_swarms(
     from rich.console import Console
 
     from gcsplan.cli.output.console import RESULTS, remark
-    from gcsplan.research.bench.swarms import run as swarms
+
+    with needs("gcsplan.research", "this benchmark"):
+        from gcsplan.research.bench.swarms import run as swarms
 
     result = swarms.run(
         out,
@@ -232,7 +236,8 @@ def bench_papers(
 ) -> None:
     """Run every scenario and algorithm of the five papers, beside their printed numbers, straight line and optimum."""
     if speed:
-        from gcsplan.research.bench.papers import speed as papers_speed
+        with needs("gcsplan.research", "this benchmark"):
+            from gcsplan.research.bench.papers import speed as papers_speed
 
         measured = papers_speed.run(missions=missions)
         if as_json:
@@ -240,8 +245,9 @@ def bench_papers(
         else:
             put(papers_speed.report(measured))
         return
-    from gcsplan.research.bench.papers import report as papers_report
-    from gcsplan.research.bench.papers import run as papers
+    with needs("gcsplan.research", "this benchmark"):
+        from gcsplan.research.bench.papers import report as papers_report
+        from gcsplan.research.bench.papers import run as papers
 
     result = papers.run(
         scenario or None, algorithm or None, runs, seed, jobs, out, cluster, None, missions=missions, readings=readings
@@ -273,8 +279,10 @@ def bench_metabox(
 ) -> None:
     """Run our optimisers beside MetaEvoBox's own on generated instances of its UAV family (extra `metabox`)."""
     from gcsplan.cli.output.console import remark
-    from gcsplan.research.bench.metabox import report as metabox_report
-    from gcsplan.research.bench.metabox import run as metabox
+
+    with needs("gcsplan.research", "this benchmark"):
+        from gcsplan.research.bench.metabox import report as metabox_report
+        from gcsplan.research.bench.metabox import run as metabox
 
     def tell(done: int, of: int) -> None:
         if done % 50 == 0 or done == of:

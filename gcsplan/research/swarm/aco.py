@@ -17,8 +17,8 @@ import numpy as np
 from gcsplan.arrays import Floats, Indices
 from gcsplan.errors import InputError, unknown_name
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
-from gcsplan.planners.registry import PlannerEntry
 from gcsplan.research.optimisers.driver import History, OptimiserResult
+from gcsplan.research.swarm import SwarmEntry
 from gcsplan.research.swarm import scene_kernels as k
 from gcsplan.research.swarm.encodings import LATERAL
 from gcsplan.research.swarm.objectives import Cost
@@ -43,7 +43,7 @@ class Rule:
     most: float = 50.0
 
 
-def plan(problem: Problem, row: PlannerEntry) -> Solution:
+def plan(problem: Problem, row: SwarmEntry) -> Solution:
     """A path that `Airspace.examine` passes: few way points along the best ant's curve, or a repair of that curve.
 
     Raises Refusal (NoMission, ``not_found``) if within the budget no ant arrives or no curve can be repaired.

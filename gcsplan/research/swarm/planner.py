@@ -19,12 +19,11 @@ from gcsplan.arrays import Floats, Indices
 from gcsplan.notes.note import Note
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
 from gcsplan.planners.refusal.explain import check_ends
-from gcsplan.planners.registry import PlannerEntry
 from gcsplan.planners.simplify import thinned
 from gcsplan.research.optimisers.driver import OptimiserResult, State, minimise
 from gcsplan.research.optimisers.registry import OptimiserEntry as Row
 from gcsplan.research.optimisers.registry import get as get_optimiser
-from gcsplan.research.swarm import cmaes, warm_start
+from gcsplan.research.swarm import SwarmEntry, cmaes, warm_start
 from gcsplan.research.swarm.encodings import Code
 from gcsplan.research.swarm.objectives import Cost, Earlier, get_objective
 from gcsplan.research.swarm.repair import repair, violations
@@ -136,7 +135,7 @@ def drawn(problem: Problem, cost: Cost, result: OptimiserResult, controls: Float
     return Found(result, scene, curve, terminals, found, float(pitch.mean()), float(yaw.mean()) if len(yaw) else 0.0)
 
 
-def plan(problem: Problem, row: PlannerEntry) -> Solution:
+def plan(problem: Problem, row: SwarmEntry) -> Solution:
     """A path that `Airspace.examine` passes: few way points along the curve that the optimiser found, or its repair.
 
     Raises Refusal (NoMission, ``not_found``) if no curve within the budget can be repaired, InputError for bad options.
@@ -144,7 +143,7 @@ def plan(problem: Problem, row: PlannerEntry) -> Solution:
     return until_found(problem, row, lambda again, settings: search(again, row.optimiser, settings))
 
 
-def until_found(problem: Problem, row: PlannerEntry, once: Callable[[Problem, Settings], Found]) -> Solution:
+def until_found(problem: Problem, row: SwarmEntry, once: Callable[[Problem, Settings], Found]) -> Solution:
     """The first solution of the searches ``once``, each with a seed of its own; the first with the problem's.
 
     At most `SEARCHES`, and none is begun when the budget for a first path is spent. The first search always runs to

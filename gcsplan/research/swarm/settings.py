@@ -9,7 +9,8 @@ from typing import Any
 
 from gcsplan.arrays import Floats
 from gcsplan.errors import unknown_name
-from gcsplan.planners.registry import PAPER, VOLUME_KEYS, PlannerEntry
+from gcsplan.planners.registry import VOLUME_KEYS
+from gcsplan.research.swarm import PAPER, SwarmEntry
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +36,7 @@ class Settings:
     around: Floats | None = None
 
     @classmethod
-    def of(cls, row: PlannerEntry, options: Mapping[str, object]) -> Settings:
+    def of(cls, row: SwarmEntry, options: Mapping[str, object]) -> Settings:
         """Settings of a planner's ``row``, replaced by ``options``. Raises InputError for an unknown key."""
         known = cls.__dataclass_fields__
         for key in options:

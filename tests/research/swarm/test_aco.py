@@ -10,6 +10,7 @@ import pytest
 from gcsplan.errors import InputError, NoMission
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.planners.registry import get
+from gcsplan.research.swarm import SWARM_PLANNERS
 from gcsplan.research.swarm.aco import make_layers, open_between, search, walk
 from gcsplan.research.swarm.repair import violations
 from gcsplan.research.swarm.scene import Scene
@@ -27,7 +28,7 @@ def mission(**options: object) -> Problem:
 
 
 def settings(**options: object) -> Settings:
-    return Settings.of(get("aco"), options)
+    return Settings.of(SWARM_PLANNERS["aco"], options)
 
 
 def test_layers_are_stops_and_sections_of_21_by_21() -> None:

@@ -15,7 +15,8 @@ from gcsplan.errors import InputError, NoMission
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.mission_file.values.schema import EncodingName, SwarmCost
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.registry import PAPER, get
+from gcsplan.planners.registry import get
+from gcsplan.research.swarm import PAPER
 from gcsplan.research.swarm.encodings import ENCODINGS
 from gcsplan.research.swarm.objectives import OBJECTIVES
 from gcsplan.research.swarm.repair import violations

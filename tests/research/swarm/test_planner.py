@@ -12,7 +12,8 @@ from gcsplan.app.fleet.pipeline import plan
 from gcsplan.errors import InputError, NoMission
 from gcsplan.notes.note import Note
 from gcsplan.planners.problem import Problem, Via
-from gcsplan.planners.registry import TABLE, get, names
+from gcsplan.planners.registry import get, names
+from gcsplan.research.swarm import SWARM_PLANNERS
 from gcsplan.research.swarm import planner as swarm_planner
 from gcsplan.research.swarm.encodings import ENCODINGS
 from gcsplan.research.swarm.planner import search
@@ -25,7 +26,7 @@ from gcsplan.world.geometry.zones import Circle, Level, Zone
 from tests.support.paths import MISSIONS
 from tests.support.planner_worlds import FIELD, faults, ground, jacksboro, random_mission
 
-SWARMS = [name for name in names() if TABLE[name].optimiser and name != "aco"]
+SWARMS = [name for name in SWARM_PLANNERS if name != "aco"]
 LIMITS = Limits(min_agl_m=30.0, horizontal_clearance_m=10.0, track_error_m=2.0, altitude_error_m=2.0)
 
 
@@ -85,7 +86,7 @@ def test_a_cost_that_sees_nothing_cannot_pass_a_path_through_a_zone(monkeypatch:
         return PaperCost(0, lambda terms, unit: terms[:, k.LENGTH])
 
     monkeypatch.setattr(swarm_planner, "get_objective", blind)
-    found = search(problem, "de", Settings.of(get("de"), problem.options))
+    found = search(problem, "de", Settings.of(SWARM_PLANNERS["de"], problem.options))
     assert found.collisions > 0
     assert any(v.kind == "zone" for v in found.violations)
     solution = get("de").plan(problem)
@@ -151,7 +152,7 @@ def test_searches_end_with_the_budget_or_their_number(
 
 def test_few_way_points_stay_within_the_corridor_of_the_curve() -> None:
     problem = toy(encoding="bspline", points=4, cost="krill")
-    found = search(problem, "de", Settings.of(get("de"), problem.options))
+    found = search(problem, "de", Settings.of(SWARM_PLANNERS["de"], problem.options))
     points = swarm_planner.way_points_beside(problem, found)
     assert points is not None
     assert 2 < len(points) < len(found.curve) / 2
@@ -194,7 +195,7 @@ def test_what_is_repaired_passes_on_real_ground(seed: int) -> None:
 
 
 def test_settings_come_from_the_row_and_the_options() -> None:
-    row = get("ssgwo")
+    row = SWARM_PLANNERS["ssgwo"]
     assert (Settings.of(row, {}).encoding, Settings.of(row, {}).points) == ("offsets", None)
     for encoding in ("paper", "box"):  # the paper's number of points belongs to the paper's encoding
         own = Settings.of(row, {"encoding": encoding, "iterations": None})
@@ -208,9 +209,9 @@ def test_settings_come_from_the_row_and_the_options() -> None:
 
 @pytest.mark.parametrize("name", SWARMS)
 def test_a_papers_encoding_is_that_of_the_papers_table(name: str) -> None:
-    told = Settings.of(get(name), {"encoding": "paper"})
+    told = Settings.of(SWARM_PLANNERS[name], {"encoding": "paper"})
     assert told.encoding in ENCODINGS
-    assert Settings.of(get(name), {}).encoding == "offsets"
+    assert Settings.of(SWARM_PLANNERS[name], {}).encoding == "offsets"
     if name in ("foa", "msfoa"):
         assert told.encoding == "polar"
     elif name in ("ib-abc", "b-abc"):
@@ -221,14 +222,14 @@ def test_a_papers_encoding_is_that_of_the_papers_table(name: str) -> None:
 
 def test_parameters_are_the_optimisers_and_the_volumes() -> None:
     problem = toy(iterations=2, parameters={"east_m": 1900.0, "step": 0.2})
-    assert search(problem, "krill", Settings.of(get("krill"), problem.options)).scene.high[0] == 1900.0
+    assert search(problem, "krill", Settings.of(SWARM_PLANNERS["krill"], problem.options)).scene.high[0] == 1900.0
     with pytest.raises(InputError, match="krill has no parameter 'stepp'"):
         get("krill").plan(toy(parameters={"stepp": 0.2}))
 
 
 def test_a_budget_of_evaluations_is_kept_exactly() -> None:
     problem = toy(evaluations=777, encoding="bspline")
-    found = search(problem, "gwo", Settings.of(get("gwo"), problem.options))
+    found = search(problem, "gwo", Settings.of(SWARM_PLANNERS["gwo"], problem.options))
     assert found.result.evaluations == 777
 
 
@@ -237,9 +238,9 @@ def test_an_earlier_vehicle_bends_the_path_of_the_next() -> None:
     plain = replace(plain, airspace=Airspace(plain.airspace.surface))
     first = get("de").plan(plain).path.points
     options = {**plain.options, "earlier": (first,), "speed_m_s": 15.0}
-    settings = Settings.of(get("de"), options)
+    settings = Settings.of(SWARM_PLANNERS["de"], options)
     second = search(plain, "de", settings)
-    alone = search(plain, "de", Settings.of(get("de"), plain.options))
+    alone = search(plain, "de", Settings.of(SWARM_PLANNERS["de"], plain.options))
     assert second.result.cost > alone.result.cost
     assert second.length_m > 0.0
     assert not np.allclose(second.curve, alone.curve)
@@ -249,9 +250,8 @@ def test_every_swarms_row_names_its_source_and_a_known_optimiser() -> None:
     from gcsplan.research.optimisers.registry import OPTIMISERS
 
     assert names()[0] == "optimal"
-    swarms = [row for row in TABLE.values() if row.optimiser]
-    assert len(swarms) >= 17
-    assert all(row.paper and row.optimiser in {*OPTIMISERS, "aco", "cmaes"} for row in swarms)
+    assert len(SWARM_PLANNERS) >= 17
+    assert all(row.paper and row.optimiser in {*OPTIMISERS, "aco", "cmaes"} for row in SWARM_PLANNERS.values())
 
 
 def test_the_scene_of_a_mission_over_unknown_ground_is_made() -> None:

@@ -12,7 +12,7 @@ from gcsplan.app.fleet.pipeline import plan
 from gcsplan.errors import InputError
 from gcsplan.planners.problem import Problem, Via
 from gcsplan.planners.registry import get
-from gcsplan.research.swarm import warm_start
+from gcsplan.research.swarm import SWARM_PLANNERS, warm_start
 from gcsplan.research.swarm.encodings import ENCODINGS
 from gcsplan.research.swarm.planner import cost_of, search
 from gcsplan.research.swarm.repair import violations
@@ -83,7 +83,9 @@ def test_a_quarter_of_the_population_is_around_the_path_and_the_rest_is_random()
 def test_a_search_around_the_optimal_path_begins_better_than_a_blind_one() -> None:
     problem = flat(encoding="bspline", points=12, population=40, iterations=1)
     blind, warm = (
-        search(problem, "de", warm_start.resolved(problem, Settings.of(get("de"), {**problem.options, **more})))
+        search(
+            problem, "de", warm_start.resolved(problem, Settings.of(SWARM_PLANNERS["de"], {**problem.options, **more}))
+        )
         for more in ({}, {"warm_start": "optimal"})
     )
     straight = warm.scene.straight_m

@@ -30,7 +30,7 @@ from gcsplan.planners.problem import Problem
 from gcsplan.planners.registry import get as get_planner
 from gcsplan.planners.simplify import thinned
 from gcsplan.research.bench.papers.scenarios import SCENARIOS, Contender, ReadyScenario, prepare, settings_of
-from gcsplan.research.swarm import aco
+from gcsplan.research.swarm import SWARM_PLANNERS, aco
 from gcsplan.research.swarm.planner import Found, scene_of, search
 from gcsplan.research.swarm.scene import Scene
 from gcsplan.research.swarm.settings import Settings
@@ -185,7 +185,7 @@ def seed_of(seed: int, number: int, vehicle: int) -> int:
 def _search(problem: Problem, contender: Contender, settings: Settings, scene: Scene) -> Found:
     if contender.planner == "aco":
         return aco.search(problem, settings, scene)
-    return search(problem, get_planner(contender.planner).optimiser, settings, scene)
+    return search(problem, SWARM_PLANNERS[contender.planner].optimiser, settings, scene)
 
 
 @lru_cache(maxsize=4)

@@ -19,8 +19,8 @@ from gcsplan.errors import InputError, unknown_name
 from gcsplan.mavlink.build.order import Margins
 from gcsplan.mission_file import MissionFile, samples
 from gcsplan.planners.problem import Problem
-from gcsplan.planners.registry import get as get_planner
 from gcsplan.research.bench.papers.printed import StraightFlight
+from gcsplan.research.swarm import SWARM_PLANNERS
 from gcsplan.research.swarm.settings import Settings
 from gcsplan.world.world import World
 
@@ -301,4 +301,4 @@ def settings_of(contender: Contender, source: MissionFile) -> Settings:
     """The settings of a contender: its planner's defaults, overridden by the mission's keys, then by its options."""
     options = _merged(dict(source.planner.extras), contender.options)
     speed_m_s = float(np.max([r.vehicle.speed_max_m_s for r in source.vehicles]))
-    return Settings.of(get_planner(contender.planner), {**options, "speed_m_s": speed_m_s})
+    return Settings.of(SWARM_PLANNERS[contender.planner], {**options, "speed_m_s": speed_m_s})

@@ -31,11 +31,10 @@ from gcsplan.errors import GcsplanError, InputError
 from gcsplan.export.table import csv_of
 from gcsplan.planners.budget import Budget
 from gcsplan.planners.problem import Problem, Refusal
-from gcsplan.planners.registry import PlannerEntry
 from gcsplan.planners.registry import get as get_planner
 from gcsplan.research.bench.papers.runs import code_digest
 from gcsplan.research.optimisers.driver import History, OptimiserResult
-from gcsplan.research.swarm import warm_start
+from gcsplan.research.swarm import SWARM_PLANNERS, SwarmEntry, warm_start
 from gcsplan.research.swarm.planner import Found, cost_of, drawn, search, settle, until_found
 from gcsplan.research.swarm.settings import Settings
 from gcsplan.research.swarm.warm_start import OPTIMAL
@@ -333,7 +332,7 @@ def attempt_of(one: NamedProblem, method: Method, evaluations: int) -> Attempt:
     if method.warm:
         options["warm_start"] = OPTIMAL
     ours = method.family == "gcsplan"
-    row = get_planner(method.name if ours else "de")
+    row = SWARM_PLANNERS[method.name if ours else "de"]
     settings = replace(Settings.of(row, options), iterations=None, evaluations=evaluations)
     settings = warm_start.resolved(problem, settings)
     began = time.process_time()
@@ -355,7 +354,7 @@ def attempt_of(one: NamedProblem, method: Method, evaluations: int) -> Attempt:
     )  # fmt: skip
 
 
-def _searches(problem: Problem, row: PlannerEntry, settings: Settings) -> int | None:
+def _searches(problem: Problem, row: SwarmEntry, settings: Settings) -> int | None:
     """Searches that the planner needs until one is legal or repaired; None if it refuses."""
     count = 0
 

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gcsplan.planners.registry import get as get_planner
 from gcsplan.research.bench.papers import judge as papers_judge
 from gcsplan.research.bench.papers import scenarios as papers_scenarios
 from gcsplan.research.bench.papers.judge import (
@@ -28,6 +27,7 @@ from gcsplan.research.bench.papers.judge import (
 from gcsplan.research.bench.papers.scenarios import READINGS, SCENARIOS, PaperReading, choose
 from gcsplan.research.bench.papers.tables import claims_table, readings_table
 from gcsplan.research.optimisers.registry import get as get_optimiser
+from gcsplan.research.swarm import SWARM_PLANNERS
 from gcsplan.research.swarm.encodings import get_encoding
 from gcsplan.research.swarm.settings import Settings
 
@@ -159,9 +159,9 @@ def test_every_reading_runs_under_a_name_of_its_own_with_options_that_exist() ->
         for contender in scenario.paper.readings:
             base = next(c for c in scenario.paper.contenders if c.name == contender.name.partition(":")[0])
             assert contender.options != base.options
-            told = Settings.of(get_planner(contender.planner), contender.options)
+            told = Settings.of(SWARM_PLANNERS[contender.planner], contender.options)
             get_encoding(told.encoding)
-            get_optimiser(get_planner(contender.planner).optimiser).with_defaults(told.split()[1])
+            get_optimiser(SWARM_PLANNERS[contender.planner].optimiser).with_defaults(told.split()[1])
 
 
 def test_readings_run_in_the_papers_own_scenarios_and_not_in_their_twins() -> None:
