@@ -173,7 +173,7 @@ def test_readings_run_in_the_papers_own_scenarios_and_not_in_their_twins() -> No
 
 
 def test_the_page_in_the_documents_has_every_claim_but_those_on_time_once() -> None:
-    page = (Path(__file__).parents[4] / "docs" / "concepts" / "papers-claims.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[4] / "docs" / "research" / "papers-claims.md").read_text(encoding="utf-8")
     table = page.split("\n## Claims\n")[1].split("\n## ")[0]
     told = re.findall(r"^\| ([a-z-]+-\d+) \|", table, re.MULTILINE)
     assert told == [claim.number for claim in CLAIMS if claim.measure != "time"]
