@@ -366,7 +366,7 @@ def _shown_text(text: str) -> str:
 def planners() -> str:
     """The table of planners."""
     lines = ["| name | what it does | from | defaults |", "| --- | --- | --- | --- |"]
-    for entry in registry.TABLE.values():
+    for entry in registry.rows():
         defaults = ", ".join(f"{key} {value}" for key, value in entry.defaults.items())
         lines.append(f"| `{entry.name}` | {entry.summary} | {entry.paper or '–'} | {defaults} |")
     return "\n".join(lines)

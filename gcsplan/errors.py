@@ -14,7 +14,8 @@ A message states what was required, what was given, where, and what to do about 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
@@ -184,3 +185,14 @@ def unknown_name(sentence: str, name: str, known: Iterable[str]) -> InputError:
     near = get_close_matches(name, names, n=1, cutoff=0.5)
     hint = f" Did you mean {near[0]!r}?" if near else ""
     return InputError(f"{sentence}.{hint} Known: {', '.join(names) or 'none'}")
+
+
+@contextmanager
+def needs(package: str, what: str) -> Iterator[None]:
+    """Around an import: InputError, which says that ``what`` needs ``package`` of gcsplan, where that is missing."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if not f"{package}.".startswith(f"{error.name}."):
+            raise
+        raise InputError(f"{what} needs {package}, which is not installed: install gcsplan with this package") from None

@@ -26,7 +26,7 @@ TERRAIN = WORLD | {"dem"}
 VEHICLE = WORLD | {"vehicle"}
 MISSION = VEHICLE | {"mavlink.mission"}
 MAVLINK = {"mavlink.mission", "mavlink.build", "mavlink.files", "mavlink.protocol", "mavlink.link"}
-ABOVE = VEHICLE | MAVLINK | {"optimisers", "planners", "fleet", "check"}
+ABOVE = VEHICLE | MAVLINK | {"planners", "fleet", "check"}
 OUTWARD = ABOVE | {"export", "report", "sim"}
 APP = OUTWARD | {"mission_file", "app"}
 
@@ -41,8 +41,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "dem": WORLD,
     "vehicle": WORLD,
     "logs": {"arrays", "errors", "figures", "notes"},
-    "optimisers": {"arrays", "errors"},
-    "planners": WORLD | {"optimisers"},
+    "planners": WORLD,
     "fleet": VEHICLE,
     "mavlink.mission": VEHICLE,
     "mavlink.build": MISSION | {"mavlink.files"},
@@ -60,9 +59,16 @@ MAY_IMPORT: dict[str, set[str]] = {
     "mission_file": OUTWARD | TERRAIN,
     "app": OUTWARD | {"mission_file"},
     "bench": APP,
-    "cli": APP | {"bench", "dem", "logs"},
+    # Research imports the product, and only the command line imports research.
+    "research.optimisers": {"arrays", "errors"},
+    "research.swarm": WORLD | {"planners", "research.optimisers"},
+    "research.bench": APP | {"bench", "research.optimisers", "research.swarm"},
+    "cli": APP | {"bench", "dem", "logs", "research.bench"},
     "__main__": {"cli"},
 }
+
+ROOMS = {"mavlink", "research"}
+"""Folders without modules of their own; each folder in them is a package."""
 
 PROJECTION = {
     "world/geodesy/frame.py",
@@ -123,7 +129,7 @@ NAMES = {module_of(path) for path in MODULES}
 def package_of(module: str) -> str:
     """The package of the table that a module belongs to; empty for the front door."""
     parts = module.split(".")[1:]
-    return ".".join(parts[:2]) if parts[:1] == ["mavlink"] and len(parts) > 1 else "".join(parts[:1])
+    return ".".join(parts[: 2 if parts[:1] in ([room] for room in ROOMS) else 1])
 
 
 def knows_metres_alone(path: Path) -> bool:
@@ -131,7 +137,7 @@ def knows_metres_alone(path: Path) -> bool:
     parts = path.relative_to(ROOT).parts
     if parts[0] == "world":
         return parts[1] == "kernels" or path.stem in ("airspace", "tube")
-    return parts[0] in ("planners", "optimisers", "fleet")
+    return parts[0] in ("planners", "fleet") or parts[:2] in (("research", "optimisers"), ("research", "swarm"))
 
 
 @cache
@@ -179,13 +185,13 @@ def identifiers(nodes: Iterable[ast.AST]) -> Iterator[str]:
 
 
 def test_every_module_has_its_package_in_the_table() -> None:
-    assert {package_of(name) for name in NAMES} - {"", "mavlink"} == set(MAY_IMPORT)
+    assert {package_of(name) for name in NAMES} - {"", *ROOMS} == set(MAY_IMPORT)
 
 
 @pytest.mark.parametrize("path", MODULES, ids=name_of)
 def test_a_package_imports_only_what_it_may(path: Path) -> None:
     where = package_of(module_of(path))
-    if where in ("", "mavlink"):
+    if where in ("", *ROOMS):
         return  # the front door; what it offers, it imports when it is asked for
     found = {package_of(module) for module in own_imports(path)} - {where}
     assert found <= MAY_IMPORT[where], f"{name_of(path)} may not import {sorted(found - MAY_IMPORT[where])}"
@@ -244,7 +250,7 @@ def test_only_the_door_projects() -> None:
 
 def test_optimisers_are_numpy_alone() -> None:
     allowed = set(sys.stdlib_module_names) | {"numpy", "gcsplan"}
-    for path in (p for p in MODULES if package_of(module_of(p)) == "optimisers"):
+    for path in (p for p in MODULES if package_of(module_of(p)) == "research.optimisers"):
         assert {m.split(".")[0] for m in imports_of(path)} <= allowed, name_of(path)
 
 
@@ -263,6 +269,17 @@ def test_terrain_is_fetched_by_its_own_command_alone() -> None:
         if isinstance(n, ast.Import | ast.ImportFrom)
     ]
     assert not {own(name) for name in imported(outside, ("gcsplan", "cli"))} & network, "other commands import it too"
+
+
+def test_research_is_imported_by_the_benches_that_are_called_alone() -> None:
+    def of_research(names: Iterable[str]) -> set[str]:
+        return {name for name in names if name.startswith("gcsplan.research")}
+
+    users = {name_of(p) for p in MODULES if of_research(imports_of(p)) and not name_of(p).startswith("research/")}
+    assert users == {"cli/commands/bench.py"}
+    tree = ast.parse((ROOT / "cli/commands/bench.py").read_text(encoding="utf-8"))
+    outside = [n for n in tree.body if isinstance(n, ast.Import | ast.ImportFrom)]
+    assert not of_research(imported(outside, ("gcsplan", "cli"))), "other commands import it too"
 
 
 def test_no_module_has_grown_into_two() -> None:

@@ -17,7 +17,7 @@ from gcsplan.native.llvm import llvm_version
 KERNEL_UNITS = {
     "world": "gcsplan.world.kernels.compiled",
     "planners": "gcsplan.planners.compiled",
-    "swarm": "gcsplan.planners.swarm.compiled",
+    "swarm": "gcsplan.research.swarm.compiled",
     "turns": "gcsplan.planners.turns.compiled",
 }
 """The modules of kernel units, by name. Each is made in its own process, because numba reads its options once."""

@@ -1,20 +1,18 @@
-"""The table of all planners: what each one is, its source, and how to call it. Cheap to import."""
+"""The names of all planners, and the package that holds each one's row: what it is, its source, how to call it.
+
+Cheap to import: a package is imported only when one of its planners is named.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from types import MappingProxyType
 from typing import cast
 
-from gcsplan.errors import unknown_name
+from gcsplan.errors import InputError, needs, unknown_name
 from gcsplan.planners.problem import Problem, Solution
-
-ENCODING = "offsets"
-"""A swarm's encoding unless another is asked for: the best for most over real terrain (docs/benchmarks.md)."""
-PAPER = "paper"
-"""Asked for as encoding: that of the planner's own paper."""
 
 VOLUME_KEYS = ("west_m", "south_m", "bottom_m", "east_m", "north_m", "top_m")
 """Keys of a swarm's ``parameters`` for the six sides of the flight volume, metres in the plane and metres AMSL."""
@@ -24,9 +22,8 @@ VOLUME_KEYS = ("west_m", "south_m", "bottom_m", "east_m", "north_m", "top_m")
 class PlannerEntry:
     """One planner; ``module`` holds its ``plan`` and is imported only on the first call.
 
-    ``paper`` is its source, empty if it is gcsplan's own. ``optimiser`` names a swarm's optimiser in
-    `gcsplan.optimisers.registry`, empty otherwise. ``defaults`` are fields of `Problem`; for a swarm, keys of
-    ``Problem.options``. ``space``: the ``encoding`` and ``points`` of a swarm's paper, which stand for `PAPER`.
+    ``paper`` is its source, empty if it is gcsplan's own. ``defaults`` are fields of `Problem`, or keys of
+    ``Problem.options``. ``warm_starts``: it takes the option ``warm_start``, a vehicle whose path is planned before.
     """
 
     name: str
@@ -34,102 +31,48 @@ class PlannerEntry:
     module: str
     paper: str = ""
     defaults: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
-    optimiser: str = ""
-    space: Mapping[str, object] = field(default_factory=lambda: MappingProxyType({}))
+    warm_starts: bool = False
 
     def plan(self, problem: Problem) -> Solution:
         """A safe path for ``problem``. Raises NoMission if none exists or none was found."""
-        run = import_module(self.module).plan
-        if self.optimiser:
-            return cast(Solution, run(problem, self))
-        return cast(Solution, run(problem))
+        return cast(Solution, import_module(self.module).plan(problem))
+
+    def by_priority(self, options: Mapping[str, object]) -> bool:
+        """Whether, with these ``options``, vehicles are planned in their order of arrival, each knowing the earlier."""
+        return False
 
 
-def _swarm(name: str, summary: str, paper: str, system: Mapping[str, object], **own: object) -> PlannerEntry:
-    """The table's row for an optimiser: its paper's search space and cost (``system``), then its ``own`` defaults."""
-    both = {**system, **own}
-    space = {key: both[key] for key in ("encoding", "points")}
-    if name != "aco":  # ants know their own sections alone
-        del both["points"]
-        both["encoding"] = ENCODING
-    return PlannerEntry(
-        name=name,
-        summary=summary,
-        module="gcsplan.planners.swarm.aco" if name == "aco" else "gcsplan.planners.swarm.planner",
-        paper=paper,
-        defaults=MappingProxyType(both),
-        optimiser=name,
-        space=MappingProxyType(space),
-    )
+_SWARM_NAMES = (
+    "krill", "aco", "abc", "b-abc", "ib-abc", "gwo", "mgwo", "igwo", "sogwo", "ssgwo", "foa", "mfoa", "iffo", "msfoa",
+    "pso", "de", "lshade", "cmaes", "po", "abo",
+)  # fmt: skip
 
-
-_KRILL_PAPER = "Xu, Zhu, Sun 2024, Biomimetics 9, 353"
-_SSGWO_PAPER = "Feng et al. 2024, Electronics 13, 68"
-_MSFOA_CITED = "Shi et al. 2020, Applied Sciences 10, 2822"
-_ABO_CITED = "Li et al. 2024, adaptive budgerigar optimization"
-_IB_ABC_PAPER = "Tan et al. 2023, Robotica 41, 1244-1257"
-
-# The search space of each paper. D, our decision where the paper is silent: the number of points of MSFOA and IB-ABC.
-_KRILL: Mapping[str, object] = {"encoding": "box", "cost": "krill", "points": 5, "population": 50, "iterations": 100}
-_SSGWO: Mapping[str, object] = {"encoding": "box", "cost": "ssgwo", "points": 30, "population": 30, "iterations": 500}
-_MSFOA: Mapping[str, object] = {"encoding": "box", "cost": "msfoa", "points": 5, "population": 100, "iterations": 200}
-_ABO: Mapping[str, object] = {"encoding": "box", "cost": "abo", "points": 3, "population": 200, "iterations": 100}
-_IB_ABC: Mapping[str, object] = {
-    "encoding": "sections", "cost": "ib-abc", "points": 10, "population": 20, "iterations": 200,
-}  # fmt: skip
-
-
-# D: the papers of these do not plan paths.
-_BASELINE: Mapping[str, object] = {
-    "encoding": ENCODING, "cost": "krill", "points": None, "population": 100, "evaluations": 10_000,
-}  # fmt: skip
-
-_PLANNERS = (
-    PlannerEntry(
-        name="optimal",
-        summary="exact shortest tracks under altitude caps, taut-string profiles, and a bound that no path can beat",
-        module="gcsplan.planners.optimal.planner",
-        defaults=MappingProxyType({"gap_percent": 0.1, "budget_s": 10.0}),
-    ),
-    _swarm("krill", "krill swarm: foraging, enemy avoidance, cruising", _KRILL_PAPER, _KRILL),
-    _swarm("aco", "ants on a grid of sections across the track", _KRILL_PAPER, _KRILL, encoding="sections"),
-    _swarm("abc", "artificial bee colony", f"Karaboga 2005; as in {_KRILL_PAPER}", _KRILL),
-    _swarm("b-abc", "balanced bee colony, no feedback", _IB_ABC_PAPER, _IB_ABC),
-    _swarm("ib-abc", "balanced bee colony with feedback", _IB_ABC_PAPER, _IB_ABC),
-    _swarm("gwo", "grey wolves", f"Mirjalili 2014; as in {_SSGWO_PAPER}", _SSGWO),
-    _swarm("mgwo", "grey wolves, weighted and greedy (our reading)", f"Zhang 2021; as in {_SSGWO_PAPER}", _SSGWO),
-    _swarm("igwo", "grey wolves that learn from neighbours", f"Nadimi-Shahraki 2021; as in {_SSGWO_PAPER}", _SSGWO),
-    _swarm("sogwo", "grey wolves with selective opposition", f"Dhargupta 2020; as in {_SSGWO_PAPER}", _SSGWO),
-    _swarm("ssgwo", "grey wolves, relative distances, annealing", _SSGWO_PAPER, _SSGWO),
-    _swarm("foa", "fruit flies, one swarm", f"Pan 2012; as in {_MSFOA_CITED}", _MSFOA, encoding="polar"),
-    _swarm("mfoa", "fruit flies, swarms of a shrinking radius", f"Yuan 2014; as in {_MSFOA_CITED}", _MSFOA),
-    _swarm("iffo", "fruit flies, one dimension at a time", f"Pan 2014; as in {_MSFOA_CITED}", _MSFOA),
-    _swarm("msfoa", "fruit flies, competing swarms", _MSFOA_CITED, _MSFOA, encoding="polar"),
-    _swarm("pso", "particle swarm", f"Shi, Eberhart 1998; as in {_MSFOA_CITED}", _MSFOA),
-    _swarm("de", "differential evolution rand/1/bin", f"Storn, Price 1997; as in {_MSFOA_CITED}", _MSFOA),
-    _swarm("lshade", "differential evolution, learnt settings", "Tanabe, Fukunaga 2014, CEC", _BASELINE),
-    _swarm(
-        "cmaes",
-        "CMA-ES with restarts, by the package cma",
-        "Hansen, Ostermeier 2001; Auger, Hansen 2005",
-        _BASELINE,
-        population=30,
-    ),
-    _swarm("po", "parrot optimizer", f"Lian 2024; as in {_ABO_CITED}", _ABO),
-    _swarm("abo", "adaptive budgerigars", _ABO_CITED, _ABO),
+PLANNER_PACKAGES: Mapping[str, str] = MappingProxyType(
+    {"optimal": "gcsplan.planners.optimal", **dict.fromkeys(_SWARM_NAMES, "gcsplan.research.swarm")}
 )
-
-TABLE: Mapping[str, PlannerEntry] = MappingProxyType({entry.name: entry for entry in _PLANNERS})
+"""Name to the package whose function ``entry`` returns the planner's row; the default planner stands first."""
 
 
 def names() -> tuple[str, ...]:
     """Every planner's name, the default one first."""
-    return tuple(TABLE)
+    return tuple(PLANNER_PACKAGES)
 
 
 def get(name: str) -> PlannerEntry:
-    """The planner called ``name``. Raises InputError, which suggests the nearest known name, if there is none."""
-    entry = TABLE.get(name)
-    if entry is None:
-        raise unknown_name(f"there is no planner {name!r}", name, TABLE)
-    return entry
+    """The planner called ``name``.
+
+    Raises InputError if there is none, with the nearest known name, or if its package is not installed.
+    """
+    if name not in PLANNER_PACKAGES:
+        raise unknown_name(f"there is no planner {name!r}", name, PLANNER_PACKAGES)
+    with needs(PLANNER_PACKAGES[name], f"the planner {name!r}"):
+        return cast(PlannerEntry, import_module(PLANNER_PACKAGES[name]).entry(name))
+
+
+def rows() -> Iterator[PlannerEntry]:
+    """All planners, the default one first; the summary of one whose package is not installed says so."""
+    for name, package in PLANNER_PACKAGES.items():
+        try:
+            yield get(name)
+        except InputError:
+            yield PlannerEntry(name, f"not installed: it needs {package}", package)

@@ -1,8 +1,8 @@
 """A second implementation of each family's rule as decided, individual by individual, in NumPy; shares no code.
 
-Each draws numbers as it needs them, in another order than `gcsplan.optimisers`, so runs of one seed differ and only
-their distributions can be compared. A rule receives a batch cost over the unit box, the size of the swarm, the number
-of variables, the number of rounds, and a generator. Equation numbers are those of the papers.
+Each draws numbers as it needs them, in another order than `gcsplan.research.optimisers`, so runs of one seed differ and
+only their distributions can be compared. A rule receives a batch cost over the unit box, the size of the swarm, the
+number of variables, the number of rounds, and a generator. Equation numbers are those of the papers.
 """
 
 from __future__ import annotations

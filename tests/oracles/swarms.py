@@ -1,4 +1,4 @@
-"""Readings of the papers' update rules, number by number from the text; nothing is shared with `gcsplan.optimisers`.
+"""Readings of the papers' update rules, number by number from the text; nothing is shared with our own optimisers.
 
 Each function runs a whole search and returns every point that it evaluates, in order. It draws from the generator in
 the order of the text, so a rule that does what the text says evaluates the same points.

@@ -10,8 +10,10 @@ import pytest
 
 from gcsplan.errors import InputError
 from gcsplan.mission_file.values.schema import EncodingName
-from gcsplan.optimisers import registry as optimisers
 from gcsplan.planners import registry
+from gcsplan.research import swarm
+from gcsplan.research.optimisers import registry as optimisers
+from gcsplan.research.swarm import SwarmEntry
 
 
 def test_the_default_planner_stands_first_and_every_name_finds_its_row() -> None:
@@ -23,16 +25,21 @@ def test_the_default_planner_stands_first_and_every_name_finds_its_row() -> None
 def test_a_row_names_a_planner_that_takes_what_it_is_called_with(name: str) -> None:
     entry = registry.get(name)
     plan = import_module(entry.module).plan
-    inspect.signature(plan).bind(*([None, entry] if entry.optimiser else [None]))
+    inspect.signature(plan).bind(*([None, entry] if isinstance(entry, SwarmEntry) else [None]))
     assert entry.summary
-    assert bool(entry.paper) == bool(entry.optimiser)
+    assert bool(entry.paper) == isinstance(entry, SwarmEntry)
 
 
-@pytest.mark.parametrize("name", [name for name in registry.names() if registry.get(name).optimiser])
+@pytest.mark.parametrize("name", swarm.SWARM_PLANNERS)
 def test_a_swarm_has_its_optimiser_and_encodings_that_a_mission_may_ask_for(name: str) -> None:
-    entry = registry.get(name)
+    entry = swarm.SWARM_PLANNERS[name]
     assert name in ("aco", "cmaes") or entry.optimiser in optimisers.OPTIMISERS  # ants on a grid, and a package
     assert {entry.space["encoding"], entry.defaults["encoding"]} <= set(get_args(EncodingName))
+
+
+def test_every_swarm_has_its_name_in_the_table_and_every_row_its_own_name() -> None:
+    assert ("optimal", *swarm.SWARM_PLANNERS) == registry.names()
+    assert all(row.name == name for name, row in swarm.SWARM_PLANNERS.items())
 
 
 def test_an_unknown_name_is_refused_with_the_nearest() -> None:
@@ -42,6 +49,8 @@ def test_an_unknown_name_is_refused_with_the_nearest() -> None:
 
 def test_the_rows_cannot_be_changed() -> None:
     with pytest.raises(TypeError):
-        registry.TABLE["mine"] = registry.get("optimal")  # type: ignore[index]
+        registry.PLANNER_PACKAGES["mine"] = "gcsplan.planners.optimal"  # type: ignore[index]
+    with pytest.raises(TypeError):
+        swarm.SWARM_PLANNERS["mine"] = swarm.SWARM_PLANNERS["krill"]  # type: ignore[index]
     with pytest.raises(TypeError):
         registry.get("krill").defaults["points"] = 3  # type: ignore[index]

@@ -1,4 +1,4 @@
-"""A package that looks like MetaEvoBox to `gcsplan.bench.metabox.worker`, with its cost in plain loops.
+"""A package that looks like MetaEvoBox to `gcsplan.research.bench.metabox.worker`, with its cost in plain loops.
 
 `interpreter` makes a folder of such packages, and a program in it that runs Python with them.
 """

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.optimisers.box import Run
-from gcsplan.optimisers.registry import get
+from gcsplan.research.optimisers.box import Run
+from gcsplan.research.optimisers.registry import get
 
 DRAWS = ("random", "uniform", "integers", "normal", "permutation")
 

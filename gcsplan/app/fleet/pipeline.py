@@ -104,10 +104,12 @@ def _brief_of(source: MissionFile, asked: PlanOptions) -> Brief:
     if goal not in ("length", "energy"):
         raise InputError(f"objective must be length or energy, given {goal!r}")
     merged = _options(source, name) | dict(asked.options)
-    by_priority = bool(entry.optimiser) and (merged.get("cost") or entry.defaults.get("cost")) == "msfoa"
-    _require_warm_start(source, name, merged)
+    if entry.warm_starts:
+        _require_warm_start(source, merged)
     number = source.planner.seed if asked.seed is None else asked.seed
-    return Brief(source, world_of(source), name, goal, number, merged, by_priority and len(source.vehicles) > 1)
+    return Brief(
+        source, world_of(source), name, goal, number, merged, len(source.vehicles) > 1 and entry.by_priority(merged)
+    )
 
 
 def _planned(
@@ -165,11 +167,11 @@ def _leader(brief: Brief) -> str | None:
     return next((r.vehicle.name for r in brief.source.vehicles if r.vehicle.name == name), None)
 
 
-def _require_warm_start(source: MissionFile, planner: str, options: Mapping[str, object]) -> None:
+def _require_warm_start(source: MissionFile, options: Mapping[str, object]) -> None:
     """Raise InputError unless ``warm_start`` is a path that will be there."""
     asked = options.get("warm_start")
     known = ("optimal", *(r.vehicle.name for r in source.vehicles))
-    if asked is not None and get_planner(planner).optimiser and asked not in known:
+    if asked is not None and asked not in known:
         raise unknown_name(
             f"warm_start is `optimal` or the name of a vehicle of the file, given {asked!r}", str(asked), known
         )

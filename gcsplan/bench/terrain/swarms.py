@@ -19,7 +19,6 @@ import numpy as np
 from gcsplan.arrays import Floats
 from gcsplan.bench.measure import length_m, passes
 from gcsplan.bench.terrain.ompl import RivalAnswer, box_of, rival_module
-from gcsplan.optimisers.driver import History, OptimiserResult
 from gcsplan.planners.problem import Problem
 from gcsplan.world.geometry.zones import Circle, Level
 
@@ -131,26 +130,28 @@ def _amsl(level: Level | None, ground: Floats, without: float) -> Floats:
     )
 
 
-def minimised(cost: Callable[[Floats], Floats], dim: int, name: str, evaluations: int, seed: int) -> OptimiserResult:
+def minimised(
+    cost: Callable[[Floats], Floats], dim: int, name: str, evaluations: int, seed: int
+) -> tuple[Floats, Floats]:
     """Run mealpy's swarm ``name`` (of `BASELINES`) on a batch cost over the unit box, for exactly ``evaluations``.
 
-    Raises InputError if mealpy is missing.
+    Returns the best numbers (dim,), and the least cost (n + 1,) after none to n evaluations, at first infinite. Raises
+    InputError if mealpy is missing.
     """
     mealpy = rival_module("mealpy")
-    best, trace = np.full(dim, 0.5), [(0, 0, math.inf)]
+    best, least = np.full(dim, 0.5), [math.inf]
 
     class Spent(Exception):
         pass
 
     def one(x: Floats) -> float:
         nonlocal best
-        count, _, least = trace[-1]
-        if count == evaluations:
+        if len(least) > evaluations:
             raise Spent
         value = float(cost(np.clip(np.asarray(x, dtype=np.float64), 0.0, 1.0)[None])[0])
-        if value < least:
+        if value < least[-1]:
             best = np.clip(x, 0.0, 1.0)
-        trace.append((count + 1, 0, min(value, least)))
+        least.append(min(value, least[-1]))
         return value
 
     # Its L-SHADE draws from numpy's global generator, and no swarm takes fewer evaluations than members a round.
@@ -160,7 +161,4 @@ def minimised(cost: Callable[[Floats], Floats], dim: int, name: str, evaluations
     bounds = mealpy.FloatVar(lb=[0.0] * dim, ub=[1.0] * dim)
     with contextlib.suppress(Spent):
         model.solve({"bounds": bounds, "minmax": "min", "obj_func": one, "log_to": None}, seed=seed)
-    counts, rounds, costs = (np.array(column) for column in zip(*trace, strict=True))
-    return OptimiserResult(
-        best, trace[-1][2], trace[-1][0], 0, History(counts, rounds, costs), "evaluations", f"mealpy {name}"
-    )  # fmt: skip
+    return best, np.array(least)

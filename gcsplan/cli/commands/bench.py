@@ -10,7 +10,7 @@ import typer
 
 from gcsplan.cli.arguments.options import ClusterOption, JobsOption, JsonOption
 from gcsplan.cli.process.exit import emit, put
-from gcsplan.errors import UsageError
+from gcsplan.errors import UsageError, needs
 
 bench_app = typer.Typer(
     help="Measurements: planners on real terrain, the papers' tables, legs checked, uploads.", no_args_is_help=True
@@ -95,8 +95,10 @@ def bench_functions(
     as_json: JsonOption = False,
 ) -> None:
     """Run SSGWO's tables 1 and 2 again, beside the printed numbers, with optima in the middle and moved."""
-    from gcsplan.bench import functions as bench
     from gcsplan.bench.files import ready
+
+    with needs("gcsplan.research", "this benchmark"):
+        from gcsplan.research.bench import functions as bench
 
     if out is not None:
         ready(out)  # find a bad directory before the long run
@@ -164,8 +166,10 @@ def bench_swarms(
     """Search 60 missions with room by every swarm: raw legal, repaired or refused, and the length over `optimal`."""
     from rich.console import Console
 
-    from gcsplan.bench.swarms import run as swarms
     from gcsplan.cli.output.console import RESULTS, remark
+
+    with needs("gcsplan.research", "this benchmark"):
+        from gcsplan.research.bench.swarms import run as swarms
 
     result = swarms.run(
         out,
@@ -232,7 +236,8 @@ def bench_papers(
 ) -> None:
     """Run every scenario and algorithm of the five papers, beside their printed numbers, straight line and optimum."""
     if speed:
-        from gcsplan.bench.papers import speed as papers_speed
+        with needs("gcsplan.research", "this benchmark"):
+            from gcsplan.research.bench.papers import speed as papers_speed
 
         measured = papers_speed.run(missions=missions)
         if as_json:
@@ -240,8 +245,9 @@ def bench_papers(
         else:
             put(papers_speed.report(measured))
         return
-    from gcsplan.bench.papers import report as papers_report
-    from gcsplan.bench.papers import run as papers
+    with needs("gcsplan.research", "this benchmark"):
+        from gcsplan.research.bench.papers import report as papers_report
+        from gcsplan.research.bench.papers import run as papers
 
     result = papers.run(
         scenario or None, algorithm or None, runs, seed, jobs, out, cluster, None, missions=missions, readings=readings
@@ -272,9 +278,11 @@ def bench_metabox(
     as_json: JsonOption = False,
 ) -> None:
     """Run our optimisers beside MetaEvoBox's own on generated instances of its UAV family (extra `metabox`)."""
-    from gcsplan.bench.metabox import report as metabox_report
-    from gcsplan.bench.metabox import run as metabox
     from gcsplan.cli.output.console import remark
+
+    with needs("gcsplan.research", "this benchmark"):
+        from gcsplan.research.bench.metabox import report as metabox_report
+        from gcsplan.research.bench.metabox import run as metabox
 
     def tell(done: int, of: int) -> None:
         if done % 50 == 0 or done == of:

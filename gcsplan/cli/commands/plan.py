@@ -379,8 +379,7 @@ def planners(as_json: JsonOption = False) -> None:
     from gcsplan.planners import registry
 
     rows = [
-        {"name": e.name, "summary": e.summary, "paper": e.paper, "defaults": dict(e.defaults)}
-        for e in registry.TABLE.values()
+        {"name": e.name, "summary": e.summary, "paper": e.paper, "defaults": dict(e.defaults)} for e in registry.rows()
     ]
     if as_json:
         emit({"planners": rows})

@@ -299,7 +299,7 @@ def test_the_papers_sequence_and_together_arrive_by_their_ideal_arithmetic() -> 
 
 @pytest.mark.slow
 def test_msfoa_plans_by_priority_with_those_before_in_view(monkeypatch: pytest.MonkeyPatch) -> None:
-    from gcsplan.planners.swarm import planner as swarm_planner
+    from gcsplan.research.swarm import planner as swarm_planner
 
     seen: list[int] = []
     search = swarm_planner.search

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,3 +34,31 @@ def test_a_swarms_path_joins_the_ends_and_a_legal_one_costs_its_length(
     low[8:] = 0.0
     assert harder(low) >= hard(low) > 2.0 * math.dist(one.start, one.goal)
     assert cost(x) >= float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) * (1.0 - 1e-12)
+
+
+def test_a_search_of_mealpys_ends_after_exactly_its_evaluations(monkeypatch: pytest.MonkeyPatch) -> None:
+    from gcsplan.bench.terrain import swarms
+
+    class Draws:
+        """As mealpy's models: ``solve`` evaluates the function more often than it is allowed to."""
+
+        def __init__(self, epoch: int, pop_size: int) -> None:
+            self.calls = epoch * pop_size
+
+        def solve(self, problem: dict[str, Any], seed: int) -> None:
+            rng = np.random.default_rng(seed)
+            for _ in range(self.calls):
+                problem["obj_func"](rng.uniform(-0.1, 1.1, len(problem["bounds"])))
+
+    mealpy = SimpleNamespace(DE=SimpleNamespace(OriginalDE=Draws), FloatVar=lambda lb, ub: lb)
+    monkeypatch.setattr(swarms, "rival_module", lambda name: mealpy)
+    tried: list[float] = []
+
+    def cost(x: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        tried.append(float((x[0] ** 2).sum()))
+        return np.array(tried[-1:])
+
+    best, least = swarms.minimised(cost, 3, "DE", 40, seed=1)
+    assert len(tried) == 40
+    assert least.tolist() == [math.inf, *np.minimum.accumulate(tried)]
+    assert (best**2).sum() == least[-1]

@@ -33,8 +33,8 @@ print(*sorted(sys.modules))
 SENDS_OR_DRAWS = {
     "PIL", "asyncio", "contourpy", "distributed", "matplotlib", "multiprocessing", "numba", "pymavlink", "rasterio",
     "scipy", "serial", "gcsplan.app.upload.run", "gcsplan.bench", "gcsplan.check.returns.rally",
-    "gcsplan.check.returns.verdict", "gcsplan.fleet.resolve", "gcsplan.native.compile", "gcsplan.optimisers",
-    "gcsplan.planners.swarm", "gcsplan.report", "gcsplan.sim",
+    "gcsplan.check.returns.verdict", "gcsplan.fleet.resolve", "gcsplan.native.compile", "gcsplan.report",
+    "gcsplan.research", "gcsplan.sim",
 }  # fmt: skip
 """What sends, draws, rehearses, compiles, or belongs to another planner or command."""
 

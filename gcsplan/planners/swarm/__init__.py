@@ -1,1 +1,0 @@
-"""Planners by swarm optimisers: encoding, cost, scene, repair, and ants; the entry of all but `aco` is `planner`."""

@@ -1,0 +1,1 @@
+"""Benchmarks of optimisers and swarm planners: the papers' tables, functions, MetaEvoBox's problems, real terrain."""

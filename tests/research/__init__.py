@@ -1,0 +1,1 @@
+"""Tests of swarm planners, optimisers and the benches of the papers."""

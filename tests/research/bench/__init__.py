@@ -1,0 +1,1 @@
+"""Tests of benchmarks of optimisers and swarm planners."""
