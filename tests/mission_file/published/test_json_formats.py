@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from gcsplan.mission_file.published.times import Hours
 from gcsplan.notes.note import Note
-from tests.mission_file.airspace.made import (
+from tests.mission_file.published.made import (
     HOLE,
     RING,
     collection,

@@ -15,7 +15,7 @@ from gcsplan.mission_file.published.openaip import is_openaip
 from gcsplan.mission_file.published.openair import OPENAIR_SUFFIXES, read_openair
 from gcsplan.mission_file.published.policy import Policy
 from gcsplan.mission_file.zone_reader import read_published
-from tests.mission_file.airspace.made import HOLE, RING, collection, ed269, ed318, openaip, volume
+from tests.mission_file.published.made import HOLE, RING, collection, ed269, ed318, openaip, volume
 
 POLICY = Policy(where="m: no_fly[0]")
 OPENAIR = (
