@@ -529,7 +529,7 @@ def test_a_plane_that_climbs_out_more_steeply_than_was_judged_is_told() -> None:
     assert judge_parameters({"TECS_PITCH_MAX": 15.0}, climbs) == []
     for pitch_deg in (25.0, 0.0):
         [told] = judge_parameters({"TECS_PITCH_MAX": pitch_deg}, climbs)
-        assert told == Note("pitch_not_flown", value=pitch_deg, flown_deg=15.0)
+        assert told == Note("pitch_not_flown", value=pitch_deg, flown_deg=15.0, judged_m=16.0)
         assert judge_parameters({"TECS_PITCH_MAX": pitch_deg}, mission(PLANE)) == []
 
 
