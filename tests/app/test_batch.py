@@ -15,8 +15,6 @@ from gcsplan.app.parallel.executor import Dask, Inline, executor
 from gcsplan.app.plan.model import PlanOptions
 from gcsplan.errors import GcsplanError, UsageError
 from gcsplan.export.table import csv_text, parquet_bytes
-from gcsplan.report.index_page import render_index
-from gcsplan.units import METRIC
 from tests.support.batches import four_missions, mission
 
 
@@ -113,23 +111,6 @@ def test_names_are_paths_from_the_common_folder(folder: Path, monkeypatch: pytes
 @pytest.mark.parametrize(("codes", "worst"), [([0, 3, 2], 3), ([0], 0), ([4, 70], 70), ([2, 4], 4), ([], 0)])
 def test_the_exit_code_is_the_worst(codes: list[int], worst: int) -> None:
     assert exit_code([Record("m", "", code, ()) for code in codes]) == worst
-
-
-def test_the_page_escapes_what_files_say() -> None:
-    row = {"mission": "a<b", "vehicle": "<script>", "code": 0, "verdict": "safe", "message": ""}
-    bad = row | {"code": 3, "verdict": "no mission", "message": "<img src=x>", "vehicle": ""}
-    page = render_index("t<", [row, bad], {0: [[47.0, 179.99], [47.01, -179.99]]}, METRIC, "summary.json")
-    assert "<img" not in page
-    assert "<script>alert" not in page
-    assert "a&lt;b" in page
-    assert 'href="a%3Cb/summary.json"' in page
-    assert "2 missions" not in page  # one name, once
-    assert 'd="M0.0' in page  # a track across 180 degrees is one short line
-    assert "1.5" in page.split("the map is")[1][:12]
-
-
-def test_an_empty_map_is_none() -> None:
-    assert "<svg" not in render_index("t", [], {}, METRIC, "summary.json")
 
 
 def test_rows_as_csv_and_parquet() -> None:

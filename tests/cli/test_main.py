@@ -12,7 +12,6 @@ from typing import Any
 
 import pytest
 
-import gcsplan
 from gcsplan.sim.vehicle.server import SimServer
 from tests.support.crossing import CROSSING, OUTPUTS, changed, vehicle
 
@@ -83,11 +82,6 @@ def test_each_kind_of_trouble_has_its_exit_code_and_is_named(
     assert "Traceback" not in err
 
 
-def test_help_and_version(run: Any) -> None:
-    assert "plan" in run("--help")[1]
-    assert run("--version")[1].startswith("0.")
-
-
 def test_a_bug_of_ours_is_exit_70_with_one_message(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     from gcsplan.app.fleet import pipeline
 
@@ -110,11 +104,6 @@ def test_ctrl_c_is_exit_130(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(pipeline, "load_mission", interrupted)
     assert run("plan", CROSSING)[0] == 130
-
-
-def test_the_package_runs_as_a_module() -> None:
-    ran = subprocess.run([sys.executable, "-m", "gcsplan", "--version"], capture_output=True, text=True, timeout=60)
-    assert (ran.returncode, ran.stdout.strip(), ran.stderr) == (0, gcsplan.__version__, "")
 
 
 @pytest.mark.slow
