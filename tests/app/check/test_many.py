@@ -36,7 +36,7 @@ class Scattered:
 
     def each(self, function: Callable[[Any, Any], Any], shared: Any, items: Sequence[Any]) -> Iterator[tuple[int, Any]]:
         for number in reversed(range(len(items))):
-            module._sites.clear()
+            module.sites.clear()
             given = pickle.loads(pickle.dumps((function, shared, items[number])))
             yield number, pickle.loads(pickle.dumps(given[0](*given[1:])))
 
@@ -100,7 +100,7 @@ def test_results_do_not_depend_on_who_works_nor_on_what_is_kept(
     assert [told_without_error(t) for t in other] == [told_without_error(t) for t in alone]
     monkeypatch.setattr(module, "KEPT_READ_BYTES", 0)
     again, archive = results(options, files, Inline(), form)
-    assert not archive._packed
+    assert not archive.packed
     assert [told_without_error(t) for t in again] == [told_without_error(t) for t in alone]
 
 

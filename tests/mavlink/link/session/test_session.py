@@ -460,7 +460,7 @@ def test_thirty_metres_aside_and_fifteen_in_height_are_allowed(north_m: float, u
 def test_return_and_failsafe_parameters_are_read_and_their_difference_reported(
     autopilot: Autopilot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(steps, "_PARAMETER_S", 0.5)  # an old ArduPlane says nothing of one that it does not have
+    monkeypatch.setattr(steps, "PARAMETER_S", 0.5)  # an old ArduPlane says nothing of one that it does not have
     board = vehicle(autopilot)
     with air(board) as link:
         options = replace(OPTIONS, read_parameters=True, rtl_rel_home_m=333.0, expected_parameters={"NO_SUCH": 1.0})
