@@ -20,4 +20,6 @@ def test_the_page_escapes_what_files_say() -> None:
 
 
 def test_an_empty_map_is_none() -> None:
-    assert "<svg" not in render_index("t", [], {}, METRIC, "summary.json")
+    page = render_index("a batch", [], {}, METRIC, "summary.json")
+    assert "<svg" not in page
+    assert "a batch" in page
