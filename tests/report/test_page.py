@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from gcsplan.app.output.report import render
 from gcsplan.check.verdict import Verdict
 from gcsplan.notes.note import Note
-from gcsplan.report.page import render_check, render_page
+from gcsplan.report.page import render_page
 from gcsplan.report.parts import html as markup
-from gcsplan.report.parts.page_data import Page
+from gcsplan.report.parts.page_data import Page, page_of_check
 from gcsplan.report.views.shaded_terrain import NO_GROUND
 from gcsplan.units import AVIATION, duration
 from gcsplan.vehicle import Vehicle
@@ -175,7 +175,7 @@ def test_a_checked_file_is_named_by_itself_where_one_vehicle_has_several() -> No
     page = small_page()
     craft, verdict = page.subjects[0].vehicle, page.subjects[0].verdict
     files = [Checked("a.waypoints", craft, verdict, (Note("home_row_blank"),)), Checked("b.plan", craft, verdict)]
-    read = Reader(render_check("two files", page.world, files, inputs=page.inputs))
+    read = Reader(render_page(page_of_check("two files", page.world, files, inputs=page.inputs)))
     assert {line["name"] for line in read.data["lines"]} == {"a.waypoints", "b.plan"}
     assert str(Note("home_row_blank")) in read.text
 
