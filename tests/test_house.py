@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ast
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -491,18 +491,31 @@ def long_names() -> list[str]:
     ]
 
 
+TIDY_TESTS: dict[str, Callable[[], list[str]]] = {
+    "modules without a test where one looks for it": without_a_test_at_their_place,
+    "modules without a test of their name": without_a_test_of_their_name,
+    "private names in tests": private_in_tests,
+    "tests without an assertion": without_an_assertion,
+    f"names of tests with more than {LONGEST_NAME} characters": long_names,
+}
+
+
+@pytest.mark.slow
 def test_every_module_has_a_test_where_one_looks_for_it() -> None:
     assert without_a_test_at_their_place() == []
 
 
+@pytest.mark.slow
 def test_tests_use_no_private_names_of_modules() -> None:
     assert private_in_tests() == []
 
 
+@pytest.mark.slow
 def test_every_test_asserts_something() -> None:
     assert without_an_assertion() == []
 
 
+@pytest.mark.slow
 def test_names_of_tests_are_short() -> None:
     assert long_names() == []
 
@@ -540,8 +553,11 @@ def arrows_between_packages() -> dict[str, set[str]]:
     return arrows
 
 
-def describe(longest: int = 12) -> str:
-    """Packages with their modules, lines and arrows; circles; the longest modules and functions."""
+def describe(longest: int = 12, *, tests: bool = True) -> str:
+    """Packages with their modules, lines and arrows; circles; the longest modules and functions.
+
+    ``tests``: with the figures of the tests, which take seconds to read.
+    """
     lines = {name_of(p): len(p.read_text(encoding="utf-8").splitlines()) for p in MODULES}
     said = ["package            modules  lines  imports"]
     for package, below in sorted(arrows_between_packages().items()):
@@ -553,20 +569,14 @@ def describe(longest: int = 12) -> str:
     said += [f"{n:6}  {name}" for name, n in sorted(lines.items(), key=lambda item: -item[1])[:longest]]
     every = [(n, f"{name_of(p)}: {name}") for p in MODULES for name, n in functions(p)]
     counted = {what: found if isinstance(found, int) else len(found) for what, found in figures().items()}
-    counted |= {
-        "modules without a test where one looks for it": len(without_a_test_at_their_place()),
-        "modules without a test of their name": len(without_a_test_of_their_name()),
-        "private names in tests": len(private_in_tests()),
-        "tests without an assertion": len(without_an_assertion()),
-        f"names of tests with more than {LONGEST_NAME} characters": len(long_names()),
-    }
+    counted |= {what: len(found()) for what, found in TIDY_TESTS.items()} if tests else {}
     said += ["", "in figures", *(f"{count:6}  {what}" for what, count in counted.items())]
     said += ["", "longest functions", *(f"{n:6}  {name}" for n, name in sorted(every, reverse=True)[:longest])]
     return "\n".join(said)
 
 
 def test_the_house_is_described() -> None:
-    text = describe()
+    text = describe(tests=False)
     assert all(f"\n{package} " in text for package in MAY_IMPORT)
     assert "circles of modules: none" in text
     assert "circles of packages: none" in text

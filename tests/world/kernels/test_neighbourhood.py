@@ -209,6 +209,7 @@ def test_neighbourhoods_forget_those_asked_for_least_lately_and_judge_alike(monk
     assert pickle.loads(pickle.dumps(kept)).kept == {}
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads the memory that is held as Linux tells it")
 def test_a_line_across_a_large_surface_takes_memory_for_its_tiles_alone() -> None:
     """A page of 4 kB for every row of every tile, or of 2 MB, were ten and a hundred times as much."""
