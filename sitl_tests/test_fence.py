@@ -45,7 +45,7 @@ def a_fence(autopilot: Autopilot) -> Fence:
 def test_a_fence_arrives_at_a_mavsdk_vehicle_and_reads_back(
     autopilot: Autopilot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(steps, "_ASK_AGAIN_S", 0.05)  # it never sends its capabilities or its position
+    monkeypatch.setattr(steps, "ASK_AGAIN_S", 0.05)  # it never sends its capabilities or its position
     fence = a_fence(autopilot)
     with MavsdkVehicle(sysid=4) as vehicle, Link(vehicle.url) as link:
         result = upload_items(link, 4, fence.items, autopilot, FENCE, options=QUICK)

@@ -41,7 +41,7 @@ def some_rally_points(n: int) -> list[MissionItem]:
 @pytest.fixture
 def asked_in_haste(monkeypatch: pytest.MonkeyPatch) -> None:
     """Wait only briefly for a vehicle's capabilities and position: MAVSDK's vehicle never sends them."""
-    monkeypatch.setattr(steps, "_ASK_AGAIN_S", 0.05)
+    monkeypatch.setattr(steps, "ASK_AGAIN_S", 0.05)
 
 
 def wires(rows: list[Row]) -> list[bytes]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ast
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -188,13 +188,16 @@ def test_every_module_has_its_package_in_the_table() -> None:
     assert {package_of(name) for name in NAMES} - {"", *ROOMS} == set(MAY_IMPORT)
 
 
-@pytest.mark.parametrize("path", MODULES, ids=name_of)
-def test_a_package_imports_only_what_it_may(path: Path) -> None:
-    where = package_of(module_of(path))
-    if where in ("", *ROOMS):
-        return  # the front door; what it offers, it imports when it is asked for
-    found = {package_of(module) for module in own_imports(path)} - {where}
-    assert found <= MAY_IMPORT[where], f"{name_of(path)} may not import {sorted(found - MAY_IMPORT[where])}"
+def test_a_package_imports_only_what_it_may() -> None:
+    wrong = {}
+    for path in MODULES:
+        where = package_of(module_of(path))
+        if where in ("", *ROOMS):
+            continue  # the front door; what it offers, it imports when it is asked for
+        found = {package_of(module) for module in own_imports(path)} - {where}
+        if found - MAY_IMPORT[where]:
+            wrong[name_of(path)] = sorted(found - MAY_IMPORT[where])
+    assert wrong == {}, "these modules may not import these packages"
 
 
 def test_the_table_has_no_circle() -> None:
@@ -235,12 +238,14 @@ def test_the_front_door_opens_without_the_heavy_rooms() -> None:
     assert roots <= set(sys.stdlib_module_names) | {"__future__"}
 
 
-@pytest.mark.parametrize("path", [p for p in MODULES if knows_metres_alone(p)], ids=name_of)
-def test_planners_and_airspace_know_metres_alone(path: Path) -> None:
-    roots = {module.split(".")[0] for module in imports_of(path)}
-    assert roots & {"pyproj", "rasterio", "pymavlink"} == set()
-    names = set(identifiers(nodes_of(path)))
-    assert sorted(n for n in names if any(word in n.lower() for word in DEGREES)) == []
+def test_planners_and_airspace_know_metres_alone() -> None:
+    degrees = {}
+    for path in (p for p in MODULES if knows_metres_alone(p)):
+        roots = {module.split(".")[0] for module in imports_of(path)}
+        names = {n for n in identifiers(nodes_of(path)) if any(word in n.lower() for word in DEGREES)}
+        if found := sorted(names | roots & {"pyproj", "rasterio", "pymavlink"}):
+            degrees[name_of(path)] = found
+    assert degrees == {}
 
 
 def test_only_the_door_projects() -> None:
@@ -375,24 +380,161 @@ OTHERS = {"_replace", "_exit", "_timestamp", "_getvalue"}
 
 def reached_through() -> list[str]:
     """Names that begin with _ and are not the module's own: imported, or looked up in something of another's."""
+    return [
+        f"{name_of(path)}:{line}: {name}"
+        for path in MODULES
+        for line, name in private(nodes_of(path), names_of(nodes_of(path)))
+    ]
+
+
+def names_of(nodes: Sequence[ast.AST]) -> set[str]:
+    """The functions, classes and attributes that a module defines itself."""
+    found = {n.name for n in nodes if isinstance(n, ast.FunctionDef | ast.ClassDef)}
+    found |= {n.attr for n in nodes if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
+    return found | {n.target.id for n in nodes if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)}
+
+
+def is_private(name: str) -> bool:
+    return name.startswith("_") and not name.startswith("__")
+
+
+def private(nodes: Sequence[ast.AST], mine: set[str]) -> Iterator[tuple[int, str]]:
+    """Line and name of each private name that a module uses and that is none of ``mine``."""
+    for node in nodes:
+        if isinstance(node, ast.Attribute) and is_private(node.attr):
+            its_own = isinstance(node.value, ast.Name) and node.value.id in ("self", "cls")
+            if not its_own and node.attr not in mine | OTHERS:
+                yield node.lineno, ast.unparse(node)
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("gcsplan"):
+            names = [a.name for a in node.names if is_private(a.name)]
+            yield from ((node.lineno, f"{node.module}.{n}") for n in names if f"{node.module}.{n}" not in NAMES)
+
+
+# -- the tests of the house -------------------------------------------------------------------------------------------
+
+TESTS = Path(__file__).parent
+LONGEST_NAME = 80  # of a test
+
+PATCHING = {"setattr", "getattr", "delattr", "hasattr"}
+
+
+@cache
+def files_of_tests() -> dict[Path, list[ast.AST]]:
+    """All modules of tests, each with its nodes."""
+    files = [*TESTS.rglob("*.py"), *(TESTS.parent / "sitl_tests").rglob("*.py")]
+    return {path: list(ast.walk(ast.parse(path.read_text(encoding="utf-8")))) for path in sorted(files)}
+
+
+def place_of_test(module: Path) -> Path:
+    """Where one looks for the test of a module first."""
+    return TESTS / module.relative_to(ROOT).parent / f"test_{module.stem.strip('_')}.py"
+
+
+def without_a_test_at_their_place() -> list[str]:
+    """Modules that have no test of their name in the folder of tests like theirs, and that no other test there names.
+
+    A package's own file counts with its modules.
+    """
+    named: dict[Path, set[str]] = {}
+    for path, nodes in files_of_tests().items():
+        if path.name.startswith("test_"):
+            found = {own(name) for name in imported(nodes, ("tests", *path.relative_to(TESTS.parent).parts[1:-1]))}
+            named.setdefault(path.parent, set()).update(name for name in found if name is not None)
+    return [
+        name_of(path)
+        for path in MODULES
+        if path.name != "__init__.py"
+        and not place_of_test(path).exists()
+        and module_of(path) not in named.get(place_of_test(path).parent, set())
+    ]
+
+
+def without_a_test_of_their_name() -> list[str]:
+    """Modules whose tests stand under another name."""
+    return [name_of(path) for path in MODULES if path.name != "__init__.py" and not place_of_test(path).exists()]
+
+
+def private_in_tests() -> list[str]:
+    """Names of gcsplan that begin with _ and that tests import, look up, or patch by a text."""
     found = []
-    for path in MODULES:
-        name, nodes = name_of(path), nodes_of(path)
-        own_names = {n.name for n in nodes if isinstance(n, ast.FunctionDef | ast.ClassDef)}
-        own_names |= {n.attr for n in nodes if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
-        own_names |= {n.target.id for n in nodes if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)}
+    for path, nodes in files_of_tests().items():
+        where, mine = path.relative_to(TESTS.parent).as_posix(), names_of(nodes)
         for node in nodes:
-            if isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.startswith("__"):
-                mine = isinstance(node.value, ast.Name) and node.value.id in ("self", "cls")
-                if not mine and node.attr not in own_names | OTHERS:
-                    found.append(f"{name}:{node.lineno}: {ast.unparse(node)}")
-            elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("gcsplan"):
-                found += [
-                    f"{name}:{node.lineno}: {node.module}.{a.name}"
-                    for a in node.names
-                    if a.name.startswith("_") and not a.name.startswith("__") and f"{node.module}.{a.name}" not in NAMES
-                ]
+            if isinstance(node, ast.Call) and getattr(node.func, "attr", getattr(node.func, "id", "")) in PATCHING:
+                texts = [a.value for a in node.args[:2] if isinstance(a, ast.Constant) and isinstance(a.value, str)]
+                parts = [part for text in texts for part in text.split(".")]
+                found += [f"{where}:{node.lineno}: {part}" for part in parts if is_private(part)]
+        found += [f"{where}:{line}: {name}" for line, name in private(nodes, mine)]
     return found
+
+
+def without_an_assertion() -> list[str]:
+    """Tests that can only fail by an error: they assert nothing, expect no error, and call nobody who does."""
+    helpers = {
+        node.name
+        for nodes in files_of_tests().values()
+        for node in nodes
+        if isinstance(node, ast.FunctionDef) and not node.name.startswith("test_") and asserts(node, set())
+    }
+    return [
+        f"{path.relative_to(TESTS.parent).as_posix()}:{node.lineno}: {node.name}"
+        for path, nodes in files_of_tests().items()
+        for node in nodes
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_") and path.name.startswith("test_")
+        if not asserts(node, helpers)
+    ]
+
+
+def asserts(function: ast.FunctionDef, helpers: set[str]) -> bool:
+    """Whether a function asserts or expects an error itself, or calls one of ``helpers``, which do."""
+    for node in ast.walk(function):
+        if isinstance(node, ast.Assert):
+            return True
+        if isinstance(node, ast.Call):
+            called = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            if called in {"raises", "warns", "fail"} | helpers or called.startswith("assert_"):
+                return True
+    return False
+
+
+def long_names() -> list[str]:
+    """Tests whose names are too long to read at once."""
+    return [
+        node.name
+        for path, nodes in files_of_tests().items()
+        for node in nodes
+        if isinstance(node, ast.FunctionDef) and path.name.startswith("test_")
+        if node.name.startswith("test_") and len(node.name) > LONGEST_NAME
+    ]
+
+
+TIDY_TESTS: dict[str, Callable[[], list[str]]] = {
+    "modules without a test where one looks for it": without_a_test_at_their_place,
+    "modules without a test of their name": without_a_test_of_their_name,
+    "private names in tests": private_in_tests,
+    "tests without an assertion": without_an_assertion,
+    f"names of tests with more than {LONGEST_NAME} characters": long_names,
+}
+
+
+@pytest.mark.slow
+def test_every_module_has_a_test_where_one_looks_for_it() -> None:
+    assert without_a_test_at_their_place() == []
+
+
+@pytest.mark.slow
+def test_tests_use_no_private_names_of_modules() -> None:
+    assert private_in_tests() == []
+
+
+@pytest.mark.slow
+def test_every_test_asserts_something() -> None:
+    assert without_an_assertion() == []
+
+
+@pytest.mark.slow
+def test_names_of_tests_are_short() -> None:
+    assert long_names() == []
 
 
 @cache
@@ -428,8 +570,11 @@ def arrows_between_packages() -> dict[str, set[str]]:
     return arrows
 
 
-def describe(longest: int = 12) -> str:
-    """Packages with their modules, lines and arrows; circles; the longest modules and functions."""
+def describe(longest: int = 12, *, tests: bool = True) -> str:
+    """Packages with their modules, lines and arrows; circles; the longest modules and functions.
+
+    ``tests``: with the figures of the tests, which take seconds to read.
+    """
     lines = {name_of(p): len(p.read_text(encoding="utf-8").splitlines()) for p in MODULES}
     said = ["package            modules  lines  imports"]
     for package, below in sorted(arrows_between_packages().items()):
@@ -441,13 +586,14 @@ def describe(longest: int = 12) -> str:
     said += [f"{n:6}  {name}" for name, n in sorted(lines.items(), key=lambda item: -item[1])[:longest]]
     every = [(n, f"{name_of(p)}: {name}") for p in MODULES for name, n in functions(p)]
     counted = {what: found if isinstance(found, int) else len(found) for what, found in figures().items()}
+    counted |= {what: len(found()) for what, found in TIDY_TESTS.items()} if tests else {}
     said += ["", "in figures", *(f"{count:6}  {what}" for what, count in counted.items())]
     said += ["", "longest functions", *(f"{n:6}  {name}" for n, name in sorted(every, reverse=True)[:longest])]
     return "\n".join(said)
 
 
 def test_the_house_is_described() -> None:
-    text = describe()
+    text = describe(tests=False)
     assert all(f"\n{package} " in text for package in MAY_IMPORT)
     assert "circles of modules: none" in text
     assert "circles of packages: none" in text

@@ -132,8 +132,8 @@ def _unlike_fitted(stretches: Sequence[Stretch], vehicle: Vehicle) -> list[Note]
         return []
     slow, fast = energy.fitted_m_s
     speed = max(far, key=lambda v: max(slow / max(v, 1e-9), v / fast))
-    at = f"{slow:g}" if slow == fast else f"{slow:g} to {fast:g}"
-    return [Note("energy_fitted_elsewhere", far[speed], fitted=at, speed_m_s=speed)]
+    fitted = (slow,) if slow == fast else (slow, fast)
+    return [Note("energy_fitted_elsewhere", far[speed], fitted=fitted, speed_m_s=speed)]
 
 
 def _refused(mission: Mission) -> list[Finding]:

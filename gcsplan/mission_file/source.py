@@ -16,7 +16,7 @@ from gcsplan.errors import InputError
 from gcsplan.mission_file import samples
 from gcsplan.mission_file.values.schema import shown
 from gcsplan.mission_file.values.yaml import MAX_YAML_BYTES, MAX_YAML_DEPTH, MAX_YAML_NODES, missing_space, read_yaml
-from gcsplan.world.terrain.input_files import tell_file
+from gcsplan.world.terrain.input_files import LOG_FILES, TERRAIN_FILES, VEHICLE_FILES, ZONES_BY_NAME, tell_file
 
 UNNAMED = Path("mission.yaml")
 """Path of a mission that has no file; files that the mission names are then found from the current folder."""
@@ -136,10 +136,10 @@ class _Plain:
 VEHICLES, ZONES, TERRAIN, LOG = "vehicles", "zones", "terrain", "log"
 
 SUFFIXES_BY_KIND = {
-    VEHICLES: (".waypoints", ".plan"),
-    ZONES: (".kml", ".kmz", ".geojson", ".gpkg", ".shp", ".fgb", ".csv", ".zip"),
-    TERRAIN: (".tif", ".tiff", ".hgt", ".asc", ".dat"),
-    LOG: (".bin", ".tlog", ".ulg"),
+    VEHICLES: VEHICLE_FILES,
+    ZONES: ZONES_BY_NAME,
+    TERRAIN: TERRAIN_FILES,
+    LOG: LOG_FILES,
 }
 
 FIRST_BYTES = {

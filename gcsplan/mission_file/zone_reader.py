@@ -1,4 +1,4 @@
-"""Zones from a file of any format, chosen by its name, and in JSON by its members.
+"""Zones from a file of any format, chosen by its name, and in JSON_ZONES by its members.
 
 Published formats are known likewise: OpenAir by its name, the others by members that no other format has.
 """
@@ -12,7 +12,7 @@ from gcsplan.errors import InputError
 from gcsplan.mission_file.published.ed269 import is_ed269, read_ed269
 from gcsplan.mission_file.published.ed318 import is_ed318, read_ed318
 from gcsplan.mission_file.published.openaip import is_openaip, read_openaip
-from gcsplan.mission_file.published.openair import OPENAIR_SUFFIXES, read_openair
+from gcsplan.mission_file.published.openair import read_openair
 from gcsplan.mission_file.published.policy import Policy
 from gcsplan.mission_file.zones.contents import load_json, unpack
 from gcsplan.mission_file.zones.csv import read_csv
@@ -20,14 +20,10 @@ from gcsplan.mission_file.zones.file import ZoneFile
 from gcsplan.mission_file.zones.geojson import read_geojson
 from gcsplan.mission_file.zones.json_document import require_wgs84, sent_in_part
 from gcsplan.mission_file.zones.kml import read_kml
-from gcsplan.world.terrain.input_files import absent, tell_file
+from gcsplan.world.terrain.input_files import JSON_ZONES, OPENAIR_ZONES, VECTOR_ZONES, ZONE_FILES, absent, tell_file
 
 MAX_ZONE_BYTES = 20_000_000
 """Most bytes of a file, and of what is unpacked from one."""
-
-JSON = (".geojson", ".json")
-VECTOR = (".gpkg", ".shp", ".fgb", ".zip")
-ZONE_SUFFIXES = (*JSON, ".kml", ".kmz", ".csv", *VECTOR)
 
 
 def read_zones(
@@ -48,14 +44,14 @@ def read_zones(
     Mistakes in single features are collected in ``problems``; a file that cannot be read at all raises InputError.
     """
     kind = path.suffix.lower()
-    if kind not in (*ZONE_SUFFIXES, *OPENAIR_SUFFIXES):
-        known = f"{', '.join(ZONE_SUFFIXES)} and OpenAir ({', '.join(OPENAIR_SUFFIXES)}) files"
+    if kind not in (*ZONE_FILES, *OPENAIR_ZONES):
+        known = f"{', '.join(ZONE_FILES)} and OpenAir ({', '.join(OPENAIR_ZONES)}) files"
         raise InputError(f"zones are read from {known}, given {path.name}", where=where)
-    if layer is not None and kind not in VECTOR:
+    if layer is not None and kind not in VECTOR_ZONES:
         raise InputError(f"a {kind} file has no layers; leave `layer` out", where=where)
     policy = policy or Policy()
     data = _bytes(path, where)
-    whole = load_json(path, data) if kind in JSON else None
+    whole = load_json(path, data) if kind in JSON_ZONES else None
     require_wgs84(whole, path)
     in_part = sent_in_part(whole, path)
     published = read_published(path, data, whole, policy)
@@ -65,7 +61,7 @@ def read_zones(
     for key in policy.keys:
         words = f"{path.name} is no file of an authority (OpenAir, ED-269, ED-318, openAIP), and has no {key}"
         raise InputError(words, where=f"{policy.where}.{key}")
-    found = read_geojson(path, whole) if kind in JSON else _read(path, kind, data, layer)
+    found = read_geojson(path, whole) if kind in JSON_ZONES else _read(path, kind, data, layer)
     found.problems[:0] = in_part
     found.give_sizes(radius_m, buffer_m)
     return found
@@ -76,7 +72,7 @@ def _read(path: Path, kind: str, data: bytes, layer: str | None) -> ZoneFile:
         return read_kml(path, unpack(path, data, [".kml"], MAX_ZONE_BYTES)[".kml"])
     if kind == ".csv":
         return read_csv(path, data)
-    if kind in VECTOR:
+    if kind in VECTOR_ZONES:
         from gcsplan.mission_file.zones.vector import read_vector  # most missions need neither it nor PROJ's database
 
         return read_vector(path, data, layer=layer, most_bytes=MAX_ZONE_BYTES)
@@ -100,7 +96,7 @@ def _bytes(path: Path, where: str) -> bytes:
 
 def read_published(path: Path, data: bytes, whole: Any, policy: Policy) -> ZoneFile | None:
     """The zones of a published file; None if it has none of these formats. ``whole`` is what its JSON holds."""
-    if path.suffix.lower() in OPENAIR_SUFFIXES:
+    if path.suffix.lower() in OPENAIR_ZONES:
         return read_openair(path, data, policy)
     for is_format, read in ((is_ed269, read_ed269), (is_ed318, read_ed318), (is_openaip, read_openaip)):
         if is_format(whole):

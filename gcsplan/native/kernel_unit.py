@@ -120,6 +120,11 @@ class KernelUnit:
                     self._loaded = self._load()
         return self._loaded[name]
 
+    def forget(self) -> None:
+        """Let the next call load the machine code anew, for what the processor can do by then."""
+        with self._lock:
+            self._loaded = None
+
     def with_numba(self) -> dict[str, Any]:
         """The kernels as functions of numba by name, for code that numba compiles together with them."""
         self.digest()

@@ -100,7 +100,7 @@ CHECK_TEXTS = {
     ),
     "reads_terrain_on_board": (
         "terrain-frame legs depend on the terrain data in the vehicle; judged as it reads this terrain, at posts every "
-        "{spacing_m} m, with {error_m:height} of error"
+        "{spacing_m:distance}, with {error_m:height} of error"
     ),
     "no_ceiling": "{key:max_agl_m} is not set: nothing limits the height above ground",
     "ends_in_the_air": "the mission ends in the air: what becomes of the vehicle after its last item is not in it",
@@ -368,7 +368,7 @@ CHECK_TEXTS = {
         "about this aircraft: give what flying takes under energy: (cruise_w, endurance_min, or what fit-energy finds)"
     ),
     "energy_fitted_elsewhere": (
-        "the energy is fitted to flights at {fitted} m/s, and from item {item} on it flies at {speed_m_s:.3g} m/s: "
+        "the energy is fitted to flights at {fitted:speed}, and from item {item} on it flies at {speed_m_s:speed.1}: "
         "what it needs may be far off; fit the energy to flights at that speed, too"
     ),
     "battery_lasts_unknown": "how long the battery lasts there is not known, for hover_w is 0",

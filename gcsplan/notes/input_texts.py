@@ -21,7 +21,7 @@ INPUT_TEXTS = {
     "lean_bounds_speed_curably": (
         "planned with {most_m_s:speed}, not {wanted_m_s:speed bare}: a lean of {lean_deg:g}°"
         "{by_default:, ArduCopter's default,| (lean_angle_deg)} allows about that; for {wanted_m_s:speed} write "
-        "lean_angle_deg: {needs_deg}, and set {setting}"
+        "{key:lean_angle_deg}: {needs_deg}, and set {setting}"
     ),
     "velocity_bounds_speed": (
         "planned with {most_m_s:speed}, not {wanted_m_s:speed bare}: MPC_XY_VEL_MAX {most_m_s:g} m/s"
@@ -238,7 +238,7 @@ INPUT_TEXTS = {
     "terrain_blocks_unused": "{count} {count:block|blocks} not used: {why}; the ground there is unknown",
     "checksum_wrong": "its checksum is wrong",
     "format_of_other_version": "its format is version {version}, wanted {wanted}",
-    "spacing_differs": "its spacing is {spacing_m} m, that of most is {most_m} m",
+    "spacing_differs": "its spacing is {spacing_m:distance}, that of most is {most_m:distance}",
     "spacing_is_zero": "its spacing is 0",
     "block_lies_elsewhere": "it lies elsewhere than its corner says (older tools placed blocks otherwise)",
     "terrain_is_a_surface": (

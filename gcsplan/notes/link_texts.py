@@ -25,11 +25,11 @@ LINK_TEXTS = {
     ),
     "position_not_told": "the vehicle reports no position: whether it stands at the start could not be checked",
     "home_on_board_elsewhere": (
-        "the vehicle's home is {away_m:distance.0} from the mission's start and {higher_m:+.1f} m in height"
+        "the vehicle's home is {away_m:distance.0} from the mission's start and {off_m:height.1} {above:above|below} it"
     ),
     "home_on_board_elsewhere_counts": (
-        "the vehicle's home is {away_m:distance.0} from the mission's start and {higher_m:+.1f} m in height; its "
-        "relative altitudes count from there if it is not armed at the start"
+        "the vehicle's home is {away_m:distance.0} from the mission's start and {off_m:height.1} {above:above|below} "
+        "it; its relative altitudes count from there if it is not armed at the start"
     ),
     "changed_after_read_back": "after the read-back: {outcome}",
     "armed_during_upload": "the vehicle was armed by somebody during the upload",
@@ -116,7 +116,7 @@ LINK_TEXTS = {
     "return_route_all_unread": "none of {names} could be read: whether the return joins the mission is not known",
     "return_joins_mission": (
         "{names} is {value:g} on board: the return joins the mission at {start}, and was judged straight home: set 1 "
-        "or 2 (RTL), or judge it with return_route: mission"
+        "or 2 (RTL), or judge it with {key:return_route}: mission"
     ),
     "return_joins_no_mission": (
         "{settings} on board: such a return does not join the mission at {start}, as it was judged: set {value:g} "
@@ -130,22 +130,22 @@ LINK_TEXTS = {
     ),
     "plane_return_leads_on": (
         "RTL_AUTOLAND is {value:g} on board: the return leads on to {start}, and was judged straight home: set "
-        "RTL_AUTOLAND 3, or judge it with return_route: mission"
+        "RTL_AUTOLAND 3, or judge it with {key:return_route}: mission"
     ),
     "pitch_not_flown": (
         "TECS_PITCH_MAX is {value:g} on board: with more than {flown_deg:g}° (0: with PTCH_LIM_MAX_DEG) an aircraft "
-        "with power to spare rises further above its take-off's altitude than the 16 m that are judged unless "
-        "climb_out_m_s tells its climb: set {flown_deg:g}, or give climb_out_m_s"
+        "with power to spare rises further above its take-off's altitude than the {judged_m:height} that are judged "
+        "unless {key:climb_out_m_s} tells its climb: set {flown_deg:g}, or give {key:climb_out_m_s}"
     ),
     "lean_angle_unread": (
-        "the largest lean angle on board could not be read: {speed_m_s:.3g} m/s need about {needs_deg}°"
+        "the largest lean angle on board could not be read: {speed_m_s:speed.1} need about {needs_deg}°"
     ),
     "lean_angle_too_small": (
-        "{name} is {value:g} on board: it leans by {lean_deg:g}° at most, which allows about {most_m_s:.3g} m/s, and "
-        "{speed_m_s:.3g} m/s are commanded: set {name} {wanted:g}, or plan with lean_angle_deg: {lean_deg:g}"
+        "{name} is {value:g} on board: it leans by {lean_deg:g}° at most, which allows about {most_m_s:speed.1}, and "
+        "{speed_m_s:speed.1} are commanded: set {name} {wanted:g}, or plan with {key:lean_angle_deg}: {lean_deg:g}"
     ),
     "velocity_too_small": (
-        "MPC_XY_VEL_MAX is {value:g} on board: it flies no faster, and {speed_m_s:.3g} m/s are commanded: set "
+        "MPC_XY_VEL_MAX is {value:g} on board: it flies no faster, and {speed_m_s:speed.1} are commanded: set "
         "MPC_XY_VEL_MAX {wanted}, or plan with speed_m_s up to {value:g}"
     ),
     "arrives_later": "it arrives later than planned: {reasons}",
@@ -188,10 +188,10 @@ LINK_TEXTS = {
     "assumed_reached_height": "the height at which an item counts as reached",
     "assumed_return_straight": "returns are judged straight home",
     "assumed_terrain_margin": "how far off its height above ground it slows down",
-    "assumed_lean": "{key:lean_angle_deg}: {speed_m_s:.3g} m/s, and forecasts in wind",
+    "assumed_lean": "{key:lean_angle_deg}: {speed_m_s:speed.1}, and forecasts in wind",
     "assumed_return_altitude": "the return altitude, above home{judged:, as judged|}",
     "assumed_return_turns": "turns of the return",
-    "assumed_bank": "the bank of its turns at {speed_m_s:.3g} m/s, and a tenth to steer",
+    "assumed_bank": "the bank of its turns at {speed_m_s:speed.1}, and a tenth to steer",
     "after_radio_loss": "loss of radio control",
     "after_ground_station_loss": "loss of the ground station",
     "after_low_battery": "a low battery",

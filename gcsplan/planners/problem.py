@@ -302,13 +302,15 @@ def straight_bound(problem: Problem, rounding_m: tuple[float, float] = (0.0, 0.0
             known.append((way, v.amsl_m))
     way += max(math.dist(last, problem.goal[:2]) - flat, 0.0)
     known.append((way, problem.goal[2]))
-    legs = [(max(b[0] - a[0], _run(problem, a, b)), max(abs(b[1] - a[1]) - rise, 0.0)) for a, b in pairwise(known)]
+    legs = [
+        (max(b[0] - a[0], least_run_m(problem, a, b)), max(abs(b[1] - a[1]) - rise, 0.0)) for a, b in pairwise(known)
+    ]
     if problem.objective == "energy":
         return sum(problem.vertical_j_per_m * up_m + problem.horizontal_j_per_m * run_m for run_m, up_m in legs)
     return sum(math.hypot(*leg) for leg in legs)
 
 
-def _run(problem: Problem, a: tuple[float, float], b: tuple[float, float]) -> float:
+def least_run_m(problem: Problem, a: tuple[float, float], b: tuple[float, float]) -> float:
     """Least metres of track that the climb or descent from ``a`` to ``b`` (metres along, altitude) needs."""
     limits, rise = problem.bound_limits, abs(b[1] - a[1]) - 2.0 * problem.rounding_m[1]
     return max(rise, 0.0) / (limits.max_climb_slope if b[1] > a[1] else limits.max_descent_slope)

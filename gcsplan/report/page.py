@@ -1,21 +1,20 @@
 """The report: one self-contained HTML page for a plan, or for files that were checked.
 
-`render_page` and `render_check` return the whole page as text: no external addresses, no clock, and the same bytes for
-the same input. Style and script are in `assets/`. The script can only draw (the page's policy enforces it), and without
-it the page still has every number, the map and the profiles.
+`render_page` returns the whole page as text: no external addresses, no clock, and the same bytes for the same input.
+Style and script are in `assets/`. The script can only draw (the page's policy enforces it), and without it the page
+still has every number, the map and the profiles.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from gcsplan import __version__
-from gcsplan.check.returns.verdict import WayHome
 from gcsplan.figures import steepened
-from gcsplan.notes.note import Note, Wording
+from gcsplan.notes.note import Wording
 from gcsplan.report.briefing import briefing_html
 from gcsplan.report.parts.html import (
     data_block,
@@ -31,13 +30,11 @@ from gcsplan.report.parts.html import (
     tools,
 )
 from gcsplan.report.parts.page_data import (
-    CheckedFile,
     Page,
     Subject,
     in_full,
     left_out_html,
     only_some,
-    page_of_check,
     samples_of,
 )
 from gcsplan.report.parts.track_samples import Passage, TrackLine, line_of, passages
@@ -50,11 +47,11 @@ from gcsplan.report.views.rehearsal import headline, rehearsal_html
 from gcsplan.report.views.replay import replay_data, replay_html, replay_of
 from gcsplan.report.views.scene_data import exaggeration, zone_meshes
 from gcsplan.report.views.shaded_terrain import Relief, extent_of, relief_of
-from gcsplan.units import KILOJOULE, METRIC, Unit, Units, duration, in_units
+from gcsplan.units import KILOJOULE, Unit, Units, duration, in_units
 from gcsplan.world.terrain.model_words import what_is_not_in
 from gcsplan.world.world import World
 
-__all__ = ["render_check", "render_page"]
+__all__ = ["render_page"]
 
 OPEN_VEHICLES = 3
 """Vehicles whose profiles are open at first; the others open on a tap, and on paper. So do a fleet's tables."""
@@ -68,24 +65,6 @@ FILTER = (
 )
 SCRIPTS = ("base.js", "labels.js", "view.js", "flight.js", "replay.js", "charts.js", "mesh.js", "scene.js",
            "filter.js", "start.js")  # fmt: skip
-
-
-def render_check(
-    title: str,
-    world: World,
-    checked: Sequence[CheckedFile],
-    *,
-    inputs: Mapping[str, object],
-    notes: Sequence[Note] = (),
-    homes: Sequence[WayHome | None] = (),
-    units: Units = METRIC,
-) -> str:
-    """The report of files that were checked in ``world``, as HTML text.
-
-    ``inputs`` are those of a mission file, or a surface's ``info``; if ``bare_dem`` is true, the page says so.
-    ``homes`` are the ways home of ``checked``, in the same order, None if not judged. ``units``: of the page's numbers.
-    """
-    return render_page(page_of_check(title, world, checked, inputs=inputs, notes=notes, homes=homes, units=units))
 
 
 def render_page(page: Page) -> str:

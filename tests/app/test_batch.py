@@ -2,47 +2,25 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
-from typer import testing as runner
 
 from gcsplan.app import batch as module
 from gcsplan.app.batch import BatchOptions, MissionBatch, Record, exit_code, missions_of
 from gcsplan.app.parallel.executor import Dask, Inline, executor
 from gcsplan.app.plan.model import PlanOptions
-from gcsplan.cli.command_table import app
 from gcsplan.errors import GcsplanError, UsageError
 from gcsplan.export.table import csv_text, parquet_bytes
-from gcsplan.report.index_page import render_index
-from gcsplan.units import METRIC
-
-
-def mission(**changes: Any) -> str:
-    vehicle = {
-        "name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 12],
-        "start": [47.0, 8.0], "goal": [47.0, 8.02],
-    }  # fmt: skip
-    whole = {"version": 1, "terrain": {"flat_m": 100}, "limits": {"min_agl_m": 30}, "vehicles": [vehicle]}
-    return yaml.safe_dump(whole | changes)
+from tests.support.batches import four_missions, mission
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Four missions: one good, one in a folder, one that is no YAML, one whose start lies in a zone."""
-    given = tmp_path / "missions"
-    (given / "north").mkdir(parents=True)
-    (given / "good.yaml").write_text(mission())
-    (given / "north" / "good.yaml").write_text(mission(name="another"))
-    (given / "north" / "broken.yaml").write_text("version: 1\nvehicles: [\n")
-    disc = {"name": "disc", "center": [47.0, 8.0], "radius_m": 200}
-    (given / "shut.yaml").write_text(mission(no_fly=[disc]))
-    return given
+    return four_missions(tmp_path / "missions")
 
 
 def ran(folder: Path, out: Path, **options: Any) -> tuple[dict[str, Record], int]:
@@ -133,42 +111,6 @@ def test_names_are_paths_from_the_common_folder(folder: Path, monkeypatch: pytes
 @pytest.mark.parametrize(("codes", "worst"), [([0, 3, 2], 3), ([0], 0), ([4, 70], 70), ([2, 4], 4), ([], 0)])
 def test_the_exit_code_is_the_worst(codes: list[int], worst: int) -> None:
     assert exit_code([Record("m", "", code, ()) for code in codes]) == worst
-
-
-def test_the_command_ends_with_a_table_and_a_page(folder: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    done = runner.CliRunner().invoke(app, ["batch", str(folder), "-o", str(out), "--jobs", "1"])
-    assert done.exit_code == 2, done.output
-    assert "2 of 4 missions planned, 2 vehicles" in done.output
-    assert "shut: error:" in done.output
-    rows = list(csv.DictReader(io.StringIO((out / "results.csv").read_text())))
-    assert [(r["mission"], r["vehicle"], r["code"]) for r in rows] == [
-        ("good", "uav1", "0"), ("north/broken", "", "2"), ("north/good", "uav1", "0"), ("shut", "", "2"),
-    ]  # fmt: skip
-    page = (out / "index.html").read_text()
-    assert page.count("<path data-row=") == 2
-    assert 'href="north/good/summary.json"' in page
-    again = runner.CliRunner().invoke(app, ["batch", str(folder), "-o", str(out), "--json"])
-    assert "4 of 4 missions are done and unchanged" in again.output
-    told = json.loads(again.stdout)
-    assert (told["missions"], len(told["rows"])) == (4, 4)
-
-
-def test_the_page_escapes_what_files_say() -> None:
-    row = {"mission": "a<b", "vehicle": "<script>", "code": 0, "verdict": "safe", "message": ""}
-    bad = row | {"code": 3, "verdict": "no mission", "message": "<img src=x>", "vehicle": ""}
-    page = render_index("t<", [row, bad], {0: [[47.0, 179.99], [47.01, -179.99]]}, METRIC, "summary.json")
-    assert "<img" not in page
-    assert "<script>alert" not in page
-    assert "a&lt;b" in page
-    assert 'href="a%3Cb/summary.json"' in page
-    assert "2 missions" not in page  # one name, once
-    assert 'd="M0.0' in page  # a track across 180 degrees is one short line
-    assert "1.5" in page.split("the map is")[1][:12]
-
-
-def test_an_empty_map_is_none() -> None:
-    assert "<svg" not in render_index("t", [], {}, METRIC, "summary.json")
 
 
 def test_rows_as_csv_and_parquet() -> None:

@@ -162,7 +162,7 @@ def test_simulated_vehicles_lean_as_far_as_their_missions_need() -> None:
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ({"ATC_ANGLE_MAX": 30.0}, "ATC_ANGLE_MAX is 30 on board: it leans by 30° at most, which allows about 10 m/s"),
+        ({"ATC_ANGLE_MAX": 30.0}, "ATC_ANGLE_MAX is 30 on board: it leans by 30° at most, which allows about 10.0 m/s"),
         ({"ATC_ANGLE_MAX": 44.0}, "set ATC_ANGLE_MAX 45, or plan with lean_angle_deg: 44"),
         ({"ANGLE_MAX": 4400.0}, "set ANGLE_MAX 4500, or plan with lean_angle_deg: 44"),
         ({"ATC_ANGLE_MAX": 45.0}, ""), ({"ANGLE_MAX": 4500.0}, ""), ({"ANGLE_MAX": 8000.0}, ""),
@@ -184,7 +184,7 @@ def test_the_parameter_is_named_and_scaled_as_the_vehicles_version_does(values: 
 
 def test_what_could_not_be_read_is_told() -> None:
     fast, slow = planned(lean_angle_deg=45).vehicles[0].mission, planned().vehicles[0].mission
-    words = "the largest lean angle on board could not be read: 15 m/s need about 45°"
+    words = "the largest lean angle on board could not be read: 15.0 m/s need about 45°"
     assert words in map(str, judge_parameters({"RTL_ALT": 1500.0}, fast))
     assert not any("lean" in note.code for note in judge_parameters({"RTL_ALT": 1500.0}, slow))
     assert lean_for_deg(15.0) == 45.0

@@ -21,7 +21,7 @@ from gcsplan.errors import InputError
 from gcsplan.export.durable import locked
 from gcsplan.export.outdir import write_outputs
 from gcsplan.world.terrain.input_files import reading, tell_file
-from tests.app.test_batch import mission
+from tests.support.batches import mission
 from tests.support.mission_inputs import CASES, SCALED, Case, geotiff, made, naming, published, tif
 
 

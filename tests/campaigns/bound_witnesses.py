@@ -12,6 +12,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -337,11 +338,9 @@ class Route:
         return [(k, self.points[k, 2] + self.base_m) for k, agl in zip(self.fixed[1:-1], asked, strict=True)
                 if agl is not None]  # fmt: skip
 
-    @property
+    @cached_property
     def air(self) -> Air:
-        if not hasattr(self, "_air"):
-            self._air = Air(self.case)
-        return self._air
+        return Air(self.case)
 
     def stops(self) -> list[Floats]:
         return [self.points[k, :2] for k in self.fixed]

@@ -223,7 +223,7 @@ def _ended_s() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def _left_over(session: int) -> list[int]:
+def left_over(session: int) -> list[int]:
     """Processes of a session that still run."""
     found = []
     for folder in Path("/proc").glob("[0-9]*"):
@@ -267,7 +267,7 @@ def interrupt(case: Case, number: signal.Signals, after_s: float, *, group: bool
         out, err = process.communicate()
         clock_s = PATIENCE_BY_CLOCK_S
     until = time.monotonic() + 5.0
-    while (left := _left_over(process.pid)) and time.monotonic() < until:
+    while (left := left_over(process.pid)) and time.monotonic() < until:
         time.sleep(0.05)
     if left:
         found.append(f"processes are left: {left}")

@@ -17,7 +17,7 @@ def test_some_inputs_of_the_campaign_find_nothing(tmp_path: Path) -> None:
 
 
 def test_the_campaign_finds_an_end_that_misses_its_day(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(times, "_DAY", timedelta(hours=20))
+    monkeypatch.setattr(times, "DAY", timedelta(hours=20))
     assert any(hours.attack(seed, tmp_path)[1] for seed in range(130, 210))
 
 

@@ -75,5 +75,5 @@ def test_what_may_be_left(tmp_path: Path) -> None:
 @linux
 def test_processes_that_are_left_are_seen() -> None:
     with subprocess.Popen(["sleep", "60"], start_new_session=True) as process:
-        assert interrupts._left_over(process.pid) == [process.pid]
+        assert interrupts.left_over(process.pid) == [process.pid]
         process.kill()

@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Iterator
 
 import pytest
 
@@ -83,22 +84,36 @@ def at_limit(kind: str) -> object:
     return pytest.param(kind, marks=[pytest.mark.skip("takes long: GCSPLAN_SIZES=all")] if dear else [])
 
 
+SERVER = """
+import sys
+from tests.campaigns import sizes
+if __name__ == "__main__":
+    sizes.warm()
+    for line in sys.stdin:
+        with sizes.place():
+            ended = sizes.run(line.strip(), sizes.SIZES[line.strip()].most, 1)
+        print(repr(ended), flush=True)
+"""
+
+
+@pytest.fixture(scope="module")
+def warmed() -> Iterator[subprocess.Popen[str]]:
+    """A process that has imported all, reads kinds and prints how an input of each ended, run in a fork of it."""
+    clocked = {name: value for name, value in os.environ.items() if name != "GCSPLAN_CLOCK"}
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", SERVER], cwd=REPOSITORY, env=clocked, text=True, **pipes) as process:
+        yield process
+        process.communicate()
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="runs forks")
 @pytest.mark.parametrize("kind", [at_limit(kind) for kind in sizes.SIZES])
-def test_an_input_at_the_limit_takes_what_is_stated(kind: str) -> None:
-    size = sizes.SIZES[kind]
-    words = (
-        "from tests.campaigns import sizes\n"
-        "if __name__ == '__main__':\n"
-        "    sizes.warm()\n"
-        f"    with sizes.place(): ended = sizes.run({kind!r}, {size.most!r}, 1)\n"
-        "    print(ended)"
-    )
-    clocked = {name: value for name, value in os.environ.items() if name != "GCSPLAN_CLOCK"}
-    done = subprocess.run(
-        [sys.executable, "-c", words], cwd=REPOSITORY, env=clocked, capture_output=True, text=True, timeout=1800
-    )
-    assert done.returncode == 0, done.stderr
-    ended = ast.literal_eval(done.stdout.splitlines()[-1])
-    assert sizes.faults(size, "at", *ended) == []
+def test_an_input_at_the_limit_takes_what_is_stated(warmed: subprocess.Popen[str], kind: str) -> None:
+    assert warmed.stdin is not None
+    assert warmed.stdout is not None
+    warmed.stdin.write(f"{kind}\n")
+    warmed.stdin.flush()
+    answer = warmed.stdout.readline()
+    assert answer, f"the process of all inputs ended with {warmed.poll()}"
+    assert sizes.faults(sizes.SIZES[kind], "at", *ast.literal_eval(answer)) == []

@@ -39,6 +39,7 @@ def test_a_killed_batch_is_found_if_outputs_are_not_compared(monkeypatch: pytest
     monkeypatch.setattr(stale, "STEPS_OF", {stale.kill: 1})
     _, found = stale.campaign(60.0, 3, 60, ["kml"])
     assert found
+    assert found[0].startswith("seed ")
 
 
 @pytest.mark.slow

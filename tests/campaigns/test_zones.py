@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -23,14 +24,14 @@ def test_some_circles_corridors_and_projected_polygons_find_nothing(tmp_path: Pa
 def test_the_campaign_finds_great_circles_that_are_left_straight(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(degree_shapes, "_great_circles", lambda *_: None)
+    monkeypatch.setattr(degree_shapes, "GREAT_CIRCLE_M", math.inf)
     assert any(zones.attack(seed, tmp_path)[2] for seed in (28, 33, 49))
 
 
 def test_the_campaign_finds_edges_the_short_way_around(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for module in (zone_draft, volumes):
         monkeypatch.setattr(module, "wide_fault", lambda *_, **__: "")
-    monkeypatch.setattr(degree_shapes, "_turned", degree_shapes.unwrapped)
+    monkeypatch.setattr(degree_shapes, "turned", degree_shapes.unwrapped)
     assert any(zones.attack(seed, tmp_path)[2] for seed in range(1, 25))
 
 

@@ -12,7 +12,7 @@ import pytest
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
-from tests.mission_file.airspace.made import ed269, volume
+from tests.mission_file.published.made import ed269, volume
 
 LAT, LON = 47.0, 8.0
 MISSION = """

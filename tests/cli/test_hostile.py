@@ -6,13 +6,10 @@ files or none. The mutations are drawn from fixed seeds.
 
 from __future__ import annotations
 
-import dataclasses
 import functools
-import io
 import json
 import random
 import socket
-import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -22,10 +19,8 @@ import numpy as np
 import pytest
 import yaml
 
-from gcsplan.app.fleet import pipeline
 from gcsplan.app.output import files as outputs
 from gcsplan.app.upload import run as uploads
-from gcsplan.cli.arguments.options import MISBEHAVIOURS
 from gcsplan.mavlink.files.formats import read_mission_file, write_plan
 from gcsplan.mavlink.link.session import session
 from gcsplan.mavlink.protocol.messages import Packet, Request
@@ -248,67 +243,6 @@ def test_garbage_on_the_link_neither_crashes_nor_passes_for_the_truth(
 # -- names, streams and Ctrl-C ----------------------------------------------------------------------------------------
 
 
-def test_no_name_in_a_file_speaks_to_the_terminal(run: Run, tmp_path: Path) -> None:
-    features = {
-        "type": "FeatureCollection",
-        "features": [
-            {
-                "type": "Feature",
-                "properties": {"name": "[/x]\ud800\u001b[31m\nred", "radius_m": 50},
-                "geometry": {"type": "Point", "coordinates": [-84.375, 36.605]},
-            }
-        ],
-    }
-    (tmp_path / "z.geojson").write_text(json.dumps(features))
-    text = MISSION.replace("version: 1", 'version: 1\nname: "[/] $\\\\frac$ \\e[31m"')
-    (tmp_path / "m.yaml").write_text(text.replace("no_fly:", "no_fly:\n  - {file: z.geojson}"))
-    code, out, err = run("plan", "m.yaml", "-o", "out", "--png", "out/map.png")
-    assert code == 0, err
-    assert "\x1b" not in out + err
-    assert "[/]" in out
-    assert (tmp_path / "out" / "map.png").read_bytes().startswith(b"\x89PNG")
-    code, out, _ = run("check", "m.yaml", "out/uav1.plan")
-    assert code == 0
-    assert "[/x]" in out
-    code, out, err = run("check", "m.yaml", "\x1b[2Jx.plan")
-    assert code == 2
-    assert "\x1b" not in out + err
-
-
-@pytest.mark.parametrize("stream", ["full", "closed"])
-def test_a_standard_output_that_takes_nothing_is_an_error_of_its_own(
-    run: Run, monkeypatch: pytest.MonkeyPatch, stream: str
-) -> None:
-    class Full(io.StringIO):
-        def write(self, text: str, /) -> int:
-            raise OSError(28, "No space left on device")
-
-    check = ("check", "m.yaml", "uav1.waypoints")
-    whole = run(*check)
-    with monkeypatch.context() as patch:
-        patch.setattr(sys, "stdout", Full() if stream == "full" else None)
-        for arguments in ((*check, "--json"), check):
-            code, _, err = run(*arguments)
-            assert code == 2
-            assert err.splitlines()[-1].startswith("gcsplan: standard output: cannot be written")
-    assert run(*check) == whole  # without the words that could not be written
-
-
-def test_ctrl_c_says_so_in_words_and_in_json(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    def plainly(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    def in_compiled_code(*_: object, **__: object) -> None:
-        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
-
-    for interrupted in (plainly, in_compiled_code):
-        monkeypatch.setattr(pipeline, "load_mission", interrupted)
-        code, out, err = run("plan", "m.yaml", "--json")
-        assert code == 130
-        assert err == "gcsplan: interrupted\n"
-        assert json.loads(out)["error"]["code"] == 130
-
-
 def test_ctrl_c_during_an_upload_says_what_is_unknown_now(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
@@ -318,17 +252,6 @@ def test_ctrl_c_during_an_upload_says_what_is_unknown_now(run: Run, monkeypatch:
     assert code == 130
     assert "its mission is now unknown" in err
     assert "uav1" in json.loads(out)["error"]["message"]
-
-
-@pytest.mark.parametrize("why", [MemoryError(), RuntimeError("can't start new thread")])
-def test_no_memory_is_an_error_that_can_be_cured(run: Run, monkeypatch: pytest.MonkeyPatch, why: Exception) -> None:
-    def hungry(*_: object, **__: object) -> None:
-        raise why
-
-    monkeypatch.setattr(pipeline, "load_mission", hungry)
-    code, _, err = run("plan", "m.yaml")
-    assert code == 2
-    assert "not enough memory" in err
 
 
 # -- outputs ----------------------------------------------------------------------------------------------------------
@@ -475,24 +398,3 @@ def test_json_of_a_failed_check_has_the_error_beside_the_verdict(run: Run, tmp_p
 
 
 # -- help -------------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("command", ["plan", "check", "upload", "verify", "download", "clear", "sim", "bench check"])
-def test_help_speaks_of_files_and_urls_and_not_of_types(run: Run, command: str) -> None:
-    code, out, _ = run(*command.split(), "--help")
-    assert code == 0
-    options = out.partition("Options:")[2]
-    for word in ("<str>", "<path>", "<int", "list["):
-        assert word not in options
-
-
-def test_help_of_sim_lists_every_misbehaviour() -> None:
-    listed = set(MISBEHAVIOURS.replace(",", " ").replace("(", " ").replace(")", " ").split())
-    assert {f.name for f in dataclasses.fields(Misbehaviour)} <= listed
-
-
-def test_no_command_shows_the_help_and_a_wrong_option_its_commands_help(run: Run) -> None:
-    code, _, err = run()
-    assert code == 2
-    assert "Commands:" in err
-    assert "see gcsplan plan --help" in run("plan", "m.yaml", "--nope")[2]

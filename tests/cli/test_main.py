@@ -12,56 +12,8 @@ from typing import Any
 
 import pytest
 
-import gcsplan
-from gcsplan.mavlink.files.formats import read_mission_file
-from gcsplan.sim.vehicle.loopback import LoopbackVehicle
-from gcsplan.sim.vehicle.misbehaviour import Misbehaviour
 from gcsplan.sim.vehicle.server import SimServer
-from gcsplan.vehicle import Autopilot
-from tests.support.paths import DATA
-
-CROSSING = DATA / "crossing.yaml"
-OUTPUTS = {"uav1.waypoints", "uav1.plan", "uav1.param", "mission.kml", "mission.geojson", "profile.csv", "summary.json"}
-
-
-def changed(tmp_path: Path, old: str, new: str) -> Path:
-    text = CROSSING.read_text()
-    assert old in text
-    file = tmp_path / "changed.yaml"
-    file.write_text(text.replace(old, new))
-    return file
-
-
-def vehicle(autopilot: Autopilot = Autopilot.ARDUCOPTER, amsl_m: float = 471.0, **trouble: Any) -> LoopbackVehicle:
-    return LoopbackVehicle(1, autopilot, lat_deg=36.6, lon_deg=-84.38, amsl_m=amsl_m, misbehave=Misbehaviour(**trouble))
-
-
-def test_plan_writes_its_outputs_into_a_directory_of_the_missions_name(run: Any, tmp_path: Path) -> None:
-    code, out, err = run("plan", CROSSING)
-    assert code == 0
-    assert "safe" in out
-    assert "bare DEM" in out
-    assert "written to crossing" in out
-    assert all(line.startswith("note: ") for line in err.splitlines())
-    assert {p.name for p in (tmp_path / "crossing").iterdir() if not p.name.startswith(".")} == OUTPUTS
-
-
-def test_the_same_plan_twice_gives_the_same_bytes(run: Any, tmp_path: Path) -> None:
-    for name in ("a", "b"):
-        assert run("plan", CROSSING, "-o", name)[0] == 0
-    for name in OUTPUTS:
-        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
-
-
-def test_plan_upload_sim_is_verified_and_says_simulated(run: Any, tmp_path: Path) -> None:
-    code, out, _ = run("plan", CROSSING, "--upload", "sim")
-    assert code == 0
-    assert "verified" in out
-    assert "simulated" in out
-    upload = json.loads((tmp_path / "crossing" / "upload.json").read_text())["vehicles"][0]["upload"]
-    assert upload["verified"] is True
-    assert upload["simulated"] is True
-    assert "upload" not in json.loads((tmp_path / "crossing" / "summary.json").read_text())["vehicles"][0]
+from tests.support.crossing import CROSSING, OUTPUTS, changed, vehicle
 
 
 def test_json_puts_exactly_one_document_on_standard_output(run: Any) -> None:
@@ -111,73 +63,6 @@ def test_a_missing_mission_file_is_named(run: Any) -> None:
     assert "nowhere.yaml" in err
 
 
-@pytest.mark.parametrize("planner", ["optimal", "optimum"])
-def test_an_unknown_planner_names_the_nearest(run: Any, planner: str) -> None:
-    code, _, err = run("plan", CROSSING, "--planner", planner)
-    assert code == (0 if planner == "optimal" else 2)
-    assert planner == "optimal" or "optimal" in err
-
-
-def test_check_passes_what_plan_wrote_and_finds_what_was_spoilt(run: Any, tmp_path: Path) -> None:
-    assert run("plan", CROSSING, "-o", "out")[0] == 0
-    for name in ("uav1.waypoints", "uav1.plan"):
-        assert run("check", CROSSING, f"out/{name}")[0] == 0
-    rows = (tmp_path / "out" / "uav1.waypoints").read_text().splitlines()
-    for i in range(4, len(rows) - 1):
-        spoilt = rows[i].split("\t")
-        spoilt[10] = str(float(spoilt[10]) - 20)
-        rows[i] = "\t".join(spoilt)
-    (tmp_path / "uav1.waypoints").write_text("\n".join(rows) + "\n")
-    code, out, _ = run("check", CROSSING, "uav1.waypoints", "--json")
-    assert code == 4
-    kinds = {v["kind"] for v in json.loads(out)["verdicts"][0]["violations"]}
-    assert "min_agl" in kinds
-    code, out, _ = run("check", CROSSING, "uav1.waypoints")
-    assert code == 4
-    assert "too low above ground" in out
-
-
-def test_what_cannot_be_judged_is_exit_4_unless_allowed(run: Any, tmp_path: Path) -> None:
-    assert run("plan", CROSSING, "-o", "out")[0] == 0
-    text = (tmp_path / "out" / "uav1.waypoints").read_text()
-    text += f"{len(text.splitlines()) - 1}\t0\t2\t177\t3\t2\t0\t0\t0\t0\t0\t1\n"
-    (tmp_path / "uav1.waypoints").write_text(text)
-    assert run("check", CROSSING, "uav1.waypoints")[0] == 4
-    assert run("check", CROSSING, "uav1.waypoints", "--allow-unjudged")[0] == 0
-
-
-def test_files_are_uploaded_verified_downloaded_and_cleared(run: Any, tmp_path: Path) -> None:
-    assert run("plan", CROSSING, "-o", "out")[0] == 0
-    with SimServer([vehicle()], "udpin:127.0.0.1:0", speedup=10.0) as server:
-        url = server.url_for_gcs
-        assert run("verify", "out/uav1.waypoints", "--to", url)[0] == 7
-        assert run("upload", "out/uav1.plan", "--to", url, "--mission", CROSSING)[0] == 0
-        assert run("verify", "out/uav1.waypoints", "--to", url)[0] == 0
-        assert run("download", "--from", url, "-o", "back.waypoints")[0] == 0
-        back = read_mission_file(tmp_path / "back.waypoints", autopilot=Autopilot.ARDUCOPTER).mission
-        sent = read_mission_file(tmp_path / "out" / "uav1.plan", autopilot=None).mission
-        assert [i.command for i in back.items] == [i.command for i in sent.items]
-        assert run("check", CROSSING, "uav1=back.waypoints")[0] == 0
-        assert run("clear", "--to", url)[0] == 0
-        assert server.vehicles[0].items()[1:] == ()
-
-
-def test_an_unsafe_file_is_not_sent_unless_unchecked(run: Any, tmp_path: Path) -> None:
-    assert run("plan", CROSSING, "-o", "out")[0] == 0
-    higher = changed(tmp_path, "min_agl_m: 60", "min_agl_m: 70")
-    with SimServer([vehicle()], "udpin:127.0.0.1:0", speedup=10.0) as server:
-        assert run("upload", "out/uav1.plan", "--to", server.url_for_gcs, "--mission", higher)[0] == 4
-        assert server.vehicles[0].items()[1:] == ()
-        assert run("upload", "out/uav1.waypoints", "--to", server.url_for_gcs, "--unchecked")[0] == 0
-        assert len(server.vehicles[0].items()) > 5
-        plan = json.loads((tmp_path / "out" / "uav1.plan").read_text())
-        plan["geoFence"] = {"polygon": [[36.0, -84.0], [36.1, -84.0], [36.1, -84.1]], "version": 1}
-        (tmp_path / "fenced.plan").write_text(json.dumps(plan))
-        code, _, err = run("upload", "fenced.plan", "--to", server.url_for_gcs, "--unchecked")
-        assert code == 0
-        assert "note: the file's geoFence of version 1 (polygon) is not read" in err
-
-
 @pytest.mark.parametrize(
     ("trouble", "code", "word"),
     [
@@ -195,37 +80,6 @@ def test_each_kind_of_trouble_has_its_exit_code_and_is_named(
     assert got == code, err
     assert word in err
     assert "Traceback" not in err
-
-
-def test_a_vehicle_that_stands_elsewhere_is_refused_unless_that_is_ignored(run: Any) -> None:
-    with SimServer([vehicle(amsl_m=900.0)], "udpin:127.0.0.1:0", speedup=10.0) as server:
-        assert run("plan", CROSSING, "--upload", server.url_for_gcs)[0] == 5
-        assert run("plan", CROSSING, "--upload", server.url_for_gcs, "--ignore-position")[0] == 0
-
-
-def test_the_wrong_autopilot_is_refused(run: Any) -> None:
-    with SimServer([vehicle(Autopilot.PX4)], "udpin:127.0.0.1:0", speedup=10.0) as server:
-        code, _, err = run("plan", CROSSING, "--upload", server.url_for_gcs)
-    assert code == 5
-    assert "PX4" in err
-
-
-@pytest.mark.parametrize("word", ["uav9=udpout:127.0.0.1:1", "carrier-pigeon", "link"])
-def test_an_upload_target_that_cannot_be_is_refused_before_planning(run: Any, tmp_path: Path, word: str) -> None:
-    assert run("plan", CROSSING, "--upload", word)[0] == 2
-    assert not (tmp_path / "crossing").exists()
-
-
-def test_planners_are_listed(run: Any) -> None:
-    code, out, _ = run("planners")
-    assert code == 0
-    assert "optimal" in out
-    assert json.loads(run("planners", "--json")[1])["planners"][0]["name"] == "optimal"
-
-
-def test_help_and_version(run: Any) -> None:
-    assert "plan" in run("--help")[1]
-    assert run("--version")[1].startswith("0.")
 
 
 def test_a_bug_of_ours_is_exit_70_with_one_message(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -250,11 +104,6 @@ def test_ctrl_c_is_exit_130(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(pipeline, "load_mission", interrupted)
     assert run("plan", CROSSING)[0] == 130
-
-
-def test_the_package_runs_as_a_module() -> None:
-    ran = subprocess.run([sys.executable, "-m", "gcsplan", "--version"], capture_output=True, text=True, timeout=60)
-    assert (ran.returncode, ran.stdout.strip(), ran.stderr) == (0, gcsplan.__version__, "")
 
 
 @pytest.mark.slow
@@ -315,17 +164,6 @@ def test_a_command_ends_alike_whoever_reads_it(arguments: str, code: int) -> Non
         assert process.wait(timeout=120) == code
 
 
-def test_a_plan_says_which_outputs_of_the_earlier_one_are_gone(run: Any, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    assert run("plan", str(CROSSING), "-o", str(out), "--report")[0] == 0
-    code, _, err = run("plan", str(CROSSING), "-o", str(out))
-    assert code == 0
-    assert not (out / "report.html").exists()
-    assert "gone from" in err
-    assert "report.html; --report writes one of this plan" in err
-    assert "gone from" not in run("plan", str(CROSSING), "-o", str(out))[2]
-
-
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
@@ -370,18 +208,3 @@ def test_the_pole_is_refused_without_an_origin_that_nobody_gave(run: Any, tmp_pa
     assert code == 2
     assert "between 85° south and 85° north" in err
     assert "origin" not in err
-
-
-def test_check_with_options_alone_tells_findings_and_way_home_in_the_units_asked(run: Any, tmp_path: Path) -> None:
-    """The words of options once took the quantities out of findings."""
-    steps = [(36.6, -84.35, 60, 22), (36.6, -84.30, 150, 16), (36.62, -84.25, 350, 16), (36.62, -84.25, 0, 21)]
-    rows = ["QGC WPL 110", "0\t1\t0\t16\t0\t0\t0\t0\t36.6\t-84.35\t300\t1"]
-    rows += [f"{k}\t0\t3\t{c}\t0\t0\t0\t0\t{y}\t{x}\t{z}\t1" for k, (y, x, z, c) in enumerate(steps, start=1)]
-    file = tmp_path / "m.waypoints"
-    file.write_text("\n".join(rows) + "\n")
-    world = ("--dem", "sample:jacksboro", "--min-agl", "120", "--max-agl", "130", "--units", "aviation", "--way-home")
-    code, out, err = run("check", str(file), *world, "-q")
-    assert code == 4
-    lines = [line for line in (out + err).splitlines() if not line.startswith(("note: ", "warning: "))]
-    assert any("ft, limit" in line for line in lines)
-    assert not [line for line in lines if re.search(r"\d ?(m|km|m/s)\b", line)]

@@ -58,7 +58,7 @@ def caught(root: Path, after: int = 3) -> dict[str, bytes | None]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(os, "replace", replace)
-        patch.setattr(generation, "_abandon", lambda *_: None)  # a process that was killed takes nothing back
+        patch.setattr(generation, "settle", lambda _: False)  # a process that was killed takes nothing back
         with pytest.raises(KeyboardInterrupt):
             write_outputs(root, SECOND)
     assert is_caught(root)

@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 import yaml
-from typer.testing import CliRunner
 
 from gcsplan.arrays import Floats
-from gcsplan.cli.commands.fit_energy import fit_energy as command
-from gcsplan.errors import UsageError
 from gcsplan.logs.fit import fit_energy
 from gcsplan.logs.flight_log import FlightLog
-from tests.support.flight_logs import HOVER, R1, R2, Leg, csv_of, flown, within
+from tests.support.flight_logs import HOVER, R1, R2, Leg, flown, within
 
 
 def log_of(t: Floats, place: Floats, watts: Floats) -> FlightLog:
@@ -117,39 +111,6 @@ def test_climbs_that_cost_more_than_descents_are_told() -> None:
         np.gradient(np.interp(t, t[::50], place[::50, 2]), t)
     )
     assert "up_and_down_differ" in [n.code for n in fit_energy([log_of(t, place, watts)]).notes]
-
-
-def run(*arguments: str) -> tuple[int, str]:
-    app = typer.Typer()
-    app.command()(command)
-    result = CliRunner().invoke(app, list(arguments), catch_exceptions=True)
-    if result.exception is not None and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    return result.exit_code, result.stdout
-
-
-def test_the_command_prints_what_is_to_be_pasted(tmp_path: Path) -> None:
-    t, place, watts = flown(seed=12)
-    file = csv_of(tmp_path / "a.csv", "time_s,x,y,z,P", [t, *place.T, watts])
-    code, text = run(str(file), "--csv-columns", "power_w=P")
-    assert code == 0
-    numbers = yaml.safe_load(text)["energy"]
-    assert set(numbers) == {"vertical_j_per_m", "horizontal_j_per_m", "hover_w", "fitted_speed_m_s"}
-    assert numbers["vertical_j_per_m"] == pytest.approx(R1, rel=0.02)
-    with pytest.raises(UsageError, match="time_s=Time"):
-        run(str(file), "--csv-columns", "power")
-
-
-def test_the_command_ends_with_4_where_the_log_cannot_tell(tmp_path: Path) -> None:
-    t, place, watts = flown([(0, 0, 10, 5), (3000, 0, 0, 300)])
-    file = csv_of(tmp_path / "a.csv", "time_s,x,y,z,power", [t, *place.T, watts])
-    code, text = run(str(file), "--json")
-    told = json.loads(text)
-    assert code == 4
-    assert told["error"]["code"] == 4
-    assert "vertical_j_per_m" in told["error"]["message"]
-    assert told["fit"]["vertical_j_per_m"]["value"] is None
-    assert told["fit"]["horizontal_j_per_m"]["value"] == pytest.approx(R2, rel=0.02)
 
 
 BASE, PER_M, UP = 300.0, 5.0, 40.0

@@ -20,9 +20,8 @@ from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Energy
-from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.limits import Limits
-from gcsplan.world.geometry.zones import Circle, Level, Polygon
+from gcsplan.world.geometry.zones import Level, Polygon
 from tests.support.attacks import draw_attacks, require_told
 from tests.support.effort import draws
 from tests.support.paths import DATA
@@ -133,35 +132,7 @@ def test_the_example_of_the_interface_loads_as_printed() -> None:
     assert json.loads(json.dumps(mission.inputs)) == mission.inputs
 
 
-def test_the_plane_lies_in_the_middle_and_its_scale_holds_over_the_whole_surface() -> None:
-    mission = load(base())
-    assert (mission.frame.lat_deg, mission.frame.lon_deg) == (36.575, -84.29)
-    rows, cols = mission.surface.ground_m.shape
-    corners = mission.surface.grid.to_plane([0, cols - 1, 0, cols - 1], [0, 0, rows - 1, rows - 1])
-    assert mission.airspace_scale >= 1.0 + 0.99 * float((corners[:, 0] ** 2).min()) / (2 * 6371e3**2)
-    assert mission.airspace_scale < 1.00002
-
-
-def test_the_surface_leaves_room_for_detours() -> None:
-    mission = load(base())
-    start, goal = mission.vehicles[0].start, mission.vehicles[0].goal
-    # A quarter of the extent to the south, where the sample goes on for long enough.
-    south = min(start[1], goal[1]) - 0.25 * (goal[0] - start[0])
-    assert math.isfinite(float(mission.surface.ground_at(0.0, south)))
-
-
-def test_a_start_in_the_file_is_kept_to_the_last_digit() -> None:
-    mission = load(base(vehicles=[vehicle(start=[36.6000001, -84.3800001])]))
-    assert mission.vehicles[0].start_deg == (36.6000001, -84.3800001)
-
-
 # -- limits and defaults ------------------------------------------------------------------------------------------
-
-
-def test_a_vehicle_overrides_the_limits_of_the_file() -> None:
-    own = vehicle(min_agl_m=80, max_amsl_m=None, limits={"track_error_m": 7})
-    limits = load(base(limits={"min_agl_m": 60, "max_amsl_m": 900}, vehicles=[own])).vehicles[0].vehicle.limits
-    assert (limits.min_agl_m, limits.max_amsl_m, limits.track_error_m) == (80, None, 7)
 
 
 def test_errors_that_are_not_given_are_not_zero_on_the_real_earth_and_are_told() -> None:
@@ -232,74 +203,7 @@ def test_a_mistake_in_a_vehicle_is_told_with_its_key(change: dict[str, Any], key
     assert words in message
 
 
-def test_obstacles_count_for_take_off() -> None:
-    terrain = {"dem": "sample:jacksboro", "obstacle_height_m": 20}
-    where, message = the_problem(base(terrain=terrain, vehicles=[vehicle(takeoff_agl_m=70)]))
-    assert where == "vehicles[0].takeoff_agl_m"
-    assert "at least 85" in message
-
-
 # -- points and zones ---------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("change", "key", "words"),
-    [
-        ({"start": [-84.38, 36.6]}, "start", "look swapped"),
-        ({"goal": [36.55, 84.2]}, "goal", "outside the DEM"),
-        ({"goal": [-95.0, 36.6]}, "goal", "look swapped"),
-        ({"goal": [95.0, 195.0]}, "goal", "latitude must be within"),
-        ({"goal": [36.55, -284.2]}, "goal", "longitude must be within"),
-        ({"goal": [89.9, 0.0]}, "goal", "outside the DEM"),
-        ({"via": [[36.58, -84.3], [38.0, -84.3]]}, "via[1]", "outside the DEM"),
-        ({"via": [[36.58, -84.3], [-84.3, 36.58]]}, "via[1]", "look swapped"),
-        ({"start": [36.6, -84.4136]}, "start", "edge of the DEM"),
-        ({"start": [36.61, -84.31]}, "start", "the start lies inside the no-fly zone 'village'"),
-        ({"goal": [36.611, -84.312]}, "goal", "the goal lies inside the no-fly zone 'village'"),
-        ({"via": [[36.61, -84.31]]}, "via[0]", "inside the no-fly zone 'village'"),
-        ({"via": [[36.61, -84.31, 90]]}, "via[0]", "inside the no-fly zone 'village'"),
-    ],
-)  # fmt: skip
-def test_a_point_that_cannot_be_flown_from_or_to_is_told(change: dict[str, Any], key: str, words: str) -> None:
-    where, message = the_problem(base(vehicles=[vehicle(**change)]))
-    assert where == f"vehicles[0].{key}"
-    assert words in message
-
-
-def test_a_start_on_a_void_is_told(tmp_path: Path) -> None:
-    heights = np.full((100, 100), 300, "int16")
-    heights[48:52, 48:52] = -32768
-    dem(tmp_path / "a.tif", heights)
-    spec = {"dem": "a.tif", "vertical_datum": "EGM96"}
-    where, message = the_problem(
-        base(terrain=spec, no_fly=..., vehicles=[vehicle(start=[36.5, -84.5], goal=[36.55, -84.45])]), tmp_path
-    )
-    assert where == "vehicles[0].start"
-    assert "void" in message
-
-
-@pytest.mark.parametrize(
-    ("bounds", "inside"),
-    [({}, True), ({"ceiling_agl_m": 1}, True), ({"floor_agl_m": 0}, True), ({"floor_agl_m": 1}, False),
-     ({"floor_amsl_m": 100}, True), ({"floor_amsl_m": 900}, False), ({"ceiling_amsl_m": 900}, True)],
-)  # fmt: skip
-def test_a_start_is_inside_a_zone_that_reaches_its_ground(bounds: dict[str, float], inside: bool) -> None:
-    zone = {"name": "z", "center": [36.6, -84.38], "radius_m": 100} | bounds
-    if inside:
-        assert "zone 'z'" in the_problem(base(no_fly=[zone]))[1]
-    else:
-        assert len(load(base(no_fly=[zone])).zones) == 1
-
-
-def test_a_start_may_touch_a_zone() -> None:
-    at = {"east_m": 10, "north_m": 0}
-    zone = {"center": {"east_m": 0, "north_m": 0}, "radius_m": 10}
-    square = {"polygon": [{"east_m": x, "north_m": y} for x, y in ((10, -5), (15, -5), (15, 5), (10, 5))]}
-    goal = {"east_m": 100, "north_m": 100}
-    touching = local(terrain={"flat_m": 0}, no_fly=[zone, square], vehicles=[vehicle(start=at, goal=goal)])
-    assert load(touching).vehicles[0].start == (10.0, 0.0, 0.0)
-    zone["radius_m"] = 10.001
-    assert "zone 'no_fly[0]'" in the_problem(touching)[1]
 
 
 @pytest.mark.parametrize(
@@ -408,63 +312,6 @@ def dem(path: Path, heights: Any, west: float = -84.6, north: float = 36.6) -> N
         file.write(heights, 1)
 
 
-def test_tiles_are_found_beside_the_mission(tmp_path: Path) -> None:
-    dem(tmp_path / "w.tif", np.full((100, 100), 300, "int16"))
-    dem(tmp_path / "e.tif", np.full((100, 100), 310, "int16"), west=-84.4)
-    whole = base(
-        terrain={"dem": ["w.tif", "e.tif"], "vertical_datum": "EGM96"}, no_fly=...,
-        vehicles=[vehicle(start=[36.5, -84.5], goal=[36.5, -84.3])],
-    )  # fmt: skip
-    mission = load(whole, tmp_path)
-    assert (mission.vehicles[0].start[2], mission.vehicles[0].goal[2]) == pytest.approx((300, 310))
-
-
-@pytest.mark.parametrize(
-    ("terrain", "key", "words"),
-    [
-        ({"dem": "none.tif"}, ".dem", "is not there"),
-        ({"dem": ["none.tif", "none2.tif"]}, ".dem[0]", "is not there"),
-        ({"dem": 5}, ".dem", "must be text"),
-        ({"dem": []}, ".dem", "at least 1"),
-        ({}, "", "either"),
-        ({"dem": "sample:jacksboro", "flat_m": 0}, "", "either"),
-        ({"flat_m": math.inf}, ".flat_m", "finite"),
-        ({"peaks": [{"center": [0, 0], "height_m": 1, "decay_m": [1, 1]}]}, ".peaks", "add `frame:"),
-        ({"peaks": [{"center": [0, 0], "height_m": 1, "decay_m": [1, 0]}]}, ".peaks[0].decay_m[1]", "at least 0.001"),
-        ({"dem": "sample:jacksboro", "obstacle_height_m": -1}, ".obstacle_height_m", "at least 0"),
-        ({"dem": "sample:jacksboro", "canopy": "none.tif"}, ".canopy", "is not there"),
-        ({"dem": "sample:jacksboro", "geoid_grid": "g.gtx"}, ".geoid_grid", "remove it"),
-        ({"dem": "sample:jacksboro", "vertical_datum": "EGM2008"}, ".vertical_datum", "EGM96"),
-        ({"dem": "sample:jacksboro", "vertical_datums": "EGM96"}, ".vertical_datums", "did you mean vertical_datum?"),
-        ("sample:jacksboro", "", "must be a mapping"),
-    ],
-)  # fmt: skip
-def test_a_mistake_in_the_terrain_is_told_with_its_key(terrain: Any, key: str, words: str, tmp_path: Path) -> None:
-    where, message = the_problem(base(terrain=terrain), tmp_path)
-    assert where == f"terrain{key}"
-    assert words in message
-
-
-def test_a_mission_wider_than_the_plane_is_refused() -> None:
-    whole = base(
-        terrain={"flat_m": 0}, no_fly=..., vehicles=[vehicle(), vehicle(name="b", sysid=2, goal=[36.5, -80.0])]
-    )
-    where, message = the_problem(whole)
-    assert where == "vehicles[1].goal"
-    assert "more than 150 km" in message
-
-
-def test_a_mission_at_the_pole_is_refused() -> None:
-    whole = base(terrain={"flat_m": 0}, no_fly=..., vehicles=[vehicle(start=[86.0, 0.0], goal=[86.01, 0.0])])
-    assert "between 85° south and 85° north" in the_problem(whole)[1]
-
-
-def test_a_mission_across_the_antimeridian_is_small() -> None:
-    whole = base(terrain={"flat_m": 10}, no_fly=..., vehicles=[vehicle(start=[10, 179.99], goal=[10, -179.99])])
-    mission = load(whole)
-    assert mission.vehicles[0].goal[0] - mission.vehicles[0].start[0] == pytest.approx(2193, abs=3)
-
-
 # -- local metres -------------------------------------------------------------------------------------------------
 
 
@@ -482,63 +329,6 @@ def test_a_mission_in_local_metres_has_no_errors_and_may_hang_its_goal_in_the_ai
     assert float(mission.surface.ground_at(50, 50)) == pytest.approx(70.0, abs=0.011)
     box = [float(x) for x in mission.surface.grid.to_plane(0, mission.surface.ground_m.shape[0] - 1)]
     assert box == pytest.approx([-50, -50])
-
-
-def test_amsl_of_a_local_frame_lifts_ground_and_points_but_not_amsl_words() -> None:
-    zone = {"center": {"east_m": 50, "north_m": 0}, "radius_m": 5, "ceiling_amsl_m": 1010}
-    end = {"east_m": 100, "north_m": 100, "agl_m": 7}
-    whole = local(
-        frame={"origin": [36.6, -84.3], "amsl_m": 1000}, terrain={"flat_m": 2}, no_fly=[zone],
-        vehicles=[vehicle(start={"east_m": 0, "north_m": 0}, goal=end, via=[{"east_m": 9, "north_m": 9, "up_m": 12}])],
-    )  # fmt: skip
-    mission = load(whole)
-    one = mission.vehicles[0]
-    assert one.start == (0.0, 0.0, 1002.0)
-    assert one.goal_amsl_m == 1009.0
-    assert one.via == ((9.0, 9.0, 10.0),)
-    assert mission.zones[0].ceiling == Level(1010.0, "amsl")
-    assert isinstance(mission.zones[0].shape, Circle)
-
-
-def test_a_local_mission_may_give_some_points_in_degrees() -> None:
-    whole = local(terrain={"flat_m": 0}, vehicles=[vehicle(start={"east_m": 0, "north_m": 0}, goal=[36.601, -84.3])])
-    assert load(whole).vehicles[0].goal[:2] == pytest.approx(Frame(36.6, -84.3).to_plane(36.601, -84.3))
-
-
-@pytest.mark.parametrize(
-    ("point", "key", "words"),
-    [
-        ({"east_m": 50, "north_m": 50, "up_m": 10}, "start.up_m", "under ground"),
-        ({"east_m": 50, "north_m": 50, "up_m": 10, "agl_m": 5}, "start", "not both"),
-        ({"east_m": 50}, "start.north_m", "is missing"),
-        ({"east": 50, "east_m": 1, "north_m": 1}, "start.east", "did you mean east_m?"),
-        ({"east_m": 5e5, "north_m": 0}, "start", "from the frame's origin"),
-        ({"east_m": math.nan, "north_m": 0}, "start.east_m", "finite"),
-    ],
-)  # fmt: skip
-def test_a_mistake_in_a_local_point_is_told(point: dict[str, float], key: str, words: str) -> None:
-    where, message = the_problem(local(vehicles=[vehicle(start=point, goal={"east_m": 9, "north_m": 9})]))
-    assert where == f"vehicles[0].{key}"
-    assert words in message
-
-
-def test_a_start_in_the_air_takes_no_take_off_height() -> None:
-    start = {"east_m": 0, "north_m": 0, "up_m": 30}
-    whole = local(vehicles=[vehicle(start=start, goal={"east_m": 9, "north_m": 9}, takeoff_agl_m=30)])
-    assert "leave takeoff_agl_m out" in the_problem(whole)[1]
-
-
-@pytest.mark.parametrize(
-    ("frame", "key"),
-    [
-        ({}, "frame.origin"),
-        ({"origin": [36.6]}, "frame.origin"),
-        ({"origin": [88.0, 0.0]}, "frame.origin"),
-        (5, "frame"),
-    ],
-)
-def test_a_bad_frame_is_told(frame: Any, key: str) -> None:
-    assert the_problem(local(frame=frame))[0] == key
 
 
 # -- the fleet, the planner and the rest --------------------------------------------------------------------------
@@ -588,20 +378,6 @@ def test_a_mistake_in_the_arrival_is_told(arrival: Any, key: str, words: str) ->
     told = {p.where.split(": ", 1)[1]: p.message for p in found}
     assert words in told[key]
     assert len(told) <= 2
-
-
-def test_the_order_of_arrival_is_that_of_the_file_unless_said() -> None:
-    mission = load(fleet(vehicle(), vehicle(name="uav2", sysid=2), arrival={"mode": "together"}))
-    assert mission.arrival is not None
-    assert mission.arrival.order == ("uav1", "uav2")
-    assert load(base()).arrival is None
-
-
-def test_the_planner_takes_keys_that_only_some_planners_know() -> None:
-    keys = {"name": "krill", "seed": 7, "encoding": "bspline", "parameters": {"delta": 0.6}}
-    planner = load(base(planner=keys)).planner
-    assert (planner.name, planner.seed, planner.gap_percent) == ("krill", 7, 0.1)
-    assert planner.extras == {"encoding": "bspline", "parameters": {"delta": 0.6}}
 
 
 @pytest.mark.parametrize(
@@ -654,12 +430,6 @@ def test_a_mistake_at_the_top_is_told(top: dict[str, Any], key: str, words: str)
     assert words in message
 
 
-def test_terrain_frames_carry_the_vehicles_own_terrain_error() -> None:
-    assert load(base()).terrain_error_m == 0.0
-    assert load(base(altitude_frame="terrain")).terrain_error_m == 30.0
-    assert load(base(altitude_frame="terrain", terrain_error_m=12)).terrain_error_m == 12.0
-
-
 def test_every_mistake_is_told_at_once_schema_and_world_alike() -> None:
     whole = base(
         limits={"min_agl_m": 60, "max_agl_m": 50},
@@ -686,39 +456,6 @@ def test_the_message_names_file_key_given_and_wanted(tmp_path: Path) -> None:
 
 
 # -- files --------------------------------------------------------------------------------------------------------
-
-
-def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
-    (tmp_path / "latin.yaml").write_bytes(b"name: \xe9")
-    (tmp_path / "big.yaml").write_bytes(b"#" * 5_000_001)
-    cases = {
-        "none.yaml": "no such file",
-        "": "folder",
-        "latin.yaml": "UTF-8",
-        "big.yaml": "at most",
-        "a\0b": "cannot be read",
-    }
-    for name, words in cases.items():
-        with pytest.raises(InputError, match=words):
-            load_mission(tmp_path / name if name else tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("", "empty"), ("- 1", "keys"), ("5", "keys"), ("a", "keys"), ("version: 1\nversion: 1", "stands twice"),
-        ("\tversion: 1", "tab"), ("version: 1\n  x: [", "line 2"),
-    ],
-)  # fmt: skip
-def test_text_that_is_no_mission_is_told(text: str, words: str) -> None:
-    (problem,) = problems(text)
-    assert words in problem.message
-
-
-def test_a_byte_order_mark_is_no_key(tmp_path: Path) -> None:
-    path = tmp_path / "m.yaml"
-    path.write_bytes(b"\xef\xbb\xbf" + yaml.safe_dump(base()).encode())
-    assert load_mission(path, planner_names=PLANNERS).stem == "m"
 
 
 # -- hostile files ------------------------------------------------------------------------------------------------

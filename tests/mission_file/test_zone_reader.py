@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import math
+import re
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gcsplan.errors import InputError, Mistake
+from gcsplan.mavlink.files.formats import read_mission_file
 from gcsplan.mission_file import zone_reader
+from gcsplan.mission_file.json_schema import mission_schema
 from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.mission_file.zones import file as zone_file
 from gcsplan.mission_file.zones.draft import (
@@ -31,6 +34,7 @@ from gcsplan.mission_file.zones.draft import (
 from gcsplan.mission_file.zones.file import ZoneFile
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
+from gcsplan.world.terrain.input_files import ZONE_FILES, ZONES_BY_NAME
 from tests.support.attacks import draw_attacks, require_told
 from tests.support.effort import draws
 
@@ -482,3 +486,19 @@ def judged(path: Path, content: bytes) -> str:
         assert all(math.isfinite(x) for x in zone.bounds)
         assert isinstance(zone.shape, Circle) or shapely.is_ccw(shapely.LinearRing(zone.shape.vertices))
     return "zones" if drafts else "problems"
+
+
+def test_every_ending_of_a_zone_file_is_read_and_named_wherever_it_is_given(tmp_path: Path) -> None:
+    """One table decides; what the reference says and what a file in the wrong place is told follow it."""
+    told = json.dumps(mission_schema()["$defs"]["ZoneKeys"]["properties"]["file"])
+    for ending in ZONES_BY_NAME:
+        assert ending in told
+        file = tmp_path / f"zones{ending}"
+        file.write_bytes(b"")
+        with pytest.raises(InputError) as refused:
+            read_zones(file, where="no_fly[0].file")
+        assert "zones are read from" not in str(refused.value)
+        with pytest.raises(InputError, match="zones are given with --zones"):
+            read_mission_file(file, autopilot=None)
+    with pytest.raises(InputError, match=", ".join(map(re.escape, ZONE_FILES))):
+        read_zones(tmp_path / "zones.dwg", where="no_fly[0].file")

@@ -53,7 +53,7 @@ def test_a_key_is_named_as_the_reader_types_it() -> None:
 
 
 def test_an_item_stands_before_its_sentence_unless_the_sentence_names_it() -> None:
-    plain, named = Note("battery_lasts_unknown", 5), Note("energy_fitted_elsewhere", 5, fitted="8", speed_m_s=12.0)
+    plain, named = Note("battery_lasts_unknown", 5), Note("energy_fitted_elsewhere", 5, fitted=(8.0,), speed_m_s=12.0)
     assert str(plain) == f"item 5: {plain.text(placed=False)}"
     assert str(named) == named.text(placed=False)
     assert "from item 5 on it flies" in str(named)

@@ -15,9 +15,9 @@ from gcsplan.notes.note import Note
 from gcsplan.report.page import render_page
 from gcsplan.report.parts import html as markup
 from gcsplan.report.parts.page_data import Page, Rehearsed
-from tests.report.test_page import HOSTILE, Reader, fleet_page, small_page
 from tests.support import browser as chromium
 from tests.support.noted import saying
+from tests.support.pages import HOSTILE, Reader, fleet_page, small_page
 
 PROGRAM = chromium.find()
 LONG = "a vehicle with quite a long name, number "

@@ -16,9 +16,9 @@ from gcsplan.check.returns.way_home import way_home
 from gcsplan.report.page import render_page
 from gcsplan.report.parts.page_data import Subject
 from gcsplan.units import AVIATION, IMPERIAL, METRIC, Units
-from tests.report.test_page import HOSTILE, fleet_page, many_page, small_page, verdict_over
 from tests.support import browser as chromium
 from tests.support.browser import Browser
+from tests.support.pages import HOSTILE, fleet_page, many_page, small_page, verdict_over
 from tests.support.shown import same, taken_apart
 
 PROGRAM = chromium.find()

@@ -18,7 +18,7 @@ def be_impatient(monkeypatch: pytest.MonkeyPatch) -> None:
 
     Parameters are asked for again after 0.1 s, and those that nothing hangs on given up after 0.3 s.
     """
-    for name, seconds in (("_ASK_AGAIN_S", 0.1), ("_PARAMETER_S", 0.3), ("_NO_PARAMETERS_S", 0.3)):
+    for name, seconds in (("ASK_AGAIN_S", 0.1), ("PARAMETER_S", 0.3), ("NO_PARAMETERS_S", 0.3)):
         monkeypatch.setattr(steps, name, seconds)
     monkeypatch.setattr(uploads, "LISTEN_S", 0.1)
     monkeypatch.setattr(session, "SessionOptions", partial(_OPTIONS, timers=Timers(response_s=0.3)))

@@ -28,7 +28,7 @@ from gcsplan.dem.sources import GLO30
 from gcsplan.world.terrain.cell import Cell
 from gcsplan.world.terrain.grid import PostHeights, TerrainGrid
 from gcsplan.world.terrain.input_files import sha256_of
-from tests.mission_file.airspace.made import collection, ed269, ed318, openaip, volume
+from tests.mission_file.published.made import collection, ed269, ed318, openaip, volume
 from tests.support.tiles import tile
 
 START, GOAL = [47.4, 8.4], [47.4, 8.412]

@@ -9,7 +9,19 @@ from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
 from gcsplan.planners.optimal.searches.cap_search import CapSearch
 from gcsplan.planners.optimal.table import all_searches
-from gcsplan.planners.problem import Problem
+from gcsplan.planners.problem import Objective, Problem
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.zones import Zone
+from tests.support.planner_worlds import ground
+
+
+def over_flat(*zones: Zone, max_agl_m: float | None = None, objective: Objective = "length") -> Problem:
+    """From west to east over level ground, 1400 m; the shortest way leads through (1000, 1000)."""
+    limits = Limits(10.0, max_agl_m=max_agl_m)
+    return Problem(
+        Airspace(ground(0.0), zones), limits, (300.0, 1000.0, 50.0), (1700.0, 1000.0, 50.0), objective=objective
+    )
 
 
 def spent_budget() -> Budget:

@@ -203,7 +203,7 @@ class Read:
     reach_m: float
 
 
-_sites: dict[str, CheckSite] = {}
+sites: dict[str, CheckSite] = {}
 """The site that this process has made for others; the last one only, for terrain is large."""
 
 
@@ -214,7 +214,7 @@ class Archive:
         if len(arguments) > MOST_FILES:
             raise UsageError(f"at most {MOST_FILES} files are checked in one call, given {len(arguments)}")
         self.name, self.asked, self.site, self.arguments = name, _keep(asked, site), site, arguments
-        self._packed: dict[int, bytes] = {}
+        self.packed: dict[int, bytes] = {}
         self._unread: dict[int, Told] = {}
 
     @classmethod
@@ -262,7 +262,7 @@ class Archive:
                 places.append(one.places)
                 reach_m = max(reach_m, one.reach_m)
                 if (kept := kept + len(one.packed)) <= KEPT_READ_BYTES:
-                    self._packed[k] = one.packed
+                    self.packed[k] = one.packed
             told(min((number + 1) * PIECE, len(self.arguments)))
         if places:
             self.site.settle(np.concatenate(places), reach_m, several=len(places) > 1)
@@ -286,7 +286,7 @@ class Archive:
             if k in self._unread:
                 continue
             try:
-                read = _unpacked(site, self.arguments[k], self._packed.get(k))
+                read = _unpacked(site, self.arguments[k], self.packed.get(k))
                 site.judged(self.arguments[k], read, Wanted(misses=False, times=False))
             except InputError:
                 continue
@@ -298,7 +298,7 @@ class Archive:
         numbers = [k for k in range(len(self.arguments)) if k not in self._unread]
         size = self._size
         pieces = [
-            [(self.arguments[k], self._packed.get(k)) for k in numbers[i : i + size]]
+            [(self.arguments[k], self.packed.get(k)) for k in numbers[i : i + size]]
             for i in range(0, len(numbers), size)
         ]
         found = (one for _, piece in in_order(workers.each(judge_piece, self.asked, pieces)) for one in piece)
@@ -359,14 +359,14 @@ def _keep(asked: ArchiveRequest, site: CheckSite) -> ArchiveRequest:
     """``asked`` with its key, by which `_site_of` then finds ``site`` in this process."""
     made_of = asked.content, asked.options, asked.autopilot
     asked = replace(asked, key=hashlib.sha256(pickle.dumps(made_of)).hexdigest())
-    _sites.clear()
-    _sites[asked.key] = site
+    sites.clear()
+    sites[asked.key] = site
     return asked
 
 
 def _site_of(asked: ArchiveRequest) -> CheckSite:
     """The site of what is asked, with its world if that is known; made once in each process."""
-    site = _sites.get(asked.key)
+    site = sites.get(asked.key)
     if site is None:
         if asked.content is not None:
             site = MissionSite(load_content(asked.content))

@@ -167,7 +167,13 @@ class Dask:
             while begun < len(asked) and asked[begun] < first + LEAD * most and len(numbers) < most:
                 number, begun = asked[begun], begun + 1
                 future = client.submit(
-                    _done, function, __version__, kept, items[number], key=f"{name}-{uuid4().hex}", priority=-number
+                    piece_done,
+                    function,
+                    __version__,
+                    kept,
+                    items[number],
+                    key=f"{name}-{uuid4().hex}",
+                    priority=-number,
                 )
                 numbers[future] = number
                 future.add_done_callback(done.put)
@@ -182,7 +188,7 @@ class Dask:
                     if stopped or not finish:
                         raise
                     stopped = True
-                    self._keep_begun(numbers)
+                    self.keep_begun(numbers)
                     continue
                 number = numbers.pop(future, None)
                 if number is None:  # given up
@@ -204,7 +210,7 @@ class Dask:
             if client.status == "running":
                 client.cancel([kept, *numbers])
 
-    def _keep_begun(self, numbers: dict[Any, int]) -> None:
+    def keep_begun(self, numbers: dict[Any, int]) -> None:
         """Give up the pieces that no worker has begun."""
         # Of all that runs: asked for by name, a piece that the scheduler has not heard of yet is an error.
         begun = {key for stacks in self.client.call_stack().values() for key in stacks}
@@ -228,7 +234,7 @@ class Dask:
                 raise InputError(f"the dask scheduler has had no worker for {DESERTED_S:g} s: start some")
 
 
-def _done(
+def piece_done(
     function: Callable[[Shared, WorkItem], WorkResult], version: str, shared: Shared, item: WorkItem
 ) -> WorkResult:
     """A piece of work, if the worker has the version of gcsplan that asks for it."""
@@ -284,9 +290,10 @@ def executor(
     """The executor for ``pieces`` of work of about ``piece_s`` seconds each; one piece is done in this process.
 
     ``cluster`` is the address of a dask scheduler, the file that describes it (``dask scheduler --scheduler-file``),
-    one of dask's cluster objects, or a ``distributed.Client``; its workers do the work. Otherwise ``jobs`` processes of
-    this machine do it (None: one for each core), if what they gain is more than the ``start_s`` seconds that it takes
-    to start them; else this process alone does, and dask is not imported.
+    one of dask's cluster objects, or a ``distributed.Client``; its workers do the work. It may be an `Executor` of the
+    caller's own, too. Otherwise ``jobs`` processes of this machine do it (None: one for each core), if what they gain
+    is more than the ``start_s`` seconds that it takes to start them; else this process alone does, and dask is not
+    imported.
 
     Raises InputError if dask is not installed and needed, or if no scheduler answers, UsageError for wrong ``jobs``.
     """
@@ -295,21 +302,20 @@ def executor(
     if pieces <= 1:
         yield Inline()
         return
+    if hasattr(cluster, "each"):
+        yield cluster
+        return
     if cluster is not None:
         with _connected(cluster) as client:
             yield Dask(client)
         return
     count = min(sane_jobs() if jobs is None else jobs, max(1, pieces))
     gain_s = pieces * piece_s - math.ceil(pieces / count) * piece_s
-    if count == 1 or gain_s <= start_s or (jobs is None and not _installed()):
+    if count == 1 or gain_s <= start_s or (jobs is None and find_spec("distributed") is None):
         yield Inline()
         return
     with _processes(count) as client:
         yield Dask(client)
-
-
-def _installed() -> bool:
-    return find_spec("distributed") is not None
 
 
 def _distributed(option: str) -> Any:

@@ -11,7 +11,7 @@ from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.check.motion.stretch import Place
 from gcsplan.check.returns.footprint import Target
 from gcsplan.check.returns.obstacles import AHEAD, GROUND, MAX_AGL, MAX_AMSL, Obstacles
-from gcsplan.check.returns.refinement import CLEAR, LEGAL, Refinement
+from gcsplan.check.returns.refinement import CLEAR, Refinement
 from gcsplan.check.returns.trace import MissionTrace
 from gcsplan.check.returns.verdict import UnsafeStretch
 from gcsplan.check.returns.words import both
@@ -177,9 +177,6 @@ def _obstacle(trace: MissionTrace, u: float, target: Target) -> Place | None:
     k = int(np.nanargmax(top))
     lat, lon = trace.world.frame.to_degrees(*places[k]).tolist()
     return lat, lon, float(top[k])
-
-
-ON_CLIMB = {CLEAR: "does_meet_ground_on_climb", LEGAL: "does_near_ground_on_climb"}
 
 
 def _why(obstacles: Obstacles, row: int, names: Sequence[str], grade: int, obstacle: Place | None) -> Note:

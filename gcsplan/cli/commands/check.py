@@ -306,14 +306,15 @@ def _say_all(batch: Batch, units: Units) -> None:
 def _report(batch: Batch, file: Path, units: Units) -> None:
     from gcsplan.export.outdir import write_whole
     from gcsplan.notes.note import Note
-    from gcsplan.report.page import render_check
+    from gcsplan.report.page import render_page
+    from gcsplan.report.parts.page_data import page_of_check
 
     worlds: list[Checked] = list({id(c.world): c for c in batch.checked}.values())
     if len(worlds) != 1:
         raise InputError("a report shows files of one area; none could be judged, or they lie too far apart")
     notes = [*batch.notes, *(Note("file_not_read", why=str(error)) for _, error in batch.unreadable)]
     homes = [c.way_home for c in batch.checked]
-    page = render_check(
+    page = page_of_check(
         batch.name, worlds[0].world, batch.checked, inputs=batch.inputs, notes=notes, homes=homes, units=units
     )
-    write_whole(file, page)
+    write_whole(file, render_page(page))

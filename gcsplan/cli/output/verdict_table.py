@@ -93,11 +93,11 @@ def verdict_table(
             say(f"energy{mark}: {', '.join(used)}")
         else:
             say(", ".join([flight, *used]))
-        say_heights(verdict, units)
+        say_extremes(verdict, units)
     say_notes(verdict.notes, wording)
 
 
-def say_heights(verdict: Verdict, units: Units) -> None:
+def say_extremes(verdict: Verdict, units: Units) -> None:
     """Print the lowest and the highest height above ground, and how high a zone is passed over or under."""
     lowest, highest, passed = verdict.lowest, verdict.highest, verdict.zone_pass
     words = []

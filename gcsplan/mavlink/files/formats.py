@@ -16,6 +16,7 @@ from gcsplan.mavlink.files.waypoints_file import parse_waypoints, read_waypoints
 from gcsplan.mavlink.mission.mission import Home
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
+from gcsplan.world.terrain.input_files import MISSION_FILES, TERRAIN_FILES, ZONES_BY_NAME
 
 __all__ = [
     "MissionFileRead",
@@ -64,11 +65,11 @@ def read_mission_file(
 def _instead(file: Path) -> str:
     """What a file of another kind, by its name, is for."""
     name, end = shlex.quote(str(file)), file.suffix.lower()
-    if end in (".yaml", ".yml"):
+    if end in MISSION_FILES:
         return f"; a mission file comes first (gcsplan check {name} FILE), and gcsplan plan {name} makes such a file"
-    if end in (".kml", ".kmz", ".geojson", ".gpkg", ".shp", ".fgb"):
+    if end in ZONES_BY_NAME:
         return f"; zones are given with --zones {name}, or in a mission file"
-    return f"; terrain is given with --dem {name}, or in a mission file" if end in (".tif", ".tiff", ".hgt") else ""
+    return f"; terrain is given with --dem {name}, or in a mission file" if end in TERRAIN_FILES else ""
 
 
 def _text(file: Path, where: str) -> str:

@@ -158,8 +158,7 @@ class Udp:
     @property
     def place(self) -> str:
         """Our own address."""
-        host, port = self._socket.getsockname()[:2]
-        return f"{host}:{port}"
+        return _written(self._socket.getsockname())
 
     def read(self) -> list[HeardBytes]:
         heard: list[HeardBytes] = []
@@ -278,8 +277,7 @@ class TcpClient:
     @property
     def place(self) -> str:
         """The peer's address."""
-        host, port = self._address[:2]
-        return f"{host}:{port}"
+        return _written(self._address)
 
     def read(self) -> list[HeardBytes]:
         if not self._stream.open and time.monotonic() >= self._again_at:
@@ -295,6 +293,12 @@ class TcpClient:
 
     def close(self) -> None:
         self._stream.close()
+
+
+def _written(address: tuple[Any, ...]) -> str:
+    """A socket's address as text; the rest of an IPv6 address is left out."""
+    host, port = address[:2]
+    return f"{host}:{port}"
 
 
 class TcpServer:
@@ -323,8 +327,7 @@ class TcpServer:
     @property
     def place(self) -> str:
         """Our own address."""
-        host, port = self._socket.getsockname()[:2]
-        return f"{host}:{port}"
+        return _written(self._socket.getsockname())
 
     def read(self) -> list[HeardBytes]:
         while len(self.clients) < _MOST_CLIENTS:

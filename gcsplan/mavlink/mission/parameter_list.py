@@ -233,7 +233,7 @@ def _plane(
         Setting(known["l1_damping"], 0.75, "equal", Note("assumed_settling"), "turns"),
         Setting(known["pitch"], 15.0, "at most", Note("assumed_pitch"), "told"),
     ]  # fmt: skip
-    roll_deg = RETURN_ROLL_DEG if returns else _roll_deg(mission, vehicle, fastest, uses_default)
+    roll_deg = RETURN_ROLL_DEG if returns else _roll_deg(mission, vehicle, fastest)
     if roll_deg > 0.0:
         why = Note("assumed_return_turns") if returns else Note("assumed_bank", speed_m_s=fastest)
         rows.append(Setting(known["roll"], roll_deg, "at least", why, "flight"))
@@ -266,7 +266,7 @@ def _without_radius(command: int, params: Sequence[float]) -> bool:
     return number is not None and not abs(params[number]) > 1.0
 
 
-def _roll_deg(mission: Mission, vehicle: Vehicle, fastest_m_s: float, uses_default: bool) -> float:
+def _roll_deg(mission: Mission, vehicle: Vehicle, fastest_m_s: float) -> float:
     """The bank of the plan's tightest turn at its highest place, with some to spare; 0 without a turn radius.
 
     Circles are as wide as the turn radius at least.

@@ -30,7 +30,6 @@ from typing import Any, ClassVar
 from gcsplan.figures import counted
 from gcsplan.mavlink.mission.mission import MISSION, MissionItem
 from gcsplan.mavlink.protocol.machine import (
-    CANCELLED_BY_US,
     Machine,
     StateLabel,
     Timers,
@@ -58,7 +57,6 @@ from gcsplan.mavlink.protocol.outcome import (
     OUR_REFUSAL,
     UNSUPPORTED,
     Accepted,
-    Outcome,
     Refused,
     Unknown,
     code_words,
@@ -104,6 +102,7 @@ class Download(Machine):
     """
 
     ROLE = "download"
+    CANCEL = E.CANCEL
     TABLE: ClassVar[Mapping[Any, Any]] = (
         {
             (S.IDLE, E.START): S.LISTING,
@@ -160,16 +159,6 @@ class Download(Machine):
         """Send REQUEST_LIST."""
         self._step(E.START)
         return self._ask_list(now)
-
-    def cancel(self, now: float, why: str = CANCELLED_BY_US) -> list[Packet]:
-        """End with an unknown outcome and send ACK CANCELLED."""
-        self.stop(Unknown(why))
-        return [self._to_vehicle(Ack(CANCELLED, self.mission_type))]
-
-    def stop(self, outcome: Outcome) -> None:
-        """End with ``outcome`` and request no more."""
-        if self.outcome is None:
-            self._end(E.CANCEL, outcome)
 
     def _ask_list(self, now: float) -> list[Packet]:
         self._items, self._count, self._first_asked_at, self._asked_at = [], None, now, now

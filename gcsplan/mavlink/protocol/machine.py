@@ -16,8 +16,8 @@ from enum import Enum
 from typing import Any, ClassVar
 
 from gcsplan.errors import GcsplanError, InputError
-from gcsplan.mavlink.protocol.messages import Address, Item, MissionMessage, Packet
-from gcsplan.mavlink.protocol.outcome import Outcome
+from gcsplan.mavlink.protocol.messages import Ack, Address, Item, MissionMessage, Packet
+from gcsplan.mavlink.protocol.outcome import CANCELLED, Outcome, Unknown
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +92,8 @@ class Machine:
 
     ROLE: ClassVar[str]
     TABLE: ClassVar[Mapping[tuple[Any, Any], Any]]
+    CANCEL: ClassVar[StateLabel]
+    """The event of `TABLE` that ends a transfer from outside."""
 
     def __init__(
         self,
@@ -159,9 +161,15 @@ class Machine:
         """Items transferred so far."""
         raise NotImplementedError
 
+    def cancel(self, now: float, why: str = CANCELLED_BY_US) -> list[Packet]:
+        """End with an unknown outcome and send ACK CANCELLED (which ArduPilot ignores in an upload)."""
+        self.stop(Unknown(why))
+        return [self._to_vehicle(Ack(CANCELLED, self.mission_type))]
+
     def stop(self, outcome: Outcome) -> None:
         """End with ``outcome`` and send nothing, because the link may lead to another vehicle by now."""
-        raise NotImplementedError
+        if self.outcome is None:
+            self._end(self.CANCEL, outcome)
 
     def _step(self, event: StateLabel) -> None:
         try:

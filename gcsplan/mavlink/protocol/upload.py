@@ -91,6 +91,7 @@ class Upload(Machine):
     """
 
     ROLE = "upload"
+    CANCEL = E.CANCEL
     TABLE: ClassVar[Mapping[Any, Any]] = {
         (S.IDLE, E.START): S.ANNOUNCED,
         (S.ANNOUNCED, E.RETRY): S.ANNOUNCED,
@@ -169,15 +170,9 @@ class Upload(Machine):
         for seq in seqs:
             self._asked_for(seq, now)
 
-    def cancel(self, now: float, why: str = CANCELLED_BY_US) -> list[Packet]:
-        """End with an unknown outcome and send ACK CANCELLED (which ArduPilot ignores)."""
-        self.stop(Unknown(why))
-        return [self._to_vehicle(Ack(CANCELLED, self.mission_type))]
-
     def stop(self, outcome: Outcome) -> None:
         """End with ``outcome`` and answer no more requests."""
-        if self.outcome is None:
-            self._end(E.CANCEL, outcome)
+        super().stop(outcome)
         self._cancelled = True
 
     def _announce(self, now: float) -> list[Packet]:
@@ -273,6 +268,7 @@ class Clear(Machine):
     """Clear a list: send CLEAR_ALL until it is acknowledged. ``mission_type`` may be ALL (255)."""
 
     ROLE = "clear"
+    CANCEL = E.CANCEL
     TABLE: ClassVar[Mapping[Any, Any]] = {
         (S.IDLE, E.START): S.ANNOUNCED,
         (S.ANNOUNCED, E.RETRY): S.ANNOUNCED,
@@ -309,11 +305,6 @@ class Clear(Machine):
         """End with an unknown outcome and send nothing."""
         self.stop(Unknown(why))
         return []
-
-    def stop(self, outcome: Outcome) -> None:
-        """End with ``outcome`` and send no more CLEAR_ALL."""
-        if self.outcome is None:
-            self._end(E.CANCEL, outcome)
 
     def _ask(self, now: float) -> list[Packet]:
         held = self._gate(now)

@@ -29,8 +29,6 @@ from gcsplan.notes.note import Datum, Note
 from gcsplan.world.geodesy.degree_shapes import LARGEST_RADIUS_M, MOST_LON_DEG, Corner
 from gcsplan.world.geodesy.frame import EARTH_RADIUS_M, Frame
 
-OPENAIR_SUFFIXES = (".openair", ".air", ".txt")
-
 NAUTICAL_MILE_M = 1852.0
 
 SILENT_CLASSES = frozenset({"UNC", "NONE"})

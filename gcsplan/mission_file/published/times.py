@@ -21,7 +21,7 @@ EARLIEST_LIFT_OFF = timedelta(minutes=30)
 """How long before a common start vehicles may leave the ground: they wait for it in the air."""
 
 LONGEST_HOURS = timedelta(days=31)
-_DAY = timedelta(days=1)
+DAY = timedelta(days=1)
 _DATE = re.compile(r"\d{4}-\d{2}-\d{2}", re.ASCII)
 _MOST_TIME_CHARACTERS = 40
 
@@ -78,7 +78,7 @@ def texts_of(at: str | Sequence[str] | None) -> tuple[str, ...] | None:
 
 def read_end(text: str) -> datetime:
     """The end of a period: as `read_instant`, but a day means all of it. Raises TimeError."""
-    return read_instant(text) + (_DAY if _DATE.fullmatch(text.strip()) else timedelta(0))
+    return read_instant(text) + (DAY if _DATE.fullmatch(text.strip()) else timedelta(0))
 
 
 def read_instant(text: str) -> datetime:
@@ -91,7 +91,7 @@ def read_instant(text: str) -> datetime:
     try:
         moment = datetime.fromisoformat(f"{last[1]}T00:00{last[2]}" if last else plain)
         if last:
-            moment += _DAY
+            moment += DAY
         if moment.tzinfo is None:
             if not _DATE.fullmatch(plain):
                 raise TimeError(f"{shown} has no time zone; write Z behind it for UTC")
@@ -142,15 +142,15 @@ class Period:
             return False
         if not self.schedule:
             return True
-        midnight = first.replace(hour=0, minute=0, second=0, microsecond=0) - 2 * _DAY  # times have offsets, and nights
-        while midnight <= last + _DAY:
+        midnight = first.replace(hour=0, minute=0, second=0, microsecond=0) - 2 * DAY  # times have offsets, and nights
+        while midnight <= last + DAY:
             for daily in self.schedule:
                 if midnight.weekday() not in daily.days:
                     continue
-                end = daily.end if daily.end > daily.start else daily.end + _DAY
+                end = daily.end if daily.end > daily.start else daily.end + DAY
                 if midnight + daily.start <= last and midnight + end >= first:
                     return True
-            midnight += _DAY
+            midnight += DAY
         return False
 
 
@@ -224,9 +224,9 @@ def _daily(given: Any) -> Daily | None:
     start, end = _of_day(given.get("startTime")), _of_day(given.get("endTime"))
     # Without a beginning it is the day's midnight, and without an end the next, in the time zone of the other one.
     offset = (start or end or (timedelta(0), timedelta(0)))[1]
-    first, last = start or (timedelta(0), offset), end or (_DAY, offset)
+    first, last = start or (timedelta(0), offset), end or (DAY, offset)
     line = Daily(frozenset(days), first[0] - first[1], last[0] - last[1])
-    if (last[0] > first[0]) != (line.end > line.start) or line.end + _DAY <= line.start:
+    if (last[0] > first[0]) != (line.end > line.start) or line.end + DAY <= line.start:
         raise TimeError("a line of a schedule ends before it begins, in time zones that differ")
     return line
 
@@ -247,7 +247,7 @@ def _of_day(given: Any) -> tuple[timedelta, timedelta] | None:
     if offset is None:
         raise TimeError(f"{text[:40]!r} has no time zone")
     whole = timedelta(hours=at.hour, minutes=at.minute, seconds=at.second, microseconds=at.microsecond)
-    return whole + (_DAY if last else timedelta(0)), offset
+    return whole + (DAY if last else timedelta(0)), offset
 
 
 def apply_in(periods: Sequence[Period], hours: Hours | None) -> bool:

@@ -176,9 +176,10 @@ def page_of_check(
     homes: Sequence[WayHome | None] = (),
     units: Units = METRIC,
 ) -> Page:
-    """The page of checked files; subjects are named by file if one vehicle has several files.
+    """The page of files that were checked in ``world``; subjects are named by file if one vehicle has several files.
 
-    ``homes`` are the ways home of ``checked``, in the same order, if they were judged.
+    ``inputs`` are those of a mission file, or a surface's ``info``; if ``bare_dem`` is true, the page says so.
+    ``homes`` are the ways home of ``checked``, in the same order, None if not judged.
     """
     names = [c.vehicle.name for c in checked]
     subjects = tuple(

@@ -44,11 +44,6 @@ class History:
         last = np.searchsorted(self.iterations, np.arange(self.iterations[-1] + 1), side="right") - 1
         return self.cost[last]
 
-    def at_evaluations(self, counts: ArrayLike) -> Floats:
-        """Best cost known after each number of evaluations in ``counts``; inf before the end of the first batch."""
-        place = np.searchsorted(self.evaluations, np.asarray(counts), side="right") - 1
-        return np.where(place < 0, np.inf, self.cost[np.maximum(place, 0)])
-
 
 @dataclass(frozen=True, slots=True)
 class OptimiserResult:

@@ -105,7 +105,7 @@ def near_polygons(ring: Sequence[Corner], frame: Frame, *, great_circles: bool =
     Its edges are cut to keep `EDGE_BOW_M`. With ``great_circles`` each edge may be the great circle as well as the line
     that is straight in degrees, and all that either encloses belongs to the polygon.
     """
-    rings = _turned(ring, frame.lon_deg)
+    rings = turned(ring, frame.lon_deg)
     wholes = _with_great_circles(rings, frame) if great_circles else [rings]
     parts = [p for one in wholes for p in _near_parts(one, frame)]
     cut = [cut_edges(part, np.roll(part, -1, axis=0), frame) for part in parts]
@@ -346,7 +346,7 @@ def _beyond(lon0: float, lon1: float) -> str:
     )
 
 
-def _turned(points: Sequence[Corner], near_lon_deg: float) -> Floats:
+def turned(points: Sequence[Corner], near_lon_deg: float) -> Floats:
     """(N, 2) longitude, latitude, all turned by the same whole turns so that the first is near ``near_lon_deg``."""
     p = np.asarray(points, float)
     return np.stack([p[:, 1] + _turns(p[0, 1], near_lon_deg), p[:, 0]], axis=-1)

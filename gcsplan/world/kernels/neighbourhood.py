@@ -117,7 +117,7 @@ class Neighbourhoods:
 
     def __init__(self, grid: GridMap, field: Field) -> None:
         self._grid, self._field = grid, field
-        self._kept: dict[tuple[bool, int, int], Neighbourhood] = {}
+        self.kept: dict[tuple[bool, int, int], Neighbourhood] = {}
         """The least lately asked for come first."""
         self._lock = threading.Lock()
 
@@ -129,17 +129,17 @@ class Neighbourhoods:
         """The extrema of ``heights`` along lines, in the kernels' form; one for each size of the reach in cells."""
         key = of_top, math.ceil(reach_m / self._field.step_x), math.ceil(reach_m / self._field.step_y)
         with self._lock:
-            own = self._kept.pop(key, None)
+            own = self.kept.pop(key, None)
             if own is None or own.examined_bytes > MOST_EXAMINED_BYTES // AT_ONCE:
                 own = Neighbourhood(self._grid, self._field, heights, reach_m)
-            self._kept[key] = own
+            self.kept[key] = own
         held = own.along(lines)  # the arrays live as long as somebody uses them, forgotten or not
         with self._lock:
-            held_bytes = sum(one.examined_bytes for one in self._kept.values())
-            for old in list(self._kept)[:-AT_ONCE]:
+            held_bytes = sum(one.examined_bytes for one in self.kept.values())
+            for old in list(self.kept)[:-AT_ONCE]:
                 if held_bytes <= MOST_EXAMINED_BYTES:
                     break
-                held_bytes -= self._kept.pop(old).examined_bytes
+                held_bytes -= self.kept.pop(old).examined_bytes
         return held
 
 

@@ -15,14 +15,11 @@ import yaml
 
 from gcsplan.app.fleet.fleet import route_of
 from gcsplan.app.fleet.pipeline import plan
-from gcsplan.app.output.files import outputs_of, report_of, summary_of
+from gcsplan.app.output.files import outputs_of, summary_of
 from gcsplan.app.plan.model import Plan
-from gcsplan.cli.output.console import plan_table
 from gcsplan.errors import InputError, NoMission
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mission_file import load_mission
-from gcsplan.notes.note import Note
-from gcsplan.units import AVIATION
 from tests.support.noted import one
 from tests.support.paths import MISSIONS
 
@@ -171,18 +168,6 @@ def test_without_an_arrival_nothing_is_changed_and_a_meeting_is_told() -> None:
     assert "\n  west and south come as near as" in str(apart)
 
 
-def test_where_times_may_not_change_another_path_is_flown_and_judged_like_any_other() -> None:
-    arrival = {"mode": "together", "separation_m": 30, "hold": "none", "arrive_s": 180}
-    done = planned(arrival, limits={"min_agl_m": 40, "max_agl_m": 60})
-    assert nearest_m(done) >= 30.0 - 1e-3
-    lengths = [v.verdict.length_m for v in done.vehicles]
-    assert max(lengths) > 1001.0
-    assert all(v.verdict.safe is True for v in done.vehicles)
-    assert done.fleet is not None
-    [kept] = [note for slot in done.fleet.slots for note in slot.notes if note.code == "keeps_clear"]
-    assert Note("takes_another_path") in kept.data["changes"]  # type: ignore[operator]
-
-
 def test_a_goal_for_two_is_refused_with_the_distance_that_works() -> None:
     with pytest.raises(NoMission, match=r"at least 30\.\d m apart") as refused:
         planned(sequence(20), {}, {"goal": {"east_m": 500, "north_m": 10}})
@@ -224,18 +209,6 @@ def test_what_cannot_hold_in_the_air_leaves_later_instead() -> None:
     assert cmd.DELAY not in [item.command for item in done.vehicles[1].mission.items]
 
 
-def test_where_nobody_may_wait_a_longer_path_makes_up_for_the_time() -> None:
-    done = planned(sequence(60, hold="none"), {}, {"speed_m_s": [9, 10]})
-    west, south = summary_of(done)["vehicles"]
-    assert south["arrive_s"] - west["arrive_s"] == pytest.approx(60.0, abs=1e-3)
-    assert (south["depart_s"], south["hold_s"]) == (0.0, 0.0)
-    assert 9.0 <= south["speed_m_s"] <= 10.0
-    assert south["length_m"] > 1300
-    assert [note["code"] for note in south["notes_data"]].count("flies_longer") == 1
-    assert done.vehicles[1].verdict.safe is True
-    assert south["lower_bound_m"] == pytest.approx(1000.0, abs=0.1)  # of its own request, not of the zigzag's vias
-
-
 # -- routes, outputs, papers --------------------------------------------------------------------------------------
 
 
@@ -272,12 +245,6 @@ def test_in_the_terrain_frame_a_vehicle_is_where_the_ground_has_it() -> None:
         assert len(flown.points) > 30
         assert flown.items is not None
         assert len(flown.items) == len(flown.points) + 1
-
-
-def test_the_same_fleet_twice_gives_the_same_bytes() -> None:
-    text = yaml.safe_dump(CROSS | {"arrival": {"mode": "together", "separation_m": 30}})
-    first, second = (outputs_of(plan(load_mission("fleet.yaml", text=text))) for _ in range(2))
-    assert first == second
 
 
 @pytest.mark.slow
@@ -351,19 +318,3 @@ def test_the_file_of_a_hundred_is_a_fleet_of_a_hundred() -> None:
 def test_bad_arrivals_are_input_errors() -> None:
     with pytest.raises(InputError, match="interval_s"):
         planned({"mode": "sequence"})
-
-
-def test_a_note_is_sentence_and_data_in_json_and_in_units_on_page_and_terminal(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    done = planned(sequence(60, hold="none"), {}, {"speed_m_s": [9, 10]})
-    told = json.loads(outputs_of(done)["summary.json"])["vehicles"][1]
-    assert len(told["notes"]) == len(told["notes_data"])
-    [data] = [d for d in told["notes_data"] if d["code"] == "flies_longer"]
-    more_m = data["data"]["more_m"]
-    assert data["item"] is None
-    assert told["notes"][told["notes_data"].index(data)] == f"flies {more_m:.0f} m more, to arrive so late"
-    in_feet = f"flies {more_m / 0.3048:.0f} ft more, to arrive so late"
-    assert in_feet in report_of(done, units=AVIATION)
-    plan_table(done, {}, AVIATION)
-    assert f"note: south: {in_feet}" in " ".join(capsys.readouterr().err.split())

@@ -16,7 +16,6 @@ import pytest
 
 from gcsplan import __version__
 from gcsplan.app.fleet.pipeline import plan
-from gcsplan.app.fleet.workers import planned_by
 from gcsplan.app.parallel import executor as module
 from gcsplan.app.parallel.executor import Dask, Executor, Inline, executor, in_order
 from gcsplan.app.plan.model import Plan
@@ -115,7 +114,7 @@ def test_without_dask_the_message_says_what_to_install(monkeypatch: pytest.Monke
         raise ImportError(name)
 
     monkeypatch.setattr(module, "import_module", missing)
-    monkeypatch.setattr(module, "_installed", lambda: False)
+    monkeypatch.setattr(module, "find_spec", lambda name: None)
     for options in ({"jobs": 2}, {"cluster": "tcp://127.0.0.1:1"}):
         with pytest.raises(InputError, match=r"--\w+ needs dask.distributed.*pip install"):  # noqa: SIM117
             with executor(**options, pieces=1000, piece_s=1.0):
@@ -142,8 +141,10 @@ def test_a_wrong_number_of_processes_is_refused(jobs: int) -> None:
         pass
 
 
-class Pickled(Inline):
+class Pickled(Executor):
     """What goes in and out passes through pickle, as between processes."""
+
+    count, dashboard = 1, ""
 
     def each(self, function: Any, shared: Any, items: Any, **_: Any) -> Any:
         for number, item in enumerate(items):
@@ -151,32 +152,26 @@ class Pickled(Inline):
             yield number, pickle.loads(pickle.dumps(args[0](*args[1:])))
 
 
-def test_planning_with_an_executor_is_planning(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_planning_with_an_executor_is_planning() -> None:
     """The way over pickled answers, without processes: what comes back makes the same plan."""
     alone = plan(fleet())
-    seen: list[tuple[str, int]] = []
-    monkeypatch.setattr(
-        "gcsplan.app.fleet.pipeline._planned",
-        lambda brief, *_: planned_by(Pickled(), brief, lambda n, k: seen.append((n, k))),
-    )
-    assert told(plan(fleet())) == told(alone)
-    assert seen == [("uav1", 1), ("uav2", 2), ("uav3", 3), ("uav4", 4)]
+    seen: list[str] = []
+    assert told(plan(fleet(), cluster=Pickled(), progress=lambda _, what: seen.append(what.phase))) == told(alone)
+    assert seen == [f"{count} of 4 planned" for count in (1, 2, 3, 4)]
 
 
-def test_the_first_refusal_in_the_file_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Backwards(Inline):
+def test_the_first_refusal_in_the_file_is_raised() -> None:
+    class Backwards(Pickled):
         def each(self, function: Any, shared: Any, items: Any, **_: Any) -> Any:
-            yield from reversed(list(Inline.each(self, function, shared, items)))
+            yield from reversed(list(Inline().each(function, shared, items)))
 
     ring = {"name": "ring", "floor_agl_m": 0, "ceiling_agl_m": 500}
     closed = [ring | {"polygon": box(400.0 * k)} for k in (1, 2)]
     given = fleet(no_fly=closed, planner={"budget_s": 0.5})
     given["vehicles"][1]["start"] = {"east_m": 0, "north_m": 400}
     given["vehicles"][2]["start"] = {"east_m": 0, "north_m": 800}
-    monkeypatch.setattr("gcsplan.app.fleet.pipeline._planned", lambda brief, *_: planned_by(Backwards(), brief))
     with pytest.raises((NoMission, InputError)) as caught:
-        plan(given)
-    monkeypatch.undo()
+        plan(given, cluster=Backwards())
     with pytest.raises(type(caught.value)) as alone:
         plan(given)
     assert str(caught.value) == str(alone.value)
@@ -250,7 +245,7 @@ def test_a_piece_handed_out_just_before_ctrl_c_is_no_error(workers: Executor) ->
     assert isinstance(workers, Dask)
     for _ in range(20):
         numbers = {workers.client.submit(square, 0, 2, pure=False): 0}
-        workers._keep_begun(numbers)
+        workers.keep_begun(numbers)
         assert all(kept.result(timeout=60) == 4 for kept in numbers)
     assert sorted(workers.each(square, 0, range(3))) == [(0, 0), (1, 1), (2, 4)]
 
@@ -261,7 +256,7 @@ def test_a_fleet_planned_by_processes_is_the_same(workers: Executor) -> None:
     assert told(plan(fleet(), cluster=workers.client)) == told(plan(fleet()))
 
 
-def test_terrain_that_planning_widened_is_the_same_here(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_terrain_that_planning_widened_is_the_same_here() -> None:
     """The way round the wall leaves the first window, and the answer comes back over the wider one."""
     wall = [[46.9, 8.01], [46.9, 8.0101], [47.08, 8.0101], [47.08, 8.01]]
     start = {"name": "uav1", "sysid": 1, "autopilot": "arducopter", "speed_m_s": [3, 12], "start": [47.0, 8.0]}
@@ -271,16 +266,15 @@ def test_terrain_that_planning_widened_is_the_same_here(monkeypatch: pytest.Monk
     }  # fmt: skip
     alone = plan(mission)
     assert alone.source.level > 0
-    monkeypatch.setattr("gcsplan.app.fleet.pipeline._planned", lambda brief, *_: planned_by(Pickled(), brief))
-    other = plan(mission)
+    other = plan(mission, cluster=Pickled())
     assert other.source.level == alone.source.level
     assert told(other) == told(alone)
 
 
 def test_a_worker_of_another_version_is_refused() -> None:
-    assert module._done(square, __version__, 1, 2) == 5
+    assert module.piece_done(square, __version__, 1, 2) == 5
     with pytest.raises(InputError, match=r"a worker of the cluster has gcsplan .*, and this is 9.9"):
-        module._done(square, "9.9", 1, 2)
+        module.piece_done(square, "9.9", 1, 2)
 
 
 @pytest.mark.slow

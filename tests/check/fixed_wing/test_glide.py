@@ -36,7 +36,9 @@ def notes(slope: float, error_m: float = 8.0) -> list[Note]:
 
 @pytest.mark.parametrize("slope", [0.0, -0.05, 0.005])
 def test_a_landing_on_the_level_or_uphill_is_not_told(slope: float) -> None:
-    assert "lands_downhill" not in codes(notes(slope))
+    told = codes(notes(slope))
+    assert "lands_downhill" not in told
+    assert "climb_out_straight" in told  # it was judged
 
 
 def test_a_landing_downhill_is_told_with_where_it_touches_down() -> None:

@@ -133,4 +133,6 @@ def test_an_arc_that_is_not_known_is_not_judged(items: list[MissionItem]) -> Non
 def test_only_a_copter_flies_arcs() -> None:
     arc = at(cmd.ARC_WAYPOINT, 1500, p1=90.0)
     for autopilot in (PLANE, Autopilot.PX4):
-        assert flown(replace(A, params=(0, 5.0, 0, 0)), arc, B, autopilot=autopilot).safe is not True
+        verdict = flown(replace(A, params=(0, 5.0, 0, 0)), arc, B, autopilot=autopilot)
+        assert verdict.safe is not True
+        assert any(note.item == 3 for note in verdict.not_judged) or verdict.findings

@@ -7,39 +7,14 @@ from dataclasses import replace
 
 import pytest
 
-from gcsplan.check.flight.follow import Flight, follow
+from gcsplan.check.flight.follow import follow
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
 from gcsplan.notes.note import Note
-from gcsplan.vehicle import Autopilot, Vehicle
-from gcsplan.world.geometry.limits import Limits
+from gcsplan.vehicle import Autopilot
+from tests.support.followed import GROUND_M, HOME, TAKEOFF, VTOL_TAKEOFF, at, fly, fly_over_a_slope, unknown, vehicle
 from tests.support.noted import codes
-
-GROUND_M = 300.0
-HOME = Home.at(36.6, -84.3, GROUND_M)
-
-
-def vehicle(autopilot: Autopilot = Autopilot.ARDUCOPTER) -> Vehicle:
-    return Vehicle("uav1", 1, autopilot, Limits(min_agl_m=60))
-
-
-def fly(
-    *items: MissionItem,
-    autopilot: Autopilot = Autopilot.ARDUCOPTER,
-    home: Home = HOME,
-    ground_m: float = GROUND_M,
-    rtl_rel_home_m: float | None = None,
-) -> Flight:
-    mission = Mission(autopilot, home, items)
-    return follow(mission, vehicle(autopilot), lambda lat, lon: ground_m, rtl_rel_home_m=rtl_rel_home_m)
-
-
-def at(command: int, north: float, east: float, z: float, frame: int = m.RELATIVE, p1: float = 0.0) -> MissionItem:
-    return MissionItem(command, frame, (p1, 0, 0, 0), m.degrees_e7(36.6 + north), m.degrees_e7(-84.3 + east), z)
-
-
-TAKEOFF = at(cmd.TAKEOFF, 0, 0, 65)
 
 
 def test_a_whole_mission_is_followed_from_the_ground_to_the_ground() -> None:
@@ -59,27 +34,6 @@ def test_relative_altitudes_count_from_the_ground_at_arming_not_the_home_row() -
     flight = fly(TAKEOFF, home=Home.at(36.6, -84.3, 0.0))
     assert flight.stretches[0].end[2] == GROUND_M + 65
     assert codes(flight.notes) == ["home_height_differs"]
-
-
-@pytest.mark.parametrize(
-    ("frame", "z", "amsl"), [(m.GLOBAL, 500, 500), (m.RELATIVE, 80, 380), (m.TERRAIN, 90, 390), (6, 80, 380)]
-)
-def test_each_frame_gives_its_altitude(frame: int, z: float, amsl: float) -> None:
-    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, z, frame))
-    assert flight.stretches[-1].end[2] == amsl
-    assert flight.stretches[-1].terrain == (frame == m.TERRAIN)
-
-
-def test_copter_keeps_its_altitude_at_zero_and_its_place_at_zero_zero() -> None:
-    stay = MissionItem(cmd.WAYPOINT, m.RELATIVE, z=90.0)
-    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), at(cmd.WAYPOINT, 0.02, 0, 0), stay)
-    assert flight.stretches[2].end[2] == GROUND_M + 80
-    assert flight.stretches[3].end == (*flight.stretches[2].end[:2], GROUND_M + 90)
-
-
-def test_px4_flies_to_altitude_zero() -> None:
-    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 0), autopilot=Autopilot.PX4)
-    assert flight.stretches[1].end[2] == GROUND_M
 
 
 def test_speed_changes_hold_from_there_on() -> None:
@@ -143,24 +97,6 @@ def test_rtl_at_an_unknown_altitude_is_not_judged() -> None:
     assert flight.not_judged == [Note("return_altitude_not_given", 3)]
 
 
-@pytest.mark.parametrize(
-    "item",
-    [
-        MissionItem(cmd.DO_SET_HOME, 0, (0, 0, 0, 0), 366000000, -843000000, 10),
-        at(31000, 0.02, 0, 80),
-    ],
-)
-def test_a_command_whose_motion_is_unknown_is_named(item: MissionItem) -> None:
-    flight = fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 80), item, at(cmd.WAYPOINT, 0.03, 0, 80))
-    assert [(n.code, n.item, n.data["command"]) for n in flight.not_judged[:1]] == [("flown_unknown", 3, item.command)]
-
-
-def test_servo_and_camera_commands_move_nothing() -> None:
-    flight = fly(TAKEOFF, MissionItem(206, 2, (25, 0, 1, 0)), MissionItem(183, 2, (9, 1500, 0, 0)))
-    assert flight.not_judged == []
-    assert len(flight.stretches) == 1
-
-
 def test_a_mission_without_take_off_is_not_judged_up_to_its_first_way_point() -> None:
     flight = fly(at(cmd.WAYPOINT, 0.01, 0, 80), at(cmd.WAYPOINT, 0.02, 0, 80))
     assert flight.not_judged == [Note("no_take_off", 1)]
@@ -197,51 +133,6 @@ def test_a_hold_counts_on_copter_and_not_on_plane() -> None:
     assert plane.stretches[-1].hold_s == 0
 
 
-SLOPE = 20_000.0  # metres that the ground rises per degree of latitude
-
-
-def fly_over_a_slope(
-    *items: MissionItem, autopilot: Autopilot = Autopilot.ARDUCOPTER, rtl_rel_home_m: float | None = None
-) -> Flight:
-    mission = Mission(autopilot, HOME, items)
-    craft = vehicle(autopilot)
-    return follow(
-        mission, craft, lambda lat, lon: GROUND_M + SLOPE * (lat - 36.6), rtl_rel_home_m=rtl_rel_home_m
-    )  # fmt: skip
-
-
-VTOL_TAKEOFF = at(cmd.VTOL_TAKEOFF, 0, 0, 65)
-
-
-@pytest.mark.parametrize(("z", "at_once"), [(79.9, True), (51, True), (80.1, False), (49, False)])
-def test_arduplane_changes_height_by_less_than_its_glide_slope_minimum_at_once(z: float, at_once: bool) -> None:
-    flight = fly(VTOL_TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, z), autopilot=Autopilot.ARDUPLANE)
-    assert bool(flight.instead) == at_once
-    for band in flight.instead:
-        assert band.start[2] == band.end[2] == pytest.approx(GROUND_M + 0.5 * (65 + z))
-        assert band.band_m == pytest.approx(abs(z - 65) / 2)
-
-
-def test_arduplane_climbs_at_once_from_below_twenty_metres() -> None:
-    low = at(cmd.WAYPOINT, 0.01, 0, 15)
-    flight = fly(VTOL_TAKEOFF, low, at(cmd.WAYPOINT, 0.02, 0, 200), autopilot=Autopilot.ARDUPLANE)
-    assert [s.seq for s in flight.instead] == [3]
-    assert flight.instead[0].band_m == pytest.approx(92.5)
-
-
-def test_copter_and_px4_change_height_along_the_leg() -> None:
-    assert fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 70)).instead == []
-    assert fly(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 70), autopilot=Autopilot.PX4).instead == []
-
-
-def test_arduplanes_glide_slope_minimum_counts_above_ground_in_terrain_frame() -> None:
-    level = at(cmd.WAYPOINT, 0.01, 0, 65, m.TERRAIN)  # 200 m higher in AMSL, the same height above ground
-    flight = fly_over_a_slope(VTOL_TAKEOFF, level, autopilot=Autopilot.ARDUPLANE)
-    (band,) = flight.instead
-    assert band.terrain
-    assert band.band_m == pytest.approx(0, abs=1e-6)
-
-
 @pytest.mark.parametrize("frame", [m.GLOBAL, m.TERRAIN])
 def test_arduplanes_vtol_take_off_in_another_frame_is_not_judged(frame: int) -> None:
     flight = fly(
@@ -258,30 +149,6 @@ def test_a_vtol_take_off_of_px4_is_not_judged() -> None:
 def test_a_take_off_to_less_than_the_least_climb_ends_there() -> None:
     assert fly(at(cmd.TAKEOFF, 0, 0, -20)).stretches[0].end[2] == GROUND_M + 1.0
     assert fly(at(cmd.TAKEOFF, 0, 0, 0), autopilot=Autopilot.PX4).stretches[0].end[2] == GROUND_M + 2.5
-
-
-def test_copter_keeps_its_height_in_the_frame_of_the_item() -> None:
-    flight = fly_over_a_slope(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 0, m.TERRAIN))
-    assert flight.stretches[-1].end[2] == pytest.approx(GROUND_M + 200 + 65)
-    flight = fly_over_a_slope(TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 0, m.GLOBAL))
-    assert flight.stretches[-1].end[2] == pytest.approx(GROUND_M + 65)
-
-
-def test_arduplane_keeps_its_altitude_only_where_there_is_no_place_either() -> None:
-    flight = fly(VTOL_TAKEOFF, at(cmd.WAYPOINT, 0.01, 0, 0), autopilot=Autopilot.ARDUPLANE)
-    assert flight.stretches[-1].end[2] == GROUND_M
-    flight = fly(VTOL_TAKEOFF, MissionItem(cmd.LOITER_TIME, m.RELATIVE, (10, 0, 0, 0)), autopilot=Autopilot.ARDUPLANE)
-    assert flight.stretches[-1].end[2] == GROUND_M + 65
-
-
-def unknown(flight: Flight) -> list[int]:
-    """The commands whose flight is not judged."""
-    return [n.data["command"] for n in flight.not_judged if n.code == "flown_unknown"]  # type: ignore[misc]
-
-
-def test_px4_knows_no_here() -> None:
-    flight = fly(TAKEOFF, MissionItem(cmd.WAYPOINT, m.RELATIVE, z=90.0), autopilot=Autopilot.PX4)
-    assert unknown(flight) == [16]
 
 
 def test_a_landing_elsewhere_in_terrain_frame_keeps_its_height_above_ground() -> None:
@@ -395,27 +262,6 @@ def test_arduplane_does_not_wait_in_the_air() -> None:
     wait = MissionItem(cmd.DELAY, m.NO_POSITION, (60, 0, 0, 0))
     assert fly(VTOL_TAKEOFF, wait, autopilot=Autopilot.ARDUPLANE).stretches[-1].hold_s == 0
     assert fly(TAKEOFF, wait).stretches[-1].hold_s == 60
-
-
-@pytest.mark.parametrize(("command", "first"), [(180, 0), (208, 2), (212, 1), (218, 4), (222, 5), (223, 0)])
-def test_commands_that_may_change_the_flight_are_named(command: int, first: float) -> None:
-    flight = fly(TAKEOFF, MissionItem(command, 2, (first, 0, 0, 0)))
-    assert unknown(flight) == [command]
-
-
-def test_an_armed_parachute_moves_nothing() -> None:
-    assert fly(TAKEOFF, MissionItem(208, 2, (1, 0, 0, 0))).not_judged == []
-
-
-def test_a_command_that_is_not_judged_is_named_with_the_reason() -> None:
-    for command, why in (
-        (cmd.PAYLOAD_PLACE, Note("descends_until_ground", name="payload place")),
-        (cmd.DO_AUX_FUNCTION, Note("switches_mode", name="auxiliary function")),
-    ):
-        flight = fly(TAKEOFF, MissionItem(command, 3, (1.0, 0.0, 0.0, 0.0), TAKEOFF.x + 9000, TAKEOFF.y, 80.0))
-        assert flight.not_judged == [Note("flown_unknown", 2, autopilot="arducopter", command=command, why=why)]
-        said = f"item 2: what arducopter flies for command {command} is not judged: {why}"
-        assert str(flight.not_judged[0]) == f"{said}; leave it out to have the rest judged"
 
 
 def test_a_copter_flies_the_vtol_commands_as_its_own() -> None:

@@ -14,7 +14,7 @@ from pyproj import Geod
 from gcsplan.mission_file.published.openair import Arc, outline
 from gcsplan.mission_file.published.times import Hours
 from gcsplan.mission_file.zones.draft import ZoneDraft
-from tests.mission_file.airspace.made import limits, outcome, read, remarks, said
+from tests.mission_file.published.made import limits, outcome, read, remarks, said
 from tests.support.attacks import draw_attacks
 from tests.support.effort import draws
 from tests.support.paths import DATA

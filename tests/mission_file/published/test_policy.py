@@ -17,7 +17,7 @@ from gcsplan.errors import InputError
 from gcsplan.mission_file import MissionFile, load_mission
 from gcsplan.mission_file.options_world import OpenWorld, WorldOptions
 from gcsplan.notes.note import Note
-from tests.mission_file.airspace.made import ed269, volume
+from tests.mission_file.published.made import ed269, volume
 
 MONDAYS = [{"permanent": "NO", "schedule": [{"day": ["MON"], "startTime": "06:00Z", "endTime": "18:00Z"}]}]
 

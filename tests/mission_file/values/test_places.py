@@ -13,10 +13,8 @@ import yaml
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from gcsplan.cli.commands.check import world_options
 from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file.load import load_mission
-from gcsplan.mission_file.options_world import OpenWorld
 from gcsplan.mission_file.request import MissionFile
 from gcsplan.mission_file.values import schema
 from gcsplan.mission_file.values.places import MAX_CHARS, PLACE_EXAMPLES, read_place
@@ -404,19 +402,6 @@ def test_a_vehicle_without_a_space_after_its_colon_is_told() -> None:
     assert found.where == "mission: vehicles[0]"
     assert "a space is missing after the colon: `name: uav1`" in found.message
     assert "`version: 1`" in problems("version:1\n")[0].message
-
-
-def test_the_home_of_check_is_a_place_in_any_form() -> None:
-    plain = world_options({"--home": "36.6,-84.38"})
-    assert plain.home == (36.6, -84.38)
-    assert plain.notes == ()
-    assert world_options({"--home": "36.6 N, 84.38 W"}) == plain
-    coarse = world_options({"--home": "32TMT 7312 4932", "--dem": "sample:jacksboro", "--min-agl": 60})
-    assert apart_m(coarse.home, GRID) < 10.0
-    [note] = [note for note in OpenWorld(coarse).notes if note.code == "place_is_a_square"]
-    assert (note.data["place"], note.data["size"]) == ("--home", "10 m")
-    with pytest.raises(InputError, match=r"--home 136.6, 84.38: .*look swapped"):
-        world_options({"--home": "136.6, 84.38"})
 
 
 def test_the_examples_of_the_reference_are_read() -> None:

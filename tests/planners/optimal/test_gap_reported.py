@@ -27,8 +27,8 @@ def test_what_rounding_takes_from_bounds_is_computed_once_and_not_for_each_searc
 ) -> None:
     """It was computed at each look at the gap, which took a twentieth of a common plan."""
     seen: list[object] = []
-    known = problems._run
-    monkeypatch.setattr(problems, "_run", lambda *what: seen.append(what) or known(*what))
+    known = problems.least_run_m
+    monkeypatch.setattr(problems, "least_run_m", lambda *what: seen.append(what) or known(*what))
     problem = problem_of(draw(12, 16))
     plan(problem)
     assert 1 <= len(seen) <= 3 * (1 + len(problem.via))

@@ -132,7 +132,7 @@ def both() -> tuple[FlightEnd, FlightEnd]:
     return start, next(straight_ends(problem(), away, SHARP[::-1]))
 
 
-def test_the_planner_is_asked_for_what_lies_between_both_ends_and_what_it_finds_is_joined_to_them() -> None:
+def test_what_the_planner_finds_between_both_ends_is_joined_to_them() -> None:
     start, goal = both()
     inner = problem_between(problem(), start, goal)
     assert (inner.start, inner.goal) == (tuple(start.chain[-1]), tuple(goal.chain[-1]))
@@ -154,7 +154,7 @@ def test_a_joint_that_arcs_make_too_steep_is_lowered() -> None:
     assert points[1, 2] < 170.0
 
 
-def test_legs_that_are_too_short_for_their_arcs_are_named_and_what_arcs_cut_off_is_bounded() -> None:
+def test_legs_too_short_for_their_arcs_are_named_and_cut_corners_bounded() -> None:
     start, _ = both()
     top = start.top
     corner = np.array([[top[0] + 300.0, 0.0, top[2]], [top[0] + 300.0, 60.0, top[2]], [top[0] + 900.0, 60.0, top[2]]])

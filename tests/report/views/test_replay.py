@@ -17,9 +17,9 @@ from gcsplan.fleet.motion.timed_path import TimedPath
 from gcsplan.report.page import render_page
 from gcsplan.report.parts.page_data import Page
 from gcsplan.report.views.replay import FINE_M, MOST_PLACES, replay_data, replay_of, thin
-from tests.report.test_page import Reader, fleet_page, small_page
 from tests.support import node
 from tests.support.effort import draws
+from tests.support.pages import Reader, fleet_page, small_page
 
 in_node = pytest.mark.skipif(node.PROGRAM is None, reason="no Node is installed")
 SCRIPTS = ("base.js", "flight.js")

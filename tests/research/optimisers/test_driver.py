@@ -37,9 +37,6 @@ def test_iterations_count_rounds_and_history_knows_every_batch() -> None:
     assert result.history.evaluations.tolist() == [4, 7, 9, 12, 14, 17, 19]
     assert result.history.iterations.tolist() == [0, 1, 1, 2, 2, 3, 3]
     assert np.array_equal(result.history.by_iteration(), result.history.cost[[0, 2, 4, 6]])
-    at = result.history.at_evaluations([3, 4, 8, 9, 99])
-    assert at[0] == np.inf
-    assert np.array_equal(at[1:], result.history.cost[[0, 1, 2, 6]])
 
 
 @pytest.mark.parametrize("budget", [1, 3, 4, 5, 7, 8, 9, 23])

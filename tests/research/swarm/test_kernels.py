@@ -139,7 +139,7 @@ def test_an_older_processors_instructions_give_the_same_bytes(
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(llvm, "get_host_cpu_name", lambda: processor)
     monkeypatch.setattr(llvm, "get_host_cpu_features", llvm.FeatureMap)
-    monkeypatch.setattr(UNIT, "_loaded", None)
+    UNIT.forget()
     there = [cost.terms(controls), cost_of("ssgwo", 7).terms(controls)]
     assert list(tmp_path.glob("gcsplan/swarm-*.code"))
     assert [a.tobytes() for a in there] == [a.tobytes() for a in here]

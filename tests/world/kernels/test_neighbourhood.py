@@ -199,16 +199,17 @@ def test_neighbourhoods_forget_those_asked_for_least_lately_and_judge_alike(monk
         reach_m = float(rng.choice(reaches))
         start, end = np.stack([rng.uniform(0.0, 4490.0, (2, 2)), -rng.uniform(0.0, 2490.0, (2, 2))], axis=-1)
         kept.along(False, z, reach_m, LineBatch(start, end))
-        extrema = next(reversed(kept._kept.values())).extrema
+        extrema = next(reversed(kept.kept.values())).extrema
         t = np.linspace(0.0, 1.0, 2000)[:, None, None]
         cells = np.floor(grid(*(start + t * (end - start)).reshape(-1, 2).T)).astype(np.intp)
         cells = cells[((cells >= 0) & (cells < [899, 499])).all(axis=1)]
         assert same_where_seen(extrema, whole[reach_m], cells[:, 1], cells[:, 0])
-        held = [one.examined_bytes for one in kept._kept.values()]
+        held = [one.examined_bytes for one in kept.kept.values()]
         assert sum(held) <= 30 * tile or len(held) <= _neighbourhood.AT_ONCE
-    assert pickle.loads(pickle.dumps(kept))._kept == {}
+    assert pickle.loads(pickle.dumps(kept)).kept == {}
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads the memory that is held as Linux tells it")
 def test_a_line_across_a_large_surface_takes_memory_for_its_tiles_alone() -> None:
     """A page of 4 kB for every row of every tile, or of 2 MB, were ten and a hundred times as much."""

@@ -242,6 +242,6 @@ def other_home(mission: Mission, read: tuple[MissionItem, ...]) -> list[Note]:
     return [
         Note(
             "home_on_board_elsewhere_counts" if relative else "home_on_board_elsewhere", away_m=away_m,
-            higher_m=higher_m,
+            higher_m=higher_m, off_m=abs(higher_m), above=higher_m >= 0.0,
         )
     ]  # fmt: skip

@@ -35,7 +35,7 @@ RECHECK_LOOK_S = 10.0
 """Seconds that a look waits for a vehicle that has fallen silent."""
 _TELLING = frozenset({"HEARTBEAT", "GLOBAL_POSITION_INT", "GPS_RAW_INT", "ATTITUDE", "SYSTEM_TIME"})
 _RECENT_S = 1.5
-_ASK_AGAIN_S = 0.5
+ASK_AGAIN_S = 0.5
 _AGAIN_S = 0.1
 _REQUEST_MESSAGE, _HEARTBEAT, _GLOBAL_POSITION_INT = 512, 0, 33
 _MOVED = frozenset({"wrong_place", "wrong_height"})
@@ -222,7 +222,7 @@ class Recheck:
     def _ask(self, now: float) -> None:
         if self._began is None or now < self._ask_at:
             return
-        self._ask_at = now + _ASK_AGAIN_S
+        self._ask_at = now + ASK_AGAIN_S
         for kind in (_HEARTBEAT, _GLOBAL_POSITION_INT):
             self._channel.send(request_message(self._address, kind), self._address)
 

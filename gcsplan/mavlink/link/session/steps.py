@@ -16,7 +16,7 @@ from gcsplan.mavlink.link.link import Channel, Heard, Link, LinkSteps
 from gcsplan.mavlink.link.options import TransferPatience
 from gcsplan.mavlink.link.prepared_answers import Prepared
 from gcsplan.mavlink.link.session.parameters import decode_value, parameter_name
-from gcsplan.mavlink.link.session.recheck import Recheck, request_message
+from gcsplan.mavlink.link.session.recheck import ASK_AGAIN_S, Recheck, request_message
 from gcsplan.mavlink.link.watch import STANDBY, UNINIT, VehicleState, Watch
 from gcsplan.mavlink.mission.autopilots import is_generic, version_of
 from gcsplan.mavlink.mission.parameter_names import OnBoard
@@ -27,11 +27,10 @@ from gcsplan.mavlink.protocol.outcome import Outcome, Unknown
 
 _AUTOPILOT_VERSION, _GLOBAL_POSITION_INT, _HOME_POSITION = 148, 33, 242
 _DOES_NOT_EXIST = 1  # MAV_PARAM_ERROR
-_ASK_AGAIN_S = 0.5
 _ASKED_TIMES, _GENERIC_ASKED_TIMES = 4, 2  # a vehicle that reports a generic autopilot may never report a position
 _ASK_AGAIN_MOST_S, _SLOWER = 4.0, 1.5
-_PARAMETER_S = 2.0
-_NO_PARAMETERS_S = 1.0
+PARAMETER_S = 2.0
+NO_PARAMETERS_S = 1.0
 SLOW_ANSWER_S = 6.0
 """Patience with parameters that are told and do not decide: several round trips of a slow link."""
 
@@ -58,10 +57,10 @@ def discover_steps(
         times = _GENERIC_ASKED_TIMES if is_generic(state.mav_autopilot) else _ASKED_TIMES
         complete = state.capabilities is not None and state.located
         if _is_booting(state) and now < found + standby_s:
-            yield now + _ASK_AGAIN_S
+            yield now + ASK_AGAIN_S
         elif not complete and now >= ask_at and asked < times:
             _ask(channel, state)
-            asked, ask_at = asked + 1, now + _ASK_AGAIN_S
+            asked, ask_at = asked + 1, now + ASK_AGAIN_S
         elif not complete and now < ask_at:
             yield ask_at
         elif now < found + listen_s:
@@ -92,7 +91,7 @@ def parameter_steps(
     values = OnBoard(generic=generic, version=version_of(state.flight_sw_version))
     unknown: set[str] = set()  # names that the vehicle reported as missing
     started = ask_at = answered_at = clock()
-    again_s = _ASK_AGAIN_S
+    again_s = ASK_AGAIN_S
 
     def missing(of: Iterable[tuple[str, ...]]) -> list[str]:
         left = [
@@ -107,7 +106,7 @@ def parameter_steps(
         return missing(group for group in needed if not values.lacks(group))
 
     def until() -> float:
-        patience_s = _PARAMETER_S if values or unknown else _NO_PARAMETERS_S
+        patience_s = PARAMETER_S if values or unknown else NO_PARAMETERS_S
         return max(answered_at + patience_s, started + most_s if waited_for() and not generic else started)
 
     for name in (name for group in groups if values.too_old_for(group) for name in group):
@@ -117,7 +116,7 @@ def parameter_steps(
         if now >= until():
             break
         if now >= ask_at:
-            late = now >= answered_at + _PARAMETER_S
+            late = now >= answered_at + PARAMETER_S
             for name in (late and waited_for()) or missing(groups):
                 _ask_parameter(channel, state.address, name)
             ask_at, again_s = now + again_s, min(_ASK_AGAIN_MOST_S, (_SLOWER if late else 1.0) * again_s)

@@ -12,10 +12,11 @@ from gcsplan.mission_file.published.ed269 import is_ed269
 from gcsplan.mission_file.published.ed318 import is_ed318
 from gcsplan.mission_file.published.members import MemberError, number_or_none, outer_ring, position, text_of, unread
 from gcsplan.mission_file.published.openaip import is_openaip
-from gcsplan.mission_file.published.openair import OPENAIR_SUFFIXES, read_openair
+from gcsplan.mission_file.published.openair import read_openair
 from gcsplan.mission_file.published.policy import Policy
 from gcsplan.mission_file.zone_reader import read_published
-from tests.mission_file.airspace.made import HOLE, RING, collection, ed269, ed318, openaip, volume
+from gcsplan.world.terrain.input_files import OPENAIR_ZONES
+from tests.mission_file.published.made import HOLE, RING, collection, ed269, ed318, openaip, volume
 
 POLICY = Policy(where="m: no_fly[0]")
 OPENAIR = (
@@ -49,7 +50,7 @@ def test_a_file_of_none_of_these_formats_is_left_to_others() -> None:
     assert read_published(Path("z.geojson"), b"", PLAIN, POLICY) is None
 
 
-@pytest.mark.parametrize("suffix", OPENAIR_SUFFIXES)
+@pytest.mark.parametrize("suffix", OPENAIR_ZONES)
 def test_openair_is_taken_by_its_ending(suffix: str) -> None:
     found = read_published(Path(f"z{suffix}"), OPENAIR, None, POLICY)
     assert found is not None

@@ -1,4 +1,4 @@
-"""`gcsplan verify`: what other programs wrote is told from what was planned, and taken only if it is judged safe."""
+"""`gcsplan upload`, `verify`, `download`, `clear`: what others wrote is taken only if it is judged safe."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
+from gcsplan.mavlink.files.formats import read_mission_file
 from gcsplan.sim.vehicle.loopback import LoopbackVehicle
 from gcsplan.sim.vehicle.server import SimServer
 from gcsplan.vehicle import Autopilot
-from tests.support.paths import DATA
+from tests.support.crossing import CROSSING, changed, vehicle
 
-CROSSING = DATA / "crossing.yaml"
 LAT, LON, ALT = 8, 9, 10
 Change = Callable[[list[str]], None]
 
@@ -164,3 +164,35 @@ def test_an_empty_board_was_sent_nothing(run: Any, url: str) -> None:
     assert code == 7
     assert "on board is 0" in text
     assert "sent" not in text
+
+
+def test_files_are_uploaded_verified_downloaded_and_cleared(run: Any, tmp_path: Path) -> None:
+    assert run("plan", CROSSING, "-o", "out")[0] == 0
+    with SimServer([vehicle()], "udpin:127.0.0.1:0", speedup=10.0) as server:
+        url = server.url_for_gcs
+        assert run("verify", "out/uav1.waypoints", "--to", url)[0] == 7
+        assert run("upload", "out/uav1.plan", "--to", url, "--mission", CROSSING)[0] == 0
+        assert run("verify", "out/uav1.waypoints", "--to", url)[0] == 0
+        assert run("download", "--from", url, "-o", "back.waypoints")[0] == 0
+        back = read_mission_file(tmp_path / "back.waypoints", autopilot=Autopilot.ARDUCOPTER).mission
+        sent = read_mission_file(tmp_path / "out" / "uav1.plan", autopilot=None).mission
+        assert [i.command for i in back.items] == [i.command for i in sent.items]
+        assert run("check", CROSSING, "uav1=back.waypoints")[0] == 0
+        assert run("clear", "--to", url)[0] == 0
+        assert server.vehicles[0].items()[1:] == ()
+
+
+def test_an_unsafe_file_is_not_sent_unless_unchecked(run: Any, tmp_path: Path) -> None:
+    assert run("plan", CROSSING, "-o", "out")[0] == 0
+    higher = changed(tmp_path, "min_agl_m: 60", "min_agl_m: 70")
+    with SimServer([vehicle()], "udpin:127.0.0.1:0", speedup=10.0) as server:
+        assert run("upload", "out/uav1.plan", "--to", server.url_for_gcs, "--mission", higher)[0] == 4
+        assert server.vehicles[0].items()[1:] == ()
+        assert run("upload", "out/uav1.waypoints", "--to", server.url_for_gcs, "--unchecked")[0] == 0
+        assert len(server.vehicles[0].items()) > 5
+        plan = json.loads((tmp_path / "out" / "uav1.plan").read_text())
+        plan["geoFence"] = {"polygon": [[36.0, -84.0], [36.1, -84.0], [36.1, -84.1]], "version": 1}
+        (tmp_path / "fenced.plan").write_text(json.dumps(plan))
+        code, said = run("upload", "fenced.plan", "--to", server.url_for_gcs, "--unchecked")
+        assert code == 0
+        assert "note: the file's geoFence of version 1 (polygon) is not read" in said

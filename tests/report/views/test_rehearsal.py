@@ -24,7 +24,7 @@ from gcsplan.units import METRIC, duration, in_units
 from tests.app.fleet.test_fleet import CROSS
 from tests.cli.conftest import run
 from tests.cli.test_fleet import ARRIVAL, LIMITS, write
-from tests.report.test_page import Reader
+from tests.support.pages import Reader
 
 __all__ = ["run"]
 

@@ -1,0 +1,81 @@
+"""Whether a flight lies within the hours for which zones were left out."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from functools import cache
+
+import pytest
+
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.plan.flight_hours import FAR_S, beyond_hours, hours_left, landing_of, waits_s, within_hours
+from gcsplan.app.plan.model import Plan
+from gcsplan.check.verdict import Verdict
+from gcsplan.errors import InputError
+from gcsplan.mission_file import load_mission
+from gcsplan.mission_file.published.times import Hours
+from tests.support.batches import mission
+
+TEN = datetime(2026, 11, 24, 10, tzinfo=UTC)
+
+
+@cache
+def planned() -> Plan:
+    return plan(load_mission(text=mission(arrival={"mode": "together"})))
+
+
+def verdict() -> Verdict:
+    return planned().vehicles[0].verdict
+
+
+def hours(seconds: float) -> Hours:
+    return Hours(TEN, TEN + timedelta(seconds=seconds))
+
+
+def test_a_flight_is_over_a_whole_second_after_its_time() -> None:
+    landed = landing_of(verdict(), TEN)
+    assert landed == TEN + timedelta(seconds=math.ceil(verdict().time_s))
+
+
+def test_a_flight_that_ends_in_the_air_or_waits_for_ever_has_no_landing() -> None:
+    made = verdict()
+    *legs, last = made.legs
+    assert landing_of(replace(made, legs=(*legs, replace(last, kind="cruise"))), TEN) is None
+    assert landing_of(replace(made, legs=(replace(legs[0], hold_s=math.inf), *legs[1:], last)), TEN) is None
+    assert landing_of(replace(made, legs=()), TEN) is None
+
+
+@pytest.mark.parametrize(("spare_s", "code"), [(1.0, None), (-1.0, "flies_beyond_hours")])
+def test_the_hours_hold_a_flight_to_the_second(spare_s: float, code: str | None) -> None:
+    note = beyond_hours(verdict(), hours(math.ceil(verdict().time_s) + spare_s))
+    assert (note.code if note else None) == code
+    assert beyond_hours(verdict(), None) is None
+
+
+def test_a_plan_that_lasts_beyond_its_hours_is_refused_by_its_vehicle() -> None:
+    made = planned()
+    assert made.fleet is not None
+    fleet = replace(made.fleet, start_utc=None)
+    enough = replace(made.source, hours=hours(24 * 3600))
+    [v] = within_hours(enough, made.vehicles, fleet)
+    assert v.verdict.not_judged == made.vehicles[0].verdict.not_judged
+    with pytest.raises(InputError, match=r"uav1 flies from 2026-11-24 10:00Z to .*; write at: \[from, to\]"):
+        within_hours(replace(made.source, hours=hours(60)), made.vehicles, fleet)
+    late = replace(fleet, start_utc=TEN - timedelta(minutes=1))
+    with pytest.raises(InputError, match="flies from 2026-11-24 09:59Z"):
+        within_hours(enough, made.vehicles, late)
+
+
+def test_a_vehicle_that_waits_has_fewer_hours_left() -> None:
+    made = planned()
+    assert made.fleet is not None
+    [v] = made.vehicles
+    source = replace(made.source, hours=hours(3600))
+    wait_s = waits_s(v, made.fleet)
+    assert 0.0 <= wait_s < FAR_S
+    left = hours_left(source, v, replace(made.fleet, start_utc=TEN))
+    assert left == Hours(TEN + timedelta(seconds=wait_s), TEN + timedelta(hours=1))
+    assert hours_left(source, v, None) == source.hours
+    assert hours_left(replace(source, hours=None), v, made.fleet) is None

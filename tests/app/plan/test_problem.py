@@ -1,0 +1,40 @@
+"""From a request to the planner's problem, and from a solution to a judged mission."""
+
+from __future__ import annotations
+
+import pytest
+import yaml
+
+from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.output.files import summary_of
+from gcsplan.errors import InputError, NoMission
+from gcsplan.mission_file import load_mission
+from tests.app.fleet.test_pipeline import CROSSING, planned
+from tests.support.noted import one
+from tests.support.paths import DATA
+
+
+def test_a_battery_that_is_too_small_is_named() -> None:
+    with pytest.raises(NoMission, match="battery") as refused:
+        planned({"energy": {"battery_j": 200_000, "reserve": 0.2}})
+    assert refused.value.reason == "battery"
+
+
+def test_a_take_off_below_the_limits_is_bad_input_and_one_at_them_is_raised() -> None:
+    with pytest.raises(InputError, match="takeoff_agl_m"):
+        planned({"takeoff_agl_m": 50})
+    done = planned({"takeoff_agl_m": 65})
+    raised = one("takeoff_raised", done.vehicles[0].notes)
+    assert raised.data["asked_m"] == 65.0
+    assert raised.data["raised_m"] > 65.0  # type: ignore[operator]
+
+
+@pytest.mark.slow
+def test_the_energy_objective_spends_no_more_than_the_shortest_way() -> None:
+    sharp = yaml.safe_dump(CROSSING | {"planner": {"gap_percent": 0.1}})
+    length, energy = (
+        plan(load_mission(DATA / "crossing.yaml", text=sharp), objective=objective)
+        for objective in ("length", "energy")
+    )
+    assert energy.vehicles[0].verdict.path_energy_j <= length.vehicles[0].verdict.path_energy_j * 1.001
+    assert summary_of(energy)["vehicles"][0]["lower_bound_m"] is None

@@ -1,0 +1,85 @@
+"""`gcsplan plan` and `gcsplan planners`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gcsplan.sim.vehicle.server import SimServer
+from gcsplan.vehicle import Autopilot
+from tests.support.crossing import CROSSING, OUTPUTS, vehicle
+
+
+def test_plan_writes_its_outputs_into_a_directory_of_the_missions_name(run: Any, tmp_path: Path) -> None:
+    code, out, err = run("plan", CROSSING)
+    assert code == 0
+    assert "safe" in out
+    assert "bare DEM" in out
+    assert "written to crossing" in out
+    assert all(line.startswith("note: ") for line in err.splitlines())
+    assert {p.name for p in (tmp_path / "crossing").iterdir() if not p.name.startswith(".")} == OUTPUTS
+
+
+def test_the_same_plan_twice_gives_the_same_bytes(run: Any, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        assert run("plan", CROSSING, "-o", name)[0] == 0
+    for name in OUTPUTS:
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
+
+
+def test_plan_upload_sim_is_verified_and_says_simulated(run: Any, tmp_path: Path) -> None:
+    code, out, _ = run("plan", CROSSING, "--upload", "sim")
+    assert code == 0
+    assert "verified" in out
+    assert "simulated" in out
+    upload = json.loads((tmp_path / "crossing" / "upload.json").read_text())["vehicles"][0]["upload"]
+    assert upload["verified"] is True
+    assert upload["simulated"] is True
+    assert "upload" not in json.loads((tmp_path / "crossing" / "summary.json").read_text())["vehicles"][0]
+
+
+@pytest.mark.parametrize("planner", ["optimal", "optimum"])
+def test_an_unknown_planner_names_the_nearest(run: Any, planner: str) -> None:
+    code, _, err = run("plan", CROSSING, "--planner", planner)
+    assert code == (0 if planner == "optimal" else 2)
+    assert planner == "optimal" or "optimal" in err
+
+
+def test_a_vehicle_that_stands_elsewhere_is_refused_unless_that_is_ignored(run: Any) -> None:
+    with SimServer([vehicle(amsl_m=900.0)], "udpin:127.0.0.1:0", speedup=10.0) as server:
+        assert run("plan", CROSSING, "--upload", server.url_for_gcs)[0] == 5
+        assert run("plan", CROSSING, "--upload", server.url_for_gcs, "--ignore-position")[0] == 0
+
+
+def test_the_wrong_autopilot_is_refused(run: Any) -> None:
+    with SimServer([vehicle(Autopilot.PX4)], "udpin:127.0.0.1:0", speedup=10.0) as server:
+        code, _, err = run("plan", CROSSING, "--upload", server.url_for_gcs)
+    assert code == 5
+    assert "PX4" in err
+
+
+@pytest.mark.parametrize("word", ["uav9=udpout:127.0.0.1:1", "carrier-pigeon", "link"])
+def test_an_upload_target_that_cannot_be_is_refused_before_planning(run: Any, tmp_path: Path, word: str) -> None:
+    assert run("plan", CROSSING, "--upload", word)[0] == 2
+    assert not (tmp_path / "crossing").exists()
+
+
+def test_planners_are_listed(run: Any) -> None:
+    code, out, _ = run("planners")
+    assert code == 0
+    assert "optimal" in out
+    assert json.loads(run("planners", "--json")[1])["planners"][0]["name"] == "optimal"
+
+
+def test_a_plan_says_which_outputs_of_the_earlier_one_are_gone(run: Any, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    assert run("plan", str(CROSSING), "-o", str(out), "--report")[0] == 0
+    code, _, err = run("plan", str(CROSSING), "-o", str(out))
+    assert code == 0
+    assert not (out / "report.html").exists()
+    assert "gone from" in err
+    assert "report.html; --report writes one of this plan" in err
+    assert "gone from" not in run("plan", str(CROSSING), "-o", str(out))[2]

@@ -1,0 +1,17 @@
+"""The unit of the kernels of turns lists every module that its machine code depends on."""
+
+from __future__ import annotations
+
+from gcsplan.planners.turns import compiled
+from tests.support.kernel_sources import faults
+
+
+def test_the_unit_of_turns_lists_all_its_modules() -> None:
+    assert faults(compiled) == []
+
+
+def test_it_is_separate_from_the_planners_so_that_a_copter_loads_no_turns() -> None:
+    from gcsplan.planners.compiled import UNIT
+
+    assert compiled.UNIT.name != UNIT.name
+    assert not set(compiled.UNIT.sources) & set(UNIT.sources)
