@@ -70,6 +70,7 @@ FILES = {
         Size(large_inputs.splines, 10_000, 60, 10_000),
         Size(large_inputs.jumps, 9985, 20, 9985),
         Size(large_inputs.unknown_keys, 240_000, 6, None, taken=False),
+        Size(large_terrain.reach_to_unknown, 2400, 20, 2500),
         Size(large_inputs.parameters, 250_000, 5, 280_000),
         Size(large_inputs.tiles_named, 2000, 5, None, taken=False),
         Size(large_logs.log, 999_999, 10, 999_999, least=1000),
