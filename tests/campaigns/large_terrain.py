@@ -60,6 +60,19 @@ def dat_megabytes(count: int, rng: random.Random) -> list[str]:
     return ["plan", *mission(terrain=terrain, start=start, goal=(2000.0, 5100.0)), "-o", "out", "--json"]
 
 
+def dat_files(count: int, rng: random.Random) -> list[str]:
+    """A mission over one file of a folder that has one for each of ``count`` tiles, 64,800 for the whole Earth."""
+    folder = Path("terrain")
+    folder.mkdir()
+    for k in range(count - 1):
+        (folder / file_name(Cell(89 - k // 360, k % 360 - 180))).write_bytes(bytes(RECORD_BYTES))
+    _write_dat(NORTH, 100, 0, 1500, rng)
+    Path(file_name(NORTH)).replace(folder / file_name(NORTH))
+    (start,) = degrees([(0.0, 40_000.0)])
+    terrain = {"dem": "terrain", "vertical_datum": "EGM96", "nodata": "none"}
+    return ["plan", *mission(terrain=terrain, start=start, goal=(500.0, 40_100.0)), "-o", "out", "--json"]
+
+
 def dat_posts(count: int, rng: random.Random) -> list[str]:
     """A mission of some ``count`` kilometres over posts every 20 m, which begins on the border of two tiles.
 
