@@ -52,7 +52,7 @@ def read_zones(
     policy = policy or Policy()
     data = _bytes(path, where)
     whole = load_json(path, data) if kind in JSON_ZONES else None
-    require_wgs84(whole, path)
+    require_wgs84(whole, path, published_format(whole) or "GeoJSON")
     in_part = sent_in_part(whole, path)
     published = read_published(path, data, whole, policy)
     if published is not None:
@@ -94,11 +94,19 @@ def _bytes(path: Path, where: str) -> bytes:
         raise InputError(f"{path} cannot be read: {why}", where=where) from None
 
 
+_JSON_FORMATS = (
+    ("ED-269", is_ed269, read_ed269), ("ED-318", is_ed318, read_ed318), ("openAIP's export", is_openaip, read_openaip),
+)  # fmt: skip
+
+
+def published_format(whole: Any) -> str:
+    """The name of the published format that JSON has; empty if it has none."""
+    return next((name for name, is_format, _ in _JSON_FORMATS if is_format(whole)), "")
+
+
 def read_published(path: Path, data: bytes, whole: Any, policy: Policy) -> ZoneFile | None:
     """The zones of a published file; None if it has none of these formats. ``whole`` is what its JSON holds."""
     if path.suffix.lower() in OPENAIR_ZONES:
         return read_openair(path, data, policy)
-    for is_format, read in ((is_ed269, read_ed269), (is_ed318, read_ed318), (is_openaip, read_openaip)):
-        if is_format(whole):
-            return read(path, whole, policy)
-    return None
+    name = published_format(whole)
+    return next((read(path, whole, policy) for one, _, read in _JSON_FORMATS if one == name), None)

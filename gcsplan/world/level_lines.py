@@ -142,7 +142,12 @@ def over(
     for first, last in pairwise(batches(air, starts, ends, MOST_LEVEL_ROWS)):
         line, s0, rows = _pieces(
             air, starts[first:last], ends[first:last],
-            (near if limits.max_agl_m is not None else UNUSED, near, far), of_top=True,
+            (
+                near if limits.max_agl_m is not None else UNUSED,
+                near,
+                far if limits.horizontal_clearance_m > 0.0 else UNUSED,
+            ),
+            of_top=True,
         )  # fmt: skip
         high = _higher(rows, 3) + (error + margin)
         legal = high + limits.min_agl_m
@@ -190,7 +195,8 @@ def _pieces(
     back = np.arange(n) % 2 == 1
     track[0::2], track[1::2] = np.where(back[:, None], ends, starts), np.where(back[:, None], starts, ends)
     bow = 0.0 if air.field.affine else BOW_M + 2.0 * air.field.error_m
-    kinds = zip((False, of_top, of_top), reaches, strict=True)
+    # Where the third reach is not used, the extrema of the second are there already.
+    kinds = zip((False, of_top, of_top), (*reaches[:2], max(reaches[1:])), strict=True)
     lines = LineBatch(track[:-1], track[1:])
     held = [air.extrema_along(top, _few(max(reach, 0.0) + bow, air), lines) for top, reach in kinds]
     surfaces = air.surfaces if of_top else air.grounds

@@ -184,6 +184,15 @@ def squares_in_kmz(count: int, rng: random.Random) -> list[str]:
     return arguments
 
 
+def members_of_kmz(count: int, rng: random.Random) -> list[str]:
+    """A KMZ of ``count`` files, of which one is the zones and the rest are empty pictures."""
+    arguments = squares_in_kmz(10, rng)
+    with zipfile.ZipFile("zones.kmz", "a") as archive:
+        for k in range(count - 1):
+            archive.writestr(f"{k}.png", "")
+    return arguments
+
+
 def bomb_in_kmz(count: int, rng: random.Random) -> list[str]:
     """A KMZ of some kilobytes whose one member has ``count`` megabytes of blanks."""
     with zipfile.ZipFile("zones.kmz", "w", zipfile.ZIP_DEFLATED) as archive, archive.open("doc.kml", "w") as member:

@@ -219,9 +219,9 @@ def test_a_polygon_across_the_antimeridian_is_one_zone(tmp_path: Path, lon_deg: 
         ('{"type": "Point", "coordinates": [1e999, 1]}', "a position is"),
         ('{"type": "Point", "coordinates": [' + "9" * 5000 + ", 1]}", "a position is"),
         ("[" * 100_000, "nested too deeply"),
-        ("{", "not GeoJSON"),
-        (b"\xff\xfe{", "not GeoJSON"),
-        ("", "not GeoJSON"),
+        ("{", "not JSON"),
+        (b"\xff\xfe{", "not JSON"),
+        ("", "not JSON"),
     ],
 )  # fmt: skip
 def test_bad_geojson_is_refused_with_its_place(tmp_path: Path, content: Any, words: str) -> None:

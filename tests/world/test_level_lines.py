@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -63,6 +64,28 @@ def test_what_is_needed_over_a_slope_and_where() -> None:
     assert wide.clear_m == pytest.approx([81.0, 81.0], abs=0.05)
     back = level_lines.over(air, np.vstack([a, b[:1]]), np.vstack([b, a[:1]]), limits)
     assert back.piece_s_m[back.piece_line == 2].max() == pytest.approx(1900.0, abs=101.0)
+
+
+def test_the_surface_within_a_clearance_is_looked_at_for_a_clearance_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is half of the work of a way home, and the level is the same without it."""
+    rng = np.random.default_rng(4)
+    z = rng.uniform(0.0, 60.0, (41, 41))
+    air = Airspace(Surface(z, z, GridMap.affine(-1000.0, 3000.0, 100.0, 100.0)))
+    ends = rng.uniform(-800.0, 2800.0, (2, 12, 2))
+    asked: list[tuple[float, ...]] = []
+
+    def pieces(*arguments: Any) -> int:
+        asked.append(arguments[-4:-1])
+        return real(*arguments)
+
+    real = level_lines.pieces
+    monkeypatch.setattr(level_lines, "pieces", pieces)
+    none, little = (Limits(20.0, horizontal_clearance_m=clear_m) for clear_m in (0.0, 1e-9))
+    met, beside = (level_lines.over(air, *ends, limits, 50.0) for limits in (none, little))
+    assert [reaches[2] for reaches in asked[:1]] == [level_lines.UNUSED]
+    assert asked[-1][2] > 0.0
+    assert np.array_equal(met.clear_m, beside.clear_m)
+    assert np.array_equal(met.piece_s_m, beside.piece_s_m)
 
 
 def test_zones_are_met_where_they_are() -> None:

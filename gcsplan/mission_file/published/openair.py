@@ -319,10 +319,13 @@ def _kind(value: str) -> str:
 
 
 def _times(texts: list[str]) -> tuple[tuple[Period, ...], str]:
-    """The periods of AA records, and what is not understood. AA NONE waits for a NOTAM, so that it counts as always."""
+    """The periods of AA records, and what is not understood. AA NONE waits for a NOTAM, so that it counts as always.
+
+    A record with more than one period, such as one that says how it repeats, is not understood.
+    """
     periods = []
     for text in texts:
-        plain = text.split(";", 1)[0].strip()
+        plain = text.strip()
         if plain.upper() == "NONE":
             return (), "AA NONE: they are activated at times that the file does not have"
         ends = [end.strip() for end in plain.split("/")]

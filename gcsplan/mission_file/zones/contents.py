@@ -33,11 +33,11 @@ def load_json(path: Path, data: bytes) -> Any:
     try:
         return json.loads(decoded(data), object_pairs_hook=_unique, parse_constant=_no_constant, parse_int=_bounded_int)
     except RecursionError:
-        raise InputError("the file is nested too deeply to be GeoJSON", where=str(path)) from None
+        raise InputError("the file is nested too deeply", where=str(path)) from None
     except ValueError as why:  # bad UTF-8, bad JSON, and the refusals below
         start = data[:200].lstrip(b"\xef\xbb\xbf \t\r\n")
         hint = "; it looks like KML: name it .kml" if start.startswith(b"<") else ""
-        raise InputError(f"this is not GeoJSON: {str(why)[:200]}{hint}", where=str(path)) from None
+        raise InputError(f"this is not JSON: {str(why)[:200]}{hint}", where=str(path)) from None
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

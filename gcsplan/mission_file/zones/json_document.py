@@ -18,7 +18,7 @@ _DEGREES = re.compile(r"(?:^|[^A-Z0-9])(?:CRS:?84H?|4326(?:\+\d+)?|4979)[^A-Z0-9
 """How the names, codes and addresses of WGS 84 in degrees end."""
 
 
-def require_wgs84(whole: Any, path: Path) -> None:
+def require_wgs84(whole: Any, path: Path, format_name: str = "GeoJSON") -> None:
     """Raise InputError for another coordinate system than WGS 84, of the document or of any object in it.
 
     RFC 7946 removed ``crs`` from the draft of 2008, but files have it, and the draft allowed it in every object.
@@ -26,8 +26,8 @@ def require_wgs84(whole: Any, path: Path) -> None:
     for where, crs in _stated(whole):
         if crs is not None and not _DEGREES.search(_name_of(crs)):
             raise InputError(
-                f"GeoJSON is in WGS84 degrees (RFC 7946), this file says {json.dumps(crs)[:100]}; convert it with "
-                "ogr2ogr -t_srs EPSG:4326",
+                f"{format_name} is in WGS84 degrees{' (RFC 7946)' if format_name == 'GeoJSON' else ''}, this file says "
+                f"{json.dumps(crs)[:100]}; convert it with ogr2ogr -t_srs EPSG:4326",
                 where=f"{path}: {where}crs",
             )
 

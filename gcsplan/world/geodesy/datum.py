@@ -54,6 +54,7 @@ ELLIPSOID_M, MOST_OFF_M, MOST_OFF_FLATTENING = 6_378_137.0, 1.5, 0.01
 """The semi-major axis of WGS 84, m, and how far that of another ellipsoid, and the inverse of its flattening, may be
 off: on Bessel's ellipsoid heights are tens of metres off."""
 
+_GRID = re.compile(r"""(?i)grids\s*=\s*([^\s"']+)|PARAMETERFILE\s*\[\s*"[^"]*"\s*,\s*"([^"]*)\"""")
 _SHIFT = re.compile(r'(?i)"Vertical_Shift"\s*,\s*([-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?)')
 
 _NAMED_CRS = re.compile(r"(?i)(EPSG|ESRI):\d{4,6}(\+\d{4,6})?|urn:ogc:def:crs:\w+:[\w.]*:\d+")
@@ -88,6 +89,7 @@ def take_apart(crs: str, *, where: str) -> RasterCRS:
     require_unshifted(crs, where=where)
     try:
         whole = CRS.from_user_input(crs)
+        require_no_grid(crs, whole, where=where)
         horizontal, vertical, unit = _parts(whole, BY_FILE, where)
         good = horizontal is not None and (horizontal.is_geographic or horizontal.is_projected)
         good = good and len(horizontal.axis_info) == 2
@@ -141,6 +143,23 @@ def require_unshifted(text: str, *, where: str) -> None:
         raise InputError(
             f"the raster's vertical system is shifted by {shift[1]} (Vertical_Shift), which is not read: convert the "
             "heights, and write the system without it",
+            where=where,
+        )
+
+
+def require_no_grid(text: str, whole: Any, *, where: str) -> None:
+    """Raise InputError for a system, a text and its pyproj CRS, that names a file of shifts.
+
+    PROJ looks for it in the current folder and in folders of its own, and takes none if it is not there, so that the
+    same mission would lie elsewhere on another day.
+    """
+    named = [*_GRID.findall(text), *_GRID.findall(whole.to_wkt())]
+    grids = [one.lstrip("@") for group in named for one in "".join(group).split(",")]
+    grids = [one for one in grids if one not in ("", "null")]
+    if grids:
+        raise InputError(
+            f"the coordinate system names a file of shifts, {grids[0][:80]!r}, which is not read: name the system by "
+            "its code, such as EPSG:31468, or convert the file (gdalwarp or ogr2ogr -t_srs EPSG:4326)",
             where=where,
         )
 

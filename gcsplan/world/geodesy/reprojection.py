@@ -15,7 +15,7 @@ from pyproj.exceptions import ProjError
 from gcsplan.arrays import Floats, Indices
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
-from gcsplan.world.geodesy.datum import WORST_SHIFT_M
+from gcsplan.world.geodesy.datum import WORST_SHIFT_M, require_no_grid
 from gcsplan.world.geodesy.degree_shapes import EDGE_BOW_M, HALF_TURN_DEG, unwrapped
 
 WGS84 = "WGS 84"
@@ -128,6 +128,7 @@ class ToDegrees:
 
 def _horizontal(crs: str, where: str) -> Any:
     whole = CRS.from_user_input(crs)
+    require_no_grid(crs, whole, where=where)
     part = whole.sub_crs_list[0] if whole.is_compound else whole
     unknown = "undefined" in part.name.lower() or "unknown" in part.name.lower()
     if unknown or not (part.is_geographic or part.is_projected):

@@ -35,7 +35,7 @@ kernel = UNIT.kernel
 """Decorator of a function that Python calls; it allocates nothing: Python passes in the arrays to work in."""
 
 SURFACE, ONE_SURFACE = "f8[] f8[,] f8[,]", "f8[] f8[,]"
-EXTREMA = "f4[,,] f4[,,] f4[,,] i8 i8"
+EXTREMA = "f4[,,] f4[,,] f4[,,] i1[,] i8 i8"
 ZONES = "f8[,] f8[,] f8[] i8[] i8[] i8"
 """Forms of arguments that stay the same over many calls: the map with one or both surfaces, extrema, zones."""
 

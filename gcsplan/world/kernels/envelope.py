@@ -60,7 +60,7 @@ def lift_beside(
     if slope == math.inf or slope == 0.0:
         return math.nan
     if slope < 0.0:
-        d, _ = unknown_near(m, z, extrema.cols, extrema.rows, ea, na, eb, nb, reach, i, j)
+        d, _ = unknown_near(m, z, extrema.gaps, extrema.cols, extrema.rows, ea, na, eb, nb, reach, i, j, reach)
         if d < reach:
             return math.nan
     x, y = reach / m[STEP_X], reach / m[STEP_Y]
@@ -235,8 +235,9 @@ def around(
             continue
         if slope < 0.0:
             d, _ = unknown_near(
-                m, z, extrema.cols, extrema.rows, points[p, 0], points[p, 1], points[p, 0], points[p, 1], reach_m, i, j
-            )
+                m, z, extrema.gaps, extrema.cols, extrema.rows, points[p, 0], points[p, 1], points[p, 0], points[p, 1],
+                reach_m, i, j, reach_m,
+            )  # fmt: skip
             if d < reach_m:
                 continue
             slope = -slope

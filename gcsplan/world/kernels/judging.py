@@ -80,7 +80,7 @@ def judge_terrain(
         if not good:
             extremes = extrema.high if sign > 0.0 else extrema.low
             good = sweep(
-                m, z, extrema.slope, extremes, extrema.cols, extrema.rows, sign,
+                m, z, extrema.slope, extremes, extrema.gaps, extrema.cols, extrema.rows, sign,
                 e0, n0, h0, e1, n1, h1, need, reach, stack, full, out,
             )  # fmt: skip
         if not good and judged:

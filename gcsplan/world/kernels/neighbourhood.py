@@ -8,12 +8,13 @@ from __future__ import annotations
 import math
 import mmap
 import threading
+from collections.abc import Callable
 from contextlib import suppress
 from itertools import product
 
 import numpy as np
 
-from gcsplan.arrays import Bools, Floats, Singles
+from gcsplan.arrays import Bools, Floats, Int8s, Singles
 from gcsplan.errors import InputError
 from gcsplan.native.signature import Held
 from gcsplan.world.geometry.surface import GridMap
@@ -34,8 +35,11 @@ MOST_EXAMINED_BYTES = 150_000_000
 """Of what all neighbourhoods of an airspace have examined: those that were asked for least lately forget it."""
 AT_ONCE = 3
 """Neighbourhoods that one call of a kernel takes."""
-MOST_ROOM_BYTES = 700_000_000
-"""Of the work array of one neighbourhood: a reach of some 3000 cells on a large surface."""
+MOST_ROOM_BYTES = 530_000_000
+"""Of the work array of one neighbourhood and the heights: a reach of some 2400 cells in 16 million, 1400 in 49."""
+FEW = 32
+"""Up to so many cells of a reach unknown ones within it are looked for one by one, without `unknown_gaps`."""
+MOST_GAP = 127
 TALL, WIDE, WIDER = 64, 1024, 4
 """Fewest rows and columns worked on at once, so that they stay in the processor's cache; and the fewest as a multiple
 of the reach around them, in cells."""
@@ -78,7 +82,9 @@ class LineBatch:
 class Neighbourhood:
     """The local extrema of a surface (rows, cols) for a reach. Tiles that have not been examined count as unknown."""
 
-    def __init__(self, grid: GridMap, field: Field, heights: Floats, reach_m: float) -> None:
+    def __init__(
+        self, grid: GridMap, field: Field, heights: Floats, reach_m: float, gaps: Callable[[], Int8s] | None = None
+    ) -> None:
         self._grid, self._field, self._heights, self._reach_m = grid, field, heights, reach_m
         self._lock = threading.Lock()
         self.seen = np.ones((0, 0), np.bool_)
@@ -88,6 +94,8 @@ class Neighbourhood:
             self.seen = np.zeros((-(-rows // TILE), -(-cols // TILE)), np.bool_)
         else:
             self.extrema = extrema_around(field, heights, reach_m)
+        if max(self.extrema.cols, self.extrema.rows) > FEW:
+            self.extrema = self.extrema._replace(gaps=gaps() if gaps else unknown_gaps(heights))
         self._held = Held(EXTREMA, *self.extrema)
         self.examined_bytes = 0 if self.seen.size else self.extrema.slope.size * CELL_BYTES
         """What its arrays take; those of a large surface take what was examined."""
@@ -119,6 +127,7 @@ class Neighbourhoods:
         self._grid, self._field = grid, field
         self.kept: dict[tuple[bool, int, int], Neighbourhood] = {}
         """The least lately asked for come first."""
+        self._gaps: dict[bool, Int8s] = {}
         self._lock = threading.Lock()
 
     def __reduce__(self) -> tuple[type[Neighbourhoods], tuple[GridMap, Field]]:
@@ -131,7 +140,7 @@ class Neighbourhoods:
         with self._lock:
             own = self.kept.pop(key, None)
             if own is None or own.examined_bytes > MOST_EXAMINED_BYTES // AT_ONCE:
-                own = Neighbourhood(self._grid, self._field, heights, reach_m)
+                own = Neighbourhood(self._grid, self._field, heights, reach_m, lambda: self._gaps_of(of_top, heights))
             self.kept[key] = own
         held = own.along(lines)  # the arrays live as long as somebody uses them, forgotten or not
         with self._lock:
@@ -142,9 +151,31 @@ class Neighbourhoods:
                 held_bytes -= self.kept.pop(old).examined_bytes
         return held
 
+    def _gaps_of(self, of_top: bool, heights: Floats) -> Int8s:
+        """The `unknown_gaps` of ground or top, found once for all reaches."""
+        if of_top not in self._gaps:
+            self._gaps[of_top] = unknown_gaps(heights)
+        return self._gaps[of_top]
+
+
+def unknown_gaps(heights: Floats) -> Int8s:
+    """How many rows from each cell the nearest unknown cell of its column is, or the border, up or down, at most
+    `MOST_GAP`: (rows - 1, columns - 1) of nodes ``heights``."""
+    gaps = np.zeros((heights.shape[0] - 1, heights.shape[1] - 1), np.int8)
+    gap = np.zeros(gaps.shape[1], np.int8)
+    for j, own in enumerate(gaps):
+        gap = np.minimum(gap, MOST_GAP - 1) + np.int8(1)
+        gap[np.isnan(heights[j, :-1] + heights[j, 1:] + heights[j + 1, :-1] + heights[j + 1, 1:])] = 0
+        own[:] = gap
+    gap = np.zeros_like(gap)
+    for own in gaps[::-1]:
+        gap = np.minimum(np.minimum(gap, MOST_GAP - 1) + np.int8(1), own)
+        own[:] = gap
+    return gaps
+
 
 def extrema_around(field: Field, heights: Floats, reach_m: float) -> LocalExtrema:
-    """The local extrema of a surface, examined everywhere."""
+    """The local extrema of a surface, examined everywhere; without `unknown_gaps`."""
     extrema = _empty(field, heights, reach_m)
     _look_at(field, heights, extrema, slice(0, heights.shape[0] - 1), slice(0, heights.shape[1] - 1))
     return extrema
@@ -155,19 +186,19 @@ def _empty(field: Field, heights: Floats, reach_m: float) -> LocalExtrema:
     shape = -(-(heights.shape[1] - 1) // STRIP), heights.shape[0] - 1, STRIP
     cols, rows = _cells(field, heights, reach_m)
     slope, high, low = (_zeros(shape) for _ in range(3))
-    return LocalExtrema(slope, high, low, cols, rows)
+    return LocalExtrema(slope, high, low, np.zeros((0, 0), np.int8), cols, rows)
 
 
 def _cells(field: Field, heights: Floats, reach_m: float) -> tuple[int, int]:
     """Columns and rows of a reach. From one as large as the surface on, any window holds all of it and what is beyond.
 
-    Raises InputError for a reach whose work array is larger than `MOST_ROOM_BYTES`.
+    Raises InputError for a reach whose work array and heights are larger than `MOST_ROOM_BYTES`.
     """
     rows, cols = heights.shape
     cols, rows = (min(math.ceil(reach_m / s), most) for s, most in ((field.step_x, cols), (field.step_y, rows)))
     box = [n - 1 if (heights.shape[0] - 1) * (heights.shape[1] - 1) <= LARGE_WINDOW else TILE for n in heights.shape]
     room_bytes = 4 * math.prod(_room(rows, cols, *box))
-    if room_bytes > MOST_ROOM_BYTES:
+    if heights.nbytes + room_bytes > MOST_ROOM_BYTES:
         raise InputError(
             f"a reach of {reach_m:.0f} m, of clearances and errors together, is {max(cols, rows)} cells of this "
             "terrain, which is more than is examined around a leg: give smaller ones, or a coarser terrain model"

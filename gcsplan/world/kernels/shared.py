@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from gcsplan.arrays import Floats, Int64s, Singles
+from gcsplan.arrays import Floats, Int8s, Int64s, Singles
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.kernels.compiled import device
 
@@ -72,12 +72,14 @@ class LocalExtrema(NamedTuple):
 
     ``slope`` (rise over run) is ``inf`` in a cell that is itself unknown, 0 in one that was not examined, which counts
     as unknown too, and negative (its magnitude is the slope) if an unknown cell, or the border, lies within reach;
-    level ground has `LEAST_SLOPE`. ``high`` and ``low`` are metres AMSL; all three are rounded outward.
+    level ground has `LEAST_SLOPE`. ``high`` and ``low`` are metres AMSL; all three are rounded outward. ``gaps``: see
+    `unknown_gaps`; without cells if the reach has so few that they are looked at one by one.
     """
 
     slope: Singles
     high: Singles
     low: Singles
+    gaps: Int8s
     cols: int
     rows: int
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from gcsplan.arrays import Floats
+from gcsplan.arrays import Floats, Int8s
 from gcsplan.world.kernels.compiled import device
 from gcsplan.world.kernels.shared import BEND, ERROR_M, RESOLUTION_M, TOUCH_M
 from gcsplan.world.kernels.sweep import local_steps, segment_box, to_grid, within
@@ -15,6 +15,7 @@ MOST_WORKED = 1_000_000
 RESOLUTION = 0.1  # part of itself to which the depth of a break is resolved, if more than RESOLUTION_M
 SPOKES = 16
 FINEST_M = 1e-3
+SPARE_CELLS = 1e-3  # how far from its cell a segment may end, by rounding
 
 
 @device
@@ -24,19 +25,51 @@ def bar_above(depth: float) -> float:
 
 
 @device
+def next_unknown(gaps: Int8s, i: int, j: int, most: int) -> int:
+    """How many rows from row j the nearest unknown cell of column i is, up or down; more than ``most``: none is."""
+    rows, cols = gaps.shape
+    k = 0
+    while 0 <= i < cols and k <= most:
+        step = min(int(gaps[j - k, i]) if k <= j else 0, int(gaps[j + k, i]) if j + k < rows else 0)
+        if step == 0:
+            break
+        k += step
+    return k
+
+
+@device
 def unknown_near(
-    m: Floats, z: Floats, extrema_c: int, extrema_r: int, e0: float, n0: float, e1: float, n1: float, reach: float,
-    i: int, j: int,
+    m: Floats, z: Floats, gaps: Int8s, extrema_c: int, extrema_r: int, e0: float, n0: float, e1: float, n1: float,
+    reach: float, i: int, j: int, known: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Distance from a short segment in cell (i, j) to the nearest unknown patch, and where on the segment.
 
-    Only patches up to ``extrema_c`` columns and ``extrema_r`` rows away are examined; ``inf`` if there is none.
+    Only patches up to ``extrema_c`` columns and ``extrema_r`` rows away are examined; ``known`` if none is nearer. With
+    ``gaps`` only the nearest of each column is, above and below: the work grows with the reach, not with its square.
     """
     rows, cols = z.shape
     c0, r0 = to_grid(m, e0, n0)
     c1, r1 = to_grid(m, e1, n1)
     sx, sy = local_steps(m, e0, n0, e1, n1, reach)
-    best, at = math.inf, 0.0
+    best, at = known, 0.0
+    if len(gaps):
+        for beside in range(2 * extrema_c + 1):
+            away = (beside + 1) // 2
+            if (away - 1 - SPARE_CELLS) * sx > best:
+                break
+            ii = i + away if beside & 1 else i - away
+            k = next_unknown(gaps, ii, j, min(extrema_r, int(min(best / sy, extrema_r + 0.0)) + 2))
+            if k > extrema_r:
+                continue
+            for jj in (j - k, j + k):
+                if 0 <= ii < cols - 1 and 0 <= jj < rows - 1 and gaps[jj, ii] != 0:
+                    continue
+                dist, t = segment_box(
+                    c0 * sx, r0 * sy, c1 * sx, r1 * sy, ii * sx, jj * sy, (ii + 1) * sx, (jj + 1) * sy
+                )
+                if dist < best:
+                    best, at = dist, t
+        return best, at
     for jj in range(j - extrema_r, j + extrema_r + 1):
         for ii in range(i - extrema_c, i + extrema_c + 1):
             if 0 <= ii < cols - 1 and 0 <= jj < rows - 1:

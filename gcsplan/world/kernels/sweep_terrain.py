@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 
-from gcsplan.arrays import Floats, Singles
+from gcsplan.arrays import Floats, Int8s, Singles
 from gcsplan.world.kernels.compiled import device
 from gcsplan.world.kernels.shared import BEND, BOW_M, CUT, ERROR_M, MASK, SHIFT, TOUCH_M
 from gcsplan.world.kernels.sweep import parts_of, slab, to_grid
@@ -125,15 +125,15 @@ def glance(
 
 @device
 def sweep(
-    m: Floats, z: Floats, slopes: Singles, extremes: Singles, extrema_c: int, extrema_r: int, sign: float, e0: float,
-    n0: float, h0: float, e1: float, n1: float, h1: float, need: float, reach: float, stack: Floats, full: bool,
-    out: Floats,
+    m: Floats, z: Floats, slopes: Singles, extremes: Singles, gaps: Int8s, extrema_c: int, extrema_r: int, sign: float,
+    e0: float, n0: float, h0: float, e1: float, n1: float, h1: float, need: float, reach: float, stack: Floats,
+    full: bool, out: Floats,
 ) -> bool:  # fmt: skip
     """Judge one leg against one demand; return False at the first break found, unless ``full``.
 
-    ``slopes``, ``extremes``: local extrema, over ``extrema_c`` columns and ``extrema_r`` rows. ``out``: lowest
-    ``sign·(altitude − height)`` on the line and where; depth of the worst break (more than `TOUCH_M` is one) and where;
-    distance to the nearest unknown patch, searched within reach, and where; steepest slope within reach of the
+    ``slopes``, ``extremes``, ``gaps``: local extrema, over ``extrema_c`` columns and ``extrema_r`` rows. ``out``:
+    lowest ``sign·(altitude − height)`` on the line and where; depth of the worst break (more than `TOUCH_M` is one) and
+    where; distance to the nearest unknown patch, searched within reach, and where; steepest slope within reach of the
     cells under the leg, ``inf`` if unknown patches are among them; the reach with the line's bow.
     """
     rows, cols = z.shape
@@ -225,8 +225,8 @@ def sweep(
                         if r > 0.0 and round_ == 0 and out[UNKNOWN] > 0.0:
                             ta, te = first + t * share, first + tb * share
                             d, s = unknown_near(
-                                m, z, extrema_c, extrema_r, e0 + (e1 - e0) * ta, n0 + (n1 - n0) * ta,
-                                e0 + (e1 - e0) * te, n0 + (n1 - n0) * te, r, i, j,
+                                m, z, gaps, extrema_c, extrema_r, e0 + (e1 - e0) * ta, n0 + (n1 - n0) * ta,
+                                e0 + (e1 - e0) * te, n0 + (n1 - n0) * te, r, i, j, out[UNKNOWN],
                             )  # fmt: skip
                             if d < out[UNKNOWN]:
                                 out[UNKNOWN], out[UNKNOWN_AT] = d, ta + s * (te - ta)

@@ -301,3 +301,14 @@ def test_a_day_alone_as_the_end_of_an_activation_is_all_of_it(tmp_path: Path) ->
     for at, unused in (("2026-11-24T23:00Z", False), ("2026-11-25T00:01Z", True)):
         (zone,) = read(tmp_path, text, "a.openair", hours=Hours.read(at)).zones
         assert bool(zone.unused) is unused
+
+
+@pytest.mark.parametrize("period", ["2026-11-24T10:00Z/2026-11-24T12:00Z;RRULE:FREQ=DAILY", "NONE;see NOTAM"])
+def test_what_stands_behind_a_semicolon_belongs_to_the_activation(tmp_path: Path, period: str) -> None:
+    """A comment begins with an asterisk. What may say that the zone comes back is not left out: it counts as always."""
+    text = f"AC R\nAN a\nAA {period}\nV X=47:00:00 N 008:00:00 E\nDC 1\n"
+    (zone,) = read(tmp_path, text, "a.openair", hours=Hours.read("2026-11-25T11:00Z")).zones
+    assert not zone.unused
+    plain = f"AC R\nAN a\nAA {period.split(';')[0]} * {period}\nV X=47:00:00 N 008:00:00 E\nDC 1\n"
+    (zone,) = read(tmp_path, plain, "a.openair", hours=Hours.read("2026-11-25T11:00Z")).zones
+    assert bool(zone.unused) is ("NONE" not in period)

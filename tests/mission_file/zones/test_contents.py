@@ -42,7 +42,7 @@ def test_json_is_the_librarys_value_where_it_is_sound() -> None:
     ("data", "words"),
     [(b'{"a": 1, "a": 2}', "'a' stands twice"), (b"NaN", "NaN is no number"),
      (b"[-Infinity]", "-Infinity is no number"), (b"[" * 100_000, "nested too deeply"),
-     (b"<kml/>", "looks like KML"), (b"\xff", "not GeoJSON")],
+     (b"<kml/>", "looks like KML"), (b"\xff", "not JSON")],
 )  # fmt: skip
 def test_json_that_two_readers_would_read_in_two_ways_is_refused(data: bytes, words: str) -> None:
     with pytest.raises(InputError, match=words):

@@ -49,3 +49,19 @@ def test_another_coordinate_system_is_refused_wherever_it_stands(tmp_path: Path,
     assert "GeoJSON is in WGS84 degrees (RFC 7946), this file says" in told(tmp_path / "z.geojson", document(name))
     for right in ("urn:ogc:def:crs:OGC:1.3:CRS84", "EPSG:4326", "http://www.opengis.net/def/crs/OGC/0/CRS84"):
         assert "WGS84 degrees" not in told(tmp_path / "z.geojson", document(right))
+
+
+def test_a_refusal_names_the_format_that_the_document_has(tmp_path: Path) -> None:
+    crs = {"crs": {"type": "name", "properties": {"name": "EPSG:4267"}}}
+    volume = {"horizontalProjection": {"type": "Circle", "center": [8.0, 47.0], "radius": 100}}
+    limits = {"lowerLimit": {"value": 0, "unit": 1, "referenceDatum": 0},
+              "upperLimit": {"value": 900, "unit": 1, "referenceDatum": 1}}  # fmt: skip
+    airspace = {"type": 1, "icaoClass": 8, "name": "a", "geometry": POLYGON} | limits
+    documents = {
+        "ED-269 is in": {"features": [{"identifier": "a", "geometry": [volume]}]},
+        "openAIP's export is in": {"items": [airspace]},
+        "GeoJSON is in": {"type": "FeatureCollection", "features": [ZONE | {"geometry": POLYGON}]},
+    }
+    for words, document in documents.items():
+        assert words in told(tmp_path / "z.json", document | crs)
+    assert "this is not JSON" in told(tmp_path / "z.json", "{")

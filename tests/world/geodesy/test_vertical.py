@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 from affine import Affine
+from pyproj import CRS
 
 from gcsplan.errors import InputError
 from gcsplan.world.geodesy.datum import stated_datum, take_apart
 from gcsplan.world.geodesy.height_unit import unit_named
+from gcsplan.world.geodesy.reprojection import ToDegrees
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.terrain.model_words import notes_on
 from gcsplan.world.terrain.voids import zero_voids
@@ -367,3 +369,24 @@ def test_patches_of_zeros_by_brute_force() -> None:
                 for p in patch:
                     wanted[p] = True
         assert np.array_equal(zero_voids(z)[0], wanted)
+
+
+@pytest.mark.parametrize(
+    "crs",
+    [
+        "+proj=utm +zone=33 +ellps=bessel +nadgrids=./x.gsb +units=m", "+proj=longlat +ellps=bessel +nadgrids=@x.gsb",
+        "+proj=longlat +ellps=bessel +nadgrids=@null,/a/x.gsb",
+        CRS("+proj=longlat +ellps=bessel +nadgrids=x.gsb").to_wkt(),
+        CRS("+proj=longlat +ellps=bessel +nadgrids=x.gsb").to_json(),
+    ],
+)  # fmt: skip
+def test_a_system_that_names_a_file_of_shifts_is_refused(crs: str) -> None:
+    """PROJ would read it from wherever it finds it, and silently take none if it is not there."""
+    for read in (lambda: take_apart(crs, where="terrain.crs"), lambda: ToDegrees(crs, (15.0, 46.0), where="z.shp")):
+        with pytest.raises(InputError, match=r"names a file of shifts, '(\./|/a/)?x\.gsb', which is not read"):
+            read()
+
+
+def test_a_system_without_shifts_is_taken() -> None:
+    assert take_apart("+proj=longlat +ellps=WGS84 +nadgrids=@null", where="crs").geographic
+    assert take_apart("EPSG:3857", where="crs").horizontal.is_projected

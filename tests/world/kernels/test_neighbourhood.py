@@ -98,7 +98,7 @@ def test_a_reach_that_takes_too_much_room_is_refused(monkeypatch: pytest.MonkeyP
     z = np.zeros((400, 400))
     field = Field.of(GridMap.affine(0.0, 0.0, 1.0, 1.0))
     extrema_around(field, z, 100.0)
-    monkeypatch.setattr(_neighbourhood, "MOST_ROOM_BYTES", 4 * 4 * (399 + 2 * 100) ** 2 - 1)
+    monkeypatch.setattr(_neighbourhood, "MOST_ROOM_BYTES", z.nbytes + 4 * 4 * (399 + 2 * 100) ** 2 - 1)
     with pytest.raises(InputError, match="a reach of 100 m, of clearances and errors together, is 100 cells"):
         extrema_around(field, z, 100.0)
     extrema_around(field, z, 99.0)

@@ -10,6 +10,7 @@ import pytest
 from gcsplan.arrays import Floats
 from gcsplan.world.geometry.surface import GridMap, Surface
 from gcsplan.world.kernels.field import Field
+from gcsplan.world.kernels.neighbourhood import unknown_gaps
 from gcsplan.world.kernels.sweep_beside import bar_above, beside_point, deepest, unknown_near
 
 CELL_M = 10.0
@@ -63,10 +64,44 @@ def test_places_around_a_point_are_read_at_its_reach() -> None:
     assert depth == pytest.approx(NEED_M + 2.0)  # 10 m farther east the ground is 2 m higher
 
 
+NO_GAPS = np.zeros((0, 0), np.int8)
+
+
 def test_the_nearest_unknown_patch_is_found_and_none_is_infinitely_far() -> None:
     z = rough(2)
-    args = (3, 3, 52.0, 55.0, 58.0, 55.0, 30.0, 5, 5)
-    assert unknown_near(FIELD.packed, z, *args)[0] == math.inf
+    args = (3, 3, 52.0, 55.0, 58.0, 55.0, 30.0, 5, 5, math.inf)
+    assert unknown_near(FIELD.packed, z, NO_GAPS, *args)[0] == math.inf
+    assert unknown_near(FIELD.packed, z, unknown_gaps(z), *args)[0] == math.inf
     z[5, 8] = math.nan  # its four cells begin at column 7, 70 m east
-    far_m, at = unknown_near(FIELD.packed, z, *args)
-    assert (far_m, at) == pytest.approx((12.0, 1.0))
+    for gaps in (NO_GAPS, unknown_gaps(z)):
+        far_m, at = unknown_near(FIELD.packed, z, gaps, *args)
+        assert (far_m, at) == pytest.approx((12.0, 1.0))
+        assert unknown_near(FIELD.packed, z, gaps, *args[:-1], 11.0)[0] == 11.0
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_columns_find_the_unknown_patch_that_looking_at_every_cell_finds(seed: int) -> None:
+    rng = np.random.default_rng([seed, 2])
+    rows, cols = (int(n) for n in rng.integers(3, 300, 2))
+    z = np.full((rows, cols), 100.0)
+    holes = int(rng.integers(0, 4))
+    z[rng.integers(0, rows, holes), rng.integers(0, cols, holes)] = math.nan
+    gaps, field = unknown_gaps(z), Field.of(GridMap.affine(0.0, rows * 7.0, 5.0, 7.0))
+    for _ in range(25):
+        i, j = int(rng.integers(0, cols - 1)), int(rng.integers(0, rows - 1))
+        ends = [(x, rows * 7.0 - y) for x, y in (rng.uniform((i, j), (i + 1, j + 1), (2, 2)) * (5.0, 7.0)).tolist()]
+        reach = int(rng.integers(1, 80)), int(rng.integers(1, 200))
+        args = (*reach, *ends[0], *ends[1], 50.0, i, j, math.inf)
+        expected = unknown_near(field.packed, z, NO_GAPS, *args)
+        assert unknown_near(field.packed, z, gaps, *args)[0] == pytest.approx(expected[0], abs=1e-9)
+
+
+def test_gaps_are_rows_to_the_nearest_unknown_cell_of_the_column_or_the_border() -> None:
+    rng = np.random.default_rng(5)
+    z = np.full((400, 6), 100.0)
+    z[rng.integers(0, 400, 3), rng.integers(0, 6, 3)] = math.nan
+    lost = np.isnan(z[:-1, :-1] + z[:-1, 1:] + z[1:, :-1] + z[1:, 1:])
+    for i in range(5):
+        unknown = [-1, *np.flatnonzero(lost[:, i]).tolist(), 399]
+        expected = [min(127, min(abs(j - k) for k in unknown)) for j in range(399)]
+        assert unknown_gaps(z)[:, i].tolist() == expected
