@@ -343,7 +343,7 @@ def lshade(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator, 
         if len(archive) > most:
             archive = [archive[i] for i in rng.permutation(len(archive))[:most]]
         slots = rng.integers(0, memory, size=size)
-        normal = rng.normal([0.0 if m_cr[r] is None else m_cr[r] for r in slots], 0.1)  # type: ignore[misc]
+        normal = rng.normal([0.0 if m_cr[r] is None else m_cr[r] for r in slots], 0.1)
         uniform = rng.random(size)
         best = rng.integers(0, max(2, round(0.11 * size)), size=size)
         first_other = rng.integers(0, size - 1, size=size)
