@@ -178,7 +178,7 @@ def ib_abc_from_zero(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.G
     return search.points
 
 
-def krill(
+def krill(  # noqa: C901 - the paper's pseudo code, step by step
     cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator, *, one: bool, printed: bool, sight: float
 ) -> list[Point]:
     """Krill by fig. 5-9: step 0.1, δ 0.618, T 3; one by one or all at once; the crowd by ranks or as printed."""
