@@ -116,7 +116,7 @@ class NotSeparated(NoMission):
         return self.conflict.worst.time_s
 
 
-def resolve(
+def resolve(  # noqa: PLR0913 - options by name, each with a default
     plan: Schedule,
     crews: Sequence[Crew],
     rules: Rules,

@@ -169,7 +169,7 @@ def sentence(template: str, data: Mapping[str, Datum], wording: Wording = IN_FIL
     return "".join(said)
 
 
-def _shown(value: Any, spec: str, wording: Wording) -> str:
+def _shown(value: Any, spec: str, wording: Wording) -> str:  # noqa: PLR0911 - a table of formats
     """A datum as its field in the sentence says."""
     if "|" in spec:
         one, several = spec.split("|")

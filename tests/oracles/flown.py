@@ -81,7 +81,7 @@ def metres_per_degree(lat: Floats) -> tuple[Floats, Floats]:
     return np.radians(A_M * (1 - E2) / w**3), np.radians(A_M / w * np.cos(np.radians(lat)))
 
 
-def moved(lat: Floats, lon: Floats, north_m: Floats, east_m: Floats) -> tuple[Floats, Floats]:
+def moved(lat: Floats, lon: Floats, north_m: Floats | float, east_m: Floats | float) -> tuple[Floats, Floats]:
     north, east = metres_per_degree(lat)
     return lat + north_m / north, lon + east_m / east
 
@@ -147,7 +147,7 @@ class NoFly:
         crosses = (y > 0) != (y2 > 0)
         at = x - np.where(crosses, y, 0) * dx / np.where(crosses, dy, 1)
         inside = (crosses & (at > 0)).sum(axis=1) % 2 == 1
-        return np.where(inside, -gap, gap)
+        return np.asarray(np.where(inside, -gap, gap))
 
 
 @dataclass
@@ -435,7 +435,7 @@ def beside(
     if not len(lat):
         return
     for north, east in rings(reach - WIDTH_M, 3, 16):
-        qlat, qlon = moved(lat, lon, np.float64(north), np.float64(east))
+        qlat, qlon = moved(lat, lon, north, east)
         inside = zone.distance_m(qlat, qlon) < -1e-3
         g = ground.at(qlat, qlon)
         floor = zone.floor + (g if zone.floor_agl else 0.0)

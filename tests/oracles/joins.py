@@ -32,7 +32,7 @@ def with_path(rng: np.random.Generator, case: Case) -> Case:
         if rng.random() < 0.5:
             back = [replace(i, z=i.z + float(rng.uniform(0.0, 60.0))) for i in back]
         if rng.random() < 0.3:
-            rng.shuffle(back)  # type: ignore[arg-type]
+            rng.shuffle(back)
         items += back[int(rng.integers(0, len(back))) :]
         if rng.random() < 0.5:
             items.append(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,10 +154,13 @@ def profile_by_programme(
     one, zero = eye_array(n - 1), csr_array((n - 1, n - 1))
     rise = eye_array(n - 1, n, k=1) - eye_array(n - 1, n)
     steep = np.concatenate([np.minimum(climb_slope, 1e6) * run, np.minimum(descent_slope, 1e6) * run])
-    found = linprog(
+    # The stubs of linprog know no sparse matrices, and no array of bounds.
+    rows: Any = vstack([hstack([rise, -one]), hstack([-rise, -one]), hstack([rise, zero]), hstack([-rise, zero])])
+    bounds: Any = np.vstack([np.stack([low_m, high_m], axis=-1), np.tile([0.0, np.inf], (n - 1, 1))])
+    found: Any = linprog(
         np.concatenate([np.zeros(n), np.ones(n - 1)]),
-        A_ub=vstack([hstack([rise, -one]), hstack([-rise, -one]), hstack([rise, zero]), hstack([-rise, zero])]),
+        A_ub=rows,
         b_ub=np.concatenate([np.zeros(2 * (n - 1)), steep]),
-        bounds=np.vstack([np.stack([low_m, high_m], axis=-1), np.tile([0.0, np.inf], (n - 1, 1))]),
+        bounds=bounds,
     )
     return Profile(np.asarray(found.x[:n]), float(found.fun)) if found.status == 0 else None

@@ -78,7 +78,7 @@ class Lattice:
         stops = [problem.start[:2], *((v.east_m, v.north_m) for v in problem.via), problem.goal[:2]]
         plane = np.vstack([stops, _nodes(air.surface, effort.points), _saddles(air.surface, effort.points // 4)])
         plane = np.vstack([plane, *_borders(problem, reach, 12)])
-        low, high = air.floor_amsl(*plane.T, limits), air.ceiling_amsl(*plane.T, limits)
+        low, high = (of(plane[:, 0], plane[:, 1], limits) for of in (air.floor_amsl, air.ceiling_amsl))
         known = np.isfinite(low) & (low <= high + 1e-6)
         known[: len(stops)] = True
         number = np.flatnonzero(known)
@@ -92,7 +92,7 @@ class Lattice:
                 z[number == row] = fixed[row]
         n, count = len(plane), len(levels)
         points = np.concatenate([np.repeat(plane, count, axis=0), z.reshape(-1, 1)], axis=1)
-        near = KDTree(plane).query(plane, k=min(21, n))[1][:, 1:]
+        near = np.asarray(KDTree(plane).query(plane, k=min(21, n))[1])[:, 1:]
         a, b = np.repeat(np.arange(n), near.shape[1]), near.ravel()
         pairs = np.unique(np.sort(np.stack([a, b], axis=-1), axis=1), axis=0)
         steps = [(k, m) for k in range(count) for m in (k - 1, k, k + 1) if 0 <= m < count]

@@ -150,8 +150,8 @@ def zones(
 
 def legal_end(rng: np.random.Generator, air: Airspace, limits: Limits, place: Floats) -> tuple[float, ...] | None:
     """A legal altitude over a place, most often the lowest."""
-    low = float(air.floor_amsl(*place, limits)) + 1e-3
-    high = float(air.ceiling_amsl(*place, limits))
+    low = float(air.floor_amsl(place[0], place[1], limits)) + 1e-3
+    high = float(air.ceiling_amsl(place[0], place[1], limits))
     if not low <= high:
         return None
     at = float(rng.choice([low, low, min(high, low + rng.uniform(0.0, 60.0))]))
@@ -241,7 +241,11 @@ def cylinders(rng: np.random.Generator) -> Case | None:
         top = Level(float(rng.uniform(20.0, 200.0)), "amsl" if rng.random() < 0.7 else "agl")
         if kind == 0:
             return None, None
-        return (None, top) if kind < 3 else (Level(float(rng.uniform(60.0, 120.0)), "amsl"), rng.choice([None, top]))
+        return (
+            (None, top)
+            if kind < 3
+            else (Level(float(rng.uniform(60.0, 120.0)), "amsl"), rng.choice(np.array([None, top], object)))
+        )
 
     found = zones(rng, ground, int(rng.choice([1, 2, 3, 4, 6, 8, 25])), levels)
     limits = Limits(
@@ -379,7 +383,7 @@ def rasters(rng: np.random.Generator) -> Case | None:
     kind = int(rng.integers(0, 3))
     if kind == 0:
         base = turned(rng)
-        z = smooth(rng, *base.heights.shape, float(rng.uniform(20.0, 100.0)))
+        z = smooth(rng, len(base.heights), base.heights.shape[1], float(rng.uniform(20.0, 100.0)))
         ground = replace(base, heights=z)
     elif kind == 1:
         base = geographic(float(rng.uniform(-65.0, 65.0)), 10.0, 1.0 / 3600.0, z)
@@ -401,7 +405,7 @@ def rasters(rng: np.random.Generator) -> Case | None:
 
 def stops(rng: np.random.Generator) -> Case | None:
     """One or two via points, with and without an altitude."""
-    case = rng.choice([mountains, cylinders, climbs])(rng)
+    case: Case | None = rng.choice(np.array([mountains, cylinders, climbs], object))(rng)
     if case is None:
         return None
     p = case.problem
@@ -458,7 +462,7 @@ def pockets(rng: np.random.Generator) -> Case | None:
     places[:, 1] = rng.uniform(low + 20.0, high - 20.0, 2)
     if rng.random() < 0.3:
         places[1, 1] = rng.uniform(100.0, size - 100.0)
-    floors = air.floor_amsl(*places.T, limits)
+    floors = air.floor_amsl(places[:, 0], places[:, 1], limits)
     tall = float(rng.choice([1e-3, rng.uniform(0.0, 1.2) * height]))
     start, goal = (*places[0].tolist(), float(floors[0]) + 1e-3), (*places[1].tolist(), float(floors[1]) + tall)
     return Case("pockets", objective(rng, Problem(air, limits, start, goal)), ground)

@@ -29,7 +29,8 @@ def fly(
 ) -> tuple[float, list[float]]:
     """Seconds until it stands at the last of ``points`` (N, 2), and its speeds where it takes up the next leg."""
     place, speed, push = points[0].copy(), np.zeros(2), np.zeros(2)
-    k, now_s, before, corners = 1, 0.0, cruise_m_s, []
+    corners: list[float] = []
+    k, now_s, before = 1, 0.0, cruise_m_s
     while now_s < 3600.0:
         target, after = points[k], points[min(k + 1, len(points) - 1)]
         ahead, further = target - place, after - target

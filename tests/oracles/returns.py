@@ -75,7 +75,7 @@ def random_case(rng: np.random.Generator, autopilot: Autopilot) -> Case | None:
     world = World(Frame(36.6, -84.3), Airspace(surface, zones, scale=scale))
     vehicle = Vehicle("uav1", 1, autopilot, limits, climb_m_s=float(rng.uniform(1.0, 8.0)))
     degrees = world.frame.to_degrees(*en.T)
-    home = Home.at(*degrees[0].tolist(), 0.0)
+    home = Home.at(float(degrees[0, 0]), float(degrees[0, 1]), 0.0)
     level = world.ground_amsl(home.lat_e7 / 1e7, home.lon_e7 / 1e7)
     if math.isnan(level):
         return None

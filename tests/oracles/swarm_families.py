@@ -40,7 +40,7 @@ def pso(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator) -> 
             v[i] = np.where((place > 1.0) | (place < 0.0), 0.0, v[i])
             x[i] = box(place)
         f = cost(x)
-        for i in np.flatnonzero(f < f_own):
+        for i in np.flatnonzero(f < f_own).tolist():
             own[i], f_own[i] = x[i], f[i]
 
 
@@ -256,7 +256,7 @@ def krill(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator) -
             look = box(x[i] + 0.3 * rng.uniform(-1.0, 1.0, size=dim))  # eq. 5
             if one(cost, look) < f[i]:
                 return step_to(x[i], look)
-        return x[i] + rng.uniform(-0.1, 0.1, size=dim)  # eq. 7
+        return np.asarray(x[i] + rng.uniform(-0.1, 0.1, size=dim))  # eq. 7
 
     for _ in range(rounds):
         seen = [[j for j in range(n) if j != i and gap(x[i], x[j]) < 0.3] for i in range(n)]

@@ -178,7 +178,7 @@ def ib_abc_from_zero(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.G
     return search.points
 
 
-def krill(
+def krill(  # noqa: C901 - the paper's pseudo code, step by step
     cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator, *, one: bool, printed: bool, sight: float
 ) -> list[Point]:
     """Krill by fig. 5-9: step 0.1, δ 0.618, T 3; one by one or all at once; the crowd by ranks or as printed."""
@@ -343,7 +343,7 @@ def lshade(cost: Cost, n: int, dim: int, rounds: int, rng: np.random.Generator, 
         if len(archive) > most:
             archive = [archive[i] for i in rng.permutation(len(archive))[:most]]
         slots = rng.integers(0, memory, size=size)
-        normal = rng.normal([0.0 if m_cr[r] is None else m_cr[r] for r in slots], 0.1)  # type: ignore[misc]
+        normal = rng.normal([0.0 if m_cr[r] is None else m_cr[r] for r in slots], 0.1)
         uniform = rng.random(size)
         best = rng.integers(0, max(2, round(0.11 * size)), size=size)
         first_other = rng.integers(0, size - 1, size=size)

@@ -16,7 +16,7 @@ M = f32(0.011131884502145034)
 INV = f32(89.83204953368922)
 
 
-def scale(lat: int, single: bool) -> float:
+def scale(lat: int, single: bool) -> float | np.float32:
     if single:
         return max(f32(np.cos(f32(f32(lat) * f32(1e-7 * math.pi / 180)))), f32(0.01))
     return max(math.cos(lat * (1.0e-7 * math.pi / 180)), 0.01)

@@ -21,7 +21,7 @@ def run_both_ways(monkeypatch: pytest.MonkeyPatch, module: ModuleType, name: str
         flat = [x for a in arguments for x in (a.arguments if isinstance(a, Held) else (a,))]
         copies = [a.copy() if isinstance(a, np.ndarray) else a for a in flat]
         expected = kernel.__wrapped__(*copies)
-        found = kernel(*arguments)
+        found: int = kernel(*arguments)
         assert found == int(expected or 0)
         for here, there in zip(flat, copies, strict=True):
             if isinstance(here, np.ndarray):

@@ -170,7 +170,7 @@ def _rows(items: tuple[Item, ...], first: int) -> list[tuple[int, Item, tuple[fl
     rows = []
     for index, item in enumerate(items):
         params = item.params if item.target is None else (float(item.target + first), *item.params[1:])
-        rows.append((first + index, item, params))  # type: ignore[arg-type]
+        rows.append((first + index, item, params))
     return rows
 
 

@@ -18,7 +18,7 @@ GCS = Address(255, 190)
 COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
 
 
-def a_vehicle(sysid: int = 1, autopilot: Autopilot = COPTER, trouble: str = "", **more: float) -> LoopbackVehicle:
+def a_vehicle(sysid: int = 1, autopilot: Autopilot = COPTER, trouble: str = "", **more: Any) -> LoopbackVehicle:
     order = Misbehaviour.parse(trouble)
     return LoopbackVehicle(sysid, autopilot, lat_deg=36.6, lon_deg=-84.38, amsl_m=371.25, misbehave=order, **more)
 

@@ -16,7 +16,8 @@ HARMLESS = {"gcsplan.arrays", "gcsplan.world.geometry.limits"}
 def imported_by(path: Path) -> set[str]:
     """The modules of gcsplan that a file imports names from."""
     nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-    return {n.module for n in nodes if isinstance(n, ast.ImportFrom) and (n.module or "").startswith("gcsplan.")}
+    named = {n.module or "" for n in nodes if isinstance(n, ast.ImportFrom)}
+    return {name for name in named if name.startswith("gcsplan.")}
 
 
 def faults(compiled: ModuleType) -> list[str]:

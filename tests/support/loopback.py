@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from gcsplan.mavlink.mission.mission import MISSION, MissionItem, float32
@@ -25,7 +27,7 @@ COPTER, PLANE, PX4 = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE, Autopilot.PX4
 BOTH = pytest.mark.parametrize("autopilot", [COPTER, PX4])
 
 
-def a_vehicle(autopilot: Autopilot = COPTER, trouble: str = "", **more: float) -> LoopbackVehicle:
+def a_vehicle(autopilot: Autopilot = COPTER, trouble: str = "", **more: Any) -> LoopbackVehicle:
     order = Misbehaviour.parse(trouble)
     return LoopbackVehicle(1, autopilot, lat_deg=36.6, lon_deg=-84.38, amsl_m=371.236, misbehave=order, **more)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cache
+from typing import Any
 
 import numpy as np
 from matplotlib.cbook import get_sample_data
@@ -33,7 +34,7 @@ def ground(
 @cache
 def jacksboro() -> Surface:
     """The sample DEM in a plane around its middle; heights belong to cell centres."""
-    data = get_sample_data("jacksboro_fault_dem.npz")
+    data: Any = get_sample_data("jacksboro_fault_dem.npz")
     z = data["elevation"].astype(float)
     dx, dy, west, north = (float(data[k]) for k in ("dx", "dy", "xmin", "ymin"))  # "ymin" is the northern edge
     frame = Frame(36.59, -84.246)

@@ -103,9 +103,8 @@ SLOW = {"fleet-4", "a paper's"}
 @cache
 def planned(case: str) -> tuple[Any, Plan]:
     asked = CASES[case]
-    source = load_mission(asked if isinstance(asked, Path) else "times.yaml", **(
-        {} if isinstance(asked, Path) else {"text": yaml.safe_dump(asked)}
-    ))  # fmt: skip
+    text = None if isinstance(asked, Path) else yaml.safe_dump(asked)
+    source = load_mission(asked if isinstance(asked, Path) else "times.yaml", text=text)
     return source, plan(source)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,13 +35,13 @@ def world(
     return World(Frame(lat_deg, -84.3), Airspace(surface(height, half_m=half_m), zones, scale=1.0))
 
 
-def vehicle(autopilot: Autopilot = Autopilot.ARDUCOPTER, **limits: float | None) -> Vehicle:
+def vehicle(autopilot: Autopilot = Autopilot.ARDUCOPTER, **limits: Any) -> Vehicle:
     """A vehicle with min AGL 60 m, track error 3 m and altitude error 5 m unless ``limits`` change them."""
-    given: dict[str, float | None] = {"min_agl_m": 60.0, "track_error_m": 3.0, "altitude_error_m": 5.0}
+    given = {"min_agl_m": 60.0, "track_error_m": 3.0, "altitude_error_m": 5.0}
     return Vehicle(
         "uav1",
         1,
         autopilot,
         Limits(**(given | limits)),
-        energy=Energy(120.0, 100.0, hover_w=400.0),  # type: ignore[arg-type]
+        energy=Energy(120.0, 100.0, hover_w=400.0),
     )

@@ -30,7 +30,7 @@ from gcsplan.planners.registry import get as get_planner
 __all__ = ["load_mission", "plan", "world_of"]
 
 
-def plan(
+def plan(  # noqa: PLR0913 - options by name, each with a default
     source: MissionFile | str | PathLike[str] | Mapping[str, Any],
     *,
     planner: str | None = None,

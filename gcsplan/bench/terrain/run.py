@@ -58,7 +58,7 @@ class TerrainResult:
         )
 
 
-def run(
+def run(  # noqa: PLR0913 - options by name, each with a default
     directory: Path,
     *,
     seed: int = 1,

@@ -149,7 +149,7 @@ def _unknown(where: str, meant: tuple[str, ...], words: str) -> Mistake:
     return Mistake(where, f"unknown key{words}", "unknown_key", meant)
 
 
-def _problem(kind: type[Keys], error: Any, where: str) -> Mistake:
+def _problem(kind: type[Keys], error: Any, where: str) -> Mistake:  # noqa: PLR0911 - a table of messages
     loc, given = error["loc"], shown(error["input"])
     path = key_path(where, loc)
     context = error.get("ctx", {})

@@ -57,7 +57,7 @@ class FoundLabels:
     opened: int
 
 
-def search(
+def search(  # noqa: PLR0913 - options by name, each with a default
     lattice: Lattice,
     starts: list[Label],
     start: tuple[float, float],

@@ -58,7 +58,7 @@ class OptimiserResult:
     optimiser: str
 
 
-def minimise(
+def minimise(  # noqa: PLR0913 - options by name, each with a default
     optimiser: str | OptimiserEntry,
     cost: BatchCost,
     dim: int,

@@ -37,7 +37,7 @@ class LoopbackVehicle:
     by their oldest names. ``firmware``: its version, None: the default of `firmware_of`.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - options by name, each with a default
         self,
         sysid: int,
         autopilot: Autopilot,

@@ -166,7 +166,7 @@ class Recheck:
         since = max(since, self._watch.newcomer_at())  # hear ours after a newcomer appears, to see that there are two
         if state is None or state.beat_at < since or (state.located and state.placed_at < since):
             self._begin(now, since)
-            return self._waits(now) or Unknown(self._unseen(state, since, now))
+            return self._waits(now) or Unknown(self._unseen(state, since))
         against = self._objections(state)
         if not boots and against and all(word == "not_ready" for word, _ in against):
             self._begin(now, since)
@@ -180,7 +180,7 @@ class Recheck:
         assert self._began is not None
         return Wait(now + _AGAIN_S) if now < self._began + self._longest_s else None
 
-    def _unseen(self, state: VehicleState | None, since: float, now: float) -> str:
+    def _unseen(self, state: VehicleState | None, since: float) -> str:
         silent = state is None or state.beat_at < since
         what = "the vehicle fell silent" if silent else "the vehicle no longer reports its position"
         if silent and self._watch.newcomer_at() > -math.inf:

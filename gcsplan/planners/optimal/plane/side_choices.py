@@ -56,7 +56,7 @@ class DetourSearch:
     terminals: Callable[[SideChoice], PinnedTrack | None]
     fine: bool
 
-    def run(
+    def run(  # noqa: C901, PLR0912 - one best-first search, whose cases share its state
         self, roots: list[SideChoice], most: int, *, first: bool, laps: bool, given: PinnedTrack | None = None
     ) -> SideChoice | None:
         """Try at most ``most`` tracks; return the choice with which the best path was found, None if none was better.

@@ -247,7 +247,7 @@ def write(
     contents: dict[str, str | bytes] = {
         "papers.csv": _csv([_flat(s, row) for s in result["scenarios"] for row in (*s["rows"], *s["reading_rows"])]),
         "papers-claims.csv": _csv(result["claims"]),
-        "papers-claims.md": "\n".join(_claims(result)) + "\n",
+        "papers-claims.md": "\n".join(_claims(result)).rstrip() + "\n",
         "papers-readings.csv": _csv(result["readings"]),
         "papers-times.csv": _csv(result["times"]["rows"]),
         "papers-times.md": "\n".join(_times(result)) + "\n",
