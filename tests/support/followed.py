@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from gcsplan.check.flight.follow import Flight, follow
+from gcsplan.check.flight.follow import follow
+from gcsplan.check.motion.stretch import Flight
 from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import Home, Mission, MissionItem
