@@ -37,7 +37,7 @@ AT_ONCE = 3
 """Neighbourhoods that one call of a kernel takes."""
 MOST_ROOM_BYTES = 530_000_000
 """Of the work array of one neighbourhood and the heights: a reach of some 2400 cells in 16 million, 1400 in 49."""
-FEW = 32
+FEW_CELLS = 32
 """Up to so many cells of a reach unknown ones within it are looked for one by one, without `unknown_gaps`."""
 MOST_GAP = 127
 TALL, WIDE, WIDER = 64, 1024, 4
@@ -94,7 +94,7 @@ class Neighbourhood:
             self.seen = np.zeros((-(-rows // TILE), -(-cols // TILE)), np.bool_)
         else:
             self.extrema = extrema_around(field, heights, reach_m)
-        if max(self.extrema.cols, self.extrema.rows) > FEW:
+        if max(self.extrema.cols, self.extrema.rows) > FEW_CELLS:
             self.extrema = self.extrema._replace(gaps=gaps() if gaps else unknown_gaps(heights))
         self._held = Held(EXTREMA, *self.extrema)
         self.examined_bytes = 0 if self.seen.size else self.extrema.slope.size * CELL_BYTES
