@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from gcsplan.bench import functions
 from gcsplan.cli.commands.bench import bench_app
+from gcsplan.research.bench import functions
 
 
 def test_legs_are_checked_and_told_in_words_or_as_a_document(run: Any) -> None:

@@ -23,7 +23,7 @@ from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.path import track_length_m
 from gcsplan.world.geometry.surface import GridMap, Surface
 
-FEW = 64
+FEW_NODES = 64
 """A level terrain model of at most this many nodes is replaced."""
 LEVEL_NODES = 65
 """Nodes along each side of the terrain model that replaces it."""
@@ -49,7 +49,7 @@ def in_window(incumbent: Incumbent) -> Problem:
     problem = incumbent.problem
     surface = problem.airspace.surface
     ground, top = surface.ground_m, surface.top_m
-    if ground.size > FEW or surface.level_m is None:
+    if ground.size > FEW_NODES or surface.level_m is None:
         return problem
     rows, cols = ground.shape
     corners = surface.grid.to_plane([0.0, cols - 1.0], [rows - 1.0, 0.0])
