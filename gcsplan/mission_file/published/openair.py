@@ -490,7 +490,11 @@ def _drawn(pieces: Sequence[Corner | Arc], clockwise: bool | None) -> list[Corne
 
 
 def _is_clockwise(ring: Sequence[Corner]) -> bool:
-    points = [(lon, lat) for lat, lon in ring]
+    """Each edge goes the short way: a file may write 179 and -179 side by side."""
+    points = [(lon, lat) for lat, lon in ring[:1]]
+    for lat, lon in ring[1:]:
+        before = points[-1][0]
+        points.append((before + (lon - before + 180.0) % 360.0 - 180.0, lat))
     area = sum(x0 * y1 - x1 * y0 for (x0, y0), (x1, y1) in zip(points, [*points[1:], points[0]], strict=True))
     return area < 0.0
 

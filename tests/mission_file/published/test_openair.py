@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 import shapely
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from pyproj import Geod
 
@@ -104,6 +104,8 @@ def test_what_is_written_is_read(tmp_path: Path, ones: list[tuple]) -> None:  # 
     st.floats(-65, 65), st.floats(-180, 180), st.floats(300.0, 90_000.0), st.integers(0, 359), st.integers(20, 340),
     st.booleans(), st.booleans(),
 )  # fmt: skip
+@example(47.0, 180.0, 300.0, 0, 181, True, False)
+@example(-18.0, -179.999, 5000.0, 45, 90, False, False)  # written as 180.001 and -179.999 side by side
 @settings(max_examples=draws(40), deadline=None)
 def test_an_arc_contains_its_zone_and_little_more(
     lat: float, lon: float, radius_m: float, start: int, turn: int, clockwise: bool, bulges: bool
