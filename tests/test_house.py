@@ -311,7 +311,7 @@ MOST_IN_A_FOLDER = 15
 
 MOST = {
     "modules": 442,
-    "statements": 60_792,
+    "statements": 60_796,
     "type names with two meanings": 0,
     "constants with two values": 1,
     "folders with more than 15 modules": 0,

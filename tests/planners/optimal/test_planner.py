@@ -390,7 +390,7 @@ ROOF = Zone("roof", Circle(75.0, 60.0, 20.0), Level(50.0, "agl"), None)
         pytest.param((), (Via(45.0, 75.0), Via(75.0, 45.0, 30.0)), 90.0, "length", marks=pytest.mark.slow),
         ((MAST, ROOF), (), 90.0, "length"),
         pytest.param((MAST,), (Via(75.0, 45.0, 10.0),), 60.0, "length", marks=pytest.mark.slow),
-        ((), (Via(75.0, 45.0),), 90.0, "energy"),
+        pytest.param((), (Via(75.0, 45.0),), 90.0, "energy", marks=pytest.mark.slow),
     ],
 )
 def test_paths_among_needles_as_high_as_the_world_is_wide(
