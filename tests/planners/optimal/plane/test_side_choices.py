@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from gcsplan.bench.terrain.problems import problems
+from gcsplan.planners.optimal.loop.workspace import Workspace
 from gcsplan.planners.optimal.plane.corridor import SideChoice
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
-from gcsplan.planners.optimal.plane.plane_search import PlaneSearch
 from gcsplan.planners.optimal.plane.side_choices import DetourSearch
 from gcsplan.planners.optimal.searches.cap_search import PAST
 from gcsplan.planners.optimal.searches.detours import PAST_FINE
@@ -67,21 +67,22 @@ def met(p: Problem, points: Floats) -> list[int]:
     return out
 
 
-def past(plane: PlaneSearch) -> None:
+def past(work: Workspace) -> None:
     """Run the detour searches, coarse and fine, without bounds and without the lattice for slopes."""
+    plane = work.plane
     plane.reach_longest()
     plane.try_below(plane.top_m, fine=True)
     plane.past(PAST, fine=False)
     plane.past(PAST_FINE, fine=True)
 
 
-def found_in(p: Problem, closer: Callable[[PlaneSearch], None] = past) -> Incumbent:
+def found_in(p: Problem, closer: Callable[[Workspace], None] = past) -> Incumbent:
     """The incumbent after the searches below the ceiling alone, checked after each."""
     work = looked(p)
-    below, plane = work.incumbent, work.plane
+    below = work.incumbent
     for again in (False, True):
         if again:
-            closer(plane)
+            closer(work)
         assert below.best is not None
         assert faults(replace(p, airspace=Airspace(p.airspace.surface)), Path(below.best)) == []
         assert met(p, below.best) == []
