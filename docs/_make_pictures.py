@@ -47,8 +47,8 @@ def main() -> None:
 
 def draw_proof(problem: Problem) -> Figure:
     """The plane of a problem's first leg: walls below the cap, the path, and the cells that a shorter one may meet."""
-    searches = search(problem)
-    below, incumbent = searches.plane, searches.incumbent
+    work = search(problem)
+    below, incumbent = work.plane, work.incumbent
     below.reach_longest()
     solution = incumbent.solution()
     leg = below.legs[0]

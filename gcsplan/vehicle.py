@@ -128,6 +128,10 @@ class Energy:
         return not (1.0 - FITS_WITHIN) * slow <= airspeed_m_s <= (1.0 + FITS_WITHIN) * fast
 
 
+OVER_TAKEOFF_M = 16.0
+"""Metres above the altitude of its take-off to which a fixed wing whose climb is not known is judged to rise."""
+
+
 @dataclass(frozen=True, slots=True)
 class ClimbOut:
     """A fixed wing's take-off as it was flown, means from leaving the ground to its altitude: climb rate and speed over

@@ -1,10 +1,11 @@
-"""Zones from a file of any format, chosen by its name, and in JSON_ZONES by its members.
+"""Zones from a file of any format, chosen by its name, and in JSON by its members.
 
 Published formats are known likewise: OpenAir by its name, the others by members that no other format has.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +53,7 @@ def read_zones(
     policy = policy or Policy()
     data = _bytes(path, where)
     whole = load_json(path, data) if kind in JSON_ZONES else None
-    require_wgs84(whole, path, published_format(whole) or "GeoJSON")
+    require_wgs84(whole, path, json_format(whole)[0])
     in_part = sent_in_part(whole, path)
     published = read_published(path, data, whole, policy)
     if published is not None:
@@ -99,14 +100,14 @@ _JSON_FORMATS = (
 )  # fmt: skip
 
 
-def published_format(whole: Any) -> str:
-    """The name of the published format that JSON has; empty if it has none."""
-    return next((name for name, is_format, _ in _JSON_FORMATS if is_format(whole)), "")
+def json_format(whole: Any) -> tuple[str, Callable[[Path, Any, Policy], ZoneFile] | None]:
+    """The name of the format that JSON has, and the reader of a published one; None for GeoJSON."""
+    return next(((name, read) for name, is_format, read in _JSON_FORMATS if is_format(whole)), ("GeoJSON", None))
 
 
 def read_published(path: Path, data: bytes, whole: Any, policy: Policy) -> ZoneFile | None:
     """The zones of a published file; None if it has none of these formats. ``whole`` is what its JSON holds."""
     if path.suffix.lower() in OPENAIR_ZONES:
         return read_openair(path, data, policy)
-    name = published_format(whole)
-    return next((read(path, whole, policy) for one, _, read in _JSON_FORMATS if one == name), None)
+    read = json_format(whole)[1]
+    return None if read is None else read(path, whole, policy)

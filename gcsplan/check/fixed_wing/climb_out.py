@@ -39,7 +39,7 @@ from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission import mission as m
 from gcsplan.mavlink.mission.mission import MissionItem
 from gcsplan.notes.note import Finding, Note
-from gcsplan.vehicle import ClimbOut, Vehicle
+from gcsplan.vehicle import OVER_TAKEOFF_M, ClimbOut, Vehicle
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geodesy.atmosphere import true_per_indicated
 from gcsplan.world.geometry.limits import Limits
@@ -56,10 +56,10 @@ CLEARANCE_PART = 0.5
 """The part of its height that the aircraft needs as clearance while it is too low for the full altitude error."""
 
 
-OVER_M, OVER_S, OVER_FROM = 16.0, 2.0, 0.15
+OVER_S, OVER_FROM = 2.0, 0.15
 """How far above the altitude of its take-off an aircraft with much power gets, for it levels off late: flown were 11 to
-18 m, 1.4 to 1.8 s of its mean climb rate. Metres if that rate is not known, otherwise its seconds; and from which part
-of its climb-out on."""
+18 m, 1.4 to 1.8 s of its mean climb rate. `OVER_TAKEOFF_M` metres if that rate is not known, otherwise its seconds; and
+from which part of its climb-out on."""
 
 MOST_BANDS = 24
 """Most level bands into which the space above a climb-out is divided."""
@@ -136,7 +136,7 @@ def above_slant(ground: Place, top: Place, limits: Limits, over_m: float) -> lis
 
 def over_m(vehicle: Vehicle) -> float:
     """How far above its take-off's altitude, and beyond the altitude error, an aircraft may get."""
-    over = OVER_M if vehicle.climb_out is None else OVER_S * vehicle.climb_out.climb_m_s
+    over = OVER_TAKEOFF_M if vehicle.climb_out is None else OVER_S * vehicle.climb_out.climb_m_s
     return max(0.0, over - vehicle.limits.altitude_error_m)
 
 

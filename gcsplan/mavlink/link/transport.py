@@ -158,7 +158,7 @@ class Udp:
     @property
     def place(self) -> str:
         """Our own address."""
-        return _written(self._socket.getsockname())
+        return _host_and_port(self._socket.getsockname())
 
     def read(self) -> list[HeardBytes]:
         heard: list[HeardBytes] = []
@@ -277,7 +277,7 @@ class TcpClient:
     @property
     def place(self) -> str:
         """The peer's address."""
-        return _written(self._address)
+        return _host_and_port(self._address)
 
     def read(self) -> list[HeardBytes]:
         if not self._stream.open and time.monotonic() >= self._again_at:
@@ -295,7 +295,7 @@ class TcpClient:
         self._stream.close()
 
 
-def _written(address: tuple[Any, ...]) -> str:
+def _host_and_port(address: tuple[Any, ...]) -> str:
     """A socket's address as text; the rest of an IPv6 address is left out."""
     host, port = address[:2]
     return f"{host}:{port}"
@@ -327,7 +327,7 @@ class TcpServer:
     @property
     def place(self) -> str:
         """Our own address."""
-        return _written(self._socket.getsockname())
+        return _host_and_port(self._socket.getsockname())
 
     def read(self) -> list[HeardBytes]:
         while len(self.clients) < _MOST_CLIENTS:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pkgutil
 from collections.abc import Sequence
+from functools import cache
 from importlib import import_module
 
 from gcsplan.errors import InputError
@@ -16,6 +17,7 @@ NAMES = tuple(sorted(module.name for module in pkgutil.iter_modules(searches.__p
 """The names of all searches; which of them a mission has depends on its objective and limits."""
 
 
+@cache
 def kinds() -> tuple[type[Search], ...]:
     """All searches, by name."""
     found = []

@@ -24,7 +24,15 @@ from gcsplan.mavlink.mission.parameter_list import Setting, off
 from gcsplan.mavlink.mission.parameter_names import PARAMETERS, ParameterValues
 from gcsplan.mavlink.mission.return_parameters import ReturnRoute, on_board, returns_otherwise, takes_another_route
 from gcsplan.notes.note import Note
-from gcsplan.vehicle import COPTER_RETURN_WAITS_S, DEFAULT_LEAN_DEG, Autopilot, Vehicle, fastest_at_m_s, lean_for_deg
+from gcsplan.vehicle import (
+    COPTER_RETURN_WAITS_S,
+    DEFAULT_LEAN_DEG,
+    OVER_TAKEOFF_M,
+    Autopilot,
+    Vehicle,
+    fastest_at_m_s,
+    lean_for_deg,
+)
 
 PARAMETER_GROUPS: dict[Autopilot, tuple[tuple[str, ...], ...]] = {
     autopilot: (
@@ -46,7 +54,6 @@ _LEAN_ANGLE = {"ANGLE_MAX": 0.01, "ATC_ANGLE_MAX": 1.0}
 _RETURN_ENDS = {"RTL_ALT_FINAL": 100.0, "RTL_ALT_FINAL_M": 1.0}
 _SAME_DEG = 0.05
 _FLOWN_PITCH_DEG = 15.0  # TECS_PITCH_MAX, default
-_JUDGED_RISE_M = 16.0  # OVER_M of check/fixed_wing/climb_out.py
 _FAILSAFE_NAMES = {
     "FS_THR_ENABLE": "loss of radio control", "THR_FAILSAFE": "loss of radio control",
     "NAV_RCL_ACT": "loss of radio control", "FS_GCS_ENABLE": "loss of the ground station",
@@ -246,7 +253,7 @@ def _climb_out(values: ParameterValues, mission: Mission) -> list[Note]:
     takes_off = any(item.command == TAKEOFF for item in mission.items)
     if mission.autopilot is not Autopilot.ARDUPLANE or not takes_off or 0.0 < pitch_deg <= _FLOWN_PITCH_DEG + _SAME_DEG:
         return []
-    return [Note("pitch_not_flown", value=pitch_deg, flown_deg=_FLOWN_PITCH_DEG, judged_m=_JUDGED_RISE_M)]
+    return [Note("pitch_not_flown", value=pitch_deg, flown_deg=_FLOWN_PITCH_DEG, judged_m=OVER_TAKEOFF_M)]
 
 
 def _lean(values: ParameterValues, mission: Mission) -> list[Note]:

@@ -76,5 +76,5 @@ class Search(ABC):
         self.seen = self.incumbent.cost
 
     def takes(self, seconds: float, per_zone_s: float = 0.0) -> Size:
-        """The size of a search that takes seconds, and some for each zone."""
+        """The size of a search that takes seconds, and some for each zone, and has no lattices: 40 MB at most."""
         return seconds + per_zone_s * len(self.problem.airspace.zones), 40.0

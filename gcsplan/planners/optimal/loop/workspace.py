@@ -47,16 +47,13 @@ class Workspace:
     def outlines(self) -> OutlineTracks:
         """The plane with the outlines of the zones only."""
         if self.known_outlines is None:
-            self.known_outlines = self._outlines()
+            from gcsplan.planners.optimal.plane.outline_tracks import OutlineTracks  # shapely: many missions need none
+
+            problem = self.incumbent.problem
+            limits = problem.bound_limits
+            highest_m = float(np.nanmax(problem.airspace.surface.ground_m))
+            most_m = [*([] if limits.max_amsl_m is None else [limits.max_amsl_m]),
+                      *([] if limits.max_agl_m is None else [highest_m + limits.max_agl_m])]  # fmt: skip
+            top_m = min(most_m) - limits.altitude_error_m if most_m else above_all(problem)
+            self.known_outlines = OutlineTracks(self.incumbent, top_m)
         return self.known_outlines
-
-    def _outlines(self) -> OutlineTracks:
-        from gcsplan.planners.optimal.plane.outline_tracks import OutlineTracks  # shapely: many missions need none
-
-        problem = self.incumbent.problem
-        limits = problem.bound_limits
-        highest_m = float(np.nanmax(problem.airspace.surface.ground_m))
-        most_m = [*([] if limits.max_amsl_m is None else [limits.max_amsl_m]),
-                  *([] if limits.max_agl_m is None else [highest_m + limits.max_agl_m])]  # fmt: skip
-        top_m = min(most_m) - limits.altitude_error_m if most_m else above_all(problem)
-        return OutlineTracks(self.incumbent, top_m)

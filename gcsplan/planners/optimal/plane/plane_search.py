@@ -12,9 +12,9 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.planners.optimal.plane.corridor import End, Narrow, PinnedTrack, SideChoice, joined
+from gcsplan.planners.optimal.plane.detour_search import DetourSearch
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
 from gcsplan.planners.optimal.plane.leg import Leg
-from gcsplan.planners.optimal.plane.side_choices import DetourSearch
 from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.planners.profile.exact import Unsettled
 from gcsplan.planners.profile.track import Flown, fly, make_track

@@ -73,17 +73,13 @@ class Bound(Search):
     @property
     def share(self) -> float:
         """By the effort."""
-        plain = self._effort == PLAIN
-        return ENERGY_SHARE if plain and self._is_energy else SHARES[self._effort or PLAIN]
+        energy = self._effort == PLAIN and self.problem.objective == "energy"
+        return ENERGY_SHARE if energy else SHARES[self._effort or PLAIN]
 
     @property
     def nearer(self) -> bool:
         """The least effort is cheap and mostly helps, but for energy."""
-        return self._effort == PLAIN and not self._is_energy
-
-    @property
-    def _is_energy(self) -> bool:
-        return self.problem.objective == "energy"
+        return self._effort == PLAIN and self.problem.objective != "energy"
 
     @property
     def _effort(self) -> int | None:

@@ -1,4 +1,4 @@
-"""Tracks around, over or under each zone, and with laps, best first, on the finer lattice (`plane/side_choices.py`)."""
+"""Tracks around, over or under each zone, and with laps, best first, on the finer lattice (`detour_search`)."""
 
 from __future__ import annotations
 

@@ -10,8 +10,8 @@ import numpy as np
 from gcsplan.planners.optimal.loop.search import Search, Size
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 
-CASE_S, MEGABYTES, MOST_COUNTED = 5e-3, 60.0, 48
-"""Counted seconds of a case, megabytes, and the most zones that count."""
+CASE_S, MEGABYTES = 5e-3, 60.0
+"""Counted seconds of a case, and megabytes of all."""
 
 
 class OutlineBound(Search):
@@ -25,7 +25,9 @@ class OutlineBound(Search):
 
     def size(self) -> Size:
         """By the number of such zones."""
-        return CASE_S * (1 + min(self._zones(), MOST_COUNTED)), MEGABYTES
+        from gcsplan.planners.optimal.plane.overflight import MOST_CASES  # shapely: many missions need none
+
+        return CASE_S * (1 + min(self._zones(), MOST_CASES)), MEGABYTES
 
     def run(self) -> None:
         """Look at all cases."""

@@ -2,7 +2,7 @@
 
 Zones that can be passed neither over nor under are obstacles in the plane. The shortest track around them is a bound
 for every path. Tracks around them, and around zones whose sides are shut because passing over or under costs more, give
-paths (`side_choices`).
+paths (`detour_search`).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from gcsplan.arrays import Floats
 from gcsplan.planners.optimal.loop.search import FAR, Search, Size
 from gcsplan.planners.optimal.navmesh.portals import Exhausted
 from gcsplan.planners.optimal.plane.corridor import SideChoice
-from gcsplan.planners.optimal.plane.side_choices import DetourSearch
+from gcsplan.planners.optimal.plane.detour_search import DetourSearch
 from gcsplan.planners.profile.track import Obstruction
 from gcsplan.world.geometry.path import track_length_m
 

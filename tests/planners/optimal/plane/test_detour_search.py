@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from gcsplan.bench.terrain.problems import problems
 from gcsplan.planners.optimal.loop.workspace import Workspace
 from gcsplan.planners.optimal.plane.corridor import SideChoice
+from gcsplan.planners.optimal.plane.detour_search import DetourSearch
 from gcsplan.planners.optimal.plane.incumbent import Incumbent
-from gcsplan.planners.optimal.plane.side_choices import DetourSearch
 from gcsplan.planners.optimal.searches.cap_search import PAST
 from gcsplan.planners.optimal.searches.detours import PAST_FINE
 from gcsplan.planners.problem import Problem
