@@ -6,8 +6,7 @@
         answers += vehicle.on_timer(now)
 
 ``now`` is the time in seconds of any clock that does not run backwards; the vehicle is switched on at the first ``now``
-that it gets. `ardupilot_protocol` and `px4_protocol` decide what it answers, `ardupilot_storage` and `px4_storage` what
-it stores, `misbehaviour` what goes wrong.
+that it gets. `ardupilot` and `px4` decide what it answers and stores, `misbehaviour` what goes wrong.
 """
 
 from __future__ import annotations
@@ -18,11 +17,10 @@ from collections.abc import Callable, Mapping, Sequence
 
 from gcsplan.mavlink.mission.mission import MISSION, Home, Mission, MissionItem
 from gcsplan.mavlink.protocol.messages import Ack, Address, Count, Item, MissionMessage, Packet, Request, RequestList
-from gcsplan.sim.vehicle.ardupilot_protocol import ArduPilotServer
-from gcsplan.sim.vehicle.ardupilot_storage import home_item
+from gcsplan.sim.vehicle.ardupilot import ArduPilotServer, home_item
 from gcsplan.sim.vehicle.firmware import Firmware, firmware_of
 from gcsplan.sim.vehicle.misbehaviour import Faults, LossyChannel, Misbehaviour, spoilt
-from gcsplan.sim.vehicle.px4_protocol import Px4Server
+from gcsplan.sim.vehicle.px4 import Px4Server
 from gcsplan.sim.vehicle.stored_lists import Board, MissionServer
 from gcsplan.vehicle import Autopilot
 

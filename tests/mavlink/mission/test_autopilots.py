@@ -16,8 +16,8 @@ from gcsplan.mavlink.mission.stored_ardupilot import STORAGE_RULES, read_back_al
 from gcsplan.mavlink.mission.stored_px4 import LOCATED, yaw
 from gcsplan.mavlink.mission.stored_px4 import LOCATED as PX4_LOCATED
 from gcsplan.mavlink.mission.stored_px4 import PLACELESS as PX4_PLACELESS
-from gcsplan.sim.vehicle.ardupilot_storage import keep_fence_item, keep_mission_item, keep_rally_item
-from gcsplan.sim.vehicle.px4_storage import keep_item
+from gcsplan.sim.vehicle.ardupilot import keep_fence_item, keep_mission_item, keep_rally_item
+from gcsplan.sim.vehicle.px4 import keep_item
 from gcsplan.sim.vehicle.stored_lists import ItemRefused
 from gcsplan.vehicle import Autopilot
 from tests.support.effort import draws
