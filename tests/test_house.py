@@ -82,7 +82,6 @@ SOCKETS = {
     "mavlink/link/link.py",
     "mavlink/link/transport.py",
     "sim/vehicle/server.py",
-    "sim/vehicle/sockets.py",
 }
 NETWORK = {"socket", "socketserver", "select", "selectors", "asyncio", "ssl", "http", "urllib", "serial"}
 DEGREES = ("lat_deg", "lon_deg", "lat_e7", "lon_e7")
@@ -310,8 +309,8 @@ def test_a_function_fits_on_a_screen() -> None:
 MOST_IN_A_FOLDER = 15
 
 MOST = {
-    "modules": 442,
-    "statements": 60_796,
+    "modules": 429,
+    "statements": 60_699,
     "type names with two meanings": 0,
     "constants with two values": 1,
     "folders with more than 15 modules": 0,

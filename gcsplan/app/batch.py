@@ -30,7 +30,7 @@ from gcsplan.app.plan.model import Plan, PlanOptions
 from gcsplan.errors import GcsplanError, InputError, NoMission, UsageError, worst_of
 from gcsplan.export.durable import locked, write_whole
 from gcsplan.export.outdir import has_outputs, is_output, retire_outputs, settle_outputs, write_outputs
-from gcsplan.mission_file.samples import file_of, is_sample
+from gcsplan.mission_file.source import file_of, is_sample
 from gcsplan.world.terrain.input_files import SPECIAL, FileReading, reading
 
 __all__ = [

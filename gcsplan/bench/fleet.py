@@ -34,7 +34,7 @@ from gcsplan.bench.measure import peak_mb
 from gcsplan.bench.sample import ROUND_DEGREE_M, SAMPLE_TERRAIN
 from gcsplan.errors import InputError
 from gcsplan.export.outdir import write_outputs, write_whole
-from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.mission_file import load_mission
 from gcsplan.sim.vehicle.server import loopback_fleet
 

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices
-from gcsplan.check.fixed_wing.climb_out import slant_findings
+from gcsplan.check.fixed_wing.ends import slant_findings
 from gcsplan.check.flight.corners import round_corners
 from gcsplan.check.flight.follow import follow
 from gcsplan.check.flight.times import seconds_of

@@ -15,8 +15,7 @@ import numpy as np
 
 from gcsplan.fleet._taken import Spans, Taken
 from gcsplan.fleet.arrival import WITHIN_S, Craft, Crew, Hold, Mode, Schedule, Slot, schedule
-from gcsplan.fleet.motion.timed_path import TimedPath
-from gcsplan.fleet.motion.timing import Route, speed_for
+from gcsplan.fleet.motion.timing import Route, TimedPath, speed_for
 from gcsplan.fleet.separation import TOLERANCE_M, Conflict, Rules, separation
 from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle

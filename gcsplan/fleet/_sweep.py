@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
-from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.fleet.motion.timing import TimedPath
 
 PARALLEL = 1e-13
 """Part of |v|²|u|² below which two velocities count as parallel: the minimum then also lies on an edge."""

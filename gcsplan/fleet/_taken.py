@@ -15,7 +15,7 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.fleet._sweep import Pieces, pieces_of, shifts
-from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.fleet.separation import TOLERANCE_M, Rules
 
 GROUP, LEVELS = 6, 3

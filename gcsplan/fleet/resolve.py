@@ -38,8 +38,7 @@ from gcsplan.fleet._settle import (
 )
 from gcsplan.fleet._taken import Taken
 from gcsplan.fleet.arrival import EXPLAINED, Crew, Hold, Schedule
-from gcsplan.fleet.motion.timed_path import TimedPath
-from gcsplan.fleet.motion.timing import Route, flown_corners
+from gcsplan.fleet.motion.timing import Route, TimedPath, flown_corners
 from gcsplan.fleet.separation import TOLERANCE_M, AirPlace, Conflict, Rules, Separation, Where, in_metres, separation
 
 __all__ = ["Again", "Change", "NotSeparated", "Reroute", "Resolved", "resolve"]

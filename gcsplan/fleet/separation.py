@@ -17,7 +17,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats, Indices
 from gcsplan.errors import InputError
 from gcsplan.fleet._sweep import Fleet, Least, below, nearest
-from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.notes.note import Note
 
 AirPlace = tuple[float, float, float]

@@ -1,5 +1,8 @@
 """The source of a mission: a file, a sample, its text, or a mapping made by a script; all become the same mapping.
 
+``sample:NAME`` is a mission file that comes with gcsplan. They lie in ``missions/`` of the repository; the build copies
+them into the package (pyproject.toml), so that they are there after ``pip install`` alone.
+
 `what_else` says what another file is that is given where a mission file belongs, and which command or key takes it.
 """
 
@@ -13,10 +16,49 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.errors import InputError
-from gcsplan.mission_file import samples
-from gcsplan.mission_file.values.schema import shown
+from gcsplan.mission_file.values.schema import nearest, shown
 from gcsplan.mission_file.values.yaml import MAX_YAML_BYTES, MAX_YAML_DEPTH, MAX_YAML_NODES, missing_space, read_yaml
 from gcsplan.world.terrain.input_files import LOG_FILES, TERRAIN_FILES, VEHICLE_FILES, ZONES_BY_NAME, tell_file
+
+SAMPLE_PREFIX = "sample:"
+SAMPLE_FOLDERS = (Path(__file__).parents[1] / "missions", Path(__file__).parents[2] / "missions")
+"""Where the files are: within an installed package, or beside the sources."""
+
+
+def sample_names() -> list[str]:
+    """The names of all samples, without the prefix; those in a folder begin with its name (``papers/abo``)."""
+    folder = _sample_folder()
+    return sorted(file.relative_to(folder).with_suffix("").as_posix() for file in folder.rglob("*.yaml"))
+
+
+def is_sample(source: str | os.PathLike[str]) -> bool:
+    """Whether ``source`` names a sample; a file that is really called so keeps its meaning."""
+    if not os.fspath(source).startswith(SAMPLE_PREFIX):
+        return False
+    tell_file(source)
+    return not os.path.exists(source)
+
+
+def file_of(source: str | os.PathLike[str]) -> Path:
+    """The file that ``source`` names, a path or ``sample:NAME``. Raises InputError for a sample that does not exist."""
+    if not is_sample(source):
+        return Path(source)
+    name = os.fspath(source).removeprefix(SAMPLE_PREFIX).replace(os.sep, "/")
+    known = sample_names()
+    if name not in known:
+        near = nearest(name, known) or "."
+        raise InputError(f"there is no such sample{near} There are: {', '.join(known)}", where=os.fspath(source))
+    return _sample_folder() / f"{name}.yaml"
+
+
+def sample_hint(file: Path) -> str:
+    """``; did you mean sample:…?`` where a missing file has the name of a sample, or an empty text."""
+    return f"; did you mean {SAMPLE_PREFIX}{file.stem}?" if file.stem in sample_names() else ""
+
+
+def _sample_folder() -> Path:
+    return next((folder for folder in SAMPLE_FOLDERS if folder.is_dir()), SAMPLE_FOLDERS[0])
+
 
 UNNAMED = Path("mission.yaml")
 """Path of a mission that has no file; files that the mission names are then found from the current folder."""
@@ -43,7 +85,7 @@ def read_content(
     elif isinstance(source, str | os.PathLike):
         file, where = Path(source), str(source)
         if text is None:
-            file = samples.file_of(source)
+            file = file_of(source)
             text, raw = _read(file, where)
         else:
             raw = read_yaml(text, where=where)
@@ -93,7 +135,7 @@ def _text(file: Path, where: str) -> str:
     except UnicodeDecodeError as why:
         raise InputError(f"the file must be UTF-8 text, byte {why.start} is not", where=where) from None
     except FileNotFoundError:
-        raise InputError(f"there is no such file{samples.hint(file)}", where=where) from None
+        raise InputError(f"there is no such file{sample_hint(file)}", where=where) from None
     except (OSError, ValueError) as why:
         raise InputError(f"the file cannot be read: {why}", where=where) from None
 

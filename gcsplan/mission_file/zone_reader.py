@@ -15,11 +15,10 @@ from gcsplan.mission_file.published.ed318 import is_ed318, read_ed318
 from gcsplan.mission_file.published.openaip import is_openaip, read_openaip
 from gcsplan.mission_file.published.openair import read_openair
 from gcsplan.mission_file.published.policy import Policy
-from gcsplan.mission_file.zones.contents import load_json, unpack
+from gcsplan.mission_file.zones.contents import load_json, require_wgs84, sent_in_part, unpack
 from gcsplan.mission_file.zones.csv import read_csv
 from gcsplan.mission_file.zones.file import ZoneFile
 from gcsplan.mission_file.zones.geojson import read_geojson
-from gcsplan.mission_file.zones.json_document import require_wgs84, sent_in_part
 from gcsplan.mission_file.zones.kml import read_kml
 from gcsplan.world.terrain.input_files import JSON_ZONES, OPENAIR_ZONES, VECTOR_ZONES, ZONE_FILES, absent, tell_file
 

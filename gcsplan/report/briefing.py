@@ -12,8 +12,20 @@ from collections.abc import Iterator, Sequence
 from gcsplan import __version__
 from gcsplan.figures import counted
 from gcsplan.mavlink.mission.return_parameters import setting
-from gcsplan.report.parts.html import energy, esc, greatest, least, num, place, plain, stated, steepest, table
-from gcsplan.report.parts.map_labels import Mark, marks_html
+from gcsplan.report.parts.html import (
+    Mark,
+    energy,
+    esc,
+    greatest,
+    least,
+    marks_html,
+    num,
+    place,
+    plain,
+    stated,
+    steepest,
+    table,
+)
 from gcsplan.report.parts.page_data import Page, Subject
 from gcsplan.report.views.fleet import motions_of, separation_words
 from gcsplan.report.views.plan import COLOURS

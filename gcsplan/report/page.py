@@ -43,10 +43,10 @@ from gcsplan.report.views.fleet import fleet_html, motions_of
 from gcsplan.report.views.home import home_html, home_lines
 from gcsplan.report.views.plan import COLOURS, map_html, map_marks
 from gcsplan.report.views.profile import profile_html, profile_legend
-from gcsplan.report.views.rehearsal import headline, rehearsal_html
 from gcsplan.report.views.replay import replay_data, replay_html, replay_of
 from gcsplan.report.views.scene_data import exaggeration, zone_meshes
 from gcsplan.report.views.shaded_terrain import Relief, extent_of, relief_of
+from gcsplan.report.views.tables import headline, rehearsal_html
 from gcsplan.units import KILOJOULE, Unit, Units, duration, in_units
 from gcsplan.world.terrain.model_words import what_is_not_in
 from gcsplan.world.world import World

@@ -21,7 +21,7 @@ from gcsplan.app.rehearse import rehearse
 from gcsplan.check.verdict import by_item
 from gcsplan.cli.output.console import plan_row
 from gcsplan.fleet.arrival import Slot
-from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.mission_file import load_mission
 from gcsplan.units import duration
 from tests.support.plans import CASES, cases, planned, text_rows

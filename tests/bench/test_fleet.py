@@ -10,7 +10,7 @@ import pytest
 
 from gcsplan.bench.fleet import PLACES_APART_M, fleet_document, report, run, sampled
 from gcsplan.errors import InputError
-from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.fleet.separation import Rules, separation
 from gcsplan.mission_file import load_mission
 from tests.fleet.test_separation import random_fleet

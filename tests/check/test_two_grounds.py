@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats
-from gcsplan.check.fixed_wing.climb_out import slant_shortage
+from gcsplan.check.fixed_wing.ends import slant_shortage
 from gcsplan.check.judge import judge
 from gcsplan.check.returns.way_home import way_home
 from gcsplan.mavlink.build.multirotor import build_mission

@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 from gcsplan.errors import NoMission
 from gcsplan.fleet._taken import Taken
 from gcsplan.fleet.arrival import Craft, Crew, Schedule, Slot, schedule
-from gcsplan.fleet.motion.timed_path import TimedPath
-from gcsplan.fleet.motion.timing import MissionEnd, Route
+from gcsplan.fleet.motion.timing import MissionEnd, Route, TimedPath
 from gcsplan.fleet.resolve import Change, NotSeparated, Resolved, least_interval_s, resolve
 from gcsplan.fleet.separation import Conflict, Rules, separation
 from gcsplan.notes.note import Note

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gcsplan.arrays import Floats
 from gcsplan.errors import InputError
 from gcsplan.fleet._sweep import Fleet, Pieces, nearest
-from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.fleet.separation import Conflict, Rules, in_metres, separation
 from gcsplan.notes.note import Note
 from tests.support.effort import draws

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from gcsplan.fleet.arrival import Crew, Schedule
-from gcsplan.fleet.motion.timed_path import TimedPath
-from gcsplan.fleet.motion.timing import POSITION_ERROR_M, Course, Route
+from gcsplan.fleet.motion.timing import POSITION_ERROR_M, Course, Route, TimedPath
 from gcsplan.vehicle import Vehicle
 
 

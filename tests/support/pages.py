@@ -15,7 +15,7 @@ from gcsplan.app.output.report import render
 from gcsplan.app.plan.model import Plan
 from gcsplan.check.judge import judge
 from gcsplan.check.verdict import Verdict
-from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.fleet.separation import Rules, separation
 from gcsplan.mavlink.build.multirotor import build_mission
 from gcsplan.mavlink.build.order import Order

@@ -26,8 +26,7 @@ from gcsplan.check.motion.circles import PLANE_LOITER_RADIUS_M, circle_growth
 from gcsplan.check.verdict import LegFigures
 from gcsplan.errors import NoMission
 from gcsplan.fleet.arrival import Craft, Crew, NoSchedule, Schedule, Slot, schedule
-from gcsplan.fleet.motion.timed_path import TimedPath
-from gcsplan.fleet.motion.timing import Course, Route, motion_error_m
+from gcsplan.fleet.motion.timing import Course, Route, TimedPath, motion_error_m
 from gcsplan.mission_file import ArrivalRequest
 from gcsplan.notes.note import Note
 from gcsplan.planners.problem import Progress

@@ -12,10 +12,9 @@ from datetime import datetime
 from os import PathLike
 from typing import Any
 
-from gcsplan.app.fleet.explain import plan_or_explain
 from gcsplan.app.fleet.fleet import finished
 from gcsplan.app.fleet.start_time import GateTime
-from gcsplan.app.fleet.workers import PIECE_S, planned_by
+from gcsplan.app.fleet.vehicle_plans import PIECE_S, plan_or_explain, planned_by
 from gcsplan.app.parallel.executor import Inline, executor
 from gcsplan.app.parallel.sites import world_of
 from gcsplan.app.plan.arguments import require

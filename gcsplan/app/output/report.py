@@ -12,7 +12,7 @@ from gcsplan.app.plan.model import Plan
 from gcsplan.app.upload.job import JobResult
 from gcsplan.app.upload.on_board import settings_of_plan
 from gcsplan.check.returns.verdict import WayHome
-from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.report.page import render_page
 from gcsplan.report.parts.html import stated
 from gcsplan.report.parts.page_data import Certificate, Compared, Page, Rehearsed, Subject

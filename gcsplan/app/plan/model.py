@@ -11,7 +11,7 @@ from gcsplan.app.plan.left_out import LeftOut
 from gcsplan.check.verdict import Verdict
 from gcsplan.errors import GcsplanError
 from gcsplan.fleet.arrival import Slot
-from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.mavlink.build.order import Order
 from gcsplan.mavlink.mission.mission import Mission
 from gcsplan.mission_file import MissionFile, VehicleRequest

@@ -18,15 +18,15 @@ from gcsplan.app.plan.model import Brief, VehiclePlan
 from gcsplan.app.plan.problem import built, looked_over, run_planner
 from gcsplan.app.plan.replanning import Attempts, with_bound
 from gcsplan.arrays import Floats
-from gcsplan.check.fixed_wing.climb_out import (
+from gcsplan.check.fixed_wing.ends import (
     REACHED_M,
     above_slant,
     beside_strip,
     circle_missing_m,
+    flared,
     over_m,
     slant_shortage,
 )
-from gcsplan.check.fixed_wing.glide import flared
 from gcsplan.check.motion.circles import circle_growth
 from gcsplan.errors import NoMission
 from gcsplan.mavlink.build.fixed_wing import pitch_deg

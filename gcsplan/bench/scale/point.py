@@ -25,7 +25,7 @@ from gcsplan.app.parallel.executor import Dask, Executor, Inline, executor
 from gcsplan.bench.measure import peak_mb
 from gcsplan.bench.scale.missions import mission
 from gcsplan.errors import GcsplanError
-from gcsplan.mission_file.samples import file_of
+from gcsplan.mission_file.source import file_of
 
 EMPTY_PIECES = 1000
 """Pieces without work by which the scheduler's own time is measured."""

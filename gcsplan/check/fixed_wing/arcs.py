@@ -26,7 +26,7 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.check.fixed_wing.climb_out import climbed
+from gcsplan.check.fixed_wing.ends import climbed
 from gcsplan.check.motion.circles import circle_growth, tracking_m, true_m_s
 from gcsplan.check.motion.stretch import SAME_PLACE_M, Flight, Place, Stretch, flat_m
 from gcsplan.check.motion.turn_parameters import DEFAULTS, Tuning

@@ -28,8 +28,7 @@ from collections.abc import Callable, Hashable
 from dataclasses import replace
 from itertools import pairwise
 
-from gcsplan.check.fixed_wing.climb_out import REACHED_M, circle_up, climb_out, is_wing, turns_early
-from gcsplan.check.fixed_wing.glide import glide
+from gcsplan.check.fixed_wing.ends import REACHED_M, circle_up, climb_out, glide, is_wing, turns_early
 from gcsplan.check.flight.arc_waypoint import fly_arc
 from gcsplan.check.flight.route import fly_all
 from gcsplan.check.motion.circles import PLANE_LOITER_RADIUS_M, circle_growth, circle_widened

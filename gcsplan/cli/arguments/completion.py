@@ -49,9 +49,9 @@ def costs(incomplete: str) -> list[str]:
 
 def missions(incomplete: str) -> list[str]:
     """The sample missions, and files that begin alike; nothing where a file is meant: the shell completes it."""
-    from gcsplan.mission_file.samples import PREFIX, names
+    from gcsplan.mission_file.source import SAMPLE_PREFIX, sample_names
 
-    return _with_files(incomplete, PREFIX, [f"{PREFIX}{name}" for name in names()])
+    return _with_files(incomplete, SAMPLE_PREFIX, [f"{SAMPLE_PREFIX}{name}" for name in sample_names()])
 
 
 def dems(incomplete: str) -> list[str]:

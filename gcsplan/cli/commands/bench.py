@@ -281,7 +281,6 @@ def bench_metabox(
     from gcsplan.cli.output.console import remark
 
     with needs("gcsplan.research", "this benchmark"):
-        from gcsplan.research.bench.metabox import report as metabox_report
         from gcsplan.research.bench.metabox import run as metabox
 
     def tell(done: int, of: int) -> None:
@@ -292,11 +291,11 @@ def bench_metabox(
         out, python, instances=instances, runs=runs, seed=seed, evaluations=evaluations,
         algorithms=algorithm or None, jobs=jobs, done=tell,
     )  # fmt: skip
-    files = metabox_report.write(result, out)
+    files = metabox.write(result, out)
     if as_json:
-        emit(result | {"rows": metabox_report.rows(result), "files": [str(file) for file in files]})
+        emit(result | {"rows": metabox.rows(result), "files": [str(file) for file in files]})
     else:
-        put(metabox_report.report(result))
+        put(metabox.report(result))
 
 
 @bench_app.command("scale", short_help="Cost against size, and what a cluster would do.")

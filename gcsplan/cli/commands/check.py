@@ -205,7 +205,7 @@ def _named(argument: str) -> list[str]:
 
 
 def _is_mission(argument: str) -> bool:
-    from gcsplan.mission_file.samples import is_sample
+    from gcsplan.mission_file.source import is_sample
 
     return Path(argument).suffix.lower() in (".yaml", ".yml") or is_sample(argument)
 

@@ -160,7 +160,7 @@ def plan(
     from gcsplan.cli.output.progress import planning_display
     from gcsplan.cli.output.verdict_table import say_homes
     from gcsplan.export.outdir import settle_outputs
-    from gcsplan.mission_file.samples import file_of
+    from gcsplan.mission_file.source import file_of
     from gcsplan.units import units_of
 
     system = units_of(units)

@@ -2,6 +2,9 @@
 
 A text is UTF-8, or UTF-16 where its first bytes say so, as Windows programs save it. JSON has no key twice, no NaN and
 no number without bounds. Of an archive, KMZ or a zipped Shapefile, one member is unpacked, never more than is allowed.
+
+GeoJSON, ED-318 and openAIP's export share two statements: the coordinate system of their places, and whether a server
+sent all of the features. Both are looked for in every JSON document, whatever its zones are.
 """
 
 from __future__ import annotations
@@ -11,6 +14,7 @@ import io
 import json
 import lzma
 import math
+import re
 import struct
 import zipfile
 import zlib
@@ -18,7 +22,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from gcsplan.errors import InputError
+from gcsplan.errors import InputError, Mistake
+from gcsplan.mission_file.zones.attributes import is_number
 
 UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
@@ -103,3 +108,66 @@ def unpack(
             raise
         words = f"this is not a sound zip archive ({str(why)[:100]}); unpack it, and name the file in it"
         raise InputError(words, where=str(path)) from None
+
+
+_DEGREES = re.compile(r"(?:^|[^A-Z0-9])(?:CRS:?84H?|4326(?:\+\d+)?|4979)[^A-Z0-9]*$", re.IGNORECASE)
+"""How the names, codes and addresses of WGS 84 in degrees end."""
+
+
+def require_wgs84(whole: Any, path: Path, format_name: str = "GeoJSON") -> None:
+    """Raise InputError for another coordinate system than WGS 84, of the document or of any object in it.
+
+    RFC 7946 removed ``crs`` from the draft of 2008, but files have it, and the draft allowed it in every object.
+    """
+    for where, crs in _stated(whole):
+        if crs is not None and not _DEGREES.search(_name_of(crs)):
+            raise InputError(
+                f"{format_name} is in WGS84 degrees{' (RFC 7946)' if format_name == 'GeoJSON' else ''}, this file says "
+                f"{json.dumps(crs)[:100]}; convert it with ogr2ogr -t_srs EPSG:4326",
+                where=f"{path}: {where}crs",
+            )
+
+
+def _stated(whole: Any) -> Iterator[tuple[str, Any]]:
+    """Each ``crs`` with the place of the object that it stands in: the document, features, geometries."""
+    if not isinstance(whole, dict):
+        return
+    yield "", whole.get("crs")
+    features = whole.get("features")
+    for i, feature in enumerate(features if isinstance(features, list) else [whole]):
+        if not isinstance(feature, dict):
+            continue
+        where = "" if feature is whole else f"features[{i}]."
+        geometry = feature.get("geometry")
+        yield where, feature.get("crs")
+        if isinstance(geometry, dict):
+            yield f"{where}geometry.", geometry.get("crs")
+            inner = geometry.get("geometries")
+            for k, one in enumerate(inner if isinstance(inner, list) else []):
+                if isinstance(one, dict):
+                    yield f"{where}geometry.geometries[{k}].", one.get("crs")
+
+
+def _name_of(crs: Any) -> str:
+    """The name, the code or the address of a coordinate system."""
+    given = crs.get("properties", crs) if isinstance(crs, dict) else crs
+    if isinstance(given, dict):
+        given = next((given[key] for key in ("name", "code", "href") if key in given), given)
+    return given if isinstance(given, str) else json.dumps(given)
+
+
+def sent_in_part(whole: Any, path: Path) -> list[Mistake]:
+    """The problem of what a server sent in part, since the zones of the rest would be missing; empty if it is whole."""
+    if not isinstance(whole, dict):
+        return []
+    inner = whole.get("properties")
+    given = {**inner, **whole} if isinstance(inner, dict) else whole
+    matched: Any = given.get("numberMatched")
+    returned: Any = given.get("numberReturned")
+    if given.get("exceededTransferLimit") is True:
+        words = "the server sent a part of the features alone (exceededTransferLimit); ask for all, page by page"
+        return [Mistake(f"{path}: exceededTransferLimit", words)]
+    if is_number(matched) and is_number(returned) and matched > returned:
+        words = f"the server sent {returned} of {matched} features; ask for all, page by page"
+        return [Mistake(f"{path}: numberMatched", words)]
+    return []

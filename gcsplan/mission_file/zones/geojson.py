@@ -20,7 +20,7 @@ MOST_MISTAKES = 1000
 def read_geojson(path: Path, whole: Any) -> ZoneFile:
     """The zones of GeoJSON, as `load_json` returns it. Raises InputError if it is not GeoJSON.
 
-    The coordinate system, and whether a server sent all of it, are looked at before (`json_document`).
+    The coordinate system, and whether a server sent all of it, are looked at before (`contents`).
     """
     found = ZoneFile(path)
     if not isinstance(whole, dict):

@@ -15,7 +15,7 @@ from gcsplan.check.returns.verdict import WayHome
 from gcsplan.check.returns.words import verdict_words
 from gcsplan.check.verdict import Verdict
 from gcsplan.fleet.arrival import Slot
-from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.fleet.separation import Separation
 from gcsplan.mavlink.mission.parameter_list import Setting
 from gcsplan.notes.note import Note, Wording

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gcsplan.arrays import Floats
-from gcsplan.report.parts.html import esc, num
-from gcsplan.report.parts.map_labels import Mark, marks_html
+from gcsplan.report.parts.html import Mark, esc, marks_html, num
 from gcsplan.report.views.shaded_terrain import nice_step
 from gcsplan.units import Unit, duration
 

@@ -9,9 +9,8 @@ from itertools import combinations
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.fleet.motion.timed_path import TimedPath
-from gcsplan.report.parts.html import esc, least, num, stated, table, tools
-from gcsplan.report.parts.map_labels import Mark
+from gcsplan.fleet.motion.timing import TimedPath
+from gcsplan.report.parts.html import Mark, esc, least, num, stated, table, tools
 from gcsplan.report.parts.page_data import Page, only_some
 from gcsplan.report.views.chart import Axes, chart_html
 from gcsplan.report.views.plan import COLOURS

@@ -8,8 +8,7 @@ from collections.abc import Container, Sequence
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.report.parts.html import at_least, esc, least, num, place, stated
-from gcsplan.report.parts.map_labels import Mark, marks_html
+from gcsplan.report.parts.html import Mark, at_least, esc, least, marks_html, num, place, stated
 from gcsplan.report.parts.page_data import Page, Subject
 from gcsplan.report.parts.track_samples import TrackLine, distance_m
 from gcsplan.report.views.shaded_terrain import TINTS, MapExtent, Relief, nice_step, tints

@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from gcsplan.arrays import Floats
-from gcsplan.report.parts.html import greatest, least, num, place, stated
-from gcsplan.report.parts.map_labels import Mark
+from gcsplan.report.parts.html import Mark, greatest, least, num, place, stated
 from gcsplan.report.parts.page_data import Subject
 from gcsplan.report.parts.track_samples import Passage, TrackLine, level_amsl
 from gcsplan.report.views.chart import Axes, chart_html

@@ -15,7 +15,7 @@ from heapq import heapify, heappop, heappush
 import numpy as np
 
 from gcsplan.arrays import Floats, Indices
-from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.report.parts.html import at_least, esc, table
 from gcsplan.report.parts.page_data import Page
 from gcsplan.report.views.plan import COLOURS

@@ -274,7 +274,7 @@ _OPTIMISERS = (
     OptimiserEntry(
         name="lshade",
         summary="differential evolution with learnt settings and a shrinking population",
-        update="lshade:lshade",
+        update="classics:lshade",
         paper="Tanabe, Fukunaga 2014, CEC, 1658-1665",
         equations="algorithms 1, 2",
         population=100,

@@ -33,7 +33,7 @@ from gcsplan.mavlink.mission import commands as cmd
 from gcsplan.mavlink.mission.mission import TERRAIN
 from gcsplan.mavlink.mission.parameter_list import parameter_list
 from gcsplan.sim.outcome import RehearsalPart
-from gcsplan.sim.vehicle.sockets import TcpTransport
+from gcsplan.sim.vehicle.server import TcpTransport
 from gcsplan.vehicle import Autopilot
 from gcsplan.world.terrain.grid import SPACING_M, Block, PostHeights, TerrainGrid, known_parts
 from gcsplan.world.world import World

@@ -22,8 +22,7 @@ from gcsplan.app.output.files import outputs_of
 from gcsplan.app.plan import wings
 from gcsplan.app.plan.model import Plan
 from gcsplan.arrays import Floats
-from gcsplan.check.fixed_wing.climb_out import above_slant, over_m, slant_shortage
-from gcsplan.check.fixed_wing.glide import flared
+from gcsplan.check.fixed_wing.ends import above_slant, flared, over_m, slant_shortage
 from gcsplan.check.judge import judge
 from gcsplan.check.motion.circles import tracking_m
 from gcsplan.check.verdict import Verdict

@@ -11,7 +11,7 @@ import pytest
 
 from gcsplan.cli import main
 from gcsplan.cli.arguments import completion
-from gcsplan.mission_file import samples
+from gcsplan.mission_file.source import sample_names
 from gcsplan.planners import registry
 from gcsplan.vehicle import Autopilot
 
@@ -85,7 +85,7 @@ def test_files_that_begin_like_a_sample_are_completed_too(complete: Any, tmp_pat
     (tmp_path / "sam.yaml").write_text("")
     found = complete("plan sam")
     assert found[0] == "sam.yaml"
-    assert found[1:] == [f"sample:{name}" for name in samples.names()]
+    assert found[1:] == [f"sample:{name}" for name in sample_names()]
 
 
 def test_the_command_line_starts_without_what_completes_its_values() -> None:

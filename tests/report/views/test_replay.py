@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gcsplan.fleet.motion.timed_path import TimedPath
+from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.report.page import render_page
 from gcsplan.report.parts.page_data import Page
 from gcsplan.report.views.replay import FINE_M, MOST_PLACES, replay_data, replay_of, thin

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from gcsplan.arrays import Floats
+from gcsplan.research.optimisers.classics import SPREAD, learnt, positive_cauchy
 from gcsplan.research.optimisers.driver import minimise
 from gcsplan.research.optimisers.functions import FUNCTIONS
-from gcsplan.research.optimisers.lshade import SPREAD, learnt, positive_cauchy
 from tests.oracles import swarms
 
 

@@ -17,7 +17,8 @@ import numpy as np
 
 from gcsplan.errors import InputError, unknown_name
 from gcsplan.mavlink.build.order import Margins
-from gcsplan.mission_file import MissionFile, samples
+from gcsplan.mission_file import MissionFile
+from gcsplan.mission_file.source import SAMPLE_FOLDERS
 from gcsplan.planners.problem import Problem
 from gcsplan.research.bench.papers.printed import StraightFlight
 from gcsplan.research.swarm import SWARM_PLANNERS
@@ -117,7 +118,7 @@ def readings_of(paper: str) -> tuple[PaperReading, ...]:
     return READINGS.get(paper, ())
 
 
-MISSION_FOLDERS = (Path("missions", "papers"), *(folder / "papers" for folder in samples.SAMPLE_FOLDERS))
+MISSION_FOLDERS = (Path("missions", "papers"), *(folder / "papers" for folder in SAMPLE_FOLDERS))
 """Folders in which the mission files are searched: here, then those of the samples."""
 
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 from gcsplan.sim.vehicle.hub import Client
-from gcsplan.sim.vehicle.sockets import ServerTransport, TcpTransport, UdpTransport
+from gcsplan.sim.vehicle.server import ServerTransport, TcpTransport, UdpTransport
 
 HERE = ("127.0.0.1", 0)
 MOST_CONNECTIONS = 16

@@ -1,9 +1,12 @@
-"""One vehicle's plan, or the reason why there is none and what would help.
+"""The plan of each vehicle of a mission file, or the reason why there is none and what would help; by any executor.
 
 A change is reported as a help only if a whole mission was planned with it. It is tried with the limits and zones of the
 mission file, through the same steps as any plan: with the margins for the wire, the climb-out and glide of a fixed
 wing, and the verdict on the mission as stored, battery included. A value is reported to do only if `plan` would write
 its mission: arrival, hours and a required return count, too, but for what other vehicles of a fleet do.
+
+A worker of an executor reads the mission again from its content, once for all vehicles, and must find the same terrain
+and zones. Its results hold no terrain: the caller puts them into its own.
 """
 
 from __future__ import annotations
@@ -13,16 +16,22 @@ from dataclasses import replace
 
 from gcsplan.app.fleet.fleet import finished
 from gcsplan.app.fleet.may_fly import flyable
+from gcsplan.app.parallel.executor import Executor
+from gcsplan.app.parallel.sites import Site, site_of, widened, world_of
+from gcsplan.app.plan.left_out import LeavingOut
 from gcsplan.app.plan.model import Brief, VehiclePlan
 from gcsplan.app.plan.problem import in_degrees, make_problem
 from gcsplan.app.plan.vehicle import plan_vehicle
-from gcsplan.errors import NoMission
+from gcsplan.errors import GcsplanError, NoMission
 from gcsplan.mission_file import VehicleRequest
 from gcsplan.planners.problem import Problem, Progress, Refusal, Solution
 from gcsplan.planners.refusal.suggestions import with_cures
 from gcsplan.world.world import World
 
-__all__ = ["plan_or_explain"]
+__all__ = ["PIECE_S", "plan_or_explain", "planned_by"]
+
+PIECE_S = 0.6
+"""Seconds that planning a vehicle takes, about: the median of 60 over mountains with margins."""
 
 
 def plan_or_explain(
@@ -74,3 +83,61 @@ def _explained(
     problem = replace(problem, limits=vehicle.limits, checked=None)
     alone = "that is tried without the other vehicles" if len(brief.source.vehicles) > 1 else ""
     return with_cures(problem, bare, lambda changed: planned(changed)[1].solution, whole, alone)
+
+
+Asked = tuple[Site, Brief]
+"""What all vehicles of a mission share: its terrain and zones, and the packed brief."""
+
+Answer = tuple[VehiclePlan, int]
+"""A vehicle's packed plan, and the level of the terrain that it was made over."""
+
+
+def planned_by(
+    workers: Executor,
+    brief: Brief,
+    told: Callable[[str, int], None] | None = None,
+    leaving: LeavingOut | None = None,
+) -> list[VehiclePlan]:
+    """Every vehicle's own plan, in the file's order; ``told(vehicle, count)`` is called as each is done.
+
+    Raises what planning one after the other would raise: InputError, NoMission of the first vehicle that has none,
+    unless ``leaving`` may leave it out.
+    """
+    leaving = leaving or LeavingOut(allowed=False)
+    source = brief.source
+    asked = site_of(source), brief.packed()
+    names = [r.vehicle.name for r in source.vehicles]
+    answers: dict[int, Answer] = {}
+    refused: dict[int, GcsplanError] = {}
+    for number, answer in workers.each(answer_of, asked, names):
+        if isinstance(answer, GcsplanError):
+            refused[number] = answer
+        else:
+            answers[number] = answer
+        if told is not None:
+            told(names[number], len(answers) + len(refused))
+        fatal = [k for k, why in refused.items() if not (leaving.allowed and isinstance(why, NoMission))]
+        if fatal and all(k in answers or k in refused for k in range(min(fatal))):
+            raise refused[min(fatal)]
+    for number, why in sorted(refused.items()):
+        if isinstance(why, NoMission):
+            leaving.leave(names[number], why)
+    return [_restored(brief, *answers[k]) for k in sorted(answers)]
+
+
+def answer_of(asked: Asked, name: str) -> Answer | GcsplanError:
+    """Plan one vehicle, in whatever process; why there is no plan is returned, so that the caller can order it."""
+    try:
+        site, packed = asked
+        brief = packed.over(*site.read())
+        [request] = [r for r in brief.source.vehicles if r.vehicle.name == name]
+        plan = plan_or_explain(brief, request)
+    except GcsplanError as why:
+        return why
+    assert plan.brief is not None
+    return plan.packed(), plan.brief.source.level
+
+
+def _restored(brief: Brief, plan: VehiclePlan, level: int) -> VehiclePlan:
+    source = widened(brief.source, level)
+    return plan.restored(brief if source is brief.source else brief.over(source, world_of(source)))
