@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from gcsplan.app.batch import BatchOptions, record_of
-from gcsplan.app.fleet import workers as fleet_jobs
+from gcsplan.app.fleet import vehicle_plans as vehicle_plans
 from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.output.files import outputs_of
 from gcsplan.app.parallel.executor import Inline
@@ -114,13 +114,13 @@ def test_nothing_is_planned_if_all_are_left_out() -> None:
 
 def test_workers_leave_out_the_same_vehicles() -> None:
     source = load_mission(text=yaml.safe_dump(mission(WEAK, GOOD[0], SHUT, GOOD[1])))
-    brief = Brief(source, fleet_jobs.world_of(source), "optimal", "length", 1, {})
+    brief = Brief(source, vehicle_plans.world_of(source), "optimal", "length", 1, {})
     leaving = LeavingOut(allowed=True)
-    found = fleet_jobs.planned_by(Inline(), brief, None, leaving)
+    found = vehicle_plans.planned_by(Inline(), brief, None, leaving)
     assert [v.name for v in found] == ["uav1", "uav3"]
     assert [v.name for v in leaving.found] == ["uav5", "uav2"]
     with pytest.raises(NoMission, match="battery"):
-        fleet_jobs.planned_by(Inline(), brief)
+        vehicle_plans.planned_by(Inline(), brief)
 
 
 def test_a_batch_has_a_row_for_each_that_is_left_out(tmp_path: Path) -> None:
