@@ -22,10 +22,10 @@ CODE = ("gcsplan", "tests/support", "tests/oracles", "tests/campaigns", "sitl_te
 DOCUMENTS = ("README.md", "CHANGELOG.md", "changelog.d", "docs")
 
 TODO: tuple[str, ...] = (
-    "gcsplan/app",
+    "gcsplan/app/plan/wings.py",
     "gcsplan/bench",
     "gcsplan/check",
-    "gcsplan/cli",
+    "gcsplan/cli/commands/fit_energy.py",
     "gcsplan/dem",
     "gcsplan/export",
     "gcsplan/fleet",
@@ -90,7 +90,7 @@ RULES = (
         r"\bwhat (?:is|are|was|were)\b[^.:;,()|]{0,60}\s(?:is|are|was|were)\b",
         "name the thing: 'a stale file is refused', not 'what is stale is refused'",
     ),
-    rule(r"^Of\b", "begin with the noun: 'The limits of a leg', not 'Of a leg: the limits'"),
+    rule(r"(?-i:^Of\b)", "begin with the noun: 'The limits of a leg', not 'Of a leg: the limits'"),
     rule(r"\bnine in ten\b", "p90 (docs/glossary.md)"),
     rule(r"[\"“*]?\bhalf\b[\"”*]*(?=\s*[,|:]|\s+and p90)", "median (docs/glossary.md)", where=r"bench"),
 )
@@ -114,7 +114,7 @@ class Sentences:
 
 def masked(pattern: re.Pattern[str], text: str) -> str:
     """The text with all that ``pattern`` finds replaced by as many characters that are no words."""
-    return pattern.sub(lambda found: re.sub(r"\S", "_", found[0]), text)
+    return pattern.sub(lambda found: re.sub(r"\S", "~", found[0]), text)
 
 
 def tokens(source: str) -> list[tokenize.TokenInfo]:

@@ -121,7 +121,7 @@ class Verdict:
     paper_energy: bool = False
     extent: FlightExtent | None = None
 
-    def told_j(self, joules: float) -> float | None:
+    def reported_j(self, joules: float) -> float | None:
         """An energy of this flight for people and files: None unless the vehicle's energy was given."""
         return joules if self.energy_stated else None
 

@@ -86,7 +86,7 @@ def entry() -> NoReturn:
         main()
     except SystemExit as ended:
         code = ended.code
-    except KeyboardInterrupt:  # it came before the command began, or while another end was told
+    except KeyboardInterrupt:  # it came before the command began, or while another end was reported
         code = interrupted().exit_code
     if code in ENDED:
         _end_now(code)

@@ -153,7 +153,7 @@ def _facts(page: Page, s: Subject, units: Units) -> Iterator[tuple[str, str]]:
 def _battery(s: Subject) -> str:
     used, battery, mark = s.verdict.battery_used_percent, s.vehicle.energy, esc(s.verdict.energy_mark)
     if used is None:
-        return f"{energy(s.verdict.told_j(s.verdict.energy_j), 0, battery.battery_v)}{mark}; capacity not given"
+        return f"{energy(s.verdict.reported_j(s.verdict.energy_j), 0, battery.battery_v)}{mark}; capacity not given"
     return f"{num(used, 1, '%')} used{mark}; {num(100.0 * battery.reserve, 0, '%')} must be left"
 
 

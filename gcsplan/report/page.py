@@ -202,7 +202,7 @@ def _card(subject: Subject, index: int, page: Page) -> str:
     limit = f"limit {num(limits.max_climb_deg, 0, '°')}" if limits.max_climb_deg < 90 else "no limit"
     figures.append(("steepest", steepest(verdict.max_climb_deg), limit))
     battery = subject.vehicle.energy
-    used = energy(verdict.told_j(verdict.energy_j), 0, battery.battery_v) + esc(verdict.energy_mark)
+    used = energy(verdict.reported_j(verdict.energy_j), 0, battery.battery_v) + esc(verdict.energy_mark)
     figures.append(
         ("battery", num(verdict.battery_used_percent, 1, "%"),
          f"{used}, of {energy(battery.battery_j, 0, battery.battery_v)}; "

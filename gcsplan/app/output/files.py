@@ -163,9 +163,9 @@ def _vehicle(
         "length_m": verdict.length_m,
         "lower_bound_m": bound if length else None,
         "gap_percent": v.gap_percent,
-        "energy_j": verdict.told_j(verdict.path_energy_j),
+        "energy_j": verdict.reported_j(verdict.path_energy_j),
         "lower_bound_j": None if length else bound,
-        "flight_energy_j": verdict.told_j(verdict.energy_j),
+        "flight_energy_j": verdict.reported_j(verdict.energy_j),
         "energy_figures": verdict.energy_figures,
         "battery_used_percent": verdict.battery_used_percent,
         "min_agl_m": lowest.min_agl_m if lowest else None,
@@ -223,8 +223,8 @@ def item_rows(vehicle: str, verdict: Verdict, slot: Slot | None = None) -> list[
         rows.append(
             ItemRow(
                 vehicle, seq, name, lat, lon, amsl, legs[-1].agl_end_m, min(low) if low else None,
-                math.fsum(leg.length_m for leg in legs), steep, verdict.told_j(energy_j),
-                verdict.told_j(spent_j), until[seq],
+                math.fsum(leg.length_m for leg in legs), steep, verdict.reported_j(energy_j),
+                verdict.reported_j(spent_j), until[seq],
             )
         )  # fmt: skip
     return rows

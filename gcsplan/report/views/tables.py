@@ -49,7 +49,7 @@ def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
                 greatest(high.max_agl_m if high else None, 1, units.height),
                 f"{least(near.zone_clearance_m, 1, units.distance)} {esc(near.nearest_zone)}" if near else "–",
                 steepest(verdict.max_climb_deg),
-                energy(verdict.told_j(verdict.energy_j), 0, s.vehicle.energy.battery_v) + esc(verdict.energy_mark),
+                energy(verdict.reported_j(verdict.energy_j), 0, s.vehicle.energy.battery_v) + esc(verdict.energy_mark),
                 num(verdict.battery_used_percent, 1, "%"),
                 duration(s.arrive_s, page.time_decimals), home,
             )
@@ -78,7 +78,7 @@ def legs_table(subject: Subject, units: Units) -> str:
                 least(item.agl_end_m, 1, units.height),
                 "column" if item.column else least(item.min_agl_m, 1, units.height),
                 greatest(item.max_agl_m, 1, units.height), steepest(item.climb_deg), near,
-                energy(subject.verdict.told_j(item.energy_j), 1),
+                energy(subject.verdict.reported_j(item.energy_j), 1),
                 num(100.0 * used / battery, 1, "%") if battery else "–", duration(item.time_s),
                 duration(clock[flown - 1]),
             )
