@@ -7,7 +7,7 @@
     ├── CheckFailed    (RuntimeError)     4  a check or a rehearsal found a violation, or could not judge
     ├── VehicleRefused (ConnectionError)  5  the vehicle refused, or gcsplan refused to send
     ├── LinkError      (ConnectionError)  6  the link is dead, or the outcome is unknown
-    └── ReadBackDiffers (RuntimeError)    7  what is on board is not what was sent
+    └── ReadBackDiffers (RuntimeError)    7  the list on board differs from the list that was sent
 
 A message states what was required, what was given, where, and what to do about it.
 """

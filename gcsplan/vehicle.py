@@ -208,7 +208,7 @@ class Vehicle:
 
     @property
     def return_speed_m_s(self) -> float | None:
-        """The speed of the autopilot's own return, whatever the mission has commanded; None: that of the mission.
+        """The speed of the autopilot's own return, whatever the mission has commanded; None: the mission's own speed.
 
         A plane returns at the airspeed of AIRSPEED_CRUISE (navigation.cpp, `calc_airspeed_errors`).
         """

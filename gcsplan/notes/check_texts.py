@@ -121,7 +121,7 @@ CHECK_TEXTS = {
         "a return leads on to DO_LAND_START, by RTL_AUTOLAND (end with the landing itself): that is not judged"
     ),
     "runway_landing": (
-        "a runway landing's glide (NAV_LAND on ArduPlane) is not judged; that of a fixed wing with "
+        "a runway landing's glide (NAV_LAND on ArduPlane) is not judged; the glide of a fixed wing with "
         "{key:turn_radius_m} is"
     ),
     "landing_ground_unknown": "the ground at the landing place is unknown; give terrain that knows it",
@@ -152,7 +152,7 @@ CHECK_TEXTS = {
         "place, and elsewhere with a wind along the runway: land on a heading of {uphill_deg:.0f}°, uphill, or give "
         "another goal"
     ),
-    # -- why what is flown for a command is not known ----------------------------------------------------------------
+    # -- why the flight for a command is not known -------------------------------------------------------------------
     "arc_unknown": (
         "{name}: an arc is known only for ArduCopter, up to 359°, without terrain frame, with an item after it that is "
         "no spline, and not from a circle"
@@ -163,9 +163,9 @@ CHECK_TEXTS = {
     "changes_to_forward_flight": (
         "{name}: it changes to forward flight after its climb, in a direction that is not known"
     ),
-    "take_off_unknown": "{name}: it comes in the air, or its altitude cannot be told",
+    "take_off_unknown": "{name}: it comes in the air, or its altitude is not known",
     "way_point_unknown": (
-        "waypoint: the ground there, or under the leg to it, is not known, or its altitude cannot be told"
+        "waypoint: the ground there, or under the leg to it, is not known, or its altitude is not known"
     ),
     "waits_for_altitude": "{name}: it waits for an altitude that a balloon may bring",
     "flown_by_computer": "{name}: another computer flies from there on",
@@ -178,10 +178,10 @@ CHECK_TEXTS = {
     "breaks_off_landing": "{name}: it breaks a landing off",
     "motion_unknown": "{name}: its motion is not known",
     "command_unknown": "its motion is not known",
-    # -- corners and turns: where a vehicle begins them, and what of them is not judged --
+    # -- corners and turns: where a vehicle begins them, and which parts of them are not judged --
     "arcs_unread": (
         "the arcs of {radius_m:distance} that {vehicle} flies at its corners are not judged: {autopilot} begins a turn "
-        "by parameters that the mission does not hold; those of ArduPlane are"
+        "by parameters that the mission does not hold; the arcs of ArduPlane are judged"
     ),
     "arcs_too_banked": (
         "turns of {radius_m:distance} at {speed_m_s:speed} need a bank of {bank_deg:.0f}°, and ArduPlane's "
@@ -204,11 +204,11 @@ CHECK_TEXTS = {
     ),
     "arcs_too_long": (
         "arcs of {radius_m:distance} take {arcs_m:distance.0} of the leg to item {leg}, which is {leg_m:distance.0} "
-        "long: what is flown there is not judged; make the leg longer, or give a smaller {key:turn_radius_m}"
+        "long: the flight there is not judged; make the leg longer, or give a smaller {key:turn_radius_m}"
     ),
     "turn_too_early": (
         "the turn begins {begins_m:distance.0} before the end of the leg to item {leg}, which is {leg_m:distance.0} "
-        "long: what is flown there is not judged; make the leg longer, or give a smaller acceptance radius (param2)"
+        "long: the flight there is not judged; make the leg longer, or give a smaller acceptance radius (param2)"
     ),
     "turns_as_arcs": (
         "turns are judged as arcs of {radius_m:distance} that begin at the acceptance radius of their way point; that "

@@ -177,7 +177,7 @@ INPUT_TEXTS = {
     "size_of_zone": "{size_m:distance}",
     "line_of_file": "line {line}: {text}",
     # -- what is not used --
-    "zones_of_other_kinds": "not used, because their kinds are not among those of the mission ({kinds})",
+    "zones_of_other_kinds": "not used, because the mission uses other kinds alone ({kinds})",
     "zones_restrict_nothing": "not used, because they restrict nothing",
     "zones_authorised": "not used, because the mission says that it is authorised to enter them",
     "zones_out_of_hours": "not used, because they do not apply in the hours of the mission ({hours})",
@@ -237,8 +237,8 @@ INPUT_TEXTS = {
     ),
     "terrain_blocks_unused": "{count} {count:block|blocks} not used: {why}; the ground there is unknown",
     "checksum_wrong": "its checksum is wrong",
-    "format_of_other_version": "its format is version {version}, wanted {wanted}",
-    "spacing_differs": "its spacing is {spacing_m:distance}, that of most is {most_m:distance}",
+    "format_of_other_version": "its format is version {version}, not {wanted}",
+    "spacing_differs": "its spacing is {spacing_m:distance}, and most blocks have {most_m:distance}",
     "spacing_is_zero": "its spacing is 0",
     "block_lies_elsewhere": "it lies elsewhere than its corner says (older tools placed blocks otherwise)",
     "terrain_is_a_surface": (

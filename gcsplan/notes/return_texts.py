@@ -129,7 +129,7 @@ RETURN_TEXTS = {
     "nothing_to_join": "the mission holds neither {one} nor {other}: there is nothing that a return joins",
     "jump_decides_join": "it jumps: what a return joins depends on the jumps that are left",
     "join_unknown_on_path": "the return path holds it, and how it is joined there is not known",
-    "join_distance_unknown": "how near it is depends on its frame or its place, which cannot be told",
+    "join_distance_unknown": "how near it is depends on its frame or its place, which are not known",
     "join_leads_nowhere": "nothing follows it that a return could fly to",
     "join_without_item": "no item that moves the vehicle follows the start that a return joins",
     "join_not_way_point": "a return joins it, and only way points and landings with a place are judged",

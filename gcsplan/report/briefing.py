@@ -1,7 +1,7 @@
 """The briefing: one printed page with what a crew reads and signs; on the screen it is not shown.
 
 It holds nothing that the rest of the report does not hold. Names and messages are cut to a length, and lists to a
-number, so that it stays one page; what is left out is said.
+number, so that it stays one page; the page says how much it leaves out.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def _shown(page: Page) -> list[tuple[int, Subject]]:
 
 
 def _problems(page: Page) -> str:
-    """What is broken and what was not judged, the first of each."""
+    """The first broken limits, and the first parts that were not judged."""
     found = [f"{s.name}: {f.note.text(s.wording(page.units))}" for s in page.subjects for f in s.verdict.findings]
     found += [f"{name}: no mission, left out: {why}" for name, why in page.left_out]
     found += [in_units(text, page.units) for text in page.rehearsed.violations] if page.rehearsed is not None else []

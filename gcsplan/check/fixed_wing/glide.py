@@ -20,7 +20,7 @@ FLARE_S, FLARE_MOST_M, LAND_SINK_M_S = 2.0, 6.0, 0.25
 
 BEFORE_M, STEP_M = 200.0, 10.0
 DOWNHILL, DOWNHILL_M = 0.02, 2.0
-"""How far before its place the ground of a landing is looked at, and from which slope and height on it is told."""
+"""How far before a landing its ground is looked at, m; the slope and height from which that ground gets a note."""
 
 
 def glide(pilot: Aboard, seq: int, item: MissionItem) -> None:

@@ -75,7 +75,7 @@ WHY_LOST = {
     cmd.DO_SET_PARAMETER: "sets_parameter",
     cmd.DO_GO_AROUND: "breaks_off_landing",
 }
-"""The note on why what is flown for a command is not known, where that does not depend on the item's numbers."""
+"""Commands whose flight is never known, whatever the item's numbers, with the code of the note that says why."""
 
 
 def why_lost(item: MissionItem, mission: Mission) -> Note:

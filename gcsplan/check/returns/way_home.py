@@ -57,7 +57,7 @@ NOISE_M = 1e-3
 """Subtracted from the highest altitude, so that it does not touch what is above it, m."""
 
 MOST_UNKNOWN = 5
-"""Stretches from which a return that joins the mission is not known, that are told."""
+"""Most stretches that are listed, from which a return that joins the mission is not known."""
 
 
 def way_home(
@@ -74,7 +74,7 @@ def way_home(
 
     ``rtl_rel_home_m`` is the vehicle's return altitude above home; None: the autopilot's default. ``rally``: propose
     rally points if no altitude is clear from every point. ``route``: straight home, or to where the return joins the
-    mission (`joins`); None: not said, which counts as straight home. Never raises for a mission that is merely unsafe.
+    mission (`joins`); None: not given, which counts as straight home. Never raises for a mission that is merely unsafe.
     """
     mission, rule = verdict.mission, RETURN_RULES[vehicle.autopilot]
     stored = replace(mission, items=tuple(profile_of(mission.autopilot).stored(item) for item in mission.items))

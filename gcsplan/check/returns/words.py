@@ -20,7 +20,7 @@ LABELS = {
 
 
 class ReturnRow(NamedTuple):
-    """One row on a way home: what it is about, a key of `LABELS`, and what is said; ``number`` of several."""
+    """One row on a way home: its subject, a key of `LABELS`, and its words; ``number``: which of several rows."""
 
     about: str
     note: Note

@@ -43,9 +43,9 @@ class Subject:
     """One vehicle, or one checked file: its verdict, and other data on it.
 
     ``slot`` is its part of the time table, None for a checked file, and so is ``motion``, the whole flight over time.
-    ``flown`` is what it flew in a rehearsal, from that track alone. ``leaves``: it is gone where its motion ends.
+    ``flown`` is its flight in a rehearsal, from that track alone. ``leaves``: it is gone where its motion ends.
     ``home`` is the way home from every point, if it was judged. ``upload`` holds the keys of ``upload.json``, None if
-    nothing was sent, ``warnings`` what was said of it. ``settings``: the parameters that its mission was judged with.
+    nothing was sent, ``warnings`` the upload's. ``settings``: the parameters that its mission was judged with.
     ``typed``: the options that the reader types, by their keys in a mission file; empty if he has one.
     """
 

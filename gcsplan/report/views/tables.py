@@ -98,7 +98,7 @@ def limits_table(subject: Subject, line: TrackLine | None, units: Units) -> str:
         word = "broken" if broken else "close" if close else "kept" if left is not None else "–"
         rows.append((name, needed, reached, least(left, _decimals(unit), unit), word, where))
         marks.append("bad" if broken else "close" if close else "")
-    head = ("limit|", "asked", "reached", "left", "|", "where|")
+    head = ("limit|", "required", "reached", "left", "|", "where|")
     return table(f"Limits of {esc(subject.name)}, and how near each came to binding", head, rows, marks=marks)
 
 

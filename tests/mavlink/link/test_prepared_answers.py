@@ -1,4 +1,4 @@
-"""Prompt answers: the same bytes as the slow way, for the same requests, and the machine is told of all of them."""
+"""Prompt answers: the same bytes as the slow way, for the same requests, and the machine gets all of them."""
 
 from __future__ import annotations
 
