@@ -28,7 +28,6 @@ TODO: tuple[str, ...] = (
     "gcsplan/dem",
     "gcsplan/fleet",
     "gcsplan/logs",
-    "gcsplan/mavlink",
     "gcsplan/mission_file",
     "gcsplan/planners",
     "gcsplan/research",

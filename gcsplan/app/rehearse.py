@@ -125,8 +125,8 @@ def _outside(planned: Plan, parameters: Mapping[str, Mapping[str, float]], resul
     vehicles, notes = [], list(result.notes)
     for v, flown in zip(planned.vehicles, result.vehicles, strict=True):
         found = off(settings_of_plan(v, None), parameters.get(v.name, {}), v.mission.autopilot)
-        notes += [o.note().of(vehicle=v.name) for o in found if o.setting.matters in ("time", "told")]
-        others = tuple(o.note() for o in found if o.setting.matters not in ("time", "told"))
+        notes += [o.note().of(vehicle=v.name) for o in found if o.setting.matters in ("time", "report")]
+        others = tuple(o.note() for o in found if o.setting.matters not in ("time", "report"))
         vehicles.append(replace(flown, not_flown=(*flown.not_flown, *others)) if others else flown)
     return replace(result, vehicles=tuple(vehicles), notes=tuple(notes))
 

@@ -185,7 +185,7 @@ def version_words(flight_sw_version: int | None) -> str:
 
 
 def version_of(flight_sw_version: int | None) -> tuple[int, int] | None:
-    """The version (major, minor) in AUTOPILOT_VERSION's number; None if it is not told."""
+    """The version (major, minor) in AUTOPILOT_VERSION's number; None if the vehicle does not report it."""
     if not flight_sw_version:
         return None
     major, minor, _, _ = flight_sw_version.to_bytes(4, "big")

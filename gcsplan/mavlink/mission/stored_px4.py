@@ -129,8 +129,8 @@ def refused_by_px4(item: MissionItem) -> str:
         )
     other = LOCATED if frame == NO_POSITION else PLACELESS
     if item.command in other:
-        wanted = "frame 2 (without a place)" if frame != NO_POSITION else "a frame with a place (0 or 3)"
-        return f"PX4 takes command {item.command} in {wanted} alone, and it is in frame {item.frame}"
+        frames = "frame 2 (without a place)" if frame != NO_POSITION else "a frame with a place (0 or 3)"
+        return f"PX4 takes command {item.command} in {frames} alone, and it is in frame {item.frame}"
     return f"PX4 does not take command {item.command} in a mission"
 
 
