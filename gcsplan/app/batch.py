@@ -282,7 +282,7 @@ def record_of(options: BatchOptions, item: tuple[str, str]) -> Record:
     with reading() as read:
         try:
             planned = plan(file, **asdict(options.plan))
-            planned, homes = flyable(planned, allow_unjudged=options.allow_unjudged, way_home=options.report)
+            planned, homes = flyable(planned, allow_unjudged=options.allow_unjudged, home=options.report)
             files = outputs.outputs_of(planned, homes)
             if options.report:
                 files["report.html"] = outputs.report_of(planned, (), homes)

@@ -83,7 +83,7 @@ def _text(file: Path, where: str) -> str:
     try:
         if file.is_dir():
             raise InputError("this is a folder; give a mission file (.yaml)", where=where)
-        with file.open("rb") as opened:  # the size is not asked for, since a pipe or a device has none
+        with file.open("rb") as opened:  # this does not read the file's size, since a pipe or a device has none
             data = opened.read(MAX_YAML_BYTES + 1)
         if len(data) > MAX_YAML_BYTES:
             raise InputError(f"a mission file has at most {MAX_YAML_BYTES} bytes, this one has more", where=where)

@@ -111,7 +111,7 @@ def prepared(
 ) -> Flights:
     """Upload, and make the tracks of what the vehicles stored. Raises as `rehearse`."""
     if runs < 1:
-        raise InputError(f"at least one run is wanted, given {runs}")
+        raise InputError(f"give at least one run, not {runs}")
     stored = on_board(parts)
     tracks = [track_of(part, mission, world, airspeed_m_s) for part, mission in zip(parts, stored, strict=True)]
     return Flights(parts, terms, tracks, weather or Weather(), seed)

@@ -98,13 +98,13 @@ def writes_path_back(request: VehicleRequest, altitude_frame: str) -> bool:
     return copter and request.end != "none" and altitude_frame != "terrain"
 
 
-def judged(plan: Plan, *, way_home: bool, option: bool = False) -> dict[str, WayHome]:
-    """The ways home of a plan if ``way_home`` or the mission requires them, else none.
+def judged(plan: Plan, *, home: bool, option: bool = False) -> dict[str, WayHome]:
+    """The ways home of a plan if ``home`` or the mission requires them, else none.
 
     ``option``: ``--require-way-home``. Raises CheckFailed if safe ones are required and one does not pass.
     """
     required = is_required(plan.source, option)
-    homes = homes_of(plan) if way_home or required else {}
+    homes = homes_of(plan) if home or required else {}
     require(homes, required=required)
     return homes
 

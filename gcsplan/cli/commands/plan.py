@@ -191,10 +191,7 @@ def plan(
                 progress=progress, gate_utc=depart, jobs=jobs, cluster=cluster, leave_out=leave_out or None,
             )  # fmt: skip
         planned, homes = flyable(
-            planned,
-            allow_unjudged=allow_unjudged,
-            way_home=report or way_home or rally,
-            require_way_home=require_way_home,
+            planned, allow_unjudged=allow_unjudged, home=report or way_home or rally, require_way_home=require_way_home
         )
         orders: list[UploadJob] = []
         if upload or fence or fence_infinite:

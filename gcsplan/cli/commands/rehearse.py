@@ -128,10 +128,7 @@ def rehearse(
     with planning_display(names, source.planner.objective) as progress:
         planned = pipeline.plan(source, planner=planner, progress=progress, jobs=jobs, cluster=cluster)
     planned, homes = flyable(
-        planned,
-        allow_unjudged=allow_unjudged,
-        way_home=way_home or report is not None,
-        require_way_home=require_way_home,
+        planned, allow_unjudged=allow_unjudged, home=way_home or report is not None, require_way_home=require_way_home
     )
     if in_sitl:
         with talking(names):

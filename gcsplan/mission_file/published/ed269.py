@@ -60,7 +60,7 @@ def _volumes_of(feature: Any) -> bool:
 
 
 def read_ed269(path: Path, whole: Any, policy: Policy) -> ZoneFile:
-    """The zones of an ED-269 document; what is wrong is in their problems and faults."""
+    """The zones of an ED-269 document; mistakes are in their problems and faults."""
     key, features = _list_of(whole)
     file = AirspaceFile(path, policy, RESTRICTIONS, great_circles=True)
     if isinstance(whole, dict) and key == "features" and whole.get("UASZoneList"):

@@ -257,7 +257,7 @@ def cure(text: str, line: int, begun: int | None) -> str:
 
 
 def missing_space(text: str) -> str:
-    """The cure for text such as ``sysid:1`` where a key and its value are wanted, or an empty text."""
+    """The cure for text such as ``sysid:1`` in place of a key and its value, or an empty text."""
     match = _TIGHT.fullmatch(text)
     return f"a space is missing after the colon: `{match[2]}: {_short(match[3].strip())}`" if match else ""
 

@@ -1,6 +1,6 @@
-"""What a JSON document says of itself: the coordinate system of its places, and whether a server sent all of it.
+"""The members of a JSON document on itself: the coordinate system of its places, and whether a server sent all of it.
 
-GeoJSON, ED-318 and openAIP's export share these members, so they are asked of every document, whatever its zones are.
+GeoJSON, ED-318 and openAIP's export share these members, so they are read in every document, whatever its zones are.
 """
 
 from __future__ import annotations

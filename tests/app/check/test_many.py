@@ -128,7 +128,7 @@ vehicles:
     found = []
     for workers in (Inline(), Scattered()):
         archive = Archive.in_mission(source, some, NO_RETURNS, Shown("row"))
-        assert archive.asked.returns.required
+        assert archive.request.returns.required
         archive.read(workers)
         found.append([told_without_error(t) for t in archive.judged(workers)])
         assert archive.sources == (batch.inputs, batch.notes)
@@ -184,7 +184,7 @@ def test_files_too_far_apart_for_one_plane_have_a_world_each(
     far = [f for f, case in corpus.write(tmp_path, {"qgc": corpus.WITH_HOME["qgc"]}).items() if case.name == "outside"]
     both = WorldOptions({"dem": [*options.terrain["dem"], dem], "vertical_datum": "EGM96"}, (), corpus.OPTIONS)  # type: ignore[misc]
     told, archive = results(both, [*near, *far, *near], Scattered())
-    assert archive.asked.extent is None
+    assert archive.request.extent is None
     assert [t.code for t in told] == [0, 4, 0]
     assert set(told[1].kinds) == {"coverage"}
     assert archive.sources[0]["vertical_datum"] == "EGM96"
@@ -199,7 +199,7 @@ def test_too_many_files_are_refused(options: WorldOptions, monkeypatch: pytest.M
 def test_other_terrain_at_a_worker_is_an_error(options: WorldOptions, files: list[str]) -> None:
     archive = Archive.with_options(options, None, files[:2], NO_RETURNS, Shown())
     archive.read(Inline())
-    archive.asked = module.replace(archive.asked, inputs={"dem_sha256": "another"})
+    archive.request = module.replace(archive.request, inputs={"dem_sha256": "another"})
     with pytest.raises(InputError, match=r"a worker reads other terrain or zones .*dem_sha256"):
         list(archive.judged(Inline()))
 
