@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 TOP = Path(__file__).resolve().parent.parent
-CODE = ("gcsplan", "tests/support", "tests/oracles", "tests/campaigns", "sitl_tests", "noxfile.py")
+CODE = ("gcsplan", "tests/support", "tests/oracles", "tests/campaigns", "sitl_tests", "noxfile.py", "docs")
 DOCUMENTS = ("README.md", "CHANGELOG.md", "changelog.d", "docs")
 
 TODO: tuple[str, ...] = (
