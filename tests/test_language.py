@@ -40,6 +40,8 @@ TODO: tuple[str, ...] = (
     "CHANGELOG.md",
     "changelog.d",
     "docs/benchmarks.md",
+    "docs/extending.md",
+    "docs/glossary.md",
     "docs/planner.md",
     "docs/planner-measurements.md",
     "docs/research",
