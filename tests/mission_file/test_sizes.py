@@ -14,7 +14,7 @@ from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.zones import draft as zone_draft
 from gcsplan.mission_file.zones.draft import MOST_ZONE_CORNERS
 from gcsplan.world.geometry.zones import Polygon
-from gcsplan.world.kernels.zone_arrays import MOST_OF_A_SECTION, lattice_over
+from gcsplan.world.kernels.zone_arrays import MOST_LISTED, lattice_over
 from tests.campaigns import large_inputs, sizes
 
 
@@ -137,7 +137,7 @@ def test_what_is_no_zone_is_counted_too(name: str, text: str, words: str, within
 def test_zones_that_all_lie_over_each_other_take_little_memory() -> None:
     box = np.array([[-6e4, -6e4, 6e4, 6e4]]) + np.random.default_rng(1).uniform(-1e4, 1e4, (20_000, 1))
     lattice, bucket, near = lattice_over(box)
-    assert len(near) <= MOST_OF_A_SECTION  # 300 million before
+    assert len(near) <= MOST_LISTED  # 300 million before
     assert bucket[-1] == len(near)
     at = ((box[7, :2] - lattice[:2]) * lattice[2]).astype(int)
     square = int(at[1] * lattice[3] + at[0])

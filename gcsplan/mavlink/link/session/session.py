@@ -256,7 +256,7 @@ def upload_items(
 
 def _require_list(mission_type: int) -> None:
     if mission_type not in (FENCE, RALLY):
-        raise InputError(f"mission type must be 1 (fence) or 2 (rally points), given {mission_type}")
+        raise InputError(f"mission type {mission_type}: give 1 (fence) or 2 (rally points)")
 
 
 def download_items(
