@@ -227,7 +227,7 @@ Part = Quantity | Symbol | Reach | Seconds | Joules
 
 
 class Readable(Protocol):
-    """What makes its own sentence, such as a note."""
+    """A datum that makes its own sentence, such as a note."""
 
     def in_units(self, units: Units) -> str:
         """The sentence with its quantities in ``units``."""

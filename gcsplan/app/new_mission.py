@@ -31,7 +31,7 @@ OPTIONS = {
 
 @dataclass(frozen=True)
 class Seen:
-    """What a vehicle tells: its place as text (None if it reports none), its autopilot and its settings."""
+    """The reports of a vehicle: its place as text (None if it reports none), its autopilot and its settings."""
 
     url: str
     autopilot: Autopilot
@@ -46,7 +46,7 @@ class Seen:
 
 
 def seen_at(url: str, sysid: int, autopilot: Autopilot | None) -> Seen:
-    """What the vehicle at ``url`` tells; nothing is written to it.
+    """The reports of the vehicle at ``url``; nothing is written to it.
 
     ``autopilot`` is what the user expects. Raises LinkError if nobody answers, VehicleRefused for another autopilot,
     or for one that gcsplan does not know where none is expected.

@@ -132,7 +132,7 @@ class Verdict:
 
     @property
     def energy_mark(self) -> str:
-        """What stands behind an energy or a part of the battery for people."""
+        """The mark behind an energy, or behind a part of the battery, in outputs for people."""
         return PAPER_MARK if self.paper_energy else ""
 
     @property

@@ -39,7 +39,7 @@ if _hears:
 
 NO_MEMORY = "not enough memory for this: give a smaller area, coarser terrain, fewer zones or items"
 NO_THREAD = "can't start new thread"
-"""What Python says, as a RuntimeError, where there is no memory for the stack of a thread."""
+"""The words of Python's RuntimeError where there is no memory for the stack of a thread."""
 
 
 def command_of(called: str) -> Any:

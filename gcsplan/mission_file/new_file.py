@@ -49,7 +49,7 @@ _ZONES = """
 
 @dataclass(frozen=True)
 class Draft:
-    """What a new mission is made of; places and files as text, as they are to stand in the file.
+    """The parts of a new mission; places and files are text, as they will stand in the file.
 
     ``dem`` are rasters, relative to the mission file; without them the ground is flat at ``flat_m`` above sea level.
     ``rtl_rel_home_m`` (m above home) and ``lean_deg`` are a vehicle's own settings, if they were read.

@@ -89,7 +89,7 @@ def make_place(
 
 
 def place_notes(point: Degrees, where: str) -> list[Note]:
-    """What a user has to know about how a place was read; ``where`` is its key behind the name of the file."""
+    """Notes for the user on how a place was read; ``where`` is its key behind the name of the file."""
     return [point.note.of(place=where.split(": ", 1)[-1])] if point.note else []
 
 

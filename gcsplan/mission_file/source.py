@@ -152,7 +152,7 @@ MEMBERS_BY_KIND = (("fileType", VEHICLES), ("features", ZONES), ("geometry", ZON
 
 
 def what_else(file: Path, raw: object = None) -> str:
-    """What ``file`` is, and what takes it; empty if it may be a mission file.
+    """The kind of ``file``, and the command that takes it; empty if it may be a mission file.
 
     ``raw`` is its content if that could be read as YAML, whose kind counts before the name.
     """

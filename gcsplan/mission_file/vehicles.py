@@ -219,7 +219,7 @@ def _check_wing(keys: VehicleKeys, limits: Limits | None, where: str, problems: 
 
 
 def _climb_out(keys: VehicleKeys, limits: Limits | None, where: str, problems: list[Mistake]) -> ClimbOut | None:
-    """How a fixed wing climbs out, if the file says so; it must not be less steep than its climb-out is judged."""
+    """A fixed wing's climb-out, if the file states one; it must not be less steep than its climb-out is judged."""
     rate, speed = keys.climb_out_m_s, keys.climb_out_speed_m_s
     if rate is None:
         if speed is not None:
@@ -432,7 +432,7 @@ def make_energy(keys: VehicleKeys, where: str, problems: list[Mistake], notes: l
 
 
 def _unsaid(given: EnergyKeys) -> list[str]:
-    """What counts as in the paper, because it is not given."""
+    """The numbers that count as in the paper, because they are not given."""
     return [key for key in ("vertical_j_per_m", "horizontal_j_per_m") if key not in given.model_fields_set]
 
 

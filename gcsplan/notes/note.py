@@ -54,7 +54,7 @@ BEFORE = ("file", "place", "vehicle")
 
 @dataclass(frozen=True, slots=True)
 class Wording:
-    """How a reader is spoken to: the units, and the option for each key of the mission file that he typed as one.
+    """The wording for a reader: the units, and the option for each key of the mission file that he typed as one.
 
     ``units``: None writes SI as files have it, with seconds and joules.
     """

@@ -44,7 +44,7 @@ MOST_LANES = 240
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Flights:
-    """What all runs of a rehearsal share: the vehicles' parts, the tracks that they fly, and the weather."""
+    """The data that all runs of a rehearsal share: the vehicles' parts, the tracks that they fly, and the weather."""
 
     parts: Sequence[RehearsalPart]
     terms: Terms
@@ -146,7 +146,7 @@ def flown(flights: Flights, world: World, block: RunBlock) -> Tally:
 
 
 def _spent_j(flights: Flights, flight: FlownLanes, lane: int) -> float:
-    """What a lane's flight took, J: in still air that of its track, else of the air that it flew through."""
+    """The energy of a lane's flight, J: of its track in still air, else of its way through the air."""
     k = lane % len(flights.parts)
     vehicle = flights.parts[k].vehicle
     if flights.weather.calm:

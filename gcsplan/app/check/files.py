@@ -35,7 +35,7 @@ from gcsplan.vehicle import Autopilot
 
 @dataclass(frozen=True)
 class Batch:
-    """Several files: those that were judged, and the errors of the others.
+    """Several files: the ones that were judged, and the errors of the others.
 
     ``inputs`` describes the world; ``typed``: as in `worlds.Checked`.
     """

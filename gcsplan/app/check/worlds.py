@@ -75,7 +75,7 @@ class Checked:
     typed: Mapping[str, str] = field(default_factory=dict)
 
     def wording(self, units: Units | None = None) -> Wording:
-        """How the reader is spoken to, in ``units``, or in SI as files have it."""
+        """The wording for the reader, in ``units``, or in SI as files have it."""
         return Wording(units, self.typed)
 
 

@@ -22,7 +22,7 @@ PIECE_S = 0.6
 
 
 SiteAndBrief = tuple[Site, Brief]
-"""What all vehicles of a mission share: its terrain and zones, and the packed brief."""
+"""The data that all vehicles of a mission share: its terrain and zones, and the packed brief."""
 
 Answer = tuple[VehiclePlan, int]
 """A vehicle's packed plan, and the level of the terrain that it was made over."""

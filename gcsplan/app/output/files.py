@@ -249,7 +249,7 @@ def _track(v: VehiclePlan, geoid: GeoidGrid | None, slot: Slot | None, returns: 
 
 
 def _described(verdict: Verdict, home: WayHome | None) -> str:
-    """What a viewer says of a track: the verdict, and how low and how high above ground it is."""
+    """The description of a track in a viewer: the verdict, and how low and how high above ground it is."""
     lowest, highest = verdict.lowest, verdict.highest
     words = [str(verdict_words(verdict.safe, home))]
     if lowest is not None:

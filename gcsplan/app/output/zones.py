@@ -1,4 +1,4 @@
-"""What was understood of each zone of a mission file or of zone files, before anything is planned."""
+"""The list of zones of a mission file or of zone files, as they were read, before anything is planned."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ class LeftOut:
     message: str
 
     def as_dict(self) -> dict[str, str]:
-        """What ``summary.json`` says of it."""
+        """The vehicle's entry in ``summary.json``."""
         return {"name": self.name, "reason": self.reason, "message": self.message}
 
 

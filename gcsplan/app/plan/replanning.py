@@ -36,7 +36,7 @@ __all__ = ["Attempts", "larger", "on_path", "replanned", "same_ends", "with_boun
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Attempts:
-    """How one kind of aircraft is planned until its mission passes.
+    """The attempts to plan one kind of aircraft until its mission passes.
 
     ``most``: plans in all. ``margins``: of the first plan. ``corner_m``: see `larger`. ``fly`` makes a path of a
     problem, and the mission with its verdict, which may break limits. It raises NoMission where there is no path.

@@ -64,7 +64,7 @@ def plan_vehicle(
 
 
 def _copter_attempts(brief: Brief, request: VehicleRequest, limited: VehicleRequest, world: World) -> Attempts:
-    """How an aircraft that can stand still is planned; ``limited`` and ``world`` are those of the search."""
+    """The attempts to plan an aircraft that can stand still; the search keeps ``limited``'s limits, over ``world``."""
     vehicle = request.vehicle
 
     def fly(problem: Problem) -> VehiclePlan:

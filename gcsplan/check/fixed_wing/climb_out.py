@@ -278,7 +278,7 @@ def bare(air: Airspace) -> Airspace:
 
 
 def beside_strip(air: Airspace) -> Note | None:
-    """What a refused climb-out or glide has to do with obstacles, and what to do; None over bare ground."""
+    """A note on obstacles for a refused climb-out or glide, with a cure; None over bare ground."""
     return None if air.surface.top_m is air.surface.high_m else Note("obstacles_beside_strip")
 
 

@@ -1,4 +1,4 @@
-"""Commands that are no places: those that move nothing, those that set speeds, and those that are flown differently.
+"""Commands that are no places: some move nothing, some set speeds, and some are flown differently.
 
 The whole table, by command, autopilot and param, is in docs/safety.md. `Pace` holds the speeds of the flight, as a
 mission's speed changes set them.

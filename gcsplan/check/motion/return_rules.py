@@ -48,7 +48,7 @@ Metres = TypeVar("Metres", float, Floats)
 
 
 class RallyAltitude(Enum):
-    """What the altitude of a rally point means for a return to it."""
+    """The meaning of a rally point's altitude for a return to it."""
 
     GROUND = "the point must lie on the ground, and the return altitude counts from it"
     RAISES = "the return is no lower than the point's altitude"
@@ -57,7 +57,7 @@ class RallyAltitude(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ReturnRule:
-    """How one autopilot returns; all numbers are the autopilot's defaults.
+    """The return of one autopilot; all numbers are the autopilot's defaults.
 
     ``parameter``: its name for the return altitude, which counts from home. ``climbs_first``: it climbs on the spot,
     never descends before it is home, and then descends vertically; else it turns, changes its altitude on the way, and

@@ -259,7 +259,7 @@ class _Judge:
         )  # fmt: skip
 
     def _why(self, parts: TraceParts, grade: int) -> tuple[Note, str]:
-        """What the returns from ``parts`` do, worst first; the first zone's name."""
+        """The faults of the returns from ``parts``, worst first; the first zone's name."""
         near = candidates(self.trace, self.joins, self.vehicle, parts)
         worst: dict[tuple[str, int], tuple[Violation, int]] = {}
         for k, join in enumerate(self.joins):
@@ -301,7 +301,7 @@ WHAT = {
     "climb": "way_climbs_too_steeply",
     "descent": "way_descends_too_steeply",
 }
-"""What a return does that breaks a limit, by the kind of the violation."""
+"""The note on a return that breaks a limit, by the kind of the violation."""
 
 
 def _does(kind: str, zone: str, grade: int) -> Note:

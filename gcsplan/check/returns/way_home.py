@@ -169,7 +169,7 @@ def _along_mission(
 
 
 def _but_the_return(flight: Flight) -> list[Note]:
-    """What was not judged of a flight, without the return that ArduPlane flies by itself: that is judged here."""
+    """Notes on the parts of a flight that were not judged, but for ArduPlane's own return, which is judged here."""
     return [note for note in flight.not_judged if note.code != "returns_by_itself"]
 
 
@@ -258,7 +258,7 @@ def _landing_sequence(mission: Mission) -> list[Note]:
 
 
 def _warnings(refinement: Refinement, vehicle: Vehicle, ground: float, lowest: float | None) -> list[Note]:
-    """What the user must know of the altitudes that were found."""
+    """Notes for the user on the altitudes that were found."""
     notes = []
     most_amsl = vehicle.limits.max_amsl_m
     if most_amsl is not None and lowest is not None and ground + lowest > most_amsl - vehicle.limits.altitude_error_m:

@@ -23,7 +23,7 @@ MISBEHAVIOURS = (
 
 
 class UnitsChoice(StrEnum):
-    """What ``--units`` may be."""
+    """The values of ``--units``."""
 
     METRIC = METRIC.name
     IMPERIAL = IMPERIAL.name

@@ -1,4 +1,4 @@
-"""How a command ends: one document on standard output, one message on standard error, an exit code."""
+"""The end of a command: one document on standard output, one message on standard error, an exit code."""
 
 from __future__ import annotations
 

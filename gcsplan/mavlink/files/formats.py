@@ -63,7 +63,7 @@ def read_mission_file(
 
 
 def _instead(file: Path) -> str:
-    """What a file of another kind, by its name, is for."""
+    """The use of a file of another kind, by its name."""
     name, end = shlex.quote(str(file)), file.suffix.lower()
     if end in MISSION_FILES:
         return f"; a mission file comes first (gcsplan check {name} FILE), and gcsplan plan {name} makes such a file"

@@ -153,7 +153,7 @@ class Link:
 
     @property
     def note(self) -> Note | None:
-        """What a user should know of how the link was opened, if anything."""
+        """A note for the user on how the link was opened; None if there is nothing to note."""
         return self.transport.note if isinstance(self.transport, Udp) else None
 
     @property

@@ -98,7 +98,7 @@ class PromptAnswers:
 
 
 def _shape(request: bytes) -> bytes:
-    """Return a request's bytes without those that vary: sequence number (4), seq (10 and 11), checksum (last two)."""
+    """Return a request's bytes, but for the varying ones: sequence number (4), seq (10 and 11), checksum (last two)."""
     return request[:4] + request[5:10] + request[12:-2]
 
 

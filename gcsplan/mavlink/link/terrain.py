@@ -62,7 +62,7 @@ class Served:
 
     @property
     def notes(self) -> list[Note]:
-        """What a user should know."""
+        """Notes for the user."""
         out = [Note("terrain_not_loaded", why=why) for why in self.problems]
         if self.unknown:
             parts = sum(self.unknown.values())

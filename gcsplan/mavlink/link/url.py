@@ -81,7 +81,7 @@ class Endpoint:
 
     @property
     def far_end(self) -> tuple[str, bool, str, int]:
-        """What the link reaches, however its URL is written: all names of this machine are one place."""
+        """The far end of the link, however its URL is written: all names of this machine are one place."""
         here = self.listens or self.host.lower() in _HERE
         return self.kind, self.listens, self.device or ("" if here else self.host.lower()), self.port
 

@@ -50,7 +50,7 @@ ALTITUDE_LIMIT_M = 83_000.0
 
 @dataclass(frozen=True, slots=True)
 class AutopilotProfile:
-    """What one autopilot accepts and stores.
+    """The items that one autopilot accepts, and how it stores them.
 
     ``max_items`` counts wire items, including home where home is one. ``stored(item)`` returns the item that reads
     back; ``refuses(item)`` returns why the autopilot refuses it, empty if it accepts it. ``atomic``: the new mission

@@ -122,7 +122,7 @@ class Off:
     raw: float
 
     def note(self) -> Note:
-        """What it is, what was assumed and why, and what to set."""
+        """The value on board, the assumed value and why it is assumed, and the value to set."""
         expected, rule = self.name.value(self.setting.value), self.setting.rule
         least = "" if rule == "equal" else f"{rule} "
         assumed = f"{least}{expected:.6g}" + "".join(f" or {self.name.value(amount):g}" for amount in self.setting.also)

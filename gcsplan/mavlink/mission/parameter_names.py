@@ -18,7 +18,7 @@ from gcsplan.vehicle import Autopilot
 __all__ = ["PARAMETERS", "Name", "OnBoard", "Parameter", "ParameterValues", "unanswered"]
 
 ParameterValues = Mapping[str, float]
-"""What was read from a vehicle, by the names of its parameters."""
+"""Values that were read from a vehicle, by the names of its parameters."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class Parameter:
         return next((n for n in self.names if math.isfinite(values.get(n.name, math.nan))), None)
 
     def setting(self, amount: float, values: Mapping[str, float] | None = None) -> str:
-        """What to set for an amount: the name that was read with its value, or every name."""
+        """The setting for an amount: the name that was read with its value, or every name."""
         found = self.on_board(values) if values else None
         names = self.names if found is None else (found,)
         return " or ".join(f"{n.name} {n.value(amount):.10g}" for n in names)
@@ -100,7 +100,7 @@ class OnBoard(dict[str, float]):
 
 
 def unanswered(values: Mapping[str, float], groups: Iterable[tuple[str, ...]]) -> list[tuple[str, ...]]:
-    """Those ``groups`` of names of which none was read as a number, and not all are known to be absent.
+    """The ``groups`` in which no name was read as a number, and not all names are known to be absent.
 
     "Does not exist" is an answer, and so is a firmware that is too old for it; silence is none, and does not count as a
     default.

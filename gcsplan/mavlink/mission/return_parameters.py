@@ -96,13 +96,13 @@ def returns_otherwise(values: Mapping[str, float]) -> Note | None:
 
 
 def setting(autopilot: Autopilot, rel_home_m: float) -> str:
-    """What to set for a return at ``rel_home_m`` on a vehicle of unknown version: every name, its value and unit."""
+    """The setting for a return at ``rel_home_m`` on a vehicle of unknown version: every name, its value and unit."""
     first, *others = RETURN_PARAMETERS[autopilot]
     return first.setting(rel_home_m) + "".join(f" or, {p.versions}, {p.setting(rel_home_m)}" for p in others)
 
 
 def settings(autopilot: Autopilot, rel_home_m: float) -> list[dict[str, str | float]]:
-    """The same as plain values."""
+    """The settings as plain values."""
     return [
         {"parameter": p.name, "value": p.value(rel_home_m), "unit": p.unit, "versions": p.versions or "all"}
         for p in RETURN_PARAMETERS[autopilot]
@@ -138,7 +138,7 @@ def deciding(mission: Mission) -> tuple[tuple[str, ...], ...]:
 
 
 def route_setting(autopilot: Autopilot, *, path: bool) -> str:
-    """What to set for returns along the mission; ``path``: along a return path, else to a landing sequence."""
+    """The setting for returns along the mission; ``path``: along a return path, else to a landing sequence."""
     if autopilot is Autopilot.ARDUPLANE:
         return f"RTL_AUTOLAND {AUTOLAND_PATH if path else AUTOLAND_LANDING:g}"
     return f"{', '.join(COPTER_RETURNS)} {AUTO_RTL:g} (Auto RTL)"

@@ -81,7 +81,7 @@ class Refused:
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """What the vehicle holds is unknown until it is read back. ``silent``: the vehicle did not answer at all."""
+    """The list on the vehicle is unknown until it is read back. ``silent``: the vehicle did not answer at all."""
 
     why: str
     silent: bool = False

@@ -85,7 +85,7 @@ def _feature(file: AirspaceFile, feature: Any, where: str, fallback: str) -> Non
 
 
 def published(feature: dict[str, Any], kind: Any, key: str, times: Any, fallback: str) -> Published:
-    """What the members say that ED-269 and ED-318 share. Raises MemberError."""
+    """A zone's members that ED-269 and ED-318 share. Raises MemberError."""
     identifier = text_of(feature.get("identifier"))
     name = text_of(feature.get("name")) or identifier or fallback
     restriction = word(kind, f"zone {name[:60]!r}: {key}").upper()

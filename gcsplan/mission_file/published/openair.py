@@ -258,7 +258,7 @@ class _OpenAirReading:
         return places
 
     def _line(self, text: str) -> Note:
-        """What stands on the line that is read."""
+        """A note with the line that is being read."""
         return Note("line_of_file", line=self.number, text=one_line(text))
 
     def _end(self) -> None:

@@ -21,7 +21,7 @@ _KINDS_SHOWN = 12
 
 @dataclass(frozen=True, slots=True)
 class Policy:
-    """What a mission says of one file: ``kinds`` that are no-fly, zones that it is ``authorised`` to enter, its hours.
+    """A mission's rules for one file: ``kinds`` that are no-fly, zones that it is ``authorised`` to enter, its hours.
 
     ``flight_level_error_m`` is how far flight levels may lie from their heights above sea level; None: they limit
     nothing. ``where`` is the place of the entry in the mission file.

@@ -60,7 +60,7 @@ _MARKS = {
     "°": "º˚∘", "'": "′’‘ʹʼ´`‛＇", '"': "″”“ʺ„‟〃＂", "-": "−–‐‑﹣－", " ": "\u00a0\u2000\u2001\u2002\u2003\u2004\u2005"
     "\u2006\u2007\u2008\u2009\u200a\u202f\u205f\u3000\t", "": "\u200b\u200e\u200f\u2060\ufeff",
 }  # fmt: skip
-"""What programs and typographers write for each mark."""
+"""The characters that programs and typographers write for each mark."""
 _PLAIN_MARKS = str.maketrans({other: mark for mark, others in _MARKS.items() for other in others})
 _WORDS_OF_PLACES = {"NORTH": "N", "SOUTH": "S", "EAST": "E", "WEST": "W", "DEGREES": "°", "DEG": "°"}
 

@@ -52,7 +52,7 @@ MAX_LINE_POINTS = 20_000
 """Most points of one line: its corridor takes a second for some thousand points."""
 
 Remark = tuple[Note, Datum]
-"""What a user has to know about how a zone of a file was read: a note for all such zones, and what this one has."""
+"""A remark for the user on how a zone was read: a note for all such zones, and the datum of this one."""
 
 ACROSS_ANTIMERIDIAN = Note("zone_across_the_antimeridian")
 OTHER_SIDE = (

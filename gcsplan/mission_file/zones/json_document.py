@@ -15,7 +15,7 @@ from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file.zones.attributes import is_number
 
 _DEGREES = re.compile(r"(?:^|[^A-Z0-9])(?:CRS:?84H?|4326(?:\+\d+)?|4979)[^A-Z0-9]*$", re.IGNORECASE)
-"""How the names, codes and addresses of WGS 84 in degrees end."""
+"""The ends of the names, codes and addresses of WGS 84 in degrees."""
 
 
 def require_wgs84(whole: Any, path: Path, format_name: str = "GeoJSON") -> None:

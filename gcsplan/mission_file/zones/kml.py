@@ -31,13 +31,13 @@ MOST_TAGS = 2_000_000
 """Most beginnings and ends of elements, each of which takes some 300 bytes of memory; 20 MB of zones have a third."""
 
 MODES: dict[str, Literal["agl", "amsl"]] = {"relativeToGround": "agl", "absolute": "amsl"}
-"""What altitudes are counted from, by the altitudeModes in which they count at all."""
+"""The zero of altitudes, by the altitudeModes in which they count at all."""
 
 DrawnCorner = tuple[float, float, float]
 """Latitude, longitude and altitude of a corner; not a number if it has no altitude."""
 
 _PICTURES = ("PhotoOverlay", "ScreenOverlay", "Tour")
-"""What shows the map and limits nothing."""
+"""Elements that decorate the map and limit nothing."""
 
 _READ_SHAPES = ("Polygon", "Point", "LineString")
 _KML_SHAPES = (*_READ_SHAPES, "LinearRing", "Model", "Track", "MultiTrack")

@@ -33,7 +33,7 @@ REFERENCES = (
     | dict.fromkeys(("AGL", "GND", "SFC", "GROUND", "SURFACE", "AGND", "ASFC"), "agl")
     | {PRESSURE: PRESSURE}
 )
-"""What a height is counted from, by its names."""
+"""The zero of a height, by its names."""
 
 GROUND_WORDS = frozenset({"GND", "SFC", "GROUND", "SURFACE"})
 UNLIMITED_WORDS = frozenset({"UNL", "UNLIM", "UNLTD", "UNLIMITED"})

@@ -32,7 +32,7 @@ ARC_STEP_DEG = "0.1"
 """GDAL draws arcs as chords of this angle: at a radius of 50 km they lie 2 cm inside."""
 
 HOT_JOURNAL = bytes.fromhex("d9d505f920a163d7")
-"""How a journal of SQLite begins whose changes are not ended: without it they are half in the file."""
+"""The first bytes of an SQLite journal of unfinished changes: without the journal the file holds half of them."""
 
 MOST_WARNINGS = 5
 

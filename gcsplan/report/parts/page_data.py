@@ -65,7 +65,7 @@ class Subject:
     typed: Mapping[str, str] = field(default_factory=dict)
 
     def wording(self, units: Units | None = None) -> Wording:
-        """How the reader is spoken to, in ``units``, or in SI."""
+        """The wording for the reader, in ``units``, or in SI."""
         return Wording(units, self.typed)
 
     @property
@@ -106,7 +106,7 @@ class Compared:
 
 @dataclass(frozen=True, slots=True)
 class Rehearsed:
-    """What a rehearsal found. ``how``: who flew, how often and in which weather, in a sentence."""
+    """The result of a rehearsal. ``how``: who flew, how often and in which weather, in a sentence."""
 
     safe: bool | None
     how: str

@@ -72,7 +72,7 @@ CIRCLES_S = 60.0
 
 @dataclass(slots=True)
 class _Log:
-    """What one vehicle reported in flight; ``released_ms``: its boot time at the acceptance of MISSION_START;
+    """The reports of one vehicle in flight; ``released_ms``: its boot time at the acceptance of MISSION_START;
     ``reached_ms``: at which it reported an item as reached for the first time."""
 
     watch: FlightWatch
@@ -152,7 +152,7 @@ def rehearse_sitl(
 
 
 def _spent_j(trace: Trace, part: RehearsalPart, weather: Weather, seed: int) -> float:
-    """What a flight took, J: by its time, and the metres through the mean wind."""
+    """The energy of a flight, J: by its time, and the metres through the mean wind."""
     held_s = math.fsum(leg.hold_s * leg.times for leg in part.verdict.legs if math.isfinite(leg.hold_s))
     held_s = min(held_s, trace.end_s - trace.begin_s)
     moved_s = trace.end_s - trace.begin_s - held_s

@@ -53,7 +53,7 @@ _EITHER: dict[str, float] = {
     "INS_ACCOFFS_X": 0.001, "INS_ACCOFFS_Y": 0.001, "INS_ACCOFFS_Z": 0.001, "INS_ACCSCAL_X": 1.001,
     "INS_ACCSCAL_Y": 1.001, "INS_ACCSCAL_Z": 1.001,
 }  # fmt: skip
-"""What lets a vehicle arm without pilot or calibration (from ArduPilot's SITL defaults)."""
+"""Parameters that let a vehicle arm without pilot or calibration (from ArduPilot's SITL defaults)."""
 
 COPTER: dict[str, float] = _EITHER | {
     "FRAME_CLASS": 1, "FRAME_TYPE": 0, "FS_THR_ENABLE": 0, "DISARM_DELAY": 0, "COMPASS_OFS_X": 5, "COMPASS_OFS_Y": 13,
@@ -127,7 +127,7 @@ def port_of(number: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _Start:
-    """How one instance is started."""
+    """The start of one instance."""
 
     program: Path
     number: int

@@ -1,4 +1,4 @@
-"""What ArduPilot stores of an item: 15 bytes per item, so some numbers read back differently.
+"""An item as ArduPilot stores it: 15 bytes per item, so some numbers read back differently.
 
 Source: ArduPilot 4.6, ``AP_Mission.cpp`` (`sanity_check_params`, `mavlink_int_to_mission_cmd`,
 `mission_cmd_to_mavlink_int`), ``MissionItemProtocol_Fence.cpp``, ``MissionItemProtocol_Rally.cpp``,

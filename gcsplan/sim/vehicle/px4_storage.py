@@ -1,4 +1,4 @@
-"""What PX4 stores of an item: floats unchanged, but only the params that a command uses.
+"""An item as PX4 stores it: floats unchanged, but only the params that a command uses.
 
 Source: PX4 ``mavlink_mission.cpp`` (`parse_mavlink_mission_item`, `format_mavlink_mission_item`) and ``navigation.h``.
 """
