@@ -92,8 +92,8 @@ def rehearse(
     """Upload to one simulated vehicle per UAV, fly all of them in simulated time, and judge; see `sim.rehearsal`.
 
     ``jobs`` processes or the workers of ``cluster`` share the runs (`executor`); a few runs are flown in this process.
-    The result does not depend on it. ``parameters``: by vehicle, those that it flies with in place of what the plan
-    assumes; what is planned stays. ``watch`` is called with the executor before the work begins.
+    The result does not depend on it. ``parameters``: by vehicle, the parameters that it flies with in place of
+    the assumed ones; the plan stays. ``watch`` is called with the executor before the work begins.
     """
     from gcsplan.sim.rehearsal import concluded, different, flown, prepared
 

@@ -217,7 +217,8 @@ LINK_TEXTS = {
         "longer --timeout"
     ),
     "parameters_not_judged": (
-        "this is not what was judged, and cannot be judged{allowed:; --allow-parameters takes that|}{off:lines}"
+        "it was judged with other values, and cannot be judged with these{allowed:; --allow-parameters takes that|}"
+        "{off:lines}"
     ),
     "breaks_limits_on_board": "{found:rows}",
     "not_judged_on_board": "not judged: {why}",

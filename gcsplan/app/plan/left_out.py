@@ -30,7 +30,7 @@ class LeftOut:
 
 
 class LeavingOut:
-    """The vehicles that are left out of a plan, if that is allowed; ``found``: those that are already."""
+    """The vehicles that are left out of a plan, if that is allowed; ``found``: the ones left out so far."""
 
     def __init__(self, *, allowed: bool, found: Sequence[LeftOut] = ()) -> None:
         self.allowed = allowed

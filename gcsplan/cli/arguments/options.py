@@ -69,7 +69,7 @@ JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on s
 ListZonesOption = Annotated[
     bool,
     typer.Option(
-        "--list-zones", help="Show what was understood of each zone: shape, size, floor, ceiling. Nothing else is done."
+        "--list-zones", help="Show each zone as it was read: shape, size, floor, ceiling. Nothing else is done."
     ),
 ]
 AtOption = Annotated[

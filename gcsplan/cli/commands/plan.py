@@ -338,11 +338,11 @@ def _add(directory: Path, files: Mapping[str, Callable[[], str]]) -> None:
         for name, content in files.items():
             add_output(directory, name, content())
     except InputError as error:
-        remark(f"note: what became of the upload is not written: {error}")
+        remark(f"note: the result of the upload is not written: {error}")
 
 
 def _say_written(directory: Path, files: list[str], notes: Sequence[tuple[str, Note]], units: Units) -> None:
-    """Print the notes on the fences, and what was written; a fleet has hundreds of files."""
+    """Print the notes on the fences, and the written files; a fleet has hundreds of files."""
     from gcsplan.cli.output.console import say, say_notes_of
     from gcsplan.notes.note import Wording
 

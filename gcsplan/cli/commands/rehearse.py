@@ -80,7 +80,7 @@ def rehearse(
     ] = None,
     i_know: Annotated[
         bool,
-        typer.Option("--i-know", help="With --sitl: arm and start what is not on this machine, or is no simulator."),
+        typer.Option("--i-know", help="With --sitl: arm and start vehicles elsewhere, or that are no simulators."),
     ] = False,
     at: AtOption = None,
     way_home: WayHomeOption = False,

@@ -281,7 +281,7 @@ class _OpenAirReading:
         limits.faults += [
             Mistake(f"{file.path}: line {number}", words) for number, words in block.mistakes[:MOST_MISTAKES]
         ]
-        if block.lost and not file.judge.reason(zone):  # it may reach farther than what is understood of it
+        if block.lost and not file.judge.reason(zone):  # the zone may reach farther than the part that is understood
             for number, words in block.lost[:MOST_MISTAKES]:
                 file.fault(f"{file.path}: line {number}", f"zone {name[:60]!r}: {words}")
             return

@@ -48,7 +48,7 @@ def read_kml(path: Path, data: bytes) -> ZoneFile:
     found = ZoneFile(path, great_circles=True)  # as Google Earth draws them
     if data.count(b"<") > MOST_TAGS:
         raise InputError(
-            f"the KML has more than {MOST_TAGS} tags; leave out what is far from the mission", where=str(path)
+            f"the KML has more than {MOST_TAGS} tags; leave out zones far from the mission", where=str(path)
         )
     try:
         root = defusedxml.ElementTree.fromstring(data, forbid_dtd=True)
