@@ -83,7 +83,7 @@ def mission_file() -> str:
 
 def _default(key: str, field: Any) -> str:
     if field.is_required():
-        return "**wanted**"
+        return "**required**"
     if key in json_schema.LATE_DEFAULTS:
         return f"`{json_schema.LATE_DEFAULTS[key]:g}`"
     value = field.default
@@ -92,24 +92,24 @@ def _default(key: str, field: Any) -> str:
     return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"
 
 
-def _value(key: str, told: Mapping[str, Any], named: Mapping[str, Any]) -> str:
-    """What may stand there: from the JSON schema of a key."""
-    if "$ref" in told:
-        name = told["$ref"].rsplit("/", 1)[-1]
+def _value(key: str, entry: Mapping[str, Any], named: Mapping[str, Any]) -> str:
+    """The values that a key takes, from its JSON schema."""
+    if "$ref" in entry:
+        name = entry["$ref"].rsplit("/", 1)[-1]
         return next((form for form, kind in schema.POINT_FORMS.items() if kind.__name__ == name), "section")
-    choices = told.get("anyOf") or told.get("oneOf")
+    choices = entry.get("anyOf") or entry.get("oneOf")
     if choices:
         words = [_value(key, c, named) for c in choices if c.get("type") != "null"]
         return " or ".join(dict.fromkeys(words))
-    if "const" in told:
-        return f"`{told['const']}`"
-    if "enum" in told:
-        return ", ".join(f"`{word}`" for word in told["enum"])
-    if told.get("type") == "array":
-        inner = _value(key, told["items"], named)
-        if inner == "number" and told.get("minItems") == 2:
-            return "[lat, lon]" if told["maxItems"] == 2 else "[lat, lon] or [lat, lon, agl_m]"
-        if told.get("minItems") == told.get("maxItems") == 2:
+    if "const" in entry:
+        return f"`{entry['const']}`"
+    if "enum" in entry:
+        return ", ".join(f"`{word}`" for word in entry["enum"])
+    if entry.get("type") == "array":
+        inner = _value(key, entry["items"], named)
+        if inner == "number" and entry.get("minItems") == 2:
+            return "[lat, lon]" if entry["maxItems"] == 2 else "[lat, lon] or [lat, lon, agl_m]"
+        if entry.get("minItems") == entry.get("maxItems") == 2:
             unit, _, bounds = inner.partition(", ")
             return f"[{unit}, {unit}]" + (f", each {bounds}" if bounds else "")
         return f"list of {inner}" + ("s" if inner == "section" else "")
@@ -120,14 +120,14 @@ def _value(key: str, told: Mapping[str, Any], named: Mapping[str, Any]) -> str:
         "object": "mapping",
         "boolean": "`true`, `false`",
     }
-    kind = names[told["type"]]
+    kind = names[entry["type"]]
     unit = units.UNIT_SYMBOLS.get(units.unit_end(key), "")
-    return ", ".join(word for word in (unit or kind, _bounds(told)) if word)
+    return ", ".join(word for word in (unit or kind, _bounds(entry)) if word)
 
 
-def _bounds(told: Mapping[str, Any]) -> str:
-    low, high = told.get("minimum"), told.get("maximum")
-    above, below = told.get("exclusiveMinimum"), told.get("exclusiveMaximum")
+def _bounds(entry: Mapping[str, Any]) -> str:
+    low, high = entry.get("minimum"), entry.get("maximum")
+    above, below = entry.get("exclusiveMinimum"), entry.get("exclusiveMaximum")
     if high is not None and high >= 1e6:  # wide enough to stop slips alone
         high = None
         low = low if low is None or low > -1e6 else None
@@ -207,7 +207,7 @@ def _option(option: Any) -> str:
 
 def _option_default(option: Any) -> str:
     if option.required:
-        return "**wanted**"
+        return "**required**"
     if option.is_flag and option.secondary_opts:
         return f"`{option.opts[0] if option.default else option.secondary_opts[0]}`"
     return "–" if option.is_flag or option.default in (None, [], (), "") else f"`{option.default}`"
@@ -245,14 +245,14 @@ def reasons_of(kind: type[errors.GcsplanError]) -> list[str]:
     """Words that ``reason`` may be, as the code says them."""
     if kind is errors.NoMission:
         return list(get_args(errors.NoMissionReason))
-    said = [
+    reasons = [
         keyword.value
         for message in messages()
         if _RAISED[message.raised] is kind
         for keyword in message.call.keywords
         if keyword.arg == "reason"
     ]
-    words = [node.value for value in said for node in ast.walk(value) if isinstance(node, ast.Constant)]
+    words = [node.value for value in reasons for node in ast.walk(value) if isinstance(node, ast.Constant)]
     return list(dict.fromkeys([kind.default_reason, *(word for word in words if str(word).isidentifier())]))
 
 
@@ -266,7 +266,7 @@ _RAISED: Mapping[str, type[errors.GcsplanError]] = {
 
 
 class Message(NamedTuple):
-    """One message as it stands in the code; ``‹…›`` is what is only known when it is said."""
+    """One message as it stands in the code; ``‹…›`` is a value of the moment."""
 
     module: str
     raised: str

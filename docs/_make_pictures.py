@@ -1,8 +1,8 @@
 """`python docs/_make_pictures.py`: the pictures of README and documents, made from the sample mission.
 
 They lie in `missions/`. Each holds the path's length in its description, which a test compares with a plan.
-That of the default planner's proof (`draw_proof`) has terrain above the cap, and the cells that a shorter path could
-meet.
+The picture of the default planner's proof (`draw_proof`) has terrain above the cap, and the cells that a shorter path
+could meet.
 """
 
 from __future__ import annotations

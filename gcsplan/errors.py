@@ -7,7 +7,7 @@
     ├── CheckFailed    (RuntimeError)     4  a check or a rehearsal found a violation, or could not judge
     ├── VehicleRefused (ConnectionError)  5  the vehicle refused, or gcsplan refused to send
     ├── LinkError      (ConnectionError)  6  the link is dead, or the outcome is unknown
-    └── ReadBackDiffers (RuntimeError)    7  what is on board is not what was sent
+    └── ReadBackDiffers (RuntimeError)    7  the list on board differs from the list that was sent
 
 A message states what was required, what was given, where, and what to do about it.
 """
@@ -50,7 +50,7 @@ class Mistake:
         return f"{self.where}: {self.message}" if self.where else self.message
 
     def as_dict(self) -> dict[str, str]:
-        """What ``--json`` says of it."""
+        """The error as ``--json`` prints it."""
         return {"where": self.where, "message": self.message} | ({"code": self.code} if self.code else {})
 
 
@@ -75,7 +75,7 @@ class GcsplanError(Exception):
         return f"{self.where}: {self.message}" if self.where else self.message
 
     def as_dict(self) -> dict[str, object]:
-        """What ``--json`` says of it."""
+        """The error as ``--json`` prints it."""
         return {"code": self.exit_code, "reason": self.reason, "message": self.message, "where": self.where}
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -101,7 +101,7 @@ class InputError(GcsplanError, ValueError):
         self.problems: tuple[Mistake, ...] = tuple(problems) or (Mistake(where, message),)
 
     def as_dict(self) -> dict[str, object]:
-        """What ``--json`` says of it, each problem included."""
+        """The error as ``--json`` prints it, with each of its problems."""
         return super().as_dict() | {"problems": [p.as_dict() for p in self.problems]}
 
     @classmethod

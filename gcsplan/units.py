@@ -50,7 +50,7 @@ MINUTE = Unit("min", 60.0)
 KILOJOULE = Unit("kJ", 1000.0)
 WATT_HOUR = Unit("Wh", 3600.0)
 MILLIAMPERE_HOUR = Unit("mAh", 3.6)
-"""Of a battery of 1 V; see `charge`."""
+"""The unit of charge, as energy at 1 V; see `charge`."""
 
 
 def charge(volts: float) -> Unit:
@@ -113,7 +113,7 @@ def units_of(name: str | Units) -> Units:
 
 
 def duration(seconds: float | None, decimals: int = 0) -> str:
-    """A duration as ``h:mm:ss``, with decimals of a second if asked; a dash if there is none."""
+    """A duration as ``h:mm:ss`` with ``decimals`` of a second; a dash if there is none."""
     if seconds is None or not math.isfinite(seconds):
         return "–"
     parts = round(abs(seconds) * 10**decimals)
@@ -227,7 +227,7 @@ Part = Quantity | Symbol | Reach | Seconds | Joules
 
 
 class Readable(Protocol):
-    """What makes its own sentence, such as a note."""
+    """A datum that makes its own sentence, such as a note."""
 
     def in_units(self, units: Units) -> str:
         """The sentence with its quantities in ``units``."""

@@ -65,7 +65,7 @@ def lean_words(lean_deg: float) -> Note:
 Amount = TypeVar("Amount", float, Floats)
 
 MissionEnd = Literal["land", "loiter", "rtl", "none"]
-"""What a mission ends with."""
+"""The end of a mission."""
 
 
 class Autopilot(StrEnum):
@@ -83,7 +83,7 @@ class Autopilot(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Energy:
-    """What flying takes: E = ``base_w`` · seconds + R2 · horizontal metres through the air + R1 · vertical metres.
+    """The energy of a flight: E = ``base_w`` · seconds + R2 · horizontal metres through the air + R1 · vertical metres.
 
     R1 (``vertical_j_per_m``, up or down), R2 and a base power of 0 are the model of the krill paper, Table 1. In a hold
     the power is ``hover_w``, the whole of it, or what `hold_w` says if that is more. `under_way_j` and `hold_w` are the
@@ -208,7 +208,7 @@ class Vehicle:
 
     @property
     def return_speed_m_s(self) -> float | None:
-        """The speed of the autopilot's own return, whatever the mission has commanded; None: that of the mission.
+        """The speed of the autopilot's own return, whatever the mission has commanded; None: the mission's own speed.
 
         A plane returns at the airspeed of AIRSPEED_CRUISE (navigation.cpp, `calc_airspeed_errors`).
         """

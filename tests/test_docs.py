@@ -78,7 +78,7 @@ def test_units_and_defaults_are_those_of_the_code(made: ModuleType) -> None:
     assert by_key["`min_agl_m`"] == ["m, ≥ 0", "–"]
     assert by_key["`horizontal_clearance_m`"] == ["m, ≥ 0", "`30`"]
     assert by_key["`altitude_frame`"] == ["`relative`, `amsl`, `terrain`", "`relative`"]
-    assert by_key["`sysid`"] == ["whole number, 1 to 255", "**wanted**"]
+    assert by_key["`sysid`"] == ["whole number, 1 to 255", "**required**"]
     assert by_key["`leg_jerk_m_s3`"][0].startswith("m/s³")
     assert by_key["`via`"][0] == (
         "list of [lat, lon] or [lat, lon, agl_m] or text or [text, text] or {east_m, north_m} or {lat, lon, agl_m} "

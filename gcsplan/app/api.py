@@ -153,7 +153,7 @@ def write(
     system = units_of(units)
     settle_outputs(folder)
     try:
-        planned, homes = flyable(planned, allow_unjudged=allow_unjudged, asked=report or way_home)
+        planned, homes = flyable(planned, allow_unjudged=allow_unjudged, home=report or way_home)
     except (CheckFailed, NoMission):
         retire_outputs(folder)
         raise
@@ -232,7 +232,7 @@ def upload(
         words = [to] if isinstance(to, str) else list(to)
     targets = uploads.targets(words, [v.request.vehicle for v in planned.vehicles])
     require_passing({v.name: v.verdict for v in planned.vehicles if v.name in targets}, allow_unjudged=allow_unjudged)
-    homes = returns.judged(planned, asked=False)
+    homes = returns.judged(planned, home=False)
     from gcsplan.sim.vehicle.server import loopback_fleet
 
     options = UploadOptions(
@@ -272,7 +272,7 @@ def rehearse(
         "rehearse", planned=planned, wind_m_s=wind_m_s, from_deg=from_deg, gusts_m_s=gusts_m_s, noise_m=noise_m,
         runs=runs, seed=seed, progress=progress, jobs=jobs,
     )  # fmt: skip
-    returns.judged(planned, asked=False)
+    returns.judged(planned, home=False)
     weather = Weather(wind_m_s, from_deg, gusts_m_s, noise_m)
     return rehearsing.rehearse(
         planned, weather=weather, runs=runs, seed=seed, progress=progress, jobs=jobs, cluster=cluster

@@ -1,10 +1,10 @@
 """Plan many mission files: each is a piece of work of its own, and a bad one never stops the others.
 
-Only this process writes; workers send the files' texts. What is done is kept, a `Record` of each mission: what it was
-made of, and which outputs it has. A mission is not planned again if no file that it reads, no option and no output of
-it has changed. A record is written before the outputs change and names their digests, so that a run that is killed in
-between, and whoever else writes into the mission's folder, leaves a record that does not hold. A record holds if
-nothing that is asked, no file that was read and no output has changed; whatever is odd in one counts as none.
+Only this process writes; workers send the files' texts. A `Record` of each planned mission keeps its sources and its
+outputs. A mission is not planned again if no file that it reads, no option and no output of it has changed. A record
+is written before the outputs change and names their digests, so that a run that is killed in between, and whoever else
+writes into the mission's folder, leaves a record that does not hold. A record holds if the request, the files that
+were read and the outputs are unchanged; a record with anything odd in it counts as none.
 """
 
 from __future__ import annotations
@@ -58,14 +58,14 @@ MOST_BYTES_OF_A_RECORD = 64_000_000
 class Record:
     """The result of one mission: a row for each vehicle (one without a vehicle if there is no mission), and tracks.
 
-    ``asked`` is a digest of what was asked for; ``inputs`` are the marks of all files that were read for it
+    ``request`` is the digest of `request_of`; ``inputs`` are the marks of all files that were read for the mission
     (`gcsplan.world.terrain.input_files`; None: not known, and planned again next time). ``code`` is the exit code that
     `plan` would end with. ``files`` are the outputs, name to text, empty if they are on disk already. ``tracks`` are
     lists of [latitude, longitude], one for each of the first rows; the vehicles of the other rows are left out.
     """
 
     mission: str
-    asked: str
+    request: str
     code: int
     rows: tuple[Mapping[str, Any], ...]
     tracks: tuple[Sequence[Sequence[float]], ...] = ()
@@ -80,7 +80,7 @@ def write_record(directory: Path, record: Record) -> None:
     inputs = None if record.inputs is None else list(record.inputs.items())
     body = json.dumps(
         {
-            "asked": record.asked, "inputs": inputs, "outputs": digests_of(record.files or {}), "code": record.code,
+            "asked": record.request, "inputs": inputs, "outputs": digests_of(record.files or {}), "code": record.code,
             "rows": record.rows, "tracks": record.tracks,
         },
         default=dict,
@@ -89,8 +89,8 @@ def write_record(directory: Path, record: Record) -> None:
     write_whole(file, json.dumps({"format": FORMAT, "sha256": _sha256(body), "body": body}) + "\n")
 
 
-def kept_record(directory: Path, mission: str, asked: str) -> Record | None:
-    """The record of an earlier run; None unless it is of what is ``asked`` now, and nothing has changed since."""
+def kept_record(directory: Path, mission: str, request: str) -> Record | None:
+    """The record of an earlier run; None unless it is of the same ``request``, and nothing has changed since."""
     try:
         with _file_of(directory, mission).open("rb") as file:
             kept = json.loads(file.read(MOST_BYTES_OF_A_RECORD))
@@ -99,10 +99,10 @@ def kept_record(directory: Path, mission: str, asked: str) -> Record | None:
         if kept.get("sha256") != _sha256(kept["body"]):
             return None
         body = json.loads(kept["body"])
-        if body["asked"] != asked or not body["inputs"]:
+        if body["asked"] != request or not body["inputs"]:
             return None
         inputs, outputs = dict(body["inputs"]), dict(body["outputs"])
-        record = Record(mission, asked, body["code"], tuple(body["rows"]), tuple(body["tracks"]), inputs=inputs)
+        record = Record(mission, request, body["code"], tuple(body["rows"]), tuple(body["tracks"]), inputs=inputs)
         if type(record.code) is not int or not record.rows or any(row["mission"] != mission for row in record.rows):
             return None
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
@@ -211,31 +211,31 @@ class MissionBatch:
         with locked(self.directory):
             yield
 
-    def run(self, workers: Executor, todo: Sequence[int], told: Callable[[Record], None]) -> None:
-        """Plan the missions with the numbers ``todo``; each is written, then ``told``, as it is done."""
+    def run(self, workers: Executor, todo: Sequence[int], on_done: Callable[[Record], None]) -> None:
+        """Plan the missions with the numbers ``todo``; write each as it is planned, then call ``on_done``."""
         names = {name.casefold() for name, _ in self.missions}
         good = []
         for number in todo:
             name, _ = self.missions[number]
             fault = fault_of_name(name, names)
             if fault:
-                told(_failed(name, "", InputError(fault)))
+                on_done(_failed(name, "", InputError(fault)))
             else:
                 good.append(number)
         items = [(self.missions[k][0], str(self.missions[k][1])) for k in good]
 
         def lost(item: tuple[str, str], why: GcsplanError) -> Record:
-            return _failed(item[0], asked_of(item[1], self.options), why)
+            return _failed(item[0], request_of(item[1], self.options), why)
 
         for _, record in workers.each(record_of, self.options, items, lost=lost):
-            told(self._written(record))
+            on_done(self._written(record))
 
     def known(self) -> tuple[list[Record], list[int]]:
         """The records that still hold, and the numbers of the missions that must be planned."""
         kept: list[Record] = []
         todo: list[int] = []
         for number, (name, path) in enumerate(self.missions):
-            record = kept_record(self.directory, name, asked_of(path, self.options))
+            record = kept_record(self.directory, name, request_of(path, self.options))
             if record is not None:
                 kept.append(record)
             else:
@@ -254,7 +254,7 @@ class MissionBatch:
                 f"{changed} is not what was read here: it changed while the mission was planned, or a worker of the "
                 "cluster sees another file there; run the same command again"
             )
-            record = _failed(record.mission, record.asked, InputError(words))
+            record = _failed(record.mission, record.request, InputError(words))
         try:
             settle_outputs(out)
             write_record(self.directory, record)
@@ -265,43 +265,43 @@ class MissionBatch:
         except (OSError, ValueError, GcsplanError) as why:
             with suppress(OSError, GcsplanError):
                 retire_outputs(out)
-            record = _failed(record.mission, record.asked, InputError(f"cannot be written: {why}", where=str(out)))
+            record = _failed(record.mission, record.request, InputError(f"cannot be written: {why}", where=str(out)))
         return replace(record, files=None)
 
 
-def asked_of(path: str | Path, options: BatchOptions) -> str:
-    """A digest of what is asked beside the content of files: which mission, the options, the version."""
-    asked = repr((__version__, RECORD_RULES, options, os.path.abspath(path)))
-    return hashlib.sha256(asked.encode("utf-8", "surrogatepass")).hexdigest()
+def request_of(path: str | Path, options: BatchOptions) -> str:
+    """A digest of the request beside the content of files: which mission, the options, the version."""
+    request = repr((__version__, RECORD_RULES, options, os.path.abspath(path)))
+    return hashlib.sha256(request.encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def record_of(options: BatchOptions, item: tuple[str, str]) -> Record:
     """Plan one mission, in whatever process; every failure becomes a row."""
     name, file = item
-    asked = asked_of(file, options)
+    request = request_of(file, options)
     with reading() as read:
         try:
             planned = plan(file, **asdict(options.plan))
-            planned, homes = flyable(planned, allow_unjudged=options.allow_unjudged, asked=options.report)
+            planned, homes = flyable(planned, allow_unjudged=options.allow_unjudged, home=options.report)
             files = outputs.outputs_of(planned, homes)
             if options.report:
                 files["report.html"] = outputs.report_of(planned, (), homes)
         except GcsplanError as why:
-            return _failed(name, asked, why, read)
+            return _failed(name, request, why, read)
         except Exception as why:  # a bug of ours in one mission must not cost the others
             words = f"internal error, a bug in gcsplan: {type(why).__name__}: {why}"
             row = _refusal(name, 70, "internal", words)
-            return Record(name, asked, 70, (row,), inputs=read.marks)
+            return Record(name, request, 70, (row,), inputs=read.marks)
     out = [_refusal(name, NoMission.exit_code, v.reason, v.message, v.name) for v in planned.left_out]
     code = NoMission.exit_code if out else 0
     rows = (*_rows(name, files["summary.json"]), *out)
-    return Record(name, asked, code, rows, tuple(_tracks(planned)), files, read.marks)
+    return Record(name, request, code, rows, tuple(_tracks(planned)), files, read.marks)
 
 
-def _failed(name: str, asked: str, why: GcsplanError, read: FileReading | None = None) -> Record:
+def _failed(name: str, request: str, why: GcsplanError, read: FileReading | None = None) -> Record:
     """The record of a mission without a plan; without ``read`` it is tried again next time."""
     row = _refusal(name, why.exit_code, why.reason, str(why))
-    return Record(name, asked, why.exit_code, (row,), inputs=None if read is None else read.marks)
+    return Record(name, request, why.exit_code, (row,), inputs=None if read is None else read.marks)
 
 
 BATCH_COLUMNS = (
@@ -321,10 +321,10 @@ def _refusal(name: str, code: int, reason: str, message: str, vehicle: str = "")
 def _rows(name: str, summary: str) -> list[dict[str, Any]]:
     """One row for each vehicle, out of the summary's text, so that both have the same numbers."""
     rows = []
-    for told in json.loads(summary)["vehicles"]:
-        row = {"mission": name, "vehicle": told["name"], "code": 0, "reason": "", "message": ""}
-        row |= {"return_safe": told.get("way_home", {}).get("safe")}
-        rows.append(row | {key: told[key] for key in BATCH_COLUMNS if key in told})
+    for done in json.loads(summary)["vehicles"]:
+        row = {"mission": name, "vehicle": done["name"], "code": 0, "reason": "", "message": ""}
+        row |= {"return_safe": done.get("way_home", {}).get("safe")}
+        rows.append(row | {key: done[key] for key in BATCH_COLUMNS if key in done})
     return rows
 
 

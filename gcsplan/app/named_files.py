@@ -1,4 +1,4 @@
-"""Files that an argument of a command names: one, those of a folder, or those of a pattern."""
+"""Files that an argument of a command names: one file, the files of a folder, or the files of a pattern."""
 
 from __future__ import annotations
 

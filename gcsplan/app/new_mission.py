@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from gcsplan.mavlink.link.watch import VehicleState
 
 HOME_NEAR_M = 30.0
-"""A home farther than this from the vehicle is told, m."""
+"""A home farther than this from the vehicle, m, gets a note."""
 
 OPTIONS = {
     "terrain": "--dem", "terrain.dem": "--dem", "terrain.vertical_datum": "--vertical-datum",
@@ -31,7 +31,7 @@ OPTIONS = {
 
 @dataclass(frozen=True)
 class Seen:
-    """What a vehicle tells: its place as text (None if it reports none), its autopilot and its settings."""
+    """The reports of a vehicle: its place as text (None if it reports none), its autopilot and its settings."""
 
     url: str
     autopilot: Autopilot
@@ -46,7 +46,7 @@ class Seen:
 
 
 def seen_at(url: str, sysid: int, autopilot: Autopilot | None) -> Seen:
-    """What the vehicle at ``url`` tells; nothing is written to it.
+    """The reports of the vehicle at ``url``; nothing is written to it.
 
     ``autopilot`` is what the user expects. Raises LinkError if nobody answers, VehicleRefused for another autopilot,
     or for one that gcsplan does not know where none is expected.
@@ -56,15 +56,17 @@ def seen_at(url: str, sysid: int, autopilot: Autopilot | None) -> Seen:
 
     with uploads.open_link(url) as link:
         options = session.SessionOptions(listen_s=uploads.LISTEN_S)
-        state, told, values = session.read_vehicle(link, sysid, options=options)
+        state, reported, values = session.read_vehicle(link, sysid, options=options)
         place = link.url
-    if told is None and autopilot is None:
+    if reported is None and autopilot is None:
         known = ", ".join(Autopilot)
         raise VehicleRefused(f"vehicle {sysid} calls itself {state.what}: say with --autopilot which it is ({known})")
-    if told is not None and autopilot not in (None, told):
-        words = f"vehicle {sysid} is {state.what}, and --autopilot {autopilot} is given: leave it out, or give {told}"
+    if reported is not None and autopilot not in (None, reported):
+        words = (
+            f"vehicle {sysid} is {state.what}, and --autopilot {autopilot} is given: leave it out, or give {reported}"
+        )
         raise VehicleRefused(words, where=url, reason="wrong_autopilot")
-    kind = told or autopilot
+    kind = reported or autopilot
     assert kind is not None
     start, notes = _start(state)
     height_m = return_on_board_m(values)

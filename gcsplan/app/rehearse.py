@@ -92,8 +92,8 @@ def rehearse(
     """Upload to one simulated vehicle per UAV, fly all of them in simulated time, and judge; see `sim.rehearsal`.
 
     ``jobs`` processes or the workers of ``cluster`` share the runs (`executor`); a few runs are flown in this process.
-    The result does not depend on it. ``parameters``: by vehicle, those that it flies with in place of what the plan
-    assumes; what is planned stays. ``watch`` is called with the executor before the work begins.
+    The result does not depend on it. ``parameters``: by vehicle, the parameters that it flies with in place of
+    the assumed ones; the plan stays. ``watch`` is called with the executor before the work begins.
     """
     from gcsplan.sim.rehearsal import concluded, different, flown, prepared
 
@@ -125,9 +125,9 @@ def _outside(planned: Plan, parameters: Mapping[str, Mapping[str, float]], resul
     vehicles, notes = [], list(result.notes)
     for v, flown in zip(planned.vehicles, result.vehicles, strict=True):
         found = off(settings_of_plan(v, None), parameters.get(v.name, {}), v.mission.autopilot)
-        notes += [o.note().of(vehicle=v.name) for o in found if o.setting.matters in ("time", "told")]
-        said = tuple(o.note() for o in found if o.setting.matters not in ("time", "told"))
-        vehicles.append(replace(flown, not_flown=(*flown.not_flown, *said)) if said else flown)
+        notes += [o.note().of(vehicle=v.name) for o in found if o.setting.matters in ("time", "report")]
+        others = tuple(o.note() for o in found if o.setting.matters not in ("time", "report"))
+        vehicles.append(replace(flown, not_flown=(*flown.not_flown, *others)) if others else flown)
     return replace(result, vehicles=tuple(vehicles), notes=tuple(notes))
 
 
@@ -174,7 +174,7 @@ def block_of(shared: tuple[Site, Flights], block: RunBlock) -> Tally:
     site, flights = shared
     tally = flown(flights, site.read()[1], block)
     if block[0]:
-        tally.flown = ()  # those of the first run alone are shown
+        tally.flown = ()  # a report shows the flights of the first run alone
     return tally
 
 
@@ -218,7 +218,7 @@ def seats_of(words: Sequence[str], names: Sequence[str]) -> dict[str, str]:
         if not equals and len(names) == 1:
             name, url = names[0], word
         elif not equals:
-            raise UsageError(f"--sitl {word}: NAME=URL is wanted, for each of {', '.join(names)}")
+            raise UsageError(f"--sitl {word}: give NAME=URL for each of {', '.join(names)}")
         if name not in names:
             raise UsageError(f"--sitl {word}: the mission file has no vehicle {name!r}; it has {', '.join(names)}")
         if found.setdefault(name, url) is not url:

@@ -83,7 +83,7 @@ class BatteryHome:
 
     @property
     def note(self) -> Note:
-        """What is said of it."""
+        """The note on the battery's use."""
         most, usable = raised(self.most_percent, 0), 100.0 * self.usable_j / self.battery_j
         if self.point_of_no_return is None or self.no_return_m is None:
             return Note("battery_enough", most_percent=most, at_m=self.most_m, usable_percent=usable)

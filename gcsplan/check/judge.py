@@ -196,7 +196,7 @@ def _figures(
     alone = len(plane.owner) == len(flight.stretches)
 
     def each(of: Callable[[Floats], float], values: Floats) -> list[float]:
-        """A number for each stretch out of those of its legs; mostly a stretch has one leg alone."""
+        """A number for each stretch from the numbers of its legs; most stretches have one leg alone."""
         return values.tolist() if alone else [of(values[a:b]) for a, b in pairwise(edges.tolist())]
 
     def first(of: Callable[[Floats], np.intp], values: Floats) -> Indices:
@@ -301,13 +301,13 @@ def _findings(
         v = enough(v, np.array(broken[owner, kind, zone]), plane.legs, limits, world.airspace)
         lat, lon = (float(x) for x in world.frame.to_degrees(v.east_m, v.north_m))
         name = world.airspace.zones[zone].name if zone >= 0 else ""
-        note = _said(s, v, name, (lat, lon))
+        note = _note_of(s, v, name, (lat, lon))
         found.append(Finding(s.seq, kind, note, lat, lon, v.amsl_m, v.value, v.limit, v.by, v.unit, name))
     return found
 
 
-def _said(s: Stretch, v: Violation, zone: str, at: tuple[float, float]) -> Note:
-    """What is said of a violation on a stretch; ``at``: latitude and longitude."""
+def _note_of(s: Stretch, v: Violation, zone: str, at: tuple[float, float]) -> Note:
+    """The note on a violation on a stretch; ``at``: latitude and longitude."""
     way = s.kind if s.jumped_from is None else Note("after_jump", way=s.kind, jump=s.jumped_from)
     lat, lon = at
     if v.kind == "coverage":

@@ -49,7 +49,7 @@ class Miss:
 
     @property
     def note(self) -> Note:
-        """What is said of it."""
+        """The note on this margin."""
         spare = self.room >= 0.0
         room = abs(self.room)
         if self.kind in NEAR_ANGLES:
@@ -164,7 +164,7 @@ def _nearest_part(start: Floats, end: Floats, world: World, zone: int) -> float:
 
 
 FARTHEST_M, WITHIN_M = 1000.0, 0.002
-"""Passes at a greater height are not told; and how closely the height is found, metres."""
+"""The greatest height of a pass that gets a note, m; the error of that height, m."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +190,7 @@ def nearest_pass(
     """The nearest pass over or under a zone; None if there is none, or if the line leads into a zone.
 
     ``owner`` (N,): index of each leg's stretch. The exact check of the legs, without errors and clearance to the side,
-    is asked how large an altitude error may be: no less than told is free above a zone or below it.
+    finds the largest altitude error that passes: that height at least is free between the line and each zone.
     """
     air = world.airspace
     near = np.flatnonzero(_meets_box(legs, air.zone_boxes))

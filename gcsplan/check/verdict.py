@@ -26,8 +26,8 @@ class LegFigures:
     """Figures of one flown stretch; NaN where the ground is unknown.
 
     ``min_agl_m`` counts from the ground and what stands on it, on the line itself; ``agl_end_m`` from bare ground.
-    ``energy_j`` includes ``hold_j`` and ``time_s`` includes ``hold_s``, those of the hold at its end; ``hold_s`` may be
-    infinite (a loiter without end takes no energy and no time here). The figures are those of one pass; ``times``: how
+    ``energy_j`` and ``time_s`` include the hold at the leg's end, ``hold_j`` and ``hold_s``; ``hold_s`` may be
+    infinite (a loiter without end takes no energy and no time here). The figures are for one pass; ``times``: how
     often it is flown, if a jump leads back. ``jumped_from``: the jump that leads to it. ``lead_j``: of ``energy_j``,
     what is at most spent ahead of an even share on the way: the base power while it is slower than its top speed.
     ``speed_m_s``: commanded.
@@ -99,13 +99,13 @@ def _together(legs: Sequence[LegFigures]) -> LegFigures:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """The result of the check of ``mission`` (as sent); what is judged is what the autopilot stores of it.
+    """The result of the check of ``mission`` (as sent), which judges the items as the autopilot stores them.
 
     ``misses``: how near it comes to each limit, on request. ``until_reserve_s``: if the mission ends in a hold or a
     round without end, seconds until the battery is down to its reserve. ``zone_pass``: the nearest zone that is passed
-    over or under. ``energy_stated``: the vehicle's energy was given; else energies say nothing and are not told.
-    ``paper_energy``: energies count the paper's numbers, for the vehicle's own were not given. ``extent``: how far all
-    that is flown comes from home, errors counted; None where nothing was judged.
+    over or under. ``energy_stated``: the vehicle's energy was given; else energies say nothing and are not reported.
+    ``paper_energy``: energies count the paper's numbers, for the vehicle's own were not given. ``extent``: the greatest
+    distances of the flight from home, errors counted; None where nothing was judged.
     """
 
     mission: Mission
@@ -121,18 +121,18 @@ class Verdict:
     paper_energy: bool = False
     extent: FlightExtent | None = None
 
-    def told_j(self, joules: float) -> float | None:
+    def reported_j(self, joules: float) -> float | None:
         """An energy of this flight for people and files: None unless the vehicle's energy was given."""
         return joules if self.energy_stated else None
 
     @property
     def energy_figures(self) -> str | None:
-        """Whose numbers the energies count: ``own`` or ``paper``; None if no energy is told."""
+        """Whose numbers the energies count: ``own`` or ``paper``; None if no energy is reported."""
         return ("paper" if self.paper_energy else "own") if self.energy_stated else None
 
     @property
     def energy_mark(self) -> str:
-        """What stands behind an energy or a part of the battery for people."""
+        """The mark behind an energy, or behind a part of the battery, in outputs for people."""
         return PAPER_MARK if self.paper_energy else ""
 
     @property

@@ -46,8 +46,8 @@ app.command()(plan.planners)
 app.command(short_help="The JSON Schema of a mission file, for editors.")(schema.schema)
 
 
-def _print_version(asked: bool) -> None:
-    if asked:
+def _print_version(is_given: bool) -> None:
+    if is_given:
         from gcsplan import __version__
 
         put(f"{__version__}\n")

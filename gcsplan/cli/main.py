@@ -39,7 +39,7 @@ if _hears:
 
 NO_MEMORY = "not enough memory for this: give a smaller area, coarser terrain, fewer zones or items"
 NO_THREAD = "can't start new thread"
-"""What Python says, as a RuntimeError, where there is no memory for the stack of a thread."""
+"""The words of Python's RuntimeError where there is no memory for the stack of a thread."""
 
 
 def command_of(called: str) -> Any:
@@ -86,7 +86,7 @@ def entry() -> NoReturn:
         main()
     except SystemExit as ended:
         code = ended.code
-    except KeyboardInterrupt:  # it came before the command began, or while another end was told
+    except KeyboardInterrupt:  # it came before the command began, or while another end was reported
         code = interrupted().exit_code
     if code in ENDED:
         _end_now(code)

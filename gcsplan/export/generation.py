@@ -254,7 +254,7 @@ def _is_directory(path: Path) -> bool:
     except FileNotFoundError:
         return False
     if not stat.S_ISDIR(mode):
-        raise NotADirectoryError(errno.ENOTDIR, "a directory is wanted here, and this is none", str(path))
+        raise NotADirectoryError(errno.ENOTDIR, "this is not a directory", str(path))
     return True
 
 

@@ -164,7 +164,7 @@ def _track(track: FlownTrack, style: int, frame: Frame, start: datetime | None, 
 
 
 def _fields(track: FlownTrack, point: WayPoint, amsl_m: float) -> str:
-    """What the balloon of a way point shows."""
+    """The text of a way point's balloon."""
     agl = f"{floored(point.agl_m, HEIGHT_DECIMALS):.{HEIGHT_DECIMALS}f}" if math.isfinite(point.agl_m) else "unknown"
     values = {
         "vehicle": track.vehicle,

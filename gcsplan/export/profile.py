@@ -31,7 +31,7 @@ PROFILE_COLUMNS: tuple[tuple[str, str, int], ...] = (
 """Column, field of `ItemRow`, decimals; the columns follow vehicle, seq and command."""
 
 ROUNDED = {"agl_m": floored, "min_agl_on_leg_m": floored, "climb_deg": steepened}
-"""How a field is rounded; others to the nearest."""
+"""The rounding of each field; the others are rounded to the nearest."""
 
 
 GROUND, TRACK, BOTH, UNKNOWN = "█", "•", "▒", "?"

@@ -13,7 +13,7 @@ from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.zones import Circle, Level, Zone
 
 HEIGHT_DECIMALS = 2
-"""Of heights on a map, metres."""
+"""Decimals of heights on a map, in metres."""
 
 OUTLINE_CORNERS = 72
 OUTLINE_MARGIN_M = 0.02
@@ -80,7 +80,7 @@ class FlownTrack:
         if len(shapes) != 1 or columns[0].ndim != 1 or len(columns[0]) < 2:
             raise ValueError(f"a track has at least two points in columns of equal length, given shapes {shapes}")
         if not all(np.isfinite(c).all() for c in columns):
-            raise ValueError(f"a track is finite; that of {self.vehicle} is not")
+            raise ValueError(f"the track of {self.vehicle} is not finite")
         if self.waypoints and len(self.waypoints) != len(columns[0]):
             raise ValueError(f"{len(columns[0])} points need as many way points, given {len(self.waypoints)}")
         for name, column in zip(("lat_deg", "lon_deg", "amsl_m"), columns, strict=True):

@@ -14,7 +14,7 @@ PARQUET = "a Parquet table needs pyarrow, which is not installed: pip install 'g
 
 
 BY_SPREADSHEETS = ("=", "+", "-", "@", "\t", "\r", "\n")
-"""What a text begins with that spreadsheets run as a formula."""
+"""First characters of texts that spreadsheets run as formulas."""
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
@@ -31,7 +31,7 @@ def csv_of(rows: Iterable[Iterable[object]], end: str = "\n") -> str:
 
 
 class _Lines(list[str]):
-    """What the library writes, line by line."""
+    """The lines that the library writes."""
 
     write = list[str].append
 

@@ -51,9 +51,9 @@ def descriptions() -> dict[tuple[str, str], str]:
 
 
 def describe(kind: type[Keys], key: str) -> str:
-    """What a key is, in plain text; ``kind`` may have inherited it."""
-    said = next((text for base in kind.__mro__ if (text := descriptions().get((base.__name__, key)))), "")
-    return re.sub(r"\[([^\]]+)\]\([^)]+\)", r"\1", said)  # without links of the reference
+    """The description of a key, in plain text; ``kind`` may have inherited the key."""
+    description = next((text for base in kind.__mro__ if (text := descriptions().get((base.__name__, key)))), "")
+    return re.sub(r"\[([^\]]+)\]\([^)]+\)", r"\1", description)  # without links of the reference
 
 
 def mission_schema() -> dict[str, Any]:
@@ -67,10 +67,10 @@ def mission_schema() -> dict[str, Any]:
         _complete(part, kinds[name])
     parts["PlannerKeys"]["properties"]["name"]["enum"] = list(names())
     _complete(whole, schema.MissionKeys)
-    for key, told in whole["properties"].items():
-        if key not in whole["required"] and not _takes_null(told):  # the reader takes a key without a value for absent
-            words = {word: told.pop(word) for word in ("description", "default") if word in told}
-            whole["properties"][key] = {"anyOf": [told, {"type": "null"}], **words}
+    for key, entry in whole["properties"].items():
+        if key not in whole["required"] and not _takes_null(entry):  # the reader takes a key without a value for absent
+            words = {word: entry.pop(word) for word in ("description", "default") if word in entry}
+            whole["properties"][key] = {"anyOf": [entry, {"type": "null"}], **words}
     return {"$schema": DIALECT, **whole, "title": SCHEMA_TITLE, "$defs": parts}
 
 
@@ -78,8 +78,8 @@ def _kinds(kind: type[Keys]) -> list[type[Keys]]:
     return [kind, *(inner for one in kind.__subclasses__() for inner in _kinds(one))]
 
 
-def _takes_null(told: Mapping[str, Any]) -> bool:
-    return {"type": "null"} in told.get("anyOf", ())
+def _takes_null(entry: Mapping[str, Any]) -> bool:
+    return {"type": "null"} in entry.get("anyOf", ())
 
 
 def _complete(part: dict[str, Any], kind: type[Keys]) -> None:
@@ -87,14 +87,14 @@ def _complete(part: dict[str, Any], kind: type[Keys]) -> None:
     part.pop("title", None)
     part["description"] = part.get("description", "").replace("``", "`")
     own: dict[str, Any] = part["properties"]
-    for key, told in own.items():
-        told.pop("title", None)
-        if told.get("default") is None or isinstance(told["default"], dict):
-            told.pop("default", None)
+    for key, entry in own.items():
+        entry.pop("title", None)
+        if entry.get("default") is None or isinstance(entry["default"], dict):
+            entry.pop("default", None)
         if key in LATE_DEFAULTS and key in kind.__annotations__:  # a vehicle inherits the limits of all
-            told["default"] = LATE_DEFAULTS[key]
-        if said := describe(kind, point_keys.ALIASES.get(key, key)):
-            told["description"] = said
+            entry["default"] = LATE_DEFAULTS[key]
+        if words := describe(kind, point_keys.ALIASES.get(key, key)):
+            entry["description"] = words
     others = {name: written for name, written in other_names(kind.model_fields).items() if written.key in own}
     for name, written in others.items():
         words = f"`{written.key}` in {written.other.symbol}. {own[written.key].get('description', '')}".strip()
@@ -108,10 +108,10 @@ def _complete(part: dict[str, Any], kind: type[Keys]) -> None:
         part["allOf"] = [*part.get("allOf", []), *({"anyOf": [{"required": [n]} for n in some]} for some in several)]
 
 
-def _without_bounds(told: Any) -> Any:
+def _without_bounds(entry: Any) -> Any:
     """A copy without the bounds of numbers and the default, which hold in the key's own unit."""
-    if isinstance(told, list):
-        return [_without_bounds(one) for one in told]
-    if isinstance(told, dict):
-        return {key: _without_bounds(one) for key, one in told.items() if key not in (*_BOUNDS, "default")}
-    return copy.copy(told)
+    if isinstance(entry, list):
+        return [_without_bounds(one) for one in entry]
+    if isinstance(entry, dict):
+        return {key: _without_bounds(one) for key, one in entry.items() if key not in (*_BOUNDS, "default")}
+    return copy.copy(entry)

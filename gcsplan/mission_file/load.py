@@ -36,7 +36,14 @@ from gcsplan.mission_file.scene import (
 )  # fmt: skip
 from gcsplan.mission_file.source import read_content
 from gcsplan.mission_file.terminals import Terminals
-from gcsplan.mission_file.values.errors import MOST_TOLD, few, read_section, told_once, unknown_keys, with_lines
+from gcsplan.mission_file.values.errors import (
+    MOST_OF_A_SECTION,
+    few,
+    listed_once,
+    read_section,
+    unknown_keys,
+    with_lines,
+)
 from gcsplan.mission_file.values.schema import (
     TOP_KEYS,
     ArrivalKeys,
@@ -75,7 +82,7 @@ from gcsplan.world.terrain.terrain import OpenTerrain, Terrain, TerrainSpec
 
 __all__ = ["ArrivalRequest", "MissionFile", "PlannerRequest", "VehicleRequest", "load_mission"]
 
-WANTED_KEYS = {
+REQUIRED_KEYS = {
     "version": "write `version: 1`",
     "terrain": "write `terrain: {dem: FILE}`, or for flat ground its altitude: `terrain: {flat_m: 300}`",
     "vehicles": "write a list with name, sysid, autopilot, start and goal of each",
@@ -163,7 +170,7 @@ class _MissionReading:
         problems += unknown_keys(raw, TOP_KEYS, self.where)
         problems += [
             Mistake(self.where + key, f"is missing; {cure}", "missing")
-            for key, cure in WANTED_KEYS.items()
+            for key, cure in REQUIRED_KEYS.items()
             if raw.get(key) is None
         ]
         name = self._name()
@@ -235,9 +242,9 @@ class _MissionReading:
 
     def _refusal(self, problems: list[Mistake]) -> InputError:
         """All problems as the user wrote the keys, with their lines if the mission was a text."""
-        told = told_once(few(problems, self.where.removesuffix(": "), 10 * MOST_TOLD))
-        told = [self.units.as_written(p) for p in told]
-        return InputError.of(told if self.text is None else with_lines(told, self.text, self.where))
+        listed = listed_once(few(problems, self.where.removesuffix(": "), 10 * MOST_OF_A_SECTION))
+        listed = [self.units.as_written(p) for p in listed]
+        return InputError.of(listed if self.text is None else with_lines(listed, self.text, self.where))
 
     # -- the plain keys ------------------------------------------------------------------------------------------
 

@@ -39,7 +39,7 @@ version: 1
 name: {name}
 """
 _ZONES = """
-# {said} For example:
+# {description} For example:
 #no_fly:
 #  - {{name: village, center: [36.61, -84.31], radius_m: 400}}
 #  - {{name: mast, center: [36.585, -84.29], radius_m: 60, ceiling_agl_m: 110}}
@@ -49,7 +49,7 @@ _ZONES = """
 
 @dataclass(frozen=True)
 class Draft:
-    """What a new mission is made of; places and files as text, as they are to stand in the file.
+    """The parts of a new mission; places and files are text, as they will stand in the file.
 
     ``dem`` are rasters, relative to the mission file; without them the ground is flat at ``flat_m`` above sea level.
     ``rtl_rel_home_m`` (m above home) and ``lean_deg`` are a vehicle's own settings, if they were read.
@@ -86,7 +86,7 @@ def text_of(draft: Draft, file: str, name: str) -> str:
     ]
     parts += _section("terrain", _terrain(draft))
     parts += _section("limits", _limits(draft))
-    parts.append(_ZONES.format(said=describe(MissionKeys, "no_fly")))
+    parts.append(_ZONES.format(description=describe(MissionKeys, "no_fly")))
     parts += _section("vehicles", _vehicle(draft), dash=True)
     parts += _section("planner", _planner())
     parts.append("")

@@ -187,12 +187,12 @@ class OpenWorld:
             problems += own
         if problems:
             raise InputError.of([_renamed(p) for p in problems])
-        said = [*self.notes, *notes_on(surface.info), *zone_notes(placed), *unused_notes(self._drafts, frame, box)]
+        notes = [*self.notes, *notes_on(surface.info), *zone_notes(placed), *unused_notes(self._drafts, frame, box)]
         if far:
-            said.append(Note("zones_left_out", count=len(far)))
+            notes.append(Note("zones_left_out", count=len(far)))
         inputs = {k: v for k, v in surface.info.items() if k not in ("notes", "source")}
         inputs["zones_sha256"] = zones_sha256(drafts)
-        inputs["notes"] = tuple(dict.fromkeys(said))
+        inputs["notes"] = tuple(dict.fromkeys(notes))
         return World(frame, Airspace(surface, zones, scale=scale)), inputs
 
     def _box(self, points: Floats, reach_m: float) -> Box:

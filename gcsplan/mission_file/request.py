@@ -23,9 +23,9 @@ ReturnRequirement = Literal["required", "reported"]
 
 @dataclass(frozen=True, slots=True)
 class ArrivalRequest:
-    """How the fleet arrives. ``order`` names every vehicle once; ``interval_s`` applies to a sequence.
+    """The fleet's arrival. ``order`` names every vehicle once; ``interval_s`` applies to a sequence.
 
-    ``best_order``: the order is searched, and ``order`` is only that of the file. ``arrive_s`` is the arrival of the
+    ``best_order``: the order is searched, and ``order`` is only the file's. ``arrive_s`` is the arrival of the
     first of a sequence, or of all together; None: by ``clock``, when the first can (``first``) or when the whole fleet
     can (``fleet``). ``hold`` is where a vehicle waits that would arrive too early: on the ground, at the gate (the top
     of take-off), or nowhere. ``window_s``: each may arrive this much earlier or later. ``pad_clear_s`` is the time
@@ -87,7 +87,7 @@ class PlannerRequest:
 
 @dataclass(frozen=True, slots=True)
 class Content:
-    """What a mission was read from: enough to read it again, in another process too.
+    """The source of a mission, from which any process can read it again.
 
     ``where`` is its name in messages, ``given`` the mapping of keys, ``text`` its text if it has one. The others are as
     in `load_mission`.

@@ -89,7 +89,7 @@ def make_place(
 
 
 def place_notes(point: Degrees, where: str) -> list[Note]:
-    """What a user has to know about how a place was read; ``where`` is its key behind the name of the file."""
+    """Notes for the user on how a place was read; ``where`` is its key behind the name of the file."""
     return [point.note.of(place=where.split(": ", 1)[-1])] if point.note else []
 
 
@@ -214,8 +214,8 @@ def make_zones(
     kinds = [k for k in ("center", "polygon", "line", "file") if getattr(keys, k) is not None]
     if len(kinds) != 1:
         given = " and ".join(kinds) or "none"
-        wanted = "give one of center (with radius_m), polygon, line (with buffer_m) and file"
-        problems.append(Mistake(where, f"{wanted}, given {given}"))
+        choices = "give one of center (with radius_m), polygon, line (with buffer_m) and file"
+        problems.append(Mistake(where, f"{choices}, given {given}"))
         return []
     if keys.file is not None:
         return _zones_of_file(keys, keys.file, where, folder, problems, notes, hours)
@@ -237,9 +237,9 @@ def _zones_of_file(
     from gcsplan.mission_file.published.policy import Policy  # imported here because most missions name no files
     from gcsplan.mission_file.zone_reader import read_zones
 
-    wanted = None if keys.kinds is None else tuple(keys.kinds)
+    kinds = None if keys.kinds is None else tuple(keys.kinds)
     try:
-        policy = Policy(wanted, tuple(keys.authorised), hours, keys.flight_level_error_m, where)
+        policy = Policy(kinds, tuple(keys.authorised), hours, keys.flight_level_error_m, where)
         found = read_zones(
             folder / file, where=f"{where}.file", radius_m=keys.radius_m, buffer_m=keys.buffer_m, layer=keys.layer,
             policy=policy,

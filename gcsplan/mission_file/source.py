@@ -125,7 +125,7 @@ def _text(file: Path, where: str) -> str:
     try:
         if file.is_dir():
             raise InputError("this is a folder; give a mission file (.yaml)", where=where)
-        with file.open("rb") as opened:  # the size is not asked for, since a pipe or a device has none
+        with file.open("rb") as opened:  # this does not read the file's size, since a pipe or a device has none
             data = opened.read(MAX_YAML_BYTES + 1)
         if len(data) > MAX_YAML_BYTES:
             raise InputError(f"a mission file has at most {MAX_YAML_BYTES} bytes, this one has more", where=where)
@@ -194,7 +194,7 @@ MEMBERS_BY_KIND = (("fileType", VEHICLES), ("features", ZONES), ("geometry", ZON
 
 
 def what_else(file: Path, raw: object = None) -> str:
-    """What ``file`` is, and what takes it; empty if it may be a mission file.
+    """The kind of ``file``, and the command that takes it; empty if it may be a mission file.
 
     ``raw`` is its content if that could be read as YAML, whose kind counts before the name.
     """

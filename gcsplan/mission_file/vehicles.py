@@ -54,8 +54,8 @@ MOTION = (
 is no bound: speed changes at once, and counts in space."""
 
 PX4_MOTION = {"climb_m_s": 3.0, "land_m_s": 0.7, "accel_m_s2": 3.0, "corner_accel_m_s2": 1.5, "leg_jerk_m_s3": 4.0}
-"""Of `MOTION`, what differs on PX4: MPC_Z_V_AUTO_UP, MPC_LAND_SPEED, MPC_ACC_HOR, MPC_XY_TRAJ_P · MPC_ACC_HOR and
-MPC_JERK_AUTO; defaults."""
+"""The values of `MOTION` that differ on PX4: the defaults of MPC_Z_V_AUTO_UP, MPC_LAND_SPEED, MPC_ACC_HOR,
+MPC_XY_TRAJ_P · MPC_ACC_HOR and MPC_JERK_AUTO."""
 
 
 def check_unique(vehicles: Sequence[Any], where: str, problems: list[Mistake]) -> tuple[str, ...]:
@@ -93,7 +93,7 @@ def make_vehicle(
 ) -> Vehicle | None:  # fmt: skip
     """A vehicle with its limits merged: the file's, overridden by its own. None, and ``problems``, if it is wrong.
 
-    ``notes`` get what is said of how its keys were read, without its name.
+    ``notes`` gets the notes on how its keys were read, without its name.
 
     ``obstacle_m`` is the obstacle height that applies everywhere; it is added to min AGL in the least take-off height.
     """
@@ -141,13 +141,13 @@ def within_lean(
     if lean_deg is None and local:
         return vehicle
     leans_deg = DEFAULT_LEAN_DEG if lean_deg is None else lean_deg
-    most, wanted = fastest_at_m_s(leans_deg), vehicle.speed_max_m_s
-    if wanted > most:
-        needs_deg = max(math.ceil(lean_for_deg(wanted) - 1e-6), round(lean_needed_deg(wanted)))
+    most, planned_m_s = fastest_at_m_s(leans_deg), vehicle.speed_max_m_s
+    if planned_m_s > most:
+        needs_deg = max(math.ceil(lean_for_deg(planned_m_s) - 1e-6), round(lean_needed_deg(planned_m_s)))
         curable = needs_deg <= LARGEST_LEAN_DEG
         notes.append(
             Note(
-                "lean_bounds_speed_curably" if curable else "lean_bounds_speed", most_m_s=most, wanted_m_s=wanted,
+                "lean_bounds_speed_curably" if curable else "lean_bounds_speed", most_m_s=most, wanted_m_s=planned_m_s,
                 lean_deg=leans_deg, by_default=lean_deg is None, needs_deg=needs_deg, setting=lean_words(needs_deg),
             )
         )  # fmt: skip
@@ -168,9 +168,9 @@ def within_vel_max(
     if most is None and local:
         return vehicle
     own = PX4_VEL_MAX_M_S if most is None else most
-    wanted = vehicle.speed_max_m_s
-    if wanted > own:
-        notes.append(Note("velocity_bounds_speed", most_m_s=own, wanted_m_s=wanted, by_default=most is None))
+    planned_m_s = vehicle.speed_max_m_s
+    if planned_m_s > own:
+        notes.append(Note("velocity_bounds_speed", most_m_s=own, wanted_m_s=planned_m_s, by_default=most is None))
     return _no_faster(replace(vehicle, vel_max_m_s=own), own)
 
 
@@ -219,7 +219,7 @@ def _check_wing(keys: VehicleKeys, limits: Limits | None, where: str, problems: 
 
 
 def _climb_out(keys: VehicleKeys, limits: Limits | None, where: str, problems: list[Mistake]) -> ClimbOut | None:
-    """How a fixed wing climbs out, if the file says so; it must not be less steep than its climb-out is judged."""
+    """A fixed wing's climb-out, if the file states one; it must not be less steep than its climb-out is judged."""
     rate, speed = keys.climb_out_m_s, keys.climb_out_speed_m_s
     if rate is None:
         if speed is not None:
@@ -326,10 +326,10 @@ def _check_heights(keys: VehicleKeys, limits: Limits, where: str, problems: list
                 )
             )
             return
-    wanted = [("takeoff_agl_m", keys.takeoff_agl_m), ("approach_agl_m", keys.approach_agl_m)]
+    heights = [("takeoff_agl_m", keys.takeoff_agl_m), ("approach_agl_m", keys.approach_agl_m)]
     for i, point in enumerate(keys.via):
-        wanted.append((f"via[{i}]", point.agl_m))
-    for key, agl_m in wanted:
+        heights.append((f"via[{i}]", point.agl_m))
+    for key, agl_m in heights:
         if agl_m is None:
             continue
         if agl_m < low - 1e-9:
@@ -376,7 +376,7 @@ def make_arrival(
 
 
 WAYS = (("base_w", "horizontal_j_per_m"), ("cruise_w",), ("endurance_s",))
-"""Keys that say what cruising takes: those of one way alone may be given."""
+"""Keys that say what cruising takes, by way: a file may give the keys of one way alone."""
 
 
 def make_energy(keys: VehicleKeys, where: str, problems: list[Mistake], notes: list[Note]) -> Energy:
@@ -386,9 +386,9 @@ def make_energy(keys: VehicleKeys, where: str, problems: list[Mistake], notes: l
     """
     given = keys.energy
     used = [[key for key in way if key in given.model_fields_set and getattr(given, key) is not None] for way in WAYS]
-    said = [found for found in used if found]
-    if len(said) > 1:
-        first, second = said[0][0], said[1][0]
+    stated = [found for found in used if found]
+    if len(stated) > 1:
+        first, second = stated[0][0], stated[1][0]
         problems.append(
             Mistake(
                 f"{where}.energy.{second}",
@@ -407,7 +407,7 @@ def make_energy(keys: VehicleKeys, where: str, problems: list[Mistake], notes: l
         words = f"the slowest speed must not be above the fastest, given [{speeds[0]:g}, {speeds[1]:g}]"
         problems.append(Mistake(f"{where}.energy.fitted_speed_m_s", words))
     base_w, along = given.base_w, given.horizontal_j_per_m
-    papers = bool(given.model_fields_set) and not said and "vertical_j_per_m" not in given.model_fields_set
+    papers = bool(given.model_fields_set) and not stated and "vertical_j_per_m" not in given.model_fields_set
     if (cruise_w := _cruise_w(given)) is not None:
         base_w, along = cruise_w, 0.0
         key = "cruise_w" if given.cruise_w is not None else "endurance_s"
@@ -432,7 +432,7 @@ def make_energy(keys: VehicleKeys, where: str, problems: list[Mistake], notes: l
 
 
 def _unsaid(given: EnergyKeys) -> list[str]:
-    """What counts as in the paper, because it is not given."""
+    """The numbers that count as in the paper, because they are not given."""
     return [key for key in ("vertical_j_per_m", "horizontal_j_per_m") if key not in given.model_fields_set]
 
 

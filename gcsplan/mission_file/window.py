@@ -89,9 +89,9 @@ class MissionPlane:
             return self._widest(source, MOST_LEVELS, most) or self._widest(source, at + 1, most_cells)
         return self._widest(source, self._level_for(margin_m, at), most_cells)
 
-    def _widest(self, source: MissionFile, wanted: int, most_cells: int) -> MissionFile | None:
-        """The widest window beyond the source's, up to level ``wanted``, that has at most ``most_cells``."""
-        for level in range(wanted, source.level, -1):
+    def _widest(self, source: MissionFile, widest_level: int, most_cells: int) -> MissionFile | None:
+        """The widest window beyond the source's, up to level ``widest_level``, that has at most ``most_cells``."""
+        for level in range(widest_level, source.level, -1):
             if self._box(level) != self._box(level - 1):
                 wide = self._loaded_at(source, level, most_cells)
                 if wide is not None and _is_larger(wide.surface, source.surface):

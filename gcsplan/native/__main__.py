@@ -44,7 +44,7 @@ def main(names: list[str]) -> None:
     if digest is None:
         raise SystemExit(f"the sources of {KERNEL_UNITS[names[0]]} are not at hand")
     if unit.vectors and platform.machine().lower() not in ("x86_64", "amd64"):
-        raise SystemExit(f"{names[0]} is made on x86-64 alone: what is best in one vector is asked of that processor")
+        raise SystemExit(f"{names[0]} is made on x86-64 alone: the width of its vectors is chosen for that processor")
     assert "numba" not in sys.modules
     os.environ.update(
         {f"NUMBA_{key}": value for key, value in NUMBA_OPTIONS[unit.vectors].items()}, NUMBA_DISABLE_JIT="0"

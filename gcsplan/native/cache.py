@@ -36,13 +36,13 @@ _SUFFIX_OF_PART = ".part"
 
 def digest_of(sources: Sequence[Path], more: str) -> str | None:
     """The digest of the files' contents and ``more``; None if a file cannot be read."""
-    told = hashlib.sha256(more.encode())
+    digest = hashlib.sha256(more.encode())
     try:
         for path in sources:
-            told.update(path.read_bytes().replace(b"\r\n", b"\n"))
+            digest.update(path.read_bytes().replace(b"\r\n", b"\n"))
     except OSError:
         return None
-    return told.hexdigest()
+    return digest.hexdigest()
 
 
 def read_shipped(path: Path, digest: str | None) -> bytes | None:
@@ -98,10 +98,10 @@ def _cache() -> Path | None:
 
     A relative path would mean another folder, perhaps somebody else's, in every working directory.
     """
-    told = os.environ.get("NUMBA_CACHE_DIR")
+    folder = os.environ.get("NUMBA_CACHE_DIR")
     try:
-        if told:
-            base = Path(told)
+        if folder:
+            base = Path(folder)
         elif sys.platform == "win32":
             base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
         elif sys.platform == "darwin":
@@ -120,12 +120,12 @@ def _is_private(folder: Path) -> bool:
         return folder.is_dir()
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
-        told = os.fstat(handle)
-        if told.st_uid != os.geteuid():
+        status = os.fstat(handle)
+        if status.st_uid != os.geteuid():
             return False
-        if told.st_mode & 0o077:
+        if status.st_mode & 0o077:
             os.fchmod(handle, 0o700)
-        if told.st_mode & 0o022:  # whoever could write here may have put something here
+        if status.st_mode & 0o022:  # whoever could write here may have put something here
             for name in os.listdir(handle):
                 if name.endswith((_SUFFIX_OF_CODE, _SUFFIX_OF_PART)):
                     os.unlink(name, dir_fd=handle)
@@ -139,13 +139,13 @@ def _open_plainly(path: str, flags: int) -> int:
     return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0))
 
 
-def _is_trusted(told: os.stat_result) -> bool:
+def _is_trusted(status: os.stat_result) -> bool:
     """Whether an open file is a regular file of this user, with only this name, that nobody else can write to."""
-    if not stat.S_ISREG(told.st_mode) or told.st_size > MAX_CODE_BYTES:
+    if not stat.S_ISREG(status.st_mode) or status.st_size > MAX_CODE_BYTES:
         return False
     if os.name != "posix":
         return True
-    return told.st_uid == os.geteuid() and told.st_nlink == 1 and not told.st_mode & 0o022
+    return status.st_uid == os.geteuid() and status.st_nlink == 1 and not status.st_mode & 0o022
 
 
 def _replace(path: Path, content: bytes, *, mode: int) -> None:

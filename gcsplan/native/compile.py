@@ -20,9 +20,9 @@ from numba.np.arrayobj import make_array, populate_array
 from gcsplan.native.signature import DTYPES, ArgumentForm
 
 
-def options(**wanted: object) -> dict[str, Any]:
+def options(**requested: object) -> dict[str, Any]:
     """The compiler options that this numba knows; without the others kernels are the same, but slower."""
-    return {name: value for name, value in wanted.items() if hasattr(CPUTargetOptions, name)}
+    return {name: value for name, value in requested.items() if hasattr(CPUTargetOptions, name)}
 
 
 KERNEL_OPTIONS = options(

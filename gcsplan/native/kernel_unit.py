@@ -203,7 +203,7 @@ def _callable(name: str, address: int, text: str) -> Callable[..., int]:
 
 
 @contextmanager
-def compilation_told(listener: Callable[[str], None]) -> Iterator[None]:
+def compilation_reported(listener: Callable[[str], None]) -> Iterator[None]:
     """In this context ``listener`` is called with a sentence before kernels are compiled; never if they are cached."""
     _listeners.append(listener)
     try:

@@ -35,7 +35,7 @@ class HostMachine:
 
     @property
     def marks(self) -> tuple[str, ...]:
-        """What machine code depends on, besides its source."""
+        """The marks of the machine and compiler on which machine code depends, besides its source."""
         return str(llvmlite.__version__), self._triple, self._cpu, self._features
 
     def compile(self, bitcode: bytes) -> bytes | None:

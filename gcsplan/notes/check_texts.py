@@ -97,7 +97,7 @@ CHECK_TEXTS = {
         "{flown_m:distance.0}; it is judged with {judged_m:distance.0 up}, for a hot day"
     ),
     "climb_rate_uncounted": "a rate of climb or descent for PX4 is not counted in the time",
-    "waits_until_time": ("a wait until a time of day costs what is not known beforehand; give its seconds (param1)"),
+    "waits_until_time": ("the energy of a wait until a time of day is not known; give its seconds (param1)"),
     "hold_without_known_end": (
         "a hold of {hold_s} s (param1) has no end that is known (give its seconds): that is not judged"
     ),
@@ -124,7 +124,7 @@ CHECK_TEXTS = {
         "a return leads on to DO_LAND_START, by RTL_AUTOLAND (end with the landing itself): that is not judged"
     ),
     "runway_landing": (
-        "a runway landing's glide (NAV_LAND on ArduPlane) is not judged; that of a fixed wing with "
+        "a runway landing's glide (NAV_LAND on ArduPlane) is not judged; the glide of a fixed wing with "
         "{key:turn_radius_m} is"
     ),
     "landing_ground_unknown": "the ground at the landing place is unknown; give terrain that knows it",
@@ -155,7 +155,7 @@ CHECK_TEXTS = {
         "place, and elsewhere with a wind along the runway: land on a heading of {uphill_deg:.0f}°, uphill, or give "
         "another goal"
     ),
-    # -- why what is flown for a command is not known ----------------------------------------------------------------
+    # -- why the flight for a command is not known -------------------------------------------------------------------
     "arc_unknown": (
         "{name}: an arc is known only for ArduCopter, up to 359°, without terrain frame, with an item after it that is "
         "no spline, and not from a circle"
@@ -166,9 +166,9 @@ CHECK_TEXTS = {
     "changes_to_forward_flight": (
         "{name}: it changes to forward flight after its climb, in a direction that is not known"
     ),
-    "take_off_unknown": "{name}: it comes in the air, or its altitude cannot be told",
+    "take_off_unknown": "{name}: it comes in the air, or its altitude is not known",
     "way_point_unknown": (
-        "waypoint: the ground there, or under the leg to it, is not known, or its altitude cannot be told"
+        "waypoint: the ground there, or under the leg to it, is not known, or its altitude is not known"
     ),
     "waits_for_altitude": "{name}: it waits for an altitude that a balloon may bring",
     "flown_by_computer": "{name}: another computer flies from there on",
@@ -181,10 +181,10 @@ CHECK_TEXTS = {
     "breaks_off_landing": "{name}: it breaks a landing off",
     "motion_unknown": "{name}: its motion is not known",
     "command_unknown": "its motion is not known",
-    # -- corners and turns: where a vehicle begins them, and what of them is not judged --
+    # -- corners and turns: where a vehicle begins them, and which parts of them are not judged --
     "arcs_unread": (
         "the arcs of {radius_m:distance} that {vehicle} flies at its corners are not judged: {autopilot} begins a turn "
-        "by parameters that the mission does not hold; those of ArduPlane are"
+        "by parameters that the mission does not hold; the arcs of ArduPlane are judged"
     ),
     "arcs_too_banked": (
         "turns of {radius_m:distance} at {speed_m_s:speed} need a bank of {bank_deg:.0f}°, and ArduPlane's "
@@ -207,11 +207,11 @@ CHECK_TEXTS = {
     ),
     "arcs_too_long": (
         "arcs of {radius_m:distance} take {arcs_m:distance.0} of the leg to item {leg}, which is {leg_m:distance.0} "
-        "long: what is flown there is not judged; make the leg longer, or give a smaller {key:turn_radius_m}"
+        "long: the flight there is not judged; make the leg longer, or give a smaller {key:turn_radius_m}"
     ),
     "turn_too_early": (
         "the turn begins {begins_m:distance.0} before the end of the leg to item {leg}, which is {leg_m:distance.0} "
-        "long: what is flown there is not judged; make the leg longer, or give a smaller acceptance radius (param2)"
+        "long: the flight there is not judged; make the leg longer, or give a smaller acceptance radius (param2)"
     ),
     "turns_as_arcs": (
         "turns are judged as arcs of {radius_m:distance} that begin at the acceptance radius of their way point; that "
@@ -507,7 +507,7 @@ CHECK_TEXTS = {
     "nothing_to_join": "the mission holds neither {one} nor {other}: there is nothing that a return joins",
     "jump_decides_join": "it jumps: what a return joins depends on the jumps that are left",
     "join_unknown_on_path": "the return path holds it, and how it is joined there is not known",
-    "join_distance_unknown": "how near it is depends on its frame or its place, which cannot be told",
+    "join_distance_unknown": "how near it is depends on its frame or its place, which are not known",
     "join_leads_nowhere": "nothing follows it that a return could fly to",
     "join_without_item": "no item that moves the vehicle follows the start that a return joins",
     "join_not_way_point": "a return joins it, and only way points and landings with a place are judged",

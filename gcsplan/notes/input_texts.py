@@ -67,11 +67,11 @@ INPUT_TEXTS = {
     ),
     "no_zone_for_fence": "no zone can be sent as a fence: the fence on board is left as it is",
     "flies_beyond_hours": (
-        "the hours of zones: those that do not apply from {hours} were left out, and the flight from then on: it lasts "
+        "the hours of zones: zones that do not apply from {hours} were left out, and the flight from then on: it lasts "
         "to {until}; write at: [from, to] with all of the flight in it"
     ),
     "hours_without_landing": (
-        "the hours of zones: those that do not apply from {hours} were left out, and the flight from then on: it ends "
+        "the hours of zones: zones that do not apply from {hours} were left out, and the flight from then on: it ends "
         "in the air, and when it lands is not known: end it with a landing (a multicopter also with an RTL), or leave "
         "`at` out, so that all zones count"
     ),
@@ -81,7 +81,7 @@ INPUT_TEXTS = {
     "home_row_missing": "the file has no home row: the mission's own home was taken",
     "six_decimals": (
         "the coordinates have six decimals (0.11 m), as MAVProxy and pymavlink save them: coarser than the wire, so "
-        "this file cannot verify exactly what is on board"
+        "this file cannot verify the list on board exactly"
     ),
     "plan_home_missing": "the file has no home: the mission's own home was taken",
     "plan_home_without_place": "the file's home holds no place (0, 0): the mission's own home was taken",
@@ -177,7 +177,7 @@ INPUT_TEXTS = {
     "size_of_zone": "{size_m:distance}",
     "line_of_file": "line {line}: {text}",
     # -- what is not used --
-    "zones_of_other_kinds": "not used, because their kinds are not among those of the mission ({kinds})",
+    "zones_of_other_kinds": "not used, because the mission uses other kinds alone ({kinds})",
     "zones_restrict_nothing": "not used, because they restrict nothing",
     "zones_authorised": "not used, because the mission says that it is authorised to enter them",
     "zones_out_of_hours": "not used, because they do not apply in the hours of the mission ({hours})",
@@ -237,8 +237,8 @@ INPUT_TEXTS = {
     ),
     "terrain_blocks_unused": "{count} {count:block|blocks} not used: {why}; the ground there is unknown",
     "checksum_wrong": "its checksum is wrong",
-    "format_of_other_version": "its format is version {version}, wanted {wanted}",
-    "spacing_differs": "its spacing is {spacing_m:distance}, that of most is {most_m:distance}",
+    "format_of_other_version": "its format is version {version}, not {wanted}",
+    "spacing_differs": "its spacing is {spacing_m:distance}, and most blocks have {most_m:distance}",
     "spacing_is_zero": "its spacing is 0",
     "block_lies_elsewhere": "it lies elsewhere than its corner says (older tools placed blocks otherwise)",
     "terrain_is_a_surface": (

@@ -35,7 +35,7 @@ LINK_TEXTS = {
     "armed_during_upload": "the vehicle was armed by somebody during the upload",
     # -- terrain on board --
     "terrain_parts_not_sent": (
-        "{parts} parts of {blocks} blocks that the vehicle asked for are not sent, because the terrain model does not "
+        "{parts} parts of {blocks} blocks that the vehicle asks for are not sent, because the terrain model does not "
         "know their ground (the first in {tile}): it asks for them again and again, and does not arm a mission in the "
         "terrain frame before it has them; give a larger DEM"
     ),
@@ -217,7 +217,8 @@ LINK_TEXTS = {
         "longer --timeout"
     ),
     "parameters_not_judged": (
-        "this is not what was judged, and cannot be judged{allowed:; --allow-parameters takes that|}{off:lines}"
+        "it was judged with other values, and cannot be judged with these{allowed:; --allow-parameters takes that|}"
+        "{off:lines}"
     ),
     "breaks_limits_on_board": "{found:rows}",
     "not_judged_on_board": "not judged: {why}",
@@ -234,7 +235,7 @@ LINK_TEXTS = {
     ),
     # -- an upload or a comparison, by what was done before and after it --
     "fence_on_board": "a fence of {items} {items:item|items} is on board too, read back and compared",
-    "judged_again_safe": "what is on board is judged again: safe",
+    "judged_again_safe": "the mission on board is judged again: safe",
     "positions_shifted": (
         "{items} {items:item differs by|items differ by up to} {most_m:distance.3}; judged again: {safe:safe|not safe}"
     ),

@@ -53,7 +53,7 @@ BEFORE = ("file", "place", "vehicle")
 
 @dataclass(frozen=True, slots=True)
 class Wording:
-    """How a reader is spoken to: the units, and the option for each key of the mission file that he typed as one.
+    """The wording for a reader: the units, and the option for each key of the mission file that he typed as one.
 
     ``units``: None writes SI as files have it, with seconds and joules.
     """
@@ -156,16 +156,16 @@ def fields_of(template: str) -> set[str]:
 
 def sentence(template: str, data: Mapping[str, Datum], wording: Wording = IN_FILES) -> str:
     """A template with its fields filled; see this module."""
-    said = []
+    parts = []
     for literal, name, form in parts_of(template):
-        said.append(literal)
+        parts.append(literal)
         if name == "key":
-            said.append(wording.options.get(form, form))
+            parts.append(wording.options.get(form, form))
         elif name == "unit":
-            said.append(Symbol(form).text(wording.units))  # type: ignore[arg-type]
+            parts.append(Symbol(form).text(wording.units))  # type: ignore[arg-type]
         elif name is not None:
-            said.append(_shown(data[name], form, wording))
-    return "".join(said)
+            parts.append(_shown(data[name], form, wording))
+    return "".join(parts)
 
 
 def _shown(value: Any, spec: str, wording: Wording) -> str:  # noqa: PLR0911 - a table of formats
@@ -215,7 +215,7 @@ def _plain(value: Datum) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One limit broken by wire item ``seq``: what is said of it, the place, and by how much.
+    """One limit broken by wire item ``seq``: the note on it, the place, and by how much.
 
     ``zone`` is the zone's name or empty.
     """
@@ -234,12 +234,12 @@ class Finding:
 
     @property
     def message(self) -> str:
-        """What is said of it, in SI."""
+        """The note on it as a sentence, in SI."""
         return str(self.note)
 
     def as_dict(self, wording: Wording = IN_FILES) -> dict[str, Any]:
         """The finding for programs: its fields with the message, and the note's code and data."""
         fields = {name: getattr(self, name) for name in self.__slots__ if name != "note"}
-        said = self.note.as_dict()
+        note = self.note.as_dict()
         begins = {"seq": fields.pop("seq"), "kind": fields.pop("kind"), "message": self.note.text(wording)}
-        return begins | fields | {"code": said["code"], "data": said["data"]}
+        return begins | fields | {"code": note["code"], "data": note["data"]}

@@ -131,7 +131,7 @@ PLAN_TEXTS = {
         "that is {height_m:height.0} above the mission's ground: without terrain an SITL's ground is flat at the "
         "altitude of home, and --sitl-binary starts one with the mission's terrain"
     ),
-    "vehicle_said": "it said: {texts}",
+    "vehicle_said": "it sent: {texts}",
     "arrived_late": "{name} arrived {late_s:seconds} late, after {took_s:seconds} instead of {told_s:seconds}",
     "down_late": "{name} was down {late_s:seconds} late, after {took_s:seconds} instead of {told_s:seconds}",
     "battery_used_up": (

@@ -1,7 +1,7 @@
 """The briefing: one printed page with what a crew reads and signs; on the screen it is not shown.
 
 It holds nothing that the rest of the report does not hold. Names and messages are cut to a length, and lists to a
-number, so that it stays one page; what is left out is said.
+number, so that it stays one page; the page says how much it leaves out.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def _shown(page: Page) -> list[tuple[int, Subject]]:
 
 
 def _problems(page: Page) -> str:
-    """What is broken and what was not judged, the first of each."""
+    """The first broken limits, and the first parts that were not judged."""
     found = [f"{s.name}: {f.note.text(s.wording(page.units))}" for s in page.subjects for f in s.verdict.findings]
     found += [f"{name}: no mission, left out: {why}" for name, why in page.left_out]
     found += [in_units(text, page.units) for text in page.rehearsed.violations] if page.rehearsed is not None else []
@@ -165,7 +165,7 @@ def _facts(page: Page, s: Subject, units: Units) -> Iterator[tuple[str, str]]:
 def _battery(s: Subject) -> str:
     used, battery, mark = s.verdict.battery_used_percent, s.vehicle.energy, esc(s.verdict.energy_mark)
     if used is None:
-        return f"{energy(s.verdict.told_j(s.verdict.energy_j), 0, battery.battery_v)}{mark}; capacity not given"
+        return f"{energy(s.verdict.reported_j(s.verdict.energy_j), 0, battery.battery_v)}{mark}; capacity not given"
     return f"{num(used, 1, '%')} used{mark}; {num(100.0 * battery.reserve, 0, '%')} must be left"
 
 

@@ -13,7 +13,7 @@ from gcsplan.units import Units, duration
 
 MissionRow = Mapping[str, Any]
 METRES_PER_DEGREE = 111_195.0
-"""Of a great circle, m."""
+"""Length of a degree of a great circle, m."""
 WIDE = 1000.0
 """Width of the map's own coordinates."""
 

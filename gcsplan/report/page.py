@@ -145,13 +145,13 @@ def _header(page: Page) -> str:
     wrong += [(s, f"not judged: {text}") for s, text in _unjudged(page)]
     several = len(page.subjects) > 1
     listed = "".join(f"<li>{f'<b>{esc(s.name)}</b>: ' if several else ''}{esc(text)}</li>" for s, text in wrong)
-    said = "" if several else "".join(f"<b>{esc(in_units(s.words, page.units))}.</b> " for s in page.subjects)
+    verdicts = "" if several else "".join(f"<b>{esc(in_units(s.words, page.units))}.</b> " for s in page.subjects)
     absent = what_is_not_in(page.inputs)
     bare = f'<p class="bare"><b>{esc(absent)}</b></p>' if absent else ""
     return (
         f'<header><p class="brand">gcsplan mission report</p><h1>{esc(page.title)}</h1>'
         f'<div class="verdict {kind}"><span class="sign" aria-hidden="true">{sign}</span>'
-        f"<div><strong>{word}</strong><p>{said}{words}</p></div></div>"
+        f"<div><strong>{word}</strong><p>{verdicts}{words}</p></div></div>"
         + (f'<ul class="findings">{listed}</ul>' if listed else "")
         + left_out_html(page)
         + bare
@@ -202,7 +202,7 @@ def _card(subject: Subject, index: int, page: Page) -> str:
     limit = f"limit {num(limits.max_climb_deg, 0, '°')}" if limits.max_climb_deg < 90 else "no limit"
     figures.append(("steepest", steepest(verdict.max_climb_deg), limit))
     battery = subject.vehicle.energy
-    used = energy(verdict.told_j(verdict.energy_j), 0, battery.battery_v) + esc(verdict.energy_mark)
+    used = energy(verdict.reported_j(verdict.energy_j), 0, battery.battery_v) + esc(verdict.energy_mark)
     figures.append(
         ("battery", num(verdict.battery_used_percent, 1, "%"),
          f"{used}, of {energy(battery.battery_j, 0, battery.battery_v)}; "

@@ -1,7 +1,7 @@
 """The result of a rehearsal: how every vehicle flew in every run, and which requirements were violated.
 
-A `RehearsalPart` is what was told of one vehicle's flight; `energy_of` is what that took, `lateness` says whether it
-came too late.
+A `RehearsalPart` is the plan of one vehicle's flight; `energy_of` is the energy of its flight, `lateness` says whether
+it came too late.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from gcsplan.vehicle import Vehicle
 from gcsplan.world.world import World
 
 LATE_FLIGHT_PART, LATE_FLIGHT_S = 0.1, 5.0
-"""Later by more than this part of the flight that was told, and by more than these seconds, is not as planned."""
+"""A flight that is later by more than this part of its planned time, and by more than these seconds, is late."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +46,8 @@ class RehearsalPart:
     leaves: bool = False
 
     @property
-    def told_s(self) -> tuple[float, float] | None:
-        """Seconds from its departure to its arrival and to its end, as they are told; None if no arrival is."""
+    def planned_s(self) -> tuple[float, float] | None:
+        """Planned seconds from its departure to its arrival and to its end; None if the plan has no arrival."""
         if self.arrive_s is None:
             return None
         arrives_s = self.arrive_s - self.depart_s
@@ -56,16 +56,16 @@ class RehearsalPart:
 
 def lateness(part: RehearsalPart, trace: Trace) -> tuple[Note, float] | None:
     """How much too late a flight came to its goal or to its end, also in seconds; None if it did not."""
-    if part.told_s is None or not math.isfinite(trace.arrive_s):
+    if part.planned_s is None or not math.isfinite(trace.arrive_s):
         return None
     flown_s = trace.arrive_s - part.depart_s, trace.end_s - part.depart_s
     worst: tuple[Note, float] | None = None
-    for arrived, told, took in zip((True, False), part.told_s, flown_s, strict=True):
-        late_s = took - told
-        if not late_s > max(LATE_FLIGHT_PART * told, LATE_FLIGHT_S) or (worst is not None and worst[1] >= late_s):
+    for arrived, planned, took in zip((True, False), part.planned_s, flown_s, strict=True):
+        late_s = took - planned
+        if not late_s > max(LATE_FLIGHT_PART * planned, LATE_FLIGHT_S) or (worst is not None and worst[1] >= late_s):
             continue
         late = Note(
-            "arrived_late" if arrived else "down_late", name=trace.name, late_s=late_s, took_s=took, told_s=told
+            "arrived_late" if arrived else "down_late", name=trace.name, late_s=late_s, took_s=took, told_s=planned
         )  # fmt: skip
         worst = late, late_s
     return worst
@@ -120,10 +120,10 @@ class Breach:
 
     def as_dict(self) -> dict[str, Any]:
         """Return a dict for JSON."""
-        said = self.message.as_dict()
+        parts = self.message.as_dict()
         return {
             "kind": self.kind, "vehicles": list(self.vehicles), "message": str(self.message), "by": _number(self.by),
-            "runs": self.runs, "code": said["code"], "data": said["data"],
+            "runs": self.runs, "code": parts["code"], "data": parts["data"],
         }  # fmt: skip
 
 
@@ -387,21 +387,21 @@ class Tally:
         used, reserve = self._used_percent(part, spent_j), part.vehicle.energy.reserve
         if used is not None and used > 100.0 * (1.0 - reserve) + 1e-9:
             name, paper = part.vehicle.name, part.vehicle.energy.papers
-            said = Note("battery_used_up", name=name, used_percent=used, paper=paper, reserve_percent=100.0 * reserve)
-            self.breach("battery", (name,), said, used - 100.0 * (1.0 - reserve))
+            note = Note("battery_used_up", name=name, used_percent=used, paper=paper, reserve_percent=100.0 * reserve)
+            self.breach("battery", (name,), note, used - 100.0 * (1.0 - reserve))
 
     def _order(self, traces: Sequence[Trace]) -> None:
         came = [t.name for t in sorted(traces, key=lambda t: math.inf if math.isnan(t.arrive_s) else t.arrive_s)]
         if self.runs == 1:
             self.order_flown = tuple(came)
-        wanted = list(self.terms.order)
-        if not wanted:
+        planned = list(self.terms.order)
+        if not planned:
             return
-        if came == wanted:
+        if came == planned:
             self.order_kept += 1
             return
         self.order_flown = tuple(came)
-        self.breach("order", (), Note("order_lost", came=tuple(came), planned=tuple(wanted)), 1.0)
+        self.breach("order", (), Note("order_lost", came=tuple(came), planned=tuple(planned)), 1.0)
 
     def _separation(self, traces: Sequence[Trace]) -> None:
         needed = self.terms.separation_m

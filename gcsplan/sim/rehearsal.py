@@ -44,7 +44,7 @@ MOST_LANES = 240
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Flights:
-    """What all runs of a rehearsal share: the vehicles' parts, the tracks that they fly, and the weather."""
+    """The data that all runs of a rehearsal share: the vehicles' parts, the tracks that they fly, and the weather."""
 
     parts: Sequence[RehearsalPart]
     terms: Terms
@@ -111,7 +111,7 @@ def prepared(
 ) -> Flights:
     """Upload, and make the tracks of what the vehicles stored. Raises as `rehearse`."""
     if runs < 1:
-        raise InputError(f"at least one run is wanted, given {runs}")
+        raise InputError(f"give at least one run, not {runs}")
     stored = on_board(parts)
     tracks = [track_of(part, mission, world, airspeed_m_s) for part, mission in zip(parts, stored, strict=True)]
     return Flights(parts, terms, tracks, weather or Weather(), seed)
@@ -146,7 +146,7 @@ def flown(flights: Flights, world: World, block: RunBlock) -> Tally:
 
 
 def _spent_j(flights: Flights, flight: FlownLanes, lane: int) -> float:
-    """What a lane's flight took, J: in still air that of its track, else of the air that it flew through."""
+    """The energy of a lane's flight, J: of its track in still air, else of its way through the air."""
     k = lane % len(flights.parts)
     vehicle = flights.parts[k].vehicle
     if flights.weather.calm:

@@ -90,7 +90,7 @@ class Case:
 @cache
 def case_of(kind: str) -> Case:
     done = plan(load_mission("m.yaml", text=mission_text(kind)))
-    homes = returns.judged(done, asked=False)
+    homes = returns.judged(done, home=False)
     [job] = jobs_of(done, {"uav1": "udpout:127.0.0.1:9"}, homes, bool(homes))
     vehicle = done.vehicles[0].request.vehicle
     base = {

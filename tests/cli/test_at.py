@@ -91,7 +91,7 @@ def test_check_judges_a_flight_within_the_hours_alone(call: Run) -> None:
     code, said = call("check", "dated.yaml", "waits.waypoints")
     assert code == 4
     assert (
-        "not judged: the hours of zones: those that do not apply from 2026-11-24 10:00Z to 12:00Z were left out" in said
+        "not judged: the hours of zones: zones that do not apply from 2026-11-24 10:00Z to 12:00Z were left out" in said
     )
     assert "it lasts to 2026-11-24 18:0" in said
     assert "write at: [from, to] with all of the flight in it" in said

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from gcsplan.native import cache
-from gcsplan.native.kernel_unit import QUICK_NOTICE, compilation_told
+from gcsplan.native.kernel_unit import QUICK_NOTICE, compilation_reported
 from tests.support.toy_kernels import kernels, notices, ship, value
 
 
@@ -145,7 +145,7 @@ def test_somebody_elses_code_is_not_run_whatever_its_digest_says(room: Path, who
     kept.write_bytes(hashlib.sha256(body).digest() + body)  # LLVM would take it for an object file, and end badly
     os.chown(folder if whose == "folder" else kept, 65534, 65534)
     said: list[str] = []
-    with compilation_told(said.append):
+    with compilation_reported(said.append):
         value(kernels(room))
     assert len(said) == 1
     if whose == "folder":

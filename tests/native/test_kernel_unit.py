@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE, compilation_told
+from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE, compilation_reported
 from gcsplan.world.kernels.compiled import UNIT as WORLD
 from tests.support.toy_kernels import imported_anew, kernels, notices, ship, value, write
 
@@ -22,7 +22,7 @@ def test_what_is_shipped_was_made_from_the_source_as_it_stands() -> None:
 
 def test_a_kernel_from_source_from_what_is_shipped_and_from_the_cache_is_the_same(room: Path) -> None:
     said: list[str] = []
-    with compilation_told(said.append):
+    with compilation_reported(said.append):
         from_source = value(kernels(room))
         assert [words.startswith(SLOW_NOTICE) for words in said] == [True]
         ship(kernels(room))

@@ -32,8 +32,8 @@ def test_every_sentence_speaks_in_the_readers_units_and_names_keys_as_typed() ->
     [
         (
             Note("spacing_differs", file="N36W085.DAT", spacing_m=50, most_m=100),
-            "N36W085.DAT: its spacing is 50 m, that of most is 100 m",
-            "N36W085.DAT: its spacing is 164.04 ft, that of most is 328.08 ft",
+            "N36W085.DAT: its spacing is 50 m, and most blocks have 100 m",
+            "N36W085.DAT: its spacing is 164.04 ft, and most blocks have 328.08 ft",
         ),
         (
             Note("home_row_blank", file="a.waypoints"),

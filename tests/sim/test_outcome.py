@@ -94,8 +94,8 @@ def trace(arrive_s: float, end_s: float) -> Trace:
 
 def test_a_flight_is_late_by_more_than_a_tenth_of_what_was_told() -> None:
     part = a_part(1, (0, 0), (1000, 0), depart_s=5.0, arrive_s=205.0)
-    assert part.told_s is not None
-    arrives_s, ends_s = part.told_s
+    assert part.planned_s is not None
+    arrives_s, ends_s = part.planned_s
     assert arrives_s == 200.0
     assert lateness(part, trace(5.0 + 219.0, 5.0 + ends_s)) is None
     late = lateness(part, trace(5.0 + 221.0, 5.0 + ends_s))
@@ -108,8 +108,8 @@ def test_a_flight_is_late_by_more_than_a_tenth_of_what_was_told() -> None:
 
 def test_the_later_of_arrival_and_end_counts() -> None:
     part = a_part(1, (0, 0), (1000, 0), arrive_s=200.0)
-    assert part.told_s is not None
-    late = lateness(part, trace(230.0, part.told_s[1] + 50.0))
+    assert part.planned_s is not None
+    late = lateness(part, trace(230.0, part.planned_s[1] + 50.0))
     assert late is not None
     assert late[1] == pytest.approx(50.0)
     assert late[0].code == "down_late"

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from gcsplan.native import cache
-from gcsplan.native.kernel_unit import KernelUnit, compilation_told
+from gcsplan.native.kernel_unit import KernelUnit, compilation_reported
 
 SOURCE = """
 from pathlib import Path
@@ -109,6 +109,6 @@ def value(of: KernelUnit, factor: float = 1.0) -> float:
 def notices(room: Path, factor: float = 1.0) -> list[str]:
     """What is said of compiling while the kernel, imported anew, is called: each notice without the unit's name."""
     said: list[str] = []
-    with compilation_told(said.append):
+    with compilation_reported(said.append):
         value(kernels(room), factor)
     return [words.rpartition(":")[0] for words in said]

@@ -10,13 +10,13 @@ import numpy as np
 
 from gcsplan.app.check.verdict_json import flat
 from gcsplan.app.check.worlds import (
-    UNASKED,
+    NO_RETURNS,
     Checked,
     CheckSite,
     MissionSite,
     OptionsSite,
     Returns,
-    Wanted,
+    VerdictParts,
     at_start,
     beyond_m,
     match,
@@ -35,7 +35,7 @@ from gcsplan.vehicle import Autopilot
 
 @dataclass(frozen=True)
 class Batch:
-    """Several files: those that were judged, and the errors of the others.
+    """Several files: the ones that were judged, and the errors of the others.
 
     ``inputs`` describes the world; ``typed``: as in `worlds.Checked`.
     """
@@ -48,7 +48,7 @@ class Batch:
     typed: Mapping[str, str] = field(default_factory=dict)
 
 
-def check_files(source: MissionFile, arguments: Sequence[str], *, returns: Returns = UNASKED) -> list[Checked]:
+def check_files(source: MissionFile, arguments: Sequence[str], *, returns: Returns = NO_RETURNS) -> list[Checked]:
     """Judge each FILE or NAME=FILE in the world of ``source``. Raises InputError or UsageError for unreadable files."""
     batch = check_batch(source, arguments, returns=returns)
     if batch.unreadable:
@@ -58,17 +58,17 @@ def check_files(source: MissionFile, arguments: Sequence[str], *, returns: Retur
     return list(batch.checked)
 
 
-def check_batch(source: MissionFile, arguments: Sequence[str], *, returns: Returns = UNASKED) -> Batch:
+def check_batch(source: MissionFile, arguments: Sequence[str], *, returns: Returns = NO_RETURNS) -> Batch:
     """Judge each FILE or NAME=FILE in the world of ``source``; a file that cannot be read does not stop the others.
 
-    ``returns``: what of the way home is asked for, beside the mission file's own ``way_home``. If a file reaches beyond
+    ``returns``: whether the way home is judged, beside the mission file's own ``way_home``. If a file reaches beyond
     the terrain that was loaded for the mission, more terrain is loaded. Raises UsageError if it is not clear which
     vehicle a file is for.
     """
     for argument in arguments:
         match(source, argument)
-    asked = Returns(returns.judged, is_required(source, returns.required))
-    return check_at(MissionSite(source), source.name, arguments, Wanted(asked))
+    both = Returns(returns.judged, is_required(source, returns.required))
+    return check_at(MissionSite(source), source.name, arguments, VerdictParts(both))
 
 
 def check_mission(source: MissionFile, mission: Mission, vehicle: str | None = None) -> Checked:
@@ -82,20 +82,20 @@ def check_mission(source: MissionFile, mission: Mission, vehicle: str | None = N
     read = at_start(MissionFileRead(mission), start, request.vehicle)
     site = MissionSite(source)
     site.settle(np.array(places_of(read.mission)), 0.0, several=False)
-    return site.judged(argument, read, Wanted())
+    return site.judged(argument, read, VerdictParts())
 
 
 def check_with_options(
-    options: WorldOptions, autopilot: Autopilot | None, arguments: Sequence[str], *, returns: Returns = UNASKED
+    options: WorldOptions, autopilot: Autopilot | None, arguments: Sequence[str], *, returns: Returns = NO_RETURNS
 ) -> Batch:
     """Judge each FILE in the world that ``options`` describe, see `OptionsSite`; ``returns``: as in `check_batch`.
 
     Raises InputError if the options are wrong.
     """
-    return check_at(OptionsSite(options, autopilot), "check", arguments, Wanted(returns))
+    return check_at(OptionsSite(options, autopilot), "check", arguments, VerdictParts(returns))
 
 
-def check_at(site: CheckSite, name: str, arguments: Sequence[str], wanted: Wanted) -> Batch:
+def check_at(site: CheckSite, name: str, arguments: Sequence[str], parts: VerdictParts) -> Batch:
     """Judge each file at a site; one that cannot be read or judged does not stop the others."""
     read: list[tuple[str, MissionFileRead]] = []
     unreadable: list[tuple[str, InputError]] = []
@@ -110,10 +110,10 @@ def check_at(site: CheckSite, name: str, arguments: Sequence[str], wanted: Wante
     checked: list[Checked] = []
     for argument, r in read:
         try:
-            checked.append(site.judged(argument, r, wanted))
+            checked.append(site.judged(argument, r, parts))
         except InputError as error:
             unreadable.append((argument, error))
-    inputs, notes = site.said
+    inputs, notes = site.sources
     return Batch(name, tuple(checked), tuple(unreadable), inputs, notes, site.typed)
 
 

@@ -1,10 +1,10 @@
 """Check an archive: any number of files in one world, whose results come one by one, in the order of the files.
 
-Files are read first, for the world that they share must hold all of them; then they are judged, in pieces, by whatever
-executor. What was read is kept in `KEPT_READ_BYTES` at most; the rest is read again. A result holds texts and counts,
-and neither mission nor terrain, so memory does not grow with what was judged.
+All files are read first, for the world that they share must hold all of them. Then an executor judges them in pieces.
+At most `KEPT_READ_BYTES` of the files are kept in memory; the others are read again. A result holds texts and counts,
+neither mission nor terrain, so memory does not grow with the number of files.
 
-A `Form` says what is told of them: the lines of each file, its JSON, or the summary by finding.
+A `Form` is the form of a result: the lines of each file, a row of JSON, or the whole JSON document.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from gcsplan.app.check.worlds import (
     MissionSite,
     OptionsSite,
     Returns,
-    Wanted,
+    VerdictParts,
     beyond_m,
     match,
     places_of,
@@ -47,18 +47,18 @@ from gcsplan.notes.note import Note
 from gcsplan.units import METRIC, Units
 from gcsplan.vehicle import Autopilot
 
-__all__ = ["Archive", "Form", "Shown", "Summary", "Told", "told_of_batch"]
+__all__ = ["Archive", "FileResult", "Form", "Shown", "Summary", "results_of_batch"]
 
 OUTCOMES = {0: "pass", 4: "do not pass", 2: "cannot be read", 70: "met a bug of gcsplan"}
-"""What became of a file, by exit code."""
+"""The outcome of a file, by exit code."""
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class FileResult:
     """The result of one file: its exit code, and how many findings of each kind it has.
 
-    ``lines`` are its findings, as with ``-q``, and ``error`` says why it was not judged. ``text`` is its JSON, if that
-    is asked for. ``failing`` is None if it passes.
+    ``lines`` are its findings, as with ``-q``, and ``error`` says why it was not judged. ``text`` is its JSON, empty
+    in the form ``lines``. ``failing`` is None if it passes.
     """
 
     file: str
@@ -70,8 +70,8 @@ class Told:
     failing: Failing | None = None
 
 
-def told_of(c: Checked, form: str, *, allow_unjudged: bool, units: Units) -> Told:
-    """What is told of a file that was judged; see `Form`."""
+def result_of(c: Checked, form: str, *, allow_unjudged: bool, units: Units) -> FileResult:
+    """The result of a file that was judged, in a `Form`."""
     failing = failing_of(c, allow_unjudged=allow_unjudged)
     kinds = Counter(f.kind for f in c.verdict.findings)
     if c.verdict.not_judged:
@@ -90,23 +90,23 @@ def told_of(c: Checked, form: str, *, allow_unjudged: bool, units: Units) -> Tol
         row = {"file": str(c.file), "code": code} | verdict()
         home = {} if c.way_home is None else {"way_home": c.way_home.as_dict(c.wording())}
         text = json_of(row | home, "verdicts", lines=False)
-    return Told(str(c.file), code, dict(kinds), lines, None, text, failing)
+    return FileResult(str(c.file), code, dict(kinds), lines, None, text, failing)
 
 
-def told_of_batch(batch: Batch, form: str, *, allow_unjudged: bool, units: Units) -> Iterator[Told]:
-    """What is told of files that are at hand: those that were judged, then the others."""
+def results_of_batch(batch: Batch, form: str, *, allow_unjudged: bool, units: Units) -> Iterator[FileResult]:
+    """The results of a batch: first the files that were judged, then the files that could not be read."""
     for c in batch.checked:
-        yield told_of(c, form, allow_unjudged=allow_unjudged, units=units)
+        yield result_of(c, form, allow_unjudged=allow_unjudged, units=units)
     for argument, error in batch.unreadable:
-        yield told_of_error(argument, error, form)
+        yield result_of_error(argument, error, form)
 
 
-def told_of_error(argument: str, why: GcsplanError, form: str) -> Told:
-    """What is told of a file that was not judged."""
+def result_of_error(argument: str, why: GcsplanError, form: str) -> FileResult:
+    """The result of a file that was not judged, and why."""
     kind = "unreadable" if isinstance(why, InputError) else "internal"
     row = {"file": argument, "code": why.exit_code, "error": why.as_dict()}
     text = json_of(row, "verdicts", lines=False) if form == "row" else ""
-    return Told(argument, why.exit_code, {kind: 1}, (), why, text, failing_to_read(argument, why))
+    return FileResult(argument, why.exit_code, {kind: 1}, (), why, text, failing_to_read(argument, why))
 
 
 @dataclass(slots=True)
@@ -118,12 +118,12 @@ class Summary:
     with_kind: Counter[str] = field(default_factory=Counter)
     of_kind: Counter[str] = field(default_factory=Counter)
 
-    def add(self, told: Told) -> None:
+    def add(self, result: FileResult) -> None:
         """Count one more file."""
         self.files += 1
-        self.codes[told.code] += 1
-        self.with_kind.update(told.kinds.keys())
-        self.of_kind.update(told.kinds)
+        self.codes[result.code] += 1
+        self.with_kind.update(result.kinds.keys())
+        self.of_kind.update(result.kinds)
 
     @property
     def code(self) -> int:
@@ -131,7 +131,7 @@ class Summary:
         return worst_of(self.codes)
 
     def as_dict(self) -> dict[str, Any]:
-        """What ``--json`` says of it; the commonest finding first."""
+        """The summary as ``--json`` prints it, the commonest finding first."""
         kinds = sorted(self.with_kind, key=lambda kind: (-self.with_kind[kind], kind))
         return {
             "files": self.files,
@@ -140,7 +140,7 @@ class Summary:
         }
 
     def lines(self) -> list[str]:
-        """The same for people."""
+        """The summary as lines for people."""
         outcomes = [f"{self.codes[code]} {words}" for code, words in OUTCOMES.items() if self.codes[code]]
         lines = [f"{counted(self.files, 'file')}: {', '.join(outcomes) or 'none'}"]
         found = self.as_dict()["findings"]
@@ -153,22 +153,22 @@ class Summary:
 
 MOST_FILES = 100_000
 KEPT_READ_BYTES = 64_000_000
-"""Most bytes of what was read that are kept until it is judged: some 20,000 files of 50 items."""
+"""Most bytes of read files that wait in memory until they are judged: some 20,000 files of 50 items."""
 
 PIECE, PIECE_HOME = 32, 2
-"""Files of a piece of work, and with the way home, which takes a second or so for each."""
+"""Number of files in a piece of work; the second number with the way home, which takes about 1 s for each file."""
 
 FILE_S, FILE_HOME_S = 0.006, 1.0
-"""Seconds that a file of 50 items takes, about."""
+"""Seconds that a file of 50 items takes, about; the second number with the way home."""
 
 Done = TypeVar("Done")
 Form = Literal["lines", "row", "whole"]
-"""What is told of a file: its findings alone, a row of JSON too, or its whole JSON document."""
+"""The form of a file's result: the lines of its findings, those lines with a row of JSON, or its JSON document."""
 
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """How results are told; with ``several`` files a bug of ours in one of them does not end the others."""
+    """How results are shown; with ``several`` files a bug of ours in one of them does not end the others."""
 
     form: Form = "lines"
     allow_unjudged: bool = False
@@ -178,10 +178,10 @@ class Shown:
 
 @dataclass(frozen=True, slots=True)
 class ArchiveRequest:
-    """What all files share, in the form in which another process can make it: a mission's content, or options.
+    """The part of a request that all files share: a mission's content, or options, from which any process makes a site.
 
-    ``extent``: of the world that options describe, if all share one; ``inputs`` are what it must be made of. ``key`` is
-    a digest of what a site is made of.
+    ``extent``: the extent of the world that options describe, if all files share one; ``inputs``: the sources that the
+    world must have. ``key``: a digest of the content and the options.
     """
 
     content: Content | None
@@ -196,7 +196,7 @@ class ArchiveRequest:
 
 @dataclass(frozen=True, slots=True)
 class Read:
-    """A file that was read: what is kept of it (nothing if it is too much), and where it flies."""
+    """A file that was read: its mission, pickled (empty if it takes too much memory), and the places that it visits."""
 
     packed: bytes
     places: Floats
@@ -210,12 +210,12 @@ sites: dict[str, CheckSite] = {}
 class Archive:
     """Files that are checked in one call, at one site."""
 
-    def __init__(self, name: str, asked: ArchiveRequest, site: CheckSite, arguments: Sequence[str]) -> None:
+    def __init__(self, name: str, request: ArchiveRequest, site: CheckSite, arguments: Sequence[str]) -> None:
         if len(arguments) > MOST_FILES:
             raise UsageError(f"at most {MOST_FILES} files are checked in one call, given {len(arguments)}")
-        self.name, self.asked, self.site, self.arguments = name, _keep(asked, site), site, arguments
+        self.name, self.request, self.site, self.arguments = name, _keep(request, site), site, arguments
         self.packed: dict[int, bytes] = {}
-        self._unread: dict[int, Told] = {}
+        self._unread: dict[int, FileResult] = {}
 
     @classmethod
     def in_mission(cls, source: MissionFile, arguments: Sequence[str], returns: Returns, shown: Shown) -> Archive:
@@ -233,67 +233,67 @@ class Archive:
         shown: Shown,
     ) -> Archive:  # fmt: skip
         """Files in the world that options describe. Raises InputError if they are wrong."""
-        asked = ArchiveRequest(None, options, autopilot, returns, shown)
-        return cls("check", asked, OptionsSite(options, autopilot), arguments)
+        request = ArchiveRequest(None, options, autopilot, returns, shown)
+        return cls("check", request, OptionsSite(options, autopilot), arguments)
 
     @property
     def work(self) -> tuple[int, float]:
-        """How many pieces of work there are, and the seconds that one takes, about."""
+        """The number of pieces of work, and the seconds that one of them takes, about."""
         size = self._size
         return -(-len(self.arguments) // size), size * (FILE_S if size == PIECE else FILE_HOME_S)
 
     @property
     def _size(self) -> int:
-        return PIECE_HOME if self.asked.returns.judged or self.asked.returns.required else PIECE
+        return PIECE_HOME if self.request.returns.judged or self.request.returns.required else PIECE
 
-    def read(self, workers: Executor, told: Callable[[int], None] = lambda _: None) -> None:
-        """Read all files and load the world that they need; ``told(count)`` says how many are read.
+    def read(self, workers: Executor, on_read: Callable[[int], None] = lambda _: None) -> None:
+        """Read all files and load the world that they need; ``on_read(count)`` is called after each piece.
 
         Raises InputError if there is no world for any of them.
         """
         pieces = [self.arguments[k : k + PIECE] for k in range(0, len(self.arguments), PIECE)]
         places: list[Floats] = []
         reach_m, kept = 0.0, 0
-        for number, found in in_order(workers.each(read_piece, self.asked, pieces)):
+        for number, found in in_order(workers.each(read_piece, self.request, pieces)):
             for k, one in enumerate(found, number * PIECE):
-                if isinstance(one, Told):
+                if isinstance(one, FileResult):
                     self._unread[k] = one
                     continue
                 places.append(one.places)
                 reach_m = max(reach_m, one.reach_m)
                 if (kept := kept + len(one.packed)) <= KEPT_READ_BYTES:
                     self.packed[k] = one.packed
-            told(min((number + 1) * PIECE, len(self.arguments)))
+            on_read(min((number + 1) * PIECE, len(self.arguments)))
         if places:
             self.site.settle(np.concatenate(places), reach_m, several=len(places) > 1)
         self._settled()
 
     def _settled(self) -> None:
-        """Ask from now on for the world that was found."""
-        asked = self.asked
+        """Put the world that was found into the request."""
+        request = self.request
         if isinstance(self.site, OptionsSite):
             extent = self.site.extent
-            asked = replace(asked, extent=extent, inputs=self.site.said[0] if extent is not None else None)
+            request = replace(request, extent=extent, inputs=self.site.sources[0] if extent is not None else None)
         elif isinstance(self.site, MissionSite):
-            asked = replace(asked, content=self.site.source.content, inputs=self.site.said[0])
-        self.asked = _keep(asked, self.site)
+            request = replace(request, content=self.site.source.content, inputs=self.site.sources[0])
+        self.request = _keep(request, self.site)
 
     @property
-    def said(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:
-        """What describes the sources of the world, and notes; of the first file's, if each has a world of its own."""
+    def sources(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:
+        """The sources of the world, and notes on them; the first file's, if each file has a world of its own."""
         site = self.site
-        for k in range(len(self.arguments) if isinstance(site, OptionsSite) and not site.said[0] else 0):
+        for k in range(len(self.arguments) if isinstance(site, OptionsSite) and not site.sources[0] else 0):
             if k in self._unread:
                 continue
             try:
                 read = _unpacked(site, self.arguments[k], self.packed.get(k))
-                site.judged(self.arguments[k], read, Wanted(misses=False, times=False))
+                site.judged(self.arguments[k], read, VerdictParts(misses=False, times=False))
             except InputError:
                 continue
             break
-        return site.said
+        return site.sources
 
-    def judged(self, workers: Executor) -> Iterator[Told]:
+    def judged(self, workers: Executor) -> Iterator[FileResult]:
         """The result of every file, in their order. Raises GcsplanError where `Executor.each` does."""
         numbers = [k for k in range(len(self.arguments)) if k not in self._unread]
         size = self._size
@@ -301,44 +301,44 @@ class Archive:
             [(self.arguments[k], self.packed.get(k)) for k in numbers[i : i + size]]
             for i in range(0, len(numbers), size)
         ]
-        found = (one for _, piece in in_order(workers.each(judge_piece, self.asked, pieces)) for one in piece)
+        found = (one for _, piece in in_order(workers.each(judge_piece, self.request, pieces)) for one in piece)
         for k in range(len(self.arguments)):
             yield self._unread[k] if k in self._unread else next(found)
 
 
-def read_piece(asked: ArchiveRequest, arguments: Sequence[str]) -> list[Read | Told]:
-    """Read some files, in whatever process; why one cannot be read is told."""
-    site = _site_of(asked)
-    return [_told_unless(asked, argument, partial(_read, site, argument)) for argument in arguments]
+def read_piece(request: ArchiveRequest, arguments: Sequence[str]) -> list[Read | FileResult]:
+    """Read some files, in any process; a file that cannot be read has its result at once."""
+    site = _site_of(request)
+    return [_result_unless(request, argument, partial(_read, site, argument)) for argument in arguments]
 
 
-def judge_piece(asked: ArchiveRequest, items: Sequence[tuple[str, bytes | None]]) -> list[Told]:
-    """Judge some files that were read, in whatever process."""
-    site = _site_of(asked)
-    shown = asked.shown
+def judge_piece(request: ArchiveRequest, items: Sequence[tuple[str, bytes | None]]) -> list[FileResult]:
+    """Judge some files that were read, in any process."""
+    site = _site_of(request)
+    shown = request.shown
     whole = shown.form == "whole"
-    wanted = Wanted(asked.returns, misses=whole, times=whole)
+    parts = VerdictParts(request.returns, misses=whole, times=whole)
 
-    def judged(argument: str, packed: bytes | None) -> Told:
-        checked = site.judged(argument, _unpacked(site, argument, packed), wanted)
-        return told_of(checked, shown.form, allow_unjudged=shown.allow_unjudged, units=shown.units)
+    def judged(argument: str, packed: bytes | None) -> FileResult:
+        checked = site.judged(argument, _unpacked(site, argument, packed), parts)
+        return result_of(checked, shown.form, allow_unjudged=shown.allow_unjudged, units=shown.units)
 
-    return [_told_unless(asked, argument, partial(judged, argument, packed)) for argument, packed in items]
+    return [_result_unless(request, argument, partial(judged, argument, packed)) for argument, packed in items]
 
 
-def _told_unless(asked: ArchiveRequest, argument: str, done: Callable[[], Done]) -> Done | Told:
-    """The result, or what is told of the error: in one file of several it must not cost the others."""
+def _result_unless(request: ArchiveRequest, argument: str, done: Callable[[], Done]) -> Done | FileResult:
+    """The result of a step, or the result that names its error: one bad file must not cost the others."""
     try:
         return done()
     except InputError as why:
-        return told_of_error(argument, why, asked.shown.form)
+        return result_of_error(argument, why, request.shown.form)
     except (MemoryError, UsageError):
         raise
     except Exception as why:
-        if not asked.shown.several:
+        if not request.shown.several:
             raise
         words = f"internal error, a bug in gcsplan: {type(why).__name__}: {why}"
-        return told_of_error(argument, GcsplanError(words, where=argument), asked.shown.form)
+        return result_of_error(argument, GcsplanError(words, where=argument), request.shown.form)
 
 
 def _read(site: CheckSite, argument: str) -> Read:
@@ -348,34 +348,36 @@ def _read(site: CheckSite, argument: str) -> Read:
 
 
 def _unpacked(site: CheckSite, argument: str, packed: bytes | None) -> MissionFileRead:
-    """What was read of a file, from this process or one that it asks; read again if it was not kept."""
+    """The mission of a file, from this process or from a worker; read again if it was not kept."""
     if packed is None:
         return site.read(argument)
     read: MissionFileRead = pickle.loads(packed)
     return read
 
 
-def _keep(asked: ArchiveRequest, site: CheckSite) -> ArchiveRequest:
-    """``asked`` with its key, by which `_site_of` then finds ``site`` in this process."""
-    made_of = asked.content, asked.options, asked.autopilot
-    asked = replace(asked, key=hashlib.sha256(pickle.dumps(made_of)).hexdigest())
+def _keep(request: ArchiveRequest, site: CheckSite) -> ArchiveRequest:
+    """``request`` with its key, by which `_site_of` then finds ``site`` in this process."""
+    made_of = request.content, request.options, request.autopilot
+    request = replace(request, key=hashlib.sha256(pickle.dumps(made_of)).hexdigest())
     sites.clear()
-    sites[asked.key] = site
-    return asked
+    sites[request.key] = site
+    return request
 
 
-def _site_of(asked: ArchiveRequest) -> CheckSite:
-    """The site of what is asked, with its world if that is known; made once in each process."""
-    site = sites.get(asked.key)
+def _site_of(request: ArchiveRequest) -> CheckSite:
+    """The site of a request, with its world if that is known; made once in each process."""
+    site = sites.get(request.key)
     if site is None:
-        if asked.content is not None:
-            site = MissionSite(load_content(asked.content))
+        if request.content is not None:
+            site = MissionSite(load_content(request.content))
         else:
-            assert asked.options is not None
-            site = OptionsSite(asked.options, asked.autopilot)
-        _keep(asked, site)
-    if isinstance(site, OptionsSite) and asked.extent is not None and asked.extent != site.extent:
-        site.settle_in(asked.extent)
-    if asked.inputs is not None:
-        require_same_inputs(site.said[0], asked.inputs, "--dem" if asked.content is None else asked.content.where)
+            assert request.options is not None
+            site = OptionsSite(request.options, request.autopilot)
+        _keep(request, site)
+    if isinstance(site, OptionsSite) and request.extent is not None and request.extent != site.extent:
+        site.settle_in(request.extent)
+    if request.inputs is not None:
+        require_same_inputs(
+            site.sources[0], request.inputs, "--dem" if request.content is None else request.content.where
+        )
     return site

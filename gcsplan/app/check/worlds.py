@@ -1,4 +1,4 @@
-"""The worlds in which somebody's files are checked: that of a mission file, or one that options describe.
+"""The worlds in which files are checked: the world of a mission file, or one that options describe.
 
 A site reads a file, knows the world that a number of files needs, and judges a file in it. Files are read before any is
 judged, for they share one plane and one piece of terrain.
@@ -75,7 +75,7 @@ class Checked:
     typed: Mapping[str, str] = field(default_factory=dict)
 
     def wording(self, units: Units | None = None) -> Wording:
-        """How the reader is spoken to, in ``units``, or in SI as files have it."""
+        """The wording for the reader, in ``units``, or in SI as files have it."""
         return Wording(units, self.typed)
 
 
@@ -87,14 +87,14 @@ class Returns:
     required: bool = False
 
 
-UNASKED = Returns()
+NO_RETURNS = Returns()
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
-    """What is wanted of a verdict: the way home, the nearest misses (half as much work again), and the times."""
+class VerdictParts:
+    """The parts that a verdict has: the way home, the nearest misses (half as much work again), and the times."""
 
-    returns: Returns = UNASKED
+    returns: Returns = NO_RETURNS
     misses: bool = True
     times: bool = True
 
@@ -114,12 +114,12 @@ class CheckSite(Protocol):
         ``several``: they are of more than one file, which may lie too far apart for one world. Raises InputError.
         """
 
-    def judged(self, argument: str, read: MissionFileRead, wanted: Wanted) -> Checked:
+    def judged(self, argument: str, read: MissionFileRead, parts: VerdictParts) -> Checked:
         """A file that was read, judged. Raises InputError."""
 
     @property
-    def said(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:
-        """What describes the world's sources, and notes; empty before a world is loaded."""
+    def sources(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:
+        """The sources of the world, and notes on them; empty before a world is loaded."""
 
 
 class MissionSite:
@@ -139,21 +139,21 @@ class MissionSite:
         )
 
     def settle(self, places: Floats, reach_m: float, *, several: bool) -> None:
-        """See `CheckSite.settle`: more terrain is loaded if they reach beyond that of the mission."""
+        """See `CheckSite.settle`: more terrain is loaded if the files reach beyond the mission's terrain."""
         self.source, self._world = reaching(self.source, places), None
 
-    def judged(self, argument: str, read: MissionFileRead, wanted: Wanted) -> Checked:
+    def judged(self, argument: str, read: MissionFileRead, parts: VerdictParts) -> Checked:
         """See `CheckSite.judged`."""
         source = self.source
         request, file = match(source, argument)
         error_m = source.terrain_error_m if source.altitude_frame == "terrain" else TERRAIN_ERROR_M
         if self._world is None:
             self._world = world_of(source)
-        return judged(request, file, read, self._world, error_m, wanted, source.hours)
+        return judged(request, file, read, self._world, error_m, parts, source.hours)
 
     @property
-    def said(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:
-        """See `CheckSite.said`."""
+    def sources(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:
+        """See `CheckSite.sources`."""
         return self.source.inputs, self.source.notes
 
 
@@ -170,7 +170,7 @@ class OptionsSite:
         self._hint = None if options.home is None else Home.at(*options.home, 0.0)
         self.extent: WorldExtent | None = None
         self._world: World | None = None
-        self._said: tuple[Mapping[str, object], tuple[Note, ...]] = {}, ()
+        self._sources: tuple[Mapping[str, object], tuple[Note, ...]] = {}, ()
 
     def read(self, argument: str) -> MissionFileRead:
         """See `CheckSite.read`."""
@@ -193,27 +193,27 @@ class OptionsSite:
         self._world = self._tell(*self.opened.over(extent))
         self.extent = extent
 
-    def judged(self, argument: str, read: MissionFileRead, wanted: Wanted) -> Checked:
+    def judged(self, argument: str, read: MissionFileRead, parts: VerdictParts) -> Checked:
         """See `CheckSite.judged`."""
         world = self._world
         if world is None:
             world = self._tell(*self.opened.around(places_of(read.mission), beyond_m(read.mission)))
         file = Path(argument)
         request = _request(self.opened, read.mission, file.stem, world)
-        done = judged(request, file, read, world, self.options.terrain_error_m, wanted, self.opened.hours)
+        done = judged(request, file, read, world, self.options.terrain_error_m, parts, self.opened.hours)
         return replace(done, typed=self.typed)
 
     def _tell(self, world: World, inputs: Mapping[str, object]) -> World:
-        """``world``; what describes the first one is told of all."""
-        if not self._said[0]:
+        """``world``; the sources of the first world stand for all of them."""
+        if not self._sources[0]:
             notes = inputs.get("notes", ())
-            self._said = {k: v for k, v in inputs.items() if k != "notes"}, notes if isinstance(notes, tuple) else ()
+            self._sources = {k: v for k, v in inputs.items() if k != "notes"}, notes if isinstance(notes, tuple) else ()
         return world
 
     @property
-    def said(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:
-        """See `CheckSite.said`."""
-        return self._said
+    def sources(self) -> tuple[Mapping[str, object], tuple[Note, ...]]:
+        """See `CheckSite.sources`."""
+        return self._sources
 
 
 def split_name(argument: str) -> tuple[str | None, Path]:
@@ -318,14 +318,15 @@ def _request(opened: OpenWorld, mission: Mission, name: str, world: World) -> Ve
 
 
 def judged(
-    request: VehicleRequest, file: Path, read: MissionFileRead, world: World, terrain_error_m: float, wanted: Wanted,
-    hours: Hours | None = None,
+    request: VehicleRequest, file: Path, read: MissionFileRead, world: World, terrain_error_m: float,
+    parts: VerdictParts, hours: Hours | None = None,
 ) -> Checked:  # fmt: skip
     """Judge a mission that was read from ``file``, for a vehicle in a world. Raises InputError.
 
-    ``hours``: those for which the world's zones were left out, from the departure on; a flight beyond is not judged.
+    ``hours``: the hours for which zones of the world were left out, from the departure on; the part of a flight beyond
+    them is not judged.
     """
-    returns, asks_home = wanted.returns, wanted.returns.judged or wanted.returns.required
+    returns, asks_home = parts.returns, parts.returns.judged or parts.returns.required
     vehicle, mission = request.vehicle, read.mission
     notes: list[Note] = list(read.notes)
     if mission.autopilot is not vehicle.autopilot:
@@ -336,10 +337,10 @@ def judged(
     mission = replace(mission, name=vehicle.name, sysid=vehicle.sysid)
     verdict = judge(
         mission, vehicle, world, rtl_rel_home_m=request.rtl_rel_home_m, terrain_error_m=terrain_error_m,
-        misses=wanted.misses, times=wanted.times or asks_home or hours is not None,
+        misses=parts.misses, times=parts.times or asks_home or hours is not None,
     )  # fmt: skip
     verdict, fence_notes = own_fence(read.fence, verdict, vehicle, world)
-    more = [said for said in (read.unread_fence, beyond_hours(verdict, hours)) if said]
+    more = [note for note in (read.unread_fence, beyond_hours(verdict, hours)) if note]
     verdict = replace(verdict, not_judged=(*verdict.not_judged, *more))
     notes += fence_notes
     loops = any(note.code == "jumps_without_end" for note in verdict.notes)

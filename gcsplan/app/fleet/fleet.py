@@ -49,7 +49,7 @@ def _climb_out_and_glide(v: VehiclePlan, world: World) -> tuple[Floats | None, F
 
 
 def _climb_out_m_s(v: VehiclePlan) -> Floats | None:
-    """Speeds (K - 1,) of the parts of the climb-out, m/s; None: those of any leg, also for what is not a fixed wing."""
+    """Speeds (K - 1,) of the parts of the climb-out, m/s; None: the same as on any leg, or no fixed wing."""
     if v.order.wing is None or v.request.vehicle.climb_out is None:
         return None
     legs = v.verdict.legs
@@ -346,7 +346,7 @@ def on_map(world: World) -> Where:
 def too_near(conflicts: Sequence[Conflict], world: World) -> Note:
     """Which vehicles come too near to each other, when and where; the first `MOST_CONFLICTS` of all."""
     where = on_map(world)
-    told = [c.note(where) for c in conflicts[:MOST_CONFLICTS]]
+    first = [c.note(where) for c in conflicts[:MOST_CONFLICTS]]
     if len(conflicts) > MOST_CONFLICTS:
-        told.append(Note("more_conflicts", count=len(conflicts) - MOST_CONFLICTS))
-    return Note("too_near", conflicts=tuple(told))
+        first.append(Note("more_conflicts", count=len(conflicts) - MOST_CONFLICTS))
+    return Note("too_near", conflicts=tuple(first))

@@ -20,9 +20,9 @@ __all__ = ["flyable", "require_passing"]
 
 
 def flyable(
-    plan: Plan, *, allow_unjudged: bool = False, asked: bool = False, require_way_home: bool = False
+    plan: Plan, *, allow_unjudged: bool = False, home: bool = False, require_way_home: bool = False
 ) -> tuple[Plan, dict[str, WayHome]]:
-    """The plan, and the way home of each vehicle where that is asked for or required; else none.
+    """The plan, and the way home of each vehicle if ``home`` or the mission requires it; else none.
 
     A mission does not fly if it breaks a limit, if something in it could not be judged (unless ``allow_unjudged``), or
     if a safe return is required and there is none. One that does not fly refuses the plan; where vehicles may be left
@@ -32,9 +32,9 @@ def flyable(
     """
     if not plan.leaves_out:
         require_passing({v.name: v.verdict for v in plan.vehicles}, allow_unjudged=allow_unjudged)
-        return plan, judged(plan, asked=asked, option=require_way_home)
+        return plan, judged(plan, home=home, option=require_way_home)
     required = is_required(plan.source, require_way_home)
-    homes = homes_of(plan) if asked or required else {}
+    homes = homes_of(plan) if home or required else {}
     leaving = LeavingOut(allowed=True, found=plan.left_out)
     for v in plan.vehicles:
         try:

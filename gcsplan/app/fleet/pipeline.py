@@ -95,17 +95,17 @@ def plan(  # noqa: PLR0913 - options by name, each with a default
     return finished(brief, vehicles, progress, leaving, None if gate_utc is None else GateTime(gate_utc))
 
 
-def _brief_of(source: MissionFile, asked: PlanOptions) -> Brief:
-    """What all vehicles of a mission are planned with; what is asked overrides the file's."""
-    name = asked.planner or source.planner.name
+def _brief_of(source: MissionFile, given: PlanOptions) -> Brief:
+    """The terms on which all vehicles of a mission are planned; the ``given`` options override the file's keys."""
+    name = given.planner or source.planner.name
     entry = get_planner(name)
-    goal = asked.objective or source.planner.objective
+    goal = given.objective or source.planner.objective
     if goal not in ("length", "energy"):
         raise InputError(f"objective must be length or energy, given {goal!r}")
-    merged = _options(source, name) | dict(asked.options)
+    merged = _options(source, name) | dict(given.options)
     if entry.warm_starts:
         _require_warm_start(source, merged)
-    number = source.planner.seed if asked.seed is None else asked.seed
+    number = source.planner.seed if given.seed is None else given.seed
     return Brief(
         source, world_of(source), name, goal, number, merged, len(source.vehicles) > 1 and entry.by_priority(merged)
     )
@@ -116,21 +116,21 @@ def _planned(
     leaving: LeavingOut,
 ) -> list[VehiclePlan]:  # fmt: skip
     """Every vehicle's own plan, in this process or by workers. By priority, or to begin around another vehicle's path,
-    each needs those before it."""
+    each vehicle needs the plans before its own."""
     if brief.by_priority or _leader(brief) is not None:
         return _one_by_one(brief, progress, leaving)
     count = len(brief.source.vehicles)
     begun_s = time.perf_counter()
 
-    def told(_: str, done: int) -> None:
-        if progress is not None:  # of no single vehicle, for several are planned at once
+    def on_done(_: str, done: int) -> None:
+        if progress is not None:  # without a vehicle's name, for several are planned at once
             progress("", Progress(time.perf_counter() - begun_s, None, None, f"{done} of {count} planned{watched}"))
 
     with executor(jobs, cluster, pieces=count, piece_s=PIECE_S) as workers:
         if isinstance(workers, Inline):
             return _one_by_one(brief, progress, leaving)
         watched = f", workers at {workers.dashboard}" if workers.dashboard else ""
-        return planned_by(workers, brief, told, leaving)
+        return planned_by(workers, brief, on_done, leaving)
 
 
 def _one_by_one(
@@ -168,11 +168,11 @@ def _leader(brief: Brief) -> str | None:
 
 def _require_warm_start(source: MissionFile, options: Mapping[str, object]) -> None:
     """Raise InputError unless ``warm_start`` is a path that will be there."""
-    asked = options.get("warm_start")
+    given = options.get("warm_start")
     known = ("optimal", *(r.vehicle.name for r in source.vehicles))
-    if asked is not None and asked not in known:
+    if given is not None and given not in known:
         raise unknown_name(
-            f"warm_start is `optimal` or the name of a vehicle of the file, given {asked!r}", str(asked), known
+            f"warm_start is `optimal` or the name of a vehicle of the file, given {given!r}", str(given), known
         )
 
 

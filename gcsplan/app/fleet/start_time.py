@@ -45,7 +45,7 @@ class GateTime:
                 start = datetime.fromisoformat(text)
         except ValueError:
             raise UsageError(
-                f"a time such as 18:30:00 (today) or 2026-11-21T18:30:00Z is wanted, given {text!r}", where="--gate-utc"
+                f"give a time such as 18:30:00 (today) or 2026-11-21T18:30:00Z, not {text!r}", where="--gate-utc"
             ) from None
         if start.tzinfo is None:
             start = start.replace(tzinfo=UTC)
@@ -60,14 +60,14 @@ class GateTime:
         if ahead_s < NEAREST_S:
             what = "is past" if ahead_s < 0 else "is too near"
             raise UsageError(
-                f"the start {what} ({at}): {NEAREST_S:g} s ahead at least are wanted, for a vehicle that misses its "
+                f"the start {what} ({at}): it must be {NEAREST_S:g} s ahead at least, for a vehicle that misses its "
                 f"gate waits for nearly a day; give a later time, with its date if it is tomorrow's",
                 where="--gate-utc",
             )
         if ahead_s > FARTHEST_S:
             raise UsageError(
                 f"the start is too far away ({at}): a gate holds no date and would open a day early; "
-                f"{FARTHEST_S / 3600:g} hours ahead at most are wanted",
+                f"give a time {FARTHEST_S / 3600:g} hours ahead at most",
                 where="--gate-utc",
             )
 

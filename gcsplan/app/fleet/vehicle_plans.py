@@ -85,8 +85,8 @@ def _explained(
     return with_cures(problem, bare, lambda changed: planned(changed)[1].solution, whole, alone)
 
 
-Asked = tuple[Site, Brief]
-"""What all vehicles of a mission share: its terrain and zones, and the packed brief."""
+SiteAndBrief = tuple[Site, Brief]
+"""The data that all vehicles of a mission share: its terrain and zones, and the packed brief."""
 
 Answer = tuple[VehiclePlan, int]
 """A vehicle's packed plan, and the level of the terrain that it was made over."""
@@ -95,27 +95,27 @@ Answer = tuple[VehiclePlan, int]
 def planned_by(
     workers: Executor,
     brief: Brief,
-    told: Callable[[str, int], None] | None = None,
+    on_done: Callable[[str, int], None] | None = None,
     leaving: LeavingOut | None = None,
 ) -> list[VehiclePlan]:
-    """Every vehicle's own plan, in the file's order; ``told(vehicle, count)`` is called as each is done.
+    """Every vehicle's own plan, in the file's order; ``on_done(vehicle, count)`` is called after each.
 
     Raises what planning one after the other would raise: InputError, NoMission of the first vehicle that has none,
     unless ``leaving`` may leave it out.
     """
     leaving = leaving or LeavingOut(allowed=False)
     source = brief.source
-    asked = site_of(source), brief.packed()
+    site_and_brief = site_of(source), brief.packed()
     names = [r.vehicle.name for r in source.vehicles]
     answers: dict[int, Answer] = {}
     refused: dict[int, GcsplanError] = {}
-    for number, answer in workers.each(answer_of, asked, names):
+    for number, answer in workers.each(answer_of, site_and_brief, names):
         if isinstance(answer, GcsplanError):
             refused[number] = answer
         else:
             answers[number] = answer
-        if told is not None:
-            told(names[number], len(answers) + len(refused))
+        if on_done is not None:
+            on_done(names[number], len(answers) + len(refused))
         fatal = [k for k, why in refused.items() if not (leaving.allowed and isinstance(why, NoMission))]
         if fatal and all(k in answers or k in refused for k in range(min(fatal))):
             raise refused[min(fatal)]
@@ -125,10 +125,10 @@ def planned_by(
     return [_restored(brief, *answers[k]) for k in sorted(answers)]
 
 
-def answer_of(asked: Asked, name: str) -> Answer | GcsplanError:
+def answer_of(site_and_brief: SiteAndBrief, name: str) -> Answer | GcsplanError:
     """Plan one vehicle, in whatever process; why there is no plan is returned, so that the caller can order it."""
     try:
-        site, packed = asked
+        site, packed = site_and_brief
         brief = packed.over(*site.read())
         [request] = [r for r in brief.source.vehicles if r.vehicle.name == name]
         plan = plan_or_explain(brief, request)

@@ -1,1 +1,1 @@
-"""What a plan or a check leaves: files, records, reports, lists."""
+"""The outputs of a plan or a check: files, records, reports, lists."""

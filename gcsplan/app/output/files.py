@@ -163,9 +163,9 @@ def _vehicle(
         "length_m": verdict.length_m,
         "lower_bound_m": bound if length else None,
         "gap_percent": v.gap_percent,
-        "energy_j": verdict.told_j(verdict.path_energy_j),
+        "energy_j": verdict.reported_j(verdict.path_energy_j),
         "lower_bound_j": None if length else bound,
-        "flight_energy_j": verdict.told_j(verdict.energy_j),
+        "flight_energy_j": verdict.reported_j(verdict.energy_j),
         "energy_figures": verdict.energy_figures,
         "battery_used_percent": verdict.battery_used_percent,
         "min_agl_m": lowest.min_agl_m if lowest else None,
@@ -223,8 +223,8 @@ def item_rows(vehicle: str, verdict: Verdict, slot: Slot | None = None) -> list[
         rows.append(
             ItemRow(
                 vehicle, seq, name, lat, lon, amsl, legs[-1].agl_end_m, min(low) if low else None,
-                math.fsum(leg.length_m for leg in legs), steep, verdict.told_j(energy_j),
-                verdict.told_j(spent_j), until[seq],
+                math.fsum(leg.length_m for leg in legs), steep, verdict.reported_j(energy_j),
+                verdict.reported_j(spent_j), until[seq],
             )
         )  # fmt: skip
     return rows
@@ -249,7 +249,7 @@ def _track(v: VehiclePlan, geoid: GeoidGrid | None, slot: Slot | None, returns: 
 
 
 def _described(verdict: Verdict, home: WayHome | None) -> str:
-    """What a viewer says of a track: the verdict, and how low and how high above ground it is."""
+    """The description of a track in a viewer: the verdict, and how low and how high above ground it is."""
     lowest, highest = verdict.lowest, verdict.highest
     words = [str(verdict_words(verdict.safe, home))]
     if lowest is not None:

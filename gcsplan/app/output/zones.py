@@ -1,4 +1,4 @@
-"""What was understood of each zone of a mission file or of zone files, before anything is planned."""
+"""The list of zones of a mission file or of zone files, as they were read, before anything is planned."""
 
 from __future__ import annotations
 
@@ -72,14 +72,14 @@ def list_zones(files: Sequence[Path], at: str | None = None) -> tuple[list[Liste
         raise InputError.of(wrong)
     for file in files:
         if file.suffix.lower() in MISSIONS:
-            own, said = read_no_fly(file, texts)
+            own, found_notes = read_no_fly(file, texts)
         else:
             found = read_zones(file, where=str(file), policy=policy)
             if found.problems:
                 raise InputError.of(found.problems)
-            own, said = found.zones, [*found.notes]
+            own, found_notes = found.zones, [*found.notes]
         drafts += own
-        notes += said
+        notes += found_notes
     drafts, more = listed(drafts)
     return [_listed(draft) for draft in drafts], [*notes, *more, *zone_notes([(draft, None) for draft in drafts])]
 

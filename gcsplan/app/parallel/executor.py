@@ -149,9 +149,9 @@ class Dask:
 
     def _together(
         self, function: Callable[[Shared, WorkItem], WorkResult], shared: Shared, items: Sequence[WorkItem],
-        asked: Sequence[int], suspects: list[int], finish: bool,
+        pending: Sequence[int], suspects: list[int], finish: bool,
     ) -> Iterator[tuple[int, WorkResult]]:  # fmt: skip
-        """The pieces ``asked``; ``suspects`` gets those that were with a worker that died, too often."""
+        """The results of the pieces ``pending``; ``suspects`` gets the pieces whose workers died too often."""
         distributed = import_module("distributed")
         client = self.client
         # A task, not scattered data: if the worker that holds the value dies, the scheduler makes it again.
@@ -163,9 +163,9 @@ class Dask:
 
         def hand_out() -> None:
             nonlocal begun
-            first = min(numbers.values(), default=asked[begun] if begun < len(asked) else 0)
-            while begun < len(asked) and asked[begun] < first + LEAD * most and len(numbers) < most:
-                number, begun = asked[begun], begun + 1
+            first = min(numbers.values(), default=pending[begun] if begun < len(pending) else 0)
+            while begun < len(pending) and pending[begun] < first + LEAD * most and len(numbers) < most:
+                number, begun = pending[begun], begun + 1
                 future = client.submit(
                     piece_done,
                     function,
@@ -212,7 +212,7 @@ class Dask:
 
     def keep_begun(self, numbers: dict[Any, int]) -> None:
         """Give up the pieces that no worker has begun."""
-        # Of all that runs: asked for by name, a piece that the scheduler has not heard of yet is an error.
+        # Called for all pieces: with the name of a piece that the scheduler does not know yet, the call fails.
         begun = {key for stacks in self.client.call_stack().values() for key in stacks}
         waiting = [f for f in numbers if not f.done() and f.key not in begun]
         for future in waiting:
@@ -247,19 +247,19 @@ def piece_done(
 
 
 def in_order(results: Iterable[tuple[int, WorkResult]]) -> Iterator[tuple[int, WorkResult]]:
-    """The results of `Executor.each` by number, from 0 on; those that come early wait."""
+    """The results of `Executor.each` by number, from 0 on; early results wait."""
     early: dict[int, WorkResult] = {}
-    wanted = 0
+    next_number = 0
     for number, result in results:
         early[number] = result
-        while wanted in early:
-            yield wanted, early.pop(wanted)
-            wanted += 1
+        while next_number in early:
+            yield next_number, early.pop(next_number)
+            next_number += 1
 
 
-def require_same_inputs(found: Mapping[str, object], asked: Mapping[str, object], where: str) -> None:
-    """Raise InputError if a worker's terrain or zones are others than those of the process that asks it."""
-    other = sorted(k for k in {*found, *asked} if found.get(k) != asked.get(k))
+def require_same_inputs(found: Mapping[str, object], expected: Mapping[str, object], where: str) -> None:
+    """Raise InputError if a worker's terrain or zones differ from the terrain or zones of the process that asks it."""
+    other = sorted(k for k in {*found, *expected} if found.get(k) != expected.get(k))
     if other:
         raise InputError(
             f"a worker reads other terrain or zones than the process that asks it ({', '.join(other)} differ): every "
@@ -298,7 +298,7 @@ def executor(
     Raises InputError if dask is not installed and needed, or if no scheduler answers, UsageError for wrong ``jobs``.
     """
     if jobs is not None and not 1 <= jobs <= MOST_JOBS:
-        raise UsageError(f"--jobs {jobs}: 1 to {MOST_JOBS} processes are wanted")
+        raise UsageError(f"--jobs {jobs}: give 1 to {MOST_JOBS} processes")
     if pieces <= 1:
         yield Inline()
         return
@@ -365,7 +365,7 @@ def _processes(count: int) -> Iterator[Any]:
     settings: dict[str, object] = {f"distributed.worker.memory.{key}": False for key in ("target", "spill", "pause")}
     settings["distributed.deploy.lost-worker-timeout"] = "1 day"
     settings["distributed.worker.profile.enabled"] = False  # it takes a fifth of a worker's time
-    # dask gives freed memory back at once; kept, it is not asked of the system again for every large array.
+    # dask gives freed memory back at once; with this, the allocator keeps it for the next large array.
     settings["distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_"] = KEPT_FREE_BYTES
     settings["distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_"] = KEPT_FREE_BYTES // 8
     with import_module("dask").config.set(settings):

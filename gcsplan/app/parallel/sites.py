@@ -20,7 +20,7 @@ from gcsplan.world.world import World
 __all__ = ["Site", "site_of", "world_of"]
 
 _read: dict[str, tuple[MissionFile, World]] = {}
-"""What this process has read for others; the last one only, for terrain is large."""
+"""The mission that this process has read for others; the last one only, for terrain is large."""
 
 
 def world_of(source: MissionFile) -> World:
@@ -51,7 +51,7 @@ class Site:
 
 
 def site_of(source: MissionFile) -> Site:
-    """What another process needs to read a mission's terrain and zones."""
+    """The data with which another process reads a mission's terrain and zones."""
     assert source.content is not None
     key = hashlib.sha256(pickle.dumps((source.content, source.inputs, source.level))).hexdigest()
     return Site(source.content, source.inputs, source.level, key)

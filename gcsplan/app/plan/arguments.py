@@ -13,7 +13,7 @@ from gcsplan.errors import UsageError
 
 __all__ = ["require"]
 
-WANTED: dict[str, tuple[Any, str]] = {
+EXPECTED: dict[str, tuple[Any, str]] = {
     "planner": (str, "the name of a planner (`gcsplan planners` lists them; docs/extending.md says how to add one)"),
     "objective": (str, "'length' or 'energy'"),
     "seed": (Integral, "a whole number"),
@@ -44,8 +44,8 @@ NEEDED = {"planned", "folder", "what", "runs", "wind_m_s", "gusts_m_s", "noise_m
 def require(function: str, **given: object) -> None:
     """Raise UsageError unless each argument is of its type, or None where it may be; True and False are no numbers."""
     for name, value in given.items():
-        kind, wanted = WANTED[name]
+        kind, expected = EXPECTED[name]
         wrong = not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool)
         if wrong and (value is not None or name in NEEDED):
             shown = getattr(value, "__name__", None) or repr(value)
-            raise UsageError(f"{name} is {wanted}; given {type(value).__name__} {shown[:60]}", where=f"{function}()")
+            raise UsageError(f"{name} is {expected}; given {type(value).__name__} {shown[:60]}", where=f"{function}()")

@@ -25,12 +25,12 @@ class LeftOut:
     message: str
 
     def as_dict(self) -> dict[str, str]:
-        """What ``summary.json`` says of it."""
+        """The vehicle's entry in ``summary.json``."""
         return {"name": self.name, "reason": self.reason, "message": self.message}
 
 
 class LeavingOut:
-    """The vehicles that are left out of a plan, if that is allowed; ``found``: those that are already."""
+    """The vehicles that are left out of a plan, if that is allowed; ``found``: the ones left out so far."""
 
     def __init__(self, *, allowed: bool, found: Sequence[LeftOut] = ()) -> None:
         self.allowed = allowed

@@ -30,7 +30,7 @@ TOUCH_M, TOUCH = 1e-3, 1e-7
 
 @dataclass(frozen=True, slots=True)
 class PlanOptions:
-    """What is asked for in place of a mission file's own keys, by the names of `plan`'s arguments; None: as it says.
+    """Options that replace a mission file's own keys, by the names of `plan`'s arguments; None: the file's key counts.
 
     ``options``: keys of single planners. ``at``: when it is flown. ``leave_out``: vehicles without a mission are left
     out.
@@ -125,7 +125,7 @@ class VehiclePlan:
         return replace(self, problem=replace(self.problem, airspace=over.world.airspace), brief=over)
 
     def all_notes(self, fleet: FleetPlan | None) -> tuple[Note, ...]:
-        """What is said of this vehicle: of its request, its search, its mission, and its part of the time table."""
+        """All notes on this vehicle: on its request, its search, its mission, and its part of the time table."""
         slot = () if fleet is None else fleet.slot(self.name).notes
         return tuple(dict.fromkeys((*self.notes, *self.solution.notes, *self.verdict.notes, *slot)))
 

@@ -132,8 +132,9 @@ def make_problem(
     progress: Callable[[Progress], None] | None = None,
     options: Mapping[str, object] | None = None,
 ) -> tuple[Problem, tuple[Note, ...]]:
-    """The planner's problem for one vehicle, with the wire's margins in the limits of its paths, those of the check for
-    its bounds, and notes for the user.
+    """The planner's problem for one vehicle, and notes for the user.
+
+    The limits of its paths have the wire's margins; its bounds have the limits of the check.
 
     The altitudes of start and goal are whole centimetres above home. If ``takeoff_agl_m`` meets min AGL plus altitude
     error but not the ground's slope within the track error, it is raised, with a note; a lower value is bad input.
@@ -151,8 +152,8 @@ def make_problem(
     air = world.airspace
     notes: list[Note] = []
 
-    start_agl_m = _wanted_agl_m(request.takeoff_agl_m, request.start_amsl_m, request.start[2])
-    goal_agl_m = _wanted_agl_m(request.approach_agl_m, request.goal_amsl_m, request.goal[2])
+    start_agl_m = _given_agl_m(request.takeoff_agl_m, request.start_amsl_m, request.start[2])
+    goal_agl_m = _given_agl_m(request.approach_agl_m, request.goal_amsl_m, request.goal[2])
     ends = _Ends(source, request, world, limits, checked, notes)
     start_amsl = ends.amsl_m("start", request.start, "takeoff_agl_m", start_agl_m)
     goal_amsl = ends.amsl_m("goal", request.goal, "approach_agl_m", goal_agl_m)
@@ -213,16 +214,16 @@ class _Ends:
     checked: Limits
     notes: list[Note]
 
-    def amsl_m(self, what: str, place: tuple[float, float, float], key: str, wanted_agl_m: float | None) -> float:
-        """The altitude AMSL of one end, as ``wanted_agl_m`` above ground or raised, with a note. Raises InputError,
+    def amsl_m(self, what: str, place: tuple[float, float, float], key: str, given_agl_m: float | None) -> float:
+        """The altitude AMSL of one end, as ``given_agl_m`` above ground or raised, with a note. Raises InputError,
         NoMission."""
         east, north, ground = place
         vehicle, air, datum = self.request.vehicle, self.world.airspace, self.request.start[2]
         low = lowest_amsl(air, east, north, self.limits)
         needed = self.limits.min_agl_m + vehicle.limits.altitude_error_m
-        if wanted_agl_m is not None and wanted_agl_m < needed - 1e-6:
+        if given_agl_m is not None and given_agl_m < needed - 1e-6:
             raise InputError(
-                f"must be at least min_agl_m + altitude_error_m = {needed:g}, given {wanted_agl_m:g}: "
+                f"must be at least min_agl_m + altitude_error_m = {needed:g}, given {given_agl_m:g}: "
                 f"the path begins and ends there",
                 where=f"{self.source.path}: vehicles.{vehicle.name}.{key}",
             )
@@ -231,13 +232,13 @@ class _Ends:
             words = f"the ground within reach of the {what} is unknown to the terrain model: {FILLED}"
             refusal = Refusal(words, reason="infeasible" if shut else "not_found", place=(east, north))
             raise in_degrees(refusal, vehicle, self.world)
-        amsl = max(low, ground + (wanted_agl_m or 0.0))
+        amsl = max(low, ground + (given_agl_m or 0.0))
         amsl = datum + math.ceil((amsl - datum) * 100.0 - 1e-6) / 100.0
-        if wanted_agl_m is not None and amsl - ground > wanted_agl_m + 0.011:
+        if given_agl_m is not None and amsl - ground > given_agl_m + 0.011:
             self.notes.append(
                 Note(
                     "takeoff_raised" if what == "start" else "approach_raised",
-                    asked_m=wanted_agl_m, raised_m=amsl - ground,
+                    asked_m=given_agl_m, raised_m=amsl - ground,
                 )
             )  # fmt: skip
         return amsl
@@ -273,7 +274,7 @@ def _vias(
     return tuple(out)
 
 
-def _wanted_agl_m(agl_m: float | None, amsl_m: float | None, ground_m: float) -> float | None:
+def _given_agl_m(agl_m: float | None, amsl_m: float | None, ground_m: float) -> float | None:
     """The height above ground that the file requests at an end: stated as AGL, or by an altitude above the ground."""
     if agl_m is None and amsl_m is not None and amsl_m > ground_m:
         return amsl_m - ground_m
@@ -287,20 +288,20 @@ def _straight_legs_m(request: VehicleRequest) -> list[float]:
 
 
 def bow_margin_m(request: VehicleRequest, world: World, margins: Margins = MARGINS) -> float:
-    """The bow that a mission's legs may have, m: that of a straight one between its terminals, `LEAST_BOW_M` at least,
-    so that legs need not be cut; as many times as large as ``margins`` ask for more than `MARGINS`."""
+    """The bow that a mission's legs may have, m: the bow of a straight leg between its terminals, so that no leg need
+    be cut, and `LEAST_BOW_M` at least. It is as many times as large as the bow of ``margins`` is beside `MARGINS`."""
     longest_m = max(_straight_legs_m(request))
     own_m = LEAST_BOW_M
     if request.vehicle.turn_radius_m > 0.0:
         own_m = LEG_BOW_M  # arcs, climb-outs and approaches have legs of their own
     straight_m = world.bow_m(min(longest_m, LONGEST_LEG_M))
-    wanted_m = min(max(own_m, straight_m), LEG_BOW_M) * margins.bow_m / LEG_BOW_M
-    return wanted_m if wanted_m <= straight_m else min(wanted_m, world.bow_m(LONGEST_LEG_M))
+    bow_m = min(max(own_m, straight_m), LEG_BOW_M) * margins.bow_m / LEG_BOW_M
+    return bow_m if bow_m <= straight_m else min(bow_m, world.bow_m(LONGEST_LEG_M))
 
 
 def _with_margins(limits: Limits, margins: Margins, *, terrain: bool) -> Limits:
-    """The limits of the planner's paths: those of the check, reduced by what the wire's rounding and the bow may take,
-    slopes yet as they are.
+    """The limits of the planner's paths: the limits of the check, reduced by the wire's rounding and the bow, with the
+    slopes as they are.
 
     In the terrain frame, too, by what a vehicle may read amiss and still be taken: an upload judges with it.
     """

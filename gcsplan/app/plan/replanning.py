@@ -36,9 +36,9 @@ __all__ = ["Attempts", "larger", "on_path", "replanned", "same_ends", "with_boun
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Attempts:
-    """How one kind of aircraft is planned until its mission passes.
+    """The attempts to plan one kind of aircraft until its mission passes.
 
-    ``most``: plans in all. ``margins``: those of the first one. ``corner_m``: see `larger`. ``fly`` makes a path of a
+    ``most``: plans in all. ``margins``: of the first plan. ``corner_m``: see `larger`. ``fly`` makes a path of a
     problem, and the mission with its verdict, which may break limits. It raises NoMission where there is no path.
     """
 
@@ -135,7 +135,7 @@ def _of_all(tried: Sequence[VehiclePlan]) -> Solution:
 
 
 def with_bound(solution: Solution, bound: float | None, problem: Problem) -> Solution:
-    """A solution of ``problem`` with another lower bound; where it is not within the wanted gap, ``gap`` did not end
+    """A solution of ``problem`` with another lower bound; if it is not within the problem's gap, ``gap`` did not end
     the search."""
     near = bound is not None and problem.cost(solution.path) <= bound * (1.0 + problem.gap_percent / 100.0)
     stopped_by = "exhausted" if solution.stopped_by == "gap" and not near else solution.stopped_by

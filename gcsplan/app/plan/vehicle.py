@@ -64,7 +64,7 @@ def plan_vehicle(
 
 
 def _copter_attempts(brief: Brief, request: VehicleRequest, limited: VehicleRequest, world: World) -> Attempts:
-    """How an aircraft that can stand still is planned; ``limited`` and ``world`` are those of the search."""
+    """The attempts to plan an aircraft that can stand still; the search keeps ``limited``'s limits, over ``world``."""
     vehicle = request.vehicle
 
     def fly(problem: Problem) -> VehiclePlan:
@@ -127,9 +127,9 @@ def _both_ways(request: VehicleRequest, altitude_frame: str) -> VehicleRequest:
     if vehicle.autopilot is not Autopilot.ARDUCOPTER:
         why = f"return paths are written for ArduCopter alone, and it is {vehicle.autopilot}"
     elif altitude_frame == "terrain":
-        why = "a return path in the terrain frame is not judged: altitude_frame relative or amsl is wanted"
+        why = "a return path in the terrain frame is not judged: use altitude_frame relative or amsl"
     elif request.end == "none":
-        why = "with end: none the mission would go on along its return path: end: land, loiter or rtl is wanted"
+        why = "with end: none the mission would go on along its return path: use end: land, loiter or rtl"
     if why:
         raise InputError(f"{vehicle.name}: return_route: mission: {why}")
     steepest = min(limits.max_climb_deg, limits.max_descent_deg)

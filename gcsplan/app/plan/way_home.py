@@ -1,7 +1,7 @@
 """The way home in every command: it is judged here, and here is decided whether it lets a mission fly.
 
 `way_home: required` in the mission file, or `--require-way-home`, refuses a mission whose return is unsafe or not
-judged. Otherwise the return is judged where that is asked for, and reported as a warning. `plan`, `check`, `upload` and
+judged. Otherwise the return is judged on request, and an unsafe one is a warning. `plan`, `check`, `upload` and
 `rehearse` all ask `lets_fly`.
 """
 
@@ -98,13 +98,13 @@ def writes_path_back(request: VehicleRequest, altitude_frame: str) -> bool:
     return copter and request.end != "none" and altitude_frame != "terrain"
 
 
-def judged(plan: Plan, *, asked: bool, option: bool = False) -> dict[str, WayHome]:
-    """The ways home of a plan where they are asked for or required, else none.
+def judged(plan: Plan, *, home: bool, option: bool = False) -> dict[str, WayHome]:
+    """The ways home of a plan if ``home`` or the mission requires them, else none.
 
     ``option``: ``--require-way-home``. Raises CheckFailed if safe ones are required and one does not pass.
     """
     required = is_required(plan.source, option)
-    homes = homes_of(plan) if asked or required else {}
+    homes = homes_of(plan) if home or required else {}
     require(homes, required=required)
     return homes
 

@@ -76,7 +76,7 @@ wider."""
 
 
 def wing_attempts(brief: Brief, request: VehicleRequest, limited: VehicleRequest, world: World) -> Attempts:
-    """How a fixed wing is planned; ``limited`` and ``world`` are those of the search.
+    """The attempts to plan a fixed wing; the search keeps ``limited``'s limits, over ``world``.
 
     The path without arcs shows where its ends should lead. Margins hardly move it, so it is found once.
     """

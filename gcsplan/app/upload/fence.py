@@ -41,8 +41,8 @@ def with_fences(jobs: Sequence[UploadJob], *, infinite: bool = False) -> tuple[l
         if job.vehicle is None or job.world is None:
             raise InputError("a fence is made of the zones that a mission was checked with, and this one was not")
         fence = fence_for(job.mission, job.vehicle, job.world, infinite=infinite, rtl_rel_home_m=job.rtl_rel_home_m)
-        said = fence.notes if fence.items else (*fence.notes, Note("no_zone_for_fence"))
-        notes += [(job.name, note) for note in said]
+        found = fence.notes if fence.items else (*fence.notes, Note("no_zone_for_fence"))
+        notes += [(job.name, note) for note in found]
         fenced.append(replace(job, fence=fence))
     return fenced, notes
 

@@ -28,7 +28,7 @@ MOST_CELLS = 25_000_000
 """Cells of the widest terrain that is loaded, 400 MB."""
 ProgressCall = Callable[[str, TransferProgress], None]
 """Called with a vehicle's name and the progress of its upload. In the last call, the phase is the outcome in a word and
-``failed`` is told."""
+``failed`` is set."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,7 @@ class FleetOnBoard:
     def against(self, name: str, vehicle: Vehicle, verdict: Verdict) -> Note | None:
         """Why the others do not keep apart from ``name``, flown as ``vehicle`` with ``verdict``; None if they do.
 
-        Nothing is asked of a fleet whose file says no ``arrival``, nor of a single vehicle.
+        A fleet whose file has no ``arrival`` need not keep apart, nor need a single vehicle.
         """
         plan = self._plan
         if not self.keeps_apart or plan.fleet is None or plan.source.arrival is None:
@@ -132,7 +132,7 @@ class UploadJob:
     """One mission for one vehicle at one URL (`SIM` for a loopback vehicle of its own).
 
     ``way_home`` is None unless it was judged. ``home_required``: a vehicle that returns at another altitude is refused.
-    ``ground`` is what a vehicle that flies the terrain frame is sent. ``hours``: those of the flight from its departure
+    ``ground`` is sent to a vehicle that flies the terrain frame. ``hours``: the hours of the flight from its departure
     on, if a zone was left out for them. ``fleet``: the other vehicles' motions, from which this one keeps apart as its
     parameters make it fly.
     """
@@ -174,12 +174,12 @@ class JobResult:
     def as_dict(self) -> dict[str, Any]:
         """The result for JSON, fixed keys first; of the others, those with a value.
 
-        ``details`` are the session's; what was said since, in ``message`` and ``warnings``, stands in their place.
+        ``details`` are the session's; the later ``message`` and ``warnings`` of this result replace the session's.
         """
         fixed = {
             "url": self.url, "outcome": self.outcome, "verified": self.verified, "simulated": self.simulated,
             "items": self.items, "seconds": self.seconds, "retries": self.retries,
         }  # fmt: skip
-        said = {"message": self.message} | in_json("warnings", self.warnings)
-        more = said | dict(self.details or {}) | said
+        latest = {"message": self.message} | in_json("warnings", self.warnings)
+        more = latest | dict(self.details or {}) | latest
         return fixed | {key: value for key, value in more.items() if value and key not in fixed}

@@ -1,7 +1,8 @@
-"""What a vehicle's parameters make of a mission: it is judged again with them, before it is sent and once on board.
+"""A mission is judged again with the vehicle's own parameters, before it is sent and once it is on board.
 
-Within the list that the mission was judged with (`parameter_list`) the vehicle flies what was told. Outside of it the
-mission is refused, or, if the user allows that, judged with what is on board; what cannot be judged stays refused.
+With parameters within the list that the mission was judged with (`parameter_list`) the vehicle flies as planned. With
+others the mission is refused, or, if the user allows that, judged with the parameters on board; a mission that cannot
+be judged with them stays refused.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ __all__ = ["judge_on_board", "settings_of", "settings_of_plan"]
 
 RIGHT_ANGLE_RAD = 0.5 * math.pi
 SAME_S, SAME_PART = 1.0, 0.005
-"""A flight that takes as long as told within this, s, or within this part of it, is the one that was told."""
+"""A flight whose time differs from the plan's by no more than this, s, or by this part of it, flies as planned."""
 
 
 def settings_of(job: UploadJob) -> tuple[Setting, ...]:
@@ -86,7 +87,7 @@ def judge_on_board(
 ) -> session.ReadBackJudge | None:
     """The check of the mission that was read back, since the vehicle will fly what it holds; None without a world.
 
-    It is asked before the mission is sent too, with the vehicle's parameters: where it turns, how fast it flies, climbs
+    Before the mission is sent it runs too, with the vehicle's parameters: where it turns, how fast it flies, climbs
     and returns, and how high it returns. ``allow_parameters``: those outside of the list are judged as they are. A
     simulated vehicle's parameters are nobody's, so the mission file's count there.
     """
@@ -150,8 +151,8 @@ def _silent(
 ) -> Note | None:
     """Which parameters that the proof hangs on, or ``others``, gave no answer; None if all did.
 
-    A peer that does not say what autopilot it is has no known parameters, and values that no vehicle was asked for say
-    nothing of the others.
+    A peer that does not say what autopilot it is has no known parameters. Where gcsplan requested no parameters, the
+    values that arrived say nothing of the others.
     """
     if not isinstance(values, OnBoard) or values.generic:
         return None
@@ -184,11 +185,16 @@ def _against_motion(
         if (allow_parameters or leans) and (against := _against_return(job, flies, verdict)):
             return against
     if job.verdict is not None and not allow_parameters:
-        told_s, takes_s = job.verdict.time_s, verdict.time_s
-        late_s = takes_s - told_s
-        if math.isfinite(late_s) and abs(late_s) > max(SAME_S, SAME_PART * told_s):
+        planned_s, takes_s = job.verdict.time_s, verdict.time_s
+        late_s = takes_s - planned_s
+        if math.isfinite(late_s) and abs(late_s) > max(SAME_S, SAME_PART * planned_s):
             return Note(
-                "flight_takes_otherwise", takes_s=takes_s, told_s=told_s, late_s=late_s, leans=leans, off=_notes(timed)
+                "flight_takes_otherwise",
+                takes_s=takes_s,
+                told_s=planned_s,
+                late_s=late_s,
+                leans=leans,
+                off=_notes(timed),
             )
     if job.fleet is not None and (near := job.fleet.against(job.name, flies, verdict)):
         return Note("too_near_on_board", near=near, off=_notes(timed))

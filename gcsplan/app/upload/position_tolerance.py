@@ -45,7 +45,7 @@ def require_tolerance(tolerance_m: float | None, *, judged: bool) -> None:
         return
     if not 0.0 < tolerance_m <= LARGEST_TOLERANCE_M:
         raise UsageError(
-            f"--tolerance-m {tolerance_m:g}: more than 0 and at most {LARGEST_TOLERANCE_M:g} m is wanted; to judge "
+            f"--tolerance-m {tolerance_m:g}: give more than 0 and at most {LARGEST_TOLERANCE_M:g} m; to judge "
             "another mission that is on board, download it and check that file"
         )
     if not judged:

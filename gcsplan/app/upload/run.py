@@ -151,9 +151,9 @@ def _job(c: Checked, url: str) -> UploadJob:
 
 
 def unchecked_job(argument: str, url: str, sysid: int) -> tuple[UploadJob, list[Note]]:
-    """The job of a file for ``--unchecked``, and what of the file is not sent with it or was not read.
+    """The job of a file for ``--unchecked``, and notes on the parts of the file that were not read or are not sent.
 
-    The vehicle is asked for its autopilot if the file does not name one.
+    If the file names no autopilot, the vehicle must report it.
     """
     name, file = split_name(argument)
     endpoint = parse_url(url)
@@ -445,8 +445,8 @@ def verify_file(
 ) -> JobResult:  # fmt: skip
     """Compare a file with the mission on board; nothing is written to the vehicle.
 
-    With ``source`` the argument may be NAME=FILE, and what is on board is judged in its world, for its vehicle (whose
-    number holds in place of ``sysid``). ``tolerance_m``: positions that are at most so far away are no difference.
+    With ``source`` the argument may be NAME=FILE, and the mission on board is judged in its world, for its vehicle,
+    whose number replaces ``sysid``. ``tolerance_m``: positions that are at most so far away are no difference.
     """
     from gcsplan.app.upload import position_tolerance as shifts
     from gcsplan.mavlink.link.session import session
@@ -480,9 +480,9 @@ def verify_file(
 def download_to(url: str, sysid: int, file: Path, *, timeout_s: float = 60.0) -> int:
     """Write the mission on board to a `.waypoints` or `.plan` file; returns the number of its wire items."""
     if file.suffix.lower() not in (".waypoints", ".plan"):
-        raise UsageError(f"-o {file}: a name that ends in .waypoints or .plan is wanted")
+        raise UsageError(f"-o {file}: give a name that ends in .waypoints or .plan")
     if file.is_dir() or not file.parent.is_dir():
-        raise UsageError(f"-o {file}: a file in a directory that is there is wanted")
+        raise UsageError(f"-o {file}: give a file in a directory that exists")
     from gcsplan.mavlink.link.session import session
 
     with open_link(url) as link:
@@ -500,7 +500,7 @@ def clear(url: str, sysid: int, kind: str, *, allow_armed: bool = False, timeout
     from gcsplan.mavlink.link.session import session
 
     if kind not in KINDS:
-        raise UsageError(f"--type {kind}: mission, fence or rally is wanted")
+        raise UsageError(f"--type {kind}: give mission, fence or rally")
     with open_link(url) as link:
         options = session.SessionOptions(listen_s=LISTEN_S, allow_armed=allow_armed, timeout_s=timeout_s)
         session.clear_mission(link, sysid, KINDS[kind], options=options).raise_for_outcome()

@@ -29,12 +29,12 @@ COMPARE_PATIENCE_S = 60.0
 T = TypeVar("T")
 
 Report = Callable[[str, int, int], None]
-"""Called with a vehicle's name and two counts: parts loaded and pending, or places compared and wanted."""
+"""Called with a vehicle's name and two counts: parts loaded and pending, or places compared and places in all."""
 
 
 @dataclass(frozen=True, slots=True)
 class ServedTo:
-    """What one vehicle asked for and got. ``complete``: it reported that nothing is pending."""
+    """The terrain that one vehicle requested and received. ``complete``: it reported that nothing is pending."""
 
     vehicle: str
     url: str
@@ -215,6 +215,6 @@ def _vehicles_of(source: MissionFile, where: Sequence[str]) -> dict[str, str]:
     if not asking:
         raise UsageError(
             f"--link {' '.join(where)}: no vehicle of {source.path} that asks for terrain is there; ArduPilot alone "
-            "does, at a URL, NAME=URL, or `link` for those of the mission file"
+            "does, at a URL, NAME=URL, or `link` for the links of the mission file"
         )
     return asking

@@ -1,1 +1,1 @@
-"""What a fixed wing flies otherwise: climb-out, arcs, early turns and the glide to land."""
+"""The flight of a fixed wing, where it differs: climb-out, arcs, early turns and the glide to land."""

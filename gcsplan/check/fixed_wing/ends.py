@@ -278,7 +278,7 @@ def bare(air: Airspace) -> Airspace:
 
 
 def beside_strip(air: Airspace) -> Note | None:
-    """What a refused climb-out or glide has to do with obstacles, and what to do; None over bare ground."""
+    """A note on obstacles for a refused climb-out or glide, with a cure; None over bare ground."""
     return None if air.surface.top_m is air.surface.high_m else Note("obstacles_beside_strip")
 
 
@@ -411,7 +411,7 @@ FLARE_S, FLARE_MOST_M, LAND_SINK_M_S = 2.0, 6.0, 0.25
 
 BEFORE_M, STEP_M = 200.0, 10.0
 DOWNHILL, DOWNHILL_M = 0.02, 2.0
-"""How far before its place the ground of a landing is looked at, and from which slope and height on it is told."""
+"""How far before a landing its ground is looked at, m; the slope and height from which that ground gets a note."""
 
 
 def glide(pilot: Aboard, seq: int, item: MissionItem) -> None:

@@ -33,7 +33,7 @@ LOADED_DEG = 270.0
 """Wider arcs may need terrain so far away that none is loaded for them; the check then says that it is unknown."""
 
 SPLINE_BULGE = 0.6
-"""The same of a spline, at most: its two tangents together are at most four times its length, which makes 16/27."""
+"""The same for a spline, at most: its two tangents together are at most four times its length, which makes 16/27."""
 
 CORNER_M_S2 = 5.0
 """Twice WPNAV_ACCEL, what WPNAV_ACCEL_C means by default, m/s²."""

@@ -1,4 +1,4 @@
-"""What an autopilot does with a mission: the items as the straight stretches that are flown.
+"""The flight that an autopilot makes of a mission: its items as straight stretches.
 
 This module reads only motion; `judge` judges it. A command whose motion we do not know is listed in ``not_judged``, so
 nothing is lost silently. Facts about the autopilots come from ArduPilot's and PX4's sources and a flown ArduCopter.

@@ -31,7 +31,7 @@ MOST_ROUTE_STEPS = 100_000
 
 
 class Pilot(Protocol):
-    """What flies the items; see `flight`."""
+    """The pilot that flies the items; see `flight`."""
 
     flight: Flight
     jumped_from: int | None

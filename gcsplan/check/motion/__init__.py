@@ -1,1 +1,1 @@
-"""What an aircraft does between items: stretches, turns and returns of each autopilot, in numbers."""
+"""The motion of an aircraft between items: stretches, turns and returns of each autopilot, in numbers."""

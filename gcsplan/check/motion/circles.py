@@ -25,8 +25,8 @@ PLANE_LOITER_RADIUS_M = 60.0  # ArduPlane WP_LOITER_RAD, default
 HOT_DAY = 1.1
 """How much thinner than the standard atmosphere the air may be."""
 
-TOLD_M = 1.0
-"""A circle that grows by less is not told."""
+NOTED_GROWTH_M = 1.0
+"""A circle that grows by less, m, gets no note."""
 
 
 def circle_growth(amsl_m: float) -> float:
@@ -38,9 +38,9 @@ def circle_growth(amsl_m: float) -> float:
 
 
 def circle_widened(seq: int, radius_m: float, amsl_m: float) -> Note | None:
-    """What ArduPlane makes of a circle's radius at an altitude; None where that is nearly the same."""
+    """A note on the radius that ArduPlane flies at an altitude; None where it is nearly the given one."""
     flown_m, most_m = radius_m / float(density_ratio(amsl_m)), radius_m * circle_growth(amsl_m)
-    if flown_m - radius_m < TOLD_M:
+    if flown_m - radius_m < NOTED_GROWTH_M:
         return None
     return Note("circle_widened", seq, radius_m=radius_m, amsl_m=amsl_m, flown_m=flown_m, judged_m=most_m)
 
@@ -94,8 +94,8 @@ def l1_off_m(radius_m: float, turn_rad: float, speed_m_s: float, tuning: Tuning 
     for _ in range(steps):
         aside = cos * y - sin * x  # left of the new leg
         closing = math.asin(min(max(-aside / ahead, -CAPTURE_SINE), CAPTURE_SINE))
-        wanted = closing + (turn_rad - heading + math.pi) % (2.0 * math.pi) - math.pi
-        push = gain * math.sin(min(max(wanted, -0.5 * math.pi), 0.5 * math.pi))
+        turn_to_fly = closing + (turn_rad - heading + math.pi) % (2.0 * math.pi) - math.pi
+        push = gain * math.sin(min(max(turn_to_fly, -0.5 * math.pi), 0.5 * math.pi))
         bank += (min(max(math.atan(push / GRAVITY_M_S2), -most), most) - bank) * STEP_S / BANK_S
         heading += GRAVITY_M_S2 * math.tan(bank) / speed_m_s * STEP_S
         x += speed_m_s * math.cos(heading) * STEP_S

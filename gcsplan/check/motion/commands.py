@@ -1,4 +1,4 @@
-"""Commands that are no places: those that move nothing, those that set speeds, and those that are flown differently.
+"""Commands that are no places: some move nothing, some set speeds, and some are flown differently.
 
 The whole table, by command, autopilot and param, is in docs/safety.md. `Pace` holds the speeds of the flight, as a
 mission's speed changes set them.
@@ -75,7 +75,7 @@ WHY_LOST = {
     cmd.DO_SET_PARAMETER: "sets_parameter",
     cmd.DO_GO_AROUND: "breaks_off_landing",
 }
-"""The note on why what is flown for a command is not known, where that does not depend on the item's numbers."""
+"""Commands whose flight is never known, whatever the item's numbers, with the code of the note that says why."""
 
 
 def why_lost(item: MissionItem, mission: Mission) -> Note:

@@ -75,7 +75,7 @@ class Aboard:
     def at_once(
         self, seq: int, kind: StretchKind, here: Place, target: Place, *, terrain: bool, reach_m: float = 0.0
     ) -> None:
-        """The altitudes of a leg whose slope an ArduPlane does not fly: it makes for those of ``target`` at once."""
+        """The altitudes of a leg whose slope an ArduPlane does not fly: it makes for ``target``'s altitude at once."""
         start = self.read(*target[:2]) + here[2] - self.read(*here[:2]) if terrain else here[2]
         rise = target[2] - start
         if abs(rise) < PLANE_GLIDE_SLOPE_MIN_M or (rise > 0 and here[2] - self.home[2] <= PLANE_LOW_M):

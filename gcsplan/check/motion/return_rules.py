@@ -48,7 +48,7 @@ Metres = TypeVar("Metres", float, Floats)
 
 
 class RallyAltitude(Enum):
-    """What the altitude of a rally point means for a return to it."""
+    """The meaning of a rally point's altitude for a return to it."""
 
     GROUND = "the point must lie on the ground, and the return altitude counts from it"
     RAISES = "the return is no lower than the point's altitude"
@@ -57,7 +57,7 @@ class RallyAltitude(Enum):
 
 @dataclass(frozen=True, slots=True)
 class ReturnRule:
-    """How one autopilot returns; all numbers are the autopilot's defaults.
+    """The return of one autopilot; all numbers are the autopilot's defaults.
 
     ``parameter``: its name for the return altitude, which counts from home. ``climbs_first``: it climbs on the spot,
     never descends before it is home, and then descends vertically; else it turns, changes its altitude on the way, and
@@ -178,8 +178,8 @@ def return_s(vehicle: Vehicle, way_m: float, rise_m: float, down_m: float, speed
     """Seconds of a return without its wait over home: no fewer than the time table has (`fleet.motion.timing`).
 
     ``way_m``: horizontal; ``rise_m``: from its beginning to its level, negative if that is lower; ``down_m``: from
-    there to the ground at home; ``speed_m_s``: that of the mission where it begins (NaN: the vehicle's fastest). It is
-    convex in the three lengths.
+    there to the ground at home; ``speed_m_s``: the mission's speed where it begins (NaN: the vehicle's fastest). The
+    result is convex in the three lengths.
     """
     own_m_s = vehicle.speed_max_m_s if math.isnan(speed_m_s) else speed_m_s
     speed = own_m_s if vehicle.return_speed_m_s is None else min(own_m_s, vehicle.return_speed_m_s)

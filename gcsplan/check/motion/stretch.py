@@ -57,7 +57,7 @@ class Unreached:
 
     @property
     def note(self) -> Note:
-        """What is said of it."""
+        """The note on the items that are never reached."""
         if self.first == self.last:
             return Note("item_unreached", self.first, by=self.seq, jumps=self.loop)
         return Note("items_unreached", self.first, last=self.last, by=self.seq, jumps=self.loop)

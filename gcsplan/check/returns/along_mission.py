@@ -6,8 +6,7 @@ in the plane and in height. Parts from which that is not legal are split, down t
 reported as safe is safe; the others may be reported as unsafe up to the ends of a smallest part too early.
 
 Which item is joined is decided by the nearest leg of the return path. A part's candidates are all that may be nearest
-from anywhere in it, within the errors of the vehicle's place. What is flown from the join on is judged with the
-mission.
+from anywhere in it, within the errors of the vehicle's place. The flight from the join on is judged with the mission.
 
 Two grades. *Clear*: the vehicle, within its errors, meets no ground, obstacle or zone. *Legal*: it keeps all limits.
 
@@ -54,7 +53,7 @@ STRIP_PIECES = 6
 """Where the ways from a part do not pass as a whole, the strip in which they begin is cut into so many pieces."""
 
 LEGS_LOOKED_AT = 200
-"""Most legs of one stretch that are looked at for the reason that is told."""
+"""Most legs of one stretch among which the check looks for the reason that it reports."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,7 +259,7 @@ class _Judge:
         )  # fmt: skip
 
     def _why(self, parts: TraceParts, grade: int) -> tuple[Note, str]:
-        """What the returns from ``parts`` do, worst first; the first zone's name."""
+        """The faults of the returns from ``parts``, worst first; the first zone's name."""
         near = candidates(self.trace, self.joins, self.vehicle, parts)
         worst: dict[tuple[str, int], tuple[Violation, int]] = {}
         for k, join in enumerate(self.joins):
@@ -302,7 +301,7 @@ WHAT = {
     "climb": "way_climbs_too_steeply",
     "descent": "way_descends_too_steeply",
 }
-"""What a return does that breaks a limit, by the kind of the violation."""
+"""The note on a return that breaks a limit, by the kind of the violation."""
 
 
 def _does(kind: str, zone: str, grade: int) -> Note:

@@ -212,7 +212,7 @@ class _Finder:
         )
 
     def _place(self, item: MissionItem) -> Floats | None:
-        """(3,) the place of an item as ArduPilot measures to it; None if that cannot be told."""
+        """(3,) the place of an item as ArduPilot measures to it; None if it is not known."""
         frame = m.FRAME_SYNONYMS.get(item.frame, item.frame)
         if frame not in (m.RELATIVE, m.GLOBAL) or not (item.x or item.y) or not math.isfinite(item.z):
             return None

@@ -133,7 +133,7 @@ def _stretch(
 def _reasons(
     trace: MissionTrace, own: Obstacles, middle: Floats, level: float, grade: int, target: Target | None
 ) -> tuple[list[Note], str, Place | None]:
-    """What the returns of a stretch do at the level, worst first; the first zone's name; the place of the ground."""
+    """The faults of a stretch's returns at the level, worst first; the first zone's name; the place of the ground."""
     hit, kind, over = own.hit(level), own.kind(), own.over()
     names = [z.name for z in trace.world.airspace.zones]
     clauses: list[tuple[tuple[bool, float], Note]] = []
@@ -180,7 +180,7 @@ def _obstacle(trace: MissionTrace, u: float, target: Target) -> Place | None:
 
 
 def _why(obstacles: Obstacles, row: int, names: Sequence[str], grade: int, obstacle: Place | None) -> Note:
-    """What a return does that hits an obstacle."""
+    """The note on a return that hits an obstacle."""
     what, top, bottom = int(obstacles.what[row]), float(obstacles.top[row]), float(obstacles.bottom[row])
     if what == MAX_AMSL:
         return Note("does_above_ceiling")

@@ -246,7 +246,7 @@ class WayHome:
 
     @property
     def then(self) -> Note | None:
-        """What the value to set leaves, with the rally points if there are any; None if there is no value to name."""
+        """The verdict with the value to set, and the rally points if there are any; None without a value to set."""
         if self.set_rel_home_m is None:
             return None
         left, legal_m = self.set_leaves_m or 0.0, self.lowest_legal_rel_home_m

@@ -57,7 +57,7 @@ NOISE_M = 1e-3
 """Subtracted from the highest altitude, so that it does not touch what is above it, m."""
 
 MOST_UNKNOWN = 5
-"""Stretches from which a return that joins the mission is not known, that are told."""
+"""Most stretches that are listed, from which a return that joins the mission is not known."""
 
 
 def way_home(
@@ -74,7 +74,7 @@ def way_home(
 
     ``rtl_rel_home_m`` is the vehicle's return altitude above home; None: the autopilot's default. ``rally``: propose
     rally points if no altitude is clear from every point. ``route``: straight home, or to where the return joins the
-    mission (`joins`); None: not said, which counts as straight home. Never raises for a mission that is merely unsafe.
+    mission (`joins`); None: not given, which counts as straight home. Never raises for a mission that is merely unsafe.
     """
     mission, rule = verdict.mission, RETURN_RULES[vehicle.autopilot]
     stored = replace(mission, items=tuple(profile_of(mission.autopilot).stored(item) for item in mission.items))
@@ -169,7 +169,7 @@ def _along_mission(
 
 
 def _but_the_return(flight: Flight) -> list[Note]:
-    """What was not judged of a flight, without the return that ArduPlane flies by itself: that is judged here."""
+    """Notes on the parts of a flight that were not judged, but for ArduPlane's own return, which is judged here."""
     return [note for note in flight.not_judged if note.code != "returns_by_itself"]
 
 
@@ -258,7 +258,7 @@ def _landing_sequence(mission: Mission) -> list[Note]:
 
 
 def _warnings(refinement: Refinement, vehicle: Vehicle, ground: float, lowest: float | None) -> list[Note]:
-    """What the user must know of the altitudes that were found."""
+    """Notes for the user on the altitudes that were found."""
     notes = []
     most_amsl = vehicle.limits.max_amsl_m
     if most_amsl is not None and lowest is not None and ground + lowest > most_amsl - vehicle.limits.altitude_error_m:

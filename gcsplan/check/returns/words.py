@@ -16,11 +16,11 @@ LABELS = {
     "legal": "within all limits too", "lowest": "lowest on a return", "battery": "battery for the return",
     "rally": "rally point", "still_no_return": "still no safe return", "not_judged": "not judged",
 }  # fmt: skip
-"""What stands before the rows on a way home, by what they are about."""
+"""The labels of the rows on a way home, by subject."""
 
 
 class ReturnRow(NamedTuple):
-    """One row on a way home: what it is about, a key of `LABELS`, and what is said; ``number`` of several."""
+    """One row on a way home: its subject, a key of `LABELS`, and its words; ``number``: which of several rows."""
 
     about: str
     note: Note
@@ -28,12 +28,12 @@ class ReturnRow(NamedTuple):
 
     @property
     def label(self) -> str:
-        """What stands before it."""
+        """The label before the row."""
         return LABELS[self.about] + (f" {self.number}" if self.number else "")
 
 
 class Return(Protocol):
-    """What a verdict says of the way home."""
+    """The part of a verdict on the way home."""
 
     @property
     def safe(self) -> bool | None:

@@ -23,7 +23,7 @@ MISBEHAVIOURS = (
 
 
 class UnitsChoice(StrEnum):
-    """What ``--units`` may be."""
+    """The values of ``--units``."""
 
     METRIC = METRIC.name
     IMPERIAL = IMPERIAL.name
@@ -69,7 +69,7 @@ JsonOption = Annotated[bool, typer.Option("--json", help="One JSON document on s
 ListZonesOption = Annotated[
     bool,
     typer.Option(
-        "--list-zones", help="Show what was understood of each zone: shape, size, floor, ceiling. Nothing else is done."
+        "--list-zones", help="Show each zone as it was read: shape, size, floor, ceiling. Nothing else is done."
     ),
 ]
 AtOption = Annotated[
@@ -207,7 +207,7 @@ MisbehaveOption = Annotated[
 def terrain_keys(datum: str | None, unit: str | None, nodata: str | None) -> dict[str, object]:
     """The keys of ``terrain:`` that these options give. Raises UsageError."""
     if unit not in (None, "m", "ft", "us_ft"):
-        raise UsageError(f"--height-unit {unit}: m, ft or us_ft is wanted")
+        raise UsageError(f"--height-unit {unit}: give m, ft or us_ft")
     number: object = nodata
     if nodata not in (None, "none"):
         try:
@@ -215,7 +215,7 @@ def terrain_keys(datum: str | None, unit: str | None, nodata: str | None) -> dic
         except ValueError:
             number = math.nan
         if not math.isfinite(float(str(number))):
-            raise UsageError(f"--nodata {nodata}: a number, or none, is wanted")
+            raise UsageError(f"--nodata {nodata}: give a number, or none")
     given = {"vertical_datum": datum, "height_unit": unit, "nodata": number}
     return {key: value for key, value in given.items() if value is not None}
 
@@ -228,4 +228,4 @@ def as_options(keys: Mapping[str, object]) -> dict[str, object]:
 def require_html(file: Path | None) -> None:
     """Raise UsageError unless ``file``, the page that is to be written, is None or can be one."""
     if file is not None and (file.suffix.lower() not in (".html", ".htm") or not file.parent.is_dir()):
-        raise UsageError(f"--report {file}: a name that ends in .html, in a directory that is there, is wanted")
+        raise UsageError(f"--report {file}: give a name that ends in .html, in a directory that exists")

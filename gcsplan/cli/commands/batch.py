@@ -52,8 +52,8 @@ def batch(
 ) -> None:
     """Plan many mission files: a table of all results, a page with a map, the outputs of each.
 
-    Nothing is sent. A mission that fails never stops the others, and the exit code is the worst. What is done and
-    unchanged is not planned again, so that the same command goes on after an interruption.
+    Nothing is sent. A mission that fails never stops the others, and the exit code is the worst. A mission that is
+    planned and unchanged is not planned again, so that the same command goes on after an interruption.
     """
     from gcsplan.app.batch import MISSION_S, BatchOptions, MissionBatch, exit_code, missions_of
     from gcsplan.app.parallel.executor import executor
@@ -69,7 +69,7 @@ def batch(
         if done:
             remark(f"{len(done)} of {len(work.missions)} missions are done and unchanged")
 
-        def told(record: Record) -> None:
+        def on_done(record: Record) -> None:
             done.append(record)
             display.done(len(done), f", {sum(r.code != 0 for r in done)} without a plan")
 
@@ -78,7 +78,7 @@ def batch(
             if todo:
                 with executor(jobs, cluster, pieces=len(todo), piece_s=MISSION_S) as workers:
                     display.workers(workers)
-                    work.run(workers, todo, told)
+                    work.run(workers, todo, on_done)
         finally:
             order = {name: k for k, (name, _) in enumerate(work.missions)}
             done.sort(key=lambda r: order[r.mission])

@@ -114,7 +114,7 @@ def bench_terrain(
         "bench-terrain"
     ),
     kinds: Annotated[
-        str, typer.Option(metavar="LIST", help="Of problems; everyday, too.")
+        str, typer.Option(metavar="LIST", help="Kinds of problems; everyday, too.")
     ] = "main,energy,band,large,many,turn",
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the problems.")] = 1,
     runs: Annotated[int, typer.Option(metavar="N", help="Runs of ours; medians are reported.")] = 9,
@@ -202,8 +202,8 @@ def bench_everyday(
         numbers = [int(s) for s in seeds.split(",")]
     except ValueError:
         raise UsageError(f"--seeds takes whole numbers such as 1,2,3, given {seeds!r}") from None
-    asked = EVERYDAY_KINDS if kinds is None else kinds.split(",")
-    outcomes = everyday.run(out, seeds=numbers, count=count, kinds=asked, without=without or (), tell=remark)
+    chosen = EVERYDAY_KINDS if kinds is None else kinds.split(",")
+    outcomes = everyday.run(out, seeds=numbers, count=count, kinds=chosen, without=without or (), tell=remark)
     put(everyday.report(outcomes))
 
 
@@ -213,15 +213,16 @@ def bench_papers(
         Path, typer.Option("-o", "--out", metavar="DIR", help="Runs and report; the same command goes on there.")
     ] = Path("papers"),
     scenario: Annotated[
-        list[str] | None, typer.Option("--scenario", metavar="NAME", help="Of missions/papers; repeatable [all].")
+        list[str] | None,
+        typer.Option("--scenario", metavar="NAME", help="A file of missions/papers; repeatable [all]."),
     ] = None,
     algorithm: Annotated[
         list[str] | None,
         typer.Option(
-            "--algorithm", metavar="NAME", help="Of the papers or a reading, `ssgwo:leaders-all`; repeatable [all]."
+            "--algorithm", metavar="NAME", help="A paper's, or a reading, `ssgwo:leaders-all`; repeatable [all]."
         ),
     ] = None,
-    runs: Annotated[int | None, typer.Option(metavar="N", help="Of each [the paper's number, 30 where none].")] = None,
+    runs: Annotated[int | None, typer.Option(metavar="N", help="Runs of each [the paper's number, else 30].")] = None,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of all runs.")] = 1,
     jobs: JobsOption = None,
     cluster: ClusterOption = None,
@@ -265,14 +266,14 @@ def bench_metabox(
         "bench-metabox"
     ),
     python: Annotated[
-        Path | None, typer.Option("--python", metavar="FILE", help="Of MetaEvoBox's environment [default: this one].")
+        Path | None, typer.Option("--python", metavar="FILE", help="MetaEvoBox's Python [default: this one].")
     ] = None,
     instances: Annotated[int, typer.Option(metavar="N", help="Generated instances, 15 and 30 threats in turn.")] = 2,
-    runs: Annotated[int, typer.Option(metavar="N", help="Of each optimiser on each instance.")] = 5,
+    runs: Annotated[int, typer.Option(metavar="N", help="Runs of each optimiser on each instance.")] = 5,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of instances and runs.")] = 1,
-    evaluations: Annotated[int, typer.Option(metavar="N", help="Of each run; MetaEvoBox's own number.")] = 2500,
+    evaluations: Annotated[int, typer.Option(metavar="N", help="Evaluations of each run, as MetaEvoBox has.")] = 2500,
     algorithm: Annotated[
-        list[str] | None, typer.Option("--algorithm", metavar="NAME", help="Of ours or theirs; repeatable [all].")
+        list[str] | None, typer.Option("--algorithm", metavar="NAME", help="One of ours or theirs; repeatable [all].")
     ] = None,
     jobs: Annotated[int, typer.Option(metavar="N", help="Processes of MetaEvoBox.")] = 1,
     as_json: JsonOption = False,
@@ -303,9 +304,7 @@ def bench_scale(
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Tables and picture go there.")] = Path(
         "bench-scale"
     ),
-    axes: Annotated[
-        str, typer.Option(metavar="LIST", help="Of missions,vehicles,zones,cells,workers.")
-    ] = "missions,vehicles,zones,cells,workers",
+    axes: Annotated[str, typer.Option(metavar="LIST", help="Sizes to vary.")] = "missions,vehicles,zones,cells,workers",
     missions: Annotated[int, typer.Option(metavar="N", help="Missions of the longest batch.")] = 40,
     workers: Annotated[int, typer.Option(metavar="N", help="Processes that share a batch, at most.")] = 2,
     kill: Annotated[bool, typer.Option("--kill", help="Also kill a worker in the middle of a batch.")] = False,

@@ -145,7 +145,7 @@ def check(
     """
     from gcsplan.app.check import files as checking
     from gcsplan.app.check import worlds as check_sites
-    from gcsplan.app.check.many import Shown, told_of_batch
+    from gcsplan.app.check.many import Shown, results_of_batch
     from gcsplan.cli.output.check_output import Document, Lines, Rows, tell, tell_archive
     from gcsplan.export.outdir import steady
     from gcsplan.units import units_of
@@ -169,24 +169,26 @@ def check(
     require_html(report)
     if as_json and json_lines:
         raise UsageError("--json is one document and --json-lines one for each file: give one of them")
-    asked, rows = check_sites.Returns(way_home, require_way_home), as_json or json_lines
+    returns, rows = check_sites.Returns(way_home, require_way_home), as_json or json_lines
     mission, arguments = (files[0], files[1:]) if _is_mission(files[0]) else (None, files)
     arguments = [file for argument in arguments for file in _named(argument)]
     form: Form = "whole" if as_json else "row" if json_lines else "lines"
     shown = Shown(form, allow_unjudged, units_of(units), len(arguments) > 1)
-    archive = _archive(mission, arguments, given, asked, shown, at)
+    archive = _archive(mission, arguments, given, returns, shown, at)
     printer = Document() if as_json else Rows() if json_lines else Lines(shown.units, summed=not quiet)
     reading = steady(check_sites.split_name(file)[1] for file in arguments)
     if report is None and (rows or quiet or len(arguments) > MOST_TABLES):
         raise typer.Exit(tell_archive(archive, printer, jobs, cluster, reading))
     with reading:
-        batch = checking.check_at(archive.site, archive.name, arguments, check_sites.Wanted(archive.asked.returns))
+        batch = checking.check_at(
+            archive.site, archive.name, arguments, check_sites.VerdictParts(archive.request.returns)
+        )
     if report is not None:
         _report(batch, report, units_of(units))
     if rows or quiet or len(arguments) > MOST_TABLES:
-        told = told_of_batch(batch, form, allow_unjudged=allow_unjudged, units=units_of(units))
+        results = results_of_batch(batch, form, allow_unjudged=allow_unjudged, units=units_of(units))
         header = (batch.name, batch.inputs, batch.notes, batch.typed)
-        raise typer.Exit(tell(header, told, printer, len(arguments)))
+        raise typer.Exit(tell(header, results, printer, len(arguments)))
     _say_all(batch, units_of(units))
     failing = [f for c in batch.checked if (f := checking.failing_of(c, allow_unjudged=allow_unjudged)) is not None]
     raise typer.Exit(worst_of({*(f.code for f in failing), *(error.exit_code for _, error in batch.unreadable)}))
@@ -213,7 +215,7 @@ def _is_mission(argument: str) -> bool:
 def _archive(
     mission: str | None, files: list[str], given: dict[str, object], returns: Returns, shown: Shown, at: str | None
 ) -> Archive:
-    """The files in the world of a mission file, or in that of the options."""
+    """The files in the world of a mission file, or in the world of the options."""
     from gcsplan.app.check.many import Archive
     from gcsplan.app.fleet import pipeline
     from gcsplan.vehicle import Autopilot
@@ -232,7 +234,7 @@ def _archive(
         )
     name = given.get("--autopilot")
     if name is not None and name not in tuple(Autopilot):
-        raise UsageError(f"--autopilot {name}: {', '.join(Autopilot)} is wanted")
+        raise UsageError(f"--autopilot {name}: give one of {', '.join(Autopilot)}")
     pilot = None if name is None else Autopilot(str(name))
     return Archive.with_options(world_options(given, at), pilot, files, returns, shown)
 
@@ -267,7 +269,7 @@ def world_options(given: dict[str, object], at: str | None = None) -> WorldOptio
 def _route(given: object) -> ReturnRoute | None:
     if given in (None, "straight", "mission"):
         return given
-    raise UsageError(f"--return-route {given}: straight or mission is wanted")
+    raise UsageError(f"--return-route {given}: give straight or mission")
 
 
 def _home(text: str) -> Degrees:
@@ -276,7 +278,7 @@ def _home(text: str) -> Degrees:
     try:
         return read_place(text)
     except ValueError as why:
-        raise UsageError(f"--home {text[:100]}: LAT,LON in degrees is wanted, for example 36.6,-84.38: {why}") from None
+        raise UsageError(f"--home {text[:100]}: give LAT,LON in degrees, for example 36.6,-84.38: {why}") from None
 
 
 def _say_all(batch: Batch, units: Units) -> None:

@@ -75,7 +75,7 @@ def fetch(
     ways = {"MISSION": mission, "--around": around, "--tiles": tiles}
     given = [name for name, value in ways.items() if value is not None]
     if len(given) != 1:
-        raise UsageError(f"which area? One of {', '.join(ways)} is wanted, given {' and '.join(given) or 'none'}")
+        raise UsageError(f"which area? Give one of {', '.join(ways)}, not {' and '.join(given) or 'none'}")
     if (around is None) != (radius_km is None):
         raise UsageError("--around LAT,LON and --radius-km N belong together")
     chosen = _source(source)
@@ -106,8 +106,8 @@ def _source(name: str | None) -> DemSource:
     return SOURCES[name or DEFAULT_SOURCE]
 
 
-def _of_mission(path: Path, wanted: str | None) -> tuple[DemSource, Sequence[Cell]]:
-    """The source that a mission names, and the tiles that it needs: all of them, or those that are missing."""
+def _of_mission(path: Path, source: str | None) -> tuple[DemSource, Sequence[Cell]]:
+    """The source that a mission names, and the tiles that it needs: all of them, or the missing ones."""
     from gcsplan.dem.cache import MissingTiles
     from gcsplan.dem.sources import SOURCES
     from gcsplan.mission_file import load_mission
@@ -128,8 +128,8 @@ def _of_mission(path: Path, wanted: str | None) -> tuple[DemSource, Sequence[Cel
             "with --around",
             where=f"{path}: terrain.dem",
         )
-    if wanted not in (None, name):
-        raise UsageError(f"--source {wanted}: {path} says `dem: {name}`; change it there")
+    if source not in (None, name):
+        raise UsageError(f"--source {source}: {path} says `dem: {name}`; change it there")
     return SOURCES[name], found
 
 
@@ -141,13 +141,13 @@ def _around(text: str, radius_km: float) -> Sequence[Cell]:
     try:
         place = read_place(text)
     except ValueError as why:
-        raise UsageError(f"--around {text[:100]}: LAT,LON in degrees is wanted, such as 36.6,-84.38: {why}") from None
+        raise UsageError(f"--around {text[:100]}: give LAT,LON in degrees, such as 36.6,-84.38: {why}") from None
     reach_m = 1000.0 * radius_km
     try:
         frame = Frame(place.lat_deg, place.lon_deg)
     except InputError:
         raise UsageError(
-            f"--around {text[:100]}: a place within ±85° of latitude is wanted, where missions are planned"
+            f"--around {text[:100]}: give a place within ±85° of latitude, where missions are planned"
         ) from None
     return cells_in(frame, (-reach_m, -reach_m, reach_m, reach_m), where="--radius-km")
 
@@ -161,7 +161,7 @@ def _named(text: str) -> Sequence[Cell]:
     wrong = [name for name, cell in zip(names, cells, strict=True) if cell is None]
     if wrong or not cells or len(cells) > MOST_TILES_OF_AREA:
         what = f"given {wrong[0][:32]!r}" if wrong else f"given {len(cells)} of them"
-        raise UsageError(f"--tiles: 1 to {MOST_TILES_OF_AREA} names such as N36W085, with commas, are wanted, {what}")
+        raise UsageError(f"--tiles: give 1 to {MOST_TILES_OF_AREA} names such as N36W085, with commas: {what}")
     return tuple(dict.fromkeys(cell for cell in cells if cell is not None))
 
 

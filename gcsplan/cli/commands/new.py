@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from gcsplan.vehicle import Autopilot
 
 T = TypeVar("T")
-MOST_ASKED = 5
-"""How often a question is asked before the command gives up."""
+MOST_ATTEMPTS = 5
+"""Answers that the command reads to one question before it gives up."""
 
 
 def new(
@@ -83,7 +83,8 @@ def new(
 ) -> None:
     """Write a mission file with a comment on every key: units, defaults, and the choices that are left.
 
-    On a terminal, what is not given is asked for. The ground is never assumed: give --dem, or --flat with a height.
+    On a terminal, the command asks for what is not given. The ground is never assumed: give --dem, or --flat with a
+    height.
     The file is read and judged before it is written, and a file that is there is replaced with --force alone.
     """
     from gcsplan.app.new_mission import checked_text, seen_at
@@ -96,9 +97,9 @@ def new(
     _require_file(out, force)
     if dem and flat is not None:
         raise UsageError("give --dem or --flat, not both")
-    said = terrain_keys(vertical_datum, height_unit, nodata)
-    if said and flat is not None:
-        raise UsageError(f"{', '.join(as_options(said))}: goes with --dem: --flat is above sea level, in metres")
+    keys = terrain_keys(vertical_datum, height_unit, nodata)
+    if keys and flat is not None:
+        raise UsageError(f"{', '.join(as_options(keys))}: goes with --dem: --flat is above sea level, in metres")
     kind = _autopilot(autopilot)
     asks = not as_json and on_a_terminal()
     seen: Seen | None = None if source is None else seen_at(source, sysid, kind)
@@ -107,7 +108,7 @@ def new(
     if not dem and flat is None:
         missing.append("--dem FILE (or --flat M: flat ground at that altitude, which is never assumed)")
     if missing and not asks:
-        raise UsageError(f"{', '.join(missing)}: wanted (see gcsplan new --help; on a terminal they are asked for)")
+        raise UsageError(f"give {', '.join(missing)} (see gcsplan new --help; on a terminal the command asks for them)")
     begin = _place("--start", where_from, "Start (LAT,LON)")
     end = _place("--goal", goal, "Goal (LAT,LON)")
     if not dem and flat is None:
@@ -145,9 +146,9 @@ def on_a_terminal() -> bool:
 def _require_file(out: Path, force: bool) -> None:
     """Raise UsageError unless ``out`` can be the new file."""
     if out.suffix.lower() not in (".yaml", ".yml"):
-        raise UsageError(f"-o {out}: a name that ends in .yaml is wanted")
+        raise UsageError(f"-o {out}: give a name that ends in .yaml")
     if out.is_dir() or not out.parent.is_dir():
-        raise UsageError(f"-o {out}: a file in a directory that is there is wanted")
+        raise UsageError(f"-o {out}: give a file in a directory that exists")
     if out.exists() and not force:
         raise UsageError(f"-o {out}: this file is there already; give another name, or --force to replace it")
 
@@ -158,12 +159,12 @@ def _autopilot(name: str | None) -> Autopilot | None:
     if name is None:
         return None
     if name not in tuple(Autopilot):
-        raise UsageError(f"--autopilot {name}: {', '.join(Autopilot)} is wanted")
+        raise UsageError(f"--autopilot {name}: give one of {', '.join(Autopilot)}")
     return Autopilot(name)
 
 
 def _place(option: str, given: str | None, question: str) -> str:
-    """A place as it stands in the file, asked for if it is not given."""
+    """A place as it stands in the file; the command asks for it if it is not given."""
     from gcsplan.mission_file.new_file import place_text
 
     if given is None:
@@ -178,7 +179,7 @@ def _ground(answer: str) -> tuple[list[str] | None, float | None]:
     """A raster, or the height of flat ground."""
     words = answer.split()
     if not words:
-        raise ValueError("a raster, or flat and its height above sea level in metres, is wanted")
+        raise ValueError("give a raster, or flat and its height above sea level in metres")
     if words[0].lower() != "flat":
         return [answer.strip()], None
     if len(words) != 2 or not re.fullmatch(r"[-+]?\d+(\.\d+)?", words[1]):
@@ -188,7 +189,7 @@ def _ground(answer: str) -> tuple[list[str] | None, float | None]:
 
 def _ask(question: str, read: Callable[[str], T], default: str | None = None) -> T:
     """Ask on the terminal until the answer can be read, a few times."""
-    for _ in range(MOST_ASKED):
+    for _ in range(MOST_ATTEMPTS):
         answer = typer.prompt(question, default=default, show_default=bool(default), err=True)
         try:
             return read(str(answer))

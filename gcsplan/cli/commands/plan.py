@@ -191,7 +191,7 @@ def plan(
                 progress=progress, gate_utc=depart, jobs=jobs, cluster=cluster, leave_out=leave_out or None,
             )  # fmt: skip
         planned, homes = flyable(
-            planned, allow_unjudged=allow_unjudged, asked=report or way_home or rally, require_way_home=require_way_home
+            planned, allow_unjudged=allow_unjudged, home=report or way_home or rally, require_way_home=require_way_home
         )
         orders: list[UploadJob] = []
         if upload or fence or fence_infinite:
@@ -239,10 +239,10 @@ def _add_results(
     """Add what an upload came to; ``report``: the units of a report that tells it too, None without one."""
     from gcsplan.app.output import files as outputs
 
-    told = {"upload.json": lambda: outputs.upload_text(planned, results, homes)}
+    texts = {"upload.json": lambda: outputs.upload_text(planned, results, homes)}
     if report is not None:
-        told["report.html"] = lambda: outputs.report_of(planned, results, homes, report)
-    _add(directory, told)
+        texts["report.html"] = lambda: outputs.report_of(planned, results, homes, report)
+    _add(directory, texts)
 
 
 def _left_out(planned: Plan, mission: Path) -> dict[str, Any] | None:
@@ -279,11 +279,11 @@ def _require_options(planner: str | None, objective: str | None, png: Path | Non
         except InputError as error:
             raise UsageError(f"--planner: {error}") from None
     if objective not in (None, "length", "energy"):
-        raise UsageError(f"--objective {objective}: length or energy is wanted")
+        raise UsageError(f"--objective {objective}: give length or energy")
     each = png is not None and (png.is_dir() or png == directory)
     named = png is not None and png.suffix.lower() == ".png" and (png.parent.is_dir() or png.parent == directory)
     if png is not None and not (each or named):
-        raise UsageError(f"--png {png}: a directory, or a name that ends in .png in one that is there, is wanted")
+        raise UsageError(f"--png {png}: give a directory, or a name that ends in .png in a directory that exists")
     return each
 
 
@@ -338,11 +338,11 @@ def _add(directory: Path, files: Mapping[str, Callable[[], str]]) -> None:
         for name, content in files.items():
             add_output(directory, name, content())
     except InputError as error:
-        remark(f"note: what became of the upload is not written: {error}")
+        remark(f"note: the result of the upload is not written: {error}")
 
 
 def _say_written(directory: Path, files: list[str], notes: Sequence[tuple[str, Note]], units: Units) -> None:
-    """Print the notes on the fences, and what was written; a fleet has hundreds of files."""
+    """Print the notes on the fences, and the written files; a fleet has hundreds of files."""
     from gcsplan.cli.output.console import say, say_notes_of
     from gcsplan.notes.note import Wording
 

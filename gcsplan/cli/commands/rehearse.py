@@ -80,7 +80,7 @@ def rehearse(
     ] = None,
     i_know: Annotated[
         bool,
-        typer.Option("--i-know", help="With --sitl: arm and start what is not on this machine, or is no simulator."),
+        typer.Option("--i-know", help="With --sitl: arm and start vehicles elsewhere, or that are no simulators."),
     ] = False,
     at: AtOption = None,
     way_home: WayHomeOption = False,
@@ -89,7 +89,7 @@ def rehearse(
     allow_unjudged: UnjudgedOption = False,
     report: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.html", help="Also write the report, with what was flown beside what was planned."),
+        typer.Option(metavar="FILE.html", help="Also write the report, with the flights beside the plan."),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -113,7 +113,7 @@ def rehearse(
 
     weather = Weather(wind, wind_from, gusts, noise_m)
     if airspeed is not None and not airspeed > 0.0:
-        raise UsageError(f"--airspeed {airspeed:g}: a speed above 0 is wanted")
+        raise UsageError(f"--airspeed {airspeed:g}: give a speed above 0")
     require_html(report)
     in_sitl = bool(sitl) or sitl_binary is not None
     if in_sitl and (noise_m or runs > 1 or airspeed is not None):
@@ -128,7 +128,7 @@ def rehearse(
     with planning_display(names, source.planner.objective) as progress:
         planned = pipeline.plan(source, planner=planner, progress=progress, jobs=jobs, cluster=cluster)
     planned, homes = flyable(
-        planned, allow_unjudged=allow_unjudged, asked=way_home or report is not None, require_way_home=require_way_home
+        planned, allow_unjudged=allow_unjudged, home=way_home or report is not None, require_way_home=require_way_home
     )
     if in_sitl:
         with talking(names):
@@ -187,7 +187,7 @@ def _ending(result: Rehearsal, units: Units) -> list[str]:
         least = f"least separation {apart} ({a} and {b}, at T+{duration(result.closest.time_s, 1)})"
         if result.terms.separation_m is not None:
             kept = f", kept in {result.separation_kept_runs} of {result.runs} runs" if result.runs > 1 else ""
-            least += f" of {Quantity(result.terms.separation_m, 'distance', None).text(units)} asked{kept}"
+            least += f" of {Quantity(result.terms.separation_m, 'distance', None).text(units)} required{kept}"
         lines.append(least)
     if result.runs > 1 and result.p95_s is not None:
         lines.append(f"95 % of all arrivals lie within {result.p95_s:.2f} s of the plan")

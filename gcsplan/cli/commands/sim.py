@@ -58,7 +58,7 @@ def sim(
         kind = Autopilot(autopilot or Autopilot.ARDUCOPTER)
         stands = [(sysid or 1, kind, (36.6, -84.38), 471.0, {})]  # a valley of the sample terrain
     else:
-        raise UsageError(f"--autopilot {autopilot}: one of {', '.join(Autopilot)} is wanted")
+        raise UsageError(f"--autopilot {autopilot}: give one of {', '.join(Autopilot)}")
     versions = firmwares([stand[1] for stand in stands], firmware)
     vehicles = [
         LoopbackVehicle(

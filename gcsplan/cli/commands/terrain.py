@@ -100,7 +100,7 @@ def serve(
     """Answer TERRAIN_REQUEST with TERRAIN_DATA from the mission's own terrain, until Ctrl-C.
 
     A vehicle that is to fly the terrain frame, or below its home, asks for the ground around it and around its way
-    points. Unknown ground is not sent, and told. Serve it before the flight, --until-loaded, or beside it.
+    points. Unknown ground is not sent but reported. Serve it before the flight, --until-loaded, or beside it.
     """
     from gcsplan.app.upload import terrain_service as terrain_link
     from gcsplan.cli.output.console import remark, say
@@ -208,10 +208,10 @@ def _progress(words: str, as_json: bool) -> Iterator[Report | None]:
         yield None
         return
     with aside.status("waits for the vehicle") as status:
-        said: dict[str, str] = {}
+        lines: dict[str, str] = {}
 
         def update(name: str, first: int, second: int) -> None:
-            said[name] = f"{name}: {words.format(first, second)}"
-            status.update("  ".join(said.values()))
+            lines[name] = f"{name}: {words.format(first, second)}"
+            status.update("  ".join(lines.values()))
 
         yield update

@@ -158,7 +158,7 @@ def verify(
         typer.Option(
             metavar="MISSION.yaml",
             autocompletion=completion.missions,
-            help="Mission file in whose world what is on board is judged again.",
+            help="Mission file in whose world the mission on board is judged again.",
         ),
     ] = None,
     tolerance_m: Annotated[
@@ -166,7 +166,8 @@ def verify(
         typer.Option(
             "--tolerance-m",
             metavar="M",
-            help="With --mission: take positions this far away, in metres, if what is on board is safe [default: 0]",
+            help="With --mission: accept positions this far away, in metres, if the mission on board is safe "
+            "[default: 0]",
         ),
     ] = None,
     at: AtOption = None,
@@ -177,7 +178,7 @@ def verify(
 ) -> None:
     """Check that exactly this file is on board: read the mission back and compare; the vehicle keeps what it has.
 
-    With --mission what is on board is also judged, as a whole, with the vehicle's parameters: exit 4 if it is not safe.
+    With --mission the whole mission on board is also judged, with the vehicle's parameters: exit 4 if it is not safe.
     """
     from gcsplan.app.check import worlds as check_sites
     from gcsplan.app.fleet import pipeline

@@ -12,7 +12,7 @@ from gcsplan.errors import GcsplanError, InputError
 
 if TYPE_CHECKING:
     from gcsplan.app.check.files import Failing
-    from gcsplan.app.check.many import Archive, Summary, Told
+    from gcsplan.app.check.many import Archive, FileResult, Summary
     from gcsplan.notes.note import Note
     from gcsplan.units import Units
 
@@ -23,7 +23,7 @@ MOST_FAILING = 100
 """Files of which the ``error`` of a document says why they do not pass; the verdicts say it of all."""
 
 Header = tuple[str, Mapping[str, object], "tuple[Note, ...]", Mapping[str, str]]
-"""The name of the mission, what describes the world's sources, notes, and the options that the reader types."""
+"""The name of the mission, the sources of the world, notes, and the options that the reader types."""
 
 
 class Printer(Protocol):
@@ -32,7 +32,7 @@ class Printer(Protocol):
     def begin(self, header: Header) -> None:
         """Print what comes first."""
 
-    def tell(self, told: Told) -> None:
+    def tell(self, result: FileResult) -> None:
         """Print the result of a file."""
 
     def end(self, header: Header, summary: Summary, error: dict[str, Any] | None) -> None:
@@ -54,16 +54,16 @@ class Lines:
             say_notes(header[2], Wording(self.units, header[3]))
             say_heights(header[1])
 
-    def tell(self, told: Told) -> None:
+    def tell(self, result: FileResult) -> None:
         """See `Printer`."""
         from gcsplan.cli.output.console import remark, say
 
-        for line in told.lines:
+        for line in result.lines:
             say(printable(line))
-        for problem in getattr(told.error, "problems", ()):
-            remark(printable(f"{problem}" if problem.where.startswith(told.file) else f"{told.file}: {problem}"))
-        if told.error is not None and not isinstance(told.error, InputError):
-            remark(printable(str(told.error)))
+        for problem in getattr(result.error, "problems", ()):
+            remark(printable(f"{problem}" if problem.where.startswith(result.file) else f"{result.file}: {problem}"))
+        if result.error is not None and not isinstance(result.error, InputError):
+            remark(printable(str(result.error)))
 
     def end(self, header: Header, summary: Summary, error: dict[str, Any] | None) -> None:
         """See `Printer`."""
@@ -79,11 +79,11 @@ class Rows:
     def begin(self, header: Header) -> None:
         """See `Printer`."""
 
-    def tell(self, told: Told) -> None:
+    def tell(self, result: FileResult) -> None:
         """See `Printer`."""
-        put(told.text + "\n")
-        if told.error is not None:
-            complain(told.error)
+        put(result.text + "\n")
+        if result.error is not None:
+            complain(result.error)
 
     def end(self, header: Header, summary: Summary, error: dict[str, Any] | None) -> None:
         """See `Printer`."""
@@ -105,12 +105,12 @@ class Document:
 
         put(write_summary(_head(header)).removesuffix("\n}\n") + ',\n  "verdicts": [')
 
-    def tell(self, told: Told) -> None:
+    def tell(self, result: FileResult) -> None:
         """See `Printer`."""
-        if told.error is not None:
-            complain(told.error)
+        if result.error is not None:
+            complain(result.error)
             return
-        put(("," if self._count else "") + "\n    " + told.text.replace("\n", "\n    "))
+        put(("," if self._count else "") + "\n    " + result.text.replace("\n", "\n    "))
         self._count += 1
 
     def end(self, header: Header, summary: Summary, error: dict[str, Any] | None) -> None:
@@ -144,13 +144,13 @@ def tell_archive(
 
     pieces, piece_s = archive.work
     count = len(archive.arguments)
-    begun_s = said_s = time.perf_counter()
+    begun_s = printed_s = time.perf_counter()
 
     def progress(words: str) -> None:
-        nonlocal said_s
+        nonlocal printed_s
         now_s = time.perf_counter()
-        if now_s - said_s >= LINE_S:
-            said_s = now_s
+        if now_s - printed_s >= LINE_S:
+            printed_s = now_s
             remark(f"{words}, {now_s - begun_s:.0f} s")
 
     with executor(jobs, cluster, pieces=pieces, piece_s=piece_s) as workers:
@@ -158,13 +158,13 @@ def tell_archive(
             remark(f"the workers can be watched at {link}")
         with reading:
             archive.read(workers, lambda read: progress(f"{read} of {count} files read"))
-        inputs, notes = archive.said
+        inputs, notes = archive.sources
         header = (archive.name, inputs, notes, archive.site.typed)
         return tell(header, archive.judged(workers), printer, count, progress)
 
 
 def tell(
-    header: Header, results: Iterable[Told], printer: Printer, count: int,
+    header: Header, results: Iterable[FileResult], printer: Printer, count: int,
     progress: Callable[[str], None] = lambda _: None,
 ) -> int:  # fmt: skip
     """Print the results of ``count`` files as they come; returns the worst exit code.
@@ -180,12 +180,12 @@ def tell(
     printer.begin(header)
     closers.append(lambda error: printer.end(header, summary, error.as_dict()))
     try:
-        for told in results:
-            summary.add(told)
-            printer.tell(told)
-            if told.failing is not None and len(failing) < MOST_FAILING:
-                failing.append(told.failing)
-            elif told.failing is not None:
+        for result in results:
+            summary.add(result)
+            printer.tell(result)
+            if result.failing is not None and len(failing) < MOST_FAILING:
+                failing.append(result.failing)
+            elif result.failing is not None:
                 more += 1
             progress(f"{summary.files} of {count} files, {summary.files - summary.codes[0]} do not pass")
     except (KeyboardInterrupt, Exception) as why:

@@ -196,7 +196,7 @@ def _say_fleet(plan: Plan, units: Units) -> None:
     if fleet.separation is None:
         return
     unit = units.distance
-    needed = f" of {unit.stated(arrival.separation_m)} {unit.symbol} asked" if arrival is not None else ""
+    needed = f" of {unit.stated(arrival.separation_m)} {unit.symbol} required" if arrival is not None else ""
     if closest is None:
         say("separation: no two vehicles are in the air at the same time")
     else:
@@ -231,7 +231,7 @@ def plan_row(
     tenths = 1 if fleet is not None and len(fleet.slots) > 1 else 0
     held = f" + {duration(slot.hold_s)} at the gate" if slot and slot.hold_s > 0 else ""
     lowest, highest, nearest, passed = verdict.lowest, verdict.highest, verdict.nearest, verdict.zone_pass
-    joules = verdict.told_j(verdict.energy_j)
+    joules = verdict.reported_j(verdict.energy_j)
     limits, mark = v.request.vehicle.limits, verdict.energy_mark
     climb = f" of {limits.max_climb_deg:g}" if limits.max_climb_deg < 90 else ""
     return {

@@ -72,14 +72,14 @@ def planning_display(names: Sequence[str], objective: str = "length") -> Iterato
     On a terminal it is one line that is redrawn several times a second and disappears at the end; elsewhere a line on
     standard error every `LINE_S` seconds. The compilation of kernels, which happens once, is reported there at once.
     """
-    from gcsplan.native.kernel_unit import compilation_told
+    from gcsplan.native.kernel_unit import compilation_reported
 
     board, screen = PlanningBoard(names, objective), aside
     if screen.is_terminal and not screen.is_dumb_terminal:
-        with _redrawn(board, screen), compilation_told(board.note):
+        with _redrawn(board, screen), compilation_reported(board.note):
             yield board.report
     else:
-        with _repeated(board), compilation_told(words.remark):
+        with _repeated(board), compilation_reported(words.remark):
             yield board.report
 
 
@@ -112,7 +112,7 @@ class WorkDisplay:
 
     def __init__(self, whole: int, what: str) -> None:
         self._whole, self._what = whole, what
-        self._begun_s = self._said_s = time.perf_counter()
+        self._begun_s = self._printed_s = time.perf_counter()
 
     @property
     def elapsed_s(self) -> float:
@@ -125,8 +125,8 @@ class WorkDisplay:
             remark(f"the workers can be watched at {executor.dashboard}")
 
     def done(self, count: int, more: str = "") -> None:
-        """Take note that ``count`` of the whole are done; ``more`` is said of them."""
+        """Take note that ``count`` of the whole are done; ``more`` follows in the line."""
         now_s = time.perf_counter()
-        if now_s - self._said_s >= LINE_S:
-            self._said_s = now_s
+        if now_s - self._printed_s >= LINE_S:
+            self._printed_s = now_s
             remark(f"{count} of {self._whole} {self._what}{more}, {self.elapsed_s:.0f} s")

@@ -68,7 +68,7 @@ def verdict_table(
             least(item.agl_end_m, 1, height), least(item.min_agl_m, 1, height), greatest(item.max_agl_m, 1, height),
             steepest(item.climb_deg),
             f"{least(item.zone_clearance_m, 0, near)} {escape(item.nearest_zone)}" if item.nearest_zone else "–",
-            number(verdict.told_j(item.energy_j), 1, KILOJOULE), duration(item.time_s),
+            number(verdict.reported_j(item.energy_j), 1, KILOJOULE), duration(item.time_s),
         )
         for item in items
     ]  # fmt: skip
@@ -82,7 +82,7 @@ def verdict_table(
             break
     print_table(table)
     if verdict.legs:
-        joules, mark = verdict.told_j(verdict.energy_j), verdict.energy_mark
+        joules, mark = verdict.reported_j(verdict.energy_j), verdict.energy_mark
         used = [] if joules is None else [energy_words(joules, None if energy is None else energy.battery_v)]
         if verdict.battery_used_percent is not None:
             used.append(f"{verdict.battery_used_percent:.0f} % of the battery")

@@ -1,4 +1,4 @@
-"""How a command ends: one document on standard output, one message on standard error, an exit code."""
+"""The end of a command: one document on standard output, one message on standard error, an exit code."""
 
 from __future__ import annotations
 
@@ -91,11 +91,11 @@ def end_in_good_order(*, as_json: bool = False) -> None:
 def sent_again(last: Sequence[int], before: Callable[[Any], object]) -> Callable[[Any], None]:
     """A ``sys.unraisablehook`` that sends the signal ``last[0]`` again if Python dropped its KeyboardInterrupt.
 
-    Callbacks of weak references and finalizers are such places, and imports have many of them: the exception is told of
-    with a traceback, and the command would go on. What else is lost goes to ``before``.
+    Python drops it in callbacks of weak references and in finalizers, of which imports have many: it prints the
+    traceback, and the command would go on. Other dropped exceptions go to ``before``.
     """
 
-    def told(lost: Any) -> None:
+    def hook(lost: Any) -> None:
         if not isinstance(lost.exc_value, KeyboardInterrupt) or not last:
             before(lost)
             return
@@ -103,7 +103,7 @@ def sent_again(last: Sequence[int], before: Callable[[Any], object]) -> Callable
         again.daemon = True
         again.start()
 
-    return told
+    return hook
 
 
 def _end_at_once(number: int) -> NoReturn:
@@ -207,7 +207,7 @@ def explained(error: Exception) -> GcsplanError:
     if describe is not None:
         context = getattr(error, "ctx", None)
         if type(error).__name__ == "NoArgsIsHelpError":
-            return UsageError(f"a command is wanted\n\n{describe()}")
+            return UsageError(f"give a command\n\n{describe()}")
         return UsageError(f"{describe()} (see {context.command_path if context else 'gcsplan'} --help)")
     cause: BaseException | None = error
     while cause is not None:

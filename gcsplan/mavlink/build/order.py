@@ -131,14 +131,14 @@ def most_cm(run_m: Floats, slope: float) -> Floats:
     return np.asarray(np.maximum(100.0 * slope * run_m - SPARE_CM, 0.0))
 
 
-def whole_cm(wanted_cm: Floats, up_cm: Floats, down_cm: Floats, fixed: Bools) -> NDArray[np.int_]:
-    """(N,) whole centimetres near ``wanted_cm`` (N,), of which leg k climbs at most ``up_cm[k]`` and descends at most
+def whole_cm(given_cm: Floats, up_cm: Floats, down_cm: Floats, fixed: Bools) -> NDArray[np.int_]:
+    """(N,) whole centimetres near ``given_cm`` (N,), of which leg k climbs at most ``up_cm[k]`` and descends at most
     ``down_cm[k]`` (N - 1,), inf for no limit. The first, the last and ``fixed`` (N,) ones are the nearest centimetre.
 
     No altitude is moved farther than one of them must be, in steps of `MOVED_CM`. Where no such altitudes are found,
     all are the nearest centimetre.
     """
-    near = np.rint(wanted_cm).astype(int)
+    near = np.rint(given_cm).astype(int)
     rise = np.diff(near)
     if not ((rise > up_cm) | (-rise > down_cm)).any():
         return near
@@ -146,8 +146,8 @@ def whole_cm(wanted_cm: Floats, up_cm: Floats, down_cm: Floats, fixed: Bools) ->
     fixed[[0, -1]] = True
     up, down = (np.floor(np.minimum(most, MOST_CM)).astype(int) for most in (up_cm, down_cm))
     for moved in MOVED_CM:
-        low = np.where(fixed, near, np.minimum(near, np.ceil(wanted_cm - moved).astype(int)))
-        high = np.where(fixed, near, np.maximum(near, np.floor(wanted_cm + moved).astype(int)))
+        low = np.where(fixed, near, np.minimum(near, np.ceil(given_cm - moved).astype(int)))
+        high = np.where(fixed, near, np.maximum(near, np.floor(given_cm + moved).astype(int)))
         found = _between(near, low, high, up, down)
         if found is not None:
             return found

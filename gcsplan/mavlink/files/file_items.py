@@ -168,7 +168,7 @@ def read_item(raw: RawItem, problems: list[Mistake], where: str) -> MissionItem 
 
 
 def _too_large(value: float) -> bool:
-    """Whether a float32 cannot hold it; asked of the wire's own rounding near the limit alone."""
+    """Whether a float32 cannot hold it. Only near the limit does this round as the wire does, which takes longer."""
     return not abs(value) < PLAIN_FLOAT and math.isinf(float32(value))
 
 

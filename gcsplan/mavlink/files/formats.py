@@ -63,7 +63,7 @@ def read_mission_file(
 
 
 def _instead(file: Path) -> str:
-    """What a file of another kind, by its name, is for."""
+    """The use of a file of another kind, by its name."""
     name, end = shlex.quote(str(file)), file.suffix.lower()
     if end in MISSION_FILES:
         return f"; a mission file comes first (gcsplan check {name} FILE), and gcsplan plan {name} makes such a file"
@@ -83,7 +83,7 @@ def _text(file: Path, where: str) -> str:
         raise InputError("not a file name", where=repr(where)) from None
     # A pipe or a device could block its reader for ever.
     if not regular:
-        raise InputError("a mission file is wanted, and this is not a regular file", where=where)
+        raise InputError("give a mission file: this is not a regular file", where=where)
     if len(data) > MAX_FILE_BYTES:
         raise InputError(f"a mission file of more than {MAX_FILE_BYTES // 10**6} MB is not read", where=where)
     try:

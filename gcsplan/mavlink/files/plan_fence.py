@@ -103,9 +103,9 @@ def fence_items(fence: object, where: str, notes: list[Note]) -> tuple[MissionIt
 
 
 def unread_keys(section: object, known: Collection[str], version: int, where: str) -> str:
-    """What of a section of a plan is not read: its keys beside the known ones, or all, if its version is another.
+    """The keys of a section of a plan that are not read: the unknown ones, or all, if its version is another.
 
-    Empty if that is nothing; keys without a value count as nothing.
+    Empty if there are none; keys without a value count as nothing.
     """
     if section is None:
         return ""

@@ -245,7 +245,7 @@ def _autopilot(mission: dict[str, Any], requested: Autopilot | None, where: str,
         notes.append(Note("plan_without_autopilot", autopilot=str(requested)))
     elif requested is not None and requested is not stated:
         raise InputError(
-            f"the file is for {stated}, and {requested} was wanted; use the file made for it, or change the vehicle",
+            f"the file is for {stated}, not for {requested}; use the file made for it, or change the vehicle",
             where=f"{where}: mission.firmwareType",
         )
     return requested or stated  # type: ignore[return-value]  # one of them is there

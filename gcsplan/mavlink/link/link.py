@@ -56,7 +56,7 @@ class Heard:
 class Channel:
     """The messages of one system on a link: a bounded inbox, and methods to answer.
 
-    Requests that were answered promptly are not in the inbox; their seqs are in ``prepared.asked``.
+    Requests that were answered promptly are not in the inbox; their seqs are in ``prepared.requested``.
     """
 
     def __init__(self, link: Link, sysid: int) -> None:
@@ -73,7 +73,7 @@ class Channel:
     @property
     def waits(self) -> bool:
         """Whether there are messages in the inbox, or promptly answered requests to record."""
-        return bool(self.inbox or (self.prepared and self.prepared.asked))
+        return bool(self.inbox or (self.prepared and self.prepared.requested))
 
     def take(self) -> Iterable[Heard]:
         """Yield and remove the messages in the inbox."""
@@ -153,7 +153,7 @@ class Link:
 
     @property
     def note(self) -> Note | None:
-        """What a user should know of how the link was opened, if anything."""
+        """A note for the user on how the link was opened; None if there is nothing to note."""
         return self.transport.note if isinstance(self.transport, Udp) else None
 
     @property
@@ -300,7 +300,7 @@ class PumpJob(Generic[T]):
             self.error, self.ended = error, True
         except Exception as error:  # a bug, which must not end the other vehicles' tasks
             _log.exception("a task for system %d failed", self.channel.sysid)
-            words = f"internal error, a bug in gcsplan: {type(error).__name__}: {error}; what is on board is not known"
+            words = f"internal error, a bug in gcsplan: {type(error).__name__}: {error}; the list on board is not known"
             self.error, self.ended = GcsplanError(words, where=f"vehicle {self.channel.sysid}"), True
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""What a session is told to do: its options, its time limits, and the task of one list for one vehicle.
+"""The options of a session, its time limits, and the task of one list for one vehicle.
 
 The user's timeout limits the time of a transfer without progress and, per item, the whole of it.
 """

@@ -39,11 +39,11 @@ _EXTRA = bytes([_ITEM.crc_extra])
 
 
 class Prepared:
-    """The items of one upload. ``asked``: the seqs that were answered since the machine was last notified."""
+    """The items of one upload. ``requested``: the seqs that were answered since the machine was last notified."""
 
     def __init__(self, frames: Sequence[bytes]) -> None:
         self.frames = frames
-        self.asked: list[int] = []
+        self.requested: list[int] = []
         self.peer: Peer | None = None
         self.extra = b""
 
@@ -81,7 +81,7 @@ class PromptAnswers:
 
     def answered(self) -> set[Peer | None]:
         """Return the peers with answers of which the machines were not yet notified."""
-        return {one.peer for one in self._by_shape.values() if one.asked}
+        return {one.peer for one in self._by_shape.values() if one.requested}
 
     def __call__(self, peer: Peer, data: bytes) -> bytes | None:
         """Return the frame that answers the datagram ``data`` from ``peer``; None if the normal path must handle it."""
@@ -91,14 +91,14 @@ class PromptAnswers:
         seq = data[10] | data[11] << 8
         if seq >= len(prepared.frames) or checksum(data[1:-2] + prepared.extra) != data[-2] | data[-1] << 8:
             return None
-        prepared.asked.append(seq)
+        prepared.requested.append(seq)
         tail = prepared.frames[seq]
         head = _HEAD_BYTES.pack(_MARKER, len(tail) - _BEFORE_PAYLOAD.size - 1, _NO_FLAGS, 0, self._writer.number())
         return head + tail[:-1] + _CHECKSUM.pack(checksum(head[1:] + tail))
 
 
 def _shape(request: bytes) -> bytes:
-    """Return a request's bytes without those that vary: sequence number (4), seq (10 and 11), checksum (last two)."""
+    """Return a request's bytes, but for the varying ones: sequence number (4), seq (10 and 11), checksum (last two)."""
     return request[:4] + request[5:10] + request[12:-2]
 
 

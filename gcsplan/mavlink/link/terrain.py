@@ -1,8 +1,8 @@
 """Terrain over a link: answer TERRAIN_REQUEST with TERRAIN_DATA, and compare what the vehicle reads with what it got.
 
-The vehicle asks for a block by its corner and for those of its 56 parts that it lacks, again every 2 s until it has
-them (AP_Terrain, `send_request`). A part of which one post is unknown is never sent: unknown is not ground. What is
-waiting to be sent is bounded, and sent at a pace that leaves room for the rest of the link.
+The vehicle asks for a block by its corner, and in it for the parts, of 56, that it lacks, again every 2 s until it has
+them (AP_Terrain, `send_request`). A part of which one post is unknown is never sent: unknown is not ground. The queue
+of parts is bounded, and sent at a pace that leaves room for the rest of the link.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ _PAUSE_S = 0.01
 _PARTS_AT_ONCE = 4
 _SERIAL_SHARE = 0.25
 _BYTES_OF_PART = 43 + 12 + 13  # payload, frame, signature
-ASK_AFTER_S, _ASK_EVERY_S, _ASKED_TIMES = 3.0, 5.0, 3
+ASK_AFTER_S, _ASK_EVERY_S, _MOST_REQUESTS = 3.0, 5.0, 3
 _REQUESTS_EVERY_US = 500_000.0
 
 
 @dataclass
 class Served:
-    """What was asked and answered so far. ``unknown``: blocks with parts that cannot be sent; ``strange``: requests
+    """The requests and answers so far. ``unknown``: blocks with parts that cannot be sent; ``strange``: requests
     for blocks that are none of ArduPilot's."""
 
     requests: int = 0
@@ -62,7 +62,7 @@ class Served:
 
     @property
     def notes(self) -> list[Note]:
-        """What a user should know."""
+        """Notes for the user."""
         out = [Note("terrain_not_loaded", why=why) for why in self.problems]
         if self.unknown:
             parts = sum(self.unknown.values())
@@ -115,7 +115,7 @@ class _Answers:
 
     def steps(self) -> LinkSteps[None]:
         clock = self._channel.link.clock
-        ask_at, asked, send_at = clock() + ASK_AFTER_S, 0, -math.inf
+        ask_at, requests, send_at = clock() + ASK_AFTER_S, 0, -math.inf
         vehicle: Heard | None = None
         while True:
             for heard in self._channel.take():
@@ -123,16 +123,16 @@ class _Answers:
                 if kind == "HEARTBEAT" and heard.message.autopilot == dialect.MAV_AUTOPILOT_ARDUPILOTMEGA:
                     vehicle = heard
                 elif kind == "TERRAIN_REQUEST":
-                    asked = _ASKED_TIMES  # it sends them by itself
+                    requests = _MOST_REQUESTS  # it sends them by itself
                     self._note(heard)
             now = clock()
-            if now >= ask_at and asked < _ASKED_TIMES and vehicle is not None:
+            if now >= ask_at and requests < _MOST_REQUESTS and vehicle is not None:
                 _ask_for_requests(self._channel, vehicle)
-                asked, ask_at = asked + 1, now + _ASK_EVERY_S
+                requests, ask_at = requests + 1, now + _ASK_EVERY_S
             if self._queue and now >= send_at:
                 self._send()
                 send_at = now + self._pause_s
-            yield send_at if self._queue else max(ask_at, now + 0.1) if asked < _ASKED_TIMES else math.inf
+            yield send_at if self._queue else max(ask_at, now + 0.1) if requests < _MOST_REQUESTS else math.inf
 
     def _note(self, heard: Heard) -> None:
         m, served = heard.message, self._served
@@ -152,11 +152,11 @@ class _Answers:
                 served.problems.append(why.message)
             return
         known = known_parts(heights)
-        wanted = int(m.mask) & ALL_PARTS
-        missing = wanted & ~known
+        requested = int(m.mask) & ALL_PARTS
+        missing = requested & ~known
         if missing:
             served.unknown[block] = missing.bit_count()
-        bits = [bit for bit in range(ALL_PARTS.bit_length()) if wanted & known & (1 << bit)]
+        bits = [bit for bit in range(ALL_PARTS.bit_length()) if requested & known & (1 << bit)]
         if bits:
             self._queue[m.lat, m.lon, spacing] = _Waiting(heard, block, heights, bits)
         while len(self._queue) > MOST_WAITING:
@@ -189,9 +189,9 @@ def _ask_for_requests(channel: Channel, vehicle: Heard) -> None:
 
 @dataclass(frozen=True, slots=True)
 class TerrainComparison:
-    """What the vehicle reads at places, beside what it was sent.
+    """The heights that the vehicle reads at places, beside the heights that it was sent.
 
-    ``off_m`` (N,): its height less ours, NaN where it has none. ``pending``, ``loaded``: parts, as it last said.
+    ``off_m`` (N,): its height less ours, NaN where it has none. ``pending``, ``loaded``: parts, by its last report.
     """
 
     places_e7: tuple[tuple[int, int], ...]
@@ -220,7 +220,7 @@ class TerrainComparison:
 
 _OUTSTANDING = 12
 _BLOCKS_AT_ONCE = 2
-"""The vehicle keeps 12 blocks and nine of them are those around it: asked for more, it would drop one for the other."""
+"""The vehicle keeps 12 blocks, nine of them around itself: to read more of them, it would drop one for the other."""
 _ANSWER_S, _UNREAD_S = 0.4, 0.5
 
 
@@ -237,8 +237,8 @@ def compare_steps(
 ) -> LinkSteps[TerrainComparison]:
     """Ask with TERRAIN_CHECK what the vehicle reads at each place, until it has all, or nothing new for so long.
 
-    The places are asked block by block, for its cache holds few blocks; a service on the same link sends what it lacks.
-    ``most_s``: the longest time for all; ``note``: is told of every message.
+    It asks for the places block by block, for the vehicle's cache holds few blocks; a service on the same link sends
+    the blocks that it lacks. ``most_s``: the longest time for all; ``note``: is called with every message.
     """
     clock = channel.link.clock
     at = np.array(places_e7, float).reshape(-1, 2)
@@ -284,13 +284,13 @@ def compare_steps(
 
 
 OFF = "terrain_off_m"
-"""Beside the parameters that were read: how far the vehicle's heights are off those that it was sent, m, measured."""
+"""Beside the parameters that were read: how far the vehicle's heights are off the heights that it was sent, m."""
 
 TERRAIN_GROUPS = (("TERRAIN_ENABLE",), ("TERRAIN_SPACING",), ("TERRAIN_OFS_MAX",))
-"""Parameters that are read, too, before a mission in the terrain frame is sent."""
+"""More parameters, which are read before a mission in the terrain frame is sent."""
 
 TERRAIN_DECIDES = (("TERRAIN_SPACING",), ("TERRAIN_OFS_MAX",))
-"""Those of them that such a mission is judged with: no answer is not their default."""
+"""The parameters of `TERRAIN_GROUPS` with which such a mission is judged: no answer is not their default."""
 
 PLACES_COMPARED = 40
 """Places that are compared before a mission is sent."""

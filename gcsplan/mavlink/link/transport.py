@@ -104,10 +104,10 @@ def _patience_s(sock: socket.socket) -> float | None:
         silence = struct.pack("@ll", 0, round(_SILENCE_S * 1e6))  # struct timeval
         for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
             sock.setsockopt(socket.SOL_SOCKET, option, silence)
-        told = any(sock.getsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, len(silence)))
+        is_set = any(sock.getsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, len(silence)))
     except (OSError, AttributeError):
-        told = False
-    return None if told and os.name == "posix" else _SILENCE_S
+        is_set = False
+    return None if is_set and os.name == "posix" else _SILENCE_S
 
 
 class Udp:

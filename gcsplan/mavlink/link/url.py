@@ -81,7 +81,7 @@ class Endpoint:
 
     @property
     def far_end(self) -> tuple[str, bool, str, int]:
-        """What the link reaches, however its URL is written: all names of this machine are one place."""
+        """The far end of the link, however its URL is written: all names of this machine are one place."""
         here = self.listens or self.host.lower() in _HERE
         return self.kind, self.listens, self.device or ("" if here else self.host.lower()), self.port
 
@@ -137,22 +137,22 @@ def parse_url(text: str) -> Endpoint:
     if scheme not in _SCHEMES or not colon:
         raise _wrong(given, "is not a link that we know")
     kind, listens = _SCHEMES[scheme]
-    rest, local = _local_port(given, rest[2:] if slashes else rest, wanted=kind == "udp" and not listens)
+    rest, local = _local_port(given, rest[2:] if slashes else rest, allowed=kind == "udp" and not listens)
     host, port = _host_and_port(given, rest, listens)
     if scheme == "udp" and slashes and host not in _HERE:
         raise _wrong(given, f"may mean either direction: write udpin://{host}:{port} or udpout://{host}:{port}")
     return Endpoint(kind, listens, host, port, local_port=local)
 
 
-def _local_port(given: str, rest: str, *, wanted: bool) -> tuple[str, int | None]:
+def _local_port(given: str, rest: str, *, allowed: bool) -> tuple[str, int | None]:
     """Split off the port to send from, which only ``udpout:`` has."""
     rest, comma, local = rest.partition(",")
     if not comma:
         return rest, None
-    if not wanted:
+    if not allowed:
         raise _wrong(given, "has a comma: only udpout:HOST:PORT,LOCAL sends from a port of its own")
     if not re.fullmatch(r"[0-9]{1,5}", local) or int(local) > 65535:
-        raise _wrong(given, f"sends from port {local!r}; a port within 1 … 65535 is wanted, or 0 for any free one")
+        raise _wrong(given, f"sends from port {local!r}; give a port within 1 … 65535, or 0 for any free one")
     return rest, int(local)
 
 
@@ -177,7 +177,7 @@ def _serial(given: str, device: str, baud: str | None) -> Endpoint:
     if baud is None:
         return Endpoint("serial", False, "", 0, device, DEFAULT_BAUD)
     if not re.fullmatch(r"[0-9]{1,8}", baud) or not 0 < int(baud) <= _MOST_BAUD:
-        raise _wrong(given, f"has baud rate {baud!r}; a number such as 57600 or 115200 is wanted")
+        raise _wrong(given, f"has baud rate {baud!r}; give a number such as 57600 or 115200")
     return Endpoint("serial", False, "", 0, device, int(baud))
 
 

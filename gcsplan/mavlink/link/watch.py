@@ -173,7 +173,7 @@ class _Clock:
 
 
 @dataclass(slots=True)
-class _Told:
+class _Reports:
     """The reports of one component at one address, without its heartbeats."""
 
     clocks: dict[str, _Clock] = field(default_factory=dict)
@@ -197,16 +197,16 @@ _Key = tuple[int, Peer, int, int]  # the same, and MAV_AUTOPILOT and MAV_TYPE
 class Watch:
     """Collects the messages of one system id: `note` records a message, `state` returns the resulting state.
 
-    ``texts`` holds the last status texts, ``said`` counts all of them. Once a vehicle is `pin`ned, `state` is that of
-    the vehicle at the pinned address, even if others use the same system id.
+    ``texts`` holds the last status texts, ``texts_heard`` counts all of them. Once a vehicle is `pin`ned, `state` is
+    the state of the vehicle at the pinned address, even if others use the same system id.
     """
 
     def __init__(self, sysid: int) -> None:
         self.sysid = sysid
         self.texts: deque[str] = deque(maxlen=_MOST_TEXTS)
-        self.said = 0
+        self.texts_heard = 0
         self._sources: dict[_Key, _Source] = {}
-        self._told: dict[_Voice, _Told] = {}
+        self._reports: dict[_Voice, _Reports] = {}
         self._pinned: _Voice | None = None
         self._pinned_at = 0.0
 
@@ -220,35 +220,35 @@ class Watch:
         if heard.late:
             self._note_against(heard, kind, now)
             return
-        told = self._voice((heard.source.compid, heard.peer), now)
+        reports = self._voice((heard.source.compid, heard.peer), now)
         if kind in _CLOCKS and heard.message.time_boot_ms:
-            told.clocks.setdefault(kind, _Clock()).note(heard.message.time_boot_ms / 1e3, now)
+            reports.clocks.setdefault(kind, _Clock()).note(heard.message.time_boot_ms / 1e3, now)
         if kind == "HEARTBEAT":
             self._heartbeat(heard, now)
         elif kind == "STATUSTEXT":
             self._text(heard.message)
         elif kind in _TELLS:
-            _TELLS[kind](told, heard.message, now)
+            _TELLS[kind](reports, heard.message, now)
 
     def _note_against(self, heard: Heard, kind: str, now: float) -> None:
         """Record a late message, which cannot confirm the state but can show a second vehicle or that it is armed."""
-        m, told = heard.message, self._told.get((heard.source.compid, heard.peer))
-        if told is None:
+        m, reports = heard.message, self._reports.get((heard.source.compid, heard.peer))
+        if reports is None:
             return
         if kind in _CLOCKS and m.time_boot_ms:
-            told.clocks.setdefault(kind, _Clock()).note(m.time_boot_ms / 1e3, now)
-        if kind == "GLOBAL_POSITION_INT" and told.place and now - told.placed_at <= FRESH_S:
+            reports.clocks.setdefault(kind, _Clock()).note(m.time_boot_ms / 1e3, now)
+        if kind == "GLOBAL_POSITION_INT" and reports.place and now - reports.placed_at <= FRESH_S:
             found = place(m.lat, m.lon, m.alt)
-            if found is not None and _leap(told.place, found):
-                told.leaps, told.leapt_from, told.leapt_at = told.leaps + 2, found, now
+            if found is not None and _leap(reports.place, found):
+                reports.leaps, reports.leapt_from, reports.leapt_at = reports.leaps + 2, found, now
         if kind == "HEARTBEAT" and m.base_mode & dialect.MAV_MODE_FLAG_SAFETY_ARMED:
             for key, source in self._sources.items():
                 if key[:2] == (heard.source.compid, heard.peer):
                     source.armed_at = now
 
-    def texts_since(self, said: int) -> tuple[str, ...]:
-        """Return the status texts after the first ``said`` of all, as far as they are still kept."""
-        new = min(self.said - said, len(self.texts))
+    def texts_since(self, texts_heard: int) -> tuple[str, ...]:
+        """Return the status texts after the first ``texts_heard`` of all, as far as they are still kept."""
+        new = min(self.texts_heard - texts_heard, len(self.texts))
         return tuple(self.texts)[len(self.texts) - new :]
 
     @property
@@ -278,14 +278,14 @@ class Watch:
                 -fresh[key].at if self._pinned else 0,
             ),
         )  # fmt: skip
-        source, told = fresh[best], self._told.get(best[:2]) or _Told()
-        lat, lon, amsl = told.place or (None, None, None)
+        source, reports = fresh[best], self._reports.get(best[:2]) or _Reports()
+        lat, lon, amsl = reports.place or (None, None, None)
         armed = source.armed or now - source.armed_at <= FRESH_S  # if two vehicles take turns, one of them is armed
         return VehicleState(
             Address(self.sysid, best[0]), source.autopilot, source.kind, armed, source.status,
-            lat, lon, amsl, told.capabilities, self._rivals(best[:2]), told.home, tuple(self.texts),
-            best[1], source.at, told.placed_at,
-            told.leapt_from if now - told.leapt_at <= FRESH_S else None, told.version,
+            lat, lon, amsl, reports.capabilities, self._rivals(best[:2]), reports.home, tuple(self.texts),
+            best[1], source.at, reports.placed_at,
+            reports.leapt_from if now - reports.leapt_at <= FRESH_S else None, reports.version,
         )  # fmt: skip
 
     def alike(self) -> bool:
@@ -295,9 +295,9 @@ class Watch:
     def _voices_at(self, voice: _Voice) -> int:
         kinds = [s for key, s in self._sources.items() if key[:2] == voice]
         overlapping = any(a is not b and a.overlaps(b) for a in kinds for b in kinds)
-        told = self._told.get(voice)
-        taking_turns = told is not None and any(clock.of_two for clock in told.clocks.values())
-        return 2 if overlapping or taking_turns or (told is not None and told.leaps > 1) else 1
+        reports = self._reports.get(voice)
+        taking_turns = reports is not None and any(clock.of_two for clock in reports.clocks.values())
+        return 2 if overlapping or taking_turns or (reports is not None and reports.leaps > 1) else 1
 
     def _rivals(self, mine: _Voice, *, here: bool = False) -> int:
         """Count the autopilots heard at the same time as ``mine``, including it; ``here``: only at its address."""
@@ -314,23 +314,25 @@ class Watch:
             if _is_autopilot(key[0], s) and (key[0] == mine[0] or s.autopilot not in (GENERIC, INVALID))
         }
         # A vehicle whose heartbeats are missing or lost counts too.
-        return (pilots | {voice for voice in self._told if voice[0] == mine[0]}) - {mine}
+        return (pilots | {voice for voice in self._reports if voice[0] == mine[0]}) - {mine}
 
     def _span(self, voice: _Voice) -> tuple[float, float]:
         """Return when a voice was first and last heard, by any message."""
         heard = [(s.first, s.at) for key, s in self._sources.items() if key[:2] == voice]
-        if voice in self._told:
-            heard.append((self._told[voice].first, self._told[voice].at))
+        if voice in self._reports:
+            heard.append((self._reports[voice].first, self._reports[voice].at))
         return min(first for first, _ in heard), max(at for _, at in heard)
 
-    def _voice(self, voice: _Voice, now: float) -> _Told:
-        told = self._told.get(voice)
-        if told is None:
-            if len(self._told) >= _MOST_SOURCES:
-                del self._told[min((v for v in self._told if v != self._pinned), key=lambda v: self._told[v].at)]
-            told = self._told[voice] = _Told(first=now)
-        told.at = now
-        return told
+    def _voice(self, voice: _Voice, now: float) -> _Reports:
+        reports = self._reports.get(voice)
+        if reports is None:
+            if len(self._reports) >= _MOST_SOURCES:
+                del self._reports[
+                    min((v for v in self._reports if v != self._pinned), key=lambda v: self._reports[v].at)
+                ]
+            reports = self._reports[voice] = _Reports(first=now)
+        reports.at = now
+        return reports
 
     def _heartbeat(self, heard: Heard, now: float) -> None:
         m = heard.message
@@ -349,7 +351,7 @@ class Watch:
 
     def _text(self, m: Any) -> None:
         text = m.text if isinstance(m.text, str) else bytes(m.text).decode(errors="replace")
-        self.said += 1
+        self.texts_heard += 1
         self.texts.append("".join(c for c in text if c.isprintable()).strip())
 
 
@@ -357,16 +359,16 @@ def _is_autopilot(compid: int, source: _Source) -> bool:
     return compid == _AUTOPILOT_COMPID or source.kind not in _NO_AUTOPILOT_TYPES
 
 
-def _position(told: _Told, m: Any, now: float) -> None:
+def _position(reports: _Reports, m: Any, now: float) -> None:
     found = place(m.lat, m.lon, m.alt)
     if found is not None:
-        _put(told, found, now, from_fix=False)
+        _put(reports, found, now, from_fix=False)
 
 
-def _put(told: _Told, found: VehiclePosition, now: float, *, from_fix: bool) -> None:
-    if told.place is not None and now - told.placed_at <= FRESH_S and _leap(told.place, found):
-        told.leaps, told.leapt_from, told.leapt_at = told.leaps + 1, told.place, now
-    told.place, told.from_fix, told.placed_at = found, from_fix, now
+def _put(reports: _Reports, found: VehiclePosition, now: float, *, from_fix: bool) -> None:
+    if reports.place is not None and now - reports.placed_at <= FRESH_S and _leap(reports.place, found):
+        reports.leaps, reports.leapt_from, reports.leapt_at = reports.leaps + 1, reports.place, now
+    reports.place, reports.from_fix, reports.placed_at = found, from_fix, now
 
 
 def _leap(a: VehiclePosition, b: VehiclePosition) -> bool:
@@ -377,20 +379,20 @@ def _leap(a: VehiclePosition, b: VehiclePosition) -> bool:
     return math.hypot(north_m, east_m) > _LEAP_M
 
 
-def _fix(told: _Told, m: Any, now: float) -> None:
+def _fix(reports: _Reports, m: Any, now: float) -> None:
     found = place(m.lat, m.lon, m.alt)
-    if found is not None and m.fix_type >= dialect.GPS_FIX_TYPE_3D_FIX and (told.place is None or told.from_fix):
-        _put(told, found, now, from_fix=True)
+    if found is not None and m.fix_type >= dialect.GPS_FIX_TYPE_3D_FIX and (reports.place is None or reports.from_fix):
+        _put(reports, found, now, from_fix=True)
 
 
-def _version(told: _Told, m: Any, now: float) -> None:
-    told.capabilities, told.version = int(m.capabilities), int(m.flight_sw_version)
+def _version(reports: _Reports, m: Any, now: float) -> None:
+    reports.capabilities, reports.version = int(m.capabilities), int(m.flight_sw_version)
 
 
-def _home_position(told: _Told, m: Any, now: float) -> None:
+def _home_position(reports: _Reports, m: Any, now: float) -> None:
     found = place(m.latitude, m.longitude, m.altitude)
     if found is not None:
-        told.home = Home(m.latitude, m.longitude, found.amsl_m)
+        reports.home = Home(m.latitude, m.longitude, found.amsl_m)
 
 
 _CLOCKS = frozenset({"SYSTEM_TIME", "ATTITUDE", "GLOBAL_POSITION_INT"})

@@ -50,7 +50,7 @@ ALTITUDE_LIMIT_M = 83_000.0
 
 @dataclass(frozen=True, slots=True)
 class AutopilotProfile:
-    """What one autopilot accepts and stores.
+    """The items that one autopilot accepts, and how it stores them.
 
     ``max_items`` counts wire items, including home where home is one. ``stored(item)`` returns the item that reads
     back; ``refuses(item)`` returns why the autopilot refuses it, empty if it accepts it. ``atomic``: the new mission
@@ -185,7 +185,7 @@ def version_words(flight_sw_version: int | None) -> str:
 
 
 def version_of(flight_sw_version: int | None) -> tuple[int, int] | None:
-    """The version (major, minor) in AUTOPILOT_VERSION's number; None if it is not told."""
+    """The version (major, minor) in AUTOPILOT_VERSION's number; None if the vehicle does not report it."""
     if not flight_sw_version:
         return None
     major, minor, _, _ = flight_sw_version.to_bytes(4, "big")

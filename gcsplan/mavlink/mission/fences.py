@@ -103,7 +103,7 @@ def fences_in_force(values: Mapping[str, float], autopilot: Autopilot, *, unread
 
 
 def acts(values: Mapping[str, float], autopilot: Autopilot) -> bool:
-    """Whether a breach of a fence changes the flight, and is not only told; what was not read does."""
+    """Whether a breach of a fence changes the flight, and is not only reported; a parameter that was not read does."""
     if autopilot is Autopilot.PX4:
         return values.get("GF_ACTION", math.inf) > _ONLY_TELLS
     return values.get("FENCE_ACTION", math.inf) != 0.0

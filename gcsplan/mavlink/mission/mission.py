@@ -21,10 +21,10 @@ GLOBAL, NO_POSITION, RELATIVE, TERRAIN = 0, 2, 3, 10
 FRAME_SYNONYMS = {5: GLOBAL, 6: RELATIVE, 11: TERRAIN}
 
 AltitudeFrame = Literal["relative", "amsl", "terrain"]
-"""What the altitudes of a mission count from: home, sea level or the terrain."""
+"""The zero of a mission's altitudes: home, sea level or the terrain."""
 
 NumberKept = Callable[[float], float]
-"""What an autopilot keeps of a number that it is sent."""
+"""From a number that was sent to the number that an autopilot keeps."""
 
 # Types of lists (MAV_MISSION_TYPE).
 MISSION, FENCE, RALLY, ALL = 0, 1, 2, 255

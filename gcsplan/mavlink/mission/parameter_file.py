@@ -68,10 +68,10 @@ def read_param_file(file: Path) -> dict[str, float]:
             amount = math.nan
         if not name or len(name) > _MOST_LETTERS or not math.isfinite(amount):
             raise InputError(
-                f"NAME,VALUE or QGroundControl's five columns are wanted, given {line.strip()[:60]!r}",
+                f"each line must be NAME,VALUE or QGroundControl's five columns, given {line.strip()[:60]!r}",
                 where=f"{file}:{number}",
             )
         values[name] = amount
     if not values:
-        raise InputError("has no parameters: NAME,VALUE lines are wanted", where=str(file))
+        raise InputError("has no parameters: give lines NAME,VALUE", where=str(file))
     return values

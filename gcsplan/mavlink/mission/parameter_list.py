@@ -48,13 +48,13 @@ __all__ = [
 ]
 
 SettingRule = Literal["equal", "at least", "at most"]
-Matters = Literal["time", "pace", "turns", "return", "flight", "told"]
+Matters = Literal["time", "pace", "turns", "return", "flight", "report"]
 
 SAME = 0.01
 """Part by which a value may differ and still count as the same."""
 
 CIRCLE_M = 60.0
-"""WP_LOITER_RAD, default: what circles without a radius of their own, and the circle over home, are judged with."""
+"""WP_LOITER_RAD, default: the radius of the circle over home, and of circles without a radius of their own."""
 
 RETURN_ROLL_DEG = 45.0
 """ROLL_LIMIT_DEG, default: the bank with which a plane's turn about is judged."""
@@ -65,13 +65,12 @@ ROLL_SPARE = 1.1
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What the proof assumes of a parameter. ``value`` is in the parameter's unit.
+    """The value that the proof assumes of a parameter. ``value`` is in the parameter's unit.
 
-    ``matters``: to the ``time`` (another value is judged again, with the separation), to the ``pace`` (to the time,
-    which no other value can be counted for), to where it ``turns`` (judged
-    again by `check.tuning`, but for the return from anywhere), to the ``return`` or to the ``flight`` itself (another
-    value is not what was judged), or is only ``told``. ``also``: other values that are within the rule, like a 0 that
-    switches it off.
+    ``matters``: what another value changes: the ``time`` (it is judged again, with the separation), the ``pace`` (the
+    time, which no other value can be counted for), where the vehicle ``turns`` (judged again by `check.tuning`, but
+    for the return from anywhere), the ``return`` or the ``flight`` itself (the proof does not hold), or nothing but a
+    ``report``. ``also``: other values that are within the rule, like a 0 that switches it off.
     """
 
     parameter: Parameter
@@ -84,7 +83,7 @@ class Setting:
     @property
     def needed(self) -> bool:
         """Whether the proof hangs on it, so that silence is no answer."""
-        return self.matters != "told"
+        return self.matters != "report"
 
     def allows(self, amount: float) -> bool:
         """Whether an amount on board is within the rule."""
@@ -123,13 +122,13 @@ class Off:
     raw: float
 
     def note(self) -> Note:
-        """What it is, what was assumed and why, and what to set."""
-        wanted, rule = self.name.value(self.setting.value), self.setting.rule
+        """The value on board, the assumed value and why it is assumed, and the value to set."""
+        expected, rule = self.name.value(self.setting.value), self.setting.rule
         least = "" if rule == "equal" else f"{rule} "
-        assumed = f"{least}{wanted:.6g}" + "".join(f" or {self.name.value(amount):g}" for amount in self.setting.also)
+        assumed = f"{least}{expected:.6g}" + "".join(f" or {self.name.value(amount):g}" for amount in self.setting.also)
         return Note(
             "parameter_not_assumed", name=self.name.name, value=self.raw, assumed=assumed, why=self.setting.why,
-            wanted=wanted,
+            wanted=expected,
         )  # fmt: skip
 
 
@@ -160,14 +159,14 @@ def _copter(
     mission: Mission, vehicle: Vehicle, rtl_rel_home_m: float | None, ends: bool, returns: bool
 ) -> list[Setting]:
     known = PARAMETERS[Autopilot.ARDUCOPTER]
-    own: Matters = "told" if commands_speed(mission) else "time"
-    back: Matters = "return" if returns else "told"
+    own: Matters = "report" if commands_speed(mission) else "time"
+    back: Matters = "return" if returns else "report"
     home = vehicle.return_speed_m_s or vehicle.speed_max_m_s
     lands = _pace(mission, vehicle, LAND, RTL)
     rows = [
         Setting(known["speed"], _speed_m_s(mission, vehicle), "equal",
                 Note("assumed_speed_or_interrupted"), own),
-        Setting(known["return_speed"], home, "equal", Note("assumed_return_speed"), "time" if ends else "told"),
+        Setting(known["return_speed"], home, "equal", Note("assumed_return_speed"), "time" if ends else "report"),
         Setting(known["climb"], vehicle.climb_m_s, "equal", Note("assumed_motion", motion="climb_m_s"), "time"),
         Setting(known["descent"], vehicle.descent_m_s, "equal", Note("assumed_motion", motion="descent_m_s"), "time"),
         Setting(known["land"], vehicle.land_m_s, "equal", Note("assumed_last_ten_metres"), "time"),
@@ -185,9 +184,9 @@ def _copter(
         Setting(known["return_altitude_type"], 0.0, "equal", Note("assumed_return_above_home"), back),
         Setting(known["cone"], 3.0, "at least", Note("assumed_return_cone"), back, also=(0.0,)),
         Setting(known["return_climb"], 0.0, "at most", Note("assumed_return_no_higher"), back),
-        Setting(known["return_end"], 0.0, "at most", Note("assumed_return_lands"), "told"),
+        Setting(known["return_end"], 0.0, "at most", Note("assumed_return_lands"), "report"),
         Setting(known["return_waits"], vehicle.return_waits_s, "equal", Note("assumed_return_waits"),
-                "time" if ends else "told"),
+                "time" if ends else "report"),
     ]  # fmt: skip
     if any(FRAME_SYNONYMS.get(item.frame, item.frame) == TERRAIN for item in mission.items):
         why = Note("assumed_terrain_margin")
@@ -201,14 +200,14 @@ def _copter(
 def _pace(mission: Mission, vehicle: Vehicle, *commands: int) -> Matters:
     """Whether a parameter of these items decides the time; an ideal vehicle has none."""
     flown = any(item.command in commands for item in mission.items) and math.isfinite(vehicle.accel_m_s2)
-    return "pace" if flown else "told"
+    return "pace" if flown else "report"
 
 
 def _altitude(known: Mapping[str, Parameter], rtl_rel_home_m: float | None, returns: bool) -> list[Setting]:
     if rtl_rel_home_m is None:
         return []
     why = Note("assumed_return_altitude", judged=returns)
-    return [Setting(known["return_altitude"], rtl_rel_home_m, "equal", why, "told")]
+    return [Setting(known["return_altitude"], rtl_rel_home_m, "equal", why, "report")]
 
 
 def _plane(
@@ -217,7 +216,7 @@ def _plane(
     known = PARAMETERS[Autopilot.ARDUPLANE]
     fastest = max(mission.commanded_m_s, vehicle.speed_max_m_s)
     slowest = _slowest_m_s(mission) or fastest
-    back: Matters = "return" if returns else "told"
+    back: Matters = "return" if returns else "report"
     circles = [CIRCLE_M, *([vehicle.turn_radius_m] if not returns else [])]
     uses_default = returns or any(_without_radius(item.command, item.params) for item in mission.items)
     rows = [
@@ -226,12 +225,12 @@ def _plane(
         Setting(known["speed_most"], fastest, "at least", Note("assumed_fastest"), "flight"),
         Setting(known["speed_least"], slowest, "at most", Note("assumed_slowest"), "flight"),
         Setting(known["circle"], max(circles), "at most", Note("assumed_circles"),
-                "flight" if uses_default else "told"),
+                "flight" if uses_default else "report"),
         Setting(known["return_circle"], CIRCLE_M, "at most", Note("assumed_circle_over_home"), back),
         Setting(known["radius"], 90.0, "at most", Note("assumed_turns_begin"), "turns"),
         Setting(known["l1_period"], 17.0, "equal", Note("assumed_settling_time"), "turns"),
         Setting(known["l1_damping"], 0.75, "equal", Note("assumed_settling"), "turns"),
-        Setting(known["pitch"], 15.0, "at most", Note("assumed_pitch"), "told"),
+        Setting(known["pitch"], 15.0, "at most", Note("assumed_pitch"), "report"),
     ]  # fmt: skip
     roll_deg = RETURN_ROLL_DEG if returns else _roll_deg(mission, vehicle, fastest)
     if roll_deg > 0.0:
@@ -239,7 +238,9 @@ def _plane(
         rows.append(Setting(known["roll"], roll_deg, "at least", why, "flight"))
     if vehicle.turn_radius_m > 0.0:
         rows.append(
-            Setting(known["climb_most"], vehicle.climb_m_s, "at least", Note("assumed_key", motion="climb_m_s"), "told")
+            Setting(
+                known["climb_most"], vehicle.climb_m_s, "at least", Note("assumed_key", motion="climb_m_s"), "report"
+            )
         )
         rows.append(
             Setting(
@@ -247,7 +248,7 @@ def _plane(
                 vehicle.descent_m_s,
                 "at least",
                 Note("assumed_key", motion="descent_m_s"),
-                "told",
+                "report",
             )
         )
     return _finite(rows + _altitude(known, rtl_rel_home_m, returns))
@@ -281,14 +282,14 @@ def _roll_deg(mission: Mission, vehicle: Vehicle, fastest_m_s: float) -> float:
 
 def _px4(mission: Mission, vehicle: Vehicle, rtl_rel_home_m: float | None, ends: bool, returns: bool) -> list[Setting]:
     known = PARAMETERS[Autopilot.PX4]
-    back: Matters = "return" if returns else "told"
+    back: Matters = "return" if returns else "report"
     home = vehicle.return_speed_m_s or vehicle.speed_max_m_s
     plain = commands_speed(mission)
     accel, lands = vehicle.accel_m_s2, _pace(mission, vehicle, LAND, RTL)
     rows = [
         Setting(known["speed_most"], _speed_m_s(mission, vehicle), "at least", Note("assumed_mission_speed"), "flight"),
         Setting(known["return_speed"], home, "equal", Note("assumed_return_speed_whatever"),
-                "time" if ends or not plain else "told"),
+                "time" if ends or not plain else "report"),
         Setting(known["climb"], vehicle.climb_m_s, "equal", Note("assumed_motion", motion="climb_m_s"), "time"),
         Setting(known["descent"], vehicle.descent_m_s, "equal", Note("assumed_motion", motion="descent_m_s"), "time"),
         Setting(known["land"], vehicle.land_m_s, "equal", Note("assumed_last_metres"), "time"),
@@ -305,7 +306,7 @@ def _px4(mission: Mission, vehicle: Vehicle, rtl_rel_home_m: float | None, ends:
         Setting(known["return_type"], 0.0, "equal", Note("assumed_return_straight"), back),
         Setting(known["cone"], 45.0, "at most", Note("assumed_return_cone"), back),
         Setting(known["return_waits"], vehicle.return_waits_s, "equal", Note("assumed_return_waits"),
-                "time" if ends else "told"),
+                "time" if ends else "report"),
     ]  # fmt: skip
     return _finite(rows + _altitude(known, rtl_rel_home_m, returns))
 
@@ -350,7 +351,7 @@ def off(settings: Sequence[Setting], values: Mapping[str, float], autopilot: Aut
     found = []
     on = fences_in_force(values, autopilot)
     if not acts(values, autopilot):
-        on = frozenset(s.parameter.key for s in settings if s.parameter.key in on and s.matters in ("return", "told"))
+        on = frozenset(s.parameter.key for s in settings if s.parameter.key in on and s.matters in ("return", "report"))
     for setting in settings:
         if is_fence(setting.parameter.key) and setting.parameter.key not in on:
             continue
@@ -450,10 +451,10 @@ def safety_list(
         if by_mission and copter:
             value, also = AUTO_RTL, (0.0,)
         why = Note("assumed_failsafe", after=after, by_mission=by_mission)
-        rows.append(Setting(known[key], value, "equal", why, "told", also))
+        rows.append(Setting(known[key], value, "equal", why, "report", also))
     if copter:
         why = Note("assumed_lost_position")
-        rows.append(Setting(known["fs_position"], 1.0, "equal", why, "told", _LANDS))
+        rows.append(Setting(known["fs_position"], 1.0, "equal", why, "report", _LANDS))
     return tuple(rows)
 
 
@@ -473,7 +474,7 @@ def _fences(autopilot: Autopilot, extent: FlightExtent, returns_m: float | None)
     why = Note("assumed_farthest_place")
     yield Setting(known["fence_radius"], float(math.ceil(extent.reach_m)), "at least", why, "flight")
     value, also = (3.0, (0.0, 1.0)) if autopilot is Autopilot.PX4 else (1.0, (0.0, 3.0) if copter else (0.0,))
-    yield Setting(known["fence_action"], value, "equal", Note("assumed_fence_action"), "told", also)
+    yield Setting(known["fence_action"], value, "equal", Note("assumed_fence_action"), "report", also)
 
 
 def needed_groups(
@@ -481,7 +482,7 @@ def needed_groups(
 ) -> tuple[tuple[str, ...], ...]:
     """The names, by parameter, that the proof hangs on, so that silence is no answer.
 
-    With ``values``, as they were read, those of fences that are off are not among them.
+    With ``values``, as they were read, the names of fences that are off are left out.
     """
     needed = [s for s in settings if s.needed]
     fences = [s for s in needed if is_fence(s.parameter.key)]

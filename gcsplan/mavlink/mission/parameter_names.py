@@ -1,10 +1,10 @@
 """Parameters of the autopilots that decide how a mission is flown: every name, its unit, and its default.
 
 ArduCopter 4.7 renamed most of them and changed their units (ArduPilot's list of renamed parameters; AC_WPNav.cpp,
-mode_rtl.cpp, Parameters.cpp); ArduPlane 4.5 renamed those of roll and airspeed. Those of PX4 are the same in its
-sources of 2023 (1.14) and of 2026. A vehicle answers to one of the names
-of a parameter. ArduPilot before 4.7 says nothing to a name that it does not have, so a parameter that is newer than the
-oldest firmware says its first version (ArduPilot's parameter lists of Copter and Plane 4.1 to 4.8).
+mode_rtl.cpp, Parameters.cpp); ArduPlane 4.5 renamed its limits of roll and airspeed. PX4 has the same names in its
+sources of 2023 (1.14) and of 2026. A vehicle answers to one of the names of a parameter. ArduPilot before 4.7 says
+nothing to a name that it does not have, so a parameter that is newer than the oldest firmware says its first version
+(ArduPilot's parameter lists of Copter and Plane 4.1 to 4.8).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from gcsplan.vehicle import Autopilot
 __all__ = ["PARAMETERS", "Name", "OnBoard", "Parameter", "ParameterValues", "unanswered"]
 
 ParameterValues = Mapping[str, float]
-"""What was read from a vehicle, by the names of its parameters."""
+"""Values that were read from a vehicle, by the names of its parameters."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class Parameter:
         return next((n for n in self.names if math.isfinite(values.get(n.name, math.nan))), None)
 
     def setting(self, amount: float, values: Mapping[str, float] | None = None) -> str:
-        """What to set for an amount: the name that was read with its value, or every name."""
+        """The setting for an amount: the name that was read with its value, or every name."""
         found = self.on_board(values) if values else None
         names = self.names if found is None else (found,)
         return " or ".join(f"{n.name} {n.value(amount):.10g}" for n in names)
@@ -70,8 +70,8 @@ class Parameter:
 class OnBoard(dict[str, float]):
     """Parameters that were read, by name. ``absent``: names that the vehicle says it does not have.
 
-    ``generic``: it does not say what autopilot it is, so nothing is known of its parameters. ``version``: that of its
-    firmware (major, minor), None if it does not tell it.
+    ``generic``: it does not say what autopilot it is, so nothing is known of its parameters. ``version``: the version
+    of its firmware (major, minor), None if it does not report it.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class OnBoard(dict[str, float]):
 
 
 def unanswered(values: Mapping[str, float], groups: Iterable[tuple[str, ...]]) -> list[tuple[str, ...]]:
-    """Those ``groups`` of names of which none was read as a number, and not all are known to be absent.
+    """The ``groups`` in which no name was read as a number, and not all names are known to be absent.
 
     "Does not exist" is an answer, and so is a firmware that is too old for it; silence is none, and does not count as a
     default.

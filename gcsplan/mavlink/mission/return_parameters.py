@@ -60,7 +60,7 @@ RETURN_PARAMETERS: dict[Autopilot, tuple[ReturnParameter, ...]] = {
     ),
     Autopilot.PX4: (ReturnParameter("RTL_RETURN_ALT", "m", 1.0),),
 }
-"""In the order in which they are named and asked for."""
+"""The altitude parameters of a return, in the order in which messages name them and gcsplan requests them."""
 
 PX4_CONE_DEG = 45.0
 """RTL_CONE_ANG, default: the half-angle of the cone around home in which PX4 returns lower."""
@@ -96,13 +96,13 @@ def returns_otherwise(values: Mapping[str, float]) -> Note | None:
 
 
 def setting(autopilot: Autopilot, rel_home_m: float) -> str:
-    """What to set for a return at ``rel_home_m`` on a vehicle of unknown version: every name, its value and unit."""
+    """The setting for a return at ``rel_home_m`` on a vehicle of unknown version: every name, its value and unit."""
     first, *others = RETURN_PARAMETERS[autopilot]
     return first.setting(rel_home_m) + "".join(f" or, {p.versions}, {p.setting(rel_home_m)}" for p in others)
 
 
 def settings(autopilot: Autopilot, rel_home_m: float) -> list[dict[str, str | float]]:
-    """The same as plain values."""
+    """The settings as plain values."""
     return [
         {"parameter": p.name, "value": p.value(rel_home_m), "unit": p.unit, "versions": p.versions or "all"}
         for p in RETURN_PARAMETERS[autopilot]
@@ -138,7 +138,7 @@ def deciding(mission: Mission) -> tuple[tuple[str, ...], ...]:
 
 
 def route_setting(autopilot: Autopilot, *, path: bool) -> str:
-    """What to set for returns along the mission; ``path``: along a return path, else to a landing sequence."""
+    """The setting for returns along the mission; ``path``: along a return path, else to a landing sequence."""
     if autopilot is Autopilot.ARDUPLANE:
         return f"RTL_AUTOLAND {AUTOLAND_PATH if path else AUTOLAND_LANDING:g}"
     return f"{', '.join(COPTER_RETURNS)} {AUTO_RTL:g} (Auto RTL)"
@@ -179,11 +179,11 @@ def _plane(value: float | None, held: tuple[str, ...], path: bool, route: Return
     if value is None:
         return Note("return_route_unread", names=("RTL_AUTOLAND",))
     if value == 0.0:
-        wanted = 3.0 if route != "mission" else AUTOLAND_PATH if path else AUTOLAND_LANDING
-        return Note("plane_does_not_arm", start=held[0], wanted=wanted)
-    wanted_value = AUTOLAND_PATH if path else AUTOLAND_LANDING
-    if route == "mission" and value != wanted_value:
-        return Note("plane_returns_otherwise", value=value, wanted=wanted_value)
+        needed = 3.0 if route != "mission" else AUTOLAND_PATH if path else AUTOLAND_LANDING
+        return Note("plane_does_not_arm", start=held[0], wanted=needed)
+    needed_value = AUTOLAND_PATH if path else AUTOLAND_LANDING
+    if route == "mission" and value != needed_value:
+        return Note("plane_returns_otherwise", value=value, wanted=needed_value)
     if route != "mission" and value not in STRAIGHT_AUTOLAND:
         return Note("plane_return_leads_on", value=value, start=held[0])
     return None

@@ -1,4 +1,4 @@
-"""What ArduPilot stores of a mission item: 15 bytes per item, so some numbers read back differently.
+"""A mission item as ArduPilot stores it: 15 bytes per item, so some numbers read back differently.
 
 Source: ArduPilot 4.6, ``AP_Mission.cpp`` (`mavlink_int_to_mission_cmd`, `mission_cmd_to_mavlink_int`, the packed
 structs of ``AP_Mission.h``), ``MissionItemProtocol_Fence.cpp`` and ``MissionItemProtocol_Rally.cpp``. The common
@@ -111,7 +111,7 @@ def read_back_altitudes(cm: int) -> tuple[float, float]:
 
 
 class StorageRule(NamedTuple):
-    """What is stored of param1 … param4; ``located``: latitude, longitude, altitude and frame are stored too."""
+    """The stored parts of param1 … param4; ``located``: latitude, longitude, altitude and frame are stored too."""
 
     located: bool
     params: tuple[NumberKept, NumberKept, NumberKept, NumberKept]

@@ -1,4 +1,4 @@
-"""What PX4 stores of a mission item: floats unchanged, but only the params that a command uses; yaw in radians.
+"""A mission item as PX4 stores it: floats unchanged, but only the params that a command uses; yaw in radians.
 
 Source: PX4 1.15, ``mavlink_mission.cpp`` (`parse_mavlink_mission_item`, `format_mavlink_mission_item`),
 ``navigation.h``, ``Limits.hpp`` (`radians`, `degrees`) and ``helper_functions.hpp`` (`wrap_2pi`).
@@ -87,7 +87,7 @@ LOCATED: dict[int, _NumberRules] = {
     cmd.CIRCLE_OUT: (_f32, _lost, _lost, _lost),
     cmd.RALLY_POINT: _NOTHING_KEPT,
 }
-"""What is stored of param1 … param4 of commands with a location (frames 0 and 3, also as 5 and 6)."""
+"""The stored parts of param1 … param4 of commands with a location (frames 0 and 3, also as 5 and 6)."""
 
 PLACELESS = frozenset(
     {
@@ -129,8 +129,8 @@ def refused_by_px4(item: MissionItem) -> str:
         )
     other = LOCATED if frame == NO_POSITION else PLACELESS
     if item.command in other:
-        wanted = "frame 2 (without a place)" if frame != NO_POSITION else "a frame with a place (0 or 3)"
-        return f"PX4 takes command {item.command} in {wanted} alone, and it is in frame {item.frame}"
+        frames = "frame 2 (without a place)" if frame != NO_POSITION else "a frame with a place (0 or 3)"
+        return f"PX4 takes command {item.command} in {frames} alone, and it is in frame {item.frame}"
     return f"PX4 does not take command {item.command} in a mission"
 
 

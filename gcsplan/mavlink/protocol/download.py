@@ -141,7 +141,7 @@ class Download(Machine):
         self._count: int | None = None
         self._restarts = 0
         self._tries = 0  # repetitions of the request that awaits its answer
-        self._first_asked_at = self._asked_at = 0.0
+        self._first_request_at = self._requested_at = 0.0
         self._heard_at = 0.0
         self._round_trip_s = self._quickest_s = 0.0
 
@@ -161,14 +161,14 @@ class Download(Machine):
         return self._ask_list(now)
 
     def _ask_list(self, now: float) -> list[Packet]:
-        self._items, self._count, self._first_asked_at, self._asked_at = [], None, now, now
+        self._items, self._count, self._first_request_at, self._requested_at = [], None, now, now
         self._deadline = now + self.timers.response_s
         return [self._to_vehicle(RequestList(self.mission_type))]
 
     def _ask_item(self, now: float) -> list[Packet]:
-        self._asked_at = now
+        self._requested_at = now
         if self._tries == 0:
-            self._first_asked_at = now
+            self._first_request_at = now
         self._deadline = now + self._wait_s
         return [self._to_vehicle(Request(len(self._items), self.mission_type))]
 
@@ -216,7 +216,7 @@ class Download(Machine):
             return self._finish(E.LAST_ITEM) if isinstance(self.outcome, Accepted) else []
         if self._state is not S.FETCHING or message.seq != len(self._items):
             return []
-        late_question = self._tries > 0 and now - self._asked_at < 0.9 * self._quickest_s
+        late_question = self._tries > 0 and now - self._requested_at < 0.9 * self._quickest_s
         self._measure(now, late_question)
         self._heard_at, self._tries = now, 0
         self._items.append(message.item)
@@ -239,7 +239,7 @@ class Download(Machine):
         answers the first request, and the repeated one is still on its way. PX4 ends a download if that one arrives
         after the next request.
         """
-        took = now - self._first_asked_at
+        took = now - self._first_request_at
         if self._tries == 0:
             self._quickest_s = min(took, self._quickest_s or took)
         if self._tries == 0 or late_question:

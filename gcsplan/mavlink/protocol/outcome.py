@@ -22,7 +22,7 @@ _CODES: dict[int, tuple[str, str]] = {
     6: ("param1 is invalid", "look at param1 of the item"),
     7: ("param2 is invalid", "look at param2 of the item"),
     8: ("param3 is invalid", "look at param3 of the item"),
-    9: ("param4 is invalid (NaN where a number is wanted?)", "look at param4 of the item"),
+    9: ("param4 is invalid (NaN in place of a number?)", "look at param4 of the item"),
     10: ("the latitude is invalid", "look at the item's place"),
     11: ("the longitude is invalid", "look at the item's place"),
     12: ("the altitude is invalid", "look at the item's altitude"),
@@ -81,7 +81,7 @@ class Refused:
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """What the vehicle holds is unknown until it is read back. ``silent``: the vehicle did not answer at all."""
+    """The list on the vehicle is unknown until it is read back. ``silent``: the vehicle did not answer at all."""
 
     why: str
     silent: bool = False

@@ -293,9 +293,9 @@ class VerifiedUpload:
             return self._pause(now, _Phase.READ)
         if isinstance(uploaded, Refused):
             return self._end(uploaded)
-        said = uploaded.why if isinstance(uploaded, Unknown) else "the vehicle said accepted"
+        outcome = uploaded.why if isinstance(uploaded, Unknown) else "the vehicle answered accepted"
         why = reading.why if isinstance(reading, Unknown) else str(reading)
-        return self._end(Unknown(f"{said}; reading back failed: {why}", silent=dead))
+        return self._end(Unknown(f"{outcome}; reading back failed: {why}", silent=dead))
 
     def _end(
         self,
@@ -326,7 +326,7 @@ def on_board(
     if read is None:
         if not began:
             cut = "" if profile_of(autopilot).atomic else ", or cut short if the announcement reached it"
-            return f"the vehicle asked for nothing: its former {name} should be untouched{cut}"
+            return f"the vehicle requested nothing: its former {name} should be untouched{cut}"
         return f"what the vehicle holds is not known: do not fly it; upload again or clear its {name}"
     if not read:
         return f"the vehicle holds no {name} now"

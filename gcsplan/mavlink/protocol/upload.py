@@ -1,23 +1,23 @@
 """`Upload` and `Clear`: our side of writing a list to a vehicle. The vehicle requests items, we answer.
 
 =============  =============  =============================================================================
-state          event          what happens
+state          event          action
 =============  =============  =============================================================================
 IDLE           START          send COUNT as soon as the gate permits
 ANNOUNCED      RETRY          send COUNT again if the gate permits: no item was requested yet
-ANNOUNCED      ASKED          send the item; from now on only requests are answered, nothing else is sent
-SENDING        ASKED          send the item: any seq in range, in any order, any number of times
-…              ALL_ASKED      the same, and every item has now been requested at least once
+ANNOUNCED      REQUESTED      send the item; from now on only requests are answered, nothing else is sent
+SENDING        REQUESTED      send the item: any seq in range, in any order, any number of times
+…              ALL_REQUESTED  the same, and every item has now been requested at least once
 ALL_SENT       TAKEN          ACK 0 after every item was requested: accepted
 …              DOUBT          an ACK that may be stale or premature: wait ``response_s`` for the next request
-DOUBTING       ASKED          the ACK was not the end: go on
+DOUBTING       REQUESTED      the ACK was not the end: go on
 …              TIMEOUT        the doubtful ACK, or the silence, becomes the outcome
-ENDED          ASKED          send the item nevertheless: the vehicle may be finishing, or starting over
+ENDED          REQUESTED      send the item nevertheless: the vehicle may be finishing, or starting over
 =============  =============  =============================================================================
 
-No item is sent on a timer, and no request resets what was recorded. ACKs are doubted because one of an earlier
+No item is sent on a timer, and no request resets what was recorded. ACKs are doubted because an ACK of an earlier
 transfer may be late, PX4 answers a duplicated COUNT with ERROR and goes on, and ArduPilot answers duplicated items with
-INVALID_SEQUENCE and goes on. An ERROR after the last item does not show what is on board.
+INVALID_SEQUENCE and goes on. An ERROR after the last item does not show which list is on board.
 """
 
 from __future__ import annotations
@@ -72,8 +72,8 @@ class UploadEvent(StateLabel):
 
     START = auto()
     RETRY = auto()
-    ASKED = auto()
-    ALL_ASKED = auto()
+    REQUESTED = auto()
+    ALL_REQUESTED = auto()
     TAKEN = auto()
     DOUBT = auto()
     TIMEOUT = auto()
@@ -95,25 +95,25 @@ class Upload(Machine):
     TABLE: ClassVar[Mapping[Any, Any]] = {
         (S.IDLE, E.START): S.ANNOUNCED,
         (S.ANNOUNCED, E.RETRY): S.ANNOUNCED,
-        (S.ANNOUNCED, E.ASKED): S.SENDING,
-        (S.ANNOUNCED, E.ALL_ASKED): S.ALL_SENT,
+        (S.ANNOUNCED, E.REQUESTED): S.SENDING,
+        (S.ANNOUNCED, E.ALL_REQUESTED): S.ALL_SENT,
         (S.ANNOUNCED, E.DOUBT): S.ANNOUNCED,
         (S.ANNOUNCED, E.TIMEOUT): S.ENDED,
-        (S.SENDING, E.ASKED): S.SENDING,
-        (S.SENDING, E.ALL_ASKED): S.ALL_SENT,
+        (S.SENDING, E.REQUESTED): S.SENDING,
+        (S.SENDING, E.ALL_REQUESTED): S.ALL_SENT,
         (S.SENDING, E.DOUBT): S.DOUBTING,
         (S.SENDING, E.TIMEOUT): S.ENDED,
-        (S.DOUBTING, E.ASKED): S.SENDING,
-        (S.DOUBTING, E.ALL_ASKED): S.ALL_SENT,
+        (S.DOUBTING, E.REQUESTED): S.SENDING,
+        (S.DOUBTING, E.ALL_REQUESTED): S.ALL_SENT,
         (S.DOUBTING, E.DOUBT): S.DOUBTING,
         (S.DOUBTING, E.TAKEN): S.ENDED,
         (S.DOUBTING, E.TIMEOUT): S.ENDED,
-        (S.ALL_SENT, E.ALL_ASKED): S.ALL_SENT,
+        (S.ALL_SENT, E.ALL_REQUESTED): S.ALL_SENT,
         (S.ALL_SENT, E.DOUBT): S.DOUBTING,
         (S.ALL_SENT, E.TAKEN): S.ENDED,
         (S.ALL_SENT, E.TIMEOUT): S.ENDED,
-        (S.ENDED, E.ASKED): S.ENDED,
-        (S.ENDED, E.ALL_ASKED): S.ENDED,
+        (S.ENDED, E.REQUESTED): S.ENDED,
+        (S.ENDED, E.ALL_REQUESTED): S.ENDED,
     } | {(state, E.CANCEL): S.ENDED for state in (S.ANNOUNCED, S.SENDING, S.ALL_SENT, S.DOUBTING)}
 
     def __init__(
@@ -135,8 +135,8 @@ class Upload(Machine):
             raise InputError("an empty list is not uploaded: clear the vehicle's list instead")
         if len(self.items) > _MOST_ITEMS:
             raise InputError(f"a list holds at most {_MOST_ITEMS} items, given {len(self.items)}")
-        self._asked: set[int] = set()
-        self._last_asked: int | None = None
+        self._requested: set[int] = set()
+        self._last_requested: int | None = None
         self._highest = -1  # highest seq requested in this round; a repeated request for item 0 begins a new round
         self._rounds = 0
         self._gives_up_at = 0.0  # a stall if no new item is requested by this time
@@ -148,12 +148,12 @@ class Upload(Machine):
     @property
     def progress(self) -> TransferProgress:
         """Items that the vehicle has requested so far."""
-        return TransferProgress("upload", len(self._asked), len(self.items))
+        return TransferProgress("upload", len(self._requested), len(self.items))
 
     @property
     def began(self) -> bool:
         """Whether the vehicle has requested any item: from then on its old list may be gone."""
-        return bool(self._asked)
+        return bool(self._requested)
 
     def start(self, now: float) -> list[Packet]:
         """Announce the list with COUNT."""
@@ -168,7 +168,7 @@ class Upload(Machine):
     def answered(self, seqs: Iterable[int], now: float) -> None:
         """Record requests for ``seqs`` that were already answered."""
         for seq in seqs:
-            self._asked_for(seq, now)
+            self._on_request(seq, now)
 
     def stop(self, outcome: Outcome) -> None:
         """End with ``outcome`` and answer no more requests."""
@@ -199,12 +199,12 @@ class Upload(Machine):
     def _answer(self, seq: int, now: float) -> list[Packet]:
         if not self._announced or self._cancelled:
             return []  # we announced nothing, so the request is for somebody else's list
-        self._asked_for(seq, now)
+        self._on_request(seq, now)
         return [self._to_vehicle(self._item(seq))]
 
-    def _asked_for(self, seq: int, now: float) -> None:
+    def _on_request(self, seq: int, now: float) -> None:
         self._note(seq, now)
-        self._step(E.ALL_ASKED if len(self._asked) == len(self.items) else E.ASKED)
+        self._step(E.ALL_REQUESTED if len(self._requested) == len(self.items) else E.REQUESTED)
         if self._state is not S.ENDED:
             self._doubt = None
             wait = 2 * self.timers.response_s if self._state is S.ALL_SENT else self.timers.silence_s
@@ -216,17 +216,17 @@ class Upload(Machine):
     def _note(self, seq: int, now: float) -> None:
         if seq == 0 and self._highest > 0 and self._rounds < self.timers.retries:
             self._highest, self._rounds = -1, self._rounds + 1
-        if seq > self._highest or self._last_asked is None:
+        if seq > self._highest or self._last_requested is None:
             self._highest, self._gives_up_at = max(seq, self._highest), now + self.timers.stall_s
-        elif seq == self._last_asked and self._state is not S.ENDED:
+        elif seq == self._last_requested and self._state is not S.ENDED:
             self.retries += 1
-        self._asked.add(seq)
-        self._last_asked = seq
+        self._requested.add(seq)
+        self._last_requested = seq
 
     def _judge(self, ack: Ack, now: float) -> None:
         if ack.code == INVALID_SEQUENCE:
             return
-        complete = len(self._asked) == len(self.items)
+        complete = len(self._requested) == len(self.items)
         if ack.code == ACCEPTED and complete:
             self._end(E.TAKEN, Accepted(ack.opaque_id))
             return
@@ -237,13 +237,13 @@ class Upload(Machine):
     def _doubtful(self, code: int, complete: bool) -> Outcome:
         """Return the outcome that a doubtful ACK stands for if no further request follows."""
         if code == ACCEPTED:
-            count = f"{len(self._asked)} of {len(self.items)} items"
-            return Unknown(f"the vehicle said accepted after asking for {count}: an answer to an earlier transfer?")
+            count = f"{len(self._requested)} of {len(self.items)} items"
+            return Unknown(f"the vehicle answered accepted after requests for {count}: to an earlier transfer?")
         if code == CANCELLED:
             return Unknown("the vehicle gave up the transfer")
         if code == ERROR and complete:
-            return Unknown("the vehicle said error after the last item: it may hold the list or not")
-        return Refused(code, None if code in (NO_SPACE, DENIED) else self._last_asked)
+            return Unknown("the vehicle answered error after the last item: it may hold the list or not")
+        return Refused(code, None if code in (NO_SPACE, DENIED) else self._last_requested)
 
     def _expire(self, now: float) -> list[Packet]:
         again = self._doubt is None or isinstance(self._doubt, Unknown) or self._doubt == Refused(ERROR)
@@ -254,13 +254,13 @@ class Upload(Machine):
         return []
 
     def _silence(self, now: float) -> Unknown:
-        done, total = len(self._asked), len(self.items)
+        done, total = len(self._requested), len(self.items)
         if not done:
             return Unknown(f"no answer to {self._announced} announcements of the list", silent=True)
         if now >= self._gives_up_at:
             return Unknown(f"the vehicle asks on and on and gets no further than item {self._highest} of {total}")
         if done == total:
-            return Unknown("every item was asked for, but the vehicle did not say whether it took the list")
+            return Unknown("the vehicle requested every item, but did not say whether it took the list")
         return Unknown(f"the vehicle fell silent after asking for {done} of {total} items")
 
 
@@ -289,7 +289,7 @@ class Clear(Machine):
     ) -> None:
         kind = mission_type if mission_type == ALL else checked_type(mission_type)
         super().__init__(us=us, vehicle=vehicle, mission_type=kind, timers=timers or Timers(), state=S.IDLE, gate=gate)
-        self._asked = 0
+        self._attempts = 0
 
     @property
     def progress(self) -> TransferProgress:
@@ -314,13 +314,13 @@ class Clear(Machine):
         if held is not None:
             self.stop(held)
             return []
-        self.retries += int(self._asked > 0)
-        self._asked += 1
+        self.retries += int(self._attempts > 0)
+        self._attempts += 1
         self._deadline = now + self.timers.response_s
         return [self._to_vehicle(ClearAll(self.mission_type))]
 
     def _react(self, message: MissionMessage, now: float) -> list[Packet]:
-        if isinstance(message, Ack) and self._asked and self._state is S.ANNOUNCED:
+        if isinstance(message, Ack) and self._attempts and self._state is S.ANNOUNCED:
             if message.code == ACCEPTED:
                 self._end(E.TAKEN, Accepted(message.opaque_id))
             else:
@@ -329,8 +329,8 @@ class Clear(Machine):
         return []
 
     def _expire(self, now: float) -> list[Packet]:
-        if self._asked <= self.timers.retries:
+        if self._attempts <= self.timers.retries:
             self._step(E.RETRY)
             return self._ask(now)
-        self._end(E.TIMEOUT, Unknown(f"no answer to {self._asked} requests to clear", silent=True))
+        self._end(E.TIMEOUT, Unknown(f"no answer to {self._attempts} requests to clear", silent=True))
         return []

@@ -60,7 +60,7 @@ def _volumes_of(feature: Any) -> bool:
 
 
 def read_ed269(path: Path, whole: Any, policy: Policy) -> ZoneFile:
-    """The zones of an ED-269 document; what is wrong is in their problems and faults."""
+    """The zones of an ED-269 document; mistakes are in their problems and faults."""
     key, features = _list_of(whole)
     file = AirspaceFile(path, policy, RESTRICTIONS, great_circles=True)
     if isinstance(whole, dict) and key == "features" and whole.get("UASZoneList"):
@@ -85,7 +85,7 @@ def _feature(file: AirspaceFile, feature: Any, where: str, fallback: str) -> Non
 
 
 def published(feature: dict[str, Any], kind: Any, key: str, times: Any, fallback: str) -> Published:
-    """What the members say that ED-269 and ED-318 share. Raises MemberError."""
+    """A zone's members that ED-269 and ED-318 share. Raises MemberError."""
     identifier = text_of(feature.get("identifier"))
     name = text_of(feature.get("name")) or identifier or fallback
     restriction = word(kind, f"zone {name[:60]!r}: {key}").upper()

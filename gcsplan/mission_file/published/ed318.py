@@ -52,7 +52,7 @@ def _required(feature: Any) -> bool:
 
 
 def read_ed318(path: Path, whole: Any, policy: Policy) -> ZoneFile:
-    """The zones of an ED-318 collection; what is wrong is in their problems and faults."""
+    """The zones of an ED-318 collection; mistakes are in their problems and faults."""
     return read_features(AirspaceFile(path, policy, ZONE_TYPES), _features(whole), "features", _feature)
 
 
@@ -72,7 +72,7 @@ def _feature(file: AirspaceFile, feature: Any, where: str, fallback: str) -> Non
     for i, one in enumerate(whole):
         part = zone.name if len(whole) == 1 else f"{zone.name}/{i + 1}"
         at = f"{where}.geometry" if one is geometry else f"{where}.geometry.geometries[{i}]"
-        # The layer of a collection, or else of the feature, holds for those of its geometries that have none.
+        # A geometry without a layer has the layer of its collection, or else of the feature.
         layer = geometry.get("layer", own) if isinstance(geometry, dict) else None
         try:
             _geometry(file, zone, part, one, layer, at)

@@ -58,7 +58,7 @@ def _is_airspace(members: dict[str, Any]) -> bool:
 
 
 def read_openaip(path: Path, whole: Any, policy: Policy) -> ZoneFile:
-    """The zones of openAIP's airspaces; what is wrong is in their problems and faults."""
+    """The zones of openAIP's airspaces; mistakes are in their problems and faults."""
     file = AirspaceFile(path, policy, (*TYPES, *CLASSES.values()))
     key = "items" if isinstance(whole, dict) and "items" in whole else "features" if isinstance(whole, dict) else ""
     if isinstance(whole, dict) and is_number(whole.get("totalPages")) and whole["totalPages"] > 1:

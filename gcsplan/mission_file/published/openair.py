@@ -97,7 +97,7 @@ class _Block:
 
 
 def read_openair(path: Path, data: bytes, policy: Policy) -> ZoneFile:
-    """The zones of OpenAir text; what is wrong is in their problems and faults."""
+    """The zones of OpenAir text; mistakes are in their problems and faults."""
     return _OpenAirReading(AirspaceFile(path, policy, OPENAIR_CLASSES_AND_TYPES, great_circles=True)).read(_text(data))
 
 
@@ -152,7 +152,7 @@ class _OpenAirReading:
             more = len(self.terrain) - MOST_MISTAKES
             records: list[Datum] = [*self.terrain[:MOST_MISTAKES]]
             records += [Note("further_zones", count=more)] if more > 0 else []
-            self.file.found.said.append(Note("terrain_records_unused", records=tuple(records)))
+            self.file.found.own_notes.append(Note("terrain_records_unused", records=tuple(records)))
         if not self.zones and not self.file.found.problems:
             self._fault(1, "the file holds no zone: an OpenAir zone begins with a line such as `AC R`")
         return self.file.finished()
@@ -258,7 +258,7 @@ class _OpenAirReading:
         return places
 
     def _line(self, text: str) -> Note:
-        """What stands on the line that is read."""
+        """A note with the line that is being read."""
         return Note("line_of_file", line=self.number, text=one_line(text))
 
     def _end(self) -> None:
@@ -281,7 +281,7 @@ class _OpenAirReading:
         limits.faults += [
             Mistake(f"{file.path}: line {number}", words) for number, words in block.mistakes[:MOST_MISTAKES]
         ]
-        if block.lost and not file.judge.reason(zone):  # it may reach farther than what is understood of it
+        if block.lost and not file.judge.reason(zone):  # the zone may reach farther than the part that is understood
             for number, words in block.lost[:MOST_MISTAKES]:
                 file.fault(f"{file.path}: line {number}", f"zone {name[:60]!r}: {words}")
             return
@@ -301,16 +301,16 @@ class _OpenAirReading:
 
 
 def _limits(block: _Block, where: str, policy: Policy) -> VolumeLimits:
-    said: list[Remark] = []
+    remarks: list[Remark] = []
     given: list[Given | None] = []
     for key, text in (("AL", block.lower), ("AH", block.upper)):
         plain = text
         if text is not None and (match := re.fullmatch(r"([^()]*\S)\s*\([^()]*\)", text)):
             plain = match[1]
-            said.append((Note("zone_text_behind_height_unread"), f"{key} {text[:60]}"))
+            remarks.append((Note("zone_text_behind_height_unread"), f"{key} {text[:60]}"))
         given.append(None if plain is None else Given(plain, (), ("FT", "AMSL"), key))
     limits = VolumeLimits.read(given[0], given[1], where, UNSTATED_LIMITS, policy=policy)
-    limits.remarks += said
+    limits.remarks += remarks
     return limits
 
 
@@ -356,8 +356,8 @@ def _places(text: str, count: int) -> tuple[list[Corner], str]:
         at = match.end()
     if len(places) == count:
         return places, text[at:].strip(" \t,")
-    wanted = "a place such as 39:29.9 N 119:46.1 W" if count == 1 else "two places with a comma between them"
-    raise _RecordError(f"it needs {wanted}")
+    needed = "a place such as 39:29.9 N 119:46.1 W" if count == 1 else "two places with a comma between them"
+    raise _RecordError(f"it needs {needed}")
 
 
 def _matches(text: str) -> Iterator[re.Match[str]]:
@@ -385,8 +385,8 @@ def _numbers(text: str, count: int) -> list[float]:
     except ValueError:
         numbers = []
     if len(numbers) != count or not all(math.isfinite(n) for n in numbers):
-        wanted = "a radius in nautical miles" if count == 1 else "a radius in nautical miles and two bearings"
-        raise _RecordError(f"it needs {wanted}")
+        needed = "a radius in nautical miles" if count == 1 else "a radius in nautical miles and two bearings"
+        raise _RecordError(f"it needs {needed}")
     return numbers
 
 

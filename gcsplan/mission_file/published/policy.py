@@ -21,7 +21,7 @@ _KINDS_SHOWN = 12
 
 @dataclass(frozen=True, slots=True)
 class Policy:
-    """What a mission says of one file: ``kinds`` that are no-fly, zones that it is ``authorised`` to enter, its hours.
+    """A mission's rules for one file: ``kinds`` that are no-fly, zones that it is ``authorised`` to enter, its hours.
 
     ``flight_level_error_m`` is how far flight levels may lie from their heights above sea level; None: they limit
     nothing. ``where`` is the place of the entry in the mission file.
@@ -73,10 +73,10 @@ class PolicyJudge:
         self.kinds |= set(zone.kinds)
         own = {name for name in self.policy.authorised if name in (zone.identifier, zone.name)}
         self.entered |= own
-        wanted = self.policy.kinds
-        if wanted is not None and not {_plain(k) for k in wanted} & {_plain(k) for k in zone.kinds}:
-            return Note("zones_of_other_kinds", kinds=wanted[:_KINDS_SHOWN])
-        if wanted is None and not zone.restricts:
+        kinds = self.policy.kinds
+        if kinds is not None and not {_plain(k) for k in kinds} & {_plain(k) for k in zone.kinds}:
+            return Note("zones_of_other_kinds", kinds=kinds[:_KINDS_SHOWN])
+        if kinds is None and not zone.restricts:
             return Note("zones_restrict_nothing")
         if own:
             return Note("zones_authorised")

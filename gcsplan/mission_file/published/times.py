@@ -29,7 +29,7 @@ _OF_PERIOD = ("permanent", "startDateTime", "endDateTime", "schedule")
 _OF_LINE = ("day", "startTime", "endTime", "startEvent", "endEvent")
 
 WEEK = ("MON", "TUE", "WED", "THU", "FRI", "SAT", "SUN")
-WANTED_HOURS = "2026-11-23T10:00Z, a day such as 2026-11-23 (UTC), or [from, to]"
+HOURS_TO_GIVE = "2026-11-23T10:00Z, a day such as 2026-11-23 (UTC), or [from, to]"
 
 
 class TimeError(ValueError):
@@ -52,14 +52,12 @@ class Hours:
         """The hours of a mission's ``at``. Raises TimeError."""
         texts = given if isinstance(given, list) else [given]
         if not 1 <= len(texts) <= 2 or not all(isinstance(t, str) for t in texts):
-            raise TimeError(f"must be {WANTED_HOURS}")
+            raise TimeError(f"must be {HOURS_TO_GIVE}")
         start, end = read_instant(texts[0]), read_end(texts[-1])
         if len(texts) == 1 and not _DATE.fullmatch(texts[-1].strip()):
             end += ALONE
         if not timedelta(0) < end - start <= LONGEST_HOURS:
-            words = (
-                "the end must lie behind the start" if end <= start else f"{LONGEST_HOURS.days} days at most are wanted"
-            )
+            words = "the end must lie behind the start" if end <= start else f"give {LONGEST_HOURS.days} days at most"
             raise TimeError(f"{words}, given {' to '.join(t.strip()[:_MOST_TIME_CHARACTERS] for t in texts)}")
         return cls(start, end)
 
@@ -100,7 +98,7 @@ def read_instant(text: str) -> datetime:
     except TimeError:
         raise
     except (ValueError, OverflowError):
-        raise TimeError(f"{shown} is no time; write {WANTED_HOURS}") from None
+        raise TimeError(f"{shown} is no time; write {HOURS_TO_GIVE}") from None
     if not 1900 <= moment.year <= 2999:  # far from where a day more or less does not exist
         raise TimeError(f"{shown} lies outside the years 1900 to 2999")
     return moment
@@ -209,8 +207,8 @@ def _moment(given: Any, read: Callable[[str], datetime] = read_instant) -> datet
 
 def _daily(given: Any) -> Daily | None:
     """One line of a schedule; None if it depends on the sun, whose times are not computed."""
-    said = given.get("day") if isinstance(given, dict) else None
-    listed = [said] if isinstance(said, str) else said
+    day = given.get("day") if isinstance(given, dict) else None
+    listed = [day] if isinstance(day, str) else day
     if not isinstance(listed, list) or not listed:
         raise TimeError("a line of a schedule has no days")
     _require_known(given, _OF_LINE, "a line of a schedule")

@@ -1,4 +1,4 @@
-"""What of published zones is not used near a mission, by name; and zones near it that are not understood."""
+"""Published zones near a mission that are not used, by name; and zones near it that are not understood."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NAMED_WITHIN_M = 5000.0
 
 
 def faults_near(placed: Sequence[tuple[ZoneDraft, Zone]], box: Box) -> list[Mistake]:
-    """What is not understood of zones that reach into the mission's surroundings."""
+    """The faults of zones that reach into the mission's surroundings."""
     found: dict[Mistake, None] = {}
     for draft, zone in placed:
         if draft.faults and _meets(zone, box):

@@ -83,7 +83,7 @@ class VolumeLimits:
     def read(
         cls, lower: Given | None, upper: Given | None, where: str, spared: Note | None = None, *, policy: Policy
     ) -> VolumeLimits:
-        """The limits; a missing one is no limit. ``spared`` is said of a limit that needs its spare words."""
+        """The limits; a missing one is no limit. ``spared`` is the note on a limit that needs its spare words."""
         found = cls()
         error_m = policy.flight_level_error_m
         levels: dict[str, float] = {}

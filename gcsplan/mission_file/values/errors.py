@@ -20,11 +20,11 @@ from gcsplan.mission_file.values.yaml import lines_of, missing_space
 Section = TypeVar("Section", bound=Keys)
 
 MOST_SWAPPED = 6
-MOST_TOLD = 100
-"""Most mistakes of one section that are told, and ten times as many of a mission."""
+MOST_OF_A_SECTION = 100
+"""Most mistakes of one section that are listed; a mission lists ten times as many."""
 
 SHORT = {TerrainKeys: "dem", PlannerKeys: "name", ZoneKeys: "file"}
-"""The key for which a text may be meant that stands where a whole section is wanted."""
+"""The key for which a text may be meant that stands in place of a whole section."""
 
 MOST_OF_NUMBER = 40
 _RANGE = re.compile(r"\s*(\d+(?:\.\d+)?)\s*(?:-|–|\.\.|to)\s*(\d+(?:\.\d+)?)\s*")
@@ -51,7 +51,9 @@ def read_section(kind: type[Section], value: Any, where: str, problems: list[Mis
         return kind.model_validate(value)
     except ValidationError as why:
         errors = why.errors(include_url=False)
-        problems += few([_problem(kind, e, where) for e in errors[:MOST_TOLD]], where, MOST_TOLD, len(errors))
+        problems += few(
+            [_problem(kind, e, where) for e in errors[:MOST_OF_A_SECTION]], where, MOST_OF_A_SECTION, len(errors)
+        )
         unknown = {e["loc"][0] for e in errors if e["type"] == "extra_forbidden" and len(e["loc"]) == 1}
         if len(unknown) < len(errors):
             return None
@@ -75,8 +77,8 @@ def few(problems: Sequence[Mistake], where: str, most: int, count: int | None = 
     ]
 
 
-def told_once(problems: Iterable[Mistake]) -> list[Mistake]:
-    """The problems without those that end with another one's cure.
+def listed_once(problems: Iterable[Mistake]) -> list[Mistake]:
+    """The problems, without the ones that end with another one's cure.
 
     A key is not missing if an unknown one beside it stands for it, and one message is enough for places that are all
     swapped.
@@ -102,14 +104,14 @@ def told_once(problems: Iterable[Mistake]) -> list[Mistake]:
         if u is not None and not u.meant:
             key = _section_and_key(gap.where)[1]
             instead[id(u)] = _unknown(u.where, (key,), f"; did you mean {key}, which is missing?")
-    told = [instead.get(id(p), p) for p in found if id(p) not in meant]
-    swapped = [p for p in told if p.code == "swapped"]
+    listed = [instead.get(id(p), p) for p in found if id(p) not in meant]
+    swapped = [p for p in listed if p.code == "swapped"]
     if len(swapped) < 2:
-        return told
+        return listed
     others = ", ".join(p.where.rpartition(": ")[2] for p in swapped[1:MOST_SWAPPED])
     more = f" and {len(swapped) - MOST_SWAPPED} more" if len(swapped) > MOST_SWAPPED else ""
     first = replace(swapped[0], message=f"{swapped[0].message} (the same at {others}{more})")
-    return [first if p is swapped[0] else p for p in told if p is swapped[0] or p not in swapped]
+    return [first if p is swapped[0] else p for p in listed if p is swapped[0] or p not in swapped]
 
 
 def _section_and_key(where: str) -> tuple[str, str]:
@@ -124,8 +126,8 @@ def unknown_keys(given: Iterable[str], known: Iterable[str], where: str) -> list
     names = list(known)
     prefix = where if where.endswith(": ") else where + "."
     wrong = [key for key in given if key not in names]
-    told = [_unknown_of(f"{prefix}{key[:80]}", key, names) for key in wrong[:MOST_TOLD]]
-    return few(told, where.removesuffix(": "), MOST_TOLD, len(wrong))
+    listed = [_unknown_of(f"{prefix}{key[:80]}", key, names) for key in wrong[:MOST_OF_A_SECTION]]
+    return few(listed, where.removesuffix(": "), MOST_OF_A_SECTION, len(wrong))
 
 
 def key_path(where: str, loc: Iterable[int | str]) -> str:

@@ -60,7 +60,7 @@ _MARKS = {
     "°": "º˚∘", "'": "′’‘ʹʼ´`‛＇", '"': "″”“ʺ„‟〃＂", "-": "−–‐‑﹣－", " ": "\u00a0\u2000\u2001\u2002\u2003\u2004\u2005"
     "\u2006\u2007\u2008\u2009\u200a\u202f\u205f\u3000\t", "": "\u200b\u200e\u200f\u2060\ufeff",
 }  # fmt: skip
-"""What programs and typographers write for each mark."""
+"""The characters that programs and typographers write for each mark."""
 _PLAIN_MARKS = str.maketrans({other: mark for mark, others in _MARKS.items() for other in others})
 _WORDS_OF_PLACES = {"NORTH": "N", "SOUTH": "S", "EAST": "E", "WEST": "W", "DEGREES": "°", "DEG": "°"}
 
@@ -124,7 +124,7 @@ def range_fault(lat_deg: float, lon_deg: float, *, most_lon_deg: float = 180.0) 
         return ""
     if is_swapped(lat_deg, lon_deg):
         return (
-            f"latitude and longitude look swapped: {lat_deg:g} is no latitude; wanted [lat, lon], did you mean "
+            f"latitude and longitude look swapped: {lat_deg:g} is no latitude; give [lat, lon], did you mean "
             f"{lon_deg:.10g}, {lat_deg:.10g}?"
         )
     if abs(lat_deg) >= 1000.0:
@@ -209,7 +209,7 @@ def _halves(text: str) -> list[str]:
         raise grids.NotAPlace("a comma parts latitude and longitude; the decimals begin with a point")
     if len(parts) == 3:
         raise grids.NotAPlace("it has a third part; a height stands as agl_m beside lat and lon, or beside at")
-    raise grids.NotAPlace("a latitude and a longitude are wanted, with a comma between them")
+    raise grids.NotAPlace("give a latitude and a longitude, with a comma between them")
 
 
 def _angle(text: str, letter: str) -> _Angle:

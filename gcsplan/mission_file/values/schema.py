@@ -166,11 +166,11 @@ class ZoneKeys(Keys):
     layer: Text | None = None
     """With `file`: the only layer of a .gpkg to be read; if absent, every one."""
     kinds: Annotated[list[Text], Field(min_length=1, max_length=100)] | None = None
-    """Of an authority's file: the kinds of zones that are no-fly; if absent, all that restrict."""
+    """With an authority's file: the kinds of zones that are no-fly; if absent, all that restrict."""
     authorised: Annotated[list[Text], Field(max_length=1000)] = []
-    """Of an authority's file: the identifiers or names of zones that the mission is authorised to enter."""
+    """With an authority's file: the identifiers or names of zones that the mission is authorised to enter."""
     flight_level_error_m: Length | None = None
-    """Of an authority's file: how far flight levels may be from heights above sea level; else they limit nothing."""
+    """With an authority's file: how far flight levels may be from heights above sea level; else they limit nothing."""
     floor_agl_m: FiniteMetres | None = None
     """Floor of the zone above ground, point by point; if absent or 0, nothing passes below."""
     ceiling_agl_m: FiniteMetres | None = None
@@ -336,7 +336,7 @@ class PlannerKeys(Keys):
     evaluations: Annotated[int, Field(ge=1, le=1_000_000_000)] | None = None
     """Most paths that a swarm may try."""
     warm_start: Text | None = None
-    """A swarm begins around this path: `optimal`, that of the default planner, or the name of another vehicle."""
+    """A swarm begins around this path: `optimal`, the path of the default planner, or the name of another vehicle."""
     parameters: Annotated[dict[str, Any], AfterValidator(_plain_values)] | None = None
     """A swarm's own parameters, by name."""
 

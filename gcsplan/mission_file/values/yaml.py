@@ -257,7 +257,7 @@ def cure(text: str, line: int, begun: int | None) -> str:
 
 
 def missing_space(text: str) -> str:
-    """The cure for text such as ``sysid:1`` where a key and its value are wanted, or an empty text."""
+    """The cure for text such as ``sysid:1`` in place of a key and its value, or an empty text."""
     match = _TIGHT.fullmatch(text)
     return f"a space is missing after the colon: `{match[2]}: {_short(match[3].strip())}`" if match else ""
 
@@ -273,7 +273,7 @@ def _not_closed(lines: list[str]) -> str:
 
 
 def _indented(before: str, line: str) -> str:
-    """What is wrong with the indent of a key after another key, or an empty text."""
+    """The fault in the indent of a key after another key, or an empty text."""
     above, own = _KEY_LINE.fullmatch(before), _KEY_LINE.fullmatch(line)
     if above is None or own is None or len(above[1]) == len(own[1]) or "-" in own[1]:
         return ""
@@ -282,7 +282,7 @@ def _indented(before: str, line: str) -> str:
 
 
 def _of_line(line: str, *, own: bool) -> str:
-    """What is wrong with a line; ``own`` if the parser stopped in it."""
+    """The fault in a line; ``own`` if the parser stopped in it."""
     if "\t" in line[: len(line) - len(line.lstrip())]:
         return "indent with spaces, not tabs"
     if "\u00a0" in line:

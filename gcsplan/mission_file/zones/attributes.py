@@ -1,4 +1,4 @@
-"""What the attributes of a zone say, in every format: its name, floor, ceiling, and its radius or buffer.
+"""The attributes of a zone, in every format: its name, floor, ceiling, and its radius or buffer.
 
 There is one table of names, and case does not matter. An attribute that seems to limit a zone but is not read leaves
 the zone larger, and a remark says so; a limit that is read and not understood is a mistake.
@@ -78,7 +78,7 @@ _OPENAIP_CODES = {"unit": {0: "M", 1: "FT", 6: "FL"}, "referencedatum": {0: "GND
 
 @dataclass(frozen=True, slots=True)
 class Meaning:
-    """What the table says of an attribute's name: ``own`` is a key of mission files, ``limit`` a floor or ceiling."""
+    """The meaning of an attribute's name: ``own`` is a key of mission files, ``limit`` a floor or ceiling."""
 
     lower: str
     own: bool
@@ -91,7 +91,7 @@ class Meaning:
 
 @lru_cache(maxsize=4096)  # features repeat their attributes' names
 def meaning_of(key: str) -> Meaning:
-    """What the table says of a name, whatever its case, spaces and signs."""
+    """The meaning of a name, whatever its case, spaces and signs."""
     lower = key.lower()
     plain = re.sub(r"[^a-z0-9]", "", lower)
     limit, shared = _LIMIT.fullmatch(plain), bool(_SHARED.fullmatch(plain))
@@ -112,7 +112,7 @@ class Attribute:
 
     @property
     def meaning(self) -> Meaning:
-        """What the table says of its name."""
+        """The meaning of its name."""
         return meaning_of(self.stands_for or self.key)
 
     def __str__(self) -> str:
@@ -121,7 +121,7 @@ class Attribute:
 
 @dataclass(frozen=True, slots=True)
 class ZoneStatements:
-    """What the attributes of one zone say."""
+    """The name, limits and size of one zone, by its attributes."""
 
     name: str
     radius_m: float | None
@@ -133,7 +133,7 @@ class ZoneStatements:
 
 
 def read_attributes(given: Sequence[Attribute], name: str, problems: list[Mistake]) -> ZoneStatements | None:
-    """What the attributes say; ``name`` is for a zone without one. None, and ``problems``, if they cannot be read."""
+    """The statements of the attributes; ``name`` is for a zone without one. None, and ``problems``, if unreadable."""
     known: list[Attribute] = []
     ignored: list[Attribute] = []
     times: list[Attribute] = []
@@ -161,7 +161,7 @@ def read_attributes(given: Sequence[Attribute], name: str, problems: list[Mistak
 
 
 def level_read(given: object, bound: str, level: Level) -> Note:
-    """How a limit as it is written was understood: ``bound`` is floor or ceiling."""
+    """A note on the reading of a limit as it is written: ``bound`` is floor or ceiling."""
     return Note("level_of_attribute", given=str(given), bound=bound, level_m=level.value_m, datum=level.datum.upper())
 
 

@@ -1,4 +1,4 @@
-"""What the bytes of a zone file hold, read strictly: a text, the values of JSON, or the members of a zip archive.
+"""The content of a zone file, read strictly: a text, the values of JSON, or the members of a zip archive.
 
 A text is UTF-8, or UTF-16 where its first bytes say so, as Windows programs save it. JSON has no key twice, no NaN and
 no number without bounds. Of an archive, KMZ or a zipped Shapefile, one member is unpacked, never more than is allowed.
@@ -69,7 +69,7 @@ DAMAGED = (
     zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, OSError, RuntimeError, ValueError,
     LookupError, ArithmeticError,
 )  # fmt: skip
-"""What the library raises for damaged archives."""
+"""The errors that the library raises for damaged archives."""
 
 
 def unpack(
@@ -98,7 +98,7 @@ def unpack(
             for name in dict.fromkeys([main, *companions]):
                 with archive.open(members[name]) as member:
                     unpacked[name.suffix.lower()] = member.read(most_bytes + 1)
-                # What the archive says of sizes may be a lie, so that the bytes themselves are counted.
+                # The archive's own sizes may be wrong, so the bytes themselves are counted.
                 if sum(len(content) for content in unpacked.values()) > most_bytes:
                     words = f"unpacks to more than {most_bytes} bytes; simplify or split it"
                     raise InputError(words, where=f"{path}: {name}")
@@ -111,7 +111,7 @@ def unpack(
 
 
 _DEGREES = re.compile(r"(?:^|[^A-Z0-9])(?:CRS:?84H?|4326(?:\+\d+)?|4979)[^A-Z0-9]*$", re.IGNORECASE)
-"""How the names, codes and addresses of WGS 84 in degrees end."""
+"""The ends of the names, codes and addresses of WGS 84 in degrees."""
 
 
 def require_wgs84(whole: Any, path: Path, format_name: str = "GeoJSON") -> None:

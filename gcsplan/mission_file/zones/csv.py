@@ -54,9 +54,9 @@ def read_csv(path: Path, data: bytes) -> ZoneFile:
         raise InputError(words, where=str(path)) from None
     lines = text.splitlines()
     filled = [line.strip() for line in lines[:20] if line.strip()]
-    said = _SEPARATOR.fullmatch(filled[0]) if filled else None
+    separator = _SEPARATOR.fullmatch(filled[0]) if filled else None
     header = filled[0] if filled else ""
-    delimiter = said[1] if said is not None else max(DELIMITERS, key=header.count)
+    delimiter = separator[1] if separator is not None else max(DELIMITERS, key=header.count)
     # A cell longer than csv's limit, 128 KiB, or a zero byte is an error of csv.
     rows = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, skipinitialspace=True)
     found = ZoneFile(path)
@@ -65,7 +65,7 @@ def read_csv(path: Path, data: bytes) -> ZoneFile:
         for row in rows:
             if not any(cell.strip() for cell in row):
                 continue
-            if said is not None and columns is None and row[0].strip().lower().startswith("sep="):
+            if separator is not None and columns is None and row[0].strip().lower().startswith("sep="):
                 continue
             if columns is None:
                 columns = _header(path, row, delimiter)
@@ -111,9 +111,9 @@ def _row(found: ZoneFile, columns: _Columns, row: list[str], where: str, fallbac
     cells = [cell.strip() for cell in row] + [""] * (len(columns.names) - len(row))
     centre = _place(found, columns, cells, where)
     given = [_attribute(columns, i, cell, where) for i, cell in enumerate(cells) if i not in columns.place and cell]
-    said = read_attributes(given, fallback, found.problems)
-    if centre is not None and said is not None:
-        found.add_circle(said, said.name, where, centre)
+    stated = read_attributes(given, fallback, found.problems)
+    if centre is not None and stated is not None:
+        found.add_circle(stated, stated.name, where, centre)
 
 
 def _place(found: ZoneFile, columns: _Columns, cells: list[str], where: str) -> tuple[float, float] | None:
@@ -130,7 +130,7 @@ def _place(found: ZoneFile, columns: _Columns, cells: list[str], where: str) -> 
         found.problems.append(Mistake(where, str(why)))
         return None
     if place.note:
-        found.said.append(place.note.of(place=where.rpartition(": ")[2]))
+        found.own_notes.append(place.note.of(place=where.rpartition(": ")[2]))
     return place.lat_deg, place.lon_deg
 
 

@@ -44,7 +44,7 @@ MOST_ALL_CORNERS = 400_000
 and twice as many each mission: they are not even drawn."""
 
 WIDEST_M, MUCH_WIDER_M = 0.5, (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
-"""How much wider an outline is drawn without being asked, m, and tolerances that are tried for a cure."""
+"""How much wider an outline is drawn without a request, m, and tolerances that are tried for a cure."""
 
 DRAWN_WIDER = Note("zone_outline_widened", most_corners=MOST_ZONE_CORNERS, wider_m=WIDEST_M)
 
@@ -52,7 +52,7 @@ MAX_LINE_POINTS = 20_000
 """Most points of one line: its corridor takes a second for some thousand points."""
 
 Remark = tuple[Note, Datum]
-"""What a user has to know about how a zone of a file was read: a note for all such zones, and what this one has."""
+"""A remark for the user on how a zone was read: a note for all such zones, and the datum of this one."""
 
 ACROSS_ANTIMERIDIAN = Note("zone_across_the_antimeridian")
 OTHER_SIDE = (
@@ -173,8 +173,8 @@ def polygon(
     if fault:
         problems.append(Mistake(at, fault))
         return None
-    said = ((ACROSS_ANTIMERIDIAN, None),) if doubt else ()
-    return ZoneDraft(name, where, tuple(ring), local, None, floor, ceiling, remarks=said, doubt=doubt)
+    remarks = ((ACROSS_ANTIMERIDIAN, None),) if doubt else ()
+    return ZoneDraft(name, where, tuple(ring), local, None, floor, ceiling, remarks=remarks, doubt=doubt)
 
 
 def corridor(
@@ -274,7 +274,7 @@ def place_zones(drafts: Sequence[ZoneDraft], frame: Frame) -> tuple[list[tuple[Z
 def _with_fewer_corners(
     draft: ZoneDraft, shapes: Sequence[Circle | Polygon]
 ) -> tuple[ZoneDraft, Sequence[Circle | Polygon]]:
-    """The shapes, those with too many corners drawn wider with fewer, and what is said of that.
+    """The shapes; a shape with too many corners is drawn wider with fewer of them, and the zone has a remark on that.
 
     If that does not help, the zone has a fault: it refuses a mission nearby.
     """
@@ -309,7 +309,7 @@ def _wider(shape: Polygon) -> Polygon | None:
 
 
 def zone_notes(placed: Sequence[tuple[ZoneDraft, object]]) -> list[Note]:
-    """The remarks of the zones, beside their drafts, with one note for all zones of which the same is said."""
+    """The remarks of the zones, beside their drafts, with one note for all zones that share a remark."""
     about: dict[Note, list[Datum]] = {}
     for draft in {id(draft): draft for draft, _ in placed}.values():  # a polygon may be cut into several zones
         for note, given in draft.remarks:

@@ -28,7 +28,7 @@ BUFFER_OF_POLYGON = Note("zone_buffer_of_polygon_unread")
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """The heights with which a format draws a polygon, as far as they limit it, and what is said of them."""
+    """The heights with which a format draws a polygon, as far as they limit it, and remarks on them."""
 
     ceiling: Level | None = None
     remarks: tuple[Remark, ...] = ()
@@ -38,7 +38,7 @@ NOT_DRAWN = Drawn()
 
 
 def drawn_unread(altitudes_m: Sequence[float]) -> Drawn:
-    """What is said of the altitudes of corners, which limit nothing."""
+    """A remark on the altitudes of corners, which limit nothing."""
     if not altitudes_m:
         return NOT_DRAWN
     return Drawn(remarks=((Note("zone_corner_altitudes_unread"), Note("drawn_up_to", top_m=max(altitudes_m))),))
@@ -63,7 +63,7 @@ class ZoneFile:
     zones: list[ZoneDraft] = field(default_factory=list)
     problems: list[Mistake] = field(default_factory=list)
     holes: int = 0
-    said: list[Note] = field(default_factory=list)
+    own_notes: list[Note] = field(default_factory=list)
     columns: tuple[str, ...] = ()
     unsized: list[Unsized] = field(default_factory=list)
     great_circles: bool = False
@@ -71,9 +71,9 @@ class ZoneFile:
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """What a user has to know about how the file was read."""
+        """The notes for the user on how the file was read."""
         holes = [Note("holes_are_no_fly", count=self.holes)] if self.holes else []
-        return tuple(note.of(file=self.path.name) for note in [*self.said, *holes])
+        return tuple(note.of(file=self.path.name) for note in [*self.own_notes, *holes])
 
     def give_sizes(self, radius_m: float | None, buffer_m: float | None) -> None:
         """Give the points and lines without a size of their own that of the mission; without one they are a problem."""
@@ -95,33 +95,43 @@ class ZoneFile:
         self.unsized = []
 
     def add_ring(
-        self, said: ZoneStatements, part: str, where: str, ring: list[tuple[float, float]], key: str,
+        self, stated: ZoneStatements, part: str, where: str, ring: list[tuple[float, float]], key: str,
         drawn: Drawn = NOT_DRAWN, holes: int = 0,
     ) -> None:  # fmt: skip
         """Add a polygon called ``part`` by its outline, (latitude, longitude), and the number of its holes."""
         self.holes += holes
-        bounds = said.bounds
-        remarks = [*said.remarks, *drawn.remarks]
+        bounds = stated.bounds
+        remarks = [*stated.remarks, *drawn.remarks]
         if drawn.ceiling is not None:
             bounds = replace(bounds, **{f"ceiling_{drawn.ceiling.datum}_m": drawn.ceiling.value_m})
-        for size_m, note in ((said.radius_m, RADIUS_OF_POLYGON), (said.buffer_m, BUFFER_OF_POLYGON)):
+        for size_m, note in ((stated.radius_m, RADIUS_OF_POLYGON), (stated.buffer_m, BUFFER_OF_POLYGON)):
             if size_m is not None:
                 remarks.append((note, Note("size_of_zone", size_m=size_m)))
         self.add(polygon(part[:200], where, ring, bounds, self.problems, key=key, holes=holes), remarks)
 
     def add_circle(
-        self, said: ZoneStatements, part: str, where: str, centre: Corner, remarks: Sequence[Remark] = ()
+        self, stated: ZoneStatements, part: str, where: str, centre: Corner, remarks: Sequence[Remark] = ()
     ) -> None:
         """Add a circle called ``part`` by its centre, (latitude, longitude); its radius may come from the mission."""
-        make = partial(circle, part[:200], where, centre, bounds=said.bounds, problems=self.problems)
-        self._add_sized("point", said.radius_m, lambda size_m: make(radius_m=size_m), where, [*said.remarks, *remarks])
+        make = partial(circle, part[:200], where, centre, bounds=stated.bounds, problems=self.problems)
+        self._add_sized(
+            "point", stated.radius_m, lambda size_m: make(radius_m=size_m), where, [*stated.remarks, *remarks]
+        )
 
     def add_line(
-        self, said: ZoneStatements, part: str, where: str, line: list[Corner], key: str, remarks: Sequence[Remark] = ()
+        self,
+        stated: ZoneStatements,
+        part: str,
+        where: str,
+        line: list[Corner],
+        key: str,
+        remarks: Sequence[Remark] = (),
     ) -> None:
         """Add the corridor around a line, (latitude, longitude); its half-width may come from the mission."""
-        make = partial(corridor, part[:200], where, line, bounds=said.bounds, problems=self.problems, key=key)
-        self._add_sized("line", said.buffer_m, lambda size_m: make(buffer_m=size_m), where, [*said.remarks, *remarks])
+        make = partial(corridor, part[:200], where, line, bounds=stated.bounds, problems=self.problems, key=key)
+        self._add_sized(
+            "line", stated.buffer_m, lambda size_m: make(buffer_m=size_m), where, [*stated.remarks, *remarks]
+        )
 
     def _add_sized(
         self, kind: Literal["point", "line"], size_m: float | None, make: Callable[[float], ZoneDraft | None],

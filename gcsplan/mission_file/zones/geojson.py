@@ -41,7 +41,7 @@ def read_geojson(path: Path, whole: Any) -> ZoneFile:
         if not flown[i]:
             _feature(found, feature, where, f"{path.stem}[{i}]")
     if any(flown):
-        found.said.append(Note("tracks_unused", count=sum(flown)))
+        found.own_notes.append(Note("tracks_unused", count=sum(flown)))
     return found
 
 
@@ -73,26 +73,26 @@ def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
         what = "properties must be an object" if not isinstance(properties, dict) else "the feature has no geometry"
         found.problems.append(Mistake(where, what))
         return
-    said = read_attributes(_attributes(properties, geometry, where), fallback, found.problems)
-    if said is None:
+    stated = read_attributes(_attributes(properties, geometry, where), fallback, found.problems)
+    if stated is None:
         return
     kind, coordinates = geometry.get("type"), geometry.get("coordinates")
     at = f"{where}.geometry.coordinates" if geometry is not feature else f"{where}.coordinates"
     if kind == "Point":
         centre = _position(found, coordinates, at)
         if centre is not None:
-            found.add_circle(said, said.name, where, centre, _unread([coordinates]).remarks)
+            found.add_circle(stated, stated.name, where, centre, _unread([coordinates]).remarks)
     elif kind in ("Polygon", "MultiPolygon"):
-        for rings, part, place in _parts(found, coordinates, said, at, kind):
-            _rings(found, rings, said, part, where, place)
+        for rings, part, place in _parts(found, coordinates, stated, at, kind):
+            _rings(found, rings, stated, part, where, place)
     elif kind in ("LineString", "MultiLineString", "MultiPoint"):
-        for one, part, place in _parts(found, coordinates, said, at, kind):
+        for one, part, place in _parts(found, coordinates, stated, at, kind):
             if kind == "MultiPoint":
                 centre = _position(found, one, place)
                 if centre is not None:
-                    found.add_circle(said, part, where, centre, _unread([one]).remarks)
+                    found.add_circle(stated, part, where, centre, _unread([one]).remarks)
             else:
-                _line(found, one, said, part, where, place)
+                _line(found, one, stated, part, where, place)
     else:
         found.problems.append(
             Mistake(
@@ -101,19 +101,19 @@ def _feature(found: ZoneFile, feature: Any, where: str, fallback: str) -> None:
         )
 
 
-def _parts(found: ZoneFile, coordinates: Any, said: ZoneStatements, at: str, kind: str) -> list[tuple[Any, str, str]]:
+def _parts(found: ZoneFile, coordinates: Any, stated: ZoneStatements, at: str, kind: str) -> list[tuple[Any, str, str]]:
     """The parts of a geometry, each with its name and place; one part unless the kind begins with Multi."""
     several = kind.startswith("Multi")
     parts = coordinates if several else [coordinates]
     if not isinstance(parts, list) or not parts:
         found.problems.append(Mistake(at, f"a {kind} needs a list of coordinates, given {shown(parts)}"))
         return []
-    return [(part, f"{said.name}/{i + 1}" if several else said.name, f"{at}[{i}]" if several else at)
+    return [(part, f"{stated.name}/{i + 1}" if several else stated.name, f"{at}[{i}]" if several else at)
             for i, part in enumerate(parts)]  # fmt: skip
 
 
 def _attributes(properties: dict[str, Any], geometry: dict[str, Any], where: str) -> list[Attribute]:
-    """Those of the feature, and those of its ``layer``, where ED-318 has the limits of a zone."""
+    """The attributes of the feature and of its ``layer``, where ED-318 has the limits of a zone."""
     given = [Attribute(key, value, f"{where}.properties.{key[:80]}") for key, value in properties.items()]
     layer = geometry.get("layer")
     if isinstance(layer, dict):
@@ -122,11 +122,11 @@ def _attributes(properties: dict[str, Any], geometry: dict[str, Any], where: str
 
 
 def _unread(positions: list[Any]) -> Drawn:
-    """What is said of altitudes in positions; GeoJSON does not tell whether they are a floor, a ceiling or ground."""
+    """A remark on altitudes in positions: GeoJSON does not say whether they are a floor, a ceiling or ground."""
     return drawn_unread([p[2] for p in positions if len(p) > 2 and is_number(p[2]) and p[2] != 0])
 
 
-def _rings(found: ZoneFile, rings: Any, said: ZoneStatements, part: str, where: str, at: str) -> None:
+def _rings(found: ZoneFile, rings: Any, stated: ZoneStatements, part: str, where: str, at: str) -> None:
     if not isinstance(rings, list) or not rings or not isinstance(rings[0], list):
         found.problems.append(Mistake(at, f"a polygon is a list of rings, given {shown(rings)}"))
         return
@@ -135,17 +135,17 @@ def _rings(found: ZoneFile, rings: Any, said: ZoneStatements, part: str, where: 
     if outline is not None and (odd := beyond_outline(outline, [hole for hole in holes if hole])):
         found.problems.append(Mistake(at, f"zone {part[:60]!r}: {odd}"))
     elif outline is not None:
-        found.add_ring(said, part, where, outline, at.removeprefix(where).removeprefix("."), _unread(rings[0]),
+        found.add_ring(stated, part, where, outline, at.removeprefix(where).removeprefix("."), _unread(rings[0]),
                        holes=len(rings) - 1)  # fmt: skip
 
 
-def _line(found: ZoneFile, positions: Any, said: ZoneStatements, part: str, where: str, at: str) -> None:
+def _line(found: ZoneFile, positions: Any, stated: ZoneStatements, part: str, where: str, at: str) -> None:
     if not isinstance(positions, list):
         found.problems.append(Mistake(at, f"a line is a list of positions, given {shown(positions)}"))
         return
     line = _positions(found, positions, at)
     if line is not None:
-        found.add_line(said, part, where, line, at.removeprefix(where).removeprefix("."), _unread(positions).remarks)
+        found.add_line(stated, part, where, line, at.removeprefix(where).removeprefix("."), _unread(positions).remarks)
 
 
 def _positions(found: ZoneFile, positions: list[Any], at: str) -> list[tuple[float, float]] | None:

@@ -31,13 +31,13 @@ MOST_TAGS = 2_000_000
 """Most beginnings and ends of elements, each of which takes some 300 bytes of memory; 20 MB of zones have a third."""
 
 MODES: dict[str, Literal["agl", "amsl"]] = {"relativeToGround": "agl", "absolute": "amsl"}
-"""What altitudes are counted from, by the altitudeModes in which they count at all."""
+"""The zero of altitudes, by the altitudeModes in which they count at all."""
 
 DrawnCorner = tuple[float, float, float]
 """Latitude, longitude and altitude of a corner; not a number if it has no altitude."""
 
 _PICTURES = ("PhotoOverlay", "ScreenOverlay", "Tour")
-"""What shows the map and limits nothing."""
+"""Elements that decorate the map and limit nothing."""
 
 _READ_SHAPES = ("Polygon", "Point", "LineString")
 _KML_SHAPES = (*_READ_SHAPES, "LinearRing", "Model", "Track", "MultiTrack")
@@ -48,7 +48,7 @@ def read_kml(path: Path, data: bytes) -> ZoneFile:
     found = ZoneFile(path, great_circles=True)  # as Google Earth draws them
     if data.count(b"<") > MOST_TAGS:
         raise InputError(
-            f"the KML has more than {MOST_TAGS} tags; leave out what is far from the mission", where=str(path)
+            f"the KML has more than {MOST_TAGS} tags; leave out zones far from the mission", where=str(path)
         )
     try:
         root = defusedxml.ElementTree.fromstring(data, forbid_dtd=True)
@@ -72,7 +72,7 @@ def read_kml(path: Path, data: bytes) -> ZoneFile:
             found.problems.append(Mistake(f"{path}: {kind}", f"a {kind} cannot be read as a zone; remove it"))
     if pictures:
         kinds = tuple(counted(count, kind) for kind, count in pictures.items())
-        found.said.append(Note("pictures_unused", kinds=kinds))
+        found.own_notes.append(Note("pictures_unused", kinds=kinds))
     for kind, count in loose.items():
         words = f"{counted(count, kind)} outside of a Placemark cannot be read as a zone; put each into a Placemark"
         found.problems.append(Mistake(f"{path}: {kind}", words))
@@ -102,8 +102,8 @@ def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
     name = next((t for c in placemark if _kind(c) == "name" and (t := (c.text or "").strip())), "")
     where = f"{found.path}: Placemark {number}" + (f" ({name[:60]})" if name else "")
     given = [Attribute("name", name, where), *_extended_data(placemark, where), *_times(placemark, where)]
-    said = read_attributes(given, f"{found.path.stem}[{number}]", found.problems)
-    if said is None:
+    stated = read_attributes(given, f"{found.path.stem}[{number}]", found.problems)
+    if stated is None:
         return
     shapes = [e for e in _walk(placemark, found.path, leaves=_READ_SHAPES) if _kind(e) in _KML_SHAPES]
     others = [_kind(e) for e in shapes if _kind(e) not in _READ_SHAPES]
@@ -117,22 +117,22 @@ def _placemark(found: ZoneFile, placemark: Any, number: int) -> None:
         )
         return
     for i, shape in enumerate(shapes):
-        part = said.name if len(shapes) == 1 else f"{said.name}/{i + 1}"
+        part = stated.name if len(shapes) == 1 else f"{stated.name}/{i + 1}"
         if _kind(shape) == "Point":
             points = _coordinates(found, shape, where)
             if points is not None and len(points) == 1:
-                found.add_circle(said, part, where, points[0][:2], _unread(points).remarks)
+                found.add_circle(stated, part, where, points[0][:2], _unread(points).remarks)
             elif points is not None:
                 found.problems.append(Mistake(where, f"a Point has one coordinate, given {len(points)}"))
         elif _kind(shape) == "LineString":
             points = _coordinates(found, shape, where)
             if points is not None:
-                found.add_line(said, part, where, [p[:2] for p in points], "", _unread(points).remarks)
+                found.add_line(stated, part, where, [p[:2] for p in points], "", _unread(points).remarks)
         else:
-            _polygon(found, shape, said, part, where)
+            _polygon(found, shape, stated, part, where)
 
 
-def _polygon(found: ZoneFile, shape: Any, said: ZoneStatements, part: str, where: str) -> None:
+def _polygon(found: ZoneFile, shape: Any, stated: ZoneStatements, part: str, where: str) -> None:
     outer = [e for e in _walk(shape, found.path) if _kind(e) == "outerBoundaryIs"]
     if len(outer) != 1:
         found.problems.append(Mistake(where, f"a Polygon has one outerBoundaryIs, given {len(outer)}"))
@@ -144,8 +144,8 @@ def _polygon(found: ZoneFile, shape: Any, said: ZoneStatements, part: str, where
     if odd:
         found.problems.append(Mistake(where, odd))
     elif points is not None:
-        drawn = _unread(points) if said.of_levels else _drawn(shape, points)
-        found.add_ring(said, part, where, [p[:2] for p in points], "", drawn, len(inner))
+        drawn = _unread(points) if stated.of_levels else _drawn(shape, points)
+        found.add_ring(stated, part, where, [p[:2] for p in points], "", drawn, len(inner))
 
 
 def _drawn(shape: Any, points: list[DrawnCorner]) -> Drawn:

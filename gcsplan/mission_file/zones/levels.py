@@ -1,8 +1,8 @@
 """Floors and ceilings of zones as authorities write them: ``1500 FT AMSL``, ``450 m AGL``, ``FL 65``, ``GND``, ``UNL``.
 
 A level is a number, a unit and a reference in any order, or a word for the ground or for no limit. The words may also
-stand beside the number, in the attribute's name (``LOWER_FT_AGL``) or in attributes of their own (``LOWER_UOM``). What
-is missing is never guessed: a unit or a reference that is guessed wrong makes a zone smaller than it is.
+stand beside the number, in the attribute's name (``LOWER_FT_AGL``) or in attributes of their own (``LOWER_UOM``). A
+missing part is never guessed: a unit or a reference that is guessed wrong makes a zone smaller than it is.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ REFERENCES = (
     | dict.fromkeys(("AGL", "GND", "SFC", "GROUND", "SURFACE", "AGND", "ASFC"), "agl")
     | {PRESSURE: PRESSURE}
 )
-"""What a height is counted from, by its names."""
+"""The zero of a height, by its names."""
 
 GROUND_WORDS = frozenset({"GND", "SFC", "GROUND", "SURFACE"})
 UNLIMITED_WORDS = frozenset({"UNL", "UNLIM", "UNLTD", "UNLIMITED"})
@@ -66,23 +66,23 @@ def read_level(value: str | int | float, words: Iterable[str] = (), spare: Seque
     ``words`` belong to it too (units and references in other attributes, or in the attribute's name); ``spare`` are
     used for what is missing alone. The ground is 0 m AGL.
     """
-    numbers, said = _tokens(str(value).translate(_FEET_MARKS) if isinstance(value, str) else repr(value))
+    numbers, named = _tokens(str(value).translate(_FEET_MARKS) if isinstance(value, str) else repr(value))
     for more in words:
         further, names = _tokens(more)
         numbers += further
-        said |= names
-    units = {LEVEL_UNITS[w] for w in said if w in LEVEL_UNITS}
-    references = {REFERENCES[w] for w in said if w in REFERENCES}
-    if unknown := sorted(said - LEVEL_UNITS.keys() - REFERENCES.keys() - UNLIMITED_WORDS):
+        named |= names
+    units = {LEVEL_UNITS[w] for w in named if w in LEVEL_UNITS}
+    references = {REFERENCES[w] for w in named if w in REFERENCES}
+    if unknown := sorted(named - LEVEL_UNITS.keys() - REFERENCES.keys() - UNLIMITED_WORDS):
         raise LevelError(f"{unknown[0]!r} is not known")
     if len(numbers) > 1:
         raise LevelError("it holds several numbers")
-    if said & UNLIMITED_WORDS:
-        if numbers or said & GROUND_WORDS:
+    if named & UNLIMITED_WORDS:
+        if numbers or named & GROUND_WORDS:
             raise LevelError("it is unlimited and has a limit")
         return Limit.UNLIMITED
     if not numbers:
-        if said & GROUND_WORDS and references == {"agl"}:
+        if named & GROUND_WORDS and references == {"agl"}:
             return Level(0.0, "agl")
         raise LevelError("it holds no number")
     for word in (text.strip().upper() for text in spare):

@@ -32,7 +32,7 @@ ARC_STEP_DEG = "0.1"
 """GDAL draws arcs as chords of this angle: at a radius of 50 km they lie 2 cm inside."""
 
 HOT_JOURNAL = bytes.fromhex("d9d505f920a163d7")
-"""How a journal of SQLite begins whose changes are not ended: without it they are half in the file."""
+"""The first bytes of an SQLite journal of unfinished changes: without the journal the file holds half of them."""
 
 MOST_WARNINGS = 5
 
@@ -58,14 +58,14 @@ def read_vector(path: Path, data: bytes, *, layer: str | None, most_bytes: int) 
         warnings.simplefilter("always")
         try:
             layers = [(str(name), kind) for name, kind in pyogrio.list_layers(source)]
-            for name in _wanted(path, layers, layer):
+            for name in _chosen_layers(path, layers, layer):
                 _layer(found, pyogrio, source, name)
         except (RuntimeError, ValueError, OSError) as why:
             if isinstance(why, InputError):
                 raise
             reason = str(why).replace(str(source), path.name)[:200]
             raise InputError(f"GDAL cannot read it: {reason}", where=str(path)) from None
-    found.said += dict.fromkeys(Note("gdal_warns", warning=str(w.message)[:200]) for w in heard[:MOST_WARNINGS])
+    found.own_notes += dict.fromkeys(Note("gdal_warns", warning=str(w.message)[:200]) for w in heard[:MOST_WARNINGS])
     return found
 
 
@@ -128,8 +128,8 @@ def _beside(path: Path, most_bytes: int) -> dict[str, bytes]:
     return beside
 
 
-def _wanted(path: Path, layers: list[tuple[str, Any]], layer: str | None) -> list[str]:
-    """The names of the layers to read: those with shapes, or the one that is asked for."""
+def _chosen_layers(path: Path, layers: list[tuple[str, Any]], layer: str | None) -> list[str]:
+    """The names of the layers to read: every layer with shapes, or the ``layer`` that is given."""
     drawn = [name for name, kind in layers if kind is not None]
     if layer is not None and layer not in drawn:
         raise InputError(
@@ -162,14 +162,14 @@ def _layer(found: ZoneFile, pyogrio: Any, source: Path, layer: str) -> None:
         raise InputError(NO_CRS, where=where)
     to_degrees = ToDegrees(meta["crs"], (0.5 * (extent[0] + extent[2]), 0.5 * (extent[1] + extent[3])), where=where)
     if to_degrees.note:
-        found.said.append(to_degrees.note)
+        found.own_notes.append(to_degrees.note)
     names = [str(name) for name in meta["fields"]]
     for i, (fid, geometry) in enumerate(zip(fids, geometries, strict=True)):
         at = f"{where}: feature {fid}"
         given = _attributes({name: column[i] for name, column in zip(names, columns, strict=True)}, at)
-        said = read_attributes(given, f"{found.path.stem}[{fid}]", found.problems)
-        if said is not None:
-            _feature(found, geometry, said, at, to_degrees)
+        stated = read_attributes(given, f"{found.path.stem}[{fid}]", found.problems)
+        if stated is not None:
+            _feature(found, geometry, stated, at, to_degrees)
 
 
 def _geometries(shapes: Any, where: str) -> Any:
@@ -197,14 +197,14 @@ def _attributes(row: Mapping[str, Any], where: str) -> list[Attribute]:
 
 
 def _feature(
-    found: ZoneFile, geometry: shapely.Geometry | None, said: ZoneStatements, where: str, to_degrees: ToDegrees
+    found: ZoneFile, geometry: shapely.Geometry | None, stated: ZoneStatements, where: str, to_degrees: ToDegrees
 ) -> None:
     """Add every part of a feature's geometry."""
     parts = [] if geometry is None else _parts(geometry)
     if not parts:
         found.problems.append(Mistake(where, "the feature has no geometry; remove it, or draw it"))
     for i, shape in enumerate(parts):
-        part = said.name if len(parts) == 1 else f"{said.name}/{i + 1}"
+        part = stated.name if len(parts) == 1 else f"{stated.name}/{i + 1}"
         if shape.geom_type not in ("Polygon", "Point", "LineString"):
             found.problems.append(Mistake(where, f"must be polygons, points or lines, given a {shape.geom_type}"))
             continue
@@ -216,17 +216,17 @@ def _feature(
             drawn_deg = to_degrees.line(xy, MAX_VERTICES, any_width=is_keep_in)
             corners = [(float(lat), float(lon)) for lat, lon in drawn_deg]
         except InputError as why:
-            found.problems.append(Mistake(where, f"zone {said.name[:60]!r}: {why.message}"))
+            found.problems.append(Mistake(where, f"zone {stated.name[:60]!r}: {why.message}"))
             continue
         rings = [np.asarray(ring.coords)[:, :2] for ring in getattr(shape, "interiors", ())]
         if odd := beyond_outline(xy.tolist(), [ring.tolist() for ring in rings], metres=True):
-            found.problems.append(Mistake(where, f"zone {said.name[:60]!r}: {odd}"))
+            found.problems.append(Mistake(where, f"zone {stated.name[:60]!r}: {odd}"))
         elif shape.geom_type == "Polygon":
-            found.add_ring(said, part, where, corners, "", drawn, len(shape.interiors))
+            found.add_ring(stated, part, where, corners, "", drawn, len(shape.interiors))
         elif shape.geom_type == "Point":
-            found.add_circle(said, part, where, corners[0], drawn.remarks)
+            found.add_circle(stated, part, where, corners[0], drawn.remarks)
         else:
-            found.add_line(said, part, where, corners, "", drawn.remarks)
+            found.add_line(stated, part, where, corners, "", drawn.remarks)
 
 
 def _parts(geometry: shapely.Geometry) -> list[Any]:
@@ -243,6 +243,6 @@ def _parts(geometry: shapely.Geometry) -> list[Any]:
 
 
 def _unread(line: Any) -> Drawn:
-    """What is said of altitudes in corners, which limit nothing."""
+    """A remark on altitudes in corners, which limit nothing."""
     heights = [p[2] for p in line.coords if len(p) > 2 and math.isfinite(p[2]) and p[2] != 0.0] if line.has_z else []
     return drawn_unread(heights)

@@ -32,7 +32,7 @@ function least(v, d, unit) {
   return num(v === null ? null : Math.floor(v * 10 ** d + 1e-3) / 10 ** d, d, unit);
 }
 
-// h:mm:ss, with decimals of a second if asked.
+// h:mm:ss, with decimals of a second on request.
 function duration(s, decimals = 0) {
   if (s === null || s === undefined || !isFinite(s)) return '–';
   const parts = Math.round(Math.abs(s) * 10 ** decimals), whole = Math.floor(parts / 10 ** decimals);

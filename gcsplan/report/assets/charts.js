@@ -49,8 +49,8 @@ function startChart(figure) {
 
   function retick(view) {
     const from = x0 + view.x * (x1 - x0), span = view.w * (x1 - x0);
-    const wanted = span / Math.max(3, Math.min(9, plot.clientWidth / 90));
-    const inUnit = size ? niceStep(wanted / size) : 0, step = size ? size * inUnit : timeStep(wanted);
+    const roughly = span / Math.max(3, Math.min(9, plot.clientWidth / 90));
+    const inUnit = size ? niceStep(roughly / size) : 0, step = size ? size * inUnit : timeStep(roughly);
     const decimals = size ? Math.max(0, -Math.floor(Math.log10(inUnit) + 1e-9)) : step < 1 ? 1 : 0;
     for (const old of grids.querySelectorAll('path:not(.y)')) old.remove();
     xticks.textContent = '';

@@ -21,7 +21,7 @@ function startReplay() {
   box.hidden = false;
   slider.max = data.replay.end;
 
-  function told() {
+  function show() {
     const words = clockWords(replay.t);
     slider.value = replay.t;
     slider.setAttribute('aria-valuetext', words);
@@ -64,7 +64,7 @@ function startReplay() {
   if (closest) closest.addEventListener('click', () => { run(false); moveTo(data.replay.closest); });
   box.querySelector('details').addEventListener('toggle', fill);
   window.addEventListener('beforeprint', () => run(false));
-  movers.push(told);
+  movers.push(show);
   moveTo(0, false);
 }
 

@@ -1,4 +1,4 @@
-// The view in space: what is looked at from where, what the mouse and the fingers do, and the labels over it.
+// The view in space: its camera, its gestures of mouse and fingers, and its labels.
 const MOST_LABELS = 300; // more would not be read, and each takes time in every frame
 
 function startScene() {
@@ -15,7 +15,7 @@ function startScene() {
   const meshes = build(gl, at, low);
   const camera = { turn: -0.5, tilt: 0.75, far: 1.25 * Math.max(ground.width, ground.height), x: 0.5 * ground.width, y: 0.5 * ground.height };
   const spans = data.lines.flatMap((l) => l.z.map((z) => z - low));
-  let stretch = data.exaggeration, pointed = null, asked = false, printing = false, matrix = null, size = [1, 1];
+  let stretch = data.exaggeration, pointed = null, scheduled = false, printing = false, matrix = null, size = [1, 1];
   const highest = Math.max(0, ...[...ground.z].map((z) => (isNaN(z) ? 0 : z - low)), ...spans);
   const lift = () => 0.4 * stretch * highest;
   const home = { ...camera };
@@ -53,8 +53,8 @@ function startScene() {
   image.src = document.querySelector('#map image').getAttribute('href');
 
   function redraw() {
-    if (asked) return;
-    asked = true;
+    if (scheduled) return;
+    scheduled = true;
     requestAnimationFrame(draw);
   }
 
@@ -84,7 +84,7 @@ function startScene() {
   }
 
   function draw() {
-    asked = false;
+    scheduled = false;
     if (!figure.clientWidth) return;
     const ratio = Math.min(2, window.devicePixelRatio || 1), style = getComputedStyle(figure);
     size = [figure.clientWidth, figure.clientHeight];
@@ -143,12 +143,12 @@ function startScene() {
     if (printing) pen.drawImage(canvas, 0, 0, size[0], size[1]); // what WebGL drew does not reach the paper by itself
     pen.textAlign = 'center';
     pen.lineJoin = 'round';
-    const said = [], text = style.getPropertyValue('--text'), halo = style.getPropertyValue('--paper');
+    const drawn = [], text = style.getPropertyValue('--text'), halo = style.getPropertyValue('--paper');
     // A label beside a symbol of radius r; all are written last, each where there is room.
     const write = (words, c, r, bold, colour) => {
       if (c[0] < 0 || c[0] > size[0] || c[1] < 0 || c[1] > size[1]) return;
       pen.font = `${bold ? '600 ' : ''}12px system-ui, sans-serif`;
-      said.push({ x: c[0], y: c[1], r, w: pen.measureText(words).width, h: 14, words, bold: !!bold, font: pen.font, colour: colour || text });
+      drawn.push({ x: c[0], y: c[1], r, w: pen.measureText(words).width, h: 14, words, bold: !!bold, font: pen.font, colour: colour || text });
     };
     const dot = (c, r, fill) => {
       pen.beginPath();
@@ -208,7 +208,7 @@ function startScene() {
       pen.stroke();
       write('N', [o[0] + 20 * u[0], o[1] + 20 * u[1] + 8], 0, true);
     }
-    const first = said.reverse().sort((a, b) => b.bold - a.bold).slice(0, MOST_LABELS);
+    const first = drawn.reverse().sort((a, b) => b.bold - a.bold).slice(0, MOST_LABELS);
     layLabels(first, ...size, []).forEach((spot, i) => {
       if (!spot) return;
       const { words, font, w, colour } = first[i], x = spot[0] + 0.5 * w, y = spot[1] + 11;
@@ -303,10 +303,10 @@ function startScene() {
   });
   const control = document.querySelector('.stretch'), range = control.querySelector('input');
   control.hidden = false;
-  const told = () => { control.querySelector('output').textContent = num(stretch, 1); };
+  const show = () => { control.querySelector('output').textContent = num(stretch, 1); };
   range.value = stretch;
-  range.addEventListener('input', () => { stretch = +range.value; told(); redraw(); });
-  told();
+  range.addEventListener('input', () => { stretch = +range.value; show(); redraw(); });
+  show();
   fit();
   new ResizeObserver(redraw).observe(figure);
   movers.push(redraw);

@@ -1,4 +1,4 @@
-// Each figure on its own: what fails in one is told in the console, and the others are there all the same.
+// Each figure on its own: an error in one goes to the console, and the others are there all the same.
 document.documentElement.classList.add('live');
 // The briefing's map is laid out when it is printed, which is the only time it is shown.
 function startBriefing() {

@@ -1,1 +1,1 @@
-"""What all views of a page share: its data, labels and HTML."""
+"""The parts that all views of a page share: its data, labels and HTML."""

@@ -54,7 +54,7 @@ def least(value: float | None, decimals: int = 1, unit: str | Unit = "") -> str:
 
 
 def at_least(value: float | None, decimals: int = 1, unit: str | Unit = "") -> str:
-    """What must at least be set or reached, as in `num`, but rounded up."""
+    """A least value to set or to reach, as in `num`, but rounded up."""
     return _rounded(raised, value, decimals, unit)
 
 

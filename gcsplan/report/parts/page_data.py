@@ -43,9 +43,9 @@ class Subject:
     """One vehicle, or one checked file: its verdict, and other data on it.
 
     ``slot`` is its part of the time table, None for a checked file, and so is ``motion``, the whole flight over time.
-    ``flown`` is what it flew in a rehearsal, from that track alone. ``leaves``: it is gone where its motion ends.
+    ``flown`` is its flight in a rehearsal, from that track alone. ``leaves``: it is gone where its motion ends.
     ``home`` is the way home from every point, if it was judged. ``upload`` holds the keys of ``upload.json``, None if
-    nothing was sent, ``warnings`` what was said of it. ``settings``: the parameters that its mission was judged with.
+    nothing was sent, ``warnings`` the upload's. ``settings``: the parameters that its mission was judged with.
     ``typed``: the options that the reader types, by their keys in a mission file; empty if he has one.
     """
 
@@ -65,7 +65,7 @@ class Subject:
     typed: Mapping[str, str] = field(default_factory=dict)
 
     def wording(self, units: Units | None = None) -> Wording:
-        """How the reader is spoken to, in ``units``, or in SI."""
+        """The wording for the reader, in ``units``, or in SI."""
         return Wording(units, self.typed)
 
     @property
@@ -106,7 +106,7 @@ class Compared:
 
 @dataclass(frozen=True, slots=True)
 class Rehearsed:
-    """What a rehearsal found. ``how``: who flew, how often and in which weather, in a sentence."""
+    """The result of a rehearsal. ``how``: who flew, how often and in which weather, in a sentence."""
 
     safe: bool | None
     how: str
@@ -242,9 +242,9 @@ def only_some(page: Page, full: frozenset[int]) -> str:
         return ""
     command = "gcsplan check MISSION.yaml VEHICLE.plan --report FILE.html"
     return (
-        f'<p class="note">Of {len(page.subjects)} vehicles {len(full)} are shown: those with problems first, then the '
-        "two that come nearest to each other, then those with the least room above the ground. The others are on the "
-        f"map and in the tables of all vehicles; <code>{command}</code> shows one of those {rest}.</p>"
+        f'<p class="note">Of {len(page.subjects)} vehicles {len(full)} are shown: first vehicles with problems, then '
+        "the two that come nearest to each other, then vehicles with the least room above the ground. The others are on "
+        f"the map and in the tables of all vehicles; <code>{command}</code> shows one of the other {rest}.</p>"
     )
 
 

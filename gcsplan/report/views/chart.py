@@ -94,20 +94,20 @@ def chart_html(name: str, axes: Axes, shapes: Sequence[str], marks: Sequence[Mar
     )
 
 
-def _ticks(low: float, high: float, wanted: int, unit: Unit | None) -> tuple[Floats, list[str]]:
-    """About ``wanted`` places with round numbers of ``unit``, in SI, and their words."""
+def _ticks(low: float, high: float, count: int, unit: Unit | None) -> tuple[Floats, list[str]]:
+    """About ``count`` places with round numbers of ``unit``, in SI, and their words."""
     if unit is None:
-        about_s, hour = (high - low) / wanted, TIME_STEPS[-1]
+        about_s, hour = (high - low) / count, TIME_STEPS[-1]
         step = next((s for s in TIME_STEPS if s >= about_s), hour * math.ceil(about_s / hour))
         at = np.asarray(step * np.arange(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1), float)
         return at, [duration(t) for t in at.tolist()]
-    every = ticks(unit.of(low), unit.of(high), wanted)
+    every = ticks(unit.of(low), unit.of(high), count)
     return np.asarray(every * unit.size), [_tick(v, every) for v in every]
 
 
-def ticks(low: float, high: float, wanted: int) -> Floats:
-    """About ``wanted`` round values between two."""
-    step = nice_step((high - low) / wanted)
+def ticks(low: float, high: float, count: int) -> Floats:
+    """About ``count`` round values between two."""
+    step = nice_step((high - low) / count)
     return np.asarray(step * np.arange(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1), float)
 
 

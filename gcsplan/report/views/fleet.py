@@ -126,7 +126,9 @@ def separation_words(page: Page) -> str:
     if found is None:
         return ""
     unit = page.units.distance
-    needed = f"{stated(found.rules.separation_m, unit)} asked, {stated(found.rules.needed_m, unit)} needed in the model"
+    needed = (
+        f"{stated(found.rules.separation_m, unit)} required, {stated(found.rules.needed_m, unit)} needed in the model"
+    )
     if found.least is None:
         return f"No two vehicles are ever in the air at the same time ({needed})."
     a, b = found.least.vehicles
@@ -176,7 +178,7 @@ def _separation_chart(
     marks = [] if mark is None else [mark]
     charts["separation"] = _numbers(times, numbers)
     nearest_words = "" if mark is None else f"; {mark.tip}"
-    words = f"Distance of the nearest two vehicles over time{nearest_words}; asked for: {num(needed_m, 1, unit)}"
+    words = f"Distance of the nearest two vehicles over time{nearest_words}; required: {num(needed_m, 1, unit)}"
     key = (
         '<ul class="legend"><li><i class="stroke nearest"></i>nearest two</li>'
         + ('<li><i class="stroke pair"></i>each pair</li>' if pairs else "")

@@ -92,7 +92,7 @@ def figures(page: Page) -> dict[str, bytes]:
 
 
 def _described(page: Page) -> dict[str, str | None]:
-    """What a picture says of itself: the mission, and the length of each vehicle's path."""
+    """The metadata of a picture: the mission, and the length of each vehicle's path."""
     lengths = "; ".join(f"{v.name}: {v.verdict.length_m:,.0f} m" for v in page.subjects)
     return {"Software": None, "Title": page.title, "Description": lengths}
 

@@ -71,7 +71,7 @@ def profile_legend(subject: Subject, line: TrackLine, found: list[Passage], worl
 
 
 def _standing(world: World) -> str:
-    """What the band between the ground and its top is."""
+    """The name of the band between the ground and its top."""
     differs, bare = world.airspace.surface.differs, bool(world.airspace.surface.info.get("bare_dem", True))
     if not differs:
         return "trees and buildings"
@@ -163,7 +163,7 @@ def _broken(subject: Subject, line: TrackLine, axes: Axes, world: World, units: 
 
 
 def passed(p: Passage, units: Units) -> str:
-    """How a zone is passed, in words; the numbers come from samples."""
+    """The passage of a zone, in words; the numbers come from samples."""
     if p.over_m is not None and p.over_m >= 0.0:
         return f"passed {least(p.over_m, 0, units.height)} above its ceiling"
     if p.under_m is not None and p.under_m >= 0.0:

@@ -186,7 +186,7 @@ def replay_html(replay: Replay, page: Page) -> str:
     within = at_least(replay.within_m, 1, page.units.distance)
     note = f"Between stored places the replay is within {within} of the time table"
     if both:
-        note += " and of what was flown. Planned vehicles are rings, flown ones dots; the dashed line is what was flown"
+        note += " and of the flight. Planned vehicles are rings, flown ones dots; the dashed line is the flight"
     exact = " Least separations are exact under “The fleet in time”." if several else ""
     return (
         '<div class="replay" id="replay" role="group" aria-label="Replay" hidden>'

@@ -28,8 +28,8 @@ def exaggeration(relief: Relief, lines: Sequence[TrackLine]) -> float:
     span = highest - relief.low_m
     if not span > 1e-6:
         return 1.0
-    wanted = 0.1 * max(relief.extent.width_m, relief.extent.height_m) / span
-    return float(min(max(round(2.0 * wanted) / 2.0, 1.0), 8.0))
+    exaggeration = 0.1 * max(relief.extent.width_m, relief.extent.height_m) / span
+    return float(min(max(round(2.0 * exaggeration) / 2.0, 1.0), 8.0))
 
 
 def zone_meshes(

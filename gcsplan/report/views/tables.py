@@ -50,7 +50,7 @@ def vehicles_table(page: Page, verdicts: Sequence[str]) -> str:
                 greatest(high.max_agl_m if high else None, 1, units.height),
                 f"{least(near.zone_clearance_m, 1, units.distance)} {esc(near.nearest_zone)}" if near else "–",
                 steepest(verdict.max_climb_deg),
-                energy(verdict.told_j(verdict.energy_j), 0, s.vehicle.energy.battery_v) + esc(verdict.energy_mark),
+                energy(verdict.reported_j(verdict.energy_j), 0, s.vehicle.energy.battery_v) + esc(verdict.energy_mark),
                 num(verdict.battery_used_percent, 1, "%"),
                 duration(s.arrive_s, page.time_decimals), home,
             )
@@ -79,7 +79,7 @@ def legs_table(subject: Subject, units: Units) -> str:
                 least(item.agl_end_m, 1, units.height),
                 "column" if item.column else least(item.min_agl_m, 1, units.height),
                 greatest(item.max_agl_m, 1, units.height), steepest(item.climb_deg), near,
-                energy(subject.verdict.told_j(item.energy_j), 1),
+                energy(subject.verdict.reported_j(item.energy_j), 1),
                 num(100.0 * used / battery, 1, "%") if battery else "–", duration(item.time_s),
                 duration(clock[flown - 1]),
             )
@@ -99,7 +99,7 @@ def limits_table(subject: Subject, line: TrackLine | None, units: Units) -> str:
         word = "broken" if broken else "close" if close else "kept" if left is not None else "–"
         rows.append((name, needed, reached, least(left, _decimals(unit), unit), word, where))
         marks.append("bad" if broken else "close" if close else "")
-    head = ("limit|", "asked", "reached", "left", "|", "where|")
+    head = ("limit|", "required", "reached", "left", "|", "where|")
     return table(f"Limits of {esc(subject.name)}, and how near each came to binding", head, rows, marks=marks)
 
 

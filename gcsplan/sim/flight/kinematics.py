@@ -123,14 +123,14 @@ class Kinematics:
         """Whether its legs are S-curves."""
         return math.isfinite(self.leg_jerk_m_s3) and math.isfinite(self.corner_accel_m_s2)
 
-    def leaning_m_s(self, rise: float, amsl_m: float, wanted_m_s: float) -> float:
-        """Return the speed along a slope at which the largest lean just balances the drag, at most ``wanted_m_s``.
+    def leaning_m_s(self, rise: float, amsl_m: float, commanded_m_s: float) -> float:
+        """Return the speed along a slope at which the largest lean just balances the drag, at most ``commanded_m_s``.
 
         ``rise``: sine of the slope. The quadrotor is the one of SIM_Frame.h.
         """
-        if math.isinf(self.lean_deg) or _pushes_on(self.lean_deg, wanted_m_s, rise, amsl_m):
-            return wanted_m_s
-        slow, fast = 0.0, wanted_m_s
+        if math.isinf(self.lean_deg) or _pushes_on(self.lean_deg, commanded_m_s, rise, amsl_m):
+            return commanded_m_s
+        slow, fast = 0.0, commanded_m_s
         for _ in range(30):
             middle = 0.5 * (slow + fast)
             slow, fast = (middle, fast) if _pushes_on(self.lean_deg, middle, rise, amsl_m) else (slow, middle)

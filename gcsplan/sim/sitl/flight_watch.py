@@ -33,7 +33,7 @@ _ON_GROUND = frozenset({cmd.TAKEOFF, cmd.LAND, cmd.RTL, cmd.VTOL_TAKEOFF, cmd.VT
 
 @dataclass(slots=True)
 class FlightWatch:
-    """What happened to one vehicle since its mission was started. ``crashed``: it hit the ground on the way."""
+    """The events of one vehicle's flight since its mission was started. ``crashed``: it hit the ground on the way."""
 
     mission: Mission
     crashed: bool = False

@@ -63,7 +63,7 @@ _ODD_LIFT_S = 0.7
 _LATE = 1.5
 _SPARE_S = 300.0
 CIRCLE_RADII = 1.5
-"""A plane is at a circle within so many radii of its centre: it flew circles with 1.12 of the radius asked for."""
+"""A plane is at a circle within so many radii of its centre: it flew circles with 1.12 of the item's radius."""
 LEAST_REACH_M = 100.0
 _CIRCLES = frozenset({cmd.LOITER_UNLIM, cmd.LOITER_TURNS, cmd.LOITER_TIME, cmd.LOITER_TO_ALT})
 CIRCLES_S = 60.0
@@ -72,7 +72,7 @@ CIRCLES_S = 60.0
 
 @dataclass(slots=True)
 class _Log:
-    """What one vehicle reported in flight; ``released_ms``: its boot time at the acceptance of MISSION_START;
+    """The reports of one vehicle in flight; ``released_ms``: its boot time at the acceptance of MISSION_START;
     ``reached_ms``: at which it reported an item as reached for the first time."""
 
     watch: FlightWatch
@@ -124,18 +124,18 @@ def rehearse_sitl(
             raise UsageError(f"--sitl flies ArduCopter and ArduPlane; {part.vehicle.name} is {part.vehicle.autopilot}")
     if not i_know:
         require_here([seats[p.vehicle.name] for p in parts])
-    said = report or (lambda name, what: None)
+    tell = report or (lambda name, what: None)
     with ExitStack() as stack:
         urls = list(dict.fromkeys(seats[p.vehicle.name] for p in parts))
         links = {url: stack.enter_context(Link(url, key=signing_key())) for url in urls}
         channels = [links[seats[p.vehicle.name]].channel(p.vehicle.sysid) for p in parts]
-        found = _all([PumpJob(c, _ready(c, p, said, i_know=i_know)) for c, p in zip(channels, parts, strict=True)])
+        found = _all([PumpJob(c, _ready(c, p, tell, i_know=i_know)) for c, p in zip(channels, parts, strict=True)])
         states: list[VehicleState] = [state for state, _ in found]
         upload_parts(parts, [channel.link for channel in channels])
         weather = weather or Weather()
         wind = wind_parameters(weather, seed)
         calm = _all([PumpJob(c, change_steps(c, s, wind)) for c, s in zip(channels, states, strict=True)])
-        flights = [PumpJob(c, _fly(c, p, s, world, said)) for c, p, s in zip(channels, parts, states, strict=True)]
+        flights = [PumpJob(c, _fly(c, p, s, world, tell)) for c, p, s in zip(channels, parts, states, strict=True)]
         logs = _all(flights)
         _all([PumpJob(c, change_steps(c, s, was)) for c, s, was in zip(channels, states, calm, strict=True)])
     tally = Tally(parts, terms)
@@ -152,7 +152,7 @@ def rehearse_sitl(
 
 
 def _spent_j(trace: Trace, part: RehearsalPart, weather: Weather, seed: int) -> float:
-    """What a flight took, J: by its time, and the metres through the mean wind."""
+    """The energy of a flight, J: by its time, and the metres through the mean wind."""
     held_s = math.fsum(leg.hold_s * leg.times for leg in part.verdict.legs if math.isfinite(leg.hold_s))
     held_s = min(held_s, trace.end_s - trace.begin_s)
     moved_s = trace.end_s - trace.begin_s - held_s
@@ -338,10 +338,10 @@ class _SitlPilot:
             if result == dialect.MAV_RESULT_ACCEPTED:
                 return
             if clock() > end:
-                said = " / ".join(self._texts[-3:])
+                texts = " / ".join(self._texts[-3:])
                 raise VehicleRefused(
                     f"system {self._to.sysid} does not take command {command} (result {result}); it says: "
-                    f"{said or 'nothing'}",
+                    f"{texts or 'nothing'}",
                     where=self._channel.link.url,
                 )
             again = clock() + 1.0

@@ -53,7 +53,7 @@ _EITHER: dict[str, float] = {
     "INS_ACCOFFS_X": 0.001, "INS_ACCOFFS_Y": 0.001, "INS_ACCOFFS_Z": 0.001, "INS_ACCSCAL_X": 1.001,
     "INS_ACCSCAL_Y": 1.001, "INS_ACCSCAL_Z": 1.001,
 }  # fmt: skip
-"""What lets a vehicle arm without pilot or calibration (from ArduPilot's SITL defaults)."""
+"""Parameters that let a vehicle arm without pilot or calibration (from ArduPilot's SITL defaults)."""
 
 COPTER: dict[str, float] = _EITHER | {
     "FRAME_CLASS": 1, "FRAME_TYPE": 0, "FS_THR_ENABLE": 0, "DISARM_DELAY": 0, "COMPASS_OFS_X": 5, "COMPASS_OFS_Y": 13,
@@ -84,7 +84,7 @@ def sitl_instances(
     vehicles, LinkError if an instance does not start.
     """
     if not 0.1 <= speedup <= 100.0:
-        raise UsageError(f"--speedup {speedup:g}: 0.1 to 100 times as fast as ours is wanted")
+        raise UsageError(f"--speedup {speedup:g}: give 0.1 to 100, times as fast as real time")
     most = LAST_INSTANCE - _FIRST_INSTANCE + 1
     if len(parts) > most:
         raise UsageError(f"--sitl-binary flies at most {most} vehicles at once, and there are {len(parts)}")
@@ -105,7 +105,7 @@ def _program(binary: Path, autopilot: Autopilot) -> Path:
     """The program for one kind of vehicle."""
     found = binary / autopilot.value if binary.is_dir() else binary
     if not found.is_file() or not os.access(found, os.X_OK):
-        raise UsageError(f"--sitl-binary {found}: a program that can be run is wanted, an {autopilot} built for SITL")
+        raise UsageError(f"--sitl-binary {found}: give a program that can be run, an {autopilot} built for SITL")
     return found
 
 
@@ -127,7 +127,7 @@ def port_of(number: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class _Start:
-    """How one instance is started."""
+    """The start of one instance."""
 
     program: Path
     number: int
@@ -151,8 +151,8 @@ def _instance(start: _Start, part: RehearsalPart, world: World | None) -> Iterat
         str(start.program.resolve()), "--model", MODELS[part.vehicle.autopilot], "--speedup", f"{start.speedup:g}",
         "--home", place, "-I", str(start.number), "--sysid", str(part.vehicle.sysid), "--defaults", str(parameters),
     ]  # fmt: skip
-    with open(own / "output.txt", "wb") as said:
-        process = subprocess.Popen(command, cwd=own, stdin=subprocess.DEVNULL, stdout=said, stderr=subprocess.STDOUT)
+    with open(own / "output.txt", "wb") as output:
+        process = subprocess.Popen(command, cwd=own, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT)
         try:
             _await(process, own / "output.txt", name)
             yield start.url
@@ -165,11 +165,11 @@ def _instance(start: _Start, part: RehearsalPart, world: World | None) -> Iterat
                 process.wait(_STOP_S)
 
 
-def _await(process: subprocess.Popen[bytes], said: Path, name: str) -> None:
+def _await(process: subprocess.Popen[bytes], output: Path, name: str) -> None:
     """Wait until its output says that it listens; a trial connection would end it when closed."""
     end = time.monotonic() + _START_S
     while time.monotonic() < end:
-        words = said.read_text(encoding="utf-8", errors="replace")
+        words = output.read_text(encoding="utf-8", errors="replace")
         if "Waiting for connection" in words or "bind port" in words:
             return
         if process.poll() is not None:
@@ -179,7 +179,7 @@ def _await(process: subprocess.Popen[bytes], said: Path, name: str) -> None:
 
 
 def parameters_of(part: RehearsalPart) -> dict[str, float]:
-    """Return an instance's parameters: those of its airframe, and the list of its plan as a pilot sets it."""
+    """Return an instance's parameters: its airframe's, and the list of its plan as a pilot sets it."""
     given = dict(PLANE if part.vehicle.autopilot is Autopilot.ARDUPLANE else COPTER)
     for s in parameter_list(part.mission, part.vehicle, rtl_rel_home_m=part.rtl_rel_home_m):
         for name in s.parameter.names:
@@ -191,7 +191,7 @@ def parameters_of(part: RehearsalPart) -> dict[str, float]:
 
 
 def heading_of(part: RehearsalPart) -> float:
-    """The direction, degrees, in which a vehicle stands: a plane in that of its take-off, for it rolls straight."""
+    """The direction, degrees, in which a vehicle stands: a plane faces along its take-off, for it rolls straight."""
     if part.vehicle.autopilot is not Autopilot.ARDUPLANE:
         return 0.0
     home = part.mission.home

@@ -1,4 +1,4 @@
-"""Wind in an SITL: its parameters SIM_WIND_*, set over the link, for what is flown there is a simulator."""
+"""Wind in an SITL: its parameters SIM_WIND_*, set over the link, for the vehicle there is a simulator."""
 
 from __future__ import annotations
 
@@ -70,18 +70,20 @@ def _until(channel: Channel, state: VehicleState, message: Any, name: str, value
         end = clock() + PARAMETER_ANSWER_S
         while clock() < end:
             yield end
-            told = _told(channel, name)
-            if not math.isnan(told) and (value is None or math.isclose(told, value, rel_tol=1e-5, abs_tol=1e-5)):
-                return told
+            reported = _reported(channel, name)
+            if not math.isnan(reported) and (
+                value is None or math.isclose(reported, value, rel_tol=1e-5, abs_tol=1e-5)
+            ):
+                return reported
     raise LinkError(
         f"system {state.address.sysid} does not take {name}: is it an SITL with wind?", where=channel.link.url
     )
 
 
-def _told(channel: Channel, name: str) -> float:
+def _reported(channel: Channel, name: str) -> float:
     """The value of a parameter among the messages that came; NaN if it is not there."""
-    told = math.nan
+    reported = math.nan
     for heard in channel.take():
         if heard.message.get_type() == "PARAM_VALUE" and parameter_name(heard.message) == name:
-            told = decode_value(heard.message, ARDUPILOTMEGA)
-    return told
+            reported = decode_value(heard.message, ARDUPILOTMEGA)
+    return reported

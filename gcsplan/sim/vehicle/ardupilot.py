@@ -384,7 +384,7 @@ class _ArduPilotList:
         self._phase = Phase.IDLE
         self._partner = Address(0, 0)
         self._count = self._next = 0
-        self._asked_at = self._heard_at = 0.0
+        self._requested_at = self._heard_at = 0.0
         self._emptied_at: float | None = None
         self._new_fence: list[MissionItem] = []
 
@@ -396,7 +396,7 @@ class _ArduPilotList:
     def deadline(self) -> float | None:
         if self._phase is not Phase.RECEIVING:
             return self._home_due
-        return min(self._asked_at + self.ASK_AGAIN_S, self._heard_at + self.GIVE_UP_S)
+        return min(self._requested_at + self.ASK_AGAIN_S, self._heard_at + self.GIVE_UP_S)
 
     @property
     def _home_due(self) -> float | None:
@@ -413,13 +413,13 @@ class _ArduPilotList:
         if now >= self._heard_at + self.GIVE_UP_S:
             self._phase = Phase.IDLE  # items that were replaced stay replaced
             return [(self._partner, self._ack(CANCELLED))]
-        return self._ask(now) if now >= self._asked_at + self.ASK_AGAIN_S else []
+        return self._ask(now) if now >= self._requested_at + self.ASK_AGAIN_S else []
 
     def _ack(self, code: int) -> Ack:
         return Ack(code, self._type)
 
     def _ask(self, now: float) -> Out:
-        self._asked_at = now
+        self._requested_at = now
         return [(self._partner, Request(self._next, self._type, legacy=True))]
 
     # uploads

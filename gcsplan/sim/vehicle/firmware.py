@@ -116,5 +116,5 @@ def firmwares(autopilots: Sequence[Autopilot], name: str | None) -> list[Firmwar
     known = [KNOWN_FIRMWARE[ARDUPILOT_FAMILY if autopilot.is_ardupilot else PX4_FAMILY] for autopilot in autopilots]
     names = {f.name for versions in known for f in versions}
     if name is not None and name not in names:
-        raise UsageError(f"--firmware {name}: one of {', '.join(sorted(names))} is wanted")
+        raise UsageError(f"--firmware {name}: give one of {', '.join(sorted(names))}")
     return [next((f for f in versions if f.name == name), versions[0]) for versions in known]

@@ -25,7 +25,7 @@ Out = list[tuple[Address, MissionMessage]]
 
 
 ParamKept = Callable[[float], float]
-"""How one param reads back."""
+"""From a param that was sent to the param that reads back."""
 ParamsKept = tuple[ParamKept, ParamKept, ParamKept, ParamKept]
 """How each of an item's four params reads back."""
 

@@ -187,7 +187,7 @@ class Telemetry:
         return terrain.report(home.lat_e7, home.lon_e7, home.amsl_m)
 
     def _terrain_messages(self, now: float) -> list[Message]:
-        """What a link has that carries the stream of terrain: it must have been asked for."""
+        """The messages of the stream of terrain, which a link carries on request alone."""
         terrain = self.terrain if self._tells_terrain else None
         if terrain is None:
             return []
@@ -265,11 +265,11 @@ class Telemetry:
         if command == mav.MAV_CMD_GET_HOME_POSITION:
             return _ACCEPTED, [self._home_position(now)]
         if command == mav.MAV_CMD_SET_MESSAGE_INTERVAL:  # accepted, but everything is still sent once a second
-            wanted = _whole(message.param1)
-            if wanted == mav.MAVLINK_MSG_ID_TERRAIN_REQUEST and vehicle.autopilot.is_ardupilot:
+            requested = _whole(message.param1)
+            if requested == mav.MAVLINK_MSG_ID_TERRAIN_REQUEST and vehicle.autopilot.is_ardupilot:
                 self._tells_terrain = message.param2 > 0.0
                 return _ACCEPTED, []
-            return (_ACCEPTED if wanted in self._by_id else _DENIED), []
+            return (_ACCEPTED if requested in self._by_id else _DENIED), []
         return _UNSUPPORTED, []
 
     def _update_flying(self) -> None:
@@ -288,14 +288,14 @@ class Telemetry:
     def _param_read(self, message: Message, now: float) -> list[Message]:
         names = self.parameters.names()
         if message.param_index >= 0:
-            wanted = names[message.param_index : message.param_index + 1]
+            requested = names[message.param_index : message.param_index + 1]
         else:
-            wanted = [name for name in names if name == _text(message.param_id)]
+            requested = [name for name in names if name == _text(message.param_id)]
             order = self._vehicle.misbehave
-            if order.mute in wanted and (order.mute_times is None or self._muted < order.mute_times):
+            if order.mute in requested and (order.mute_times is None or self._muted < order.mute_times):
                 self._muted += 1
                 return []
-        return list(self._param_values(wanted))
+        return list(self._param_values(requested))
 
     def _param_set(self, message: Message, now: float) -> list[Message]:
         name = _text(message.param_id)
@@ -304,9 +304,9 @@ class Telemetry:
         self.parameters.set_from_wire(name, message.param_value)
         return list(self._param_values([name]))
 
-    def _param_values(self, wanted: list[str]) -> Iterator[Message]:
+    def _param_values(self, requested: list[str]) -> Iterator[Message]:
         names = self.parameters.names()
-        for name in wanted:
+        for name in requested:
             value, kind = self.parameters.on_wire(name)
             yield mav.MAVLink_param_value_message(name.encode(), value, kind, len(names), names.index(name))
 

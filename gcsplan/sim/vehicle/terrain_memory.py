@@ -44,7 +44,7 @@ class TerrainMemory:
         self._next_request = -math.inf
 
     def read(self, lat_e7: int, lon_e7: int) -> float | None:
-        """The height at a place, m AMSL; None if a post is missing, which then counts as wanted."""
+        """The height at a place, m AMSL; None if a post is missing, which then counts as needed."""
         [block] = self.grid.blocks_over(lat_e7, lon_e7)
         bits, heights = self._kept(block)
         north, east = (float(m) / self.grid.spacing_m for m in self.grid.offset_m(block.cell, lat_e7, lon_e7))
@@ -100,7 +100,7 @@ class TerrainMemory:
 
     @property
     def pending(self) -> int:
-        """Parts that are wanted and missing."""
+        """The number of parts that are needed and missing."""
         return sum((ALL_PARTS & ~bits).bit_count() for bits, _ in self._cache.values())
 
     @property

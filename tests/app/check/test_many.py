@@ -18,8 +18,8 @@ import pytest
 from gcsplan.app.check import many as module
 from gcsplan.app.check import worlds as check_sites
 from gcsplan.app.check.files import check_batch, check_with_options, finding_lines
-from gcsplan.app.check.many import Archive, Form, Shown, Summary, Told
-from gcsplan.app.check.worlds import UNASKED, Returns
+from gcsplan.app.check.many import Archive, FileResult, Form, Shown, Summary
+from gcsplan.app.check.worlds import NO_RETURNS, Returns
 from gcsplan.app.parallel.executor import Executor, Inline, executor
 from gcsplan.cli import main as cli
 from gcsplan.errors import InputError, UsageError
@@ -67,8 +67,8 @@ def files(folder: Path) -> list[str]:
 
 
 def results(
-    options: WorldOptions, files: Sequence[str], workers: Executor, form: Form = "lines", returns: Returns = UNASKED
-) -> tuple[list[Told], Archive]:
+    options: WorldOptions, files: Sequence[str], workers: Executor, form: Form = "lines", returns: Returns = NO_RETURNS
+) -> tuple[list[FileResult], Archive]:
     archive = Archive.with_options(options, None, files, returns, Shown(form))
     archive.read(workers)
     return list(archive.judged(workers)), archive
@@ -84,7 +84,7 @@ def test_an_archive_is_judged_as_its_files_are_together(options: WorldOptions, f
         assert by_file[str(c.file)].code == (0 if c.verdict.safe else 4)
     for argument, error in batch.unreadable:
         assert str(by_file[argument].error) == str(error)
-    assert archive.said == (batch.inputs, batch.notes)
+    assert archive.sources == (batch.inputs, batch.notes)
     assert {t.code for t in told} == {0, 2, 4}
 
 
@@ -127,18 +127,18 @@ vehicles:
     judged = {str(c.file): c for c in batch.checked}
     found = []
     for workers in (Inline(), Scattered()):
-        archive = Archive.in_mission(source, some, UNASKED, Shown("row"))
-        assert archive.asked.returns.required
+        archive = Archive.in_mission(source, some, NO_RETURNS, Shown("row"))
+        assert archive.request.returns.required
         archive.read(workers)
         found.append([told_without_error(t) for t in archive.judged(workers)])
-        assert archive.said == (batch.inputs, batch.notes)
+        assert archive.sources == (batch.inputs, batch.notes)
     assert found[0] == found[1]
     for file, code, _, lines, *_ in found[0]:
         assert (file in judged) == (code != 2)
         assert lines == (tuple(finding_lines(judged[str(file)])) if file in judged else ())
 
 
-def told_without_error(told: Told) -> tuple[object, ...]:
+def told_without_error(told: FileResult) -> tuple[object, ...]:
     return told.file, told.code, told.kinds, told.lines, str(told.error), told.text, told.failing
 
 
@@ -184,22 +184,22 @@ def test_files_too_far_apart_for_one_plane_have_a_world_each(
     far = [f for f, case in corpus.write(tmp_path, {"qgc": corpus.WITH_HOME["qgc"]}).items() if case.name == "outside"]
     both = WorldOptions({"dem": [*options.terrain["dem"], dem], "vertical_datum": "EGM96"}, (), corpus.OPTIONS)  # type: ignore[misc]
     told, archive = results(both, [*near, *far, *near], Scattered())
-    assert archive.asked.extent is None
+    assert archive.request.extent is None
     assert [t.code for t in told] == [0, 4, 0]
     assert set(told[1].kinds) == {"coverage"}
-    assert archive.said[0]["vertical_datum"] == "EGM96"
+    assert archive.sources[0]["vertical_datum"] == "EGM96"
 
 
 def test_too_many_files_are_refused(options: WorldOptions, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MOST_FILES", 3)
     with pytest.raises(UsageError, match="at most 3 files are checked in one call, given 4"):
-        Archive.with_options(options, None, ["x"] * 4, UNASKED, Shown())
+        Archive.with_options(options, None, ["x"] * 4, NO_RETURNS, Shown())
 
 
 def test_other_terrain_at_a_worker_is_an_error(options: WorldOptions, files: list[str]) -> None:
-    archive = Archive.with_options(options, None, files[:2], UNASKED, Shown())
+    archive = Archive.with_options(options, None, files[:2], NO_RETURNS, Shown())
     archive.read(Inline())
-    archive.asked = module.replace(archive.asked, inputs={"dem_sha256": "another"})
+    archive.request = module.replace(archive.request, inputs={"dem_sha256": "another"})
     with pytest.raises(InputError, match=r"a worker reads other terrain or zones .*dem_sha256"):
         list(archive.judged(Inline()))
 
@@ -366,7 +366,7 @@ def test_memory_does_not_grow_with_the_files(
     names = many(tmp_path / "many", 450)
     peaks = []
     for count in (20, 150, 450):
-        archive = Archive.with_options(options, None, names[:count], UNASKED, Shown("whole"))
+        archive = Archive.with_options(options, None, names[:count], NO_RETURNS, Shown("whole"))
         tracemalloc.start()
         archive.read(Inline())
         assert sum(1 for _ in archive.judged(Inline())) == count

@@ -86,7 +86,7 @@ def test_the_parameters_on_board_must_choose_the_route_that_was_judged() -> None
     [
         ({"autopilot": "px4"}, "for ArduCopter alone"),
         ({"autopilot": "arduplane"}, "for ArduCopter alone"),
-        ({"end": "none"}, "end: land, loiter or rtl is wanted"),
+        ({"end": "none"}, "use end: land, loiter or rtl"),
     ],
 )
 def test_where_no_path_back_is_written_one_message_says_why(vehicle: dict[str, Any], words: str) -> None:

@@ -31,9 +31,10 @@ OFF_WORDS = "LAND_SPEED is 30 on board, and 50 is assumed (land_m_s, the landing
          "WPNAV_RADIUS or WP_RADIUS_M, RTL_ALT could not be read from the vehicle, and no answer is not the default: "
          "try again, nearer or with a longer --timeout"),
         (Note("parameters_not_judged", allowed=True, off=(OFF,)),
-         "this is not what was judged, and cannot be judged; --allow-parameters takes that\n  " + OFF_WORDS),
+         "it was judged with other values, and cannot be judged with these; --allow-parameters takes that\n  "
+         + OFF_WORDS),
         (Note("parameters_not_judged", allowed=False, off=(OFF, OFF)),
-         f"this is not what was judged, and cannot be judged\n  {OFF_WORDS}\n  {OFF_WORDS}"),
+         f"it was judged with other values, and cannot be judged with these\n  {OFF_WORDS}\n  {OFF_WORDS}"),
         (Note("breaks_limits_on_board",
               found=(OFF, Note("not_judged_on_board", why=Note("battery_lasts_unknown", 3)))),
          OFF_WORDS + "\nnot judged: item 3: how long the battery lasts there is not known, for hover_w is 0"),

@@ -93,12 +93,12 @@ def test_a_place_is_fetched_with_the_area_around_it(run: Any, served: Served) ->
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ((), "which area? One of MISSION, --around, --tiles is wanted, given none"),
+        ((), "which area? Give one of MISSION, --around, --tiles, not none"),
         (("ridge.yaml", "--tiles", "N36W085"), "given MISSION and --tiles"),
         (("--around", "36.5,-84.5"), "--around LAT,LON and --radius-km N belong together"),
         (("ridge.yaml", "--radius-km", "3"), "--around LAT,LON and --radius-km N belong together"),
-        (("--around", "here", "--radius-km", "3"), "--around here: LAT,LON in degrees is wanted"),
-        (("--tiles", "N36W85"), "names such as N36W085, with commas, are wanted, given 'N36W85'"),
+        (("--around", "here", "--radius-km", "3"), "--around here: give LAT,LON in degrees"),
+        (("--tiles", "N36W85"), "names such as N36W085, with commas: given 'N36W85'"),
         (("--tiles", ","), "given 0 of them"),
         (("--tiles", "N36W085", "--source", "glo30"), "there is no source 'glo30'"),
         (("--tiles", "N36W085", "--mirror", "mirror.example"), "--mirror: an address such as https://"),
@@ -106,7 +106,7 @@ def test_a_place_is_fetched_with_the_area_around_it(run: Any, served: Served) ->
         (("nothing.yaml",), "nothing.yaml: there is no such file"),
         (("sample.yaml",), "terrain.dem: names no published source"),
         (("--around", "80,0", "--radius-km", "300"), "--radius-km: this area needs"),
-        (("--around", "89,0", "--radius-km", "3"), "--around 89,0: a place within ±85° of latitude is wanted"),
+        (("--around", "89,0", "--radius-km", "3"), "--around 89,0: give a place within ±85° of latitude"),
     ],
 )
 def test_a_mistake_is_one_message(run: Any, served: Served, tmp_path: Path, arguments: Any, words: str) -> None:

@@ -50,7 +50,7 @@ def test_each_vehicle_of_a_mission_stands_at_its_start(run: Any, served: list[An
     ("arguments", "words"),
     [
         ((CROSSING, "--sysid", 2), "--autopilot and --sysid go without a mission file"),
-        (("--autopilot", "paparazzi"), "--autopilot paparazzi: one of arducopter, arduplane, px4 is wanted"),
+        (("--autopilot", "paparazzi"), "--autopilot paparazzi: give one of arducopter, arduplane, px4"),
         (("--misbehave", "sulk=1"), "sulk"),
     ],
 )

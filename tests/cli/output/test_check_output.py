@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from gcsplan.app.check.many import Told
+from gcsplan.app.check.many import FileResult
 from gcsplan.cli.output.check_output import Document, Header, Lines, Printer, Rows, tell
 from gcsplan.errors import InputError
 from gcsplan.notes.note import Note
@@ -17,11 +17,11 @@ from gcsplan.units import METRIC
 HEADER: Header = ("ridge", {"dem": "a.tif"}, (Note("no_ceiling"),), {"max_agl_m": "--max-agl"})
 
 
-def told(file: str, **fields: Any) -> Told:
-    return Told(**{"file": file, "code": 0, "kinds": {}, "text": f'{{"file": "{file}"}}', **fields})
+def told(file: str, **fields: Any) -> FileResult:
+    return FileResult(**{"file": file, "code": 0, "kinds": {}, "text": f'{{"file": "{file}"}}', **fields})
 
 
-def results(*, broken: bool = False) -> Iterator[Told]:
+def results(*, broken: bool = False) -> Iterator[FileResult]:
     yield told("a.plan", lines=("a.plan:3: too low",), code=4)
     yield told("b.plan")
     if broken:

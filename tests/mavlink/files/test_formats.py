@@ -526,7 +526,7 @@ def test_the_plan_says_for_which_autopilot_it_is(firmware: int, kind: int | None
         if kind is None and other is PLANE:
             assert read_plan(text, autopilot=other, where="f").autopilot is PLANE
             continue
-        with pytest.raises(InputError, match=f"the file is for {autopilot}, and {other} was wanted"):
+        with pytest.raises(InputError, match=f"the file is for {autopilot}, not for {other}"):
             read_plan(text, autopilot=other, where="f")
 
 

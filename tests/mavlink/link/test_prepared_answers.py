@@ -1,4 +1,4 @@
-"""Prompt answers: the same bytes as the slow way, for the same requests, and the machine is told of all of them."""
+"""Prompt answers: the same bytes as the slow way, for the same requests, and the machine gets all of them."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def test_a_prompt_answer_is_the_same_bytes_as_pymavlinks(
     for message in messages:
         expected = slow.pack(wire.encode(message, theirs))
         assert answers(PEER, frame(Request(message.seq, kind), theirs, ours, number=message.seq)) == expected
-    assert prepared.asked == list(range(len(items)))
+    assert prepared.requested == list(range(len(items)))
 
 
 def test_frames_are_numbered_through_whoever_packs_them() -> None:
@@ -119,15 +119,15 @@ def test_the_checksum_is_mavlinks() -> None:
 @pytest.mark.parametrize("legacy", [False, True])
 def test_what_differs_in_seq_alone_is_answered_in_any_order_and_again(legacy: bool) -> None:
     answers, prepared = taught(700, Request(0, legacy=legacy))
-    asked = [599, 0, 256, 256, 1, 511, 699]
-    for number, seq in enumerate(asked):
+    requested = [599, 0, 256, 256, 1, 511, 699]
+    for number, seq in enumerate(requested):
         data = answers(PEER, frame(Request(seq, legacy=legacy), number=number))
         assert data is not None
         packet = wire.decode(parsed(data))
         assert packet is not None
         assert (packet.source, packet.target) == (GCS, VEHICLE)
         assert packet.message == Item(seq, items_of(700)[seq])
-    assert prepared.asked == asked
+    assert prepared.requested == requested
 
 
 def test_what_differs_in_anything_else_is_left_to_the_machine() -> None:
@@ -152,7 +152,7 @@ def test_what_differs_in_anything_else_is_left_to_the_machine() -> None:
     }
     assert {name: answers(PEER, data) for name, data in strangers.items()} == dict.fromkeys(strangers)
     assert answers(("127.0.0.1", 14551), frame(Request(1))) is None
-    assert prepared.asked == []
+    assert prepared.requested == []
     assert answers(PEER, frame(Request(1))) is not None
 
 
@@ -163,7 +163,7 @@ def test_no_flipped_bit_is_answered() -> None:
         damaged = bytearray(sound)
         damaged[bit // 8] ^= 1 << bit % 8
         assert answers(PEER, bytes(damaged)) is None
-    assert prepared.asked == []
+    assert prepared.requested == []
 
 
 @settings(max_examples=draws(300))

@@ -67,7 +67,7 @@ def test_all_that_restricts_is_no_fly_and_the_rest_is_named(tmp_path: Path) -> N
 def test_kinds_and_authorisations_are_the_mission_s(tmp_path: Path) -> None:
     found = mission(tmp_path, FREE, ASK, SHUT, entry={"kinds": ["req_authorization", "NO_RESTRICTION"]})
     assert names(found) == {"free", "ask"}
-    assert "their kinds are not among those of the mission (req_authorization, NO_RESTRICTION): shut" in notes(found)
+    assert "the mission uses other kinds alone (req_authorization, NO_RESTRICTION): shut" in notes(found)
     found = mission(tmp_path, ASK, SHUT, entry={"authorised": ["A1", "shut"]})
     assert not names(found)
     assert "authorised to enter them: ask, shut" in notes(found)

@@ -9,7 +9,7 @@ import pytest
 
 from gcsplan.errors import InputError, Mistake
 from gcsplan.mission_file import load_mission
-from gcsplan.mission_file.values.errors import told_once
+from gcsplan.mission_file.values.errors import listed_once
 from tests.check.test_energy import mission
 
 
@@ -49,11 +49,11 @@ def test_limits_that_stand_under_another_name_are_not_missing() -> None:
 
 def test_swapped_places_are_one_problem_whatever_its_words_are() -> None:
     swapped = [Mistake(f"m.yaml: vehicles[{i}].start", f"words {i}", "swapped") for i in range(3)]
-    [one] = told_once(swapped)
+    [one] = listed_once(swapped)
     assert one.code == "swapped"
     assert one.message == "words 0 (the same at vehicles[1].start, vehicles[2].start)"
     alike = [Mistake(p.where, "latitude and longitude look swapped") for p in swapped]
-    assert told_once(alike) == alike  # the words alone decide nothing
+    assert listed_once(alike) == alike  # the words alone decide nothing
 
 
 def test_a_problem_without_a_kind_has_no_code_in_json() -> None:

@@ -41,7 +41,7 @@ def test_of_a_large_fleet_all_are_on_the_map_and_some_have_profiles() -> None:
     assert len(text) < 4_000_000
     whole = render_page(many_page(100))
     assert len(set(re.findall(r'id="profile-(\d+)"', whole))) == 100
-    assert "are shown: those with problems" not in whole
+    assert "are shown: first vehicles with problems" not in whole
 
 
 def test_the_nearest_two_over_time_are_those_of_all_pairs() -> None:

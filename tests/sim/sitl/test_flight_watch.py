@@ -54,5 +54,5 @@ def test_a_failsafe_is_named_with_what_the_vehicle_said() -> None:
     never = Note("never_arrived_for", name="uav1", why=watch.why())
     assert str(never) == (
         "uav1 never arrived at its goal: it left AUTO for RTL at item 2, it still flew to item 2 when the time was up, "
-        "it said: Battery Failsafe"
+        "it sent: Battery Failsafe"
     )

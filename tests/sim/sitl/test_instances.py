@@ -71,7 +71,7 @@ def test_a_folder_without_the_vehicles_program_is_named(tmp_path: Path) -> None:
     where = ramp()
     (tmp_path / "arduplane").touch(mode=0o755)
     with (
-        pytest.raises(UsageError, match="arducopter: a program that can be run is wanted"),
+        pytest.raises(UsageError, match="arducopter: give a program that can be run"),
         instances.sitl_instances(tmp_path, [a_part(where)]),
     ):
         pass

@@ -177,7 +177,7 @@ def test_a_vehicle_names_its_version(autopilot: Autopilot) -> None:
 def test_a_version_counts_for_the_vehicles_that_have_it() -> None:
     assert [f.name for f in firmwares([COPTER, PX4], "4.7")] == ["4.7", "1.17"]
     assert [f.name for f in firmwares([PLANE, PX4], None)] == ["4.6", "1.17"]
-    with pytest.raises(UsageError, match=r"--firmware 1\.18: one of 4\.6, 4\.7 is wanted"):
+    with pytest.raises(UsageError, match=r"--firmware 1\.18: give one of 4\.6, 4\.7"):
         firmwares([COPTER], "1.18")
 
 

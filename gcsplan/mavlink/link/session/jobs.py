@@ -91,7 +91,7 @@ def uploading(channel: Channel, task: Task) -> LinkSteps[UploadResult]:
         failed = yield from judging(channel, task, task.mission, values, recheck)
     if failed is not None:
         raise FailsCheck(failed, task.sysid)
-    said_before = watch.said
+    texts_before = watch.texts_heard
     machine = VerifiedUpload(
         task.items,
         task.autopilot,
@@ -124,7 +124,7 @@ def uploading(channel: Channel, task: Task) -> LinkSteps[UploadResult]:
         warnings.append(Note("armed_during_upload"))
     ended_s = clock() - started
     result = yield from result_of(
-        task, channel, settled, ended_s, warnings, watch.texts_since(said_before), values, recheck
+        task, channel, settled, ended_s, warnings, watch.texts_since(texts_before), values, recheck
     )
     result = replace(result, state=state)
     return replace(result, changed=changed.reason, change=changed.why) if changed else result
@@ -323,9 +323,9 @@ def result_of(
 def reading_parameters(
     channel: Channel, task: Task, state: VehicleState, watch: Watch, recheck: Recheck
 ) -> LinkSteps[tuple[list[Note], OnBoard]]:
-    """Read the parameters on board; return warnings about those that do not fit the list, and the values read.
+    """Read the parameters on board; return warnings about values that do not fit the list, and the values read.
 
-    Those that the judge needs are asked for until the timeout.
+    Until the timeout, it requests the parameters that the judge needs.
     """
     options, mission = task.options, task.mission
     warnings: list[Note] = []
@@ -358,8 +358,8 @@ def judging(
 ) -> LinkSteps[Note | None]:
     """Ask the task's judge, beside the other vehicles' transfers; return its answer, None without a judge.
 
-    A judge that has not ended after the timeout has not passed. In simulated time it is asked in line, for there no
-    time passes meanwhile.
+    A judge that has not ended after the timeout has not passed. In simulated time the judge runs in line, for no time
+    passes meanwhile.
     """
     judge = task.judge
     if judge is None:

@@ -62,7 +62,7 @@ _FAILSAFE_NAMES = {
 }  # fmt: skip
 _SAME_M, _SAME_S = 0.5, 0.5
 _ENABLED = {1.0: "the take-off", 2.0: "the take-off", 3.0: "arming"}  # FENCE_AUTOENABLE
-_TOLD_ELSEWHERE = {"return_altitude", "return_waits", "return_end", "return_type", "pitch", "radius", "radius_height"}
+_IN_OTHER_NOTES = {"return_altitude", "return_waits", "return_end", "return_type", "pitch", "radius", "radius_height"}
 
 
 def decode_value(message: Any, mav_autopilot: int) -> float:
@@ -174,7 +174,7 @@ def judge_fence_parameters(values: ParameterValues) -> list[Note]:
 
 
 def _other_fences(values: ParameterValues) -> list[Note]:
-    """The fences that FENCE_ENABLE also enables: those of FENCE_TYPE that are no polygons and circles."""
+    """The fences that FENCE_ENABLE also enables: the kinds of FENCE_TYPE beside polygons and circles."""
     kinds = values.get("FENCE_TYPE")
     if kinds is None:
         return [Note("fence_type_unread")]
@@ -194,8 +194,9 @@ def _at(values: ParameterValues, name: str) -> Note:
 
 
 def settings_words(settings: Sequence[Setting], values: ParameterValues, autopilot: Autopilot) -> list[Note]:
-    """Which parameters on board are outside of what the mission was judged with; other notes tell of some of them."""
-    return [o.note() for o in off(settings, values, autopilot) if o.setting.parameter.key not in _TOLD_ELSEWHERE]
+    """Notes on the parameters on board that are outside of what the mission was judged with, but for
+    `_IN_OTHER_NOTES`."""
+    return [o.note() for o in off(settings, values, autopilot) if o.setting.parameter.key not in _IN_OTHER_NOTES]
 
 
 def _numbers(values: ParameterValues) -> tuple[ParameterValues, list[Note]]:
@@ -216,16 +217,16 @@ def _return_altitude(values: ParameterValues, checked_m: float | None, advised_m
     name, height_m = parameter.name, parameter.metres(values[parameter.name])
     if checked_m is None:
         return [Note("return_not_checked", rel_home_m=height_m, name=name)]
-    wanted_m = checked_m if advised_m is None else advised_m
+    set_m = checked_m if advised_m is None else advised_m
     if abs(height_m - checked_m) > _SAME_M:
         return [
             Note(
                 "return_at_another_altitude", rel_home_m=height_m, name=name, checked_m=checked_m,
-                setting=parameter.setting(wanted_m),
+                setting=parameter.setting(set_m),
             )
         ]  # fmt: skip
-    if abs(height_m - wanted_m) > _SAME_M:
-        return [Note("return_altitude_advised", rel_home_m=height_m, name=name, setting=parameter.setting(wanted_m))]
+    if abs(height_m - set_m) > _SAME_M:
+        return [Note("return_altitude_advised", rel_home_m=height_m, name=name, setting=parameter.setting(set_m))]
     return []
 
 
@@ -268,7 +269,7 @@ def _lean(values: ParameterValues, mission: Mission) -> list[Note]:
 
 
 def _fences(values: ParameterValues, autopilot: Autopilot, extent: _Extent) -> list[Note]:
-    """The fences in force that the items leave: what is told of a mission that was not judged in its world."""
+    """Notes on the fences in force that the items leave, for a mission that was not judged in its world."""
     known, on = SAFETY[autopilot], fences_in_force(values, autopilot)
     limits = [("fence_top", extent.top_rel_home_m), ("fence_radius", extent.reach_m)]
     return [
@@ -326,9 +327,9 @@ def slower_words(values: ParameterValues, vehicle: Vehicle) -> list[Note]:
         ("MPC_Z_V_AUTO_DN", values.get("MPC_Z_V_AUTO_DN", math.nan), vehicle.descent_m_s, "descent_m_s"),
     ]
     found = [
-        Note("slower_than_planned", name=name, value=value, wanted=wanted, planned_key=key)
-        for name, value, wanted, key in planned
-        if value < wanted * (1.0 - _SAME)
+        Note("slower_than_planned", name=name, value=value, wanted=expected, planned_key=key)
+        for name, value, expected, key in planned
+        if value < expected * (1.0 - _SAME)
     ]
     returns = values.get("MPC_XY_CRUISE", math.nan)
     if vehicle.return_speed_m_s is not None and returns < vehicle.return_speed_m_s * (1.0 - _SAME):

@@ -78,7 +78,7 @@ class Recheck:
 
     @property
     def watch(self) -> Watch:
-        """What follows the vehicle's messages."""
+        """The watch over the vehicle's messages."""
         return self._watch
 
     @property

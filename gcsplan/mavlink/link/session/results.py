@@ -125,8 +125,8 @@ class UploadResult:
             shown = "; ".join(str(d) for d in self.faults[:_DIFFERENCES_SHOWN])
             rest = len(self.faults) - _DIFFERENCES_SHOWN
             more = f"; and {rest} more" if rest > 0 else ""
-            asked = "the file has" if self.faults[0].unsent else "was sent"
-            return ReadBackDiffers(f"what is on board is not what {asked}: {shown}{more}{tail}", where=where)
+            source = "the file has" if self.faults[0].unsent else "was sent"
+            return ReadBackDiffers(f"the list on board is not what {source}: {shown}{more}{tail}", where=where)
         if self.failed_check is not None:
             return CheckFailed(f"the mission as read back fails the check: {self.failed_check}{tail}", where=where)
         return LinkError(f"the outcome is {self.reason}{tail}", where=where)

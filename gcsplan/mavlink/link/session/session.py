@@ -232,8 +232,8 @@ def require_verdict(mission: Mission, verdict: CheckedMission | None, *, uncheck
         words = "a mission is sent with its passing verdict: check it first, or send it unchecked on purpose"
         raise CheckFailed(words, where=where, reason="unchecked")
     if verdict.safe is not True:
-        said = "did not pass the check" if verdict.safe is False else "could not be judged in full"
-        raise CheckFailed(f"the mission {said}: it is not sent", where=where)
+        failure = "did not pass the check" if verdict.safe is False else "could not be judged in full"
+        raise CheckFailed(f"the mission {failure}: it is not sent", where=where)
     if not _same_mission(verdict.mission, mission):
         raise CheckFailed("the verdict is of another mission than the one to be sent", where=where, reason="unchecked")
 
@@ -256,7 +256,7 @@ def upload_items(
 
 def _require_list(mission_type: int) -> None:
     if mission_type not in (FENCE, RALLY):
-        raise InputError(f"fence (1) or rally points (2) are wanted, given mission type {mission_type}")
+        raise InputError(f"mission type {mission_type}: give 1 (fence) or 2 (rally points)")
 
 
 def download_items(

@@ -27,12 +27,12 @@ from gcsplan.mavlink.protocol.outcome import Outcome, Unknown
 
 _AUTOPILOT_VERSION, _GLOBAL_POSITION_INT, _HOME_POSITION = 148, 33, 242
 _DOES_NOT_EXIST = 1  # MAV_PARAM_ERROR
-_ASKED_TIMES, _GENERIC_ASKED_TIMES = 4, 2  # a vehicle that reports a generic autopilot may never report a position
+_MOST_REQUESTS, _MOST_REQUESTS_OF_GENERIC = 4, 2  # a vehicle with a generic autopilot may never report a position
 _ASK_AGAIN_MOST_S, _SLOWER = 4.0, 1.5
 PARAMETER_S = 2.0
 NO_PARAMETERS_S = 1.0
 SLOW_ANSWER_S = 6.0
-"""Patience with parameters that are told and do not decide: several round trips of a slow link."""
+"""Patience with parameters that are reported but decide nothing: several round trips of a slow link."""
 
 
 def discover_steps(
@@ -50,17 +50,17 @@ def discover_steps(
             raise dead_link(channel.link, channel.sysid, timeout_s)
         yield started + timeout_s
         _note(channel, watch)
-    found, asked, ask_at = clock(), 0, clock()
+    found, requested, ask_at = clock(), 0, clock()
     while True:
         now = clock()
         state = watch.state(now) or state
-        times = _GENERIC_ASKED_TIMES if is_generic(state.mav_autopilot) else _ASKED_TIMES
+        times = _MOST_REQUESTS_OF_GENERIC if is_generic(state.mav_autopilot) else _MOST_REQUESTS
         complete = state.capabilities is not None and state.located
         if _is_booting(state) and now < found + standby_s:
             yield now + ASK_AGAIN_S
-        elif not complete and now >= ask_at and asked < times:
+        elif not complete and now >= ask_at and requested < times:
             _ask(channel, state)
-            asked, ask_at = asked + 1, now + ASK_AGAIN_S
+            requested, ask_at = requested + 1, now + ASK_AGAIN_S
         elif not complete and now < ask_at:
             yield ask_at
         elif now < found + listen_s:
@@ -80,11 +80,11 @@ def parameter_steps(
     needed: Collection[tuple[str, ...]] = (),
     most_s: float = 0.0,
 ) -> LinkSteps[OnBoard]:
-    """Return the values of those parameters that the vehicle has, and the names that it says it does not have.
+    """Return the values of the parameters that the vehicle has, and the names that it says it does not have.
 
-    A value that is not a number is NaN. Of each of ``groups`` it has one name. It takes at most 2 s after the last
-    answer, or 1 s if none arrives; but the groups that are ``needed`` are asked for until ``most_s``, unless the
-    vehicle does not say what it is. What is then still without an answer is in neither: `parameter_names.unanswered`.
+    A value that is not a number is NaN. A vehicle has one name of each of ``groups``. The step takes at most 2 s after
+    the last answer, or 1 s if none arrives; but it requests the groups that are ``needed`` until ``most_s``, unless the
+    vehicle does not say what it is. A name without an answer is in neither result: `parameter_names.unanswered`.
     """
     clock = channel.link.clock
     generic = is_generic(state.mav_autopilot)
@@ -180,12 +180,12 @@ def _is_booting(state: VehicleState) -> bool:
 
 def _ask(channel: Channel, state: VehicleState) -> None:
     to = state.address
-    wanted = {
+    needed = {
         _AUTOPILOT_VERSION: state.capabilities is None,
         _GLOBAL_POSITION_INT: not state.located,
         _HOME_POSITION: state.home is None,
     }
-    for kind in (kind for kind, lacking in wanted.items() if lacking):
+    for kind in (kind for kind, lacking in needed.items() if lacking):
         channel.send(request_message(to, kind), to)
 
 
@@ -262,9 +262,9 @@ def drive(
     try:
         while machine.deadline is not None:
             yield _next(machine, recheck, patience)
-            if prepared.asked:
-                machine.answered(prepared.asked, clock())
-                prepared.asked.clear()
+            if prepared.requested:
+                machine.answered(prepared.requested, clock())
+                prepared.requested.clear()
                 if recheck:
                     recheck.contact(clock())
             for heard in channel.take():

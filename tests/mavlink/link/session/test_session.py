@@ -139,7 +139,7 @@ def test_a_mission_that_the_vehicles_own_parameters_make_unsafe_is_not_sent() ->
         heard.append(dict(values))
         return CUT_CORNER if values.get("NAV_ACC_RAD") == 2.0 else None
 
-    with air(board) as link, pytest.raises(FailsCheck, match="this is not what was judged") as caught:
+    with air(board) as link, pytest.raises(FailsCheck, match="it was judged with other values") as caught:
         upload_mission(link, mission(Autopilot.PX4), options=replace(OPTIONS, read_parameters=True), judge=judge)
     assert (caught.value.reason, caught.value.note) == ("parameters", CUT_CORNER)
     assert board.items() == ()
