@@ -208,7 +208,7 @@ class PlaneSearch:
     # -------------------------------------------------------------------- bounds
 
     def size(self, looks: float) -> tuple[float, float]:
-        """Counted seconds of ``looks`` searches over the lattices of all legs, and megabytes of those."""
+        """Counted seconds of ``looks`` searches over the lattices of all legs, and megabytes of the lattices."""
         nodes = sum(leg.cells_of.nodes for leg in self.legs)
         return looks * nodes * NODE_S, nodes * NODE_MB
 
@@ -226,7 +226,7 @@ class PlaneSearch:
         return self.longest() - sum(other.lower_m for other in self.legs if other is not leg)
 
     def raise_tracks(self) -> None:
-        """Raise the lower bound of the cost to that of the shortest tracks."""
+        """Raise the lower bound of the cost to the cost of the shortest tracks."""
         self.incumbent.raise_track_bound(sum(leg.lower_m for leg in self.legs))
 
     @property

@@ -18,7 +18,7 @@ that later tracks keep from zones over ground; and the most it may be pinched fo
 
 
 class FineTracks(Search):
-    """Once, when a path is known, also if the gap is nearly as small as wanted. Remembers nothing."""
+    """Runs once, when a path is known, also if the gap is nearly as small as requested. Remembers nothing."""
 
     NAME, IMPROVES, SHARE = "fine_tracks", "paths", 0.9
 
