@@ -226,7 +226,7 @@ def test_an_answer_whose_length_nobody_knows_is_refused(served: Served, tmp_path
         return True
 
     served.trouble = trouble
-    assert "does not say how long it is" in str(refusal(served, tmp_path))
+    assert "the server gives no length" in str(refusal(served, tmp_path))
 
 
 def test_a_server_that_continues_another_part_is_not_believed(served: Served, tmp_path: Path) -> None:

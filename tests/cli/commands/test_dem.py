@@ -134,6 +134,6 @@ def test_what_cannot_be_had_is_exit_code_6_and_the_rest_stays(run: Any, served: 
     code, out, err = run("dem", "fetch", "ridge.yaml", "--json")
     assert code == 6
     assert json.loads(out)["error"]["reason"] == "download"
-    assert "1 of 2 tiles could not be had" in err
+    assert "1 of 2 tiles could not be downloaded" in err
     assert "N36W084: http://127.0.0.1" in err
     assert "1 copernicus-glo30 tile of this area is not in the cache" in run("plan", "ridge.yaml")[2]
