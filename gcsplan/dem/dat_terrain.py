@@ -316,7 +316,7 @@ class DatMosaic:
             )
             if not (n.size and e.size):
                 continue
-            # Of posts beyond the tile's eastern border the autopilot reads the first alone, of its row or the next.
+            # Beyond the tile's eastern border the autopilot reads only the first post, of its row or the next.
             last = np.pad(np.ceil(wide), ((1, 1), (0, 0)), mode="edge")
             read = e <= np.maximum(np.maximum(last[:-2], last[1:-1]), last[2:])
             posts_at = self.grid.post_e7(cell, *np.meshgrid(n, e, indexing="ij"))

@@ -49,7 +49,7 @@ def ib_abc(run: Run, *, feedback: bool, scale: float, spent_share: float, group:
     when the mean count is high.
 
     ``scale`` bounds φ; ``spent_share`` is γ. Without ``feedback`` μ is 1: B-ABC, in our reading. ``counts_from`` is the
-    first count of each source, "one" or "zero"; with zero, as the text says, μ = 0/0 of the first cycle is taken as 0.
+    first count of each source, "one" or "zero"; with zero, as in the text, μ = 0/0 of the first cycle is taken as 0.
     """
     require("ib-abc", "counts_from", counts_from, ("one", "zero"))
     if not 0.0 < spent_share < 1.0:

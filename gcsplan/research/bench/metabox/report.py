@@ -21,14 +21,15 @@ METABOX_COLUMNS = ("optimiser", "of", "place, %", "p", "over the best, %", "clea
 def rows(result: dict[str, Any]) -> list[dict[str, Any]]:
     """A row for each optimiser, best mean place first.
 
-    ``place_percent``: of its runs among all runs on an instance, by cost, from 0 (best) to 100; mean over all. ``p``:
-    of "its places do not differ from those of the first row" (Mann and Whitney's U, Holm over the optimisers).
-    ``over_percent``: median cost over the least cost that any run found on the instance, median over the instances.
-    None if half of the runs found nothing. ``clear``: part of the runs whose best path has no penalty. ``outside``:
-    part of the points that it evaluated out of the box. ``medians``: of the cost, by instance; None as above.
+    ``place_percent``: mean place of its runs among all runs on an instance, by cost, from 0 (best) to 100. ``p``:
+    probability of its places if they do not differ from the first row's (Mann and Whitney's U, Holm over the
+    optimisers). ``over_percent``: median cost over the least cost that any run found on the instance, median over the
+    instances; None if half of the runs found nothing. ``clear``: part of the runs whose best path has no penalty.
+    ``outside``: part of its evaluated points that lie out of the box. ``medians``: median cost by instance; None as
+    above.
     """
-    told = result["settings"]
-    names, count, runs = told["algorithms"], told["instances"], told["runs"]
+    settings = result["settings"]
+    names, count, runs = settings["algorithms"], settings["instances"], settings["runs"]
     costs = np.full((count, len(names), runs), np.inf)
     tally = {name: np.zeros(4) for name in names}  # clear, outside, evaluated, failed
     for record in result["runs"]:
@@ -78,7 +79,7 @@ def _finite(number: float) -> float | None:
 
 
 def _places(costs: Floats) -> Floats:
-    """Places (optimisers, instances × runs) of ``costs`` (instances, optimisers, runs) among those of the instance."""
+    """Places (optimisers, instances × runs) of ``costs`` (instances, optimisers, runs) among its instance's costs."""
     from scipy.stats import rankdata
 
     ranks = np.array([rankdata(one).reshape(one.shape) for one in costs])
@@ -86,11 +87,12 @@ def _places(costs: Floats) -> Floats:
 
 
 def _markdown(result: dict[str, Any]) -> Iterator[str]:
-    told = result["settings"]
-    threats = ", ".join(map(str, told["threats"]))
+    settings = result["settings"]
+    threats = ", ".join(map(str, settings["threats"]))
     yield (
-        f"{told['instances']} generated instances of MetaEvoBox's UAV family (threats: {threats}), seed "
-        f"{told['seed']}, {told['evaluations']} evaluations, {told['runs']} runs; its published instances are others."
+        f"{settings['instances']} generated instances of MetaEvoBox's UAV family (threats: {threats}), seed "
+        f"{settings['seed']}, {settings['evaluations']} evaluations, {settings['runs']} runs; its published instances "
+        "are others."
     )
     yield ""
     yield f"| {' | '.join(METABOX_COLUMNS)} |"

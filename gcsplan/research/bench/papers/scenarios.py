@@ -29,7 +29,7 @@ Options = Mapping[str, object]
 
 @dataclass(frozen=True, slots=True)
 class PaperReading:
-    """One reading: ``what`` says what differs; ``changes``: algorithm of the paper to its options on top."""
+    """One reading: ``what`` names the difference; ``changes``: algorithm of the paper to its options on top."""
 
     name: str
     what: str
@@ -58,7 +58,7 @@ FIELD_M = 800.0
 
 READINGS: Mapping[str, tuple[PaperReading, ...]] = MappingProxyType({
     "krill": (
-        _of("one-krill-at-a-time", "each krill sees where those before it went (fig. 9)", krill=_with(moves="one")),
+        _of("one-krill-at-a-time", "each krill sees where the ones before it went (fig. 9)", krill=_with(moves="one")),
         _of("printed-crowd", "it goes where food over n_f is less than δ times its own", krill=_with(crowd="printed")),
         _of(*_BEES, abc=_with(bees="together")),
     ),
@@ -118,7 +118,7 @@ def readings_of(paper: str) -> tuple[PaperReading, ...]:
 
 
 MISSION_FOLDERS = (Path("missions", "papers"), *(folder / "papers" for folder in samples.SAMPLE_FOLDERS))
-"""Folders in which the mission files are searched: here, then those of the samples."""
+"""Folders in which the mission files are searched: here, then the folders of the samples."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,17 +231,17 @@ SCENARIOS: Mapping[str, Scenario] = MappingProxyType(
 def choose(
     names: Sequence[str] | None, algorithms: Sequence[str] | None, *, readings: bool = True
 ) -> list[tuple[Scenario, list[Contender]]]:
-    """The scenarios called ``names`` (None: all), each with those of its contenders that ``algorithms`` names; None:
-    all, or without ``readings`` the paper's own.
+    """The scenarios called ``names`` (None: all), each with its contenders that ``algorithms`` names; None: all, or
+    without ``readings`` the paper's own.
 
     Raises InputError for an unknown name, and if nothing is left.
     """
-    asked = _known("scenario", names, SCENARIOS)
-    here = {c.name: None for name in asked for c in SCENARIOS[name].contenders}
-    wanted = _known("algorithm", algorithms, here)
+    chosen = _known("scenario", names, SCENARIOS)
+    here = {c.name: None for name in chosen for c in SCENARIOS[name].contenders}
+    allowed = _known("algorithm", algorithms, here)
     if algorithms is None and not readings:
-        wanted = [name for name in wanted if ":" not in name]
-    picked = [(SCENARIOS[n], [c for c in SCENARIOS[n].contenders if c.name in wanted]) for n in asked]
+        allowed = [name for name in allowed if ":" not in name]
+    picked = [(SCENARIOS[n], [c for c in SCENARIOS[n].contenders if c.name in allowed]) for n in chosen]
     return [(scenario, contenders) for scenario, contenders in picked if contenders]
 
 
