@@ -66,7 +66,7 @@ REASONS = {
     "two units": "two units of height", "unknown unit": "which is not known", "no unit": "nothing says the unit",
     "own unit": "states it itself", "in metres": "are in metres", "own voids": "marks its voids itself",
     "ellipsoid": "must be converted to mean sea level", "other ellipsoid": "count from another ellipsoid",
-    "no heights": "has no axis of heights", "silent tile": "nothing says the unit of those of",
+    "no heights": "has no axis of heights", "silent tile": "nothing states the unit of",
 }  # fmt: skip
 MARKS = (-9999.0, -32767.0, -32768.0)
 """Raw numbers that are voids wherever they stand."""

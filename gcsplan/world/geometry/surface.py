@@ -70,7 +70,7 @@ class GridMap:
         """
         u = (np.asarray(east_m, float) - self.centre[0]) / self.scale_m
         v = (np.asarray(north_m, float) - self.centre[1]) / self.scale_m
-        v = v.reshape((1,) * (u.ndim - v.ndim) + v.shape)  # of_u has axes before those of v
+        v = v.reshape((1,) * (u.ndim - v.ndim) + v.shape)  # of_u has its axes before the axes of v
         with np.errstate(over="ignore", invalid="ignore"):
             powers = np.ones((DEGREE + 1, v.size))
             for power in range(DEGREE):

@@ -209,7 +209,7 @@ def test_tiles_in_feet_do_not_lend_their_unit_to_one_that_states_none(tmp_path: 
     b = degrees_tif(tmp_path / "b.tif", heights)
     for order in ((a, b), (b, a)):
         said = str(refusal(order))
-        assert "heights of a.tif are feet, from the file, and nothing says the unit of those of b.tif" in said
+        assert "heights of a.tif are feet, from the file, and nothing states the unit of b.tif" in said
         assert "`height_unit: ft`" in said
         assert is_times(load(order, height_unit="ft"), heights, FOOT)
     c = degrees_tif(tmp_path / "c.tif", heights, units=("m",))
