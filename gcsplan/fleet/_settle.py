@@ -120,7 +120,7 @@ class Chooser:
         return self._option("path", slot)
 
     def best(self, base: Option) -> Option | None:
-        """The cheapest option that keeps clear; None if none of those tried does."""
+        """The cheapest tried option that keeps clear; None if none does."""
         if self.clear(base):
             return base
         if not self.freedom.keeps_arrival:
@@ -217,10 +217,10 @@ class Chooser:
     def _arriving(self, depart_s: float, hold_s: float, how: How) -> Option | None:
         """The flight that leaves near ``depart_s``, holds ``hold_s``, and arrives as scheduled; None if impossible."""
         craft, arrive = self.craft, self.was.arrive_s
-        wanted = arrive - depart_s - hold_s
-        if not craft.fast_s - WITHIN_S <= wanted <= craft.slow_s + WITHIN_S:
+        flight_s = arrive - depart_s - hold_s
+        if not craft.fast_s - WITHIN_S <= flight_s <= craft.slow_s + WITHIN_S:
             return None
-        speed = speed_for(craft.course.time_to_goal_s, wanted, craft.slowest_m_s, craft.fastest_m_s, 1e-3)
+        speed = speed_for(craft.course.time_to_goal_s, flight_s, craft.slowest_m_s, craft.fastest_m_s, 1e-3)
         slot = craft.fly(speed, depart_s, hold_s)
         # The speed is a float32 from a coarse search; the departure corrects its error.
         depart = depart_s + arrive - slot.arrive_s
@@ -289,7 +289,7 @@ class Change:
     because: Conflict
 
     def note(self) -> Note:
-        """What changes, and which vehicle it keeps clear of."""
+        """The change, and the vehicle that it keeps clear of."""
         changes = []
         later_s = self.slot.depart_s - self.was.depart_s
         if abs(later_s) > 0.005:
@@ -393,10 +393,10 @@ def moved(settled: ChoicesByName) -> tuple[ChoicesByName, float]:
 
 
 def _settle(plan: Schedule, ask: Ask, done: ChoicesByName) -> tuple[Settlement, ChoicesByName]:
-    """Fix all in order; those in ``done``, the first of them, stay as they are. Also returns those before any trouble.
+    """Fix all in order; the first vehicles, in ``done``, stay as they are. Also returns the ones before any trouble.
 
-    A vehicle that is stuck is moved before those in its way, if no priority is set and not too many are fixed again;
-    else it is left out, or ends this.
+    A vehicle that is stuck is moved before the vehicles in its way, if no priority is set and not too many are fixed
+    again; else it is left out, or ends this.
     """
     order = list(plan.order if ask.priority is None else ask.priority)
     slots, vehicles = {s.name: s for s in plan.slots}, {c.name: c.vehicle for c in ask.crews}
@@ -438,7 +438,7 @@ def _taken(rules: Rules, done: ChoicesByName) -> Taken:
 
 
 def _choice(chooser: Chooser, plan: Schedule, ask: Ask) -> Choice | Stuck:
-    """The best option of one vehicle against those before it."""
+    """The best option of one vehicle against the vehicles before it."""
     was, taken = chooser.was, chooser.taken
     base = chooser.base()
     assert base is not None
@@ -450,7 +450,7 @@ def _choice(chooser: Chooser, plan: Schedule, ask: Ask) -> Choice | Stuck:
         best = _other_path(was.name, chooser, met, ask.replan, ask.attempts)
     if best is None:
         others = tuple({n for c in met for n in c.worst.vehicles} - {was.name})
-        near_goals = [c for c in met if _at_goals(c, plan, ask.rules)]  # what no departure, speed or path can help
+        near_goals = [c for c in met if _at_goals(c, plan, ask.rules)]  # no departure, speed or path can help these
         return Stuck(was.name, [*near_goals, *met][0], others, bool(near_goals))
     change = Change(was.name, best.how, was, best.slot, best.extra_j, met[0])
     best = replace(best, slot=replace(best.slot, notes=(*best.slot.notes, change.note())))

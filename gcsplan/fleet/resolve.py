@@ -1,7 +1,7 @@
 """Resolve conflicts by priority, at the least cost: by departure, speed, a hold or another path; or refuse.
 
-Vehicles are fixed one after the other. A vehicle that meets one of those before it gets the cheapest change that keeps
-clear of all of them (`_settle`). In a fleet with fixed arrivals, a departure changes together with the speed, so that
+Vehicles are fixed one after the other. A vehicle that meets an earlier one gets the cheapest change that keeps clear of
+all earlier ones (`_settle`). In a fleet with fixed arrivals, a departure changes together with the speed, so that
 the arrival stays. If nothing helps, the refusal names the two vehicles, the place and the time, and, if the goals are
 the reason, the smallest interval or distance of goals that works. At the end `separation` judges the whole fleet.
 
@@ -65,7 +65,7 @@ LONGEST_INTERVAL_S = 3600.0
 class Resolved:
     """A fleet that keeps its separation.
 
-    ``schedule`` has every slot as it is flown, ``paths`` the motions in its order, ``changes`` what was changed,
+    ``schedule`` has every slot as it is flown, ``paths`` the motions in its order, ``changes`` the changes to vehicles,
     ``separation`` the exact judgement. ``later_s`` is the delay of all arrivals. ``left_out`` has an error for each
     vehicle that is left out.
     """
@@ -202,7 +202,7 @@ def _refuse_goals(plan: Schedule, ask: Ask, where: Where) -> None:
         conflict = max(conflicts, key=lambda c: c.from_s)
         goals_m = least_goals_m(plan, crews, rules, (a.name, b.name), hold=ask.hold) or rounded_up(rules.needed_m)
         raise NotSeparated(
-            f"the goals of {a.name} and {b.name} are {flat:.1f} m apart, and {why}; {_asked(rules)}: put the goals at "
+            f"the goals of {a.name} and {b.name} are {flat:.1f} m apart, and {why}; {_words(rules)}: put the goals at "
             f"least {goals_m:g} m apart{_other_cure(plan, ends)}; {conflict.note(where)}",
             conflict=conflict,
             vehicle=b.name,
@@ -215,10 +215,10 @@ def _other_cure(plan: Schedule, ends: Set[str]) -> str:
         return ", or let them arrive in sequence (arrival: {mode: sequence})"
     if ends == {"loiter"}:
         return ", or let the first fly on (end: rtl)"
-    return ", or say how long a landed vehicle stands on its pad (arrival: {pad_clear_s: …})"
+    return ", or state how long a landed vehicle stands on its pad (arrival: {pad_clear_s: …})"
 
 
-def _asked(rules: Rules) -> str:
+def _words(rules: Rules) -> str:
     more = []
     if rules.error_m > 0.0:
         more.append(f"{rules.error_m:g} m of error of each")
@@ -228,20 +228,20 @@ def _asked(rules: Rules) -> str:
 
 
 def _refusal(plan: Schedule, ask: Ask, stuck: Stuck, again: Again, where: Where, *, cures: bool) -> NotSeparated:
-    """Why a vehicle is stuck and, with ``cures``, what would work."""
+    """Why a vehicle is stuck and, with ``cures``, the cures."""
     conflict, rules = stuck.conflict, ask.rules
     words = f"{conflict.note(where)}; no departure, speed, hold or other path of {stuck.name} that was tried helps"
     interval, goals_m = None, None
     if stuck.at_goals and cures:
         goals_m = least_goals_m(plan, ask.crews, rules, conflict.worst.vehicles, hold=ask.hold, later_s=ask.later_s)
-        said = [] if goals_m is None else [f"goals at least {goals_m:g} m apart, each on the side it is reached from"]
+        works = [] if goals_m is None else [f"goals at least {goals_m:g} m apart, each on the side it is reached from"]
         if plan.mode == "sequence":
             interval = least_interval_s(
                 plan, ask.crews, rules, hold=ask.hold, later_s=ask.later_s, again=again, between=conflict.worst.vehicles
             )
             if interval is not None:
-                said.insert(0, f"interval_s {interval:g}{' or more' if len(plan.slots) > MANY else ''}")
-        words += f"; what works: {', or '.join(said)}" if said else ""
+                works.insert(0, f"interval_s {interval:g}{' or more' if len(plan.slots) > MANY else ''}")
+        words += f"; what works: {', or '.join(works)}" if works else ""
     return NotSeparated(words, conflict=conflict, vehicle=stuck.name, interval_s=interval, goals_m=goals_m)
 
 

@@ -89,7 +89,7 @@ class Conflict:
     """Two vehicles nearer than ``needed_m`` from ``from_s`` until ``until_s`` (inf: for good), and the worst moment.
 
     ``kind``: both are in the ``air``; or the *first* takes off or lands beside the second, which stands on the ground.
-    With a window the time span is that of the pieces that may meet, rounded outward.
+    With a window the time span covers the pieces that may meet, rounded outward.
     """
 
     kind: ConflictKind
@@ -174,7 +174,7 @@ def separation(paths: Sequence[TimedPath], rules: Rules) -> Separation:
         fleet = Fleet.of(paths, rules.window_s) if paths else None
         none = np.zeros(0, dtype=np.intp)
         if fleet is None:
-            raise InputError("separation was asked of no vehicle at all")
+            raise InputError("give at least one vehicle to judge the separation of")
         return Separation(rules, names, distance, None, (), (), Pairs(fleet, none, none, Least.none(0)))
     fleet = Fleet.of(paths, rules.window_s)
     i, j = (index.astype(np.intp) for index in np.triu_indices(len(paths), 1))
