@@ -83,9 +83,9 @@ def test_tiles_come_with_their_records_and_once_only(served: Served, tmp_path: P
     assert record["vertical_datum"] == "EGM2008"
     assert record["sha256"] == hashlib.sha256(data).hexdigest()
     assert record["url"] == f"{served.url}/copernicus-dem-30m/{GLO30.object_of(FOUR[0])}"
-    asked = len(served.asked)
+    asked = len(served.requests)
     assert [f.cached for f in fetch(served, tmp_path, *FOUR)] == [True] * 4
-    assert len(served.asked) == asked
+    assert len(served.requests) == asked
     assert parts(tmp_path) == []
 
 
