@@ -23,34 +23,22 @@ DOCUMENTS = ("README.md", "CHANGELOG.md", "changelog.d", "docs")
 
 TODO: tuple[str, ...] = (
     "gcsplan/app",
-    "gcsplan/bench",
     "gcsplan/check",
     "gcsplan/cli",
-    "gcsplan/dem",
     "gcsplan/export",
-    "gcsplan/fleet",
-    "gcsplan/logs",
     "gcsplan/mavlink",
     "gcsplan/mission_file",
     "gcsplan/native",
     "gcsplan/notes",
     "gcsplan/planners",
     "gcsplan/report",
-    "gcsplan/research",
     "gcsplan/sim",
-    "gcsplan/world",
     "gcsplan/__init__.py",
     "gcsplan/errors.py",
     "gcsplan/units.py",
     "gcsplan/vehicle.py",
     "tests/support",
-    "tests/oracles",
-    "tests/campaigns",
-    "sitl_tests",
-    "noxfile.py",
     "README.md",
-    "CHANGELOG.md",
-    "changelog.d",
     "docs",
 )
 """Folders and files whose language nobody has put right yet; empty when the pass is done."""
@@ -94,6 +82,9 @@ RULES = (
     rule(r"\bnine in ten\b", "p90 (docs/glossary.md)"),
     rule(r"[\"“*]?\bhalf\b[\"”*]*(?=\s*[,|:]|\s+and p90)", "median (docs/glossary.md)", where=r"bench"),
 )
+
+COLUMNS = {"gap_asked_percent"}
+"""Names that are columns of files, a contract."""
 
 A_TERM = re.compile("|".join(TERMS), re.IGNORECASE)
 WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
@@ -186,7 +177,7 @@ def names(where: str, found: Iterable[tokenize.TokenInfo], nodes: Sequence[ast.A
         for key in node.keywords
     }
     for token in found:
-        if token.type == tokenize.NAME and A_TERM.search(token.string):
+        if token.type == tokenize.NAME and A_TERM.search(token.string) and token.string not in COLUMNS:
             words = {word.lower() for word in WORD.findall(token.string)}
             is_data = (token.start[0], len_utf8(token)) in data
             yield from (

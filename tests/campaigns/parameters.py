@@ -5,7 +5,7 @@
 
 A flight that is accepted must take the judged time (within 1 s or 0.5 %, and the simulator's own error), run on no
 farther before a return than was judged, return at the judged height and by the judged rule, and have the bank for its
-turns. A set that keeps all of these limits with room to spare must not be refused. The oracle reads the parameters itself:
+turns. A set that keeps all of these limits with room to spare must not be refused. The oracle reads parameters itself:
 it shares neither the table of names nor the judge's motion with the code that it tests.
 """
 

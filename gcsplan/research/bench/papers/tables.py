@@ -26,8 +26,8 @@ ClaimRows = Sequence[Mapping[str, Any]]
 METHOD = (
     "Two-sided Mann and Whitney's U, Holm-corrected over all claims of a paper within each column (as run, at equal "
     f"evaluations, twin, each reading); {HOLDS} and {REVERSED} need p < {SIGNIFICANCE:g}, {TIE} means that no "
-    "difference is shown. A is the probability that a run of the claim's better one is really better; a tie counts "
-    "0.5: A 0.5 is no difference, 1 is always. Runs that break a limit rank last in length and energy (“illegal”: half "
+    "difference is shown. A is the probability that a run of the claim's better one is really better, with 0.5 for "
+    "a tie: 0.5 is no difference, 1 is always. Runs that break a limit rank last in length and energy (“illegal”: half "
     "of the runs or more)."
 )
 IMPOSSIBLE_MEANS = (
