@@ -51,7 +51,7 @@ POSTS_AT_ONCE = 500_000
 
 
 REACH = 1.1
-"""Spacings around a cell within which a post counts: one, and what the scales of two tiles differ by."""
+"""Spacings around a cell within which a post counts: one, and the difference of two tiles' scales."""
 
 FLATTEST = 1e-6
 """Posts whose places spread less than this, in squares of spacings, lie in one row or are one."""

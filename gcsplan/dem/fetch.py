@@ -303,7 +303,7 @@ def _sync(path: Path) -> None:
 
 
 def _drop(part: Path) -> None:
-    """Remove a part and what stands beside it."""
+    """Remove a part and the file beside it."""
     part.unlink(missing_ok=True)
     part.with_name(part.name + ".json").unlink(missing_ok=True)
 

@@ -79,7 +79,7 @@ class Option:
 
 @dataclass(frozen=True, slots=True)
 class Freedom:
-    """What may be changed. With ``mode`` sequence or together the arrival is fixed, with none it is free.
+    """The allowed changes. With ``mode`` sequence or together the arrival is fixed, with none it is free.
 
     No vehicle leaves before 0 s. If nothing else helps, one may leave up to ``before_s`` earlier; the whole fleet then
     starts, and arrives, that much later.
@@ -318,7 +318,7 @@ def maker(plan: Schedule, crews: Sequence[Crew], hold: Hold) -> Again:
 
 
 @dataclass(frozen=True, slots=True)
-class Ask:
+class Job:
     """The arguments of `resolve`, which stay the same over all tries."""
 
     crews: Sequence[Crew]
@@ -369,21 +369,21 @@ ChoicesByName = dict[str, Choice]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Settlement:
-    """The choices of all vehicles but those that are ``stuck``: at most one, unless vehicles may be left out."""
+    """The choices of all vehicles but the ``stuck`` ones: at most one, unless vehicles may be left out."""
 
     done: ChoicesByName
     stuck: tuple[Stuck, ...] = ()
 
 
-def settle(plan: Schedule, ask: Ask) -> Settlement:
+def settle(plan: Schedule, job: Job) -> Settlement:
     """Choices for all vehicles. Other paths are used only if nothing else helps.
 
-    A vehicle may leave up to ``ask.later_s`` before 0 s; see `moved`.
+    A vehicle may leave up to ``job.later_s`` before 0 s; see `moved`.
     """
-    if ask.replan is None:
-        return _settle(plan, ask, {})[0]
-    found, before = _settle(plan, replace(ask, replan=None, leave_out=False), {})
-    return _settle(plan, ask, before)[0] if found.stuck else found
+    if job.replan is None:
+        return _settle(plan, job, {})[0]
+    found, before = _settle(plan, replace(job, replan=None, leave_out=False), {})
+    return _settle(plan, job, before)[0] if found.stuck else found
 
 
 def moved(settled: ChoicesByName) -> tuple[ChoicesByName, float]:
@@ -392,23 +392,23 @@ def moved(settled: ChoicesByName) -> tuple[ChoicesByName, float]:
     return (settled if later <= 0.0 else {name: choice.later(later) for name, choice in settled.items()}), later
 
 
-def _settle(plan: Schedule, ask: Ask, done: ChoicesByName) -> tuple[Settlement, ChoicesByName]:
+def _settle(plan: Schedule, job: Job, done: ChoicesByName) -> tuple[Settlement, ChoicesByName]:
     """Fix all in order; the first vehicles, in ``done``, stay as they are. Also returns the ones before any trouble.
 
     A vehicle that is stuck is moved before the vehicles in its way, if no priority is set and not too many are fixed
     again; else it is left out, or ends this.
     """
-    order = list(plan.order if ask.priority is None else ask.priority)
-    slots, vehicles = {s.name: s for s in plan.slots}, {c.name: c.vehicle for c in ask.crews}
-    freedom = Freedom(plan.mode, ask.hold, ask.later_s)
+    order = list(plan.order if job.priority is None else job.priority)
+    slots, vehicles = {s.name: s for s in plan.slots}, {c.name: c.vehicle for c in job.crews}
+    freedom = Freedom(plan.mode, job.hold, job.later_s)
     promoted: set[str] = set()
     left: list[Stuck] = []
     before: ChoicesByName | None = None
-    taken, turn = _taken(ask.rules, done), len(done)
+    taken, turn = _taken(job.rules, done), len(done)
     while turn < len(order):
         name = order[turn]
         was = slots[name]
-        found = _choice(Chooser(vehicles[name], was.route, was, freedom, taken), plan, ask)
+        found = _choice(Chooser(vehicles[name], was.route, was, freedom, taken), plan, job)
         if isinstance(found, Choice):
             done = done | {name: found}
             taken.add(found.option.path)
@@ -417,15 +417,15 @@ def _settle(plan: Schedule, ask: Ask, done: ChoicesByName) -> tuple[Settlement, 
         before = done if before is None else before
         order.pop(turn)
         first = min(order.index(other) for other in found.others)
-        may = ask.priority is None and not found.at_goals and name not in promoted
+        may = job.priority is None and not found.at_goals and name not in promoted
         if may and len(promoted) < PROMOTIONS and turn - first <= MOST_AGAIN:
             promoted.add(name)
             order.insert(first, name)
             done = {name: done[name] for name in order[:first]}
-            taken, turn = _taken(ask.rules, done), first
+            taken, turn = _taken(job.rules, done), first
             continue
         left.append(found)
-        if not ask.leave_out:
+        if not job.leave_out:
             break
     return Settlement(done, tuple(left)), done if before is None else before
 
@@ -437,7 +437,7 @@ def _taken(rules: Rules, done: ChoicesByName) -> Taken:
     return taken
 
 
-def _choice(chooser: Chooser, plan: Schedule, ask: Ask) -> Choice | Stuck:
+def _choice(chooser: Chooser, plan: Schedule, job: Job) -> Choice | Stuck:
     """The best option of one vehicle against the vehicles before it."""
     was, taken = chooser.was, chooser.taken
     base = chooser.base()
@@ -446,11 +446,11 @@ def _choice(chooser: Chooser, plan: Schedule, ask: Ask) -> Choice | Stuck:
     if best is base:
         return Choice(base, None)
     met = _conflicts(base.path, taken)
-    if best is None and ask.replan is not None:
-        best = _other_path(was.name, chooser, met, ask.replan, ask.attempts)
+    if best is None and job.replan is not None:
+        best = _other_path(was.name, chooser, met, job.replan, job.attempts)
     if best is None:
         others = tuple({n for c in met for n in c.worst.vehicles} - {was.name})
-        near_goals = [c for c in met if _at_goals(c, plan, ask.rules)]  # no departure, speed or path can help these
+        near_goals = [c for c in met if _at_goals(c, plan, job.rules)]  # no departure, speed or path can help these
         return Stuck(was.name, [*near_goals, *met][0], others, bool(near_goals))
     change = Change(was.name, best.how, was, best.slot, best.extra_j, met[0])
     best = replace(best, slot=replace(best.slot, notes=(*best.slot.notes, change.note())))

@@ -41,7 +41,7 @@ class Rules:
 
     ``separation_m`` holds between any two vehicles. Each of them may be ``error_m`` away from its modelled position,
     and up to ``window_s`` early or late, independently of the others. A landed vehicle stays where it landed for
-    ``pad_clear_s`` (inf: for good). Those in ``leaving`` fly away where their motion ends, so they stand nowhere.
+    ``pad_clear_s`` (inf: for good). Vehicles in ``leaving`` fly away where their motion ends, so they stand nowhere.
     """
 
     separation_m: float
@@ -163,7 +163,7 @@ def separation(paths: Sequence[TimedPath], rules: Rules) -> Separation:
     Pairs are judged while both are in the air (a vehicle that ends in the air stays there for good). Then the pads are
     judged: a vehicle conflicts if it takes off or lands nearer than ``rules.needed_m`` (horizontally) to a landed
     vehicle, or lands that near to a waiting one. Waiting vehicles are not judged against each other, nor against one
-    that takes off beside them; a note says so. A vehicle that flies over one on the ground is not judged against it,
+    that takes off beside them; a note states it. A vehicle that flies over one on the ground is not judged against it,
     because min AGL covers that. Raises InputError for two vehicles of one name.
     """
     names = tuple(p.name for p in paths)

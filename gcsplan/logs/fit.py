@@ -60,7 +60,7 @@ LEAST_SPEED_RATIO = 1.2
 """Least ratio of the fastest to the slowest airspeed that determines a base power."""
 
 ALIKE_POWER = 0.1
-"""Beside a base power: the part of the power to which what a metre adds must be known; it may be nothing."""
+"""Beside a base power: the part of the power to which a metre's own share must be known; the share may be 0."""
 
 AMOUNTS = ("m up and down", "m along", "s of hovering")
 
@@ -337,7 +337,7 @@ def _three(value: float) -> str:
     return f"{value:.{digits}f}"
 
 
-# -- a flight in steps of a few seconds: what each moved, how long, and what it took ---------------------------------
+# -- a flight in steps of a few seconds: metres, seconds and joules of each ------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)

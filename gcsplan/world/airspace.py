@@ -5,7 +5,7 @@ the bow against the line straight in the plane stays within centimetres; that bo
 are in metres of the plane; `gcsplan.world.geodesy.frame` converts to and from degrees.
 
 Exact are: the ground under the line, zones with levels above mean sea level, ceilings, angles. Conservative, by a few
-centimetres at most, are: what lies beside the line within its errors and clearance, and zones over ground. Touching a
+centimetres at most, are: ground beside the line within its errors and clearance, and zones over ground. Touching a
 limit is legal; a micrometre is float noise.
 """
 

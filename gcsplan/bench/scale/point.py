@@ -94,7 +94,7 @@ def _planned(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def _warm(_: None, number: int) -> int:
-    """Load and compile what planning over a DEM needs."""
+    """Load and compile all code that planning over a DEM needs."""
     if not _warmed:
         _warmed.append(number)
         with suppress(GcsplanError):

@@ -202,7 +202,7 @@ def measure(
     """The outcome of gcsplan's planner: medians of ``runs``; ``long`` runs it once with a minute and no gap.
 
     Every run gets its own airspace and surface (over the same heights), so that nothing kept from the run before helps.
-    Creating them is not counted, but what the planner derives from them is.
+    Creating them is not counted, but the planner's own derived data are.
     """
     problem = replace(one.problem, budget_s=LONG_RUN_S, gap_percent=0.0) if long else one.problem
     memory, answers, swept, took = Memory(), [], [], []

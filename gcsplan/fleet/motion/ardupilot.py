@@ -3,7 +3,7 @@
 ArduPilot flies each leg as if it stopped at its end, and begins the next leg while this one slows down, adding both
 motions (SCurve.cpp, `advance_target_along_track`). It begins as early as the middle of the turn then lies within
 WPNAV_RADIUS of the way point, is no faster than either leg allows, and turns with no more than WPNAV_ACCEL_C and
-WPNAV_ACCEL_Z (parameters' defaults). So a flight takes the seconds of its legs less those in which two of them overlap.
+WPNAV_ACCEL_Z (parameters' defaults). So a flight takes the seconds of its legs less the seconds of their overlaps.
 
 It waits for a vehicle that lags behind (`advance_wp_target_along_track`), which it does where it speeds up from a low
 speed: `LAG_S` is the measured delay.
@@ -45,7 +45,7 @@ BODY, ROTORS = 0.003627, 0.02532
 _LEAN_ROUNDS = 30
 
 MEASURED_AMSL_M, SPARE = 593.0, 1.007
-"""Where the drag was measured, and what a speed should be below the fastest where the altitude is not known."""
+"""The altitude at which the drag was measured, and the part of the fastest speed to keep at an unknown altitude."""
 
 
 TERRAIN_MARGIN_M = 10.0

@@ -110,7 +110,7 @@ def _turning(problem: Problem) -> Solution:
     the arcs need it. Raises Refusal."""
     from gcsplan.planners.turns.planner import rounded, with_more_clearance  # few missions have wings
 
-    # Laps are short and have sharp corners: rounding them to arcs loses what they gain.
+    # Laps are short and have sharp corners: rounding them to arcs loses their gain.
     sharp = _sharp(replace(problem, turn_radius_m=0.0), sharp=False)
     points = sharp.path.points
 

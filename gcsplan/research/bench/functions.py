@@ -2,7 +2,7 @@
 
 There are two settings. *Middle*: the optimum is in the middle of the box, and the wolves' rule is bound to the same
 point (origin 0.5), which is what table 2 measured. *Shifted*: the same rule with the optimum moved, so that a rule
-loses what it owes to the middle. A result of 0 in the middle is less than the unit box resolves near 0.5, where doubles
+loses that advantage. A result of 0 in the middle is less than the unit box resolves near 0.5, where doubles
 are 1e−16 apart: about 1e−26 on f1. Rankings of such values count neither as reproduced nor as not reproduced.
 
 Every algorithm starts from the same population in the same run, so runs are compared in pairs.

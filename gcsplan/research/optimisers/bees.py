@@ -19,7 +19,7 @@ def abc(run: Run, *, limit: int, group: int, bees: str) -> Steps:
 
     Each bee tries to change one element of its source: vⱼ = xⱼ + φ·(xⱼ − x_kj), k another source. Each bee that does
     not improve its source adds one to the source's failures; a scout replaces a source of more than ``limit`` failures.
-    ``bees`` is "one": each bee starts from what the bee before it left; or "together", in a fraction of the time.
+    ``bees`` is "one": each bee starts from the result of the bee before it; or "together", in a fraction of the time.
     """
     require("abc", "bees", bees, ("together", "one"))
     x = run.first()

@@ -16,7 +16,7 @@ from gcsplan.errors import InputError
 from gcsplan.research.optimisers.box import Run, Steps, clipped, keep_better, require
 
 REDRAWS = 50
-"""Most times that the step of a pair of variables with S > 1 is drawn again; what remains is scaled by the encoding."""
+"""Most redraws of the step of a pair of variables with S > 1; the encoding scales a step that remains too large."""
 
 
 def foa(run: Run, *, step: float) -> Steps:

@@ -54,7 +54,7 @@ MOST_EDGE_POINTS = 1000
 
 UNTANGLED, MOST_OF_POINT = 32, 4
 """A line of more points than the first that crosses itself more often than this for each point becomes several
-corridors at once: what it surrounds would be found, at great length, and then cut into parts of its own."""
+corridors at once: the area that it surrounds would be found, at great length, and then cut into parts of its own."""
 
 ZONE_FAR_M = 1.6 * FARTHEST_M
 """No mission goes farther than this from the frame's origin, m."""

@@ -103,8 +103,8 @@ def unit_that_counts(
         return unit, [Note("heights_in_unit_of_key", file=file, height_unit=unit.name, stated=names)] if other else []
     if any(not s.is_same(stated[0]) for s in stated[1:]):
         raise InputError(
-            f"{file} states two units of height: {', '.join(names)}; say with `height_unit: us_ft` (or m, ft) which "
-            "one is right",
+            f"{file} states two units of height: {', '.join(names)}; state the right one with `height_unit: us_ft` "
+            "(or m, ft)",
             where=where,
         )
     if stated:
@@ -114,7 +114,7 @@ def unit_that_counts(
     if not horizontal.is_same(METRE):
         likely = next((key for key, unit in OF_KEY.items() if unit.is_same(horizontal)), "m")
         raise InputError(
-            f"the grid of {file} is in {horizontal.name}, and nothing says the unit of its heights; say it with "
+            f"the grid of {file} is in {horizontal.name}, and nothing states the unit of its heights; state it with "
             f"`height_unit: {likely}` (or {', '.join(key for key in OF_KEY if key != likely)})",
             where=where,
         )

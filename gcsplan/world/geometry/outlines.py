@@ -31,7 +31,7 @@ WIDER_M = (0.05, 0.2, 1.0, 5.0, 20.0, 100.0)
 """Tolerances that `few_corners` tries, m."""
 
 MOST_OUTLINE_ROUNDS = 200
-"""Rounds of steps at most; each takes a fifth of what can be left out, or more."""
+"""Rounds of steps at most; each takes a fifth of the removable corners, or more."""
 
 
 def overlapping_pairs(ring: Floats) -> float:

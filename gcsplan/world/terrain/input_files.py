@@ -1,7 +1,7 @@
-"""The files that a mission reads, and whether they are still what they were.
+"""The files that a mission reads, and whether they are unchanged.
 
 Every reader reports a file here before it opens it, also one that is not there (it may appear) and one whose content is
-remembered from an earlier mission. Within `reading` each report is kept with a mark of what was found:
+remembered from an earlier mission. Within `reading` each report is kept with a mark of the found state:
 
 - a file: SHA-256 of its content up to `WHOLE_BYTES`, as long as all of a mission's together have at most
   `TOGETHER_BYTES`; beyond these limits its size, time of change and inode

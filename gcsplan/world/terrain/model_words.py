@@ -12,7 +12,7 @@ ABSENT = {
     "bare": "trees, masts and wires are not in it",
     "surface": "trees and buildings as the radar saw them; newer ones, masts and wires are not in it",
 }
-"""By the kind of a DEM, what it does not hold."""
+"""The parts that a DEM lacks, by its kind."""
 
 
 def what_is_not_in(inputs: Mapping[str, object], model: str = " DEM") -> str:

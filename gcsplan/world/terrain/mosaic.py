@@ -187,7 +187,7 @@ class Mosaic:
             x, y = (np.asarray(a, float) for a in there.transform(east_m, north_m))
             if not (np.isfinite(x).all() and np.isfinite(y).all()):
                 raise InputError(
-                    "the mission reaches beyond what the DEM's coordinate system can hold; gdalwarp the DEM to a "
+                    "the mission reaches beyond the limits of the DEM's coordinate system; gdalwarp the DEM to a "
                     "system made for this place",
                     where=self.where,
                 )
@@ -405,7 +405,7 @@ class Heights:
 def read_tiles(
     parts: Sequence[tuple[PlacedTile, SharedNodes]], c0: int, r0: int, cols: int, rows: int, where: str = ""
 ) -> tuple[Heights, list[Note]]:
-    """The heights of a window that begins at column ``c0`` and row ``r0``, and notes on what differs or is unknown.
+    """The heights of a window that begins at column ``c0`` and row ``r0``, and notes on differing or unknown parts.
 
     ``where`` names the files in messages. Raises InputError.
     """

@@ -377,7 +377,7 @@ def _strips(
 ) -> Iterator[tuple[int, Floats]]:
     """Strips of ``raw * scale + offset``, metres; masked, non-finite and implausible cells are NaN.
 
-    ``window``: column, row, columns, rows. ``nodata``: what else stands for no height in the raw numbers.
+    ``window``: column, row, columns, rows. ``nodata``: a further raw number that stands for no height.
     """
     from rasterio.windows import Window
 

@@ -55,7 +55,7 @@ class TerrainSpec:
     """The terrain as the user states it; paths are opened as they are (the mission file resolves relative ones).
 
     Either ``dem`` (paths of tiles, or ``sample:jacksboro`` alone), or ``flat_m`` with ``peaks`` on it (metres of a
-    local frame; heights above its ``up_m: 0``). ``crs`` and ``height_unit`` count before what the rasters state.
+    local frame; heights above its ``up_m: 0``). ``crs`` and ``height_unit`` count before the rasters' own statements.
     ``nodata``: a number of the rasters that stands for no height, or "none": only the numbers that they declare do, and
     exact zeros are ground or sea.
     ``obstacle_height_m`` stands everywhere; ``canopy`` is a raster of heights above ground, whose nodata cells are

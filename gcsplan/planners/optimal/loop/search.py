@@ -23,7 +23,7 @@ WORTH_AGAIN = 0.02
 
 class Search(ABC):
     """One source of paths or bounds: a module of `searches`, which is named like it. It reads the incumbent and
-    improves it; what it remembers between two runs is its own."""
+    improves it; its memory between two runs is its own."""
 
     NAME: ClassVar[str]
     IMPROVES: ClassVar[Improves]

@@ -1,6 +1,6 @@
 """The clearance grid: by how much each lattice node's floor exceeds a cap, and the mesh of the free cells.
 
-For bounds, the cap may be lowered near the ends of a leg to what a path can climb to there (`ClearanceGrid.hold`).
+For bounds, the cap may be lowered near the ends of a leg to the height that a path can reach (`ClearanceGrid.hold`).
 That shuts nodes, so tracks get longer and leave less length to climb with, and the cap can be lowered once more.
 """
 

@@ -119,7 +119,7 @@ class ZoneOutline:
         return np.sort(np.concatenate([np.arange(4 * COARSE) * WIDTH, *more]))
 
     def _grown(self, vertices: Floats) -> shapely.Geometry:
-        """The polygon grown edge by edge, with round corners: `shapely.buffer` would smooth what it grows."""
+        """The polygon grown edge by edge, with round corners: `shapely.buffer` would smooth the result."""
         bare = shapely.Polygon(vertices)
         reach = self.reach_m + (self.hair_m if self.outer else -self.hair_m)
         if reach <= 0.0:

@@ -260,7 +260,7 @@ def bound_cheaper(plane: PlaneSearch, cost: float, *, by_intervals: bool = False
     def least(tracks: list[float]) -> float:
         if sum(tracks) >= most_m * (1.0 - 1e-12):
             return cost
-        # The length to spare is what the legs' bounds leave, which is less now that these are better.
+        # The legs' bounds leave the length to spare, which is less now that they are better.
         return _least_of_pieces(plane, tracks, max(most_m - sum(tracks), 0.0))
 
     one = len(plane.legs) == 1

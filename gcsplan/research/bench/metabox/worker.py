@@ -249,7 +249,7 @@ def serve(requests: BinaryIO, answers: BinaryIO) -> None:
             request["points"] = np.frombuffer(requests.read(8 * shape[0] * shape[1])).reshape(shape)
         try:
             answer(known[what](**request))
-        except Exception as error:  # the asker decides what a fault means
+        except Exception as error:  # the other process decides on a fault
             answer({"error": f"{type(error).__name__}: {error}"})
 
 

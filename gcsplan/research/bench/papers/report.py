@@ -176,7 +176,7 @@ def _notes(summary: ScenarioSummary) -> list[str]:
         words = "above the planner optimal's" if part >= 0.0 else "below the path that the planner optimal found"
         out.append(f"The shortest legal run is {min(legal):,.2f} m, {abs(part):.2f} % {words}.")
     level = summary["equal_evaluations"]
-    out.append(f"“Equal evaluations” are the first {level:,} of each run, its schedule being that of the whole run.")
+    out.append(f"“Equal evaluations” are the first {level:,} of each run, with the schedule of the whole run.")
     reasons = {
         f"{name} {summary['printed'][name][measure].text} {FAULT_UNITS[measure.rpartition('_')[2]]}: {why}"
         for name, bad in summary["faults"].items()

@@ -1,4 +1,4 @@
-"""The scenarios of the five papers: mission file, algorithms, number of runs. `judge` has what they claim.
+"""The scenarios of the five papers: mission file, algorithms, number of runs. `judge` has their claims.
 
 `READINGS` are other ways to understand a rule or a setting, run and judged beside the one that is decided. One changes
 the options of some algorithms of its paper. Those run under a name of their own (`ssgwo:leaders-all`), and every claim
@@ -48,7 +48,7 @@ def _with(**parameters: object) -> Options:
     return MappingProxyType({"parameters": parameters})
 
 
-_BEES = ("all-bees-at-once", "all bees of one kind start from what the kind before left (ABC)")
+_BEES = ("all-bees-at-once", "all bees of one kind start from the results of the kind before (ABC)")
 _BY_OFFSETS = MappingProxyType({"encoding": "offsets"})
 _BY_SECTIONS = MappingProxyType({"encoding": "sections"})
 _BY_METRES = MappingProxyType({"encoding": "sections-whole"})

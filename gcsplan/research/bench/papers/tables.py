@@ -156,7 +156,7 @@ def counts(claims: ClaimRows) -> list[str]:
 
 
 def stands(result: Mapping[str, Any]) -> Iterator[tuple[str, list[str]]]:
-    """Title of each paper, and in sentences what of it stands."""
+    """Title of each paper, and its standing in sentences."""
     titles = {s.paper.name: s.paper.title for s in SCENARIOS.values()}
     for paper in dict.fromkeys(s["paper"] for s in result["scenarios"]):
         yield f"{paper}: {titles[paper]}", list(standing(result, paper))
