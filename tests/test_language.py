@@ -38,6 +38,7 @@ TODO: tuple[str, ...] = (
     "gcsplan/units.py",
     "gcsplan/vehicle.py",
     "tests/support",
+    "tests/campaigns/parameters.py",
     "README.md",
     "docs",
 )
