@@ -195,7 +195,7 @@ def test_a_key_for_the_grid_does_not_change_what_the_file_says_of_heights(tmp_pa
 def test_a_key_for_the_grid_leaves_the_file_s_datum_and_unit(tmp_path: Path) -> None:
     heights = np.round(hills(100, 100))
     ellipsoidal = degrees_tif(tmp_path / "a.tif", heights, crs="EPSG:4979")
-    assert "the raster itself says WGS 84 ellipsoidal" in str(refusal(ellipsoidal, crs="EPSG:4326"))
+    assert "the raster itself states WGS 84 ellipsoidal" in str(refusal(ellipsoidal, crs="EPSG:4326"))
     assert is_times(load(ellipsoidal, crs="EPSG:4326+5773"), heights, 1.0)
     feet = degrees_tif(tmp_path / "b.tif", heights, crs="EPSG:4326+6360")
     surface = load(feet, crs="EPSG:4326", vertical_datum=None)
