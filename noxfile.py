@@ -50,12 +50,12 @@ def ready(session: nox.Session, *extras: str) -> str:
     if not session.virtualenv.is_sandboxed:
         return sys.executable
     python = str(Path(session.bin, "python"))
-    wanted = ["-e", f".[{','.join(extras)}]"]
+    packages = ["-e", f".[{','.join(extras)}]"]
     if os.environ.get("GCSPLAN_LEAST"):
         session.install("uv")
-        module(session, python, "uv", "pip", "install", "--quiet", "--resolution", "lowest-direct", *wanted)
+        module(session, python, "uv", "pip", "install", "--quiet", "--resolution", "lowest-direct", *packages)
     else:
-        session.install(*wanted)
+        session.install(*packages)
     return python
 
 
@@ -111,16 +111,16 @@ def coverage(session: nox.Session) -> None:
 
 
 def attack(session: nox.Session, python: str, names: list[str], *arguments: str) -> None:
-    """Run campaigns, a few at once; print what each says when it ends."""
+    """Run campaigns, a few at once; print the output of each when it ends."""
 
-    def said(name: str) -> tuple[bool, str]:
+    def outcome(name: str) -> tuple[bool, str]:
         command = [python, "-m", f"tests.campaigns.{name}", *arguments]
         ended = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
         return ended.returncode != 0, f"\n-- {name}\n{ended.stdout}"
 
     failed = []
     with ThreadPoolExecutor(CAMPAIGNS_AT_ONCE) as pool:
-        for name, (fault, words) in zip(names, pool.map(said, names), strict=True):
+        for name, (fault, words) in zip(names, pool.map(outcome, names), strict=True):
             print(words, end="", flush=True)
             failed += [name] if fault else []
     if failed:
@@ -129,7 +129,7 @@ def attack(session: nox.Session, python: str, names: list[str], *arguments: str)
 
 @nox.session
 def campaigns(session: nox.Session) -> None:
-    """The attacks of docs/safety.md, half a minute each; or those named, with the options that follow the names."""
+    """The attacks of docs/safety.md, half a minute each; or the named ones, with the options that follow the names."""
     given = list(session.posargs)
     first = next((k for k, word in enumerate(given) if word.startswith("-")), len(given))
     names, options = given[:first] or list(CAMPAIGNS), given[first:] or ["--seconds", str(CAMPAIGN_S)]
@@ -188,14 +188,14 @@ def package(session: nox.Session) -> None:
 
 
 def found_pythons() -> dict[str, str]:
-    """Every supported Python of this machine, on the path or among those of pyenv: its version and its program."""
+    """Every supported Python of this machine, on the path or in pyenv: its version and its program."""
     root = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv"))
     found = {}
     for version in PYTHONS:
         programs = [shutil.which(f"python{version}"), *map(str, sorted(root.glob(f"versions/{version}.*/bin/python")))]
         for program in filter(None, programs):
-            ask = [program, "-c", "import sys; print('%d.%d' % sys.version_info[:2])"]
-            if subprocess.run(ask, capture_output=True, text=True, check=False).stdout.strip() == version:
+            command = [program, "-c", "import sys; print('%d.%d' % sys.version_info[:2])"]
+            if subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip() == version:
                 found[version] = program
                 break
     return found
@@ -226,8 +226,8 @@ def pythons(session: nox.Session) -> None:
             continue
         programs = programs_of(work / version)
         module(session, sys.executable, "uv", "venv", "-q", "--clear", "--python", found[version], str(work / version))
-        wanted = ["--python", str(programs / "python"), "--constraints", str(work / "same.txt"), str(TOP)]
-        module(session, sys.executable, "uv", "pip", "install", "-q", *wanted)
+        target = ["--python", str(programs / "python"), "--constraints", str(work / "same.txt"), str(TOP)]
+        module(session, sys.executable, "uv", "pip", "install", "-q", *target)
         missions[version] = missions_of(session, programs, work / f"missions-{version}")
     shutil.rmtree(work)
     first, *others = missions

@@ -1,6 +1,6 @@
 """Distribution of tests over workers: all tests of the real autopilot run in one, because it has a single console.
 
-The quick tests of a file in `tests/` share a worker too, because they share imports and set-up. Slow tests, and those
+The quick tests of a file in `tests/` share a worker too, because they share imports and set-up. Slow tests, and tests
 of other programs, are few and long and go to any free worker. (The mark `xdist_group` would do the same, but
 pytest-xdist 3.8 ignores it under pytest 9.2.)
 """

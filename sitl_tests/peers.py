@@ -64,7 +64,7 @@ class MavsdkVehicle:
         self.port = free_port(socket.SOCK_DGRAM)
         self.url = f"udpout:127.0.0.1:{self.port}"
         self._sysid = sysid
-        self._said: queue.Queue[dict[str, Any]] = queue.Queue()
+        self._heard: queue.Queue[dict[str, Any]] = queue.Queue()
 
     def __enter__(self) -> MavsdkVehicle:
         script = [sys.executable, str(_HERE / "mavsdk_vehicle.py"), f"udpin://127.0.0.1:{self.port}", str(self._sysid)]
@@ -92,13 +92,13 @@ class MavsdkVehicle:
     def _read(self) -> None:
         assert self._process.stdout is not None
         for line in self._process.stdout:
-            self._said.put(json.loads(line))
+            self._heard.put(json.loads(line))
 
     def _next(self, within_s: float) -> dict[str, Any]:
         try:
-            return self._said.get(timeout=within_s)
+            return self._heard.get(timeout=within_s)
         except queue.Empty:
-            raise AssertionError(f"the MAVSDK vehicle said nothing within {within_s} s") from None
+            raise AssertionError(f"the MAVSDK vehicle sent nothing within {within_s} s") from None
 
     def received(self, within_s: float = 10.0) -> list[Row]:
         """The rows of the next list that is uploaded to it completely; AssertionError after ``within_s``."""

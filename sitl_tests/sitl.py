@@ -1,7 +1,7 @@
 """A real autopilot for tests: a SITL that is running already, or a binary that is started and stopped.
 
 Set ``GCSPLAN_SITL`` to a folder with ``arducopter`` and ``arduplane``, to one of these programs, or to the URL of a
-running SITL (``tcp:127.0.0.1:5760``). Each test says which vehicle it is for: `needs` skips it where there is none.
+running SITL (``tcp:127.0.0.1:5760``). Each test names its vehicle: `needs` skips it where there is none.
 """
 
 from __future__ import annotations
@@ -39,23 +39,23 @@ _PORTS = ("--base-port", "--rc-in-port", "--irlock-port", "--sim-port-in", "--si
 _START_S, _READY_S, _STOP_S, _ANSWER_S = 20.0, 120.0, 10.0, 10.0
 
 
-def wanted() -> str:
+def sitl_variable() -> str:
     """The value of GCSPLAN_SITL, or an empty string."""
     return os.environ.get(VARIABLE, "").strip()
 
 
 def binary(autopilot: Autopilot) -> Path | None:
     """The program of that vehicle, None if there is none."""
-    if not wanted():
+    if not sitl_variable():
         return None
-    given = Path(wanted())
+    given = Path(sitl_variable())
     found = given / autopilot.value if given.is_dir() else given
     return found if found.is_file() and found.stem == autopilot.value else None
 
 
 def needs(autopilot: Autopilot, *, program: bool = False) -> pytest.MarkDecorator:
     """Skip a test for this vehicle where GCSPLAN_SITL names none; ``program``: where it names no program of it."""
-    url = ":" in wanted() and not Path(wanted()).exists() and not program
+    url = ":" in sitl_variable() and not Path(sitl_variable()).exists() and not program
     form = "a folder with it, or its path" if program else "a folder with it, its path, or a running SITL's URL"
     reason = f"for {autopilot}, and there is none: set {VARIABLE} to {form}"
     return pytest.mark.skipif(binary(autopilot) is None and not url, reason=reason)
@@ -72,7 +72,7 @@ def running(autopilot: Autopilot, directory: Path) -> Iterator[Link]:
     """Open a link to such an autopilot. Tests share it: SITL ends when its console's link closes."""
     program = binary(autopilot)
     if program is None:
-        with Link(wanted()) as link:
+        with Link(sitl_variable()) as link:
             yield link
         return
     ports = [free_port(socket.SOCK_STREAM) for _ in _PORTS]
@@ -115,7 +115,7 @@ def ready(link: Link, sysid: int, autopilot: Autopilot) -> VehicleState:
     while True:
         state = discover(link, sysid, 20.0, listen_s=0.0, standby_s=60.0)
         if autopilot_of(state.mav_autopilot, state.mav_type) is not autopilot:
-            pytest.skip(f"for {autopilot}, and {wanted()} is {state.what}")
+            pytest.skip(f"for {autopilot}, and {sitl_variable()} is {state.what}")
         if state.located and state.home is not None:
             return state
         assert time.monotonic() < end, f"the autopilot has no position after {_READY_S} s: {state}"
@@ -130,16 +130,16 @@ def firmware(link: Link, state: VehicleState) -> Firmware:
 
 def _flight_sw_version(link: Link, state: VehicleState) -> LinkSteps[int]:
     channel = link.channel(state.address.sysid)
-    ask = dialect.MAVLink_command_long_message(
+    request = dialect.MAVLink_command_long_message(
         *state.address, dialect.MAV_CMD_REQUEST_MESSAGE, 0, dialect.MAVLINK_MSG_ID_AUTOPILOT_VERSION, *[0.0] * 6
     )
     end = link.clock() + _ANSWER_S
     while link.clock() < end:
-        channel.send(ask, state.address)
+        channel.send(request, state.address)
         again = link.clock() + 1.0
         while link.clock() < again:
             yield again
             for heard in channel.take():
                 if heard.message.get_type() == "AUTOPILOT_VERSION":
                     return int(heard.message.flight_sw_version)
-    raise AssertionError(f"it does not tell its version within {_ANSWER_S} s")
+    raise AssertionError(f"it does not report its version within {_ANSWER_S} s")

@@ -46,10 +46,10 @@ def gcsplan(*words: str, cwd: Path) -> tuple[int, dict[str, Any], str]:
 def test_a_plan_reaches_mavsdk_vehicles_with_the_same_wire_numbers(tmp_path: Path) -> None:
     (tmp_path / "field.yaml").write_text(textwrap.dedent(MISSION))
     with MavsdkVehicle(sysid=1) as one, MavsdkVehicle(sysid=2) as two:
-        code, document, said = gcsplan(
+        code, document, words = gcsplan(
             "plan", "field.yaml", "--upload", f"uav1={one.url}", "--upload", f"uav2={two.url}", cwd=tmp_path
         )
-        assert code == 0, said
+        assert code == 0, words
         rows = [one.received(), two.received()]
     copter = read_mission_file(tmp_path / "field" / "uav1.waypoints", autopilot=Autopilot.ARDUCOPTER).mission
     px4 = read_mission_file(tmp_path / "field" / "uav2.plan", autopilot=Autopilot.PX4).mission

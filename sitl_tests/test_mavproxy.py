@@ -44,9 +44,9 @@ def mavproxy(master: str, folder: Path, *more: str, typed: bool = False) -> Iter
         *more,
     ]  # fmt: skip
     environment = {**os.environ, "MAVLINK20": "1", "HOME": str(folder)}
-    with (folder / "mavproxy.txt").open("wb") as said:
+    with (folder / "mavproxy.txt").open("wb") as log:
         source = subprocess.PIPE if typed else subprocess.DEVNULL
-        process = subprocess.Popen(command, cwd=folder, env=environment, stdin=source, stdout=said, stderr=said)
+        process = subprocess.Popen(command, cwd=folder, env=environment, stdin=source, stdout=log, stderr=log)
         try:
             yield process
         finally:
@@ -77,10 +77,10 @@ def test_what_mavproxy_loads_itself_is_named_as_its_writing(tmp_path: Path) -> N
         process.stdin.write(f"wp load {file}\n".encode())
         process.stdin.flush()
         until(lambda: len(board.items()) == len(mission.wire_items()))
-    said = (tmp_path / "mavproxy.txt").read_text(errors="replace")
+    log = (tmp_path / "mavproxy.txt").read_text(errors="replace")
     found = faults(compare(mission.wire_items(), board.items(), COPTER))
     shift = shift_of(mission, board.items(), found)
-    assert shift is not None, said
+    assert shift is not None, log
     assert shift.sender == CUTTING
     assert shift.most_m < 0.016
 
@@ -100,10 +100,10 @@ def test_what_is_called_verified_through_mavproxy_is_on_board(
         mavproxy(relay.url, tmp_path, f"--out=udpout:{link.place}"),
     ):
         (result,) = upload_fleet([UploadOrder(link, mission, options=options)])
-    said = (tmp_path / "mavproxy.txt").read_text(errors="replace")
+    log = (tmp_path / "mavproxy.txt").read_text(errors="replace")
     if isinstance(result, GcsplanError):
-        assert result.exit_code in (5, 6), said
-        assert loss > 0.2, (result, said)
+        assert result.exit_code in (5, 6), log
+        assert loss > 0.2, (result, log)
         return
     if result.verified:
         assert not faults(compare(mission.wire_items(), board.items(), autopilot))

@@ -39,7 +39,7 @@ def some_rally_points(n: int) -> list[MissionItem]:
 
 
 @pytest.fixture
-def asked_in_haste(monkeypatch: pytest.MonkeyPatch) -> None:
+def hasty_requests(monkeypatch: pytest.MonkeyPatch) -> None:
     """Wait only briefly for a vehicle's capabilities and position: MAVSDK's vehicle never sends them."""
     monkeypatch.setattr(steps, "ASK_AGAIN_S", 0.05)
 
@@ -66,7 +66,7 @@ def test_every_item_arrives_at_a_mavsdk_vehicle_with_the_same_numbers(autopilot:
         assert any("could not be checked" in str(warning) for warning in result.warnings)  # it calls itself generic
 
 
-@pytest.mark.usefixtures("asked_in_haste")
+@pytest.mark.usefixtures("hasty_requests")
 def test_odd_numbers_arrive_at_a_mavsdk_vehicle_bit_by_bit() -> None:
     odd = (
         MissionItem(16, 3, (math.nan, -0.0, 1e-45, 3.4e38), -(2**31), 2**31 - 1, 0.1),
@@ -81,7 +81,7 @@ def test_odd_numbers_arrive_at_a_mavsdk_vehicle_bit_by_bit() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("asked_in_haste")
+@pytest.mark.usefixtures("hasty_requests")
 def test_all_three_lists_of_a_mavsdk_vehicle_are_kept_apart() -> None:
     mission = a_mission(PX4, 12)
     with MavsdkVehicle() as vehicle, Link(vehicle.url) as link:
@@ -135,7 +135,7 @@ def test_mavsdk_takes_our_vehicle_for_one_and_its_missions_survive(autopilot: Au
         )
 
 
-def test_mavsdk_clears_our_vehicle_and_is_told_what_is_refused() -> None:
+def test_mavsdk_clears_our_vehicle_and_hears_each_refusal() -> None:
     vehicle = a_vehicle(PX4)
     good = [row_for(n, item, current=int(n == 0)) for n, item in enumerate(a_mission(PX4, 6).items)]
     bad = [*good[:3], row_for(3, MissionItem(16, TERRAIN, z=50.0))]

@@ -59,13 +59,13 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> Plan:
 
 
 @sitl.needs(Autopilot.ARDUCOPTER, program=True)
-def test_two_real_arducopters_arrive_as_planned_and_as_the_built_in_simulator_says(planned: Plan) -> None:
-    said: list[tuple[str, str]] = []
+def test_two_real_arducopters_arrive_as_planned_and_as_the_built_in_simulator(planned: Plan) -> None:
+    reports: list[tuple[str, str]] = []
     result = rehearse_in_sitl(
         planned,
         binary=sitl.binary(Autopilot.ARDUCOPTER),
         speedup=10.0,
-        report=lambda name, what: said.append((name, what)),
+        report=lambda name, what: reports.append((name, what)),
     )
     assert result.simulator == "sitl"
     assert result.breaches == ()
@@ -80,7 +80,7 @@ def test_two_real_arducopters_arrive_as_planned_and_as_the_built_in_simulator_sa
     assert result.closest is not None
     assert ours.closest is not None
     assert result.closest.distance_m == pytest.approx(ours.closest.distance_m, abs=25.0)
-    assert {name for name, what in said if what == "flies"} == {"uav1", "uav2"}
+    assert {name for name, what in reports if what == "flies"} == {"uav1", "uav2"}
 
 
 BELOW = """
@@ -142,7 +142,7 @@ def test_it_lands_slowly_above_home(tmp_path: Path) -> None:
 
 
 @sitl.needs(Autopilot.ARDUCOPTER, program=True)
-def test_over_flat_ground_it_hits_that_and_says_so(below: Plan) -> None:
+def test_over_flat_ground_it_hits_that_and_reports_it(below: Plan) -> None:
     binary = sitl.binary(Autopilot.ARDUCOPTER)
     assert binary is not None
     with sitl_instances(binary, parts_of(below), speedup=10.0) as addresses:

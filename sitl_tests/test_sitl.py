@@ -1,4 +1,4 @@
-"""A real ArduPilot stores items as our autopilot profile says, and our loopback vehicle of its version does the same.
+"""A real ArduPilot stores items as our autopilot profile states, and our loopback vehicle of its version does the same.
 
 Every test is for ArduCopter and ArduPlane alike; each is skipped where there is none.
 """
@@ -72,7 +72,7 @@ class Real:
         self.link.transport.write(writer.pack(wire.encode(message, Address(SYSID, 1))), peer)
 
     def hear(self, count: int, within_s: float, quiet_s: float) -> list[Packet]:
-        """Mission packets: up to ``count`` within ``within_s``, and all that arrive in the ``quiet_s`` after those."""
+        """Mission packets: up to ``count`` within ``within_s``, and all that arrive in the ``quiet_s`` after them."""
         heard: list[Packet] = []
         end = time.monotonic() + (within_s if count else quiet_s)
         while time.monotonic() < end:
@@ -192,7 +192,7 @@ def test_a_mission_with_every_command_is_kept_as_expected(real: Real) -> None:
     assert wires(read.items) == wires(twin.items()[1:])
 
 
-def test_another_mission_on_board_is_told_apart(real: Real) -> None:
+def test_another_mission_on_board_is_recognised(real: Real) -> None:
     mission = every_command(real.home, real.autopilot)
     assert upload_mission(real.link, mission, options=UNCHECKED).verified
     items = list(mission.items)
@@ -288,7 +288,7 @@ def comparable(packet: Packet) -> tuple[Any, ...]:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_whatever_is_said_our_vehicle_answers_the_same(real: Real, seed: int) -> None:
+def test_our_vehicle_answers_any_message_as_the_real_one(real: Real, seed: int) -> None:
     """Compare every answer of the loopback vehicle with the real one's, for random messages of two ground stations."""
     rng, twin = random.Random(seed), real.twin()
     for kind in KINDS:

@@ -44,7 +44,7 @@ def free_instance() -> int:
 @pytest.fixture
 def copter(tmp_path: Path) -> Iterator[str]:
     number = free_instance()
-    said = tmp_path / "output.txt"
+    output = tmp_path / "output.txt"
     program = sitl.binary(Autopilot.ARDUCOPTER)
     assert program is not None
     command = [
@@ -58,12 +58,12 @@ def copter(tmp_path: Path) -> Iterator[str]:
         "--home",
         "36.59,-84.25,552,0",
     ]
-    with said.open("wb") as out:
+    with output.open("wb") as out:
         process = subprocess.Popen(command, cwd=tmp_path, stdin=subprocess.DEVNULL, stdout=out, stderr=out)
         try:
             end = time.monotonic() + 30.0
-            while "Waiting for connection" not in said.read_text(errors="replace") and time.monotonic() < end:
-                assert process.poll() is None, said.read_text(errors="replace")[-300:]
+            while "Waiting for connection" not in output.read_text(errors="replace") and time.monotonic() < end:
+                assert process.poll() is None, output.read_text(errors="replace")[-300:]
                 time.sleep(0.1)
             yield f"tcp:127.0.0.1:{5760 + 10 * number}"
         finally:
@@ -77,7 +77,7 @@ def test_a_real_arducopter_reads_the_terrain_that_it_was_sent(copter: str, tmp_p
     assert isinstance(result, TerrainComparison), result
     assert result.read == 200
     assert result.worst_m < 0.05
-    # What it kept on its card are our blocks.
+    # The blocks on its card are ours.
     [file] = [read_dat(path, where="") for path in (tmp_path / "terrain").glob("*.DAT")]
     assert file.notes == ()
     assert len(file.blocks) > 4

@@ -77,7 +77,7 @@ def flown(folder: Path, goal: str, end: str) -> Flown:
     text = re.sub(r"\n *takeoff_heading_deg:.*", "", text)  # which is right for the sample's own goal
     if end == "rtl":  # it turns for home beside the ridge, and climbs on the way
         text = text.replace("end: rtl", "end: rtl\n    approach_agl_m: 320")
-    if end == "land":  # the return from a low glide is not asked about here
+    if end == "land":  # the return from a low glide is not judged here
         text = text.replace("way_home: required", "")
     file = folder / f"{end}.yaml"
     file.write_text(text, encoding="utf-8")
@@ -139,7 +139,7 @@ def test_it_circles_about_its_goal(circling: Flown) -> None:
     radius = np.linalg.norm((circle - goal)[:, :2], axis=1)
     assert np.abs(circle[:, 2] - goal[2]).max() < HEIGHT_M
     assert radius.min() > 0.95 * RADIUS_M
-    # It was measured to fly 12 % wider than it is told.
+    # It was measured to fly 12 % wider than its radius.
     assert radius.max() < 1.15 * RADIUS_M + TRACK_M
 
 

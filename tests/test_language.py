@@ -22,29 +22,8 @@ CODE = ("gcsplan", "tests/support", "tests/oracles", "tests/campaigns", "sitl_te
 DOCUMENTS = ("README.md", "CHANGELOG.md", "changelog.d", "docs")
 
 TODO: tuple[str, ...] = (
-    "gcsplan/app/plan/wings.py",
-    "gcsplan/bench",
-    "gcsplan/cli/commands/fit_energy.py",
-    "gcsplan/dem",
-    "gcsplan/fleet",
-    "gcsplan/logs",
-    "gcsplan/planners",
-    "gcsplan/research",
-    "gcsplan/world",
-    "tests/support",
-    "tests/oracles",
-    "tests/campaigns",
-    "sitl_tests",
-    "noxfile.py",
+    "tests/campaigns/parameters.py",
     "README.md",
-    "CHANGELOG.md",
-    "changelog.d",
-    "docs/benchmarks.md",
-    "docs/extending.md",
-    "docs/glossary.md",
-    "docs/planner.md",
-    "docs/planner-measurements.md",
-    "docs/research",
 )
 """Folders and files whose language nobody has put right yet; empty when the pass is done."""
 
@@ -87,6 +66,9 @@ RULES = (
     rule(r"\bnine in ten\b", "p90 (docs/glossary.md)"),
     rule(r"[\"“*]?\bhalf\b[\"”*]*(?=\s*[,|:]|\s+and p90)", "median (docs/glossary.md)", where=r"bench"),
 )
+
+COLUMNS = {"gap_asked_percent"}
+"""Names that are columns of files, a contract."""
 
 A_TERM = re.compile("|".join(TERMS), re.IGNORECASE)
 WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
@@ -179,7 +161,7 @@ def names(where: str, found: Iterable[tokenize.TokenInfo], nodes: Sequence[ast.A
         for key in node.keywords
     }
     for token in found:
-        if token.type == tokenize.NAME and A_TERM.search(token.string):
+        if token.type == tokenize.NAME and A_TERM.search(token.string) and token.string not in COLUMNS:
             words = {word.lower() for word in WORD.findall(token.string)}
             is_data = (token.start[0], len_utf8(token)) in data
             yield from (

@@ -1,1 +1,1 @@
-"""Benchmarks. Each prints what it measured, and a ratio, because machines are noisy."""
+"""Benchmarks. Each prints its measurements, and a ratio, because machines are noisy."""

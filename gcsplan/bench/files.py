@@ -42,7 +42,7 @@ def png(figure: Figure, dpi: float = 100.0) -> bytes:
 
 
 def kept_rows(path: Path) -> Iterator[Any]:
-    """What is kept in a file of JSON lines; nothing if there is no such file.
+    """The records of a file of JSON lines; none if there is no such file.
 
     A line that cannot be read, such as a truncated last one, counts as not written. Raises InputError if the file
     cannot be read.

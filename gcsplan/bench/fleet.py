@@ -1,4 +1,4 @@
-"""A large fleet from its mission file to what is on board: seconds and memory of each step, and a sampled oracle.
+"""A large fleet from its mission file to the vehicles: seconds and memory of each step, and a sampled oracle.
 
 The missions are depots over the sample terrain whose copters fly to places around them. Each depot has rows of pads;
 each pad has one copter, and each copter a place of its own, drawn around its depot. Places are drawn apart from each
@@ -73,7 +73,7 @@ def run(
 ) -> dict[str, Any]:
     """Make the mission file, plan it with ``leave_out``, write outputs and report to ``out``, and sample the motions.
 
-    ``upload``: also upload to simulated vehicles, on as many links as system ids ask for. Raises InputError for a
+    ``upload``: also upload to simulated vehicles, on as many links as system ids need. Raises InputError for a
     number out of range, NoMission if no vehicle has a mission.
     """
     document = fleet_document(vehicles, seed, interval_s)
@@ -184,7 +184,7 @@ def report(result: dict[str, Any]) -> str:
 def fleet_document(vehicles: int, seed: int = 1, interval_s: float = 4.0) -> dict[str, Any]:
     """A mission file, as read from YAML, with a number of vehicles. Raises InputError for a number out of range."""
     if not 2 <= vehicles <= MOST_FLEET or not interval_s > 0.0:
-        words = f"2 to {MOST_FLEET} vehicles and an interval above 0 s are wanted, given {vehicles}, {interval_s:g}"
+        words = f"give 2 to {MOST_FLEET} vehicles and an interval above 0 s, not {vehicles} and {interval_s:g}"
         raise InputError(words)
     rng = np.random.default_rng([seed, vehicles])
     depots = _apart(rng, math.ceil(vehicles / PADS**2), DEPOTS_APART_M)

@@ -1,4 +1,4 @@
-"""What benchmarks measure with: the exact check of a whole path, memory, percentiles, and rank tests."""
+"""The instruments of benchmarks: the exact check of a whole path, memory, percentiles, and rank tests."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Legs
 
 MOST_RUNS = 10_000
-"""Runs of an algorithm that one call may ask for."""
+"""Most runs of an algorithm in one call."""
 LEAST_RUNS_TO_JUDGE = 30
 SIGNIFICANCE = 0.05
 """Runs of each, at least, from which rankings are judged, and the p below which they differ."""

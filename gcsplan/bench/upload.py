@@ -1,13 +1,13 @@
 """Upload to the same loopback vehicle by gcsplan and by MAVSDK, in turn, in one run; and to a whole fleet at once.
 
-For both, the time is that of an upload on an open link, from the call with the items until it returns on the final ACK.
+For both, the time covers an upload on an open link, from the call with the items until it returns on the final ACK.
 The vehicle is one process, MAVSDK another (it logs to standard output). The order changes from run to run, and one
 upload of each comes before the first timed one. The time of a whole verified upload by gcsplan (transfer, read-back and
 comparison) is reported beside it.
 
 A fleet is uploaded to at once, beside the slowest of its vehicles alone: both should take the same time. Every vehicle
-loses packets by its own seed, in both directions, and has the same seed when it is uploaded to alone. The time is that
-of a whole verified upload: discovery, preflight, parameters, transfer, read-back and comparison. The vehicles run in a
+loses packets by its own seed, in both directions, and has the same seed when it is uploaded to alone. The time covers a
+whole verified upload: discovery, preflight, parameters, transfer, read-back and comparison. The vehicles run in a
 separate process, with their own timers (ArduCopter repeats a request after a second).
 """
 
@@ -61,7 +61,7 @@ def run(items: int = 600, runs: int = 15) -> dict[str, Any]:
     if find_spec("mavsdk") is None:
         raise InputError("this benchmark needs MAVSDK: pip install 'gcsplan[test]'")
     if not 1 <= items <= 2000 or not 1 <= runs <= 100:
-        raise InputError(f"1 to 2000 items and 1 to 100 runs are wanted, given {items} and {runs}")
+        raise InputError(f"give 1 to 2000 items and 1 to 100 runs, not {items} and {runs}")
     mission = items_of(items)
     ours: list[float] = []
     theirs: list[float] = []
@@ -110,7 +110,7 @@ def run_fleet(fleet: int = 20, items: int = 50, drop: float = 0.05, autopilot: s
     """
     if not 2 <= fleet <= 254 or not 2 <= items <= 600 or not 0.0 <= drop <= 0.2:
         raise InputError(
-            f"2 to 254 vehicles, 2 to 600 items and a loss of 0 to 0.2 are wanted, given {fleet}, {items}, {drop:g}"
+            f"give 2 to 254 vehicles, 2 to 600 items and a loss of 0 to 0.2, not {fleet}, {items} and {drop:g}"
         )
     kind = Autopilot(autopilot)
     together_s, results = _timed(range(1, fleet + 1), items, drop, kind)

@@ -1,7 +1,7 @@
-"""The cache: tiles on the disk, each with a record of what it is, where it comes from and its checksum.
+"""The cache: tiles on the disk, each with a record of its state, its origin and its checksum.
 
 ``<cache>/<source>/N36W085.tif`` counts only with ``N36W085.json`` beside it, which is written last. A record may also
-say that there is no tile, because it is sea or because the source lacks it. Nothing here uses the network.
+state that there is no tile, because it is sea or because the source lacks it. Nothing here uses the network.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ class MissingTiles(Mistake):
 
 @dataclass(frozen=True, slots=True)
 class TileRecord:
-    """What the cache knows of a tile.
+    """The cache's knowledge of a tile.
 
     ``state``: ``tile`` (the file is there), ``sea`` (neither the source nor GLO-90 lists it), ``absent`` (the source
-    does not list it, GLO-90 does). ``lists`` are the addresses and checksums of the lists that say so. ``sha256`` is
-    that of what came; ``etag_agrees`` if the server's ETag is a checksum that agrees with it.
+    does not list it, GLO-90 does). ``lists`` are the addresses and checksums of the lists that show the state.
+    ``sha256`` is the checksum of the downloaded bytes; ``etag_agrees``: the server's ETag is a checksum equal to it.
     """
 
     tile: str
@@ -65,7 +65,7 @@ def cache_folder() -> Path:
     for name in ("XDG_CACHE_HOME", "LOCALAPPDATA", "HOME"):
         tell_setting(name)
     xdg = os.environ.get("XDG_CACHE_HOME", "")
-    if xdg and Path(xdg).is_absolute():  # its specification says to ignore others
+    if xdg and Path(xdg).is_absolute():  # its specification ignores others
         return Path(xdg) / "gcsplan" / "dem"
     local = os.environ.get("LOCALAPPDATA", "")
     try:
@@ -92,7 +92,7 @@ class Cache:
         return self.folder / f"{cell.name}.json"
 
     def find(self, cell: Cell) -> TileRecord | None:
-        """What the cache holds of a tile; None if nothing, or nothing that can be relied on."""
+        """The cache's record of a tile; None if there is none that can be relied on."""
         tell_file(self.record_path(cell))
         tell_file(self.tile_path(cell))
         record = _read(self.record_path(cell))

@@ -1,8 +1,8 @@
 """ArduPilot's terrain files, read and written: N36W085.DAT holds the blocks of one degree tile, 2048 bytes a record.
 
-The layout is that of AP_Terrain (`grid_block`, `seek_offset`): little-endian, a CRC-16 over the block, and the record's
-place in the file given by the block's place in the tile. A record of zeros is a block that nobody has filled. What is
-written are the blocks around a mission, with those of files that are there.
+AP_Terrain (`grid_block`, `seek_offset`) defines the layout: little-endian, a CRC-16 over the block, and the record's
+place in the file given by the block's place in the tile. A record of zeros is a block that nobody has filled. An export
+writes the blocks around a mission, together with the blocks of existing files.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ RECORD_BYTES = 2048
 DAT_SUFFIX = ".DAT"
 VERSION = 1
 MOST_DAT_BYTES = 256 * 2**20
-"""Of a file, and of all files that one mission uses. A tile with posts every 15 m has less, nine of every 40 m too."""
+"""Most bytes of one file, and of all files that one mission uses. A tile with posts every 15 m has fewer; so do nine
+tiles with posts every 40 m."""
 
 RECORD = np.dtype([
     ("bitmap", "<u8"), ("lat", "<i4"), ("lon", "<i4"), ("crc", "<u2"), ("version", "<u2"), ("spacing", "<u2"),
@@ -61,8 +62,8 @@ KM_A_DEGREE = 111.2
 class DatBlocks(Mapping[Block, Floats]):
     """Heights (28, 32) of the good blocks of a file, NaN for parts that are not known.
 
-    They are kept as the file's own records, which take a quarter of the memory, and are decoded when they are asked
-    for: a mission uses a few blocks of a tile.
+    They are kept as the file's own records, which take a quarter of the memory, and are decoded at their first use: a
+    mission uses a few blocks of a tile.
     """
 
     def __init__(self, records: NDArray[np.void], numbers: Mapping[Block, int]) -> None:
@@ -100,7 +101,7 @@ class DatBlocks(Mapping[Block, Floats]):
 class DatFile:
     """One file: its tile, its spacing, and the heights of its good blocks.
 
-    ``left_out``: how many blocks are not used, by what is wrong with them.
+    ``left_out``: how many blocks are not used, by their fault.
     """
 
     name: str
@@ -111,7 +112,7 @@ class DatFile:
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """What a user should know of it."""
+        """Notes for the user on its faults."""
         return tuple(
             Note("terrain_blocks_unused", file=self.name, count=n, why=why) for why, n in self.left_out.items()
         )
@@ -123,7 +124,7 @@ def file_name(cell: Cell) -> str:
 
 
 def cell_of_file(path: Path, *, where: str) -> Cell:
-    """The tile that a file's name tells. Raises InputError if it tells none."""
+    """The tile that a file's name gives. Raises InputError if it gives none."""
     cell = cell_of(path.stem.upper())
     if cell is None:
         raise InputError(
@@ -133,7 +134,7 @@ def cell_of_file(path: Path, *, where: str) -> Cell:
 
 
 def is_dat(path: Path) -> bool:
-    """Whether a name is that of a terrain file of ArduPilot."""
+    """Whether a file of this name is a terrain file of ArduPilot."""
     return path.suffix.upper() == DAT_SUFFIX
 
 
@@ -170,7 +171,7 @@ def read_dat(path: Path, *, where: str) -> DatFile:
     cell = cell_of_file(path, where=where)
     if size > MOST_DAT_BYTES or size % RECORD_BYTES:
         raise InputError(
-            f"{path} is no terrain file of ArduPilot: {size} bytes, wanted records of {RECORD_BYTES}, "
+            f"{path} is no terrain file of ArduPilot: {size} bytes, expected records of {RECORD_BYTES} bytes, "
             f"{MOST_DAT_BYTES >> 20} MB at most",
             where=where,
         )

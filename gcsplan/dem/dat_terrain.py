@@ -1,15 +1,15 @@
 """Terrain out of ArduPilot's .DAT files: the posts of the tile under the mission, as they are.
 
-The surface lies on the post grid of the tile that holds the middle of the mission, so that inside this tile its heights
-are those that the autopilot interpolates. A neighbouring tile has posts of its own that fit no common grid: there, and
-in the cells on the border, the terrain of the files lies between a least and a greatest height (`bounds`): on even
-ground, however steep, they are one.
+The surface lies on the post grid of the tile that holds the middle of the mission, so that inside this tile the
+autopilot interpolates the same heights. A neighbouring tile has posts of its own that fit no common grid: there, and in
+the cells on the border, the terrain of the files lies between a least and a greatest height (`bounds`). On even ground,
+however steep, the two heights are equal.
 
 These bounds hold for terrain that is bilinear between the posts of several grids. In each cell of the one grid a plane
-is fitted to the posts within a spacing of it. Whatever is bilinear between these posts lies between that plane less the
-lowest of their distances from it and that plane plus the highest one. A node takes the outermost value of the four
-cells around it, so that between nodes the bounds hold too. Over a plane they are the plane. A cell whose posts lie in
-one row holds no ground between posts, and counts for no node.
+is fitted to the posts within a spacing of it. A surface that is bilinear between these posts lies between the plane
+plus the lowest and the plane plus the highest of their (signed) heights above it. A node takes the outermost value of
+the four cells around it, so that between nodes the bounds hold too. Over a plane they are the plane. A cell whose posts
+lie in one row holds no ground between posts, and counts for no node.
 """
 
 from __future__ import annotations
@@ -47,11 +47,11 @@ MOST_POSTS = MAX_CELLS // 4
 """Posts around a mission: they have a greatest and a least height, and the files are in memory beside them."""
 
 POSTS_AT_ONCE = 500_000
-"""Posts that are joined with those of other tiles at once: that takes 250 bytes for each."""
+"""Posts of one tile that are joined with posts of other tiles at once: each takes 250 bytes."""
 
 
 REACH = 1.1
-"""Spacings around a cell within which a post counts: one, and what the scales of two tiles differ by."""
+"""Spacings around a cell within which a post counts: one, and the difference of two tiles' scales."""
 
 FLATTEST = 1e-6
 """Posts whose places spread less than this, in squares of spacings, lie in one row or are one."""
@@ -59,7 +59,7 @@ FLATTEST = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class DatTile:
-    """What reports say of one file."""
+    """The report's entry for one file."""
 
     name: str
     path: Path
@@ -95,7 +95,7 @@ def dat_files(paths: Sequence[str], *, where: str) -> list[Path]:
 
 
 class DatTerrain:
-    """Files, each read when a place or a mission first needs it. Raises InputError for what is no such file."""
+    """Files, each read when a place or a mission first needs it. Raises InputError for any other file."""
 
     def __init__(self, paths: Sequence[Path], spec: TerrainSpec, *, where: str) -> None:
         self._spec, self._where, self._at = spec, where, place(where, "dem")
@@ -269,7 +269,7 @@ class DatMosaic:
         return found
 
     def _sides(self, anchor: Cell, north: Floats, east: Floats) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-        """Of each node: whether a cell beside it meets its own tile, and whether one meets another tile."""
+        """For each node: whether a cell beside it meets its own tile, and whether one meets another tile."""
         high = DEGREE_E7 * METRES_OF_E7 / self.grid.spacing_m
         corner = anchor.lat_deg * DEGREE_E7
         span = np.stack([north - 1.0, north + 1.0]) * (self.grid.spacing_m / METRES_OF_E7)
@@ -316,7 +316,7 @@ class DatMosaic:
             )
             if not (n.size and e.size):
                 continue
-            # Of posts beyond the tile's eastern border the autopilot reads the first alone, of its row or the next.
+            # Beyond the tile's eastern border the autopilot reads only the first post, of its row or the next.
             last = np.pad(np.ceil(wide), ((1, 1), (0, 0)), mode="edge")
             read = e <= np.maximum(np.maximum(last[:-2], last[1:-1]), last[2:])
             posts_at = self.grid.post_e7(cell, *np.meshgrid(n, e, indexing="ij"))

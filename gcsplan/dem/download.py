@@ -25,7 +25,7 @@ from gcsplan import __version__
 from gcsplan.errors import LinkError
 
 DownloadReport = Callable[[int, int | None], None]
-"""Called with the bytes that are there and those of the whole, if known."""
+"""Called with the number of bytes received and of the whole, if known."""
 
 BLOCK_BYTES = 65_536
 LONGEST_PAUSE_S = 30.0
@@ -54,7 +54,7 @@ class DownloadPatience:
 
 @dataclass(frozen=True, slots=True)
 class Arrived:
-    """What came: bytes, checksum, the server's ETag, and whether that ETag is a checksum that agrees."""
+    """The received object: bytes, checksum, the server's ETag, and whether that ETag is a checksum that agrees."""
 
     bytes: int
     sha256: str
@@ -72,7 +72,7 @@ class _Again(Exception):
 
 @dataclass
 class _PartFile:
-    """The part of an object that is there, with what says of which version it is."""
+    """The part of an object that was received, with the mark of its version."""
 
     file: Path
     url: str
@@ -88,12 +88,12 @@ class _PartFile:
         self.etag, self.have = "", 0
         with suppress(OSError, ValueError):
             with self.side.open("rb") as file:
-                said = json.loads(file.read(MOST_SIDE_BYTES))
-            if isinstance(said, dict) and said.get("url") == self.url and isinstance(said.get("etag"), str):
-                self.have, self.etag = self.file.stat().st_size, said["etag"]
+                kept = json.loads(file.read(MOST_SIDE_BYTES))
+            if isinstance(kept, dict) and kept.get("url") == self.url and isinstance(kept.get("etag"), str):
+                self.have, self.etag = self.file.stat().st_size, kept["etag"]
 
     def begin(self, etag: str) -> None:
-        """Start anew; a weak ETag does not tell versions apart, so that such a part is not resumed."""
+        """Start anew; a weak ETag does not distinguish versions, so that such a part is not resumed."""
         self.drop()
         self.etag, self.have = "" if etag.startswith("W/") else etag, 0
         if self.etag:
@@ -207,7 +207,7 @@ def _try(
 
 
 def _opener() -> urllib.request.OpenerDirector:
-    """HTTP and HTTPS alone: no file:, ftp: or data:, whatever an address or a redirect says."""
+    """HTTP and HTTPS alone: no file:, ftp: or data:, in an address or in a redirect."""
     opener = urllib.request.OpenerDirector()
     for handler in (
         urllib.request.ProxyHandler(), urllib.request.UnknownHandler(), urllib.request.HTTPHandler(),
@@ -221,21 +221,21 @@ def _opener() -> urllib.request.OpenerDirector:
 def _begin(part: _PartFile, answer: Any, most_bytes: int) -> int | None:
     """Read an answer's headers; returns the length of the whole, None if the answer comes in chunks."""
     if answer.headers.get("Content-Encoding", "identity").lower() != "identity":
-        raise LinkError("the server packs what it sends, though it was asked not to", where=part.url)
+        raise LinkError("the server compresses its answer, although the request excluded that", where=part.url)
     etag = answer.headers.get("ETag", "")
     etag = etag if len(etag) <= MOST_ETAG else ""
     if answer.status == 206:
         span = re.fullmatch(r"bytes ([0-9]{1,15})-([0-9]{1,15})/([0-9]{1,15})", answer.headers.get("Content-Range", ""))
         if span is None or int(span[1]) != part.have or (etag and etag != part.etag):
             part.drop()
-            raise _Again("the server continued another part than was asked for")
+            raise _Again("the server continued another part than the requested one")
         length: int | None = int(span[3])
     elif answer.status == 200:
         part.begin(etag)
-        said = answer.headers.get("Content-Length", "")
-        length = int(said) if re.fullmatch("[0-9]{1,15}", said) else None
+        stated = answer.headers.get("Content-Length", "")
+        length = int(stated) if re.fullmatch("[0-9]{1,15}", stated) else None
         if length is None and answer.headers.get("Transfer-Encoding", "").lower() != "chunked":
-            raise LinkError("the server does not say how long it is, so that nobody could see a loss", where=part.url)
+            raise LinkError("the server gives no length, so that nobody could see a loss", where=part.url)
     else:
         raise LinkError(f"the server answers {answer.status} {_words(answer.reason)}", where=part.url)
     if length is not None and length > most_bytes:
@@ -260,7 +260,7 @@ def _take(
 
 
 def _block(answer: Any) -> bytes:
-    """What comes next; the network's trouble, told from the disk's."""
+    """The next bytes of the answer; faults of the network and of the disk are kept apart."""
     try:
         return bytes(answer.read1(BLOCK_BYTES))
     except OSError as why:
@@ -272,17 +272,17 @@ def _refused(part: _PartFile, why: urllib.error.HTTPError) -> None:
     with why:
         if why.code in _PASSING:
             raise _Again(f"the server answers {why.code} {_words(why.reason)}")
-        if why.code == 416:  # what is kept is longer than the object is now
+        if why.code == 416:  # the kept part is longer than the object is now
             part.drop()
-            raise _Again("what was kept of it is of another version")
+            raise _Again("the kept part is of another version")
         raise LinkError(f"the server answers {why.code} {_words(why.reason)}", where=part.url, reason="download")
 
 
 def _checked(part: _PartFile, length: int) -> Arrived:
-    """Compare what came with its length and, where the server's ETag is an MD5 as S3 makes them, with that.
+    """Compare the received bytes with their length and, where the server's ETag is an MD5 as S3 makes them, with it.
 
-    Of a file that was uploaded in parts the size of these is not known: if one of `PART_MB` agrees, it is right; if
-    none does, that says nothing.
+    The size of the parts in which a file was uploaded is not known: if one of `PART_MB` agrees, the file is right; if
+    none agrees, nothing is known.
     """
     sha256, md5 = hashlib.sha256(), hashlib.md5(usedforsecurity=False)
     count = 0
@@ -291,34 +291,36 @@ def _checked(part: _PartFile, length: int) -> Arrived:
             sha256.update(block)
             md5.update(block)
             count += len(block)
-    told = _MD5.fullmatch(part.etag)
-    whole = told is not None and told[2] is None
-    agrees = told is not None and (told[1] == md5.hexdigest() if whole else _agree(part.file, told[1], int(told[2])))
+    digest = _MD5.fullmatch(part.etag)
+    whole = digest is not None and digest[2] is None
+    agrees = digest is not None and (
+        digest[1] == md5.hexdigest() if whole else _agree(part.file, digest[1], int(digest[2]))
+    )
     if count != length or (whole and not agrees):
         etag = part.etag
         part.drop()
         raise _Again(
-            f"its checksum is wrong (the server says {etag})"
+            f"its checksum is wrong (the server's is {etag})"
             if count == length
             else "it has another length on the disk"
         )
     return Arrived(count, sha256.hexdigest(), part.etag, agrees)
 
 
-def _agree(file: Path, wanted: str, parts: int) -> bool:
-    """Whether ``wanted`` is the MD5 of the MD5s of this many parts of the file, of some usual size."""
+def _agree(file: Path, expected: str, parts: int) -> bool:
+    """Whether ``expected`` is the MD5 of the MD5s of this many parts of the file, of some usual size."""
     size = file.stat().st_size
     for part_bytes in (mb << 20 for mb in PART_MB if -(-size // (mb << 20)) == parts):
         whole = hashlib.md5(usedforsecurity=False)
         with file.open("rb") as opened:
             while block := opened.read(part_bytes):
                 whole.update(hashlib.md5(block, usedforsecurity=False).digest())
-        if whole.hexdigest() == wanted:
+        if whole.hexdigest() == expected:
             return True
     return False
 
 
 def _words(why: object) -> str:
-    """The first line of what somebody else says, without what a terminal would obey."""
+    """The first line of a stranger's text, without characters that a terminal would obey."""
     line = (str(why).strip() or type(why).__name__).splitlines()[0][:200]
     return "".join(c if c.isprintable() else "\ufffd" for c in line)

@@ -1,6 +1,6 @@
-"""Fills the cache: lists say which tiles exist, tiles are downloaded, verified and only then moved into the cache.
+"""Fills the cache: lists name the tiles that exist; a tile is downloaded, verified and only then moved into the cache.
 
-Whole tiles are brought, not windows of them: a checksum is one of a whole file, and a whole tile serves every later
+Whole tiles are downloaded, not windows of them: a checksum covers a whole file, and a whole tile serves every later
 mission there.
 """
 
@@ -32,10 +32,10 @@ else:
     POSIX = True
 
 LIST_DAYS = 30.0
-"""A list is asked for anew after this many days."""
+"""A list is downloaded anew after this many days."""
 
 FetchProgress = Callable[[str, int, int | None], None]
-"""Called with the name of a tile or list, bytes that are there, and those of the whole, if known."""
+"""Called with the name of a tile or list, and the number of bytes received and of the whole, if known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class Fetch:
     ) -> None:
         if mirror and not is_address(mirror):
             raise InputError(
-                f"an address such as https://mirror.example/dem is wanted, given {mirror[:200]!r}", where="--mirror"
+                f"expected an address such as https://mirror.example/dem, given {mirror[:200]!r}", where="--mirror"
             )
         self.cache, self.source = cache, cache.source
         self._mirror = mirror.rstrip("/")
@@ -83,8 +83,8 @@ class Fetch:
         if failed:
             lines = "\n".join(f"  {cell.name}: {why}" for cell, why in failed)
             raise LinkError(
-                f"{len(failed)} of {len(cells)} tiles could not be had; what came is kept, and the same command goes "
-                f"on from here:\n{lines}",
+                f"{len(failed)} of {len(cells)} tiles could not be downloaded; the others are kept, and the same "
+                f"command goes on from here:\n{lines}",
                 reason="download",
             )
         return done
@@ -123,15 +123,15 @@ class Fetch:
             raise InputError(words, where=str(self.cache.folder)) from why
 
     def _is_new(self, cell: Cell) -> bool:
-        """Whether a record is so new that the lists need not be asked again."""
+        """Whether a record is so new that the lists need not be read again."""
         return _age_days(self.cache.record_path(cell)) < LIST_DAYS
 
     def _bring(self, cell: Cell) -> TileRecord:
-        published, told = self._list(self.source)
+        published, line = self._list(self.source)
         if cell.name in published:
             return self._tile(cell)
         fuller, more = self._list(WITNESS)
-        return self._none(cell, "absent" if cell.name in fuller else "sea", (told, more))
+        return self._none(cell, "absent" if cell.name in fuller else "sea", (line, more))
 
     # -- one tile ------------------------------------------------------------------------------------------------
 
@@ -145,9 +145,7 @@ class Fetch:
             verify(part, cell, self.source)
         except InputError as why:
             _drop(part)
-            raise LinkError(
-                f"what the server gave is not this tile, and was removed: {why.message}", where=url
-            ) from None
+            raise LinkError(f"the server's file is not this tile, and was removed: {why.message}", where=url) from None
         record = TileRecord(
             cell.name, self.source.name, "tile", self.source.kind, self.source.vertical_datum, _now(), url,
             arrived.etag, arrived.agrees, arrived.bytes, arrived.sha256,
@@ -169,7 +167,7 @@ class Fetch:
     # -- lists ---------------------------------------------------------------------------------------------------
 
     def _list(self, source: DemSource) -> tuple[frozenset[str], str]:
-        """The tiles that a source publishes, and a line that says by which list."""
+        """The tiles that a source publishes, and a line that names the list."""
         found = self._lists.get(source.bucket)
         if found is None:
             try:
@@ -201,7 +199,7 @@ class Fetch:
             if names is None:
                 _drop(part)
                 raise LinkError(
-                    f"what the server gave is not the whole list of {source.title}, so that a tile that it lacks "
+                    f"the server's file is not the whole list of {source.title}, so that a tile that it lacks "
                     "could be land",
                     where=url,
                 )
@@ -260,11 +258,11 @@ def verify(path: Path, cell: Cell, source: DemSource) -> Raster:
         if file.read(4) not in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
             raise InputError("it is no GeoTIFF")
     raster = open_raster(path, where="")
-    wanted = f"{cell.name} of {source.name}"
+    tile = f"{cell.name} of {source.name}"
     if not raster.crs.geographic:
-        raise InputError(f"it is not in degrees, as {wanted} is")
+        raise InputError(f"it is not in degrees, as {tile} is")
     if raster.vertical is not None and raster.vertical.name != source.vertical_datum:
-        raise InputError(f"it says {raster.vertical.name}, and the heights of {wanted} are {source.vertical_datum}")
+        raise InputError(f"its heights are {raster.vertical.name}, and {tile} has heights {source.vertical_datum}")
     # The first node lies on the north-west corner; the last ones on the next tiles' first, or one cell before.
     off = (
         (raster.west + 0.5 * raster.dx - cell.lon_deg) / raster.dx,
@@ -275,7 +273,7 @@ def verify(path: Path, cell: Cell, source: DemSource) -> Raster:
     if max(map(abs, off)) > 1e-3 or not all(math.isclose(side, 1.0, abs_tol=1e-6) for side in sides):
         raise InputError(
             f"it covers {sides[0]:.6g}° by {sides[1]:.6g}° from {raster.north - 0.5 * raster.dy:.6f}, "
-            f"{raster.west + 0.5 * raster.dx:.6f}; {wanted} covers one degree from {cell.lat_deg + 1}, {cell.lon_deg}"
+            f"{raster.west + 0.5 * raster.dx:.6f}; {tile} covers one degree from {cell.lat_deg + 1}, {cell.lon_deg}"
         )
     known = sum(int(np.isfinite(strip).sum()) for _, strip in raster.read(0, 0, raster.cols, raster.rows))
     if not known:
@@ -305,7 +303,7 @@ def _sync(path: Path) -> None:
 
 
 def _drop(part: Path) -> None:
-    """Remove a part and what stands beside it."""
+    """Remove a part and the file beside it."""
     part.unlink(missing_ok=True)
     part.with_name(part.name + ".json").unlink(missing_ok=True)
 

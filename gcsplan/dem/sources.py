@@ -1,6 +1,6 @@
-"""The table of published terrain: where each source lies, what its heights mean, and which of its tiles an area needs.
+"""The table of published terrain: each source's address, the meaning of its heights, and the tiles that an area needs.
 
-Addresses, names and spacings are those of the publishers' own descriptions (docs/how-to/terrain.md names them). A
+Addresses, names and spacings follow the publishers' own descriptions (docs/how-to/terrain.md names them). A
 source belongs here only if its datum and its kind of model are stated by its publisher for every tile. Tiles have one
 degree.
 """
@@ -29,7 +29,7 @@ ModelKind = Literal["surface", "bare"]
 MOST_LIST_BYTES = 64 * 2**20
 
 CELL_SPARE_M = RASTER_SPARE_M + 200.0
-"""Around a box, m: what is read around it, and three cells of the coarsest source."""
+"""Margin around a box, m: the terrain that is read around it, and three cells of the coarsest source."""
 
 MOST_TILES_OF_AREA = 100
 """Most tiles that one mission or one command may need: a mission is much smaller, and so many take gigabytes."""
@@ -39,11 +39,11 @@ MOST_TILES_OF_AREA = 100
 class DemSource:
     """One source.
 
-    ``kind``: a surface model holds trees and buildings, a bare one only the earth. ``address`` is that of the public
-    bucket, and ``bucket`` its name, the folder that a mirror has for it. ``object_of`` names the object of a tile,
+    ``kind``: a surface model holds trees and buildings, a bare one only the earth. ``address`` is the public bucket's
+    address, and ``bucket`` its name, the folder that a mirror has for it. ``object_of`` names the object of a tile,
     ``listing`` the one that lists all tiles; each match of ``listed`` in it is a tile (groups: N36, W085), and a list
     is whole if it holds ``least_tiles`` and ends with ``last``. ``columns_of`` counts a tile's columns for 3,600 rows.
-    ``notice`` is what the licence wants beside everything that is made of the data.
+    ``notice`` is the text that the licence requires beside everything that is made of the data.
     """
 
     name: str
@@ -112,7 +112,7 @@ GLO90 = replace(
     object_of=_copernicus(30),
     notice=GLO30.notice.replace("-30", "-90"),
 )
-"""It holds every tile of land, so its list tells the sea from tiles that another source merely lacks."""
+"""It holds every tile of land, so its list separates the sea from tiles that another source merely lacks."""
 
 SRTM = DemSource(
     name="srtm",

@@ -1,6 +1,6 @@
 """Opens the terrain that a mission states: rasters, ArduPilot's .DAT files, flat ground, or a published source.
 
-A source's tiles come from the cache alone, and a mission uses those that its first window needs: the same ones
+A source's tiles come from the cache alone, and a mission uses the tiles that its first window needs: the same ones
 whatever else the cache holds, so that a plan does not change when another mission's tiles are fetched.
 """
 
@@ -39,7 +39,7 @@ from gcsplan.world.terrain.terrain import (
 )
 
 TILE_ROWS = 3600
-"""Rows of a tile of sea if no tile beside it says another number."""
+"""Rows of a tile of sea if no tile beside it has another number."""
 
 
 def open_dem(spec: TerrainSpec, *, where: str) -> OpenTerrain:
@@ -82,16 +82,16 @@ class _SourceTerrain:
             raise InputError(f"{_not_published(self._source, absent)}; give another DEM", where=at)
         sample = next(iter(tiles.values()), None)
         found = [tiles[c] if c in tiles else _sea(self._source, c, sample) for c in records if c in tiles or c in sea]
-        # What these publish at 0 m is sea: their voids are filled or declared.
+        # Ground that these sources publish at 0 m is sea: their voids are filled or declared.
         spec = replace(self._spec, dem=(self._source.name,), nodata=NO_MORE_VOIDS)
-        info, notes = _told(self._source, records, sea, absent)
+        info, notes = _reported(self._source, records, sea, absent)
         return terrain_of(Mosaic(found, where=at), spec, where=self._where, info=info, notes=notes)
 
 
-def _told(
+def _reported(
     source: DemSource, records: Mapping[Cell, TileRecord], sea: list[Cell], absent: list[Cell]
 ) -> tuple[dict[str, object], tuple[Note, ...]]:
-    """What reports say of the terrain, and notes."""
+    """The report's entry for the terrain, and notes."""
     info: dict[str, object] = {
         "dem_source": source.name,
         "dem_kind": source.kind,
@@ -105,12 +105,12 @@ def _told(
         notes.append(Note("terrain_is_a_surface", source=source.name))
     if sea:
         info["sea_tiles"] = names_of(sea)
-        said = [c for c in sea if records[c].state == "absent"]
-        listed = [c for c in sea if c not in said]
+        stated = [c for c in sea if records[c].state == "absent"]
+        listed = [c for c in sea if c not in stated]
         if listed:
             notes.append(Note("tiles_are_sea", tiles=names_of(listed), source=source.name))
-        if said:
-            notes.append(Note("tiles_are_sea_by_mission", tiles=names_of(said)))
+        if stated:
+            notes.append(Note("tiles_are_sea_by_mission", tiles=names_of(stated)))
     if absent:
         notes.append(_not_published(source, absent))
     return info, tuple(notes)
@@ -121,7 +121,7 @@ def _not_published(source: DemSource, cells: list[Cell]) -> Note:
 
 
 def _tile(cache: Cache, cell: Cell, record: TileRecord, where: str) -> Raster:
-    """A cached tile with its source's datum, if it is still what its record says."""
+    """A cached tile with its source's datum, if it still agrees with its record."""
     path = cache.tile_path(cell)
     if sha256_of(path) != record.sha256:
         raise InputError.of([cache.missing((cell,), where, "damaged, unlike its checksum")])

@@ -78,7 +78,7 @@ class Option:
 
 @dataclass(frozen=True, slots=True)
 class Freedom:
-    """What may be changed. With ``mode`` sequence or together the arrival is fixed, with none it is free.
+    """The allowed changes. With ``mode`` sequence or together the arrival is fixed, with none it is free.
 
     No vehicle leaves before 0 s. If nothing else helps, one may leave up to ``before_s`` earlier; the whole fleet then
     starts, and arrives, that much later.
@@ -119,7 +119,7 @@ class Chooser:
         return self._option("path", slot)
 
     def best(self, base: Option) -> Option | None:
-        """The cheapest option that keeps clear; None if none of those tried does."""
+        """The cheapest tried option that keeps clear; None if none does."""
         if self.clear(base):
             return base
         if not self.freedom.keeps_arrival:
@@ -216,10 +216,10 @@ class Chooser:
     def _arriving(self, depart_s: float, hold_s: float, how: How) -> Option | None:
         """The flight that leaves near ``depart_s``, holds ``hold_s``, and arrives as scheduled; None if impossible."""
         craft, arrive = self.craft, self.was.arrive_s
-        wanted = arrive - depart_s - hold_s
-        if not craft.fast_s - WITHIN_S <= wanted <= craft.slow_s + WITHIN_S:
+        flight_s = arrive - depart_s - hold_s
+        if not craft.fast_s - WITHIN_S <= flight_s <= craft.slow_s + WITHIN_S:
             return None
-        speed = speed_for(craft.course.time_to_goal_s, wanted, craft.slowest_m_s, craft.fastest_m_s, 1e-3)
+        speed = speed_for(craft.course.time_to_goal_s, flight_s, craft.slowest_m_s, craft.fastest_m_s, 1e-3)
         slot = craft.fly(speed, depart_s, hold_s)
         # The speed is a float32 from a coarse search; the departure corrects its error.
         depart = depart_s + arrive - slot.arrive_s
@@ -288,7 +288,7 @@ class Change:
     because: Conflict
 
     def note(self) -> Note:
-        """What changes, and which vehicle it keeps clear of."""
+        """The change, and the vehicle that it keeps clear of."""
         changes = []
         later_s = self.slot.depart_s - self.was.depart_s
         if abs(later_s) > 0.005:
@@ -317,7 +317,7 @@ def maker(plan: Schedule, crews: Sequence[Crew], hold: Hold) -> Again:
 
 
 @dataclass(frozen=True, slots=True)
-class Ask:
+class Job:
     """The arguments of `resolve`, which stay the same over all tries."""
 
     crews: Sequence[Crew]
@@ -368,21 +368,21 @@ ChoicesByName = dict[str, Choice]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Settlement:
-    """The choices of all vehicles but those that are ``stuck``: at most one, unless vehicles may be left out."""
+    """The choices of all vehicles but the ``stuck`` ones: at most one, unless vehicles may be left out."""
 
     done: ChoicesByName
     stuck: tuple[Stuck, ...] = ()
 
 
-def settle(plan: Schedule, ask: Ask) -> Settlement:
+def settle(plan: Schedule, job: Job) -> Settlement:
     """Choices for all vehicles. Other paths are used only if nothing else helps.
 
-    A vehicle may leave up to ``ask.later_s`` before 0 s; see `moved`.
+    A vehicle may leave up to ``job.later_s`` before 0 s; see `moved`.
     """
-    if ask.replan is None:
-        return _settle(plan, ask, {})[0]
-    found, before = _settle(plan, replace(ask, replan=None, leave_out=False), {})
-    return _settle(plan, ask, before)[0] if found.stuck else found
+    if job.replan is None:
+        return _settle(plan, job, {})[0]
+    found, before = _settle(plan, replace(job, replan=None, leave_out=False), {})
+    return _settle(plan, job, before)[0] if found.stuck else found
 
 
 def moved(settled: ChoicesByName) -> tuple[ChoicesByName, float]:
@@ -391,23 +391,23 @@ def moved(settled: ChoicesByName) -> tuple[ChoicesByName, float]:
     return (settled if later <= 0.0 else {name: choice.later(later) for name, choice in settled.items()}), later
 
 
-def _settle(plan: Schedule, ask: Ask, done: ChoicesByName) -> tuple[Settlement, ChoicesByName]:
-    """Fix all in order; those in ``done``, the first of them, stay as they are. Also returns those before any trouble.
+def _settle(plan: Schedule, job: Job, done: ChoicesByName) -> tuple[Settlement, ChoicesByName]:
+    """Fix all in order; the first vehicles, in ``done``, stay as they are. Also returns the ones before any trouble.
 
-    A vehicle that is stuck is moved before those in its way, if no priority is set and not too many are fixed again;
-    else it is left out, or ends this.
+    A vehicle that is stuck is moved before the vehicles in its way, if no priority is set and not too many are fixed
+    again; else it is left out, or ends this.
     """
-    order = list(plan.order if ask.priority is None else ask.priority)
-    slots, vehicles = {s.name: s for s in plan.slots}, {c.name: c.vehicle for c in ask.crews}
-    freedom = Freedom(plan.mode, ask.hold, ask.later_s)
+    order = list(plan.order if job.priority is None else job.priority)
+    slots, vehicles = {s.name: s for s in plan.slots}, {c.name: c.vehicle for c in job.crews}
+    freedom = Freedom(plan.mode, job.hold, job.later_s)
     promoted: set[str] = set()
     left: list[Stuck] = []
     before: ChoicesByName | None = None
-    taken, turn = _taken(ask.rules, done), len(done)
+    taken, turn = _taken(job.rules, done), len(done)
     while turn < len(order):
         name = order[turn]
         was = slots[name]
-        found = _choice(Chooser(vehicles[name], was.route, was, freedom, taken), plan, ask)
+        found = _choice(Chooser(vehicles[name], was.route, was, freedom, taken), plan, job)
         if isinstance(found, Choice):
             done = done | {name: found}
             taken.add(found.option.path)
@@ -416,15 +416,15 @@ def _settle(plan: Schedule, ask: Ask, done: ChoicesByName) -> tuple[Settlement, 
         before = done if before is None else before
         order.pop(turn)
         first = min(order.index(other) for other in found.others)
-        may = ask.priority is None and not found.at_goals and name not in promoted
+        may = job.priority is None and not found.at_goals and name not in promoted
         if may and len(promoted) < PROMOTIONS and turn - first <= MOST_AGAIN:
             promoted.add(name)
             order.insert(first, name)
             done = {name: done[name] for name in order[:first]}
-            taken, turn = _taken(ask.rules, done), first
+            taken, turn = _taken(job.rules, done), first
             continue
         left.append(found)
-        if not ask.leave_out:
+        if not job.leave_out:
             break
     return Settlement(done, tuple(left)), done if before is None else before
 
@@ -436,8 +436,8 @@ def _taken(rules: Rules, done: ChoicesByName) -> Taken:
     return taken
 
 
-def _choice(chooser: Chooser, plan: Schedule, ask: Ask) -> Choice | Stuck:
-    """The best option of one vehicle against those before it."""
+def _choice(chooser: Chooser, plan: Schedule, job: Job) -> Choice | Stuck:
+    """The best option of one vehicle against the vehicles before it."""
     was, taken = chooser.was, chooser.taken
     base = chooser.base()
     assert base is not None
@@ -445,11 +445,11 @@ def _choice(chooser: Chooser, plan: Schedule, ask: Ask) -> Choice | Stuck:
     if best is base:
         return Choice(base, None)
     met = _conflicts(base.path, taken)
-    if best is None and ask.replan is not None:
-        best = _other_path(was.name, chooser, met, ask.replan, ask.attempts)
+    if best is None and job.replan is not None:
+        best = _other_path(was.name, chooser, met, job.replan, job.attempts)
     if best is None:
         others = tuple({n for c in met for n in c.worst.vehicles} - {was.name})
-        near_goals = [c for c in met if _at_goals(c, plan, ask.rules)]  # what no departure, speed or path can help
+        near_goals = [c for c in met if _at_goals(c, plan, job.rules)]  # no departure, speed or path can help these
         return Stuck(was.name, [*near_goals, *met][0], others, bool(near_goals))
     change = Change(was.name, best.how, was, best.slot, best.extra_j, met[0])
     best = replace(best, slot=replace(best.slot, notes=(*best.slot.notes, change.note())))

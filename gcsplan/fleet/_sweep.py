@@ -189,8 +189,8 @@ def _inside(gap: Floats, rate: Floats, long: Floats, needed_m: float) -> tuple[F
 class Fleet:
     """Motions of V vehicles cut into K slices between ``edges_s`` (K + 1,), narrow where much moves.
 
-    ``pieces`` holds those of all vehicles in turn, ``offset`` (V,) the first of each. ``nodes`` (V, K + 1, 3) are the
-    places at the slices' ends (on the ground before take-off and after landing). ``stray`` is (V, K), in metres.
+    ``pieces`` holds the pieces of all vehicles in turn, ``offset`` (V,) the first of each. ``nodes`` (V, K + 1, 3) are
+    the places at the slices' ends (on the ground before take-off and after landing). ``stray`` is (V, K), in metres.
     ``fastest`` (V, K) is the top speed, m/s, in a slice and a window about it. ``begins`` and ``ends`` (V,) are the
     times in the air. ``first`` and ``last`` (V, K) are the pieces in a slice and a window about it, numbered over all
     vehicles.

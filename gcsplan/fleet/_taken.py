@@ -73,7 +73,7 @@ class Boxes:
 
 
 def _touching(a: Boxes, i: Indices, b: Boxes, j: Indices) -> tuple[Indices, Indices]:
-    """Of the pairs ``i`` of ``a`` with ``j`` of ``b`` (n,), those whose boxes touch."""
+    """The pairs whose boxes touch, out of the pairs ``i`` of ``a`` with ``j`` of ``b`` (n,)."""
     for axis in (3, 0, 1, 2):
         touch = np.flatnonzero((b.high[j, axis] >= a.low[i, axis]) & (b.low[j, axis] <= a.high[i, axis]))
         i, j = i[touch], j[touch]

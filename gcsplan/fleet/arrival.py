@@ -7,7 +7,7 @@ the speed is found as a root, since time never rises with speed.
 
 To arrive later a `Craft` flies slower. If that would be slower than its slowest speed, it leaves later (which costs
 nothing), holds at the gate, or gets a longer path. If a vehicle is late even at its fastest, the first one waits; if
-that is not wanted (``clock="first"``, as in the paper) or impossible, there is no schedule.
+the clock forbids that (``clock="first"``, as in the paper) or it is impossible, there is no schedule.
 
 So a vehicle can be at the goal from ``fast_s`` (its fastest) to ``latest_s`` (its slowest, or inf if it may wait). Turn
 ``p`` of a sequence that begins at ``first_s`` is at ``first_s + p·interval_s``: that decides in which orders a fleet
@@ -56,7 +56,7 @@ WITHIN_LEAN_DEG = 0.01
 Mode = Literal["sequence", "together", "none"]
 
 EXPLAINED = 3
-"""Vehicles that are left out whose errors say what would work: finding it looks at the whole fleet."""
+"""Most omitted vehicles whose errors name a cure: finding it looks at the whole fleet."""
 
 
 def interval_range(fast_s: Floats, latest_s: Floats, clock: Clock, first_s: float | None) -> tuple[float, float]:
@@ -96,7 +96,7 @@ def best_order(
     first_s: float | None,
     cost: OrderCost | None = None,
 ) -> Indices | None:
-    """The order that finishes earliest, and among those with the same starting time the cheapest; None if none works.
+    """The order that finishes earliest, and the cheapest one of a starting time; None if none works.
 
     ``cost`` returns joules (n, n) of each vehicle (row) for arriving at the times (n,) that are passed to it. Exact for
     any number of vehicles: for a given starting time, turns are assigned as a linear assignment problem (if waiting
@@ -229,8 +229,8 @@ class Craft:
         arrive_s = depart_s + self.course.time_to_goal_s(speed, hold_s)
         moving_s = self.course.moving_s(speed) if self.vehicle.energy.base_w else math.nan
         joules = self.crew.route.energy_j(self.vehicle, hold_s, moving_s)
-        said = (*notes, *_speed_notes(self.vehicle, speed))
-        return Slot(self.name, depart_s, hold_s, speed, arrive_s, joules, self.crew.route, said)
+        all_notes = (*notes, *_speed_notes(self.vehicle, speed))
+        return Slot(self.name, depart_s, hold_s, speed, arrive_s, joules, self.crew.route, all_notes)
 
     def at(self, arrive_s: float, hold: Hold = "ground", longer: Longer | None = None) -> Slot | None:
         """The slot that arrives at ``arrive_s``: at a lower speed, else at its slowest, with waiting as allowed.
@@ -265,9 +265,9 @@ class Craft:
 
     def _longer(self, arrive_s: float, longer: Longer) -> Slot | None:
         """Fly a longer path at the slowest speed or a little faster; lengths are tried until one fits."""
-        wanted_m = self.crew.route.length_m + (arrive_s - self.slow_s) * self.slowest_m_s
+        length_m = self.crew.route.length_m + (arrive_s - self.slow_s) * self.slowest_m_s
         for _ in range(LONGER_TRIES):
-            route = longer(self.name, wanted_m)
+            route = longer(self.name, length_m)
             if route is None:
                 return None
             other = Craft(Crew(self.vehicle, route))
@@ -277,7 +277,7 @@ class Craft:
                 assert slot is not None
                 return other.fly(slot.speed_m_s, notes=[Note("flies_longer", more_m=more_m)])
             off_s = arrive_s - (other.slow_s if arrive_s > other.slow_s else 0.5 * (other.slow_s + other.fast_s))
-            wanted_m += off_s * self.slowest_m_s
+            length_m += off_s * self.slowest_m_s
         return None
 
 
@@ -294,7 +294,7 @@ def _float32_range(low: float, high: float) -> tuple[float, float]:
 
 
 def _speed_notes(vehicle: Vehicle, speed_m_s: float) -> list[Note]:
-    """What an ArduCopter must be able to lean: for the speed in still air, and as far as forecasts in wind count."""
+    """The lean that an ArduCopter needs: for the speed in still air, and as far as forecasts in wind count."""
     if vehicle.autopilot is not Autopilot.ARDUCOPTER:
         return []
     lean_deg = max(math.ceil(lean_for_deg(speed_m_s) - WITHIN_LEAN_DEG), round(lean_needed_deg(speed_m_s)))
@@ -313,7 +313,7 @@ def _speed_notes(vehicle: Vehicle, speed_m_s: float) -> list[Note]:
 class Schedule:
     """Slots in the order of ``order``: by arrival for sequence and none, as requested for together.
 
-    ``left_out`` says of each vehicle without a slot why it cannot comply; its turn stays empty.
+    ``left_out`` has the reason for each vehicle without a slot; its turn stays empty.
     """
 
     mode: Mode
@@ -461,7 +461,7 @@ def _refusal(
     craft: Sequence[Craft], turn: int, mode: Mode, step_s: float, hold: Hold, clock: Clock, arrive_s: float | None,
     first_s: float, *, cures: bool,
 ) -> NoSchedule:  # fmt: skip
-    """The NoSchedule that says why this turn cannot be kept and, with ``cures``, what would work."""
+    """The NoSchedule with the reason why this turn cannot be kept and, with ``cures``, with cures."""
     one, at_s = craft[turn], first_s + turn * step_s
     late = at_s < one.fast_s
     what = f"the common arrival is {at_s:.1f} s" if mode == "together" else f"its turn is {at_s:.1f} s"
@@ -475,29 +475,29 @@ def _refusal(
     fast, latest = np.array([c.fast_s for c in craft]), np.array([c.latest_s(hold) for c in craft])
     earliest = earliest_first(fast, latest, step_s)
     interval = _least_interval(craft, hold, clock, arrive_s) if mode == "sequence" else None
-    said = []
+    words = []
     if mode == "together":
-        said.append(
+        words.append(
             "there is no common arrival of all" if earliest is None
             else f"the earliest common arrival is arrive_s: {_up(earliest)}"
         )  # fmt: skip
     else:
         low, high = interval_range(fast, latest, clock, arrive_s)
         if interval is None:
-            said.append("no interval_s works in this order")
+            words.append("no interval_s works in this order")
         elif late:
-            said.append(f"the earliest feasible interval_s is {_up(interval)}")
+            words.append(f"the earliest feasible interval_s is {_up(interval)}")
         else:
-            said.append(f"an interval_s from {_up(low)} to {math.floor(high * 1e3 + 1e-6) / 1e3:.3f} works")
+            words.append(f"an interval_s from {_up(low)} to {math.floor(high * 1e3 + 1e-6) / 1e3:.3f} works")
         if earliest is not None:
-            said.append(f"with this interval all can follow a first at {_up(earliest)} s (clock: fleet)")
+            words.append(f"with this interval all can follow a first at {_up(earliest)} s (clock: fleet)")
         if _best(craft, step_s, hold, clock, arrive_s, None) is not None:
-            said.append("order: best finds an order that works")
+            words.append("order: best finds an order that works")
     if hold != "ground" and not late:
-        said.append("hold: ground lets it leave later")
+        words.append("hold: ground lets it leave later")
     if interval is not None or earliest is not None:
-        said.append("only times are compared here, neither batteries nor separation")
-    return NoSchedule(f"{why}; {'; '.join(said)}", vehicle=one.name, interval_s=interval, arrive_s=earliest)
+        words.append("only times are compared here, neither batteries nor separation")
+    return NoSchedule(f"{why}; {'; '.join(words)}", vehicle=one.name, interval_s=interval, arrive_s=earliest)
 
 
 def _cannot_wait(one: Craft) -> str:

@@ -1,7 +1,7 @@
 """Resolve conflicts by priority, at the least cost: by departure, speed, a hold or another path; or refuse.
 
-Vehicles are fixed one after the other. A vehicle that meets one of those before it gets the cheapest change that keeps
-clear of all of them (`_settle`). In a fleet with fixed arrivals, a departure changes together with the speed, so that
+Vehicles are fixed one after the other. A vehicle that meets an earlier one gets the cheapest change that keeps clear of
+all earlier ones (`_settle`). In a fleet with fixed arrivals, a departure changes together with the speed, so that
 the arrival stays. If nothing helps, the refusal names the two vehicles, the place and the time, and, if the goals are
 the reason, the smallest interval or distance of goals that works. At the end `separation` judges the whole fleet.
 
@@ -25,8 +25,8 @@ from gcsplan.fleet._settle import (
     LATER_S,
     REROUTE_ATTEMPTS,
     Again,
-    Ask,
     Change,
+    Job,
     Reroute,
     Settlement,
     Stuck,
@@ -64,7 +64,7 @@ LONGEST_INTERVAL_S = 3600.0
 class Resolved:
     """A fleet that keeps its separation.
 
-    ``schedule`` has every slot as it is flown, ``paths`` the motions in its order, ``changes`` what was changed,
+    ``schedule`` has every slot as it is flown, ``paths`` the motions in its order, ``changes`` the changes to vehicles,
     ``separation`` the exact judgement. ``later_s`` is the delay of all arrivals. ``left_out`` has an error for each
     vehicle that is left out.
     """
@@ -147,12 +147,12 @@ def resolve(  # noqa: PLR0913 - options by name, each with a default
     rules = with_leaving(rules, plan)
     if priority is not None and sorted(priority) != sorted(s.name for s in plan.slots):
         raise ValueError(f"a priority names every vehicle once: {', '.join(plan.order)}; given {', '.join(priority)}")
-    ask = Ask(crews, rules, priority, hold, later_s, replan, attempts, leave_out)
+    job = Job(crews, rules, priority, hold, later_s, replan, attempts, leave_out)
     if not leave_out:
-        _refuse_goals(plan, ask, where)
-    settled, judged, moved_s = settle_groups(plan, ask)
+        _refuse_goals(plan, job, where)
+    settled, judged, moved_s = settle_groups(plan, job)
     left_out = tuple(
-        _refusal(plan, ask, stuck, again or maker(plan, crews, hold), where, cures=k < EXPLAINED)
+        _refusal(plan, job, stuck, again or maker(plan, crews, hold), where, cures=k < EXPLAINED)
         for k, stuck in enumerate(settled.stuck)
     )
     if judged is None:
@@ -173,9 +173,9 @@ def resolve(  # noqa: PLR0913 - options by name, each with a default
 # -- goals nearer than the separation, and refusals -------------------------------------------------------------------
 
 
-def _refuse_goals(plan: Schedule, ask: Ask, where: Where) -> None:
+def _refuse_goals(plan: Schedule, job: Job, where: Where) -> None:
     """Refuse at once if two goals are so near that no departure, speed or path can help."""
-    crews, rules = ask.crews, ask.rules
+    crews, rules = job.crews, job.rules
     vehicles = {c.name: c.vehicle for c in crews}
     slots, needed = plan.slots, rules.needed_m - TOLERANCE_M
     goals = np.array([s.route.points[-1] for s in slots])
@@ -199,9 +199,9 @@ def _refuse_goals(plan: Schedule, ask: Ask, where: Where) -> None:
         if not conflicts:
             continue
         conflict = max(conflicts, key=lambda c: c.from_s)
-        goals_m = least_goals_m(plan, crews, rules, (a.name, b.name), hold=ask.hold) or rounded_up(rules.needed_m)
+        goals_m = least_goals_m(plan, crews, rules, (a.name, b.name), hold=job.hold) or rounded_up(rules.needed_m)
         raise NotSeparated(
-            f"the goals of {a.name} and {b.name} are {flat:.1f} m apart, and {why}; {_asked(rules)}: put the goals at "
+            f"the goals of {a.name} and {b.name} are {flat:.1f} m apart, and {why}; {_words(rules)}: put the goals at "
             f"least {goals_m:g} m apart{_other_cure(plan, ends)}; {conflict.note(where)}",
             conflict=conflict,
             vehicle=b.name,
@@ -214,10 +214,10 @@ def _other_cure(plan: Schedule, ends: Set[str]) -> str:
         return ", or let them arrive in sequence (arrival: {mode: sequence})"
     if ends == {"loiter"}:
         return ", or let the first fly on (end: rtl)"
-    return ", or say how long a landed vehicle stands on its pad (arrival: {pad_clear_s: …})"
+    return ", or state how long a landed vehicle stands on its pad (arrival: {pad_clear_s: …})"
 
 
-def _asked(rules: Rules) -> str:
+def _words(rules: Rules) -> str:
     more = []
     if rules.error_m > 0.0:
         more.append(f"{rules.error_m:g} m of error of each")
@@ -226,36 +226,36 @@ def _asked(rules: Rules) -> str:
     return f"separation_m is {rules.separation_m:g}" + (f" ({', '.join(more)})" if more else "")
 
 
-def _refusal(plan: Schedule, ask: Ask, stuck: Stuck, again: Again, where: Where, *, cures: bool) -> NotSeparated:
-    """Why a vehicle is stuck and, with ``cures``, what would work."""
-    conflict, rules = stuck.conflict, ask.rules
+def _refusal(plan: Schedule, job: Job, stuck: Stuck, again: Again, where: Where, *, cures: bool) -> NotSeparated:
+    """Why a vehicle is stuck and, with ``cures``, the cures."""
+    conflict, rules = stuck.conflict, job.rules
     words = f"{conflict.note(where)}; no departure, speed, hold or other path of {stuck.name} that was tried helps"
     interval, goals_m = None, None
     if stuck.at_goals and cures:
-        goals_m = least_goals_m(plan, ask.crews, rules, conflict.worst.vehicles, hold=ask.hold, later_s=ask.later_s)
-        said = [] if goals_m is None else [f"goals at least {goals_m:g} m apart, each on the side it is reached from"]
+        goals_m = least_goals_m(plan, job.crews, rules, conflict.worst.vehicles, hold=job.hold, later_s=job.later_s)
+        works = [] if goals_m is None else [f"goals at least {goals_m:g} m apart, each on the side it is reached from"]
         if plan.mode == "sequence":
             interval = least_interval_s(
-                plan, ask.crews, rules, hold=ask.hold, later_s=ask.later_s, again=again, between=conflict.worst.vehicles
+                plan, job.crews, rules, hold=job.hold, later_s=job.later_s, again=again, between=conflict.worst.vehicles
             )
             if interval is not None:
-                said.insert(0, f"interval_s {interval:g}{' or more' if len(plan.slots) > MANY else ''}")
-        words += f"; what works: {', or '.join(said)}" if said else ""
+                works.insert(0, f"interval_s {interval:g}{' or more' if len(plan.slots) > MANY else ''}")
+        words += f"; what works: {', or '.join(works)}" if works else ""
     return NotSeparated(words, conflict=conflict, vehicle=stuck.name, interval_s=interval, goals_m=goals_m)
 
 
-def settle_groups(plan: Schedule, ask: Ask) -> tuple[Settlement, Separation | None, float]:
+def settle_groups(plan: Schedule, job: Job) -> tuple[Settlement, Separation | None, float]:
     """Choices for all vehicles, group by group; the separation of all, and the delay that `moved` gave them, s.
 
-    Without ``ask.leave_out`` the first vehicle that is stuck ends this, and there is no separation.
+    Without ``job.leave_out`` the first vehicle that is stuck ends this, and there is no separation.
     """
-    groups = groups_of(plan, ask.rules)
+    groups = groups_of(plan, job.rules)
     known: dict[tuple[str, ...], Settlement] = {}
     for joined in range(JOINED + 1):
         for group in groups:
             if tuple(group) not in known:
-                found = settle(*_part(plan, ask, group))
-                if found.stuck and not ask.leave_out:
+                found = settle(*_part(plan, job, group))
+                if found.stuck and not job.leave_out:
                     return found, None, 0.0
                 known[tuple(group)] = found
         parts = [known[tuple(group)] for group in groups]
@@ -263,7 +263,7 @@ def settle_groups(plan: Schedule, ask: Ask) -> tuple[Settlement, Separation | No
         if not choices:
             return Settlement({}, tuple(s for part in parts for s in part.stuck)), None, 0.0
         done, moved_s = moved({name: choices[name] for name in plan.order if name in choices})
-        judged = separation([choice.option.path for choice in done.values()], ask.rules)
+        judged = separation([choice.option.path for choice in done.values()], job.rules)
         met = [c.worst.vehicles for c in judged.conflicts]
         if not met or len(groups) == 1:
             break
@@ -302,14 +302,14 @@ def _joined(names: Sequence[str], together: Iterable[Sequence[str]]) -> Groups:
     return list(groups.values())
 
 
-def _part(plan: Schedule, ask: Ask, group: Sequence[str]) -> tuple[Schedule, Ask]:
+def _part(plan: Schedule, job: Job, group: Sequence[str]) -> tuple[Schedule, Job]:
     """The schedule and the arguments for some of the vehicles."""
     of = frozenset(group)
     slots = tuple(s for s in plan.slots if s.name in of)
-    priority = None if ask.priority is None else [n for n in ask.priority if n in of]
+    priority = None if job.priority is None else [n for n in job.priority if n in of]
     return (
         replace(plan, slots=slots, order=tuple(n for n in plan.order if n in of)),
-        replace(ask, crews=[c for c in ask.crews if c.name in of], priority=priority),
+        replace(job, crews=[c for c in job.crews if c.name in of], priority=priority),
     )
 
 
@@ -338,7 +338,7 @@ def least_interval_s(
         found = least_interval_s(pair, two, rules, hold=hold, later_s=later_s, between=between)
         return None if found is None else rounded_up(found / apart)
     current = [Crew(c.vehicle, plan.of(c.name).route) for c in crews]
-    ask = Ask(current, rules, None, hold, later_s)
+    job = Job(current, rules, None, hold, later_s)
     make = again or maker(plan, current, hold)
 
     def works(tenths: int) -> bool:
@@ -346,7 +346,7 @@ def least_interval_s(
             anew = make(tenths * INTERVAL_STEP_S)
         except NoMission:
             return False
-        return not settle(anew, ask).stuck
+        return not settle(anew, job).stuck
 
     floor = math.floor(plan.interval_s / INTERVAL_STEP_S + 1e-9)
     bad, good, step = floor, floor + max(1, _guess(plan, current, rules, between)), 1
@@ -404,7 +404,7 @@ def least_goals_m(
         moved = [c if c.name == between[0] else Crew(c.vehicle, _ended(c.route, still, tenths)) for c in own]
         try:
             anew = maker(pair, moved, hold)(pair.interval_s)
-            if not settle(anew, Ask(moved, rules, None, hold, later_s)).stuck:
+            if not settle(anew, Job(moved, rules, None, hold, later_s)).stuck:
                 return tenths
         except NoMission:
             pass

@@ -41,7 +41,7 @@ class Rules:
 
     ``separation_m`` holds between any two vehicles. Each of them may be ``error_m`` away from its modelled position,
     and up to ``window_s`` early or late, independently of the others. A landed vehicle stays where it landed for
-    ``pad_clear_s`` (inf: for good). Those in ``leaving`` fly away where their motion ends, so they stand nowhere.
+    ``pad_clear_s`` (inf: for good). Vehicles in ``leaving`` fly away where their motion ends, so they stand nowhere.
     """
 
     separation_m: float
@@ -89,7 +89,7 @@ class Conflict:
     """Two vehicles nearer than ``needed_m`` from ``from_s`` until ``until_s`` (inf: for good), and the worst moment.
 
     ``kind``: both are in the ``air``; or the *first* takes off or lands beside the second, which stands on the ground.
-    With a window the time span is that of the pieces that may meet, rounded outward.
+    With a window the time span covers the pieces that may meet, rounded outward.
     """
 
     kind: ConflictKind
@@ -163,7 +163,7 @@ def separation(paths: Sequence[TimedPath], rules: Rules) -> Separation:
     Pairs are judged while both are in the air (a vehicle that ends in the air stays there for good). Then the pads are
     judged: a vehicle conflicts if it takes off or lands nearer than ``rules.needed_m`` (horizontally) to a landed
     vehicle, or lands that near to a waiting one. Waiting vehicles are not judged against each other, nor against one
-    that takes off beside them; a note says so. A vehicle that flies over one on the ground is not judged against it,
+    that takes off beside them; a note states it. A vehicle that flies over one on the ground is not judged against it,
     because min AGL covers that. Raises InputError for two vehicles of one name.
     """
     names = tuple(p.name for p in paths)
@@ -174,7 +174,7 @@ def separation(paths: Sequence[TimedPath], rules: Rules) -> Separation:
         fleet = Fleet.of(paths, rules.window_s) if paths else None
         none = np.zeros(0, dtype=np.intp)
         if fleet is None:
-            raise InputError("separation was asked of no vehicle at all")
+            raise InputError("give at least one vehicle to judge the separation of")
         return Separation(rules, names, distance, None, (), (), Pairs(fleet, none, none, Least.none(0)))
     fleet = Fleet.of(paths, rules.window_s)
     i, j = (index.astype(np.intp) for index in np.triu_indices(len(paths), 1))

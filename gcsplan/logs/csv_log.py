@@ -30,7 +30,7 @@ COLUMN_NAMES: dict[str, tuple[str, ...]] = {
 }
 """Accepted column names for each quantity, in any case of letters."""
 
-WANTED_COLUMNS = (
+NEEDED_COLUMNS = (
     "time_s, lat and lon (or east_m and north_m), amsl_m, and power_w (or volt and amp); name others with "
     "--csv-columns time_s=Time,lat=Latitude"
 )
@@ -137,7 +137,7 @@ def _places(names: list[str], columns: Mapping[str, str], where: str) -> dict[st
     if lacking:
         raise InputError(
             f"has no column for {', '.join(lacking)}; its header is {', '.join(names)[:200] or 'empty'}. "
-            f"Wanted are {WANTED_COLUMNS}",
+            f"Needed are {NEEDED_COLUMNS}",
             where=where,
         )
     return at

@@ -29,7 +29,7 @@ MOST_RECORDS = 10_000_000
 """Most records of a log, of all kinds: pymavlink keeps the place of each, 50 bytes. Logs of 256 MB have 6 million."""
 
 MOST_BATTERIES = 16  # AP_BATT_MONITOR_MAX_INSTANCES of ArduPilot 4.6
-MOST_COMPLAINTS = 10_000  # of pymavlink, which makes one for each byte that it cannot read
+MOST_COMPLAINTS = 10_000  # pymavlink makes one for each byte that it cannot read
 UNSCALED = frozenset("bBhHiIqQ")
 """Format characters of whole numbers that DFReader does not scale."""
 
@@ -47,11 +47,11 @@ def read_dataflash(file: Path) -> FlightLog:
     # the reader's own clock is found by reading up to a GPS message, and is not used
     reader: Any = type("Reader", (DFReader.DFReader_binary,), {"init_clock": DFReader.DFReader_binary.init_clock_usec})
     log: Any = object.__new__(reader)  # there, and closed, also if it cannot be made
-    with _overheard() as said:
+    with _overheard() as complaints:
         try:
             log.__init__(str(file))
-            wanted = {log.name_to_id.get(kind) for kind in MESSAGES_READ} - {None}
-            if sum(log.counts[k] for k in wanted) > MOST_READINGS:
+            kinds = {log.name_to_id.get(kind) for kind in MESSAGES_READ} - {None}
+            if sum(log.counts[k] for k in kinds) > MOST_READINGS:
                 raise too_long(str(file))
             while (m := log.recv_match(type=MESSAGES_READ)) is not None:
                 _take(m, read)
@@ -67,7 +67,7 @@ def read_dataflash(file: Path) -> FlightLog:
             with suppress(AttributeError):
                 log.close()
     notes = []
-    if said():
+    if complaints():
         notes.append(Note("log_damaged", log=file.name))
     places = read["places"]
     if not len(places) and len(read["gps"]):
@@ -105,7 +105,7 @@ def _overheard() -> Iterator[Callable[[], bool]]:
 
 
 class _Complaints(io.TextIOBase):
-    """Counts what is written, and keeps none of it; raises ValueError once there are too many complaints."""
+    """Counts the written complaints, and keeps none of them; raises ValueError once there are too many."""
 
     def __init__(self) -> None:
         self.count = 0

@@ -1,9 +1,9 @@
 """Fit the energy model to flown energy: a vertical metre, a metre through the air, a second of flight, one of hovering.
 
-The model is that of `gcsplan.vehicle.Energy`, with which missions are planned: a step of the flight takes R1 times its
+The model is `gcsplan.vehicle.Energy`, with which missions are planned: a step of the flight takes R1 times its
 vertical metres plus R2 times its horizontal metres through the air plus the base power times its seconds, or hover
-power times its seconds of hovering. Flights at one speed cannot tell the base power from R2: it is then left out, and
-the fit holds at that speed. Metres are through the air where the log tells the wind. The fit is weighted
+power times its seconds of hovering. Flights at one speed cannot separate the base power from R2: it is then left out,
+and the fit holds at that speed. Metres are through the air where the log has the wind. The fit is weighted
 least squares over steps of a few seconds, robust by Huber's weights, with no coefficient below 0. A coefficient is
 reported only if the log determines it: enough of its motion was flown, the other columns do not explain its column, and
 its 95 % interval is narrow.
@@ -57,10 +57,10 @@ BASE = 3
 """The column of the seconds that are not hovering."""
 
 LEAST_SPEED_RATIO = 1.2
-"""The fastest airspeed over the slowest that tells a base power."""
+"""Least ratio of the fastest to the slowest airspeed that determines a base power."""
 
 ALIKE_POWER = 0.1
-"""Beside a base power: the part of the power to which what a metre adds must be known; it may be nothing."""
+"""Beside a base power: the part of the power to which a metre's own share must be known; the share may be 0."""
 
 AMOUNTS = ("m up and down", "m along", "s of hovering")
 
@@ -94,7 +94,7 @@ class EnergyFit:
     notes: tuple[Note, ...]
 
     @property
-    def told(self) -> bool:
+    def is_complete(self) -> bool:
         """Whether R1 and R2 are both known (hover_w is useful, but a mission can be planned without it)."""
         return self.vertical.value is not None and self.horizontal.value is not None
 
@@ -119,7 +119,7 @@ class EnergyFit:
         } | {
             "steps": self.steps, "energy_j": self.energy_j, "speed_m_s": self.speed_m_s,
             "fitted_speed_m_s": list(self.fitted_m_s),
-            "off_percent": self.off_percent, "told": self.told, **in_json("notes", self.notes),
+            "off_percent": self.off_percent, "told": self.is_complete, **in_json("notes", self.notes),
         }  # fmt: skip
 
 
@@ -168,7 +168,7 @@ def fit_energy(logs: Iterable[FlightLog]) -> EnergyFit:
         steps=len(y),
         energy_j=float(y.sum()),
         speed_m_s=middle if moving.any() else 0.0,
-        off_percent=float(100.0 * np.median(np.abs(y - (based or alone).said) / np.maximum(y, 1e-9))),
+        off_percent=float(100.0 * np.median(np.abs(y - (based or alone).predicted) / np.maximum(y, 1e-9))),
         notes=(*log_notes, *_of_wind(winds), *_up_and_down(x, y, rise, made, base)),
     )
 
@@ -194,7 +194,7 @@ def _too_little(x: Floats, rise: Floats) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """Coefficients of some columns, their halves of the 95 % interval, and the energy that they say of each step.
+    """Coefficients of some columns, their halves of the 95 % interval, and the energy that they predict for each step.
 
     ``alike_w``: the power of a step up to which a coefficient with a base power beside it need not be known; it may
     then be 0. None without a base.
@@ -205,7 +205,7 @@ class _Model:
     beta: Floats
     half: Floats
     unique: Floats
-    said: Floats
+    predicted: Floats
     alike_w: float | None = None
 
     @classmethod
@@ -245,7 +245,7 @@ class _Model:
 def _with_base(
     x: Floats, y: Floats, columns: Sequence[int], speeds_m_s: tuple[float, float]
 ) -> tuple[_Model | None, str]:
-    """The model with a base power, or why the flights do not tell one."""
+    """The model with a base power, or why the flights do not determine one."""
     slow, fast = speeds_m_s
     if fast < LEAST_SPEED_RATIO * slow:
         return None, f"flown at {_three(0.5 * (slow + fast))} m/s through the air alone: fly at two speeds or more"
@@ -256,12 +256,12 @@ def _with_base(
 
 
 def _of_wind(winds_m_s: Sequence[float | None]) -> list[Note]:
-    """Whether metres are those through the air; ``winds_m_s``: the mean wind of each log, None if it tells none."""
-    told = [wind for wind in winds_m_s if wind is not None]
-    if not told:
+    """Whether metres are through the air; ``winds_m_s``: the mean wind of each log, None if it has none."""
+    known = [wind for wind in winds_m_s if wind is not None]
+    if not known:
         return [Note("wind_unknown")]
-    silent, logs = len(winds_m_s) - len(told), len(winds_m_s)
-    return [Note("wind_counted_of_some" if silent else "wind_counted", wind_m_s=max(told), silent=silent, logs=logs)]
+    silent, logs = len(winds_m_s) - len(known), len(winds_m_s)
+    return [Note("wind_counted_of_some" if silent else "wind_counted", wind_m_s=max(known), silent=silent, logs=logs)]
 
 
 def _robust(x: Floats, y: Floats) -> tuple[Floats, Floats]:
@@ -275,10 +275,10 @@ def _robust(x: Floats, y: Floats) -> tuple[Floats, Floats]:
         root = np.sqrt(weight)
         before = beta
         beta, _ = nnls(x * root[:, None], y * root)
-        said = np.maximum(x @ beta, 0.2 * np.median(y))
-        off = (y - x @ beta) / said
+        predicted = np.maximum(x @ beta, 0.2 * np.median(y))
+        off = (y - x @ beta) / predicted
         spread = max(1.4826 * float(np.median(np.abs(off))), 1e-6)
-        weight = np.minimum(1.0, HUBER * spread / np.maximum(np.abs(off), 1e-12)) / said**2
+        weight = np.minimum(1.0, HUBER * spread / np.maximum(np.abs(off), 1e-12)) / predicted**2
         if np.allclose(beta, before, rtol=1e-9, atol=1e-12):
             break
     return beta, weight
@@ -306,13 +306,13 @@ def _unique(x: Floats) -> Floats:
 def _shadow(k: int, columns: Sequence[int], x: Floats) -> str:
     others = " and ".join(MOTIONS[c] for c in columns if c != k and (x[:, c] > 0.0).any())
     if k == BASE:
-        return f"cannot be told apart from {others}: the log has them always in the same proportion; fly at two speeds"
+        return f"cannot be separated from {others}: the log has them always in the same proportion; fly at two speeds"
     if k < 2:
         return (
-            f"cannot be told apart from {others}: the log has them always in the same proportion; fly some of it "
+            f"cannot be separated from {others}: the log has them always in the same proportion; fly some of it "
             f"level and some of it up and down"
         )
-    return f"cannot be told apart from {others}"
+    return f"cannot be separated from {others}"
 
 
 def _up_and_down(x: Floats, y: Floats, rise: Floats, made: Sequence[Coefficient], base: Coefficient) -> list[Note]:
@@ -337,7 +337,7 @@ def _three(value: float) -> str:
     return f"{value:.{digits}f}"
 
 
-# -- a flight in steps of a few seconds: what each moved, how long, and what it took ---------------------------------
+# -- a flight in steps of a few seconds: metres, seconds and joules of each ------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)

@@ -67,7 +67,7 @@ class FlightLog:
     """The series of one flight, each with its own clock readings (seconds, rising).
 
     ``place_s``, ``east_m``, ``north_m``, ``amsl_m`` are (P,), ``power_s``, ``power_w`` are (Q,). ``wind`` (W, 3) are
-    seconds and the velocity of the air to the east and to the north, m/s; empty if the log does not tell it. ``notes``
+    seconds and the velocity of the air to the east and to the north, m/s; empty if the log lacks it. ``notes``
     state which data was used and which was skipped.
     """
 
@@ -88,8 +88,8 @@ class FlightLog:
     ) -> FlightLog:  # fmt: skip
         """A log from (seconds, latitude, longitude, AMSL) and (seconds, watts), in any order, without rows with NaN.
 
-        ``wind``: (seconds, east, north) of the air; one that is 0 throughout is that of a vehicle that does not
-        estimate it. Raises InputError if there is too little data, or if its power is not that of an aircraft.
+        ``wind``: (seconds, east, north) of the air; a wind of 0 throughout comes from a vehicle that does not estimate
+        it. Raises InputError if there is too little data, or if its power is not an aircraft's.
         """
         at, watts = _sorted(places), _sorted(power)
         if degrees and len(at):
@@ -110,12 +110,12 @@ class FlightLog:
 
 
 def require_power(watts: Floats, name: str) -> None:
-    """Raise InputError if the power of a flight is not that of an aircraft: then a unit is mistaken."""
+    """Raise InputError if the power of a flight is not an aircraft's: then a unit is mistaken."""
     flying = watts[watts > 0.0]
     middle_w = float(np.median(flying)) if len(flying) else 0.0
     if len(flying) and not LEAST_W <= middle_w <= MOST_W:
         raise InputError(
-            f"tells a power of {middle_w:.3g} W, and {LEAST_W:g} to {MOST_W:g} W are an aircraft's: its power, its "
+            f"has a power of {middle_w:.3g} W, and {LEAST_W:g} to {MOST_W:g} W are an aircraft's: its power, its "
             f"voltage (V) or its current (A) is in another unit, such as hundredths or thousandths; convert it",
             where=name,
         )
@@ -124,7 +124,7 @@ def require_power(watts: Floats, name: str) -> None:
 def watts_of(readings: NumberRows, name: str) -> Floats:
     """(N, 2) seconds and watts of readings of (seconds, volt, ampere).
 
-    Raises InputError if voltage or current is not that of an aircraft's battery: then a unit is mistaken.
+    Raises InputError if voltage or current is not an aircraft battery's: then a unit is mistaken.
     """
     rows = np.array(readings, dtype=np.float64).reshape(-1, 3)
     for what, unit, column, least, most in (("voltage", "V", 1, LEAST_V, MOST_V), ("current", "A", 2, LEAST_A, MOST_A)):
@@ -132,8 +132,8 @@ def watts_of(readings: NumberRows, name: str) -> Floats:
         middle = float(np.median(values)) if len(values) else math.nan
         if len(values) and not least <= middle <= most:
             raise InputError(
-                f"tells a {what} of {middle:.3g} {unit}, and {least:g} to {most:g} {unit} are those of an aircraft's "
-                f"battery: it is in another unit, such as hundredths or thousandths; convert it",
+                f"has a {what} of {middle:.3g} {unit}, and {least:g} to {most:g} {unit} are an aircraft "
+                f"battery's: it is in another unit, such as hundredths or thousandths; convert it",
                 where=name,
             )
     return np.column_stack([rows[:, 0], rows[:, 1] * rows[:, 2]])

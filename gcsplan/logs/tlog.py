@@ -51,12 +51,12 @@ def read_telemetry(file: Path, sysid: int | None) -> FlightLog:
     flew = sorted(who for who, own in read.items() if len(own[POSITION]))
     if sysid is None and len(flew) > 1:
         raise InputError(
-            f"holds the flights of the systems {', '.join(map(str, flew))}: say which with --sysid N", where=str(file)
+            f"holds the flights of the systems {', '.join(map(str, flew))}: choose one with --sysid N", where=str(file)
         )
     who = sysid if sysid is not None else flew[0] if flew else 0
     if who not in flew:
-        words = f"of system {who}; it holds {', '.join(map(str, flew)) or 'none'}" if sysid is not None else ""
-        raise InputError(f"holds no places (GLOBAL_POSITION_INT) {words}".rstrip(), where=str(file))
+        words = "" if sysid is None else f" with sysid {who}; it holds {', '.join(map(str, flew)) or 'none'}"
+        raise InputError(f"holds no places (GLOBAL_POSITION_INT){words}", where=str(file))
     own = read[who]
     batteries = {k: own[BATTERY][own[BATTERY][:, 0] == k, 1:] for k in np.unique(own[BATTERY][:, 0]).tolist()}
     power = together(batteries) if batteries else own[STATUS]
@@ -90,7 +90,7 @@ class _Counted:
 
 
 def _take(m: Any, read: dict[int, Readings], name: str) -> None:
-    """Add what a message tells of its vehicle."""
+    """Add a message's readings of its vehicle."""
     kind = m.get_type()
     if kind not in (POSITION, BATTERY, STATUS, WIND):
         return

@@ -1,9 +1,9 @@
 """The limits of one plan: counted work, counted bytes, and the clock as a last stop.
 
-Work is counted in seconds of a plain processor, computed from the sizes of what is processed (`RATES`). So the same
+Work is counted in seconds of a plain processor, computed from the sizes of the processed data (`RATES`). So the same
 problem stops at the same point on every machine and under any load. A budget in seconds allows only a part of itself as
 counted work (`COUNTED`), so a machine that is slower or busier by that factor still finishes in time. The clock stops
-only a plan that is slower still; the result then depends on the machine and says so (``stopped_by: time``).
+only a plan that is slower still; the result then depends on the machine, and names that (``stopped_by: time``).
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ SPARE_S = 0.5
 
 
 def clock_stops_plans() -> bool:
-    """Whether the clock stops plans that do not say so themselves: unless the environment has GCSPLAN_CLOCK=off."""
+    """Whether the clock stops plans that leave ``clocked`` open: unless the environment has GCSPLAN_CLOCK=off."""
     return os.environ.get("GCSPLAN_CLOCK") != "off"
 
 
@@ -136,7 +136,7 @@ class Budget:
 
     @property
     def stopped_by(self) -> str:
-        """What stopped the plan: time, budget, or exhausted where neither did."""
+        """The cause of the plan's stop: time, budget, or exhausted where neither stopped it."""
         return "time" if self.clocked_out else "budget" if self.ran_out else "exhausted"
 
     def fits(self, seconds: float, megabytes: float) -> bool:
@@ -153,6 +153,6 @@ class Budget:
     ) -> Budget:
         """A budget without limits. A problem that carries one without ``clocked`` is planned without a clock.
 
-        ``clocked``: None, as `clock_stops_plans` says.
+        ``clocked``: None for the value of `clock_stops_plans`.
         """
         return cls(math.inf, math.inf, clock_stops_plans() if clocked is None else clocked, until_s, clock)

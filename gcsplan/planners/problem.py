@@ -49,15 +49,15 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class EndRounding:
-    """What the rounding of ends and vias takes from lower bounds: `Problem.connectors`, and the cost of the
+    """The deduction from lower bounds for the rounding of ends and vias: `Problem.connectors`, and the cost of the
     ``straight`` line between places that lie as near to each other as they may."""
 
     connectors: float
     straight: float
 
     def bound(self, bound: float) -> float:
-        """A lower bound of all paths, whose ends and vias may lie beside the exact ones, from one of paths between
-        those: less the connectors, or the straight line if that is longer."""
+        """A lower bound of all paths, whose ends and vias may lie beside the exact ones, from a bound of paths between
+        the exact ones: less the connectors, or the straight line if that is longer."""
         return max(bound - self.connectors, min(self.straight, bound))
 
 
@@ -65,9 +65,9 @@ class EndRounding:
 class Problem:
     """Find a path from ``start`` to ``goal`` (east_m, north_m, amsl_m) that passes every ``via`` in order.
 
-    ``limits`` are what paths keep: they already include the planner's margins (wire rounding, bow, corners that are
+    Paths keep ``limits``, which already include the planner's margins (wire rounding, bow, corners that are
     cut), so a path that passes `Airspace.examine` under them passes the final check too. ``checked`` are the same
-    limits as the check applies them, without any margin (None: ``limits``): bounds and proofs assume those alone, by
+    limits as the check applies them, without any margin (None: ``limits``): bounds and proofs assume only these, by
     `bound_limits` and `for_bounds`. ``rounding_m``: how far ends and vias of the paths that a bound speaks of may lie
     beside the problem's own, in the plane and in altitude. See docs/concepts/certificates.md.
 
@@ -103,7 +103,7 @@ class Problem:
 
     @property
     def bound_limits(self) -> Limits:
-        """The limits that bounds and proofs assume: those of the check, with less track error by `_aside_m`.
+        """The limits that bounds and proofs assume: the check's limits, with less track error by `_aside_m`.
 
         So a path that begins a little beside the start is one from the start itself, with a connector that is legal.
         """
@@ -147,7 +147,7 @@ class Problem:
         return (2 + 2 * len(self.via)) * each
 
     def rounding(self) -> EndRounding:
-        """What the rounding of ends and vias takes from lower bounds."""
+        """The deduction from lower bounds for the rounding of ends and vias."""
         return EndRounding(self.connectors, straight_bound(self, self.rounding_m) * (1.0 - 1e-12))
 
     def leg_costs(self, start: Floats, end: Floats) -> Floats:
@@ -230,9 +230,9 @@ PlanFunction = Callable[[Problem], Solution]
 
 
 class Refusal(NoMission):
-    """There is no mission: why, and ``east_m``, ``north_m`` of the binding place, None if there is no single place.
+    """There is no mission: the reason, and ``east_m``, ``north_m`` of the binding place, None without a single place.
 
-    ``place_of``: what is at that place, if the message does not say so.
+    ``place_of``: the object at that place, if the message does not name it.
     ``untried``: another limit, or fewer zones, may help, and none has been tried yet (`with_cures` does so).
     """
 

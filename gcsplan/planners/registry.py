@@ -1,4 +1,4 @@
-"""The names of all planners, and the package that holds each one's row: what it is, its source, how to call it.
+"""The names of all planners, and the package that holds each one's row: summary, source, how to call it.
 
 Cheap to import: a package is imported only when one of its planners is named.
 """
@@ -70,7 +70,7 @@ def get(name: str) -> PlannerEntry:
 
 
 def rows() -> Iterator[PlannerEntry]:
-    """All planners, the default one first; the summary of one whose package is not installed says so."""
+    """All planners, the default one first; the summary of a planner whose package is not installed names that."""
     for name, package in PLANNER_PACKAGES.items():
         try:
             yield get(name)

@@ -89,7 +89,7 @@ class _Choices:
 
     ``first``, ``last`` (R,): indices of the points at which a stretch begins and ends. ``mids`` (R, 12, 3): places of
     the one point that may replace two inner ones; valid where ``allowed`` (R, 12). For a stretch with one inner point
-    the only choice is to leave it out; its place is then that of ``first``.
+    the only choice is to leave it out; its place is then the place of ``first``.
     """
 
     first: Indices
@@ -100,7 +100,7 @@ class _Choices:
 
 def fewer(problem: Problem, points: Floats, pinned: Bools, worth: float) -> tuple[Floats, Bools]:
     """Remove points: leave one out, or replace two by one (see `_choices`), cheapest first. All removals together may
-    cost at most ``worth``. Returns the points and which of them are ``pinned`` (those stay)."""
+    cost at most ``worth``. Returns the points and which of them are ``pinned`` (which stay)."""
     spent = 0.0
     came_from, marks = np.full(len(points), -1), np.zeros((0, 12), np.int8)
     while len(points) > 2:
@@ -138,7 +138,7 @@ def _choices(points: Floats, pinned: Bools) -> _Choices:
     """All choices to remove one point of a path; see `_Choices`.
 
     Two points may be replaced by one at the place of either, midway, or where the outer legs meet; each place at three
-    altitudes: those of both points and the mean.
+    altitudes: the altitude of each point and the mean.
     """
     n = len(points)
     one, two = np.arange(n - 2), np.arange(n - 3)
@@ -182,9 +182,9 @@ def _still_known(marks: Int8s, came_from: Indices) -> Int8s:
     return known
 
 
-def _look(problem: Problem, points: Floats, choices: _Choices, asked: Bools, marks: Int8s) -> None:
-    """Run the exact check on the choices where ``asked`` (R, 12), and record the result in ``marks`` (R, 12)."""
-    row, column = np.nonzero(asked)
+def _look(problem: Problem, points: Floats, choices: _Choices, unseen: Bools, marks: Int8s) -> None:
+    """Run the exact check on the ``unseen`` choices (R, 12), and record the result in ``marks`` (R, 12)."""
+    row, column = np.nonzero(unseen)
     first, last, place = choices.first[row], choices.last[row], choices.mids[row, column]
     legal = np.ones(len(row), np.bool_)
     two = last - first == 3

@@ -5,7 +5,7 @@ the bow against the line straight in the plane stays within centimetres; that bo
 are in metres of the plane; `gcsplan.world.geodesy.frame` converts to and from degrees.
 
 Exact are: the ground under the line, zones with levels above mean sea level, ceilings, angles. Conservative, by a few
-centimetres at most, are: what lies beside the line within its errors and clearance, and zones over ground. Touching a
+centimetres at most, are: ground beside the line within its errors and clearance, and zones over ground. Touching a
 limit is legal; a micrometre is float noise.
 """
 
@@ -175,7 +175,7 @@ class Airspace:
     """A surface and its zones, with the functions that judge legs.
 
     ``scale`` >= 1: largest scale of the plane over the mission; real metres times it are at most metres of the plane,
-    so every horizontal clearance is multiplied by it. ``zones`` are those given, with higher ceilings above ground
+    so every horizontal clearance is multiplied by it. ``zones`` are the given ones, with higher ceilings above ground
     where the ground has two heights (`over_both_grounds`). ``field``, ``zone_arrays``, ``surfaces`` and ``grounds`` are
     the same as the kernels read it.
     """
@@ -209,7 +209,7 @@ class Airspace:
         return float(np.fmax.reduce(self._examined(legs, limits)[1][:, _KIND_NUMBERS[kind], 0], initial=0.0))
 
     def _examined(self, legs: Legs, limits: Limits) -> tuple[Floats, Floats, Indices, Indices, Floats]:
-        """What the kernel finds: figures (N, 4), the worst of each kind (N, 7, 2), the nearest zone (N,), and the zones
+        """The kernel's findings: figures (N, 4), the worst of each kind (N, 7, 2), the nearest zone (N,), and the zones
         that are hit: leg and zone (H, 2), distance and fraction (H, 2)."""
         n = len(legs)
         ok, found = np.zeros(n, np.bool_), np.full((n, 4), np.nan)
@@ -228,7 +228,8 @@ class Airspace:
         return self.clear_counted(legs, limits)[0]
 
     def clear_counted(self, legs: Legs, limits: Limits) -> tuple[Bools, float]:
-        """What `clear` returns, and into how many pieces ground beside the legs was cut: most work close to ground."""
+        """The result of `clear`, and the number of pieces into which ground beside the legs was cut: most of the work
+        close to ground."""
         ok = np.zeros(len(legs), np.bool_)
         self._judge(legs, limits, False, ok, _HELD_NOTHING)
         return ok, work_arrays.cut
@@ -335,10 +336,10 @@ class Airspace:
         reach = (legs.track_error_m + limits.horizontal_clearance_m) * self.scale
         known_within = np.where(legs.column, legs.track_error_m * self.scale, reach)
         steep = (kind == CLIMB) | (kind == DESCENT)
-        asked = np.zeros(len(_VIOLATION_KINDS))
-        asked[[MIN_AGL, CLIMB, DESCENT]] = limits.min_agl_m, limits.max_climb_deg, limits.max_descent_deg
-        asked[[MAX_AGL, MAX_AMSL]] = limits.max_agl_m or 0.0, limits.max_amsl_m or 0.0
-        limit = np.where(kind == COVERAGE, known_within[leg], asked[kind])
+        bounds = np.zeros(len(_VIOLATION_KINDS))
+        bounds[[MIN_AGL, CLIMB, DESCENT]] = limits.min_agl_m, limits.max_climb_deg, limits.max_descent_deg
+        bounds[[MAX_AGL, MAX_AMSL]] = limits.max_agl_m or 0.0, limits.max_amsl_m or 0.0
+        limit = np.where(kind == COVERAGE, known_within[leg], bounds[kind])
         by = np.where(steep, np.maximum(np.abs(climb_deg[leg]) - limit, ANGLE_DEG), by)
         value = limit + np.where((kind == MIN_AGL) | (kind == TERRAIN) | (kind == COVERAGE), -by, by)
         value = np.where(kind == COVERAGE, np.maximum(value, 0.0), value)

@@ -105,7 +105,7 @@ class Swept:
 
 @dataclass(frozen=True, eq=False)
 class LevelLines:
-    """What N lines meet.
+    """The ground and obstacles that N lines meet.
 
     ``clear_m`` (N,): the lowest AMSL level over the whole line that meets no ground or obstacle within errors and
     clearance; ``legal_m`` (N,): the lowest that also keeps min AGL; both +inf over unknown ground. ``ceiling_m`` (N,):

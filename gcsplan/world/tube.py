@@ -29,7 +29,7 @@ ZONE_ROOM_M = 0.05
 """The same beside a zone whose levels follow the ground."""
 
 TUBE_MARGIN_M = 0.01
-"""Extra height, m: twice what the check's branch and bound resolves."""
+"""Extra height, m: twice the resolution of the check's branch and bound."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ class Reaches:
     """How far from a place the ground counts, metres of the plane: for errors (near), clearance (far); margins added.
 
     If the map is exact and nothing beside the place counts, there is no margin: the check is exact there too.
-    ``near_margin_m``, ``far_margin_m``: extra heights to keep above what lies within the reach. ``zone_m``: the reach
+    ``near_margin_m``, ``far_margin_m``: extra heights to keep above the ground within the reach. ``zone_m``: the reach
     of zones, without margins.
     """
 

@@ -48,7 +48,7 @@ class World:
 
     @cached_property
     def _grounds(self) -> dict[tuple[float, float], float]:
-        """The ground at places that were asked for last: home is asked for again and again."""
+        """The ground at the places requested last: home is requested again and again."""
         return {}
 
     def bow_m(self, longest_m: float) -> float:
@@ -73,7 +73,7 @@ class World:
 
     @cached_property
     def _bows(self) -> dict[float, float]:
-        """The bows of legs that were asked for last, by half their length: every attempt at a plan asks again."""
+        """The bows of the legs requested last, by half their length: every attempt at a plan requests them again."""
         return {}
 
     def read_amsl(self, lat_deg: float, lon_deg: float) -> float:

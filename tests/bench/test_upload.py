@@ -31,7 +31,7 @@ def test_a_mission_has_as_many_way_points_as_asked_no_two_alike() -> None:
 @pytest.mark.parametrize("asked", [{"items": 0}, {"items": 2001}, {"runs": 0}, {"runs": 101}])
 def test_uploads_that_would_measure_nothing_are_refused(asked: dict[str, int]) -> None:
     pytest.importorskip("mavsdk")
-    with pytest.raises(InputError, match="1 to 2000 items and 1 to 100 runs are wanted"):
+    with pytest.raises(InputError, match="1 to 2000 items and 1 to 100 runs, not"):
         upload.run(**asked)
 
 

@@ -98,7 +98,7 @@ class Air:
         heapq.heappush(self._acts, (self.now + after_s, self._count, act))
 
     def put(self, address: Peer, place: Place) -> None:
-        """Add ``place`` at ``address``, beside those that are there already."""
+        """Add ``place`` at ``address``, beside the places that are there already."""
         self.at(address).append(place)
         self._answer(address, place, place.on_timer(self.now))
 

@@ -1,7 +1,7 @@
 """Shortest tracks and altitudes by a second implementation: ground, grown zones, a visibility graph, taut profiles.
 
-No code comes from gcsplan. A zone is grown by what the check asks; corners of the grown zone are followed by a mitre of
-many small turns outside it, so that every track found is one that the check can pass.
+No code comes from gcsplan. A zone is grown by the check's distance; corners of the grown zone are followed by a mitre
+of many small turns outside it, so that every track found is one that the check can pass.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class Air:
 
     @property
     def reach_m(self) -> float:
-        """By what a zone is grown."""
+        """The metres by which a zone is grown."""
         return self.beside + self.track
 
     def floors(self, points: Floats) -> Floats:
@@ -370,13 +370,13 @@ def taut(s: Floats, low: Floats, high: Floats, slopes: tuple[float, float]) -> F
 
 
 def _on(s: Floats, z: Floats, slope: float) -> Floats:
-    """Where a bound ``z`` must hold, what it asks further on along the track: falling by ``slope`` (positive for lower
-    bounds), or rising by it (negative, for upper bounds)."""
+    """The bound further on along the track that follows from a bound ``z`` at a place: falling by ``slope`` (positive
+    for lower bounds), or rising by it (negative, for upper bounds)."""
     if slope >= 0.0:
         return np.asarray(np.maximum.accumulate(z + slope * s) - slope * s)
     return np.asarray(np.minimum.accumulate(z + slope * s) - slope * s)
 
 
 def _back(s: Floats, z: Floats, slope: float) -> Floats:
-    """As `_on`, for what it asks further back."""
+    """As `_on`, further back along the track."""
     return _on(s[-1] - s[::-1], z[::-1], slope)[::-1]

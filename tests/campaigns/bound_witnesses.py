@@ -1,7 +1,7 @@
 """Missions at the check's limit, drawn to undercut a bound or a proof: each is judged by `gcsplan.check` alone.
 
-A witness begins with the plan's own items up to the take-off's top (a wing: its climb-out's end) and ends with those
-from its approach on; between them lie way points that this module draws. What is kept of each is whether the check
+A witness begins with the plan's own items up to the take-off's top (a wing: its climb-out's end) and ends with the
+items from its approach on; between them lie way points that this module draws. Each witness keeps whether the check
 calls it safe, and its flown length or energy.
 """
 
@@ -46,7 +46,7 @@ class Witness:
 
 @dataclass(eq=False)
 class Budget:
-    """What may be spent on one vehicle: until ``until_s`` by the clock and at most ``left`` judgements."""
+    """The budget of one vehicle: until ``until_s`` by the clock and at most ``left`` judgements."""
 
     until_s: float
     left: int
@@ -60,9 +60,9 @@ class Budget:
 class Route:
     """The way points between the fixed ends of a plan, and the judge of others in their place.
 
-    ``points`` (N, 3) are the plan's own, ends included: east, north, and z in the items' frame. ``fixed``: those that
+    ``points`` (N, 3) are the plan's own, ends included: east, north, and z in the items' frame. ``fixed``: points that
     may not move (ends and vias). ``base_m``: AMSL of z = 0; NaN in the terrain frame. ``source``: judge there and not
-    in the plan's world, for a plan that is of another world and only gives its ends.
+    in the plan's world, for a plan of another world that only gives its ends.
     """
 
     case: Case
@@ -334,8 +334,8 @@ class Route:
         return np.column_stack([np.interp(kept, s, at[:, 0]), np.interp(kept, s, at[:, 1]), z - self.base_m])
 
     def via_heights(self) -> list[tuple[int, float]]:
-        asked = [p.get("agl_m") for p in self.request.get("via", [])]  # type: ignore[attr-defined]
-        return [(k, self.points[k, 2] + self.base_m) for k, agl in zip(self.fixed[1:-1], asked, strict=True)
+        agls = [p.get("agl_m") for p in self.request.get("via", [])]  # type: ignore[attr-defined]
+        return [(k, self.points[k, 2] + self.base_m) for k, agl in zip(self.fixed[1:-1], agls, strict=True)
                 if agl is not None]  # fmt: skip
 
     @cached_property

@@ -61,7 +61,7 @@ class Barrier:
 
 @dataclass(eq=False)
 class Case:
-    """One mission file and what it says, in numbers. ``flat_m``: the ground, where there is no ``terrain``."""
+    """One mission file and its content in numbers. ``flat_m``: the ground, where there is no ``terrain``."""
 
     family: str
     seed: int
@@ -282,16 +282,16 @@ def walls(rng: np.random.Generator) -> Case:
 
 
 def slits(rng: np.random.Generator) -> Case:
-    """A long wall with a slit that is wider than the check asks by centimetres or metres."""
+    """A long wall with a slit that is wider than the check requires by centimetres or metres."""
     far, half = float(rng.uniform(300.0, 1500.0)), float(rng.choice(LONG_M, p=LONG_PART))
-    asked = errors(rng)
+    errors_of = errors(rng)
     room = float(rng.choice([0.08, 0.15, 0.3, 1.0, 3.0]))
-    wide = 2.0 * (asked["horizontal_clearance_m"] + asked["track_error_m"]) + room
+    wide = 2.0 * (errors_of["horizontal_clearance_m"] + errors_of["track_error_m"]) + room
     at, east, thick = float(rng.uniform(-60.0, 60.0)), 0.5 * far, float(rng.choice([2.0, 20.0, 60.0]))
     found = [
         Barrier(wall(east, -half, at - 0.5 * wide, thick)), Barrier(wall(east, at + 0.5 * wide, half, thick)),
     ]  # fmt: skip
-    limits = {"min_agl_m": 30.0, **asked}
+    limits = {"min_agl_m": 30.0, **errors_of}
     if rng.random() < 0.4:  # boxed in: without the slit there is no way
         x = (-200.0, far + 200.0)
         ring = [(x[0], -half, x[1], -half + 10.0), (x[0], half - 10.0, x[1], half), (x[0] - 10.0, -half, x[0], half),
@@ -304,11 +304,11 @@ def slits(rng: np.random.Generator) -> Case:
 def over(rng: np.random.Generator) -> Case:
     """A long wall to pass over below the ceiling, or under, with centimetres to spare, or just none."""
     far, half = float(rng.uniform(300.0, 1500.0)), float(rng.choice(LONG_M, p=LONG_PART))
-    asked = errors(rng)
+    errors_of = errors(rng)
     room, low = float(rng.choice([0.02, 0.04, 0.1, 0.5, 3.0])), 30.0
     b = Barrier(wall(0.5 * far, -half, half, float(rng.choice([4.0, 40.0]))))
-    limits = {"min_agl_m": low, **asked}
-    error = asked["altitude_error_m"]
+    limits = {"min_agl_m": low, **errors_of}
+    error = errors_of["altitude_error_m"]
     if rng.random() < 0.6:
         top = float(rng.uniform(40.0, 120.0))
         b.ceiling = (top, "agl") if rng.random() < 0.4 else (100.0 + top, "amsl")

@@ -5,10 +5,10 @@ vias, fleets, fixed wings, return paths, the terrain frame, zones that are not c
 functions alone. Then a second implementation draws missions from the plan's own take-off top to its approach, each
 judged by the check. A fault is
 
-- undercut: a safe mission costs less than the bound, by more than 1 mm + 1e-7 of it (or the joules of that);
+- undercut: a safe mission costs less than the bound, by more than 1 mm + 1e-7 of it (or the joules of this length);
 - proved: a mission is safe where the plan was refused as proved;
 - own cost: a plan costs less than its own bound;
-- silent: a refusal that stems from unknown ground does not say so (with the voids filled there is a plan);
+- silent: a refusal that stems from unknown ground does not name it (with the voids filled there is a plan);
 - not safe: the check does not pass the plan's own mission;
 - crash: anything but a plan or a refusal.
 
@@ -71,7 +71,7 @@ class Fault:
 
 @dataclass
 class Tally:
-    """What a campaign did and found."""
+    """The counts and faults of a campaign."""
 
     worlds: Counter[str] = field(default_factory=Counter)
     planned: Counter[str] = field(default_factory=Counter)
@@ -197,15 +197,15 @@ def _refused(
     case: Case, folder: Path, refusal: NoMission, tally: Tally, rng: np.random.Generator, most: int, world_s: float
 ) -> Witness | None:
     """Attack a refusal: a safe mission from the ends of a plan without zones, or over other ground."""
-    said = f"{refusal.reason}{' (proved)' if _proved(refusal) else ''}"
+    outcome = f"{refusal.reason}{' (proved)' if _proved(refusal) else ''}"
     words = " ".join(str(refusal).split())[:160]
-    tally.refused[said] += 1
+    tally.refused[outcome] += 1
     holed = case.terrain is not None and np.isnan(case.terrain.heights).any()
     searched = refusal.reason in ("infeasible", "not_found") and "a path was found" not in str(refusal)
     if holed and searched and not SAYS_UNKNOWN.search(str(refusal)):
         try:
             _plan(folder / "filled.yaml")
-            tally.fault("silent", case, f"with its voids filled there is a plan, and the refusal says: {words}")
+            tally.fault("silent", case, f"with its voids filled there is a plan, and the refusal is: {words}")
         except GcsplanError:
             pass
     for name in ("open", "bare"):
@@ -227,7 +227,7 @@ def _refused(
         if route.best is None:
             continue
         if _proved(refusal) and len(case.vehicles) == 1:
-            tally.fault("proved", case, f"safe with {route.best.cost:.2f} ({route.best.how}), and it is said: {words}")
+            tally.fault("proved", case, f"safe with {route.best.cost:.2f} ({route.best.how}); the refusal: {words}")
             return route.best
         tally.missed[case.family] += 1
     return None
@@ -284,14 +284,14 @@ def main() -> int:
     parser.add_argument("--families", nargs="+", default=list(FAMILIES), choices=list(FAMILIES))
     parser.add_argument("--keep", type=Path, help="folder for the mission files and witnesses of faults")
     given = parser.parse_args()
-    asked: list[int] = []
+    signals: list[int] = []
     for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda which, _: asked.append(which))
+        signal.signal(number, lambda which, _: signals.append(which))
     tally = run(
         given.seconds, given.seed, given.families, worlds=given.worlds, witnesses=given.witnesses, keep=given.keep,
-        stopped=lambda: bool(asked),
+        stopped=lambda: bool(signals),
     )  # fmt: skip
-    if asked:
+    if signals:
         print("stopped by a signal", flush=True)
     print(tally.table(), flush=True)
     return 1 if tally.faults else 0

@@ -42,12 +42,12 @@ class OddParameters(Parameters):
 
 
 class Craft:
-    """A vehicle behind a hub. Records what is on board when, and what the ground station has heard from it."""
+    """A vehicle behind a hub. Records the items on board by time, and the messages that the station has heard."""
 
     def __init__(self, vehicle: LoopbackVehicle, air: Air, signing: Signing | None = None) -> None:
         self.vehicle, self.air = vehicle, air
         self.hub = Hub([vehicle], always=STATION, signing=signing)
-        self.wanted: tuple[MissionItem, ...] = ()
+        self.expected: tuple[MissionItem, ...] = ()
         self.deadline = self.hub.deadline
         self.silent = False
         self.address: Peer = ""
@@ -60,11 +60,11 @@ class Craft:
         self.equal: list[tuple[float, float]] = []
 
     def forget(self) -> None:
-        """Forget what the ground station has heard: a new run of it begins, which knows nothing of the last one."""
+        """Forget the messages that the ground station has heard: a new run of it begins without them."""
         self.known_since, self.last_heard = math.inf, -math.inf
         self.together = 0  # positions heard while another vehicle was at the same address
         self._beats_at: list[float] = []
-        self.armed_told = self.far_told = math.inf
+        self.armed_reported = self.far_reported = math.inf
 
     def take(self, client: str, data: bytes, now: float) -> list[tuple[Any, bytes]]:
         """Receive bytes from the ground station; return the answers."""
@@ -76,7 +76,7 @@ class Craft:
         return sent
 
     def on_timer(self, now: float) -> list[tuple[Any, bytes]]:
-        """What it sends at this time without being asked."""
+        """The messages that it sends at this time on its own."""
         sent = self.hub.on_timer(now)
         self.deadline = self.hub.deadline
         self.look()
@@ -84,16 +84,16 @@ class Craft:
 
     def look(self) -> None:
         items = list(self.vehicle.items())
-        if items == self._last or not self.wanted:
+        if items == self._last or not self.expected:
             return
         self._last, now = items, self.air.now
-        same = not faults(compare(self.wanted, items, self.vehicle.autopilot))
+        same = not faults(compare(self.expected, items, self.vehicle.autopilot))
         if self._equal_since < now and not same:
             self.equal.append((self._equal_since, now))
         self._equal_since = min(self._equal_since, now) if same else math.inf
 
     def was_equal(self, since: float, until: float) -> bool:
-        """Whether the wanted items were on board at some time between ``since`` and ``until``."""
+        """Whether the expected items were on board at some time between ``since`` and ``until``."""
         self.look()
         spans = [*self.equal, (self._equal_since, math.inf)]
         return any(begin <= until and end >= since for begin, end in spans)
@@ -105,10 +105,10 @@ class Craft:
         if kind == "HEARTBEAT":
             self.known_since = min(self.known_since, now)
             self._beats_at.append(now)
-            self.armed_told = min(self.armed_told, now) if message.base_mode & 128 else math.inf
+            self.armed_reported = min(self.armed_reported, now) if message.base_mode & 128 else math.inf
         elif kind == "GLOBAL_POSITION_INT":
             far = max(abs(message.lat - self.start.lat_e7), abs(message.lon - self.start.lon_e7)) > 5000
-            self.far_told = min(self.far_told, now) if far else math.inf
+            self.far_reported = min(self.far_reported, now) if far else math.inf
 
     def heard_between(self, since: float, until: float) -> bool:
         """Whether two of its heartbeats were heard between ``since`` and ``until``."""
@@ -158,7 +158,7 @@ SILENCE_S = 3.0
 
 @dataclass
 class Voice:
-    """What the ground station has heard in the name of one component at one address, whoever sent it."""
+    """The messages that the ground station has heard in the name of one component at one address, whoever sent them."""
 
     last: float = -math.inf
     back_at: float = -math.inf

@@ -231,7 +231,7 @@ def killed_before(change: int, work: Callable[[], object]) -> Callable[[], objec
 
 
 def kills(root: Path, of: World, rng: random.Random) -> Iterator[list[str]]:
-    """Kill the step at every change, half of the times also the next runs while they recover; yield faults of each."""
+    """Kill the step at every change, in half of the cases also the next runs while they recover; yield their faults."""
     for change in range(10_000):
         put(root, of.before)
         ended = in_child(killed_before(change, lambda: of.step(root)))

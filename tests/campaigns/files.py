@@ -74,7 +74,7 @@ def civil(code: object, out: str, err: str) -> list[str]:
     try:
         document = json.loads(out)
         if ("error" in document) != (code != 0) or (code != 0 and document["error"]["code"] != code):
-            found.append("the document does not say how it ended")
+            found.append("the document lacks the outcome")
     except ValueError:
         found.append(f"standard output is no JSON document: {out[:200]!r}")
     found += [f"standard error holds a {word}: {err[-400:]}" for word in ("Traceback", "Warning") if word in err]
@@ -85,23 +85,23 @@ def civil(code: object, out: str, err: str) -> list[str]:
 
 def work(seed: int) -> None:
     """Run inputs for ever; write JSON lines on the real standard output when each begins and ends."""
-    say = os.fdopen(os.dup(1), "w")
-    said = tempfile.TemporaryFile()  # noqa: SIM115  # stays open as long as the process
-    os.dup2(said.fileno(), 1)
-    os.dup2(said.fileno(), 2)  # libraries write there without Python
+    real = os.fdopen(os.dup(1), "w")
+    library_words = tempfile.TemporaryFile()  # noqa: SIM115  # stays open as long as the process
+    os.dup2(library_words.fileno(), 1)
+    os.dup2(library_words.fileno(), 2)  # libraries write there without Python
     write_clean()
     while True:
-        print(json.dumps(["begins", seed]), file=say, flush=True)
+        print(json.dumps(["begins", seed]), file=real, flush=True)
         kind, code, found = attack(seed)
-        if said.tell():
-            said.seek(0)
-            found.append(f"seed {seed} ({kind}): a library wrote {said.read()[:300]!r}")
-            said.seek(0)
-            said.truncate()
+        if library_words.tell():
+            library_words.seek(0)
+            found.append(f"seed {seed} ({kind}): a library wrote {library_words.read()[:300]!r}")
+            library_words.seek(0)
+            library_words.truncate()
         memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
         if memory_mb > MEMORY_MB:
             found.append(f"seed {seed} ({kind}): {memory_mb:.0f} MB are held")
-        print(json.dumps(["ended", kind, code, found, memory_mb]), file=say, flush=True)
+        print(json.dumps(["ended", kind, code, found, memory_mb]), file=real, flush=True)
         seed += 1
 
 
@@ -116,13 +116,13 @@ def campaign(seconds: float, seed: int, inputs: int, keep: str | None) -> int:
         while sum(count.values()) < inputs and time.monotonic() < until and len(found) < MAX_FOUND:
             with Worker(folder, seed) as worker:
                 while sum(count.values()) < inputs and time.monotonic() < until and len(found) < MAX_FOUND:
-                    told = worker.answer()
-                    kind, code, faults, held_mb = told or ("none", -1, [f"seed {worker.seed}: {worker.fate()}"], 0.0)
+                    answer = worker.answer()
+                    kind, code, faults, held_mb = answer or ("none", -1, [f"seed {worker.seed}: {worker.fate()}"], 0.0)
                     count[f"{kind} {code}"] += 1
                     found += faults
                     for line in faults:
                         print(line, flush=True)
-                    if told is None:
+                    if answer is None:
                         break
                     memory_mb = max(memory_mb, held_mb)
                     if held_mb > MEMORY_MB:
@@ -141,7 +141,7 @@ class Worker:
         environment = os.environ | {"PYTHONPATH": paths}
         self.process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, env=environment)
         self.seed = seed
-        self._said = b""
+        self._answered = b""
 
     def __enter__(self) -> Worker:
         return self
@@ -173,13 +173,13 @@ class Worker:
     def _line(self, seconds: float) -> bytes:
         assert self.process.stdout is not None
         handle, until = self.process.stdout.fileno(), time.monotonic() + seconds
-        while b"\n" not in self._said:
+        while b"\n" not in self._answered:
             left = until - time.monotonic()
             more = os.read(handle, 65536) if left > 0.0 and select.select([handle], [], [], left)[0] else b""
             if not more:
                 return b""
-            self._said += more
-        line, _, self._said = self._said.partition(b"\n")
+            self._answered += more
+        line, _, self._answered = self._answered.partition(b"\n")
         return line
 
 

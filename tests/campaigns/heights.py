@@ -3,7 +3,7 @@
     python -m tests.campaigns.heights --seconds 600 --seed 1
 
 Each case is one mission's terrain: GeoTIFF, ESRI .asc, SRTM .hgt or ArduPilot's .DAT, with a vertical datum, a unit
-and a void stated by keys, by the file, or by nobody, and often by several of them. What must be read is worked out
+and a void stated by keys, by the file, or by nobody, and often by several of them. The right answer is worked out
 here, from tables written by hand: refused for one of the given reasons, or heights, bilinear between nodes. A fault is
 a case that is read where it must be refused, refused where it must be read, refused for another reason, or read with
 other heights.
@@ -62,11 +62,11 @@ UNIT_WORDS = {
 KEY_UNITS = {"m": 1.0, "ft": FOOT, "us_ft": US_FOOT}
 REASONS = {
     "depths": "counts depths", "another zero": "do not count from mean sea level",
-    "no datum": "does not say what its heights are measured from", "two datums": "the raster itself says",
-    "two units": "two units of height", "unknown unit": "which is not known", "no unit": "nothing says the unit",
+    "no datum": "does not say what its heights are measured from", "two datums": "the raster itself states",
+    "two units": "two units of height", "unknown unit": "which is not known", "no unit": "nothing states the unit",
     "own unit": "states it itself", "in metres": "are in metres", "own voids": "marks its voids itself",
     "ellipsoid": "must be converted to mean sea level", "other ellipsoid": "count from another ellipsoid",
-    "no heights": "has no axis of heights", "silent tile": "nothing says the unit of those of",
+    "no heights": "has no axis of heights", "silent tile": "nothing states the unit of",
 }  # fmt: skip
 MARKS = (-9999.0, -32767.0, -32768.0)
 """Raw numbers that are voids wherever they stand."""
@@ -84,7 +84,7 @@ def load(spec: TerrainSpec, frame: Frame) -> Surface:
 
 @dataclass
 class Tally:
-    """What became of the cases: how many were read, refused for which reason, and what was wrong."""
+    """The outcomes of the cases: how many were read, how many refused for which reason, and the faults."""
 
     read: int = 0
     formats: Counter[str] = field(default_factory=Counter)
@@ -133,8 +133,8 @@ def bilinear(z: Floats, col: Floats, row: Floats) -> Floats:
 
 
 @dataclass
-class Said:
-    """Who says what of heights; None if nobody."""
+class Statements:
+    """The statements on heights, by who makes them; None if nobody does."""
 
     key: str | None
     key_unit: float | None
@@ -144,7 +144,7 @@ class Said:
     reasons: set[str]
 
     @classmethod
-    def draw(cls, rng: np.random.Generator, *, own: bool) -> Said:
+    def draw(cls, rng: np.random.Generator, *, own: bool) -> Statements:
         reasons: set[str] = set()
 
         def code() -> int:
@@ -190,7 +190,7 @@ class Said:
             reasons.add("two datums")
         if key == "WGS84":
             reasons.add("ellipsoid")
-        if rng.random() < 0.03 and not reasons:  # what a key forbids is not forgotten with it
+        if rng.random() < 0.03 and not reasons:  # a refusal by a key stays, also without the key
             key, key_unit, key_name = None, None, None
             if own_code is None:
                 reasons.add("no datum")
@@ -198,7 +198,7 @@ class Said:
         return cls(key, key_unit, key_name, own_code, height_unit, reasons)
 
     def spec(self, dem: tuple[str, ...], nodata: Any, crs: str | None = None) -> TerrainSpec:
-        """What the keys of a mission say."""
+        """The keys of a mission."""
         unit: Any = self.height_unit
         return TerrainSpec(dem=dem, crs=crs, vertical_datum=self.key, height_unit=unit, nodata=nodata)
 
@@ -259,14 +259,14 @@ def slopes(rng: np.random.Generator, rows: int, cols: int, low: float, high: flo
 def raster_case(rng: np.random.Generator, folder: Path, kind: str) -> Case:
     """A GeoTIFF or an .asc of 120 × 120 nodes, at times two that overlap."""
     feet_grid = kind == "tif" and rng.random() < 0.2
-    said = Said.draw(rng, own=True)
+    stated = Statements.draw(rng, own=True)
     band = str(rng.choice([*UNIT_WORDS, "fathoms", "m/10", "0.1 ft"])) if rng.random() < 0.3 else None
-    metres = said.metres(band, feet_grid=feet_grid)
+    metres = stated.metres(band, feet_grid=feet_grid)
     n = 120
     low, high = (40.0, 400.0) if rng.random() < 0.8 else (-430.0, -300.0)  # the Dead Sea
     truth = slopes(rng, n, n, low, high)
     scale, offset = 1.0, 0.0
-    if kind == "tif" and said.own_code is None and rng.random() < 0.25:  # GDAL writes no scale beside a vertical part
+    if kind == "tif" and stated.own_code is None and rng.random() < 0.25:  # GDAL writes no scale beside a vertical part
         scale, offset = float(rng.choice([0.5, 0.1])), float(rng.choice([0.0, 50.0]))
     raw = np.round((truth / metres - offset) / scale)
     dtype = "int16" if kind == "tif" and np.abs(raw).max() < 30_000 and rng.random() < 0.5 else "float32"
@@ -284,9 +284,9 @@ def raster_case(rng: np.random.Generator, folder: Path, kind: str) -> Case:
     bands = [band, band]
     if second is not None and band in UNIT_WORDS and rng.random() < 0.3:  # the second tile is silent
         bands[1] = None
-        own_unit = None if said.own_code is None else HEIGHT_CODES.get(said.own_code, (None, ""))[0]
-        if said.height_unit is None and said.key_unit is None and own_unit is None:
-            said.reasons |= ({"silent tile"} if UNIT_WORDS[band] != 1.0 else set()) | (
+        own_unit = None if stated.own_code is None else HEIGHT_CODES.get(stated.own_code, (None, ""))[0]
+        if stated.height_unit is None and stated.key_unit is None and own_unit is None:
+            stated.reasons |= ({"silent tile"} if UNIT_WORDS[band] != 1.0 else set()) | (
                 {"no unit"} if feet_grid else set()
             )
     read = []
@@ -302,7 +302,7 @@ def raster_case(rng: np.random.Generator, folder: Path, kind: str) -> Case:
         low_m, high_m = (np.where(void, np.nan, z) for z in (low_m, high_m))
     frame, transform, at, spare_m = _place(rng, feet_grid, n)
     crs = "EPSG:2264" if feet_grid else "EPSG:4326"
-    own = crs if said.own_code is None else f"{crs}+{said.own_code}"
+    own = crs if stated.own_code is None else f"{crs}+{stated.own_code}"
     paths, by_key = [], kind == "asc" and rng.random() < 0.3
     for k, z in enumerate(surfaces):
         path = folder / f"{k}.{kind}"
@@ -329,8 +329,8 @@ def raster_case(rng: np.random.Generator, folder: Path, kind: str) -> Case:
                 )
                 (folder / f"{k}.asc.aux.xml").write_text(xml)
         paths.append(str(path))
-    spec = said.spec(tuple(paths), key_nodata, own if by_key else None)
-    return Case(spec, frame, said.reasons, low_m, high_m, at, spare_m)
+    spec = stated.spec(tuple(paths), key_nodata, own if by_key else None)
+    return Case(spec, frame, stated.reasons, low_m, high_m, at, spare_m)
 
 
 def _voids(rng: np.random.Generator, raw: Floats, metres: float) -> tuple[float | None, Any]:
@@ -392,9 +392,9 @@ def _place(
 
 def hgt_case(rng: np.random.Generator, folder: Path) -> Case:
     """A tile of 1201 posts a side, metres by its format, at times with a neighbour that differs along their border."""
-    said = Said.draw(rng, own=False)
-    metres = said.metres(None, feet_grid=False, by_format=True)
-    raw = np.round(slopes(rng, 1201, 1201, 40.0, 400.0) / (metres if said.height_unit else 1.0))
+    stated = Statements.draw(rng, own=False)
+    metres = stated.metres(None, feet_grid=False, by_format=True)
+    raw = np.round(slopes(rng, 1201, 1201, 40.0, 400.0) / (metres if stated.height_unit else 1.0))
     r, c = 600, 600
     key_nodata: Any = None
     if rng.random() < 0.3:
@@ -404,21 +404,21 @@ def hgt_case(rng: np.random.Generator, folder: Path) -> Case:
         key_nodata = "none" if rng.random() < 0.3 else None
     (folder / "N36W085.hgt").write_bytes(raw.astype(">i2").tobytes())
     if rng.random() < 0.3:
-        return _neighbours(rng, folder, said, raw, metres)
+        return _neighbours(rng, folder, stated, raw, metres)
     z = np.where(raw == -32768.0, np.nan, raw) * metres
     if key_nodata is None:
         z[500:700, 500:700] = np.where(shoreless(z[500:700, 500:700]), np.nan, z[500:700, 500:700])
-    spec = said.spec(dem=(str(folder / "N36W085.hgt"),), nodata=key_nodata)
+    spec = stated.spec(dem=(str(folder / "N36W085.hgt"),), nodata=key_nodata)
 
     def at(lat: Floats, lon: Floats) -> tuple[Floats, Floats]:
         return (lon + 85.0) * 1200.0, (37.0 - lat) * 1200.0
 
-    return Case(spec, Frame(36.5, -84.5), said.reasons, z, z, at, 0.02)
+    return Case(spec, Frame(36.5, -84.5), stated.reasons, z, z, at, 0.02)
 
 
-def _neighbours(rng: np.random.Generator, folder: Path, said: Said, west: Floats, metres: float) -> Case:
+def _neighbours(rng: np.random.Generator, folder: Path, stated: Statements, west: Floats, metres: float) -> Case:
     """Two tiles whose common column of posts differs; the mission lies over it."""
-    east = np.round(slopes(rng, 1201, 1201, 40.0, 400.0) / (metres if said.height_unit else 1.0))
+    east = np.round(slopes(rng, 1201, 1201, 40.0, 400.0) / (metres if stated.height_unit else 1.0))
     off = np.round(rng.uniform(-40.0, 40.0, 1201) * (rng.random(1201) < 0.7))
     east[:, 0] = west[:, -1] + off
     if rng.random() < 0.5:
@@ -435,20 +435,20 @@ def _neighbours(rng: np.random.Generator, folder: Path, said: Said, west: Floats
     def at(lat: Floats, lon: Floats) -> tuple[Floats, Floats]:
         return (lon + 85.0) * 1200.0, (37.0 - lat) * 1200.0
 
-    return Case(said.spec(paths, None), Frame(36.5, -84.0), said.reasons, low, high, at, 0.02)
+    return Case(stated.spec(paths, None), Frame(36.5, -84.0), stated.reasons, low, high, at, 0.02)
 
 
 def dat_case(rng: np.random.Generator, folder: Path) -> tuple[Case, Path]:
     """ArduPilot's files of a place, often at a degree line: what the autopilot reads lies between both heights."""
-    said = Said.draw(rng, own=False)
-    if said.height_unit is not None:
-        said.reasons.add("own unit")
-    if said.key_unit is not None and said.key_unit != 1.0:
-        said.reasons.add("in metres")
+    stated = Statements.draw(rng, own=False)
+    if stated.height_unit is not None:
+        stated.reasons.add("own unit")
+    if stated.key_unit is not None and stated.key_unit != 1.0:
+        stated.reasons.add("in metres")
     key_nodata: Any = None
     if rng.random() < 0.1:
         key_nodata = 0.0
-        said.reasons.add("own voids")
+        stated.reasons.add("own voids")
     lat = float(rng.integers(-60, 60) + rng.choice([0.003, 0.5, 0.997]))
     lon = float(rng.integers(-170, 170) + rng.choice([0.003, 0.5, 0.997]))
     (north, east), waves_m = rng.uniform(-0.6, 0.6, 2), float(rng.choice([0.0, 5.0, 40.0]))
@@ -460,15 +460,15 @@ def dat_case(rng: np.random.Generator, folder: Path) -> tuple[Case, Path]:
         return np.asarray(3500.0 + 111_000.0 * (north * (lat_deg - lat) + east * wide * away) + waves)
 
     path = write_dat(folder / "terrain", lat, lon, reach_deg=0.06, ground=ground)
-    spec = said.spec(dem=(str(path),), nodata=key_nodata)
-    return Case(spec, Frame(lat, lon), said.reasons, spare_m=2.1 if waves_m == 0.0 else math.inf), path
+    spec = stated.spec(dem=(str(path),), nodata=key_nodata)
+    return Case(spec, Frame(lat, lon), stated.reasons, spare_m=2.1 if waves_m == 0.0 else math.inf), path
 
 
 # -- the judgement ----------------------------------------------------------------------------------------------------
 
 
 def attempt(seed: int, tally: Tally, reader: Load = load) -> None:
-    """One case; what is wrong goes to the tally."""
+    """One case; its faults go to the tally."""
     rng = np.random.default_rng(seed)
     kind = str(rng.choice(["tif", "tif", "tif", "asc", "asc", "hgt", "dat"]))
     tally.formats[kind] += 1
@@ -487,7 +487,7 @@ def attempt(seed: int, tally: Tally, reader: Load = load) -> None:
         except InputError as why:
             found = {reason for reason, words in REASONS.items() if words in str(why)}
             if not case.reasons or not found & case.reasons:
-                fault(f"refused ({re.sub(r'/tmp/[^ ]*/', '', str(why))[:160]}), wanted {case.reasons or 'heights'}")
+                fault(f"refused ({re.sub(r'/tmp/[^ ]*/', '', str(why))[:160]}), expected {case.reasons or 'heights'}")
             tally.refused[next(iter(sorted(found & case.reasons)), "another reason")] += 1
             return
         if case.reasons:
@@ -498,24 +498,24 @@ def attempt(seed: int, tally: Tally, reader: Load = load) -> None:
         degrees = case.frame.to_degrees(plane[:, 0], plane[:, 1])
         if dat is not None:
             true = np.array([interpolated(dat, *(math.floor(x * 1e7) for x in d)) for d in degrees])
-            wanted = true, true
+            expected = true, true
         else:
             assert case.at is not None
             at = case.at(degrees[:, 0], degrees[:, 1])
-            wanted = bilinear(case.low, *at), bilinear(case.high, *at)
+            expected = bilinear(case.low, *at), bilinear(case.high, *at)
     got = surface.ground_at(*plane.T), surface.high_at(*plane.T)
     tally.two_heights += bool((got[1] > got[0] + 1e-6).any())
     tally.voids += bool(np.isnan(got[0]).any())
     if dat is not None:
-        if not (got[0] <= wanted[0] + 0.03).all() or not (got[1] >= wanted[0] - 0.03).all():
+        if not (got[0] <= expected[0] + 0.03).all() or not (got[1] >= expected[0] - 0.03).all():
             fault("what the autopilot reads lies outside of both heights")
         if (got[1] - got[0]).max() > case.spare_m:
             fault(f"a plane has two heights {(got[1] - got[0]).max():.1f} m apart")
         return
     near = _beside_voids(case, at)
-    for name, a, b in zip(("least", "greatest"), got, wanted, strict=True):
+    for name, a, b in zip(("least", "greatest"), got, expected, strict=True):
         if (np.isnan(a) != np.isnan(b))[~near].any():
-            fault(f"{name}: {np.isnan(a).sum()} places unknown, wanted {np.isnan(b).sum()}; {case.spec}")
+            fault(f"{name}: {np.isnan(a).sum()} places unknown, expected {np.isnan(b).sum()}; {case.spec}")
         off = np.abs(a - b)[~np.isnan(a) & ~np.isnan(b)]
         if off.size and off.max() > case.spare_m:
             fault(f"{name}: off by {off.max():.3f} m; {case.spec}")
@@ -524,7 +524,7 @@ def attempt(seed: int, tally: Tally, reader: Load = load) -> None:
     here = case.at(np.array([case.frame.lat_deg]), np.array([case.frame.lon_deg]))
     by_hand = float(bilinear(case.high, *here)[0] - bilinear(case.low, *here)[0])
     if not math.isnan(by_hand) and abs(spread - by_hand) > 2.0 * case.spare_m:
-        fault(f"home's two heights are {spread:.3f} m apart, wanted {by_hand:.3f}")
+        fault(f"home's two heights are {spread:.3f} m apart, expected {by_hand:.3f}")
 
 
 def _beside_voids(case: Case, at: tuple[Floats, Floats]) -> Floats:

@@ -6,9 +6,9 @@ An input is a zone over a mission's start with random periods as its format publ
 OpenAir: days alone, schedules without a beginning or an end, nights, 24:00, time zones, also two in one line, hours of
 the sun, times without a zone, members that nobody knows; around a leap day, the turn of the year, and days on which
 clocks change), a mission file with a random `at`, and a file of items with holds and loiters, waits for a time of day
-and loops, some without end, that stays in the zone. The clock here
-shares no code with the reader: it asks of every minute whether the zone applies in it, and it knows how long the flight
-lasts at least, by its holds and its distance at the fastest speed.
+and loops, some without end, that stays in the zone. The clock here shares no code with the reader: it finds for every
+minute whether the zone applies in it, and it knows how long the flight lasts at least, by its holds and its distance at
+the fastest speed.
 
 A fault is a zone that is not used although it applies in a minute of the hours, or can never apply; and a verdict
 `safe` of a flight during which it applies. Exits with 1 and prints the seed if there is one; ``--seed S --inputs 1``
@@ -76,8 +76,8 @@ def clock(rng: random.Random, zone: str) -> tuple[str, int]:
 
 
 def line(rng: random.Random) -> tuple[Line, tuple[Any, ...] | None]:
-    """A line of a schedule as published, and (days, start and end in minutes, their offsets); empty if the sun says
-    when, and None if nobody can understand it."""
+    """A line of a schedule as published, and (days, start and end in minutes, their offsets); empty if the sun sets the
+    times, and None if nobody can understand it."""
     days = rng.sample(WEEK, rng.randint(1, 3)) if rng.random() < 0.8 else ["ANY"]
     own = rng.choice([*OFFSETS])
     other = rng.choice([*OFFSETS]) if rng.random() < 0.2 else own
@@ -109,12 +109,12 @@ def period(rng: random.Random, monday: datetime, *, scheduled: bool) -> tuple[Pe
     lines = [line(rng) for _ in range(rng.randint(1, 2))] if scheduled and rng.random() < 0.7 else []
     if lines:
         given["schedule"] = [one for one, _ in lines]
-    told = [numbers for _, numbers in lines]
-    if None in told:
+    rule = [numbers for _, numbers in lines]
+    if None in rule:
         return given, None
     if start is not None and rng.random() < 0.03:
         return given | {"startDateTime": given["startDateTime"][:10] + "T10:00"}, None
-    return given, (start, end, [] if () in told else told)
+    return given, (start, end, [] if () in rule else rule)
 
 
 def spans(lines: list[Any], first: datetime, last: datetime) -> Iterator[tuple[datetime, datetime]]:
@@ -135,19 +135,19 @@ def spans(lines: list[Any], first: datetime, last: datetime) -> Iterator[tuple[d
             day += DAY
 
 
-def applies(told: tuple[Any, ...], minute: datetime) -> bool:
+def applies(rule: tuple[Any, ...], minute: datetime) -> bool:
     """Whether a period applies in a minute."""
-    start, end, lines = told
+    start, end, lines = rule
     if (start is not None and minute < start) or (end is not None and minute > end):
         return False
     return not lines or any(begins <= minute <= ends for begins, ends in spans(lines, minute, minute))
 
 
-def possible(told: tuple[Any, ...] | None) -> bool:
-    """Whether a period can apply at all, and says what it means."""
-    if told is None:
+def possible(rule: tuple[Any, ...] | None) -> bool:
+    """Whether a period can apply at all, and can be understood."""
+    if rule is None:
         return False
-    start, end, lines = told
+    start, end, lines = rule
     if start is not None and end is not None and start > end:
         return False
     try:
@@ -170,7 +170,7 @@ def zone(rng: random.Random, monday: datetime, folder: Path) -> tuple[str, Path,
     if form == "openair":
         ends = [[p.get(key, "NONE") for key in ("startDateTime", "endDateTime")] for p, _ in made]
         file.write_text(text + "".join(f"\nAA {a}/{b}" for a, b in ends), encoding="utf-8")
-        return form, file, [told for _, told in made]
+        return form, file, [rule for _, rule in made]
     whole = json.loads(text)
     if form == "ed269":
         whole["features"][0]["applicability"] = [p for p, _ in made]
@@ -180,7 +180,7 @@ def zone(rng: random.Random, monday: datetime, folder: Path) -> tuple[str, Path,
         span = made[0][0]
         whole["items"][0] |= {"activeFrom": span.get("startDateTime"), "activeUntil": span.get("endDateTime")}
     file.write_text(json.dumps(whole), encoding="utf-8")
-    return form, file, [told for _, told in made]
+    return form, file, [rule for _, rule in made]
 
 
 def flight(rng: random.Random) -> tuple[tuple[MissionItem, ...], float | None]:
@@ -238,10 +238,10 @@ def attack(seed: int, folder: Path) -> tuple[str, list[str]]:
     if rng.random() < 0.6:
         last = first + timedelta(minutes=rng.choice([1, 30, 120, 600, 3000]))
         at = [text, f"{last:%Y-%m-%dT%H:%MZ}"]
-    always = any(told == (None, None, []) for told in periods) or not all(map(possible, periods))
+    always = any(rule == (None, None, []) for rule in periods) or not all(map(possible, periods))
     count = int((last - first) / MINUTE) + 1
-    understood = [told for told in periods if told is not None]
-    meets = always or any(applies(told, first + i * MINUTE) for i in range(count) for told in understood)
+    understood = [rule for rule in periods if rule is not None]
+    meets = always or any(applies(rule, first + i * MINUTE) for i in range(count) for rule in understood)
     named = f"seed {seed} ({form})"
     try:
         source = mission(file, at)
@@ -258,7 +258,7 @@ def attack(seed: int, folder: Path) -> tuple[str, list[str]]:
         return ("left out, unsafe" if verdict.safe is False else "left out, not judged"), []
     until = first + timedelta(seconds=30 * 86400 if lasts_s is None else lasts_s)
     minutes = int((until - first) / MINUTE) + 1
-    if lasts_s is None or any(applies(told, first + i * MINUTE) for i in range(minutes) for told in understood):
+    if lasts_s is None or any(applies(rule, first + i * MINUTE) for i in range(minutes) for rule in understood):
         lasts = "has no end" if lasts_s is None else f"lasts {lasts_s:.0f} s"
         return "safe", [f"{named}: at {at}: safe, and the zone applies during the flight, which {lasts}"]
     return "left out, safe", []

@@ -1,4 +1,4 @@
-"""Signals at random moments of commands that write, compute for long, or talk: do they end as the contract says?
+"""Signals at random moments of commands that write, compute for long, or talk: do they end by the contract?
 
     python -m tests.campaigns.interrupts --seconds 120 [--seed 1] [--rounds N] [--kinds plan check …]
 
@@ -6,7 +6,7 @@ A site is a folder with a random past and one command; it is run undisturbed fir
 and sends it SIGINT, SIGTERM or SIGHUP, alone or with its whole group as a terminal does, after a random part of its
 time. It must end within `PATIENCE_S` of the processor, with the signal's exit code (or with its own, if it was
 done), one message, no traceback, one JSON document, no process left, and files that are all of before or all of after.
-Undisturbed, it then must make what it made at first. Exits with 1, and prints the seed, if any of that fails.
+Undisturbed, it then must make the same files as at first. Exits with 1, and prints the seed, if any of that fails.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from tests.support.paths import REPOSITORY
 from tests.support.tiles import Served, serving
 
 PATIENCE_S, PATIENCE_BY_CLOCK_S = 2.0, 30.0
-"""Seconds of the processor that a command may take once it was told to end; and of the clock, on a busy machine."""
+"""Seconds of the processor that a command may take after its signal; and of the clock, on a busy machine."""
 
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
 HIDDEN = ".gcsplan-"
@@ -51,7 +51,7 @@ Tree = dict[str, bytes]
 
 @dataclass
 class Case:
-    """A command, the folder that it writes to, and what is there before and after it."""
+    """A command, the folder that it writes to, and the folder's content before and after it."""
 
     arguments: list[str]
     folder: Path
@@ -212,7 +212,7 @@ KINDS: dict[str, Callable[[Path, random.Random, ExitStack], Case]] = {
 
 
 def _used_s(process: int) -> float:
-    """Seconds of the processor that a process and those of its children that ended have used."""
+    """Seconds of the processor that a process and its ended children have used."""
     fields = Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()
     return sum(int(t) for t in fields[11:15]) / os.sysconf("SC_CLK_TCK")
 
@@ -238,7 +238,7 @@ def left_over(session: int) -> list[int]:
 
 @dataclass
 class End:
-    """How a command ended that was told to."""
+    """The end of a command after its signal."""
 
     number: signal.Signals
     code: int
@@ -292,8 +292,8 @@ def wrong_end(end: End, own_code: int) -> list[str]:
     try:
         document = json.loads(end.out)
         if end.code == CODES[end.number] and document.get("error", {}).get("code") != end.code:
-            found.append(f"the document does not say how it ended: {end.out[-300:]}")
-    except json.JSONDecodeError as why:  # a document that was being printed may be cut off: the exit code says so
+            found.append(f"the document lacks the outcome: {end.out[-300:]}")
+    except json.JSONDecodeError as why:  # a document that was being printed may be cut off: the exit code shows the end
         cut_off = end.code == CODES[end.number] and end.out.startswith("{") and why.msg != "Extra data"
         if not cut_off:
             found.append(f"standard output is no JSON document: {end.out[-300:]!r}, {end.err[-300:]!r}")
@@ -336,7 +336,7 @@ def site(seed: int, place: Path, kind: str, stack: ExitStack) -> tuple[Case, lis
 
 
 def attack(case: Case, rng: random.Random) -> tuple[str, End, list[str]]:
-    """One round; returns what was done, how the command ended, and every fault."""
+    """One round; returns the action, the end of the command, and every fault."""
     case.put_back()
     number, group = rng.choice(list(CODES)), rng.random() < 0.5
     after_s = case.lasts_s * rng.uniform(0.05, 1.05)

@@ -50,7 +50,7 @@ def smooth(count: int, rng: random.Random) -> Places:
 def mission(
     no_fly: list[dict[str, object]] | None = None, goal: tuple[float, float] = (4000.0, 100.0), **keys: object
 ) -> list[str]:
-    """Write ``m.yaml``: one copter over flat ground; ``keys`` replace those of the file, or of its vehicle."""
+    """Write ``m.yaml``: one copter over flat ground; ``keys`` replace the file's keys, or its vehicle's."""
     start, end = degrees([(0.0, 0.0), goal])
     vehicle: dict[str, object] = {
         "name": "u", "sysid": 1, "autopilot": "arducopter", "start": start, "goal": end, "speed_m_s": [3, 10],
@@ -167,7 +167,7 @@ def tiles_named(count: int, rng: random.Random) -> list[str]:
 
 
 def fleet(count: int, rng: random.Random) -> list[str]:
-    """Vehicles side by side that fly to the other side; those that share a system id have links of their own."""
+    """Vehicles side by side that fly to the other side; vehicles of one system id have links of their own."""
     fliers = []
     for k in range(count):
         start, goal = degrees(

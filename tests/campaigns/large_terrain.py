@@ -28,7 +28,7 @@ BLOCK_M = 24, 28
 def _write_dat(cell: Cell, spacing_m: int, first: int, count: int, rng: random.Random) -> None:
     """Write the file of a tile whose records from ``first`` on, ``count`` of them, hold ground of about 100 m.
 
-    What lies before is a hole in the file, and holds no block.
+    The part before them is a hole in the file, and holds no block.
     """
     grid = TerrainGrid(spacing_m)
     row = grid.blocks_a_row(cell)

@@ -39,7 +39,7 @@ STRIP_M = 1000.0
 
 @dataclass(frozen=True)
 class Case:
-    """One mission in one world; ``limits`` are those of the vehicle."""
+    """One mission in one world; ``limits`` are the vehicle's."""
 
     family: str
     ground: Ground

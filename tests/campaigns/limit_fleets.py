@@ -33,19 +33,19 @@ def fleet_at_limit(rng: np.random.Generator) -> tuple[float, str] | None:
 
     Negative if the separation is kept.
     """
-    asked, separation_m = _asked(rng), float(rng.uniform(5.0, 60.0))
-    text = yaml.safe_dump(asked | {"arrival": asked["arrival"] | {"separation_m": separation_m}})
+    mission, separation_m = _drawn_fleet(rng), float(rng.uniform(5.0, 60.0))
+    text = yaml.safe_dump(mission | {"arrival": mission["arrival"] | {"separation_m": separation_m}})
     try:
         done = plan(load_mission("fleet.yaml", text=text))
     except NoMission:
         return None
-    window_s = float(asked["arrival"]["window_s"])
+    window_s = float(mission["arrival"]["window_s"])
     sampled = separation_m - _nearest_m(done, window_s)
     flown = _flown_short_m(done, window_s, separation_m, rng)
     return max((sampled, "separation, sampled"), (flown, "separation, flown"))
 
 
-def _asked(rng: np.random.Generator) -> dict[str, Any]:
+def _drawn_fleet(rng: np.random.Generator) -> dict[str, Any]:
     count = int(rng.integers(2, 4))
     angles = rng.uniform(0.0, 2.0 * np.pi) + np.arange(count) * rng.uniform(0.5, 1.5)
     vehicles = []
@@ -67,16 +67,16 @@ def _asked(rng: np.random.Generator) -> dict[str, Any]:
     }  # fmt: skip
     if arrival["mode"] == "sequence":
         arrival["interval_s"] = float(rng.uniform(0.0, 25.0))
-    asked: dict[str, Any] = {
+    mission: dict[str, Any] = {
         "version": 1, "name": "fleet", "frame": {"origin": [36.6, -84.3], "amsl_m": 0}, "terrain": _ground(rng),
         "limits": {"min_agl_m": 40, "max_climb_deg": 30}, "vehicles": vehicles, "arrival": arrival,
     }  # fmt: skip
     if rng.random() < 0.4:
-        asked["no_fly"] = [
+        mission["no_fly"] = [
             {"center": {"east_m": float(x), "north_m": float(y)}, "radius_m": float(r)}
             for x, y, r in zip(*rng.uniform(-150.0, 150.0, (2, 2)), rng.uniform(20.0, 90.0, 2), strict=True)
         ]
-    return asked
+    return mission
 
 
 def _ground(rng: np.random.Generator) -> dict[str, Any]:

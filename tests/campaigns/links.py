@@ -76,7 +76,7 @@ class Seat:
     mission: Mission
     others: list[Craft] = field(default_factory=list)
     began: float = 0.0
-    asked_at: float = 0.0  # time of the last request of the list
+    requested_at: float = 0.0  # time of the last request of the list
     acked_at: float = 0.0
     wrote: int = 0
     checked: Craft | None = None
@@ -129,7 +129,7 @@ class Run:
         trouble = self._trouble() if rng.random() < 0.35 else Misbehaviour(seed=rng.randrange(2**31))
         boot_s = rng.choice((0.0, 0.0, 0.0, 3.0, 15.0))
         craft = Craft(self._vehicle(sysid, autopilot, home, misbehave=trouble, boot_s=boot_s), air, self._signing())
-        craft.wanted = mission.wire_items()
+        craft.expected = mission.wire_items()
         if rng.random() < 0.5:
             old = mission_of(sysid, autopilot, rng.choice((2, 9, 300)), Home.at(36.7, -84.3, 371.0))
             craft.vehicle.load(old.wire_items())
@@ -217,7 +217,7 @@ class Run:
             self._vehicle(vehicle.sysid, autopilot, home, compid=1 if rng.random() < 0.85 else rng.choice((2, 154))),
             self.air, self._signing() if rng.random() < 0.5 else None,
         )  # fmt: skip
-        one.start, one.wanted = seat.craft.start, seat.craft.wanted
+        one.start, one.expected = seat.craft.start, seat.craft.expected
         one.vehicle.armed = rng.random() < 0.5
         if rng.random() < 0.5:
             one.vehicle.load(seat.mission.wire_items() if rng.random() < 0.3 else seat.craft.vehicle.items())
@@ -278,7 +278,7 @@ class Run:
             if seat is None:
                 self.found.append(f"misdelivered: {packet.message} to system {packet.target.sysid}")
             elif kind == REQUEST_LIST:
-                seat.asked_at = self.air.now
+                seat.requested_at = self.air.now
             elif kind == ACK:
                 seat.acked_at = self.air.now
             else:
@@ -290,25 +290,25 @@ class Run:
         there = [o for o in self.air.at(peer) if isinstance(o, Craft) and o.vehicle.sysid == seat.mission.sysid]
         if seat.pinned is None:
             seat.checked, seat.pinned, seat.to = self._found(seat, there), peer, to
-        said: list[str] = []
+        kinds: list[str] = []
         voice = self.voices.get((to, peer), Voice())
         if peer != seat.pinned:
-            said.append("a twin at another address")
+            kinds.append("a twin at another address")
         elif now - voice.last > LOOKED_S:
-            said.append("one that is silent")
+            kinds.append("one that is silent")
         elif not voice.looked_at:
-            said.append("one that came after a silence and was not looked at")
+            kinds.append("one that came after a silence and was not looked at")
         for one in there:
-            if one.armed_told < now and kind != ITEM and not self.options.allow_armed:
-                said.append("one that was heard to be armed")
+            if one.armed_reported < now and kind != ITEM and not self.options.allow_armed:
+                kinds.append("one that was heard to be armed")
             # Positions of a component count only after its heartbeat, which identifies it as an autopilot.
-            if one.far_told < now and one.known_since < now and not self.options.ignore_position:
-                said.append("one that was heard to be 33 km away")
+            if one.far_reported < now and one.known_since < now and not self.options.ignore_position:
+                kinds.append("one that was heard to be 33 km away")
             if one is not seat.checked and seat.checked in there:
                 least = min(one.together, seat.checked.together if seat.checked else 0)
                 if least > ALIKE_FRAMES and one.known_since < now:
-                    said.append("two at one address")
-        self.found += [f"misdelivered at {now - 1000.0:.2f} s: {what} to {words}" for words in said]
+                    kinds.append("two at one address")
+        self.found += [f"misdelivered at {now - 1000.0:.2f} s: {what} to {words}" for words in kinds]
 
     def _found(self, seat: Seat, there: list[Craft]) -> Craft | None:
         """The craft that was checked: ours if it was heard recently, else the one at the address heard last."""
@@ -396,7 +396,7 @@ class Run:
             there[:] = [one for one in there if one is not seat.craft]
             seat.craft.left_at = air.now
         self._recorder.replay(rng.choice((seat.address, "recorder")), rng.uniform(0.0, 3.0), Recorder.MOST)
-        seat.asked_at = seat.acked_at = air.now
+        seat.requested_at = seat.acked_at = air.now
 
     def _judge(self, d: uploads.JobResult, seat: Seat) -> None:
         now, checked = self.air.now, seat.checked
@@ -404,7 +404,7 @@ class Run:
             self.found.append(f"crash: {d.vehicle}: {d.message}")
         here = [o for o in (seat.craft, *seat.others) if seat.pinned and o in self.air.at(seat.pinned)]
         there = [o for o in (checked, *here) if o is not None]
-        if d.verified and not any(o.was_equal(seat.asked_at, now) for o in there):
+        if d.verified and not any(o.was_equal(seat.requested_at, now) for o in there):
             self.found.append(f"false verified: {d.vehicle}: {d.as_dict()}")
         if d.code == 0 and d.verified and not any("after the read-back" in str(w) for w in d.warnings):
             self.found += [f"untold: {d.vehicle} {words}, and exit 0" for words in self._untold(seat, here)]
@@ -417,9 +417,9 @@ class Run:
         if looked_at == math.inf:
             yield "was not looked at after the read-back"
         for o in here:
-            if o.armed_told <= looked_at and not self.options.allow_armed:
+            if o.armed_reported <= looked_at and not self.options.allow_armed:
                 yield "was heard to be armed"
-            if o.far_told <= looked_at and o.known_since <= looked_at and not self.options.ignore_position:
+            if o.far_reported <= looked_at and o.known_since <= looked_at and not self.options.ignore_position:
                 yield "was heard to be 33 km away"
         if checked is None:
             return

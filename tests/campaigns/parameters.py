@@ -1,11 +1,11 @@
-"""Random parameter sets on board, asked of the judge that uploads ask, and flown in the built-in simulator.
+"""Random parameter sets on board, judged by the judge of uploads, and flown in the built-in simulator.
 
     python -m tests.campaigns.parameters --sets 500 --seed 1
     python -m tests.campaigns.parameters --seconds 600
 
-A flight that is accepted must take the time that was told (1 s or 0.5 %, and what the simulator itself is off by), run
-on no farther before a return than was judged, return at the judged height and by the judged rule, and have the bank for
-its turns. What keeps all of that with room to spare must not be refused. The oracle reads the raw parameters by itself:
+A flight that is accepted must take the judged time (within 1 s or 0.5 %, and the simulator's own error), run on no
+farther before a return than was judged, return at the judged height and by the judged rule, and have the bank for its
+turns. A set that keeps all of these limits with room to spare must not be refused. The oracle reads parameters itself:
 it shares neither the table of names nor the judge's motion with the code that it tests.
 """
 
@@ -49,7 +49,7 @@ from tests.oracles.px4_smoothing import fly as smoothing
 LAT, LON = 46.5, 8.0
 KINDS = ("copter", "copter-rtl", "copter-required", "fast", "px4", "px4-rtl", "wing", "wing-required")
 SPARE_S, SPARE_PART = 0.5, 0.004
-"""How much the simulator's own motion may differ from the told one beyond the tolerance."""
+"""Largest difference of the simulator's own motion from the judged one beyond the tolerance."""
 
 G_M_S2 = 9.80665
 TOP_M = 40.0
@@ -84,7 +84,7 @@ class Case:
     plan: Plan
     job: UploadJob
     base: dict[str, float]
-    told_s: float
+    time_s: float
 
 
 @cache
@@ -102,7 +102,7 @@ def case_of(kind: str) -> Case:
 
 
 def board_of(case: Case, changed: Values) -> OnBoard:
-    """What the vehicle answers, as the simulated vehicle of today's version has it."""
+    """The vehicle's answers, as from the simulated vehicle of today's version."""
     autopilot = case.job.mission.autopilot
     table = Parameters(autopilot, 1, firmware_of(autopilot), case.base | changed)
     return OnBoard({name: table.value(name) for name in table.names()})
@@ -112,7 +112,7 @@ def board_of(case: Case, changed: Values) -> OnBoard:
 
 
 def kinematics(vehicle: Vehicle, raw: Values) -> tuple[Kinematics, Vehicle]:
-    """The simulator's motion with raw parameters; what is not among them is the plan's."""
+    """The simulator's motion with raw parameters; the plan's values replace missing ones."""
     own = Kinematics.of(vehicle)
     if vehicle.autopilot is Autopilot.ARDUPLANE:
         cruise = raw.get("AIRSPEED_CRUISE", vehicle.speed_max_m_s)
@@ -144,7 +144,7 @@ def flown_s(done: Plan, vehicle: Vehicle, raw: Values) -> float:
     """Seconds of the flight in the built-in simulator, on the motion of raw parameters.
 
     A PX4's legs, which the simulator flies with one even acceleration, are flown step by step instead, by the rules of
-    PX4: the simulator's flight with the plan's accelerations, and what the legs take more or less than with those.
+    PX4: the simulator's flight with the plan's accelerations, and the difference that the raw ones make to the legs.
     """
     [part] = parts_of(done)
     moved, other = kinematics(vehicle, raw)
@@ -204,7 +204,7 @@ def flown_extent_m(kind: str) -> tuple[float, float]:
 
 
 def breaches(kind: str, raw: Values, spare: float) -> list[str]:
-    """The fences that a flight would leave; with a ``spare`` below 1 also those that it nearly leaves."""
+    """The fences that a flight would leave; with a ``spare`` below 1 also the fences that it nearly leaves."""
     away_m, high_m = flown_extent_m(kind)
     room = 0.0 if spare == 1.0 else 40.0
     if kind.startswith("px4"):
@@ -226,14 +226,15 @@ def breaches(kind: str, raw: Values, spare: float) -> list[str]:
 
 
 def faults(kind: str, case: Case, raw: Values, spare: float) -> list[str]:
-    """What an accepted flight with these parameters would break; ``spare``: part of each tolerance that counts."""
+    """The limits that an accepted flight with these parameters would break; ``spare``: the counted part of each
+    tolerance."""
     vehicle = case.job.vehicle
     assert vehicle is not None
     found = []
     took_s = flown_s(case.plan, vehicle, raw)
-    off_s = abs(took_s - case.told_s)
-    if off_s > spare * max(1.0, 0.005 * case.told_s) + (SPARE_S + SPARE_PART * case.told_s if spare == 1.0 else 0.0):
-        found.append(f"time {took_s - case.told_s:+.1f} s of {case.told_s:.1f}")
+    off_s = abs(took_s - case.time_s)
+    if off_s > spare * max(1.0, 0.005 * case.time_s) + (SPARE_S + SPARE_PART * case.time_s if spare == 1.0 else 0.0):
+        found.append(f"time {took_s - case.time_s:+.1f} s of {case.time_s:.1f}")
     found += breaches(kind, raw, spare)
     returns_too = kind.endswith(("rtl", "required"))
     if returns_too and vehicle.autopilot is Autopilot.ARDUCOPTER:
@@ -245,10 +246,10 @@ def faults(kind: str, case: Case, raw: Values, spare: float) -> list[str]:
             found.append("lower in the cone")
     if kind == "copter-required":
         accel = raw.get("WPNAV_ACCEL", 250.0) / 100.0
-        told_m, speed = run_on_m(vehicle, 9.0), 9.0
+        judged_m, speed = run_on_m(vehicle, 9.0), 9.0
         runs_m = speed**2 / (2.0 * accel) + accel / 2.0  # get_stopping_point_NE_m
-        if runs_m > told_m * 1.03 + 0.1:
-            found.append(f"runs on {runs_m:.0f} m of {told_m:.0f}")
+        if runs_m > judged_m * 1.03 + 0.1:
+            found.append(f"runs on {runs_m:.0f} m of {judged_m:.0f}")
     if returns_too and vehicle.autopilot is Autopilot.PX4 and raw.get("RTL_TYPE", 0.0) != 0.0:
         found.append("another return")
     if vehicle.autopilot is Autopilot.ARDUPLANE:
@@ -264,7 +265,7 @@ def faults(kind: str, case: Case, raw: Values, spare: float) -> list[str]:
 
 
 def random_set(kind: str, rng: random.Random) -> dict[str, float]:
-    """A few parameters away from what the vehicle was set up with, a little or much."""
+    """A few parameters away from the vehicle's set-up, a little or much."""
 
     def near(value: float, least: float) -> float:
         factor = rng.choice([rng.uniform(0.995, 1.005), rng.uniform(0.85, 1.2), rng.uniform(0.2, 3.0)])

@@ -1,10 +1,10 @@
-"""Random returns, flown by the second implementation or by a SITL, against the told places and heights.
+"""Random returns, flown by the second implementation or by a SITL, against the judged places and heights.
 
     python -m tests.campaigns.returns --returns 50 --seed 1
     python -m tests.campaigns.returns --returns 3 --seed 1 --sitl /path/to/arducopter --instance 30
 
 Each return begins at a random place of a random mission over hills, often close to a corner. It must stay within the
-told places, widened by the track error, and never come nearer to the ground than told, less 1 m.
+judged places, widened by the track error, and never come nearer to the ground than judged, less 1 m.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from tests.oracles.returning import Begin, copter, plane
 from tests.support.worlds import surface
 
 COPTER, PLANE = Autopilot.ARDUCOPTER, Autopilot.ARDUPLANE
-TOLD_LESS_M = 1.0
+JUDGED_LESS_M = 1.0
 HOME_AMSL_M = 300.0
 
 
@@ -138,7 +138,7 @@ def scene(rng: np.random.Generator, autopilot: Autopilot) -> Scene:
 
 
 def outside_m(places: ReturnPlaces, points: Floats, scene: Scene) -> float:
-    """How far the farthest of (N, 2) points lies outside the told places, m; the track error is included in them."""
+    """How far the farthest of (N, 2) points lies outside the judged places, m; they include the track error."""
     limits, vehicle = scene.vehicle.limits, scene.vehicle
     gap = np.empty(len(points))
     circle = 0.0
@@ -194,29 +194,29 @@ def corner_m_s(scene: Scene) -> float:
 
 @dataclass(frozen=True)
 class Found:
-    """One return: how far outside the told places it came (m, negative: within), heights flown and told."""
+    """One return: how far outside the judged places it came (m, negative: within), heights flown and judged."""
 
     outside_m: float
     flown_agl_m: float
-    told_agl_m: float
+    judged_agl_m: float
     aside_m: float
 
     @property
-    def as_told(self) -> bool:
-        return self.outside_m <= 0.0 and self.flown_agl_m >= self.told_agl_m - TOLD_LESS_M
+    def as_judged(self) -> bool:
+        return self.outside_m <= 0.0 and self.flown_agl_m >= self.judged_agl_m - JUDGED_LESS_M
 
 
 def compare(scene: Scene, points: Floats, part: TraceParts) -> Found:
-    """``points`` (N, 3) flown from a place within ``part`` until over home, against what is told."""
+    """``points`` (N, 3) flown from a place within ``part`` until over home, against the judgement."""
     places = places_of_returns(scene.trace, part, scene.target, scene.vehicle)
     level = HOME_AMSL_M + scene.rtl_rel_home_m
-    told = float(heights_agl(scene.trace, part, scene.target, scene.vehicle, level)[0])
+    judged_m = float(heights_agl(scene.trace, part, scene.target, scene.vehicle, level)[0])
     away = points[np.hypot(*points[:, :2].T) > 5.0] if scene.vehicle.autopilot is COPTER else points
     agl = away[:, 2] - scene.world.airspace.surface.ground_at(*away[:, :2].T)
     first = scene.trace.points(part.middle)[0, :2]
     to_home = -first / math.hypot(*first)
     aside = np.abs((points[:, :2] - first) @ np.array([-to_home[1], to_home[0]]))
-    return Found(outside_m(places, points[:, :2], scene), float(agl.min()), told, float(aside.max()))
+    return Found(outside_m(places, points[:, :2], scene), float(agl.min()), judged_m, float(aside.max()))
 
 
 def in_twin(seed: int, autopilot: Autopilot) -> Found:
@@ -246,9 +246,9 @@ def main() -> None:
             found = fly_in_sitl(args.seed + k, autopilot, args.sitl, args.instance, args.defaults)
         else:
             found = in_twin(args.seed + k, autopilot)
-        bad += not found.as_told
-        print(args.seed + k, autopilot.value, "as told" if found.as_told else "NOT AS TOLD", found, flush=True)
-    print(f"{args.returns} returns, {bad} not as told")
+        bad += not found.as_judged
+        print(args.seed + k, autopilot.value, "as judged" if found.as_judged else "NOT AS JUDGED", found, flush=True)
+    print(f"{args.returns} returns, {bad} not as judged")
 
 
 if __name__ == "__main__":

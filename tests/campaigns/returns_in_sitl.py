@@ -58,11 +58,11 @@ def _start(one: Scene, binary: str, instance: int, defaults: str | None, own: Pa
     files = ",".join([*([defaults] if defaults else []), str(own / "own.parm")])
     home = one.mission.home
     place = f"{home.lat_e7 / 1e7:.7f},{home.lon_e7 / 1e7:.7f},{HOME_AMSL_M:.2f},90"
-    with open(own / "output.txt", "wb") as said:
+    with open(own / "output.txt", "wb") as log:
         return subprocess.Popen(
             [os.path.abspath(binary), "--model", "plane" if plane else "+", "--speedup", str(SPEEDUP), "--home", place,
              "-I", str(instance), "--defaults", files],
-            cwd=own, stdin=subprocess.DEVNULL, stdout=said, stderr=subprocess.STDOUT,
+            cwd=own, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT,
         )  # fmt: skip
 
 
@@ -115,7 +115,7 @@ def _fly(link: Any, one: Scene) -> tuple[Floats, float]:
         for _ in range(40):
             link.recv_match(type="HEARTBEAT", blocking=True, timeout=0.05)
     link.mav.command_long_send(1, 1, mavutil.mavlink.MAV_CMD_MISSION_START, 0, 0, 0, 0, 0, 0, 0, 0)
-    frame, item, asked, began = one.world.frame, 0, False, None
+    frame, item, sent, began = one.world.frame, 0, False, None
     points: list[tuple[float, float, float]] = []
     corner = one.place(one.seq, 0.0)[:2]
     rounds, last_bearing = 0.0, None
@@ -126,19 +126,19 @@ def _fly(link: Any, one: Scene) -> tuple[Floats, float]:
         kind = m.get_type()
         if kind == "MISSION_CURRENT":
             item = m.seq
-        elif kind == "HEARTBEAT" and began is None and asked and m.custom_mode == (PLANE_RTL if plane else COPTER_RTL):
+        elif kind == "HEARTBEAT" and began is None and sent and m.custom_mode == (PLANE_RTL if plane else COPTER_RTL):
             began = len(points)
         elif kind == "GLOBAL_POSITION_INT":
             east, north = (float(x) for x in frame.to_plane(m.lat / 1e7, m.lon / 1e7))
             points.append((east, north, m.alt / 1e3))
             left = math.dist((east, north), corner)
             speed = math.hypot(m.vx, m.vy) / 100.0
-            if item == one.seq and left <= one.left_m + 0.1 * speed and not asked:
+            if item == one.seq and left <= one.left_m + 0.1 * speed and not sent:
                 link.mav.set_mode_send(1, 1, PLANE_RTL if plane else COPTER_RTL)
-                asked = True
+                sent = True
                 points = points[-1:]
                 began_left = left
-            if not asked or len(points) < 30:
+            if not sent or len(points) < 30:
                 continue
             away = math.hypot(east, north)
             if plane:
@@ -151,5 +151,5 @@ def _fly(link: Any, one: Scene) -> tuple[Floats, float]:
             elif away < 2.0 and speed < 0.5:
                 break
     else:
-        raise AssertionError(f"it did not come home: item {item}, asked {asked}, began {began}, at {points[-1:]}")
+        raise AssertionError(f"it did not come home: item {item}, return sent {sent}, began {began}, at {points[-1:]}")
     return np.array(points), began_left

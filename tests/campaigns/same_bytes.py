@@ -3,10 +3,10 @@
     python -m tests.campaigns.same_bytes COMMIT [--sets gallery papers …] [--count 60] [--checks 300]
 
 For changes that move or rename code and must not change any output. Missions are planned (a part of them in batches),
-then files are checked: what the other commit planned, and each of these with altitudes, places and commands changed.
-Compared are exit codes, every `.waypoints`, `.plan` and CSV byte by byte, and of JSON what it says in numbers, names
-and keys: further keys, notes, messages and pictures may differ. No clock stops a plan. Prints what differs, and exits
-with 1 if anything does.
+then files are checked: the missions of the other commit, and each of them with altitudes, places and commands changed.
+Compared are exit codes, every `.waypoints`, `.plan` and CSV byte by byte, and the numbers, names and keys of JSON:
+further keys, notes, messages and pictures may differ. No clock stops a plan. Prints the differences, and exits with 1
+if there are any.
 """
 
 from __future__ import annotations
@@ -49,13 +49,13 @@ main = importlib.import_module("gcsplan.cli.main").main
 for folder, arguments in json.load(open(sys.argv[1])):
     os.makedirs(folder, exist_ok=True)
     sys.argv = ["gcsplan", *arguments]
-    code, said = 0, io.StringIO()
-    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(io.StringIO()):
+    code, printed = 0, io.StringIO()
+    with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
         try:
             main()
         except SystemExit as ended:
             code = ended.code or 0
-    open(f"{folder}/stdout.json", "w").write(said.getvalue())
+    open(f"{folder}/stdout.json", "w").write(printed.getvalue())
     print(folder, code, flush=True)
 """
 
@@ -131,8 +131,8 @@ def checks(names: Sequence[str], files: Path, count: int) -> Iterator[Command]:
 def run(tree: Path, folder: Path, out: str, commands: Sequence[Command]) -> dict[str, str]:
     """Run the commands with the code of ``tree``, below ``folder/out``; the exit code of each."""
     (folder / out).mkdir(exist_ok=True)
-    asked = [(f"{out}/{name}", arguments) for name, arguments in commands]
-    (folder / f"{out}.commands").write_text(json.dumps(asked), encoding="utf-8")
+    given = [(f"{out}/{name}", arguments) for name, arguments in commands]
+    (folder / f"{out}.commands").write_text(json.dumps(given), encoding="utf-8")
     env = os.environ | {"PYTHONPATH": str(tree)}
     with (folder / f"{out}.log").open("w", encoding="utf-8") as log:
         ended = subprocess.run(
@@ -145,7 +145,7 @@ def run(tree: Path, folder: Path, out: str, commands: Sequence[Command]) -> dict
 
 
 def compared(folder: Path) -> dict[str, bytes | Any]:
-    """What is compared of the files below a folder, by name."""
+    """The compared content of the files below a folder, by name."""
     found: dict[str, bytes | Any] = {}
     for path in sorted(folder.rglob("*")):
         if path.suffix in BYTES and path.is_file():
@@ -157,7 +157,7 @@ def compared(folder: Path) -> dict[str, bytes | Any]:
 
 
 def same(before: Any, now: Any) -> bool:
-    """Whether ``now`` has all that ``before`` says, but for sentences; it may have more keys."""
+    """Whether ``now`` has all of ``before``, but for sentences; it may have more keys."""
     if isinstance(before, dict) and isinstance(now, dict):
         return all(key in SENTENCES or (key in now and same(value, now[key])) for key, value in before.items())
     if isinstance(before, list) and isinstance(now, list):
@@ -205,9 +205,9 @@ def main() -> int:
         ended: dict[str, dict[str, str]] = {}
         for out, tree in trees.items():
             ended[out] = run(tree, folder, out, plans(arguments.sets, arguments.count, out, folder))
-        asked = list(checks(list(texts), folder / "before", arguments.checks))
+        given = list(checks(list(texts), folder / "before", arguments.checks))
         for out, tree in trees.items():
-            ended[out] |= run(tree, folder, out, asked)
+            ended[out] |= run(tree, folder, out, given)
         files, differ = 0, 0
         for name, code in ended["before"].items():
             before, now = compared(folder / "before" / name), compared(folder / "now" / name)

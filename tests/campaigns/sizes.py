@@ -199,7 +199,7 @@ def run(kind: str, count: float, seed: int) -> tuple[int, float, float, str]:
 
 
 def faults(size: Size, where: str, code: int, took_s: float, held_mb: float, words: str) -> list[str]:
-    """What is wrong with how an input ended."""
+    """The faults of an input's end."""
     found = [] if code in CODES else [f"ended with {code}: {words}"]
     found += [f"took {took_s:.1f} s of the processor, not {size.within_s:g}"] if took_s > size.within_s else []
     found += [f"held {held_mb:.0f} MB"] if held_mb > MEMORY_MB else []

@@ -1,4 +1,4 @@
-"""Batches whose files, outputs and records change: is what they call done and unchanged what planning it now gives?
+"""Batches whose files, outputs and records change: do missions that they call done equal a new plan?
 
     python -m tests.campaigns.stale --seconds 120 [--seed 1] [--steps N]
 
@@ -6,7 +6,7 @@ A site is a few missions over files of random kinds (`tests.support.mission_inpu
 changes something: a file that a mission reads (with a new time, or with its old one; cut, removed, added, put back), an
 output (edited, deleted, exchanged, another plan written over it), a record (damaged, exchanged), or it kills a batch
 before a random change to the disk. Then the batch runs again. The oracle knows which files were written for which
-mission, and asks no list of gcsplan's: the missions that were touched must be planned anew, the others must not, and
+mission, and uses no list of gcsplan's: the missions that were touched must be planned anew, the others must not, and
 every folder of results must equal what a new batch writes into an empty folder, with nothing remembered. Exits with 1,
 and prints the seed and the step, if that fails.
 """
@@ -59,9 +59,9 @@ class Site:
     cases: dict[str, Case]
     expected: dict[str, Expected] = field(default_factory=dict)
     kept: dict[Path, bytes | None] = field(default_factory=dict)
-    """What each file was at first; None: it was not there."""
+    """The first content of each file; None: it was not there."""
     unsure: set[str] = field(default_factory=set)
-    """Missions that may not read the file that changed, since the one that names it is no longer what it was."""
+    """Missions that may not read the changed file, since the file that names it has changed too."""
 
     @property
     def out(self) -> Path:
@@ -133,7 +133,7 @@ def _spoilt(data: bytes | None, rng: random.Random) -> bytes:
 
 
 def touch_others(site: Site) -> set[str]:
-    """Files that no mission reads, and new times for those that they read."""
+    """Files that no mission reads, and new times for the files that they read."""
     for name in site.cases:
         (site.cases[name].folder / "notes.txt").write_text(str(site.rng.random()))
         for path in site.files(name):
@@ -179,15 +179,15 @@ def change_record(site: Site) -> set[str]:
         )
     else:
         file.write_bytes(_spoilt(before, site.rng))
-    # A byte that JSON does not mind (the space after a comma that became a tab) changes nothing that a record says.
-    return set() if _said(file) == _said_of(before) else {name}
+    # A byte that JSON does not mind (the space after a comma that became a tab) changes nothing in a record.
+    return set() if _content(file) == _content_of(before) else {name}
 
 
-def _said(file: Path) -> Any:
-    return _said_of(file.read_bytes()) if file.is_file() else None
+def _content(file: Path) -> Any:
+    return _content_of(file.read_bytes()) if file.is_file() else None
 
 
-def _said_of(data: bytes) -> Any:
+def _content_of(data: bytes) -> Any:
     import json
 
     try:
@@ -248,7 +248,7 @@ STEPS_OF: dict[Callable[[Site], set[str]], int] = {
 
 
 def _run(batch: MissionBatch) -> tuple[dict[str, Record], set[str]]:
-    """The records of all missions, and the names of those that were planned now."""
+    """The records of all missions, and the names of the missions planned now."""
     with batch.alone():
         done, todo = batch.known()
         batch.run(Inline(), todo, done.append)
@@ -278,7 +278,7 @@ def _afresh(site: Site) -> dict[str, Expected]:
 
 
 def judge(site: Site, touched: set[str], *, killed: bool) -> list[str]:
-    """Run the batch again, and say what is wrong with what it did."""
+    """Run the batch again; return the faults of its outcome."""
     try:
         records, planned = _run(site.batch(site.out))
     except GcsplanError as why:
@@ -301,7 +301,7 @@ def judge(site: Site, touched: set[str], *, killed: bool) -> list[str]:
         if other:
             wrong.append(f"{name} is not what planning it now gives: {', '.join(other)}")
     if site.batch(site.out).known()[1]:
-        wrong.append("what was just done is not called done")
+        wrong.append("a mission just done is not called done")
     return wrong
 
 

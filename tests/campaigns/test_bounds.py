@@ -34,7 +34,7 @@ def raised(bound_of: Callable[[VehiclePlan], float]) -> Planner:
 
 
 def refused(words: str) -> Planner:
-    """A planner that refuses every mission file but those that the campaign makes beside it."""
+    """A planner that refuses every mission file but the ones that the campaign makes beside it."""
 
     def planner(file: Path) -> Plan:
         if file.stem == "mission":
@@ -74,7 +74,7 @@ def test_a_refusal_that_does_not_name_unknown_ground_is_found() -> None:
 
 FOUND = [
     pytest.param("slits", 13, id="a slit with room was called shut, which is proved"),
-    pytest.param("fleets", 11, id="the bound of a detour was that of its zigzag, 28 % above a straight mission"),
+    pytest.param("fleets", 11, id="the bound of a detour followed its zigzag, 28 % above a straight mission"),
     pytest.param("holes", 3, id="a refusal for unknown ground did not name it"),
     pytest.param("mountains", 4, id="a plan of a mission in hills cost less than its own bound"),
     *(

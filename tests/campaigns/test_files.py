@@ -48,7 +48,7 @@ def test_what_a_run_owes() -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="needs signals")
-def test_an_input_that_ends_the_process_is_told_by_its_seed(tmp_path: Path) -> None:
+def test_an_input_that_ends_the_process_is_named_by_its_seed(tmp_path: Path) -> None:
     with files.Worker(tmp_path, 1) as worker:
         assert worker.answer() is not None
         os.kill(worker.process.pid, signal.SIGFPE)

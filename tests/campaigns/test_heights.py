@@ -37,7 +37,7 @@ def upside_down(spec: TerrainSpec, frame: Frame) -> Surface:
 PLANTED = [(of_one_height, 1), (with_zeros, 22), (upside_down, 104), (feet_as_metres, 3)]
 
 
-def test_what_is_read_is_what_the_files_say() -> None:
+def test_heights_are_read_as_the_files_state_them() -> None:
     tally = run(FOREVER_S, 1000, most=14)
     assert tally.faults == []
     assert tally.read > 5

@@ -29,22 +29,22 @@ def test_a_short_campaign_of_signals_finds_nothing(kind: str) -> None:
     assert re.match(r"\d rounds, 0 faults, ", ended.stdout)
 
 
-def said(code: int) -> str:
+def ended(code: int) -> str:
     return json.dumps({"error": {"code": code}})
 
 
-def test_what_a_command_owes_that_was_told_to_end() -> None:
+def test_a_stopped_command_owes_one_message_and_its_code() -> None:
     def end(code: int, out: str, err: str) -> End:
         return End(signal.SIGTERM, code, out, err, 0.1)
 
-    assert wrong_end(end(143, said(143), "gcsplan: terminated\n"), 0) == []
+    assert wrong_end(end(143, ended(143), "gcsplan: terminated\n"), 0) == []
     assert wrong_end(end(0, "{}", ""), 0) == []
     assert wrong_end(end(-15, "", ""), 0) == []
     assert wrong_end(end(143, '{"schema": 1, "vehi', "gcsplan: terminated\n"), 0) == []  # cut off while it was printed
     for code, out, err in (
-        (130, said(130), "gcsplan: interrupted\n"), (143, "", "gcsplan: terminated\n"), (143, said(143), ""),
-        (143, said(143), "Traceback (most recent call last): gcsplan"), (70, said(70), "gcsplan: internal error\n"),
-        (143, said(143) * 2, "gcsplan: terminated\n"), (-15, "{", ""), (4, "{}", ""),
+        (130, ended(130), "gcsplan: interrupted\n"), (143, "", "gcsplan: terminated\n"), (143, ended(143), ""),
+        (143, ended(143), "Traceback (most recent call last): gcsplan"), (70, ended(70), "gcsplan: internal error\n"),
+        (143, ended(143) * 2, "gcsplan: terminated\n"), (-15, "{", ""), (4, "{}", ""),
     ):  # fmt: skip
         assert wrong_end(end(code, out, err), 0), (code, out, err)
 

@@ -31,7 +31,7 @@ def test_nothing_that_is_called_safe_at_the_limit_is_unsafe() -> None:
             "circle",
         ),  # a leg from a circle smaller than the track error was judged as if it began in the circle's middle
         (600078, "return"),  # PX4 begins its return below the mission's altitude and flies all of it that low
-        (700239, "spline"),  # its climb angle was that of a curve on a sphere
+        (700239, "spline"),  # it had the climb angle of a curve on a sphere
         (600111, "spline"),  # the steepest point of a curve that almost turns back lay between the eight samples
         (600036, "wing"),  # where two arcs overlap, the piece back from one to the next counted as climbing distance
         (1000092, "wing"),  # where two arcs overlap on a leg of 0.86 m, both counted as climbing distance

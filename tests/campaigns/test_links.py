@@ -31,13 +31,13 @@ def test_the_campaign_finds_an_upload_that_does_not_look_again(monkeypatch: pyte
 
 
 @pytest.fixture
-def asked_for_less(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The seeds below were found when a PX4 was asked for fewer parameters; with more, the events miss each other."""
-    asked = PARAMETER_GROUPS[Autopilot.PX4]
-    monkeypatch.setitem(PARAMETER_GROUPS, Autopilot.PX4, asked[: asked.index(("NAV_MC_ALT_RAD",)) + 1])
+def fewer_parameters(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The seeds below were found with fewer requested parameters of a PX4; with more, the events miss each other."""
+    groups = PARAMETER_GROUPS[Autopilot.PX4]
+    monkeypatch.setitem(PARAMETER_GROUPS, Autopilot.PX4, groups[: groups.index(("NAV_MC_ALT_RAD",)) + 1])
 
 
-@pytest.mark.usefixtures("asked_for_less")
+@pytest.mark.usefixtures("fewer_parameters")
 def test_seeds_that_found_something_once_find_nothing() -> None:
     """Twins with another component id at one address (first six seeds), a twin that came between an upload and the
     rollback of ``--atomic`` (301591), and false alarms of the campaign itself (the rest)."""
@@ -45,7 +45,7 @@ def test_seeds_that_found_something_once_find_nothing() -> None:
         assert campaign(range(seed, seed + 1))[1] == []
 
 
-@pytest.mark.usefixtures("asked_for_less")
+@pytest.mark.usefixtures("fewer_parameters")
 def test_the_campaign_finds_an_upload_that_answers_before_it_judges(monkeypatch: pytest.MonkeyPatch) -> None:
     def admits(self: Recheck, heard: Heard, message: object, now: float) -> bool:
         return heard.peer == self._channel.peer and not self.shut

@@ -35,7 +35,7 @@ def test_a_short_campaign_of_sizes_finds_nothing(kinds: str) -> None:
     assert re.search(r"^\d+ inputs, 0 faults, the next seed is \d+$", ended.stdout, re.MULTILINE)
 
 
-def test_amounts_lie_where_they_are_said_to() -> None:
+def test_amounts_lie_where_their_sizes_state() -> None:
     rng = random.Random(1)
     drawn: Counter[str] = Counter()
     for size in sizes.SIZES.values():

@@ -33,7 +33,7 @@ def test_a_planted_fault_is_found(fault: str, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_a_killed_batch_is_found_if_outputs_are_not_compared(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It leaves files that are not those of the record beside them."""
+    """It leaves files that differ from the record beside them."""
     monkeypatch.setattr("gcsplan.app.batch.has_outputs", lambda folder, digests: True)
     monkeypatch.setattr(stale, "MISSIONS", 1)
     monkeypatch.setattr(stale, "STEPS_OF", {stale.kill: 1})

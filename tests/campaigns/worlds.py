@@ -363,8 +363,8 @@ def judge(
         file.write_text(yaml.safe_dump(case.document), encoding="utf-8")
         source = load_mission(file)
         objective = "energy" if rng.random() < 0.2 else "length"
-        said: list[Progress] = []
-        problem = make_problem(source, source.vehicles[0], world_of(source), objective, 1, progress=said.append)[0]
+        reports: list[Progress] = []
+        problem = make_problem(source, source.vehicles[0], world_of(source), objective, 1, progress=reports.append)[0]
         windows: list[float] = []
         problem = replace(_counting(problem, windows), **changes)  # type: ignore[arg-type]
         out = Outcome(family, seed, "solved", known=case.known(problem), objective=objective)
@@ -384,7 +384,7 @@ def judge(
         out.took_s, out.windows = time.perf_counter() - begun, 1 + len(windows)
         answered = found.problem or problem
         out.cost = answered.cost(found.path)
-        bounds = [found.lower_bound, *(p.lower_bound for p in said)]
+        bounds = [found.lower_bound, *(p.lower_bound for p in reports)]
         out.bound = max(b for b in bounds if b is not None)
         if out.bound > min(out.cost, out.known) * (1.0 + 1e-8):
             out.wrong.append("the bound lies over a path that is known")

@@ -30,7 +30,7 @@ SYSTEMS = {  # EPSG code: longitudes and latitudes in which it is used
     2154: (-4.0, 9.0, 42.0, 50.0), 4807: (-4.0, 9.0, 42.0, 50.0), 3035: (-10.0, 30.0, 36.0, 66.0),
 }  # fmt: skip
 NEAR_BORDER_M = 8.0
-"""What datum shifts are good to, and edges are kept to, m."""
+"""Accuracy of datum shifts, and tolerance of edges, m."""
 
 
 def sized(rng: random.Random, folder: Path) -> tuple[str, Path, Callable[[float, float], bool | None]]:
@@ -139,9 +139,9 @@ def attack(seed: int, folder: Path) -> tuple[str, str, list[str]]:
     for lon, lat in places(rng, found.zones):
         frame = Frame(min(max(lat + rng.uniform(-0.5, 0.5), -85.0), 85.0),
                       (lon + rng.uniform(-0.9, 0.9) + 180.0) % 360.0 - 180.0)  # fmt: skip
-        answer, wanted = holds(found.zones, frame, lon, lat), right(lon, lat)
-        if wanted is not None and answer != wanted:
-            words = "inside, read as free" if wanted else "outside, read as inside"
+        answer, expected = holds(found.zones, frame, lon, lat), right(lon, lat)
+        if expected is not None and answer != expected:
+            words = "inside, read as free" if expected else "outside, read as inside"
             faults.append(f"seed {seed} ({named}): {lat:.6f}, {lon:.6f} is {words}")
     return named, "read", faults
 

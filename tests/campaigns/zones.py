@@ -5,9 +5,9 @@
 An input is one or two random polygons: narrow or up to a turn wide, in either convention of longitudes, across the
 antimeridian, at a pole, with a hole, split, of several parts with several holes. It is written in one format and read
 by `read_zones`; then places inside and outside it are looked up. The answer that is right is computed here, without the
-code under test: longitudes count as they are written, edges are straight in degrees, and in formats that do not say so
-great circles as well, whose latitude at a longitude comes from the plane through the centre of the Earth. Each fourth
-input is a circle, a corridor or a polygon in another coordinate system (`zone_shapes`).
+code under test: longitudes count as they are written, edges are straight in degrees, and in formats that do not state
+it great circles as well, whose latitude at a longitude comes from the plane through the centre of the Earth. Each
+fourth input is a circle, a corridor or a polygon in another coordinate system (`zone_shapes`).
 
 A fault is a place that the format has inside the zone (its holes too, since they count as no-fly) and that gcsplan
 neither refuses nor has in a zone; or one that is well outside and in a zone. Exits with 1 and prints the seed if there
@@ -84,13 +84,13 @@ def polygon(rng: random.Random) -> tuple[str, list[Part]]:
     if kind == "pole":
         sign, reach = rng.choice([-1.0, 1.0]), rng.uniform(55.0, 85.0)
         lons = [-180.0 + 360.0 * i / 8 for i in range(9)]
-        if rng.random() < 0.5:  # as RFC 7946 can say it: along the pole
+        if rng.random() < 0.5:  # a form of RFC 7946: along the pole
             return kind, [[[*((x, sign * reach) for x in lons), (180.0, sign * 90.0), (-180.0, sign * 90.0)]]]
         return kind, [[[(x, sign * reach) for x in lons[:-1]]]]
     if kind == "hole":
         ring = _star(rng, lon, lat, rng.uniform(1.0, 9.0), 0.0)
         return kind, [[ring, [(lon, lat), (lon + 0.02, lat), (lon, lat + 0.02)]]]
-    if kind == "islands":  # of one zone, each with lakes
+    if kind == "islands":  # one zone of several parts, each with lakes
         return kind, [_island(rng, lon + 25.0 * k, 0.8 * lat) for k in range(rng.randint(2, 5))]
     hole = [(lon * 0.8, lat * 0.8), (lon * 0.8 + 3.0, lat * 0.8), (lon * 0.8, lat * 0.8 + 2.0)]
     return kind, [[_band(rng, -179.9, 179.9, -80.0, 80.0, rng.choice([1, 4])), hole]]
@@ -242,7 +242,7 @@ def attack(seed: int, folder: Path) -> tuple[str, str, list[str]]:
         if answer is None or right is None or answer == right:
             continue
         if answer and kind == "written across":
-            continue  # what is forbidden besides is no fault there: the zone is the other side
+            continue  # a place in the zone besides is no fault there: the zone is the other side
         faults.append(f"seed {seed} ({named}): {lat:.6f}, {lon:.6f} is {'inside' if right else 'outside'}, read as "
                       f"{'inside' if answer else 'free'}")  # fmt: skip
     if kind == "written across":

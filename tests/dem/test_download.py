@@ -78,7 +78,7 @@ def test_a_connection_that_breaks_again_and_again_is_resumed_where_it_broke(serv
     served.trouble = trouble
     bring(served, tmp_path)
     assert (tmp_path / "object.part").read_bytes() == DATA
-    firsts = [int(span.removeprefix("bytes=").removesuffix("-") or 0) for _, span in served.asked]
+    firsts = [int(span.removeprefix("bytes=").removesuffix("-") or 0) for _, span in served.requests]
     assert firsts == [60_000 * k for k in range(7)]
 
 
@@ -95,7 +95,7 @@ def test_what_an_earlier_run_left_is_continued(served: Served, tmp_path: Path) -
     served.trouble = lambda request, path, number: False
     bring(served, tmp_path)
     assert (tmp_path / "object.part").read_bytes() == DATA
-    assert served.asked[-1][1] == "bytes=150000-"
+    assert served.requests[-1][1] == "bytes=150000-"
 
 
 def test_a_part_of_another_version_is_not_continued(served: Served, tmp_path: Path) -> None:
@@ -117,7 +117,7 @@ def test_without_an_etag_every_try_begins_anew(served: Served, tmp_path: Path) -
     served.trouble = trouble
     bring(served, tmp_path)
     assert (tmp_path / "object.part").read_bytes() == DATA
-    assert {span for _, span in served.asked} == {""}
+    assert {span for _, span in served.requests} == {""}
 
 
 def test_a_wrong_checksum_is_never_kept(served: Served, tmp_path: Path) -> None:
@@ -155,7 +155,7 @@ def test_a_file_that_somebody_else_writes_to_is_not_believed(served: Served, tmp
 def test_what_is_not_there_is_asked_for_once(served: Served, tmp_path: Path, code: int) -> None:
     served.trouble = lambda request, path, number: request.send_error(code) is None
     assert f"the server answers {code}" in str(refusal(served, tmp_path))
-    assert len(served.asked) == 1
+    assert len(served.requests) == 1
     assert list(tmp_path.iterdir()) == []
 
 
@@ -164,7 +164,7 @@ def test_what_is_not_there_is_asked_for_once(served: Served, tmp_path: Path, cod
 def test_a_server_that_is_busy_is_asked_again(served: Served, tmp_path: Path, code: int) -> None:
     served.trouble = lambda request, path, number: number < 3 and request.send_error(code) is None
     bring(served, tmp_path)
-    assert len(served.asked) == 3
+    assert len(served.requests) == 3
 
 
 def test_a_silent_server_is_left(served: Served, tmp_path: Path) -> None:
@@ -226,7 +226,7 @@ def test_an_answer_whose_length_nobody_knows_is_refused(served: Served, tmp_path
         return True
 
     served.trouble = trouble
-    assert "does not say how long it is" in str(refusal(served, tmp_path))
+    assert "the server gives no length" in str(refusal(served, tmp_path))
 
 
 def test_a_server_that_continues_another_part_is_not_believed(served: Served, tmp_path: Path) -> None:

@@ -83,9 +83,9 @@ def test_tiles_come_with_their_records_and_once_only(served: Served, tmp_path: P
     assert record["vertical_datum"] == "EGM2008"
     assert record["sha256"] == hashlib.sha256(data).hexdigest()
     assert record["url"] == f"{served.url}/copernicus-dem-30m/{GLO30.object_of(FOUR[0])}"
-    asked = len(served.asked)
+    asked = len(served.requests)
     assert [f.cached for f in fetch(served, tmp_path, *FOUR)] == [True] * 4
-    assert len(served.asked) == asked
+    assert len(served.requests) == asked
     assert parts(tmp_path) == []
 
 
@@ -125,7 +125,7 @@ def test_four_tiles_over_a_lossy_server_end_right_or_with_a_clear_error(
 def test_a_tile_that_fails_does_not_cost_the_others(served: Served, tmp_path: Path) -> None:
     del served.objects[f"/{GLO30.bucket}/{GLO30.object_of(FOUR[1])}"]
     said = refusal(served, tmp_path, *FOUR)
-    assert "1 of 4 tiles could not be had" in said
+    assert "1 of 4 tiles could not be downloaded" in said
     assert f"N36W084: {served.url}" in said
     assert "answers 404" in said
     assert is_in_order(tmp_path) == {FOUR[0].name, FOUR[2].name, FOUR[3].name}
@@ -151,7 +151,7 @@ def damaged(data: bytes) -> bytes:
 def test_what_is_no_such_tile_is_removed(served: Served, tmp_path: Path, make: Callable[[], bytes], words: str) -> None:
     served.put(GLO30, GLO30.object_of(FOUR[0]), make())
     said = refusal(served, tmp_path, FOUR[0])
-    assert "what the server gave is not this tile, and was removed" in said
+    assert "the server's file is not this tile, and was removed" in said
     assert words in said
     assert parts(tmp_path) == []
     assert is_in_order(tmp_path) == set()

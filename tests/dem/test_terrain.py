@@ -265,7 +265,7 @@ def test_a_mission_names_a_source(cache: Path) -> None:
 @pytest.mark.parametrize(
     ("terrain", "words"),
     [
-        ({"vertical_datum": "EGM96"}, "the mission says EGM96, the raster itself says EGM2008"),
+        ({"vertical_datum": "EGM96"}, "the mission states EGM96, the raster itself states EGM2008"),
         ({"crs": "EPSG:4326"}, r"terrain\.crs: copernicus-glo30 states it itself"),
         ({"height_unit": "ft"}, r"terrain\.height_unit: copernicus-glo30 states it itself"),
         ({"dem": ["copernicus-glo30", "more.tif"]}, r"terrain\.dem: copernicus-glo30 stands alone"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gcsplan.fleet._settle import Ask, moved, settle
+from gcsplan.fleet._settle import Job, moved, settle
 from gcsplan.fleet.arrival import Crew, schedule
 from gcsplan.fleet.resolve import groups_of, resolve, settle_groups
 from gcsplan.fleet.separation import Rules, separation
@@ -40,9 +40,9 @@ def test_groups_are_the_clusters() -> None:
 def test_group_by_group_is_the_same_as_all_at_once(seed: int) -> None:
     crews = clusters(seed)
     plan = schedule(crews, "sequence", interval_s=1.0)
-    ask = Ask(crews, RULES, None, "ground", 600.0)
-    found, judged, later_s = settle_groups(plan, ask)
-    whole = settle(plan, ask)
+    job = Job(crews, RULES, None, "ground", 600.0)
+    found, judged, later_s = settle_groups(plan, job)
+    whole = settle(plan, job)
     moved_all, moved_s = moved(whole.done)
     assert later_s == moved_s
     assert not separation(motions(plan, crews), RULES).safe
@@ -59,7 +59,7 @@ def test_groups_that_meet_after_all_are_joined(monkeypatch: pytest.MonkeyPatch) 
     plan = schedule(crews, "sequence", interval_s=1.0)
     assert not separation(motions(plan, crews), RULES).safe
     monkeypatch.setattr("gcsplan.fleet.resolve.groups_of", lambda plan, rules: [[name] for name in plan.order])
-    found, judged, _ = settle_groups(plan, Ask(crews, RULES, None, "ground", 600.0))
+    found, judged, _ = settle_groups(plan, Job(crews, RULES, None, "ground", 600.0))
     assert judged is not None
     assert judged.safe
     assert set(found.done) == set(plan.order)

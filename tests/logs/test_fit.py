@@ -24,7 +24,7 @@ def log_of(t: Floats, place: Floats, watts: Floats) -> FlightLog:
 def test_a_flights_coefficients_are_found_within_2_percent_at_5_percent_noise(seed: int) -> None:
     found = fit_energy([log_of(*flown(seed=seed))])
     assert within(found)
-    assert found.told
+    assert found.is_complete
     for c, true in ((found.vertical, R1), (found.horizontal, R2), (found.hover, HOVER)):
         assert c.value is not None
         assert c.half_95 is not None
@@ -70,7 +70,7 @@ def test_a_level_flight_tells_nothing_of_the_vertical() -> None:
     found = fit_energy([log_of(*flown([(0, 0, 10, 5), (0, 0, 0, 60), (4000, 0, 0, 400), (0, 0, 0, 60)]))])
     assert found.vertical.value is None
     assert "few" in found.vertical.why
-    assert not found.told
+    assert not found.is_complete
     assert found.horizontal.value == pytest.approx(R2, rel=0.02)
     assert "# vertical_j_per_m" in found.yaml()
     assert "\n  horizontal_j_per_m: 1" in found.yaml()
@@ -88,8 +88,8 @@ def test_a_flight_that_always_climbs_alike_cannot_tell_up_from_along() -> None:
 def test_two_flights_tell_what_neither_does_alone() -> None:
     slanted = log_of(*flown([(300, 0, 60, 30), (300, 0, -60, 30)] * 6))
     level = log_of(*flown([(0, 0, 10, 5), (4000, 0, 0, 400), (0, 0, 0, 40)], seed=2))
-    assert not fit_energy([slanted]).told
-    assert not fit_energy([level]).told
+    assert not fit_energy([slanted]).is_complete
+    assert not fit_energy([level]).is_complete
     both = fit_energy([slanted, level])
     assert both.vertical.value == pytest.approx(R1, rel=0.05)
     assert both.horizontal.value == pytest.approx(R2, rel=0.02)
@@ -166,6 +166,6 @@ def test_a_power_that_does_not_grow_with_speed_is_a_base_power_alone() -> None:
     t, place, _ = flown(TWO_SPEEDS, seed=24)
     watts = 320.0 * (1.0 + 0.03 * np.random.default_rng(24).standard_normal(len(t)))
     found = fit_energy([log_of(t, place, watts)])
-    assert found.told
+    assert found.is_complete
     assert found.base.value == pytest.approx(320.0, rel=0.05)
     assert found.horizontal.value == pytest.approx(0.0, abs=2.0)

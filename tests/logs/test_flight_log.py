@@ -20,10 +20,10 @@ def test_readings_in_another_unit_are_refused(tmp_path: Path, volt: float, amper
     t, place, watts = flown(seed=25)
     file = csv_of(tmp_path / "a.csv", "time_s,x,y,z,volt,amp", [t, *place.T, np.full(len(t), 22.2 * volt),
                   watts / 22.2 * ampere])  # fmt: skip
-    with pytest.raises(InputError, match=f"tells a {what} of .*another unit"):
+    with pytest.raises(InputError, match=f"has a {what} of .*another unit"):
         read_log(file)
     milli = csv_of(tmp_path / "b.csv", "time_s,x,y,z,power", [t, *place.T, 1000.0 * watts])
-    with pytest.raises(InputError, match="tells a power of"):
+    with pytest.raises(InputError, match="has a power of"):
         read_log(milli)
 
 

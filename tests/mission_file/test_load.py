@@ -22,7 +22,7 @@ from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot, Energy
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.zones import Level, Polygon
-from tests.support.attacks import draw_attacks, require_told
+from tests.support.attacks import draw_attacks, require_placed_words
 from tests.support.effort import draws
 from tests.support.paths import DATA
 
@@ -530,7 +530,7 @@ def damaged(data: st.DataObject) -> str:
     try:
         mission = load(text)
     except InputError as error:
-        require_told(error)
+        require_placed_words(error)
         return "refused"
     assert mission.vehicles
     return "read"

@@ -35,7 +35,7 @@ from gcsplan.mission_file.zones.file import ZoneFile
 from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from gcsplan.world.terrain.input_files import ZONE_FILES, ZONES_BY_NAME
-from tests.support.attacks import draw_attacks, require_told
+from tests.support.attacks import draw_attacks, require_placed_words
 from tests.support.effort import draws
 
 FRAME = Frame(36.6, -84.3)
@@ -478,7 +478,7 @@ def judged(path: Path, content: bytes) -> str:
     try:
         found = read_zones(path, where="m")
     except InputError as error:
-        require_told(error)
+        require_placed_words(error)
         return "problems"
     assert all(p.where and p.message for p in found.problems)
     drafts: list[ZoneDraft] = found.zones

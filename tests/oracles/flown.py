@@ -41,7 +41,7 @@ class Ground:
         self.z, self.west, self.north, self.dx, self.dy = heights, west, north, dx, dy
 
     def read(self, lat: Floats, lon: Floats) -> Floats:
-        """What ArduPilot takes for the ground: posts every 100 m of its own flat degree tiles, in metres upwards."""
+        """ArduPilot's ground: posts every 100 m of its own flat degree tiles, in metres upwards."""
         m = float(np.float32(0.011131884502145034)) * 1e7
         a, o = np.floor(lat), np.floor(lon)
         north, east = (lat - a) * m / 100.0, (lon - o) * m * np.cos(np.radians(0.5 * (lat + a))) / 100.0
@@ -169,17 +169,17 @@ class Rules:
     speed_m_s: float
 
     @classmethod
-    def of(cls, asked: dict[str, Any], index: int = 0) -> Rules:
-        vehicle = asked["vehicles"][index]
-        limits = asked.get("limits", {}) | vehicle
+    def of(cls, mission: dict[str, Any], index: int = 0) -> Rules:
+        vehicle = mission["vehicles"][index]
+        limits = mission.get("limits", {}) | vehicle
         climb = float(limits.get("max_climb_deg", 15.0 if vehicle["autopilot"] == "arduplane" else 90.0))
         return cls(
             float(limits["min_agl_m"]),
             float(limits.get("max_agl_m", math.inf)), float(limits.get("max_amsl_m", math.inf)),
             float(limits.get("horizontal_clearance_m", 30)), float(limits.get("track_error_m", 3)),
             float(limits.get("altitude_error_m", 5)), climb, float(limits.get("max_descent_deg", climb)),
-            float(asked["terrain"].get("obstacle_height_m", 0)), [NoFly.of(z) for z in asked.get("no_fly", [])],
-            float(asked.get("terrain_error_m", TERRAIN_ERROR_M)), vehicle.get("rtl_rel_home_m"),
+            float(mission["terrain"].get("obstacle_height_m", 0)), [NoFly.of(z) for z in mission.get("no_fly", [])],
+            float(mission.get("terrain_error_m", TERRAIN_ERROR_M)), vehicle.get("rtl_rel_home_m"),
             float(vehicle.get("speed_m_s", [3, 15])[1]),
         )  # fmt: skip
 

@@ -84,7 +84,8 @@ def choice(case: Case, at: Floats) -> tuple[int, Floats]:
 
 
 def join_breach(case: Case, at: Floats, stop: Floats, wrong: Floats, *, legal: bool, column: bool) -> str:
-    """What the return from ``at`` breaks that stops at ``stop`` and takes itself to be off by ``wrong``; or empty.
+    """The limits broken by the return from ``at`` that stops at ``stop`` and takes itself to be off by ``wrong``; or
+    empty.
 
     ``column``: it begins in the take-off, whose ground does not count for a return that ends above it.
     """

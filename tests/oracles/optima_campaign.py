@@ -99,8 +99,8 @@ def judge(
     If a legal path is stored for the mission, only a patient ``effort`` searches for another one as well.
     """
     case = make(family, seed)
-    said: list[Progress] = []
-    problem = replace(case.problem, progress=said.append, **changes)  # type: ignore[arg-type]
+    reports: list[Progress] = []
+    problem = replace(case.problem, progress=reports.append, **changes)  # type: ignore[arg-type]
     verdict = Verdict(family, seed)
     witness = known(family, seed, case)
     found = best_path(problem, seed, effort) if witness is None or effort is PATIENT else None
@@ -134,7 +134,7 @@ def judge(
         verdict.wrong.append(f"no lower bound: {solution.lower_bound}")
         return verdict
     # Bounds reported as progress are promises too.
-    verdict.bound = max([solution.lower_bound, *(x.lower_bound for x in said if x.lower_bound is not None)])
+    verdict.bound = max([solution.lower_bound, *(x.lower_bound for x in reports if x.lower_bound is not None)])
     if verdict.bound > verdict.cost + touch:
         verdict.wrong.append("the bound lies over the planner's own path")
     elif verdict.bound > verdict.best + touch:

@@ -78,7 +78,7 @@ def cost_of(problem: Problem, points: Floats) -> float:
 
 
 def pinned(problem: Problem, points: Floats) -> Floats:
-    """Which coordinates (N, 3) of a path's points are fixed: those of its ends, and of its vias in order."""
+    """Which coordinates (N, 3) of a path's points are fixed: its ends' coordinates, and its vias' in order."""
     fixed = np.zeros(points.shape, bool)
     fixed[[0, -1]] = True
     at = 0

@@ -25,7 +25,7 @@ from gcsplan.world.geometry.zones import Circle
 from tests.oracles.optima_polish import QUICK, Effort, cost_of, is_feasible, leg_costs, polish, pull
 
 NEAR = 1e-3
-"""Distance (m) that lattice points keep from zones, beyond what is required."""
+"""Distance (m) that lattice points keep from zones, beyond the required clearance."""
 MOST_LEVELS = 16
 """Altitudes added to a lattice at most where climb or descent is limited."""
 EVERY_NODE = 1500

@@ -1,6 +1,6 @@
 """A PX4 multicopter on level legs, step by step: the rules of `gcsplan.fleet.motion.px4`, integrated in time.
 
-In each step the speed that is wanted follows from the place alone: towards the way point, or while it turns towards a
+In each step the commanded speed follows from the place alone: towards the way point, or while it turns towards a
 point on the leg; the speed then changes with a bounded acceleration and a bounded jerk.
 """
 
@@ -48,8 +48,8 @@ def fly(
         else:
             before = most
         way = aim - place
-        wanted = way / max(float(np.linalg.norm(way)), 1e-9) * most
-        error = wanted - (speed + push * np.linalg.norm(push) / (2.0 * jerk))
+        commanded = way / max(float(np.linalg.norm(way)), 1e-9) * most
+        error = commanded - (speed + push * np.linalg.norm(push) / (2.0 * jerk))
         size = float(np.linalg.norm(error))
         pull = error / max(size, 1e-9) * (accel if size >= 0.05 else min(accel, math.sqrt(2.0 * jerk * size)))
         change = pull - push

@@ -56,10 +56,10 @@ def copter(begin: Begin, home: Floats, return_amsl_m: float, *, wpnav_m_s: float
         goal, height = goals[0]
         to = goal - at[:2]
         left = math.hypot(*to)
-        wanted = min(_toward(left, COPTER_M_S2), wpnav_m_s) * to / max(left, 1e-9)
-        asked = 2.0 * (wanted - v[:2])
-        size = math.hypot(*asked)
-        push += (asked * min(1.0, PUSH_M_S2 / max(size, 1e-9)) - push) * STEP_S / LAG_S
+        commanded = min(_toward(left, COPTER_M_S2), wpnav_m_s) * to / max(left, 1e-9)
+        change = 2.0 * (commanded - v[:2])
+        size = math.hypot(*change)
+        push += (change * min(1.0, PUSH_M_S2 / max(size, 1e-9)) - push) * STEP_S / LAG_S
         v[:2] += push * STEP_S
         levels += math.copysign(min(UP_M_S * STEP_S, abs(height - levels)), height - levels)
         sink = max(min(_toward(abs(levels - at[2]), RATE_M_S2), UP_M_S), 0.0) * math.copysign(1.0, levels - at[2])

@@ -145,7 +145,7 @@ def run_on(case: Case, at: Floats, to: Floats, after: Floats | None) -> Floats:
 def breach(
     case: Case, at: Floats, *, legal: bool, more_m: float = 0.0, lift_m: float = 0.0, on: Floats | None = None
 ) -> str:
-    """What the return from ``at`` (east, north, AMSL) breaks; empty if nothing; ``on``: see `run_on`.
+    """The limits that the return from ``at`` (east, north, AMSL) breaks; empty if none; ``on``: see `run_on`.
 
     ``legal``: judge AGL and AMSL limits too; ``more_m``, ``lift_m``: metres added to track and altitude error.
     """

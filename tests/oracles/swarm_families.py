@@ -2,7 +2,7 @@
 
 Each draws numbers as it needs them, in another order than `gcsplan.research.optimisers`, so runs of one seed differ and
 only their distributions can be compared. A rule receives a batch cost over the unit box, the size of the swarm, the
-number of variables, the number of rounds, and a generator. Equation numbers are those of the papers.
+number of variables, the number of rounds, and a generator. Equation numbers follow the papers.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Readings of the papers' update rules, number by number from the text; nothing is shared with our own optimisers.
 
 Each function runs a whole search and returns every point that it evaluates, in order. It draws from the generator in
-the order of the text, so a rule that does what the text says evaluates the same points.
+the order of the text, so a rule that follows the text evaluates the same points.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ def one_bee(
             else:
                 failures[i] += 1
 
-    def told(r: float) -> int:
+    def drawn(r: float) -> int:
         fitness = [1.0 / (1.0 + v) for v in f]
         at, total = 0, fitness[0]
         while total <= r * sum(fitness):
@@ -137,7 +137,7 @@ def one_bee(
 
     for _ in range(rounds):
         fly(list(range(n)))
-        fly([told(r) for r in rng.random(n)])  # all onlookers choose by what the employed bees have told
+        fly([drawn(r) for r in rng.random(n)])  # all onlookers choose by the results of the employed bees
         spent = failures.index(max(failures))
         if failures[spent] > limit:
             x[spent], f[spent] = search(rng.random(dim))

@@ -1,6 +1,6 @@
 """An ArduCopter over ground, in short steps of time: its height above ground scales its speed by WPNAV_TER_MARGIN.
 
-From AC_WPNav.cpp and AC_PosControl.cpp: the height that is wanted is that of the ground below plus a constant; the
+From AC_WPNav.cpp and AC_PosControl.cpp: the commanded height is the height of the ground below plus a constant; the
 vehicle follows it with bounded rates and one bounded acceleration, as fast as it can still stop there; and its speed is
 the commanded one times 1 - (|error| - margin / 2) / (margin / 2), from 0.01 to 1.
 """
@@ -23,8 +23,8 @@ def fly(
         error_m = ground_m(along_m) - height_m
         worst_m = max(worst_m, abs(error_m))
         stops_at = math.sqrt(2.0 * vertical_m_s2 * abs(error_m))
-        wanted = min(stops_at, climb_m_s) if error_m > 0.0 else -min(stops_at, descent_m_s)
-        change = max(-vertical_m_s2 * STEP_S, min(vertical_m_s2 * STEP_S, wanted - climbs))
+        rate = min(stops_at, climb_m_s) if error_m > 0.0 else -min(stops_at, descent_m_s)
+        change = max(-vertical_m_s2 * STEP_S, min(vertical_m_s2 * STEP_S, rate - climbs))
         climbs += change
         height_m += climbs * STEP_S
         scale = max(0.01, min(1.0, 1.0 - (abs(error_m) - 0.5 * margin_m) / (0.5 * margin_m)))

@@ -27,8 +27,8 @@ def draw_attacks(count: int, attack: Callable[[st.DataObject], str]) -> set[str]
     return ends
 
 
-def require_told(error: InputError) -> None:
-    """What an error about an input owes: its exit code, and words for each problem, with a place."""
+def require_placed_words(error: InputError) -> None:
+    """Require that an error about an input has its exit code, and words for each problem, with a place."""
     assert error.exit_code == 2
     assert error.problems
     assert all(p.where and p.message for p in error.problems), error.problems

@@ -127,16 +127,16 @@ class Browser:
 
     def complaints(self) -> list[str]:
         """Errors and warnings of the page since it was opened."""
-        told = []
+        reported = []
         for event in self.events:
             name, params = event.get("method"), event.get("params", {})
             if name == "Runtime.exceptionThrown":
-                told.append(json.dumps(params["exceptionDetails"]))
+                reported.append(json.dumps(params["exceptionDetails"]))
             elif name == "Runtime.consoleAPICalled" and params["type"] in ("error", "warning", "assert"):
-                told.append(json.dumps(params["args"]))
+                reported.append(json.dumps(params["args"]))
             elif name == "Log.entryAdded" and params["entry"]["level"] in ("error", "warning"):
-                told.append(params["entry"]["text"])
-        return told
+                reported.append(params["entry"]["text"])
+        return reported
 
     def requests(self) -> list[str]:
         """Every URL that the page has requested since it was opened, except ``data:`` URLs."""

@@ -1,4 +1,4 @@
-"""What ground stations say to a hub of loopback vehicles, and what they hear, without sockets."""
+"""Messages of ground stations to a hub of loopback vehicles, and its answers, without sockets."""
 
 from __future__ import annotations
 
@@ -38,5 +38,5 @@ def messages(data: Iterable[bytes]) -> list[Any]:
 
 
 def ask(hub: Hub, message: Any, now: float = 0.0, *, client: Client = "a", source: Address = GCS) -> list[Any]:
-    """Say one thing to the hub; what came back to this client."""
+    """Send one message to the hub; return the answers to this client."""
     return messages(data for to, data in hub.take(client, frame(message, source), now) if to == client)

@@ -16,7 +16,7 @@ _OPTIONS = session.SessionOptions
 def be_impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Listen only 0.1 s for a second vehicle with the same system id, and wait 0.3 s for each response.
 
-    Parameters are asked for again after 0.1 s, and those that nothing hangs on given up after 0.3 s.
+    Parameters are requested again after 0.1 s, and given up after 0.3 s where nothing depends on them.
     """
     for name, seconds in (("ASK_AGAIN_S", 0.1), ("PARAMETER_S", 0.3), ("NO_PARAMETERS_S", 0.3)):
         monkeypatch.setattr(steps, name, seconds)

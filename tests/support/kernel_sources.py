@@ -1,4 +1,4 @@
-"""What a unit of kernels must list: each module that marks a function of it, and all that these take constants from."""
+"""The modules that a unit of kernels must list: each that marks a function of it, and all whose constants they take."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def imported_by(path: Path) -> set[str]:
 
 
 def faults(compiled: ModuleType) -> list[str]:
-    """What the list of the unit in ``compiled`` lacks, or has too much."""
+    """The modules that the list of the unit in ``compiled`` lacks, or has too much."""
     listed = {path.resolve() for path in compiled.UNIT.sources}
     modules = {".".join(("gcsplan", *p.resolve().relative_to(ROOT).with_suffix("").parts)) for p in listed}
     marked = {p for p in ROOT.rglob("*.py") if compiled.__name__ in imported_by(p)}

@@ -1,4 +1,4 @@
-"""A ground station for loopback vehicles: it says a message, uploads and downloads, without a link."""
+"""A ground station for loopback vehicles: it sends a message, uploads and downloads, without a link."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def waypoint(n: int, **changes: float) -> MissionItem:
 
 
 def of_cm(cm: int) -> float:
-    """How ArduPilot tells whole centimetres: times 0.01 in float32."""
+    """Whole centimetres as ArduPilot sends them: times 0.01 in float32."""
     return float32(float32(0.01) * cm)
 
 
@@ -79,7 +79,7 @@ def download(vehicle: LoopbackVehicle, mission_type: int = MISSION) -> list[Miss
 
 
 def kept(autopilot: Autopilot, item: MissionItem) -> MissionItem | int:
-    """What becomes of one mission item: as it reads back, or the code of the refusal."""
+    """The outcome of one mission item: as it reads back, or the code of the refusal."""
     vehicle = a_vehicle(autopilot)
     answer = upload(vehicle, [waypoint(0), item])
     assert isinstance(answer, Ack)

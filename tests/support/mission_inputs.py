@@ -1,4 +1,4 @@
-"""Missions over every kind of file that they may read, each with what its maker wrote: no list of gcsplan's is asked.
+"""Missions over every kind of file that they may read, each with its maker's files: no list of gcsplan's is used.
 
 A `Case` has the files that the mission reads, and those that do not exist and would count if they appeared.
 """
@@ -129,7 +129,7 @@ def geotiff(case: Case) -> None:
 
 
 def scaled(case: Case) -> None:
-    """A GeoTIFF whose sidecar says scale and offset."""
+    """A GeoTIFF whose sidecar states scale and offset."""
     geotiff(case)
     case.file("dem.tif.aux.xml", SCALED.format(10))
 

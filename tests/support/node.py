@@ -28,7 +28,7 @@ const window = {{ addEventListener() {{}} }};
 const found = {json.dumps(json.dumps({"grid": GRID, "lines": [], "units": METRIC.as_dict()}))};
 const document = {{ getElementById: () => ({{ textContent: found }}) }};
 """
-"""What `base.js` finds of a page: no figure, no ground, no vehicle."""
+"""The page that `base.js` finds: no figure, no ground, no vehicle."""
 
 
 def ask(assets: tuple[str, ...], expression: str, given: object = None) -> Any:

@@ -1,4 +1,4 @@
-"""What tests ask of notes: their codes, and the notes within them."""
+"""Questions of tests about notes: their codes, and the notes within them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pages of a report for tests: one vehicle, a fleet, a large one, a planned one; and a reader of what is on a page."""
+"""Pages of a report for tests: one vehicle, a fleet, a large one, a planned one; and a reader of a page's content."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class Reader(HTMLParser):
 
     @property
     def data(self) -> dict[str, Any]:
-        """What the page's script is given."""
+        """The data of the page's script."""
         found: dict[str, Any] = json.loads(next(text for attrs, text in self.scripts if attrs.get("id") == "data"))
         return found
 

@@ -102,9 +102,9 @@ SLOW = {"fleet-4", "a paper's"}
 
 @cache
 def planned(case: str) -> tuple[Any, Plan]:
-    asked = CASES[case]
-    text = None if isinstance(asked, Path) else yaml.safe_dump(asked)
-    source = load_mission(asked if isinstance(asked, Path) else "times.yaml", text=text)
+    mission = CASES[case]
+    text = None if isinstance(mission, Path) else yaml.safe_dump(mission)
+    source = load_mission(mission if isinstance(mission, Path) else "times.yaml", text=text)
     return source, plan(source)
 
 

@@ -18,7 +18,7 @@ FLAT = worlds.world(GROUND_M, half_m=4000.0)
 CLIMB_S = 70 / 2.5 + 2.5
 CRUISE_M_S = 10.0
 BRAKING_S = CRUISE_M_S / 1.5
-"""What starting and stopping cost beside the cruise itself."""
+"""The time of starting and stopping beside the cruise itself."""
 
 
 def at(command: int, east_m: float, north_m: float, z: float, world: World = FLAT) -> MissionItem:

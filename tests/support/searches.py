@@ -49,5 +49,5 @@ def looked(problem: Problem) -> Workspace:
 
 
 def improve(work: Workspace, without: tuple[str, ...] = ()) -> None:
-    """Run all searches, except those named in ``without``."""
+    """Run all searches, except the ones named in ``without``."""
     govern(work.incumbent, [search for search in all_searches(work) if search.NAME not in without])

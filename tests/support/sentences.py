@@ -1,4 +1,4 @@
-"""What holds for every sentence of the catalogue: it speaks in its reader's units, and names keys as he types them.
+"""Rules for every sentence of the catalogue: it uses its reader's units, and names keys as the reader types them.
 
 A room of the catalogue is a dict of templates by code; `faults_of` fills each of them with numbers, as a note would.
 """
@@ -40,7 +40,7 @@ def note_of(code: str) -> Note:
 
 
 def faults_of(room: Mapping[str, str], own_units: set[str]) -> Iterator[str]:
-    """What is wrong with the sentences of a room. ``own_units``: codes of those that write a unit out with reason."""
+    """The faults of the sentences of a room. ``own_units``: codes of sentences that write a unit out with reason."""
     options = {key: f"--{key.replace('_', '-')}" for key in KEYS}
     for code, text in room.items():
         note = note_of(code)

@@ -1,4 +1,4 @@
-"""What people read, back as numbers in SI: durations, numbers with thin spaces, and the quantities of a text."""
+"""Shown texts back as numbers in SI: durations, numbers with thin spaces, and the quantities of a text."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def taken_apart(text: str) -> tuple[str, list[tuple[float, float]]]:
     return QUANTITY.sub(take, text), found
 
 
-def same(found: list[tuple[float, float]], wanted: list[tuple[float, float]]) -> None:
-    assert len(found) == len(wanted)
-    for (value, digit), (si, of_si) in zip(found, wanted, strict=True):
+def same(found: list[tuple[float, float]], expected: list[tuple[float, float]]) -> None:
+    assert len(found) == len(expected)
+    for (value, digit), (si, of_si) in zip(found, expected, strict=True):
         assert abs(value - si) <= 1.01 * max(digit, of_si) + 0.51 * min(digit, of_si), (value, si)

@@ -35,7 +35,7 @@ class Recorded:
 
 
 class Play:
-    """One run of a rule of the registry. ``batches``: what it has yielded so far; ``costs``: what it was sent."""
+    """One run of a rule of the registry. ``batches``: the points yielded so far; ``costs``: the costs sent to it."""
 
     def __init__(
         self, name: str, cost: Callable[[Floats], Floats], first: Floats, *, T: int, seed: int = 0, **changes: Any

@@ -75,11 +75,11 @@ def _lines(source: DemSource, cells: Iterable[Cell]) -> str:
 
 @dataclass
 class Served:
-    """What a server has, by path, and what it did. ``trouble`` may answer a request itself, by its number, from 1."""
+    """A server's objects, by path, and its requests. ``trouble`` may answer a request itself, by its number, from 1."""
 
     objects: dict[str, bytes] = field(default_factory=dict)
     trouble: Callable[[BaseHTTPRequestHandler, str, int], bool] = lambda request, path, number: False
-    asked: list[tuple[str, str]] = field(default_factory=list)
+    requests: list[tuple[str, str]] = field(default_factory=list)
     url: str = ""
 
     def put(self, source: DemSource, name: str, data: bytes) -> None:
@@ -93,21 +93,21 @@ class Served:
         return data
 
     def put_lists(self, *, land: Iterable[Cell] = (), lacking: Iterable[Cell] = (), source: DemSource = GLO30) -> None:
-        """Add the lists: ``source`` and GLO-90 have ``land``, GLO-90 also what is ``lacking``; the rest is sea."""
+        """Add the lists: ``source`` and GLO-90 have ``land``, GLO-90 also the ``lacking`` tiles; the rest is sea."""
         self.put(source, source.listing, listing(source, land))
         self.put(GLO90, GLO90.listing, listing(GLO90, [*land, *lacking]))
 
     def paths(self, end: str = ".tif") -> list[str]:
-        """Paths asked for that end so."""
-        return [path for path, _ in self.asked if path.endswith(end)]
+        """Requested paths with this end."""
+        return [path for path, _ in self.requests if path.endswith(end)]
 
 
 def send(request: BaseHTTPRequestHandler, data: bytes, *, cut: int | None = None, etag: str | None = None) -> None:
-    """Answer as S3 does: with length and MD5, or the asked range of it; after ``cut`` bytes the connection ends."""
+    """Answer as S3 does: with length and MD5, or the requested range; after ``cut`` bytes the connection ends."""
     tag = f'"{hashlib.md5(data).hexdigest()}"' if etag is None else etag
-    asked, first = request.headers.get("Range"), 0
-    if asked is not None and request.headers.get("If-Range", tag) == tag:
-        first = int(asked.removeprefix("bytes=").removesuffix("-"))
+    span, first = request.headers.get("Range"), 0
+    if span is not None and request.headers.get("If-Range", tag) == tag:
+        first = int(span.removeprefix("bytes=").removesuffix("-"))
         if first >= len(data):
             request.send_error(416)
             return
@@ -137,7 +137,7 @@ def serving(served: Served) -> Iterator[Served]:
 
         def do_GET(self) -> None:
             with lock:
-                served.asked.append((self.path, self.headers.get("Range", "")))
+                served.requests.append((self.path, self.headers.get("Range", "")))
                 counts[self.path] = counts.get(self.path, 0) + 1
                 number = counts[self.path]
             try:

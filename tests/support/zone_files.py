@@ -144,4 +144,4 @@ WRITERS: dict[str, Callable[[Path, Sequence[Part]], Path]] = {
 """A writer for each format, by its name in tests."""
 
 EITHER_EDGE = frozenset({"kml", "openair", "ed269"})
-"""Formats that do not say that edges are straight in degrees: what great circles enclose is inside, too."""
+"""Formats without a statement that edges are straight in degrees: the area within great circles is inside, too."""

@@ -75,7 +75,7 @@ def test_what_a_terrain_model_does_not_hold_is_said(info: dict[str, object], wor
 def test_how_heights_were_read_is_one_line_with_the_ends_rounded_outwards() -> None:
     unit = replace(METRE, by="from the file")
     words = heights_read([unit, unit], "EGM96", 160.9, 439.1)
-    assert words == f"{unit.told()}; EGM96; ground 160–440 m AMSL"
+    assert words == f"{unit.stated()}; EGM96; ground 160–440 m AMSL"
     assert heights_read([unit], "EGM96", -3.2, 9.0).endswith("ground -4 to 9 m AMSL")
     assert heights_read([unit], "EGM96", 5.0, 5.0).endswith("ground 5 m AMSL")
     assert heights_line({"heights_read": words}) == f"heights: {words}"

@@ -36,7 +36,7 @@ SHORTEST_WAY_M, LONGEST_WAY_M = 400.0, 8000.0
 CLEARANCE_M, TRACK_ERROR_M, ALTITUDE_ERROR_M = 30.0, 3.0, 5.0
 """Defaults of a mission file, m."""
 PLACE_SPARE_M = 2.0
-"""Metres that places keep from zones beyond the margins, for what a plan adds for rounding."""
+"""Metres that places keep from zones beyond the margins, for a plan's own margins for rounding."""
 FLAT_MIN_AGL_M = 30.0
 SAMPLE_MIN_AGL_M = 60.0
 MISSION_DRAWS = 1000

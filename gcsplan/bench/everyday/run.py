@@ -45,7 +45,7 @@ class MissionOutcome:
 
     ``oracle_m`` is the shortest track on flat ground around the zones; ``over_percent`` is how much longer the
     planner's track is. ``status`` is solved, infeasible (proved), not found, unsafe, failed or killed. Seconds are
-    wall-clock seconds; ``memory_mb`` is the peak above what the process had before.
+    wall-clock seconds; ``memory_mb`` is the peak above the process's memory before.
     """
 
     name: str
@@ -95,7 +95,7 @@ def run(
     without: Sequence[str] = (),
     tell: Callable[[str], None] = lambda words: None,
 ) -> list[MissionOutcome]:
-    """Plan ``count`` missions of each seed (those of ``kinds``); write ``everyday.csv`` and ``.md`` to ``directory``.
+    """Plan ``count`` missions of each seed, of ``kinds`` only; write ``everyday.csv`` and ``.md`` to ``directory``.
 
     ``without``: sources of paths and bounds that the planner must not use. Raises InputError for unknown kinds.
     """

@@ -1,6 +1,6 @@
 """One measurement of `scale`, in a process of its own so that its memory is its own: ``python -m …scale.point JSON``.
 
-Imports, kernels and workers are warm before the clock starts; how long workers take to start is told apart.
+Imports, kernels and workers are warm before the clock starts; the workers' start is measured apart.
 """
 
 from __future__ import annotations
@@ -41,15 +41,15 @@ def batch_point(missions: str, out: str, jobs: int, kill: bool = False) -> dict[
         spent = _Spent(workers)
         for _ in workers.each(_warm, None, range(4 * workers.count)):
             pass
-        told: dict[str, Any] = {"start_s": time.perf_counter() - begun_s}
+        figures: dict[str, Any] = {"start_s": time.perf_counter() - begun_s}
         watched = _Watched(workers, Path(out) / "begun.log", count // 3 if kill else None)
         with spent.measured() as took:
             work.run(watched, range(count), done.append)
-        told |= took | watched.told(count)
+        figures |= took | watched.figures(count)
         if isinstance(workers, Dask):
-            told |= _scheduler(workers)
+            figures |= _scheduler(workers)
     codes = [r.code for r in done]
-    return told | {
+    return figures | {
         "missions": count, "jobs": jobs, "planned": codes.count(0), "refused": len(codes) - codes.count(0),
         "bytes_sha256": digest_of(Path(out)),
     }  # fmt: skip
@@ -94,7 +94,7 @@ def _planned(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def _warm(_: None, number: int) -> int:
-    """Load and compile what planning over a DEM needs."""
+    """Load and compile all code that planning over a DEM needs."""
     if not _warmed:
         _warmed.append(number)
         with suppress(GcsplanError):
@@ -117,7 +117,7 @@ class _Spent:
 
     @contextmanager
     def measured(self) -> Iterator[dict[str, Any]]:
-        """Yield a dict that holds the figures afterwards. Of workers, those that live at the end count."""
+        """Yield a dict that holds the figures afterwards. Only workers that live at the end count."""
         took: dict[str, Any] = {}
         before, wall_s, cpu_s = self._workers(), time.perf_counter(), time.process_time()
         yield took
@@ -167,11 +167,11 @@ class _Watched:
                 self._killed += 1
             yield number, result
 
-    def told(self, count: int) -> dict[str, Any]:
+    def figures(self, count: int) -> dict[str, Any]:
         begun = len(self._log.read_text(encoding="utf-8").splitlines())
         self._log.unlink()
-        told = {"begun": begun, "done_again": begun - count, "killed": self._killed, "item_bytes": self._sent / count}
-        return told | ({"result_bytes": self._returned / count} if self._returned else {})
+        counts = {"begun": begun, "done_again": begun - count, "killed": self._killed, "item_bytes": self._sent / count}
+        return counts | ({"result_bytes": self._returned / count} if self._returned else {})
 
 
 def _logged(shared: tuple[str, BatchOptions], item: tuple[str, str]) -> Record:
@@ -210,8 +210,8 @@ POINT_KINDS: dict[str, Callable[..., dict[str, Any]]] = {
 
 def main() -> None:
     """Measure the point that the argument names, and print the figures as JSON."""
-    asked = json.loads(sys.argv[1])
-    print(json.dumps(POINT_KINDS[asked.pop("point")](**asked)))
+    request = json.loads(sys.argv[1])
+    print(json.dumps(POINT_KINDS[request.pop("point")](**request)))
 
 
 if __name__ == "__main__":

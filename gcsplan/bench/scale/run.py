@@ -1,4 +1,4 @@
-"""What planning costs, against size: missions, vehicles, zones, cells of the DEM, workers; and what a cluster would do.
+"""The cost of planning by size: missions, vehicles, zones, cells of the DEM, workers; and an estimate for a cluster.
 
 Every point is measured in a process of its own (`point`), on missions made from a seed (`missions`).
 """
@@ -50,7 +50,7 @@ def run(
 
     Args:
         axes: of `AXES`.
-        missions: how many the longest batch has.
+        missions: number of missions of the longest batch.
         workers: the most processes that share a batch; 2 and this many are measured beside one.
         seed: of the missions and of the made hills.
         kill: also kill one of the workers after a third of the batch.
@@ -59,15 +59,14 @@ def run(
     Returns:
         ``settings``; ``rows``, one for each point (`SCALE_COLUMNS`); ``cluster`` (`cluster_of`), None without workers.
 
-    Raises UsageError for what cannot be measured, GcsplanError if a point ends with an error.
+    Raises UsageError for sizes out of range, GcsplanError if a point ends with an error.
     """
     unknown = [a for a in axes if a not in AXES]
     if unknown or not axes:
         raise UsageError(f"axes are {', '.join(AXES)}, given {', '.join(unknown) or 'none'}")
     if not 4 <= missions <= MOST_SCALE_MISSIONS or not 2 <= workers <= MOST_WORKERS:
         raise UsageError(
-            f"4 to {MOST_SCALE_MISSIONS} missions and 2 to {MOST_WORKERS} workers are wanted, given {missions} and "
-            f"{workers}"
+            f"give 4 to {MOST_SCALE_MISSIONS} missions and 2 to {MOST_WORKERS} workers, not {missions} and {workers}"
         )
     rows: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory(prefix="gcsplan-scale-") as folder:
@@ -108,17 +107,17 @@ class _ScaleFolder:
         out = self.folder / f"out-{self._outs}"
         return self.measured("batch", missions=str(self.missions(count)), out=str(out), jobs=jobs, kill=kill)
 
-    def measured(self, point: str, **asked: Any) -> dict[str, Any]:
+    def measured(self, point: str, **given: Any) -> dict[str, Any]:
         """The figures of a point, from a process of its own."""
-        sizes = {k: v for k, v in asked.items() if isinstance(v, int) and k != "seed"}
+        sizes = {k: v for k, v in given.items() if isinstance(v, int) and k != "seed"}
         self._tell(f"{point}: {', '.join(f'{k} {v}' for k, v in sizes.items())}")
-        command = [sys.executable, "-m", "gcsplan.bench.scale.point", json.dumps({"point": point, **asked})]
+        command = [sys.executable, "-m", "gcsplan.bench.scale.point", json.dumps({"point": point, **given})]
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_POINT_S, check=False)
         except subprocess.TimeoutExpired as error:
             raise GcsplanError(f"{point} took longer than {LONGEST_POINT_S:g} s") from error
         if done.returncode:
-            last = done.stderr.strip().splitlines()[-1:] or ["it said nothing"]
+            last = done.stderr.strip().splitlines()[-1:] or ["no words"]
             raise GcsplanError(f"{point} ended with an error: {last[0]}")
         found: dict[str, Any] = json.loads(done.stdout)
         return found
@@ -134,8 +133,8 @@ def _vehicles(place: _ScaleFolder, missions: int, workers: int, kill: bool) -> l
 
 
 def _zones(place: _ScaleFolder, missions: int, workers: int, kill: bool) -> list[dict[str, Any]]:
-    asked: dict[str, Any] = {"seed": place.seed, "tiles": str(place.tiles()), "missions": EACH}
-    return [{"axis": "zones", "size": n} | place.measured("zones", zones=n, **asked) for n in MEASURED_ZONES]
+    given: dict[str, Any] = {"seed": place.seed, "tiles": str(place.tiles()), "missions": EACH}
+    return [{"axis": "zones", "size": n} | place.measured("zones", zones=n, **given) for n in MEASURED_ZONES]
 
 
 def _cells(place: _ScaleFolder, missions: int, workers: int, kill: bool) -> list[dict[str, Any]]:
@@ -153,7 +152,7 @@ def _workers(place: _ScaleFolder, missions: int, workers: int, kill: bool) -> li
         found.append((workers, place.batch(missions, workers, kill=True)))
     rows = [{"axis": "workers", "size": 1} | alone]
     for count, shared in found:
-        # On a busy machine the wall says little: the least time on as many cores as there are workers.
+        # On a busy machine wall-clock time means little: take the least time on as many cores as there are workers.
         busiest_s = max(shared["own_cpu_s"], *shared["worker_cpu_s"], shared["cpu_s"] / count)
         rows.append(
             {
@@ -171,10 +170,10 @@ _ROWS: dict[str, Callable[[_ScaleFolder, int, int, bool], list[dict[str, Any]]]]
 
 
 def cluster_of(alone: dict[str, Any], shared: dict[str, Any]) -> dict[str, Any]:
-    """What a cluster of `CORES` would do, by Amdahl's law, from one process and the most workers measured.
+    """The estimate for a cluster of `CORES`, by Amdahl's law, from one process and the most workers measured.
 
-    ``piece_s``: a worker's processor time for a mission. ``serial_s``: that of the one process that hands out, collects
-    and writes, its scheduler included, which nothing divides. ``serial_part``: that share of all work.
+    ``piece_s``: a worker's processor time for a mission. ``serial_s``: processor time of the one process that hands
+    out, collects and writes, its scheduler included, which nothing divides. ``serial_part``: its share of all work.
     """
     count = shared["missions"]
     piece_s, serial_s = sum(shared["worker_cpu_s"]) / count, shared["own_cpu_s"] / count

@@ -38,7 +38,7 @@ from gcsplan.world.kernels.zone_arrays import zones_as_arrays
 
 PLANNERS = {"RRT*": "RRTstar", "InformedRRT*": "InformedRRTstar", "BIT*": "BITstar"}
 CROSSINGS = 2000
-RIVALS_CURE = "this benchmark needs OMPL and mealpy: pip install 'gcsplan[bench]', or say --no-rivals"
+RIVALS_CURE = "this benchmark needs OMPL and mealpy: pip install 'gcsplan[bench]', or give --no-rivals"
 
 OneLeg = Callable[[float, float, float, float, float, float], bool]
 """``clear(east0_m, north0_m, amsl0_m, east1_m, north1_m, amsl1_m)``."""
@@ -107,11 +107,11 @@ def plan(problem: Problem, name: str, seconds: float, seed: int) -> RivalAnswer:
     start, goal = space.allocState(), space.allocState()
     for axis in range(3):
         start[axis], goal[axis] = problem.start[axis], problem.goal[axis]
-    asked = base.ProblemDefinition(info)
-    asked.setStartAndGoalStates(start, goal)
-    asked.setOptimizationObjective(base.PathLengthOptimizationObjective(info))
+    definition = base.ProblemDefinition(info)
+    definition.setStartAndGoalStates(start, goal)
+    definition.setOptimizationObjective(base.PathLengthOptimizationObjective(info))
     planner = getattr(geometric, PLANNERS[name])(info)
-    planner.setProblemDefinition(asked)
+    planner.setProblemDefinition(definition)
     planner.setup()
     crossing_s = _crossing_s(info, start, problem)
     first: list[float] = []
@@ -128,9 +128,9 @@ def plan(problem: Problem, name: str, seconds: float, seed: int) -> RivalAnswer:
 
     planner.solve(base.PlannerTerminationCondition(over))
     planned_s = elapsed_s()
-    if not asked.hasExactSolution():
+    if not definition.hasExactSolution():
         return RivalAnswer(None, None, None, None, planned_s, counts[0])
-    path = asked.getSolutionPath()
+    path = definition.getSolutionPath()
     raw = _points(path)
     geometric.PathSimplifier(info).simplify(path, 10.0 * seconds)  # ends by itself long before that time
     simple = _points(path) if path.check() else raw

@@ -1,9 +1,9 @@
 """Starts, goals, ceilings and zones over the sample DEM, drawn from a seed: the parts of the problems.
 
 A pair is kept if a ceiling exists that blocks the straight line but leaves start and goal joined below it. Zones are
-kept if those of unlimited height leave them joined too. Both are found by flooding the cells of the DEM from the start;
-a cell is as high as its highest corner and blocked by a zone that touches it, so cells that count as joined are joined.
-Whether the climb limit and the other zones leave a path is for the planners to find.
+kept if the zones of unlimited height leave them joined too. Both are found by flooding the cells of the DEM from the
+start; a cell is as high as its highest corner and blocked by a zone that touches it, so cells that count as joined are
+joined. Whether the climb limit and the other zones leave a path is for the planners to find.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class TerrainPair:
 
     ``ceiling_m`` is the max AMSL that blocks the straight line. ``steepest_deg`` is the climb and descent limit: they
     are equal, so that a leg is legal in both directions, which planners that grow trees from both ends assume.
-    ``redraws`` counts those of the pair and of its zones.
+    ``redraws`` counts the redraws of the pair and of its zones.
     """
 
     number: int
@@ -86,7 +86,7 @@ class FloorCells:
         return cls(highest, e, n, 0.51 * float(np.hypot(*size)))
 
     def joined(self, surface: Surface, a: tuple[float, float], b: tuple[float, float], open_: Bools) -> bool:
-        """Whether ``open_`` cells that share edges lead from the cell of ``a`` to that of ``b``."""
+        """Whether ``open_`` cells that share edges lead from the cell of ``a`` to the cell of ``b``."""
         from scipy.ndimage import label
 
         (c0, r0), (c1, r1) = (np.floor(surface.grid(*p)).astype(int) for p in (a, b))
@@ -186,7 +186,7 @@ def draw_zones(
 ) -> list[Zone]:
     """Discs around the line from start to goal, none over either; radii are spread evenly in their logarithm.
 
-    Of each four, two have unlimited height, one has a ceiling (to be flown over), and one a floor (to be flown under)
+    In each four, two have unlimited height, one has a ceiling (to be flown over), and one a floor (to be flown under)
     and, in half of the cases, a ceiling too. Levels are above ground or, equally often, above mean sea level.
     """
     a, b = np.array(pair.start), np.array(pair.goal)

@@ -16,7 +16,7 @@ Kinds:
   (`draw_with_room`), for planners that search by samples; always with the clearance and errors of a real mission.
 
 Starts and goals are at the lowest legal altitude, rounded up to a centimetre. Clearance and errors are zero, so that
-other planners need only a yes or no; ``errors`` sets those of a real mission. Everyday missions have their own.
+other planners need only a yes or no; ``errors`` sets a real mission's values. Everyday missions have their own.
 
 A mission has room if a *corridor* joins its ends: a strip that advances along the straight track, turns at most 45° off
 it and stays within half its length to either side, so that a point on each plane across the track can follow it. It is
@@ -94,7 +94,7 @@ def problems(
 ) -> list[NamedProblem]:
     """The problems of one kind, or the first ``count`` of each group. Raises InputError for an unknown kind.
 
-    ``errors``: with the clearance and errors of a real mission; ceilings and zones are then drawn for those.
+    ``errors``: with the clearance and errors of a real mission; ceilings and zones are then drawn for them.
     """
     make = _PROBLEM_MAKERS.get(kind)
     if make is None:
@@ -127,11 +127,11 @@ def key_of(problem: Problem) -> str:
     ]
     rows, cols = surface.ground_m.shape
     corners = surface.grid.to_plane([0.0, cols - 1.0], [0.0, rows - 1.0])
-    told = (
+    inputs = (
         [f"{x:.3f}" for x in (*p.start, *p.goal, *corners.ravel().tolist())], p.via, zones, p.limits,
         p.objective, p.vertical_j_per_m, p.horizontal_j_per_m, p.turn_radius_m, round(p.airspace.scale, 9),
     )  # fmt: skip
-    digest = hashlib.sha256(repr(told).encode())
+    digest = hashlib.sha256(repr(inputs).encode())
     digest.update(surface.ground_m.tobytes())
     if surface.top_m is not surface.ground_m:
         digest.update(surface.top_m.tobytes())

@@ -28,7 +28,7 @@ class MethodLine:
 
     ``gaps`` are percent above the best certified bound of the problem if there is one; for gcsplan's own runs, above
     the run's own bound. ``shorter`` counts problems on which the method beats gcsplan's ordinary run. Percentiles (50,
-    90) are of seconds; ``ratio`` is the median of the whole time over that of the sweep; ``memory_mb`` is the largest
+    90) are of seconds; ``ratio`` is the median of the whole time over the sweep's median; ``memory_mb`` is the largest
     peak.
     """
 
@@ -138,7 +138,7 @@ def table(found: Sequence[MethodLine], title: str) -> Table:
 
 
 def markdown(found: Sequence[MethodLine], outcomes: Sequence[MethodOutcome], about: Sequence[str]) -> str:
-    """The table with what was measured, and the problems that were not solved."""
+    """The table of the measured lines, and the problems that were not solved."""
     rows = [TERRAIN_COLUMNS, tuple("---" for _ in TERRAIN_COLUMNS), *(line.cells for line in found)]
     text = ["# Planners over real terrain", "", *about, "", *(f"| {' | '.join(row)} |" for row in rows), ""]
     for heading, items in (

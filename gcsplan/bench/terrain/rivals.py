@@ -1,7 +1,7 @@
 """Other planners, run in a separate process; each answer is written to a file before the next is requested.
 
-A run takes minutes to hours, so what is in the file is not run again after an interruption. A rival that crashes or
-hangs loses only its own answer.
+A run takes minutes to hours, so answers in the file are not computed again after an interruption. A rival that crashes
+or hangs loses only its own answer.
 """
 
 from __future__ import annotations
@@ -93,21 +93,21 @@ class Answers:
 
 
 def compare(
-    named: Sequence[NamedProblem], asked: Sequence[Rival], answers: Answers, seed: int,
+    named: Sequence[NamedProblem], chosen: Sequence[Rival], answers: Answers, seed: int,
     tell: Callable[[str], None] = lambda words: None, *, kept_only: bool = False,
 ) -> Iterator[MethodOutcome]:  # fmt: skip
     """Every rival's outcome on every problem, as they come; ``tell`` receives a message on each.
 
     Raises InputError if a rival is not installed. With ``kept_only``, answers come only from the file, of any version.
 
-    Paths are judged again here by the exact check, those of earlier runs too: the file is not trusted.
+    Paths are judged again here by the exact check, also from earlier runs: the file is not trusted.
     """
-    versions = {rival: None if kept_only else release(rival) for rival in asked}
+    versions = {rival: None if kept_only else release(rival) for rival in chosen}
     worker: RivalProcess | None = None
     try:
         for one in named:
             key = key_of(one.problem)
-            for rival in asked:
+            for rival in chosen:
                 version = versions[rival]
                 outcome = answers.get(key, rival.method, version)
                 if outcome is None and version is None:
@@ -205,9 +205,9 @@ def _attempt(problem: Problem, rival: Rival, seed: int, base: MethodOutcome) -> 
     return judged(done, problem)
 
 
-def require(asked: Sequence[Rival]) -> None:
+def require(chosen: Sequence[Rival]) -> None:
     """Raise InputError with a cure if a rival is not installed."""
-    if not asked:
-        raise InputError("no rival is asked for: give --seconds, or say --no-rivals")
-    for rival in asked:
+    if not chosen:
+        raise InputError("no rival is requested: give --seconds, or --no-rivals")
+    for rival in chosen:
         release(rival)

@@ -91,9 +91,9 @@ def run(  # noqa: PLR0913 - options by name, each with a default
         raise InputError("runs and count must be 1 or more, seconds more than 0")
     if not (math.isfinite(gap_percent) and gap_percent >= 0.0):
         raise InputError(f"gap_percent must be 0 or more, given {gap_percent:g}")
-    asked = others.rivals(seconds, swarms=swarms) if rivals else []
+    compared_with = others.rivals(seconds, swarms=swarms) if rivals else []
     if rivals and not kept_only:
-        others.require(asked)
+        others.require(compared_with)
     require_names(without)
     options = {"without": tuple(without)} if without else {}
     result = TerrainResult()
@@ -101,7 +101,7 @@ def run(  # noqa: PLR0913 - options by name, each with a default
     warm_s = 0.0
 
     def write() -> None:
-        result.about = _about(result.outcomes, seed, runs, warm_s, redraws, errors, asked)
+        result.about = _about(result.outcomes, seed, runs, warm_s, redraws, errors, compared_with)
         result.write(directory)
 
     try:
@@ -125,9 +125,9 @@ def run(  # noqa: PLR0913 - options by name, each with a default
             if kind in others.RIVAL_KINDS:
                 compared += named
             write()
-        if asked:
+        if compared_with:
             kept = others.Answers(directory / ANSWERS)
-            result.outcomes += others.compare(compared, asked, kept, seed, tell, kept_only=kept_only)
+            result.outcomes += others.compare(compared, compared_with, kept, seed, tell, kept_only=kept_only)
     finally:
         if result.outcomes:
             write()
@@ -136,36 +136,36 @@ def run(  # noqa: PLR0913 - options by name, each with a default
 
 def _about(
     outcomes: Sequence[MethodOutcome], seed: int, runs: int, warm_s: float, redraws: Sequence[tuple[int, int]],
-    errors: bool, asked: Sequence[others.Rival],
+    errors: bool, compared_with: Sequence[others.Rival],
 ) -> list[str]:  # fmt: skip
-    """Lines on what was measured, and on which machine."""
+    """Lines on the measurement and its machine."""
     sweeps = [o.sweep_s for o in outcomes if o.sweep_s is not None]
     held = "with the clearance and errors of a real mission" if errors else "with no clearance and no errors"
     pairs, sets = (max((r[i] for r in redraws), default=0) for i in (0, 1))
-    told = [
+    lines = [
         f"Seed {seed}, {held}; gcsplan {version('gcsplan')}, Python {platform.python_version()}, {platform.machine()}.",
         "",
         f"Our times are medians of {runs} runs in process, warm (compiling and a first plan of each group took "
-        f"{warm_s:.1f} s); each run starts with an airspace that nothing has been worked out for yet.",
+        f"{warm_s:.1f} s); each run starts with an airspace without any results of earlier runs.",
         f"The sweep, the exact check of {SWEEP_LEGS:,} one-kilometre legs, took {statistics.median(sweeps):.4f} s "
-        "(median of all, one after every run); memory is the peak above what was in use before.",
-        "Gaps are above the highest certified lower bound; ours above that of the same run; they may stop at a "
-        f"certified gap of {_gaps_asked(outcomes)}. 'Done' is the time to the certificate of ours.",
+        "(median of all, one after every run); memory is the peak above the memory in use before.",
+        "Gaps are above the highest certified lower bound; our gaps are above the bound of the same run; our runs may "
+        f"stop at a certified gap of {_gaps_requested(outcomes)}. 'Done' is the time to our certificate.",
         f"Before one problem up to {pairs} pairs and {sets} sets of zones were drawn in vain.",
     ]
-    if asked:
+    if compared_with:
         releases = {o.version for o in outcomes if o.version}
-        told += [
+        lines += [
             f"Others: {', '.join(sorted(releases)) or 'none yet'}; they get the same exact check of each "
-            "leg, and OMPL's seconds are those of the processor without those spent between C++ and Python.",
+            "leg, and OMPL's seconds are processor time without the time spent between C++ and Python.",
         ]
-    return told
+    return lines
 
 
-def _gaps_asked(outcomes: Sequence[MethodOutcome]) -> str:
+def _gaps_requested(outcomes: Sequence[MethodOutcome]) -> str:
     """The requested gaps by method, in words."""
-    asked = {(o.method, o.gap_asked_percent) for o in outcomes if o.gap_asked_percent is not None}
-    return ", ".join(f"{gap:g} % ({method})" for method, gap in sorted(asked)) or "no size"
+    gaps = {(o.method, o.gap_asked_percent) for o in outcomes if o.gap_asked_percent is not None}
+    return ", ".join(f"{gap:g} % ({method})" for method, gap in sorted(gaps)) or "no size"
 
 
 SWEEP_LEGS = 100_000
@@ -202,7 +202,7 @@ def measure(
     """The outcome of gcsplan's planner: medians of ``runs``; ``long`` runs it once with a minute and no gap.
 
     Every run gets its own airspace and surface (over the same heights), so that nothing kept from the run before helps.
-    Creating them is not counted, but what the planner derives from them is.
+    Creating them is not counted, but the planner's own derived data are.
     """
     problem = replace(one.problem, budget_s=LONG_RUN_S, gap_percent=0.0) if long else one.problem
     memory, answers, swept, took = Memory(), [], [], []
@@ -226,7 +226,7 @@ def measure(
         return replace(base, status=_refused(answers[0]), detail=_words(answers[0], len(found), len(answers)))
     costs = [problem.cost(s.path) for s in found]
     bounds = [s.lower_bound for s in found if s.lower_bound is not None]
-    # A path may leave the terrain that was loaded first: it is then judged over what was loaded for it.
+    # A path may leave the terrain that was loaded first: it is then judged over the terrain that was loaded for it.
     safe = all(passes(_anew(s.problem or problem), s.path.points) for s in found)
     worst = max(range(len(found)), key=lambda i: costs[i])
     return replace(

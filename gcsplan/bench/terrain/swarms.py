@@ -24,7 +24,7 @@ from gcsplan.world.geometry.zones import Circle, Level
 
 SWARMS = {"GWO": "OriginalGWO", "PSO": "OriginalPSO", "DE": "OriginalDE", "ABC": "OriginalABC", "FOA": "OriginalFOA"}
 BASELINES = {"DE": SWARMS["DE"], "GWO": SWARMS["GWO"]}
-"""Those of `gcsplan bench swarms`."""
+"""The baselines of `gcsplan bench swarms`."""
 SWARM_MEMBERS, EPOCHS = 30, 500
 CONTROL, SPLINE_SAMPLES = 8, 200
 SAMPLE_SPARE_M, SAMPLE_SPARE_SLOPE = 5.0, 0.95

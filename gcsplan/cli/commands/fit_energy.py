@@ -43,7 +43,7 @@ def fit_energy(
     columns = _columns(csv_columns)
     found = fit(read_log(file, columns=columns, sysid=sysid) for file in logs)
     error = None
-    if not found.told:
+    if not found.is_complete:
         why = [f"{c.name}: {c.why}" for c in (found.vertical, found.horizontal) if c.value is None]
         error = {
             "code": CheckFailed.exit_code,

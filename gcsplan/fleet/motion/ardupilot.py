@@ -3,20 +3,20 @@
 ArduPilot flies each leg as if it stopped at its end, and begins the next leg while this one slows down, adding both
 motions (SCurve.cpp, `advance_target_along_track`). It begins as early as the middle of the turn then lies within
 WPNAV_RADIUS of the way point, is no faster than either leg allows, and turns with no more than WPNAV_ACCEL_C and
-WPNAV_ACCEL_Z (parameters' defaults). So a flight takes the seconds of its legs less those in which two of them overlap.
+WPNAV_ACCEL_Z (parameters' defaults). So a flight takes the seconds of its legs less the seconds of their overlaps.
 
 It waits for a vehicle that lags behind (`advance_wp_target_along_track`), which it does where it speeds up from a low
-speed: `LAG_S` is what that was measured to cost.
+speed: `LAG_S` is the measured delay.
 
 **Over steep ground** its height trails the ground's before it slows down. On a leg that follows the ground it flies at
-full speed while its height is within half of WPNAV_TER_MARGIN (10 m) of the wanted one, and the slower the more it is
-off, down to a standstill at the whole margin (AC_WPNav.cpp, `advance_wp_target_along_track`; AC_PosControl.cpp,
+full speed while its height is within half of WPNAV_TER_MARGIN (10 m) of the commanded one, and the slower the more it
+is off, down to a standstill at the whole margin (AC_WPNav.cpp, `advance_wp_target_along_track`; AC_PosControl.cpp,
 `pos_offset_z_scaler`). It climbs and sinks meanwhile with its rates at most, and as fast as it can still stop at the
-wanted height. So on a long slope it comes to the speed that its rates allow, and it is there a few seconds earlier than
-if it never left the height. Flown on a ramp of 50 %, where 2.5 m/s of climb allow 5 m/s of the 10: 7.4 m too low; 7.5 m
-by this rule.
+commanded height. So on a long slope it comes to the speed that its rates allow, and it is there a few seconds earlier
+than if it never left the height. Flown on a ramp of 50 %, where 2.5 m/s of climb allow 5 m/s of the 10: 7.4 m too low;
+7.5 m by this rule.
 
-**Its largest lean angle** limits the speed along a slope, against the drag. The airframe is that of ArduPilot's
+**Its largest lean angle** limits the speed along a slope, against the drag. The airframe is ArduPilot's
 simulated quadrotor (SIM_Frame.h: 3 kg, 15.08 m/s at 45° of lean, 593 m above sea level), whose drag is a body's, which
 grows with the square of the speed through the air, and the rotors', which grows with the speed itself. An airframe with
 less drag is faster. Along the body's longitudinal axis drag balances gravity, for the thrust is across it; so down a
@@ -45,7 +45,7 @@ BODY, ROTORS = 0.003627, 0.02532
 _LEAN_ROUNDS = 30
 
 MEASURED_AMSL_M, SPARE = 593.0, 1.007
-"""Where the drag was measured, and what a speed should be below the fastest where the altitude is not known."""
+"""The altitude at which the drag was measured, and the part of the fastest speed to keep at an unknown altitude."""
 
 
 TERRAIN_MARGIN_M = 10.0
@@ -96,10 +96,10 @@ def lean_needed_deg(speed_m_s: float, amsl_m: float | None = None) -> float:
 
     Without an altitude: with a little to spare, where the drag was measured.
     """
-    wanted = SPARE * speed_m_s if amsl_m is None else speed_m_s * (1.0 - 1e-3)
+    least_m_s = SPARE * speed_m_s if amsl_m is None else speed_m_s * (1.0 - 1e-3)
     leans = np.arange(1.0, LARGEST_LEAN_DEG + 1.0)
     height = np.full(len(leans), MEASURED_AMSL_M if amsl_m is None else amsl_m)
-    enough = np.flatnonzero(leaning_m_s(leans, np.zeros(len(leans)), height) >= wanted)
+    enough = np.flatnonzero(leaning_m_s(leans, np.zeros(len(leans)), height) >= least_m_s)
     return float(leans[enough[0]]) if len(enough) else LARGEST_LEAN_DEG + 1.0
 
 
@@ -136,12 +136,12 @@ def _fly(
     half, i, count = 0.5 * TERRAIN_MARGIN_M, first, len(lengths)
     speed, gone_m, since_s = speeds[first], 0.0, 0.0
     climbs = max(-down[i], min(up[i], rises[i] / lengths[i] * speed))
-    off = math.copysign(0.5 * climbs * climbs / vertical_m_s2, climbs)  # how far the height wanted is above its own
+    off = math.copysign(0.5 * climbs * climbs / vertical_m_s2, climbs)  # the commanded height above its own
     most_z, most = vertical_m_s2 * STEP_S, accel_m_s2 * STEP_S
     while True:
-        wanted = math.sqrt(2.0 * vertical_m_s2 * abs(off))
-        wanted = min(wanted, up[i]) if off > 0.0 else -min(wanted, down[i])
-        climbs += max(-most_z, min(most_z, wanted - climbs))
+        rate = math.sqrt(2.0 * vertical_m_s2 * abs(off))
+        rate = min(rate, up[i]) if off > 0.0 else -min(rate, down[i])
+        climbs += max(-most_z, min(most_z, rate - climbs))
         share = max(_SLOWEST, min(1.0, 2.0 - abs(off) / half))
         speed += max(-most, min(most, share * speeds[i] - speed))
         step_m, left_s = max(speed, _SLOWEST) * STEP_S, STEP_S
@@ -350,7 +350,7 @@ def curved(
 
 
 def _unit(way: Floats, instead: Floats) -> Floats:
-    """(L, 3) the directions of ``way``; those of ``instead`` where it has no length."""
+    """(L, 3) the directions of ``way``, or of ``instead`` where it has no length."""
     known = np.linalg.norm(way, axis=1) > _LEAST_CURVE_M
     course = np.where(known[:, None], way, instead)
     return np.asarray(course / np.linalg.norm(course, axis=1)[:, None])
@@ -413,7 +413,7 @@ def _latest(low: Floats, high: Floats, allowed: Callable[[Floats], Bools]) -> tu
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Turns:
-    """T turns between two legs each: the curves of the legs before and of those after (2T,), the legs' directions
+    """T turns between two legs each: the curves of the legs before, then of the legs after (2T,), the legs' directions
     (T, 3), and the lower speed limit of both (T,)."""
 
     pairs: Curves

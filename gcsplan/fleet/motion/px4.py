@@ -136,8 +136,8 @@ class Smoothed:
         return np.concatenate([[0.0], self.begin_m[1:] - 0.5 * self.arc_m, self.at[-1:]])
 
     def _corners(self, law: _Law, top: Floats) -> tuple[Floats, Floats, Floats]:
-        """Of the end of each leg (N,): the speed of the corner, the `_Law`'s base for it, and the speed that is reached
-        where the corner begins."""
+        """For the end of each leg (N,): the speed of the corner, the `_Law`'s base for it, and the speed where the
+        corner begins."""
         within = np.minimum(law.limit_m_s(self.leg_m[1:], 0.0), np.minimum(top[:-1], top[1:]))
         sharp = np.tan(np.minimum(0.5 * self.turn, 0.5 * math.pi - 1e-6))
         free = np.sqrt(self.vehicle.corner_accel_m_s2 * self.cut_m / np.maximum(sharp, 1e-9))
@@ -184,7 +184,7 @@ class _Law:
         return np.maximum(peak - self.ease_m_s / 3.0, 0.0) * self.ease_s
 
     def turning_s(self, turn: Floats, speed: Floats) -> Floats:
-        """Seconds for which it is slow in a corner: until its course is nearly that of the next leg."""
+        """Seconds for which it is slow in a corner: until its course is nearly the course of the next leg."""
         change = 2.0 * speed * np.sin(0.5 * np.maximum(turn - ALIGNED, 0.0))
         full = change / self.accel + self.ease_s
         return TURN_SHARE * np.where(change > self.accel * self.ease_s, full, 2.0 * np.sqrt(change / self.jerk))
@@ -294,8 +294,8 @@ def smoothed(
 def _rounded(
     p: Floats, leg_m: Floats, cut: Floats, turn: Floats, stands: Bools
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """The track through ``p`` with rounded corners as chords, the metres along it, those at each corner's middle, and
-    the corners' lengths."""
+    """The track through ``p`` with rounded corners as chords, the metres along it, the metres at each corner's middle,
+    and the corners' lengths."""
     share = np.linspace(0.0, 1.0, _CHORDS + 1)[:, None, None]
     unit = np.diff(p, axis=0) / leg_m[:, None]
     a, b = p[1:-1] - unit[:-1] * cut[:, None], p[1:-1] + unit[1:] * cut[:, None]

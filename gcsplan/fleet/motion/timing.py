@@ -112,7 +112,7 @@ def legs(
     1,) are one leg, cut to follow the ground or a curve; None: each part is a leg. ``pace`` (N - 1,) is the speed that
     results from a cruise speed of 1, if that is not 1. ``rates_m_s`` (N - 1, 2) are the rates of climb and descent on
     each part, ``radius_m`` (N - 1,) PX4's acceptance radius at its end, if they are not the vehicle's own; ``follows``
-    (N - 1,) those that follow the ground.
+    (N - 1,) the parts that follow the ground.
 
     ArduPilot flies S-curves (`curved`) and PX4 smooths (`smoothed`) unless a motion key of the vehicle is not
     bounded; every other vehicle rounds its corners (`speeds`). A fixed wing keeps the airspeed that it indicates,
@@ -159,7 +159,7 @@ class Route:
 
     A fixed wing has no columns: ``climb_out`` (K, 3) leads from the ground to the first point, ``glide`` (K, 3) from
     the last point down to the ground if it lands. After a return it circles over home and stays in the air.
-    ``climb_out_m_s`` (K - 1,) are true speeds along the climb-out, if they are not those of any leg.
+    ``climb_out_m_s`` (K - 1,) are true speeds along the climb-out, if they differ from every leg's speed.
     """
 
     name: str
@@ -215,8 +215,8 @@ class Route:
 class Course:
     """The stretches of a route for a vehicle, ready for any speed.
 
-    ``to_goal`` are those before the arrival, each with the seconds of holding after it; ``after`` are those after the
-    arrival.
+    ``to_goal`` are the stretches before the arrival, each with the seconds of holding after it; ``after`` are the
+    stretches after the arrival.
     """
 
     def __init__(self, route: Route, vehicle: Vehicle) -> None:
@@ -294,14 +294,14 @@ def motion_error_m(vehicle: Vehicle, error_m: float = POSITION_ERROR_M) -> float
 
 
 def speed_for(
-    time_s: Callable[[float], float], wanted_s: float, slow_m_s: float, fast_m_s: float, within_s: float = 1e-9
+    time_s: Callable[[float], float], target_s: float, slow_m_s: float, fast_m_s: float, within_s: float = 1e-9
 ) -> float:
-    """The speed between two at which ``time_s`` (falling) is ``wanted_s``; the faster end where it is flat.
+    """The speed between two at which ``time_s`` (falling) is ``target_s``; the faster end where it is flat.
 
-    If ``wanted_s`` is not between the times at the two ends, the nearer end is returned.
+    If ``target_s`` is not between the times at the two ends, the nearer end is returned.
     """
     low, high = slow_m_s, fast_m_s
-    t_low, t_high = time_s(low) - wanted_s, time_s(high) - wanted_s
+    t_low, t_high = time_s(low) - target_s, time_s(high) - target_s
     if t_high >= -within_s:
         return high
     if t_low <= within_s:
@@ -313,7 +313,7 @@ def speed_for(
         x = (x_low * t_high - x_high * t_low) / (t_high - t_low)
         if not x_high < x < x_low:
             x = 0.5 * (x_low + x_high)
-        t = time_s(1.0 / x) - wanted_s
+        t = time_s(1.0 / x) - target_s
         if abs(t) <= within_s or x_low - x_high <= 1e-15 * x_low:
             break
         if t > 0.0:

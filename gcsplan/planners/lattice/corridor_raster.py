@@ -1,6 +1,6 @@
 """Floors and ceilings sampled around a track, on which tracks are pulled tight at 100 trials per millisecond.
 
-Floors and ceilings are those of `Airspace`, on a raster along a corridor. Zones that are flown over or under are part
+Floors and ceilings come from `Airspace`, on a raster along a corridor. Zones that are flown over or under are part
 of them, all others are walls. The result is not proved legal: `profile.exact` checks it, and `Guide.learn` and
 `Guide.narrow` correct the raster where it was wrong.
 """

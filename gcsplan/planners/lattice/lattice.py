@@ -1,7 +1,7 @@
 """The world as the lattice search sees it: a square lattice of nodes with floors, ceilings and zones on its edges.
 
-Floors and ceilings are those of `Airspace` on a lattice of half the spacing, so that they are known at the ends and
-in the middle of every edge; zones are tested against the whole line of an edge. The lattice only guides: the result of
+Floors and ceilings come from `Airspace`, on a lattice of half the spacing, so that they are known at the ends and in
+the middle of every edge; zones are tested against the whole line of an edge. The lattice only guides: the result of
 a search is checked exactly along its line, and `Lattice.raise_floor` corrects the lattice for the next search.
 """
 
@@ -99,7 +99,8 @@ def make_lattice(problem: Problem, box: tuple[float, float, float, float], step_
 
 
 def _ground_of_zones(problem: Problem, x: Floats, y: Floats, wanted: Bools, beside_m: float) -> Floats:
-    """Ground altitude where ``wanted`` and within ``beside_m`` of the box of a zone with a level AGL; 0 elsewhere."""
+    """Ground altitude at ``wanted`` places no farther than ``beside_m`` from the box of a zone with a level AGL; 0
+    elsewhere."""
     asked = np.zeros(wanted.shape, np.bool_)
     for zone in problem.airspace.zones:
         if zone.follows_ground:

@@ -109,7 +109,7 @@ def cheaper(problem: Problem, tell: Tell, known: Floats, longest_m: float) -> Fl
 
 
 def _not_found(problem: Problem, router: Router | None) -> Refusal:
-    """The refusal after the last lattice: how fine that was, and what stopped the last track, and where."""
+    """The refusal after the last lattice: its spacing, and the reason and the place of the last track's stop."""
     words, place, at = "", None, ""
     if router is not None:
         words = f" on a grid of {router.lattice.step_m:.0f} m"

@@ -38,8 +38,8 @@ and by the last, from the start again."""
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Label:
-    """A track to a terminal: its ``cost``, reachable altitudes from ``low_m`` to ``high_m``, those of lowest cost from
-    ``cheap_low_m`` to ``cheap_high_m``, and its ``places`` (N, 2)."""
+    """A track to a terminal: its ``cost``, reachable altitudes from ``low_m`` to ``high_m``, the cheapest of these
+    altitudes from ``cheap_low_m`` to ``cheap_high_m``, and its ``places`` (N, 2)."""
 
     cost: float
     low_m: float
@@ -85,7 +85,7 @@ def search(  # noqa: PLR0913 - options by name, each with a default
     links = (start_links, goal_links)
     node = np.concatenate([x.node for x in links])
     from_start = np.arange(len(node)) < len(start_links.node)
-    # Links run from the terminal to the node; those of the goal are flown from the node to the terminal.
+    # Links run from the terminal to the node; the goal's links are flown from the node to the terminal.
     low = np.vstack([start_links.low_m, goal_links.low_m[:, ::-1]])
     high = np.vstack([start_links.high_m, goal_links.high_m[:, ::-1]])
     source = np.where(from_start, here, node)

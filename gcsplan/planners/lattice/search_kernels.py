@@ -242,7 +242,7 @@ def reach(  # type: ignore[no-untyped-def]
                     value[count, q] = v[q]
                 first[to] = count
                 held[to] += 1
-                # The rest of the track is at least the straight line, and at least what the climb (descent) needs.
+                # The rest of the track is at least the straight line, and at least the climb's (descent's) length.
                 ahead, vertical = rest, 0.0
                 if terms[GOAL_LOW] > v[HIGH] and (terms[GOAL_LOW] - v[HIGH]) / terms[UP] > ahead:
                     ahead = (terms[GOAL_LOW] - v[HIGH]) / terms[UP]

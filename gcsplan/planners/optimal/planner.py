@@ -50,11 +50,11 @@ def plan(problem: Problem) -> Solution:
     ``budget`` is not ``clocked``. With ``turn_radius_m`` the
     path's points are fly-by way points, passed on arcs of that radius, and the flown path is the legal one.
     ``options``: ``without``, names of searches to leave out. If no path is found, raises Refusal (a NoMission), which
-    names the binding constraint and says whether it is proved that there is no path.
+    names the binding constraint and whether it is proved that there is no path.
     """
     problem = replace(problem, budget=problem.budget.anew(problem.budget_s, problem.budget_mb))
     found = plan_over(problem, _within)
-    # The searches bound paths between the exact ends; those of the mission may lie beside them.
+    # The searches bound paths between the exact ends; the mission's ends may lie beside them.
     bound = None if found.lower_bound is None else problem.rounding().bound(found.lower_bound)
     return replace(found, lower_bound=bound)
 
@@ -110,7 +110,7 @@ def _turning(problem: Problem) -> Solution:
     the arcs need it. Raises Refusal."""
     from gcsplan.planners.turns.planner import rounded, with_more_clearance  # few missions have wings
 
-    # Laps are short and have sharp corners: rounding them to arcs loses what they gain.
+    # Laps are short and have sharp corners: rounding them to arcs loses their gain.
     sharp = _sharp(replace(problem, turn_radius_m=0.0), sharp=False)
     points = sharp.path.points
 
@@ -125,7 +125,7 @@ def _turning(problem: Problem) -> Solution:
     if found is None:
         raise Refusal(
             f"a path with sharp corners was found, but none was whose arcs of turn_radius_m {problem.turn_radius_m:g} "
-            f"keep the limits: allow tighter turns, or move what is in the way",
+            f"keep the limits: allow tighter turns, or move the obstacle",
             reason="not_found",
         )
     near = sharp.lower_bound is not None and found.cost <= sharp.lower_bound * (1.0 + problem.gap_percent / 100.0)

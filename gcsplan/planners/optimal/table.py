@@ -28,15 +28,15 @@ def kinds() -> tuple[type[Search], ...]:
 
 
 def all_searches(work: Workspace) -> list[Search]:
-    """The searches of one problem, but for those that its options leave out. Raises InputError for an unknown name."""
+    """The searches of one problem, without the ones that its options exclude. Raises InputError for an unknown name."""
     without = left_out(work.incumbent.problem)
     return [kind(work) for kind in kinds() if kind.NAME not in without]
 
 
 def left_out(problem: Problem) -> tuple[str, ...]:
     """The searches that a problem's options leave out. Raises InputError for an unknown name."""
-    asked = problem.options.get("without", ())
-    names = tuple(str(n) for n in asked) if isinstance(asked, tuple | list) else (str(asked),)
+    without = problem.options.get("without", ())
+    names = tuple(str(n) for n in without) if isinstance(without, tuple | list) else (str(without),)
     require_names(names)
     return names
 

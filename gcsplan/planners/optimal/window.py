@@ -1,9 +1,9 @@
 """Planning over a window of the terrain, and over a larger one where the window's border limits the result.
 
 A bound, or a proof that there is no path, is found for paths within the window. It holds for all paths over the
-mission's terrain if those that leave the window cost at least as much; the track to the border and on to the goal gives
+mission's terrain if paths that leave the window cost at least as much; the track to the border and on to the goal gives
 their least cost. Otherwise more terrain is loaded, until memory, time or the terrain ends. Then the bound is the least
-cost of the paths that leave, and a refusal says how far from the straight track the terrain was searched.
+cost of the paths that leave, and a refusal gives the distance from the straight track to which terrain was searched.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ MOST_WINDOWS = 12
 
 def plan_over(problem: Problem, plan_window: PlanFunction) -> Solution:
     """The solution of ``plan_window`` over the problem's surface, with a bound for all terrain. Plans over more terrain
-    if paths beyond the border could be better by more than the wanted gap, or if there are none within it.
+    if paths beyond the border could be better by more than the requested gap, or if there are none within it.
 
-    ``plan_window`` raises the refusal of `refusal.explain` if it finds no path. The solution's ``problem`` is that of
-    its window; None for the first window. Raises Refusal.
+    ``plan_window`` raises the refusal of `refusal.explain` if it finds no path. The solution's ``problem`` is the
+    window's problem; None for the first window. Raises Refusal.
     """
     begun = time.perf_counter()
     best: Solution | None = None
@@ -38,9 +38,9 @@ def plan_over(problem: Problem, plan_window: PlanFunction) -> Solution:
     now, widest = problem, problem.widen is None
     for _ in range(MOST_WINDOWS):
         leaving = exit_cost(now)
-        asked = replace(now, progress=_reported(now, begun, leaving), leaving=math.inf if widest else leaving)
+        window = replace(now, progress=_reported(now, begun, leaving), leaving=math.inf if widest else leaving)
         try:
-            found = plan_window(asked)
+            found = plan_window(window)
         except NoPath as no_path:
             refused = no_path
             if best is not None or not goes_on(now) or (no_path.reason == "infeasible" and enclosed(now)):
@@ -74,9 +74,9 @@ def _reported(now: Problem, begun: float, leaving: float) -> Callable[[Progress]
     if report is None:
         return None
 
-    def held(said: Progress) -> None:
-        bound = None if said.lower_bound is None else min(said.lower_bound, leaving)
-        report(replace(said, elapsed_s=time.perf_counter() - begun, lower_bound=bound))
+    def held(state: Progress) -> None:
+        bound = None if state.lower_bound is None else min(state.lower_bound, leaving)
+        report(replace(state, elapsed_s=time.perf_counter() - begun, lower_bound=bound))
 
     return held
 
@@ -122,7 +122,7 @@ def held_to_border(problem: Problem, found: Solution, leaving: float) -> Solutio
 
 
 def binds(problem: Problem, found: Solution, leaving: float) -> bool:
-    """Whether paths that leave the surface set the bound, and the gap is larger than wanted because of them."""
+    """Whether paths that leave the surface set the bound, and the gap is larger than requested because of them."""
     if found.lower_bound is None:
         return False
     return found.lower_bound >= leaving and problem.cost(found.path) - leaving > problem.gap_percent / 100.0 * leaving
@@ -131,7 +131,7 @@ def binds(problem: Problem, found: Solution, leaving: float) -> bool:
 def better(now: Problem, best: Solution | None, found: Solution) -> Solution:
     """The better of two solutions: ``found`` over the present terrain, or ``best`` over less terrain. If the path of
     ``best`` is cheaper, it is returned with the bound of ``found`` if it is legal here; else with its own if it is
-    cheaper by more than the wanted gap."""
+    cheaper by more than the requested gap."""
     if best is None or now.cost(found.path) <= now.cost(best.path):
         return found
     points, limits = best.path.points, now.limits

@@ -172,8 +172,8 @@ def extend(
 ) -> tuple[Track, Flown] | None:
     """Insert laps into a track (N, 2) where its profile is too steep; return track and profile, None if no laps help.
 
-    ``pinned`` (N,) vertices that stay, ``pin_m`` (N,) their altitudes (NaN: free), as in `Track`. ``length``: that of
-    laps, see `SPARE`. A track that needs no laps is returned without any.
+    ``pinned`` (N,) vertices that stay, ``pin_m`` (N,) their altitudes (NaN: free), as in `Track`. ``length``: of a lap,
+    see `SPARE`. A track that needs no laps is returned without any.
     """
     track = sampled_track(problem, points, pinned, pin_m)
     lack = lacking(problem, track)
@@ -199,8 +199,8 @@ def with_laps(
 ) -> list[tuple[Floats, Bools]]:
     """Paths over a track (N, 2) with laps where it is too steep: way points (M, 3), and (M,) whether they must stay.
 
-    ``exact`` makes way points of a track and its profile, or tells why the exact check refuses them; then longer laps
-    are tried. At most two paths; none if no laps help.
+    ``exact`` makes way points of a track and its profile, or returns the reason of a refusal by the exact check; then
+    longer laps are tried. At most two paths; none if no laps help.
     """
     limits = problem.limits
     found = []
@@ -219,9 +219,9 @@ def with_laps(
 def _lengthened(
     problem: Problem, track: Track, lack: Lacking, length: tuple[float, float]
 ) -> tuple[Track, Lacking] | None:
-    """Insert laps along the piece that lacks most height: the first that are enough, otherwise those that help most.
+    """Insert laps along the piece that lacks most height: the first laps that are enough, otherwise the most helpful.
 
-    ``length``: see `extend`. Return the longer track and what it still lacks; None if no laps help.
+    ``length``: see `extend`. Return the longer track and the height that it still lacks; None if no laps help.
     """
     why, limits = lack.steep[0], problem.limits
     needed = why.by / (limits.max_climb_slope if why.kind == "climb" else limits.max_descent_slope)
@@ -250,8 +250,8 @@ class _Detour:
 
 
 def _promising(problem: Problem, track: Track, lack: Lacking, length_m: float) -> list[_Detour]:
-    """Detours along the piece that lacks most height: at most `TRIED` that clear all zones, first those whose floor
-    exceeds a steady climb least."""
+    """Detours along the piece that lacks most height: at most `TRIED` that clear all zones, in the order in which their
+    floor exceeds a steady climb, least first."""
     why, up = lack.steep[0], lack.steep[0].kind == "climb"
     slope = problem.limits.max_climb_slope if up else problem.limits.max_descent_slope
     low_s, high_s = (why.s0_m, why.s1_m) if up else (why.s1_m, why.s0_m)

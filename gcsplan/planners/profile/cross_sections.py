@@ -113,7 +113,7 @@ def _moved(problem: Problem, points: Floats, kinds: Indices, move_m: float) -> F
     aside[kind != FREE] = 0.0
     up[kind == UPRIGHT] = 0.0, 0.0, 1.0
     up[kind == FIXED] = 0.0
-    # Where the climb is limited, what is moved aside must move up or down by less, or the legs are too steep.
+    # Where the climb is limited, a point moved aside must move up or down by less, or the legs are too steep.
     upright = min(1.0, problem.limits.max_climb_slope, problem.limits.max_descent_slope)
     i, j = (a.ravel()[:, None] for a in np.meshgrid(ASIDE, UP))
     places = points[1:-1, None] + move_m * (i * aside[:, None] + upright * j * up[:, None])  # (n, 15, 3)

@@ -39,7 +39,7 @@ class Unsettled:
     span_m: float = 0.0
     zone: int = -1
     past: Unsettled | None = None
-    """Of a zone: why the profile past it fails that lacks least."""
+    """Per zone: why the profile past it fails that lacks least."""
 
 
 @dataclass(eq=False, slots=True)
@@ -99,7 +99,7 @@ def settle(
     """Way points (N, 3) over a track that pass the exact check, and (N,) whether they must stay.
 
     The profile is drawn over floors sampled point by point, which are closer to the true ground than bounds over whole
-    pieces of the track, and so are the levels of zones above ground, where those bounds leave no way. Where the exact
+    pieces of the track, and so are the levels of zones above ground, where these bounds leave no way. Where the exact
     check finds ground (or a maximum AGL, or such a zone) violated between two samples, the floor (ceiling, level) of
     that piece is corrected and the profile drawn again, up to `CORRECTIONS` times. `Unsettled` if none passes.
     """
@@ -171,7 +171,7 @@ def _pass(s_m: Floats, floor: Floats, ceiling: Floats, band: Band) -> None:
 
 
 def sampled_track(problem: Problem, points: Floats, pinned: Bools, pin_m: Floats) -> Track:
-    """A track whose tube is sampled point by point; the bands of zones are those of the exact tube."""
+    """A track whose tube is sampled point by point, with the exact tube's bands of zones."""
     exact = make_track(problem, points, pinned, pin_m)
     at = [np.zeros(1)]
     for a, b in zip(exact.s_m[:-1], exact.s_m[1:], strict=True):

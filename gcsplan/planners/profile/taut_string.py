@@ -4,7 +4,7 @@ A tube's floor and ceiling are linear between breakpoints and may jump there. A 
 breakpoints is therefore legal exactly if it passes every *door*, the span between floor and ceiling at a breakpoint.
 The shortest such profile minimises the sum of any convex function of the slope: length, total climb and the steepest
 climb or descent at once (Barlow et al. 1972, ch. 1; the funnel is Lee and Preparata's, 1984). If it breaks a climb
-limit, so does every other profile through those doors.
+limit, so does every other profile through the same doors.
 """
 
 from __future__ import annotations

@@ -24,8 +24,8 @@ KEEP_M = 1e-4
 """Metres kept from floors and ceilings where they are far enough apart, so that rounding never decides."""
 
 CLOSE_M, CLOSE_STEP_M, CLOSE_SPARE_M = 60.0, 1.0, 0.03
-"""Where a tube shuts an end in, the floor is read again: how far from that end, at what spacing, and what is added to
-it, all in metres."""
+"""Where a tube shuts an end in, the floor is read again: up to this distance from the end, at this spacing, with this
+much added, all in metres."""
 
 DEARER = 2e-4
 """Extra cost of passing over or under zones, as a part, from which on a track around the deepest is worth a search."""
@@ -52,7 +52,7 @@ class Obstruction:
     by: float
     zone: int = -1
     past: Obstruction | None = None
-    """Of a zone: what stops the profile past it that lacks least, of those that were tried."""
+    """Per zone: the obstacle to the profile past it that lacks least, out of all tried profiles."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -84,7 +84,7 @@ class Lacking:
     """The cheapest profile over a track if laps could be flown wherever it is too steep.
 
     ``cost``: with laps; ``laps_m``: metres of laps; ``steep``: the pieces that need them, most missing height first;
-    ``zones``: those that force the climb or descent of the first such piece. Where nothing is too steep, but the
+    ``zones``: the zones that force the climb or descent of the first such piece. Where nothing is too steep, but the
     cost is higher than without zones (`DEARER`), ``zones`` holds the zone that is met deepest.
     """
 
@@ -98,7 +98,7 @@ class Lacking:
 @dataclass(frozen=True, slots=True)
 class Closed:
     """Why a track cannot be flown even with laps: the floor is ``by`` metres above the ceiling at its tightest place,
-    for the best choice of sides that was tried; ``zones``: those passed over or under there, as far as known."""
+    for the best choice of sides that was tried; ``zones``: the zones passed over or under there, as far as known."""
 
     by: float
     zones: tuple[int, ...]
@@ -286,8 +286,8 @@ class _Sections:
         return tuple({b.zone: None for b in chosen if b.s0_m < s1_m + BESIDE_M and b.s1_m > s0_m - BESIDE_M})
 
     def deepest(self, profile: Profile, over: BandSides) -> tuple[int, float] | None:
-        """Of the bands without a chosen side the one that ``profile`` runs into deepest, and how many metres deep; None
-        if it clears all of them by `KEEP_M`."""
+        """The band that ``profile`` runs into deepest, out of the bands without a chosen side, and how many metres
+        deep; None if it clears all of them by `KEEP_M`."""
         hits: list[tuple[int, float]] = []
         if any(side is None for side in over):
             z = profile.at(self.s_m)

@@ -1,8 +1,8 @@
 """Levels of zones along a track, and the widest free altitudes between them.
 
 Where a zone follows ground, a tube takes the steepest slope around each whole piece for the zone's levels, which may be
-metres too much on a slope. Here they are read from the zone's own ground, within reach of samples of the track. That is
-no proof: the exact check judges what is flown between them.
+metres too much on a slope. Here they are read from the zone's own ground, within reach of samples of the track. This is
+no proof: the exact check judges the path between the samples.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from gcsplan.world.geometry.zones import Polygon, Zone
 LEVEL_SAMPLE_M = 12.0
 """Metres between samples along a track, at most."""
 SPARE_M, STEP_M = 0.05, 0.04
-"""Metres added to the levels that are read; and by how much a level is corrected after its first violation in the exact
-check, which tells no height. Each further correction is as much as all before."""
+"""Metres added to the levels that are read; and metres by which a level is corrected after its first violation in the
+exact check, which gives no height. Each further correction is as much as all before."""
 
 
 GROUND_RINGS = ((0.0, 1), (1.0 / 3.0, 8), (2.0 / 3.0, 16), (0.9, 32), (1.0, 64))
@@ -33,16 +33,16 @@ GROUND_RINGS = ((0.0, 1), (1.0 / 3.0, 8), (2.0 / 3.0, 16), (0.9, 32), (1.0, 64))
 
 
 def may_pass(problem: Problem, track: Track, shut: Obstruction) -> bool:
-    """Whether the exact check may pass a path over a track that is ``shut`` by its tube: what is pinched lacks
-    centimetres there, for cells shut what lacks more, and bands of zones above ground (AGL) are wider than what the
-    exact check shuts."""
+    """Whether the exact check may pass a path over a track that is ``shut`` by its tube. A pinched track lacks only
+    centimetres there, because cells shut a track that lacks more, and the tube's bands of zones above ground (AGL) are
+    wider than the altitudes that the exact check shuts."""
     follows = any(problem.airspace.zones[band.zone].follows_ground for band in track.tube.bands)
     return shut.kind == "pinched" or follows
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ZoneLevels:
-    """A band with levels read from the zone's own ground around samples of the track, and what they are at most.
+    """A band with levels read from the zone's own ground around samples of the track, and with their certain limits.
 
     ``most`` (2, K, 2): the tube's own bottom and top, which hold for certain; ``moved`` (K,): the corrections so far,
     infinite where nothing is left to correct.
@@ -104,8 +104,8 @@ class ZoneLevels:
 
 
 def _filled(s_m: Floats, ground: Floats) -> Floats:
-    """Ground (N,) along a track, where none is known that of the nearest places: at a zone's rim, little of its ground
-    is within reach, and samples may miss that."""
+    """Ground (N,) along a track; where none is known, the ground of the nearest places: at a zone's rim, little of its
+    ground is within reach, and samples may miss it."""
     known = np.isfinite(ground)
     return np.asarray(np.interp(s_m, s_m[known], ground[known]) if known.any() else ground)
 
@@ -114,8 +114,8 @@ def widest_free(
     problem: Problem, track: Track, s_m: Floats, floor_m: Floats, cap_m: float, enough_m: float
 ) -> tuple[Floats, Floats]:
     """(N,) the lowest and the highest altitude of the widest free interval at places ``s_m`` (N,) along a track, from
-    the floors there to a cap, between the zones; of those that are ``enough_m`` wide, the highest. The lowest altitude
-    is above the highest where none is free."""
+    the floors there to a cap, between the zones; if several are ``enough_m`` wide, the highest of them. The lowest
+    altitude is above the highest where none is free."""
     bands = []
     for band in (ZoneLevels.of(problem, track, of).band for of in track.tube.bands):
         within = (s_m >= band.s0_m) & (s_m <= band.s1_m)

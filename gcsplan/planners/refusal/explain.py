@@ -1,7 +1,7 @@
 """Why there is no path: terminals that break a limit by themselves, and the refusal after a search without success.
 
-A planner's own refusal says only whether it is proved that there is no path, or that none was found; `suggestions` then
-tries out what would help.
+A planner's own refusal states only whether it is proved that there is no path, or that none was found; `suggestions`
+then tries out cures.
 """
 
 from __future__ import annotations
@@ -154,14 +154,14 @@ def _proved(problem: Problem, place: tuple[float, float], amsl: float | None) ->
 
 
 def _broken(problem: Problem, place: tuple[float, float, float]) -> tuple[Violation, ...]:
-    """What the exact check finds at a place."""
+    """The finding of the exact check at a place."""
     here = np.array([place])
     return problem.airspace.examine(Legs.between(here, here, problem.limits), problem.limits).violations
 
 
 def _shut_by(problem: Problem, place: tuple[float, float], low: float, high: float) -> list[Zone]:
-    """The zones that shut all altitudes from ``low`` to ``high`` at a place, each by itself. Those with a level over
-    ground count only inside their shape: beside it, ground elsewhere decides."""
+    """The zones that shut all altitudes from ``low`` to ``high`` at a place, each by itself. A zone with a level over
+    ground counts only inside its shape: beside it, ground elsewhere decides."""
     air, limits, here, found = problem.airspace, problem.limits, np.array([place]), []
     for zone in air.zones:
         bottom, top, *over_ground = levels_of(limits, zone).tolist()

@@ -1,9 +1,9 @@
-"""What would help where there is no path: change one limit at a time and plan the changed problem.
+"""Cures where there is no path: change one limit at a time and plan the changed problem.
 
 `Trials` plans the changed versions, bounded in number and time. There are two kinds of plan. A quick one stops at its
-first path: it says that there is one, and which changes are worth more. A whole one has the budget and the wanted gap
-of the problem, and all that refuses a plan, such as the battery: only it says that a value would do. So a limit's value
-is reported to do only if a whole plan with it has a mission.
+first path: it shows that there is one, and which changes are worth more. A whole one has the budget and the requested
+gap of the problem, and every reason to refuse a plan, such as the battery: only a whole plan shows that a value would
+do. So a limit's value is reported to do only if a whole plan with it has a mission.
 """
 
 from __future__ import annotations
@@ -42,15 +42,15 @@ LACKS = {
     "time": "the arrival time is not kept",
     "too_many_items": "the mission has too many items",
 }
-"""What is said of a plan that found a path, and no mission, by the reason of its refusal."""
+"""Words for a plan that found a path, and no mission, by the reason of its refusal."""
 ANY_PERCENT = 1e6
-"""Wanted gap so large that the first path is good enough."""
+"""Requested gap so large that the first path is good enough."""
 HIGHEST_M, LEAST_DEG = 9500.0, 0.05
 """The highest ceiling, metres, and the smallest climb limit, degrees, that are tried."""
 
 
 FILLED = "give a terrain model that knows it (`gcsplan dem fetch` gets one), or fill its voids (nodata)"
-"""What fills unknown ground."""
+"""Advice for unknown ground."""
 NAMES, SINGLES = 5, 8
 """Most no-fly zones that are named in a message, and that are removed one at a time."""
 STEEPEST_DEG, STEEPEST_TURNING_DEG = 90.0, 45.0
@@ -65,7 +65,7 @@ class Trials:
     """Plans of changed versions of one problem: at most `MOST_TRIALS` quick ones, none of them begun after ``share_s``
     seconds, and whole ones, bounded by `WHOLE_SHARE`.
 
-    ``plan`` returns a solution or raises NoMission; ``whole`` is the same with everything that the caller asks of a
+    ``plan`` returns a solution or raises NoMission; ``whole`` is the same with every requirement of the caller on a
     plan, and may also raise CheckFailed.
     """
 
@@ -78,7 +78,7 @@ class Trials:
         self.stopped = False
         """Whether the last quick plan was stopped, so that it is not known whether its problem has a path."""
         self.lacks = ""
-        """What the last plan without a mission lacked, in words."""
+        """The lack of the last plan without a mission, in words."""
 
     @property
     def _now_s(self) -> float:
@@ -174,7 +174,7 @@ class Trials:
 
 
 def _lacks(refused: GcsplanError) -> str:
-    """What a plan that was refused lacks, in words that follow ``with VALUE``."""
+    """The lack of a plan that was refused, in words that follow ``with VALUE``."""
     if isinstance(refused, CheckFailed):
         return refused.headline
     if isinstance(refused, InputError):
@@ -250,8 +250,8 @@ def with_cures(
 ) -> Refusal:
     """The refusal ``bare`` of ``problem``, extended by what would help; every cure is planned before it is reported.
 
-    ``plan`` returns a solution of a changed problem or raises NoMission; ``whole`` (None: the same) also refuses
-    whatever else refuses a plan, and ``but`` says what that leaves out. The clock is read between two plans and
+    ``plan`` returns a solution of a changed problem or raises NoMission; ``whole`` (None: the same) also refuses for
+    every other reason, and ``but`` names the reasons that it leaves out. The clock is read between two plans and
     whenever a plan reports progress, so the whole stays short if the planner keeps ``budget_s``.
     """
     if not bare.untried:
@@ -399,8 +399,8 @@ def _above_ground(trials: Trials, path: Floats) -> Cure:
 
 
 def _fewer_zones(trials: Trials, path: Floats) -> Cure:
-    """Find which zones must go, among those that a path planned without zones enters: one of them alone, or else all of
-    them."""
+    """Find which zones must go, among the zones that a path planned without zones enters: one of them alone, or else
+    all of them."""
     problem, zones = trials.problem, trials.problem.airspace.zones
     broken = problem.airspace.examine(Legs.of_path(path, problem.limits), problem.limits).violations
     crossed = sorted({v.zone for v in broken if v.zone >= 0})

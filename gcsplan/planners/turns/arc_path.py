@@ -26,7 +26,7 @@ NO_TURN = 1e-9
 """Turns up to this many radians count as none."""
 
 DAMPED = 40
-"""Rounds more in which pinned discs go half of the way to where they belong, if they swing to and fro."""
+"""Further rounds in which pinned discs go half of the way to their place, if they swing to and fro."""
 
 MISSED_M = 1e-3
 """Metres by which an arc may end before its pin, or begin behind it."""

@@ -63,7 +63,7 @@ LACKING_M = 0.05
 
 
 class EndJudge(Protocol):
-    """What an aircraft keeps clear of near the ground. The check knows it, and no planner."""
+    """The judge of an aircraft's clearance near the ground. The check knows it, and no planner."""
 
     @property
     def reached_m(self) -> float:
@@ -81,7 +81,7 @@ class EndJudge(Protocol):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class WantedEnd:
-    """What is wanted of an end: at ``ground`` (3,), with a slant as steep as ``slope``, to ``agl_m`` above it at least.
+    """The required end: at ``ground`` (3,), with a slant as steep as ``slope``, to at least ``agl_m`` above it.
 
     ``heading``: the only one, radians from east to north, seen outwards; None for any.
     """
@@ -131,7 +131,7 @@ def straight_ends(problem: Problem, wanted: WantedEnd, sharp: Floats) -> Iterato
 
 
 def _headings(ground: Floats, aim: Floats, given: float | None) -> list[float]:
-    """The requested heading alone; otherwise all headings, those nearest to the direction of ``aim`` first."""
+    """The requested heading alone; otherwise all headings, the nearest to the direction of ``aim`` first."""
     if given is not None:
         return [given]
     natural = math.atan2(aim[1] - ground[1], aim[0] - ground[0])
@@ -212,7 +212,7 @@ def _circle(problem: Problem, judge: EndJudge, middle: Floats, least_m: float, a
     needed = max(_floor(air, np.array([[*middle[:2], 0.0], [*there, 0.0]]), wide), least_m)
     if not middle[2] < needed <= middle[2] + HIGHEST_CIRCLE_M:
         return None
-    # It may leave the circle lower by what the judge says.
+    # It may leave the circle lower by the metres that the judge reports.
     z = middle[2] + math.ceil((needed - middle[2]) * 100.0 - 1e-6) / 100.0 + judge.reached_m
     line = np.array([[*middle[:2], z], [*there, z]])
     clear = column_clear(middle, line[0], reach_m, limits, air) and air.clear(Legs.of_path(line, wide), wide).all()
@@ -303,8 +303,8 @@ def unfitting_legs(points: Floats, start: FlightEnd, goal: FlightEnd | None, rad
 
 
 def cut_off_m(points: Floats, start: FlightEnd, goal: FlightEnd | None, radius_m: float) -> float:
-    """Metres by which what is flown may be shorter than from the end of the climb-out to the approach: the arcs cut off
-    both joints, and circles do not pass their middle. ``points`` (N, 3) begin behind the first joint."""
+    """Metres by which the flown path may be shorter than from the end of the climb-out to the approach: the arcs cut
+    off both joints, and circles do not pass their middle. ``points`` (N, 3) begin behind the first joint."""
     whole = np.vstack([start.ground, start.leaves, points, *([] if goal is None else [goal.ground])])
     tangent = tangents_m(whole, radius_m)
     cut_m = 2.0 * (tangent - radius_m * np.arctan(tangent / radius_m))

@@ -180,7 +180,7 @@ def pinched(
 ) -> None:
     """Write to ``out`` (3,): metres of floor above ceiling, integrated along the track; the worst place; metres there.
 
-    The ceiling includes what can be climbed to from the start (``z0``), or descended from to the goal (``z1``). Places
+    The ceiling includes the height that can be reached from the start (``z0``), or left for the goal (``z1``). Places
     near the ends are ignored if little is missing (`END_M`, `FORGIVEN_M`): the ends are checked elsewhere.
     """
     total, worst, most = 0.0, 0.0, 0.0

@@ -9,7 +9,7 @@ anew (`turns.profile`), and discs are moved where ground or zones are in the way
 - A via is passed exactly: it lies on its arc and is a way point there, between the two that make the arc. At a slight
   turn the arc has one way point, just outside of the via, and the via is the middle of the arc.
 - Start and goal have no heading of their own.
-- No lower bound is computed here; that of the path with corners holds for every path with arcs too.
+- No lower bound is computed here; the bound of the path with corners holds for every path with arcs too.
 
 The arc of a pinned disc passes its pin in the middle. Between pins less than some 1.4 radii apart, or between a pin and
 an end that lies in its disc, there is no such arc path. With a free disc between them, which is flown around in a loop,
@@ -56,7 +56,7 @@ def with_loops(arc_path: ArcPath) -> ArcPath:
 
 
 def _short_legs(arc_path: ArcPath) -> list[int]:
-    """Legs that are too short; if there are none, those at a pinned disc whose arc does not reach its pin; in order."""
+    """Legs that are too short; if there are none, legs at a pinned disc whose arc does not reach its pin; in order."""
     bad = lacking_m(arc_path) > -SPARE_M
     if not bad.any():
         missed = np.concatenate([[0.0], missed_m(arc_path), [0.0]])
@@ -113,8 +113,8 @@ class Rounded:
 
     ``way_points`` (M, 3): for the autopilot. At each but the first and the last, where the legs turn, it flies the arc
     of the turn radius that is tangent to both legs. Arcs of neighbours may touch but do not overlap. Altitude is linear
-    along the track between way points; that of a way point is reached in the middle of its arc. ``flown`` (K, 3): that
-    path, arcs as chords; ``cost`` in the problem's objective, along the arcs themselves.
+    along the track between way points; each way point's altitude is reached in the middle of its arc. ``flown`` (K, 3):
+    that path, arcs as chords; ``cost`` in the problem's objective, along the arcs themselves.
     """
 
     way_points: Floats

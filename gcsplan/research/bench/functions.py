@@ -2,7 +2,7 @@
 
 There are two settings. *Middle*: the optimum is in the middle of the box, and the wolves' rule is bound to the same
 point (origin 0.5), which is what table 2 measured. *Shifted*: the same rule with the optimum moved, so that a rule
-loses what it owes to the middle. A result of 0 in the middle is less than the unit box resolves near 0.5, where doubles
+loses that advantage. A result of 0 in the middle is less than the unit box resolves near 0.5, where doubles
 are 1e−16 apart: about 1e−26 on f1. Rankings of such values count neither as reproduced nor as not reproduced.
 
 Every algorithm starts from the same population in the same run, so runs are compared in pairs.
@@ -139,7 +139,7 @@ def run(
     InputError for invalid arguments.
     """
     if not 1 <= runs <= MOST_RUNS:
-        raise InputError(f"1 to {MOST_RUNS} runs are wanted, given {runs}")
+        raise InputError(f"give 1 to {MOST_RUNS} runs, not {runs}")
     unknown = [name for name in functions if name not in FUNCTIONS]
     if unknown or not functions or not algorithms:
         raise InputError(f"functions must be of {', '.join(FUNCTIONS)}, given {', '.join(unknown) or 'none'}")
@@ -351,7 +351,7 @@ def _pairs(rows: list[dict[str, Any]]) -> Iterator[tuple[dict[str, Any], dict[st
 def _remarks(result: dict[str, Any]) -> list[str]:
     lines = []
     if any(row["mean"] == 0.0 for row in result["rows"]):
-        lines.append("0 of ours: less than the unit box can tell apart about its middle, 1e−26 on f1.")
+        lines.append("0 of ours: below the resolution of the unit box about its middle, 1e−26 on f1.")
     if any(row["printed_fault"] for row in result["rows"]):
         lines.append(f"‡ no {PAPER_RUNS} values can have the mean, standard deviation and best that the paper prints.")
     for setting in SETTINGS:

@@ -19,7 +19,7 @@ def abc(run: Run, *, limit: int, group: int, bees: str) -> Steps:
 
     Each bee tries to change one element of its source: vⱼ = xⱼ + φ·(xⱼ − x_kj), k another source. Each bee that does
     not improve its source adds one to the source's failures; a scout replaces a source of more than ``limit`` failures.
-    ``bees`` is "one": each bee starts from what the bee before it left; or "together", in a fraction of the time.
+    ``bees`` is "one": each bee starts from the result of the bee before it; or "together", in a fraction of the time.
     """
     require("abc", "bees", bees, ("together", "one"))
     x = run.first()
@@ -49,7 +49,7 @@ def ib_abc(run: Run, *, feedback: bool, scale: float, spent_share: float, group:
     when the mean count is high.
 
     ``scale`` bounds φ; ``spent_share`` is γ. Without ``feedback`` μ is 1: B-ABC, in our reading. ``counts_from`` is the
-    first count of each source, "one" or "zero"; with zero, as the text says, μ = 0/0 of the first cycle is taken as 0.
+    first count of each source, "one" or "zero"; with zero, as in the text, μ = 0/0 of the first cycle is taken as 0.
     """
     require("ib-abc", "counts_from", counts_from, ("one", "zero"))
     if not 0.0 < spent_share < 1.0:

@@ -102,7 +102,7 @@ def rms_distances(a: Floats, b: Floats) -> Floats:
 
 
 def keep_better(x: Floats, f: Floats, tried: Floats, f_tried: Floats) -> Bools:
-    """Replace rows of ``x`` and ``f`` by those of ``tried`` that cost less, in place; return which (n,)."""
+    """Replace rows of ``x`` and ``f`` by the rows of ``tried`` that cost less, in place; return which (n,)."""
     better = f_tried < f
     x[better] = tried[better]
     f[better] = f_tried[better]

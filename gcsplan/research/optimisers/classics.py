@@ -58,7 +58,7 @@ def de(run: Run, *, scale_least: float, scale_most: float, crossover: float) -> 
 def lshade(run: Run, *, memory: int, archive_share: float, best_share: float, least: int) -> Steps:
     """Mutation current-to-pbest/1 with an archive of replaced parents, binomial crossover, greedy replacement.
 
-    ``memory``: H, length of the success history; ``archive_share``: size of the archive over that of the population;
+    ``memory``: H, length of the success history; ``archive_share``: size of the archive over the population's;
     ``best_share``: p, part of the population from which pbest is drawn, at least two; ``least``: the final population.
     The population falls linearly with the spent budget.
     """

@@ -78,13 +78,13 @@ def minimise(  # noqa: PLR0913 - options by name, each with a default
         optimiser: a name of `gcsplan.research.optimisers.registry`, or a row of your own.
         cost: batch objective, (n, dim) to (n,). A value that is not finite counts as the worst.
         dim: number of variables, 1 or more.
-        population: size of the swarm; default: that of the row.
-        iterations: rounds of the update rule after the first population; default: that of the row, unless
-            ``evaluations`` is set.
+        population: size of the swarm; default: the row's.
+        iterations: rounds of the update rule after the first population; default: the row's, unless ``evaluations``
+            is set.
         evaluations: most cost evaluations (rows passed to ``cost``), used exactly: the last batch is cut. If both are
             set, the run ends at whichever is reached first.
         seed: a whole number, or a generator to draw from.
-        parameters: those of the rule; they replace the row's defaults.
+        parameters: the rule's parameters; they replace the row's defaults.
         target: stop after the batch that finds this cost or less.
         start: (m, dim) points that take the first places of the first population.
         tell: called after each batch; return True to stop.
@@ -171,12 +171,12 @@ class _Book:
     def _stop(self, at: int) -> StoppedBy | None:
         run = self.run
         assert self.best_x is not None
-        told = self.tell is not None and self.tell(
+        ended = self.tell is not None and self.tell(
             State(at, run.evaluations, run.elapsed, self.best, self.best_x.copy())
         )
         if self.best <= self.target:
             return "target"
-        if told:
+        if ended:
             return "told"
         return "evaluations" if run.evaluations == run.evaluations_limit else None
 

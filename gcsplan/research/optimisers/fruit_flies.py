@@ -1,6 +1,6 @@
 """Fruit flies: FOA (Pan 2012), IFFO (Pan et al. 2014), MFOA (Yuan et al. 2014), MSFOA (Shi et al. 2020).
 
-Equation numbers are those of Shi et al. FOA's smell judgement S = 1/D (eq. 3) stays in [0, 1] only for D ≥ 1, which
+Equation numbers follow Shi et al. FOA's smell judgement S = 1/D (eq. 3) stays in [0, 1] only for D ≥ 1, which
 does not hold in the unit square. MSFOA uses the distance itself (eq. 31), an encoding with two hidden variables for
 each coordinate. This module holds the search alone: places of swarms, and flies around them.
 """
@@ -16,7 +16,7 @@ from gcsplan.errors import InputError
 from gcsplan.research.optimisers.box import Run, Steps, clipped, keep_better, require
 
 REDRAWS = 50
-"""Most times that the step of a pair of variables with S > 1 is drawn again; what remains is scaled by the encoding."""
+"""Most redraws of the step of a pair of variables with S > 1; the encoding scales a step that remains too large."""
 
 
 def foa(run: Run, *, step: float) -> Steps:

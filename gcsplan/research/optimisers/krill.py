@@ -18,7 +18,7 @@ def krill(run: Run, *, sight: float, step: float, crowding: float, attempts: int
     """Each krill avoids enemies and cruises, and keeps the better result; where one of the two fails, it forages.
 
     ``sight`` is U, ``crowding`` δ, ``attempts`` T of foraging. The better result replaces the krill even if it is worse
-    than the krill was. ``moves`` is "together", or "one": each krill sees where those before it have gone (fig. 9).
+    than the krill was. ``moves`` is "together", or "one": each krill sees where the ones before it have gone (fig. 9).
     ``crowd`` is "ranks", or "printed": it goes where food over n_f is less than δ times its own.
     """
     require("krill", "moves", moves, ("together", "one"))
@@ -37,7 +37,7 @@ def krill(run: Run, *, sight: float, step: float, crowding: float, attempts: int
 
 @dataclass(frozen=True, slots=True)
 class _KrillMove:
-    """One move of some krill; the parameters are those of `krill`."""
+    """One move of some krill; for the parameters see `krill`."""
 
     rng: np.random.Generator
     sight: float
@@ -47,7 +47,7 @@ class _KrillMove:
     printed: bool
 
     def sees(self, x: Floats, who: Indices) -> Bools:
-        """(m, n) which of all krill at ``x`` (n, dim) those of ``who`` (m,) have in sight; none sees itself."""
+        """(m, n) which of all krill at ``x`` (n, dim) each krill of ``who`` (m,) has in sight; none sees itself."""
         seen = np.asarray(rms_distances(x[who], x) < self.sight)
         seen[np.arange(len(who)), who] = False
         return seen
@@ -65,11 +65,11 @@ class _KrillMove:
 
         # Enemy avoidance. E eq. 8 prints the centre of two krill; here the mean of all neighbours in sight.
         centre = seen[who] @ x / np.maximum(around[who], 1)[:, None]
-        asked = met & (self.printed | self._roomy(around[who], n))
+        tries = met & (self.printed | self._roomy(around[who], n))
         f_centre = np.full(m, np.inf)
-        if asked.any():
-            f_centre[asked] = yield clipped(centre[asked])
-        avoids = self._goes(f_centre, around[who], f[who], n) & asked
+        if tries.any():
+            f_centre[tries] = yield clipped(centre[tries])
+        avoids = self._goes(f_centre, around[who], f[who], n) & tries
 
         # Cruising. E prints Y_c where Y_j is meant; the crowd is counted around X_j.
         lead = np.where(seen[who], f, np.inf).argmin(axis=1)

@@ -1,6 +1,6 @@
 """Grey wolves: GWO and its variants MGWO, IGWO, SOGWO, SSGWO.
 
-Equation numbers are those of Feng et al. 2024 (Electronics 13, 68), which restates GWO as its (1)-(12).
+Equation numbers follow Feng et al. 2024 (Electronics 13, 68), which restates GWO as its (1)-(12).
 
 ``origin`` is the point, in unit coordinates, from which |C·leader − x| and multiples of positions are measured; the
 rule pulls towards it. At 0.5, the middle of the box, it has an advantage on functions with their optimum there.
@@ -25,8 +25,8 @@ def gwo(run: Run, *, origin: float) -> Steps:
     f = yield x
     pack = Pack(x, f)
     for _ in run.cycles():
-        told = tell(run.rng, x, pack.x, 2.0 - 2.0 * run.elapsed, origin)  # eq. 5
-        x = clipped(told.sum(axis=0) / PACK)  # eq. 12
+        targets = targets_of(run.rng, x, pack.x, 2.0 - 2.0 * run.elapsed, origin)  # eq. 5
+        x = clipped(targets.sum(axis=0) / PACK)  # eq. 12
         f = yield x
         pack.meet(x, f)
 
@@ -43,8 +43,8 @@ def mgwo(run: Run, *, origin: float) -> Steps:
     for _ in run.cycles():
         a = 2.0 * (1.0 - math.expm1(run.elapsed) / (math.e - 1.0))
         weight = 1.0 / (pack.f - pack.f[0] + abs(pack.f[2] - pack.f[0]) + 1e-12)
-        told = tell(run.rng, x, pack.x, a, origin)
-        tried = clipped(np.tensordot(weight / weight.sum(), told, axes=1))
+        targets = targets_of(run.rng, x, pack.x, a, origin)
+        tried = clipped(np.tensordot(weight / weight.sum(), targets, axes=1))
         f_tried = yield tried
         keep_better(x, f, tried, f_tried)
         pack = Pack(x, f)  # moves are greedy, so the best three ever are in the population
@@ -58,7 +58,7 @@ def igwo(run: Run, *, origin: float) -> Steps:
     n = len(x)
     pack = Pack(x, f)
     for _ in run.cycles():
-        led = tell(run.rng, x, pack.x, 2.0 - 2.0 * run.elapsed, origin).sum(axis=0) / PACK
+        led = targets_of(run.rng, x, pack.x, 2.0 - 2.0 * run.elapsed, origin).sum(axis=0) / PACK
         led = _halfway(led, x)
         learnt = _halfway(_learnt(run.rng, x, led), x)
         costs = yield np.concatenate([led, learnt])
@@ -81,7 +81,7 @@ def sogwo(run: Run, *, origin: float, alike: str, span: float) -> Steps:
     for _ in run.cycles():
         a = 2.0 - 2.0 * run.elapsed
         x = opposed(x, f, pack.x[0], a) if alike == "ranks" else opposed_by_distance(x, a, span)
-        x = clipped(tell(run.rng, x, pack.x, a, origin).sum(axis=0) / PACK)
+        x = clipped(targets_of(run.rng, x, pack.x, a, origin).sum(axis=0) / PACK)
         f = yield x
         pack.meet(x, f)
 
@@ -92,7 +92,7 @@ def ssgwo(run: Run, *, origin: float, factor: str, leaders: str, trial: str) -> 
     ``factor`` is "cosine" or "printed" (eq. 13). ``leaders`` is "all": every wolf moves by eq. 23 over eq. 9-11, whose
     A and C are what Algorithm 1 updates; "apart": the leaders move by eq. 17-19, and only to improve; or "printed":
     every wolf moves by eq. 23 over eq. 17-19. ``trial`` is "every": eq. 24 decides for each wolf; or "alpha": for α
-    alone, as its letters say, while all others move anyway.
+    alone, as its letters state, while all others move anyway.
     """
     require("ssgwo", "factor", factor, tuple(FACTORS))
     require("ssgwo", "leaders", leaders, ("apart", "all", "printed"))
@@ -109,15 +109,15 @@ def ssgwo(run: Run, *, origin: float, factor: str, leaders: str, trial: str) -> 
         # E eq. 17-19: as printed they do not contain X_i, and with b ≥ 0 they move β and δ away from α; Algorithm 1
         # updates A and C, which only eq. 6-11 use.
         if leaders == "apart":
-            told = tell(run.rng, x[others], x[first], a, origin)
-            tried[others] = _weighed(told, nearness(x, x[first])[:, others])  # eq. 23
+            targets = targets_of(run.rng, x[others], x[first], a, origin)
+            tried[others] = _weighed(targets, nearness(x, x[first])[:, others])  # eq. 23
             tried[first] = scattered(run.rng, x, first, others, a, 1)[:, 0]
         else:
             if leaders == "all":
-                told = tell(run.rng, x, x[first], a, origin)
+                targets = targets_of(run.rng, x, x[first], a, origin)
             else:
-                told = scattered(run.rng, x, first, others, a, len(x))
-            tried[:] = _weighed(told, nearness(x, x[first]))
+                targets = scattered(run.rng, x, first, others, a, len(x))
+            tried[:] = _weighed(targets, nearness(x, x[first]))
         f_tried = yield clipped(tried)
         # E eq. 24: the inner "while (P > rand)" may never end; here one trial for each wolf and iteration.
         worse = np.maximum(f_tried - f, 0.0) / max(temperature, 1e-200)
@@ -130,7 +130,7 @@ def ssgwo(run: Run, *, origin: float, factor: str, leaders: str, trial: str) -> 
         temperature *= ANNEALING_SHARE  # eq. 25
 
 
-def tell(rng: np.random.Generator, x: Floats, leaders: Floats, a: float, origin: float) -> Floats:
+def targets_of(rng: np.random.Generator, x: Floats, leaders: Floats, a: float, origin: float) -> Floats:
     """Targets (3, n, dim) that each leader (3, dim) sets for each wolf (n, dim), eq. 3, 4 and 6-11, unclipped."""
     r1, r2 = rng.random((2, PACK, *x.shape))
     r1 *= 2.0 * a
@@ -141,8 +141,8 @@ def tell(rng: np.random.Generator, x: Floats, leaders: Floats, a: float, origin:
     r2 -= x - origin
     np.abs(r2, out=r2)
     r2 *= r1
-    told: Floats = np.subtract(leaders[:, None, :], r2, out=r2)
-    return told
+    targets: Floats = np.subtract(leaders[:, None, :], r2, out=r2)
+    return targets
 
 
 def scattered(rng: np.random.Generator, x: Floats, first: Indices, others: Indices, a: float, count: int) -> Floats:
@@ -222,8 +222,8 @@ class Pack:
             self.x, self.f = np.concatenate([self.x, x[better]])[best], all_f[best]
 
 
-# E eq. 13 falls fastest at first (1.293 at T/4, linear 1.5), but its text says "remains high": the cosine has the same
-# values at 0, T/2 and T and the shape of the text.
+# E eq. 13 falls fastest at first (1.293 at T/4, linear 1.5), but its text states "remains high": the cosine has the
+# same values at 0, T/2 and T and the shape of the text.
 FACTORS = {
     "cosine": lambda share: 1.0 + math.cos(math.pi * share),
     "printed": lambda share: (
@@ -234,9 +234,9 @@ FACTORS = {
 }
 
 
-def _weighed(told: Floats, near: Floats) -> Floats:
+def _weighed(targets: Floats, near: Floats) -> Floats:
     """Eq. 20-23: the mean (n, dim) of targets (3, n, dim), weighted by ``near`` (3, n)."""
-    mixed: Floats = np.einsum("kn,knd->nd", near / near.sum(axis=0), told)
+    mixed: Floats = np.einsum("kn,knd->nd", near / near.sum(axis=0), targets)
     return mixed
 
 

@@ -15,9 +15,9 @@ from gcsplan.planners.problem import Problem, Solution
 from gcsplan.planners.registry import PlannerEntry
 
 ENCODING = "offsets"
-"""A swarm's encoding unless another is asked for: the best for most over real terrain (docs/research/benchmarks.md)."""
+"""A swarm's encoding by default: the best for most over real terrain (docs/research/benchmarks.md)."""
 PAPER = "paper"
-"""Asked for as encoding: that of the planner's own paper."""
+"""The encoding's name for the encoding of the planner's own paper."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -89,7 +89,7 @@ def make_layers(scene: Scene, points: tuple[int, ...]) -> list[Floats]:
 
 
 def _section(scene: Scene, middle: Floats, left: Floats, reach_m: float) -> Floats:
-    """Nodes (n, 3) of one plane across the track, without those where the floor is above the ceiling."""
+    """Nodes (n, 3) of one plane across the track, only where the floor is not above the ceiling."""
     # Distance to either side at which the plane leaves the volume.
     with np.errstate(divide="ignore"):
         sides = np.stack([(scene.low[:2] - middle) / left, (scene.high[:2] - middle) / left])

@@ -34,14 +34,14 @@ def cmaes(run: Run, *, step: float, step_given: float) -> Steps:
     given = len(run.start) > 0
     mean = run.start[0].copy() if given else np.full(run.dim, 0.5)
     search = _search(cma, run, mean, step_given if given else step, run.population)
-    x = _asked(search)
+    x = _drawn(search)
     search.tell(x, list((yield x)))
     doubled = 0
     for _ in run.cycles():
         if search.stop():
             doubled = min(doubled + 1, DOUBLINGS)
             search = _search(cma, run, run.rng.random(run.dim), step, run.population << doubled)
-        x = _asked(search)
+        x = _drawn(search)
         search.tell(x, list((yield x)))
 
 
@@ -53,7 +53,7 @@ def _search(cma: Any, run: Run, mean: Floats, step: float, population: int) -> A
     )  # fmt: skip
 
 
-def _asked(search: Any) -> Floats:
+def _drawn(search: Any) -> Floats:
     return clipped(np.array(search.ask(), dtype=np.float64))
 
 
@@ -62,7 +62,7 @@ ENTRY = OptimiserEntry(
     summary="CMA-ES with restarts of twice the population, by the package cma",
     update="gcsplan.research.swarm.cmaes:cmaes",
     paper="Hansen, Ostermeier 2001; Auger, Hansen 2005; package cma",
-    equations="those of the package",
+    equations="by the package",
     population=30,
     iterations=500,
     defaults=MappingProxyType({"step": 0.3, "step_given": 0.05}),

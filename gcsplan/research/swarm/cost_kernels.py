@@ -257,7 +257,7 @@ def _yaw_terms(count: int, east: Floats, north: Floats, run: Floats, rise: Float
 
 @device
 def _count_terms(x: Floats, y: Floats, z: Floats, floor: Floats, numbers: Floats, out: Floats) -> None:
-    """Count ABO's samples under the floor or over unknown ground, and those out of the flight volume."""
+    """Count ABO's samples under the floor or over unknown ground, and samples out of the flight volume."""
     west, south, bottom = numbers[s.WEST], numbers[s.SOUTH], numbers[s.BOTTOM]
     east, north, top = numbers[s.EAST], numbers[s.NORTH], numbers[s.TOP]
     under, outside = 0.0, 0.0
@@ -331,7 +331,7 @@ def room(samples: int) -> list[Floats]:
 def measure(
     controls: Floats, bands: Floats, spans: Int64s,
     heights: Singles, quadratic: Floats, floors: Singles, floor_map: Floats, numbers: Floats, zones: Floats,
-    corners: Floats, stride: int, wanted: int,
+    corners: Floats, stride: int, groups: int,
     cost: Floats, leg: Floats, run: Floats,
     all_x: Floats, all_y: Floats, all_z: Floats, weight: Floats, floor: Floats, ground: Floats,
     column: Floats, row: Floats,
@@ -341,12 +341,12 @@ def measure(
 ) -> None:  # fmt: skip
     """Write the terms of P paths of N control points, ``controls`` (P, N, 3), to ``out`` (P, TERMS).
 
-    ``stride``: samples from node to node; ``wanted``: bits of the optional groups of terms. The rest are working arrays
+    ``stride``: samples from node to node; ``groups``: bits of the optional groups of terms. The rest are working arrays
     (see `room`): for samples and legs; for samples followed by points added on long legs; for chords; for a box.
     """
     count = len(cost)
     x, y, z = all_x[:count], all_y[:count], all_z[:count]
-    grounded = (wanted & (CEILING | HEIGHTS | HIDING)) != 0
+    grounded = (groups & (CEILING | HEIGHTS | HIDING)) != 0
     shared = one_grid(heights, quadratic, floors, floor_map)
     for p in range(len(controls)):
         to = out[p]
@@ -371,22 +371,22 @@ def measure(
         to[UNKNOWN] = _unknown(floor[:many], weight)
         _zone_terms(
             all_x[:many], all_y[:many], all_z, weight, leg, heights, quadratic, numbers, zones, corners, box,
-            (wanted & SAMPLES_NEAR) != 0, to,
+            (groups & SAMPLES_NEAR) != 0, to,
         )  # fmt: skip
         weight[0] = weight[count - 1] = 0.0  # start and goal are fixed, and may lie exactly on the floor
-        _limit_terms(all_z[:many], weight, ground, floor, (wanted & CEILING) != 0, numbers, to)
+        _limit_terms(all_z[:many], weight, ground, floor, (groups & CEILING) != 0, numbers, to)
 
-        if wanted & COUNTS:
+        if groups & COUNTS:
             _count_terms(x, y, z, floor, numbers, to)
-        if wanted & NODES_NEAR:
+        if groups & NODES_NEAR:
             _near_terms(x, y, z, heights, quadratic, numbers, zones, corners, box, stride, east, north, to)
-        if wanted & (ANGLES | YAWS):
+        if groups & (ANGLES | YAWS):
             legs = chords(x, y, z, stride, east, north, flat, rise, base)
-            if wanted & ANGLES:
-                _angle_terms(legs, east, north, flat, rise, base, (wanted & BENDS) != 0, to)
-            if wanted & YAWS:
+            if groups & ANGLES:
+                _angle_terms(legs, east, north, flat, rise, base, (groups & BENDS) != 0, to)
+            if groups & YAWS:
                 _yaw_terms(legs, east, north, flat, rise, to)
-        if wanted & HEIGHTS:
+        if groups & HEIGHTS:
             _height_terms(z, ground, numbers, to)
-        if wanted & HIDING:
+        if groups & HIDING:
             _hiding_terms(x, y, z, ground, run, zones, corners, numbers, box, cost, to)

@@ -1,6 +1,6 @@
 """Kernels from control points to samples: curves, legs and chords, and exponentials and angles without a library.
 
-Exponentials and angles are computed by series, accurate to the last digits. Unlike those of a C library they are
+Exponentials and angles are computed by series, accurate to the last digits. Unlike a C library's functions they are
 vectorised and give the same bits on every machine.
 """
 
@@ -41,7 +41,7 @@ def exponential(x: float) -> float:
 
 @device
 def angle(across: float, along: float) -> float:
-    """atan2(across, along) for across >= 0, from 0 to π; 0 if both are 0. The series is that of a quarter of the angle
+    """atan2(across, along) for across >= 0, from 0 to π; 0 if both are 0. The series gives a quarter of the angle
     (folded to at most 45 degrees)."""
     a = abs(along)
     most, least = max(across, a), min(across, a)
@@ -150,10 +150,10 @@ def divide(leg: Floats, step_m: float, x: Floats, y: Floats, z: Floats, weight: 
 def chords(
     x: Floats, y: Floats, z: Floats, stride: int, east: Floats, north: Floats, run: Floats, rise: Floats, base: Floats
 ) -> int:
-    """Write the chords between nodes (every ``stride``-th sample), without those of no length; return how many.
+    """Write the chords between nodes (every ``stride``-th sample), except chords of no length; return how many.
 
-    ``east``, ``north``: horizontal vector of a chord; a vertical chord keeps that of the chord before. ``run`` and
-    ``rise`` in metres; ``base``: the altitude at which a chord begins.
+    ``east``, ``north``: horizontal vector of a chord; a vertical chord keeps the vector of the chord before. ``run``
+    and ``rise`` in metres; ``base``: the altitude at which a chord begins.
     """
     count = 0
     he, hn = 1.0, 0.0

@@ -68,7 +68,7 @@ def _polar_signed(scene: Scene, a: Floats, b: Floats, u: Floats, out: Floats) ->
 
 
 def _from_polar(scene: Scene, a: Floats, b: Floats, points: Floats) -> Floats:
-    # Of all hidden variables with this radius, two equal ones.
+    # Two equal hidden variables, out of all pairs with this radius.
     return np.repeat(np.clip(_from_box(scene, a, b, points), 0.0, 1.0) / np.sqrt(2.0), 2, axis=-1)
 
 
@@ -196,9 +196,9 @@ class Code:
         """The code with ``points`` way points (default: the encoding's own), distributed by the stages' lengths."""
         encoding = get_encoding(name)
         stages = len(scene.terminals) - 1
-        wanted = max(encoding.points if points is None else points, stages)
+        count = max(encoding.points if points is None else points, stages)
         lengths = np.linalg.norm(np.diff(scene.terminals, axis=0), axis=1)
-        return cls(encoding, scene, shares(wanted, lengths))
+        return cls(encoding, scene, shares(count, lengths))
 
     @property
     def dim(self) -> int:

@@ -1,4 +1,4 @@
-"""The costs of the swarms: those of the five papers, by name, over the terms that `cost_kernels` measures.
+"""The costs of the swarms, one for each of the five papers, by name, over the terms that `cost_kernels` measures.
 
 Each is the paper's own formula plus `forbidden`, how far the path breaks limits of the mission that the paper does not
 know, so that every objective ranks illegal paths too. All costs are sampled and never pass a mission. D marks a
@@ -29,7 +29,7 @@ from gcsplan.research.swarm.encodings import Code, shares
 from gcsplan.research.swarm.scene import SAMPLES, Scene
 from gcsplan.research.swarm.scene_kernels import SCENE, clocks_of, nearness
 
-SPLINE_DEGREE = 3  # of the splines
+SPLINE_DEGREE = 3
 
 PENALTY = 100.0
 """Cost of a metre that is not allowed, in metres (D in all costs; C and PC of MSFOA, P of ABO, μ_obs of SSGWO are 100
@@ -125,10 +125,10 @@ Weigh = Callable[[Floats, CostReference], Floats]
 
 @dataclass(frozen=True, slots=True)
 class PaperCost:
-    """One cost. ``weigh``: from terms (n, TERMS) to costs (n,); ``wanted``: bits of the optional groups of terms that
+    """One cost. ``weigh``: from terms (n, TERMS) to costs (n,); ``groups``: bits of the optional groups of terms that
     it needs."""
 
-    wanted: int
+    groups: int
     weigh: Weigh
 
 
@@ -193,9 +193,9 @@ def _msfoa(terms: Floats, unit: CostReference) -> Floats:
     """MSFOA, eq. 20–27; the nearness of eq. 28–30 is added by `Cost`.
 
     E eq. 21: here the height is above ground, max(0, AGL - h_min). E eq. 24: T_de is max(0, 1 - d/R). E eq. 25 adds the
-    penalty to itself; here it is a constant for each turn above φ_max (D 45°). E eq. 26 penalises slopes inside [β, α];
-    here those outside. D: JH is the path's mean height times its length, with heights as a part of the volume's height
-    as in eq. 32; in metres JH would be some 50 times JL, and length would no longer count.
+    penalty to itself; here it is a constant for each turn above φ_max (D 45°). E eq. 26 penalises slopes inside [β, α],
+    here it is slopes outside. D: JH is the path's mean height times its length, with heights as a part of the volume's
+    height as in eq. 32; in metres JH would be some 50 times JL, and length would no longer count.
     """
     high = terms[:, k.HIGH] / unit.height_m * terms[:, k.LENGTH]
     limits = C * (terms[:, k.TURNS] + terms[:, k.SLOPES])
@@ -212,8 +212,8 @@ def _abo(terms: Floats, unit: CostReference) -> Floats:
 IB_ABC_TERMS = np.array([k.LENGTH, k.BEND, k.EXPOSED, k.SPHERE])
 IB_ABC_WEIGHTS = np.array([0.4, 0.2, 0.2, 0.2])  # D: λ of eq. 6
 LEAST, NONE = np.array([1.0, math.pi, 1.0, 1.0]), np.array([1e-9, 1e-3, 1e-9, 1e-9])
-"""What a term is divided by where the straight line has none of it, that is at most ``NONE``: float noise turns the
-line by some 1e-8 rad at each node (arccos)."""
+"""Divisor of a term of which the straight line has none, which means at most ``NONE``: float noise turns the line by
+some 1e-8 rad at each node (arccos)."""
 
 
 def _ib_abc(terms: Floats, unit: CostReference) -> Floats:
@@ -287,11 +287,11 @@ class Cost:
         self.earlier, self.speed_m_s = tuple(earlier), speed_m_s
         scene = code.scene
         self.curve, self.stride = sampled(scene, code.points)
-        wanted = objective.wanted | (k.CEILING if scene.ceiling_follows_ground else 0)
+        groups = objective.groups | (k.CEILING if scene.ceiling_follows_ground else 0)
         self.held = Held(
             f"{CURVE} {SCENE} i8 i8 {k.ROOM}",
             self.curve.bands, self.curve.spans, scene.heights, scene.quadratic, scene.floors, scene.floor_map,
-            scene.numbers, scene.zones, scene.corners, self.stride, wanted, *k.room(self.curve.basis.shape[1]),
+            scene.numbers, scene.zones, scene.corners, self.stride, groups, *k.room(self.curve.basis.shape[1]),
         )  # fmt: skip
         straight = self.terms(self.straight_controls()[None])[0]
         self.unit = CostReference(

@@ -1,7 +1,7 @@
 """Planning by a swarm: an optimiser, an encoding and a cost search for a curve, and the exact check judges it.
 
 If few way points close to the curve pass the exact check, they are the path. Otherwise the curve is repaired
-(`repair`), and a note states what was wrong. A curve that cannot be repaired is thrown away, and the search begins
+(`repair`), and a note names the fault. A curve that cannot be repaired is thrown away, and the search begins
 again with another seed, until the mission's budget is spent; then the mission is refused. Nothing sampled passes a
 mission.
 """
@@ -83,7 +83,7 @@ def scene_of(problem: Problem, settings: Settings) -> Scene:
 def cost_of(problem: Problem, settings: Settings, scene: Scene | None = None) -> Cost:
     """The objective of a search. Raises InputError for options that it does not accept.
 
-    ``scene``: that of `scene_of`, where it is there already.
+    ``scene``: the result of `scene_of`, where it is known already.
     """
     scene = scene_of(problem, settings) if scene is None else scene
     code = Code.of(settings.encoding, scene, settings.points)

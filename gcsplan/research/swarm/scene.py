@@ -160,7 +160,7 @@ class Scene:
 
     @cached_property
     def _ground(self) -> Held:
-        """What `rooms` reads, prepared for the many calls that each have few points."""
+        """The arrays that `rooms` reads, prepared for the many calls that each have few points."""
         return Held(k.GROUND, self.heights, self.quadratic, self.floors, self.floor_map, self.numbers)
 
     def _terminals(self, problem: Problem, flat: Floats) -> Floats:

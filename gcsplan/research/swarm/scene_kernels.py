@@ -13,7 +13,7 @@ GROUND = "f4[,] f8[,] f4[,] f8[,] f8[]"
 """Forms of a scene's heights, quadratic, floors, floor_map and numbers."""
 
 SCENE = f"{GROUND} f8[,] f8[,]"
-"""The same, and those of its zones and corners."""
+"""The same, and the types of its zones and corners."""
 
 # Indices of a scene's numbers.
 (

@@ -17,10 +17,10 @@ from gcsplan.research.swarm import PAPER, SwarmEntry
 class Settings:
     """Settings of a search; None stands for the default of the optimiser or of the encoding.
 
-    ``parameters``: those of the optimiser, and the sides of the flight volume (`VOLUME_KEYS`). ``earlier``: polylines
+    ``parameters``: the optimiser's, and the sides of the flight volume (`VOLUME_KEYS`). ``earlier``: polylines
     (N, 3) of vehicles that have the right of way and depart at the same time; all fly at ``speed_m_s``. For ants
-    ``points`` is the number of sections. ``warm_start``: ``optimal`` (the search begins around the path of that
-    planner), or the name of a vehicle, whose path is then in ``around`` (N, 3).
+    ``points`` is the number of sections. ``warm_start``: ``optimal`` (the search begins around that planner's path),
+    or the name of a vehicle, whose path is then in ``around`` (N, 3).
     """
 
     encoding: str = "box"

@@ -1,4 +1,4 @@
-"""Warm start: members of the first population around a known path, that of the planner `optimal` or of another vehicle.
+"""Warm start: members of the first population around a known path: of the planner `optimal` or of another vehicle.
 
 The control points whose curve is nearest to the path are found by least squares, and then the numbers that encode them.
 One member is the path itself, as well as the encoding can draw it; others are scattered around it, and the rest of the
@@ -33,10 +33,10 @@ unit box."""
 
 
 def resolved(problem: Problem, settings: Settings) -> Settings:
-    """``settings`` with the path of the planner `optimal`, if they ask for it. Raises NoMission if it finds none.
+    """``settings`` with the path of the planner `optimal`, if they request it. Raises NoMission if it finds none.
 
-    Unless they say otherwise, a search around a path has `MORE_POINTS` times the encoding's way points: it can follow
-    the path more closely, and need not find it among so many numbers.
+    By default, a search around a path has `MORE_POINTS` times the encoding's way points: it can follow the path more
+    closely, and need not find it among so many numbers.
     """
     around, points = settings.around, settings.points
     if around is None and settings.warm_start == OPTIMAL:
@@ -74,27 +74,27 @@ def encoded(cost: Cost, path: Floats) -> Floats:
         basis = curve.basis[row : row + count + 2, samples]
         stations = encoding.stations(count)
         if stations is None:
-            wanted = _resampled(part, basis.shape[1])
+            places = _resampled(part, basis.shape[1])
         else:
-            wanted = _over(part, a, b, np.asarray(np.concatenate([[0.0], stations, [1.0]]) @ basis, np.float64))
-        inner = _fitted(basis, a, b, wanted)
+            places = _over(part, a, b, np.asarray(np.concatenate([[0.0], stations, [1.0]]) @ basis, np.float64))
+        inner = _fitted(basis, a, b, places)
         out.append(encoding.encode(scene, a, b, inner).ravel())
         row += count + 1
     return np.clip(np.concatenate(out), 0.0, 1.0)
 
 
-def _fitted(basis: Floats, a: Floats, b: Floats, wanted: Floats) -> Floats:
-    """Control points (K, 3) between ``a`` and ``b`` whose curve is nearest to ``wanted`` (S, 3), and hardly below it.
+def _fitted(basis: Floats, a: Floats, b: Floats, places: Floats) -> Floats:
+    """Control points (K, 3) between ``a`` and ``b`` whose curve is nearest to ``places`` (S, 3), and hardly below it.
 
-    A path near the ground is smoothed into the ground. So where the curve is below it, more height is asked for.
+    A path near the ground is smoothed into the ground. So where the curve is below it, the path is raised.
     """
     of_ends = basis[[0, -1]].T @ np.stack([a, b])
     solver = np.linalg.pinv(basis[1:-1].T)
-    inner = np.asarray(solver @ (wanted - of_ends))
-    raised = wanted[:, 2].copy()
+    inner = np.asarray(solver @ (places - of_ends))
+    raised = places[:, 2].copy()
     for _ in range(RAISES):
         z = of_ends[:, 2] + basis[1:-1].T @ inner[:, 2]
-        raised += np.maximum(wanted[:, 2] - z, 0.0)
+        raised += np.maximum(places[:, 2] - z, 0.0)
         inner[:, 2] = solver @ (raised - of_ends[:, 2])
     return inner
 

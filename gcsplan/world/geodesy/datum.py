@@ -38,21 +38,21 @@ _NOT_THE_SEA = re.compile(
     r"|wiener[ _]null|vienna|\baioc|\bkoc\b|\bkoc_|poolbeg|kiunga|kumul"
     r"|(?<!mean[ _-])(?<!zero[ _-])(?<!non[ _-])\btid(e|al)"
 )
-"""Zeros that are metres away from mean sea level: of tides, charts, inland seas and towns, or of nothing that is known.
+"""Zeros that are metres away from mean sea level: of tides, charts, inland seas and towns, or of unknown origin.
 
-The register has Vienna's zero 157 m above that of the country, AIOC's at the Caspian Sea, and Poolbeg's 2.7 m below
-Malin Head's; Kumul and Kiunga are 3 m off.
+The register has Vienna's zero 157 m above Austria's, AIOC's at the Caspian Sea, and Poolbeg's 2.7 m below Malin Head's;
+Kumul and Kiunga are 3 m off.
 """
 
 _GEOCENTRIC = re.compile(
     r"(?i)WGS_?(19)?84|ETRS|ETRF|ITRF|IG[Sb]\d|NAD_?(19)?83|North_American_1983|GDA|NZGD|JGD|SIRGAS|POSGAR|RGF_?(19)?93"
     r"|SWEREF|EUREF|DREF91|CGCS|China_Geodetic|GRS80|ellipsoid"
 )
-"""Beginnings of names of ellipsoidal heights whose ellipsoid lies where that of WGS 84 does, within a metre or two."""
+"""Beginnings of names of ellipsoidal heights whose ellipsoid agrees with WGS 84's within a metre or two."""
 
 ELLIPSOID_M, MOST_OFF_M, MOST_OFF_FLATTENING = 6_378_137.0, 1.5, 0.01
-"""The semi-major axis of WGS 84, m, and how far that of another ellipsoid, and the inverse of its flattening, may be
-off: on Bessel's ellipsoid heights are tens of metres off."""
+"""The semi-major axis of WGS 84, m, and the largest differences of another ellipsoid's axis, m, and of its inverse
+flattening: on Bessel's ellipsoid heights are tens of metres off."""
 
 _GRID = re.compile(r"""(?i)grids\s*=\s*([^\s"']+)|PARAMETERFILE\s*\[\s*"[^"]*"\s*,\s*"([^"]*)\"""")
 _SHIFT = re.compile(r'(?i)"Vertical_Shift"\s*,\s*([-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?)')
@@ -95,14 +95,14 @@ def take_apart(crs: str, *, where: str) -> RasterCRS:
         good = good and len(horizontal.axis_info) == 2
     except ProjError as why:
         raise InputError(
-            f"the coordinate system is not understood ({_first_line(why)}); say what it is with `crs:`, "
+            f"the coordinate system is not understood ({_first_line(why)}); state it with `crs:`, "
             "for example `crs: EPSG:4326`",
             where=where,
         ) from None
     if not good:
         raise InputError(
             f"the coordinate system must be geographic or projected, given {whole.type_name} {whole.name!r}; "
-            "say what it is with `crs:`, for example `crs: EPSG:4326`",
+            "state it with `crs:`, for example `crs: EPSG:4326`",
             where=where,
         )
     geographic = bool(horizontal.is_geographic)
@@ -111,29 +111,29 @@ def take_apart(crs: str, *, where: str) -> RasterCRS:
     return RasterCRS(horizontal, geographic, length, vertical, unit)
 
 
-def with_vertical_of(said: RasterCRS, own: str, prj: str, *, where: str) -> RasterCRS:
-    """``said``, which stands for a file's own system, with what that one, ``own``, states of heights.
+def with_vertical_of(given: RasterCRS, own: str, prj: str, *, where: str) -> RasterCRS:
+    """``given``, which replaces a file's own system, with the vertical part of that system, ``own``.
 
-    ``prj`` is its text beside the file, if there is one: libraries forget a part of that (`require_unshifted`).
+    ``prj`` is its text beside the file, if there is one: libraries forget a part of it (`require_unshifted`).
 
-    A user who names the grid has said nothing of heights, and what counts downwards or from another zero does so all
-    the same. A vertical system that no register knows counts as none: this is the way to read such a file. Raises
-    InputError for heights that are refused; a ``said`` with a vertical part is taken as it is.
+    A user who names the grid has stated nothing about heights, and the file's heights still count downwards or from
+    another zero. A vertical system that no register knows counts as none: this is the way to read such a file. Raises
+    InputError for heights that are refused; a ``given`` with a vertical part is taken as it is.
     """
-    if said.vertical is not None:
-        return said
+    if given.vertical is not None:
+        return given
     try:
         require_unshifted(prj or own, where=where)
         whole = CRS.from_user_input(own)
         if whole.is_geocentric or not (whole.is_compound or whole.is_vertical or len(whole.axis_info) == 3):
-            return said
+            return given
         _, vertical, unit = _parts(whole, BY_FILE, where, any_name=True)
     except ProjError:
-        return said
+        return given
     except InputError as why:
         cure = "if the file is wrong about that, state both parts with `crs:`, such as EPSG:4326+5773"
         raise InputError(f"{why.message}; {cure}", where=where) from None
-    return replace(said, vertical=vertical, vertical_unit=unit)
+    return replace(given, vertical=vertical, vertical_unit=unit)
 
 
 def require_unshifted(text: str, *, where: str) -> None:
@@ -167,11 +167,11 @@ def require_no_grid(text: str, whole: Any, *, where: str) -> None:
 def _parts(
     whole: Any, by: str, where: str, *, any_name: bool = False
 ) -> tuple[Any, VerticalDatum | None, HeightUnit | None]:
-    """Of a pyproj CRS: the horizontal part in 2D (None if there is none), the vertical datum, and the unit of heights.
+    """The parts of a pyproj CRS: the horizontal one in 2D (None if there is none), vertical datum, and unit of heights.
 
-    Unit and direction are those of the vertical axis itself. ``by`` names the one who states the unit. ``any_name``:
-    a vertical system that no register knows has a unit and no datum. Raises InputError for what counts downwards, and
-    for zeros that are not the sea's.
+    Unit and direction come from the vertical axis itself. ``by`` names the one who states the unit. ``any_name``: a
+    vertical system that no register knows has a unit and no datum. Raises InputError for heights that count downwards,
+    and for zeros that are not the sea's.
     """
     parts = whole.sub_crs_list if whole.is_compound else [whole]
     horizontal = None if parts[0].is_vertical else parts[0]
@@ -190,7 +190,7 @@ def _parts(
     if not axes or axes[0].direction.lower() != "up":
         raise InputError(
             f"{name!r} counts depths, downwards from its zero; only heights, which count upwards, are read: turn the "
-            "numbers around (gdal_calc.py --calc=-A), and say the datum of the heights (for MSL depth it is "
+            "numbers around (gdal_calc.py --calc=-A), and state the datum of the heights (for MSL depth it is "
             "EPSG:5714, for NAVD88 depth EPSG:5703)",
             where=where,
         )
@@ -198,7 +198,7 @@ def _parts(
     if _NOT_THE_SEA.search(zero):
         raise InputError(
             f"heights in {name!r} do not count from mean sea level, and their zero may be metres away from it: "
-            "convert them (gdalwarp -t_srs with the wanted vertical datum), and say that datum",
+            "convert them (gdalwarp -t_srs with another vertical datum), and state that datum",
             where=where,
         )
     ellipsoidal = "ellipsoid" in f"{name} {axes[0].name}".lower()
@@ -218,13 +218,13 @@ def _require_registered(vertical: Any, where: str) -> None:
     name = str(vertical.name)
     if vertical.source_crs is not None:
         raise InputError(
-            f"heights in {name!r} are shifted from those in {str(vertical.source_crs.name)!r}: convert them (gdalwarp "
+            f"heights in {name!r} are shifted from {str(vertical.source_crs.name)!r}: convert them (gdalwarp "
             "-t_srs with that system)",
             where=where,
         )
     if not _is_registered(vertical):
         raise InputError(
-            f"the raster has heights in {name!r}, which no register knows; say `vertical_datum:` (AMSL if it follows "
+            f"the raster has heights in {name!r}, which no register knows; state `vertical_datum:` (AMSL if it follows "
             "mean sea level) and, in place of the raster's own system, `crs:` (its horizontal part, such as EPSG:4326)",
             where=where,
         )
@@ -233,13 +233,13 @@ def _require_registered(vertical: Any, where: str) -> None:
 def _is_registered(vertical: Any) -> bool:
     """Whether a vertical system, or its datum, is one that a register knows."""
     if vertical.source_crs is not None:
-        return True  # of a shifted one the shift is refused
+        return True  # its shift is refused elsewhere
     datum = "" if vertical.datum is None else str(vertical.datum.name)
     return vertical.to_authority() is not None or _is_known(str(vertical.name)) or _is_known(datum)
 
 
 def _is_known(name: str) -> bool:
-    """Whether a name is, or begins with, that of a vertical system or datum that we or PROJ's registers know."""
+    """Whether a name is, or begins with, the name of a vertical system or datum that we or PROJ's registers know."""
     key = re.sub(r"[^A-Z0-9]", "", name.upper())
     if any(key.startswith(known) for known in (*_GEOIDS, *_NATIONAL)) or _of_name(name) is not None:
         return True
@@ -251,7 +251,7 @@ def _is_known(name: str) -> bool:
 
 
 def _require_geocentric(crs: Any, where: str) -> None:
-    """Raise InputError if the ellipsoid of a 3D system is not about that of WGS 84."""
+    """Raise InputError if the ellipsoid of a 3D system is not about WGS 84's."""
     of = crs.ellipsoid
     off = (
         abs(of.semi_major_metre - ELLIPSOID_M) > MOST_OFF_M
@@ -263,8 +263,8 @@ def _require_geocentric(crs: Any, where: str) -> None:
 
 def _not_geocentric(name: str, where: str) -> InputError:
     return InputError(
-        f"ellipsoidal heights in {name!r} count from another ellipsoid than that of WGS 84, which may be tens of "
-        "metres away: convert them (gdalwarp -t_srs EPSG:4979, or to a datum at mean sea level), and say that datum",
+        f"ellipsoidal heights in {name!r} count from another ellipsoid than WGS 84's, which may be tens of metres "
+        "away: convert them (gdalwarp -t_srs EPSG:4979, or to a datum at mean sea level), and state that datum",
         where=where,
     )
 
@@ -289,7 +289,7 @@ def vertical_datum(given: str | None, raster: VerticalDatum | None, *, where: st
     if stated.name == "AMSL" and not raster.ellipsoidal:
         return raster
     raise InputError(
-        f"the mission says {stated.name}, the raster itself says {raster.name}; remove the key, or correct the "
+        f"the mission states {stated.name}, the raster itself states {raster.name}; remove the key, or correct the "
         "raster (gdal_edit.py -a_srs, or `crs:` with both parts, such as EPSG:4326+5773)",
         where=where,
     )
@@ -314,7 +314,7 @@ def plane_to_raster(
     except ProjError as why:
         raise InputError(
             f"there is no known way from WGS84 to the raster's coordinate system {horizontal.name!r} "
-            f"({_first_line(why)}); say what it is with `crs:`, or reproject it (gdalwarp -t_srs EPSG:4326)",
+            f"({_first_line(why)}); state it with `crs:`, or reproject it (gdalwarp -t_srs EPSG:4326)",
             where=where,
         ) from None
     accuracy_m = float(one.accuracy) if one.accuracy is not None else -1.0
@@ -333,8 +333,8 @@ def to_wgs84(horizontal: Any, *, where: str) -> Transformer:
         return Transformer.from_crs(horizontal, CRS.from_epsg(4326), always_xy=True)
     except ProjError as why:
         raise InputError(
-            f"there is no known way from {horizontal.name!r} to WGS84 ({_first_line(why)}); say what the coordinate "
-            "system is with `crs:`",
+            f"there is no known way from {horizontal.name!r} to WGS84 ({_first_line(why)}); state the coordinate "
+            "system with `crs:`",
             where=where,
         ) from None
 
@@ -352,7 +352,7 @@ def stated_datum(given: str, *, where: str) -> tuple[VerticalDatum, HeightUnit |
             crs = CRS.from_user_input(code if code.lower().startswith("urn") else code.upper())
         except ProjError:
             raise InputError(f"{text} is not in the register of coordinate systems", where=where) from None
-        return _said_by(crs, text, where)
+        return _stated_by(crs, text, where)
     key = re.sub(r"[^A-Z0-9]", "", given.upper())
     if key in _GEOIDS:
         return VerticalDatum(_GEOIDS[key]), None
@@ -362,7 +362,7 @@ def stated_datum(given: str, *, where: str) -> tuple[VerticalDatum, HeightUnit |
         return _national(key), None
     named_crs = _of_name(text)
     if named_crs is not None:
-        return _said_by(named_crs, text, where)
+        return _stated_by(named_crs, text, where)
     raise InputError(
         f"unknown vertical datum {given!r}; known are {', '.join(dict.fromkeys(_GEOIDS.values()))}, WGS84 "
         "(ellipsoidal), EPSG:code, and national ones such as NAVD88, DHHN2016 or AHD; AMSL stands for any other that "
@@ -371,10 +371,10 @@ def stated_datum(given: str, *, where: str) -> tuple[VerticalDatum, HeightUnit |
     )
 
 
-def _said_by(crs: Any, text: str, where: str) -> tuple[VerticalDatum, HeightUnit | None]:
+def _stated_by(crs: Any, text: str, where: str) -> tuple[VerticalDatum, HeightUnit | None]:
     _, datum, unit = _parts(crs, f"by vertical_datum {text}", where)
     if datum is None:
-        raise InputError(f"{text} ({crs.name}) says nothing about heights", where=where)
+        raise InputError(f"{text} ({crs.name}) has no part for heights", where=where)
     return datum, unit
 
 

@@ -54,7 +54,7 @@ MOST_EDGE_POINTS = 1000
 
 UNTANGLED, MOST_OF_POINT = 32, 4
 """A line of more points than the first that crosses itself more often than this for each point becomes several
-corridors at once: what it surrounds would be found, at great length, and then cut into parts of its own."""
+corridors at once: the area that it surrounds would be found, at great length, and then cut into parts of its own."""
 
 ZONE_FAR_M = 1.6 * FARTHEST_M
 """No mission goes farther than this from the frame's origin, m."""
@@ -66,7 +66,7 @@ TURNS_DEG = (0.0, -360.0, 360.0)
 """Whole turns by which a zone may lie beside the mission's longitudes."""
 
 HALF_TURN_DEG = 180.0
-"""From this longitude difference on nobody can tell on which side of the globe an edge runs."""
+"""From this longitude difference on it is unknown on which side of the globe an edge runs."""
 
 ACROSS_DEG, ACROSS_PART = 2.0, 0.5
 """Edges of a whole turn less the first may cross the antimeridian, if the polygon then is wide by this part of its
@@ -79,7 +79,7 @@ POLE_DEG = 89.999
 """A corner at a latitude from here on is the pole."""
 
 GREAT_CIRCLE_M = 1.0
-"""An edge that lies nearer to its great circle is not told from it, m."""
+"""An edge that lies nearer to its great circle counts as that circle, m."""
 
 MOST_PIECES, MOST_PIECES_OF_ALL = 20_000, 400_000
 """Most pieces of one great circle, and of all of one zone."""
@@ -113,7 +113,7 @@ def near_polygons(ring: Sequence[Corner], frame: Frame, *, great_circles: bool =
 
 
 def plain_polygons(rings: Sequence[Sequence[Corner]], frame: Frame, *, great_circles: bool) -> list[Polygon | None]:
-    """What `near_polygons` makes of each ring, computed for all of them together; None of one that it must look at.
+    """The result of `near_polygons` for each ring, computed for all of them together; None if it must look at the ring.
 
     A country's zones are many, and most are like this: near as a whole, with edges too short to bow.
     """
@@ -243,7 +243,7 @@ def outline_of(points: Sequence[Corner], *, local: bool = False) -> tuple[list[C
     if overlapping_pairs(shapely.get_coordinates(shape)[:-1]) > MOST_EDGE_PAIRS:
         return ring, (
             f"the outline has {len(ring)} corners, and its edges lie beside each other in such numbers that it would "
-            "take minutes to examine; simplify it, or draw what is around it"
+            "take minutes to examine; simplify it, or draw an outline around it"
         )
     # The function, not the method: it lets other threads run, which hear signals.
     return ring, "" if shapely.is_valid(shape) and shape.area > 0.0 else _why_invalid(shape, local)
@@ -266,7 +266,7 @@ def beyond_outline(outline: Sequence[Corner], holes: Sequence[Sequence[Corner]],
         if (inner < low).any() or (inner > high).any():
             return (
                 f"ring {k} reaches beyond ring 1, which is the outline: put the outline first and holes after it, and "
-                "draw what is no hole as a polygon of its own"
+                "draw any other part as a polygon of its own"
             )
     return ""
 
@@ -311,7 +311,7 @@ def across(points: Sequence[Corner], holes: int = 0) -> tuple[Sequence[Corner], 
     """The corners of a polygon with longitudes past the antimeridian where it crosses it, and where it lies if not.
 
     The second is a rectangle from which its surroundings are left out. It is empty, and the points are unchanged, if
-    they do not cross the antimeridian as `ACROSS_DEG` says, or if there are ``holes``.
+    they do not cross the antimeridian by the rule of `ACROSS_DEG`, or if there are ``holes``.
     """
     if holes or len(points) < 3 or not _width_deg(points) >= 360.0 - ACROSS_DEG:
         return points, ()
@@ -368,8 +368,8 @@ def _with_great_circles(ring: Floats, frame: Frame) -> list[Floats]:
     most = MOST_CROSSINGS + 8 * len(ring)  # at a corner two edges touch two others, which counts for each
     if len(ring) > FEW_EDGES and (overlapping_pairs(both) > MOST_EDGE_PAIRS or crossings(both, most) > most):
         raise InputError(
-            f"of its outline of {len(ring)} corners so many long edges lie beside each other that it would take "
-            "minutes to tell what they enclose along great circles; simplify it"
+            f"its outline of {len(ring)} corners has so many long edges beside each other that it would take minutes "
+            "to find the area that they enclose along great circles; simplify it"
         )
     whole = shapely.union_all([shapely.Polygon(ring), shapely.make_valid(shapely.Polygon(bent))])
     parts = [p for p in shapely.get_parts(whole) if p.geom_type == "Polygon"]
@@ -381,7 +381,7 @@ def _great_circles(begins: Floats, ends: Floats, window: tuple[float, float, flo
 
     On the sphere of geodetic latitudes; edges are shorter than half a turn. One that ends at a pole goes along the
     other end's meridian. Edges over other longitudes than the ``window``'s, and those that lie north or south of it
-    either way, stay straight: on which side of a place they cross its meridian tells what holds it.
+    either way, stay straight: the side of a place on which they cross its meridian decides which polygon holds it.
     """
     long = _may_follow_great_circle(begins, ends)
     west, east = np.minimum(begins[:, 0], ends[:, 0]), np.maximum(begins[:, 0], ends[:, 0])
@@ -435,8 +435,9 @@ def _may_follow_great_circle(begins: Floats, ends: Floats) -> Bools:
 def latitudes_between(begins: ArrayLike, ends: ArrayLike) -> tuple[Floats, Floats]:
     """(N,) least and greatest latitudes of edges (N, 2) latitude, longitude, as straight lines or great circles.
 
-    With x from one end and D the longitudes between them, the tangent of a great circle's latitude is that of its
-    ends, weighted by sin(D - x)/sin(D) and sin(x)/sin(D), whose sum is from 1 to 1/cos(D/2). The shorter way counts.
+    With x from one end and D the longitudes between them, the tangent of a great circle's latitude is the sum of the
+    ends' tangents, weighted by sin(D - x)/sin(D) and sin(x)/sin(D), whose sum is from 1 to 1/cos(D/2). The shorter way
+    counts.
     """
     a, b = np.asarray(begins, float), np.asarray(ends, float)
     span = np.abs((b[:, 1] - a[:, 1] + 180.0) % 360.0 - 180.0)
@@ -491,7 +492,7 @@ def cut_edges(begins: Floats, ends: Floats, frame: Frame) -> Floats:
 def _may_bow(start: Floats, end: Floats) -> Bools:
     """(N,) whether edges, (N, 2) longitude, latitude, may lie farther than `EDGE_BOW_M` from their chords in the plane.
 
-    An edge of length s at latitude f bows by at most (0.18 tan f + 0.02) s²/R, a fifth of what is compared here.
+    An edge of length s at latitude f bows by at most (0.18 tan f + 0.02) s²/R, a fifth of the value compared here.
     Most outlines have many short edges, and to measure them takes longer than all else.
     """
     high, low = np.maximum(np.abs(start[:, 1]), np.abs(end[:, 1])), np.minimum(np.abs(start[:, 1]), np.abs(end[:, 1]))

@@ -42,8 +42,8 @@ class Frame:
         self.lon_deg = float(lon_deg)
         self.amsl_m = float(amsl_m)
         self._projection = f"+proj=tmerc +lat_0={self.lat_deg:.15g} +lon_0={self.lon_deg:.15g} +k=1 +x_0=0 +y_0=0"
-        # What PROJ derives from the two coordinate systems, identical to the last bit, without a search in its
-        # database.
+        # The operation that PROJ derives from the two coordinate systems, identical to the last bit, without a search
+        # in its database.
         plane = f"{self._projection} +ellps=WGS84"
         self._forward = Transformer.from_pipeline(
             f"+proj=pipeline +step +proj=unitconvert +xy_in=deg +xy_out=rad +step {plane}"

@@ -70,7 +70,7 @@ def read_utm(plain: str) -> GridPlace | None:
     if not _LIKE_UTM.match(plain):
         return None
     if match is None:
-        raise NotAPlace("zone, band or hemisphere, easting and northing are wanted")
+        raise NotAPlace("give zone, band or hemisphere, easting and northing")
     zone, letter = _zone(match[1]), match[2]
     easting_m, northing_m = float(match[3]), float(match[4])
     _check_metres(easting_m, northing_m)
@@ -97,7 +97,7 @@ def read_mgrs(plain: str) -> GridPlace | None:
     match = _MGRS.fullmatch(plain)
     if match is None:
         polar = "; squares at the poles are not read, write lat, lon" if plain[:1] in "ABYZ" else ""
-        raise NotAPlace(f"zone, band, two letters of a square and an even number of digits are wanted{polar}")
+        raise NotAPlace(f"give zone, band, two letters of a square and an even number of digits{polar}")
     groups = match[5].split()
     digits = "".join(groups)
     if len(groups) > 2 or len({len(group) for group in groups}) > 1 or len(digits) % 2:

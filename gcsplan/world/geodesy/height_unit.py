@@ -1,4 +1,4 @@
-"""Units of height: what files call them, which one counts for a raster, and who says so."""
+"""Units of height: their names in files, the one that counts for a raster, and who states it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SAME_UNIT = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class HeightUnit:
-    """A unit of height. ``by`` says who states it: the file, a key, a format, or nobody."""
+    """A unit of height. ``by`` names who states it: the file, a key, a format, or nobody."""
 
     name: str
     metres: float
@@ -29,7 +29,7 @@ class HeightUnit:
         """Whether both are one length, whatever their names."""
         return math.isclose(self.metres, other.metres, rel_tol=SAME_UNIT)
 
-    def told(self) -> str:
+    def stated(self) -> str:
         """The unit and who states it, for one line of a report."""
         return f"{self.name}, {self.by}" if self.by else self.name
 
@@ -70,9 +70,9 @@ def unit_named(words: str) -> HeightUnit | None:
 
 
 def unit_of_prj(text: str) -> str:
-    """What the text of a .prj of ArcInfo calls the unit of its heights (``Zunits FEET``); empty if it says none.
+    """The name of the unit of heights in the text of ArcInfo's .prj (``Zunits FEET``); empty if it states none.
 
-    GDAL reads the unit of its places alone. A number is how many make a metre, of which 1 alone is a unit with a name.
+    GDAL reads the unit of its places alone. A number is how many units make a metre; only 1 is a unit with a name.
     """
     found = re.search(r"(?im)^[ \t]*zunits[ \t]+(\S.*?)\s*$", text)
     words = "" if found is None else found[1]
@@ -88,23 +88,23 @@ def unit_of_length(metres: float, name: str) -> HeightUnit:
 
 
 def unit_that_counts(
-    stated: Sequence[HeightUnit], wanted: str | None, horizontal: HeightUnit, file: str, *, where: str
+    stated: Sequence[HeightUnit], given: str | None, horizontal: HeightUnit, file: str, *, where: str
 ) -> tuple[HeightUnit, list[Note]]:
     """The unit of a file's heights, and notes.
 
-    ``stated`` are the units that the file and the vertical datum state, ``wanted`` is ``height_unit`` (`OF_KEY`), which
+    ``stated`` are the units that the file and the vertical datum state, ``given`` is ``height_unit`` (`OF_KEY`), which
     counts before all of them; ``horizontal`` is the unit of the grid. Where nothing is stated, metres count over a grid
     in metres or degrees. Raises InputError where two units are stated, and over a grid in feet where none is.
     """
     names = tuple(dict.fromkeys(f"{unit.name} ({unit.by})" for unit in stated))
-    if wanted is not None:
-        unit = replace(OF_KEY[wanted], by=BY_KEY)
+    if given is not None:
+        unit = replace(OF_KEY[given], by=BY_KEY)
         other = [s for s in stated if not s.is_same(unit)]
         return unit, [Note("heights_in_unit_of_key", file=file, height_unit=unit.name, stated=names)] if other else []
     if any(not s.is_same(stated[0]) for s in stated[1:]):
         raise InputError(
-            f"{file} states two units of height: {', '.join(names)}; say with `height_unit: us_ft` (or m, ft) which "
-            "one is right",
+            f"{file} states two units of height: {', '.join(names)}; state the right one with `height_unit: us_ft` "
+            "(or m, ft)",
             where=where,
         )
     if stated:
@@ -114,7 +114,7 @@ def unit_that_counts(
     if not horizontal.is_same(METRE):
         likely = next((key for key, unit in OF_KEY.items() if unit.is_same(horizontal)), "m")
         raise InputError(
-            f"the grid of {file} is in {horizontal.name}, and nothing says the unit of its heights; say it with "
+            f"the grid of {file} is in {horizontal.name}, and nothing states the unit of its heights; state it with "
             f"`height_unit: {likely}` (or {', '.join(key for key in OF_KEY if key != likely)})",
             where=where,
         )

@@ -29,8 +29,8 @@ MEASURED_AT = np.array([0.25, 0.5, 0.75])
 class ToDegrees:
     """From one coordinate system to WGS 84, by one operation for all of a layer, never a ballpark one.
 
-    ``crs`` is WKT, a PROJ string or ``EPSG:code``; ``middle`` (x, y) lies among the shapes. ``note`` says what was
-    done, and is None for degrees on WGS 84. Raises InputError.
+    ``crs`` is WKT, a PROJ string or ``EPSG:code``; ``middle`` (x, y) lies among the shapes. ``note`` names the
+    operation, and is None for degrees on WGS 84. Raises InputError.
     """
 
     def __init__(self, crs: str, middle: tuple[float, float], *, where: str) -> None:
@@ -80,9 +80,9 @@ class ToDegrees:
     def line(self, xy: Floats, most: int, *, any_width: bool = False) -> Floats:
         """(M, 2) latitude, longitude of a line (N, 2) x, y, cut until it is straight in degrees from point to point.
 
-        No more than ``most`` points are added. Raises InputError if that are too few, and unless ``any_width`` for an
-        edge of half a turn and more: a zone across the antimeridian that somebody converted to Mercator is one around
-        the rest of the globe.
+        No more than ``most`` points are added. Raises InputError if more are needed, and unless ``any_width`` for an
+        edge of half a turn and more: a zone across the antimeridian that somebody converted to Mercator lies around the
+        rest of the globe.
         """
         ends = self.points(xy)
         if self._operation is None or len(xy) < 2:

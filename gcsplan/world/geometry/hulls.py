@@ -106,7 +106,7 @@ def _holds(regions: Floats, points: Floats) -> Bools:
 
 @cache
 def _choices(count: int, size: int) -> tuple[Indices, ...]:
-    """The numbers of all choices of ``size`` of ``count`` points: those of the first points, of the second, …"""
+    """The numbers of all choices of ``size`` of ``count`` points: numbers of the first points, of the second, …"""
     return tuple(np.array(list(combinations(range(count), size)), dtype=np.intp).reshape(-1, size).T)
 
 

@@ -5,8 +5,8 @@ whose boxes overlap, which are estimated from some of the edges.
 
 An outline is drawn wider (or narrower) by two kinds of steps, each of which only adds to the polygon (or only takes
 from it): a corner that points inward is left out, and an edge whose both ends point outward is replaced by the corner
-in which its neighbours meet. For each edge the greatest distance of what was added from the first polygon is known,
-never too small, and stays within the tolerance. Whether the result crosses itself is examined at the end.
+in which its neighbours meet. For each edge an upper bound of the distance of the added area from the first polygon is
+known, and stays within the tolerance. Whether the result crosses itself is examined at the end.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats
 
 MOST_EDGE_PAIRS = 12e6
-"""Pairs of edges with overlapping boxes, of an outline that is examined: GEOS takes half a second for them."""
+"""Most pairs of edges with overlapping boxes in an outline that is examined: GEOS takes half a second for them."""
 
 MOST_CROSSINGS = 30_000
-"""Crossings of an outline with itself, of which what it encloses is found: GEOS takes two seconds for them."""
+"""Most crossings of an outline with itself whose enclosed area is found: GEOS takes two seconds for them."""
 
 FEW_CORNERS = 2000
 """Outlines with so many corners are examined without an estimate."""
@@ -31,7 +31,7 @@ WIDER_M = (0.05, 0.2, 1.0, 5.0, 20.0, 100.0)
 """Tolerances that `few_corners` tries, m."""
 
 MOST_OUTLINE_ROUNDS = 200
-"""Rounds of steps at most; each takes a fifth of what can be left out, or more."""
+"""Rounds of steps at most; each takes a fifth of the removable corners, or more."""
 
 
 def overlapping_pairs(ring: Floats) -> float:
@@ -56,7 +56,7 @@ def crossings(ring: Floats, most: int = MOST_CROSSINGS, *, closed: bool = True) 
 
     edges = shapely.linestrings(np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)[: None if closed else -1])
     tree, count = shapely.STRtree(edges), 0
-    at_once = max(8, min(AT_ONCE, 1_000_000 // len(edges)))  # the boxes of one edge may overlap those of all others
+    at_once = max(8, min(AT_ONCE, 1_000_000 // len(edges)))  # the box of one edge may overlap all others
     for k in range(0, len(edges), at_once):
         some = edges[k : k + at_once]
         count += int(tree.query(some, predicate="intersects").shape[1]) - 3 * len(some)  # itself and its two neighbours
@@ -77,7 +77,7 @@ def fewer_corners(
     import shapely
 
     ring = np.asarray(vertices, float)
-    error = np.zeros(len(ring))  # of the edge from each corner to the next
+    error = np.zeros(len(ring))  # for the edge from each corner to the next
     for _ in range(MOST_OUTLINE_ROUNDS):
         if len(ring) <= 4:
             break
@@ -111,11 +111,11 @@ def _round(ring: Floats, error: Floats, tolerance_m: float, side: float) -> tupl
     back, after, last = np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0), np.roll(ring, -2, axis=0)
     left, mine, next_ = np.roll(error, 1), error, np.roll(error, -1)
     turn = side * _cross(ring - back, after - ring)  # positive: the corner points outward
-    # Leave out corner i, which points inward: what is added is the triangle of it and its neighbours.
+    # Leave out corner i, which points inward: this adds the triangle of it and its neighbours.
     chord = np.linalg.norm(after - back, axis=1)
     height = np.abs(_cross(ring - back, after - back)) / np.maximum(chord, 1e-30)
     lost = np.where(turn <= 0.0, np.minimum(height, 0.5 * chord) + np.maximum(left, mine), np.inf)
-    # Replace edge i by the corner in which its neighbours meet: what is added is the triangle of that and the edge.
+    # Replace edge i by the corner in which its neighbours meet: this adds the triangle of that corner and the edge.
     meet, meets = _meeting(back, ring, after, last)
     step = after - ring
     part = ((meet - ring) * step).sum(axis=1) / np.maximum((step * step).sum(axis=1), 1e-30)

@@ -70,7 +70,7 @@ class GridMap:
         """
         u = (np.asarray(east_m, float) - self.centre[0]) / self.scale_m
         v = (np.asarray(north_m, float) - self.centre[1]) / self.scale_m
-        v = v.reshape((1,) * (u.ndim - v.ndim) + v.shape)  # of_u has axes before those of v
+        v = v.reshape((1,) * (u.ndim - v.ndim) + v.shape)  # of_u has its axes before the axes of v
         with np.errstate(over="ignore", invalid="ignore"):
             powers = np.ones((DEGREE + 1, v.size))
             for power in range(DEGREE):
@@ -115,7 +115,7 @@ class GridMap:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Ground and what stands on it.
+    """Ground and the obstacles on it.
 
     ``ground_m`` (rows, cols): least height of each node, metres AMSL; NaN is unknown, never ground; bilinear between
     nodes. ``high_m``: greatest height of the ground, the same array unless sources differ somewhere; the true ground
@@ -168,7 +168,7 @@ class Surface:
 
     @property
     def level_m(self) -> float | None:
-        """Altitude AMSL of the ground if it is level, and so is what stands on it; None if it is not.
+        """Altitude AMSL of the ground if it is level, and so is the top of its obstacles; else None.
 
         A surface with an unknown node is not level, for a void may be anything; nor is one with two heights.
         """

@@ -13,7 +13,7 @@ from gcsplan.world.kernels.shared import steps_of
 
 
 class Field(NamedTuple):
-    """What the check uses of a surface's map to its grid.
+    """The parts of a surface's map to its grid that the check uses.
 
     ``bend`` bounds the map's second derivative, 1/m, with cells taken as metres: a line of length L bows by at most
     bend·L²/8, and the metric changes by bend·d over a distance d. ``step_x``, ``step_y``: metres of one column and one

@@ -43,7 +43,7 @@ FEW_ZONES = 24  # up to this many, a look through all boxes is faster than the l
 @inlined
 def judge_terrain(
     m: Floats, ground: Floats, top: Floats, near: LocalExtrema, far: LocalExtrema, over: LocalExtrema, column: bool,
-    e0: float, n0: float, h0: float, e1: float, n1: float, h1: float, track: float, altitude: float, want: Demands,
+    e0: float, n0: float, h0: float, e1: float, n1: float, h1: float, track: float, altitude: float, limits: Demands,
     stack: Floats, full: bool, out: Floats, worst: Floats, leg: int,
 ) -> bool:  # fmt: skip
     """Judge ground, obstacles and ceilings of one leg; return False at the first violation unless ``full``.
@@ -53,24 +53,24 @@ def judge_terrain(
     ``out[8:11]``: lowest height above top, its fraction, and highest above ground; the rest of ``out`` is `sweep`'s.
     """
     fine = True
-    track_m = track * want.scale
+    track_m = track * limits.scale
     out[8], out[9], out[10] = math.nan, 0.0, math.nan
     for kind in (MIN_AGL, TERRAIN, MAX_AGL):
-        z, extrema, sign, need, reach = top, near, 1.0, want.min_agl_m + altitude, track_m
+        z, extrema, sign, need, reach = top, near, 1.0, limits.min_agl_m + altitude, track_m
         judged = True
         if kind == MIN_AGL:
             need = -math.inf if column else need
         elif kind == TERRAIN:
-            if column or want.clearance_m <= 0.0:
+            if column or limits.clearance_m <= 0.0:
                 continue
-            extrema, need, reach = far, altitude, track_m + want.clearance_m * want.scale
+            extrema, need, reach = far, altitude, track_m + limits.clearance_m * limits.scale
             # Skip the search if even the steepest slope does not lift the ground to the flight level.
             same = near.cols == far.cols and near.rows == far.rows
-            if same and out[LOW] - altitude >= (out[REACH] + want.clearance_m * want.scale) * out[STEEPEST]:
+            if same and out[LOW] - altitude >= (out[REACH] + limits.clearance_m * limits.scale) * out[STEEPEST]:
                 continue
         else:
-            z, extrema, sign, need = ground, over, -1.0, altitude - want.max_agl_m
-            judged = want.max_agl_m < math.inf
+            z, extrema, sign, need = ground, over, -1.0, altitude - limits.max_agl_m
+            judged = limits.max_agl_m < math.inf
             if not (full or judged):
                 continue
         sure = glance(m, z, extrema.slope, sign, e0, n0, h0, e1, n1, h1, need, reach, full, out)
@@ -134,7 +134,7 @@ def candidates(
 @device
 def judge(
     m: Floats, ground: Floats, top: Floats, near: LocalExtrema, far: LocalExtrema, over: LocalExtrema, zs: Zones,
-    start: Floats, end: Floats, column: Bools, track: Floats, altitude: Floats, want: Demands, full: bool, ok: Bools,
+    start: Floats, end: Floats, column: Bools, track: Floats, altitude: Floats, limits: Demands, full: bool, ok: Bools,
     found: Floats, worst: Floats, nearest: Int64s, hit: Int64s, hit_at: Floats, stack: Floats, out: Floats,
     events: Floats, seen: Int64s, list_of: Int64s,
 ) -> int:  # fmt: skip
@@ -154,10 +154,10 @@ def judge(
         e0, n0, h0 = start[i, 0], start[i, 1], start[i, 2]
         e1, n1, h1 = end[i, 0], end[i, 1], end[i, 2]
         flat = math.sqrt((e1 - e0) ** 2 + (n1 - n0) ** 2)
-        over_top = max(h0, h1) + altitude[i] - want.max_amsl_m
+        over_top = max(h0, h1) + altitude[i] - limits.max_amsl_m
         # A slope without limit is inf, and inf times the 0 m run of a vertical leg is NaN, which nothing exceeds.
-        up = not column[i] and h1 - h0 > flat * want.max_climb
-        down = not column[i] and h0 - h1 > flat * want.max_descent
+        up = not column[i] and h1 - h0 > flat * limits.max_climb
+        down = not column[i] and h0 - h1 > flat * limits.max_descent
         fine = not (up or down or over_top > TOUCH_M)
         ok[i] = False
         if not (fine or full):
@@ -165,13 +165,13 @@ def judge(
         fine = (
             judge_terrain(
                 m, ground, top, near, far, over, column[i], e0, n0, h0, e1, n1, h1,
-                track[i], altitude[i], want, stack, full, out, worst, i,
+                track[i], altitude[i], limits, stack, full, out, worst, i,
             )
             and fine
         )  # fmt: skip
         if not (fine or full):
             continue
-        reach = (track[i] + want.clearance_m) * want.scale
+        reach = (track[i] + limits.clearance_m) * limits.scale
         west, east, south, north = min(e0, e1), max(e0, e1), min(n0, n1), max(n0, n1)
         count = zones
         if not full:

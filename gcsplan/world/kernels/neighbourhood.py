@@ -30,13 +30,15 @@ TILE, SPACING = STRIP, 32
 BOW = 2
 """Upper bound, in cells, of how far a line of the plane leaves the straight grid line between two such places."""
 CELL_BYTES = 12
-"""Of a cell that was examined: a slope and two heights."""
+"""Bytes of an examined cell: a slope and two heights."""
 MOST_EXAMINED_BYTES = 150_000_000
-"""Of what all neighbourhoods of an airspace have examined: those that were asked for least lately forget it."""
+"""Most bytes of examined cells in all neighbourhoods of an airspace; the least recently used neighbourhoods forget
+theirs."""
 AT_ONCE = 3
 """Neighbourhoods that one call of a kernel takes."""
 MOST_ROOM_BYTES = 530_000_000
-"""Of the work array of one neighbourhood and the heights: a reach of some 2400 cells in 16 million, 1400 in 49."""
+"""Most bytes of the work array of one neighbourhood and the heights: a reach of some 2400 cells in 16 million, 1400 in
+49."""
 FEW_CELLS = 32
 """Up to so many cells of a reach unknown ones within it are looked for one by one, without `unknown_gaps`."""
 MOST_GAP = 127
@@ -98,7 +100,7 @@ class Neighbourhood:
             self.extrema = self.extrema._replace(gaps=gaps() if gaps else unknown_gaps(heights))
         self._held = Held(EXTREMA, *self.extrema)
         self.examined_bytes = 0 if self.seen.size else self.extrema.slope.size * CELL_BYTES
-        """What its arrays take; those of a large surface take what was examined."""
+        """Bytes of its arrays; over a large surface, only the examined cells take memory."""
 
     def __reduce__(self) -> tuple[type[Neighbourhood], tuple[GridMap, Field, Floats, float]]:
         """Pickle the inputs only: a copy in another process examines its tiles anew."""
@@ -118,15 +120,15 @@ class Neighbourhood:
 
 
 class Neighbourhoods:
-    """The local extrema of an airspace for each reach that is asked for, little more than `MOST_EXAMINED_BYTES`.
+    """The local extrema of an airspace for each requested reach, in little more than `MOST_EXAMINED_BYTES`.
 
-    A way home asks for a dozen reaches along lines that cover all of the terrain: 40 million cells took 4 GB.
+    A way home needs a dozen reaches along lines that cover all of the terrain: 40 million cells took 4 GB.
     """
 
     def __init__(self, grid: GridMap, field: Field) -> None:
         self._grid, self._field = grid, field
         self.kept: dict[tuple[bool, int, int], Neighbourhood] = {}
-        """The least lately asked for come first."""
+        """The least recently used come first."""
         self._gaps: dict[bool, Int8s] = {}
         self._lock = threading.Lock()
 
@@ -190,7 +192,7 @@ def _empty(field: Field, heights: Floats, reach_m: float) -> LocalExtrema:
 
 
 def _cells(field: Field, heights: Floats, reach_m: float) -> tuple[int, int]:
-    """Columns and rows of a reach. From one as large as the surface on, any window holds all of it and what is beyond.
+    """Columns and rows of a reach. A window of a reach as large as the surface holds all of it and the cells beyond.
 
     Raises InputError for a reach whose work array and heights are larger than `MOST_ROOM_BYTES`.
     """
@@ -215,7 +217,7 @@ def _room(reach_rows: int, reach_cols: int, rows: int, cols: int) -> tuple[int, 
 def _zeros(shape: tuple[int, ...]) -> Singles:
     """Zeros (float32) that take no memory until they are written over, and then in pages of 4 kB.
 
-    ``np.zeros`` asks Linux for pages of 2 MB, and the tiles of one long line are in most of them.
+    ``np.zeros`` requests pages of 2 MB from Linux, and the tiles of one long line are in most of them.
     """
     size = 4 * math.prod(shape)
     if not hasattr(mmap, "MADV_NOHUGEPAGE") or size < mmap.PAGESIZE:

@@ -29,7 +29,7 @@ AFFINE, CENTRE_E, CENTRE_N, PER_UNIT, HALF, BEND, ERROR_M, STEP_X, STEP_Y, LINEA
 HORNER = LINEAR + 6
 
 # Indices of a zone's row of numbers. Circle: east, north, radius in metres of the plane; a negative radius marks a
-# polygon, whose vertices are those from FIRST up to LAST. Box: west, south, east, north. Floor and ceiling are above
+# polygon, whose vertices go from FIRST up to LAST. Box: west, south, east, north. Floor and ceiling are above
 # mean sea level, or above ground if the _AGL mark is not 0; -inf and inf if there is none. Band: lowest floor and
 # highest ceiling above mean sea level over all the ground under the zone. Cells: first and last column, first and last
 # row that the shape may touch.

@@ -92,9 +92,9 @@ def break_of_piece(
 
     The piece is ``u0`` to ``u1`` and ``v0`` to ``v1`` of a cell with sides ``sx``, ``sy`` and height
     ``za + kb·u + kc·v + kd·u·v``; the segment leads from (``ax``, ``ay``), m from the cell's first corner, by (``dx``,
-    ``dy``), with heights ``w0`` to ``w0 + dw``. The bound is the lower of two: that of the highest corner; and that of
-    the plane that is tangent at the piece's middle, raised by what the piece bulges above it, which within ``r`` of a
-    place is higher by at most ``r`` times its slope. The second is nearly exact for small pieces.
+    ``dy``), with heights ``w0`` to ``w0 + dw``. The bound is the lower of two. One comes from the highest corner; the
+    other from the plane that is tangent at the piece's middle, raised by the piece's bulge above it, which within ``r``
+    of a place is higher by at most ``r`` times its slope. The second is nearly exact for small pieces.
     """
     p, q = za + kb * u0 + kc * v0 + kd * u0 * v0, za + kb * u1 + kc * v0 + kd * u1 * v0
     s, t = za + kb * u0 + kc * v1 + kd * u0 * v1, za + kb * u1 + kc * v1 + kd * u1 * v1

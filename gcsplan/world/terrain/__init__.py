@@ -1,1 +1,1 @@
-"""Terrain models: files read, joined and cut to a grid, what is unknown in them, and what a vehicle stores of them."""
+"""Terrain models: files read, joined and cut to a grid, their unknown parts, and the part that a vehicle stores."""

@@ -24,7 +24,7 @@ WORST_GEOID_M = 120.0
 MAX_POSTS = 4_000_000
 """Most posts of a grid that a mission may need; the finest existing geoid has 2,000 per square degree."""
 
-_UNDULATION = "geoid_undulation"  # PROJ's name for the wanted band, if there are several
+_UNDULATION = "geoid_undulation"  # PROJ's name for the band of heights, if there are several
 
 
 class GeoidGrid:
@@ -82,9 +82,9 @@ class GeoidGrid:
             raise
         except Exception as why:
             # As for rasters: GDAL and rasterio raise many types of exception on broken headers.
-            said = (str(why.__cause__ or why).strip() or type(why).__name__).splitlines()[0][:200]
+            cause = (str(why.__cause__ or why).strip() or type(why).__name__).splitlines()[0][:200]
             raise InputError(
-                f"the geoid grid {self.path} cannot be read as a .gtx or GeoTIFF grid ({said})", where=self.where
+                f"the geoid grid {self.path} cannot be read as a .gtx or GeoTIFF grid ({cause})", where=self.where
             ) from None
 
 

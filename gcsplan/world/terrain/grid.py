@@ -1,8 +1,8 @@
-"""ArduPilot's terrain grid: where its posts lie, how they are kept in blocks, and what height it reads between them.
+"""ArduPilot's terrain grid: the places of its posts, their blocks, and the height that it reads between them.
 
 Each degree tile has posts of its own, ``spacing_m`` apart, counted north and east from its south-west corner by the
-autopilot's flat-earth formula (AP_Terrain, `calculate_grid_info`). A block holds 28 × 32 posts, the first of them 24
-north and 28 east of those of its neighbour, so that every point has its four posts in one block. A block is sent and
+autopilot's flat-earth formula (AP_Terrain, `calculate_grid_info`). A block holds 28 × 32 posts, and begins 24 posts
+north and 28 east of its neighbour, so that every point has its four posts in one block. A block is sent and
 marked as known in parts of 4 × 4 posts. Heights are whole metres; between posts they are bilinear.
 
 The autopilot computes some of this in float32, which moves a point by up to 1 cm; here it is float64.
@@ -29,7 +29,7 @@ PART_POSTS = 4
 POSTS_OF_BLOCK = (28, 32)
 """Posts of a block, north and east."""
 STRIDE = (24, 28)
-"""Posts from a block's first to that of the next, north and east."""
+"""Posts from a block's first post to the next block's first one, north and east."""
 PARTS_OF_BLOCK = (POSTS_OF_BLOCK[0] // PART_POSTS, POSTS_OF_BLOCK[1] // PART_POSTS)
 ALL_PARTS = (1 << (PARTS_OF_BLOCK[0] * PARTS_OF_BLOCK[1])) - 1
 
@@ -128,8 +128,8 @@ class TerrainGrid:
     def blocks_within(self, south_e7: float, west_e7: float, north_e7: float, east_e7: float) -> Iterator[Block]:
         """The blocks that the autopilot may look up anywhere in a box of degrees, which may cross the antimeridian.
 
-        They come tile by tile and row by row, and are found as they are asked for. A block on the border of the box
-        or of its tile may be one too many, never one too few.
+        They come tile by tile and row by row, each found when it is needed. A block on the border of the box or of its
+        tile may be one too many, never one too few.
         """
         width = (east_e7 - west_e7) % (360.0 * DEGREE_E7) if east_e7 != west_e7 else 0.0
         first = math.floor(west_e7 / DEGREE_E7)

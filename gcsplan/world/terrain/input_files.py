@@ -1,16 +1,16 @@
-"""The files that a mission reads, and whether they are still what they were.
+"""The files that a mission reads, and whether they are unchanged.
 
 Every reader reports a file here before it opens it, also one that is not there (it may appear) and one whose content is
-remembered from an earlier mission. Within `reading` each report is kept with a mark of what was found:
+remembered from an earlier mission. Within `reading` each report is kept with a mark of the found state:
 
 - a file: SHA-256 of its content up to `WHOLE_BYTES`, as long as all of a mission's together have at most
-  `TOGETHER_BYTES`; of what is beyond, its size, time of change and inode
-- a raster: that of itself and of every file beside it that its name begins (``dem.tif``: ``dem.*``), for GDAL finds
-  sidecars, world files, overviews and masks there
+  `TOGETHER_BYTES`; beyond these limits its size, time of change and inode
+- a raster: the marks of itself and of every file beside it that its name begins (``dem.tif``: ``dem.*``), for GDAL
+  finds sidecars, world files, overviews and masks there
 - a folder: the names in it that count
-- a setting: the value of an environment variable that says where files are
+- a setting: the value of an environment variable that names a place of files
 
-docs/safety.md says what "unchanged" assumes.
+docs/safety.md states the assumptions of "unchanged".
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ __all__ = [
     "sha256_of_all", "states_of", "tell_file", "tell_folder", "tell_raster", "tell_setting",
 ]  # fmt: skip
 
-# Endings, in lower case, by which a reader is chosen, and a file that is given elsewhere is told where it belongs.
+# Endings, in lower case, by which a reader is chosen, and a message names the key to which a misplaced file belongs.
 JSON_ZONES = (".geojson", ".json")
 VECTOR_ZONES = (".gpkg", ".shp", ".fgb", ".zip")
 ZONE_FILES = (*JSON_ZONES, ".kml", ".kmz", ".csv", *VECTOR_ZONES)
@@ -66,7 +66,7 @@ _now: ContextVar[FileReading | None] = ContextVar("reading", default=None)
 
 
 class FileReading:
-    """What was reported since `reading` began: ``marks``, in this order."""
+    """The reports since `reading` began: ``marks``, in this order."""
 
     def __init__(self) -> None:
         self.marks: dict[str, str] = {}
@@ -111,7 +111,7 @@ class FileReading:
 
     @staticmethod
     def changed(marks: Mapping[str, str]) -> str:
-        """The first path of ``marks`` that is not what it was; empty if all are."""
+        """The first path of ``marks`` that has changed; empty if none has."""
         now = FileReading()
         for key, mark in marks.items():
             now.tell(key)
@@ -128,7 +128,7 @@ def path_of(key: str) -> str:
 
 @contextmanager
 def reading() -> Iterator[FileReading]:
-    """Keep what is reported in the body, by this thread."""
+    """Keep the reports of the body, by this thread."""
     found = FileReading()
     token = _now.set(found)
     try:
@@ -156,7 +156,7 @@ def tell_raster(path: str | os.PathLike[str]) -> None:
 
 
 def tell_setting(name: str) -> None:
-    """Report an environment variable that says where files are."""
+    """Report an environment variable that names a place of files."""
     now = _now.get()
     if now is not None:
         now.tell(f"setting {name}")
@@ -202,7 +202,7 @@ def beside(path: str | os.PathLike[str]) -> list[Path]:
 
 
 def states_of(files: Iterable[Path]) -> tuple[tuple[object, ...], ...]:
-    """Names, sizes, times and inodes of files that are there: what must not change while what they say is kept."""
+    """Names, sizes, times and inodes of existing files: they must not change while their content is kept."""
     found = []
     for file in files:
         try:

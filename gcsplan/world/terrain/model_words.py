@@ -1,4 +1,4 @@
-"""What every report says of a terrain model: what it does not hold, and how its heights were read."""
+"""Words of every report on a terrain model: its missing parts, and how its heights were read."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ ABSENT = {
     "bare": "trees, masts and wires are not in it",
     "surface": "trees and buildings as the radar saw them; newer ones, masts and wires are not in it",
 }
-"""By the kind of a DEM, what it does not hold."""
+"""The parts that a DEM lacks, by its kind."""
 
 
 def what_is_not_in(inputs: Mapping[str, object], model: str = " DEM") -> str:
@@ -23,7 +23,7 @@ def what_is_not_in(inputs: Mapping[str, object], model: str = " DEM") -> str:
 
 
 def notes_on(info: Mapping[str, object]) -> tuple[Note, ...]:
-    """What a user has to know of the terrain, of a surface's ``info``."""
+    """Notes on the terrain for the user, from a surface's ``info``."""
     notes = info.get("notes", ())
     assert isinstance(notes, tuple)
     return notes
@@ -32,15 +32,15 @@ def notes_on(info: Mapping[str, object]) -> tuple[Note, ...]:
 def heights_read(units: Iterable[HeightUnit], datum: str, low_m: float, high_m: float) -> str:
     """How heights were read: ``US survey feet, from the file; NAVD88; ground 160–440 m``.
 
-    ``units`` are those of all files, ``low_m`` and ``high_m`` the lowest and the highest ground that was loaded.
+    ``units`` come from all files, ``low_m`` and ``high_m`` are the lowest and the highest ground that was loaded.
     """
-    told = " and ".join(dict.fromkeys(unit.told() for unit in units))
+    stated = " and ".join(dict.fromkeys(unit.stated() for unit in units))
     low, high = floored(low_m, 0), raised(high_m, 0)
     ends = f"{high:.0f}" if low == high else f"{low:.0f}{' to ' if low < 0.0 else '–'}{high:.0f}"
-    return f"{told}; {datum}; ground {ends} m AMSL"
+    return f"{stated}; {datum}; ground {ends} m AMSL"
 
 
 def heights_line(inputs: Mapping[str, object]) -> str | None:
-    """The line of a surface's ``info`` or a report's inputs: ``heights: …``; None if they do not say it."""
+    """The line of a surface's ``info`` or a report's inputs: ``heights: …``; None if they lack it."""
     read = inputs.get("heights_read")
     return f"heights: {read}" if isinstance(read, str) else None

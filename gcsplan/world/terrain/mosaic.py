@@ -130,7 +130,7 @@ class Mosaic:
                 )
             if other.vertical != first.vertical:
                 raise InputError(
-                    f"the tiles must share one vertical datum: {first.name} says {_datum(first)}, {other.name} "
+                    f"the tiles must share one vertical datum: {first.name} states {_datum(first)}, {other.name} "
                     f"{_datum(other)}; correct the one that is wrong (gdal_edit.py -a_srs)",
                     where=where,
                 )
@@ -187,7 +187,7 @@ class Mosaic:
             x, y = (np.asarray(a, float) for a in there.transform(east_m, north_m))
             if not (np.isfinite(x).all() and np.isfinite(y).all()):
                 raise InputError(
-                    "the mission reaches beyond what the DEM's coordinate system can hold; gdalwarp the DEM to a "
+                    "the mission reaches beyond the limits of the DEM's coordinate system; gdalwarp the DEM to a "
                     "system made for this place",
                     where=self.where,
                 )
@@ -233,7 +233,7 @@ class Mosaic:
         if not grid.error_m <= FIT_ERROR_M:
             raise InputError(
                 f"the mission is too wide for the DEM's coordinate system: its grid can be placed to "
-                f"{grid.error_m:.3g} m only, wanted {FIT_ERROR_M:g} m; gdalwarp the DEM to UTM, or plan a smaller "
+                f"{grid.error_m:.3g} m only, needed {FIT_ERROR_M:g} m; gdalwarp the DEM to UTM, or plan a smaller "
                 "mission",
                 where=self.where,
             )
@@ -284,7 +284,7 @@ class Mosaic:
                     tiles.append(PlacedTile(raster, round(col), round(row), round(ratio * parts)))
                 elif turn == nearest:
                     raise InputError(
-                        f"the tiles must lie on one grid: {raster.name} is off that of {first.name} by "
+                        f"the tiles must lie on one grid: {raster.name} is off the grid of {first.name} by "
                         f"{col - round(col):.3f} columns and {row - round(row):.3f} rows; gdalwarp them together",
                         where=self.where,
                     )
@@ -298,8 +298,8 @@ def _require_known_units(rasters: Sequence[Raster], where: str) -> None:
     if silent is not None and other is not None:
         likely = next((key for key, unit in OF_KEY.items() if unit.is_same(other.unit)), "m")
         raise InputError(
-            f"the heights of {other.name} are {other.unit.told()}, and nothing says the unit of those of {silent.name} "
-            f"beside it; if all tiles have one, say it with `height_unit: {likely}`, else write it into the file "
+            f"the heights of {other.name} are {other.unit.stated()}, and nothing states the unit of {silent.name} "
+            f"beside it; if all tiles have one, state it with `height_unit: {likely}`, else write it into the file "
             "(gdal_edit.py -units metre)",
             where=where,
         )
@@ -405,7 +405,7 @@ class Heights:
 def read_tiles(
     parts: Sequence[tuple[PlacedTile, SharedNodes]], c0: int, r0: int, cols: int, rows: int, where: str = ""
 ) -> tuple[Heights, list[Note]]:
-    """The heights of a window that begins at column ``c0`` and row ``r0``, and notes on what differs or is unknown.
+    """The heights of a window that begins at column ``c0`` and row ``r0``, and notes on differing or unknown parts.
 
     ``where`` names the files in messages. Raises InputError.
     """
@@ -461,7 +461,7 @@ def _put_wide(heights: Heights, parts: Sequence[tuple[PlacedTile, SharedNodes]],
 
 
 class Tile(Protocol):
-    """What reports say of one file, and the datum that it states."""
+    """The report's entry for one file, and the datum that it states."""
 
     @property
     def stored_bytes(self) -> int:
@@ -473,11 +473,11 @@ class Tile(Protocol):
 
     @property
     def vertical(self) -> VerticalDatum | None:
-        """What its heights are above; None if it does not say."""
+        """The zero of its heights; None if it states none."""
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """What a user should know of it."""
+        """Notes on it for the user."""
 
     @property
     def unit(self) -> HeightUnit:
@@ -506,7 +506,7 @@ def tiles_of(paths: Sequence[str], *, where: str) -> list[str]:
     """The rasters that ``paths`` name, as files or in folders. Raises InputError."""
     found = [tile for path in paths for tile in _in_folder(path, where)]
     if len(found) > MOST_TILES:
-        raise InputError(f"{len(found)} tiles are named; {MOST_TILES} are the most: give those around", where=where)
+        raise InputError(f"{len(found)} tiles are named; {MOST_TILES} are the most: give the tiles around", where=where)
     return found
 
 

@@ -1,4 +1,4 @@
-"""What stands on the ground: one height everywhere, or a canopy raster that is never under-estimated between nodes."""
+"""Obstacles on the ground: one height everywhere, or a canopy raster that is never under-estimated between nodes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gcsplan.world.terrain.mosaic import Window
 TALLEST_M = 250.0
 """A canopy cell above this, m (or below -1 m) is an undeclared nodata value: unknown. The tallest tree has 116 m."""
 
-_PAD_CELLS = 0.02  # of a DEM cell: far above the bows of pixel edges and the fit's error
+_PAD_CELLS = 0.02  # a part of a DEM cell, far above the bows of pixel edges and the fit's error
 _CHUNK_CELLS = 200_000  # at once: a hundred megabytes of corners and indices
 
 
@@ -79,7 +79,7 @@ def _outside(cells: Floats, ground: Window, canopy: Window, unknown_m: float) ->
 
 
 def _grid_to_grid(source: Window, target: Window) -> GridMap:
-    """The map from columns and rows of one window to those of another, through the plane."""
+    """The map from columns and rows of one window to columns and rows of another, through the plane."""
 
     def exact(col: Floats, row: Floats) -> tuple[Floats, Floats]:
         plane = source.grid.to_plane(col, row)

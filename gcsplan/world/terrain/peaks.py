@@ -13,7 +13,7 @@ from gcsplan.errors import InputError
 from gcsplan.world.geometry.surface import GridMap
 from gcsplan.world.geometry.zones import Box
 
-WANTED_ERROR_M = 0.01
+TARGET_ERROR_M = 0.01
 """The gridded surface lies at most this far above the true one, m, if `MAX_PEAK_NODES` permits."""
 
 MAX_PEAK_NODES = 4_000_000
@@ -54,7 +54,7 @@ def peaks_grid(base_m: float, peaks: Sequence[Peak], box: Box, most_nodes: int |
     ys: Floats = south + height * fraction
     in_x, in_y = _concavity(peaks, xs, ys)
     sharpest = float((in_x + in_y).max())
-    spacing = math.sqrt(8.0 * WANTED_ERROR_M / sharpest) if sharpest > 0.0 else math.inf
+    spacing = math.sqrt(8.0 * TARGET_ERROR_M / sharpest) if sharpest > 0.0 else math.inf
     spacing = min(spacing, min(width, height) / _COARSEST)
     cols, rows = math.ceil(width / spacing), math.ceil(height / spacing)
     if most_nodes is not None and (cols + 1) * (rows + 1) > min(most_nodes, MAX_PEAK_NODES):

@@ -1,7 +1,7 @@
 """One raster file: its header, and windows of it in metres with NaN for everything unknown.
 
 GDAL opens only three formats, and only files that exist: a path from a mission file must never become a web request.
-Heights belong to pixel centres, whatever AREA_OR_POINT says: GDAL's transform refers to the corners in either case.
+Heights belong to pixel centres, whatever AREA_OR_POINT states: GDAL's transform refers to the corners in either case.
 """
 
 from __future__ import annotations
@@ -69,8 +69,8 @@ class Raster:
     ``read(col, row, cols, rows)`` yields strips (first row within the window, heights (n, cols)), NaN where unknown.
     ``west``, ``north`` are the outer corner in the raster's own units, ``dx``, ``dy`` > 0 the cell. ``read`` returns
     metres, but above the raster's own vertical datum; ``vertical`` is the file's statement of that datum. ``unit`` is
-    the one in which the file counts. ``stored_bytes``: the size of the file. ``files`` are those that it is read from:
-    itself, and its sidecars, masks and overviews.
+    the unit in which the file counts. ``stored_bytes``: the size of the file. ``files``: its sources, which are itself
+    and its sidecars, masks and overviews.
     """
 
     name: str
@@ -92,7 +92,7 @@ class Raster:
 
 @dataclass(frozen=True, slots=True)
 class RasterStatements:
-    """What the user says of a file, and what counts before the file's own statements.
+    """The user's statements on a file, which count before the file's own statements.
 
     ``crs``: its coordinate system. ``height_unit``: a key of `OF_KEY`. ``datum_unit``: the unit that the vertical datum
     states. ``nodata``: a number of the file that stands for no height.
@@ -119,7 +119,7 @@ def open_raster(
 ) -> Raster:
     """Header of the raster at ``path`` (GeoTIFF, SRTM .hgt or .hgt.zip, ESRI .asc).
 
-    The keywords are what the user says (`RasterStatements`).
+    The keywords are the user's statements (`RasterStatements`).
 
     If neither the file nor one beside it or that it names has changed since this process opened it, it is not opened
     again: many missions use the same tiles. Raises InputError for anything that is not a readable, georeferenced,
@@ -127,20 +127,20 @@ def open_raster(
     """
     tell_raster(path)
     require_file(path, where=where)
-    said = RasterStatements(crs, height_unit, datum_unit, nodata)
-    key = (path.absolute(), said, states_of(beside(path)))
+    given = RasterStatements(crs, height_unit, datum_unit, nodata)
+    key = (path.absolute(), given, states_of(beside(path)))
     try:
         found = remembered_headers.get(key)
         if found is None or found[2] != states_of(found[0].files):  # one that a sidecar names may lie anywhere
             with gdal(path) as dataset:
-                header, to_metres = _header(dataset, path, said, where=where)
+                header, to_metres = _header(dataset, path, given, where=where)
             if len(remembered_headers) >= MOST_HEADERS:
                 remembered_headers.clear()
             found = remembered_headers[key] = header, to_metres, states_of(header.files)
         header, to_metres, _ = found
         for file in header.files:
             tell_file(file)
-        return replace(header, read=_reader(path, *to_metres, said.nodata, where=where))
+        return replace(header, read=_reader(path, *to_metres, given.nodata, where=where))
     except InputError:
         raise
     except Exception as why:
@@ -167,7 +167,7 @@ def require_file(path: Path, *, where: str) -> None:
 
 @contextmanager
 def gdal(path: Path, other: str = "") -> Iterator[Any]:
-    """The dataset at ``path``, whatever GDAL's environment variables say about pixel corners.
+    """The dataset at ``path``, whatever GDAL's environment variables state about pixel corners.
 
     ``other``: the driver for a file that is no GeoTIFF, if the file's name does not decide it.
     """
@@ -177,12 +177,12 @@ def gdal(path: Path, other: str = "") -> Iterator[Any]:
 
     with (
         warnings.catch_warnings(),
-        # GDAL keeps the vertical part of older GeoTIFFs to itself unless it is asked for.
+        # GDAL gives the vertical part of older GeoTIFFs only on request.
         rasterio.Env(
             GTIFF_POINT_GEO_IGNORE=False, GDAL_PAM_ENABLED=True, GDAL_CACHEMAX=CACHE_BYTES, GTIFF_REPORT_COMPD_CS=True
         ),
     ):
-        # Our own check of the georeference says more; the other warnings are between rasterio and its dependencies.
+        # Our own check of the georeference reports more; the other warnings are between rasterio and its dependencies.
         for category in (NotGeoreferencedWarning, DeprecationWarning, PendingDeprecationWarning):
             warnings.simplefilter("ignore", category)
         with rasterio.open(path.resolve(), driver=_driver(path, other)) as dataset:
@@ -216,7 +216,7 @@ def _driver(path: Path, other: str) -> str:
 
 
 def _is_hgt(path: Path) -> bool:
-    """Whether a name is that of an SRTM tile, zipped or not: GDAL then reads the one tile of that name inside."""
+    """Whether a file of this name is an SRTM tile, zipped or not: GDAL then reads the one tile of that name inside."""
     return path.name.lower().endswith((".hgt", ".hgt.zip"))
 
 
@@ -229,7 +229,7 @@ def _unreadable(path: Path, why: Exception) -> str:
         )
     elif path.suffix.lower() == ".zip":
         hint = "; unpack it first"
-    cause = why.__cause__ or why  # rasterio says "see previous exception"
+    cause = why.__cause__ or why  # rasterio's own words are "see previous exception"
     reason = (str(cause).strip() or type(cause).__name__).splitlines()[0].replace(str(path.absolute()), path.name)[:200]
     return (
         f"{path} cannot be read as a GeoTIFF, an SRTM .hgt or an ESRI .asc grid ({reason}){hint}; "
@@ -252,9 +252,9 @@ def require_numbers(dataset: Any, path: Path, *, where: str) -> None:
         )
 
 
-def _header(dataset: Any, path: Path, said: RasterStatements, *, where: str) -> tuple[Raster, tuple[float, float]]:
+def _header(dataset: Any, path: Path, given: RasterStatements, *, where: str) -> tuple[Raster, tuple[float, float]]:
     notes: list[Note] = []
-    crs = said.crs
+    crs = given.crs
     if dataset.count < 1:
         raise InputError(f"{path} holds no raster band", where=where)
     if dataset.count > 1:
@@ -279,7 +279,7 @@ def _header(dataset: Any, path: Path, said: RasterStatements, *, where: str) -> 
     text = crs if crs is not None else (dataset.crs.to_wkt() if dataset.crs else None)
     if text is None:
         raise InputError(
-            f"{path} does not say its coordinate system; add `crs:`, for example `crs: EPSG:4326` for degrees",
+            f"{path} does not state its coordinate system; add `crs:`, for example `crs: EPSG:4326` for degrees",
             where=where,
         )
     if crs is not None and dataset.crs:
@@ -292,7 +292,7 @@ def _header(dataset: Any, path: Path, said: RasterStatements, *, where: str) -> 
         system = with_vertical_of(system, dataset.crs.to_wkt(), prj, where=where)
     if system.geographic:
         _require_degrees(t, dataset, path, where=where)
-    unit, unit_notes = _unit(dataset, system, said, path, prj, where=where)
+    unit, unit_notes = _unit(dataset, system, given, path, prj, where=where)
     factor = unit.metres
     notes += unit_notes
     scale, offset = float(dataset.scales[0]), float(dataset.offsets[0])
@@ -303,7 +303,7 @@ def _header(dataset: Any, path: Path, said: RasterStatements, *, where: str) -> 
     to_metres = (scale * factor, offset * factor)
     header = Raster(
         path.name, system, t.c, t.f, t.a, -t.e, dataset.width, dataset.height, system.vertical,
-        _reader(path, *to_metres, said.nodata, where=where), path.stat().st_size, lambda: sha256_of_all(files),
+        _reader(path, *to_metres, given.nodata, where=where), path.stat().st_size, lambda: sha256_of_all(files),
         tuple(notes), unit, files,
     )  # fmt: skip
     return header, to_metres
@@ -347,29 +347,29 @@ def _require_degrees(t: Any, dataset: Any, path: Path, *, where: str) -> None:
     if t.f > 90.0 - t.e or south < -90.0 + t.e or t.c < -540.0 or east > 540.0:
         raise InputError(
             f"{path} is in degrees but reaches from {t.c:g}, {south:g} to {east:g}, {t.f:g}: if it is in metres, "
-            "say its coordinate system with `crs:`",
+            "state its coordinate system with `crs:`",
             where=where,
         )
 
 
 def _unit(
-    dataset: Any, system: RasterCRS, said: RasterStatements, path: Path, prj: str, *, where: str
+    dataset: Any, system: RasterCRS, given: RasterStatements, path: Path, prj: str, *, where: str
 ) -> tuple[HeightUnit, list[Note]]:
     """The unit of the heights, and notes; ``prj`` is the text of the .prj beside an .asc. Raises InputError."""
-    stated = [unit for unit in (system.vertical_unit, said.datum_unit) if unit is not None]
+    stated = [unit for unit in (system.vertical_unit, given.datum_unit) if unit is not None]
     for words in (str(dataset.units[0] or "").strip(), unit_of_prj(prj)):
         if not words:
             continue
         unit = unit_named(words)
         if unit is not None:
             stated.append(replace(unit, by=BY_FORMAT if dataset.driver == "SRTMHGT" else BY_FILE))
-        elif said.height_unit is None and (system.vertical_unit is None or words != system.vertical_unit.name):
+        elif given.height_unit is None and (system.vertical_unit is None or words != system.vertical_unit.name):
             raise InputError(
-                f"{path} gives heights in {words!r}, which is not known; say the unit with `height_unit: m` "
-                "(or ft, us_ft; a canopy says its own: gdal_edit.py -units metre)",
+                f"{path} gives heights in {words!r}, which is not known; state the unit with `height_unit: m` "
+                "(or ft, us_ft; a canopy states its own: gdal_edit.py -units metre)",
                 where=where,
             )
-    return unit_that_counts(stated, said.height_unit, system.horizontal_unit, path.name, where=where)
+    return unit_that_counts(stated, given.height_unit, system.horizontal_unit, path.name, where=where)
 
 
 def _strips(
@@ -377,7 +377,7 @@ def _strips(
 ) -> Iterator[tuple[int, Floats]]:
     """Strips of ``raw * scale + offset``, metres; masked, non-finite and implausible cells are NaN.
 
-    ``window``: column, row, columns, rows. ``nodata``: what else stands for no height in the raw numbers.
+    ``window``: column, row, columns, rows. ``nodata``: a further raw number that stands for no height.
     """
     from rasterio.windows import Window
 

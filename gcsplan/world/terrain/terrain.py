@@ -55,9 +55,9 @@ class TerrainSpec:
     """The terrain as the user states it; paths are opened as they are (the mission file resolves relative ones).
 
     Either ``dem`` (paths of tiles, or ``sample:jacksboro`` alone), or ``flat_m`` with ``peaks`` on it (metres of a
-    local frame; heights above its ``up_m: 0``). ``crs`` and ``height_unit`` count before what the rasters state.
-    ``nodata``: a number of the rasters that stands for no height, or "none": no other number than those that they
-    declare does, and exact zeros are ground or sea.
+    local frame; heights above its ``up_m: 0``). ``crs`` and ``height_unit`` count before the rasters' own statements.
+    ``nodata``: a number of the rasters that stands for no height, or "none": only the numbers that they declare do, and
+    exact zeros are ground or sea.
     ``obstacle_height_m`` stands everywhere; ``canopy`` is a raster of heights above ground, whose nodata cells are
     unknown unless ``canopy_nodata_m`` sets their height; if both are set the higher one counts. ``sea``: where a
     published source has no tile there is sea.
@@ -156,7 +156,7 @@ def terrain_of(
     info: Mapping[str, object] | None = None,
     notes: Sequence[Note] = (),
 ) -> Terrain:
-    """Terrain of tiles on one grid; ``spec`` says the rest, ``info`` and ``notes`` go with its surfaces too.
+    """Terrain of tiles on one grid; ``spec`` states the rest, ``info`` and ``notes`` go with its surfaces too.
 
     Raises InputError.
     """
@@ -363,7 +363,7 @@ def _geoid(spec: TerrainSpec, datum: VerticalDatum, where: str) -> GeoidGrid | N
         return GeoidGrid(Path(spec.geoid_grid), where=at)
     if spec.geoid_grid is not None:
         raise InputError(
-            f"a geoid grid is for ellipsoidal heights, and these are {datum.name}: remove it, or say "
+            f"a geoid grid is for ellipsoidal heights, and these are {datum.name}: remove it, or state "
             "`vertical_datum: WGS84`",
             where=at,
         )

@@ -1,7 +1,7 @@
 """The terrain that an ArduPilot vehicle flies over in the terrain frame: its own grid, made of the mission's ground.
 
 The vehicle knows the ground at posts alone, in whole metres, and is bilinear between them (`terrain_grid`). Over a
-valley or a ridge that is narrower than its posts it flies higher or lower above the ground than it says.
+valley or a ridge that is narrower than its posts it flies higher or lower above the ground than it reports.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def _ground_at(frame: Frame, surface: Surface, lat_deg: Floats, lon_deg: Floats)
 class VehicleTerrain:
     """The vehicle's grid over ``surface``; unknown where the vehicle would not get all posts of a 4 × 4 part.
 
-    Where the ground has two heights the posts are of the greatest one, and `spread_at` tells how much lower those of a
+    Where the ground has two heights the posts have the greater one, and `spread_at` gives how much lower the posts of a
     vehicle may be whose terrain is another one of the sources.
     """
 

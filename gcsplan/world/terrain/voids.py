@@ -1,6 +1,6 @@
-"""Voids that a terrain model holds as heights of exactly 0 without saying so.
+"""Undeclared voids, which a terrain model holds as heights of exactly 0.
 
-Programs fill what they do not know with 0, and such a hole on a crest looks like a valley. Sea and lakes at 0 have a
+Programs fill unknown cells with 0, and such a hole on a crest looks like a valley. Sea and lakes at 0 have a
 shore: ground that rises from 0. A patch of exact zeros without any shore has cliffs all around, and counts as a void.
 """
 
@@ -49,7 +49,7 @@ def take_out_zeros(
         raise InputError(
             f"the DEM has heights of exactly 0 m, which may hide voids, and is too large around the mission to look "
             f"at their shores: {cells / 1e6:.3g} million cells, more than {MAX_CELLS // 2 / 1e6:.3g} million. If each "
-            f"0 is ground or sea, say `nodata: none`, and if each is a void `nodata: 0`; or use a coarser DEM "
+            f"0 is ground or sea, state `nodata: none`, and if each is a void `nodata: 0`; or use a coarser DEM "
             f"(gdalwarp -tr)",
             where=where,
         )
@@ -108,7 +108,7 @@ def zero_voids(heights_m: Floats) -> Voids:
     """The connected patches of exactly 0 that have no shore.
 
     ``heights_m`` (rows, cols), NaN where unknown. Nodes are connected to all eight around them. A patch has a shore if
-    a known node beside it lies within `SHORE_M` of 0; one without any known node beside it has nothing to tell.
+    a known node beside it lies within `SHORE_M` of 0; one without any known node beside it is no patch to judge.
     """
     zero = heights_m == 0.0
     if not zero.any():
@@ -126,7 +126,7 @@ def zero_voids(heights_m: Floats) -> Voids:
             shore = zero[at] & ~zero[beside] & ~np.isnan(heights_m[beside])
             np.minimum.at(nearest, patch[at][shore], np.abs(heights_m[beside][shore]))
     alone = np.isinf(nearest)
-    alone[0] = False  # what is no zero
+    alone[0] = False  # cells that are not zero
     blind = np.asarray(alone[patch]) if alone.any() else nothing
     void = np.isfinite(nearest) & (nearest > SHORE_M)
     if not void.any():

@@ -19,7 +19,7 @@ from gcsplan.errors import UsageError
         ({"axes": ["planets"]}, "cells, workers, given planets"),
         ({"axes": []}, "given none"),
         ({"missions": 3}, "4 to 10000 missions"),
-        ({"workers": 1}, "2 to 64 workers are wanted, given 40 and 1"),
+        ({"workers": 1}, "2 to 64 workers, not 40 and 1"),
     ],
 )
 def test_what_cannot_be_measured_is_refused(change: dict[str, Any], message: str) -> None:

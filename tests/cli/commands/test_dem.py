@@ -53,7 +53,7 @@ def test_from_nothing_to_a_plan_by_the_commands_that_are_told(run: Any, served: 
     assert code == 0
     assert [line.split()[0] for line in out.splitlines()] == ["N36W085", "N36W084"]
     assert "surface model (trees and buildings are in it), heights above EGM2008" in err
-    asked = len(served.asked)
+    asked = len(served.requests)
     code, out, _ = run("plan", "ridge.yaml")
     assert code == 0
     assert SURFACE_DEM in out
@@ -62,14 +62,14 @@ def test_from_nothing_to_a_plan_by_the_commands_that_are_told(run: Any, served: 
     code, out, _ = run("check", "ridge.yaml", "ridge/uav1.waypoints", "--json")
     assert code == 0
     assert json.loads(out)["inputs"]["dem_tiles"] == "N36W085,N36W084"
-    assert len(served.asked) == asked
+    assert len(served.requests) == asked
 
 
 def test_a_mission_is_fetched_by_its_file(run: Any, served: Served) -> None:
     code, out, _ = run("dem", "fetch", "ridge.yaml", "--offline", "--json")
     assert code == 2
     assert set(json.loads(out)["error"]["problems"][0]) == {"where", "message"}
-    assert served.asked == []
+    assert served.requests == []
     assert run("dem", "fetch", "ridge.yaml")[0] == 0
     code, out, _ = run("dem", "fetch", "ridge.yaml", "--offline", "--json")
     assert code == 0
@@ -116,7 +116,7 @@ def test_a_mistake_is_one_message(run: Any, served: Served, tmp_path: Path, argu
     assert code == 2
     assert out == ""
     assert words in err
-    assert served.asked == []
+    assert served.requests == []
 
 
 def test_an_interruption_says_that_nothing_is_lost(run: Any, served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -134,6 +134,6 @@ def test_what_cannot_be_had_is_exit_code_6_and_the_rest_stays(run: Any, served: 
     code, out, err = run("dem", "fetch", "ridge.yaml", "--json")
     assert code == 6
     assert json.loads(out)["error"]["reason"] == "download"
-    assert "1 of 2 tiles could not be had" in err
+    assert "1 of 2 tiles could not be downloaded" in err
     assert "N36W084: http://127.0.0.1" in err
     assert "1 copernicus-glo30 tile of this area is not in the cache" in run("plan", "ridge.yaml")[2]

@@ -11,7 +11,7 @@ from gcsplan.mission_file.published.policy import Policy
 from gcsplan.mission_file.zone_reader import read_zones
 from gcsplan.mission_file.zones.draft import ZoneDraft
 from gcsplan.mission_file.zones.file import ZoneFile
-from tests.support.attacks import require_told
+from tests.support.attacks import require_placed_words
 
 RING = [[8.0, 47.0], [8.1, 47.0], [8.1, 47.1], [8.0, 47.1], [8.0, 47.0]]
 HOLE = [[8.04, 47.04], [8.06, 47.04], [8.06, 47.06], [8.04, 47.04]]
@@ -38,7 +38,7 @@ def outcome(folder: Path, content: Any, name: str = "zones.json") -> str:
     try:
         found = read(folder, content, name)
     except InputError as error:
-        require_told(error)
+        require_placed_words(error)
         return "refused"
     assert all(p.where and p.message for p in found.problems)
     assert all(zone.name for zone in found.zones)

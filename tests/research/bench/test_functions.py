@@ -122,7 +122,7 @@ def test_the_benchmark_gives_the_same_numbers_over_processes_as_in_one(tmp_path:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"runs": 0}, "1 to 10000 runs are wanted, given 0"),
+        ({"runs": 0}, "give 1 to 10000 runs, not 0"),
         ({"jobs": 0}, "jobs"),
         ({"functions": ("f10",)}, "f8, f9, given f10"),
         ({"functions": ()}, "given none"),

@@ -134,7 +134,7 @@ def test_long_edges_beside_each_other_are_counted_before_great_circles_are_joine
     teeth = [(46.5 + 1e-6 * (k // 2 + 1), 8.0 + 0.5 * (-1) ** ((k + 1) // 2)) for k in range(400)]
     comb = [*teeth, (47.0, 8.7), (46.4, 8.7)]  # 0.1 m apart: each great circle crosses hundreds of straight edges
     assert shapely.Polygon(comb).is_valid
-    with pytest.raises(InputError, match="of its outline of 402 corners so many long edges lie beside each other"):
+    with pytest.raises(InputError, match="its outline of 402 corners has so many long edges beside each other"):
         near_polygons(comb, FRAME, great_circles=True)
 
 

@@ -100,7 +100,7 @@ def test_the_words_of_units(words: str, metres: float | None) -> None:
 @pytest.mark.parametrize("code", ["EPSG:9267", "EPSG:4985", "ESRI:115921", "ESRI:115908", "ESRI:115875"])
 def test_ellipsoidal_heights_on_another_ellipsoid_are_refused_by_name(code: str) -> None:
     """MGI and CH1903+ are on Bessel's, tens of metres away; WGS 72 some metres."""
-    with pytest.raises(InputError, match="count from another ellipsoid than that of WGS 84"):
+    with pytest.raises(InputError, match="count from another ellipsoid than WGS 84's"):
         stated_datum(code, where="m")
 
 
@@ -195,7 +195,7 @@ def test_a_key_for_the_grid_does_not_change_what_the_file_says_of_heights(tmp_pa
 def test_a_key_for_the_grid_leaves_the_file_s_datum_and_unit(tmp_path: Path) -> None:
     heights = np.round(hills(100, 100))
     ellipsoidal = degrees_tif(tmp_path / "a.tif", heights, crs="EPSG:4979")
-    assert "the raster itself says WGS 84 ellipsoidal" in str(refusal(ellipsoidal, crs="EPSG:4326"))
+    assert "the raster itself states WGS 84 ellipsoidal" in str(refusal(ellipsoidal, crs="EPSG:4326"))
     assert is_times(load(ellipsoidal, crs="EPSG:4326+5773"), heights, 1.0)
     feet = degrees_tif(tmp_path / "b.tif", heights, crs="EPSG:4326+6360")
     surface = load(feet, crs="EPSG:4326", vertical_datum=None)
@@ -209,7 +209,7 @@ def test_tiles_in_feet_do_not_lend_their_unit_to_one_that_states_none(tmp_path: 
     b = degrees_tif(tmp_path / "b.tif", heights)
     for order in ((a, b), (b, a)):
         said = str(refusal(order))
-        assert "heights of a.tif are feet, from the file, and nothing says the unit of those of b.tif" in said
+        assert "heights of a.tif are feet, from the file, and nothing states the unit of b.tif" in said
         assert "`height_unit: ft`" in said
         assert is_times(load(order, height_unit="ft"), heights, FOOT)
     c = degrees_tif(tmp_path / "c.tif", heights, units=("m",))

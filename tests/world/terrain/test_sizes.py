@@ -61,7 +61,7 @@ def test_zeros_that_may_be_voids_count(tmp_path: Path, monkeypatch: pytest.Monke
     most_cells(monkeypatch, 2 * count)
     load(path)
     most_cells(monkeypatch, 2 * count - 1)
-    assert "If each 0 is ground or sea, say `nodata: none`" in str(refusal(path))
+    assert "If each 0 is ground or sea, state `nodata: none`" in str(refusal(path))
     assert np.isfinite(load(path, nodata="none").ground_m).all()
 
 

@@ -39,7 +39,7 @@ from gcsplan.world.terrain.mosaic import tiles_of
 from gcsplan.world.terrain.peaks import Peak
 from gcsplan.world.terrain.raster import open_raster
 from gcsplan.world.terrain.terrain import TerrainSpec, load_terrain, open_terrain
-from tests.support.attacks import draw_attacks, require_told
+from tests.support.attacks import draw_attacks, require_placed_words
 from tests.support.effort import draws
 
 FRAME = Frame(36.5, -84.5)
@@ -953,7 +953,7 @@ def judged(path: Path, **keys: Any) -> str:
     try:
         surface = load(path, **keys)
     except InputError as error:
-        require_told(error)
+        require_placed_words(error)
         return "refused"
     known = surface.ground_m[np.isfinite(surface.ground_m)]
     assert known.size == 0 or -500.0 <= known.min() <= known.max() <= 9000.0

@@ -1,1 +1,1 @@
-"""The loop of a plan: what a search is, what searches share, and the governor that chooses between them."""
+"""The loop of a plan: the protocol of searches, their shared workspace, and the governor that chooses between them."""

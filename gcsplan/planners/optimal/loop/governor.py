@@ -22,7 +22,7 @@ MOST_SEARCHES = 200
 
 
 def govern(incumbent: Incumbent, searches: Sequence[Search]) -> None:
-    """Run searches until the gap is as small as wanted, no search is left, or the budget is spent."""
+    """Run searches until the gap is as small as requested, no search is left, or the budget is spent."""
     budget = incumbent.budget
     for _ in range(MOST_SEARCHES):
         ended = incumbent.proved_infeasible or incumbent.gap <= incumbent.nearer or incumbent.needs_terrain
@@ -32,10 +32,10 @@ def govern(incumbent: Incumbent, searches: Sequence[Search]) -> None:
         best, size = -math.inf, (0.0, 0.0)
         for search in searches:
             if (search.nearer or not incumbent.done()) and search.is_open():
-                asked = search.size()
-                worth = search.share / max(asked[0], LEAST_S)
+                needs = search.size()
+                worth = search.share / max(needs[0], LEAST_S)
                 if worth > best:
-                    chosen, best, size = search, worth, asked
+                    chosen, best, size = search, worth, needs
         if chosen is None:
             return
         chosen.choose()

@@ -1,4 +1,4 @@
-"""What a search is to the governor: when it applies, what it promises and takes, and what runs it."""
+"""A search as the governor sees it: when it applies, its worth and cost, and the method that runs it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ WORTH_AGAIN = 0.02
 
 class Search(ABC):
     """One source of paths or bounds: a module of `searches`, which is named like it. It reads the incumbent and
-    improves it; what it remembers between two runs is its own."""
+    improves it; its memory between two runs is its own."""
 
     NAME: ClassVar[str]
     IMPROVES: ClassVar[Improves]
@@ -46,7 +46,7 @@ class Search(ABC):
 
     @property
     def nearer(self) -> bool:
-        """Whether it is worth its cost even if the gap is already as small as wanted; see `incumbent.NEARER`."""
+        """Whether it is worth its cost even if the gap is already as small as requested; see `incumbent.NEARER`."""
         return False
 
     @abstractmethod

@@ -1,4 +1,4 @@
-"""What the searches of one problem share: the incumbent, the lattices of its legs, and the outlines of its zones.
+"""The objects that the searches of one problem share: incumbent, lattices of its legs, and outlines of its zones.
 
 Each is made at first use, because many missions need none.
 """
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Workspace:
-    """What the searches of one problem share; ``farthest``: see `Leg`."""
+    """The objects that the searches of one problem share; ``farthest``: see `Leg`."""
 
     def __init__(self, incumbent: Incumbent, farthest: float = math.inf) -> None:
         self.incumbent, self.farthest = incumbent, farthest

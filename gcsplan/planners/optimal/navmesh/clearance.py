@@ -1,6 +1,6 @@
 """The clearance grid: by how much each lattice node's floor exceeds a cap, and the mesh of the free cells.
 
-For bounds, the cap may be lowered near the ends of a leg to what a path can climb to there (`ClearanceGrid.hold`).
+For bounds, the cap may be lowered near the ends of a leg to the height that a path can reach (`ClearanceGrid.hold`).
 That shuts nodes, so tracks get longer and leave less length to climb with, and the cap can be lowered once more.
 """
 
@@ -28,7 +28,7 @@ Cone = tuple[float, float, float, float]
 """A climb cone, the highest altitudes near an end of a leg: its east_m and north_m, altitude there (m AMSL), slope."""
 
 AROUND = 8
-"""Nodes on each side of the wanted cells that are looked at too, at most: more than `climb_cones.BESIDE`."""
+"""Most nodes on each side of the selected cells that are looked at too: more than `climb_cones.BESIDE`."""
 RIM_CELLS = 12.0
 """Depth, in cells, to which a zone is looked at that may be too high to climb over so near an end."""
 ALIKE = 12.0
@@ -37,7 +37,7 @@ BORDER_HAIR_M = 0.1
 """Metres by which less than the demanded distance from a border is shut for bounds, and more for paths."""
 LEARN_M, LEARN_SPARE_M, LEARN_HAIR_M = 2.0, 0.03, 0.05
 """Longest step, m, at which `learn` checks a track; metres that must be free there; metres by which nodes are raised
-above what was missing."""
+beyond the missing height."""
 NODE_BYTES = 150.0
 """Bytes of a node that is looked at, with the cells and pieces beside it."""
 MOST_MEET = 8
@@ -49,13 +49,13 @@ with an entry for every name."""
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PlaneSpec:
-    """What a plane's mesh is for: all that any legal track may cross at or below ``cap_m`` (``low``: for bounds), or
-    what can certainly be crossed legally (for paths).
+    """The use of a plane's mesh. For bounds (``low``) it holds all that any legal track may cross at or below
+    ``cap_m``; for paths, only places that can certainly be crossed legally.
 
     ``ends``: the cones in which paths climb from the ends of the leg, see `clearance_kernels.fill`; ``under``, ``over``
     (zones,): which zones may be passed below their floors, above their ceilings; None for all. ``exact_m``: if not
-    None, floors are those of the exact check at the nodes, without a margin for what lies between them, and these
-    metres are kept from levels of zones that follow the ground.
+    None, the nodes have the floors of the exact check, without a margin for the ground between them, and these metres
+    are kept from levels of zones that follow the ground.
     """
 
     cap_m: float
@@ -182,7 +182,7 @@ class ClearanceGrid:
             yield j * (self.shape[1] - 1) + i, wall[at]
 
     def _be_exact(self) -> None:
-        """Set the floors of the nodes that are looked at to those of the exact check."""
+        """Give the nodes that are looked at the floors of the exact check."""
         cols = np.arange(self.shape[1])
         seen = (cols >= self._around[:, :1]) & (cols < self._around[:, 1:])
         seen[seen] = np.isfinite(self._excess[seen])
@@ -349,8 +349,8 @@ class ClearanceGrid:
 def mesh_of(
     plane: Plane, cap_m: float, low: bool, fineness: int = 1, wanted: Bools | None = None, single: bool = False
 ) -> Mesh:
-    """Make the mesh of what can be crossed at or below ``cap_m``: for bounds (``low``), all that any legal track may
-    cross; for paths, only what can be crossed legally.
+    """Make the mesh of the plane at or below ``cap_m``: for bounds (``low``), all that any legal track may cross; for
+    paths, only places that can be crossed legally.
 
     ``wanted``: only these cells. ``single``: each free cell is a piece of its own. Raises Exhausted.
     """
@@ -374,7 +374,8 @@ def _apart(cones: list[Cone], cap_m: float, more_m: float) -> bool:
 
 
 def _spans(wanted: Bools, fineness: int) -> Int32s:
-    """(rows, 2) for each row of cells, cut ``fineness`` times finer: first wanted column, and that after the last."""
+    """(rows, 2) for each row of cells, cut ``fineness`` times finer: the first ``wanted`` column, and the column after
+    the last one."""
     first, last = wanted.argmax(axis=1), wanted.shape[1] - wanted[:, ::-1].argmax(axis=1)
     spans = np.stack([first, np.where(wanted.any(axis=1), last, first)], axis=-1) * fineness
     return np.ascontiguousarray(np.repeat(spans, fineness, axis=0), np.int32)

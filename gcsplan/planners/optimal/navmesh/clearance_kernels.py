@@ -131,7 +131,8 @@ def blank(value: Floats, around: Int32s, at_first: float) -> None:
 
 @device
 def _on_border(z: Floats, over: Int64s, j: int, i: int) -> float:
-    """The height of the node j rows north and i columns east of the south-west corner; that of the border beyond it."""
+    """The height of the node j rows north and i columns east of the south-west corner; beyond the border, the border's
+    height."""
     return float(z[over[3] - min(j, over[3] - over[1]), over[0] + min(i, over[2] - over[0])])
 
 
@@ -146,9 +147,9 @@ def pool(z: Floats, over: Int64s, stride: int, low: Floats, high: Floats) -> Non
     """Heights of every ``stride``-th node of a terrain model, rows going north, lowered (``low``) and raised (``high``)
     until the bilinear patches between them lie nowhere above, and nowhere below, the terrain model's own patches.
 
-    ``over``: first and last column and row to use (col0, row0, col1, row1); beyond them, heights are those of the
-    border. The difference of large and small patches is bilinear in each small cell, so it is greatest at a node. An
-    unknown node (NaN) shuts every patch that it lies in for ``high`` (inf), and is ignored for ``low``.
+    ``over``: first and last column and row to use (col0, row0, col1, row1); beyond them, the border's heights count.
+    The difference of large and small patches is bilinear in each small cell, so it is greatest at a node. An unknown
+    node (NaN) shuts every patch that it lies in for ``high`` (inf), and is ignored for ``low``.
     """
     rows, cols = low.shape
     for j in range(rows):

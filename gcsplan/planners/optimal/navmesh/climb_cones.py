@@ -1,8 +1,8 @@
-"""Climb cones: how high a path can be near the ends of a leg, so that a bound may exclude what is higher.
+"""Climb cones: how high a path can be near the ends of a leg, so that a bound may exclude higher altitudes.
 
-At a node, a path is at most as high as the end's altitude plus the slope times a length: that of a free track to the
-node, and the length that the path has to spare. `look_around` finds the nodes that are higher and measures straight
-lines to them, `walk_around` measures tracks to those out of sight, and `hold_down` raises the excess of the nodes.
+At a node, a path is at most as high as the end's altitude plus the slope times a length: the length of a free track to
+the node, and the length that the path has to spare. `look_around` finds the nodes that are higher and measures straight
+lines to them, `walk_around` measures tracks to nodes out of sight, and `hold_down` raises the excess of the nodes.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from gcsplan.planners.optimal.navmesh.polyanya import pop, push
 from gcsplan.planners.optimal.navmesh.zone_kernels import BOTTOM, PAIR, THIN, TOP, UNDER, depth, level
 
 NODES_BESIDE = 5
-"""Nodes on each side of those that a cone could shut for which the distance must be known, too."""
+"""Nodes on each side of the nodes that a cone could shut whose distance must be known, too."""
 FROM_END = -1
 """Value of ``root`` where the straight line to a node begins at the end of the leg, not at a node."""
 LONG = 40.0
@@ -35,7 +35,7 @@ def lift_lids(
 ) -> None:  # fmt: skip
     """Set ``lift`` at each node of ``around`` to how far, m, zones there that can be flown over below ``cap`` are
     higher than the floor; 0 where there is none. Only nodes at most ``rim`` deep in a zone count: a path that does not
-    get past those gets no farther in. Set ``either`` (zeros before) to 1 where one of them can be flown under, too."""
+    get past them gets no farther in. Set ``either`` (zeros before) to 1 where a zone can be flown under, too."""
     blank(lift, around, 0.0)
     for z in range(len(zones)):
         if zones[z, PAIR] > 0.0 or zones[z, TOP] == np.inf:
@@ -58,7 +58,7 @@ def look_around(
     around: Int32s, excess: Floats, floor: Floats, lift: Floats, of: Int32s, values: Floats, x: Floats, y: Floats,
     cone: Floats, seen: Int8s, away: Floats,
 ) -> int:  # fmt: skip
-    """Find the nodes near an end that are higher than a path can climb to from there, and those around them.
+    """Find the nodes near an end that are higher than a path can climb to from there, and the nodes around them.
 
     ``cone``: x, y, column, row, height, slope, cap. Sets ``seen`` (rows, cols, zeros before) to 1 at nodes that the end
     sees across wholly free cells, with their distance in ``away`` (else inf), and to -1 or -2 at others whose distance
@@ -68,7 +68,7 @@ def look_around(
     left, right, low, high = _box(x, y, cone)
     missing = 0
     blank(away, around, math.inf)
-    # Distances are needed only at nodes that the cone could shut, and at some nodes around those.
+    # Distances are needed only at nodes that the cone could shut, and at some nodes around them.
     if right < left or not _mark(around, excess, floor, lift, x, y, cone, left, right, low, high, seen):
         return 0
     for j in range(low, high + 1):

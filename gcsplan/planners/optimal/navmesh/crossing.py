@@ -39,9 +39,9 @@ HALVINGS, MOST_PAIRS = 40, 200_000
 
 @dataclass(frozen=True, slots=True)
 class Climb:
-    """What an end of a leg lacks to a zone's top: ``rise_m``, which takes at least ``slant_m`` metres of flight.
-    ``more_m``: the track beyond the end, on which the climb may begin. ``dearer``: what each metre costs more by which
-    a track is too short for that."""
+    """The height ``rise_m`` from an end of a leg to a zone's top, which takes at least ``slant_m`` metres of flight.
+    ``more_m``: the track beyond the end, on which the climb may begin. ``dearer``: the price of each metre by which a
+    track is too short for the climb."""
 
     rise_m: float
     slant_m: float
@@ -54,7 +54,7 @@ class Climb:
         return np.maximum(np.hypot(track_m + self.more_m, self.rise_m), self.slant_m)
 
     def length_m(self, track_m: Floats) -> Floats:
-        """The same over tracks that are just so long, with what is dearer."""
+        """The same cost over tracks of just that length, with the price ``dearer``."""
         lacks_m = math.sqrt(max(self.slant_m**2 - self.rise_m**2, 0.0)) - (track_m + self.more_m)
         return self.least_m(track_m) + self.dearer * np.maximum(lacks_m, 0.0)
 

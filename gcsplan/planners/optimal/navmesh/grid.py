@@ -1,7 +1,7 @@
-"""The plane under a mission as a lattice of nodes, from which meshes of what is free below an altitude cap are made.
+"""The plane under a mission as a lattice of nodes, from which meshes of the free plane below an altitude cap are made.
 
 The lattice is the terrain model's own, each cell cut into parts where a finer one is needed, because ground is bilinear
-in those cells and in no others. A bilinear patch can be cut into two triangles along either diagonal: one gives a
+in the model's cells and in no others. A bilinear patch can be cut into two triangles along either diagonal: one gives a
 surface that never lies above the patch, the other one that never lies below it. So there are two kinds of mesh: one
 holds every legal track (``low``: for bounds), and in the other every track is legal but for rounding (for paths).
 The values of the nodes come from the terrain model: heights for bounds and for paths, slopes, and places.
@@ -132,7 +132,7 @@ class Plane:
     ``col0``, ``row1``: the terrain model's column and row at node (0, 0). ``tops``, ``grounds``: two arrays (rows,
     cols) each, m AMSL, NaN where unknown, the first for bounds and the second for paths. ``inside`` (rows - 1,
     cols - 1): the cells that are looked at. A cell of the terrain model is ``parts`` cells wide and long here, or a
-    cell here is ``stride`` of those; nodes lie on straight lines for ``block`` cells at a time.
+    cell here is ``stride`` model cells wide; nodes lie on straight lines for ``block`` cells at a time.
     """
 
     problem: Problem
@@ -241,7 +241,7 @@ def extent(problem: Problem, box: Box) -> NodeExtent:
 
 
 def finer_plane(plane: Plane, cells: Bools, parts: int, stride: int, fit: Fit) -> tuple[Plane, Bools]:
-    """Make a finer lattice over some of a plane's ``cells``; return it and those cells on it. See `make_plane`."""
+    """Make a finer lattice over some of a plane's ``cells``; return it and the same cells on it. See `make_plane`."""
     cols = plane.problem.airspace.surface.ground_m.shape[1]
     row, col, last_row, last_col = box_of(cells)
     span = plane.stride / plane.parts  # a cell's width, in cells of the terrain model
@@ -252,7 +252,8 @@ def finer_plane(plane: Plane, cells: Bools, parts: int, stride: int, fit: Fit) -
 
 
 def box_of(wanted: Bools) -> tuple[int, int, int, int]:
-    """First row and column that hold a true value, and those after the last; (0, 0, 1, 1) if nothing is true."""
+    """First row and column that hold a true value, and the row and column after the last; (0, 0, 1, 1) if nothing is
+    true."""
     rows, cols = np.flatnonzero(wanted.any(axis=1)), np.flatnonzero(wanted.any(axis=0))
     if not len(rows):
         return 0, 0, 1, 1
@@ -274,7 +275,7 @@ def on_finer(plane: Plane, cells: Bools, finer: Plane) -> Bools:
 def lattice(
     problem: Problem, over: NodeExtent, parts: int, stride: int, whole: int, reach: DetourEllipse | None, fit: Fit
 ) -> Plane:
-    """Make the lattice over an `extent`; the other arguments are those of `make_plane`."""
+    """Make the lattice over an `extent`; the other arguments: see `make_plane`."""
     surface = problem.airspace.surface
     fit = replace(fit, spare_m=fit.spare_m + problem.bound_spare_m)
     col0, _, _, row1 = over

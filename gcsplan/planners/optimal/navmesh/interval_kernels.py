@@ -1,12 +1,13 @@
-"""Kernels for altitude intervals: what a zone shuts over a whole cell of a lattice, for bounds, and what zones leave.
+"""Kernels for altitude intervals: altitudes that a zone shuts over a whole cell, for bounds, and those left free.
 
-A zone whose levels follow the ground shuts, at a place within reach of it, what lies between its levels over *its own*
-ground within reach. Over a steep slope that is far more than what the ground below the place tells: under a zone whose
-floor is a few metres above the lowest legal altitude nothing is left. What holds for the corners of a cell and those of
-another one within reach holds for every place of the two: the zone's parts are convex, and so is what is within reach.
+A zone whose levels follow the ground shuts, at a place within reach of it, all altitudes between its levels over *its
+own* ground within reach. Over a steep slope this range is far wider than the range over the ground below the place:
+under a zone whose floor is a few metres above the lowest legal altitude nothing is left. A condition that holds for the
+corners of a cell and for the corners of another cell within reach holds for every place of the two: the zone's parts
+are convex, and so is the area within reach.
 
-These altitudes are cut out of those over a cell. From an interval that is left, a path can enter those intervals over
-the neighbouring cells that share an altitude with it; values are carried from one to another. It never enters another
+These altitudes are cut out of the altitudes over a cell. From an interval that is left, a path can enter the intervals
+over neighbouring cells that share an altitude with it; values are carried from one to another. It never enters another
 one over the same cell, because a zone that covers the whole cell lies between them. Further kernels give the altitudes
 that the cells leave to a track, place by place.
 """
@@ -182,7 +183,7 @@ DISC = np.array([(r * math.sin(a), r * math.cos(a)) for r, n in CELL_RINGS for a
 
 @device
 def _node(a: Floats, fineness: int, j: int, i: int) -> float:
-    """`value_at` a node; fast where the lattice is that of ``a``."""
+    """`value_at` a node; fast where the lattice is the lattice of ``a``."""
     return float(a[j, i]) if fineness == 1 else value_at(a, fineness, j, i)
 
 
@@ -191,7 +192,7 @@ def _covers(
     x: Floats, y: Floats, fineness: int, zones: Floats, edges: Floats, z: int, reach: float, near: float, j: int,
     i: int, jj: int, ii: int,
 ) -> bool:  # fmt: skip
-    """Whether cell (jj, ii) lies wholly in a zone, and each of its corners within ``near`` of that of cell (j, i)."""
+    """Whether cell (jj, ii) lies wholly in a zone, each corner within ``near`` of the same corner of cell (j, i)."""
     for k in range(4):
         v, u = k >> 1, k & 1
         px, py = _node(x, fineness, jj + v, ii + u), _node(y, fineness, jj + v, ii + u)
@@ -206,8 +207,8 @@ def _lowest_and_highest(
     ground: Floats, x: Floats, y: Floats, fineness: int, zones: Floats, edges: Floats, z: int, reach: float,
     near: float, j: int, i: int,
 ) -> tuple[int, int, int, int, int]:  # fmt: skip
-    """Of the cells whose ground is a zone's own and within reach of cell (j, i): row and column of the one with the
-    lowest ground and of the one with the highest, all -1 if there is none; and the number of cells that were read.
+    """Row and column of the cell with the lowest ground and of the cell with the highest, among the cells whose ground
+    is a zone's own and within reach of cell (j, i), all -1 if there is none; and the number of cells that were read.
 
     ``ground``, ``x``, ``y``: at the nodes of a lattice of which cell (j, i) is a part, ``fineness`` times finer.
     ``reach``: metres by which the zone is grown; ``near``: a little less, from each place of the cell to that ground.

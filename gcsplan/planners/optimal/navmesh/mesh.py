@@ -24,7 +24,7 @@ MOST_OPENED, ANYHOW, OF_PORTAL = 3_000_000, 100_000, 64
 """Intervals that a search may open before it is given up: at most `MOST_OPENED`, and at most `ANYHOW` plus `OF_PORTAL`
 per portal. If the goal is farther than the limit, and many tracks lead around many corners, it would open many more."""
 INTERVAL_BYTES = 200.0
-"""Bytes of an opened interval, with those that it yields and that are never opened."""
+"""Bytes of an opened interval, with the intervals that it yields and that are never opened."""
 
 
 @dataclass(eq=False, slots=True)

@@ -316,8 +316,8 @@ def within(
     joins: Int32s, from_start: Floats, from_goal: Floats, limit: float, met: Bools, piece: Int32s,
     out: Bools,
 ) -> None:  # fmt: skip
-    """Mark the cells (``out``, all false before) of pieces that tracks no longer than ``limit`` may enter: those at
-    portals that such tracks meet, and those where ``met`` (pieces,) is true before, at both ends of the tracks."""
+    """Mark the cells (``out``, all false before) of pieces that tracks no longer than ``limit`` may enter: pieces at
+    portals that such tracks meet, and pieces where ``met`` (pieces,) is true before, at both ends of the tracks."""
     for n in range(len(joins)):
         if from_start[n] + from_goal[n] <= limit:
             met[joins[n, 0]] = met[joins[n, 1]] = True

@@ -6,10 +6,10 @@ The free parts of a cell that hang together on the finer lattice become pieces o
 parts of neighbouring cells meet. Whatever can be flown passes through these pieces in turn, so the mesh is one for
 bounds as before. Pieces of one cell overlap in the plane, which does not matter to a track: it is led by portals.
 
-There, the terrain beside a track makes walls for bounds, too: on a pass, the ground at both sides is higher than that
-below. An aircraft may be as far from its track as the track error. So a place is shut if the terrain is too high
-anywhere within that distance; for all places of a small cell, the terrain in one direction is that of the cell moved
-there.
+There, the terrain beside a track makes walls for bounds, too: on a pass, the ground at both sides is higher than the
+ground below. An aircraft may be as far from its track as the track error. So a place is shut if the terrain is too high
+anywhere within that distance; for all places of a small cell, the terrain in one direction is the terrain of the cell
+moved there.
 """
 
 from __future__ import annotations
@@ -90,8 +90,8 @@ def _moved(z: Floats, j: Indices, i: Indices, b: float, a: float) -> Floats:
     by ``b`` rows and ``a`` columns, whichever diagonal the cells are cut along. ``z`` is bilinear in each cell."""
     v, u = b - math.floor(b), a - math.floor(a)
     rows, cols = ([math.floor(of) + more for more in (t, 1.0, 1.0 + t)] for of, t in ((b, v), (a, u)))
-    # The difference from what is bilinear in the cell is so in each of the four parts that the moved lattice's lines
-    # cut the cell into. So it is least at a corner of theirs.
+    # The lines of the moved lattice cut the cell into four parts. In each, the difference from a bilinear surface is
+    # bilinear too, so it is least at a corner of a part.
     seen = [[_at(z, j, i, row, col) for col in cols] for row in rows]
     low, high = (seen[0][0], seen[0][2]), (seen[2][0], seen[2][2])
     lower = np.zeros(len(j))
@@ -158,7 +158,7 @@ class LegNecks:
 
 
 class Necks:
-    """The necks of a lattice: that of a ``plane``, cut ``fineness`` times finer. Cells at the places ``but_at`` (K, 2)
+    """The necks of a ``plane``'s lattice, cut ``fineness`` times finer. Cells at the places ``but_at`` (K, 2)
     are left as they are."""
 
     def __init__(self, plane: Plane, fineness: int, cap_m: float, but_at: Floats) -> None:
@@ -270,8 +270,8 @@ class Necks:
         )  # fmt: skip
 
     def _portals(self, clearance: ClearanceGrid, mesh: Mesh, cut: Indices) -> tuple[Indices, Floats, Indices]:
-        """The portals (N,) of a mesh, of those ``cut``, in which openings lie; those openings (N, 7), with row and
-        column in the mesh, and with the range; and the cells (N, 2) at both sides."""
+        """The portals (N,) of a mesh, out of the portals ``cut``, in which openings lie; the openings (N, 7) in them,
+        with row and column in the mesh, and with the range; and the cells (N, 2) at both sides."""
         openings = _joined(self._necks)
         at = self._local(clearance, openings[:, :2].astype(np.intp))
         openings[:, :2] = at
@@ -330,8 +330,8 @@ def _openings(mesh: Mesh, own: Bools, ratio: int, first: Indices) -> tuple[Indic
 
 
 def _joined(necks: list[Neck]) -> Floats:
-    """(N, 7) the openings of all necks, with the range in the last two columns: those of two necks on the edge between
-    them become one for each pair of parts that may meet there."""
+    """(N, 7) the openings of all necks, with the range in the last two columns: openings of two necks on the edge
+    between them become one for each pair of parts that may meet there."""
     openings = np.vstack([np.column_stack([neck.openings, neck.range]) for neck in necks])
     at, aside = openings[:, :2].astype(np.int64), openings[:, 2] == 0.0
     next_at = at + np.stack([~aside, aside], axis=-1)
@@ -422,6 +422,6 @@ def _widened(cells: Bools) -> Bools:
 
 
 def _grown(cells: set[tuple[int, int]], by: int) -> set[tuple[int, int]]:
-    """Cells, and all those no farther than ``by`` rows and columns from one of them."""
+    """Cells, and all cells no farther than ``by`` rows and columns from one of them."""
     steps = range(-by, by + 1)
     return {(row + j, col + i) for row, col in cells for j in steps for i in steps}

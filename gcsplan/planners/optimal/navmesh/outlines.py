@@ -1,8 +1,8 @@
-"""Zones as outlines in the plane: the exact shortest track around those that can be passed neither over nor under.
+"""Zones as outlines in the plane: the exact shortest track around zones that can be passed neither over nor under.
 
 A zone is grown by the distance to keep from it, with round corners. A polygon inside that shape gives a bound, and one
 around it gives a path; their arcs are drawn more finely where a track touches them. The free plane between the
-polygons is cut into triangles, and Polyanya finds the shortest track over those (`polyanya`).
+polygons is cut into triangles, and Polyanya finds the shortest track over them (`polyanya`).
 
 Zones are added one by one: the shortest track past the zones known so far is a bound for all of them, and as soon as
 it meets no other zone it is the answer. So the work depends on the zones that matter, however many there are.
@@ -51,7 +51,7 @@ MOST_SEARCH_NODES = 1_000_000
 class ZoneOutline:
     """One zone grown by ``reach_m``: its polygon for paths (``outer``) or for bounds.
 
-    ``sectors``: those of a circle that are drawn finely, each as wide as a coarse chord; ``fine``: whether the corners
+    ``sectors``: the finely drawn sectors of a circle, each as wide as a coarse chord; ``fine``: whether the corners
     of a polygon are drawn finely.
     """
 
@@ -111,7 +111,7 @@ class ZoneOutline:
         return shapely.Polygon(np.array([circle.east_m, circle.north_m]) + corners)
 
     def _angles(self, radius: float, sectors: Iterable[int]) -> Floats:
-        """Angles (rad, rising) at which the chords of a circle begin, those in ``sectors`` drawn finely."""
+        """Angles (rad, rising) at which the chords of a circle begin; chords in ``sectors`` are drawn finely."""
         off_m = max(OFF_OUTER_M, OFF_OUTER * radius) if self.outer else OFF_M
         step = math.sqrt(8.0 * off_m / max(radius, 1e-3))
         parts = max(math.ceil(WIDTH / step), 2)
@@ -119,7 +119,7 @@ class ZoneOutline:
         return np.sort(np.concatenate([np.arange(4 * COARSE) * WIDTH, *more]))
 
     def _grown(self, vertices: Floats) -> shapely.Geometry:
-        """The polygon grown edge by edge, with round corners: `shapely.buffer` would smooth what it grows."""
+        """The polygon grown edge by edge, with round corners: `shapely.buffer` would smooth the result."""
         bare = shapely.Polygon(vertices)
         reach = self.reach_m + (self.hair_m if self.outer else -self.hair_m)
         if reach <= 0.0:
@@ -251,7 +251,7 @@ class Solids:
                 return None
             line = shapely.LineString(track.points)
             near = [k for k in self._tree.query(line).tolist() if which[k]]
-            # Coarse arcs lie inside or outside the true ones: draw those that the track passes near finely first.
+            # Coarse arcs lie inside or outside the true ones: draw the arcs near the track finely first.
             finer = [k for k in near if self.outlines[k].refine(track.points) and k in self._known]
             unknown = (k for k in near if k not in self._known)
             met = {k for k in unknown if shapely.relate_pattern(self.outlines[k].shape, line, "T********")}

@@ -122,7 +122,7 @@ def place_on(ends: Floats, p: int, x: float, y: float) -> float:
 
 @device
 def join(node: Floats, link: Int32s, name: Int64s, first: Int32s, list_of: int, current: int) -> bool:
-    """Merge into a node's interval those on its portal that touch it and have the same root; return whether any do.
+    """Merge into a node's interval all that touch it on its portal and have the same root; return whether any do.
 
     Merged nodes become `GONE`. All nodes that are `GONE`, and the node itself, leave the portal's list, which begins at
     ``first[list_of]`` (index + 1; 0: empty).

@@ -37,9 +37,11 @@ class GroundTrack:
 
 @dataclass(eq=False, slots=True)
 class Portals:
-    """Portals as `polyanya.search` takes them: ``order[start[p] : start[p + 1]]`` lists those of piece p; ``ends``
-    (portals, 4) is x, y of both ends, ``names`` (portals, 2) the names of both, all less than ``named``, and ``joins``
-    (portals, 2) the pieces at the left and at the right. ``fan``: most pieces that meet at one place."""
+    """Portals as `polyanya.search` takes them: ``order[start[p] : start[p + 1]]`` lists the portals of piece p.
+
+    ``ends`` (portals, 4) is x, y of both ends, ``names`` (portals, 2) the names of both, all less than ``named``, and
+    ``joins`` (portals, 2) the pieces at the left and at the right. ``fan``: most pieces that meet at one place.
+    """
 
     start: Int32s
     ends: Floats

@@ -13,11 +13,11 @@ from gcsplan.planners.optimal.navmesh.mesh_kernels import NEXT
 EAST, NORTH, RADIUS, BOTTOM, TOP, BOTTOM_AGL, TOP_AGL, FIRST, LAST, UNDER = range(10)
 PAIR, BOTTOM_2, TOP_2, BOTTOM_2_AGL, TOP_2_AGL, UNDER_2, THIN, LOOKS, OWN_BOTTOM, OWN_TOP = range(10, 20)
 ONE, OTHER, RISE, NUMBERS = range(20, 24)
-"""Columns of the array ``zones``, and their number; those with a 2 are of the second zone of a pair that cross. Where
+"""Columns of the array ``zones``, and their number; a 2 marks the columns of the second zone of a crossing pair. Where
 its bottom and top are no more than ``THIN`` apart, there is no zone: ground lifts a floor over a ceiling AMSL. A zone
 that ``LOOKS`` follows its own ground, also beside it: ``OWN_BOTTOM``, ``OWN_TOP`` are its levels over that; a pair does
 if one of its zones does. ``ONE``, ``OTHER``: the rows of the zones of a pair. ``RISE``: metres that ground may rise or
-fall within reach anywhere at a zone; 0 where the slopes at nodes tell better (see `BESIDE`)."""
+fall within reach anywhere at a zone; 0 where the slopes at nodes give a closer value (see `BESIDE`)."""
 BESIDE = 2.0
 """Datum of a level over all ground within reach, for paths; 1: over the ground below; 0: AMSL."""
 STAMPED = 10
@@ -114,10 +114,10 @@ def stamp_zones(
 ) -> int:  # fmt: skip
     """Give the cells that zones shut walls of their own; return how many walls there are.
 
-    A wall's values are how deep the cell's corners lie in the shape, or how far its top is above what is allowed, m.
+    A wall's values are how deep the cell's corners lie in the shape, or how far its top is above the allowed height, m.
     ``zones`` (Z, NUMBERS); ``boxes`` (Z, 4): first and last column, first and last row of the cells each may touch;
-    ``around``, ``span``, ``of``, ``values``: as in `mesh_kernels`. ``low``: only what is certainly shut; else all that
-    may be shut.
+    ``around``, ``span``, ``of``, ``values``: as in `mesh_kernels`. ``low``: only cells that are certainly shut; else
+    all cells that may be shut.
 
     For paths, ground within ``reach`` decides levels of datum `BESIDE`. How far it rises and falls at each node
     (``up``, ``down``: work arrays) is guessed from ``steep``, the slopes at the nodes of a lattice ``fineness`` times
@@ -245,8 +245,8 @@ def _look_beside(
     not reach. The zone is grown by ``reach``, so its own ground is where it is deeper than that. Nodes of cells without
     any free place are left out.
 
-    ``ground``: at the nodes; ``coarse``, ``x``, ``y``: at those of a lattice ``fineness`` times coarser; ``disc`` (N,
-    2): the places around a node, m east and north, at which it is read. ``read`` (1,) counts them.
+    ``ground``: at the nodes; ``coarse``, ``x``, ``y``: at the nodes of a lattice ``fineness`` times coarser; ``disc``
+    (N, 2): the places around a node, m east and north, at which ground is read. ``read`` (1,) counts them.
     """
     ex, ey = (x[0, 1] - x[0, 0]) / fineness, (y[0, 1] - y[0, 0]) / fineness
     nx, ny = (x[1, 0] - x[0, 0]) / fineness, (y[1, 0] - y[0, 0]) / fineness

@@ -79,7 +79,7 @@ class Shapes:
 
     A form is a half-plane a - b x - c y > 0, or a disc (radius, x, y, 1). ``boxes`` (K, 4): first and last column,
     first and last row of the cells that each part may touch; ``owner`` (K, 2): indices of its zones (twice the same,
-    or both of a crossing); ``cells``: number of cells in all boxes; ``looking``: in those of zones that `LOOKS`.
+    or both of a crossing); ``cells``: number of cells in all boxes; ``looking``: in the boxes of zones that `LOOKS`.
     """
 
     low: tuple[Floats, Floats]
@@ -96,7 +96,7 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
     A level over ground (AGL) counts from the ground in the zone itself, also where it limits flight beside the zone,
     within reach. There, the ground below gives the level with an error of as much as the ground rises within reach. So
     such a zone is laid down twice: as it is, and grown by the reach with its levels moved by that rise. For bounds, the
-    rise is the most anywhere at the zone; for paths, what it is around each node (`BESIDE`), as far as that is known.
+    rise is the most anywhere at the zone; for paths, the rise around each node (`BESIDE`), as far as it is known.
     """
     air = problem.airspace
     reach = air.beside_m(problem.limits)  # no less than what bounds assume

@@ -4,9 +4,9 @@ Over each cell of a mesh, the ground below and the zones leave intervals of alti
 
 After s metres of its track a path is at altitude z. If it climbs no steeper than c and descends no steeper than d, then
 z - c s never rises and z + d s never falls. Nor do s - r and s + t ever fall, where r and t are the lengths of the
-shortest tracks from the start and to the goal past what certainly stands in the way. In an interval, z lies within it
+shortest tracks from the start and to the goal past certain obstacles. In an interval, z lies within it
 and s is at least the shortest track to it; so each interval limits these four quantities. The extreme value of each on
-arrival is that of the chain of intervals whose worst member is best, found like a shortest path. An interval is shut if
+arrival belongs to the chain of intervals whose worst member is best, found like a shortest path. An interval is shut if
 by these values no altitude in it can be reached in time, or the goal cannot be reached from it; shut intervals restrict
 the others. If none is left, no track is that short.
 """
@@ -70,7 +70,7 @@ def intervals(
 
 
 def _laid(mesh: Mesh) -> tuple[Floats, Floats, Floats, Floats, Floats, Int32s, bool, float, float]:
-    """What the zone kernels take: ground, x and y of the mesh's nodes, numbers and forms of the shapes that are
+    """The input of the zone kernels: ground, x and y of the mesh's nodes, numbers and forms of the shapes that are
     certainly shut, their boxes on the mesh, whether the ground is the terrain model's own, and `Plane.reach_m`."""
     plane, (rows, cols) = mesh.plane, mesh.excess.shape
     ground = np.ascontiguousarray(plane.grounds[0][mesh.row : mesh.row + rows, mesh.col : mesh.col + cols])
@@ -196,8 +196,8 @@ class AltitudeIntervals:
 
 
 class Reached:
-    """Cache of the altitude intervals that tracks up to several lengths may enter; each starts from those of a longer
-    length.
+    """Cache of the altitude intervals that tracks up to several lengths may enter; each length starts from the
+    intervals of a longer one.
 
     ``every``: the intervals that tracks shorter than ``limit_m`` may meet.
     """

@@ -76,8 +76,8 @@ class Nearby:
 
 @dataclass(slots=True)
 class Narrow:
-    """What earlier tracks through slits lacked: places (2,) and by how many metres they were pinched there; and metres
-    that tracks are to keep from the levels of zones over ground."""
+    """Places (2,) where earlier tracks through slits were pinched, and by how many metres; and metres that tracks keep
+    from the levels of zones over ground."""
 
     pinched: list[tuple[Floats, float]] = field(default_factory=list)
     zones_m: float = 0.0

@@ -30,7 +30,7 @@ from gcsplan.world.geometry.path import distances_m
 
 LACKING_M, HAIR_M = 3.0, 0.2
 """If a track lacks less than `LACKING_M` between floor and ceiling, cells may be more lenient than the exact check,
-mostly beside terrain with a horizontal clearance: the search repeats under a cap lowered by what is missing and
+mostly beside terrain with a horizontal clearance: the search repeats under a cap lowered by the missing height and
 `HAIR_M`."""
 TAKEN = 5
 """Most tracks over which paths are looked for."""

@@ -24,12 +24,12 @@ HOPE = 1.5
 """A path is simplified only if it would become the best by gaining this many times the most that simplifying gained for
 a path of its kind so far."""
 NEARER = 0.45
-"""Part of the wanted gap down to which cheap searches that mostly help still run, and which a bound tries first."""
+"""Part of the requested gap down to which cheap searches that mostly help still run, and which a bound tries first."""
 HIGHER_M = 0.2
 """Added to the highest altitude of better paths, m."""
 STEEP_RISE = 0.15
-"""Rise of a path, as a part of its track's length, from which it counts as steep: one cap for the whole track says
-little then, since a zone that is passed low must be flown around, and one that is passed high need not."""
+"""Rise of a path, as a part of its track's length, from which it counts as steep: one cap for the whole track is a
+poor measure then, since a zone that is passed low must be flown around, and one that is passed high need not."""
 
 
 class Incumbent:
@@ -143,8 +143,8 @@ class Incumbent:
         self.proved_infeasible = True
 
     def raise_track_bound(self, track_m: float) -> None:
-        """Raise the lower bound to the least cost of paths whose tracks are at least ``track_m`` metres long, as those
-        of all paths are that are better than the best."""
+        """Raise the lower bound to the least cost of paths whose tracks are at least ``track_m`` metres long. The track
+        of every path that is better than the best one must be that long."""
         self.track_m = max(self.track_m, track_m)
         self.raise_bound(self.least(track_m))
 
@@ -193,12 +193,12 @@ class Incumbent:
         return (self.cost - self.bound) / max(self.bound, 1e-9)
 
     def done(self) -> bool:
-        """Whether the gap to the bound that is reported, of paths whose ends may lie beside the exact ones, is as small
-        as wanted."""
+        """Whether the gap to the reported bound is as small as requested; that bound is of paths whose ends may lie
+        beside the exact ones."""
         return self.cost <= self.rounding.bound(self.bound) * (1.0 + self.wanted)
 
     def goes_on(self) -> bool:
-        """Whether the gap is larger than wanted, more bound is of use, and budget is left."""
+        """Whether the gap is larger than requested, more bound is of use, and budget is left."""
         return not self.done() and not self.needs_terrain and self.budget.goes_on()
 
     @property

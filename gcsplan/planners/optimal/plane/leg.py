@@ -36,7 +36,7 @@ from gcsplan.planners.problem import Problem
 from gcsplan.world.geometry.zones import Box, Circle
 
 COARSE_M = 100.0
-"""Largest cells wanted for the first-look lattice, metres, unless the terrain model's own are larger."""
+"""Largest cells of the first-look lattice, metres, unless the terrain model's own are larger."""
 FINE_M, FINE_PARTS, MOST_FINE = 24.0, 400.0, 6
 """Cells of the finer lattice are about as wide as the smaller of `FINE_M` metres and the leg's length / `FINE_PARTS`;
 but a cell is cut into at most `MOST_FINE` parts a side."""
@@ -89,7 +89,7 @@ class Cells:
 
     @property
     def has_fine(self) -> bool:
-        """Whether there is a lattice finer than that of the first look."""
+        """Whether there is a lattice finer than the first-look lattice."""
         return self.ratio > 1
 
 
@@ -204,7 +204,7 @@ class Leg:
         """Flood all cells that are free below the highest cap, as far as tracks lead that are longer than the shortest
         by at most ``slack`` (a part of it), and no longer than ``within_m``. Sets `length_m` and `reach_m`.
 
-        Widens the lattice until those tracks lie within it.
+        Widens the lattice until these tracks lie within it.
         """
         self._ahead = self._close = self._reached = None
         self._finer = 1
@@ -452,7 +452,7 @@ class Leg:
         return self._close
 
     def _each_cell(self, plane: Plane, wanted: Bools, limit_m: float, ahead: Guide) -> Nearby | None:
-        """Flood the ``wanted`` cells of a lattice, each as a piece of its own; None if that is too much work.
+        """Flood the ``wanted`` cells of a lattice, each as a piece of its own; None if the work exceeds its limit.
         ``ahead``: distances from the start over a mesh that has at least the same free cells."""
         a, b = self.start.place, self.goal.place
         try:

@@ -63,7 +63,7 @@ class OutlineTracks:
         return (too_high & ~self.under) | ~(self.under | self.over)
 
     def outline(self, zone: int, *, outer: bool) -> ZoneOutline:
-        """A zone's outline for paths (``outer``) or for bounds, once `tracks` was asked for such."""
+        """A zone's outline for paths (``outer``) or for bounds, once `tracks` has used one."""
         return self._solids[outer].outlines[zone]
 
     def tracks(self, which: Bools, *, outer: bool) -> list[Floats] | None:
@@ -91,8 +91,8 @@ class OutlineTracks:
 
 
 def _sides(problem: Problem) -> tuple[Bools, Floats]:
-    """(zones,) which zones can perhaps be passed under at some place, and the least altitude AMSL over each, inf over
-    those without a top."""
+    """(zones,) which zones can perhaps be passed under at some place, and the least altitude AMSL over each, inf over a
+    zone without a top."""
     limits, surface, zones = problem.bound_limits, problem.airspace.surface, problem.airspace.zones
     high = float(np.nanmax(surface.ground_m)) if any(z.follows_ground for z in zones) else 0.0
     low = float(np.nanmin(surface.ground_m))

@@ -1,8 +1,8 @@
 """A bound for worlds whose zones can be passed over: around each of them, or over it with all of the climb.
 
-Every path passes around all zones, or over some. The cases are told apart one zone at a time: around it, the track is
+Every path passes around all zones, or over some. The cases are split one zone at a time: around it, the track is
 longer; over it, the path rises to its top, crosses it, and descends (`crossing`). A case is closed when the way that
-its bound belongs to meets no other zone below its top. The bound of all paths is that of the lowest case.
+its bound belongs to meets no other zone below its top. The bound of all paths is the bound of the lowest case.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ MOST_CASES = 48
 CROSSING_ROUNDS = 6
 """Most times that one crossing is computed again, with arcs drawn more finely or more zones beside it."""
 SHORT_TRACK_COST_M = 10.0
-"""What each metre of track that is too short for its climb costs a path, m: then it is made longer without laps."""
+"""Cost of each metre by which a track is too short for its climb, m: then it is made longer without laps."""
 LOWER_M = 0.01
 """A way is too low over a zone if it is more than this below its top, m."""
 
@@ -141,7 +141,7 @@ class Overflight:
         return None
 
     def _too_low(self, case: _Case) -> int | None:
-        """The zone below whose top a case's way is deepest, out of those that may be passed over or around; None if
+        """The zone below whose top a case's way is deepest, out of the zones that may be passed over or around; None if
         there is none."""
         outlines, way = self.outlines, np.concatenate(case.ways)
         line, along_m = shapely.LineString(way[:, :2]), distances_m(way)
@@ -185,8 +185,8 @@ class Overflight:
         return [case]
 
     def _over(self, k: int, shut: Bools, stretches: list[_Stretch], tracks: list[Floats]) -> tuple[float, list[Floats]]:
-        """The least length of paths over a zone and around the zones ``shut``, at most that of the best path, and ways
-        that are as long, as far as they are known. ``tracks``: the shortest ones of all legs."""
+        """The least length of paths over a zone and around the zones ``shut``, at most the best path's length, and ways
+        of this length, as far as they are known. ``tracks``: the shortest tracks of all legs."""
         top_m, shape = float(self.outlines.tops_m[k]), self._outline(k).shape
         around = [way for s in stretches for way in s.ways(tracks)]
         all_m = sum(s.least_m for s in stretches)
@@ -217,8 +217,8 @@ class Overflight:
         return stretch.climbs(leg, top_m, self.problem, outer=self.outer)
 
     def _crossing(self, k: int, leg: int, shut: Bools, climbs: tuple[Climb, Climb], limit_m: float) -> Crossing | None:
-        """The crossing of a leg over a zone and around those of the zones ``shut`` that its way meets; None if nothing
-        is known, as for a leg that begins or ends over the zone."""
+        """The crossing of a leg over a zone and around the zones that are ``shut`` and that its way meets; None if
+        nothing is known, as for a leg that begins or ends over the zone."""
         outlines = self.outlines
         a, b, _ = outlines.legs[leg]
         beside: set[int] = set()

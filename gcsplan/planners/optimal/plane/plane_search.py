@@ -38,7 +38,7 @@ ZONES_SHUT = 8
 PROVED = 1e-8
 """A gap, as a part, that is smaller is due to rounding: the best path is proved optimal."""
 NODE_S, NODE_MB = 0.8e-6, 3e-4
-"""Counted seconds and megabytes of a searched node, with what a search keeps of it."""
+"""Counted seconds and megabytes of a searched node, with its kept data."""
 SMALL = 50.0
 """A world is small if the straight line of each leg is at most this many cells of the terrain model long."""
 
@@ -87,7 +87,7 @@ class PlaneSearch:
             for limits in (problem.limits, problem.bound_limits)
         )
         self.top_m = incumbent.highest(bounds_m)
-        """Highest altitude AMSL that bounds assume: the ceiling, or what better paths can climb to."""
+        """Highest altitude AMSL that bounds assume: the ceiling, or the height that better paths can reach."""
         self.path_top_m = min(self.top_m, paths_m)
         """Highest altitude AMSL of the paths that are searched."""
         places = terminals_of(problem)
@@ -208,7 +208,7 @@ class PlaneSearch:
     # -------------------------------------------------------------------- bounds
 
     def size(self, looks: float) -> tuple[float, float]:
-        """Counted seconds of ``looks`` searches over the lattices of all legs, and megabytes of those."""
+        """Counted seconds of ``looks`` searches over the lattices of all legs, and megabytes of the lattices."""
         nodes = sum(leg.cells_of.nodes for leg in self.legs)
         return looks * nodes * NODE_S, nodes * NODE_MB
 
@@ -222,11 +222,11 @@ class PlaneSearch:
         return self.incumbent.longest(sum(leg.reach_m for leg in self.legs))
 
     def limit(self, leg: Leg) -> float:
-        """`longest` for one leg: what remains if the other legs are as short as possible."""
+        """`longest` for one leg: the length that remains if the other legs are as short as possible."""
         return self.longest() - sum(other.lower_m for other in self.legs if other is not leg)
 
     def raise_tracks(self) -> None:
-        """Raise the lower bound of the cost to that of the shortest tracks."""
+        """Raise the lower bound of the cost to the cost of the shortest tracks."""
         self.incumbent.raise_track_bound(sum(leg.lower_m for leg in self.legs))
 
     @property

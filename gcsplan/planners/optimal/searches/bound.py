@@ -1,6 +1,6 @@
 """Lower bounds of length and energy from the plane: is any path cheaper than a value between bound and best path?
 
-Few tracks are that short, they can climb only little near their ends, and they must climb over the ground on their way.
+Few tracks are that short, can climb only little near their ends, and must climb over the ground on their way.
 If no path is cheaper, the value is the new bound. Otherwise the value replaces the upper end of the interval that is
 left, and the bound of the cheaper paths its lower end.
 
@@ -34,7 +34,7 @@ a gain is worth the work; and the part of the interval at which it is first cut 
 FALLS = -0.25
 """Change of the bound of cheaper paths with their greatest cost, assumed until two such bounds are known."""
 CLIMBED = (0.98, 0.9, 0.75, 0.5)
-"""Parts of the extra length that climbing costs the longest tracks, tried in turn as that of shorter tracks."""
+"""Parts of the extra length that climbing costs the longest tracks, tried in turn for shorter tracks."""
 LENGTH_PIECES = 4
 """Pieces into which the range of track lengths is cut; each piece has its own bound of the climb."""
 
@@ -49,7 +49,7 @@ INTERVAL_S, REFINED_S = 0.7e-6, 4e-6
 """Counted seconds for each cell of the finer lattice near short tracks: what altitude intervals take on average, and
 the least that refinement takes in nine of ten missions. Refinement raises bounds even if it ends with the budget."""
 REFINED_GAP = 1.75
-"""Times the wanted gap beyond which cells are cut finer, which takes as long as all other searches together."""
+"""Multiple of the requested gap from which cells are cut finer, which takes as long as all other searches together."""
 MOST_CORRIDOR_CELLS = 50_000
 """Most cells of all corridors for which altitude intervals are computed."""
 FINER = 2
@@ -136,7 +136,7 @@ class Bound(Search):
 def altitude_ranges(leg: Leg, track_m: float, limit_m: float) -> tuple[Floats, Floats, Floats]:
     """Metres along a leg (M,), and floor and ceiling there (M,), for all tracks of ``track_m`` to ``limit_m`` metres.
 
-    A longer track is mapped to ``track_m`` by moving its points towards its start by at most what it is longer. So the
+    A longer track is mapped to ``track_m`` by moving its points towards its start by at most its extra length. So the
     floor at a place is the lowest, and the ceiling the highest, within that distance; inf and -inf where no cell is.
     """
     at = np.linspace(0.0, track_m, FLOOR_STEPS + 1)[1:-1]
@@ -183,8 +183,9 @@ def _string(legs: list[Leg], tracks_m: list[float], limits_m: list[float]) -> Pr
 
 
 def halve(plane: PlaneSearch, *, far: bool = False, by_intervals: bool = False) -> None:
-    """Raise the lower bound of the cost until the gap is as small as wanted, if possible; unless ``far``, the value for
-    that is tried first. The interval between bound and path is halved until bounds predict the best cut."""
+    """Raise the lower bound of the cost until the gap is as small as requested, if possible. Unless ``far``, the bound
+    that gives this gap is tried first. The interval between bound and path is halved until bounds predict the best
+    cut."""
     incumbent = plane.incumbent
     if by_intervals:
         _raise_by_intervals(plane)
@@ -222,7 +223,7 @@ def _least_step(plane: PlaneSearch) -> float:
 
 def _meeting(cheaper: list[tuple[float, float]]) -> float:
     """The cost that should equal the bound of all cheaper paths, extrapolated from the last two costs tried, or from
-    one with the slope `FALLS`; inf if they do not tell."""
+    one with the slope `FALLS`; inf if they allow no extrapolation."""
     if not cheaper:
         return math.inf
     (a, of_a), (b, of_b) = cheaper[0], cheaper[-1]
@@ -244,7 +245,8 @@ def _raise_by_intervals(plane: PlaneSearch) -> None:
 
 
 def _limits(plane: PlaneSearch, most_m: float) -> list[tuple[Leg, float]]:
-    """The legs, and the greatest lengths of their tracks if those of all legs are ``most_m`` long at most."""
+    """The legs, and the greatest length of each one's track if the tracks of all legs together are at most ``most_m``
+    long."""
     spare = most_m - sum(leg.lower_m for leg in plane.legs)
     return [(leg, leg.lower_m + spare) for leg in plane.legs]
 
@@ -258,7 +260,7 @@ def bound_cheaper(plane: PlaneSearch, cost: float, *, by_intervals: bool = False
     def least(tracks: list[float]) -> float:
         if sum(tracks) >= most_m * (1.0 - 1e-12):
             return cost
-        # The length to spare is what the legs' bounds leave, which is less now that these are better.
+        # The legs' bounds leave the length to spare, which is less now that they are better.
         return _least_of_pieces(plane, tracks, max(most_m - sum(tracks), 0.0))
 
     one = len(plane.legs) == 1
@@ -282,7 +284,7 @@ def longest_track(plane: PlaneSearch, cost: float) -> float:
     if plane.problem.objective == "energy":
         limits = [limit for _, limit in _limits(plane, longest_m)]
         climbed_m = climb_bound(legs, [leg.lower_m for leg in legs], limits)
-        # Where the climb alone costs more, no length is left: that of the shortest tracks, which nothing undercuts.
+        # Where the climb alone costs more, no length is left: take the shortest tracks, which nothing undercuts.
         return max(min(longest_m, incumbent.longest(longest_m, cost, climbed_m)), sum(leg.lower_m for leg in legs))
     if len(legs) > 1:
         return longest_m

@@ -5,7 +5,7 @@ long at most, and metres or centimetres are missing. Beside it there may be an o
 show: the line is searched on which the track crosses a pass that is open by centimetres, and each such stretch is
 planned as a problem of its own, so small that its cells are a metre or two wide. If that finds nothing and the gap is
 large, the piece between the places where the track leaves and meets the path is searched as a leg of its own, whose
-cells are finer than those of the whole leg.
+cells are finer than the cells of the whole leg.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ class BoundCorridor(Search):
         return self.problem.limits.max_agl_m is None
 
     def size(self) -> Size:
-        """What it takes is not known before; it gets a part of the rest."""
+        """Its work is not known before; it gets a part of the rest."""
         return self.work.plane.size(self.FIRST_PASSES if self.incumbent.best is None else self.PASSES)
 
     def run(self) -> None:
@@ -161,7 +161,7 @@ def _look_closely(plane: PlaneSearch, leg: Leg) -> None:
 
 
 def _end(plane: PlaneSearch, leg: Leg, along_m: float, whole_m: float) -> Floats:
-    """(3,) an end of a leg, its start if ``along_m`` is 0; where its altitude is free, that of `_height`."""
+    """(3,) an end of a leg, its start if ``along_m`` is 0; a free altitude comes from `_height`."""
     end = leg.start if along_m <= 0.0 else leg.goal
     if end.amsl_m is not None:
         return np.array([*end.place, end.amsl_m])
@@ -170,7 +170,7 @@ def _end(plane: PlaneSearch, leg: Leg, along_m: float, whole_m: float) -> Floats
 
 
 def _sampled(way: Floats) -> tuple[Floats, Floats, Floats]:
-    """Metres along a track of its vertices, metres along it (N,) of places at most `STEP_M` apart, and those places
+    """Metres along a track to each of its vertices; metres along it (N,) to places at most `STEP_M` apart; the places
     (N, 2)."""
     at = distances_m(way)
     s = np.linspace(0.0, at[-1], math.ceil(at[-1] / STEP_M) + 1)
@@ -229,8 +229,8 @@ def _along(
     """(N, 3) way points from one of ``ends`` to the other along a track, past the stretches that are shut; None if that
     fails or does not cost less than ``cost``.
 
-    ``places`` (N, 2) of the track, ``s`` (N,) metres along it; ``whole_m``: its whole length. If zones shut any, those
-    that terrain and zones shut are tried before those that terrain shuts.
+    ``places`` (N, 2) of the track, ``s`` (N,) metres along it; ``whole_m``: its whole length. If zones shut a stretch,
+    the stretches that terrain and zones shut are tried before the stretches that terrain alone shuts.
     """
     floor = plane.problem.floors(*places.T)
     free = [(places, floor, np.full_like(floor, plane.path_top_m))]
@@ -250,7 +250,7 @@ def _past(
     plane: PlaneSearch, leg: Leg, ends: list[Floats], places: Floats, s: Floats, whole_m: float, low: Floats,
     high: Floats,
 ) -> Floats | None:  # fmt: skip
-    """`_along` past the stretches that are shut; ``low``, ``high`` (N,): what is free at the places."""
+    """`_along` past the stretches that are shut; ``low``, ``high`` (N,): the free altitudes at the places."""
     # An infinite floor is shut (unknown ground), or given (an end), whatever is free below the cap.
     stretches = shut_stretches(np.subtract(low, high, out=low.copy(), where=np.isfinite(low)))
     if len(stretches) > MOST_STRETCHES:
@@ -365,9 +365,9 @@ def shut_stretches(over: Floats) -> list[tuple[int, int]]:
 
 
 def _freer(plane: PlaneSearch, places: Floats) -> tuple[Floats, Floats, Floats]:
-    """The places (N, 2) of a track, moved by `ASIDE_M` where one side of it is shut and the other is free, and what
-    `free_below` tells of all but its ends: a bound's track touches zones, and where it does no stretch can begin or
-    end."""
+    """The places (N, 2) of a track, moved by `ASIDE_M` where one side of it is shut and the other is free, and the
+    result of `free_below` for all but its ends: a bound's track touches zones, and where it does no stretch can begin
+    or end."""
     ahead = np.gradient(places, axis=0)
     aside = np.stack([-ahead[:, 1], ahead[:, 0]], axis=-1) / np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
     tried = [places + off * aside for off in (0.0, ASIDE_M, -ASIDE_M)]
@@ -377,7 +377,7 @@ def _freer(plane: PlaneSearch, places: Floats) -> tuple[Floats, Floats, Floats]:
     side[[0, -1]] = 0
     rows = np.arange(len(places))
     low, high = (np.stack([of[k] for of in free])[side, rows] for k in range(2))
-    low[[0, -1]] = -math.inf  # the ends of the track give way to those of the path
+    low[[0, -1]] = -math.inf  # the ends of the track give way to the path's ends
     return np.stack(tried)[side, rows], low, high
 
 
@@ -446,7 +446,7 @@ def _chain(strip: _Strip) -> Floats:
     programming."""
     steps = np.linspace(-1.0, 1.0, TRIED)
     at = strip.moved(np.tile(SIDE_M * steps, (len(strip.places), 1)))
-    # From each place of a row to those of the next that are a few places aside, by way of the middle.
+    # From each place of a row to the places of the next row that are a few places aside, by way of the middle.
     beside = np.arange(TRIED)[:, None] + np.arange(-MOST_ASIDE, MOST_ASIDE + 1)
     there = beside.clip(0, TRIED - 1)
     ways = strip.over(0.5 * (at[:-1, :, None] + at[1:, there])) + strip.over(at)[1:, there]

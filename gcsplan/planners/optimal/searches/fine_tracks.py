@@ -1,7 +1,7 @@
 """The shortest track below the ceiling on the finer lattice, within the corridor of tracks that may be shorter.
 
 With a track error, first over nodes that are only as high as in the exact check: through slits that are shut in the
-other lattices, because these reserve what the ground may rise beside a track, and nearer to terrain.
+other lattices, because these reserve the possible rise of the ground beside a track, and nearer to terrain.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ that later tracks keep from zones over ground; and the most it may be pinched fo
 
 
 class FineTracks(Search):
-    """Once, when a path is known, also if the gap is nearly as small as wanted. Remembers nothing."""
+    """Runs once, when a path is known, also if the gap is nearly as small as requested. Remembers nothing."""
 
     NAME, IMPROVES, SHARE = "fine_tracks", "paths", 0.9
 

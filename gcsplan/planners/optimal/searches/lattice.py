@@ -22,7 +22,7 @@ class LatticeSearch(Search):
 
     @property
     def share(self) -> float:
-        """By what is known."""
+        """By the limits, and by whether a path is known."""
         return self._worth[0]
 
     @property
@@ -45,7 +45,7 @@ class LatticeSearch(Search):
         return self.problem.limits.max_agl_m is not None or i.best is None or i.gap > FAR
 
     def size(self) -> Size:
-        """What it takes is not known before; it gets a part of the rest."""
+        """Its work is not known before; it gets a part of the rest."""
         return self.takes(self._worth[1])
 
     def run(self) -> None:

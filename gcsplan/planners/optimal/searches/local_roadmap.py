@@ -1,12 +1,12 @@
 """Paths through small worlds of a few dozen cells of the terrain model, over a roadmap of places that matter.
 
-There the lattices of the plane miss what is narrower than their cells: a pass exactly as high as the ceiling, a slit
+There the lattices of the plane miss openings narrower than their cells: a pass exactly as high as the ceiling, a slit
 between two cylinders, a climb that must wind along a wall. The roadmap has few places: the terrain model's own nodes
 and its saddles, the rims of zones, slits between them, and a regular lattice in between. Each has a column of altitudes
 from its floor up; legs between neighbours pass the exact check.
 
 The cheapest path over the roadmap and others well apart from it are each drawn together (`cross_sections`) on
-cross-sections along them; the best of those is the result. A roadmap is a source of paths and gives no lower bound.
+cross-sections along them; the best one is the result. A roadmap is a source of paths and gives no lower bound.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ WINDING = 1.06
 PATHS, APART = 10, 3.0
 """Most paths between two terminals, and how many spacings each must lie from all before it at some node."""
 DRAWN = 8
-"""The cheapest of those paths, which are drawn together."""
+"""Number of the cheapest paths, which are drawn together."""
 DRAWN_HOPE = 1.06
 """A path drawn together coarsely that costs more than this times the best known one is dropped."""
 VIA_LEVELS = 24
@@ -108,7 +108,7 @@ class LocalRoadmap(Search):
         self._chosen.add(self._turn or LAST)
 
     def size(self) -> Size:
-        """What it takes is not known before; it gets a part of the rest."""
+        """Its work is not known before; it gets a part of the rest."""
         return self.takes((self._turn or LAST)[1])
 
     def run(self) -> None:
@@ -143,7 +143,7 @@ def small_path(problem: Problem, known: Floats | None) -> tuple[Floats, Bools] |
 
 
 def _straight(problem: Problem) -> Floats:
-    """(K, 3) the terminals, heights that are free in between those that are not, but not below the floor."""
+    """(K, 3) the terminals; a free height lies in between the fixed ones, but not below the floor."""
     flat = np.array(terminals_of(problem))
     s = distances_m(flat)
     heights = np.array([problem.start[2], *(math.nan if v.amsl_m is None else v.amsl_m for v in problem.via),
@@ -250,7 +250,7 @@ def _box(problem: Problem, ends: Floats, limit: float) -> tuple[Floats, Floats]:
 
 
 def _heights(problem: Problem, ends: Floats, low: Floats, high: Floats) -> tuple[float, float, list[float]]:
-    """The lowest and the highest altitude worth a look, and those that zones and ends begin and end at."""
+    """The lowest and the highest altitude worth a look, and the altitudes at which zones and ends begin and end."""
     limits, surface = problem.limits, problem.airspace.surface
     error = limits.altitude_error_m + HAIR_M
     east, north = (a.ravel() for a in np.meshgrid(*(np.linspace(low[k], high[k], 40) for k in range(2))))
@@ -404,7 +404,7 @@ def path_over(
 
 
 def terminals_by_leg(problem: Problem, points: Floats) -> Floats:
-    """(K, 3) start, vias and goal; a via of free altitude at that of the path ``points`` (N, 3) beside it."""
+    """(K, 3) start, vias and goal; a via of free altitude takes the altitude of the path ``points`` (N, 3) near it."""
     terminals = [np.array(problem.start)]
     for via in problem.via:
         off = np.hypot(points[:, 0] - via.east_m, points[:, 1] - via.north_m)
@@ -467,7 +467,8 @@ class Roadmap:
         return cls(nodes, *ends, spacing_m, graph)
 
     def beyond(self, cost: Floats) -> Floats:
-        """(goals,) the least cost to each place of the second terminal, given that (starts,) to those of the first."""
+        """(goals,) the least cost to each place of the second terminal, from the least cost (starts,) to each place of
+        the first."""
         out = np.full(self.goals, np.inf)
         for k in np.flatnonzero(np.isfinite(cost)).tolist():
             away, _ = _reached(self.graph, k)

@@ -21,7 +21,7 @@ from gcsplan.planners.profile.track import Obstruction
 from gcsplan.world.geometry.path import track_length_m
 
 OUTLINES_S, ZONE_S = 1.3e-3, 0.8e-3
-"""Counted seconds, and those of each zone."""
+"""Counted seconds of the search, and more for each zone."""
 TRACKS = 24
 """Most tracks that are tried."""
 

@@ -5,7 +5,7 @@ so the instances here are of the same family: terrain of 900 × 900 cells, 15 an
 points in polar coordinates (30 variables), and a cost of five weighted terms. Ours search the same cost over the unit
 box. Each has its own population.
 
-MetaEvoBox pins versions that clash with those of gcsplan's other extras, so its optimisers run in its own code, in an
+MetaEvoBox pins versions that clash with gcsplan's other extras, so its optimisers run in its own code, in an
 environment of its own: `worker` runs there, and a `Worker` is such a process.
 """
 
@@ -55,7 +55,7 @@ TAIL = 400
 """Characters of MetaEvoBox's own complaint that a message repeats."""
 
 METABOX_CURE = (
-    "MetaEvoBox wants an environment of its own: python3.11 -m venv metabox-env, "
+    "MetaEvoBox needs an environment of its own: python3.11 -m venv metabox-env, "
     "metabox-env/bin/pip install 'gcsplan[metabox]', then gcsplan bench metabox --python metabox-env/bin/python"
 )
 
@@ -120,7 +120,7 @@ class Worker:
         return answer
 
     def load(self, files: Sequence[Path]) -> None:
-        """Load the instances in ``files``; ``dims`` and ``threats`` say how many variables and threats each has."""
+        """Load the instances in ``files``; ``dims`` and ``threats`` hold the numbers of variables and of threats."""
         answer = self.ask("load", files=[str(file) for file in files])
         self.dims, self.threats = answer["dims"], answer["threats"]
 
@@ -144,14 +144,14 @@ class Worker:
 
     def _ended(self, how: str) -> InputError:
         self._log.seek(0)
-        said = self._log.read().decode(errors="replace").strip()
+        log = self._log.read().decode(errors="replace").strip()
         return InputError(
-            f"MetaEvoBox's process {how}. Its last words: {said[-TAIL:] or 'none'}", where=str(self._python)
+            f"MetaEvoBox's process {how}. Its last words: {log[-TAIL:] or 'none'}", where=str(self._python)
         )
 
 
 def ours() -> tuple[str, ...]:
-    """Our optimisers; of those with the same rule and defaults the last."""
+    """Our optimisers; the last one of several with the same rule and defaults."""
     known = {
         (row.update, row.population, tuple(sorted(row.defaults.items()))): name for name, row in OPTIMISERS.items()
     }
@@ -197,29 +197,29 @@ def run(
         and jobs >= 1
     ):
         raise InputError(
-            f"1 to {MOST_INSTANCES} instances, 1 to {MOST_METABOX_RUNS} runs, {LEAST_BUDGET} evaluations or more and "
-            f"1 job or more are wanted, given {instances}, {runs}, {evaluations} and {jobs}"
+            f"give 1 to {MOST_INSTANCES} instances, 1 to {MOST_METABOX_RUNS} runs, {LEAST_BUDGET} evaluations or more "
+            f"and 1 job or more, not {instances}, {runs}, {evaluations} and {jobs}"
         )
     names = tuple(dict.fromkeys(algorithms)) if algorithms else known
-    asked = [_OptimiserRun(i, name, k, seed) for i in range(instances) for name in names for k in range(runs)]
+    every = [_OptimiserRun(i, name, k, seed) for i in range(instances) for name in names for k in range(runs)]
     ready(out)
     files = [out / f"instance-{k}-threats-{_threats(k)}-seed-{seed}.pkl" for k in range(instances)]
     with ExitStack() as stack:
         python = Path(sys.executable) if python is None else python
-        workers = [stack.enter_context(Worker(python)) for _ in range(min(jobs, len(asked)))]
+        workers = [stack.enter_context(Worker(python)) for _ in range(min(jobs, len(every)))]
         missing = [k for k in range(instances) if not files[k].exists()]
         for _ in _each(workers, missing, lambda worker, k: _generate(worker, files[k], k, seed)):
             pass
         for worker in workers:
             worker.load(files)
         records = []
-        for record in _each(workers, asked, lambda worker, job: _record(worker, job, evaluations)):
+        for record in _each(workers, every, lambda worker, job: _record(worker, job, evaluations)):
             records.append(record)
             if done is not None:
-                done(len(records), len(asked))
-        told = {"instances": instances, "runs": runs, "seed": seed, "evaluations": evaluations}
+                done(len(records), len(every))
+        settings = {"instances": instances, "runs": runs, "seed": seed, "evaluations": evaluations}
         return {
-            "settings": told | {"algorithms": list(names), "dims": workers[0].dims, "threats": workers[0].threats},
+            "settings": settings | {"algorithms": list(names), "dims": workers[0].dims, "threats": workers[0].threats},
             "sha256": [hashlib.sha256(file.read_bytes()).hexdigest() for file in files],
             "versions": workers[0].versions,
             "runs": records,
@@ -239,9 +239,9 @@ def _generate(worker: Worker, file: Path, instance: int, seed: int) -> None:
 
 
 def _each(
-    workers: Sequence[Worker], asked: Sequence[Question], work: Callable[[Worker, Question], Reply]
+    workers: Sequence[Worker], questions: Sequence[Question], work: Callable[[Worker, Question], Reply]
 ) -> Iterator[Reply]:
-    """The results of ``work`` in the order of ``asked``; each worker does one thing at a time."""
+    """The results of ``work`` in the order of ``questions``; each worker does one item at a time."""
     idle: SimpleQueue[Worker] = SimpleQueue()
     for worker in workers:
         idle.put(worker)
@@ -255,13 +255,13 @@ def _each(
 
     with ThreadPoolExecutor(len(workers)) as pool:
         try:
-            yield from pool.map(one, asked)
+            yield from pool.map(one, questions)
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
 
 
 def _record(worker: Worker, job: _OptimiserRun, evaluations: int) -> dict[str, Any]:
-    """One run. ``cost`` and ``clear`` are those of the best point; ``outside``: evaluated points out of the box."""
+    """One run. ``cost`` and ``clear``: of the best point; ``outside``: number of evaluated points out of the box."""
     record: dict[str, Any] = {"instance": job.instance, "algorithm": job.algorithm, "run": job.run}
     if job.algorithm in THEIRS:
         # MetaEvoBox's seeds are 32 bits.
@@ -275,8 +275,8 @@ def _record(worker: Worker, job: _OptimiserRun, evaluations: int) -> dict[str, A
         seed=np.random.default_rng([job.seed, job.instance, job.run]),
     )  # fmt: skip
     judged = worker.ask("judge", best.x[None], instance=job.instance)
-    told = {"evaluations": best.evaluations, "outside": 0, "failed": ""}
-    return record | {"cost": judged["costs"][0], "clear": judged["clear"][0]} | told
+    ours = {"evaluations": best.evaluations, "outside": 0, "failed": ""}
+    return record | {"cost": judged["costs"][0], "clear": judged["clear"][0]} | ours
 
 
 METABOX_COLUMNS = ("optimiser", "of", "place, %", "p", "over the best, %", "clear", "remarks")
@@ -285,14 +285,15 @@ METABOX_COLUMNS = ("optimiser", "of", "place, %", "p", "over the best, %", "clea
 def rows(result: dict[str, Any]) -> list[dict[str, Any]]:
     """A row for each optimiser, best mean place first.
 
-    ``place_percent``: of its runs among all runs on an instance, by cost, from 0 (best) to 100; mean over all. ``p``:
-    of "its places do not differ from those of the first row" (Mann and Whitney's U, Holm over the optimisers).
-    ``over_percent``: median cost over the least cost that any run found on the instance, median over the instances.
-    None if half of the runs found nothing. ``clear``: part of the runs whose best path has no penalty. ``outside``:
-    part of the points that it evaluated out of the box. ``medians``: of the cost, by instance; None as above.
+    ``place_percent``: mean place of its runs among all runs on an instance, by cost, from 0 (best) to 100. ``p``:
+    probability of its places if they do not differ from the first row's (Mann and Whitney's U, Holm over the
+    optimisers). ``over_percent``: median cost over the least cost that any run found on the instance, median over the
+    instances; None if half of the runs found nothing. ``clear``: part of the runs whose best path has no penalty.
+    ``outside``: part of its evaluated points that lie out of the box. ``medians``: median cost by instance; None as
+    above.
     """
-    told = result["settings"]
-    names, count, runs = told["algorithms"], told["instances"], told["runs"]
+    settings = result["settings"]
+    names, count, runs = settings["algorithms"], settings["instances"], settings["runs"]
     costs = np.full((count, len(names), runs), np.inf)
     tally = {name: np.zeros(4) for name in names}  # clear, outside, evaluated, failed
     for record in result["runs"]:
@@ -342,7 +343,7 @@ def _finite(number: float) -> float | None:
 
 
 def _places(costs: Floats) -> Floats:
-    """Places (optimisers, instances × runs) of ``costs`` (instances, optimisers, runs) among those of the instance."""
+    """Places (optimisers, instances × runs) of ``costs`` (instances, optimisers, runs) among its instance's costs."""
     from scipy.stats import rankdata
 
     ranks = np.array([rankdata(one).reshape(one.shape) for one in costs])
@@ -350,11 +351,12 @@ def _places(costs: Floats) -> Floats:
 
 
 def _markdown(result: dict[str, Any]) -> Iterator[str]:
-    told = result["settings"]
-    threats = ", ".join(map(str, told["threats"]))
+    settings = result["settings"]
+    threats = ", ".join(map(str, settings["threats"]))
     yield (
-        f"{told['instances']} generated instances of MetaEvoBox's UAV family (threats: {threats}), seed "
-        f"{told['seed']}, {told['evaluations']} evaluations, {told['runs']} runs; its published instances are others."
+        f"{settings['instances']} generated instances of MetaEvoBox's UAV family (threats: {threats}), seed "
+        f"{settings['seed']}, {settings['evaluations']} evaluations, {settings['runs']} runs; its published instances "
+        "are others."
     )
     yield ""
     yield f"| {' | '.join(METABOX_COLUMNS)} |"

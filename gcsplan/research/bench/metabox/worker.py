@@ -48,8 +48,8 @@ def make(file: str, threats: int, seed: int) -> dict[str, Any]:
 def load(files: list[str]) -> dict[str, Any]:
     """Load the instances in ``files``, one in each."""
     dataset = import_module("metaevobox.environment.problem.SOO.UAV.uav_dataset").UAV_Dataset
-    told = {"num": 1, "dv": WAY_POINTS, "j_pen": COLLISION_PENALTY, "difficulty": "all"}
-    problems[:] = [UavInstance(dataset.get_datasets(path=file, **told)[0].data[0]) for file in files]
+    given = {"num": 1, "dv": WAY_POINTS, "j_pen": COLLISION_PENALTY, "difficulty": "all"}
+    problems[:] = [UavInstance(dataset.get_datasets(path=file, **given)[0].data[0]) for file in files]
     return {"dims": [problem.dim for problem in problems], "threats": [problem.threats for problem in problems]}
 
 
@@ -65,13 +65,13 @@ def judge(instance: int, points: Any) -> dict[str, Any]:
     Without a penalty no threat is hit and no sample is under ground.
     """
     problem = problems[instance]
-    told = problem.theirs.terrain_model
+    model = problem.theirs.terrain_model
     costs = problem.theirs.func(problem.lb + points * problem.span)
-    told["J_pen"] = 0.0
+    model["J_pen"] = 0.0
     try:
         without = problem.theirs.func(problem.lb + points * problem.span)
     finally:
-        told["J_pen"] = COLLISION_PENALTY
+        model["J_pen"] = COLLISION_PENALTY
     return {"costs": costs.tolist(), "clear": (costs == without).tolist()}
 
 
@@ -99,11 +99,11 @@ def solve(instance: int, optimiser: str, seed: int, evaluations: int) -> dict[st
                 run["cost"], run["point"] = float(costs[i]), np.clip(unit[i], 0.0, 1.0).tolist()
         return costs
 
-    told = SimpleNamespace(
+    config = SimpleNamespace(
         maxFEs=evaluations, n_logpoint=LOGS, log_interval=max(1, evaluations // LOGS), full_meta_data=False,
         device="cpu", dim=problem.dim,
     )  # fmt: skip
-    rule = getattr(import_module("metaevobox.baseline.bbo"), optimiser)(told)
+    rule = getattr(import_module("metaevobox.baseline.bbo"), optimiser)(config)
     rule.seed(seed)
     random.seed(seed)
     np.random.seed(seed)  # noqa: NPY002 - some of its optimisers draw from there
@@ -132,8 +132,8 @@ class UavInstance:
         self.threats = len(self.model["threats"])
         points = self.lb + np.random.default_rng(1).random((POINTS_COMPARED, self.dim)) * self.span
         points[: POINTS_COMPARED // 4, ::9] = 0.0  # some legs of no length
-        ours, wanted = self.func(points), theirs.func(points)
-        worst = float(np.max(np.abs(ours - wanted) / wanted))
+        ours, expected = self.func(points), theirs.func(points)
+        worst = float(np.max(np.abs(ours - expected) / expected))
         if worst > COSTS_NEAR:
             raise ValueError(f"the cost of MetaEvoBox is not the known one: they differ by {worst:.1e}")
 
@@ -207,13 +207,13 @@ class UavInstance:
 
 
 def _ready() -> dict[str, Any]:
-    """Versions of what takes part, or why MetaEvoBox cannot be imported."""
+    """Versions of the packages, or why MetaEvoBox cannot be imported."""
     try:
         import_module("metaevobox.baseline.bbo")
-        # cma draws its seed from the clock unless it is told to leave numpy's generator alone.
+        # cma draws its seed from the clock unless its options leave numpy's generator alone.
         bound: Any = import_module("metaevobox.baseline.bbo.cmaes")
         bound.cma = _Cma(import_module("cma").CMAEvolutionStrategy)
-    except Exception as error:  # any fault of a strange environment is told, not raised
+    except Exception as error:  # any fault of a strange environment is reported, not raised
         return {"error": f"{type(error).__name__}: {error}"}
     return {"versions": {name: version(name) for name in PACKAGES}}
 
@@ -230,7 +230,7 @@ class _Cma:
         return self._strategy(x, sigma, options | {"seed": float("nan"), "verbose": -9})
 
 
-def serve(asked: BinaryIO, answers: BinaryIO) -> None:
+def serve(requests: BinaryIO, answers: BinaryIO) -> None:
     """Answer requests until there are no more."""
     import numpy as np
 
@@ -242,14 +242,14 @@ def serve(asked: BinaryIO, answers: BinaryIO) -> None:
         "make": make, "load": load, "cost": cost, "judge": judge, "solve": solve,
     }  # fmt: skip
     answer(_ready())
-    for line in iter(asked.readline, b""):
+    for line in iter(requests.readline, b""):
         request = json.loads(line)
         what, shape = request.pop("what"), request.pop("shape", None)
         if shape is not None:
-            request["points"] = np.frombuffer(asked.read(8 * shape[0] * shape[1])).reshape(shape)
+            request["points"] = np.frombuffer(requests.read(8 * shape[0] * shape[1])).reshape(shape)
         try:
             answer(known[what](**request))
-        except Exception as error:  # the asker decides what a fault means
+        except Exception as error:  # the other process decides on a fault
             answer({"error": f"{type(error).__name__}: {error}"})
 
 

@@ -1,8 +1,8 @@
 """The claims of the five papers, each judged once: as run here, at equal evaluations, in its twin, under each reading.
 
 Two-sided Mann and Whitney's U on the runs, Holm-corrected over all claims of a paper within one column: the claims as
-they stand, those at equal evaluations, the twins, and each reading are a column each. What a clock has measured is
-judged apart, because it differs from run to run.
+they stand, the claims at equal evaluations, the twins, and each reading are a column each. Times are judged apart,
+because they differ from run to run.
 
 `CLAIMS` has all claims, each once: "A has less of a measure than B in scenario S". A claim follows from printed numbers
 (which is below which) where there are any. Claims from curves and sentences, which a paper shows without numbers, are
@@ -263,11 +263,11 @@ def _correct(cells: Sequence[Comparison]) -> None:
 
 
 def standing(judged: Mapping[str, Sequence[Mapping[str, Any]]], paper: str) -> Iterator[str]:
-    """What of a paper stands, in sentences: each measure with the claims that hold, tie and are reversed; then what
-    each reading changes."""
+    """The standing of a paper, in sentences: each measure with the claims that hold, tie and are reversed; then the
+    changes by each reading."""
     claims = {c["claim"]: c for c in judged["claims"] if c["paper"] == paper}
-    told = [c for c in claims.values() if c["ranking"] in _RANKING_WORDS]
-    if not told:
+    ranked = [c for c in claims.values() if c["ranking"] in _RANKING_WORDS]
+    if not ranked:
         yield f"Rankings are judged from {LEAST_RUNS_TO_JUDGE} runs on: too few were made."
         return
     count = Counter(c["verdict"] for c in claims.values())
@@ -275,11 +275,11 @@ def standing(judged: Mapping[str, Sequence[Mapping[str, Any]]], paper: str) -> I
         f"{len(claims)} claims: holds {count[HOLDS]}, reversed {count[REVERSED]}, no difference {count[TIE]}, "
         f"impossible as printed {count[IMPOSSIBLE_AS_PRINTED]}."
     )
-    for measure in dict.fromkeys(c["measure"] for c in told):
+    for measure in dict.fromkeys(c["measure"] for c in ranked):
         parts = []
         for ranking, word in _RANKING_WORDS.items():
             places: dict[str, list[str]] = {}
-            for c in told:
+            for c in ranked:
                 if c["measure"] == measure and c["ranking"] == ranking:
                     places.setdefault(c["words"], []).append(c["scenario"].removeprefix(f"{paper}-"))
             if places:

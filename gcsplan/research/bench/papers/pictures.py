@@ -165,8 +165,8 @@ def draw_convergence(summary: dict[str, Any]) -> bytes:
             # The costs of the first batches do not matter: the scale begins after 2 % of the grid.
             later = middle[shown & (grid >= 0.02 * grid[-1])]
             least, most = min(least, float(low[shown].min())), max(most, float(later.max(initial=-math.inf)))
-        of = {"iterations": " of each vehicle's search", "evaluations": " of all vehicles' costs"}[along]
-        ax.set(xlabel=along + (of if len(summary["set"].problems) > 1 else ""))
+        of = {"iterations": "each vehicle's search", "evaluations": "all vehicles' costs"}[along]
+        ax.set(xlabel=f"{along} of {of}" if len(summary["set"].problems) > 1 else along)
         ax.grid(alpha=0.3, which="both")
     if lowest > 0.0 and math.isfinite(most):
         if most > LOG_SCALE_FROM * least:

@@ -107,7 +107,7 @@ def readings_of_scenario(summary: ScenarioSummary) -> PaperTable:
 
 
 def _reference(header: Sequence[str], summary: ScenarioSummary, name: str, key: str) -> tuple[str, ...]:
-    """A row with the length, and the energy if it is known, of what no swarm has to do with."""
+    """A row of a path that no swarm found: its length, and its energy if it is known."""
     cells = ["–"] * len(header)
     cells[0] = name
     for title, value, digits in (("best legal, m", summary[f"{key}_m"], 2), ("energy, J", summary[f"{key}_j"], 0)):
@@ -176,7 +176,7 @@ def _notes(summary: ScenarioSummary) -> list[str]:
         words = "above the planner optimal's" if part >= 0.0 else "below the path that the planner optimal found"
         out.append(f"The shortest legal run is {min(legal):,.2f} m, {abs(part):.2f} % {words}.")
     level = summary["equal_evaluations"]
-    out.append(f"“Equal evaluations” are the first {level:,} of each run, its schedule being that of the whole run.")
+    out.append(f"“Equal evaluations” are the first {level:,} of each run, with the schedule of the whole run.")
     reasons = {
         f"{name} {summary['printed'][name][measure].text} {FAULT_UNITS[measure.rpartition('_')[2]]}: {why}"
         for name, bad in summary["faults"].items()
@@ -187,7 +187,7 @@ def _notes(summary: ScenarioSummary) -> list[str]:
 
 
 def tables(result: dict[str, Any]) -> Iterator[tuple[ScenarioSummary | None, PaperTable]]:
-    """All tables; those of scenarios come with their summary."""
+    """All tables; a scenario's table comes with its summary."""
     if result["claims"]:
         yield None, claims_table(result["claims"])
     if result["readings"]:
@@ -392,7 +392,7 @@ def _krill(rows: dict[str, PrintedRow]) -> list[str]:
         if name != "krill"
     )
     return [
-        f"Of the paper's {len(ratios)} printed energies {same} are {common:.2f} J/m times the printed length, whatever "
+        f"{same} of the paper's {len(ratios)} printed energies are {common:.2f} J/m times the printed length, whatever "
         "the climb; Table 1's 120 J/m up or down and 100 J/m along give many times more even for the straight line.",
         f"Printed energy saved here by krill: {saved}.",
     ]
@@ -429,15 +429,15 @@ def schedules(summary: dict[str, Any]) -> tuple[tuple[str, ...], list[tuple[str,
     if summary["paper"] != "ib-abc" or arrival is None:
         return header, []
     vehicle = ready.source.vehicles[0].vehicle
-    told = (arrival.mode, arrival.interval_s, vehicle.speed_min_m_s, vehicle.speed_max_m_s)
+    schedule_of = (arrival.mode, arrival.interval_s, vehicle.speed_min_m_s, vehicle.speed_max_m_s)
     out: list[tuple[str, ...]] = []
     for row in summary["rows"]:
         lengths = row["vehicle_lengths_m"]
         printed = summary["printed"].get(row["algorithm"])
-        ours = None if lengths is None else schedule(lengths, *told)
+        ours = None if lengths is None else schedule(lengths, *schedule_of)
         count = len(ready.problems)
         theirs = None if printed is None else [printed[f"length_{i}_m"].value for i in range(1, count + 1)]
-        right = None if theirs is None else schedule(theirs, *told)
+        right = None if theirs is None else schedule(theirs, *schedule_of)
         # The printed lengths are rounded, so the results that follow from them have a tolerance.
         off_m = 0.0 if printed is None else max(printed[f"length_{i}_m"].half_unit for i in range(1, count + 1))
         off_s = off_m / vehicle.speed_max_m_s

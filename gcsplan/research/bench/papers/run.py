@@ -1,7 +1,7 @@
 """The five papers' experiments run again: every scenario and algorithm, beside the printed numbers.
 
-`scenarios` holds what is run, `runs` how a run is done, `printed` what the papers print. All algorithms get the same
-seeds. Every finished run is kept in the output directory, and the same call continues from there.
+`scenarios` holds the experiments, `runs` the execution of a run, `printed` the papers' numbers. All algorithms get the
+same seeds. Every finished run is kept in the output directory, and the same call continues from there.
 """
 
 from __future__ import annotations
@@ -58,23 +58,25 @@ def run(
     """
     if (runs is not None and not 1 <= runs <= MOST_RUNS) or (jobs is not None and jobs < 1) or seed < 0:
         raise InputError(
-            f"1 to {MOST_RUNS} runs, 1 job or more and a seed of 0 or more are wanted, given {runs}, {jobs}, {seed}"
+            f"give 1 to {MOST_RUNS} runs, 1 job or more and a seed of 0 or more, not {runs}, {jobs} and {seed}"
         )
     chosen = choose(scenarios, algorithms, readings=readings)
-    asked: dict[tuple[str, str], list[PaperRun]] = {}
+    planned: dict[tuple[str, str], list[PaperRun]] = {}
     code = code_digest()
     texts = {scenario.name: mission_text(scenario.name, missions) for scenario, _ in chosen}
     for scenario, contenders in chosen:
         text, count = texts[scenario.name], runs or scenario.paper.runs
         for name in _optima(scenario):
-            asked[scenario.name, name] = [PaperRun(scenario.name, name, text, 0, 0, code)]
+            planned[scenario.name, name] = [PaperRun(scenario.name, name, text, 0, 0, code)]
         for c in contenders:
-            asked[scenario.name, c.name] = [PaperRun(scenario.name, c.name, text, seed, k, code) for k in range(count)]
+            planned[scenario.name, c.name] = [
+                PaperRun(scenario.name, c.name, text, seed, k, code) for k in range(count)
+            ]
     ready(out)
     store = Store(out / PAPER_RUNS_FILE)
     there = store.load()
     # The references come first, so that a table that is read half way has its optimum.
-    every = sorted((job for some in asked.values() for job in some), key=lambda job: job.algorithm not in OPTIMA)
+    every = sorted((job for some in planned.values() for job in some), key=lambda job: job.algorithm not in OPTIMA)
     todo = [job for job in every if job.key not in there]
     at = [len(every) - len(todo)]
     if done is not None:
@@ -88,7 +90,7 @@ def run(
             done(at[0], len(every))
 
     carry_out(todo, jobs, cluster, keep)
-    found = {place: [there[job.key] for job in some] for place, some in asked.items()}
+    found = {place: [there[job.key] for job in some] for place, some in planned.items()}
     judged = judge([scenario for scenario, _ in chosen], found)
     timed = [time_row(s.name, c.name, found[s.name, c.name]) for s, contenders in chosen for c in contenders]
     return {
@@ -122,7 +124,7 @@ def _optima(scenario: Scenario) -> list[str]:
 def _summary(
     scenario: Scenario, prepared: ReadyScenario, names: Sequence[str], found: dict[tuple[str, str], list[RunRecord]]
 ) -> dict[str, Any]:
-    """All that the report says of a scenario; ``set`` and ``records`` are for its pictures."""
+    """The report's data of a scenario; ``set`` and ``records`` are for its pictures."""
     own = {c.name for c in scenario.paper.contenders}
     records = {name: found[scenario.name, name] for name in names if name in own}
     others = {name: found[scenario.name, name] for name in names if name not in own}

@@ -90,11 +90,11 @@ class PaperRun:
     @property
     def digest(self) -> str:
         """Digest of everything that decides the result."""
-        told: list[object] = [self.text, self.code]
+        parts: list[object] = [self.text, self.code]
         if self.algorithm not in OPTIMA:
             c = self.contender
-            told += [c.planner, {k: dict(v) if isinstance(v, Mapping) else v for k, v in c.options.items()}]
-        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
+            parts += [c.planner, {k: dict(v) if isinstance(v, Mapping) else v for k, v in c.options.items()}]
+        return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
 
     @property
     def contender(self) -> Contender:
@@ -103,7 +103,7 @@ class PaperRun:
 
 
 def key_of(record: RunRecord) -> Key:
-    """The identity of the run that a record is of. Raises KeyError or TypeError for what is no record."""
+    """The identity of a record's run. Raises KeyError or TypeError for anything but a record."""
     return (record["scenario"], record["algorithm"], record["seed"], record["number"], record["digest"])
 
 
@@ -163,11 +163,11 @@ def _best(ready: ReadyScenario, objective: str) -> RunRecord:
     began = time.thread_time()
     costs, bounds, paths, stopped = [], [], [], []
     for problem in ready.problems:
-        asked = replace(
+        reference = replace(
             problem, objective="energy" if objective == "energy" else "length", budget=Budget.endless(clocked=False)
         )
-        solution = get_planner("optimal").plan(asked)
-        costs.append(asked.cost(solution.path))
+        solution = get_planner("optimal").plan(reference)
+        costs.append(reference.cost(solution.path))
         bounds.append(solution.lower_bound)
         paths.append(solution.path.points)
         stopped.append(solution.stopped_by)

@@ -1,4 +1,4 @@
-"""The scenarios of the five papers: mission file, algorithms, number of runs. `judge` has what they claim.
+"""The scenarios of the five papers: mission file, algorithms, number of runs. `judge` has their claims.
 
 `READINGS` are other ways to understand a rule or a setting, run and judged beside the one that is decided. One changes
 the options of some algorithms of its paper. Those run under a name of their own (`ssgwo:leaders-all`), and every claim
@@ -30,7 +30,7 @@ Options = Mapping[str, object]
 
 @dataclass(frozen=True, slots=True)
 class PaperReading:
-    """One reading: ``what`` says what differs; ``changes``: algorithm of the paper to its options on top."""
+    """One reading: ``what`` names the difference; ``changes``: algorithm of the paper to its options on top."""
 
     name: str
     what: str
@@ -49,7 +49,7 @@ def _with(**parameters: object) -> Options:
     return MappingProxyType({"parameters": parameters})
 
 
-_BEES = ("all-bees-at-once", "all bees of one kind start from what the kind before left (ABC)")
+_BEES = ("all-bees-at-once", "all bees of one kind start from the results of the kind before (ABC)")
 _BY_OFFSETS = MappingProxyType({"encoding": "offsets"})
 _BY_SECTIONS = MappingProxyType({"encoding": "sections"})
 _BY_METRES = MappingProxyType({"encoding": "sections-whole"})
@@ -59,7 +59,7 @@ FIELD_M = 800.0
 
 READINGS: Mapping[str, tuple[PaperReading, ...]] = MappingProxyType({
     "krill": (
-        _of("one-krill-at-a-time", "each krill sees where those before it went (fig. 9)", krill=_with(moves="one")),
+        _of("one-krill-at-a-time", "each krill sees where the ones before it went (fig. 9)", krill=_with(moves="one")),
         _of("printed-crowd", "it goes where food over n_f is less than δ times its own", krill=_with(crowd="printed")),
         _of(*_BEES, abc=_with(bees="together")),
     ),
@@ -119,7 +119,7 @@ def readings_of(paper: str) -> tuple[PaperReading, ...]:
 
 
 MISSION_FOLDERS = (Path("missions", "papers"), *(folder / "papers" for folder in SAMPLE_FOLDERS))
-"""Folders in which the mission files are searched: here, then those of the samples."""
+"""Folders in which the mission files are searched: here, then the folders of the samples."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,17 +232,17 @@ SCENARIOS: Mapping[str, Scenario] = MappingProxyType(
 def choose(
     names: Sequence[str] | None, algorithms: Sequence[str] | None, *, readings: bool = True
 ) -> list[tuple[Scenario, list[Contender]]]:
-    """The scenarios called ``names`` (None: all), each with those of its contenders that ``algorithms`` names; None:
-    all, or without ``readings`` the paper's own.
+    """The scenarios called ``names`` (None: all), each with its contenders that ``algorithms`` names; None: all, or
+    without ``readings`` the paper's own.
 
     Raises InputError for an unknown name, and if nothing is left.
     """
-    asked = _known("scenario", names, SCENARIOS)
-    here = {c.name: None for name in asked for c in SCENARIOS[name].contenders}
-    wanted = _known("algorithm", algorithms, here)
+    chosen = _known("scenario", names, SCENARIOS)
+    here = {c.name: None for name in chosen for c in SCENARIOS[name].contenders}
+    allowed = _known("algorithm", algorithms, here)
     if algorithms is None and not readings:
-        wanted = [name for name in wanted if ":" not in name]
-    picked = [(SCENARIOS[n], [c for c in SCENARIOS[n].contenders if c.name in wanted]) for n in asked]
+        allowed = [name for name in allowed if ":" not in name]
+    picked = [(SCENARIOS[n], [c for c in SCENARIOS[n].contenders if c.name in allowed]) for n in chosen]
     return [(scenario, contenders) for scenario, contenders in picked if contenders]
 
 

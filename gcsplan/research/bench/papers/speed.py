@@ -36,7 +36,7 @@ TERM_GROUPS = {
     "nodes near zones": k.NODES_NEAR, "samples near zones": k.SAMPLES_NEAR, "heights above ground": k.HEIGHTS,
     "concealment": k.HIDING, "counts of samples": k.COUNTS,
 }  # fmt: skip
-"""The optional groups of terms, in words; those of turns in space contain the other turns."""
+"""The optional groups of terms, in words; the terms of turns in space contain the other turns."""
 BARE_PART, DIVIDED_PART, ZONES_PART = "curve, lengths, floor", "denser samples on long legs", "zones"
 AIMS = {"run_s": 0.25, "mealpy_ratio": 10.0, "single_ratio": 3.0, "costs_per_s": 300_000.0, "krill_s": 0.5}
 """The aims: most seconds, least ratios and rates."""
@@ -54,10 +54,10 @@ def run(repeats: int = 3, *, missions: Path | None = None, mealpy: bool = True) 
     def swarm(objective: Callable[[Floats], Floats]) -> Callable[[], object]:
         return lambda: minimise("gwo", objective, cost.dim, population=size, iterations=rounds, seed=1)
 
-    asked: dict[str, Callable[[], object]] = {"run_s": swarm(cost), "single_s": swarm(single)}
+    works: dict[str, Callable[[], object]] = {"run_s": swarm(cost), "single_s": swarm(single)}
     if mealpy:
-        asked["mealpy_s"] = _mealpy(cost, size, rounds)
-    took = _best_s(asked, repeats)
+        works["mealpy_s"] = _mealpy(cost, size, rounds)
+    took = _best_s(works, repeats)
     krill = _best_s({name: _whole(name, missions) for name in KRILL}, repeats)
     batches = {f"{objective} cost, {encoding}": _batch(objective, encoding) for objective, encoding in COSTS}
     rates = {name: BATCH / seconds for name, seconds in _best_s(batches, repeats).items()}
@@ -102,11 +102,11 @@ def report(result: dict[str, Any]) -> str:
     ) + "\n"  # fmt: skip
 
 
-def _best_s(asked: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, float]:
+def _best_s(works: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, float]:
     """Least thread seconds of each function, called in turn, after one round that does not count."""
-    took: dict[str, list[float]] = {name: [] for name in asked}
+    took: dict[str, list[float]] = {name: [] for name in works}
     for turn in range(repeats + 1):
-        for name, work in asked.items():
+        for name, work in works.items():
             began = time.thread_time()
             work()
             if turn:
@@ -117,13 +117,13 @@ def _best_s(asked: Mapping[str, Callable[[], object]], repeats: int) -> dict[str
 def cost_of(name: str, missions: Path | None) -> tuple[Cost, int, int]:
     """The objective of a scenario's own algorithm, its population and iterations."""
     ready = prepare(name, mission_text(name, missions))
-    told = settings_of(SCENARIOS[name].paper.contenders[0], ready.source)
-    volume, _ = told.split()
+    settings = settings_of(SCENARIOS[name].paper.contenders[0], ready.source)
+    volume, _ = settings.split()
     problem = ready.problems[0]
-    code = Code.of(told.encoding, Scene.of(problem, volume), told.points)
-    assert told.population is not None
-    assert told.iterations is not None
-    return Cost(problem, code, get_objective(told.cost)), told.population, told.iterations
+    code = Code.of(settings.encoding, Scene.of(problem, volume), settings.points)
+    assert settings.population is not None
+    assert settings.iterations is not None
+    return Cost(problem, code, get_objective(settings.cost)), settings.population, settings.iterations
 
 
 def _whole(name: str, missions: Path | None) -> Callable[[], object]:
@@ -138,11 +138,11 @@ def _mealpy(cost: Cost, size: int, rounds: int) -> Callable[[], object]:
         mealpy = import_module("mealpy")
     except ImportError:
         raise InputError("the comparison needs mealpy, which is not installed: pip install 'gcsplan[bench]'") from None
-    told = {
+    problem = {
         "bounds": mealpy.FloatVar(lb=[0.0] * cost.dim, ub=[1.0] * cost.dim), "minmax": "min", "log_to": None,
         "obj_func": lambda x: float(cost(np.asarray(x)[None])[0]),
     }  # fmt: skip
-    return lambda: mealpy.GWO.OriginalGWO(epoch=rounds, pop_size=size).solve(told, seed=1)
+    return lambda: mealpy.GWO.OriginalGWO(epoch=rounds, pop_size=size).solve(problem, seed=1)
 
 
 def _bench_problem() -> Problem:
@@ -171,10 +171,10 @@ def parts_of_cost() -> dict[str, Callable[[], object]]:
     whole = scene_.numbers.copy()
     whole[SPACING] = math.inf
 
-    def work(wanted: int, zones: Floats, numbers: Floats) -> Callable[[], object]:
+    def work(bits: int, zones: Floats, numbers: Floats) -> Callable[[], object]:
         return lambda: k.measure(
             controls, drawn.bands, drawn.spans, scene_.heights, scene_.quadratic, scene_.floors, scene_.floor_map,
-            numbers, zones, scene_.corners, stride, wanted, *room, out,
+            numbers, zones, scene_.corners, stride, bits, *room, out,
         )  # fmt: skip
 
     none = scene_.zones[:0]
@@ -187,7 +187,7 @@ def parts_of_cost() -> dict[str, Callable[[], object]]:
 
 
 def differences(took: Mapping[str, float]) -> dict[str, float]:
-    """What each part adds to the work before it."""
+    """The seconds that each part adds to the work before it."""
     whole = took[ZONES_PART]
     first = {
         BARE_PART: took[BARE_PART],

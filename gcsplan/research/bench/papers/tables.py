@@ -26,8 +26,8 @@ ClaimRows = Sequence[Mapping[str, Any]]
 METHOD = (
     "Two-sided Mann and Whitney's U, Holm-corrected over all claims of a paper within each column (as run, at equal "
     f"evaluations, twin, each reading); {HOLDS} and {REVERSED} need p < {SIGNIFICANCE:g}, {TIE} means that no "
-    "difference is shown. A is the probability that a run of the claim's better one is really better, ties counted "
-    "half: 0.5 is no difference, 1 is always. Runs that break a limit rank last in length and energy (“illegal”: half "
+    "difference is shown. A is the probability that a run of the claim's better one is really better, with 0.5 for "
+    "a tie: 0.5 is no difference, 1 is always. Runs that break a limit rank last in length and energy (“illegal”: half "
     "of the runs or more)."
 )
 IMPOSSIBLE_MEANS = (
@@ -147,16 +147,16 @@ def counts(claims: ClaimRows) -> list[str]:
     order = (HOLDS, TIE, REVERSED, IMPOSSIBLE_AS_PRINTED, NO_LEGAL, TOO_FEW_RUNS, NOT_RUN)
     for paper in dict.fromkeys(c["paper"] for c in claims):
         count = Counter(c["verdict"] for c in claims if c["paper"] == paper)
-        told = ", ".join(f"{count[verdict]} {verdict}" for verdict in order if count[verdict])
+        verdicts = ", ".join(f"{count[verdict]} {verdict}" for verdict in order if count[verdict])
         total = sum(count.values())
-        out.append(f"{paper}: {total} claim{'' if total == 1 else 's'}, {told}.")
+        out.append(f"{paper}: {total} claim{'' if total == 1 else 's'}, {verdicts}.")
     if any(c.get(f"{prefix}ranking") == TOO_FEW_RUNS for c in claims for prefix in ("", "equal_", "twin_")):
         out.append(f"Rankings are judged from {LEAST_RUNS_TO_JUDGE} runs on.")
     return out
 
 
 def stands(result: Mapping[str, Any]) -> Iterator[tuple[str, list[str]]]:
-    """Title of each paper, and in sentences what of it stands."""
+    """Title of each paper, and its standing in sentences."""
     titles = {s.paper.name: s.paper.title for s in SCENARIOS.values()}
     for paper in dict.fromkeys(s["paper"] for s in result["scenarios"]):
         yield f"{paper}: {titles[paper]}", list(standing(result, paper))

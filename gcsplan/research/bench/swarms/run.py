@@ -1,7 +1,7 @@
 """``gcsplan bench swarms``: swarms on 60 missions over real terrain with room, beside the planner `optimal`.
 
-Every method minimises with the same number of cost evaluations on every mission, from the same seed. What it finds is
-raw legal, repaired or refused, by the planners' own steps. The missions are the kind ``room`` of `terrain.problems`.
+Every method minimises with the same number of cost evaluations on every mission, from the same seed. Its path is raw
+legal, repaired or refused, by the planners' own steps. The missions are the kind ``room`` of `terrain.problems`.
 """
 
 from __future__ import annotations
@@ -54,16 +54,16 @@ SWARM_COLUMNS = (
 
 
 LENGTH_COST = "krill"
-"""The cost that is the length, with penalties: that of every method unless it says otherwise."""
+"""The cost that is the length, with penalties: every method's cost unless its row names another."""
 
 AttemptStatus = Literal["raw legal", "repaired", "refused"]
 
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """A row of the table: whose optimiser (``family``: gcsplan or mealpy), its name, encoding and cost.
+    """A row of the table: the optimiser's origin (``family``: gcsplan or mealpy), name, encoding and cost.
 
-    ``cost`` own: that of the optimiser's paper. ``warm``: it begins around the path of `optimal`.
+    ``cost`` own: the cost of the optimiser's paper. ``warm``: it begins around the path of `optimal`.
     """
 
     family: str
@@ -144,7 +144,7 @@ class SwarmsResult:
 
     @property
     def about(self) -> list[str]:
-        """Lines on what was measured."""
+        """Lines on the measured missions."""
         gap = [100.0 * (o.length_m / o.bound_m - 1.0) for o in self.optima.values()]
         took = [o.seconds for o in self.optima.values()]
         pairs, sets = (max(r[i] for r in self.redraws) for i in (0, 1))
@@ -207,7 +207,7 @@ def _release(package: str) -> str:
 
 
 def methods(*, encodings: bool = False, warm: bool = False) -> list[Method]:
-    """The rows of the table; with ``encodings`` those of the table that compares encodings.
+    """The rows of the table; with ``encodings`` the rows of the table that compares encodings.
 
     ``warm``: searches that begin around the path of `optimal`, too.
     """
@@ -244,11 +244,11 @@ def run(
     for name in names or ():
         if name not in known:
             raise InputError(f"the methods are {', '.join(known)}, given {name!r}")
-    asked = [m for m in methods(encodings=encodings, warm=warm) if names is None or m.label in names]
-    if any(m.family == "mealpy" for m in asked):
+    chosen = [m for m in methods(encodings=encodings, warm=warm) if names is None or m.label in names]
+    if any(m.family == "mealpy" for m in chosen):
         release("mealpy")
     named = problems("room", seed, count=count)
-    jobs_of = [SwarmJob(seed, evaluations, one.name, method) for method in [None, *asked] for one in named]
+    jobs_of = [SwarmJob(seed, evaluations, one.name, method) for method in [None, *chosen] for one in named]
     kept = Kept(directory / ATTEMPTS_FILE)
     left = [job for job in jobs_of if job.key not in kept.known]
     with executor(jobs, pieces=len(left), piece_s=ATTEMPT_S) as workers:

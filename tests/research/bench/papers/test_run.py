@@ -91,7 +91,7 @@ def test_ctrl_c_loses_nothing_that_is_finished_and_processes_give_the_same_numbe
     [
         ({"runs": 0}, "1 to 10000 runs"),
         ({"jobs": 0}, "1 job or more"),
-        ({"seed": -1}, "a seed of 0 or more are wanted, given 1, 1, -1"),
+        ({"seed": -1}, "a seed of 0 or more, not 1, 1 and -1"),
         ({"scenarios": []}, "no scenario is given; known: krill-mound"),
         ({"algorithms": ["pso"]}, "there is no algorithm 'pso' here"),
     ],
