@@ -412,15 +412,6 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
     return MARK.sub(lambda mark: PARTS[mark.group(1)](), markdown)
 
 
-def on_files(files: Any, config: Any) -> Any:
-    """The pictures of the README are the site's too."""
-    from mkdocs.structure.files import File
-
-    for picture in sorted((TOP / "missions").glob("*.png")):
-        files.append(File.generated(config, f"pictures/{picture.name}", abs_src_path=str(picture)))
-    return files
-
-
 def on_post_build(config: Any) -> None:
     """End the build where a page would load something from elsewhere."""
     from mkdocs.exceptions import PluginError
