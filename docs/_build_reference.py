@@ -382,7 +382,8 @@ def firmware_changes() -> str:
 
 def from_top(name: str) -> str:
     """A file of the repository as a page; its links count from here."""
-    return (TOP / name).read_text(encoding="utf-8").replace("](docs/", "](")
+    text = (TOP / name).read_text(encoding="utf-8").replace("](docs/", "](")
+    return re.sub(r"\]\((CONTRIBUTING|CHANGELOG)\.md\)", lambda link: link[0].lower(), text)
 
 
 PARTS: Mapping[str, Callable[[], str]] = {
@@ -394,6 +395,7 @@ PARTS: Mapping[str, Callable[[], str]] = {
     "notes": all_notes,
     "planners": planners,
     "firmware-changes": firmware_changes,
+    "readme": lambda: from_top("README.md"),
     "changelog": lambda: from_top("CHANGELOG.md"),
     "contributing": lambda: from_top("CONTRIBUTING.md"),
 }
