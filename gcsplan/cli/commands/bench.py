@@ -114,7 +114,7 @@ def bench_terrain(
         "bench-terrain"
     ),
     kinds: Annotated[
-        str, typer.Option(metavar="LIST", help="Of problems; everyday, too.")
+        str, typer.Option(metavar="LIST", help="Kinds of problems; `everyday` is one more.")
     ] = "main,energy,band,large,many,turn",
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the problems.")] = 1,
     runs: Annotated[int, typer.Option(metavar="N", help="Runs of ours; medians are reported.")] = 9,
@@ -213,15 +213,16 @@ def bench_papers(
         Path, typer.Option("-o", "--out", metavar="DIR", help="Runs and report; the same command goes on there.")
     ] = Path("papers"),
     scenario: Annotated[
-        list[str] | None, typer.Option("--scenario", metavar="NAME", help="Of missions/papers; repeatable [all].")
+        list[str] | None,
+        typer.Option("--scenario", metavar="NAME", help="Run this mission of missions/papers; repeatable [all]."),
     ] = None,
     algorithm: Annotated[
         list[str] | None,
         typer.Option(
-            "--algorithm", metavar="NAME", help="Of the papers or a reading, `ssgwo:leaders-all`; repeatable [all]."
+            "--algorithm", metavar="NAME", help="Run this algorithm or reading (`ssgwo:leaders-all`); repeatable [all]."
         ),
     ] = None,
-    runs: Annotated[int | None, typer.Option(metavar="N", help="Of each [the paper's number, 30 where none].")] = None,
+    runs: Annotated[int | None, typer.Option(metavar="N", help="Runs of each [the paper's number, or 30].")] = None,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of all runs.")] = 1,
     jobs: JobsOption = None,
     cluster: ClusterOption = None,
@@ -265,14 +266,18 @@ def bench_metabox(
         "bench-metabox"
     ),
     python: Annotated[
-        Path | None, typer.Option("--python", metavar="FILE", help="Of MetaEvoBox's environment [default: this one].")
+        Path | None,
+        typer.Option("--python", metavar="FILE", help="Python of MetaEvoBox's environment [default: this one]."),
     ] = None,
     instances: Annotated[int, typer.Option(metavar="N", help="Generated instances, 15 and 30 threats in turn.")] = 2,
-    runs: Annotated[int, typer.Option(metavar="N", help="Of each optimiser on each instance.")] = 5,
+    runs: Annotated[int, typer.Option(metavar="N", help="Runs of each optimiser on each instance.")] = 5,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of instances and runs.")] = 1,
-    evaluations: Annotated[int, typer.Option(metavar="N", help="Of each run; MetaEvoBox's own number.")] = 2500,
+    evaluations: Annotated[
+        int, typer.Option(metavar="N", help="Evaluations in each run; the default is MetaEvoBox's.")
+    ] = 2500,
     algorithm: Annotated[
-        list[str] | None, typer.Option("--algorithm", metavar="NAME", help="Of ours or theirs; repeatable [all].")
+        list[str] | None,
+        typer.Option("--algorithm", metavar="NAME", help="Run this optimiser, ours or theirs; repeatable [all]."),
     ] = None,
     jobs: Annotated[int, typer.Option(metavar="N", help="Processes of MetaEvoBox.")] = 1,
     as_json: JsonOption = False,
@@ -303,9 +308,7 @@ def bench_scale(
     out: Annotated[Path, typer.Option("-o", "--out", metavar="DIR", help="Tables and picture go there.")] = Path(
         "bench-scale"
     ),
-    axes: Annotated[
-        str, typer.Option(metavar="LIST", help="Of missions,vehicles,zones,cells,workers.")
-    ] = "missions,vehicles,zones,cells,workers",
+    axes: Annotated[str, typer.Option(metavar="LIST", help="Sizes to vary.")] = "missions,vehicles,zones,cells,workers",
     missions: Annotated[int, typer.Option(metavar="N", help="Missions of the longest batch.")] = 40,
     workers: Annotated[int, typer.Option(metavar="N", help="Processes that share a batch, at most.")] = 2,
     kill: Annotated[bool, typer.Option("--kill", help="Also kill a worker in the middle of a batch.")] = False,
