@@ -382,7 +382,8 @@ def firmware_changes() -> str:
 
 def from_top(name: str) -> str:
     """A file of the repository as a page; its links count from here."""
-    return (TOP / name).read_text(encoding="utf-8").replace("](docs/", "](")
+    text = (TOP / name).read_text(encoding="utf-8").replace("](docs/", "](")
+    return re.sub(r"\]\((CONTRIBUTING|CHANGELOG)\.md\)", lambda link: link[0].lower(), text)
 
 
 PARTS: Mapping[str, Callable[[], str]] = {
@@ -394,6 +395,7 @@ PARTS: Mapping[str, Callable[[], str]] = {
     "notes": all_notes,
     "planners": planners,
     "firmware-changes": firmware_changes,
+    "readme": lambda: from_top("README.md"),
     "changelog": lambda: from_top("CHANGELOG.md"),
     "contributing": lambda: from_top("CONTRIBUTING.md"),
 }
@@ -410,15 +412,6 @@ FOREIGN = re.compile(r"""<(?:script|img|iframe|source|video|audio)[^>]*\ssrc=["'
 def on_page_markdown(markdown: str, **_: Any) -> str:
     """Put the parts that are made from the code where the page wants them."""
     return MARK.sub(lambda mark: PARTS[mark.group(1)](), markdown)
-
-
-def on_files(files: Any, config: Any) -> Any:
-    """The pictures of the README are the site's too."""
-    from mkdocs.structure.files import File
-
-    for picture in sorted((TOP / "missions").glob("*.png")):
-        files.append(File.generated(config, f"pictures/{picture.name}", abs_src_path=str(picture)))
-    return files
 
 
 def on_post_build(config: Any) -> None:

@@ -1,13 +1,14 @@
 """`python docs/_make_pictures.py`: the pictures of README and documents, made from the sample mission.
 
-They lie in `missions/`. Each holds the path's length in its description, which a test compares with a plan.
-The picture of the default planner's proof (`draw_proof`) has terrain above the cap, and the cells that a shorter path
-could meet.
+They are in `docs/pictures/`. `report.webp` is the top of the page that ``gcsplan plan --report`` writes, in Chromium.
+`optimal.png` is the default planner's proof: terrain above the cap, and the cells that a shorter path could meet.
+Each picture holds the path's length in its description, which a test compares with a plan.
 """
 
 from __future__ import annotations
 
 import io
+import tempfile
 from pathlib import Path
 from typing import IO
 
@@ -17,32 +18,53 @@ from matplotlib.colors import LightSource, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from PIL import ExifTags, Image
 
+import gcsplan
 from gcsplan.app.fleet.pipeline import load_mission, plan, world_of
-from gcsplan.app.output.files import figures_of, picture_of
 from gcsplan.app.plan.problem import make_problem
 from gcsplan.planners.optimal.navmesh.clearance import mesh_of
 from gcsplan.planners.optimal.planner import search
 from gcsplan.planners.problem import Problem
+from tests.support import browser
 
-MISSIONS = Path(__file__).parents[1] / "missions"
+TOP = Path(__file__).parents[1]
+PICTURES = TOP / "docs" / "pictures"
 WALL, ROOM = "#b04a3a", "#2c7fb8"
+PAGE_PX = 1100
+"""Width of the page in the picture; its height ends below the map's legend."""
 
 
 def main() -> None:
-    """Write the three pictures."""
-    source = load_mission(MISSIONS / "jacksboro.yaml")
+    """Write both pictures."""
+    source = load_mission(TOP / "missions" / "jacksboro.yaml")
     planned = plan(source)
     problem, _ = make_problem(source, source.vehicles[0], world_of(source), source.planner.objective, 1)
     proof = io.BytesIO()
     save_proof(problem, proof)
-    for name, content in (
-        ("jacksboro.png", picture_of(planned)),
-        ("jacksboro-space.png", figures_of(planned)["report-space.png"]),
-        ("optimal.png", proof.getvalue()),
-    ):
-        (MISSIONS / name).write_bytes(content)
-        print(f"{MISSIONS / name}: {len(content):,} bytes")
+    page = picture_of_page(gcsplan.report(planned), f"uav1: {planned.vehicles[0].verdict.length_m:,.0f} m")
+    for name, content in (("report.webp", page), ("optimal.png", proof.getvalue())):
+        (PICTURES / name).write_bytes(content)
+        print(f"{PICTURES / name}: {len(content):,} bytes")
+
+
+def picture_of_page(html: str, description: str) -> bytes:
+    """The top of a report, down to the legend of its map, as WebP with a description."""
+    program = browser.find()
+    if program is None:
+        raise SystemExit(f"needs a browser: {', '.join(browser.NAMES)}, or the one that GCSPLAN_CHROMIUM names")
+    with tempfile.TemporaryDirectory() as folder, browser.browser(program, Path(folder, "home")) as shown:
+        file = Path(folder, "report.html")
+        file.write_text(html, encoding="utf-8")
+        shown.visit(file, width=PAGE_PX)
+        legend = "document.querySelector('#map + .legend').getBoundingClientRect().bottom"
+        shown.visit(file, width=PAGE_PX, height=round(shown.evaluate(legend)) + 8)
+        screen = Image.open(io.BytesIO(shown.picture())).convert("RGB")
+    exif = Image.Exif()
+    exif[ExifTags.Base.ImageDescription] = description
+    content = io.BytesIO()
+    screen.save(content, "WEBP", quality=85, method=6, exif=exif)
+    return content.getvalue()
 
 
 def draw_proof(problem: Problem) -> Figure:

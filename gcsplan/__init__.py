@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from gcsplan.app.fleet.pipeline import load_mission, plan
 
 __all__ = ["__version__", "check", "load_mission", "plan", "rehearse", "report", "upload", "write"]
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _MODULE_OF = {
     "load_mission": "gcsplan.app.fleet.pipeline",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 
+from gcsplan import __version__
 from tests.support.paths import REPOSITORY
 
 FRAGMENTS = sorted(path for path in (REPOSITORY / "changelog.d").iterdir() if path.name != "README.md")
@@ -26,4 +27,5 @@ def test_the_next_section_has_its_place() -> None:
     assert text.count(config["start_string"]) == 1
     versions = re.findall(r"^## (\S+?)(?:, \d{4}-\d\d-\d\d)?$", text, re.MULTILINE)
     assert versions == sorted(set(versions), key=lambda v: tuple(map(int, v.split("."))), reverse=True)
+    assert versions[0] == __version__
     assert len(text[text.index("\n## 0.1.0") :].strip().splitlines()) <= 40

@@ -15,7 +15,7 @@ from typing import Any, get_args
 
 import pytest
 import yaml
-from PIL import Image
+from PIL import ExifTags, Image
 
 import gcsplan
 from gcsplan import errors
@@ -174,8 +174,7 @@ def test_links_between_documents_lead_somewhere(page: Path) -> None:
     text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
     for target in re.findall(r"\]\(([^)#]+?)(?:#[^)]*)?\)", text):
         if not target.startswith(("http:", "https:", "mailto:")):
-            picture = TOP / "missions" / Path(target).name if "pictures/" in target else page.parent / target
-            assert picture.exists(), f"{page.name}: {target}"
+            assert (page.parent / target).exists(), f"{page.name}: {target}"
 
 
 ROOMS = ("gcsplan", "tests", "sitl_tests", "missions", "docs")
@@ -226,7 +225,7 @@ def test_the_tutorial_s_mission_is_one(tmp_path: Path) -> None:
 
 
 def test_readme_is_short() -> None:
-    assert len((TOP / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
+    assert len((TOP / "README.md").read_text(encoding="utf-8").splitlines()) <= 130
 
 
 # -- what is built -----------------------------------------------------------------------------------------------------
@@ -252,11 +251,11 @@ def test_what_loads_from_elsewhere_is_seen(made: ModuleType, text: str, foreign:
 
 def test_the_pictures_show_the_sample_mission_as_it_is_planned_today() -> None:
     (vehicle,) = gcsplan.plan(str(TOP / "missions" / "jacksboro.yaml")).vehicles
-    length = f"uav1: {vehicle.verdict.length_m:,.0f} m"
-    bound = f"no path is shorter than {vehicle.solution.lower_bound:,.0f} m"
-    for name, words in (("jacksboro.png", length), ("jacksboro-space.png", length), ("optimal.png", bound)):
-        with Image.open(TOP / "missions" / name) as picture:
-            assert picture.info["Description"].startswith(words), CURE
+    with Image.open(DOCS / "pictures" / "report.webp") as page:
+        assert page.getexif()[ExifTags.Base.ImageDescription] == f"uav1: {vehicle.verdict.length_m:,.0f} m", CURE
+    with Image.open(DOCS / "pictures" / "optimal.png") as proof:
+        bound = f"no path is shorter than {vehicle.solution.lower_bound:,.0f} m"
+        assert proof.info["Description"].startswith(bound), CURE
 
 
 def test_the_picture_of_the_proof_tells_walls_room_path_and_gap_with_units() -> None:

@@ -114,7 +114,7 @@ def bench_terrain(
         "bench-terrain"
     ),
     kinds: Annotated[
-        str, typer.Option(metavar="LIST", help="Kinds of problems; everyday, too.")
+        str, typer.Option(metavar="LIST", help="Kinds of problems; `everyday` is one more.")
     ] = "main,energy,band,large,many,turn",
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the problems.")] = 1,
     runs: Annotated[int, typer.Option(metavar="N", help="Runs of ours; medians are reported.")] = 9,
@@ -214,15 +214,15 @@ def bench_papers(
     ] = Path("papers"),
     scenario: Annotated[
         list[str] | None,
-        typer.Option("--scenario", metavar="NAME", help="A file of missions/papers; repeatable [all]."),
+        typer.Option("--scenario", metavar="NAME", help="Run this mission of missions/papers; repeatable [all]."),
     ] = None,
     algorithm: Annotated[
         list[str] | None,
         typer.Option(
-            "--algorithm", metavar="NAME", help="A paper's, or a reading, `ssgwo:leaders-all`; repeatable [all]."
+            "--algorithm", metavar="NAME", help="Run this algorithm or reading (`ssgwo:leaders-all`); repeatable [all]."
         ),
     ] = None,
-    runs: Annotated[int | None, typer.Option(metavar="N", help="Runs of each [the paper's number, else 30].")] = None,
+    runs: Annotated[int | None, typer.Option(metavar="N", help="Runs of each [the paper's number, or 30].")] = None,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of all runs.")] = 1,
     jobs: JobsOption = None,
     cluster: ClusterOption = None,
@@ -266,14 +266,18 @@ def bench_metabox(
         "bench-metabox"
     ),
     python: Annotated[
-        Path | None, typer.Option("--python", metavar="FILE", help="MetaEvoBox's Python [default: this one].")
+        Path | None,
+        typer.Option("--python", metavar="FILE", help="Python of MetaEvoBox's environment [default: this one]."),
     ] = None,
     instances: Annotated[int, typer.Option(metavar="N", help="Generated instances, 15 and 30 threats in turn.")] = 2,
     runs: Annotated[int, typer.Option(metavar="N", help="Runs of each optimiser on each instance.")] = 5,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of instances and runs.")] = 1,
-    evaluations: Annotated[int, typer.Option(metavar="N", help="Evaluations of each run, as MetaEvoBox has.")] = 2500,
+    evaluations: Annotated[
+        int, typer.Option(metavar="N", help="Evaluations in each run; the default is MetaEvoBox's.")
+    ] = 2500,
     algorithm: Annotated[
-        list[str] | None, typer.Option("--algorithm", metavar="NAME", help="One of ours or theirs; repeatable [all].")
+        list[str] | None,
+        typer.Option("--algorithm", metavar="NAME", help="Run this optimiser, ours or theirs; repeatable [all]."),
     ] = None,
     jobs: Annotated[int, typer.Option(metavar="N", help="Processes of MetaEvoBox.")] = 1,
     as_json: JsonOption = False,

@@ -55,13 +55,15 @@ class AutopilotProfile:
     ``max_items`` counts wire items, including home where home is one. ``stored(item)`` returns the item that reads
     back; ``refuses(item)`` returns why the autopilot refuses it, empty if it accepts it. ``atomic``: the new mission
     replaces the old one only at the end of an upload, so a broken upload leaves the old one. ``holds_s``: seconds for
-    which a broken upload keeps the vehicle busy.
+    which a broken upload keeps the vehicle busy. Of ``mav_types``, those of ``judged_types`` fly as the check follows
+    a mission: a PX4's is followed as a multicopter flies it.
     """
 
     autopilot: Autopilot
     label: str
     mav_autopilot: int
     mav_types: frozenset[int]
+    judged_types: frozenset[int]
     max_items: int
     atomic: bool
     holds_s: float
@@ -75,6 +77,7 @@ _TABLE: dict[Autopilot, AutopilotProfile] = {
         "ArduCopter",
         ARDUPILOTMEGA,
         COPTERS,
+        COPTERS,
         max_items=650,  # measured; an item takes 15 bytes in the storage of a 16 KB board (StorageManager.cpp)
         atomic=False,  # MissionItemProtocol_Waypoints.cpp: COUNT truncates, items replace one by one
         holds_s=8.0,  # MissionItemProtocol.h: upload_timeout_ms
@@ -85,6 +88,7 @@ _TABLE: dict[Autopilot, AutopilotProfile] = {
         Autopilot.ARDUPLANE,
         "ArduPlane",
         ARDUPILOTMEGA,
+        PLANES,
         PLANES,
         max_items=650,  # ArduPlane's own layout holds 655; the smaller number is used for both
         atomic=False,
@@ -97,6 +101,7 @@ _TABLE: dict[Autopilot, AutopilotProfile] = {
         "PX4",
         PX4,
         COPTERS | PLANES,
+        COPTERS,
         # navigation.h: NUM_MISSIONS_SUPPORTED 2000 on boards with an SD card, 65534 in simulation, 500 with missions
         # in RAM and 50 on the smallest boards; a board that holds fewer answers NO_SPACE.
         max_items=2000,

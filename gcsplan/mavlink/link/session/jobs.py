@@ -191,7 +191,7 @@ def verifying(channel: Channel, task: Task) -> LinkSteps[UploadResult]:
     values = OnBoard()
     if task.judge is not None:
         against: Reasons = []
-        identity(state, task.autopilot, against, warnings)
+        identity(state, task.autopilot, against, warnings, judged=True)
         if against:
             raise VehicleRefused(f"not compared: {against[0][1]}", where=f"vehicle {task.sysid}", reason=against[0][0])
         noted, values = yield from reading_parameters(channel, task, state, recheck.watch, recheck)

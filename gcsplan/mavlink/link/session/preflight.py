@@ -83,7 +83,7 @@ def objections(
     """Return the reasons against sending, each a word and a text, and the warnings; arguments as in `preflight`."""
     against: list[tuple[str, str]] = []
     warnings: list[Note] = []
-    identity(state, autopilot, against, warnings)
+    identity(state, autopilot, against, warnings, judged=judged)
     _readiness(state, allow_armed, against, warnings)
     _abilities(state, items, autopilot, mission_type, against, warnings)
     if mission_type == MISSION and needs_straight(items, autopilot) and not is_generic(state.mav_autopilot):
@@ -94,8 +94,13 @@ def objections(
     return against, warnings
 
 
-def identity(state: VehicleState, autopilot: Autopilot, against: Reasons, warnings: list[Note]) -> None:
-    """Add to ``against`` and ``warnings`` what speaks against its being the one vehicle with that autopilot."""
+def identity(
+    state: VehicleState, autopilot: Autopilot, against: Reasons, warnings: list[Note], *, judged: bool
+) -> None:
+    """Add to ``against`` and ``warnings`` what speaks against its being the one vehicle with that autopilot.
+
+    ``judged``: it must fly as a mission for this autopilot is judged, which a PX4's wings do not.
+    """
     if state.sources > 1:
         against.append(("ambiguous", rivals_words(state)))
     row = profile_of(autopilot)
@@ -109,14 +114,15 @@ def identity(state: VehicleState, autopilot: Autopilot, against: Reasons, warnin
                 f"the mission is written for {row.label}, and the vehicle is {state.what}: plan it for that autopilot",
             )
         )
-    elif state.mav_type not in row.mav_types:
+    elif state.mav_type not in (row.judged_types if judged else row.mav_types):
         if state.mav_type == 0:
             warnings.append(Note("vehicle_type_not_told", autopilot=row.label))
         else:
             against.append(
                 (
                     "wrong_autopilot",
-                    f"the mission is written for {row.label}, and the vehicle is a {type_name(state.mav_type)}",
+                    f"the vehicle is a {type_name(state.mav_type)}, which does not fly as a mission for {row.label} is "
+                    f"judged",
                 )
             )
 
@@ -175,8 +181,13 @@ def _straightness(state: VehicleState, against: Reasons, warnings: list[Note], *
     last = ".".join(map(str, STRAIGHT_UNTIL))
     found = Note("px4_may_miss_way_points", version=version_words(state.flight_sw_version))
     if judged:
-        cure = f"the straight legs that were judged hold until PX4 {last} alone; fly that, or at one altitude"
-        against.append(("firmware", f"{found}: {cure}"))
+        against.append(
+            (
+                "firmware",
+                f"{found}: the straight legs that were judged hold until PX4 {last} alone; fly that, or at one "
+                f"altitude",
+            )
+        )
     else:
         warnings.append(found)
 

@@ -400,6 +400,17 @@ def test_what_speaks_against_an_upload_refuses_it(change: dict[str, Any], reason
     assert refused.value.reason == reason
 
 
+@pytest.mark.parametrize("mav_type", [1, 22])
+def test_a_judged_mission_goes_to_no_px4_that_is_a_fixed_wing_or_a_vtol(mav_type: int) -> None:
+    state = replace(READY, mav_autopilot=12, mav_type=mav_type, flight_sw_version=PX4_17)
+    items = mission(PX4).wire_items()
+    with pytest.raises(VehicleRefused, match="does not fly as a mission for PX4 is judged") as refused:
+        preflight(state, items, PX4, judged=True)
+    assert (refused.value.reason, refused.value.exit_code) == ("wrong_autopilot", 5)
+    assert preflight(state, items, PX4) == []  # unchecked
+    assert preflight(replace(state, mav_type=2), items, PX4, judged=True) == []
+
+
 def test_all_reasons_are_told_at_once() -> None:
     state = replace(READY, armed=True, lat_deg=40.0, sources=3, system_status=BOOT)
     with pytest.raises(VehicleRefused, match=r"3 autopilots.*booting.*armed.*m from the mission's start"):
