@@ -193,7 +193,7 @@ def nearest_pass(
     is asked how large an altitude error may be: no less than told is free above a zone or below it.
     """
     air = world.airspace
-    near = np.flatnonzero(_meets_box(legs, air.zone_boxes))
+    near = np.flatnonzero(_meets_box(legs, air.zone_table.box_m))
     if not len(near):
         return None
     free = replace(limits, horizontal_clearance_m=0.0, min_agl_m=0.0, max_agl_m=None, max_amsl_m=None)

@@ -17,7 +17,7 @@ from gcsplan.world.geometry.path import distances_m
 from gcsplan.world.kernels.entries import pieces
 from gcsplan.world.kernels.field import Field
 from gcsplan.world.kernels.shared import BAND_HIGH, BAND_LOW, BOW_M, CEILING, CEILING_AGL, FLOOR, FLOOR_AGL, Zones
-from gcsplan.world.kernels.zone_arrays import spans
+from gcsplan.world.kernels.zone_spans import spans
 
 ROOM_M = 0.02
 """Extra reach, m, for the accuracy that the check loses between the plane and the grid."""
