@@ -204,6 +204,24 @@ class ZoneTable:
         low, high = np.where(own, ground, np.inf), np.where(own, ground, -np.inf)
         return low.reshape(len(places), -1).min(axis=1), high.reshape(len(places), -1).max(axis=1)
 
+    def rise_m(self, zone: int, box_m: Box, reach_m: float) -> float:
+        """Metres by which the ground under a zone may differ from the ground at a place of a box within reach, at most;
+        0 if neither floor nor ceiling follows the ground, inf where ground is unknown."""
+        if reach_m <= 0.0 or not self.follow_ground[zone]:
+            return 0.0
+        grid, own_m = self.surface.grid, self.zones[zone].bounds
+        west, south = (max(a, b) - reach_m for a, b in zip(own_m[:2], box_m[:2], strict=True))
+        east, north = (min(a, b) + reach_m for a, b in zip(own_m[2:], box_m[2:], strict=True))
+        e, n = np.meshgrid(np.linspace(west, east, 5), np.linspace(south, north, 5))
+        at = grid(e.ravel(), n.ravel())
+        first = np.maximum(np.floor(at.min(axis=0)).astype(np.intp) - 1, 0)
+        last = np.maximum(np.ceil(at.max(axis=0)).astype(np.intp) + 2, first + 1)
+        z = self.surface.ground_m[first[1] : last[1], first[0] : last[0]]
+        across, along = (float(np.abs(np.diff(z, axis=a)).max(initial=0.0)) for a in (1, 0))
+        turned = grid.jacobian(0.5 * (west + east), 0.5 * (south + north)).T
+        steep = max(math.hypot(*(turned @ (across, along))), math.hypot(*(turned @ (across, -along))))
+        return max(1.01 * reach_m * steep, 1e-9) if math.isfinite(steep) else math.inf
+
     def _polygon(self, zone: int) -> Any:
         """A polygon of shapely's, prepared for many questions."""
         if zone not in self._polygons:
