@@ -49,9 +49,8 @@ from gcsplan.world.kernels.shared import (
     TOUCH_M,
     Demands,
 )
-from gcsplan.world.kernels.zone_spans import deepest_in_circle, deepest_inside
 from gcsplan.world.tube import ZONE_ROOM_M, Band, Reaches, Tube, make_tube
-from gcsplan.world.zone_table import ZoneTable, over_both_grounds
+from gcsplan.world.zone_table import ZoneTable, deepest_in_circle, deepest_inside, over_both_grounds
 
 __all__ = ["Airspace", "Band", "LegReport", "Legs", "Tube", "Violation", "ViolationKind"]
 
@@ -266,9 +265,7 @@ class Airspace:
         def extrema(of_top: bool, reach_m: float) -> Held:
             return self.extrema_along(of_top, reach_m, lines)
 
-        return make_tube(
-            points, limits, self.field, self.zone_table.arrays, extrema, self.surfaces, self.grounds, self.scale
-        )
+        return make_tube(points, limits, self.field, self.zone_table, extrema, self.surfaces, self.grounds, self.scale)
 
     def straight_cells(self, bow_m: float) -> int:
         """How many cells of the terrain model in a row have lines that are straight in the plane within ``bow_m``."""

@@ -34,8 +34,8 @@ from gcsplan.world.kernels.shared import (
     RADIUS,
     TOUCH_M,
 )
-from gcsplan.world.kernels.zone_spans import grown_edges
 from gcsplan.world.tube import TUBE_MARGIN_M, ZONE_ROOM_M, Reaches
+from gcsplan.world.zone_table import grown_edges
 
 WIDER_REACH = 1.6
 UNUSED = -1e9

@@ -1,4 +1,4 @@
-"""The table of zones: the lattice that finds them, ceilings over two grounds, own ground, and what is near them."""
+"""The table of zones: what finds them, ceilings over two grounds, own ground, what is near them and how deep inside."""
 
 from __future__ import annotations
 
@@ -12,11 +12,19 @@ from gcsplan.world.geodesy.degree_shapes import counter_clockwise
 from gcsplan.world.geometry.surface import GridMap, Surface
 from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from gcsplan.world.kernels.field import Field
-from gcsplan.world.zone_table import RING_POINTS, ZoneTable, lattice_over, over_both_grounds
+from gcsplan.world.zone_table import (
+    RING_POINTS,
+    ZoneTable,
+    deepest_in_circle,
+    deepest_inside,
+    lattice_over,
+    over_both_grounds,
+)
 
 GRID = GridMap.affine(0.0, 200.0, 10.0, 10.0)
 FIELD = Field.of(GRID)
 LOW = np.zeros((21, 21))
+SQUARE = np.array([[80.0, 80.0], [120.0, 80.0], [120.0, 120.0], [80.0, 120.0]])
 
 
 @pytest.mark.parametrize("count", [1, 30, 400])
@@ -124,7 +132,7 @@ def test_segments_near_a_polygon_are_found_wherever_they_lie() -> None:
 
 
 def test_columns_say_what_the_zones_are() -> None:
-    square = Polygon(np.array([[80.0, 80.0], [120.0, 80.0], [120.0, 120.0], [80.0, 120.0]]))
+    square = Polygon(SQUARE)
     zones = [
         Zone("disc", Circle(50.0, 60.0, 10.0), Level(30.0, "agl"), Level(90.0, "amsl")),
         Zone("square", square, None, Level(70.0, "agl")),
@@ -144,3 +152,30 @@ def test_columns_say_what_the_zones_are() -> None:
     places = np.array([[60.0, 60.0], [61.0, 60.0]])
     assert table.holds(0, places).tolist() == [True, False]
     assert table.near(0, places, places, 0.0).tolist() == [True, True]
+
+
+def test_spans_of_a_track_are_where_samples_are_near() -> None:
+    zones = [Zone("square", Polygon(SQUARE)), Zone("disc", Circle(150.0, 60.0, 12.0))]
+    table = ZoneTable.of(zones, Surface(LOW, LOW, GRID), FIELD, 1.0)
+    track = np.array([[10.0, 95.0], [130.0, 100.0], [160.0, 20.0]])
+    found = table.spans(track, 7.0, 7.0)
+    s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(track, axis=0).T))])
+    at = np.linspace(0.0, s[-1], 20_001)
+    places = shapely.points(*(np.interp(at, s, track[:, k]) for k in range(2)))
+    for k, (shape, more) in enumerate([(shapely.Polygon(SQUARE), 0.0), (shapely.Point(150.0, 60.0), 12.0)]):
+        near = at[shapely.distance(shape, places) <= 7.0 + more]
+        mine = [(s0, s1) for zone, s0, s1 in found if zone == k]
+        assert (mine[0][0], mine[-1][1]) == pytest.approx((near[0], near[-1]), abs=0.05)
+
+
+def test_the_deepest_place_inside_is_that_of_samples() -> None:
+    start, end = np.array([70.0, 90.0]), np.array([125.0, 110.0])
+    depth_m, at = deepest_inside(SQUARE, start, end)
+    t = np.linspace(0.0, 1.0, 20_001)[:, None]
+    places = start + t * (end - start)
+    depth = np.minimum(places - 80.0, 120.0 - places).min(axis=1)
+    assert depth_m == pytest.approx(depth.max(), abs=1e-2)
+    assert depth[round(at * 20_000)] == pytest.approx(depth.max(), abs=1e-2)
+    assert deepest_in_circle(Circle(100.0, 100.0, 20.0), 20.0, np.array([70.0, 100.0]), np.array([130.0, 100.0])) == (
+        pytest.approx((20.0, 0.5))
+    )

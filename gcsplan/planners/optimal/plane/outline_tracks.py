@@ -74,7 +74,7 @@ class OutlineTracks:
             hair = HAIR_M if air.surface.grid.error_m == 0.0 else HAIR_BENT_M
             hair_m = np.full(len(air.zones), hair if outer else hair + self.problem.bound_spare_m)
             hair_m += max(wider_m - reach_m, 0.0) * air.zone_table.follow_ground
-            solids = Solids(air.zones, reach_m, air.scale, hair_m.tolist(), self.incumbent.budget, outer=outer)
+            solids = Solids(air.zone_table, reach_m, hair_m, self.incumbent.budget, outer=outer)
             for hint in self._hints:
                 solids.look_along(hint, which)
             self._solids[outer] = solids
