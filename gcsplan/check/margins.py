@@ -21,7 +21,7 @@ from gcsplan.notes.note import Note
 from gcsplan.vehicle import Vehicle
 from gcsplan.world.airspace import Airspace, LegReport, Legs, Violation
 from gcsplan.world.geometry.limits import Limits
-from gcsplan.world.geometry.zones import Circle, Level
+from gcsplan.world.geometry.zones import Circle
 from gcsplan.world.world import World
 
 MOST_ZONES = 3
@@ -193,7 +193,7 @@ def nearest_pass(
     finds the largest altitude error that passes: that height at least is free between the line and each zone.
     """
     air = world.airspace
-    near = np.flatnonzero(_meets_box(legs, air.zone_boxes))
+    near = np.flatnonzero(_meets_box(legs, air.zone_table.box_m))
     if not len(near):
         return None
     free = replace(limits, horizontal_clearance_m=0.0, min_agl_m=0.0, max_agl_m=None, max_amsl_m=None)
@@ -210,19 +210,12 @@ def nearest_pass(
         middle = 0.5 * (clear_m + hits_m)
         v = hit(middle)
         clear_m, hits_m, found = (middle, hits_m, found) if v is None else (clear_m, middle, v)
-    zone = air.zones[found.zone]
     ground = float(air.surface.ground_at(found.east_m, found.north_m))
-    floor, ceiling = _amsl_m(zone.floor, ground, -math.inf), _amsl_m(zone.ceiling, ground, math.inf)
+    floor, ceiling = (float(levels[found.zone]) for levels in air.zone_table.levels_m(ground_m=ground))
     lat, lon = (float(x) for x in world.frame.to_degrees(found.east_m, found.north_m))
     over = found.amsl_m - ceiling >= floor - found.amsl_m
     seq = stretches[int(owner[near[found.leg]])].seq
-    return ZonePass(seq, zone.name, clear_m, over, lat, lon)
-
-
-def _amsl_m(level: Level | None, ground_m: float, without_m: float) -> float:
-    if level is None:
-        return without_m
-    return level.value_m + (ground_m if level.datum == "agl" else 0.0)
+    return ZonePass(seq, air.zones[found.zone].name, clear_m, over, lat, lon)
 
 
 def _meets_box(legs: Legs, boxes: Floats) -> Bools:

@@ -48,13 +48,10 @@ def goes_on(problem: Problem) -> bool:
     terminals = np.array(terminals_of(problem))
     if not ((terminals > low) & (terminals < high)).all():
         return True
-    for zone in problem.airspace.zones:
-        west, south, east, north = _bounds(zone, problem.airspace, problem.limits)
-        within = west > low[0] and south > low[1] and east < high[0] and north < high[1]
-        beyond = west > high[0] or south > high[1] or east < low[0] or north < low[1]
-        if not within and not beyond:
-            return True
-    return False
+    first, last = (problem.airspace.zone_table.box_m + np.repeat([-reach, reach], 2)).reshape(-1, 2, 2).swapaxes(0, 1)
+    within = ((first > low) & (last < high)).all(axis=1)
+    beyond = ((first > high) | (last < low)).any(axis=1)
+    return not (within | beyond).all()
 
 
 def exit_cost(problem: Problem) -> float:
@@ -166,7 +163,10 @@ def _by_zones(problem: Problem) -> bool:
     air, limits = problem.airspace, problem.bound_limits
     top = math.inf if limits.max_amsl_m is None else limits.max_amsl_m - limits.altitude_error_m
     reach = limits.horizontal_clearance_m + limits.track_error_m - ENCLOSING_SHRUNK_M - problem.bound_spare_m
-    walls = [_shape(z, reach) for z in air.zones if _is_wall(z, top)]
+    bottoms, tops = air.zone_table.levels_m()
+    # A wall reaches from the ground to above the ceiling everywhere.
+    up = np.isposinf(tops) | ((tops > top) & ~air.zone_table.over_ground[:, 1])
+    walls = [_shape(air.zones[k], reach) for k in np.flatnonzero(np.isneginf(bottoms) & up).tolist()]
     if not walls:
         return False
     surface = air.surface
@@ -187,12 +187,6 @@ def _by_zones(problem: Problem) -> bool:
     return len(numbers) > 1
 
 
-def _is_wall(zone: Zone, top_m: float) -> bool:
-    """Whether a zone reaches from the ground to above ``top_m`` AMSL everywhere."""
-    high = zone.ceiling
-    return zone.floor is None and (high is None or (high.datum == "amsl" and high.value_m > top_m))
-
-
 def _shape(zone: Zone, reach_m: float) -> Any:
     """The polygon of a zone grown by ``reach_m``; slightly too small, because chords lie inside their arcs."""
     import shapely
@@ -206,13 +200,6 @@ def _shape(zone: Zone, reach_m: float) -> Any:
     if not shapely.is_valid(shape):  # to make a valid one valid takes minutes where edges lie close to each other
         shape = shapely.make_valid(shape)
     return shape.buffer(reach_m, quad_segs=16) if reach_m > 0.0 else shape
-
-
-def _bounds(zone: Zone, air: Airspace, limits: Limits) -> tuple[float, float, float, float]:
-    """West, south, east, north of a zone's box, grown by the distance that paths keep from the zone."""
-    west, south, east, north = zone.bounds
-    more = _reach_m(air, limits) + (air.scale - 1.0) * max(east - west, north - south)
-    return west - more, south - more, east + more, north + more
 
 
 def _reach_m(air: Airspace, limits: Limits) -> float:

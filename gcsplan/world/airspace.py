@@ -49,8 +49,8 @@ from gcsplan.world.kernels.shared import (
     TOUCH_M,
     Demands,
 )
-from gcsplan.world.kernels.zone_arrays import BOX, deepest_in_circle, deepest_inside, over_both_grounds, zones_as_arrays
 from gcsplan.world.tube import ZONE_ROOM_M, Band, Reaches, Tube, make_tube
+from gcsplan.world.zone_table import ZoneTable, deepest_in_circle, deepest_inside, over_both_grounds
 
 __all__ = ["Airspace", "Band", "LegReport", "Legs", "Tube", "Violation", "ViolationKind"]
 
@@ -175,9 +175,9 @@ class Airspace:
     """A surface and its zones, with the functions that judge legs.
 
     ``scale`` >= 1: largest scale of the plane over the mission; real metres times it are at most metres of the plane,
-    so every horizontal clearance is multiplied by it. ``zones`` are the given ones, with higher ceilings above ground
-    where the ground has two heights (`over_both_grounds`). ``field``, ``zone_arrays``, ``surfaces`` and ``grounds`` are
-    the same as the kernels read it.
+    so every horizontal clearance is multiplied by it. ``zones`` are those given, with higher ceilings above ground
+    where the ground has two heights (`over_both_grounds`), and ``zone_table`` is what the planners read of them.
+    ``field``, ``surfaces`` and ``grounds`` are the surface as the kernels read it.
     """
 
     def __init__(self, surface: Surface, zones: Sequence[Zone] = (), *, scale: float = 1.0) -> None:
@@ -186,15 +186,15 @@ class Airspace:
         self.surface = surface
         self.scale = scale
         self.field = Field.of(surface.grid)
-        self.zones = over_both_grounds(zones, surface, self.field, scale)
-        self.zone_arrays = zones_as_arrays(self.zones, surface, self.field, scale)
+        self.zone_table = ZoneTable.of(over_both_grounds(zones, surface, self.field, scale), surface, self.field, scale)
+        self.zones = self.zone_table.zones
         self._neighbourhoods = Neighbourhoods(surface.grid, self.field)
         ground, top = (np.ascontiguousarray(a, dtype=np.float64) for a in (surface.ground_m, surface.top_m))
         self._heights = ground, top
         self.surfaces = Held(SURFACE, self.field.packed, ground, top)
         self.grounds = Held(SURFACE, self.field.packed, ground, ground)
         self._tops, self._bare = (Held(ONE_SURFACE, self.field.packed, z) for z in (top, ground))
-        self._held_zones = Held(ZONES, *self.zone_arrays)
+        self._held_zones = Held(ZONES, *self.zone_table.arrays)
 
     def examine(self, legs: Legs, limits: Limits) -> LegReport:
         """Every violation along the whole of every leg. ``limits``' own errors are not used: the legs carry them."""
@@ -266,7 +266,7 @@ class Airspace:
         def extrema(of_top: bool, reach_m: float) -> Held:
             return self.extrema_along(of_top, reach_m, lines)
 
-        return make_tube(points, limits, self.field, self.zone_arrays, extrema, self.surfaces, self.grounds, self.scale)
+        return make_tube(points, limits, self.field, self.zone_table, extrema, self.surfaces, self.grounds, self.scale)
 
     def straight_cells(self, bow_m: float) -> int:
         """How many cells of the terrain model in a row have lines that are straight in the plane within ``bow_m``."""
@@ -308,14 +308,9 @@ class Airspace:
                 self.surfaces, near, far, self.extrema_along(False, near_m, lines), self._held_zones,
                 legs.start, legs.end, legs.column, legs.track_error_m, legs.altitude_error_m,
                 *Demands.of(limits, self.scale), full, ok, found,
-                work_arrays(self.zone_arrays.most_corners, len(self.zones)),
+                work_arrays(self.zone_table.arrays.most_corners, len(self.zones)),
             )
         )  # fmt: skip
-
-    @property
-    def zone_boxes(self) -> Floats:
-        """(Z, 4) west, south, east and north of each zone's shape, metres of the plane."""
-        return self.zone_arrays.table[:, BOX]
 
     def beside_m(self, limits: Limits) -> float:
         """Horizontal distance to keep from zones on every side, metres of the plane: clearance plus track error."""
@@ -374,7 +369,7 @@ class Airspace:
         value, at = hit_at[:, 0].copy(), hit_at[:, 1].copy()
         for row in range(len(hit)):
             leg, k = hit[row].tolist()
-            numbers, shape = self.zone_arrays.table[k], self.zones[k].shape
+            numbers, shape = self.zone_table.arrays.table[k], self.zones[k].shape
             over_ground = bool(numbers[FLOOR_AGL] or numbers[CEILING_AGL])
             if over_ground and value[row] > 0.0:  # the kernel's distance is accurate to NEAR_M or NEAR_PART of it
                 value[row] = max(0.0, value[row] - max(NEAR_M, NEAR_PART * value[row]))

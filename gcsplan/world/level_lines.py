@@ -26,22 +26,17 @@ from gcsplan.world.kernels.shared import (
     CEILING,
     CEILING_AGL,
     EAST,
-    EAST_E,
     FIRST,
     FLOOR,
     FLOOR_AGL,
     LAST,
     NORTH,
-    NORTH_N,
     RADIUS,
-    SOUTH_N,
     TOUCH_M,
-    WEST_E,
 )
-from gcsplan.world.kernels.zone_arrays import grown_edges
 from gcsplan.world.tube import TUBE_MARGIN_M, ZONE_ROOM_M, Reaches
+from gcsplan.world.zone_table import grown_edges
 
-BOX_LOW, BOX_HIGH = [WEST_E, SOUTH_N], [EAST_E, NORTH_N]
 WIDER_REACH = 1.6
 UNUSED = -1e9
 """A reach for which the kernel need not look for anything."""
@@ -242,16 +237,15 @@ def _crossings(
     air: Airspace, starts: Floats, ends: Floats, reach: Reaches, wide_m: float, error_m: float, swept: Swept | None,
     clearance_m: float,
 ) -> Crossings:  # fmt: skip
-    table, vertex = air.zone_arrays.table, air.zone_arrays.vertex
+    table, vertex = air.zone_table.arrays.table, air.zone_table.arrays.vertex
     step = ends - starts
     length = np.hypot(*step.T)
     unit = np.divide(step, length[:, None], out=np.tile([1.0, 0.0], (len(starts), 1)), where=length[:, None] > 0.0)
-    over_ground = (table[:, FLOOR_AGL] != 0.0) | (table[:, CEILING_AGL] != 0.0)
+    over_ground = air.zone_table.follow_ground
     lines, zones, firsts, lasts, begins = [], [], [], [], []
     low, high = np.minimum(starts, ends).min(axis=0), np.maximum(starts, ends).max(axis=0)
-    around = reach.far_m + wide_m + ZONE_ROOM_M
-    near = (table[:, BOX_LOW] <= high + around).all(axis=1) & (table[:, BOX_HIGH] >= low - around).all(axis=1)
-    for k in np.flatnonzero(near).tolist():
+    box_m = *low.tolist(), *high.tolist()
+    for k in air.zone_table.within(box_m, reach.far_m + wide_m + ZONE_ROOM_M):
         row = table[k]
         if row[FLOOR_AGL] == row[CEILING_AGL] and not row[FLOOR] < row[CEILING]:
             continue  # the floor is not below the ceiling: nothing is inside

@@ -16,8 +16,8 @@ from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.path import distances_m
 from gcsplan.world.kernels.entries import pieces
 from gcsplan.world.kernels.field import Field
-from gcsplan.world.kernels.shared import BAND_HIGH, BAND_LOW, BOW_M, CEILING, CEILING_AGL, FLOOR, FLOOR_AGL, Zones
-from gcsplan.world.kernels.zone_arrays import spans
+from gcsplan.world.kernels.shared import BAND_HIGH, BAND_LOW, BOW_M, CEILING, CEILING_AGL, FLOOR, FLOOR_AGL
+from gcsplan.world.zone_table import ZoneTable
 
 ROOM_M = 0.02
 """Extra reach, m, for the accuracy that the check loses between the plane and the grid."""
@@ -96,7 +96,7 @@ def make_tube(
     track: Floats,
     limits: Limits,
     field: Field,
-    zones: Zones,
+    zones: ZoneTable,
     extrema: Callable[[bool, float], Held],
     surfaces: Held,
     grounds: Held,
@@ -142,7 +142,7 @@ def _pieces(
 
 
 def _bands(
-    track: Floats, limits: Limits, field: Field, zones: Zones,
+    track: Floats, limits: Limits, field: Field, zones: ZoneTable,
     extrema: Callable[[bool, float], Held], reach: Reaches, grounds: Held,
 ) -> tuple[Band, ...]:  # fmt: skip
     """One band for each span of the track within reach of a zone, by zone and distance along the track."""
@@ -150,8 +150,8 @@ def _bands(
     wide = reach.far_m + ZONE_ROOM_M
     length = distances_m(track)
     out: list[Band] = []
-    for zone, s0, s1 in spans(track, zones, reach.zone_m, wide):
-        numbers = zones.table[zone]
+    for zone, s0, s1 in zones.spans(track, reach.zone_m, wide):
+        numbers = zones.arrays.table[zone]
         bottom, top, agl = numbers[FLOOR], numbers[CEILING], numbers[[FLOOR_AGL, CEILING_AGL]]
         if agl.any():
             around = extrema(False, wide + (0.0 if field.affine else BOW_M + 2.0 * field.error_m))

@@ -14,7 +14,7 @@ from gcsplan.mission_file import load_mission
 from gcsplan.mission_file.zones import draft as zone_draft
 from gcsplan.mission_file.zones.draft import MOST_ZONE_CORNERS
 from gcsplan.world.geometry.zones import Polygon
-from gcsplan.world.kernels.zone_arrays import MOST_LISTED, lattice_over
+from gcsplan.world.zone_table import MOST_LISTED, lattice_over
 from tests.campaigns import large_inputs, sizes
 
 

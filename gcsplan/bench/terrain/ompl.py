@@ -34,7 +34,6 @@ from gcsplan.world.kernels.entries import judge
 from gcsplan.world.kernels.field import Field
 from gcsplan.world.kernels.neighbourhood import extrema_around
 from gcsplan.world.kernels.shared import BOW_M, Demands
-from gcsplan.world.kernels.zone_arrays import zones_as_arrays
 
 PLANNERS = {"RRT*": "RRTstar", "InformedRRT*": "InformedRRTstar", "BIT*": "BITstar"}
 CROSSINGS = 2000
@@ -214,7 +213,7 @@ def kernel_arguments(airspace: Airspace, limits: Limits) -> tuple[Any, ...]:
     """The arguments that `Airspace.clear` passes to the kernel, for one leg."""
     surface, scale = airspace.surface, airspace.scale
     field = Field.of(surface.grid)
-    zones = zones_as_arrays(airspace.zones, surface, field, scale)
+    zones = airspace.zone_table.arrays
     near_m = limits.track_error_m * scale + (0.0 if field.affine else BOW_M + field.error_m)
     near = extrema_around(field, surface.top_m, near_m)
     far = extrema_around(field, surface.top_m, near_m + limits.horizontal_clearance_m * scale)

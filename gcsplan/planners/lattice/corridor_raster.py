@@ -14,12 +14,11 @@ import numpy as np
 
 from gcsplan.arrays import Bools, Floats, Indices, Int64s
 from gcsplan.planners.lattice import pull_kernels
-from gcsplan.planners.lattice.lattice import near_zone
 from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.planners.profile.track import denser
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.path import track_length_m
-from gcsplan.world.geometry.zones import Circle, Level, Zone
+from gcsplan.world.geometry.zones import Level, Zone
 
 SHUT_M = 1e5
 """Floor, in metres, where no altitude is free; finite, so that kernels need not handle infinities."""
@@ -194,37 +193,30 @@ def make_guide(
     ceiling[jj, ii] = np.clip(air.ceiling_amsl(x[ii], y[jj], limits), -SHUT_M, SHUT_M)
     circles, edges = [], []
     for number, zone in enumerate(air.zones):
-        at = _near(problem, zone, x, y, step)
-        if at is None:
+        js, is_ = _near(problem, number, x, y, step)
+        if not len(js) or _passed(problem, zone, over.get(number), x, y, js, is_, floor, ceiling):
             continue
-        js, is_ = at
-        if not _passed(problem, zone, over.get(number), x, y, js, is_, floor, ceiling):
-            if isinstance(zone.shape, Circle):
-                c = zone.shape
-                circles.append(
-                    (c.east_m, c.north_m, c.radius_m * air.scale + problem.airspace.beside_m(problem.limits))
-                )
-            else:
-                v = zone.shape.vertices
-                edges.extend(np.hstack([v, np.roll(v, -1, axis=0)]).tolist())
+        corners = air.zone_table.corners_m(number)
+        edges.extend(np.hstack([corners, np.roll(corners, -1, axis=0)]).tolist())
+        if not len(corners):
+            circles.append(air.zone_table.discs_m[number] + (0.0, 0.0, air.beside_m(limits)))
     return CorridorRaster(
         problem, west, south, step, floor, ceiling,
         np.array(circles).reshape(-1, 3), np.array(edges).reshape(-1, 4), pull_kernels.workspace(),
     )  # fmt: skip
 
 
-def _near(problem: Problem, zone: Zone, x: Floats, y: Floats, step: float) -> tuple[Indices, ...] | None:
-    """Rows and columns of the nodes within reach of a zone plus three quarters of a step; None if there are none."""
-    w, s, e, n = zone.bounds
-    reach = problem.airspace.beside_m(problem.limits) + 0.75 * step + 1.0
-    i = np.flatnonzero((x > w - reach) & (x < e + reach))
-    j = np.flatnonzero((y > s - reach) & (y < n + reach))
-    if not len(i) or not len(j):
-        return None
+def _near(problem: Problem, zone: int, x: Floats, y: Floats, step: float) -> tuple[Indices, ...]:
+    """Rows and columns of the nodes within reach of a zone plus three quarters of a step."""
+    air = problem.airspace
+    w, s, e, n = air.zone_table.box_m[zone].tolist()
+    reach = air.beside_m(problem.limits) + 0.75 * step
+    i = np.flatnonzero((x > w - reach - 1.0) & (x < e + reach + 1.0))
+    j = np.flatnonzero((y > s - reach - 1.0) & (y < n + reach + 1.0))
     jj, ii = (a.ravel() for a in np.meshgrid(j, i, indexing="ij"))
     at = np.stack([x[ii], y[jj]], axis=-1)
-    close = near_zone(at, at, zone, problem.airspace.beside_m(problem.limits) + 0.75 * step, problem.airspace.scale)
-    return (jj[close], ii[close]) if close.any() else None
+    close = air.zone_table.near(zone, at, at, reach)
+    return jj[close], ii[close]
 
 
 def _passed(

@@ -17,7 +17,6 @@ from gcsplan.arrays import Bools, Floats, Int64s
 from gcsplan.planners.problem import ENDS_M, Problem, terminals_of
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
-from gcsplan.world.geometry.zones import Circle, Zone
 
 STEPS = np.array([(1, 0), (0, 1), (1, 1), (-1, 1), (2, 1), (1, 2), (-1, 2), (-2, 1)], dtype=np.int64)
 """Half of the 16 directions, in nodes (east, north); edge ``node * 8 + k`` goes from ``node`` by ``STEPS[k]``."""
@@ -102,12 +101,11 @@ def _ground_of_zones(problem: Problem, x: Floats, y: Floats, wanted: Bools, besi
     """Ground altitude at ``wanted`` places no farther than ``beside_m`` from the box of a zone with a level AGL; 0
     elsewhere."""
     asked = np.zeros(wanted.shape, np.bool_)
-    for zone in problem.airspace.zones:
-        if zone.follows_ground:
-            w, s, e, n = zone.bounds
-            cols = slice(*np.searchsorted(x, (w - beside_m, e + beside_m)))
-            rows = slice(*np.searchsorted(y, (s - beside_m, n + beside_m)))
-            asked[rows, cols] = wanted[rows, cols]
+    table = problem.airspace.zone_table
+    for w, s, e, n in table.box_m[table.follow_ground].tolist():
+        cols = slice(*np.searchsorted(x, (w - beside_m, e + beside_m)))
+        rows = slice(*np.searchsorted(y, (s - beside_m, n + beside_m)))
+        asked[rows, cols] = wanted[rows, cols]
     ground = np.zeros(wanted.shape)
     jj, ii = np.nonzero(asked)
     # Unknown ground has an infinite floor, so its altitude does not matter here.
@@ -131,68 +129,26 @@ def _edge_bands(
 ) -> tuple[Int64s, Floats, Floats, Bools]:
     """Edge, low, high and (B, 2) which of these are AGL, of every band of every zone; sorted by edge, then by low."""
     ny, nx = (ground.shape[0] + 1) // 2, (ground.shape[1] + 1) // 2
-    edges: list[Int64s] = []
-    levels: list[Floats] = []
-    for zone in air.zones:
-        w, s, e, n = zone.bounds
-        far = reach + 2.0 * step
+    table, far = air.zone_table, reach + 2.0 * step
+    edges, zones = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+    for zone in table.within((west, south, west + (nx - 1) * step, south + (ny - 1) * step), far):
+        w, s, e, n = table.box_m[zone].tolist()
         i0, i1 = max(0, math.floor((w - far - west) / step)), min(nx - 1, math.ceil((e + far - west) / step))
         j0, j1 = max(0, math.floor((s - far - south) / step)), min(ny - 1, math.ceil((n + far - south) / step))
-        if i0 > i1 or j0 > j1:
-            continue
         k, j, i = (a.ravel() for a in np.mgrid[0 : len(STEPS), j0 : j1 + 1, i0 : i1 + 1])
         ends_i, ends_j = i + STEPS[k, 0], j + STEPS[k, 1]
         inside = (ends_i >= 0) & (ends_i < nx) & (ends_j < ny)
         a = np.stack([west + i * step, south + j * step], axis=-1)
         b = np.stack([west + ends_i * step, south + ends_j * step], axis=-1)
-        hit = np.flatnonzero(inside & near_zone(a, b, zone, reach, air.scale))
+        hit = np.flatnonzero(inside & table.near(zone, a, b, reach))
         edges.append((j[hit] * nx + i[hit]) * 8 + k[hit])
-        levels.append(np.repeat(levels_of(limits, zone)[None], len(hit), axis=0))
-    if not edges:
-        return np.zeros(0, np.int64), np.zeros(0), np.zeros(0), np.zeros((0, 2), np.bool_)
-    edge, level = np.concatenate(edges), np.concatenate(levels)
+        zones.append(np.full(len(hit), zone))
+    edge, of = np.concatenate(edges), np.concatenate(zones)
+    (low, high), agl = table.levels_m(limits.altitude_error_m), table.over_ground
     row, col = np.divmod(edge // 8, nx)
-    order = np.lexsort((level[:, 0] + level[:, 2] * ground[2 * row, 2 * col], edge))
-    low, high, agl = (np.ascontiguousarray(level[order, c]) for c in (0, 1, slice(2, 4)))
-    return edge[order], low, high, agl > 0.0
-
-
-def levels_of(limits: Limits, zone: Zone) -> Floats:
-    """Lowest and highest altitude that a zone forbids, altitude errors included, and of each 1 if it is AGL: (4,)."""
-    out = np.array([-np.inf, np.inf, 0.0, 0.0])
-    for k, (level, error) in enumerate(
-        ((zone.floor, -limits.altitude_error_m), (zone.ceiling, limits.altitude_error_m))
-    ):
-        if level is not None:
-            out[k], out[k + 2] = level.value_m + error, level.datum == "agl"
-    return out
-
-
-def near_zone(a: Floats, b: Floats, zone: Zone, reach_m: float, scale: float) -> Bools:
-    """Whether segments ``a``–``b`` (K, 2) come within ``reach_m`` of a zone's shape in the plane: (K,).
-
-    A circle's radius is in real metres; a real metre is at most ``scale`` metres of the plane.
-    """
-    shape = zone.shape
-    if isinstance(shape, Circle):
-        centre = np.array([shape.east_m, shape.north_m])
-        d = b - a
-        t = np.clip(((centre - a) * d).sum(-1) / np.maximum((d * d).sum(-1), 1e-300), 0.0, 1.0)
-        off = a + t[:, None] * d - centre
-        return np.asarray(np.hypot(off[:, 0], off[:, 1]) < shape.radius_m * scale + reach_m)
-    if not len(a):
-        return np.zeros(0, bool)
-    west, south, east, north = zone.bounds
-    low, high = np.minimum(a, b).min(axis=0) - reach_m - 1.0, np.maximum(a, b).max(axis=0) + reach_m + 1.0
-    if west > high[0] or east < low[0] or south > high[1] or north < low[1]:  # as most zones of a country's file are
-        return np.zeros(len(a), bool)
-    import shapely  # most missions have no polygons
-
-    polygon = shapely.Polygon(shape.vertices)
-    shapely.prepare(polygon)
-    # To shapely a line of no length is near nothing: lengthen it by a micrometre.
-    far = np.where((a == b).all(axis=1, keepdims=True), b + 1e-6, b)
-    return np.asarray(shapely.dwithin(polygon, shapely.linestrings(np.stack([a, far], axis=1)), reach_m))
+    order = np.lexsort((low[of] + agl[of, 0] * ground[2 * row, 2 * col], edge))
+    of = of[order]
+    return edge[order], low[of], high[of], agl[of]
 
 
 def _known(ground: Floats, unknown: float) -> Floats:
@@ -223,21 +179,17 @@ def make_links(problem: Problem, lattice: Lattice, place: tuple[float, float], a
     b = lattice.node_places(node)
     a = np.broadcast_to(np.asarray(place), b.shape)
     at = a[:, None] + np.linspace(0.0, 1.0, LINK_DOORS)[None, :, None] * (b - a)[:, None]
-    air, limits = problem.airspace, problem.limits
+    air, limits, table = problem.airspace, problem.limits, problem.airspace.zone_table
     low = np.asarray(air.floor_amsl(at[..., 0], at[..., 1], limits))
     high = np.asarray(air.ceiling_amsl(at[..., 0], at[..., 1], limits))
     bands: list[list[tuple[Floats, Floats]]] = [[] for _ in node]
-    ground: Floats | None = None
-    for zone in air.zones:
-        hit = np.flatnonzero(near_zone(a, b, zone, lattice.reach_m, air.scale))
-        if not len(hit):
-            continue
-        bottom, top, *agl = levels_of(limits, zone)
-        if any(agl) and ground is None:
-            ground = _known(air.surface.ground_at(at[..., 0], at[..., 1]), 0.0)
-        for row in hit:
-            under = ground[row] if ground is not None else np.zeros(LINK_DOORS)
-            bands[row].append((bottom + under * agl[0], top + under * agl[1]))
+    bottom, top = table.levels_m(limits.altitude_error_m)
+    follows = bool(table.follow_ground.any())
+    ground = _known(air.surface.ground_at(at[..., 0], at[..., 1]), 0.0) if follows else np.zeros(at.shape[:2])
+    for zone in range(len(table)):
+        for row in np.flatnonzero(table.near(zone, a, b, lattice.reach_m)):
+            under = np.where(table.over_ground[zone, :, None], ground[row], 0.0)
+            bands[row].append((bottom[zone] + under[0], top[zone] + under[1]))
     rows, lows, highs = [], [], []
     for k, found in enumerate(bands):
         for gap_low, gap_high in gaps(found):

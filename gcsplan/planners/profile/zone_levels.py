@@ -18,18 +18,13 @@ from gcsplan.planners.profile.taut_string import Profile
 from gcsplan.planners.profile.track import Obstruction, Track, denser, make_track, values_at
 from gcsplan.world.airspace import Band
 from gcsplan.world.geometry.path import distances_m
-from gcsplan.world.geometry.surface import Surface
-from gcsplan.world.geometry.zones import Polygon, Zone
+from gcsplan.world.zone_table import RING_POINTS
 
 LEVEL_SAMPLE_M = 12.0
 """Metres between samples along a track, at most."""
 SPARE_M, STEP_M = 0.05, 0.04
 """Metres added to the levels that are read; and metres by which a level is corrected after its first violation in the
 exact check, which gives no height. Each further correction is as much as all before."""
-
-
-GROUND_RINGS = ((0.0, 1), (1.0 / 3.0, 8), (2.0 / 3.0, 16), (0.9, 32), (1.0, 64))
-"""Circles of points at which ground is read: their radius, as a part of the reach, and how many."""
 
 
 def may_pass(problem: Problem, track: Track, shut: Obstruction) -> bool:
@@ -62,7 +57,7 @@ class ZoneLevels:
         s = np.unique(np.concatenate([band.s_m, np.linspace(band.s0_m, band.s1_m, parts + 1)]))
         problem.budget.spend("place", len(s) * RING_POINTS)
         places = np.stack([np.interp(s, track.s_m, track.points[:, k]) for k in range(2)], axis=-1)
-        ground = own_ground(air.surface, zone, places, air.beside_m(problem.limits))
+        ground = air.zone_table.own_ground_m(band.zone, places, air.beside_m(problem.limits))
         most, found = [], []
         sides = (zone.floor, band.bottom_m, -1.0), (zone.ceiling, band.top_m, 1.0)
         for k, (level, tubes, spare_m) in enumerate(sides):
@@ -145,25 +140,3 @@ def shut_places(problem: Problem, points: Floats, cap_m: float, step_m: float) -
     places = denser(points, step_m)
     low, high = free_below(problem, places, cap_m, 0.0)
     return np.asarray(places[low > high])
-
-
-RING_POINTS = sum(n for _, n in GROUND_RINGS)
-_TURNS = [(r, math.tau * k / n) for r, n in GROUND_RINGS for k in range(n)]
-_RING_OFFSETS = np.array([(r * math.cos(turn), r * math.sin(turn)) for r, turn in _TURNS])
-
-
-def own_ground(surface: Surface, zone: Zone, places: Floats, reach_m: float) -> tuple[Floats, Floats]:
-    """(N,) lowest and highest ground under a zone within ``reach_m`` of places (N, 2), as far as `RING_POINTS` around
-    each show; inf and -inf where none of them is under the zone or known."""
-    shape = zone.shape
-    points = (places[:, None] + reach_m * _RING_OFFSETS).reshape(-1, 2)
-    if isinstance(shape, Polygon):
-        import shapely  # many missions have no polygons
-
-        within = shapely.contains_xy(shapely.Polygon(shape.vertices), points)
-    else:
-        within = np.hypot(points[:, 0] - shape.east_m, points[:, 1] - shape.north_m) <= shape.radius_m
-    ground = surface.ground_at(*points.T)
-    within &= np.isfinite(ground)
-    low, high = np.where(within, ground, np.inf), np.where(within, ground, -np.inf)
-    return low.reshape(len(places), -1).min(axis=1), high.reshape(len(places), -1).max(axis=1)

@@ -13,7 +13,6 @@ from itertools import pairwise
 import numpy as np
 
 from gcsplan.planners.border import enclosed, goes_on, within_m
-from gcsplan.planners.lattice.lattice import levels_of, near_zone
 from gcsplan.planners.problem import Problem, Refusal, terminals_of
 from gcsplan.planners.refusal.suggestions import FILLED, floor_words, rounded_up
 from gcsplan.world.airspace import Airspace, Legs, Violation
@@ -160,23 +159,20 @@ def _broken(problem: Problem, place: tuple[float, float, float]) -> tuple[Violat
 
 
 def _shut_by(problem: Problem, place: tuple[float, float], low: float, high: float) -> list[Zone]:
-    """The zones that shut all altitudes from ``low`` to ``high`` at a place, each by itself. A zone with a level over
-    ground counts only inside its shape: beside it, ground elsewhere decides."""
-    air, limits, here, found = problem.airspace, problem.limits, np.array([place]), []
-    for zone in air.zones:
-        bottom, top, *over_ground = levels_of(limits, zone).tolist()
-        reach, scale = (0.0, 1.0) if zone.follows_ground else (air.beside_m(limits), air.scale)
-        if not near_zone(here, here, zone, reach, scale)[0]:
-            continue
-        ground = float(air.surface.ground_at(*place)) if zone.follows_ground else 0.0
-        # Over unknown ground, a zone's floor or ceiling AGL cannot be evaluated, so the zone has no open side there.
-        if over_ground[0]:
-            bottom = -math.inf if math.isnan(ground) else bottom + ground
-        if over_ground[1]:
-            top = math.inf if math.isnan(ground) else top + ground
-        if bottom < low and (top > high or math.isinf(top)):
-            found.append(zone)
-    return found
+    """The zones that shut all altitudes from ``low`` to ``high`` at a place, each by itself. Those with a level over
+    ground count only inside their shape: beside it, ground elsewhere decides."""
+    air, limits, here = problem.airspace, problem.limits, np.array([place])
+    table = air.zone_table
+    bottoms, tops = table.levels_m(limits.altitude_error_m, float(air.surface.ground_at(*place)))
+    # Over unknown ground, a zone's floor or ceiling AGL cannot be evaluated, so the zone has no open side there.
+    bottoms, tops = np.where(np.isnan(bottoms), -math.inf, bottoms), np.where(np.isnan(tops), math.inf, tops)
+    return [
+        zone
+        for k, zone in enumerate(air.zones)
+        if bottoms[k] < low
+        and (tops[k] > high or math.isinf(tops[k]))
+        and (table.holds(k, here) if zone.follows_ground else table.near(k, here, here, air.beside_m(limits)))[0]
+    ]
 
 
 def _ceiling_words(limits: Limits, air: Airspace, place: tuple[float, float]) -> str:

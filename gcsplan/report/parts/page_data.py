@@ -243,7 +243,7 @@ def only_some(page: Page, full: frozenset[int]) -> str:
     command = "gcsplan check MISSION.yaml VEHICLE.plan --report FILE.html"
     return (
         f'<p class="note">{len(full)} of {len(page.subjects)} vehicles are shown: first those with problems, then '
-        "the two that come nearest to each other, then vehicles with the least room above the ground. The others are on "
+        "the two that come nearest to each other, then vehicles with the least height over ground. The others are on "
         f"the map and in the tables of all vehicles; <code>{command}</code> shows one of the other {rest}.</p>"
     )
 

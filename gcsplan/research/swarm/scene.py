@@ -19,7 +19,7 @@ from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.path import distances_m
 from gcsplan.world.geometry.surface import Surface
-from gcsplan.world.geometry.zones import Level, Zone
+from gcsplan.world.kernels.shared import FIRST, LAST
 
 GROWN = 0.1
 """Margin of the flight volume around the terminals, on every side, as a part of their box's longer side. The box is
@@ -255,35 +255,20 @@ def _window(surface: Surface, box: tuple[float, float, float, float]) -> tuple[i
 
 
 def _zones(air: Airspace, limits: Limits) -> tuple[Floats, Floats]:
-    """Zones (Z, ZONE_COLUMNS), and the corners (C, 2) of all polygons."""
-    zones = np.zeros((len(air.zones), k.ZONE_COLUMNS))
-    corners: list[Floats] = []
-    reach = air.beside_m(limits)
-    first = 0
-    for row, zone in zip(zones, air.zones, strict=True):
-        vertices = getattr(zone.shape, "vertices", None)
-        if vertices is None:
-            row[[k.ZE, k.ZN, k.ZR]] = zone.shape.east_m, zone.shape.north_m, zone.shape.radius_m * air.scale  # type: ignore[union-attr]
-        else:
-            centre = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
-            row[[k.ZE, k.ZN]] = centre
-            row[k.ZR] = float(np.hypot(*(vertices - centre).T).max())
-            row[[k.CORNERS, k.FIRST]] = len(vertices), first
-            corners.append(vertices)
-            first += len(vertices)
-        row[k.REACH] = reach
-        row[k.Z_LOW], row[k.LOW_AGL] = _level(zone.floor, -FAR, -limits.altitude_error_m)
-        row[k.Z_HIGH], row[k.HIGH_AGL] = _level(zone.ceiling, FAR, limits.altitude_error_m)
-        row[k.Z_MIDDLE] = _middle(zone)
-    return zones, np.ascontiguousarray(np.vstack(corners)) if corners else np.zeros((0, 2))
-
-
-def _level(level: Level | None, none: float, error: float) -> tuple[float, float]:
-    return (none, 0.0) if level is None else (level.value_m + error, 1.0 if level.datum == "agl" else 0.0)
-
-
-def _middle(zone: Zone) -> float:
-    """Altitude of the centre of IB-ABC's sphere for a zone: half-way up, or 0 if the zone has no ceiling."""
-    if zone.ceiling is None:
-        return 0.0
-    return 0.5 * (zone.ceiling.value_m + (zone.floor.value_m if zone.floor is not None else 0.0))
+    """Zones (Z, ZONE_COLUMNS), and the corners (C, 2) of all polygons. Each zone lies in a disc: a polygon in that
+    around the middle of its box."""
+    table = air.zone_table
+    zones, corners = np.zeros((len(table), k.ZONE_COLUMNS)), table.arrays.vertex
+    zones[:, [k.ZE, k.ZN, k.ZR]] = table.discs_m
+    zones[:, k.FIRST], last = table.arrays.table[:, [FIRST, LAST]].T
+    zones[:, k.CORNERS] = last - zones[:, k.FIRST]
+    for zone in np.flatnonzero(zones[:, k.CORNERS]).tolist():
+        middle = 0.5 * (table.box_m[zone, :2] + table.box_m[zone, 2:])
+        zones[zone, [k.ZE, k.ZN, k.ZR]] = *middle, np.hypot(*(table.corners_m(zone) - middle).T).max()
+    zones[:, k.REACH] = air.beside_m(limits)
+    zones[:, [k.Z_LOW, k.Z_HIGH]] = np.clip(np.transpose(table.levels_m(limits.altitude_error_m)), -FAR, FAR)
+    zones[:, [k.LOW_AGL, k.HIGH_AGL]] = table.over_ground
+    # The centre of IB-ABC's sphere for a zone is half-way up, or at 0 if the zone has no ceiling.
+    low, high = table.levels_m()
+    zones[:, k.Z_MIDDLE] = np.where(np.isfinite(high), 0.5 * (high + np.where(np.isfinite(low), low, 0.0)), 0.0)
+    return zones, corners

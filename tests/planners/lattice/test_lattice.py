@@ -1,29 +1,36 @@
-"""Which segments lie near a zone: against shapely for random segments, most of them far away."""
+"""The lattice of a search: its edges carry the altitudes that zones forbid there, and no others."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-import pytest
-import shapely
 
-from gcsplan.planners.lattice.lattice import near_zone
-from gcsplan.world.geodesy.degree_shapes import counter_clockwise
-from gcsplan.world.geometry.zones import Zone
+from gcsplan.planners.lattice.lattice import STEPS, make_lattice
+from gcsplan.planners.problem import Problem
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.zones import Circle, Level, Zone
+from tests.support.planner_worlds import ground
 
 
-@pytest.mark.draws
-def test_segments_near_a_polygon_are_found_wherever_they_lie() -> None:
-    rng = np.random.default_rng(5)
-    for _ in range(60):
-        corners = rng.uniform(-100, 100, (3, 2))
-        zone = Zone("zone", counter_clockwise(corners))
-        reach = rng.uniform(0, 80)
-        a = rng.uniform(-1, 1, (rng.integers(0, 8), 2)) * rng.choice([150, 400, 4000]) + rng.uniform(-300, 300, 2)
-        b = a + rng.uniform(-1, 1, a.shape) * rng.choice([0.0, 50.0, 900.0])
-        exact = [
-            shapely.Polygon(corners).distance(shapely.LineString([p, q]) if (p != q).any() else shapely.Point(p))
-            for p, q in zip(a, b, strict=True)
-        ]
-        found = near_zone(a, b, zone, reach, 1.0)
-        assert found.shape == (len(a),)
-        assert found.tolist() == [d <= reach for d in exact]
+def test_edges_within_reach_of_a_zone_have_its_levels_and_no_others() -> None:
+    zones = [
+        Zone("over ground", Circle(300.0, 300.0, 40.0), Level(60.0, "agl"), Level(90.0, "agl")),
+        Zone("fixed", Circle(300.0, 300.0, 40.0), None, Level(120.0, "amsl")),
+        Zone("far away", Circle(5e4, 5e4, 40.0)),
+    ]
+    limits = Limits(min_agl_m=20.0, horizontal_clearance_m=15.0, altitude_error_m=5.0)
+    air = Airspace(ground(0.0), zones)
+    problem = Problem(air, limits, (100.0, 300.0, 500.0), (500.0, 300.0, 500.0))
+    lattice = make_lattice(problem, (100.0, 100.0, 500.0, 500.0), 50.0, math.inf)
+    edge = np.arange(lattice.nx * lattice.ny * 8)
+    a = lattice.node_places(edge // 8)
+    b = a + 50.0 * STEPS[edge % 8]
+    inside = ((b >= 99.0) & (b <= 501.0)).all(axis=1)
+    t = np.linspace(0.0, 1.0, 2001)[:, None, None]
+    near = inside & (np.hypot(*(a + t * (b - a) - 300.0).transpose(2, 0, 1)).min(axis=0) < 55.0)
+    assert near.any()
+    assert np.diff(lattice.band_at).tolist() == (2 * near).tolist()
+    found = np.column_stack([lattice.band_low, lattice.band_high, lattice.band_agl])
+    assert {tuple(row) for row in found.tolist()} == {(55.0, 95.0, 1.0, 1.0), (-math.inf, 125.0, 0.0, 0.0)}

@@ -12,7 +12,7 @@ from gcsplan.planners.problem import Problem
 from gcsplan.planners.profile.exact import LegJudge, Unsettled, sampled_track, settle
 from gcsplan.planners.profile.taut_string import Profile
 from gcsplan.planners.profile.track import Flown, fly, make_track
-from gcsplan.planners.profile.zone_levels import ZoneLevels, own_ground, widest_free
+from gcsplan.planners.profile.zone_levels import ZoneLevels, widest_free
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.path import Path
@@ -48,7 +48,7 @@ def test_ground_under_a_zone_is_that_of_dense_samples(shape: str, seed: int) -> 
     form = Circle(600.0, 600.0, 170.0) if shape == "disc" else Polygon(corners)
     zone = Zone("z", form, Level(80.0, "agl"), None)
     places = rng.uniform(400.0, 800.0, (300, 2))
-    low, high = own_ground(surface, zone, places, REACH_M)
+    low, high = Airspace(surface, [zone]).zone_table.own_ground_m(0, places, REACH_M)
     side = np.arange(-REACH_M, REACH_M + 0.1, 0.75)
     off = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
     off = off[np.hypot(*off.T) <= REACH_M]

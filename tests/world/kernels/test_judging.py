@@ -9,7 +9,7 @@ from gcsplan.world.geometry.surface import GridMap, Surface
 from gcsplan.world.geometry.zones import Circle, Zone
 from gcsplan.world.kernels.field import Field
 from gcsplan.world.kernels.judging import FEW_ZONES, candidates
-from gcsplan.world.kernels.zone_arrays import zones_as_arrays
+from gcsplan.world.zone_table import ZoneTable
 
 GRID = GridMap.affine(0.0, 1000.0, 100.0, 100.0)
 LEVEL = np.zeros((11, 11))
@@ -20,7 +20,7 @@ def test_the_zones_that_a_leg_may_meet_are_those_whose_boxes_overlap_its_own(cou
     rng = np.random.default_rng(count)
     numbers = np.column_stack([rng.uniform(0.0, 1000.0, (count, 2)), rng.uniform(1.0, 90.0, count)]).tolist()
     zones = [Zone(f"z{k}", Circle(*n)) for k, n in enumerate(numbers)]
-    arrays = zones_as_arrays(zones, Surface(LEVEL, LEVEL, GRID), Field.of(GRID), 1.0)
+    arrays = ZoneTable.of(zones, Surface(LEVEL, LEVEL, GRID), Field.of(GRID), 1.0).arrays
     seen, list_of = np.full(count, -1), np.full(count, -1)
     for stamp in range(40):
         (west, east), (south, north) = np.sort(rng.uniform(-100.0, 1100.0, (2, 2))).tolist()

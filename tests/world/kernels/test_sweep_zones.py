@@ -12,14 +12,14 @@ from gcsplan.world.geometry.zones import Circle, Polygon, Zone
 from gcsplan.world.kernels.field import Field
 from gcsplan.world.kernels.shared import Zones
 from gcsplan.world.kernels.sweep_zones import approach, at_heights, signed_distance
-from gcsplan.world.kernels.zone_arrays import zones_as_arrays
+from gcsplan.world.zone_table import ZoneTable
 
 GRID = GridMap.affine(-100.0, 100.0, 10.0, 10.0)
 LEVEL = np.zeros((21, 21))
 
 
 def arrays_of(*zones: Zone) -> Zones:
-    return zones_as_arrays(zones, Surface(LEVEL, LEVEL, GRID), Field.of(GRID), 1.0)
+    return ZoneTable.of(zones, Surface(LEVEL, LEVEL, GRID), Field.of(GRID), 1.0).arrays
 
 
 def ring(seed: int) -> Floats:

@@ -337,7 +337,7 @@ class ClearanceGrid:
         self._laid = True
 
     def _no_own_ground(self) -> tuple[Int32s, Int64s, Int64s]:
-        """Where `stamp_beside` keeps the zones' own ground, all unknown yet: see `interval_kernels._own_ground`."""
+        """Where `stamp_beside` keeps the zones' own ground, all unknown yet: see `zone_kernels.own_ground`."""
         looks = (self._zones[:, LOOKS] > 0.0) & (self._zones[:, PAIR] == 0.0)
         wide, high = ((self._boxes[:, k + 1] - self._boxes[:, k] + 1).clip(0).astype(np.int64) for k in (0, 2))
         end = np.cumsum(np.where(looks, wide * high, 0))

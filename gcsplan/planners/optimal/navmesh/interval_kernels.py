@@ -1,10 +1,8 @@
 """Kernels for altitude intervals: altitudes that a zone shuts over a whole cell, for bounds, and those left free.
 
-A zone whose levels follow the ground shuts, at a place within reach of it, all altitudes between its levels over *its
-own* ground within reach. Over a steep slope this range is far wider than the range over the ground below the place:
-under a zone whose floor is a few metres above the lowest legal altitude nothing is left. A condition that holds for the
-corners of a cell and for the corners of another cell within reach holds for every place of the two: the zone's parts
-are convex, and so is the area within reach.
+A zone whose levels follow the ground shuts, at a place within reach of it, what lies between its levels over *its own*
+ground within reach (`zone_kernels`). Over a steep slope that is far more than what the ground below the place tells:
+under a zone whose floor is a few metres above the lowest legal altitude nothing is left.
 
 These altitudes are cut out of the altitudes over a cell. From an interval that is left, a path can enter the intervals
 over neighbouring cells that share an altitude with it; values are carried from one to another. It never enters another
@@ -24,7 +22,6 @@ from gcsplan.planners.optimal.navmesh.mesh_kernels import NEXT
 from gcsplan.planners.optimal.navmesh.polyanya import pop, push
 from gcsplan.planners.optimal.navmesh.zone_kernels import (
     BOTTOM,
-    BOTTOM_AGL,
     LOOKS,
     ONE,
     OTHER,
@@ -33,21 +30,20 @@ from gcsplan.planners.optimal.navmesh.zone_kernels import (
     PAIR,
     THIN,
     TOP,
-    TOP_AGL,
     UNDER,
+    bulge,
     depth,
     level,
+    lowest_and_highest,
+    node,
+    over_ground,
+    own_ground,
+    own_level,
     put,
-    value_at,
 )
 
 ROUNDING = 1e-9
 """Part of a step between places by which a cell's range is widened at both ends."""
-
-
-CELL_RINGS = ((1.0, 32), (0.8, 16), (0.5, 8), (0.25, 4), (0.0, 1))
-"""Circles around a cell on which ground is read, as parts of the reach, and cells on each: on a slope, the lowest and
-the highest lie on the largest."""
 
 
 @kernel("f8[,] f8[,] f8[,] f8[,] f8[,] i4[,] b1 f8 f8 f8 i4[] i4[] f8[,] f8[,]")
@@ -177,93 +173,6 @@ def range_along(
                 highs[level - 1, i] = max(highs[level - 1, i], highs[level, k])
 
 
-DISC = np.array([(r * math.sin(a), r * math.cos(a)) for r, n in CELL_RINGS for a in np.arange(n) * (2.0 * math.pi / n)])
-"""Those cells: rows and columns away, for a reach of 1."""
-
-
-@device
-def _node(a: Floats, fineness: int, j: int, i: int) -> float:
-    """`value_at` a node; fast where the lattice is the lattice of ``a``."""
-    return float(a[j, i]) if fineness == 1 else value_at(a, fineness, j, i)
-
-
-@device
-def _covers(
-    x: Floats, y: Floats, fineness: int, zones: Floats, edges: Floats, z: int, reach: float, near: float, j: int,
-    i: int, jj: int, ii: int,
-) -> bool:  # fmt: skip
-    """Whether cell (jj, ii) lies wholly in a zone, each corner within ``near`` of the same corner of cell (j, i)."""
-    for k in range(4):
-        v, u = k >> 1, k & 1
-        px, py = _node(x, fineness, jj + v, ii + u), _node(y, fineness, jj + v, ii + u)
-        dx, dy = px - _node(x, fineness, j + v, i + u), py - _node(y, fineness, j + v, i + u)
-        if dx * dx + dy * dy > near * near or depth(zones, edges, z, px, py) <= reach:
-            return False
-    return True
-
-
-@device
-def _lowest_and_highest(
-    ground: Floats, x: Floats, y: Floats, fineness: int, zones: Floats, edges: Floats, z: int, reach: float,
-    near: float, j: int, i: int,
-) -> tuple[int, int, int, int, int]:  # fmt: skip
-    """Row and column of the cell with the lowest ground and of the cell with the highest, among the cells whose ground
-    is a zone's own and within reach of cell (j, i), all -1 if there is none; and the number of cells that were read.
-
-    ``ground``, ``x``, ``y``: at the nodes of a lattice of which cell (j, i) is a part, ``fineness`` times finer.
-    ``reach``: metres by which the zone is grown; ``near``: a little less, from each place of the cell to that ground.
-    """
-    ex = _node(x, fineness, j, i + 1) - _node(x, fineness, j, i)
-    ey = _node(y, fineness, j, i + 1) - _node(y, fineness, j, i)
-    nx = _node(x, fineness, j + 1, i) - _node(x, fineness, j, i)
-    ny = _node(y, fineness, j + 1, i) - _node(y, fineness, j, i)
-    across, along = math.sqrt(ex * ex + ey * ey), math.sqrt(nx * nx + ny * ny)
-    low_j = low_i = high_j = high_i = -1
-    if depth(zones, edges, z, _node(x, fineness, j, i), _node(y, fineness, j, i)) <= reach - near:
-        return low_j, low_i, high_j, high_i, 1
-    least, most = np.inf, -np.inf
-    for n in range(len(DISC)):
-        jj, ii = j + int(DISC[n, 0] * near / along), i + int(DISC[n, 1] * near / across)
-        if not (0 <= jj < (len(x) - 1) * fineness and 0 <= ii < (x.shape[1] - 1) * fineness):
-            continue
-        height = _node(ground, fineness, jj, ii) + _node(ground, fineness, jj + 1, ii + 1)
-        # False as well where ground is unknown.
-        if not ((height < least or height > most) and height + _node(ground, fineness, jj, ii + 1) < np.inf):
-            continue
-        if not _covers(x, y, fineness, zones, edges, z, reach, near, j, i, jj, ii):
-            continue
-        if height < least:
-            least, low_j, low_i = height, jj, ii
-        if height > most:
-            most, high_j, high_i = height, jj, ii
-    return low_j, low_i, high_j, high_i, len(DISC)
-
-
-@device
-def _bulge(ground: Floats, fineness: int, j: int, i: int) -> float:
-    """Metres by which a cell's bilinear ground differs from its triangles, at most."""
-    straight = _node(ground, fineness, j, i) + _node(ground, fineness, j + 1, i + 1)
-    return 0.25 * abs(straight - _node(ground, fineness, j, i + 1) - _node(ground, fineness, j + 1, i))
-
-
-@device
-def _own_ground(
-    ground: Floats, x: Floats, y: Floats, fineness: int, zones: Floats, edges: Floats, boxes: Int32s, z: int,
-    reach: float, near: float, j: int, i: int, own: Int32s, own_at: Int64s, read: Int64s,
-) -> tuple[int, int, int, int]:  # fmt: skip
-    """`_lowest_and_highest`, read once for each zone and cell: ``own`` (K, 4) keeps it from row ``own_at`` of the zone
-    on for all cells of its box, rows of a box first; -2 where it is not known yet. ``read`` (1,) counts cells read."""
-    width = boxes[z, 1] - boxes[z, 0] + 1
-    at = own_at[z] + (j - boxes[z, 2]) * width + i - boxes[z, 0]
-    if own[at, 0] < -1:
-        low_j, low_i, high_j, high_i, count = _lowest_and_highest(
-            ground, x, y, fineness, zones, edges, z, reach, near, j, i
-        )
-        own[at, 0], own[at, 1], own[at, 2], own[at, 3] = low_j, low_i, high_j, high_i
-        read[0] += count
-    return own[at, 0], own[at, 1], own[at, 2], own[at, 3]
-
-
 @device
 def _levels(
     ground: Floats, x: Floats, y: Floats, fineness: int, zones: Floats, edges: Floats, boxes: Int32s, z: int,
@@ -271,30 +180,28 @@ def _levels(
 ) -> bool:  # fmt: skip
     """Fill rows ``first`` to ``first`` + 2 of ``of`` with functions, given at the corners of a cell and linear between,
     of a zone: at a place where the third, how deep it lies in the zone, is above 0, the zone shuts all altitudes from
-    the first to the second. Returns whether they are known. Other arguments: as in `_own_ground`."""
+    the first to the second. Returns whether they are known. Other arguments: as in `own_ground`."""
     low_j, low_i, high_j, high_i = -1, -1, -1, -1
     looks = zones[z, LOOKS] > 0.0
     if looks:
         if not (boxes[z, 0] <= i <= boxes[z, 1] and boxes[z, 2] <= j <= boxes[z, 3]):
             return False
-        low_j, low_i, high_j, high_i = _own_ground(
+        low_j, low_i, high_j, high_i = own_ground(
             ground, x, y, fineness, zones, edges, boxes, z, reach, near, j, i, own, own_at, read
         )
     if low_j < 0 if looks else over_ground(zones, z):
         return False
-    low_off = _bulge(ground, fineness, low_j, low_i) if looks else 0.0
-    high_off = _bulge(ground, fineness, high_j, high_i) if looks else 0.0
+    low_off = bulge(ground, fineness, low_j, low_i) if looks else 0.0
+    high_off = bulge(ground, fineness, high_j, high_i) if looks else 0.0
     for k in range(4):
         v, u = k >> 1, (k ^ (k >> 1)) & 1
-        low = _node(ground, fineness, low_j + v, low_i + u) + low_off if looks else 0.0
-        high = _node(ground, fineness, high_j + v, high_i + u) - high_off if looks else 0.0
-        of[first, k] = _own(zones, z, OWN_BOTTOM, low) if zones[z, UNDER] > 0.0 else -np.inf
-        of[first + 1, k] = _own(zones, z, OWN_TOP, high)
+        low = node(ground, fineness, low_j + v, low_i + u) + low_off if looks else 0.0
+        high = node(ground, fineness, high_j + v, high_i + u) - high_off if looks else 0.0
+        of[first, k] = own_level(zones, z, OWN_BOTTOM, low) if zones[z, UNDER] > 0.0 else -np.inf
+        of[first + 1, k] = own_level(zones, z, OWN_TOP, high)
         of[first + 2, k] = np.inf
         if not looks:
-            of[first + 2, k] = depth(
-                zones, edges, z, _node(x, fineness, j + v, i + u), _node(y, fineness, j + v, i + u)
-            )
+            of[first + 2, k] = depth(zones, edges, z, node(x, fineness, j + v, i + u), node(y, fineness, j + v, i + u))
         elif zones[z, UNDER] > 0.0:
             of[first + 2, k] = of[first + 1, k] - of[first, k] - zones[z, THIN]
     return True
@@ -327,7 +234,7 @@ def stamp_beside(
 ) -> int:  # fmt: skip
     """Give walls to the cells that a zone's own ground shuts in part or whole, by itself or together with another zone,
     after the ``count`` walls of `zone_kernels.stamp_zones`; return how many there are then. ``ground``, ``x``, ``y``:
-    as in `_lowest_and_highest`; ``room`` (8, 4): a work array; ``own``, ``own_at``, ``read``: as in `_own_ground`."""
+    as in `lowest_and_highest`; ``room`` (8, 4): a work array; ``own``, ``own_at``, ``read``: as in `own_ground`."""
     wall = values[len(values) - 1]
     for z in range(len(zones)):
         if zones[z, LOOKS] == 0.0:
@@ -369,37 +276,23 @@ def stamp_beside(
 
 
 @device
-def _own(zones: Floats, z: int, level: int, ground: float) -> float:
-    """The altitude of a zone's level, `OWN_BOTTOM` or `OWN_TOP`, over its own ground of altitude ``ground``."""
-    over = zones[z, BOTTOM_AGL if level == OWN_BOTTOM else TOP_AGL] > 0.0
-    return float(zones[z, level] + (ground if over else 0.0))
-
-
-@device
 def _shut_beside(
     ground: Floats, x: Floats, y: Floats, zones: Floats, edges: Floats, z: int, reach: float, near: float, j: int,
     i: int,
 ) -> tuple[float, float]:  # fmt: skip
     """The altitudes (bottom, top) that a zone's own ground within reach shuts everywhere over a cell; (inf, -inf) if
     none are known."""
-    low_j, low_i, high_j, high_i, _ = _lowest_and_highest(ground, x, y, 1, zones, edges, z, reach, near, j, i)
+    low_j, low_i, high_j, high_i, _ = lowest_and_highest(ground, x, y, 1, zones, edges, z, reach, near, j, i)
     if low_j < 0:
         return np.inf, -np.inf
     low, high = -np.inf, np.inf
     for k in range(4):
         v, u = k >> 1, k & 1
         low, high = max(low, ground[low_j + v, low_i + u]), min(high, ground[high_j + v, high_i + u])
-    bottom, top = -np.inf, _own(zones, z, OWN_TOP, high)
+    bottom, top = -np.inf, own_level(zones, z, OWN_TOP, high)
     if zones[z, UNDER] > 0.0:
-        bottom = _own(zones, z, OWN_BOTTOM, low)
+        bottom = own_level(zones, z, OWN_BOTTOM, low)
     return (bottom, top) if top - bottom > zones[z, THIN] else (np.inf, -np.inf)
-
-
-@device
-def over_ground(zones: Floats, z: int) -> bool:
-    """Whether a zone has a level over ground (AGL) past which a path may fly."""
-    under_agl = zones[z, UNDER] > 0.0 and zones[z, BOTTOM_AGL] > 0.0
-    return bool(under_agl or (zones[z, TOP] < np.inf and zones[z, TOP_AGL] > 0.0))
 
 
 @device

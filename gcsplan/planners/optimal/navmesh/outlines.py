@@ -22,7 +22,7 @@ from gcsplan.planners.budget import Budget
 from gcsplan.planners.optimal.navmesh.mesh_kernels import sort_portals
 from gcsplan.planners.optimal.navmesh.portals import Exhausted, GroundPlace, GroundTrack, Portals
 from gcsplan.world.geometry.outlines import few_corners
-from gcsplan.world.geometry.zones import Circle, Zone
+from gcsplan.world.zone_table import ZoneTable
 
 COARSE = 4
 """Chords per quarter circle of every arc, at first."""
@@ -49,15 +49,15 @@ MOST_SEARCH_NODES = 1_000_000
 
 @dataclass(eq=False, slots=True)
 class ZoneOutline:
-    """One zone grown by ``reach_m``: its polygon for paths (``outer``) or for bounds.
+    """A zone of a table, by its number, grown by ``reach_m``: its polygon for paths (``outer``) or for bounds.
 
     ``sectors``: the finely drawn sectors of a circle, each as wide as a coarse chord; ``fine``: whether the corners
     of a polygon are drawn finely.
     """
 
-    zone: Zone
+    table: ZoneTable
+    zone: int
     reach_m: float
-    scale: float
     outer: bool
     hair_m: float
     sectors: set[int] = field(default_factory=set)
@@ -68,28 +68,28 @@ class ZoneOutline:
     def shape(self) -> shapely.Geometry:
         """The polygon; several, or an empty one, if a zone made smaller by ``hair_m`` falls into parts or vanishes."""
         if self._shape is None:
-            self._shape = self._disc() if isinstance(self.zone.shape, Circle) else self._grown(self.zone.shape.vertices)
+            corners = self.table.corners_m(self.zone)
+            self._shape = self._grown(corners) if len(corners) else self._disc()
         return self._shape
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
         """West, south, east, north of a box that contains the shape, however finely it is drawn."""
-        west, south, east, north = self.zone.bounds
-        radius = max(east - west, north - south)
-        more = (self.reach_m + self.hair_m + (self.scale - 1.0) * radius) * NEAR + (NEAR - 1.0) * radius
+        west, south, east, north = self.table.box_m[self.zone].tolist()
+        more = (self.reach_m + self.hair_m) * NEAR + (NEAR - 1.0) * max(east - west, north - south)
         return west - more, south - more, east + more, north + more
 
     def refine(self, track: Floats) -> bool:
         """Draw the arcs finely where a track (N, 2) comes so near that it matters; return whether anything changes."""
-        shape = self.zone.shape
-        if not isinstance(shape, Circle):
+        *middle, radius = self.table.discs_m[self.zone].tolist()
+        if radius < 0.0:
             if self.fine or self.reach_m <= self.hair_m:
                 return False
             line = shapely.LineString(track)
-            self.fine = bool(shapely.dwithin(shapely.Polygon(shape.vertices), line, NEAR * self.reach_m))
+            self.fine = bool(shapely.dwithin(self.table.polygon(self.zone), line, NEAR * self.reach_m))
             new = {0} if self.fine else set()
         else:
-            middle, radius = np.array([shape.east_m, shape.north_m]), shape.radius_m * self.scale + self.reach_m
+            radius += self.reach_m
             a, d = track[:-1], np.diff(track, axis=0)
             t = ((middle - a) * d).sum(axis=1) / np.maximum((d * d).sum(axis=1), 1e-12)
             off = np.vstack([a + t.clip(0.0, 1.0)[:, None] * d, track]) - middle
@@ -104,11 +104,10 @@ class ZoneOutline:
         return bool(new)
 
     def _disc(self) -> shapely.Polygon:
-        circle = self.zone.shape
-        assert isinstance(circle, Circle)
-        radius = max(circle.radius_m * self.scale + self.reach_m + (self.hair_m if self.outer else -self.hair_m), 0.0)
+        *middle, radius = self.table.discs_m[self.zone].tolist()
+        radius = max(radius + self.reach_m + (self.hair_m if self.outer else -self.hair_m), 0.0)
         corners = _around(self._angles(radius, self.sectors), radius, outer=self.outer)
-        return shapely.Polygon(np.array([circle.east_m, circle.north_m]) + corners)
+        return shapely.Polygon(np.array(middle) + corners)
 
     def _angles(self, radius: float, sectors: Iterable[int]) -> Floats:
         """Angles (rad, rising) at which the chords of a circle begin; chords in ``sectors`` are drawn finely."""
@@ -221,15 +220,14 @@ class Solids:
 
     def __init__(
         self,
-        zones: Sequence[Zone],
+        table: ZoneTable,
         reach_m: float,
-        scale: float,
-        hair_m: Sequence[float],
+        hair_m: Floats,
         budget: Budget,
         *,
         outer: bool,
     ) -> None:
-        self.outlines = [ZoneOutline(z, reach_m, scale, outer, hair) for z, hair in zip(zones, hair_m, strict=True)]
+        self.outlines = [ZoneOutline(table, k, reach_m, outer, hair) for k, hair in enumerate(hair_m.tolist())]
         self._budget = budget
         self._tree = shapely.STRtree(shapely.box(*np.array([o.bounds for o in self.outlines]).reshape(-1, 4).T))
         self._known: set[int] = set()

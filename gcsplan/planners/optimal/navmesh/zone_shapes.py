@@ -8,7 +8,7 @@ from itertools import zip_longest
 
 import numpy as np
 
-from gcsplan.arrays import Floats, Indices, Int32s
+from gcsplan.arrays import Bools, Floats, Indices, Int32s
 from gcsplan.planners.optimal.navmesh.zone_kernels import (
     BESIDE,
     BOTTOM,
@@ -35,7 +35,7 @@ from gcsplan.planners.optimal.navmesh.zone_kernels import (
 )
 from gcsplan.planners.problem import Problem
 from gcsplan.world.geometry.limits import Limits
-from gcsplan.world.geometry.zones import Circle, Zone
+from gcsplan.world.zone_table import ZoneTable
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,40 +102,39 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
     reach = air.beside_m(problem.limits)  # no less than what bounds assume
     there = reach <= min(math.dist((x[0, 0], y[0, 0]), place) for place in ((x[0, 1], y[0, 1]), (x[1, 0], y[1, 0])))
     box = float(x.min()), float(y.min()), float(x.max()), float(y.max())
-    found: list[tuple[int, Zone, _Part]] = []
+    table = air.zone_table
+    found: list[tuple[int, _Part]] = []
     moved: list[float] = []
     """Metres by which each part's levels over ground are moved; 0: they are not, and a part with such is not grown."""
 
-    def growth(zone: Zone, more: float, sign: float, off_m: float, limits: Limits) -> float:
-        return (0.0 if more == 0.0 and zone.follows_ground else air.beside_m(limits)) + sign * off_m
+    def growth(zone: int, more: float, sign: float, off_m: float, limits: Limits) -> float:
+        return (0.0 if more == 0.0 and table.follow_ground[zone] else air.beside_m(limits)) + sign * off_m
 
     sides = (-1.0, fit.spare_m, problem.bound_limits), (1.0, fit.hair_m, problem.limits)
-    for number, zone in enumerate(air.zones):
-        west, south, east, north = zone.bounds
-        if west - reach > box[2] or east + reach < box[0] or south - reach > box[3] or north + reach < box[1]:
-            continue
-        rise = _rise(problem, zone, reach, box)
+    for zone in table.within(box, reach):
+        rise = table.rise_m(zone, box, reach)
         for more in (0.0, rise) if rise > 0.0 else (0.0,):
-            parts = _parts(zone, growth(zone, more, *sides[0]), OVERLAP * fit.spare_m)
-            found.extend((number, zone, part) for part in parts)
+            parts = _parts(table.corners_m(zone), growth(zone, more, *sides[0]), OVERLAP * fit.spare_m)
+            found.extend((zone, part) for part in parts)
             moved.extend(more for _ in parts)
-    pairs = _crossing(found, reach + max(fit.spare_m, fit.hair_m))
+    levels_m = np.transpose(table.levels_m())
+    pairs = _crossing(table, [zone for zone, _ in found], reach + max(fit.spare_m, fit.hair_m))
     both: list[tuple[Floats, Floats]] = []
     bounds = np.tile([np.inf, np.inf, -np.inf, -np.inf], (len(found) + len(pairs), 1))
     for side, (sign, off_m, limits) in enumerate(sides):
         rows = np.zeros((len(found) + len(pairs), NUMBERS))
         forms: list[Floats] = []
-        for k, (row, (_, zone, part)) in enumerate(zip(rows, found, strict=False)):
+        for k, (row, (zone, part)) in enumerate(zip(rows, found, strict=False)):
             grow = growth(zone, moved[k], sign, off_m, limits)
-            _set_levels(row, zone, moved[k], sign, off_m, limits)
-            row[UNDER], row[RISE] = zone.floor is not None, 0.0 if there else moved[k]
-            row[RADIUS] = -1.0
+            _set_levels(row, levels_m[zone], table.over_ground[zone], moved[k], sign, off_m, limits)
+            row[RISE], row[RADIUS] = 0.0 if there else moved[k], -1.0
+            east_m, north_m, radius_m = table.discs_m[zone].tolist()
             corners: Floats | None
-            if isinstance(zone.shape, Circle):
-                radius = max(zone.shape.radius_m * air.scale + grow, 0.0)
-                row[[EAST, NORTH, RADIUS]] = zone.shape.east_m, zone.shape.north_m, radius
-                forms.append(np.array([[radius, zone.shape.east_m, zone.shape.north_m, 1.0]]))
-                corners, grow = np.array([[zone.shape.east_m, zone.shape.north_m]]), radius
+            if radius_m >= 0.0:
+                grow = max(radius_m + grow, 0.0)
+                row[[EAST, NORTH, RADIUS]] = east_m, north_m, grow
+                forms.append(np.array([[grow, east_m, north_m, 1.0]]))
+                corners = np.array([[east_m, north_m]])
             elif (corners := part.sides[side]) is None:
                 forms.append(NOTHING)
                 continue
@@ -155,28 +154,28 @@ def make_shapes(problem: Problem, x: Floats, y: Floats, fit: Fit = LOOSE) -> Sha
         bounds[k, 2:] = np.minimum(bounds[a, 2:], bounds[b, 2:])
     boxes = _cells(bounds, x, y)
     size = (boxes[:, 1] - boxes[:, 0] + 1).clip(0) * (boxes[:, 3] - boxes[:, 2] + 1).clip(0)
-    numbers = [number for number, *_ in found]
+    numbers = [number for number, _ in found]
     owner = np.array([(n, n) for n in numbers] + [(numbers[a], numbers[b]) for a, b in pairs], np.intp).reshape(-1, 2)
     return Shapes(both[0], both[1], boxes, owner, int(size.sum()), int(size[both[0][0][:, LOOKS] > 0.0].sum()))
 
 
-def _set_levels(row: Floats, zone: Zone, moved_m: float, sign: float, off_m: float, limits: Limits) -> None:
-    """Fill in the levels of a part, for bounds (``sign`` -1) or for paths (1), off by a margin ``off_m``."""
-    row[[BOTTOM, TOP, OWN_BOTTOM, OWN_TOP]] = -np.inf, np.inf, -np.inf, np.inf
+def _set_levels(
+    row: Floats, levels_m: Floats, over_ground: Bools, moved_m: float, sign: float, off_m: float, limits: Limits
+) -> None:
+    """Fill in the levels of a part, for bounds (``sign`` -1) or for paths (1), off by a margin ``off_m``; ``levels_m``,
+    ``over_ground`` (2,): floor and ceiling of its zone."""
     row[LOOKS] = sign < 0.0 and moved_m > 0.0
     row[THIN] = 2.0 * (limits.altitude_error_m - off_m) if sign < 0.0 else -np.inf
-    for level, at, more in ((zone.floor, BOTTOM, -1.0), (zone.ceiling, TOP, 1.0)):
-        if level is not None:
-            over_ground = level.datum == "agl"
-            # For paths, AMSL levels get no margin for rounding: a zone may be exactly as high as the ceiling.
-            off = sign * off_m if over_ground or sign < 0.0 else -TOUCH_M
-            row[at] = level.value_m + more * (limits.altitude_error_m + off)
-            row[at + 2] = over_ground
-            row[OWN_BOTTOM if at == BOTTOM else OWN_TOP] = row[at]
-            if over_ground and moved_m > 0.0 and sign > 0.0:
-                row[at + 2] = BESIDE
-            elif over_ground:
-                row[at] -= more * moved_m
+    for side, at, own, more in ((0, BOTTOM, OWN_BOTTOM, -1.0), (1, TOP, OWN_TOP, 1.0)):
+        # For paths, AMSL levels get no margin for rounding: a zone may be exactly as high as the ceiling.
+        off = sign * off_m if over_ground[side] or sign < 0.0 else -TOUCH_M
+        row[at] = row[own] = levels_m[side] + more * (limits.altitude_error_m + off)
+        row[at + 2] = over_ground[side]
+        if over_ground[side] and moved_m > 0.0 and sign > 0.0:
+            row[at + 2] = BESIDE
+        elif over_ground[side]:
+            row[at] -= more * moved_m
+    row[UNDER] = row[BOTTOM] > -np.inf
 
 
 def _cross(rows: Floats, k: int, a: int, b: int) -> None:
@@ -188,55 +187,38 @@ def _cross(rows: Floats, k: int, a: int, b: int) -> None:
     rows[k, UNDER_2] = rows[b, UNDER]
 
 
-def _rise(problem: Problem, zone: Zone, reach: float, box: tuple[float, float, float, float]) -> float:
-    """Metres by which the ground under a zone may differ from the ground at a place within reach, at most; 0 if neither
-    floor nor ceiling follows the ground."""
-    if reach <= 0.0 or not zone.follows_ground:
-        return 0.0
-    surface = problem.airspace.surface
-    west, south = (max(a, b) - reach for a, b in zip(zone.bounds[:2], box[:2], strict=True))
-    east, north = (min(a, b) + reach for a, b in zip(zone.bounds[2:], box[2:], strict=True))
-    e, n = np.meshgrid(np.linspace(west, east, 5), np.linspace(south, north, 5))
-    at = surface.grid(e.ravel(), n.ravel())
-    first = np.maximum(np.floor(at.min(axis=0)).astype(np.intp) - 1, 0)
-    last = np.maximum(np.ceil(at.max(axis=0)).astype(np.intp) + 2, first + 1)
-    z = surface.ground_m[first[1] : last[1], first[0] : last[0]]
-    across, along = (float(np.abs(np.diff(z, axis=a)).max(initial=0.0)) for a in (1, 0))
-    turned = surface.grid.jacobian(0.5 * (west + east), 0.5 * (south + north)).T
-    steep = max(math.hypot(*(turned @ (across, along))), math.hypot(*(turned @ (across, -along))))
-    return max(1.01 * reach * steep, 1e-9) if math.isfinite(steep) else math.inf
-
-
-def _crossing(found: list[tuple[int, Zone, _Part]], reach: float) -> list[tuple[int, int]]:
-    """Pairs of parts that may cross, of two zones each of which, by itself, may be passed above or below."""
-    some = [k for k, (_, zone, _) in enumerate(found) if zone.floor is not None or zone.ceiling is not None]
+def _crossing(table: ZoneTable, owner: list[int], reach: float) -> list[tuple[int, int]]:
+    """Pairs of parts that may cross, of two zones each of which, by itself, may be passed above or below; ``owner``:
+    the zone of each part."""
+    bottoms, tops = (np.isfinite(levels).tolist() for levels in table.levels_m())
+    some = [k for k, zone in enumerate(owner) if bottoms[zone] or tops[zone]]
+    boxes, apart = table.box_m.tolist(), 2.0 * reach
     out = []
     for n, a in enumerate(some):
         for b in some[n + 1 :]:
-            p, q = found[a][1], found[b][1]
+            p, q = owner[a], owner[b]
             # Two that can both be passed only above (or only below) are passed as the higher (lower) of them.
-            one_way = (p.floor is None and q.floor is None) or (p.ceiling is None and q.ceiling is None)
-            if found[a][0] == found[b][0] or one_way:
+            if p == q or not (bottoms[p] or bottoms[q]) or not (tops[p] or tops[q]):
                 continue
-            u, v = p.bounds, q.bounds
-            apart = 2.0 * reach
+            u, v = boxes[p], boxes[q]
             if u[0] - v[2] < apart and v[0] - u[2] < apart and u[1] - v[3] < apart and v[1] - u[3] < apart:
                 out.append((a, b))
     return out
 
 
-def _parts(zone: Zone, grow_m: float, overlap_m: float) -> list[_Part]:
-    """The convex parts of a zone that is grown by ``grow_m`` for bounds. Parts that are made smaller one by one would
-    leave slits between them, so the zone is made smaller first, and its parts grown until they overlap."""
-    if isinstance(zone.shape, Circle):
+def _parts(corners: Floats, grow_m: float, overlap_m: float) -> list[_Part]:
+    """The convex parts of a zone of these ``corners`` (none: a circle) that is grown by ``grow_m`` for bounds. Parts
+    that are made smaller one by one would leave slits between them, so the zone is made smaller first, and its parts
+    grown until they overlap."""
+    if not len(corners):
         return [_Part()]
-    whole = convex_parts(zone.shape.vertices)
+    whole = convex_parts(corners)
     if len(whole) == 1 or grow_m >= overlap_m:
         return [_Part((part, part)) for part in whole]
     import shapely
 
     inset_m = overlap_m - grow_m
-    small = shapely.Polygon(zone.shape.vertices).buffer(-inset_m, join_style="mitre", mitre_limit=100.0)
+    small = shapely.Polygon(corners).buffer(-inset_m, join_style="mitre", mitre_limit=100.0)
     rings = [p.exterior for p in shapely.get_parts(small) if not p.is_empty]
     ccw = [shapely.get_coordinates(ring if ring.is_ccw else ring.reverse())[:-1] for ring in rings]
     low = [part for vertices in ccw for part in convex_parts(vertices)]

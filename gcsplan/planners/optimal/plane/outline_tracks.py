@@ -32,8 +32,7 @@ class OutlineTracks:
         heights = [*(v.amsl_m for v in self.problem.via), self.problem.goal[2]]
         self.legs = [(a, b, z) for (a, b), z in zip(pairwise(places), heights, strict=True) if math.dist(a, b) > 1e-3]
         self.under, self.tops_m = _sides(self.problem)
-        over_ground = [z.ceiling is not None and z.ceiling.datum == "agl" for z in self.problem.airspace.zones]
-        by_ground = np.array(over_ground, np.bool_) | (self.problem.limits.max_agl_m is not None)
+        by_ground = self.problem.airspace.zone_table.over_ground[:, 1] | (self.problem.limits.max_agl_m is not None)
         self.over = self.tops_m <= top_m + np.where(by_ground, HARDLY_M, TOUCH_M)
         self._solids: dict[bool, Solids] = {}
         self._hints: list[Floats] = []
@@ -73,11 +72,9 @@ class OutlineTracks:
             air, limits = self.problem.airspace, self.problem.limits if outer else self.problem.bound_limits
             reach_m, wider_m = air.beside_m(limits), air.beside_over_ground_m(limits) if outer else 0.0
             hair = HAIR_M if air.surface.grid.error_m == 0.0 else HAIR_BENT_M
-            hair_m = [hair if outer else hair + self.problem.bound_spare_m] * len(air.zones)
-            hair_m = [
-                h + max(wider_m - reach_m, 0.0) * z.follows_ground for h, z in zip(hair_m, air.zones, strict=True)
-            ]
-            solids = Solids(air.zones, reach_m, air.scale, hair_m, self.incumbent.budget, outer=outer)
+            hair_m = np.full(len(air.zones), hair if outer else hair + self.problem.bound_spare_m)
+            hair_m += max(wider_m - reach_m, 0.0) * air.zone_table.follow_ground
+            solids = Solids(air.zone_table, reach_m, hair_m, self.incumbent.budget, outer=outer)
             for hint in self._hints:
                 solids.look_along(hint, which)
             self._solids[outer] = solids
@@ -91,19 +88,14 @@ class OutlineTracks:
 
 
 def _sides(problem: Problem) -> tuple[Bools, Floats]:
-    """(zones,) which zones can perhaps be passed under at some place, and the least altitude AMSL over each, inf over a
-    zone without a top."""
-    limits, surface, zones = problem.bound_limits, problem.airspace.surface, problem.airspace.zones
-    high = float(np.nanmax(surface.ground_m)) if any(z.follows_ground for z in zones) else 0.0
+    """(zones,) which zones can perhaps be passed under at some place, and the least altitude AMSL over each, inf over
+    those without a top."""
+    limits, surface, table = problem.bound_limits, problem.airspace.surface, problem.airspace.zone_table
+    high = float(np.nanmax(surface.ground_m)) if table.follow_ground.any() else 0.0
     low = float(np.nanmin(surface.ground_m))
-    lowest = limits.min_agl_m + limits.altitude_error_m
-    under, tops_m = np.zeros(len(zones), np.bool_), np.full(len(zones), math.inf)
-    for k, zone in enumerate(zones):
-        if zone.floor is not None:
-            room = zone.floor.value_m - limits.altitude_error_m - lowest
-            # A floor AGL and the lowest legal altitude count from the same ground, except for ground within clearance.
-            beside = high - low if problem.airspace.beside_m(limits) > 0.0 else 0.0
-            under[k] = room - (low if zone.floor.datum == "amsl" else -beside) >= -HARDLY_M
-        if zone.ceiling is not None:
-            tops_m[k] = zone.ceiling.value_m + limits.altitude_error_m + (low if zone.ceiling.datum == "agl" else 0.0)
-    return under, tops_m
+    bottoms_m, _ = table.levels_m(limits.altitude_error_m)
+    # A floor AGL and the lowest legal altitude count from the same ground, except for ground within clearance.
+    beside_m = high - low if problem.airspace.beside_m(limits) > 0.0 else 0.0
+    lowest_m = limits.min_agl_m + limits.altitude_error_m
+    under = bottoms_m - lowest_m - np.where(table.over_ground[:, 0], -beside_m, low) >= -HARDLY_M
+    return under, table.levels_m(limits.altitude_error_m, low)[1]

@@ -241,9 +241,7 @@ def above_all(problem: Problem) -> float:
     """An altitude AMSL, metres, above all ground, zone ceilings and terminals, with at least 100 m to spare."""
     surface, limits = problem.airspace.surface, problem.limits
     high = float(np.nanmax(surface.top_m))
-    tops = [0.0]
-    for zone in problem.airspace.zones:
-        if zone.ceiling is not None:
-            tops.append(zone.ceiling.value_m + (high if zone.ceiling.datum == "agl" else 0.0))
+    _, tops = problem.airspace.zone_table.levels_m(ground_m=high)
     ends = [problem.start[2], problem.goal[2], *(v.amsl_m for v in problem.via if v.amsl_m is not None)]
-    return max(high + limits.min_agl_m, *tops, *ends) + limits.altitude_error_m + 2.0 * limits.track_error_m + 100.0
+    most = max(high + limits.min_agl_m, float(tops[np.isfinite(tops)].max(initial=0.0)), *ends)
+    return most + limits.altitude_error_m + 2.0 * limits.track_error_m + 100.0

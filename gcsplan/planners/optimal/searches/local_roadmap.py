@@ -25,7 +25,6 @@ from gcsplan.planners.optimal.navmesh.grid import NodeExtent, extent
 from gcsplan.planners.problem import Problem, terminals_of
 from gcsplan.planners.profile.cross_sections import FIXED, FREE, UPRIGHT, cheapest, drawn, kinds_of
 from gcsplan.world.geometry.path import distances_m
-from gcsplan.world.geometry.zones import Circle
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -258,18 +257,13 @@ def _heights(problem: Problem, ends: Floats, low: Floats, high: Floats) -> tuple
     floor = floor[np.isfinite(floor)]
     bottom_m = min(float(floor.min(initial=math.inf)), float(ends[:, 2].min()))
     top_m = max(float(floor.max(initial=-math.inf)), float(ends[:, 2].max()))
-    marks: list[float] = []
-    for zone in problem.airspace.zones:
-        for level, side in ((zone.ceiling, 1.0), (zone.floor, -1.0)):
-            if level is None:
-                continue
-            ground = 0.0 if level.datum == "amsl" else float(np.nanmax(surface.top_m))
-            mark = level.value_m + ground + side * error
-            marks += [mark] if level.datum == "amsl" else []
-            top_m = max(top_m, mark) if side > 0.0 else top_m
+    table = problem.airspace.zone_table
+    _, tops = table.levels_m(ground_m=float(np.nanmax(surface.top_m)))
+    top_m = max(top_m, float(tops[np.isfinite(tops)].max(initial=-math.inf)) + error)
+    fixed = [level[~agl] for level, agl in zip(table.levels_m(error), table.over_ground.T, strict=True)]
     if limits.max_amsl_m is not None:
         top_m = min(top_m, limits.max_amsl_m - limits.altitude_error_m)
-    marks = sorted({round(m, 3) for m in marks if bottom_m <= m <= top_m})
+    marks = sorted({round(m, 3) for m in np.concatenate(fixed).tolist() if bottom_m <= m <= top_m})
     most = LEVELS[0]
     if len(marks) > most:
         marks = [marks[k] for k in np.linspace(0, len(marks) - 1, most).round().astype(int).tolist()]
@@ -321,13 +315,12 @@ def _rims(problem: Problem) -> list[Floats]:
     more, out = problem.airspace.beside_m(problem.limits) + HAIR_M, []
     turn = np.arange(CIRCLE_PLACES) * (2.0 * math.pi / CIRCLE_PLACES)
     around = np.stack([np.cos(turn), np.sin(turn)], axis=-1) / math.cos(math.pi / CIRCLE_PLACES)
-    for zone in problem.airspace.zones:
-        shape = zone.shape
-        if isinstance(shape, Circle):
-            middle = np.array([shape.east_m, shape.north_m])
-            out.append(middle + (shape.radius_m * problem.airspace.scale + more) * around)
+    table = problem.airspace.zone_table
+    for zone, (east_m, north_m, radius_m) in enumerate(table.discs_m.tolist()):
+        if radius_m >= 0.0:
+            out.append(np.array([east_m, north_m]) + (radius_m + more) * around)
         else:
-            p = shape.vertices
+            p = table.corners_m(zone)
             back, on = np.roll(p, 1, axis=0) - p, np.roll(p, -1, axis=0) - p
             outward = -(back / np.hypot(*back.T)[:, None] + on / np.hypot(*on.T)[:, None])
             outward /= np.maximum(np.hypot(*outward.T), 1e-9)[:, None]
@@ -338,9 +331,9 @@ def _rims(problem: Problem) -> list[Floats]:
 def _slits(problem: Problem, widest_m: float) -> Floats:
     """(N, 5, 2) five places on the line through each slit between two circles, the third in its middle; the narrowest
     come first, for they are what nothing else finds."""
-    circles = [z.shape for z in problem.airspace.zones if isinstance(z.shape, Circle)]
-    middles = np.array([(c.east_m, c.north_m) for c in circles]).reshape(-1, 2)
-    radii = np.array([c.radius_m for c in circles]) * problem.airspace.scale + problem.airspace.beside_m(problem.limits)
+    discs = problem.airspace.zone_table.discs_m
+    circles = discs[discs[:, 2] >= 0.0]
+    middles, radii = circles[:, :2], circles[:, 2] + problem.airspace.beside_m(problem.limits)
     i, j = np.triu_indices(len(circles), 1)
     apart = np.hypot(*(middles[j] - middles[i]).T)
     gap = apart - radii[i] - radii[j]

@@ -59,7 +59,9 @@ def test_bound_and_path_enclose_the_visibility_graphs_track(seed: int) -> None:
     except EnclosedPlace:
         pytest.skip("the zones enclose a place")
     found = [
-        Solids(zones, reach_m, 1.0, [2e-3] * len(zones), Budget.endless(), outer=o).shortest(*places, every)
+        Solids(
+            Airspace(FLAT, zones).zone_table, reach_m, np.full(len(zones), 2e-3), Budget.endless(), outer=o
+        ).shortest(*places, every)
         for o in (False, True)
     ]
     assert found[0] is not None
@@ -93,7 +95,8 @@ def test_any_number_of_triangles_may_meet_at_a_corner(seed: int) -> None:
         pytest.skip("the goal lies in the disc")
     oracle = VisibilityGraph.of(zones, 0.0).shortest(places)
     for outer in (False, True):
-        track = Solids(zones, 0.0, 1.0, [2e-3] * 2, Budget.endless(), outer=outer).shortest(*places, np.ones(2, bool))
+        solids = Solids(Airspace(FLAT, zones).zone_table, 0.0, np.full(2, 2e-3), Budget.endless(), outer=outer)
+        track = solids.shortest(*places, np.ones(2, bool))
         assert track is not None
         assert track.length_m == pytest.approx(oracle, rel=3e-4, abs=0.05)
 
@@ -172,7 +175,7 @@ def test_what_would_be_too_large_is_left_alone(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(outlines, "MOST_OUTLINE_CORNERS", 10)
     zones = [Zone("disc", Circle(0.0, 0.0, 300.0))]
     with pytest.raises(Exhausted):
-        Solids(zones, 0.0, 1.0, [2e-3] * len(zones), Budget.endless(), outer=True).shortest(
+        Solids(Airspace(FLAT, zones).zone_table, 0.0, np.full(1, 2e-3), Budget.endless(), outer=True).shortest(
             (-1e3, 0.0), (1e3, 0.0), np.ones(1, np.bool_)
         )
     assert plan(mission(zones, 33.0)).lower_bound is not None  # the lattice finds a bound where the outlines do not
