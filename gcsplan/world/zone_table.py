@@ -166,7 +166,7 @@ class ZoneTable:
         return np.flatnonzero(near & (south - reach_m <= box_m[3]) & (north + reach_m >= box_m[1])).tolist()
 
     def spans(self, track: Floats, within_m: float, over_ground_m: float) -> list[tuple[int, float, float]]:
-        """(zone, s0_m, s1_m) of each span of ``track`` (N, 2) within reach of a zone, by zone and metres along the track.
+        """(zone, s0_m, s1_m) of each span of ``track`` (N, 2) within reach of a zone, by zone and metres along.
 
         The reach is ``within_m``, or ``over_ground_m`` for a zone with a level over ground.
         """

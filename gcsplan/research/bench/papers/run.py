@@ -61,22 +61,20 @@ def run(
             f"give 1 to {MOST_RUNS} runs, 1 job or more and a seed of 0 or more, not {runs}, {jobs} and {seed}"
         )
     chosen = choose(scenarios, algorithms, readings=readings)
-    planned: dict[tuple[str, str], list[PaperRun]] = {}
+    due: dict[tuple[str, str], list[PaperRun]] = {}
     code = code_digest()
     texts = {scenario.name: mission_text(scenario.name, missions) for scenario, _ in chosen}
     for scenario, contenders in chosen:
         text, count = texts[scenario.name], runs or scenario.paper.runs
         for name in _optima(scenario):
-            planned[scenario.name, name] = [PaperRun(scenario.name, name, text, 0, 0, code)]
+            due[scenario.name, name] = [PaperRun(scenario.name, name, text, 0, 0, code)]
         for c in contenders:
-            planned[scenario.name, c.name] = [
-                PaperRun(scenario.name, c.name, text, seed, k, code) for k in range(count)
-            ]
+            due[scenario.name, c.name] = [PaperRun(scenario.name, c.name, text, seed, k, code) for k in range(count)]
     ready(out)
     store = Store(out / PAPER_RUNS_FILE)
     there = store.load()
     # The references come first, so that a table that is read half way has its optimum.
-    every = sorted((job for some in planned.values() for job in some), key=lambda job: job.algorithm not in OPTIMA)
+    every = sorted((job for some in due.values() for job in some), key=lambda job: job.algorithm not in OPTIMA)
     todo = [job for job in every if job.key not in there]
     at = [len(every) - len(todo)]
     if done is not None:
@@ -90,7 +88,7 @@ def run(
             done(at[0], len(every))
 
     carry_out(todo, jobs, cluster, keep)
-    found = {place: [there[job.key] for job in some] for place, some in planned.items()}
+    found = {place: [there[job.key] for job in some] for place, some in due.items()}
     judged = judge([scenario for scenario, _ in chosen], found)
     timed = [time_row(s.name, c.name, found[s.name, c.name]) for s, contenders in chosen for c in contenders]
     return {
