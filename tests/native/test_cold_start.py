@@ -24,12 +24,12 @@ FLOOR_LLVM = 22
 FIRST_RUN = """
 import json, sys, time
 import gcsplan
-from gcsplan.native.kernel_unit import SLOW_NOTICE, compilation_told
+from gcsplan.native.kernel_unit import SLOW_NOTICE, compilation_reported
 from gcsplan.native.__main__ import KERNEL_UNITS
 import importlib, llvmlite, llvmlite.binding
 
 said, began = [], time.perf_counter()
-with compilation_told(said.append):
+with compilation_reported(said.append):
     for module in KERNEL_UNITS.values():
         unit = importlib.import_module(module).UNIT
         unit.digest()

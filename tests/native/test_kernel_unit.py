@@ -74,7 +74,7 @@ import math
 from pathlib import Path
 
 from {package}.{helper} import SCALE, longest
-from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE, KernelUnit, compilation_told
+from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE, KernelUnit, compilation_reported
 
 from {package}._unit import UNIT
 
@@ -107,7 +107,7 @@ import math
 UNIT_OF = """
 from pathlib import Path
 
-from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE, KernelUnit, compilation_told
+from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE, KernelUnit, compilation_reported
 
 UNIT = KernelUnit("marked", Path(__file__).parent, "{package}", ("_unit", "inner.helper", "marked"))
 """

@@ -17,7 +17,7 @@ from gcsplan.native.kernel_unit import KernelUnit, compilation_reported
 SOURCE = """
 from pathlib import Path
 
-from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE, KernelUnit, compilation_told
+from gcsplan.native.kernel_unit import QUICK_NOTICE, SLOW_NOTICE, KernelUnit, compilation_reported
 
 UNIT = KernelUnit("toy", Path(__file__).parent, "toys", ("weighing",))
 FACTOR = {factor}
