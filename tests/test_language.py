@@ -21,12 +21,6 @@ TOP = Path(__file__).resolve().parent.parent
 CODE = ("gcsplan", "tests/support", "tests/oracles", "tests/campaigns", "sitl_tests", "noxfile.py", "docs")
 DOCUMENTS = ("README.md", "CHANGELOG.md", "changelog.d", "docs")
 
-TODO: tuple[str, ...] = (
-    "tests/campaigns/parameters.py",
-    "README.md",
-)
-"""Folders and files whose language nobody has put right yet; empty when the pass is done."""
-
 pytestmark = pytest.mark.xdist_group("language")  # one process reads the files
 
 
@@ -163,7 +157,7 @@ def names(where: str, found: Iterable[tokenize.TokenInfo], nodes: Sequence[ast.A
     for token in found:
         if token.type == tokenize.NAME and A_TERM.search(token.string) and token.string not in COLUMNS:
             words = {word.lower() for word in WORD.findall(token.string)}
-            is_data = (token.start[0], len_utf8(token)) in data
+            is_data = (token.start[0], column_of(token)) in data
             yield from (
                 f"{where}:{token.start[0]}: {token.string}: {cure}"
                 for term, cure in TERMS.items()
@@ -171,7 +165,7 @@ def names(where: str, found: Iterable[tokenize.TokenInfo], nodes: Sequence[ast.A
             )
 
 
-def len_utf8(token: tokenize.TokenInfo) -> int:
+def column_of(token: tokenize.TokenInfo) -> int:
     """The column of a token as the syntax tree counts it, in bytes."""
     return len(token.line[: token.start[1]].encode())
 
@@ -193,14 +187,9 @@ def files() -> tuple[Path, ...]:
     return tuple(path for group in each for path in group)
 
 
-def is_left(path: Path) -> bool:
-    """Whether a file is still to be put right."""
-    return any(path == TOP / name or TOP / name in path.parents for name in TODO)
-
-
 @pytest.mark.slow
 def test_sentences_are_plain() -> None:
-    assert [one for path in files() if not is_left(path) for one in findings(path)] == []
+    assert [one for path in files() for one in findings(path)] == []
 
 
 @pytest.mark.parametrize(
@@ -246,6 +235,6 @@ def test_names_are_judged_but_for_the_data_of_notes() -> None:
 
 if __name__ == "__main__":
     chosen = [Path(name).resolve() for name in sys.argv[1:]] or files()
-    places = [one for path in chosen if path in files() and not is_left(path) for one in findings(path)]
+    places = [one for path in chosen if path in files() for one in findings(path)]
     print(*places, sep="\n", end="\n" if places else "")
     sys.exit(1 if places else 0)

@@ -107,8 +107,8 @@ def value(of: KernelUnit, factor: float = 1.0) -> float:
 
 
 def notices(room: Path, factor: float = 1.0) -> list[str]:
-    """What is said of compiling while the kernel, imported anew, is called: each notice without the unit's name."""
-    said: list[str] = []
-    with compilation_reported(said.append):
+    """The notices of compiling while the kernel, imported anew, is called, each without the unit's name."""
+    found: list[str] = []
+    with compilation_reported(found.append):
         value(kernels(room), factor)
-    return [words.rpartition(":")[0] for words in said]
+    return [words.rpartition(":")[0] for words in found]

@@ -37,7 +37,7 @@ from gcsplan.planners.problem import Problem, Solution, straight_bound
 from gcsplan.planners.refusal.suggestions import FILLED
 from gcsplan.planners.turns.ends import (
     FlightEnd,
-    WantedEnd,
+    RequiredEnd,
     around_m,
     circling_ends,
     column_clear,
@@ -205,13 +205,13 @@ def starts(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator
     given = request.takeoff_heading_deg
     heading = None if given is None else math.radians(90.0 - given)
     rules = _EndRules(problem, over=over_m(request.vehicle))
-    wanted = WantedEnd(np.array(request.start), slope, request.takeoff_agl_m, heading, rules)
-    straight = straight_ends(problem, wanted, sharp)
+    required = RequiredEnd(np.array(request.start), slope, request.takeoff_agl_m, heading, rules)
+    straight = straight_ends(problem, required, sharp)
     first = next(straight, None)
     which = "on any heading" if given is None else f"on takeoff_heading_deg {given:g}"
     other = "start" if given is None else "heading"
     return _some(
-        circling_ends(problem, wanted, sharp) if first is None else chain([first], straight),
+        circling_ends(problem, required, sharp) if first is None else chain([first], straight),
         f"{request.vehicle.name}: no climb-out {which} clears the ground, the zones and the ceiling at "
         f"{pitch_deg(request.vehicle)}° (max_climb_deg, whole degrees) and leads to where min AGL is met, straight "
         f"or in circles: another {other} or a steeper climb may{beside_strip(problem.airspace)}",
@@ -224,9 +224,9 @@ def goals(problem: Problem, request: VehicleRequest, sharp: Floats) -> Iterator[
         return iter([None])
     slope = request.vehicle.limits.max_descent_slope * (1.0 - FLOWN_SLOPE)
     rules = _EndRules(problem, lands_m_s=request.vehicle.speed_max_m_s)
-    wanted = WantedEnd(np.array(request.goal), slope, request.approach_agl_m, None, rules)
+    required = RequiredEnd(np.array(request.goal), slope, request.approach_agl_m, None, rules)
     return _some(
-        straight_ends(problem, wanted, sharp[::-1]),
+        straight_ends(problem, required, sharp[::-1]),
         f"{request.vehicle.name}: no straight approach to the goal, on any heading, clears the ground and the "
         f"zones at max_descent_deg {request.vehicle.limits.max_descent_deg:g}: use end: loiter, or another goal"
         f"{beside_strip(problem.airspace)}",

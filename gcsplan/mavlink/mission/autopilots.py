@@ -55,8 +55,8 @@ class AutopilotProfile:
     ``max_items`` counts wire items, including home where home is one. ``stored(item)`` returns the item that reads
     back; ``refuses(item)`` returns why the autopilot refuses it, empty if it accepts it. ``atomic``: the new mission
     replaces the old one only at the end of an upload, so a broken upload leaves the old one. ``holds_s``: seconds for
-    which a broken upload keeps the vehicle busy. Of ``mav_types``, those of ``judged_types`` fly as the check follows
-    a mission: a PX4's is followed as a multicopter flies it.
+    which a broken upload keeps the vehicle busy. The check follows a mission as vehicles of
+    ``judged_types``, a part of ``mav_types``, fly it: a PX4's as a multicopter flies it.
     """
 
     autopilot: Autopilot

@@ -81,33 +81,33 @@ def make_lattice(problem: Problem, box: tuple[float, float, float, float], step_
     half = 0.5 * step_m
     x: Floats = west + half * np.arange(2 * nx - 1, dtype=np.float64)
     y: Floats = south + half * np.arange(2 * ny - 1, dtype=np.float64)
-    wanted = _within_detour(problem, x, y, detour, 2.0 * step_m)
+    inside = _within_detour(problem, x, y, detour, 2.0 * step_m)
     shape = (len(y), len(x))
     floor = np.full(shape, np.inf)
     ceiling = np.full(shape, -np.inf)
-    jj, ii = np.nonzero(wanted)
+    jj, ii = np.nonzero(inside)
     air, limits = problem.airspace, problem.limits
     floor[jj, ii] = problem.floors(x[ii], y[jj])
     ceiling[jj, ii] = air.ceiling_amsl(x[ii], y[jj], limits)
     reach = air.beside_m(limits)
-    ground = _ground_of_zones(problem, x, y, wanted, reach + 2.0 * step_m)
+    ground = _ground_of_zones(problem, x, y, inside, reach + 2.0 * step_m)
     edges, low, high, agl = _edge_bands(air, limits, reach, west, south, step_m, ground)
     at = np.zeros(nx * ny * 8 + 1, np.int64)
     np.cumsum(np.bincount(edges, minlength=nx * ny * 8), out=at[1:])
     return Lattice(west, south, step_m, nx, ny, floor, ceiling, ground, at, low, high, agl, reach)
 
 
-def _ground_of_zones(problem: Problem, x: Floats, y: Floats, wanted: Bools, beside_m: float) -> Floats:
-    """Ground altitude at ``wanted`` places no farther than ``beside_m`` from the box of a zone with a level AGL; 0
+def _ground_of_zones(problem: Problem, x: Floats, y: Floats, inside: Bools, beside_m: float) -> Floats:
+    """Ground altitude at ``inside`` places no farther than ``beside_m`` from the box of a zone with a level AGL; 0
     elsewhere."""
-    asked = np.zeros(wanted.shape, np.bool_)
+    near = np.zeros(inside.shape, np.bool_)
     table = problem.airspace.zone_table
     for w, s, e, n in table.box_m[table.follow_ground].tolist():
         cols = slice(*np.searchsorted(x, (w - beside_m, e + beside_m)))
         rows = slice(*np.searchsorted(y, (s - beside_m, n + beside_m)))
-        asked[rows, cols] = wanted[rows, cols]
-    ground = np.zeros(wanted.shape)
-    jj, ii = np.nonzero(asked)
+        near[rows, cols] = inside[rows, cols]
+    ground = np.zeros(inside.shape)
+    jj, ii = np.nonzero(near)
     # Unknown ground has an infinite floor, so its altitude does not matter here.
     ground[jj, ii] = _known(problem.airspace.surface.ground_at(x[ii], y[jj]), 0.0)
     return ground

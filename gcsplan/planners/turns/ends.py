@@ -24,7 +24,7 @@ from gcsplan.world.geometry.limits import Limits
 __all__ = [
     "EndJudge",
     "FlightEnd",
-    "WantedEnd",
+    "RequiredEnd",
     "around_m",
     "circling_ends",
     "column_clear",
@@ -80,7 +80,7 @@ class EndJudge(Protocol):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class WantedEnd:
+class RequiredEnd:
     """The required end: at ``ground`` (3,), with a slant as steep as ``slope``, to at least ``agl_m`` above it.
 
     ``heading``: the only one, radians from east to north, seen outwards; None for any.
@@ -119,13 +119,13 @@ def around_m(problem: Problem) -> float:
     return float(math.ceil(problem.turn_radius_m))
 
 
-def straight_ends(problem: Problem, wanted: WantedEnd, sharp: Floats) -> Iterator[FlightEnd]:
+def straight_ends(problem: Problem, required: RequiredEnd, sharp: Floats) -> Iterator[FlightEnd]:
     """The legal ends, seen outwards from the ground; ``sharp`` (N, 3) is the path from there, without arcs."""
-    ground, radius = wanted.ground, problem.turn_radius_m
+    ground, radius = required.ground, problem.turn_radius_m
     run_m = radius * math.tan(0.5 * SHARPEST_RAD) + 20.0
-    aim = _along(sharp, (float(sharp[0, 2]) - float(ground[2])) / wanted.slope + run_m + 2.0 * radius)
-    for heading in _headings(ground, aim, wanted.heading):
-        end = _end(problem, wanted, heading, aim, run_m)
+    aim = _along(sharp, (float(sharp[0, 2]) - float(ground[2])) / required.slope + run_m + 2.0 * radius)
+    for heading in _headings(ground, aim, required.heading):
+        end = _end(problem, required, heading, aim, run_m)
         if end is not None:
             yield end
 
@@ -140,12 +140,12 @@ def _headings(ground: Floats, aim: Floats, given: float | None) -> list[float]:
     return [natural + turn for turn in turns]
 
 
-def _end(problem: Problem, wanted: WantedEnd, heading: float, aim: Floats, run_m: float) -> FlightEnd | None:
+def _end(problem: Problem, required: RequiredEnd, heading: float, aim: Floats, run_m: float) -> FlightEnd | None:
     """The shortest legal end on a heading; None if there is none."""
-    ground, slope = wanted.ground, wanted.slope
+    ground, slope = required.ground, required.slope
     air, limits = problem.airspace, problem.limits
     way = np.array([math.cos(heading), math.sin(heading)])
-    least = ground[2] + max(wanted.agl_m or 0.0, limits.min_agl_m)
+    least = ground[2] + max(required.agl_m or 0.0, limits.min_agl_m)
     slanted = _steep(limits)
     length = (least - ground[2]) / slope
     while length <= LONGEST_M:
@@ -158,7 +158,7 @@ def _end(problem: Problem, wanted: WantedEnd, heading: float, aim: Floats, run_m
         if needed > z:
             length += max((needed - z) / slope, 1.0) if needed - z < 50.0 else LONGER_M
             continue
-        if not wanted.judge.slant_clear(ground, top):
+        if not required.judge.slant_clear(ground, top):
             return None
         if air.clear(Legs.of_path(np.vstack([top, chain]), slanted), slanted).all():
             return FlightEnd(ground, top, chain, heading)
@@ -177,20 +177,20 @@ def _steep(limits: Limits) -> Limits:
     return replace(limits, max_climb_deg=90.0, max_descent_deg=90.0)
 
 
-def circling_ends(problem: Problem, wanted: WantedEnd, sharp: Floats) -> Iterator[FlightEnd]:
+def circling_ends(problem: Problem, required: RequiredEnd, sharp: Floats) -> Iterator[FlightEnd]:
     """Short climb-outs that continue in circles, up to where the first leg is legal in any direction."""
     air, limits, radius = problem.airspace, problem.limits, around_m(problem)
-    ground, aim = wanted.ground, _along(sharp, 6.0 * radius)
-    least = float(ground[2]) + max(wanted.agl_m or 0.0, limits.min_agl_m)
-    for one in _headings(ground, aim, wanted.heading):
+    ground, aim = required.ground, _along(sharp, 6.0 * radius)
+    least = float(ground[2]) + max(required.agl_m or 0.0, limits.min_agl_m)
+    for one in _headings(ground, aim, required.heading):
         way = np.array([math.cos(one), math.sin(one)])
         for low_m in CIRCLES_FROM_M:
-            top = np.array([*(ground[:2] + low_m / wanted.slope * way), ground[2] + low_m])
-            if not wanted.judge.slant_clear(ground, top):
+            top = np.array([*(ground[:2] + low_m / required.slope * way), ground[2] + low_m])
+            if not required.judge.slant_clear(ground, top):
                 break
             for side in (0.5 * math.pi, -0.5 * math.pi, 0.0):  # middle left, right (both on the circle) or ahead
                 towards = np.array([math.cos(one + side), math.sin(one + side)])
-                high = _circle(problem, wanted.judge, top + np.array([*(radius * towards), 0.0]), least, aim)
+                high = _circle(problem, required.judge, top + np.array([*(radius * towards), 0.0]), least, aim)
                 if high is None:
                     continue
                 middle, half = 0.5 * (high[0, 2] + top[2]), 0.5 * (high[0, 2] - top[2])

@@ -15,7 +15,7 @@ from gcsplan.planners.turns.ends import (
     LONGER_M,
     SHARPEST_RAD,
     FlightEnd,
-    WantedEnd,
+    RequiredEnd,
     around_m,
     circling_ends,
     column_clear,
@@ -63,12 +63,12 @@ def problem(*zones: Zone, high: bool = False) -> Problem:
     return Problem(air, LIMITS, (0.0, 0.0, 150.0), (4000.0, 0.0, 150.0), turn_radius_m=RADIUS_M)
 
 
-def wanted(agl_m: float | None = None, heading: float | None = None, rules: Rules = Rules()) -> WantedEnd:
-    return WantedEnd(GROUND, SLOPE, agl_m, heading, rules)
+def required(agl_m: float | None = None, heading: float | None = None, rules: Rules = Rules()) -> RequiredEnd:
+    return RequiredEnd(GROUND, SLOPE, agl_m, heading, rules)
 
 
 def test_an_end_climbs_towards_the_path_to_where_min_agl_is_met_or_as_high_as_asked() -> None:
-    least, asked = (next(straight_ends(problem(), wanted(agl_m), SHARP)) for agl_m in (None, 80.0))
+    least, asked = (next(straight_ends(problem(), required(agl_m), SHARP)) for agl_m in (None, 80.0))
     assert least.heading == asked.heading == 0.0
     assert least.top[2] == pytest.approx(135.0, abs=0.3)  # with the altitude error
     assert asked.top[2] == pytest.approx(180.0, abs=0.1)
@@ -80,16 +80,16 @@ def test_an_end_climbs_towards_the_path_to_where_min_agl_is_met_or_as_high_as_as
 
 
 def test_the_nearest_legal_headings_come_first_and_a_wanted_one_is_the_only_one() -> None:
-    headings = [round(math.degrees(end.heading)) for end in straight_ends(problem(), wanted(), SHARP)]
+    headings = [round(math.degrees(end.heading)) for end in straight_ends(problem(), required(), SHARP)]
     assert headings[:5] == [0, 15, -15, 30, -30]
     assert all(abs(h) <= 90 for h in headings), "the rules shut all others"
-    [only] = straight_ends(problem(), wanted(heading=0.3), SHARP)
+    [only] = straight_ends(problem(), required(heading=0.3), SHARP)
     assert only.heading == 0.3
-    assert list(straight_ends(problem(), wanted(heading=math.pi), SHARP)) == []
+    assert list(straight_ends(problem(), required(heading=math.pi), SHARP)) == []
 
 
 def test_an_end_away_from_the_path_turns_back_in_steps_that_have_room() -> None:
-    end = next(straight_ends(problem(), wanted(heading=math.radians(80.0)), SHARP))
+    end = next(straight_ends(problem(), required(heading=math.radians(80.0)), SHARP))
     legs = np.diff(np.vstack([end.top, end.chain])[:, :2], axis=0)
     turns = np.diff(np.arctan2(legs[:, 1], legs[:, 0]))
     assert len(turns) == 1
@@ -98,17 +98,17 @@ def test_an_end_away_from_the_path_turns_back_in_steps_that_have_room() -> None:
 
 
 def test_an_end_is_lengthened_where_a_zone_is_in_the_way_of_its_first_turn() -> None:
-    plain = next(straight_ends(problem(), wanted(heading=0.0), SHARP))
+    plain = next(straight_ends(problem(), required(heading=0.0), SHARP))
     zone = Zone("mast", Circle(float(plain.chain[0, 0]), 0.0, 3.0))
-    past = next(straight_ends(problem(zone), wanted(heading=0.0), SHARP))  # the rules let a slant through
+    past = next(straight_ends(problem(zone), required(heading=0.0), SHARP))  # the rules let a slant through
     assert past.top[0] > plain.chain[0, 0] + 3.0
-    low = next(straight_ends(problem(high=True), wanted(agl_m=225.0, heading=0.0), SHARP))
+    low = next(straight_ends(problem(high=True), required(agl_m=225.0, heading=0.0), SHARP))
     assert low.top[2] >= 335.0, "it goes on until it is as high as the ridge asks"
     assert low.top[0] > plain.top[0] + LONGER_M
 
 
 def test_circles_climb_beside_the_climb_out_to_where_their_first_leg_is_legal() -> None:
-    found = list(islice(circling_ends(problem(), wanted(agl_m=200.0, heading=0.0), SHARP), 2))
+    found = list(islice(circling_ends(problem(), required(agl_m=200.0, heading=0.0), SHARP), 2))
     left, right = found
     assert (left.circle_m, right.circle_m) == (-around_m(problem()), around_m(problem()))
     for end in found:
@@ -116,7 +116,7 @@ def test_circles_climb_beside_the_climb_out_to_where_their_first_leg_is_legal() 
         assert end.leaves is end.circle
         assert math.dist(end.circle[:2], end.top[:2]) == pytest.approx(RADIUS_M)
         assert end.circle[2] == pytest.approx(300.0 + Rules().reached_m, abs=0.02)
-    shut = wanted(agl_m=200.0, heading=0.0, rules=Rules(missing_m=1.0))
+    shut = required(agl_m=200.0, heading=0.0, rules=Rules(missing_m=1.0))
     assert list(circling_ends(problem(), shut, SHARP)) == []
 
 
@@ -127,8 +127,8 @@ def test_neither_end_stays_the_same_while_all_others_are_tried() -> None:
 
 
 def both() -> tuple[FlightEnd, FlightEnd]:
-    start = next(straight_ends(problem(), wanted(), SHARP))
-    away = WantedEnd(np.array([4000.0, 0.0, 100.0]), SLOPE, None, None, Rules(eastwards=False))
+    start = next(straight_ends(problem(), required(), SHARP))
+    away = RequiredEnd(np.array([4000.0, 0.0, 100.0]), SLOPE, None, None, Rules(eastwards=False))
     return start, next(straight_ends(problem(), away, SHARP[::-1]))
 
 

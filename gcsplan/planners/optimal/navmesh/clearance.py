@@ -67,7 +67,7 @@ class PlaneSpec:
 
 
 class ClearanceGrid:
-    """The *excess* (floor minus cap, m) at the nodes of a plane's ``wanted`` cells (None: all), cut ``fineness`` times
+    """The *excess* (floor minus cap, m) at the nodes of a plane's ``chosen`` cells (None: all), cut ``fineness`` times
     finer, and the walls of the zones.
 
     ``whole``: the mesh is kept and can be read at all its nodes; other grids are valid only until the plane's next one.
@@ -75,15 +75,15 @@ class ClearanceGrid:
     """
 
     def __init__(
-        self, plane: Plane, spec: PlaneSpec, fineness: int = 1, wanted: Bools | None = None, *, whole: bool = False
+        self, plane: Plane, spec: PlaneSpec, fineness: int = 1, chosen: Bools | None = None, *, whole: bool = False
     ) -> None:
         cap_m, low, exact_m = spec.cap_m, spec.low, spec.exact_m
         problem = plane.problem
         limits, scale = problem.bound_limits if low else problem.limits, problem.airspace.scale
-        whole = whole or wanted is None
-        wanted = plane.inside if wanted is None else wanted
+        whole = whole or chosen is None
+        chosen = plane.inside if chosen is None else chosen
         self.plane, self.fineness, self.cap_m, self.low = plane, fineness, cap_m, low
-        self.row, self.col, last_row, last_col = box_of(wanted)
+        self.row, self.col, last_row, last_col = box_of(chosen)
         inner = np.s_[self.row : last_row, self.col : last_col]
         nodes = np.s_[self.row : last_row + 1, self.col : last_col + 1]
         top, ground, x, y = (
@@ -93,7 +93,7 @@ class ClearanceGrid:
         rows, cols = self.shape = (top.shape[0] - 1) * fineness + 1, (top.shape[1] - 1) * fineness + 1
         self._array = Scratch().array if whole else plane.scratch.array
         self._excess, self._floor, self._ground, self._x, self._y = (self._array(f"{k}", self.shape) for k in range(5))
-        self._span = _spans(wanted[inner], fineness)
+        self._span = _spans(chosen[inner], fineness)
         self._around = np.tile(np.array([0, cols], np.int32), (rows, 1)) if whole else columns_around(self._span, cols)
         self._diagonal = np.zeros((rows - 1) * (cols - 1), np.int8)
         looked_at = float((self._around[:, 1] - self._around[:, 0]).clip(0).sum())
@@ -113,7 +113,7 @@ class ClearanceGrid:
                 # Beside cliffs the horizontal clearance is the binding limit; the sum is more than both demand.
                 beside += limits.horizontal_clearance_m * scale
         fill(
-            top, ground, steep, x, y, np.ascontiguousarray(wanted[inner]), fineness, more, beside, cap_m,
+            top, ground, steep, x, y, np.ascontiguousarray(chosen[inner]), fineness, more, beside, cap_m,
             np.array(spec.ends).reshape(-1, 4), low, self._around, self._excess, self._floor, self._ground, self._x,
             self._y, self._diagonal,
         )  # fmt: skip
@@ -347,14 +347,14 @@ class ClearanceGrid:
 
 
 def mesh_of(
-    plane: Plane, cap_m: float, low: bool, fineness: int = 1, wanted: Bools | None = None, single: bool = False
+    plane: Plane, cap_m: float, low: bool, fineness: int = 1, chosen: Bools | None = None, single: bool = False
 ) -> Mesh:
     """Make the mesh of the plane at or below ``cap_m``: for bounds (``low``), all that any legal track may cross; for
     paths, only places that can be crossed legally.
 
-    ``wanted``: only these cells. ``single``: each free cell is a piece of its own. Raises Exhausted.
+    ``chosen``: only these cells. ``single``: each free cell is a piece of its own. Raises Exhausted.
     """
-    return ClearanceGrid(plane, PlaneSpec(cap_m, low), fineness, wanted, whole=single).mesh(single=single)
+    return ClearanceGrid(plane, PlaneSpec(cap_m, low), fineness, chosen, whole=single).mesh(single=single)
 
 
 def sampled(track: Floats, step_m: float) -> Floats:
@@ -373,11 +373,11 @@ def _apart(cones: list[Cone], cap_m: float, more_m: float) -> bool:
     )
 
 
-def _spans(wanted: Bools, fineness: int) -> Int32s:
-    """(rows, 2) for each row of cells, cut ``fineness`` times finer: the first ``wanted`` column, and the column after
+def _spans(chosen: Bools, fineness: int) -> Int32s:
+    """(rows, 2) for each row of cells, cut ``fineness`` times finer: the first ``chosen`` column, and the column after
     the last one."""
-    first, last = wanted.argmax(axis=1), wanted.shape[1] - wanted[:, ::-1].argmax(axis=1)
-    spans = np.stack([first, np.where(wanted.any(axis=1), last, first)], axis=-1) * fineness
+    first, last = chosen.argmax(axis=1), chosen.shape[1] - chosen[:, ::-1].argmax(axis=1)
+    spans = np.stack([first, np.where(chosen.any(axis=1), last, first)], axis=-1) * fineness
     return np.ascontiguousarray(np.repeat(spans, fineness, axis=0), np.int32)
 
 

@@ -15,11 +15,11 @@ SPARE = 0.999
 
 @kernel("f8[,] f8[,] f8[,] f8[,] f8[,] b1[,] i8 f8 f8 f8 f8[,] b1 i4[,] f8[,] f8[,] f8[,] f8[,] f8[,] i1[]")
 def fill(
-    top: Floats, ground: Floats, steep: Floats, x: Floats, y: Floats, wanted: Bools, fineness: int,
+    top: Floats, ground: Floats, steep: Floats, x: Floats, y: Floats, chosen: Bools, fineness: int,
     more: float, beside: float, cap: float, cones: Floats, low: bool, around: Int32s, excess: Floats, floor: Floats,
     under: Floats, fine_x: Floats, fine_y: Floats, diagonal: Int8s,
 ) -> None:  # fmt: skip
-    """Cut each ``wanted`` (rows - 1, cols - 1) cell into ``fineness`` parts a side and compute the values of the nodes.
+    """Cut each ``chosen`` (rows - 1, cols - 1) cell into ``fineness`` parts a side and compute the values of the nodes.
 
     ``floor`` is ``top`` + ``more`` + ``beside`` times a slope: for paths ``steep`` (rows, cols); for bounds (``steep``
     is empty) the least slope that holds within ``beside``, which is shortened, of all places next to the node.
@@ -28,12 +28,12 @@ def fill(
     `blank`). ``under`` is the ground. ``diagonal``: which diagonal to cut a cell along so that its triangles never lie
     above (``low``), or never below, the bilinear patch.
     """
-    rows, cols = wanted.shape
+    rows, cols = chosen.shape
     fine_cols = cols * fineness
     blank(excess, around, math.inf)
     for j in range(rows):
         for i in range(cols):
-            if not wanted[j, i]:
+            if not chosen[j, i]:
                 continue
             twist = top[j, i] + top[j + 1, i + 1] - top[j, i + 1] - top[j + 1, i]
             way = np.int8(1 if (twist > 0.0) == low else 0)
@@ -92,7 +92,7 @@ def _rises(top: Floats, row: float, col: float, rows: float, cols: float, along:
                 u = max(col - cols - i, 0.0) if k == 0 else min(col + cols - i, 1.0)
                 e, n = (b - a) * (1.0 - v) + (c - d) * v, (d - a) * (1.0 - u) + (c - b) * u
                 least_e, most_e, least_n, most_n = min(least_e, e), max(most_e, e), min(least_n, n), max(most_n, n)
-    # Of each component's range, the least slope is the one nearest to 0.
+    # The least slope is the one nearest to 0 in each component's range.
     e, n = max(least_e, -most_e, 0.0) / across, max(least_n, -most_n, 0.0) / along
     return math.sqrt(e * e + n * n)
 

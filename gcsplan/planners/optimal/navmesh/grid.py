@@ -251,10 +251,10 @@ def finer_plane(plane: Plane, cells: Bools, parts: int, stride: int, fit: Fit) -
     return finer, on_finer(plane, cells, finer)
 
 
-def box_of(wanted: Bools) -> tuple[int, int, int, int]:
+def box_of(chosen: Bools) -> tuple[int, int, int, int]:
     """First row and column that hold a true value, and the row and column after the last; (0, 0, 1, 1) if nothing is
     true."""
-    rows, cols = np.flatnonzero(wanted.any(axis=1)), np.flatnonzero(wanted.any(axis=0))
+    rows, cols = np.flatnonzero(chosen.any(axis=1)), np.flatnonzero(chosen.any(axis=0))
     if not len(rows):
         return 0, 0, 1, 1
     return int(rows[0]), int(cols[0]), int(rows[-1]) + 1, int(cols[-1]) + 1

@@ -288,10 +288,10 @@ class Necks:
         left, right = np.where(aside, one, other), np.where(aside, other, one)
         keys = mesh.joins[cut, 0].astype(np.int64) * mesh.pieces + mesh.joins[cut, 1]
         order = np.argsort(keys)
-        asked = left.astype(np.int64) * mesh.pieces + right
-        place = np.searchsorted(keys[order], asked).clip(0, len(cut) - 1)
+        sought = left.astype(np.int64) * mesh.pieces + right
+        place = np.searchsorted(keys[order], sought).clip(0, len(cut) - 1)
         open_ = (left >= 0) & (right >= 0) & _looked_at(mesh).ravel()[cells].all(axis=1)
-        open_ &= keys[order][place] == asked
+        open_ &= keys[order][place] == sought
         return cut[order][place[open_]], openings[open_], cells[open_]
 
 

@@ -2,7 +2,7 @@
 
 A level over ground (AGL) counts from the ground under the zone itself, also where it limits flight beside the zone,
 within reach. That *own ground* is read in two ways. For paths, on circles around a node (`look_beside`): as good as
-dense samples, and what is flown is checked. For bounds, cell by cell (`own_ground`): what holds for the corners of a
+dense samples, and the check judges the flight. For bounds, cell by cell (`own_ground`): what holds for the corners of a
 cell and those of another one within reach holds for every place of the two, because the zone's parts are convex, and
 so is what is within reach.
 
@@ -153,7 +153,7 @@ def look_beside(
     not reach. The zone is grown by ``reach``, so its own ground is where it is deeper than that. Nodes of cells without
     any free place are left out.
 
-    ``ground``: at the nodes; ``coarse``, ``x``, ``y``: at those of a lattice ``fineness`` times coarser; ``disc`` (N,
+    ``ground``: at the nodes; ``coarse``, ``x``, ``y``: at nodes of a lattice ``fineness`` times coarser; ``disc`` (N,
     2): the places around a node, m east and north, at which it is read. ``read`` (1,) counts them.
     """
     ex, ey = (x[0, 1] - x[0, 0]) / fineness, (y[0, 1] - y[0, 0]) / fineness
@@ -207,7 +207,7 @@ def _covers(
     x: Floats, y: Floats, fineness: int, zones: Floats, edges: Floats, z: int, reach: float, near: float, j: int,
     i: int, jj: int, ii: int,
 ) -> bool:  # fmt: skip
-    """Whether cell (jj, ii) lies wholly in a zone, and each of its corners within ``near`` of that of cell (j, i)."""
+    """Whether cell (jj, ii) lies wholly in a zone, each corner within ``near`` of the same corner of cell (j, i)."""
     for k in range(4):
         v, u = k >> 1, k & 1
         px, py = node(x, fineness, jj + v, ii + u), node(y, fineness, jj + v, ii + u)
@@ -222,8 +222,8 @@ def lowest_and_highest(
     ground: Floats, x: Floats, y: Floats, fineness: int, zones: Floats, edges: Floats, z: int, reach: float,
     near: float, j: int, i: int,
 ) -> tuple[int, int, int, int, int]:  # fmt: skip
-    """Of the cells whose ground is a zone's own and within reach of cell (j, i): row and column of the one with the
-    lowest ground and of the one with the highest, all -1 if there is none; and the number of cells that were read.
+    """Row and column of the cell with the lowest ground, and of the cell with the highest, among cells whose ground is
+    a zone's own and within reach of cell (j, i); all -1 if there is none. Then the number of cells that were read.
 
     ``ground``, ``x``, ``y``: at the nodes of a lattice of which cell (j, i) is a part, ``fineness`` times finer.
     ``reach``: metres by which the zone is grown; ``near``: a little less, from each place of the cell to that ground.

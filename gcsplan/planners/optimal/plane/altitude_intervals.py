@@ -205,7 +205,7 @@ class Reached:
     def __init__(self, every: AltitudeIntervals, limits: Limits, limit_m: float) -> None:
         self._limits, self._most_m = limits, limit_m
         self._known: dict[float, AltitudeIntervals] = {limit_m: every}
-        self._asked: set[float] = set()
+        self._computed: set[float] = set()
         self.looked_at = 0
         """Intervals that the last call of `within` began with."""
 
@@ -216,9 +216,9 @@ class Reached:
     def within(self, limit_m: float, near: Bools) -> AltitudeIntervals:
         """`known`, computed for this very length, of the cells that are ``near`` (cells,)."""
         self.looked_at = 0
-        if limit_m in self._asked and limit_m in self._known:
+        if limit_m in self._computed and limit_m in self._known:
             return self._known[limit_m]
-        self._asked.add(limit_m)
+        self._computed.add(limit_m)
         found = self.known(limit_m)
         found = found.only(near[found.cell])
         self.looked_at = len(found.cell)

@@ -79,7 +79,7 @@ class DetourSearch:
             pushed += 1
             key = self.incumbent.least(length_m + 0.5 * (sum(choice.least_m) + sum(choice.most_m)))
             if over is not None and found is not None:
-                key = found.cost if found.cost > self.incumbent.bound * (1.0 + self.incumbent.wanted) else 0.0
+                key = found.cost if found.cost > self.incumbent.bound * (1.0 + self.incumbent.most_gap) else 0.0
             heappush(open_set, (key, pushed, length_m, choice, found, over))
 
         for root in roots:
@@ -101,10 +101,10 @@ class DetourSearch:
                 if (*sides, found) not in flat:
                     self._split(length_m, choice, found, hoped, push)
                 continue
-            asked = *sides, choice.most_m, choice.lower_m
-            if asked in done:
+            case = *sides, choice.most_m, choice.lower_m
+            if case in done:
                 continue
-            done.add(asked)
+            done.add(case)
             looked += 1
             known_terminals = given if choice is roots[0] else None
             terminals = known_terminals or self.terminals(choice)

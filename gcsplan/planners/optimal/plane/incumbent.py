@@ -41,8 +41,8 @@ class Incumbent:
         self.problem, self.sharp, self.piece = problem, sharp, piece
         self.budget: Budget = problem.budget
         self.rounding = problem.rounding()
-        self.wanted = problem.gap_percent / 100.0
-        self.nearer = NEARER * self.wanted
+        self.most_gap = problem.gap_percent / 100.0
+        self.nearer = NEARER * self.most_gap
         self.judge = LegJudge(problem)
         self.best: Floats | None = None
         self.pinned: Bools | None = None
@@ -195,7 +195,7 @@ class Incumbent:
     def done(self) -> bool:
         """Whether the gap to the reported bound is as small as requested; that bound is of paths whose ends may lie
         beside the exact ones."""
-        return self.cost <= self.rounding.bound(self.bound) * (1.0 + self.wanted)
+        return self.cost <= self.rounding.bound(self.bound) * (1.0 + self.most_gap)
 
     def goes_on(self) -> bool:
         """Whether the gap is larger than requested, more bound is of use, and budget is left."""
@@ -204,7 +204,7 @@ class Incumbent:
     @property
     def needs_terrain(self) -> bool:
         """Whether a path is known, and only paths that leave the surface may still be better; see `Problem.leaving`."""
-        return self.best is not None and self.bound > self.problem.leaving * (1.0 + self.wanted)
+        return self.best is not None and self.bound > self.problem.leaving * (1.0 + self.most_gap)
 
     @property
     def is_steep(self) -> bool:

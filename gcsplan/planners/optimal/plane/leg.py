@@ -103,11 +103,11 @@ def choose(problem: Problem, place: tuple[float, float], straight_m: float, box:
     fitting = 1e6 * problem.budget.megabytes / NODE_BYTES / legs
     most = min(max(MOST_FIRST / legs, MANY), fitting)
     cell_m, finest_m = float(size.max()), max(min(FINE_M, straight_m / FINE_PARTS), LEAST_M)
-    wanted_m = max(_wanted_m(problem, straight_m), LEAST_M, cell_m * math.sqrt(cells / most))
-    parts = max(1, round(cell_m / wanted_m))
+    first_m = max(_first_cell_m(problem, straight_m), LEAST_M, cell_m * math.sqrt(cells / most))
+    parts = max(1, round(cell_m / first_m))
     # Merged cells only bound the heights between their nodes, so cells are merged only if that saves many nodes.
     fine_stride = 1 if parts > 1 or finest_m < 2.0 * cell_m else round(finest_m / cell_m)
-    stride = fine_stride * max(1, round(wanted_m / cell_m / fine_stride))
+    stride = fine_stride * max(1, round(first_m / cell_m / fine_stride))
     if parts > 1 or (stride < 3 and cells <= fitting):
         stride = fine_stride = 1
     ratio, cut = stride // fine_stride, 1
@@ -116,7 +116,7 @@ def choose(problem: Problem, place: tuple[float, float], straight_m: float, box:
     return Cells(parts, stride, fine_stride, ratio, cut, cells * (parts / stride) ** 2)
 
 
-def _wanted_m(problem: Problem, straight_m: float) -> float:
+def _first_cell_m(problem: Problem, straight_m: float) -> float:
     """Cell width for the first look, metres, from the length of the leg and the sizes of the zones."""
     least, most = straight_m / 250.0, min(straight_m / 60.0, COARSE_M)
     radii = [
@@ -212,9 +212,9 @@ class Leg:
         detours = (*(d for d in DETOURS if d < self.farthest), self.farthest)
         limited = math.isfinite(within_m)
         if limited:
-            asked = max(within_m / self.straight_m, LEAST_DETOUR) * (1.0 + 1e-9)
-            much = asked > DETOURS[0] and needs_most(self.problem, self._around(asked))
-            detours = (self._detour if self._detour >= asked else math.inf if much else asked,)
+            least_detour = max(within_m / self.straight_m, LEAST_DETOUR) * (1.0 + 1e-9)
+            much = least_detour > DETOURS[0] and needs_most(self.problem, self._around(least_detour))
+            detours = (self._detour if self._detour >= least_detour else math.inf if much else least_detour,)
         for detour in detours:
             if not limited and detour < self.farthest:
                 if detour * self.straight_m < self.length_m * (1.0 + slack) < math.inf:
@@ -370,20 +370,20 @@ class Leg:
         close = self._closer(limit)
         if close.left is self._guide or self._finer > 1:
             return False
-        wanted = close.away.between(close.left, limit)
-        row, col, last_row, last_col = box_of(wanted)
+        chosen = close.away.between(close.left, limit)
+        row, col, last_row, last_col = box_of(chosen)
         most = MOST_NODES if self.problem.airspace.surface.ground_m.size < LARGE else MOST_BESIDE
         if (last_row - row) * (last_col - col) * (self.cells_of.ratio * parts) ** 2 > most:
             return False
-        if not fits_memory(self.problem, wanted, 0, self.cells_of.ratio * parts):
+        if not fits_memory(self.problem, chosen, 0, self.cells_of.ratio * parts):
             return False
-        if self.cells_of.fine_stride > 1 or np.count_nonzero(wanted) * self.cells_of.ratio**2 > MOST_ALONE:
+        if self.cells_of.fine_stride > 1 or np.count_nonzero(chosen) * self.cells_of.ratio**2 > MOST_ALONE:
             cut = 1
         finer = cut * (self.cells_of.parts * self.cells_of.cut if self.cells_of.stride == 1 else self.cells_of.parts)
         # The nodes of the two lattices may differ in place by `LOOSE.bent_m`.
         more = limit + 2.0 * LOOSE.bent_m
         found = self._each_cell(
-            *finer_plane(self.plane, wanted, finer, self.cells_of.fine_stride, CLOSE), more, close.away
+            *finer_plane(self.plane, chosen, finer, self.cells_of.fine_stride, CLOSE), more, close.away
         )
         if found is None:
             return False
@@ -451,12 +451,12 @@ class Leg:
             self._close = found
         return self._close
 
-    def _each_cell(self, plane: Plane, wanted: Bools, limit_m: float, ahead: Guide) -> Nearby | None:
-        """Flood the ``wanted`` cells of a lattice, each as a piece of its own; None if the work exceeds its limit.
+    def _each_cell(self, plane: Plane, chosen: Bools, limit_m: float, ahead: Guide) -> Nearby | None:
+        """Flood the ``chosen`` cells of a lattice, each as a piece of its own; None if the work exceeds its limit.
         ``ahead``: distances from the start over a mesh that has at least the same free cells."""
         a, b = self.start.place, self.goal.place
         try:
-            mesh = mesh_of(plane, self.top_m, True, 1, wanted, single=True)
+            mesh = mesh_of(plane, self.top_m, True, 1, chosen, single=True)
             left = mesh.flood(b, a, limit_m, math.inf, ahead)[1]
             away = mesh.flood(a, b, limit_m, math.inf, left)[1]
         except Exhausted:

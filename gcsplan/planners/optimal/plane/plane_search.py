@@ -112,8 +112,8 @@ class PlaneSearch:
             if not self.incumbent.budget.goes_on():
                 return None
             limit = self.limit(leg)
-            wanted = leg.corridor(limit) if fine and leg.cells_of.has_fine else None
-            way = leg.track(cap_m - choice.lower_m, wanted, limit, choice, narrow)
+            corridor = leg.corridor(limit) if fine and leg.cells_of.has_fine else None
+            way = leg.track(cap_m - choice.lower_m, corridor, limit, choice, narrow)
             if way is None:
                 return None
             ways.append(way.points)

@@ -90,7 +90,7 @@ class Bound(Search):
         if BY_INTERVALS not in self._chosen and incumbent.climbs:
             return BY_INTERVALS
         # Under a maximum AGL it takes twice as long as all others together, for a tenth or two of the gap.
-        far = incumbent.gap > REFINED_GAP * incumbent.wanted and self.problem.limits.max_agl_m is None
+        far = incumbent.gap > REFINED_GAP * incumbent.most_gap and self.problem.limits.max_agl_m is None
         return REFINED if REFINED not in self._chosen and far else None
 
     def applies(self) -> bool:
@@ -266,14 +266,14 @@ def bound_cheaper(plane: PlaneSearch, cost: float, *, by_intervals: bool = False
     one = len(plane.legs) == 1
     tracks = []
     for leg, limit in _limits(plane, most_m):
-        wanted = leg.corridor(limit)
+        corridor = leg.corridor(limit)
         if by_intervals:
             intervals = leg.intervals(limit)
             if not len(intervals.cell):
                 tracks.append(min(limit, leg.reach_m))
                 continue
-            wanted = wanted.within(intervals.cells)
-        tracks.append(leg.bound(plane.top_m, wanted, limit, True, lambda track: one and least([track]) >= cost))
+            corridor = corridor.within(intervals.cells)
+        tracks.append(leg.bound(plane.top_m, corridor, limit, True, lambda track: one and least([track]) >= cost))
     return least(tracks)
 
 

@@ -98,8 +98,8 @@ def bound_by_caps(plane: PlaneSearch) -> None:
 
     def track_m(cap: float, care: int) -> float:
         limits = [plane.limit(leg) for leg in plane.legs]
-        wanted = [leg.corridor(limit) if care else None for leg, limit in zip(plane.legs, limits, strict=True)]
-        looked_at = zip(plane.legs, wanted, limits, strict=True)
+        corridors = [leg.corridor(limit) if care else None for leg, limit in zip(plane.legs, limits, strict=True)]
+        looked_at = zip(plane.legs, corridors, limits, strict=True)
         return sum(leg.bound(cap, cells, limit, care > 0) for leg, cells, limit in looked_at)
 
     def try_at(cap: float) -> None:

@@ -224,8 +224,8 @@ def _links_of_end(problem: Problem, k: int, end: Floats, nodes: Floats, spacing_
 
 def _levels(slope: float, spacing_m: float, range_m: float, places: int) -> int:
     """How many altitudes there are over each of so many places."""
-    wanted = math.ceil(range_m / (slope * spacing_m)) + 1 if math.isfinite(slope) else LEVELS[0]
-    return max(min(wanted, LEVELS[1], 2 * NODES // max(places, 1)), 2)
+    needed = math.ceil(range_m / (slope * spacing_m)) + 1 if math.isfinite(slope) else LEVELS[0]
+    return max(min(needed, LEVELS[1], 2 * NODES // max(places, 1)), 2)
 
 
 def _box(problem: Problem, ends: Floats, limit: float) -> tuple[Floats, Floats]:
