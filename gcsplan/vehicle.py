@@ -121,7 +121,7 @@ class Energy:
         return max(self.hover_w, self.base_w + self.horizontal_j_per_m * airspeed_m_s)
 
     def unlike_fitted(self, airspeed_m_s: float) -> bool:
-        """Whether an airspeed is so far from those that the numbers are fitted to that they may not hold."""
+        """Whether an airspeed is so far from the fitted ones that the numbers may not hold."""
         if self.fitted_m_s is None:
             return False
         slow, fast = self.fitted_m_s

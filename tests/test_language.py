@@ -49,7 +49,7 @@ RULES = (
     *(rule(rf"\b{term}\b", cure) for term, cure in TERMS.items()),
     rule(
         r"(?:^|[.!?:;,(—–]\s|\b(?:of|only|all|also|even|just|alone|both|for|by|in|on|at|without|see|nor|that|among)\s)"
-        r"(?:that|those) of\b",
+        r"(?:(?:that|those) of|those (?:that|which|who|with|without))\b",
         "name the thing: 'the limits of the check', not 'those of the check'",
     ),
     rule(
@@ -200,6 +200,7 @@ def test_sentences_are_plain() -> None:
         ("The limits of the check.", True),
         ("``limits``: those of the check.", False),
         ("The limits are lower than those of the check.", True),
+        ("The fence, and zones: those that lie near it.", False),
         ("Of each leg: its length.", False),
         ("What is stale is refused.", False),
         ("What is left: two files.", True),

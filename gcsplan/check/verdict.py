@@ -215,7 +215,7 @@ class Verdict:
 
     @property
     def nearest(self) -> LegFigures | None:
-        """The stretch nearest to a zone among those that meet a zone's height band; None if there is none."""
+        """The stretch nearest to a zone whose height band it meets; None if there is none."""
         legs = [leg for leg in self.legs if leg.nearest_zone]
         return min(legs, key=lambda leg: leg.zone_clearance_m, default=None)
 

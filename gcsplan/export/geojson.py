@@ -60,7 +60,7 @@ def write_geojson(name: str, tracks: Sequence[FlownTrack], zones: Sequence[Zone]
 
 
 def _figures(point: WayPoint, amsl_m: float) -> dict[str, Any]:
-    """The properties of a way point; those that are not known are left out."""
+    """The properties of a way point; unknown ones are left out."""
     about = {
         "name": point.name,
         "number": point.number,

@@ -142,7 +142,7 @@ def with_numba(
     """The numba functions of plain ``kernels`` by name.
 
     ``others``: the plain functions, kernels included, that kernels call; each by the id of the object that modules know
-    under its name. ``inlined``: ids of those that are copied into their caller.
+    under its name. ``inlined``: ids of the functions that are copied into their caller.
     """
     scopes: dict[int, dict[str, Any]] = {}
 

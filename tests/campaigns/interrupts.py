@@ -71,7 +71,7 @@ class Case:
     after: Tree = field(default_factory=dict)
 
     def tree(self) -> Tree:
-        """The files of the output, without those that differ each time."""
+        """The files of the output, but for the ones that differ each time."""
         root = self.folder / self.written
         if not self.written or not root.is_dir():
             return {}

@@ -401,7 +401,7 @@ def end_processes() -> None:
 def _deaf() -> Iterator[None]:
     """Processes that are started here do not hear Ctrl-C: this process ends them, without a traceback from each."""
     if hasattr(signal, "pthread_sigmask"):
-        # This thread, those that it starts and their processes; others of this process still hear it.
+        # The block holds for this thread, its children and their processes; other threads still hear Ctrl-C.
         blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             yield

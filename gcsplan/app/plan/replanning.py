@@ -115,8 +115,8 @@ def _within_budget(problem: Problem, tried: Sequence[VehiclePlan], begun_s: floa
 
 
 def _of_all(tried: Sequence[VehiclePlan]) -> Solution:
-    """The solution of the last of some plans, with the best lower bound of those that have its ends: all of them hold
-    under the limits of the check, whatever margins the paths keep. Times and searches are those of all."""
+    """The solution of the last plan, with the best lower bound of the plans that have its ends: all bounds hold under
+    the limits of the check, whatever margins the paths keep. Times and searches count all plans."""
     found = [plan.solution for plan in tried]
     first, last = found[0], found[-1]
     if len(found) == 1:

@@ -172,7 +172,7 @@ class JobResult:
     details: Mapping[str, Any] | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """The result for JSON, fixed keys first; of the others, those with a value.
+        """The result for JSON: fixed keys first, then the other keys that have a value.
 
         ``details`` are the session's; the later ``message`` and ``warnings`` of this result replace the session's.
         """

@@ -50,7 +50,7 @@ ENDS = (cmd.LAND, cmd.VTOL_LAND, cmd.RTL, cmd.LOITER_UNLIM)
 
 
 def flown_in_order(mission: Mission) -> tuple[MissionItem, ...]:
-    """The items without those that only a return leads to: behind an end and a start such as DO_LAND_START."""
+    """The items but for the ones to which only a return leads: behind an end and a start such as DO_LAND_START."""
     for k, (item, after) in enumerate(pairwise(mission.items), start=1):
         if item.command in ENDS and after.command in LAND_STARTS and mission.autopilot.is_ardupilot:
             return mission.items[:k]

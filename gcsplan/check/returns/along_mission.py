@@ -201,7 +201,7 @@ class _Judge:
         return np.asarray(ways.rise_m <= slope * np.maximum(ways.away_m - ways.reach_m - 2.0 * self.about_m, 0.0))
 
     def _beyond(self, join: Join) -> tuple[bool, bool, bool]:
-        """Whether what follows the join is clear, legal, and known, for those who come from anywhere."""
+        """Whether the flight behind the join is clear, legal, and known, for a return from anywhere."""
         if join.unknown:
             return True, True, False
         if self.copter:

@@ -44,7 +44,7 @@ def stretches_of(
     *,
     but: int | None = None,
 ) -> tuple[UnsafeStretch, ...]:
-    """The stretches that fail ``grade`` at ``level``, in the order flown, without those that fail the grade ``but``.
+    """The stretches that fail ``grade`` at ``level`` but not the grade ``but``, in the order flown.
 
     ``target``: where the returns lead, needed to locate the obstacle; with None neither the obstacle's place nor an
     altitude is reported.

@@ -109,8 +109,8 @@ def trailing_s(
 ) -> Floats:  # fmt: skip
     """(P,) seconds of parts that are flown one after another, ``part_m`` (P,) long and with ``rise_m`` (P,).
 
-    ``rates_m_s`` (P, 2): of climb and descent; ``speed_m_s`` (P,): the highest speed on level ground. Those that
-    ``follows`` (P,) follow the ground, the others are flown at that speed. ``accel_m_s2``, ``vertical_m_s2``:
+    ``rates_m_s`` (P, 2): of climb and descent; ``speed_m_s`` (P,): the highest speed on level ground. Parts that
+    ``follows`` (P,) marks follow the ground, the others are flown at that speed. ``accel_m_s2``, ``vertical_m_s2``:
     along the leg, and up or down.
     """
     seconds = part_m / speed_m_s

@@ -38,7 +38,7 @@ from gcsplan.world.terrain.grid import (
 LEAST_SPACING_M, MOST_SPACING_M = 5, 1000
 MOST_SPACINGS = 4
 MOST_WAITING = 64
-"""Blocks that wait to be sent; the vehicle asks again for those that are dropped. Its cache holds 12."""
+"""Blocks that wait to be sent; the vehicle asks again for dropped ones. Its cache holds 12."""
 
 _PAUSE_S = 0.01
 _PARTS_AT_ONCE = 4

@@ -102,7 +102,7 @@ PLACELESS = frozenset(
         cmd.DO_VTOL_TRANSITION, cmd.DO_WINCH,
     }
 )  # fmt: skip
-"""Commands that PX4 accepts in MAV_FRAME_MISSION (2); those that are not in `LOCATED`, in no other frame."""
+"""Commands that PX4 accepts in MAV_FRAME_MISSION (2); commands outside of `LOCATED`, in no other frame."""
 
 KEPT_WHOLE = frozenset({cmd.POLYGON_IN, cmd.POLYGON_OUT, cmd.CIRCLE_IN, cmd.CIRCLE_OUT, cmd.RALLY_POINT})
 _FENCE = range(cmd.FENCE_RETURN_POINT, cmd.CIRCLE_OUT + 1)

@@ -46,7 +46,7 @@ def authority_of(given: Any) -> str:
 
 
 def unread(given: dict[str, Any], known: Collection[str], *, all_of_them: bool = False) -> list[Remark]:
-    """A remark on the members that the format does not have: those that seem to limit the zone, or ``all_of_them``."""
+    """A remark on the members that the format does not have and that seem to limit the zone, or on ``all_of_them``."""
     found = []
     for key, value in given.items():
         meaning = meaning_of(key)

@@ -159,7 +159,7 @@ def _broken(problem: Problem, place: tuple[float, float, float]) -> tuple[Violat
 
 
 def _shut_by(problem: Problem, place: tuple[float, float], low: float, high: float) -> list[Zone]:
-    """The zones that shut all altitudes from ``low`` to ``high`` at a place, each by itself. Those with a level over
+    """The zones that shut all altitudes from ``low`` to ``high`` at a place, each by itself. Zones with a level over
     ground count only inside their shape: beside it, ground elsewhere decides."""
     air, limits, here = problem.airspace, problem.limits, np.array([place])
     table = air.zone_table

@@ -207,8 +207,8 @@ LIGHT_SAMPLES = 12
 def in_full(page: Page) -> frozenset[int]:
     """The numbers of the vehicles that have profiles and tables of their own.
 
-    Of more than `MOST_WHOLE` vehicles: those with a finding, something not judged or no safe return, then the two that
-    come nearest to each other, then those with the least room above the ground.
+    Above `MOST_WHOLE` vehicles, they are the ones with a finding, something not judged or no safe return, then the two
+    that come nearest to each other, then vehicles with the least room above the ground.
     """
     if len(page.subjects) <= MOST_WHOLE:
         return frozenset(range(len(page.subjects)))

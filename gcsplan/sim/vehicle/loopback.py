@@ -31,8 +31,8 @@ class LoopbackVehicle:
     """One vehicle that stands on the ground and stores a mission, a fence and rally points.
 
     ``lat_deg``, ``lon_deg``, ``amsl_m``: its position, which is also its home. ``boot_s``: seconds after being switched
-    on for which it answers NO_SPACE (ArduPilot) or nothing (PX4). ``parameters``: those that differ from the defaults,
-    by their oldest names. ``firmware``: its version, None: the default of `firmware_of`.
+    on for which it answers NO_SPACE (ArduPilot) or nothing (PX4). ``parameters``: values that differ from the
+    defaults, by their oldest names. ``firmware``: its version, None: the default of `firmware_of`.
     """
 
     def __init__(  # noqa: PLR0913 - options by name, each with a default

@@ -46,7 +46,7 @@ def test_of_a_larger_fleet_those_with_problems_and_least_room_are_shown() -> Non
     room = {k: s.verdict.lowest.min_agl_m for k, s in enumerate(page.subjects) if s.verdict.lowest is not None}
     rest = full - unsafe - near
     assert max(room[k] for k in rest) <= min(room[k] for k in range(len(page.subjects)) if k not in full)
-    assert f"Of {MOST_WHOLE + 1} vehicles {MOST_FULL} are shown" in only_some(page, full)
+    assert f"{MOST_FULL} of {MOST_WHOLE + 1} vehicles are shown" in only_some(page, full)
     assert [n == LIGHT_SAMPLES for n in samples_of(page, full)] == [k not in full for k in range(len(page.subjects))]
 
 

@@ -34,14 +34,14 @@ def test_of_a_large_fleet_all_are_on_the_map_and_some_have_profiles() -> None:
     least = page.separation.least if page.separation is not None else None
     assert least is not None
     assert {str(int(name[3:]) - 1) for name in least.vehicles} <= profiles
-    assert "Of 130 vehicles 24 are shown" in read.text
+    assert "24 of 130 vehicles are shown" in read.text
     assert "1 without a mission, left out" in read.text
     assert "it is <shut> in" in read.text
     assert {int(n) for n in re.findall(r'<tr[^>]* data-vehicle="(\d+)"', text)} == set(range(130))
     assert len(text) < 4_000_000
     whole = render_page(many_page(100))
     assert len(set(re.findall(r'id="profile-(\d+)"', whole))) == 100
-    assert "are shown: first vehicles with problems" not in whole
+    assert "vehicles are shown: first" not in whole
 
 
 def test_the_nearest_two_over_time_are_those_of_all_pairs() -> None:
