@@ -66,11 +66,12 @@ def module(session: nox.Session, python: str, *arguments: str) -> None:
 
 @nox.session
 def lint(session: nox.Session) -> None:
-    """Rules, format, spelling."""
+    """Rules, format, spelling, language."""
     python = ready(session, "dev")
     module(session, python, "ruff", "check", ".")
     module(session, python, "ruff", "format", "--check", ".")
     module(session, python, "codespell_lib")
+    module(session, python, "tests.test_language")
 
 
 @nox.session
