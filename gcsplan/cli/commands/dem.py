@@ -75,7 +75,7 @@ def fetch(
     ways = {"MISSION": mission, "--around": around, "--tiles": tiles}
     given = [name for name, value in ways.items() if value is not None]
     if len(given) != 1:
-        raise UsageError(f"which area? Give one of {', '.join(ways)}, not {' and '.join(given) or 'none'}")
+        raise UsageError(f"which area? Give one of {', '.join(ways)}; given {' and '.join(given) or 'none'}")
     if (around is None) != (radius_km is None):
         raise UsageError("--around LAT,LON and --radius-km N belong together")
     chosen = _source(source)

@@ -93,7 +93,7 @@ def test_a_place_is_fetched_with_the_area_around_it(run: Any, served: Served) ->
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ((), "which area? Give one of MISSION, --around, --tiles, not none"),
+        ((), "which area? Give one of MISSION, --around, --tiles; given none"),
         (("ridge.yaml", "--tiles", "N36W085"), "given MISSION and --tiles"),
         (("--around", "36.5,-84.5"), "--around LAT,LON and --radius-km N belong together"),
         (("ridge.yaml", "--radius-km", "3"), "--around LAT,LON and --radius-km N belong together"),
@@ -101,7 +101,7 @@ def test_a_place_is_fetched_with_the_area_around_it(run: Any, served: Served) ->
         (("--tiles", "N36W85"), "names such as N36W085, with commas: given 'N36W85'"),
         (("--tiles", ","), "given 0 of them"),
         (("--tiles", "N36W085", "--source", "glo30"), "there is no source 'glo30'"),
-        (("--tiles", "N36W085", "--mirror", "mirror.example"), "--mirror: an address such as https://"),
+        (("--tiles", "N36W085", "--mirror", "mirror.example"), "--mirror: expected an address such as https://"),
         (("ridge.yaml", "--source", "srtm"), "ridge.yaml says `dem: copernicus-glo30`; change it there"),
         (("nothing.yaml",), "nothing.yaml: there is no such file"),
         (("sample.yaml",), "terrain.dem: names no published source"),
