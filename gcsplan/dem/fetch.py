@@ -69,7 +69,7 @@ class Fetch:
         self._lists: dict[str, tuple[frozenset[str], str] | LinkError] = {}
 
     def run(self, cells: Sequence[Cell]) -> list[Fetched]:
-        """Bring every tile that is not in the cache. Raises LinkError, naming each that could not be had."""
+        """Bring every tile that is not in the cache. Raises LinkError, naming each that could not be downloaded."""
         done: list[Fetched] = []
         failed: list[tuple[Cell, GcsplanError]] = []
         for i, cell in enumerate(cells):

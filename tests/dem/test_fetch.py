@@ -118,7 +118,7 @@ def test_four_tiles_over_a_lossy_server_end_right_or_with_a_clear_error(
         except LinkError as why:
             said.append(str(why))
             is_in_order(tmp_path)
-    assert all("could not be had" in words for words in said)
+    assert all("could not be downloaded" in words for words in said)
     assert is_in_order(tmp_path) == {cell.name for cell in FOUR}
 
 

@@ -326,7 +326,7 @@ def test_bad_questions_are_refused() -> None:
         Rules(30.0, window_s=math.nan)
     with pytest.raises(InputError, match="separation_m"):
         Rules(-1.0)
-    with pytest.raises(InputError, match="no vehicle"):
+    with pytest.raises(InputError, match="at least one vehicle"):
         separation([], Rules(30.0))
     alone = separation([a], Rules(30.0))
     assert alone.safe

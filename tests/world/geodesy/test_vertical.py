@@ -131,7 +131,7 @@ NAVD88_SHIFTED = (
     [
         ('VERT_CS["Site 7",VERT_DATUM["Site 7",2005],UNIT["metre",1],AXIS["Up",UP]]', "'Site 7', which no register"),
         ('VERT_CS["unnamed",VERT_DATUM["unnamed",2005],UNIT["metre",1],AXIS["Up",UP]]', "which no register knows"),
-        (NAVD88_SHIFTED, "'Site' are shifted from those in 'NAVD88 height'"),
+        (NAVD88_SHIFTED, "'Site' are shifted from 'NAVD88 height'"),
     ],
 )
 def test_a_vertical_system_of_a_file_s_own_is_refused_by_name(vertical: str, words: str) -> None:

@@ -48,7 +48,7 @@ def test_a_cost_that_is_not_the_known_one_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("python", [Path("/nowhere/python"), Path(sys.executable)])
 def test_without_metaevobox_the_message_says_how_to_get_it(python: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"MetaEvoBox wants an environment of its own: .*pip install") as raised:
+    with pytest.raises(InputError, match=r"MetaEvoBox needs an environment of its own: .*pip install") as raised:
         metabox.run(tmp_path, python)
     assert raised.value.problems[0].where == str(python)
 
@@ -58,7 +58,7 @@ def test_without_metaevobox_the_message_says_how_to_get_it(python: Path, tmp_pat
     [
         ({"algorithms": ["gwoo"]}, "gwo"),
         ({"instances": 57}, "1 to 56 instances"),
-        ({"runs": 0}, "given 2, 0, 2500 and 1"),
+        ({"runs": 0}, "not 2, 0, 2500 and 1"),
         ({"evaluations": 99}, "100 evaluations or more"),
     ],
 )

@@ -83,7 +83,7 @@ def test_another_clock_changes_the_files_of_times_alone(
 
 def test_what_is_said_of_the_tables_is_worked_out_from_them() -> None:
     krill = " ".join(remarks("krill-forest"))
-    assert "5 are 14.32 J/m" in krill
+    assert "5 of the paper's 9 printed energies are 14.32 J/m" in krill
     assert "1.0 % against abc" in krill
     assert "2.1 % against aco" in krill
     msfoa = [" ".join(remarks(f"msfoa-{i}")) for i in (1, 2, 3)]
