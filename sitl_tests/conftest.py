@@ -11,13 +11,15 @@ from typing import Any
 
 import pytest
 
+from tests.support import effort
+
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
     """The scheduler that pyproject.toml chooses, with the groups of the module docstring."""
     from xdist.scheduler import LoadGroupScheduling
 
-    quick = config.getoption("markexpr") == "not slow"
+    quick = config.getoption("markexpr") == effort.QUICK
 
     class Together(LoadGroupScheduling):
         def _split_scope(self, nodeid: str) -> str:

@@ -8,6 +8,9 @@ from __future__ import annotations
 PART, LEAST = 8, 6
 """The quick suite takes an eighth of the draws, but at least six (all of them if there are fewer)."""
 
+QUICK = "not slow and not nightly"
+"""What pyproject.toml selects by default, and thus the quick suite."""
+
 full = True
 """Whether this run takes all draws; `tests.conftest` sets it before tests are collected."""
 
