@@ -105,6 +105,12 @@ def slow(session: nox.Session) -> None:
 
 
 @nox.session
+def nightly(session: nox.Session) -> None:
+    """Tests that do at length what a campaign does in each change, or that a change seldom breaks."""
+    module(session, ready(session, "test", "cluster", "parquet"), "pytest", "-m", "nightly", *session.posargs)
+
+
+@nox.session
 def coverage(session: nox.Session) -> None:
     """Statements and branches that the quick suite reaches. Kernels are left out: they run compiled."""
     python = ready(session, "dev", "cluster", "parquet")

@@ -23,7 +23,7 @@ from tests.support import effort
 def pytest_configure(config: pytest.Config) -> None:
     os.environ.pop("GCSPLAN_UNITS", None)  # the suite reads the words of the default
     os.environ["GCSPLAN_CLOCK"] = "off"
-    effort.full = config.getoption("markexpr") != "not slow"
+    effort.full = config.getoption("markexpr") != effort.QUICK
     settings.register_profile("fixed", derandomize=True, deadline=None, max_examples=effort.draws(100))
     settings.load_profile("fixed")
 

@@ -14,16 +14,15 @@ import pytest
 
 from gcsplan.app.check.files import check_files
 from gcsplan.app.check.verdict_json import verdict_of
-from gcsplan.app.output.files import outputs_of, report_of, summary_of
+from gcsplan.app.output.files import summary_of
 from gcsplan.app.output.report import render_rehearsal
 from gcsplan.app.plan.model import Plan, VehiclePlan
-from gcsplan.app.rehearse import rehearse
 from gcsplan.check.verdict import Verdict, by_item
 from gcsplan.cli.output.console import plan_row
 from gcsplan.cli.output.verdict_table import verdict_table
 from gcsplan.export.summary import write_summary
 from gcsplan.figures import floored, steepened
-from tests.support.plans import CASES, SLOW, cases, planned, text_rows
+from tests.support.plans import CASES, SLOW, cases, flown, planned, reported, text_rows, written
 from tests.support.shown import number, seconds
 
 pytestmark = pytest.mark.xdist_group("plans")  # one process plans the missions, not three
@@ -85,7 +84,7 @@ def test_the_table_shows_it(case: str) -> None:
 def test_json_and_csv_hold_it(case: str) -> None:
     _, done = planned(case)
     told = {v["name"]: v for v in summary_of(done)["vehicles"]}
-    rows = list(csv.DictReader(io.StringIO(outputs_of(done)["profile.csv"])))
+    rows = list(csv.DictReader(io.StringIO(written(case)["profile.csv"])))
     for v in done.vehicles:
         entry, true, verdict = told[v.name], truth(v, done), v.verdict
         for key, name in (
@@ -115,7 +114,7 @@ def test_json_and_csv_hold_it(case: str) -> None:
 @cases
 def test_the_report_shows_it(case: str) -> None:
     _, done = planned(case)
-    page = report_of(done)
+    page = reported(case)
     for v in done.vehicles:
         true = truth(v, done)
         card = page.split(f"</i>{v.name}<span")[1].split("</dl>")[0]
@@ -160,7 +159,7 @@ def agrees(again: Verdict, v: VehiclePlan) -> None:
 @cases
 def test_the_check_of_the_written_file_finds_it(case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source, done = planned(case)
-    files = outputs_of(done)
+    files = written(case)
     for v in done.vehicles:
         path = tmp_path / f"{v.name}.plan"
         path.write_text(files[path.name], encoding="utf-8")
@@ -182,8 +181,8 @@ def test_the_check_of_the_written_file_finds_it(case: str, tmp_path: Path, capsy
 @pytest.mark.parametrize("case", [name for name in CASES if name not in SLOW])
 def test_a_rehearsal_has_the_plans_numbers_beside_what_was_flown(case: str) -> None:
     _, done = planned(case)
-    flown = rehearse(done)
-    rows = text_rows(render_rehearsal(done, flown), "What was flown")
+    found = flown(case)
+    rows = text_rows(render_rehearsal(done, found), "What was flown")
     for v in done.vehicles:
         true = truth(v, done)
         of = {row[1]: row for row in rows if row[0] == v.name}
@@ -192,4 +191,4 @@ def test_a_rehearsal_has_the_plans_numbers_beside_what_was_flown(case: str) -> N
             shown_as(of["lowest above ground"][2].rstrip("m\u202f "), true["min_agl_m"], 1, least=True)
         if true["battery_percent"] is not None:
             shown_as(of["battery used"][2].rstrip("%\u202f "), true["battery_percent"], 1)
-    assert write_summary({"vehicles": [v.as_dict() for v in flown.vehicles]})
+    assert write_summary({"vehicles": [v.as_dict() for v in found.vehicles]})

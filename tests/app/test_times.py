@@ -17,14 +17,13 @@ from gcsplan.app.check.files import check_files, more_of
 from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.output.files import outputs_of, report_of, summary_of
 from gcsplan.app.plan.model import Plan, VehiclePlan
-from gcsplan.app.rehearse import rehearse
 from gcsplan.check.verdict import by_item
 from gcsplan.cli.output.console import plan_row
 from gcsplan.fleet.arrival import Slot
 from gcsplan.fleet.motion.timing import TimedPath
 from gcsplan.mission_file import load_mission
 from gcsplan.units import duration
-from tests.support.plans import CASES, cases, planned, text_rows
+from tests.support.plans import CASES, cases, flown, planned, reported, text_rows, written
 from tests.support.shown import seconds
 
 SAME_S = 1e-6
@@ -62,9 +61,9 @@ def test_the_sum_of_the_legs_is_the_arrival_and_the_motions(case: str) -> None:
 @cases
 def test_table_json_csv_and_report_say_the_same_times(case: str) -> None:
     _, done = planned(case)
-    files, told = outputs_of(done), {v["name"]: v for v in summary_of(done)["vehicles"]}
+    files, told = written(case), {v["name"]: v for v in summary_of(done)["vehicles"]}
     rows = list(csv.DictReader(io.StringIO(files["profile.csv"])))
-    page = report_of(done)
+    page = reported(case)
     decimals = 1 if len(done.vehicles) > 1 else 0  # the order of a fleet may hang on tenths
     off_s = 0.501 * 10.0**-decimals
     for v, slot, _ in parts(done):
@@ -98,7 +97,7 @@ def test_table_json_csv_and_report_say_the_same_times(case: str) -> None:
 @cases
 def test_the_check_of_the_written_file_says_the_same_times(case: str, tmp_path: Path) -> None:
     source, done = planned(case)
-    files = outputs_of(done)
+    files = written(case)
     for v, _, _ in parts(done):
         for ending in (".waypoints", ".plan"):
             path = tmp_path / f"{v.name}{ending}"
@@ -115,7 +114,7 @@ def test_the_check_of_the_written_file_says_the_same_times(case: str, tmp_path: 
 )
 def test_a_rehearsal_compares_with_the_planned_time(case: str) -> None:
     _, done = planned(case)
-    found = rehearse(done)
+    found = flown(case)
     rows = {row["vehicle"]: row for row in found.rows()}
     for performance, (v, slot, _) in zip(found.vehicles, parts(done), strict=True):
         assert performance.planned_s == slot.arrive_s

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import false_discovery_control, mannwhitneyu
 
 from gcsplan.bench.measure import Memory, compare, flown, holm, passes
 from gcsplan.bench.terrain.problems import NamedProblem
@@ -120,6 +119,8 @@ def test_peak_memory_is_that_of_the_block() -> None:
 
 
 def test_the_rank_test_is_scipys_on_made_runs() -> None:
+    from scipy.stats import mannwhitneyu  # slow to import, for every process that collects
+
     rng = np.random.default_rng(3)
     for shift in (-0.5, 0.0, 0.5, 2.0):
         a, b = rng.normal(0.0, 1.0, 35), rng.normal(shift, 1.0, 40)
@@ -139,6 +140,8 @@ def test_the_rank_test_is_scipys_on_made_runs() -> None:
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12))
 @settings(max_examples=draws(60))
 def test_holms_correction_lies_between_the_raw_values_and_bonferronis(p: list[float]) -> None:
+    from scipy.stats import false_discovery_control  # slow to import, for every process that collects
+
     out = holm(p)
     order = np.argsort(p, kind="stable")
     assert (np.diff(np.array(out)[order]) >= 0.0).all()

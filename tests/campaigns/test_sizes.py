@@ -24,7 +24,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(os.name != "posix", reason="runs forks")
 @pytest.mark.parametrize("kinds", ["sizes.FILES", "sizes.WORLDS"])
 def test_a_short_campaign_of_sizes_finds_nothing(kinds: str) -> None:
@@ -72,18 +72,6 @@ def test_every_kind_is_in_the_table_of_limits() -> None:
         assert re.search(rf"`{kind}`[^;|]*, at most {size.within_s:g} s", row), kind
 
 
-DEAR = {
-    "messages", "items_at_home", "splines", "readings", "wing_over_cells", "wing_over_hills", "corners_drawn",
-    "corners_at_home",
-}  # fmt: skip
-"""Kinds that take 15 to 40 s each at their limit: with GCSPLAN_SIZES=all."""
-
-
-def at_limit(kind: str) -> object:
-    dear = kind in DEAR and os.environ.get("GCSPLAN_SIZES") != "all"
-    return pytest.param(kind, marks=[pytest.mark.skip("takes long: GCSPLAN_SIZES=all")] if dear else [])
-
-
 SERVER = """
 import sys
 from tests.campaigns import sizes
@@ -106,9 +94,9 @@ def warmed() -> Iterator[subprocess.Popen[str]]:
         process.communicate()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(os.name != "posix", reason="runs forks")
-@pytest.mark.parametrize("kind", [at_limit(kind) for kind in sizes.SIZES])
+@pytest.mark.parametrize("kind", list(sizes.SIZES))
 def test_an_input_at_the_limit_takes_what_is_stated(warmed: subprocess.Popen[str], kind: str) -> None:
     assert warmed.stdin is not None
     assert warmed.stdout is not None

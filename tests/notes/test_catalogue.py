@@ -5,12 +5,18 @@ from __future__ import annotations
 import ast
 import importlib
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
+
+import pytest
 
 import gcsplan
 from gcsplan.notes.note import NUMBER_KINDS, TEXTS, fields_of, parts_of
 
 ROOT = Path(gcsplan.__file__).parent
+
+pytestmark = pytest.mark.xdist_group("catalogue")  # one process reads the modules, not three
+
 FORMS = {*NUMBER_KINDS, "angle", "key", "reach", "seconds", "joules", "lines", "rows", "g"}
 
 
@@ -46,17 +52,19 @@ def codes_of(node: ast.expr, tables: dict[str, list[str]]) -> list[str]:
     return [str(node.value)]
 
 
-MADE = [
-    (where, node, codes)
-    for where, node, tables in made()
-    if not where.startswith("notes/note.py")
-    for codes in [codes_of(node.args[0], tables)]
-]
+@cache
+def coded() -> list[tuple[str, ast.Call, list[str]]]:
+    """Every `Note(…)` of the code outside the catalogue, with its place and its codes."""
+    return [
+        (where, node, codes_of(node.args[0], tables))
+        for where, node, tables in made()
+        if not where.startswith("notes/note.py")
+    ]
 
 
 def test_every_note_has_a_sentence_with_its_data_and_no_other() -> None:
     wrong = []
-    for where, node, codes in MADE:
+    for where, node, codes in coded():
         given = {keyword.arg for keyword in node.keywords}
         for code in codes:
             if code not in TEXTS:
@@ -69,7 +77,7 @@ def test_every_note_has_a_sentence_with_its_data_and_no_other() -> None:
 
 
 def test_every_sentence_is_said_somewhere() -> None:
-    said = {code for *_, codes in MADE for code in codes}
+    said = {code for *_, codes in coded() for code in codes}
     assert sorted(set(TEXTS) - said) == []
 
 

@@ -42,6 +42,7 @@ def whole_hill() -> Solution:
     return plan(mission(ground(hill), BAND))
 
 
+@pytest.mark.first_quick
 @pytest.mark.parametrize("void", [(3, 3), (0, 0), (90, 50)])
 def test_hills_with_one_unknown_node_are_not_level(void: tuple[int, int]) -> None:
     """They were flown under a ceiling AMSL, that of one node: there was no path over the hill, which was proved."""

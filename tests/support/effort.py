@@ -5,8 +5,15 @@ Hypothesis tests run in both suites; so do tests with the mark ``draws``, which 
 
 from __future__ import annotations
 
+from typing import Any
+
+import pytest
+
 PART, LEAST = 8, 6
 """The quick suite takes an eighth of the draws, but at least six (all of them if there are fewer)."""
+
+QUICK = "not slow and not nightly"
+"""What pyproject.toml selects by default, and thus the quick suite."""
 
 full = True
 """Whether this run takes all draws; `tests.conftest` sets it before tests are collected."""
@@ -15,6 +22,16 @@ full = True
 def draws(count: int) -> int:
     """The number of draws that this run takes out of ``count``."""
     return count if full else max(min(count, LEAST), count // PART)
+
+
+def seeds(quick: int, slow: int, nightly: int) -> list[Any]:
+    """Seeds 0, 1 … as parameters: ``quick`` of them for every suite, more up to ``slow`` for ``-m slow``, the others up
+    to ``nightly`` for ``-m nightly``."""
+    return [
+        *range(quick),
+        *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(quick, slow)),
+        *(pytest.param(seed, marks=pytest.mark.nightly) for seed in range(slow, nightly)),
+    ]
 
 
 def worlds(count: int) -> int:

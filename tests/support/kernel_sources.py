@@ -24,8 +24,10 @@ def faults(compiled: ModuleType) -> list[str]:
     """The modules that the list of the unit in ``compiled`` lacks, or has too much."""
     listed = {path.resolve() for path in compiled.UNIT.sources}
     modules = {".".join(("gcsplan", *p.resolve().relative_to(ROOT).with_suffix("").parts)) for p in listed}
-    marked = {p for p in ROOT.rglob("*.py") if compiled.__name__ in imported_by(p)}
-    markers = {p for p in marked if any(word in p.read_text(encoding="utf-8") for word in ("@kernel", "@device"))}
+    texts = {path: path.read_text(encoding="utf-8") for path in ROOT.rglob("*.py")}
+    named = [path for path, text in texts.items() if compiled.__name__ in text]  # the others need no parser
+    marked = {path for path in named if compiled.__name__ in imported_by(path)}
+    markers = {path for path in marked if any(word in texts[path] for word in ("@kernel", "@device"))}
     found = [f"{path.name} marks kernels and is not listed" for path in sorted(markers - listed)]
     for path in sorted(listed):
         others = imported_by(path) - modules - HARMLESS - {compiled.__name__}

@@ -1,4 +1,4 @@
-"""Missions of every kind, planned once for each process of the tests, and the tables of a report."""
+"""Missions of every kind, planned, written and flown once for each process of the tests; and the tables of a report."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ import pytest
 import yaml
 
 from gcsplan.app.fleet.pipeline import plan
+from gcsplan.app.output.files import outputs_of, report_of
 from gcsplan.app.plan.model import Plan
+from gcsplan.app.rehearse import Rehearsal, rehearse
 from gcsplan.mission_file import load_mission
 from tests.support.paths import MISSIONS
 
@@ -106,6 +108,24 @@ def planned(case: str) -> tuple[Any, Plan]:
     text = None if isinstance(mission, Path) else yaml.safe_dump(mission)
     source = load_mission(mission if isinstance(mission, Path) else "times.yaml", text=text)
     return source, plan(source)
+
+
+@cache
+def written(case: str) -> dict[str, str]:
+    """The files of the plan of a case, by name."""
+    return outputs_of(planned(case)[1])
+
+
+@cache
+def reported(case: str) -> str:
+    """The page of the plan of a case."""
+    return report_of(planned(case)[1])
+
+
+@cache
+def flown(case: str) -> Rehearsal:
+    """The rehearsal of the plan of a case: one run without wind."""
+    return rehearse(planned(case)[1])
 
 
 cases = pytest.mark.parametrize(

@@ -252,7 +252,7 @@ class _Lanes:
         braked = np.where(accel < AT_ONCE_M_S2, np.sqrt(np.maximum(ahead, 0.0)) - half, np.inf)
         braked = np.maximum(braked, np.where(ways.square[there] > 0.0, CRAWL_M_S, 0.0))
         steady = np.maximum(cap, v - 2.0 * half)
-        faster = np.minimum(np.minimum(v + accel * np.clip(after, 0.0, b), steady), braked)
+        faster = np.minimum(np.minimum(v + accel * np.minimum(np.maximum(after, 0.0), b), steady), braked)
         left = ways.stop_at[k] - s
         # Speeding up: full acceleration, then constant speed. Slowing down: uniform, as assumed for `braked`.
         gone = np.where(faster > v, faster * b - (faster - v) ** 2 / (2.0 * accel), 0.5 * (v + faster) * b)
@@ -268,9 +268,9 @@ class _Lanes:
         self.clock[:] = to_s
         came_m = self.s - s
         over_s = np.where(timed, (then - ways.stop_clock[k]) / np.maximum(pace, 1e-9), -1.0)
-        for lane in np.flatnonzero(stops):
+        for lane in stops.nonzero()[0].tolist():
             left_s = float(b[lane] - over_s[lane]) if over_s[lane] >= 0.0 else None
-            self._stop(int(lane), to_s - float(b[lane]), float(v[lane]), float(faster[lane]), float(left[lane]), left_s)
+            self._stop(lane, to_s - float(b[lane]), float(v[lane]), float(faster[lane]), float(left[lane]), left_s)
         self.piece = np.where(stops | self.done, self.piece, self._piece_at(k, self.s))
         self._count(k, came_m, np.where(stops, b - (to_s - self.clock), b), holds, wind)
 
@@ -303,7 +303,7 @@ class _Lanes:
     def _piece_at(self, k: Indices, s: Floats) -> Indices:
         """Return the pieces at ``s`` (L,): piece ``k`` or a later one before the next stop."""
         ends, k = self._ways.end, k.copy()
-        behind = np.flatnonzero(s >= ends[k])
+        behind = (s >= ends[k]).nonzero()[0]
         while len(behind):
             behind = behind[~self._ways.stops_after[k[behind]]]
             k[behind] += 1

@@ -45,19 +45,19 @@ class Field(NamedTuple):
 def _bounds(grid: GridMap, affine: bool) -> tuple[float, float, float]:
     """``bend``, ``step_x``, ``step_y`` of `Field`, from a lattice over the fitted square."""
     f = np.linspace(-1.0, 1.0, 2 if affine else 33)
-    u, v = (a.ravel() for a in np.meshgrid(f, f))
+    in_u, in_v = ([a.ravel() ** k for k in range(DEGREE + 1)] for a in np.meshgrid(f, f))
 
     def derivative(du: int, dv: int) -> Floats:
-        total = np.zeros((len(u), 2))
+        total = np.zeros((len(f) ** 2, 2))
         for k, (i, j) in enumerate(POWERS):
             if i >= du and j >= dv:
                 factor = math.perm(i, du) * math.perm(j, dv) / grid.scale_m ** (du + dv)
-                total += factor * (u ** (i - du) * v ** (j - dv))[:, None] * grid.coefficients[k]
+                total += factor * (in_u[i - du] * in_v[j - dv])[:, None] * grid.coefficients[k]
         return total
 
     jacobian = np.stack([derivative(1, 0), derivative(0, 1)], axis=-1)
     inverse = np.linalg.inv(jacobian)
-    steps = np.array([steps_of(*m.ravel().tolist()) for m in inverse])
+    steps = np.array([steps_of(*m) for m in inverse.reshape(-1, 4).tolist()])
     if affine:
         return 0.0, float(steps[:, 0].min()), float(steps[:, 1].min())
     # A symmetric form has its largest value over two directions where the two are equal.

@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from gcsplan.app.batch import BatchOptions, record_of
-from gcsplan.app.fleet import vehicle_plans as vehicle_plans
+from gcsplan.app.fleet import vehicle_plans
 from gcsplan.app.fleet.pipeline import plan
 from gcsplan.app.output.files import outputs_of
 from gcsplan.app.parallel.executor import Inline

@@ -437,7 +437,7 @@ def test_two_vias_with_right_angles_are_passed_over_flat_ground() -> None:
 
 
 @pytest.mark.parametrize("most_deg", [12.0, 35.0, 115.0])
-@pytest.mark.parametrize("count", [2, 3, 4])
+@pytest.mark.parametrize("count", [2, *(pytest.param(k, marks=pytest.mark.slow) for k in (3, 4))])
 def test_any_vias_far_apart_are_passed_over_flat_ground(count: int, most_deg: float) -> None:
     for seed in range(3):
         places = around(seed, count, most_deg)

@@ -22,6 +22,7 @@ from gcsplan.world.world import World
 from tests.check.returns.test_way_home import BARE, OVER, judged, mission, ridge
 from tests.oracles.joins import join_breach, random_path_case
 from tests.oracles.returns import run_on
+from tests.support.effort import seeds
 from tests.support.noted import codes, within
 from tests.support.worlds import vehicle, world
 
@@ -138,7 +139,7 @@ def _reported(home: WayHome, seq: int, along_m: float, *, legal: bool) -> bool:
     return any(s.from_seq <= seq <= s.to_seq and s.from_m - 0.5 <= along_m <= s.to_m + 0.5 for s in found)
 
 
-@pytest.mark.parametrize("seed", [*range(24), *(pytest.param(k, marks=pytest.mark.slow) for k in range(24, 250))])
+@pytest.mark.parametrize("seed", seeds(12, 90, 250))
 def test_no_return_that_breaks_a_limit_is_called_safe(seed: int) -> None:
     rng = np.random.default_rng([22, seed])
     case = random_path_case(rng)

@@ -28,11 +28,13 @@ def at(command: int, east: float, north: float = 0.0, up: float = 100.0, p1: flo
 @pytest.mark.parametrize(
     "curve",
     [
-        at(cmd.ARC_WAYPOINT, 1500, p1=180.0), at(cmd.ARC_WAYPOINT, 1500, p1=-60.0),
-        at(cmd.ARC_WAYPOINT, 1500, p1=300.0),
-        at(cmd.ARC_WAYPOINT, 1200, 300, 160.0, 90.0), at(cmd.SPLINE_WAYPOINT, 1200, 300), at(cmd.WAYPOINT, 1200, 300),
+        pytest.param(at(cmd.ARC_WAYPOINT, 1500, p1=180.0), id="half", marks=pytest.mark.slow),
+        pytest.param(at(cmd.ARC_WAYPOINT, 1500, p1=-60.0), id="left"),
+        pytest.param(at(cmd.ARC_WAYPOINT, 1500, p1=300.0), id="long", marks=pytest.mark.slow),
+        pytest.param(at(cmd.ARC_WAYPOINT, 1200, 300, 160.0, 90.0), id="climbing", marks=pytest.mark.slow),
+        pytest.param(at(cmd.SPLINE_WAYPOINT, 1200, 300), id="spline"),
+        pytest.param(at(cmd.WAYPOINT, 1200, 300), id="straight", marks=pytest.mark.slow),
     ],
-    ids=["half", "left", "long", "climbing", "spline", "straight"],
 )  # fmt: skip
 def test_a_curve_takes_as_long_as_told(curve: MissionItem, speed_m_s: float) -> None:
     """Two models that share no code; a curve is one leg of the autopilot, however many chords stand for it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -41,7 +42,8 @@ def is_times(surface: Surface, heights: Any, metres: float) -> bool:
     """Whether a surface holds a part of ``heights`` times ``metres``."""
     rows, cols = surface.ground_m.shape
     return any(
-        np.allclose(heights[r : r + rows, c : c + cols] * metres, surface.ground_m, rtol=1e-9, atol=1e-9)
+        math.isclose(heights[r, c] * metres, surface.ground_m[0, 0], rel_tol=1e-9, abs_tol=1e-9)
+        and np.allclose(heights[r : r + rows, c : c + cols] * metres, surface.ground_m, rtol=1e-9, atol=1e-9)
         for r in range(101 - rows)
         for c in range(101 - cols)
     )

@@ -80,7 +80,13 @@ def test_the_nearest_unknown_patch_is_found_and_none_is_infinitely_far() -> None
 
 
 @pytest.mark.parametrize(
-    "seed", [1, 6, *(pytest.param(k, marks=pytest.mark.slow) for k in range(12) if k not in (1, 6))]
+    "seed",
+    [
+        1,
+        6,
+        *(pytest.param(k, marks=pytest.mark.slow) for k in (0, 2, 3)),
+        *(pytest.param(k, marks=pytest.mark.nightly) for k in (4, 5, *range(7, 12))),
+    ],
 )
 def test_columns_find_the_unknown_patch_that_looking_at_every_cell_finds(seed: int) -> None:
     rng = np.random.default_rng([seed, 2])

@@ -17,7 +17,7 @@ from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace, Legs
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.surface import GridMap, Surface
-from tests.planners.optimal.navmesh.test_mesh import EVERYWHERE, LIMITS, WORLDS, inner, world_of
+from tests.planners.optimal.navmesh.test_mesh import EVERYWHERE, WORLDS, inner, world_of
 from tests.support import effort
 from tests.support.effort import worlds
 
@@ -46,7 +46,9 @@ def passed(problem: Problem, points: Floats, z: Floats) -> bool:
 
 
 @pytest.mark.draws
-@pytest.mark.parametrize("limits", LIMITS)
+@pytest.mark.parametrize(
+    "limits", ["clearance", *(pytest.param(k, marks=pytest.mark.slow) for k in ("bare", "errors"))]
+)
 @pytest.mark.parametrize("world", WORLDS)
 def test_lines_that_the_exact_check_passes_lead_through_necks(world: str, limits: str) -> None:
     rng = np.random.default_rng([31, *world.encode(), *limits.encode()])

@@ -22,6 +22,7 @@ from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.surface import Surface
 from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
 from gcsplan.world.terrain.peaks import flat_grid
+from tests.support.effort import seeds
 
 FLAT = Surface(*flat_grid(0.0, (-6000.0, -6000.0, 6000.0, 6000.0))[:1] * 2, flat_grid(0.0, (-6e3, -6e3, 6e3, 6e3))[1])
 
@@ -47,7 +48,7 @@ def mission(zones: list[Zone], reach_m: float, via: tuple[Via, ...] = ()) -> Pro
     return Problem(Airspace(FLAT, zones), limits, (-1500.0, 0.0, 40.0), (1500.0, 0.0, 40.0), via)
 
 
-@pytest.mark.parametrize("seed", [*range(10), *(pytest.param(k, marks=pytest.mark.slow) for k in range(10, 60))])
+@pytest.mark.parametrize("seed", seeds(10, 35, 60))
 def test_bound_and_path_enclose_the_visibility_graphs_track(seed: int) -> None:
     rng = np.random.default_rng(seed)
     reach_m = float(rng.choice([0.0, 33.0]))
