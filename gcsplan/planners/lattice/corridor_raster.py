@@ -192,8 +192,8 @@ def make_guide(
     floor[jj, ii] = np.minimum(problem.floors(x[ii], y[jj]), SHUT_M)
     ceiling[jj, ii] = np.clip(air.ceiling_amsl(x[ii], y[jj], limits), -SHUT_M, SHUT_M)
     circles, edges = [], []
-    for number, zone in enumerate(air.zones):
-        js, is_ = _near(problem, number, x, y, step)
+    for number in air.zone_table.within((west, south, float(x[-1]), float(y[-1])), air.beside_m(limits) + step):
+        zone, (js, is_) = air.zones[number], _near(problem, number, x, y, step)
         if not len(js) or _passed(problem, zone, over.get(number), x, y, js, is_, floor, ceiling):
             continue
         corners = air.zone_table.corners_m(number)

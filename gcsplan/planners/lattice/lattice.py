@@ -186,7 +186,7 @@ def make_links(problem: Problem, lattice: Lattice, place: tuple[float, float], a
     bottom, top = table.levels_m(limits.altitude_error_m)
     follows = bool(table.follow_ground.any())
     ground = _known(air.surface.ground_at(at[..., 0], at[..., 1]), 0.0) if follows else np.zeros(at.shape[:2])
-    for zone in range(len(table)):
+    for zone in table.within((*place, *place), lattice.reach_m + 3.0 * lattice.step_m):
         for row in np.flatnonzero(table.near(zone, a, b, lattice.reach_m)):
             under = np.where(table.over_ground[zone, :, None], ground[row], 0.0)
             bands[row].append((bottom[zone] + under[0], top[zone] + under[1]))
