@@ -18,7 +18,6 @@ import numpy as np
 from gcsplan.arrays import Floats, Int32s, Int64s
 from gcsplan.planners.compiled import device, kernel
 from gcsplan.planners.optimal.navmesh.mesh_kernels import NEXT
-from gcsplan.world.zone_table import places_on
 
 EAST, NORTH, RADIUS, BOTTOM, TOP, BOTTOM_AGL, TOP_AGL, FIRST, LAST, UNDER = range(10)
 PAIR, BOTTOM_2, TOP_2, BOTTOM_2_AGL, TOP_2_AGL, UNDER_2, THIN, LOOKS, OWN_BOTTOM, OWN_TOP = range(10, 20)
@@ -32,14 +31,16 @@ BESIDE = 2.0
 """Datum of a level over all ground within reach, for paths; 1: over the ground below; 0: AMSL."""
 NODE_RINGS = ((0.0, 1), (1.0 / 3.0, 10), (2.0 / 3.0, 21), (1.0, 32))
 """Circles around a node on which ground is read for `BESIDE`, as parts of the reach, and places on each."""
-PLACES = places_on(NODE_RINGS)
+PLACES = np.array(
+    [(r * math.cos(a), r * math.sin(a)) for r, n in NODE_RINGS for a in np.arange(n) * (2.0 * math.pi / n)]
+)
 """Those places: metres east and north of the node, for a reach of 1."""
 RIM = 0.01
 """Part of the reach by which they may lie outside of the zone: at its rim, few places lie within."""
 CELL_RINGS = ((1.0, 32), (0.8, 16), (0.5, 8), (0.25, 4), (0.0, 1))
 """Circles around a cell on which ground is read, as parts of the reach, and cells on each: on a slope, the lowest and
 the highest lie on the largest."""
-DISC = np.ascontiguousarray(places_on(CELL_RINGS)[:, ::-1])
+DISC = np.array([(r * math.sin(a), r * math.cos(a)) for r, n in CELL_RINGS for a in np.arange(n) * (2.0 * math.pi / n)])
 """Those cells: rows and columns away, for a reach of 1."""
 STAMPED = 10
 """Places read for `BESIDE` that take as long as one cell that a zone may shut."""
