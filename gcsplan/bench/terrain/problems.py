@@ -12,6 +12,7 @@ Kinds:
 - ``many``: a pair of ``main`` with a thousand small zones;
 - ``turn``: all of ``main`` with a turn radius of 100 m, and again of 200 m;
 - ``everyday``: missions of ``gcsplan bench everyday`` without vias, half of them with clearance and errors;
+- ``ceiling``: 100 missions below a ceiling above ground (`under_ceiling`), with objectives and errors of their own;
 - ``room``: 20 pairs as in ``main``, each with 0, 10 and 20 zones, whose ceilings and zones leave a wide corridor
   (`draw_with_room`), for planners that search by samples; always with the clearance and errors of a real mission.
 
@@ -40,6 +41,7 @@ from scipy.ndimage import maximum_filter
 from gcsplan.arrays import Bools, Floats
 from gcsplan.bench.everyday import missions as everyday_missions
 from gcsplan.bench.everyday import run as everyday
+from gcsplan.bench.terrain import under_ceiling
 from gcsplan.bench.terrain.pairs import (
     ABOVE_JOIN_M,
     MOST_ZONE_SETS,
@@ -104,8 +106,10 @@ def problems(
     for one in make(seed, REAL_ERRORS if errors else NO_ERRORS, count):
         seen[one.group] = seen.get(one.group, 0) + 1
         if count is None or seen[one.group] <= count:
-            goal: Objective = "energy" if kind == "energy" else objective
-            found.append(replace(one, problem=replace(one.problem, objective=goal), seed=seed, errors=errors))
+            if kind != "ceiling":
+                goal: Objective = "energy" if kind == "energy" else objective
+                one = replace(one, problem=replace(one.problem, objective=goal))
+            found.append(replace(one, seed=seed, errors=errors or kind == "ceiling"))
     return found
 
 
@@ -241,12 +245,21 @@ def _room(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem
             yield NamedProblem(name, problem, "room", f"room, {zones} zones", pair.redraws)
 
 
+def _ceiling(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:
+    del limits  # each mission has its own
+    for number in range(under_ceiling.MISSIONS):
+        if count is not None and number >= 20 * count:  # each group is among twenty in a row
+            return
+        group, problem, redraws = under_ceiling.mission(seed, number)
+        yield NamedProblem(f"ceiling {seed}/{number:02d}, {group}", problem, "ceiling", group, redraws)
+
+
 _PROBLEM_MAKERS: dict[str, Callable[[int, Limits, int | None], Iterator[NamedProblem]]] = {
     "main": _main, "energy": _energy, "band": _band, "large": _large, "many": _many, "turn": _turn,
-    "everyday": _everyday, "room": _room,
+    "everyday": _everyday, "ceiling": _ceiling, "room": _room,
 }  # fmt: skip
 PROBLEM_KINDS = tuple(_PROBLEM_MAKERS)
-MOUNTAINS = PROBLEM_KINDS[:-2]
+MOUNTAINS = PROBLEM_KINDS[:-3]
 """The kinds over real mountains that are measured unless others are named."""
 
 
