@@ -309,8 +309,8 @@ def test_a_function_fits_on_a_screen() -> None:
 MOST_IN_A_FOLDER = 15
 
 MOST = {
-    "modules": 429,
-    "statements": 60_659,
+    "modules": 434,
+    "statements": 61_339,
     "type names with two meanings": 0,
     "constants with two values": 1,
     "folders with more than 15 modules": 0,

@@ -28,6 +28,7 @@ RATES = {
     "corner": 12e-6,
     "label": 2.4e-6,
     "interval": 1.1e-6,
+    "section": 1e-8,
     "read": 0.025e-6,
     "pull": 50e-6,
     "sighted": 0.35e-6,
@@ -39,9 +40,9 @@ RATES = {
 ``portal`` of a mesh, interval ``opened`` on a portal, call of the exact ``check`` with the use of its result, ``leg``
 checked, piece of ground ``cut`` beside a leg, ``cell`` of terrain that a leg crosses, ``piece`` of a tube, ``place``
 whose floor is read, ``corner`` of an outline triangulated, ``label`` of the lattice search, altitude ``interval``
-examined for one track length, cell of a zone's own ground ``read`` for a cell beside it, point of a line to ``pull``
-(for each size of move), node ``sighted`` from an end of a leg, node ``walked`` to from there, path ``drawn`` by a
-swarm, and curve to ``mend``."""
+examined for one track length, leg between nodes of two ``section`` lines, cell of a zone's own ground ``read`` for a
+cell beside it, point of a line to ``pull`` (for each size of move), node ``sighted`` from an end of a leg, node
+``walked`` to from there, path ``drawn`` by a swarm, and curve to ``mend``."""
 COUNTED = 0.4
 """Part of the budget's seconds that may be spent as counted work."""
 FIRST, FIRST_S = 3.0, 0.5

@@ -19,6 +19,7 @@ UNIT = KernelUnit(
         "optimal.navmesh.mesh_kernels",
         "optimal.navmesh.polyanya",
         "optimal.navmesh.zone_kernels",
+        "optimal.plane.section_kernels",
         "profile.taut_kernels",
     ),
 )

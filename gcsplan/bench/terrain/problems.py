@@ -247,7 +247,7 @@ def _room(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem
 
 def _ceiling(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem]:
     del limits  # each mission has its own
-    for number in range(under_ceiling.MISSIONS):
+    for number in range(under_ceiling.CEILING_MISSIONS):
         if count is not None and number >= 20 * count:  # each group is among twenty in a row
             return
         group, problem, redraws = under_ceiling.mission(seed, number)

@@ -22,13 +22,13 @@ from gcsplan.world.geodesy.frame import Frame
 from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.surface import NO_SIDES, GridMap, Surface
 
-MISSIONS = 100
-WAY_M = (2_000.0, 25_000.0)
+CEILING_MISSIONS = 100
+DISTANCE_M = (2_000.0, 25_000.0)
 FLOOR_M, CEILING_M = (30.0, 60.0), (90.0, 150.0)
 CLIMB_DEG, WING_CLIMB_DEG = (10.0, 25.0), (8.0, 12.0)
-RADIUS_M = (60.0, 150.0)
-ZONES = (0, 3, 10, 20, 40)
-ERRORS = {"horizontal_clearance_m": 20.0, "track_error_m": 3.0, "altitude_error_m": 5.0}
+WING_TURN_M = (60.0, 150.0)
+ZONE_COUNTS = (0, 3, 10, 20, 40)
+USUAL_ERRORS = {"horizontal_clearance_m": 20.0, "track_error_m": 3.0, "altitude_error_m": 5.0}
 POST_M, BESIDE = 30.0, 0.4
 """Metres between the posts of made terrain, and how far it reaches beyond the ends, in parts of their distance."""
 WAVE_M, STEEPNESS = (4_000.0, 9_000.0), (0.02, 0.1)
@@ -41,16 +41,16 @@ def mission(seed: int, number: int) -> tuple[str, Problem, tuple[int, int]]:
     """Mission ``number`` of a seed: its group, its problem, and how many pairs and sets of zones were drawn before."""
     rng = np.random.default_rng([seed, number, 4])
     wing, energy, over_sample = number % 4 == 3, number % 5 == 2, number % 2 == 0
-    zones = int(ZONES[number % len(ZONES)]) if number % 3 else 0
+    zones = int(ZONE_COUNTS[number % len(ZONE_COUNTS)]) if number % 3 else 0
     steepest = round(float(rng.uniform(*(WING_CLIMB_DEG if wing else CLIMB_DEG))), 1)
     limits = Limits(
         min_agl_m=float(round(rng.uniform(*FLOOR_M))),
         max_agl_m=float(round(rng.uniform(*CEILING_M))),
         max_climb_deg=steepest,
         max_descent_deg=steepest,
-        **ERRORS,
+        **USUAL_ERRORS,
     )
-    radius_m = float(round(rng.uniform(*RADIUS_M))) if wing else 0.0
+    radius_m = float(round(rng.uniform(*WING_TURN_M))) if wing else 0.0
     pair, redraws = _pair(rng, number, limits, zones, over_sample=over_sample)
     airspace = Airspace(pair.surface, pair.zones, scale=pair.scale)
     (e0, n0), (e1, n1) = pair.start, pair.goal
@@ -73,7 +73,7 @@ def _pair(
 ) -> tuple[TerrainPair, tuple[int, int]]:
     """A pair whose ends are joined past the zones of unlimited height."""
     pairs = sets = 0
-    way_m = float(rng.uniform(*WAY_M))
+    way_m = float(rng.uniform(*DISTANCE_M))
     while True:
         pair = place(rng, number, way_m, limits.max_climb_deg) if over_sample else _made(rng, number, way_m, limits)
         airspace = Airspace(pair.surface, scale=pair.scale)

@@ -45,7 +45,7 @@ def test_made_terrain_has_posts_of_thirty_metres_and_hills() -> None:
 
 
 def test_the_kind_keeps_the_objectives_of_its_missions(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(under_ceiling, "MISSIONS", 3)
+    monkeypatch.setattr(under_ceiling, "CEILING_MISSIONS", 3)
     found = problems("ceiling", seed=3, errors=False)
     assert [one.problem.objective for one in found] == ["length", "length", "energy"]
     assert all(one.errors and one.name.endswith(one.group) for one in found)

@@ -15,6 +15,8 @@ Improves = Literal["paths", "bounds", "paths, bounds"]
 FAR, WIDE, MUCH = 5e-3, 1e-2, 5e-2
 """Gaps, as parts, beyond which other sources of paths are tried; beyond which reachable altitudes are searched before
 others have tried to close the gap; and beyond which small worlds are searched before time is spent on a bound."""
+BAND_FAR = 2.5e-3
+"""Gap under a maximum AGL up to which only the bound is weak: searches for paths gain a few thousandths of it."""
 OF_REST = 0.5
 """Part of the counted work left that a search may take whose work is not known before, if a path is known."""
 WORTH_AGAIN = 0.02

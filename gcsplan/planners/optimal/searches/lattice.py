@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from gcsplan.planners.lattice.planner import cheaper, plan_band
-from gcsplan.planners.optimal.loop.search import FAR, OF_REST, WIDE, Search, Size
+from gcsplan.planners.optimal.loop.search import BAND_FAR, FAR, OF_REST, WIDE, Search, Size
 from gcsplan.planners.problem import Refusal
 
 EARLY_OF_REST = 0.25
@@ -13,8 +13,8 @@ EARLY_OF_REST = 0.25
 
 
 class LatticeSearch(Search):
-    """Under a maximum AGL once, before others; else if no path is known, and once more beyond a gap of `FAR`. Where
-    path and bound are far apart it finds other valleys; else it gains little, and takes long. Remembers nothing."""
+    """If no path is known, and once more beyond a gap of `FAR`; under a maximum AGL once, beyond `BAND_FAR`. Where path
+    and bound are far apart it finds other valleys; else it gains little, and takes long. Remembers nothing."""
 
     NAME, IMPROVES, SHARE, ANEW = "lattice", "paths", 0.02, True
     FIRST, FAR_APART, BAND = (0.5, 1.0), (0.25, 0.3), (0.9, 0.5)
@@ -40,9 +40,10 @@ class LatticeSearch(Search):
         return super().is_open()
 
     def applies(self) -> bool:
-        """Whether no path is known, or a gap beyond `FAR` is left."""
+        """Whether no path is known, or the gap is large."""
         i = self.incumbent
-        return self.problem.limits.max_agl_m is not None or i.best is None or i.gap > FAR
+        band = self.problem.limits.max_agl_m is not None
+        return i.best is None or i.gap > (BAND_FAR if band else FAR)
 
     def size(self) -> Size:
         """Its work is not known before; it gets a part of the rest."""

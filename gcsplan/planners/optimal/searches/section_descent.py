@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from gcsplan.planners.optimal.loop.search import Search, Size
+from gcsplan.planners.optimal.loop.search import BAND_FAR, Search, Size
 from gcsplan.planners.profile.cross_sections import tightened
 
 DESCENT_S = 0.1
 
 
 class SectionDescent(Search):
-    """When a path is known, and again after a better one. Remembers nothing."""
+    """When a path is known, and again after a better one; under a maximum AGL beyond a gap of `BAND_FAR`. Remembers
+    nothing."""
 
     NAME, IMPROVES, SHARE, AGAIN = "section_descent", "paths", 0.1, True
 
-    @property
-    def share(self) -> float:
-        """Under a maximum AGL, paths of a lattice have much to gain."""
-        return self.SHARE if self.problem.limits.max_agl_m is None else 0.9
-
     def applies(self) -> bool:
-        """Whether a path is known."""
-        return self.incumbent.best is not None
+        """Whether a path is known, and under a maximum AGL whether it may be weak."""
+        i = self.incumbent
+        return i.best is not None and (self.problem.limits.max_agl_m is None or i.gap > BAND_FAR)
 
     def size(self) -> Size:
         """Some seconds of legs under the exact check."""

@@ -1,4 +1,4 @@
-"""The best path drawn together: never longer, legal, and wanted sooner under a maximum AGL."""
+"""The best path drawn together: never longer, and legal."""
 
 from __future__ import annotations
 
@@ -27,8 +27,3 @@ def test_a_detour_that_is_too_wide_is_drawn_together() -> None:
     assert search.incumbent.best is not None
     assert search.incumbent.cost < 0.97 * before
     assert faults(problem, Path(search.incumbent.best)) == []
-
-
-def test_under_a_maximum_agl_it_takes_a_larger_share() -> None:
-    low, free = (SectionDescent(work_of(over_flat(max_agl_m=most_m))) for most_m in (120.0, None))
-    assert low.share > free.share == SectionDescent.SHARE

@@ -1,0 +1,114 @@
+"""Chains on sections: no path is cheaper than their bound, and little is left between it and the best path."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gcsplan.planners.optimal.loop.workspace import Workspace
+from gcsplan.planners.optimal.plane.incumbent import Incumbent
+from gcsplan.planners.optimal.plane.sections import lay_out, lines_of, widest_spans
+from gcsplan.planners.optimal.searches.sections import SectionChains
+from gcsplan.planners.optimal.searches.straight import Straight
+from gcsplan.planners.problem import Objective, Problem, Via
+from gcsplan.planners.profile.cross_sections import tightened
+from gcsplan.world.airspace import Airspace
+from gcsplan.world.geometry.limits import Limits
+from gcsplan.world.geometry.path import Path
+from gcsplan.world.geometry.surface import GridMap, Surface
+from gcsplan.world.geometry.zones import Circle, Zone
+from tests.support.planner_worlds import faults
+from tests.support.searches import improve, looked, over_flat
+
+POST_M = 40.0
+
+
+def hills(seed: int, objective: Objective = "length", climb_deg: float = 90.0, errors: bool = False) -> Problem:
+    """Over hills of some hundred metres, 3.4 km from west to east, 30 to 90 m above ground."""
+    rng = np.random.default_rng(seed)
+    n = 101
+    x, y = np.meshgrid(np.arange(n) * POST_M, np.arange(n) * POST_M)
+    z = np.zeros((n, n))
+    for _ in range(12):
+        a, b = rng.uniform(-1.0, 1.0, 2) * 2.0 * np.pi / rng.uniform(500.0, 2500.0)
+        z += rng.uniform(4.0, 22.0) * np.sin(a * x + b * y + rng.uniform(0.0, 6.0))
+    surface = Surface(z, z, GridMap.affine(0.0, (n - 1) * POST_M, POST_M, POST_M))
+    some = {"track_error_m": 3.0, "altitude_error_m": 4.0, "horizontal_clearance_m": 20.0} if errors else {}
+    limits = Limits(30.0, 90.0, max_climb_deg=climb_deg, max_descent_deg=climb_deg, **some)
+    air = Airspace(surface, (Zone("disc", Circle(2000.0, 2100.0, 180.0)),))
+    (e0, n0), (e1, n1) = (300.0, 2000.0), (3700.0, 2000.0)
+    low = air.floor_amsl(np.array([e0, e1]), np.array([n0, n1]), limits) + 5.0
+    return Problem(air, limits, (e0, n0, float(low[0])), (e1, n1, float(low[1])), objective=objective)
+
+
+def found(problem: Problem) -> Workspace:
+    """A workspace after all searches."""
+    work = looked(problem)
+    improve(work)
+    assert work.incumbent.best is not None
+    return work
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("errors", [False, True])
+@pytest.mark.parametrize(("objective", "climb_deg"), [("length", 90.0), ("length", 12.0), ("energy", 20.0)])
+def test_a_path_drawn_together_costs_no_less_than_the_bound(
+    objective: Objective, climb_deg: float, errors: bool
+) -> None:
+    for seed in (1, 2):
+        problem = hills(seed, objective, climb_deg, errors)
+        work = looked(problem)
+        improve(work, without=("bound", "cap_pairs", "bound_corridor", "outline_bound"))
+        incumbent = work.incumbent
+        assert incumbent.best is not None
+        SectionChains(work).run()
+        points = incumbent.best
+        for _ in range(3):
+            points, _ = tightened(problem, points)
+        path = Path(points)
+        assert faults(problem, path) == []
+        assert problem.cost(path) >= incumbent.bound
+
+
+@pytest.mark.parametrize(
+    ("objective", "gap"), [("length", 0.0025), pytest.param("energy", 0.02, marks=pytest.mark.slow)]
+)
+def test_the_bound_over_hills_comes_near_the_best_path(objective: Objective, gap: float) -> None:
+    work = looked(hills(6, objective, 25.0))
+    improve(work, without=("bound", "outline_bound"))
+    assert work.incumbent.gap < gap
+    assert max(s.bound_percent for s in work.incumbent.steps if s.name == "sections") > 0.1
+
+
+def test_a_via_is_passed_and_the_bound_counts_the_way_by_it() -> None:
+    problem = replace(hills(4), via=(Via(2000.0, 2600.0),))
+    work = found(problem)
+    assert work.incumbent.gap < 0.005
+    ends = np.array([problem.start[:2], (2000.0, 2600.0), problem.goal[:2]])
+    assert work.incumbent.bound > np.hypot(*np.diff(ends, axis=0).T).sum()
+
+
+def test_it_needs_a_ceiling_above_ground_and_a_path() -> None:
+    work = looked(over_flat())
+    assert work.incumbent.best is not None
+    assert not SectionChains(work).applies()
+    low = Workspace(Incumbent(over_flat(max_agl_m=120.0)))
+    search = SectionChains(low)
+    assert not search.applies()
+    Straight(low).run()
+    assert search.applies()
+    search.run()
+    assert low.incumbent.gap < 1e-6
+
+
+def test_unknown_ground_among_the_nodes_leaves_no_sections() -> None:
+    problem = hills(5)
+    heights = problem.airspace.surface.ground_m.copy()
+    heights[40, 45:55] = np.nan
+    surface = Surface(heights, heights, problem.airspace.surface.grid)
+    for air, known in ((Airspace(surface), False), (problem.airspace, True)):
+        plane = looked(replace(problem, airspace=air)).plane
+        lines = lines_of(plane, 120.0)
+        assert (lay_out(plane, lines, widest_spans(plane, lines, 3700.0), 20.0, 3700.0) is not None) == known
