@@ -128,8 +128,8 @@ def cheapest_chain(
             value[n], near[n] = math.inf, -1
             if shut[n]:
                 continue
-            # The other section's nodes are in order: from the nearest one, go both ways until it is too far. What is
-            # near enough to one node is mostly near enough to the next one.
+            # The other section's nodes are in order: from the nearest one, go both ways until it is too far. The nodes
+            # near enough to one node are mostly near enough to the next one.
             while nearest + 1 < of1 and _run(x, y, nearest + 1, n) <= _run(x, y, nearest, n):
                 nearest += 1
             while nearest > of0 and _run(x, y, nearest - 1, n) < _run(x, y, nearest, n):

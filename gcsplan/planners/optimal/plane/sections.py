@@ -162,7 +162,7 @@ def lay_out(
 
 
 def _lay_heights(plane: PlaneSearch, made: Sections) -> bool:
-    """Set floors and ceilings. The ends' and vias' own altitudes are both; what is free there is as elsewhere."""
+    """Set floors and ceilings. The ends' and vias' own altitudes are both; free altitudes have both as elsewhere."""
     problem, limits = plane.problem, plane.problem.bound_limits
     surface = problem.airspace.surface
     col, row = np.ascontiguousarray(surface.grid(made.x, made.y).T)
