@@ -37,6 +37,8 @@ WORTH_MORE = 0.05
 """Part of the gap that an effort must close for the next one to follow."""
 FINE = 0.05
 """Metres between nodes, as a part of the spacing, from which on more nodes and a better path change little."""
+NEARER_PATH = 0.7
+"""Part of the gap it left, to which a better path must have closed it for another run."""
 LEAST_STEP, MOST_STEP = 1.0 / 80.0, 0.4
 """Least and most metres between nodes, as parts of the spacing."""
 WORTH, IDLE = 0.02, 4
@@ -48,18 +50,20 @@ CHEAPER = 1e-4
 
 
 class SectionChains(Search):
-    """Under a maximum AGL, when a path is known; after a better one again, unless nodes were near each other already.
-    Remembers prices, the last effort, and whether they were."""
+    """Under a maximum AGL, when a path is known; after a much better one again, unless nodes were near each other
+    already. Remembers prices, the last effort, whether nodes were, and the gap that it left."""
 
     NAME, IMPROVES, SHARE, AGAIN = "sections", "paths, bounds", 0.8, True
 
     def __init__(self, work: Workspace) -> None:
         super().__init__(work)
-        self._prices, self._effort, self._fine = Prices(), 0, False
+        self._prices, self._effort, self._fine, self._left = Prices(), 0, False, math.inf
 
     def applies(self) -> bool:
         """Under a maximum AGL, when a path is known."""
-        return self.problem.limits.max_agl_m is not None and self.incumbent.best is not None and not self._fine
+        if self.problem.limits.max_agl_m is None or self.incumbent.best is None or self._fine:
+            return False
+        return self.incumbent.gap < NEARER_PATH * self._left
 
     def size(self) -> Size:
         """Chains over few nodes; those over many are only looked for while they close the gap."""
@@ -82,6 +86,7 @@ class SectionChains(Search):
                     incumbent.raise_bound(math.inf)
                     return
                 self._fine = chains.sections.step_m <= FINE * chains.spacing_m
+                self._left = incumbent.gap
                 gained = gap - (incumbent.cost - incumbent.bound)
                 ends = effort + 1 == len(EFFORTS) or (effort > 0 and (self._fine or gained < WORTH_MORE * gap))
                 if ends or not incumbent.goes_on():
