@@ -341,5 +341,5 @@ def test_a_rehearsal_flies_with_the_parameters_of_a_file_or_a_vehicle(tmp_path: 
     with pytest.raises(UsageError, match="no vehicle 'b'"):
         parameters_of([f"b={file}"], done)
     file.write_text("RTL_SPEED;500\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"board\.param:1: NAME,VALUE"):
+    with pytest.raises(InputError, match=r"board\.param:1: each line must be NAME,VALUE"):
         parameters_of([str(file)], done)

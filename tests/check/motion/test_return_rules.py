@@ -149,11 +149,11 @@ def test_a_plane_turns_about_within_the_formula_wherever_home_lies(speed: float)
 
 
 @pytest.mark.slow
-def test_fifty_random_returns_fly_within_the_told_places_and_no_lower() -> None:
+def test_fifty_random_returns_fly_within_the_judged_places_and_no_lower() -> None:
     found = [in_twin(seed, (COPTER, PLANE)[seed % 2]) for seed in range(50)]
     assert [f for f in found if not f.as_judged] == []
-    copters = [f for f in found[::2] if f.flown_agl_m < f.told_agl_m + 3.0]
-    assert len(copters) > 12  # the told height is no mere bound
+    copters = [f for f in found[::2] if f.flown_agl_m < f.judged_agl_m + 3.0]
+    assert len(copters) > 12  # the judged height is no mere bound
 
 
 @pytest.mark.parametrize("seed", [2, 5])
