@@ -41,7 +41,7 @@ def _next_line(a: float, b: float, t: float) -> float:
 @device
 def _sag(z: Floats, sign: float, r0: float, c0: float, r1: float, c1: float, z0: float, z1: float) -> float:
     """The most by which the straight line from ``z0`` to ``z1`` exceeds ``sign`` times the heights between two places:
-    exact, for between two grid lines heights are quadratic."""
+    exact, for between two grid lines heights are quadratic. NaN if one of them is not known."""
     most, t = -math.inf, 0.0
     begin = sign * _height(z, r0, c0)
     while t < 1.0:
@@ -49,6 +49,8 @@ def _sag(z: Floats, sign: float, r0: float, c0: float, r1: float, c1: float, z0:
         half = 0.5 * (t + to)
         middle = sign * _height(z, r0 + half * (r1 - r0), c0 + half * (c1 - c0))
         end = sign * _height(z, r0 + to * (r1 - r0), c0 + to * (c1 - c0))
+        if math.isnan(middle) or math.isnan(end):
+            return math.nan
         bend = 2.0 * (begin + end) - 4.0 * middle  # heights are begin + rise u + bend u², for u from 0 to 1
         rise = end - begin - bend
         line, its_rise = z0 + t * (z1 - z0), (to - t) * (z1 - z0)
@@ -90,6 +92,8 @@ def lay_sections(
                 for j in range(len(beside)):
                     r, c = beside[j, 0], beside[j, 1]
                     here = _sag(z, sign, row[n] + r, col[n] + c, row[n + 1] + r, col[n + 1] + c, out[n], out[n + 1])
+                    if math.isnan(here):
+                        return False
                     sag = min(sag, max(here, 0.0))
             out[n] += more - max(sag, before)
             before = sag

@@ -17,7 +17,6 @@ from gcsplan.planners.optimal.navmesh.zone_kernels import (
     BOTTOM,
     BOTTOM_AGL,
     FIRST,
-    LAST,
     LOOKS,
     PAIR,
     THIN,
@@ -37,15 +36,23 @@ NODE_MB = 3e-4
 """Megabytes of a node."""
 
 
+ZoneLevels = tuple[int, float, float, float, float, float]
+"""A zone's number and levels: bottom and top, whether each is above ground, and the thickness at which it is none."""
+Chords = dict[ZoneLevels, list[tuple[float, float]]]
+"""The parts of a line, metres aside, in each zone; they do not touch."""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Line:
-    """A section's line: the leg that it crosses (None: a terminal, a single place), its middle, and its direction."""
+    """A section's line: the leg that it crosses (None: a terminal, a single place), its middle, its direction, straight
+    metres along the legs up to it, and its parts in zones."""
 
     leg: Leg | None
     east_m: float
     north_m: float
     across: tuple[float, float]
     along_m: float
+    chords: Chords = field(default_factory=dict)
 
 
 @dataclass(eq=False, slots=True)
@@ -85,6 +92,13 @@ class Sections:
         off = np.where(self.beside, np.abs(np.diff(values)), 0.0)
         return np.asarray(np.maximum(np.append(off, 0.0), np.append(0.0, off)))
 
+    def touched(self, nodes: Bools) -> Bools:
+        """(N,) the given nodes (N,) and their neighbours in the section: a place is between two nodes."""
+        same, out = self.beside, nodes.copy()
+        out[:-1] |= nodes[1:] & same
+        out[1:] |= nodes[:-1] & same
+        return out
+
     def nearest(self, aside_m: Floats) -> Int64s:
         """(S,) the nodes nearest to places ``aside_m`` (S,) of the legs."""
         first, last = self.first[:-1], self.first[1:] - 1
@@ -110,7 +124,8 @@ def lines_of(plane: PlaneSearch, spacing_m: float) -> list[Line]:
         across = (y0 - y1) / length, (x1 - x0) / length
         count = max(math.ceil(length / spacing_m), 1)
         for t in np.arange(1, count) / count:
-            lines.append(Line(leg, x0 + t * (x1 - x0), y0 + t * (y1 - y0), across, begin + t * length))
+            place = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
+            lines.append(Line(leg, *place, across, begin + t * length, _chords(leg.plane.shapes, place, across)))
         begin += length
         lines.append(Line(None, x1, y1, (0.0, 0.0), begin))
     return lines
@@ -150,11 +165,7 @@ def lay_out(
     if not _lay_heights(plane, made):
         return None
     _lay_distances(plane, made)
-    free, same = made.low <= made.high, made.beside
-    near = free.copy()
-    near[:-1] |= free[1:] & same
-    near[1:] |= free[:-1] & same
-    made.shut = ~near
+    made.shut = ~made.touched(made.low <= made.high)
     for part, over, below in _in_zones(plane, made):
         made.shut[part] |= over & below
     made.loose = np.maximum(made.widest(made.low), made.widest(made.high))
@@ -166,7 +177,9 @@ def _lay_heights(plane: PlaneSearch, made: Sections) -> bool:
     problem, limits = plane.problem, plane.problem.bound_limits
     surface = problem.airspace.surface
     col, row = np.ascontiguousarray(surface.grid(made.x, made.y).T)
-    radius_m = max(limits.track_error_m - INSIDE_M - surface.grid.error_m, 0.0)
+    # Metres of a cell change away from the start, so the places are nearer by as much.
+    far_m = float(np.hypot(made.x - problem.start[0], made.y - problem.start[1]).max())
+    radius_m = (limits.track_error_m - surface.grid.error_m) * (1.0 - problem.airspace.field.bend * far_m) - INSIDE_M
     places = radius_m * ERROR_PLACES if radius_m > 0.0 else ERROR_PLACES[:1]
     beside = np.ascontiguousarray((places @ surface.grid.jacobian(*problem.start[:2]).T)[:, ::-1])
     made.low, made.high = np.empty(len(made.x)), np.full(len(made.x), plane.top_m + _spare_m(plane))
@@ -213,10 +226,10 @@ def _in_zones(plane: PlaneSearch, made: Sections) -> Iterator[tuple[slice, Bools
         begin, end = int(made.first[k]), int(made.first[k + 1])
         if line.leg is None or end - begin < 3:
             continue
-        for (_, bottom, top, bottom_agl, top_agl, thin), parts in _chords(line.leg.plane.shapes, line).items():
+        for (_, bottom, top, bottom_agl, top_agl, thin), parts in line.chords.items():
             if not (math.isinf(top) or math.isinf(bottom) or (bottom_agl == top_agl and top - bottom > thin)):
                 continue
-            for a, b in _joined(parts):
+            for a, b in parts:
                 m = math.ceil((a + INSIDE_M - made.aside[begin]) / made.step_m) + 1
                 n = math.floor((b - INSIDE_M - made.aside[begin]) / made.step_m)
                 first, last = begin + max(m, 1), begin + min(n, end - begin - 1)
@@ -229,41 +242,36 @@ def _in_zones(plane: PlaneSearch, made: Sections) -> Iterator[tuple[slice, Bools
                     yield slice(first, last), over, below
 
 
-ZoneKey = tuple[int, float, float, float, float, float]
-
-
-def _chords(shapes: Shapes, line: Line) -> dict[ZoneKey, list[tuple[float, float]]]:
-    """The parts of a line, metres aside, in the convex parts of each zone with the same levels."""
+def _chords(shapes: Shapes, place: tuple[float, float], across: tuple[float, float]) -> Chords:
+    """The parts in zones of the line through a place in the direction ``across``."""
     zones, forms = shapes.low
-    found: dict[ZoneKey, list[tuple[float, float]]] = {}
-    for row, owner in zip(zones, shapes.owner, strict=True):
-        if row[PAIR] > 0.0 or row[LOOKS] > 0.0:
-            continue
-        low, high = -math.inf, math.inf
-        for form in forms[int(row[FIRST]) : int(row[LAST])]:
-            a, b = _in_form(form, line)
-            low, high = max(low, a), min(high, b)
-        if low < high:
-            key = int(owner[0]), *row[[BOTTOM, TOP, BOTTOM_AGL, TOP_AGL, THIN]].tolist()
-            found.setdefault(key, []).append((low, high))
-    return found
+    if not len(zones):
+        return {}
+    first = zones[:, FIRST].astype(np.intp)
+    low, high = _in_forms(forms, place, across)
+    low, high = np.maximum.reduceat(low, first), np.minimum.reduceat(high, first)
+    met = np.flatnonzero((low < high) & (zones[:, PAIR] == 0.0) & (zones[:, LOOKS] == 0.0))
+    found: Chords = {}
+    for k, levels in zip(met.tolist(), zones[met][:, [BOTTOM, TOP, BOTTOM_AGL, TOP_AGL, THIN]].tolist(), strict=True):
+        found.setdefault((int(shapes.owner[k, 0]), *levels), []).append((float(low[k]), float(high[k])))
+    return {levels: _joined(parts) for levels, parts in found.items()}
 
 
-def _in_form(form: Floats, line: Line) -> tuple[float, float]:
-    """The part of a line in a disc or a half-plane (`zone_shapes.Shapes`)."""
-    nothing = math.inf, -math.inf
-    size, x, y, disc = form.tolist()
-    if disc > 0.0:
-        dx, dy = x - line.east_m, y - line.north_m
-        middle = dx * line.across[0] + dy * line.across[1]
-        square = size * abs(size) - (dx * dx + dy * dy - middle * middle)
-        half = math.sqrt(max(square, 0.0))
-        return (middle - half, middle + half) if square > 0.0 else nothing
-    depth = size - x * line.east_m - y * line.north_m
-    slope = x * line.across[0] + y * line.across[1]
-    if abs(slope) < 1e-12:
-        return (-math.inf, math.inf) if depth > 0.0 else nothing
-    return (-math.inf, depth / slope) if slope > 0.0 else (depth / slope, math.inf)
+def _in_forms(forms: Floats, place: tuple[float, float], across: tuple[float, float]) -> tuple[Floats, Floats]:
+    """(E,) the least and the greatest metres aside of a line within each disc and half-plane (`zone_shapes.Shapes`);
+    inf and -inf where it meets none."""
+    size, x, y, disc = forms.T
+    dx, dy = x - place[0], y - place[1]
+    middle = dx * across[0] + dy * across[1]
+    square = size * np.abs(size) - (dx * dx + dy * dy - middle * middle)
+    half = np.sqrt(np.maximum(square, 0.0))
+    depth, slope = size - x * place[0] - y * place[1], x * across[0] + y * across[1]
+    along = np.abs(slope) < 1e-12
+    end = depth / np.where(along, 1.0, slope)
+    inside = np.where(disc > 0.0, square > 0.0, ~along | (depth > 0.0))
+    low = np.where(disc > 0.0, middle - half, np.where(along | (slope > 0.0), -np.inf, end))
+    high = np.where(disc > 0.0, middle + half, np.where(along | (slope < 0.0), np.inf, end))
+    return np.where(inside, low, np.inf), np.where(inside, high, -np.inf)
 
 
 def _joined(parts: list[tuple[float, float]]) -> list[tuple[float, float]]:

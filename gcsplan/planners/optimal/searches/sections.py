@@ -20,6 +20,7 @@ from gcsplan.planners.optimal.plane.section_kernels import cheapest_chain
 from gcsplan.planners.optimal.plane.section_prices import Prices, chain_prices, numbers, slants
 from gcsplan.planners.optimal.plane.sections import (
     NODE_MB,
+    Line,
     Sections,
     SectionSpans,
     crossings,
@@ -75,17 +76,18 @@ class SectionChains(Search):
         plane, incumbent = self.work.plane, self.incumbent
         if incumbent.best is None or not plane.legs or not plane.reach_longest() or math.isinf(plane.longest()):
             return
-        spans: SectionSpans | None = None
+        spacing_m = min(SPACING_M, sum(leg.straight_m for leg in plane.legs) / LEAST_SECTIONS)
+        lines, spans = lines_of(plane, spacing_m), None
         for effort in range(self._effort, len(EFFORTS)):
             gap = incumbent.cost - incumbent.bound
-            self._effort = effort
-            chains = _Chains(plane, self._prices, EFFORTS[effort], spans)
+            chains = _Chains(plane, self._prices, lines, spacing_m, effort, spans)
             if chains.sections is not None:
+                self._effort = effort
                 chains.run()
                 if not math.isfinite(chains.bound):
                     incumbent.raise_bound(math.inf)
                     return
-                self._fine = chains.sections.step_m <= FINE * chains.spacing_m
+                self._fine = chains.sections.step_m <= FINE * spacing_m
                 self._left = incumbent.gap
                 gained = gap - (incumbent.cost - incumbent.bound)
                 ends = effort + 1 == len(EFFORTS) or (effort > 0 and (self._fine or gained < WORTH_MORE * gap))
@@ -98,14 +100,13 @@ class _Chains:
     """Chains over one set of nodes. ``bound``: the highest bound so far."""
 
     def __init__(
-        self, plane: PlaneSearch, prices: Prices, effort: tuple[float, int], spans: SectionSpans | None = None
-    ) -> None:
+        self, plane: PlaneSearch, prices: Prices, lines: list[Line], spacing_m: float, effort: int,
+        spans: SectionSpans | None,
+    ) -> None:  # fmt: skip
         self.plane, self.incumbent, self.problem = plane, plane.incumbent, plane.problem
-        self.prices, self.bound, self.legs = prices, 0.0, effort[0]
-        self.most_chains = effort[1]
+        self.prices, self.bound = prices, 0.0
+        self.legs, self.most_chains = EFFORTS[effort]
         straight_m, most_m = sum(leg.straight_m for leg in plane.legs), plane.longest()
-        self.spacing_m = spacing_m = min(SPACING_M, straight_m / LEAST_SECTIONS)
-        lines = lines_of(plane, spacing_m)
         within = widest_spans(plane, lines, most_m)
         if spans is not None:
             within = [(max(a, c), min(b, d)) for (a, b), (c, d) in zip(within, spans, strict=True)]
@@ -116,7 +117,6 @@ class _Chains:
         self.sections: Sections | None = None
         if step_m <= MOST_STEP * spacing_m:
             self.sections = lay_out(plane, lines, within, max(step_m, LEAST_STEP * spacing_m), most_m)
-        self._through: Floats | None = None
 
     def run(self) -> None:
         """Find chain and prices in turn until the bound gains no more; then try the cheapest chain as a track."""
@@ -151,10 +151,7 @@ class _Chains:
         assert sections is not None
         price = self.prices.at(sections)
         through = self._swept(price, back=False)[0] + self._swept(price, back=True)[0]
-        good, same = through <= self.incumbent.cost, sections.beside
-        near = good.copy()
-        near[:-1] |= good[1:] & same
-        near[1:] |= good[:-1] & same
+        near = sections.touched(through <= self.incumbent.cost)
         spans: SectionSpans = []
         for begin, end in zip(sections.first[:-1], sections.first[1:], strict=True):
             aside = sections.aside[begin:end][near[begin:end]]

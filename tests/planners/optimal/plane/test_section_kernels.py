@@ -58,6 +58,16 @@ def test_unknown_ground_is_reported() -> None:
     assert not lay_sections(z, 1.0, 0.0, -math.inf, np.array([0, 3], np.int64), at, at + 1.0, np.zeros((1, 2)), out)
 
 
+def test_unknown_ground_between_two_known_nodes_is_reported() -> None:
+    z = np.zeros((4, 9))
+    z[1, 4] = math.nan
+    out = np.empty(2)
+    row, col = np.array([1.5, 1.5]), np.array([1.5, 6.5])
+    ends = np.array([0, 2], np.int64)
+    assert not lay_sections(z, 1.0, 0.0, -math.inf, ends, row, col, np.zeros((1, 2)), out)
+    assert lay_sections(z, 1.0, 0.0, -math.inf, ends, row + 1.0, col, np.zeros((1, 2)), out)
+
+
 def sweep(rng: np.random.Generator, *, back: bool) -> tuple[float, float]:
     """The least sum over random nodes by the kernel, and over all chains one by one."""
     first = np.array([0, 1, 5, 9, 12, 13], np.int64)

@@ -10,7 +10,9 @@ import pytest
 
 from gcsplan.planners.optimal.plane.sections import Sections, crossings, lay_out, lines_of, widest_spans
 from gcsplan.planners.problem import Via
+from gcsplan.world.geometry.limits import Limits
 from gcsplan.world.geometry.zones import Circle, Level, Polygon, Zone
+from tests.support.planner_worlds import random_mission
 from tests.support.searches import looked, over_flat
 
 MOST_M = 2200.0
@@ -99,3 +101,38 @@ def test_crossings_are_the_first_of_a_path_on_each_leg() -> None:
         ]
         assert min(runs) < 1e-6
     assert found[0] == found[-1] == 0.0
+
+
+def test_no_floor_of_the_exact_check_is_below_the_lines_between_nodes() -> None:
+    limits = Limits(40.0, 130.0, track_error_m=12.0, altitude_error_m=5.0, max_climb_deg=20.0, max_descent_deg=20.0)
+    problem = random_mission(4, limits, zones=0)
+    plane = looked(problem).plane
+    lines = lines_of(plane, 400.0)
+    most_m = 1.1 * sum(leg.straight_m for leg in plane.legs)
+    found = lay_out(plane, lines, widest_spans(plane, lines, most_m), 25.0, most_m)
+    assert found is not None
+    here = np.flatnonzero(found.beside)
+    t = np.random.default_rng(4).uniform(0.0, 1.0, len(here))
+    x, y, low = (v[here] + t * (v[here + 1] - v[here]) for v in (found.x, found.y, found.low))
+    room_m = problem.airspace.floor_amsl(x, y, limits) - low
+    assert room_m.min() >= 0.0
+    assert np.median(room_m) < 2.0  # the highest of five places, instead of all within the track error
+
+
+def test_chords_are_the_parts_of_a_line_within_the_zones() -> None:
+    disc, ring = Circle(1000.0, 1000.0, 150.0), Polygon(RING)
+    found = sections_of(Zone("disc", disc), Zone("ring", ring, None, Level(100.0, "agl")))
+    seen = 0
+    for line in found.lines:
+        for (zone, *_), parts in line.chords.items():
+            seen += 1
+            assert sorted(parts) == parts
+            for a, b in parts:
+                for aside_m in np.linspace(a, b, 9):
+                    east, north = line.east_m + aside_m * line.across[0], line.north_m + aside_m * line.across[1]
+                    if zone == 0:
+                        assert math.hypot(east - 1000.0, north - 1000.0) <= 150.0
+                    else:
+                        assert 800.0 <= east <= 1200.0
+                        assert 800.0 <= north <= 900.0 + 1.76 * abs(east - 1000.0)
+    assert seen > 4
