@@ -310,7 +310,7 @@ MOST_IN_A_FOLDER = 15
 
 MOST = {
     "modules": 434,
-    "statements": 61_346,
+    "statements": 61_348,
     "type names with two meanings": 0,
     "constants with two values": 1,
     "folders with more than 15 modules": 0,

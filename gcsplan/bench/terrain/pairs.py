@@ -18,6 +18,7 @@ import numpy as np
 from gcsplan.arrays import Bools, Floats
 from gcsplan.bench.sample import SAMPLE_HALF_M, SAMPLE_MIDDLE_DEG, sample_spec
 from gcsplan.mission_file.scene import make_box
+from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geodesy.frame import Frame, centre_of
 from gcsplan.world.geometry.limits import Limits
@@ -141,16 +142,32 @@ def draw_pair(rng: np.random.Generator, number: int, limits: Limits, zones: int,
         top = draw_ceiling(rng, pair, cells, limits) if ceiling else None
         if top is not None or not ceiling:
             below = cells.floor_m <= (1e9 if top is None else top - limits.altitude_error_m)
-            for _ in range(MOST_ZONE_SETS):
-                found = draw_zones(rng, pair, zones)
-                free = below & cells.outside(found, limits.horizontal_clearance_m + limits.track_error_m)
-                if cells.joined(pair.surface, pair.start, pair.goal, free):
-                    return TerrainPair(
-                        number, pair.frame, pair.start, pair.goal, pair.surface, pair.scale, top, steepest_deg,
-                        tuple(found), (pairs, sets),
-                    )  # fmt: skip
-                sets += 1
+            found, tried = draw_joined_zones(rng, pair, cells, below, limits, zones)
+            sets += tried
+            if found is not None:
+                return replace(pair, ceiling_m=top, zones=found, redraws=(pairs, sets))
         pairs += 1
+
+
+def draw_joined_zones(
+    rng: np.random.Generator, pair: TerrainPair, cells: FloorCells, below: Bools, limits: Limits, count: int
+) -> tuple[tuple[Zone, ...] | None, int]:
+    """Zones that leave the ends joined through the cells ``below``, and how many sets were drawn in vain before; None
+    after `MOST_ZONE_SETS`."""
+    reach_m = limits.horizontal_clearance_m + limits.track_error_m
+    for tried in range(MOST_ZONE_SETS):
+        found = draw_zones(rng, pair, count)
+        if cells.joined(pair.surface, pair.start, pair.goal, below & cells.outside(found, reach_m)):
+            return tuple(found), tried
+    return None, MOST_ZONE_SETS
+
+
+def problem_of(pair: TerrainPair, airspace: Airspace, limits: Limits) -> Problem:
+    """The problem between a pair's ends at their lowest legal altitudes, rounded up to a centimetre."""
+    (e0, n0), (e1, n1) = pair.start, pair.goal
+    floors = airspace.floor_amsl(np.array([e0, e1]), np.array([n0, n1]), limits)
+    z0, z1 = (math.ceil(100.0 * z - 1e-4) / 100.0 for z in floors.tolist())
+    return Problem(airspace, limits, (e0, n0, z0), (e1, n1, z1))
 
 
 def stratum(rng: np.random.Generator, number: int) -> tuple[float, float]:

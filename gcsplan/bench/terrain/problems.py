@@ -55,6 +55,7 @@ from gcsplan.bench.terrain.pairs import (
     draw_zones,
     lowest_ceiling,
     place,
+    problem_of,
     sample,
     stratum,
 )
@@ -155,7 +156,9 @@ def _main(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem
     for zones in MAIN_ZONES:
         for number in _spread(count):
             pair = pair_of(seed, number, limits)
-            problem = _problem(pair, Airspace(pair.surface, pair.zones[:zones], scale=pair.scale), _held(pair, limits))
+            problem = problem_of(
+                pair, Airspace(pair.surface, pair.zones[:zones], scale=pair.scale), _held(pair, limits)
+            )
             yield NamedProblem(
                 f"main {seed}/{number:02d}, {zones} zones", problem, "main", f"{zones} zones", pair.redraws
             )
@@ -173,7 +176,7 @@ def _band(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem
             held = replace(
                 limits, min_agl_m=BAND_M[0], max_agl_m=BAND_M[1], max_climb_deg=degrees, max_descent_deg=degrees
             )
-            problem = _problem(pair, Airspace(pair.surface, scale=pair.scale), held)
+            problem = problem_of(pair, Airspace(pair.surface, scale=pair.scale), held)
             name = f"band {seed}/{number:02d}, {degrees:g}°"
             yield NamedProblem(name, problem, "band", f"{BAND_M[0]:g}–{BAND_M[1]:g} m, {degrees:g}°", pair.redraws)
 
@@ -194,7 +197,7 @@ def _large(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProble
             join = FloorCells.of(airspace, limits).lowest_join(surface, pair.start, pair.goal)
             held = replace(held, max_amsl_m=math.floor(join + ABOVE_JOIN_M[0] + limits.altitude_error_m) + 0.5)
         name = f"large {seed}/{number:02d}, 10 zones"
-        problem = _problem(pair, airspace, held)
+        problem = problem_of(pair, airspace, held)
         # A new airspace, because the data derived for the old one takes hundreds of megabytes.
         problem = replace(problem, airspace=Airspace(surface, airspace.zones, scale=scale))
         yield NamedProblem(name, problem, "large", f"{rows} × {cols} nodes", pair.redraws)
@@ -209,7 +212,7 @@ def _many(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem
         zones = draw_zones(rng, pair, MANY_ZONES, SMALL_RADIUS_M)
         airspace = Airspace(pair.surface, zones, scale=pair.scale)
         if _joined(airspace, pair, limits, pair.ceiling_m):
-            problem = _problem(pair, airspace, held)
+            problem = problem_of(pair, airspace, held)
             name = f"many {seed}/{MANY_PAIR:02d}, {MANY_ZONES} zones"
             yield NamedProblem(name, problem, "many", f"{MANY_ZONES} zones", (pair.redraws[0], redraws))
             return
@@ -240,7 +243,7 @@ def _room(seed: int, limits: Limits, count: int | None) -> Iterator[NamedProblem
         for number in _spread(count):
             pair = pair_of(seed, number, REAL_ERRORS, "room")
             airspace = Airspace(pair.surface, pair.zones[:zones], scale=pair.scale)
-            problem = _problem(pair, airspace, _held(pair, REAL_ERRORS))
+            problem = problem_of(pair, airspace, _held(pair, REAL_ERRORS))
             name = f"room {seed}/{number:02d}, {zones} zones"
             yield NamedProblem(name, problem, "room", f"room, {zones} zones", pair.redraws)
 
@@ -274,13 +277,6 @@ def _held(pair: TerrainPair, limits: Limits) -> Limits:
     return replace(
         limits, max_amsl_m=pair.ceiling_m, max_climb_deg=pair.steepest_deg, max_descent_deg=pair.steepest_deg
     )
-
-
-def _problem(pair: TerrainPair, airspace: Airspace, limits: Limits) -> Problem:
-    (e0, n0), (e1, n1) = pair.start, pair.goal
-    floors = airspace.floor_amsl(np.array([e0, e1]), np.array([n0, n1]), limits)
-    z0, z1 = (math.ceil(100.0 * z - 1e-4) / 100.0 for z in floors.tolist())
-    return Problem(airspace, limits, (e0, n0, z0), (e1, n1, z1))
 
 
 def _joined(airspace: Airspace, pair: TerrainPair, limits: Limits, ceiling_m: float) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from gcsplan.arrays import Floats
-from gcsplan.bench.terrain.pairs import MOST_ZONE_SETS, FloorCells, TerrainPair, draw_zones, place
+from gcsplan.bench.terrain.pairs import FloorCells, TerrainPair, draw_joined_zones, place, problem_of
 from gcsplan.planners.problem import Problem
 from gcsplan.world.airspace import Airspace
 from gcsplan.world.geodesy.frame import Frame
@@ -52,18 +52,8 @@ def mission(seed: int, number: int) -> tuple[str, Problem, tuple[int, int]]:
     )
     radius_m = float(round(rng.uniform(*WING_TURN_M))) if wing else 0.0
     pair, redraws = _pair(rng, number, limits, zones, over_sample=over_sample)
-    airspace = Airspace(pair.surface, pair.zones, scale=pair.scale)
-    (e0, n0), (e1, n1) = pair.start, pair.goal
-    floors = airspace.floor_amsl(np.array([e0, e1]), np.array([n0, n1]), limits)
-    z0, z1 = (math.ceil(100.0 * z - 1e-4) / 100.0 for z in floors.tolist())
-    problem = Problem(
-        airspace,
-        limits,
-        (e0, n0, z0),
-        (e1, n1, z1),
-        objective="energy" if energy else "length",
-        turn_radius_m=radius_m,
-    )
+    problem = problem_of(pair, Airspace(pair.surface, pair.zones, scale=pair.scale), limits)
+    problem = replace(problem, objective="energy" if energy else "length", turn_radius_m=radius_m)
     group = f"{'wing' if wing else 'copter'}, {problem.objective}"
     return group, problem, redraws
 
@@ -76,15 +66,11 @@ def _pair(
     way_m = float(rng.uniform(*DISTANCE_M))
     while True:
         pair = place(rng, number, way_m, limits.max_climb_deg) if over_sample else _made(rng, number, way_m, limits)
-        airspace = Airspace(pair.surface, scale=pair.scale)
-        cells = FloorCells.of(airspace, limits)
-        known = np.isfinite(cells.floor_m)
-        for _ in range(MOST_ZONE_SETS):
-            found = draw_zones(rng, pair, zones)
-            free = known & cells.outside(found, limits.horizontal_clearance_m + limits.track_error_m)
-            if cells.joined(pair.surface, pair.start, pair.goal, free):
-                return replace(pair, zones=tuple(found)), (pairs, sets)
-            sets += 1
+        cells = FloorCells.of(Airspace(pair.surface, scale=pair.scale), limits)
+        found, tried = draw_joined_zones(rng, pair, cells, np.isfinite(cells.floor_m), limits, zones)
+        sets += tried
+        if found is not None:
+            return replace(pair, zones=found), (pairs, sets)
         pairs += 1
 
 

@@ -36,9 +36,9 @@ NODE_MB = 3e-4
 """Megabytes of a node."""
 
 
-ZoneLevels = tuple[int, float, float, float, float, float]
+ChordZone = tuple[int, float, float, float, float, float]
 """A zone's number and levels: bottom and top, whether each is above ground, and the thickness at which it is none."""
-Chords = dict[ZoneLevels, list[tuple[float, float]]]
+Chords = dict[ChordZone, list[tuple[float, float]]]
 """The parts of a line, metres aside, in each zone; they do not touch."""
 
 
@@ -104,11 +104,6 @@ class Sections:
         first, last = self.first[:-1], self.first[1:] - 1
         off = np.rint((aside_m - self.aside[first]) / self.step_m).astype(np.int64)
         return np.asarray(np.clip(first + off, first, last))
-
-    @property
-    def along_m(self) -> Floats:
-        """(S,) straight metres along the legs up to each section."""
-        return np.array([line.along_m for line in self.lines])
 
 
 SectionSpans = list[tuple[float, float]]
