@@ -1,6 +1,6 @@
 """Sentences on what the check finds, does not judge and notes: items, turns, findings, energy; and the way home.
 
-Of the way home: from where a return is not safe and why, what to set, and what is not judged.
+On the way home: from where a return is not safe and why, what to set, and which parts are not judged.
 """
 
 CHECK_TEXTS = {
