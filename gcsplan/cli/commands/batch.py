@@ -67,7 +67,9 @@ def batch(
     with work.alone():
         done, todo = work.known()
         if done:
-            remark(f"{len(done)} of {len(work.missions)} missions are done and unchanged")
+            failed = sum(r.code != 0 for r in done)
+            without = f", {failed} of them without a plan" if failed else ""
+            remark(f"{len(done)} of {len(work.missions)} missions are done and unchanged{without}")
 
         def on_done(record: Record) -> None:
             done.append(record)
