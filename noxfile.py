@@ -37,7 +37,7 @@ CAMPAIGNS = (
     "worlds",
 )
 CAMPAIGN_S = 30
-CAMPAIGNS_AT_ONCE = 2
+CAMPAIGNS_AT_ONCE = 3
 SAMPLES = ("jacksboro", "jacksboro-wing")
 """Samples whose missions have the same bytes on every Python."""
 
@@ -101,7 +101,8 @@ def quick(session: nox.Session) -> None:
 @nox.session
 def slow(session: nox.Session) -> None:
     """Tests that take seconds each: brute force, browsers, hostile files."""
-    module(session, ready(session, "test", "cluster", "parquet"), "pytest", "-m", "slow", *session.posargs)
+    python = ready(session, "test", "cluster", "parquet")
+    module(session, python, "pytest", "-m", "slow and not nightly", *session.posargs)
 
 
 @nox.session

@@ -55,6 +55,7 @@ def pytest_collection_finish() -> None:
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: Sequence[pytest.Item]) -> None:
     """Mark tests as slow: with the mark ``first_quick`` all parameters but the first; in a full run all random tests.
+    Mark as nightly, with ``nightly_but``, all parameters but those that it names.
 
     The quick suite runs those random tests too, with a part of their draws.
     """
@@ -65,6 +66,10 @@ def pytest_collection_modifyitems(items: Sequence[pytest.Item]) -> None:
             if test in seen:
                 item.add_marker("slow")
             seen.add(test)
+    for item in items:
+        kept = item.get_closest_marker("nightly_but")
+        if kept and item.name.partition("[")[2].removesuffix("]") not in kept.args:
+            item.add_marker("nightly")
     for item in items if effort.full else ():
         if item.get_closest_marker("draws") or is_hypothesis_test(getattr(item, "obj", None)):
             item.add_marker("slow")

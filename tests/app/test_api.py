@@ -100,6 +100,7 @@ def test_help_shows_every_function_with_its_arguments() -> None:
 
 
 @pytest.mark.first_quick
+@pytest.mark.nightly_but("gcsplan.check.verdict", "gcsplan")
 @pytest.mark.parametrize("first", ["gcsplan.check.verdict", "gcsplan.report.page", "gcsplan.cli.main", "gcsplan"])
 def test_check_and_report_are_functions_whatever_was_imported_before(first: str) -> None:
     """Packages of the same names stand beside them, and importing one would put it in the function's place."""

@@ -133,7 +133,7 @@ def test_a_start_within_the_margins_of_a_zone_is_not_proved_illegal() -> None:
     assert caught.value.reason == "infeasible"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_room_over_a_wall_that_only_the_margins_take_away_counts_for_the_bound() -> None:
     """The way over the wall, 2 cm below the ceiling, is a tenth of the way around it."""
     v = planned(ERRORS | {"max_amsl_m": 200}, wall("long", 200, 210, -2000, 2000, ceiling_amsl_m=189.98), goal_m=422.0)

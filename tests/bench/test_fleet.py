@@ -60,7 +60,7 @@ def test_samples_and_the_exact_separation_agree() -> None:
     assert near > 10
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_fleet_of_120_is_planned_kept_apart_and_uploaded(tmp_path: Path) -> None:
     result = run(120, tmp_path, interval_s=2.0, jobs=1, upload=True)
     assert result["placed"] >= 116

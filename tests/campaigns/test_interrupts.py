@@ -19,6 +19,7 @@ linux = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks a
 
 
 @pytest.mark.slow
+@pytest.mark.nightly_but("plan")
 @linux
 @pytest.mark.parametrize("kind", list(interrupts.KINDS))
 def test_a_short_campaign_of_signals_finds_nothing(kind: str) -> None:

@@ -43,7 +43,7 @@ def test_what_the_campaign_found_once_is_cured(seed: int, family: str) -> None:
     assert tally.unsafe == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_no_family_is_unsafe_at_the_limit() -> None:
     tally = run(FOREVER_S, 40, most=4)
     assert tally.unsafe == []

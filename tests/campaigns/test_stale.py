@@ -42,7 +42,7 @@ def test_a_killed_batch_is_found_if_outputs_are_not_compared(monkeypatch: pytest
     assert found[0].startswith("seed ")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_short_campaign_finds_nothing() -> None:
     count, found = stale.campaign(120.0, 1, 60)
     assert not found

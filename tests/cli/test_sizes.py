@@ -32,6 +32,6 @@ def test_runs_of_a_rehearsal_are_counted(run: Any) -> None:
     assert "10000" in err
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_log_of_half_a_million_lines_is_read(run: Any) -> None:
     assert run(*sizes.write("log", 500_000))[0] in (0, 4)  # 4: it tells too little of what metres and climbs take

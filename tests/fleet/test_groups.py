@@ -35,6 +35,7 @@ def test_groups_are_the_clusters() -> None:
     assert sorted(map(sorted, groups_of(plan, RULES))) == [[f"c{c}v{k}" for k in range(4)] for c in range(3)]
 
 
+@pytest.mark.nightly_but("0", "1")
 @pytest.mark.first_quick
 @pytest.mark.parametrize("seed", range(4))
 def test_group_by_group_is_the_same_as_all_at_once(seed: int) -> None:
@@ -65,7 +66,7 @@ def test_groups_that_meet_after_all_are_joined(monkeypatch: pytest.MonkeyPatch) 
     assert set(found.done) == set(plan.order)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_one_that_is_stuck_is_left_out_of_its_group_alone() -> None:
     # The goal of the last lies beside that of the first of its cluster, where the first has landed.
     crews = clusters(3)

@@ -167,6 +167,7 @@ print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024.0)
 
 
 @pytest.mark.slow
+@pytest.mark.nightly_but("300.0-wall", "64.0-sample")
 @pytest.mark.parametrize("kind", ["tiny", "wall", "detour", "comb", "sample"])
 @pytest.mark.parametrize("megabytes", [64.0, 300.0])
 def test_memory_stays_within_its_budget_even_without_outlines(kind: str, megabytes: float) -> None:
@@ -211,4 +212,4 @@ def test_legs_whose_laps_leave_much_to_spare_share_memory_and_work() -> None:
     printed = subprocess.run([sys.executable, "-c", HIGH], capture_output=True, text=True, timeout=120, check=True)
     megabytes, seconds = map(float, printed.stdout.split())
     assert megabytes < 700.0
-    assert seconds < 11.0
+    assert seconds < 25.0  # of processor time: 7 s, 12 s on a slow machine; 50 s for legs that do not share

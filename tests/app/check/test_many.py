@@ -104,7 +104,7 @@ def test_results_do_not_depend_on_who_works_nor_on_what_is_kept(
     assert [told_without_error(t) for t in again] == [told_without_error(t) for t in alone]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_world_of_a_mission_is_the_same_everywhere(
     folder: Path, options: WorldOptions, files: list[str], tmp_path: Path
 ) -> None:
@@ -357,7 +357,7 @@ def garbage_soon() -> Iterator[None]:
     gc.set_threshold(*before)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.usefixtures("garbage_soon")
 def test_memory_does_not_grow_with_the_files(
     options: WorldOptions, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -375,7 +375,7 @@ def test_memory_does_not_grow_with_the_files(
     assert peaks[2] - peaks[1] < 300 * 1500  # names, and the places of ten items; a whole text has 10,000 characters
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_thousand_files_by_processes_are_the_same(options: WorldOptions, tmp_path: Path) -> None:
     pytest.importorskip("distributed")
     names = many(tmp_path / "many", 1000)

@@ -209,7 +209,7 @@ def test_a_killed_worker_costs_its_own_pieces_only(workers: Executor, tmp_path: 
     assert (tmp_path / "killed").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_piece_that_kills_every_worker_is_named() -> None:
     pytest.importorskip("distributed")
     with (
@@ -219,7 +219,7 @@ def test_a_piece_that_kills_every_worker_is_named() -> None:
         list(two.each(kills_always, 0, [1]))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_piece_that_kills_every_worker_costs_no_other(workers: Executor) -> None:
     found = workers.each(kills_always, 3, range(8), lost=lambda item, why: -item)
     assert sorted(found) == [(k, -3 if k == 3 else k) for k in range(8)]
@@ -250,7 +250,7 @@ def test_a_piece_handed_out_just_before_ctrl_c_is_no_error(workers: Executor) ->
     assert sorted(workers.each(square, 0, range(3))) == [(0, 0), (1, 1), (2, 4)]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_fleet_planned_by_processes_is_the_same(workers: Executor) -> None:
     assert isinstance(workers, Dask)
     assert told(plan(fleet(), cluster=workers.client)) == told(plan(fleet()))
@@ -313,7 +313,7 @@ def test_a_scheduler_is_found_by_its_file_or_its_object_and_its_end_is_told(tmp_
             found.extend((k, local.close()) for k, _ in one.each(square, 1, range(100)))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_no_scheduler_answers() -> None:
     pytest.importorskip("distributed")
     with (

@@ -16,7 +16,7 @@ from gcsplan.mission_file import load_mission
 from tests.support.noted import codes
 
 
-@pytest.mark.parametrize(("number", "most_m"), [(64, 5425.0), pytest.param(38, 702.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("number", "most_m"), [(64, 5425.0), pytest.param(38, 702.0, marks=pytest.mark.nightly)])
 def test_a_mission_over_hills_without_errors_is_planned_once(number: int, most_m: float) -> None:
     # Planned again with the margins of its short legs' climbs, 64 took 5,501 m and 38 took 714.
     one = draw(11, number)

@@ -68,7 +68,7 @@ def wires(done: Plan) -> list[list[object]]:
     [
         (SHUT, "infeasible", "wall"),
         (WEAK, "battery", "battery"),
-        pytest.param(BESIDE, "separation", "uav1", marks=pytest.mark.slow),
+        pytest.param(BESIDE, "separation", "uav1", marks=pytest.mark.nightly),
     ],
 )
 def test_one_without_a_mission_refuses_all_or_is_left_out_by_name(bad: dict[str, Any], reason: str, of: str) -> None:
@@ -88,7 +88,7 @@ def test_one_without_a_mission_refuses_all_or_is_left_out_by_name(bad: dict[str,
     assert wires(done) == wires(plan(mission(GOOD[0], GOOD[1], bad, leave_out=True)))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_turn_of_the_sequence_stays_empty_for_one_that_is_in_the_way() -> None:
     done = plan(mission(GOOD[0], BESIDE, GOOD[1]), leave_out=True)
     assert done.fleet is not None

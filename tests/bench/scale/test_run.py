@@ -38,7 +38,7 @@ def test_a_cluster_is_bounded_by_the_process_that_writes() -> None:
     assert found["serial_part"] == pytest.approx(0.02 / 1.02)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_two_processes_write_the_same_bytes_as_one_even_if_one_is_killed(tmp_path: Path) -> None:
     pytest.importorskip("distributed")
     result = scale.run(["workers", "zones"], 30, 2, 2, kill=True)

@@ -155,7 +155,7 @@ def has_corridor(pair: TerrainPair, ceiling_m: float) -> bool:
     return 0 in here
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("number", [0, 2])
 def test_a_mission_with_room_has_a_corridor_and_loses_it_below_its_ceiling(number: int) -> None:
     pair = pair_of(1, number, REAL_ERRORS, "room")
@@ -171,7 +171,7 @@ def test_a_mission_with_room_has_a_corridor_and_loses_it_below_its_ceiling(numbe
         assert corridors.open(ceiling, pair.zones, reach) == has_corridor(pair, ceiling)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_missions_with_room_are_sixty_and_their_ceiling_blocks_the_straight_track() -> None:
     named = problems("room", 1)
     assert [len(one.problem.airspace.zones) for one in named] == [0] * 20 + [10] * 20 + [20] * 20

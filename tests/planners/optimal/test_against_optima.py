@@ -135,6 +135,7 @@ def test_patient_search_comes_within_a_hair_of_known_optima() -> None:
 # --- the planner --------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly_but("bands", "clearances")
 @pytest.mark.parametrize("family", FAMILIES)
 def test_bound_is_never_over_and_path_never_under_what_is_known(family: str) -> None:
     verdicts = [judge(family, seed, BRIEF) for seed in range(WORLDS[family])]
@@ -144,6 +145,7 @@ def test_bound_is_never_over_and_path_never_under_what_is_known(family: str) -> 
     assert len(missed) <= MOST_MISSED.get(family, 0.1) * len(verdicts), "\n".join(missed)
 
 
+@pytest.mark.nightly_but("clearances+voids")
 @pytest.mark.parametrize("family", HOLED)
 def test_no_void_makes_a_bound_or_a_proof_wrong(family: str) -> None:
     verdicts = [judge(family, seed, BRIEF) for seed in range(HOLED_WORLDS)]
@@ -151,6 +153,7 @@ def test_no_void_makes_a_bound_or_a_proof_wrong(family: str) -> None:
     assert not wrong, "\n".join([*wrong, summary(verdicts)])
 
 
+@pytest.mark.nightly_but("cylinders", "mountains", "borders")
 @pytest.mark.parametrize("family", ["cylinders", "mountains", "climbs", "clearances", "borders"])
 def test_bound_holds_for_the_path_of_the_mission_flown_backwards(family: str) -> None:
     for seed in range(100, 100 + BACKWARDS):

@@ -37,7 +37,7 @@ def test_what_rounding_takes_from_bounds_is_computed_once_and_not_for_each_searc
 @pytest.mark.parametrize(
     ("number", "least"),
     [
-        pytest.param(38, 690.0, marks=pytest.mark.slow, id="a ring of a wall, without errors"),
+        pytest.param(38, 690.0, marks=pytest.mark.nightly, id="a ring of a wall, without errors"),
         pytest.param(75, 635.9, marks=pytest.mark.slow, id="over a zone, and down at the climb limit"),
     ],
 )

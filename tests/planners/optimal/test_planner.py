@@ -322,8 +322,8 @@ def test_random_missions_under_a_ceiling(seed: int) -> None:
     assert faults_of_plan(random_mission(seed, replace(FIELD, max_amsl_m=690.5))) == []
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [60, pytest.param(61, marks=pytest.mark.slow)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("seed", [60, 61])
 def test_random_missions_for_energy(seed: int) -> None:
     assert faults_of_plan(random_mission(seed, objective="energy")) == []
 
@@ -356,6 +356,7 @@ def test_jacksboro_mission_winds_through_the_gaps_that_its_ceiling_and_zones_lea
 
 
 @pytest.mark.slow
+@pytest.mark.nightly_but("krill-mound-156.72")
 @pytest.mark.parametrize(
     ("name", "most_m"), [("krill-forest", 188.9), ("abo", 129.4), ("krill-hills", 162.6), ("krill-mound", 156.72)]
 )
@@ -383,6 +384,7 @@ MAST = Zone("mast", Circle(45.0, 38.0, 9.0), None, Level(60.0, "amsl"))
 ROOF = Zone("roof", Circle(75.0, 60.0, 20.0), Level(50.0, "agl"), None)
 
 
+@pytest.mark.nightly_but("zones1-via1-90.0-length", "zones3-via3-90.0-energy")
 @pytest.mark.first_quick
 @pytest.mark.parametrize(
     ("zones", "via", "degrees", "objective"),

@@ -100,7 +100,7 @@ def test_where_memory_ends_before_the_terrain_nothing_is_called_proved() -> None
     assert f"not found within {within_m(problem) / 1000.0:.1f} km" in caught.value.message
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_every_vehicle_is_judged_over_the_widest_terrain_that_one_of_them_needed() -> None:
     short = {**ROW_4["vehicles"][0], "name": "short", "sysid": 2, "goal": [36.55317, -84.264]}  # type: ignore[index]
     done = plan(source_of({**ROW_4, "vehicles": [short, *ROW_4["vehicles"]]}))  # type: ignore[misc]
@@ -108,7 +108,7 @@ def test_every_vehicle_is_judged_over_the_widest_terrain_that_one_of_them_needed
     assert {v.brief.world for v in done.vehicles if v.brief is not None} == {done.world}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_two_plans_are_the_same_to_the_last_bit() -> None:
     one, other = (planner.plan(problem_of(source_of(ROW_4))) for _ in range(2))
     assert one.path.points.tobytes() == other.path.points.tobytes()
@@ -319,7 +319,7 @@ def attempt(problem: Problem) -> Solution | Refusal:
         return refusal
 
 
-@pytest.mark.parametrize("first", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in (50, 100, 150))])
+@pytest.mark.parametrize("first", [0, *(pytest.param(k, marks=pytest.mark.nightly) for k in (50, 100, 150))])
 def test_bounds_and_proofs_hold_for_the_world_beyond_the_window(first: int) -> None:
     wider = 0
     for seed in range(first, first + 50):
@@ -393,6 +393,7 @@ def test_campaign_of_worlds(family: str, seed: int) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly_but("101-ridge", "100-tiles", "101-edge")
 @pytest.mark.parametrize("family", ["ridge", "tiles", "edge"])
 @pytest.mark.parametrize("seed", range(100, 106))
 def test_campaign_of_worlds_longer(family: str, seed: int) -> None:

@@ -120,7 +120,7 @@ def test_goal_fenced_in_names_the_zones() -> None:
     assert e.east_m is not None
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_one_zone_across_the_map_is_named_alone() -> None:
     bar = Zone("border", Circle(1000.0, 1000.0, 1200.0), Level(0.0, "amsl"), Level(4000.0, "amsl"))
     dot = Zone("dot", Circle(300.0, 300.0, 50.0))
@@ -131,7 +131,7 @@ def test_one_zone_across_the_map_is_named_alone() -> None:
     assert "'dot'" not in e.message
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_climb_limit_too_tight_says_what_would_do() -> None:
     def cliff(east: Floats, north: Floats) -> Floats:
         return np.where(east < 1000.0, 300.0, 0.0)

@@ -120,13 +120,16 @@ def refusal_of(problem: Problem) -> Refusal:
     return with_cures(replace(problem, budget_s=30.0), caught.value, plan)  # enough even on a busy machine
 
 
-SLOW = {"ridges with errors 5", "cliff", "cliff, long way", "two ceilings", *(f"ridges {k}" for k in (2, 3, 4))}
-SLOW |= {f"ridges with errors {k}" for k in (6, 7, 8)}
+SLOW = {"two ceilings", *(f"ridges {k}" for k in (2, 3, 4))}
+NIGHTLY = {"cliff", "cliff, long way", *(f"ridges with errors {k}" for k in (5, 6, 7, 8))}
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in MISSIONS_REFUSED]
-)
+def tier(name: str) -> list[pytest.MarkDecorator]:
+    """The mark of a mission that takes long to refuse and to plan with each cure."""
+    return [pytest.mark.nightly] if name in NIGHTLY else [pytest.mark.slow] if name in SLOW else []
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=tier(name)) for name in MISSIONS_REFUSED])
 def test_what_is_reported_to_help_does(name: str) -> None:
     problem = MISSIONS_REFUSED[name]
     refusal = refusal_of(problem)
@@ -138,6 +141,7 @@ def test_what_is_reported_to_help_does(name: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly_but("jacksboro.yaml-max_amsl_m-600.5", "jacksboro-wing.yaml-max_amsl_m-500.5")
 @pytest.mark.parametrize(
     ("file", "key", "given"),
     [

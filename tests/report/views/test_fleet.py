@@ -21,7 +21,7 @@ from tests.support.pages import (
 )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_of_a_large_fleet_all_are_on_the_map_and_some_have_profiles() -> None:
     page = many_page(130)
     text = render_page(page)

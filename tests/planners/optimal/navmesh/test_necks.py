@@ -47,7 +47,7 @@ def passed(problem: Problem, points: Floats, z: Floats) -> bool:
 
 @pytest.mark.draws
 @pytest.mark.parametrize(
-    "limits", ["clearance", *(pytest.param(k, marks=pytest.mark.slow) for k in ("bare", "errors"))]
+    "limits", ["clearance", *(pytest.param(k, marks=pytest.mark.nightly) for k in ("bare", "errors"))]
 )
 @pytest.mark.parametrize("world", WORLDS)
 def test_lines_that_the_exact_check_passes_lead_through_necks(world: str, limits: str) -> None:

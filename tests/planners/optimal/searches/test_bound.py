@@ -69,6 +69,7 @@ def test_a_cost_that_the_climb_alone_exceeds_leaves_no_track() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.nightly_but("0 zones-0.5")
 @pytest.mark.parametrize(("zones", "gap_percent"), [("0 zones", 0.5), ("40 zones", 1.0)])
 def test_a_wall_that_only_finer_cells_close_is_closed_for_energy_too(zones: str, gap_percent: float) -> None:
     """A detour of 17 km for 7.6 km. Larger cells leave the wall open, and the bound was a third below the path; with 40

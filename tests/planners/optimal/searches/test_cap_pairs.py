@@ -255,6 +255,7 @@ def test_no_path_over_a_short_track_is_shorter_than_the_bound_of_what_it_climbs(
 
 
 @pytest.mark.slow
+@pytest.mark.nightly_but("free-90.0-length", "free-90.0-energy", "fixed-90.0-length", "none-30.0-energy")
 @pytest.mark.parametrize("objective", ["length", "energy"])
 @pytest.mark.parametrize(("kind", "climb_deg"), [("free", 90.0), ("fixed", 90.0), ("both", 90.0), ("none", 30.0)])
 def test_no_path_past_vias_costs_less_than_the_bound(objective: Objective, climb_deg: float, kind: str) -> None:

@@ -42,7 +42,7 @@ def ridge(over_m: float, askew: float, half_m: float, ends: bool) -> Problem:
 CASES = [(0.1, 0.0, 120.0), (0.05, 0.0, 60.0), (0.2, 0.5, 40.0), (0.1, 0.2, 80.0)]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(("over_m", "askew", "half_m"), CASES)
 def test_a_path_leads_through_what_is_open_by_centimetres(
     over_m: float, askew: float, half_m: float, monkeypatch: pytest.MonkeyPatch
@@ -68,7 +68,7 @@ def test_the_first_path_leads_through_it_where_there_is_no_other(over_m: float, 
     assert faults(problem, found.path) == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_no_path_leads_through_a_notch_that_is_shut() -> None:
     problem = ridge(-0.3, 0.0, 60.0, True)
     found = optimal.plan(problem)

@@ -36,7 +36,7 @@ def test_box_plots_show_costs_of_all_runs_and_lengths_of_legal_ones() -> None:
     assert spread(records, "length_m").tolist() == [1140.0, 1160.0]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_fleet_has_its_distances_drawn_and_one_vehicle_none(finished: tuple[dict[str, Any], Path]) -> None:
     assert draw_fleet(finished[0]["scenarios"][0]) is None
     for name, paths in (("msfoa-1", 3), ("ib-abc-sequence", 4)):

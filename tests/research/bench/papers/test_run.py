@@ -68,7 +68,7 @@ def test_what_is_finished_is_not_run_again(
     assert calls[4:] == ["optimal", "gwo"]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_ctrl_c_loses_nothing_that_is_finished_and_processes_give_the_same_numbers(
     finished: tuple[dict[str, Any], Path], missions: Path, tmp_path: Path
 ) -> None:
