@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from gcsplan.errors import InputError
-from gcsplan.mission_file.published.ed269 import is_ed269, read_ed269
+from gcsplan.mission_file.published.ed269 import is_ed269, is_ed269_geojson, read_ed269, read_ed269_geojson
 from gcsplan.mission_file.published.ed318 import is_ed318, read_ed318
 from gcsplan.mission_file.published.openaip import is_openaip, read_openaip
 from gcsplan.mission_file.published.openair import read_openair
 from gcsplan.mission_file.published.policy import Policy
 from gcsplan.mission_file.zones.contents import load_json, require_wgs84, sent_in_part, unpack
 from gcsplan.mission_file.zones.csv import read_csv
-from gcsplan.mission_file.zones.file import ZoneFile
+from gcsplan.mission_file.zones.file import OnBad, ZoneFile
 from gcsplan.mission_file.zones.geojson import read_geojson
 from gcsplan.mission_file.zones.kml import read_kml
 from gcsplan.world.terrain.input_files import JSON_ZONES, OPENAIR_ZONES, VECTOR_ZONES, ZONE_FILES, absent, tell_file
@@ -54,16 +54,18 @@ def read_zones(
     whole = load_json(path, data) if kind in JSON_ZONES else None
     require_wgs84(whole, path, json_format(whole)[0])
     in_part = sent_in_part(whole, path)
-    published = read_published(path, data, whole, policy)
-    if published is not None:
-        published.problems[:0] = in_part
-        return published
-    for key in policy.keys:
-        words = f"{path.name} is no file of an authority (OpenAir, ED-269, ED-318, openAIP), and has no {key}"
-        raise InputError(words, where=f"{policy.where}.{key}")
-    found = read_geojson(path, whole) if kind in JSON_ZONES else _read(path, kind, data, layer)
-    found.problems[:0] = in_part
-    found.give_sizes(radius_m, buffer_m)
+    found = read_published(path, data, whole, policy)
+    on_bad: OnBad = policy.on_bad or ("refuse" if found is None else "strict")
+    if found is None:
+        for key in policy.keys:
+            words = f"{path.name} is no file of an authority (OpenAir, ED-269, ED-318, openAIP), and has no {key}"
+            raise InputError(words, where=f"{policy.where}.{key}")
+        found = read_geojson(path, whole) if kind in JSON_ZONES else _read(path, kind, data, layer)
+        ignore_at = policy.place_of("ignore", "--ignore")
+        found.give_sizes(radius_m, buffer_m, policy.ignore, ignore_at)
+    found.refusals[:0] = in_part
+    skipped = "--on-bad skip" if policy.by_options else "on_bad: skip"
+    found.settle(on_bad, f"leave it out by name ({skipped})")
     return found
 
 
@@ -96,6 +98,7 @@ def _bytes(path: Path, where: str) -> bytes:
 
 _JSON_FORMATS = (
     ("ED-269", is_ed269, read_ed269), ("ED-318", is_ed318, read_ed318), ("openAIP's export", is_openaip, read_openaip),
+    ("GeoJSON with the properties of ED-269", is_ed269_geojson, read_ed269_geojson),
 )  # fmt: skip
 
 

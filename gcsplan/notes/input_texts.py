@@ -134,9 +134,7 @@ INPUT_TEXTS = {
         "limits without a unit or a reference are read as OpenAir's programs do, in feet above sea level"
     ),
     "zone_limits_move": ("the limits of these zones move: at that end they count from the ground up, or without end"),
-    "zone_limits_not_understood": (
-        "the limits of these zones are not understood: they count from the ground up without end"
-    ),
+    "zone_limits_not_understood": ("these zones are understood in part: they count from the ground up without end"),
     "zone_corner_altitudes_unread": "the altitudes of corners are not read as limits",
     "zone_drawn_altitudes_unread": "the drawn altitudes are not read as limits",
     "zone_ceiling_as_drawn": (
@@ -184,6 +182,10 @@ INPUT_TEXTS = {
     "zones_unused_far_away": "not used: {count} further {count:zone|zones} far from the mission",
     "zones_left_out": "left out: {count} {count:zone|zones} of files, too far away to matter",
     "zone_not_understood": "{where}: {why}",
+    "zones_not_understood_far": "not understood, and too far from the mission to matter",
+    "zone_skipped": "left out, because it is not understood: {where}: {why}",
+    "zones_skipped": "left out, because their outlines are not understood",
+    "shapes_ignored": "left out, because the mission ignores {kind}",
     # -- how a file was read --
     "holes_are_no_fly": "{count} {count:hole|holes} in polygons counted as no-fly",
     "terrain_records_unused": "not used, because they draw terrain: {records}",

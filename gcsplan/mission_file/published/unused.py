@@ -28,6 +28,21 @@ def faults_near(placed: Sequence[tuple[ZoneDraft, Zone]], box: Box) -> list[Mist
     return list(found)
 
 
+def not_understood_far(placed: Sequence[tuple[ZoneDraft, Zone]], far: Sequence[ZoneDraft], box: Box) -> list[Note]:
+    """A note with the name of every zone that is not understood and lies too far from the mission to matter.
+
+    ``far`` lies beyond the plane; of the others not even the surroundings reach into the mission's ``box``, beyond
+    which no ground is known, so that no flight is judged safe there.
+    """
+    near = {id(draft) for draft, zone in placed if _meets(zone, box)}
+    away = [*far, *(draft for draft, _ in placed if draft.faults and id(draft) not in near)]
+    found: dict[str, dict[str, None]] = {}
+    for draft in away:
+        if draft.faults or draft.unread:
+            found.setdefault(_file_of(draft), {})[one_line(draft.name)] = None
+    return [Note("zones_not_understood_far", file=file, zones=tuple(names)) for file, names in found.items()]
+
+
 def used(drafts: Sequence[ZoneDraft]) -> list[ZoneDraft]:
     """The zones that are no-fly."""
     return [d for d in drafts if not d.unused]
@@ -70,9 +85,13 @@ def _reasons(unused: Sequence[ZoneDraft]) -> list[Note]:
     about: dict[Note, list[str]] = {}
     for draft in unused:
         if draft.unused is not None:
-            why = draft.unused.of(file=PurePath(draft.where.split(": ", 1)[0]).name)
+            why = draft.unused.of(file=_file_of(draft))
             about.setdefault(why, []).append(one_line(draft.name))
     return [why.of(zones=tuple(names)) for why, names in about.items()]
+
+
+def _file_of(draft: ZoneDraft) -> str:
+    return PurePath(draft.where.split(": ", 1)[0]).name
 
 
 def _border(box: Box) -> list[tuple[float, float]]:

@@ -165,6 +165,10 @@ class ZoneKeys(Keys):
     """A file of zones: .geojson, .kml, .kmz, .gpkg, .shp, .fgb, .zip, .csv, OpenAir, ED-269, ED-318 or openAIP."""
     layer: Text | None = None
     """With `file`: the only layer of a .gpkg to be read; if absent, every one."""
+    on_bad: Literal["refuse", "strict", "skip"] | None = None
+    """With `file`: what zones do that are not understood; if absent, own files refuse, authorities' are strict."""
+    ignore: Annotated[list[Literal["points", "lines", "empty"]], Field(max_length=10)] = []
+    """With a file of your own: shapes beside zones that are left out by name, those without a size of their own."""
     kinds: Annotated[list[Text], Field(min_length=1, max_length=100)] | None = None
     """With an authority's file: the kinds of zones that are no-fly; if absent, all that restrict."""
     authorised: Annotated[list[Text], Field(max_length=1000)] = []
