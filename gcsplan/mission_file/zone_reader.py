@@ -17,10 +17,19 @@ from gcsplan.mission_file.published.openair import read_openair
 from gcsplan.mission_file.published.policy import Policy
 from gcsplan.mission_file.zones.contents import load_json, require_wgs84, sent_in_part, unpack
 from gcsplan.mission_file.zones.csv import read_csv
+from gcsplan.mission_file.zones.fence import is_fence, read_fence
 from gcsplan.mission_file.zones.file import OnBad, ZoneFile
 from gcsplan.mission_file.zones.geojson import read_geojson
 from gcsplan.mission_file.zones.kml import read_kml
-from gcsplan.world.terrain.input_files import JSON_ZONES, OPENAIR_ZONES, VECTOR_ZONES, ZONE_FILES, absent, tell_file
+from gcsplan.world.terrain.input_files import (
+    FENCE_ZONES,
+    JSON_ZONES,
+    OPENAIR_ZONES,
+    VECTOR_ZONES,
+    ZONE_FILES,
+    absent,
+    tell_file,
+)
 
 MAX_ZONE_BYTES = 20_000_000
 """Most bytes of a file, and of what is unpacked from one."""
@@ -44,8 +53,8 @@ def read_zones(
     Mistakes in single features are collected in ``problems``; a file that cannot be read at all raises InputError.
     """
     kind = path.suffix.lower()
-    if kind not in (*ZONE_FILES, *OPENAIR_ZONES):
-        known = f"{', '.join(ZONE_FILES)} and OpenAir ({', '.join(OPENAIR_ZONES)}) files"
+    if kind not in (*ZONE_FILES, *FENCE_ZONES, *OPENAIR_ZONES):
+        known = f"{', '.join((*ZONE_FILES, *FENCE_ZONES))} and OpenAir ({', '.join(OPENAIR_ZONES)}) files"
         raise InputError(f"zones are read from {known}, given {path.name}", where=where)
     if layer is not None and kind not in VECTOR_ZONES:
         raise InputError(f"a {kind} file has no layers; leave `layer` out", where=where)
@@ -72,6 +81,8 @@ def read_zones(
 def _read(path: Path, kind: str, data: bytes, layer: str | None) -> ZoneFile:
     if kind == ".kmz":
         return read_kml(path, unpack(path, data, [".kml"], MAX_ZONE_BYTES)[".kml"])
+    if kind in (*FENCE_ZONES, *OPENAIR_ZONES):
+        return read_fence(path, data)
     if kind == ".csv":
         return read_csv(path, data)
     if kind in VECTOR_ZONES:
@@ -109,7 +120,7 @@ def json_format(whole: Any) -> tuple[str, Callable[[Path, Any, Policy], ZoneFile
 
 def read_published(path: Path, data: bytes, whole: Any, policy: Policy) -> ZoneFile | None:
     """The zones of a published file; None if it has none of these formats. ``whole`` is what its JSON holds."""
-    if path.suffix.lower() in OPENAIR_ZONES:
+    if path.suffix.lower() in OPENAIR_ZONES and not is_fence(data):
         return read_openair(path, data, policy)
     read = json_format(whole)[1]
     return None if read is None else read(path, whole, policy)

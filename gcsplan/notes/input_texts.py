@@ -189,6 +189,7 @@ INPUT_TEXTS = {
     # -- how a file was read --
     "holes_are_no_fly": "{count} {count:hole|holes} in polygons counted as no-fly",
     "terrain_records_unused": "not used, because they draw terrain: {records}",
+    "fence_return_points_unused": "not used: {count} {count:point|points} to which a fence sends the aircraft",
     "tracks_unused": "not used: {count} {count:track or way point|tracks and way points} of a mission",
     "pictures_unused": "not used: {kinds}",
     "gdal_warns": "GDAL warns: {warning}",

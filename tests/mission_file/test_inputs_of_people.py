@@ -11,7 +11,10 @@ import pytest
 from gcsplan.errors import InputError
 from gcsplan.mavlink.files.plan_file import parse_plan
 from gcsplan.mavlink.files.waypoints_file import parse_waypoints
+from gcsplan.mission_file.published.policy import Policy
+from gcsplan.mission_file.published.unused import used
 from gcsplan.mission_file.zone_reader import read_zones
+from gcsplan.notes.note import Note
 from gcsplan.vehicle import Autopilot
 
 OPENAIR = "* Großer Platz\r\nAC R\r\nAN Ödland\r\nAL GND\r\nAH 3500FT AMSL\r\n{}\r\n{}\r\n{}\r\n"
@@ -116,3 +119,193 @@ def test_an_altitude_that_contradicts_what_is_sent_is_told(item: dict[str, Any],
     notes = "\n".join(map(str, parse_plan(plan(**item), autopilot=None, where="a").notes))
     assert told in notes
     assert bool(told) == ("Altitude" in notes)
+
+
+# -- fences of Mission Planner and MAVProxy
+
+
+def fence_rows(*items: tuple[int, float, float, float]) -> str:
+    """A fence as Mission Planner saves it: (command, first parameter, latitude, longitude)."""
+    rows = [
+        f"{k}\t0\t3\t{command}\t{p1}\t0\t0\t0\t{lat}\t{lon}\t0\t1" for k, (command, p1, lat, lon) in enumerate(items, 1)
+    ]
+    return "\n".join(["QGC WPL 110", ROWS.splitlines()[0], *rows]) + "\n"
+
+
+TRIANGLE = [(46.02, 14.47), (46.06, 14.47), (46.06, 14.52)]
+OUT = [(5002, 3, *corner) for corner in TRIANGLE]
+
+
+def test_a_fence_saved_as_way_points_is_read_as_zones(tmp_path: Path) -> None:
+    path = tmp_path / "a.waypoints"
+    path.write_text(fence_rows(*OUT, (5004, 100, 46.1, 14.6), (5000, 0, 46.1, 14.6)))
+    found = read_zones(path, where="zones")
+    assert [(z.points, z.radius_m) for z in found.zones] == [(tuple(TRIANGLE), None), (((46.1, 14.6),), 100.0)]
+    assert "a.waypoints: not used: 1 point to which a fence sends the aircraft" in map(str, found.notes)
+    path.write_text(
+        "\n".join(line for line in fence_rows(*OUT).splitlines() if "\t330\t" not in line).replace("\n1\t", "\n1\t")
+    )
+    assert zones(path) == [tuple(TRIANGLE)]  # MAVProxy writes no home
+
+
+@pytest.mark.parametrize(
+    ("items", "words"),
+    [
+        (OUT[:2], "a polygon of 3 corners needs as many rows of command 5002 that say so; 2 follow each other"),
+        ([*OUT, (16, 0, 46.0, 14.0)], "command 16 is none of a fence"),
+        ([(5004, 0, 46.0, 14.0)], "must be above 0"),
+        ([(5001, 3, *corner) for corner in TRIANGLE], "keeps the aircraft in"),
+        ([(16, 0, 46.0, 14.0)], "the file holds a mission, and no fence"),
+        ([(5100, 0, 46.0, 14.0)], "the file holds rally points, and no fence"),
+        ([], "the file holds nothing, and no fence"),
+    ],
+)
+def test_a_fence_that_is_not_whole_or_no_zone_says_so(tmp_path: Path, items: Any, words: str) -> None:
+    path = tmp_path / "a.waypoints"
+    path.write_text(fence_rows(*items))
+    try:
+        said = "\n".join(map(str, read_zones(path, where="zones").problems))
+    except InputError as why:
+        said = str(why)
+    assert words in said
+
+
+HEAD = "#saved by Mission Planner 1.3.80\n"
+RETURN = "46.03 14.48\n"
+CORNERS = "46.02 14.47\n46.06 14.47\n46.06 14.52\n"
+FIRST = "46.02 14.47\n"
+
+
+@pytest.mark.parametrize(
+    "written", [CORNERS, CORNERS + FIRST, (CORNERS + FIRST).replace(".", ","), CORNERS.replace(" ", ", ")]
+)
+def test_a_drawn_polygon_of_mission_planner_is_a_zone(tmp_path: Path, written: str) -> None:
+    path = tmp_path / "a.poly"
+    path.write_text(HEAD + written)
+    assert zones(path) == [tuple(TRIANGLE)]
+
+
+@pytest.mark.parametrize("name", ["a.fen", "a.txt"])
+@pytest.mark.parametrize(
+    ("written", "words"),
+    [
+        (RETURN + CORNERS + FIRST, "keeps the aircraft in"),
+        (RETURN + CORNERS, "is the file whole?"),
+        (RETURN + "46.02 14.47 3\n", "line 3: a line holds latitude and longitude, as `46.02 14.47`, given"),
+        ("14.47 46.02\nEND\n", "this is OpenStreetMap's .poly"),
+    ],
+)
+def test_a_fence_of_places_is_known_and_named(tmp_path: Path, name: str, written: str, words: str) -> None:
+    path = tmp_path / name
+    path.write_text(HEAD + written)
+    try:
+        said = "\n".join(map(str, read_zones(path, where="zones").problems))
+    except InputError as why:
+        said = str(why)
+    assert words in said
+
+
+# -- shapes beside zones, and ED-269 in GeoJSON
+
+SQUARE = {"type": "Polygon", "coordinates": [[[14.5, 46.0], [14.51, 46.0], [14.51, 46.01], [14.5, 46.0]]]}
+BESIDE = {
+    "pin": {"type": "Point", "coordinates": [14.5, 46.0]},
+    "way": {"type": "LineString", "coordinates": [[14.5, 46.0], [14.6, 46.0]]},
+    "none": None,
+    "bare": {"type": "GeometryCollection", "geometries": []},
+}
+
+
+def geojson(**shapes: Any) -> str:
+    made = [{"type": "Feature", "properties": {"name": name}, "geometry": one} for name, one in shapes.items()]
+    return json.dumps({"type": "FeatureCollection", "features": made})
+
+
+def test_shapes_beside_polygons_are_ignored_by_name_or_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.geojson"
+    both = {"type": "GeometryCollection", "geometries": [SQUARE, SQUARE, BESIDE["pin"]]}
+    path.write_text(geojson(zone=SQUARE, both=both, **BESIDE))
+    refused = read_zones(path, where="zones", policy=Policy(where="--zones"))
+    assert [p.message.split(":")[0] for p in refused.problems] == [
+        "a point needs a radius to be a zone, and so do 1 more", "a line needs a corridor's half-width to be a zone",
+        "the feature has no geometry; remove it, draw it, or leave it out by name (ignore",
+        "the feature has no geometry; remove it, draw it, or leave it out by name (ignore",
+    ]  # fmt: skip
+    found = read_zones(path, where="zones", policy=Policy(where="--zones", ignore=("points", "lines", "empty")))
+    assert not found.problems
+    assert [z.name for z in found.zones] == ["zone", "both/1", "both/2"]
+    told = {note.data["kind"]: note.data["zones"] for note in found.notes if note.code == "shapes_ignored"}
+    assert told == {
+        "points without a radius": ("both/3", "pin"),
+        "lines without a width": ("way",),
+        "empty geometries": ("none", "bare"),
+    }
+
+
+def test_what_has_a_size_is_no_shape_to_ignore(tmp_path: Path) -> None:
+    path = tmp_path / "a.geojson"
+    path.write_text(geojson(zone=SQUARE, **BESIDE).replace('{"name": "pin"}', '{"name": "pin", "radius_m": 50}'))
+    every = Policy(where="--zones", ignore=("points", "lines", "empty"))
+    assert [z.name for z in read_zones(path, where="zones", policy=every).zones] == ["zone", "pin"]
+    said = read_zones(path, where="zones", policy=every, radius_m=30.0).problems
+    assert [str(problem) for problem in said] == ["--ignore: points have a size in the mission, too: leave one out"]
+
+
+@pytest.mark.parametrize("inner", ["", "<Point><coordinates>14,46</coordinates></Point>", "<LinearRing/>", "<Model/>"])
+def test_pins_and_paths_in_kml_are_ignored_by_name(tmp_path: Path, inner: str) -> None:
+    ring = "<coordinates>14.5,46 14.51,46 14.51,46.01</coordinates>"
+    zone = (
+        f"<Placemark><Polygon><outerBoundaryIs><LinearRing>{ring}</LinearRing></outerBoundaryIs></Polygon></Placemark>"
+    )
+    path = tmp_path / "a.kml"
+    path.write_text(f"<kml><Placemark><name>beside</name>{inner}</Placemark>{zone}</kml>")
+    (problem,) = read_zones(path, where="zones").problems
+    assert "leave" in problem.message
+    assert "--ignore" in problem.message
+    found = read_zones(path, where="zones", policy=Policy(ignore=("points", "lines", "empty")))
+    assert not found.problems
+    assert len(found.zones) == 1
+    assert "beside" in "".join(map(str, found.notes))
+
+
+def test_geojson_with_the_properties_of_ed269_is_an_authority_s(tmp_path: Path) -> None:
+    def zone(restriction: Any, **more: Any) -> dict[str, Any]:
+        given = {"identifier": "A", "name": str(restriction), "restriction": restriction, "uomDimensions": "M",
+                 "lowerLimit": 0, "lowerVerticalReference": "AGL", "upperLimit": 120, "upperVerticalReference": "AGL",
+                 "applicability": [{"permanent": "YES"}]} | more  # fmt: skip
+        return {"type": "Feature", "properties": given, "geometry": SQUARE}
+
+    week = {"permanent": "NO", "startDateTime": "2026-01-05T00:00:00Z", "endDateTime": "2026-01-06T00:00:00Z"}
+    features = [zone("PROHIBITED"), zone("NO_RESTRICTION"), zone(None), zone("CONDITIONAL", applicability=[week])]
+    path = tmp_path / "a.geojson"
+    path.write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    drafts = read_zones(path, where="zones").zones
+    free = Note("zones_restrict_nothing")
+    assert [(z.name, str(z.ceiling), z.unused) for z in drafts] == [
+        ("PROHIBITED", "120 m AGL", None), ("NO_RESTRICTION", "120 m AGL", free), ("None", "None", None),
+        ("CONDITIONAL", "120 m AGL", None),
+    ]  # fmt: skip
+    only = Policy(kinds=("PROHIBITED",))
+    assert [z.name for z in used(read_zones(path, where="zones", policy=only).zones)] == ["PROHIBITED", "None"]
+
+
+def test_a_network_link_is_named_with_its_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.kml"
+    path.write_text(
+        "<kml><NetworkLink><name>all</name><Link><href>https://x.test/z.kml</href></Link></NetworkLink></kml>"
+    )
+    (problem,) = read_zones(path, where="zones").problems
+    assert "NetworkLink (all): the zones of the link to https://x.test/z.kml are not in this file" in str(problem)
+
+
+@pytest.mark.parametrize("limit", ["Ask on 122.8", "1500"])
+def test_own_zones_whose_limits_are_not_understood_refuse_or_count_whole(tmp_path: Path, limit: str) -> None:
+    path = tmp_path / "a.geojson"
+    path.write_text(geojson(zone=SQUARE).replace('{"name": "zone"}', json.dumps({"name": "zone", "UPPER": limit})))
+    assert "cannot be read as a level" in str(read_zones(path, where="zones").problems)
+    for on_bad in ("strict", "skip"):
+        found = read_zones(path, where="zones", policy=Policy(on_bad=on_bad))
+        assert not found.problems
+        (draft,) = found.zones
+        assert (draft.floor, draft.ceiling) == (None, None)
+        assert draft.remarks[-1][0] == Note("zone_limits_not_understood", file="a.geojson")
