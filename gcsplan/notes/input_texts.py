@@ -255,6 +255,7 @@ INPUT_TEXTS = {
     ),
     # -- flight logs and on the energy model that is fitted to them --
     "log_damaged": "{log} is damaged in places, which were passed over",
+    "places_of_receiver": "no vehicle_global_position, so the receiver's own places were taken, {topic}",
     "places_of_gps": "no POS messages, so the GPS's own places were taken",
     "power_of_system_status": "no BATTERY_STATUS, so SYS_STATUS was taken",
     "lines_passed_over": "passed over {count} {count:line|lines} without numbers",
