@@ -71,7 +71,7 @@ def read_zones(
             raise InputError(words, where=f"{policy.where}.{key}")
         found = read_geojson(path, whole) if kind in JSON_ZONES else _read(path, kind, data, layer)
         ignore_at = policy.place_of("ignore", "--ignore")
-        found.give_sizes(radius_m, buffer_m, policy.ignore, ignore_at)
+        found.give_sizes(radius_m, buffer_m, policy.ignore, ignore_at, skip=on_bad == "skip")
     found.refusals[:0] = in_part
     skipped = "--on-bad skip" if policy.by_options else "on_bad: skip"
     found.settle(on_bad, f"leave it out by name ({skipped})")

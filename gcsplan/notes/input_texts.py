@@ -185,7 +185,7 @@ INPUT_TEXTS = {
     "zones_not_understood_far": "not understood, and too far from the mission to matter",
     "zone_skipped": "left out, because it is not understood: {where}: {why}",
     "zones_skipped": "left out, because their outlines are not understood",
-    "shapes_ignored": "left out, because the mission ignores {kind}",
+    "shapes_ignored": "left out, because these are {kind}",
     # -- how a file was read --
     "holes_are_no_fly": "{count} {count:hole|holes} in polygons counted as no-fly",
     "terrain_records_unused": "not used, because they draw terrain: {records}",

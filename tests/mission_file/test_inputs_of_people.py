@@ -55,7 +55,7 @@ def test_places_that_are_none_stay_refused(tmp_path: Path, place: str) -> None:
     assert [place in str(problem) for problem in found.problems] == [True]
 
 
-@pytest.mark.parametrize("head", ["sep=;\n", '"sep=;"\n', "SEP=;;;;\n\n"])
+@pytest.mark.parametrize("head", ["sep=\t\n", "sep=;\n", '"sep=;"\n', "SEP=;;;;\n\n"])
 def test_a_table_whose_first_line_says_what_parts_the_columns(tmp_path: Path, head: str) -> None:
     path = tmp_path / "a.csv"
     path.write_text(head + "name;lat;lon;radius_m\nX;46.0405;14,495;50\n", encoding="utf-16")

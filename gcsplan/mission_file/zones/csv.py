@@ -53,7 +53,7 @@ def read_csv(path: Path, data: bytes) -> ZoneFile:
         words = f"the file must be UTF-8 text, byte {why.start} is not; save it as `CSV UTF-8`"
         raise InputError(words, where=str(path)) from None
     lines = text.splitlines()
-    filled = [line.strip() for line in lines[:20] if line.strip()]
+    filled = [line.strip(" ") for line in lines[:20] if line.strip()]  # a tab may be what sep= says
     separator = _SEPARATOR.fullmatch(filled[0]) if filled else None
     header = filled[0] if filled else ""
     delimiter = separator[1] if separator is not None else max(DELIMITERS, key=header.count)

@@ -140,11 +140,13 @@ class ZoneFile:
         return draft
 
     def give_sizes(
-        self, radius_m: float | None, buffer_m: float | None, ignore: Collection[Ignorable] = (), where: str = ""
-    ) -> None:
+        self, radius_m: float | None, buffer_m: float | None, ignore: Collection[Ignorable] = (), where: str = "",
+        *, skip: bool = False,
+    ) -> None:  # fmt: skip
         """Give the points and lines without a size of their own that of the mission, which has ``ignore`` at ``where``.
 
-        Those without one, and what is no shape of a zone, are ignored by name, or are problems.
+        Those without one, and what is no shape of a zone, are ignored by name, or are problems. With ``skip`` all of
+        them are ignored beside zones.
         """
         given: dict[Ignorable, float | None] = {"points": radius_m, "lines": buffer_m}
         for kind, size_m in given.items():
@@ -154,6 +156,7 @@ class ZoneFile:
             size_m = given[some.kind]
             if size_m is not None and (draft := some.make(size_m)) is not None:
                 self.zones.insert(some.at, self._remarked(draft, some.remarks))
+        ignore = IGNORED if skip and self.zones else ignore
         self._without_size("points", "a point needs a radius", "radius_m", radius_m, ignore)
         self._without_size("lines", "a line needs a corridor's half-width", "buffer_m", buffer_m, ignore)
         self.problems += [problem for kind, _, problem in self.unshaped if kind not in ignore]
