@@ -1,6 +1,6 @@
 """Spoilt files of zones, as they are published or drawn, in every format: read, or refused in words; nothing vanishes.
 
-    python -m tests.campaigns.published --each 2000 [--seed 1] [--formats openair,kml]
+    python -m tests.campaigns.published --seconds 600 [--seed 1] [--inputs 2000] [--formats openair,kml]
 
 An input is a file of some zones of one format, spoilt as transfers, editors and exports do: lines that lack, stand
 twice, are cut or have other letters; members of JSON that lack or are something else; another encoding; the end cut
@@ -9,7 +9,7 @@ under test its elements are counted here, and those that nothing was done to.
 
 A fault is an error that is no InputError, a refusal without a place or words, an element of a file that was read which
 is neither a zone nor named, or one that was left alone and is another zone than in the whole file. Exits with 1 and
-prints the seed if there is one; ``--seed S --each 1 --formats F`` repeats it.
+prints the seed if there is one; ``--seed S --inputs 1 --formats F`` repeats it.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import random
 import re
 import sys
 import tempfile
+import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -46,7 +47,7 @@ ENCODINGS = ("utf-8", "utf-8", "utf-8", "utf-8-sig", "utf-16")
 
 @dataclass(frozen=True)
 class Element:
-    """One element of a file: what it holds, and words of which one must be said of it if it is no zone."""
+    """One element of a file: what it holds, and words of which the notes must have one if it is no zone."""
 
     content: str
     words: tuple[str, ...]
@@ -234,8 +235,8 @@ def elements(form: str, content: Any) -> dict[str, Element]:
         for i, one in enumerate(found if isinstance(found, list) else []):
             named = one.get("properties", one) if isinstance(one, dict) else {}
             name = named.get("name") if isinstance(named, dict) else None
-            said = (f"{key}[{i}]", *([name.strip()] if isinstance(name, str) and name.strip() else [f"[{i}]"]))
-            made[f"{key}[{i}]"] = Element(json.dumps(one), said)
+            words = (f"{key}[{i}]", *([name.strip()] if isinstance(name, str) and name.strip() else [f"[{i}]"]))
+            made[f"{key}[{i}]"] = Element(json.dumps(one), words)
         return made
     lines = content.splitlines()
     if form == "openair":
@@ -305,14 +306,14 @@ def _bytes(content: Any, encoding: str) -> bytes:
     return text.encode(encoding, "replace")
 
 
-def vanished(found: ZoneFile, wanted: dict[str, Element]) -> list[str]:
+def vanished(found: ZoneFile, present: dict[str, Element]) -> list[str]:
     """The elements that are neither a zone nor named."""
     drafts, notes = listed(found.zones)
-    said = "\n".join(str(note) for note in [*found.notes, *notes, *zone_notes([(draft, None) for draft in drafts])])
+    named = "\n".join(str(note) for note in [*found.notes, *notes, *zone_notes([(draft, None) for draft in drafts])])
     return [
         f"{place} ({element.content[:60]!r}) is no zone and not named"
-        for place, element in wanted.items()
-        if not _of(found.zones, place) and not any(re.search(rf"{re.escape(w)}(?!\d)", said) for w in element.words)
+        for place, element in present.items()
+        if not _of(found.zones, place) and not any(re.search(rf"{re.escape(w)}(?!\d)", named) for w in element.words)
     ]
 
 
@@ -344,20 +345,21 @@ def _shapes(drafts: list[ZoneDraft]) -> list[Any]:
 def main() -> int:
     """Run the campaign; the exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--each", type=int, default=2000, help="inputs of each format")
+    parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--inputs", type=int, default=10**9, help="inputs of each format")
     parser.add_argument("--formats", default=",".join(FORMATS))
     args = parser.parse_args()
+    until, seed = time.monotonic() + args.seconds, args.seed
     found: list[str] = []
     ended: Counter[tuple[str, str]] = Counter()
     with tempfile.TemporaryDirectory() as folder:
-        for form in args.formats.split(","):
-            for seed in range(args.seed, args.seed + args.each):
+        while seed - args.seed < args.inputs and time.monotonic() < until and len(found) < MAX_FOUND:
+            for form in args.formats.split(","):
                 how, faults = attack(form, seed, Path(folder))
                 ended[form, how] += 1
                 found += faults
-                if len(found) >= MAX_FOUND:
-                    break
+            seed += 1
     print(f"{sum(ended.values())} inputs, {len(found)} faults")
     for (form, how), count in sorted(ended.items()):
         print(f"  {form}: {how}: {count}")

@@ -100,7 +100,7 @@ def number_or_none(given: Any, name: str) -> float | int | None:
 
 
 def limit_of(given: Any, words: tuple[str, ...], key: str) -> Given | None:
-    """A limit by its number; None without one. What is no number stays as it is written, and is no level then."""
+    """A limit by its number; None without one. Another value stays as it is written, and mostly is no level then."""
     try:
         value = number_or_none(given, key)
     except MemberError:
@@ -125,7 +125,7 @@ def read_features(
 
 
 def parts_of(geometry: Any, name: str) -> list[tuple[str, dict[str, Any]]]:
-    """The polygons of a GeoJSON geometry, those of a collection numbered behind the name. Raises MemberError."""
+    """The polygons of a GeoJSON geometry, each with its name; a collection's are numbered. Raises MemberError."""
     whole: Any = [geometry]
     if isinstance(geometry, dict) and geometry.get("type") == "GeometryCollection":
         whole = geometry.get("geometries")

@@ -25,7 +25,7 @@ class Policy:
     """A mission's rules for one file: ``kinds`` that are no-fly, zones that it is ``authorised`` to enter, its hours.
 
     ``flight_level_error_m`` is how far flight levels may lie from their heights above sea level; None: they limit
-    nothing. ``on_bad`` is the rule for elements that are not understood (None: that of the file's format), ``ignore``
+    nothing. ``on_bad`` is the rule for elements that are not understood (None: by the file's format), ``ignore``
     has the shapes beside zones that are left out. ``where`` is the place of the entry in the mission file, or the
     option ``--zones``.
     """

@@ -1,7 +1,7 @@
 """One volume of a published zone, from what its format says to the drafts that all zone files share.
 
 What is not understood never makes a zone smaller. Limits, or a kind, are kept as ``unread`` of the draft, which then
-counts from the ground up without end; what is not understood of its outline is a fault, which refuses a mission in its
+counts from the ground up without end; an outline that is not understood is a fault, which refuses a mission in its
 surroundings (`unused.faults_near`).
 """
 

@@ -168,7 +168,7 @@ class ZoneKeys(Keys):
     on_bad: Literal["refuse", "strict", "skip"] | None = None
     """With `file`: what zones do that are not understood; if absent, own files refuse, authorities' are strict."""
     ignore: Annotated[list[Literal["points", "lines", "empty"]], Field(max_length=10)] = []
-    """With a file of your own: shapes beside zones that are left out by name, those without a size of their own."""
+    """With a file of your own: shapes beside zones, without a size of their own, that are left out by name."""
     kinds: Annotated[list[Text], Field(min_length=1, max_length=100)] | None = None
     """With an authority's file: the kinds of zones that are no-fly; if absent, all that restrict."""
     authorised: Annotated[list[Text], Field(max_length=1000)] = []
