@@ -25,7 +25,7 @@ from gcsplan.notes.note import Note
 
 ULOG_HEAD = b"ULog\x01\x12\x35"
 BATTERY, PLACE = "battery_status", "vehicle_global_position"
-PLACES: Mapping[str, tuple[tuple[tuple[str, float], ...], ...]] = {
+ULOG_PLACES: Mapping[str, tuple[tuple[tuple[str, float], ...], ...]] = {
     PLACE: ((("lat", 1.0), ("lon", 1.0), ("alt", 1.0)),),
     "sensor_gps": ((("latitude_deg", 1.0), ("longitude_deg", 1.0), ("altitude_msl_m", 1.0)),
                    (("lat", 1e-7), ("lon", 1e-7), ("alt", 1e-3))),
@@ -50,7 +50,7 @@ def read_ulog(file: Path) -> FlightLog:
         words = ".ulg files are read by pyulog, which is not there: pip install 'gcsplan[logs]'"
         raise InputError(words, where=str(file)) from None
     _require_small(file)
-    topics = [BATTERY, *PLACES, *WINDS]
+    topics = [BATTERY, *ULOG_PLACES, *WINDS]
     try:
         with contextlib.redirect_stdout(io.StringIO()):
             log = ULog(str(file), topics)
@@ -78,7 +78,7 @@ def read_ulog(file: Path) -> FlightLog:
 
 def _places(data: Mapping[str, list[Mapping[str, Any]]], lacking: list[str]) -> tuple[str, Floats]:
     """The topic of the places, and (N, 4) seconds, latitude, longitude, AMSL; empty if none has a fix."""
-    for name, layouts in PLACES.items():
+    for name, layouts in ULOG_PLACES.items():
         for given in data[name]:
             layout = next((one for one in layouts if all(key in given for key, _ in one)), None)
             if layout is None:
@@ -127,7 +127,7 @@ def _require(
 ) -> None:
     lacks = f"; {'; '.join(dict.fromkeys(lacking))}" if lacking else ""
     if not len(places):
-        topics = " or ".join(PLACES)
+        topics = " or ".join(ULOG_PLACES)
         raise InputError(f"holds no places ({topics} with a fix){lacks}", where=str(file))
     if not power:
         why = "its current_a is never above 0" if data[BATTERY] and not lacking else f"it needs {BATTERY}"
@@ -165,6 +165,6 @@ def _require_small(file: Path) -> None:
             sizes[name] = min(inner, MOST_FIELDS + 1)
         return sizes[name]
 
-    for name in (BATTERY, *PLACES, *WINDS):
+    for name in (BATTERY, *ULOG_PLACES, *WINDS):
         if fields_of(name, 0) > MOST_FIELDS:
             raise InputError(f"its {name} has more than {MOST_FIELDS} numbers: it is damaged", where=str(file))

@@ -217,13 +217,13 @@ def _rule(word: object) -> OnBad | None:
 
 def _ignored(words: object) -> tuple[Ignorable, ...]:
     """The shapes that `--ignore` names, each word or several with commas."""
-    from gcsplan.mission_file.zones.file import IGNORED
+    from gcsplan.mission_file.zones.file import IGNORABLE
 
     given = [word.strip() for text in (words if isinstance(words, list) else ()) for word in str(text).split(",")]
     for word in given:
-        if word not in IGNORED:
-            raise UsageError(f"--ignore {word}: give one of {', '.join(IGNORED)}")
-    return tuple(kind for kind in IGNORED if kind in given)
+        if word not in IGNORABLE:
+            raise UsageError(f"--ignore {word}: give one of {', '.join(IGNORABLE)}")
+    return tuple(kind for kind in IGNORABLE if kind in given)
 
 
 def _named(argument: str) -> list[str]:

@@ -88,11 +88,17 @@ class Arc:
         step = min(WIDEST_STEP, 2.0 * math.acos(1.0 - min(ARC_SAGITTA_M / max(self.radii_m), 0.5)))
         return max(1, math.ceil(abs(self.sweep) / step))
 
+    def _bow_m(self, part: float) -> float:
+        """How far a piece of ``part`` radians, straight in degrees, may lie from the line straight in the plane, m."""
+        highest = min(abs(self.centre[0]) + math.degrees(max(self.radii_m) / EARTH_RADIUS_M), 89.0)
+        return 1.1 * (max(self.radii_m) * part) ** 2 * math.tan(math.radians(highest)) / (8.0 * EARTH_RADIUS_M)
+
     def corners(self, outward: bool | None) -> list[Corner]:
         """The arc's corners: around the circle if it bulges ``outward``, inside it if not, on it if that is unknown."""
-        least, most = min(self.radii_m), max(self.radii_m)
         count = self.pieces
         part = self.sweep / count
+        bow_m = self._bow_m(part)
+        least, most = min(self.radii_m) - bow_m, max(self.radii_m) + bow_m
         if outward:  # tangents: their corners lie over the middle of each piece
             radius = most / math.cos(0.5 * part)
             places = [(self.start, most), *((self.start + (i + 0.5) * part, radius) for i in range(count))]
@@ -101,7 +107,7 @@ class Arc:
             stretch = [(1.0 + STRETCHED + 0.2 * (r * math.sin(b) / EARTH_RADIUS_M) ** 2) for b, r in places]
             places = [(b, r * more) for (b, r), more in zip(places, stretch, strict=True)]
         else:
-            radius = least if outward is not None else most
+            radius = least if outward is not None else max(self.radii_m)
             places = [(self.start + i * part, radius) for i in range(count + 1)]
         frame = _frame(self.centre)
         at = frame.to_degrees([r * math.sin(b) for b, r in places], [r * math.cos(b) for b, r in places])

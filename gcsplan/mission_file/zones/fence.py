@@ -32,7 +32,7 @@ from gcsplan.notes.note import Note
 from gcsplan.world.geodesy.degree_shapes import Corner
 
 _PAIR_PART = re.compile(r"[-+]?\d{1,3}(?:[.,]\d{1,20})?", re.ASCII)
-_LONGEST_LINE = 1000
+_LONGEST_PAIR = 1000
 _HOME = (0, WAYPOINT)
 """Commands of the row with home: Mission Planner writes 0 if it is unknown."""
 
@@ -93,7 +93,7 @@ def _corners(found: ZoneFile, text: str) -> Iterator[Corner | None]:
 
 def _pair(line: str) -> Corner | None:
     """Latitude and longitude, also with the decimal commas that Mission Planner writes in some countries."""
-    if len(line) > _LONGEST_LINE:
+    if len(line) > _LONGEST_PAIR:
         return None
     parts = [part for part in re.split(r"[\s;]+", line.strip()) if part]
     if len(parts) == 1 and line.count(",") == 1:

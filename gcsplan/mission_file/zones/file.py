@@ -32,7 +32,7 @@ OnBad = Literal["refuse", "strict", "skip"]
 """The rule for elements that are not understood; see `ZoneFile.settle`."""
 
 Ignorable = Literal["points", "lines", "empty"]
-IGNORED: dict[Ignorable, str] = {
+IGNORABLE: dict[Ignorable, str] = {
     "points": "points without a radius", "lines": "lines without a width", "empty": "empty geometries",
 }  # fmt: skip
 """The shapes beside zones that a mission may ignore, in words."""
@@ -156,11 +156,11 @@ class ZoneFile:
             size_m = given[some.kind]
             if size_m is not None and (draft := some.make(size_m)) is not None:
                 self.zones.insert(some.at, self._remarked(draft, some.remarks))
-        ignore = IGNORED if skip and self.zones else ignore
+        ignore = IGNORABLE if skip and self.zones else ignore
         self._without_size("points", "a point needs a radius", "radius_m", radius_m, ignore)
         self._without_size("lines", "a line needs a corridor's half-width", "buffer_m", buffer_m, ignore)
         self.problems += [problem for kind, _, problem in self.unshaped if kind not in ignore]
-        for kind, words in IGNORED.items():
+        for kind, words in IGNORABLE.items():
             names = [some.name for some in self.unsized if some.kind == kind and given.get(kind) is None]
             names += [name for one, name, _ in self.unshaped if one == kind]
             if kind in ignore and names:
